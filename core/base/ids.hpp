@@ -1,0 +1,32 @@
+/// Strong ids: an index of one thing cannot be used for another.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+
+namespace kilotwin {
+
+template <class Tag>
+class Id {
+ public:
+  constexpr Id() = default;
+  constexpr explicit Id(std::uint32_t value) : value_(value) {}
+  [[nodiscard]] constexpr std::uint32_t value() const { return value_; }
+  constexpr auto operator<=>(const Id&) const = default;
+
+ private:
+  std::uint32_t value_ = 0;
+};
+
+using RobotId = Id<struct RobotTag>;          ///< 0..N-1 over all groups; also the robot's kilo_uid
+using PartitionId = Id<struct PartitionTag>;  ///< row * columns + column
+using HostId = Id<struct HostTag>;            ///< 0..hosts-1
+using FederateId = Id<struct FederateTag>;    ///< index in the plan: partitions, radio, station, hosts
+
+/// What a robot is doing, as kilolib numbers it (facts of the firmware), and FAILED, which no firmware knows: its program
+/// faulted in simulation.
+enum class LifeCycle : std::uint8_t {
+  kSleeping = 0, kIdle = 1, kBattery = 2, kSetup = 3, kRunning = 4, kCharging = 5, kMoving = 6, kFailed = 255
+};
+
+}  // namespace kilotwin

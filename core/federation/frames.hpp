@@ -1,0 +1,72 @@
+/// What the engines exchange once per tick. The plain form of idl/frames.idl, which describes every field; the headers
+/// that only the wire needs (publisher, run, directives) are added by core/federation/wire.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/time.hpp"
+
+namespace kilotwin {
+
+/// An infrared message without its CRC: data[9], type.
+using IrMessage = std::array<std::uint8_t, 10>;
+
+/// Poses of the robots that a partition owns, or of those that a neighbour must see. Ascending ids.
+struct BodyFrame {
+  Tick tick;
+  std::vector<std::uint32_t> robot;
+  std::vector<double> x_mm, y_mm, heading_rad;
+
+  void clear() { robot.clear(); x_mm.clear(); y_mm.clear(); heading_rad.clear(); }
+  void add(std::uint32_t id, double x, double y, double heading) {
+    robot.push_back(id); x_mm.push_back(x); y_mm.push_back(y); heading_rad.push_back(heading);
+  }
+};
+
+/// What the programs of one host set; entry i belongs to robot first_robot + i.
+struct ActuationFrame {
+  Tick tick;
+  std::uint32_t first_robot = 0;
+  std::vector<std::uint8_t> motor_left, motor_right;  ///< duty 0..255; the left motor drives the right-hand leg
+  std::vector<std::uint8_t> led;                      ///< r | g << 2 | b << 4
+  std::vector<std::uint8_t> life_cycle;               ///< LifeCycle
+  std::vector<std::uint16_t> tx_period;               ///< kilo_tx_period, counts of 128 us
+  std::vector<std::uint32_t> offer_robot;             ///< ascending
+  std::vector<IrMessage> offer_message;
+};
+
+/// What the radio tells one host.
+struct RadioFrame {
+  Tick tick;
+  std::uint32_t first_robot = 0;
+  std::vector<std::uint8_t> kilo_ticks;          ///< per robot
+  std::vector<std::uint32_t> ask;                ///< ascending
+  std::vector<std::uint32_t> sent;               ///< ascending
+  std::vector<std::uint32_t> reception_robot;    ///< ordered by robot, then by time of arrival
+  std::vector<std::uint16_t> reception_message;  ///< index into messages
+  std::vector<std::int16_t> reception_high_gain, reception_low_gain;
+  std::vector<IrMessage> messages;
+};
+
+enum class OverheadCommand : std::uint8_t { kStop = 0, kRepeat = 2, kOnce = 6 };
+
+struct OverheadPacket {
+  OverheadCommand command = OverheadCommand::kStop;
+  IrMessage message{};
+};
+
+/// What the station sends down to the overhead controller within one tick, in order.
+struct OverheadFrame {
+  Tick tick;
+  std::vector<OverheadPacket> packets;
+};
+
+/// The pose of a real robot, stamped by the ingress; applied before the step from the tick at hand.
+struct TrackedPoseInput {
+  std::uint32_t robot = 0;
+  double x_mm = 0, y_mm = 0, heading_rad = 0;
+};
+
+}  // namespace kilotwin
