@@ -2,37 +2,73 @@
 ///   h(t) = sum mod 2^64 over entities and domains of H(domain, id, fields)
 ///   H(t) = chain(H(t-1), h(t)), H at the first tick 0
 /// Fields are 64-bit words in a fixed order; doubles enter by their bits, -0 as 0. A sum, so that federates add up parts.
+/// Made to tell two runs apart, not to withstand somebody who seeks a collision.
 #pragma once
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <string_view>
 
 namespace kilotwin {
 
 /// Whose fields: each federate hashes what it owns.
 enum class HashDomain : std::uint64_t { kBody = 1, kProgram = 2, kRadio = 3, kStation = 4 };
 
+/// A double as a word. The state never holds a NaN, whose bits would differ between CPUs.
 [[nodiscard]] inline std::uint64_t hash_bits(double value) { return std::bit_cast<std::uint64_t>(value + 0.0); }
 
-/// 64 x 64 -> 128 bit multiply, halves xored: the mixing step.
-[[nodiscard]] inline std::uint64_t hash_mix(std::uint64_t a, std::uint64_t b) {
-  __extension__ using Wide = unsigned __int128;
-  const Wide product = static_cast<Wide>(a) * b;
-  return static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64);
+/// Two words into one. For either argument fixed it is a bijection of the other, so that a difference in one is never
+/// lost; each bit of either flips each bit of the result with probability 1/2. The multipliers are odd words without
+/// structure (fractional parts of the square roots of 2, 3 and 5).
+[[nodiscard]] constexpr std::uint64_t hash_mix(std::uint64_t a, std::uint64_t b) {
+  a = (a ^ a >> 32) * 0x6a09e667f3bcc909u + b;
+  a = (a ^ a >> 32) * 0xbb67ae8584caa73bu;
+  a = (a ^ a >> 29) * 0x3c6ef372fe94f82bu;
+  return a ^ a >> 32;
 }
+
+/// Takes words one by one. The state is 128 bits wide, and every step is a bijection of it and injective in the word: no
+/// operand can be zero at the expense of what came before, and only finish() folds.
+class HashState {
+ public:
+  constexpr HashState(std::uint64_t a, std::uint64_t b) : a_(a), b_(b) {}
+
+  constexpr void add(std::uint64_t word) {
+    __extension__ using Wide = unsigned __int128;
+    const Wide product = static_cast<Wide>(a_ ^ word) * 0xa54ff53a5f1d36f1u;  // as above, of 7
+    a_ = b_ + static_cast<std::uint64_t>(product >> 64);
+    b_ = static_cast<std::uint64_t>(product);
+  }
+  [[nodiscard]] constexpr std::uint64_t finish() const { return hash_mix(a_, b_); }
+
+ private:
+  std::uint64_t a_, b_;
+};
 
 /// H(domain, id, words).
 [[nodiscard]] inline std::uint64_t entity_hash(HashDomain domain, std::uint32_t id,
                                                std::initializer_list<std::uint64_t> words) {
-  std::uint64_t h = hash_mix(static_cast<std::uint64_t>(domain) * 0x9e3779b97f4a7c15u ^ id, 0xd6e8feb86659fd93u);
-  for (const std::uint64_t word : words) h = hash_mix(h ^ word ^ 0xa0761d6478bd642fu, (h << 23 | h >> 41) ^ 0xe7037ed1a0b428dbu);
-  return h ^ h >> 32;
+  HashState state(id, static_cast<std::uint64_t>(domain));
+  for (const std::uint64_t word : words) state.add(word);
+  return state.finish();
+}
+
+/// Of a string of bytes; the same on machines of either byte order.
+[[nodiscard]] constexpr std::uint64_t hash_bytes(std::string_view bytes) {
+  HashState state(bytes.size(), 0);
+  for (std::size_t at = 0; at < bytes.size(); at += 8) {
+    std::uint64_t word = 0;
+    for (std::size_t i = at; i < at + 8 && i < bytes.size(); ++i) {
+      word |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << 8 * (i - at);
+    }
+    state.add(word);
+  }
+  return state.finish();
 }
 
 /// H(t) from H(t-1) and h(t).
-[[nodiscard]] inline std::uint64_t hash_chain(std::uint64_t previous, std::uint64_t sum) {
-  return hash_mix(previous ^ 0x8ebc6af09c88c6e3u, sum ^ 0x589965cc75374cc3u) + sum;
-}
+[[nodiscard]] inline std::uint64_t hash_chain(std::uint64_t previous, std::uint64_t sum) { return hash_mix(previous, sum); }
 
 }  // namespace kilotwin

@@ -70,6 +70,10 @@ class RunPlan {
   [[nodiscard]] const proto::Experiment& experiment() const { return manifest.experiment(); }
   [[nodiscard]] std::uint64_t run() const { return manifest.run(); }
   [[nodiscard]] std::uint64_t seed() const { return experiment().seed(); }
+  /// Ticks between checkpoints; 0: none.
+  [[nodiscard]] std::int64_t checkpoint_every() const {
+    return tick_length.at_or_after(experiment().deployment().checkpoint_every_s()).count();
+  }
   [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(manifest.x_mm_size()); }
   [[nodiscard]] Pose initial_pose(std::uint32_t robot) const;
   /// Index of the robot's program in manifest.program, or kNoProgram where its group is tracked.
@@ -85,10 +89,18 @@ class RunPlan {
   [[nodiscard]] FederateId comm() const { return FederateId{grid.size()}; }
   [[nodiscard]] FederateId station() const { return FederateId{grid.size() + 1}; }
   [[nodiscard]] FederateId behaviours(HostId h) const { return FederateId{grid.size() + 2 + h.value()}; }
+  [[nodiscard]] std::vector<FederateId> all_physics() const { return ids(0, grid.size()); }
+  [[nodiscard]] std::vector<FederateId> all_behaviours() const { return ids(grid.size() + 2, federates()); }
   /// "physics 0,1" (column, row), "comm", "station", "behaviours 1/3" (counted from 1).
   [[nodiscard]] std::string name(FederateId id) const;
 
  private:
+  static std::vector<FederateId> ids(std::uint32_t from, std::uint32_t to) {
+    std::vector<FederateId> result;
+    for (std::uint32_t i = from; i < to; ++i) result.push_back(FederateId{i});
+    return result;
+  }
+
   std::vector<std::uint32_t> program_of_;
 };
 

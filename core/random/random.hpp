@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "core/base/error.hpp"
 #include "core/base/time.hpp"
 
 namespace kilotwin {
@@ -20,22 +21,68 @@ enum class Stream : std::uint16_t {
   kProgram = 7,          ///< what a robot's program calls hardware noise (rand_hard, readings)
 };
 
-/// Philox4x32 with 10 rounds.
-[[nodiscard]] std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter, std::array<std::uint32_t, 2> key);
+/// Philox4x32 with 10 rounds. Multipliers and key increments are those of the paper (the increments: the golden ratio and
+/// the square root of 3, less 1, times 2^32).
+[[nodiscard]] constexpr std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
+                                                                std::array<std::uint32_t, 2> key) {
+  auto [c0, c1, c2, c3] = counter;
+  auto [k0, k1] = key;
+  for (int round = 0; round < 10; ++round) {
+    const std::uint64_t product0 = std::uint64_t{0xd2511f53u} * c0;
+    const std::uint64_t product1 = std::uint64_t{0xcd9e8d57u} * c2;
+    c0 = static_cast<std::uint32_t>(product1 >> 32) ^ c1 ^ k0;
+    c1 = static_cast<std::uint32_t>(product1);
+    c2 = static_cast<std::uint32_t>(product0 >> 32) ^ c3 ^ k1;
+    c3 = static_cast<std::uint32_t>(product0);
+    k0 += 0x9e3779b9u;
+    k1 += 0xbb67ae85u;
+  }
+  return {c0, c1, c2, c3};
+}
 
+/// Numbers of one seed. The seed is the key; (stream, entity, tick, block) fill the 128 bits of the counter and no two of
+/// them share one. A block holds two draws: draws 2b and 2b+1 are the halves of block b. `pair` calls yield both of them
+/// for the price of one.
 class Random {
  public:
-  explicit Random(std::uint64_t seed) : seed_(seed) {}
-  /// 128 random bits. draw < 2^16, tick < 2^32.
-  [[nodiscard]] std::array<std::uint32_t, 4> block(Stream, std::uint32_t entity, Tick, std::uint32_t draw) const;
-  [[nodiscard]] std::uint64_t bits(Stream, std::uint32_t entity, Tick, std::uint32_t draw) const;
+  explicit Random(std::uint64_t seed) : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)} {}
+
+  /// 128 random bits: those of draws 2b and 2b+1. b < 2^16.
+  [[nodiscard]] std::array<std::uint32_t, 4> block(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t b) const {
+    KILOTWIN_DEMAND(b < 0x10000u);
+    const auto count = static_cast<std::uint64_t>(tick.count());
+    return philox4x32({static_cast<std::uint32_t>(count), entity, static_cast<std::uint32_t>(stream) << 16 | b,
+                       static_cast<std::uint32_t>(count >> 32)}, key_);
+  }
+  /// 64 random bits. draw < 2^17.
+  [[nodiscard]] std::uint64_t bits(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t draw) const {
+    return bits_pair(stream, entity, tick, draw / 2)[draw % 2];
+  }
   /// Uniform in the open interval (0, 1): never 0, never 1; 52 bits.
-  [[nodiscard]] double uniform(Stream, std::uint32_t entity, Tick, std::uint32_t draw) const;
-  /// Standard normal, by the inverse of its distribution function.
+  [[nodiscard]] double uniform(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t draw) const {
+    return uniform_of(bits(stream, entity, tick, draw));
+  }
+  /// Standard normal, by the inverse of its distribution function: |value| < 8.3.
   [[nodiscard]] double normal(Stream, std::uint32_t entity, Tick, std::uint32_t draw) const;
 
+  // Draws 2b and 2b+1.
+  [[nodiscard]] std::array<std::uint64_t, 2> bits_pair(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t b) const {
+    const auto word = block(stream, entity, tick, b);
+    return {std::uint64_t{word[1]} << 32 | word[0], std::uint64_t{word[3]} << 32 | word[2]};
+  }
+  [[nodiscard]] std::array<double, 2> uniform_pair(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t b) const {
+    const auto pair = bits_pair(stream, entity, tick, b);
+    return {uniform_of(pair[0]), uniform_of(pair[1])};
+  }
+  [[nodiscard]] std::array<double, 2> normal_pair(Stream, std::uint32_t entity, Tick, std::uint32_t b) const;
+
  private:
-  std::uint64_t seed_;
+  /// The middle of one of 2^52 equal cells of (0, 1); exact.
+  [[nodiscard]] static double uniform_of(std::uint64_t bits) {
+    return (static_cast<double>(static_cast<std::int64_t>(bits >> 12)) + 0.5) * 0x1p-52;
+  }
+
+  std::array<std::uint32_t, 2> key_;
 };
 
 }  // namespace kilotwin

@@ -1,0 +1,72 @@
+#include <cstdlib>
+#include <sstream>
+#include <system_error>
+
+#include "clients/behaviours/compiler.hpp"
+#include "clients/behaviours/compiler_common.hpp"
+#include "clients/behaviours/files.hpp"
+#include "clients/behaviours/process.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace fs = std::filesystem;
+namespace {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() : path_((fs::temp_directory_path() / "kilotwin-avr-XXXXXX").string()) {
+    if (mkdtemp(path_.data()) == nullptr) throw RunError(path_ + ": cannot be made; is the disk full?");
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  [[nodiscard]] fs::path path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+std::string required_tool(const char* name, const char* package) {
+  const fs::path path = find_executable(name);
+  if (path.empty()) throw UserError(std::string("no ") + name + " on this machine; apt-get install " + package);
+  return path.string();
+}
+
+/// Adds what avr-size says of one object: text, data and bss in the second line.
+void add_size(AvrSize& sum, const std::string& table) {
+  std::istringstream stream(table);
+  std::string header;
+  std::getline(stream, header);
+  std::uint32_t text = 0, data = 0, bss = 0;
+  if (!(stream >> text >> data >> bss)) throw RunError("avr-size said something unexpected: " + table);
+  sum.flash_octets += text + data;
+  sum.ram_octets += data + bss;
+}
+
+}  // namespace
+
+AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptions& options) {
+  check_sources(sources);
+  const std::string gcc = required_tool("avr-gcc", "gcc-avr avr-libc");
+  const std::string size = required_tool("avr-size", "binutils-avr");
+  const fs::path runtime = unpacked_runtime(cache_directory(options.cache_directory));
+  const TemporaryFolder folder;
+  const std::string object = (folder.path() / "program.o").string();
+  AvrSize sum;
+  for (const fs::path& source : sources) {
+    std::vector<std::string> arguments{gcc, "-mmcu=atmega328p", "-Os", "-std=gnu11", "-DF_CPU=8000000", "-funsigned-char",
+                                       "-funsigned-bitfields", "-fpack-struct", "-fshort-enums",
+                                       "-fdiagnostics-color=never", "-isystem", (runtime / "kilolib").string()};
+    for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
+    arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
+    const ProcessResult result = run_process(arguments);
+    if (result.status != 0) throw UserError(first_error_first(result.errors, source));
+    add_size(sum, run_process({size, object}).output);
+  }
+  return sum;
+}
+
+}  // namespace kilotwin::behaviours

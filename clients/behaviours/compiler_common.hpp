@@ -1,0 +1,24 @@
+/// What compiling for the simulation and for the real robot share.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "clients/behaviours/compiler.hpp"
+
+namespace kilotwin::behaviours {
+
+/// Writes the embedded runtime below the cache, once per content, and returns its folder.
+[[nodiscard]] std::filesystem::path unpacked_runtime(const std::filesystem::path& cache);
+
+/// -D options; throws UserError where a macro's name is none.
+[[nodiscard]] std::vector<std::string> define_flags(const std::vector<std::string>& defines);
+
+/// Throws UserError where there is no source, or one that is not a readable file named *.c.
+void check_sources(const std::vector<std::filesystem::path>& sources);
+
+/// The first error of a compiler's or linker's output as "FILE:LINE:COLUMN: error: ...", then all other lines.
+[[nodiscard]] std::string first_error_first(const std::string& output, const std::filesystem::path& source);
+
+}  // namespace kilotwin::behaviours

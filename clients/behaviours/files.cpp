@@ -1,0 +1,74 @@
+#include "clients/behaviours/files.hpp"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace fs = std::filesystem;
+namespace {
+
+bool usable(const fs::path& directory) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  return fs::is_directory(directory, error) && access(directory.c_str(), W_OK | X_OK) == 0;
+}
+
+fs::path from_environment(const char* name) {
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing here changes the environment
+  return value != nullptr && value[0] == '/' ? fs::path(value) : fs::path();
+}
+
+}  // namespace
+
+std::optional<std::string> read_file(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return std::nullopt;
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream octets;
+  octets << file.rdbuf();
+  if (!file || !octets) return std::nullopt;
+  return std::move(octets).str();
+}
+
+bool write_file(const fs::path& path, std::string_view octets) {
+  std::string temporary = path.string() + ".XXXXXX";
+  const int descriptor = mkstemp(temporary.data());
+  if (descriptor < 0) return false;
+  while (!octets.empty()) {
+    const ssize_t written = write(descriptor, octets.data(), octets.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) break;
+    octets.remove_prefix(static_cast<std::size_t>(written));
+  }
+  const bool whole = octets.empty();
+  if (close(descriptor) == 0 && whole && std::rename(temporary.c_str(), path.c_str()) == 0) return true;
+  unlink(temporary.c_str());
+  return false;
+}
+
+fs::path cache_directory(const fs::path& wanted) {
+  if (!wanted.empty() && usable(wanted)) return wanted;
+  if (const fs::path base = from_environment("XDG_CACHE_HOME"); !base.empty() && usable(base / "kilotwin")) {
+    return base / "kilotwin";
+  }
+  if (const fs::path home = from_environment("HOME"); !home.empty() && usable(home / ".cache/kilotwin")) {
+    return home / ".cache/kilotwin";
+  }
+  std::error_code error;
+  std::string temporary = (fs::temp_directory_path(error) / "kilotwin-XXXXXX").string();
+  if (mkdtemp(temporary.data()) == nullptr) {
+    throw RunError("no directory for compiled programs: " + temporary + ": " + std::strerror(errno) +
+                   "; make ~/.cache or /tmp writable, or set XDG_CACHE_HOME");
+  }
+  return temporary;
+}
+
+}  // namespace kilotwin::behaviours

@@ -1,0 +1,87 @@
+/* What a robot's image and its host agree on: C and C++, natural alignment without padding in both. */
+#ifndef KILOTWIN_BEHAVIOURS_IMAGE_ABI_H
+#define KILOTWIN_BEHAVIOURS_IMAGE_ABI_H
+
+#include <stdint.h>
+
+#define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
+#define KT_IMAGE_VERSION 1u
+
+/* The host's page in a slot: not part of any robot's memory. */
+struct KtControl {
+  uint64_t host_stack;      /* the host's stack pointer while robot code runs */
+  uint64_t robot_stack;     /* the main program's stack pointer while it waits */
+  uint64_t interrupt_stack; /* where callbacks start */
+};
+
+/* Simulated hardware of one robot and the state of its firmware; part of the robot's memory. */
+struct KtRobot {
+  uint64_t noise;        /* host: state of the generator behind rand_hard */
+  uint64_t debt_cycles;  /* time that the program spent in delays and has still to wait for */
+  uint32_t tick_cycles;  /* host: length of a tick */
+  uint32_t clock_reads;  /* in the present tick */
+  uint16_t uid;          /* host */
+  uint8_t straight_duty; /* host: calibrated duties */
+  uint8_t turn_duty;     /* host */
+  uint8_t state;         /* kilotwin::LifeCycle */
+  uint8_t motors_on;
+  uint8_t duty_left;
+  uint8_t duty_right;
+  uint8_t led;
+  uint8_t in_interrupt;
+  uint8_t parked;        /* the main program does nothing until a message of the overhead controller arrives */
+  uint8_t deaf;          /* interrupts are off: asleep, or the program has ended */
+  uint8_t bootloader;
+  uint8_t reset;         /* the memory is to be made anew */
+  uint8_t motion;        /* what calibration messages asked for */
+  uint8_t motion_done;
+  uint64_t waits;        /* how often the program has waited for a tick */
+};
+
+struct KtMessage {
+  uint8_t data[9];
+  uint8_t type;
+  uint16_t crc;
+};
+
+struct KtReception {
+  struct KtMessage message;
+  int16_t low_gain;
+  int16_t high_gain;
+};
+
+/* What happened to a robot in a tick. */
+struct KtEvents {
+  const struct KtReception* reception;
+  uint32_t receptions;
+  uint32_t sent; /* 1: the robot's own message has left */
+};
+
+/* The entry point of the ELF file points to this table. Addresses are those of the slot. */
+struct KtImage {
+  uint64_t magic;
+  uint64_t version;
+  uint64_t control;     /* of the KtControl*; the loader writes it */
+  uint64_t robot;       /* of the KtRobot */
+  uint64_t ticks;       /* of kilo_ticks, uint32_t */
+  uint64_t tx_period;   /* of kilo_tx_period, uint16_t */
+  uint64_t boot;        /* void(void): where a robot starts */
+  uint64_t enter;       /* void(KtControl*): continues the main program until it waits */
+  uint64_t call;        /* uint64_t(KtControl*, function, argument): runs a function on the interrupt stack */
+  uint64_t leave;       /* the way back to the host out of both, from anywhere */
+  uint64_t interrupts;  /* uint64_t(const KtEvents*) */
+  uint64_t transmit;    /* uint64_t(KtMessage*): 1 if the robot sends, else 0 */
+};
+
+#ifdef __cplusplus
+#define KT_ASSERT static_assert
+#else
+#define KT_ASSERT _Static_assert
+#endif
+KT_ASSERT(sizeof(struct KtRobot) == 56, "no padding");
+KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
+KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
+KT_ASSERT(sizeof(struct KtEvents) == 16, "no padding");
+KT_ASSERT(sizeof(struct KtImage) == 96, "no padding");
+
+#endif

@@ -1,0 +1,71 @@
+/* The programming interface of a Kilobot, as robots' programs know it from kilolib: the same names, types and meaning. */
+#ifndef KILOTWIN_KILOLIB_H
+#define KILOTWIN_KILOLIB_H
+
+#include <stdint.h>
+
+#include "message.h"
+#include "message_crc.h"
+
+/* Two bits per colour, 0..3 each. Unparenthesised outside, as programs have always known it. */
+#define RGB(r, g, b) (r & 3) | (((g & 3) << 2)) | ((b & 3) << 4)
+/* Ticks of the robot's clock per second, about. */
+#define TICKS_PER_SEC 31
+
+/* Strength of a received message, 10-bit ADC counts. */
+typedef struct {
+  int16_t low_gain;
+  int16_t high_gain;
+} distance_measurement_t;
+
+typedef void (*message_rx_t)(message_t*, distance_measurement_t* d);
+typedef message_t* (*message_tx_t)(void);
+typedef void (*message_tx_success_t)(void);
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+extern volatile uint32_t kilo_ticks;
+/* Timer counts of 128 us between messages; 3906 = 0.5 s. */
+extern volatile uint16_t kilo_tx_period;
+extern uint16_t kilo_uid;
+/* Calibrated duties. */
+extern uint8_t kilo_turn_left;
+extern uint8_t kilo_turn_right;
+extern uint8_t kilo_straight_left;
+extern uint8_t kilo_straight_right;
+
+/* Called like interrupts: on reception, when a message may be sent (NULL: none), and when it has left. */
+extern message_rx_t kilo_message_rx;
+extern message_tx_t kilo_message_tx;
+extern message_tx_success_t kilo_message_tx_success;
+
+/* Distance of the sender, centre to centre, mm. */
+uint8_t estimate_distance(const distance_measurement_t* d);
+void delay(uint16_t ms);
+uint8_t rand_hard(void);
+uint8_t rand_soft(void);
+void rand_seed(uint8_t seed);
+int16_t get_ambientlight(void);
+int16_t get_voltage(void);
+int16_t get_temperature(void);
+void set_motors(uint8_t left, uint8_t right);
+/* Both motors at full duty for 15 ms, to overcome static friction. */
+void spinup_motors(void);
+void set_color(uint8_t color);
+void kilo_init(void);
+/* Runs setup() once and loop() for ever when the overhead controller says RUN. Does not return. */
+void kilo_start(void (*setup)(void), void (*loop)(void));
+
+#if defined(__x86_64__) && !defined(KILOTWIN_RUNTIME)
+/* A program that waits in `while (kilo_ticks < later);` must let time pass; so reading the clock goes through a function
+ * that ends the tick for the robot after very many readings within one tick. */
+volatile uint32_t* kilotwin_clock(void);
+#define kilo_ticks (*kilotwin_clock())
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,168 @@
+/* Strings, numbers, sorting, random numbers: what robots' programs use of the C library. */
+#include <ctype.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#undef memcpy
+#undef memset
+
+_Noreturn void kilotwin_end(void);
+
+_Noreturn void exit(int status) {
+  (void)status;
+  kilotwin_end();
+}
+
+_Noreturn void abort(void) { __builtin_trap(); }
+
+void* memcpy(void* to, const void* from, size_t size) {
+  void* start = to;
+  __asm__ volatile("rep movsb" : "+D"(to), "+S"(from), "+c"(size) : : "memory");
+  return start;
+}
+
+void* memmove(void* to, const void* from, size_t size) {
+  if ((uintptr_t)to - (uintptr_t)from >= size) return memcpy(to, from, size);
+  volatile unsigned char* t = to;
+  const unsigned char* f = from;
+  while (size-- > 0) t[size] = f[size];
+  return to;
+}
+
+void* memset(void* to, int value, size_t size) {
+  void* start = to;
+  __asm__ volatile("rep stosb" : "+D"(to), "+c"(size) : "a"(value) : "memory");
+  return start;
+}
+
+int memcmp(const void* a, const void* b, size_t size) {
+  const unsigned char *x = a, *y = b;
+  for (; size > 0; --size, ++x, ++y) {
+    if (*x != *y) return *x - *y;
+  }
+  return 0;
+}
+
+void* memchr(const void* in, int value, size_t size) {
+  for (const unsigned char* x = in; size > 0; --size, ++x) {
+    if (*x == (unsigned char)value) return (void*)x;
+  }
+  return NULL;
+}
+
+size_t strnlen(const char* text, size_t most) {
+  const volatile char* at = text;
+  size_t length = 0;
+  while (length < most && at[length] != 0) ++length;
+  return length;
+}
+
+size_t strlen(const char* text) { return strnlen(text, SIZE_MAX); }
+
+int strncmp(const char* a, const char* b, size_t most) {
+  for (; most > 0; --most, ++a, ++b) {
+    if (*a != *b || *a == 0) return (unsigned char)*a - (unsigned char)*b;
+  }
+  return 0;
+}
+
+int strcmp(const char* a, const char* b) { return strncmp(a, b, SIZE_MAX); }
+
+char* strcpy(char* to, const char* from) { return memcpy(to, from, strlen(from) + 1); }
+
+char* strncpy(char* to, const char* from, size_t size) {
+  const size_t length = strnlen(from, size);
+  memcpy(to, from, length);
+  memset(to + length, 0, size - length);
+  return to;
+}
+
+char* strcat(char* to, const char* from) {
+  strcpy(to + strlen(to), from);
+  return to;
+}
+
+char* strchr(const char* text, int c) { return memchr(text, c, strlen(text) + 1); }
+
+char* strrchr(const char* text, int c) {
+  for (size_t i = strlen(text) + 1; i-- > 0;) {
+    if (text[i] == (char)c) return (char*)text + i;
+  }
+  return NULL;
+}
+
+char* strstr(const char* text, const char* part) {
+  const size_t length = strlen(part);
+  for (;; ++text) {
+    if (strncmp(text, part, length) == 0) return (char*)text;
+    if (*text == 0) return NULL;
+  }
+}
+
+int abs(int value) { return value < 0 ? -value : value; }
+long labs(long value) { return value < 0 ? -value : value; }
+long long llabs(long long value) { return value < 0 ? -value : value; }
+
+long atol(const char* text) {
+  while (isspace(*text)) ++text;
+  const int negative = *text == '-';
+  if (*text == '-' || *text == '+') ++text;
+  unsigned long value = 0;
+  for (; isdigit(*text); ++text) value = value * 10 + (unsigned long)(*text - '0');
+  return (long)(negative ? 0 - value : value);
+}
+
+int atoi(const char* text) { return (int)atol(text); }
+
+/* Park and Miller's generator in Schrage's form, as avr-libc has it: state 0 stands for 123459876. */
+static int32_t next_random(int32_t* state) {
+  int32_t x = *state == 0 ? 123459876 : *state;
+  x = 16807 * (x % 127773) - 2836 * (x / 127773);
+  if (x < 0) x += 0x7fffffff;
+  return *state = x;
+}
+
+static int32_t rand_state = 1, random_state = 1;
+
+int rand(void) { return (int)((uint32_t)next_random(&rand_state) % ((uint32_t)RAND_MAX + 1)); }
+void srand(unsigned seed) { rand_state = (int32_t)(uint16_t)seed; }
+
+int rand_r(unsigned long* state) {
+  int32_t x = (int32_t)*state;
+  next_random(&x);
+  *state = (unsigned long)x;
+  return (int)((uint32_t)x % ((uint32_t)RAND_MAX + 1));
+}
+
+long random(void) { return (long)((uint32_t)next_random(&random_state) % ((uint32_t)RANDOM_MAX + 1)); }
+void srandom(unsigned long seed) { random_state = (int32_t)seed; }
+
+/* Insertion sort: stable, small, and fast for the few elements that a robot has. */
+void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*)) {
+  unsigned char* first = base;
+  for (size_t i = 1; i < count; ++i) {
+    for (unsigned char* at = first + i * size; at > first && compare(at - size, at) > 0; at -= size) {
+      for (size_t k = 0; k < size; ++k) {
+        const unsigned char swapped = at[k];
+        at[k] = at[k - size];
+        at[k - size] = swapped;
+      }
+    }
+  }
+}
+
+void* bsearch(const void* key, const void* base, size_t count, size_t size, int (*compare)(const void*, const void*)) {
+  const unsigned char* first = base;
+  while (count > 0) {
+    const unsigned char* middle = first + count / 2 * size;
+    const int order = compare(key, middle);
+    if (order == 0) return (void*)middle;
+    if (order > 0) {
+      first = middle + size;
+      count -= count / 2 + 1;
+    } else {
+      count /= 2;
+    }
+  }
+  return NULL;
+}

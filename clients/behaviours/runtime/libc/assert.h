@@ -1,0 +1,8 @@
+/* A failed assertion stops the robot as any fault does. */
+#undef assert
+#ifdef NDEBUG
+#define assert(condition) ((void)0)
+#else
+_Noreturn void abort(void);
+#define assert(condition) ((condition) ? (void)0 : abort())
+#endif

@@ -1,0 +1,290 @@
+#include "clients/local/local_run.hpp"
+
+#include <sys/resource.h>
+
+#include <atomic>
+#include <barrier>
+#include <chrono>
+#include <thread>
+
+#include "clients/behaviours/engine.hpp"
+#include "core/base/state_hash.hpp"
+#include "core/federation/hash_book.hpp"
+#include "core/federation/interrupt.hpp"
+#include "core/federation/pace.hpp"
+#include "services/ark/station_engine.hpp"
+#include "services/comm/radio_engine.hpp"
+#include "services/physics/engine.hpp"
+
+namespace kilotwin::local {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How often the observer's idle() is called.
+constexpr auto kIdlePeriod = std::chrono::milliseconds(100);
+
+/// All frames of one tick.
+struct Frames {
+  std::vector<BodyFrame> bodies;               // per partition
+  std::vector<std::vector<BodyFrame>> ghosts;  // per sending partition and its neighbours
+  std::vector<RadioFrame> radio;               // per host
+  std::vector<ActuationFrame> actuation;       // per host
+  OverheadFrame overhead;
+  // The same as engines take them.
+  std::vector<const BodyFrame*> all_bodies;
+  std::vector<const ActuationFrame*> all_actuation;
+  std::vector<std::vector<const BodyFrame*>> ghosts_for;  // per receiving partition, by ascending sender
+};
+
+class LocalRun {
+ public:
+  LocalRun(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs, const LocalOptions& options,
+           RunObserver& observer)
+      : plan_(plan), options_(options), observer_(observer), radio_(plan), station_(plan),
+        first_(options.resumed ? options.resumed->tick : Tick{0}),
+        schedule_(first_, plan.last_tick, plan.checkpoint_every()) {
+    for (std::uint32_t p = 0; p < plan.grid.size(); ++p) physics_.push_back(physics::make_engine(plan, PartitionId{p}));
+    for (std::uint32_t h = 0; h < plan.hosts; ++h) {
+      hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
+    }
+    if (options.resumed) load(*options.resumed);
+    for (const Directive& directive : options.inputs) schedule_.add(directive);
+    for (Frames& frames : frames_) lay_out(frames);
+    task_ns_.resize(plan.federates());
+    hash_parts_.resize(plan.federates());
+  }
+
+  RunTotals run() {
+    std::uint64_t chain = options_.resumed ? options_.resumed->hash_chain() : 0;
+    for (std::uint32_t task = 0; task < plan_.federates(); ++task) emit(task, frames_of(first_));
+    if (first_hashed(first_) == first_) chain = close_tick(first_, chain);
+
+    Workers workers(*this, options_.threads);
+    const auto begun = Clock::now();
+    auto next_idle = begun;
+    Tick now = first_;
+    RunTotals totals;
+    Pace pace(plan_);
+    for (;; ++now) {
+      pace.hold(now - first_);
+      if (interrupted() != 0) totals.failure = "interrupted";
+      const bool last = schedule_.verdict(now) == RunSchedule::Verdict::kFinished || !totals.failure.empty();
+      if (schedule_.checkpoint_at(now)) save(now, chain);
+      const auto recorded_from = Clock::now();
+      observer_.state(now, frames_of(now).all_bodies, frames_of(now).all_actuation, last);
+      const auto recorded_to = Clock::now();
+      recording_ns_ += ns(recorded_from, recorded_to);
+      if (recorded_to >= next_idle) {
+        next_idle = recorded_to + kIdlePeriod;
+        observer_.idle(progress(now, static_cast<double>(ns(begun, recorded_to)) * 1e-9));
+      }
+      if (last) break;
+      workers.step(now);
+      chain = close_tick(now + 1, chain);
+    }
+    totals.wall_s = static_cast<double>(ns(begun, Clock::now())) * 1e-9;
+    totals.first = first_;
+    totals.last = now;
+    totals.state_hash = chain;
+    totals.stopped_early = schedule_.stopped_early();
+    fill(totals);
+    return totals;
+  }
+
+ private:
+  /// Threads that share the tasks of a tick; a task is the step of one engine.
+  class Workers {
+   public:
+    Workers(LocalRun& run, std::uint32_t threads) : run_(run), barrier_(static_cast<std::ptrdiff_t>(threads)) {
+      for (std::uint32_t i = 1; i < threads; ++i) {
+        threads_.emplace_back([this] {
+          for (;;) {
+            barrier_.arrive_and_wait();
+            if (done_) return;
+            work();
+            barrier_.arrive_and_wait();
+          }
+        });
+      }
+    }
+    ~Workers() {
+      if (threads_.empty()) return;
+      done_ = true;
+      barrier_.arrive_and_wait();
+      for (std::thread& thread : threads_) thread.join();
+    }
+    void step(Tick from) {
+      from_ = from;
+      next_task_ = 0;
+      if (threads_.empty()) return work();
+      barrier_.arrive_and_wait();
+      work();
+      barrier_.arrive_and_wait();
+    }
+
+   private:
+    void work() {
+      auto begun = Clock::now();
+      // Hosts first: they take longest.
+      const std::uint32_t tasks = run_.plan_.federates();
+      for (std::uint32_t i = next_task_++; i < tasks; i = next_task_++) {
+        const std::uint32_t task = tasks - 1 - i;
+        run_.step(task, from_);
+        run_.emit(task, run_.frames_of(from_ + 1));
+        const auto ended = Clock::now();
+        run_.task_ns_[task] += ns(begun, ended);
+        begun = ended;
+      }
+    }
+    LocalRun& run_;
+    std::barrier<> barrier_;
+    std::vector<std::thread> threads_;
+    std::atomic<std::uint32_t> next_task_{0};
+    Tick from_;
+    bool done_ = false;
+  };
+
+  static std::uint64_t ns(Clock::time_point from, Clock::time_point to) {
+    return static_cast<std::uint64_t>(std::chrono::nanoseconds(to - from).count());
+  }
+
+  Frames& frames_of(Tick tick) { return frames_[static_cast<std::size_t>(tick.count() & 1)]; }
+
+  void lay_out(Frames& frames) {
+    const std::size_t partitions = physics_.size();
+    frames.bodies.resize(partitions);
+    frames.ghosts.resize(partitions);
+    frames.ghosts_for.resize(partitions);
+    frames.radio.resize(hosts_.size());
+    frames.actuation.resize(hosts_.size());
+    for (std::size_t p = 0; p < partitions; ++p) {
+      frames.all_bodies.push_back(&frames.bodies[p]);
+      frames.ghosts[p].resize(physics_[p]->neighbours().size());
+    }
+    for (std::size_t p = 0; p < partitions; ++p) {
+      for (std::size_t i = 0; i < frames.ghosts[p].size(); ++i) {
+        frames.ghosts_for[physics_[p]->neighbours()[i].value()].push_back(&frames.ghosts[p][i]);
+      }
+    }
+    for (const ActuationFrame& frame : frames.actuation) frames.all_actuation.push_back(&frame);
+  }
+
+  // Tasks are numbered as federates are: partitions, radio, station, hosts.
+  void step(std::uint32_t task, Tick from) {
+    const Frames& in = frames_of(from);
+    const auto partitions = static_cast<std::uint32_t>(physics_.size());
+    if (task < partitions) {
+      physics_[task]->step(from, {in.ghosts_for[task], in.all_actuation, schedule_.tracked_poses()});
+    } else if (task == partitions) {
+      radio_.step(from, {in.all_bodies, in.all_actuation, in.overhead});
+    } else if (task == partitions + 1) {
+      station_.step(from, {in.all_bodies, in.all_actuation, schedule_.overhead_inputs()});
+    } else {
+      hosts_[task - partitions - 2]->step(from, in.radio[task - partitions - 2]);
+    }
+  }
+
+  void emit(std::uint32_t task, Frames& out) {
+    const auto partitions = static_cast<std::uint32_t>(physics_.size());
+    if (task < partitions) {
+      physics_[task]->emit_bodies(out.bodies[task]);
+      for (std::size_t i = 0; i < out.ghosts[task].size(); ++i) {
+        physics_[task]->emit_ghosts(physics_[task]->neighbours()[i], out.ghosts[task][i]);
+      }
+      hash_parts_[task] = physics_[task]->hash_part();
+    } else if (task == partitions) {
+      for (std::uint32_t h = 0; h < hosts_.size(); ++h) radio_.emit(HostId{h}, out.radio[h]);
+      hash_parts_[task] = radio_.hash_part();
+    } else if (task == partitions + 1) {
+      station_.emit(out.overhead);
+      hash_parts_[task] = station_.hash_part();
+    } else {
+      hosts_[task - partitions - 2]->emit(out.actuation[task - partitions - 2]);
+      hash_parts_[task] = hosts_[task - partitions - 2]->hash_part();
+    }
+  }
+
+  std::uint64_t close_tick(Tick tick, std::uint64_t chain) {
+    std::uint64_t sum = 0;
+    for (const std::uint64_t part : hash_parts_) sum += part;
+    chain = hash_chain(chain, sum);
+    observer_.hash(tick, chain);
+    return chain;
+  }
+
+  void save(Tick now, std::uint64_t chain) {
+    for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
+      proto::CheckpointPart part;
+      if (task < physics_.size()) physics_[task]->save(*part.mutable_physics());
+      else if (task == physics_.size()) radio_.save(*part.mutable_radio());
+      else if (task == physics_.size() + 1) station_.save(*part.mutable_station());
+      else hosts_[task - physics_.size() - 2]->save(*part.mutable_behaviours());
+      if (part.has_station()) part.mutable_station()->set_hash_chain(chain);
+      write_checkpoint_part(options_.run_directory, plan_, now, FederateId{task}, part);
+    }
+  }
+
+  void load(const Checkpoint& checkpoint) {
+    for (const auto& engine : physics_) engine->load(checkpoint.tick, checkpoint.physics());
+    radio_.load(checkpoint.tick, checkpoint.radio());
+    station_.load(checkpoint.tick, checkpoint.station());
+    for (const auto& engine : hosts_) engine->load(checkpoint.tick, checkpoint.behaviours());
+  }
+
+  [[nodiscard]] RunProgress progress(Tick now, double wall_s) const {
+    RunProgress progress;
+    progress.now = now;
+    progress.wall_s = wall_s;
+    progress.sent = radio_.counters().sent;
+    progress.received = radio_.counters().received;
+    for (const auto& engine : hosts_) progress.robots_failed += engine->robots_failed();
+    return progress;
+  }
+
+  void fill(RunTotals& totals) const {
+    const auto add = [&](Work work, std::uint64_t value) { totals.work_ns[static_cast<std::size_t>(work)] += value; };
+    for (std::uint32_t task = 0; task < task_ns_.size(); ++task) {
+      add(task < physics_.size()        ? Work::kPhysics
+          : task == physics_.size()     ? Work::kRadio
+          : task == physics_.size() + 1 ? Work::kStation
+                                        : Work::kBehaviours,
+          task_ns_[task]);
+    }
+    add(Work::kRecording, recording_ns_);
+    const auto& counters = radio_.counters();
+    totals.attempted = counters.attempted;
+    totals.sent = counters.sent;
+    totals.received = counters.received;
+    totals.collided = counters.collided;
+    totals.pairs = radio_.pair_counts();
+    for (const auto& engine : hosts_) totals.robots_failed += engine->robots_failed();
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6; };
+    totals.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+    totals.peak_memory_mib = static_cast<double>(usage.ru_maxrss) / 1024.0;
+  }
+
+  const RunPlan& plan_;
+  const LocalOptions& options_;
+  RunObserver& observer_;
+  std::vector<std::unique_ptr<physics::Engine>> physics_;
+  comm::RadioEngine radio_;
+  ark::StationEngine station_;
+  std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
+  const Tick first_;
+  RunSchedule schedule_;
+  Frames frames_[2];  // of even and of odd ticks: while one is read the other is written
+  std::vector<std::uint64_t> task_ns_, hash_parts_;
+  std::uint64_t recording_ns_ = 0;
+};
+
+}  // namespace
+
+RunTotals run(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs, const LocalOptions& options,
+              RunObserver& observer) {
+  return LocalRun(plan, programs, options, observer).run();
+}
+
+}  // namespace kilotwin::local

@@ -1,0 +1,49 @@
+/// Paths of all robots, from any number of states in memory that does not depend on how many there are.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "clients/recorder/reader.hpp"
+
+namespace kilotwin::recorder {
+
+/// All robots at one instant.
+struct Snapshot {
+  double time_s = 0;
+  std::vector<double> x_mm, y_mm, heading_rad;
+  std::vector<std::uint8_t> led, life_cycle;
+};
+
+struct Point {
+  float x_mm, y_mm;
+};
+
+/// The first state, the last, and evenly spaced ones in between.
+class Paths {
+ public:
+  /// Reads all states that remain. Keeps at most about `points` places over all robots, yet at least 8 per robot.
+  Paths(Reader& recording, std::size_t points);
+
+  [[nodiscard]] bool empty() const { return states_ == 0; }
+  [[nodiscard]] std::uint64_t states() const { return states_; }
+  [[nodiscard]] std::size_t robots() const { return first_.x_mm.size(); }
+  [[nodiscard]] const Snapshot& first() const { return first_; }
+  [[nodiscard]] const Snapshot& last() const { return last_; }
+  /// A robot's way from its first to its last place.
+  [[nodiscard]] std::vector<Point> path(std::size_t robot) const;
+
+ private:
+  void keep(const proto::StateRecord& state, std::size_t most);
+
+  std::uint64_t states_ = 0, stride_ = 1;
+  Snapshot first_, last_;
+  std::vector<std::vector<Point>> kept_;  // per kept state, all robots
+};
+
+/// The path with fewer points, none of which was further than `tolerance_mm` from it (Douglas and Peucker 1973).
+[[nodiscard]] std::vector<Point> simplified(std::span<const Point> path, double tolerance_mm);
+
+}  // namespace kilotwin::recorder

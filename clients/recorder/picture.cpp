@@ -1,0 +1,305 @@
+#include "clients/recorder/picture.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "clients/recorder/axis.hpp"
+#include "clients/recorder/file.hpp"
+#include "clients/recorder/paths.hpp"
+#include "clients/recorder/svg.hpp"
+#include "core/base/error.hpp"
+#include "core/base/ids.hpp"
+#include "core/base/pose.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+constexpr double kMargin_px = 28, kGap_px = 26, kTitle_px = 66, kPanelTitle_px = 26, kPanelFoot_px = 48;
+constexpr double kCaption_px = 12;
+/// Places kept for the paths of all robots together.
+constexpr std::size_t kPathPoints = 160'000;
+/// Drawings inside a panel have integer coordinates of a tenth of a pixel, which makes them short.
+constexpr double kUnitsPerPx = 10;
+/// Discs are not drawn smaller than this.
+constexpr double kLeastDisc_px = 1.8;
+
+struct Box {
+  double x_min_mm = 1e300, y_min_mm = 1e300, x_max_mm = -1e300, y_max_mm = -1e300;
+  void add(double x, double y) {
+    x_min_mm = std::min(x_min_mm, x);
+    x_max_mm = std::max(x_max_mm, x);
+    y_min_mm = std::min(y_min_mm, y);
+    y_max_mm = std::max(y_max_mm, y);
+  }
+  [[nodiscard]] Box widened(double by_mm) const { return {x_min_mm - by_mm, y_min_mm - by_mm, x_max_mm + by_mm, y_max_mm + by_mm}; }
+  [[nodiscard]] double width_mm() const { return x_max_mm - x_min_mm; }
+  [[nodiscard]] double height_mm() const { return y_max_mm - y_min_mm; }
+};
+
+/// How a part of the arena lies in a panel of width x height px. y points up in the arena and down on paper.
+class View {
+ public:
+  View(const Box& box, double width_px, double height_px)
+      : width_px_(width_px), height_px_(height_px),
+        px_per_mm_(std::min(width_px / box.width_mm(), height_px / box.height_mm())),
+        x_mm_((box.x_min_mm + box.x_max_mm) / 2), y_mm_((box.y_min_mm + box.y_max_mm) / 2) {}
+  [[nodiscard]] double px_per_mm() const { return px_per_mm_; }
+  [[nodiscard]] long x(double x_mm) const { return std::lround(kUnitsPerPx * (width_px_ / 2 + (x_mm - x_mm_) * px_per_mm_)); }
+  [[nodiscard]] long y(double y_mm) const { return std::lround(kUnitsPerPx * (height_px_ / 2 - (y_mm - y_mm_) * px_per_mm_)); }
+  [[nodiscard]] double length(double mm) const { return kUnitsPerPx * mm * px_per_mm_; }
+  [[nodiscard]] double width_px() const { return width_px_; }
+  [[nodiscard]] double height_px() const { return height_px_; }
+
+ private:
+  double width_px_, height_px_, px_per_mm_, x_mm_, y_mm_;
+};
+
+template <class... Arguments>
+void put(std::string& out, fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  fmt::format_to(std::back_inserter(out), format, std::forward<Arguments>(arguments)...);
+}
+
+/// "30 s", "59.97 s", "1200 s": as exact as a tick, without zeros that say nothing.
+std::string time_text(double time_s) {
+  return fmt::format("{:g} s", std::round(time_s * 100) / 100);
+}
+
+bool failed(const Snapshot& at, std::size_t robot) { return at.life_cycle[robot] == static_cast<std::uint8_t>(LifeCycle::kFailed); }
+
+double disc_units(const View& view) { return std::max(view.length(2 * kRobotRadius_mm), kUnitsPerPx * kLeastDisc_px); }
+
+/// Robots as discs with their LED's colour and a tick towards the heading; failed ones with a red rim. A disc is a line of no
+/// length with round ends as thick as the disc: ten bytes.
+std::string draw_discs(const Snapshot& at, const View& view) {
+  std::map<std::uint8_t, std::string> by_led;
+  std::string rims, failed_rims, ticks;
+  const double disc = disc_units(view), rim = std::max(disc * 0.09, 1.5), tick = disc * 0.5;
+  for (std::size_t i = 0; i < at.x_mm.size(); ++i) {
+    const long x = view.x(at.x_mm[i]), y = view.y(at.y_mm[i]);
+    put(failed(at, i) ? failed_rims : rims, "M{} {}h1", x, y);
+    put(by_led[at.led[i] & 63], "M{} {}h1", x, y);
+    put(ticks, "M{} {}l{} {}", x, y, std::lround(tick * std::cos(at.heading_rad[i])), -std::lround(tick * std::sin(at.heading_rad[i])));
+  }
+  std::string out = "<g fill=\"none\" stroke-linecap=\"round\">\n";
+  put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", svg::kInk, disc, rims);
+  if (!failed_rims.empty()) {
+    put(out, "<path stroke=\"#d0021b\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", disc * 1.35, failed_rims);
+  }
+  for (const auto& [led, discs] : by_led) {
+    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", svg::led_colour(led), std::max(disc - 2 * rim, disc * 0.5), discs);
+  }
+  put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" stroke-linecap=\"butt\" d=\"{}\"/>\n</g>\n", svg::kInk, std::max(disc * 0.1, 1.5), ticks);
+  return out;
+}
+
+/// Ways of all robots, coloured by where in the swarm they began, so that one sees who went where and how they mix.
+std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
+  constexpr std::array<std::string_view, 6> kByStart = {"#2b4c9b", "#2387b5", "#2aa58a", "#d9a21b", "#e0702a", "#b8336a"};
+  std::array<std::string, kByStart.size()> ways, ends;
+  std::string starts;
+  const Snapshot& first = paths.first();
+  for (std::size_t i = 0; i < paths.robots(); ++i) {
+    const double part = start.width_mm() > 0 ? (first.x_mm[i] - start.x_min_mm) / start.width_mm() : 0;
+    const std::size_t group = std::min(static_cast<std::size_t>(part * kByStart.size()), kByStart.size() - 1);
+    const std::vector<Point> way = simplified(paths.path(i), 0.3 / view.px_per_mm());
+    long x = view.x(way[0].x_mm), y = view.y(way[0].y_mm);
+    put(starts, "M{} {}h1", x, y);
+    std::string& d = ways[group];
+    put(d, "M{} {}", x, y);
+    char command = 'l';
+    for (std::size_t k = 1; k < way.size(); ++k) {
+      const long next_x = view.x(way[k].x_mm), next_y = view.y(way[k].y_mm);
+      if (next_x == x && next_y == y) continue;
+      // A minus sign separates as well as a space does.
+      put(d, "{}{}{}{}", command, next_x - x, next_y < y ? "" : " ", next_y - y);
+      command = ' ';
+      x = next_x;
+      y = next_y;
+    }
+    if (command == 'l') d += "h1";
+    put(ends[group], "M{} {}h1", x, y);
+  }
+  const double robots = static_cast<double>(paths.robots());
+  const double width = std::clamp(24 - 5 * std::log10(robots), 5.0, 18.0);
+  const double opacity = std::clamp(1.15 - 0.15 * std::log10(robots), 0.5, 0.95);
+  const double dot = std::clamp(disc_units(view), 12.0, 80.0) * std::clamp(1.1 - 0.15 * std::log10(robots), 0.5, 1.0);
+  std::string out = "<g fill=\"none\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n";
+  put(out, "<path stroke=\"#b4bcc6\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", dot * 0.8, starts);
+  for (std::size_t group = 0; group < ways.size(); ++group) {
+    if (ways[group].empty()) continue;
+    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" stroke-opacity=\"{:.2f}\" d=\"{}\"/>\n", kByStart[group], width, opacity, ways[group]);
+  }
+  for (std::size_t group = 0; group < ends.size(); ++group) {
+    if (ends[group].empty()) continue;
+    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", kByStart[group], dot, ends[group]);
+  }
+  return out + "</g>\n";
+}
+
+/// The arena's walls as far as the view shows them, on a ground that tells inside from outside.
+std::string draw_arena(const View& view, double width_mm, double height_mm) {
+  const auto clipped = [](long value, double px) {
+    return std::clamp(value, -100L, static_cast<long>(kUnitsPerPx * px) + 100L);
+  };
+  const long left = clipped(view.x(-width_mm / 2), view.width_px()), right = clipped(view.x(width_mm / 2), view.width_px());
+  const long top = clipped(view.y(height_mm / 2), view.height_px()), bottom = clipped(view.y(-height_mm / 2), view.height_px());
+  return fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#fbfcfd\" stroke=\"{}\" stroke-width=\"16\"/>\n", left, top,
+                     right - left, bottom - top, svg::kInk);
+}
+
+/// The dashed outline of what another panel shows enlarged.
+std::string draw_frame(const View& view, const Box& box) {
+  return fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"10\" stroke-dasharray=\"40 30\"/>\n",
+                     view.x(box.x_min_mm), view.y(box.y_max_mm), view.x(box.x_max_mm) - view.x(box.x_min_mm),
+                     view.y(box.y_min_mm) - view.y(box.y_max_mm), svg::kFaint);
+}
+
+std::string scale_bar(const View& view, double x, double y) {
+  const double length_mm = round_step(view.width_px() / view.px_per_mm(), 7) ;
+  const double length_px = length_mm * view.px_per_mm();
+  std::string out = fmt::format("<path d=\"M{0:.1f} {1:.1f}v6M{0:.1f} {2:.1f}h{3:.1f}M{4:.1f} {1:.1f}v6\" fill=\"none\" stroke=\"{5}\" stroke-width=\"1.6\"/>\n", x,
+                                y - 3, y, length_px, x + length_px, svg::kInk);
+  return out + svg::text(x + length_px + 8, y + 4, kCaption_px, fmt::format("{:g} mm", length_mm));
+}
+
+/// The commonest LEDs with their numbers, as many as fit, then the failed robots.
+std::string led_legend(const Snapshot& at, double x, double y, double width_px) {
+  std::map<std::uint8_t, std::size_t> counts;
+  std::size_t failures = 0;
+  for (std::size_t i = 0; i < at.led.size(); ++i) {
+    ++counts[at.led[i] & 63];
+    if (failed(at, i)) ++failures;
+  }
+  std::vector<std::pair<std::uint8_t, std::size_t>> order(counts.begin(), counts.end());
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  struct Entry {
+    std::string fill, rim, label;
+  };
+  std::vector<Entry> entries;
+  if (failures > 0) entries.push_back({"none", "#d0021b", fmt::format("failed {}", failures)});
+  for (const auto& [led, count] : order) {
+    entries.push_back({svg::led_colour(led), std::string(svg::kInk), fmt::format("LED {} {}", svg::led_name(led), count)});
+  }
+  std::string out;
+  const double end = x + width_px;
+  for (const Entry& entry : entries) {
+    const double width = 14 + svg::text_width_px(entry.label, kCaption_px) + 14;
+    if (x + width > end + 14) break;
+    put(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4.5\" fill=\"{}\" stroke=\"{}\" stroke-width=\"1.4\"/>\n", x + 5, y - 4, entry.fill, entry.rim);
+    out += svg::text(x + 14, y, kCaption_px, entry.label, svg::kFaint);
+    x += width;
+  }
+  return out;
+}
+
+/// A panel: title, drawing clipped to its frame, scale bar, a remark, and what explains it.
+struct Panel {
+  std::string title, when, drawing, remark, legend;
+};
+
+std::string draw_panel(const Panel& panel, const View& view, double x, double y) {
+  std::string out = svg::text(x, y + 16, 15, panel.title, svg::kInk, svg::Anchor::kStart, true);
+  out += svg::text(x + view.width_px(), y + 16, 13, panel.when, svg::kFaint, svg::Anchor::kEnd);
+  const double top = y + kPanelTitle_px;
+  put(out, "<svg x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{3:.1f}\" viewBox=\"0 0 {4:.0f} {5:.0f}\" overflow=\"hidden\">\n", x, top,
+      view.width_px(), view.height_px(), kUnitsPerPx * view.width_px(), kUnitsPerPx * view.height_px());
+  out += "<rect width=\"100%\" height=\"100%\" fill=\"#eef1f4\"/>\n";
+  out += panel.drawing;
+  out += "</svg>\n";
+  put(out, "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"{}\"/>\n", x, top, view.width_px(),
+      view.height_px(), svg::kLine);
+  const double below = top + view.height_px() + 18;
+  out += scale_bar(view, x + 1, below - 4);
+  out += svg::text(x + view.width_px(), below, kCaption_px, panel.remark, svg::kFaint, svg::Anchor::kEnd);
+  return out + panel.legend;
+}
+
+Box extent(const Snapshot& at) {
+  Box box;
+  for (std::size_t i = 0; i < at.x_mm.size(); ++i) box.add(at.x_mm[i], at.y_mm[i]);
+  return box;
+}
+
+/// `inner` where it is much smaller than `outer`, and then with some ground around it.
+Box zoomed(const Box& inner, const Box& outer) {
+  const double size = std::max({inner.width_mm(), inner.height_mm(), 8 * kRobotRadius_mm});
+  Box wide = inner.widened(0.06 * size + 2 * kRobotRadius_mm);
+  // A single robot or a row of them gets ground on all sides.
+  const double least = 0.6 * size;
+  if (wide.width_mm() < least) wide = {wide.x_min_mm - least / 2, wide.y_min_mm, wide.x_max_mm + least / 2, wide.y_max_mm};
+  if (wide.height_mm() < least) wide = {wide.x_min_mm, wide.y_min_mm - least / 2, wide.x_max_mm, wide.y_max_mm + least / 2};
+  const double ratio = std::min(outer.width_mm() / wide.width_mm(), outer.height_mm() / wide.height_mm());
+  return ratio >= 1.7 ? wide : outer;
+}
+
+}  // namespace
+
+std::string picture_svg(Reader& recording) {
+  const Paths paths(recording, kPathPoints);
+  if (paths.empty()) throw UserError(fmt::format("{}: no state to draw; the run ended before its first one", recording.path().string()));
+  const proto::RecordingHeader& header = recording.header();
+
+  const Box arena = Box{-header.arena_width_mm() / 2, -header.arena_height_mm() / 2, header.arena_width_mm() / 2, header.arena_height_mm() / 2};
+  Box everything;
+  for (std::size_t i = 0; i < paths.robots(); ++i) {
+    for (const Point& p : paths.path(i)) everything.add(p.x_mm, p.y_mm);
+  }
+  const Box start = extent(paths.first());
+  const Box whole = arena.widened(0.01 * std::max(arena.width_mm(), arena.height_mm()));
+  const Box shown = zoomed(everything, whole);
+  const Box shown_at_start = zoomed(start, shown);
+
+  const bool below = shown.width_mm() > 2.2 * shown.height_mm();  // wide ones lie one below the other
+  const double width_px = below ? 900 : 384;
+  const double height_px = std::clamp(width_px * shown.height_mm() / shown.width_mm(), below ? 110.0 : 200.0, 560.0);
+  const View view(shown, width_px, height_px), start_view(shown_at_start, width_px, height_px);
+
+  const auto remark = [&](const View& of, const View& against, std::string_view than) {
+    std::string text;
+    if (disc_units(of) > of.length(2 * kRobotRadius_mm) * 1.01) text += "discs larger than life";
+    const double factor = of.px_per_mm() / against.px_per_mm();
+    if (factor > 1.05) text += fmt::format("{}enlarged {:.1f} times{}", text.empty() ? "" : ", ", factor, than);
+    return text;
+  };
+  const View arena_view(whole, width_px, height_px);
+  const std::string part = view.px_per_mm() > 1.05 * arena_view.px_per_mm()
+                               ? fmt::format("part of the {:g} mm x {:g} mm arena", arena.width_mm(), arena.height_mm()) : "";
+  const bool start_zoomed = start_view.px_per_mm() > 1.05 * view.px_per_mm();
+  const std::string from = time_text(paths.first().time_s), to = time_text(paths.last().time_s);
+
+  Panel panels[3];
+  panels[0] = {"Start", from, draw_arena(start_view, arena.width_mm(), arena.height_mm()) + draw_discs(paths.first(), start_view),
+               start_zoomed ? remark(start_view, view, ", dashed frame in Paths") : part, ""};
+  std::string ways = draw_arena(view, arena.width_mm(), arena.height_mm());
+  if (start_zoomed) ways += draw_frame(view, shown_at_start);
+  panels[1] = {"Paths", fmt::format("{} to {}", from, to), ways + draw_paths(paths, view, start), part.empty() ? "grey: start, dot: end" : part, ""};
+  panels[2] = {"End", to, draw_arena(view, arena.width_mm(), arena.height_mm()) + draw_discs(paths.last(), view), remark(view, view, ""), ""};
+  if (panels[2].remark.empty()) panels[2].remark = part;
+
+  const double step_x = below ? 0 : width_px + kGap_px, step_y = below ? kPanelTitle_px + height_px + kPanelFoot_px : 0;
+  const double total_width = 2 * kMargin_px + width_px + 2 * step_x;
+  const double total_height = kMargin_px + kTitle_px + kPanelTitle_px + height_px + kPanelFoot_px + 2 * step_y;
+  const std::string name = svg::shortened(header.name().empty() ? "Kilotwin run" : header.name(), 60);
+  const std::string facts = fmt::format("{} robot{} \u00b7 seed {} \u00b7 {} simulated \u00b7 arena {:g} mm \u00d7 {:g} mm", header.robots(), header.robots() == 1 ? "" : "s",
+                                        header.seed(), to, header.arena_width_mm(), header.arena_height_mm());
+  std::string body = svg::text(kMargin_px, kMargin_px + 16, 22, name, svg::kInk, svg::Anchor::kStart, true);
+  body += svg::text(kMargin_px, kMargin_px + 38, 14, facts, svg::kFaint);
+  for (int i = 0; i < 3; ++i) {
+    const double x = kMargin_px + i * step_x, y = kMargin_px + kTitle_px - 10 + i * step_y;
+    const double foot = y + kPanelTitle_px + height_px + 38;
+    if (i == 0) panels[i].legend = led_legend(paths.first(), x, foot, width_px);
+    if (i == 1) panels[i].legend = svg::text(x, foot, kCaption_px, "colour: place at the start, from left to right", svg::kFaint);
+    if (i == 2) panels[i].legend = led_legend(paths.last(), x, foot, width_px);
+    body += draw_panel(panels[i], i == 0 ? start_view : view, x, y);
+  }
+  return svg::document(total_width, total_height, name, facts + ". Three panels: start, paths and end of all robots.", body);
+}
+
+void write_picture(Reader& recording, const std::filesystem::path& file) { write_file(file, picture_svg(recording)); }
+
+}  // namespace kilotwin::recorder

@@ -1,0 +1,208 @@
+#include "clients/recorder/reader.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <utility>
+
+#include "clients/recorder/file.hpp"
+#include "core/base/error.hpp"
+#include "core/base/pose.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+constexpr std::size_t kBlock_bytes = 1 << 20;
+/// Ticks lie in this range: 1e6 s of the shortest tick are 2.5e8, and 2^53 keeps products with doubles exact.
+constexpr std::int64_t kLastTick = std::int64_t{1} << 40;
+
+std::uint32_t get_u32(std::span<const std::uint8_t> from) {
+  return from[0] | std::uint32_t{from[1]} << 8 | std::uint32_t{from[2]} << 16 | std::uint32_t{from[3]} << 24;
+}
+
+bool in_range(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
+
+bool all_within(const google::protobuf::RepeatedField<double>& values, double bound) {
+  return std::all_of(values.begin(), values.end(), [bound](double value) { return in_range(value, -bound, bound); });
+}
+
+bool valid_tick(std::int64_t tick) { return tick >= 0 && tick <= kLastTick; }
+
+/// Whether the fields have the ranges of idl/experiment.proto.
+bool valid(const proto::RecordingHeader& header) {
+  return in_range(header.tick_cycles(), 1 << 15, 1 << 20) && in_range(header.robots(), 1, kMostRobots) &&
+         in_range(header.every_s(), 1e-3, 1e9) && in_range(header.arena_width_mm(), 1, 1e6) &&
+         in_range(header.arena_height_mm(), 1, 1e6) && valid_tick(header.first_tick());
+}
+
+}  // namespace
+
+Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
+  struct stat about {};
+  const auto unreadable = [&](const std::string& reason) {
+    return UserError(fmt::format("{}: cannot be read: {}; expected a run directory or its recording.ktrec", file_.string(), reason));
+  };
+  const auto foreign = [&](std::string_view why) {
+    return UserError(fmt::format("{}: not a Kilotwin recording; {}", file_.string(), why));
+  };
+  if (::stat(file_.c_str(), &about) != 0) throw unreadable(system_reason());
+  if (!S_ISREG(about.st_mode)) throw foreign("expected a file, the recording.ktrec of a run directory");
+  descriptor_ = ::open(file_.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor_ < 0) throw unreadable(system_reason());
+  try {
+    if (!read_record() || !record_.has_header()) {
+      throw foreign(about.st_size == 0 ? "it is empty; expected the recording.ktrec of a run directory"
+                                       : "expected the recording.ktrec of a run directory");
+    }
+    header_ = std::move(*record_.mutable_header());
+    if (header_.format() > kRecordingFormat) {
+      throw foreign(fmt::format("format {} of a newer version, this one reads format {}", header_.format(), kRecordingFormat));
+    }
+    if (!valid(header_)) throw foreign("its header has values that no run has");
+  } catch (...) {
+    ::close(descriptor_);
+    throw;
+  }
+  records_from_ = offset_;
+  rewind();
+}
+
+Reader::~Reader() { ::close(descriptor_); }
+
+void Reader::rewind() {
+  offset_ = records_from_;
+  ended_ = false;
+  warning_.clear();
+  last_state_ = header_.first_tick() - 1;
+}
+
+void Reader::warn(std::string_view what) {
+  warning_ = fmt::format("{}: {} at byte {}; read up to there", file_.string(), what, offset_);
+}
+
+std::span<const std::uint8_t> Reader::waiting() const {
+  return std::span(block_).subspan(static_cast<std::size_t>(offset_ - block_from_));
+}
+
+/// Whether so many bytes from offset_ on are there, and then in waiting().
+bool Reader::fill(std::size_t bytes) {
+  const std::uint64_t block_end = block_from_ + block_.size();
+  if (offset_ >= block_from_ && offset_ <= block_end && block_end - offset_ >= bytes) return true;
+  struct stat about {};
+  if (::fstat(descriptor_, &about) != 0) return false;
+  const auto size = static_cast<std::uint64_t>(about.st_size);
+  if (offset_ > size || size - offset_ < bytes) return false;  // before any memory is asked for
+  block_from_ = offset_;
+  block_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(size - offset_, std::max(bytes, kBlock_bytes))));
+  std::size_t got = 0;
+  while (got < block_.size()) {
+    const ssize_t n = ::pread(descriptor_, block_.data() + got, block_.size() - got, static_cast<off_t>(block_from_ + got));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) {
+      block_.clear();
+      throw RunError(fmt::format("{}: cannot be read: {}", file_.string(), system_reason()));
+    }
+    if (n == 0) break;
+    got += static_cast<std::size_t>(n);
+  }
+  block_.resize(got);
+  return got >= bytes;
+}
+
+/// Reads the frame at offset_ into record_ and moves behind it. False at the end, with a warning where that is no whole
+/// frame's.
+bool Reader::read_record() {
+  warning_.clear();
+  if (!fill(kFramePrefix_bytes)) {
+    if (fill(1)) warn("cut off");
+    return false;
+  }
+  const std::uint32_t length = get_u32(waiting());
+  const std::uint32_t crc = get_u32(waiting().subspan(4));
+  if (length == 0 || length > kLongestRecord_bytes) {
+    warn("damaged");
+    return false;
+  }
+  if (!fill(kFramePrefix_bytes + length)) {
+    warn("cut off");
+    return false;
+  }
+  const std::span<const std::uint8_t> body = waiting().subspan(kFramePrefix_bytes, length);
+  if (::crc32_z(0, body.data(), body.size()) != crc || !record_.ParseFromArray(body.data(), static_cast<int>(length))) {
+    warn("damaged");
+    return false;
+  }
+  offset_ += kFramePrefix_bytes + length;
+  return true;
+}
+
+/// What keeps record_ from being handed out; nullptr where nothing does.
+const char* Reader::defect_of_record() const {
+  const auto robots = static_cast<int>(header_.robots());
+  switch (record_.kind_case()) {
+    case proto::Record::kHeader:
+      return "a second header";
+    case proto::Record::kState: {
+      const proto::StateRecord& state = record_.state();
+      if (state.x_mm_size() != robots || state.y_mm_size() != robots || state.heading_rad_size() != robots ||
+          state.led().size() != header_.robots() || state.life_cycle().size() != header_.robots()) {
+        return "a state of another number of robots";
+      }
+      if (!valid_tick(state.tick()) || state.tick() <= last_state_) return "a state out of order";
+      if (!all_within(state.x_mm(), kFarthest_mm) || !all_within(state.y_mm(), kFarthest_mm) ||
+          !all_within(state.heading_rad(), 2 * kPi)) {
+        return "a state with a pose that is none";
+      }
+      return nullptr;
+    }
+    case proto::Record::kHash:
+      return valid_tick(record_.hash().first_tick()) ? nullptr : "hashes of ticks that are none";
+    case proto::Record::kInput:
+      return valid_tick(record_.input().tick()) ? nullptr : "an input at a tick that is none";
+    case proto::Record::kMessages: {
+      const proto::MessagesRecord& messages = record_.messages();
+      const auto known = [&](std::uint32_t robot) { return robot < header_.robots(); };
+      const bool right = messages.receiver_size() == messages.sender_size() &&
+                         messages.sender_size() == messages.count_size() &&
+                         std::all_of(messages.receiver().begin(), messages.receiver().end(), known) &&
+                         std::all_of(messages.sender().begin(), messages.sender().end(), known);
+      return right ? nullptr : "messages of robots that are none";
+    }
+    case proto::Record::kEnd:
+      return valid_tick(record_.end().tick()) ? nullptr : "an end at a tick that is none";
+    case proto::Record::KIND_NOT_SET:
+      return nullptr;
+  }
+  return nullptr;
+}
+
+const proto::Record* Reader::next() {
+  while (!ended_) {
+    const std::uint64_t start = offset_;
+    if (!read_record()) return nullptr;
+    if (const char* const defect = defect_of_record()) {
+      offset_ = start;
+      warn(fmt::format("damaged: {}", defect));
+      return nullptr;
+    }
+    if (record_.kind_case() == proto::Record::KIND_NOT_SET) continue;  // of a kind that this version does not know
+    if (record_.has_state()) last_state_ = record_.state().tick();
+    if (record_.has_end()) ended_ = true;
+    return &record_;
+  }
+  return nullptr;
+}
+
+const proto::StateRecord* Reader::next_state() {
+  while (const proto::Record* record = next()) {
+    if (record->has_state()) return &record->state();
+  }
+  return nullptr;
+}
+
+}  // namespace kilotwin::recorder

@@ -1,0 +1,68 @@
+/// Reader: the records of a recording, in order; also of one that still grows, of one that was cut off, and of any bytes at
+/// all: what it hands out has been checked.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/recorder/recording.hpp"
+
+namespace kilotwin::recorder {
+
+/// Bounds of what a Reader hands out, beyond which a file is no recording.
+inline constexpr std::uint32_t kMostRobots = 100'000;  ///< idl/experiment.proto
+inline constexpr double kFarthest_mm = 1e7;            ///< of a robot from the origin; arenas are at most 1e6 wide
+
+class Reader {
+ public:
+  /// Opens a file and reads its header. Throws UserError: "FILE: cannot be read: reason", or
+  /// "FILE: not a Kilotwin recording; ..." for other files and newer formats.
+  explicit Reader(std::filesystem::path file);
+  ~Reader();
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+
+  [[nodiscard]] const proto::RecordingHeader& header() const { return header_; }
+  [[nodiscard]] TickLength tick_length() const { return TickLength{header_.tick_cycles()}; }
+  [[nodiscard]] const std::filesystem::path& path() const { return file_; }
+
+  /// The next record after the header, valid until the next call; nullptr at the end. Where the file grows, a later call
+  /// goes on. States have one entry per robot in every field, finite poses and ascending ticks; messages name robots.
+  [[nodiscard]] const proto::Record* next();
+  /// The next state among the records, nullptr at the end.
+  [[nodiscard]] const proto::StateRecord* next_state();
+  /// To the first record after the header again.
+  void rewind();
+
+  /// After next() gave nullptr: whether the run's own end was reached. Without it and without a warning, the run was killed,
+  /// or goes on.
+  [[nodiscard]] bool ended() const { return ended_; }
+  /// After next() gave nullptr: empty, or one line that tells where and how the file breaks off:
+  /// "FILE: cut off at byte N; read up to there".
+  [[nodiscard]] const std::string& warning() const { return warning_; }
+
+ private:
+  [[nodiscard]] bool fill(std::size_t bytes);
+  [[nodiscard]] bool read_record();
+  [[nodiscard]] const char* defect_of_record() const;
+  [[nodiscard]] std::span<const std::uint8_t> waiting() const;
+  void warn(std::string_view what);
+
+  std::filesystem::path file_;
+  int descriptor_ = -1;
+  proto::RecordingHeader header_;
+  proto::Record record_;
+  std::string warning_;
+  bool ended_ = false;
+  std::uint64_t offset_ = 0;        // of the next frame in the file
+  std::uint64_t records_from_ = 0;  // offset of the first frame after the header
+  std::int64_t last_state_ = 0;     // tick of the last state handed out
+  std::vector<std::uint8_t> block_;  // bytes of the file from block_from_ on
+  std::uint64_t block_from_ = 0;
+};
+
+}  // namespace kilotwin::recorder

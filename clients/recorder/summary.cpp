@@ -1,0 +1,178 @@
+#include "clients/recorder/summary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "clients/recorder/file.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::uint64_t parsed_hash(const std::string& digits) {
+  std::uint64_t value = 0;
+  const char* const last = digits.data() + digits.size();
+  const auto [end, error] = std::from_chars(digits.data(), last, value, 16);
+  if (digits.size() != 16 || error != std::errc{} || end != last) throw std::invalid_argument("state_hash has 16 hex digits");
+  return value;
+}
+
+std::pair<std::uint32_t, std::uint32_t> parsed_partitions(const std::string& text) {
+  std::uint32_t columns = 0, rows = 0;
+  const char* const last = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), last, columns);
+  if (first.ec == std::errc{} && first.ptr != last && *first.ptr == 'x') {
+    const auto second = std::from_chars(first.ptr + 1, last, rows);
+    if (second.ec == std::errc{} && second.ptr == last) return {columns, rows};
+  }
+  throw std::invalid_argument("partitions is COLUMNSxROWS");
+}
+
+/// "1 robot", "2 robots", "no robot".
+std::string counted(std::uint64_t count, std::string_view noun) {
+  if (count == 0) return fmt::format("no {}", noun);
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+/// Three significant digits, never in exponential form.
+std::string short_number(double value) {
+  const int decimals = value >= 99.95 ? 0 : value >= 9.995 ? 1 : 2;
+  return fmt::format("{:.{}f}", value, decimals);
+}
+
+std::string percentage(std::uint64_t part, std::uint64_t whole) {
+  return fmt::format("{:.3g} %", whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole));
+}
+
+}  // namespace
+
+double Summary::realtime_factor() const {
+  if (!(wall_s > 0) || ticks <= resumed_from_tick) return 0;
+  return simulated_s * static_cast<double>(ticks - resumed_from_tick) / static_cast<double>(ticks) / wall_s;
+}
+
+void write_summary(const Summary& s, const std::filesystem::path& file) {
+  const Json json{
+      {"name", s.name},
+      {"seed", s.seed},
+      {"mode", s.mode},
+      {"partitions", fmt::format("{}x{}", s.partition_columns, s.partition_rows)},
+      {"hosts", s.hosts},
+      {"robots", s.robots},
+      {"ticks", s.ticks},
+      {"resumed_from_tick", s.resumed_from_tick},
+      {"simulated_s", s.simulated_s},
+      {"start_s", s.start_s},
+      {"wall_s", s.wall_s},
+      {"realtime_factor", s.realtime_factor()},
+      {"cpu_s", s.cpu_s},
+      {"peak_memory_mib", s.peak_memory_mib},
+      {"state_hash", fmt::format("{:016x}", s.state_hash)},
+      {"messages",
+       Json{{"attempted", s.messages.attempted},
+            {"sent", s.messages.sent},
+            {"received", s.messages.received},
+            {"collided", s.messages.collided}}},
+      {"robots_failed", s.robots_failed},
+      {"recoveries", s.recoveries},
+      {"moved_mm", Json{{"mean", s.moved_mm.mean}, {"max", s.moved_mm.max}}},
+      {"cost_ns_per_robot_tick",
+       Json{{"behaviours", s.cost_ns_per_robot_tick.behaviours},
+            {"physics", s.cost_ns_per_robot_tick.physics},
+            {"radio", s.cost_ns_per_robot_tick.radio},
+            {"station", s.cost_ns_per_robot_tick.station},
+            {"exchange", s.cost_ns_per_robot_tick.exchange},
+            {"recording", s.cost_ns_per_robot_tick.recording}}},
+  };
+  write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Summary read_summary(const std::filesystem::path& file) {
+  const std::string text = read_file(file);
+  try {
+    const Json json = Json::parse(text);
+    Summary s;
+    json.at("name").get_to(s.name);
+    json.at("seed").get_to(s.seed);
+    json.at("mode").get_to(s.mode);
+    std::tie(s.partition_columns, s.partition_rows) = parsed_partitions(json.at("partitions").get<std::string>());
+    json.at("robots").get_to(s.robots);
+    json.at("ticks").get_to(s.ticks);
+    json.at("simulated_s").get_to(s.simulated_s);
+    json.at("start_s").get_to(s.start_s);
+    json.at("wall_s").get_to(s.wall_s);
+    s.state_hash = parsed_hash(json.at("state_hash").get<std::string>());
+    const Json& messages = json.at("messages");
+    messages.at("attempted").get_to(s.messages.attempted);
+    messages.at("sent").get_to(s.messages.sent);
+    messages.at("received").get_to(s.messages.received);
+    messages.at("collided").get_to(s.messages.collided);
+    json.at("robots_failed").get_to(s.robots_failed);
+    json.at("recoveries").get_to(s.recoveries);
+    // The rest is not part of the contract and may be missing.
+    s.hosts = json.value("hosts", 1u);
+    s.resumed_from_tick = json.value("resumed_from_tick", std::int64_t{0});
+    s.cpu_s = json.value("cpu_s", 0.0);
+    s.peak_memory_mib = json.value("peak_memory_mib", 0.0);
+    const Json none = Json::object();
+    const Json moved = json.value("moved_mm", none);
+    s.moved_mm = {moved.value("mean", 0.0), moved.value("max", 0.0)};
+    const Json cost = json.value("cost_ns_per_robot_tick", none);
+    s.cost_ns_per_robot_tick = {cost.value("behaviours", 0.0), cost.value("physics", 0.0),  cost.value("radio", 0.0),
+                                cost.value("station", 0.0),    cost.value("exchange", 0.0), cost.value("recording", 0.0)};
+    return s;
+  } catch (const std::exception& error) {
+    throw UserError(fmt::format("{}: not a summary; expected the summary.json of a run directory ({})", file.string(), error.what()));
+  }
+}
+
+std::string summary_text(const Summary& s, const std::filesystem::path& directory) {
+  std::string text;
+  const auto line = [&text](std::string_view label, const std::string& rest) {
+    text += fmt::format("  {:<10}{}\n", label, rest);
+  };
+  text += fmt::format("{}, seed {}: {}, {} simulated s ({} ticks)\n", s.name, s.seed, counted(s.robots, "robot"),
+                      short_number(s.simulated_s), s.ticks);
+  std::string how = fmt::format("{} s of wall time, {} times real time, after {} s to start", short_number(s.wall_s),
+                                short_number(s.realtime_factor()), short_number(s.start_s));
+  if (s.resumed_from_tick > 0) how += fmt::format("; resumed from tick {}", s.resumed_from_tick);
+  line("took", how);
+  std::string where = s.mode;
+  if (s.mode == "federated") {
+    where += fmt::format(": {}x{} {}, {}", s.partition_columns, s.partition_rows,
+                         s.partition_columns * s.partition_rows == 1 ? "partition" : "partitions", counted(s.hosts, "host"));
+  }
+  if (s.recoveries > 0) where += fmt::format("; went back to a checkpoint {}", s.recoveries == 1 ? "once" : fmt::format("{} times", s.recoveries));
+  line("mode", where);
+  line("moved", fmt::format("{} mm from start to end on average, {} mm at most", short_number(s.moved_mm.mean), short_number(s.moved_mm.max)));
+  line("messages", fmt::format("{} sent of {} attempted; {} received, {} ({}) lost to collisions", s.messages.sent,
+                               s.messages.attempted, s.messages.received, s.messages.collided,
+                               percentage(s.messages.collided, s.messages.received + s.messages.collided)));
+  line("failed", counted(s.robots_failed, "robot"));
+  const Summary::Cost& c = s.cost_ns_per_robot_tick;
+  std::vector<std::pair<std::string_view, double>> parts{{"behaviours", c.behaviours}, {"physics", c.physics},
+                                                         {"radio", c.radio},           {"station", c.station},
+                                                         {"exchange", c.exchange},     {"recording", c.recording}};
+  std::stable_sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::string cost = fmt::format("{} ns per robot and tick", short_number(c.total()));
+  for (std::size_t i = 0; i < parts.size() && parts[i].second > 0; ++i) {
+    cost += fmt::format("{} {} {}", i == 0 ? ":" : ",", parts[i].first, short_number(parts[i].second));
+  }
+  line("cost", cost);
+  line("used", fmt::format("{} s of CPU time, {} MiB of memory", short_number(s.cpu_s), short_number(s.peak_memory_mib)));
+  line("hash", fmt::format("{:016x}", s.state_hash));
+  line("results", fmt::format("{}: summary.json, picture.svg, recording.ktrec", directory.string()));
+  return text;
+}
+
+}  // namespace kilotwin::recorder

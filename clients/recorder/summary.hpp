@@ -1,0 +1,54 @@
+/// Summary: what a run was and did, as summary.json for scripts and as a few lines for people.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace kilotwin::recorder {
+
+/// The fields carry the names that they have in the file.
+struct Summary {
+  std::string name;
+  std::uint64_t seed = 0;
+  std::string mode;                        ///< "local" or "federated"
+  std::uint32_t partition_columns = 1, partition_rows = 1;  ///< partitions: "2x1", as for --partitions
+  std::uint32_t hosts = 1;
+  std::uint32_t robots = 0;
+  std::int64_t ticks = 0;                  ///< the run's last tick
+  std::int64_t resumed_from_tick = 0;      ///< 0 where it began at the beginning
+  double simulated_s = 0;                  ///< at the last tick
+  double start_s = 0;                      ///< wall time from the command to the first tick
+  double wall_s = 0;                       ///< wall time from the first tick to the last
+  double cpu_s = 0;                        ///< of all processes of the run
+  double peak_memory_mib = 0;              ///< of all processes of the run, resident
+  std::uint64_t state_hash = 0;            ///< 16 hex digits in the file
+  struct Messages {
+    std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
+  } messages;
+  std::uint32_t robots_failed = 0;
+  std::uint32_t recoveries = 0;
+  /// Distance between a robot's first and last recorded place.
+  struct Moved {
+    double mean = 0, max = 0;
+  } moved_mm;
+  /// CPU time by subject, over robots and ticks stepped.
+  struct Cost {
+    double behaviours = 0, physics = 0, radio = 0, station = 0, exchange = 0, recording = 0;
+    [[nodiscard]] double total() const { return behaviours + physics + radio + station + exchange + recording; }
+  } cost_ns_per_robot_tick;
+
+  /// Simulated over wall time, of the ticks that this run stepped itself; 0 where it stepped none.
+  [[nodiscard]] double realtime_factor() const;
+};
+
+/// Writes summary.json. Throws RunError.
+void write_summary(const Summary& summary, const std::filesystem::path& file);
+
+/// Reads one. Throws UserError where a field of the contract is missing or of another type: "FILE: not a summary; ...".
+[[nodiscard]] Summary read_summary(const std::filesystem::path& file);
+
+/// 8 to 12 lines that tell what happened and where the results are.
+[[nodiscard]] std::string summary_text(const Summary& summary, const std::filesystem::path& directory);
+
+}  // namespace kilotwin::recorder

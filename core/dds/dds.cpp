@@ -1,0 +1,137 @@
+#include "core/dds/dds.hpp"
+
+#include <fmt/format.h>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::dds {
+
+std::string cyclone_configuration(const Transport& transport) {
+  const bool local = transport.peers.empty();
+  std::string peers;
+  if (local) peers = R"(<Peer Address="127.0.0.1"/>)";
+  for (const std::string& peer : transport.peers) peers += fmt::format(R"(<Peer Address="{}"/>)", peer);
+  // Unicast only: `lo` has no multicast, and laboratories' switches often drop it. Messages as large as UDP allows, so
+  // that a frame is one datagram; indices beyond Cyclone's default of 9, which is the limit of processes per machine.
+  return fmt::format(
+      R"(<CycloneDDS><Domain id="any"><General>{}<AllowMulticast>false</AllowMulticast>)"
+      R"(<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>64000B</FragmentSize></General>)"
+      R"(<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>120</MaxAutoParticipantIndex>)"
+      R"(<LeaseDuration>{}ms</LeaseDuration><Peers>{}</Peers></Discovery></Domain></CycloneDDS>)",
+      local ? R"(<Interfaces><NetworkInterface name="lo"/></Interfaces>)" : "", static_cast<int>(kLease_s * 1000), peers);
+}
+
+Entity::Entity(dds_entity_t handle, const std::string& what) : handle_(handle) {
+  if (handle < 0) {
+    handle_ = 0;
+    throw RunError(fmt::format("DDS: cannot make {}: {}", what, dds_strretcode(handle)));
+  }
+}
+
+Entity& Entity::operator=(Entity&& other) noexcept {
+  std::swap(handle_, other.handle_);
+  return *this;
+}
+
+Entity::~Entity() {
+  if (handle_ > 0) dds_delete(handle_);
+}
+
+Participant::Participant(const Transport& transport)
+    : domain_(dds_create_domain(transport.domain, cyclone_configuration(transport).c_str()),
+              fmt::format("domain {}", transport.domain)),
+      participant_(dds_create_participant(transport.domain, nullptr, nullptr),
+                   fmt::format("a participant in domain {}", transport.domain)) {}
+
+namespace detail {
+namespace {
+
+struct QosDeleter {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
+
+constexpr int kFrameDepth = 8;  // federates are at most 4 ticks apart: core/federation/schedule.hpp
+
+Qos make_qos(const Channel& channel) {
+  Qos qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(10));
+  switch (channel.delivery) {
+    case Delivery::kFrame: dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kFrameDepth); break;
+    case Delivery::kRoster:
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
+      dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+      dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, static_cast<dds_duration_t>(kLease_s * 1e9));
+      break;
+    case Delivery::kLog:
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
+      dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_ALL, -1, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED,
+                                  DDS_LENGTH_UNLIMITED);
+      break;
+    case Delivery::kStatus:
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
+      dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+      break;
+    case Delivery::kRequest: dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 16); break;
+    case Delivery::kTelemetry:
+      dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
+      break;
+  }
+  return qos;
+}
+
+// A topic's QoS must agree between all who make it, so routing by partition is set on the endpoint alone.
+Entity make_topic(const Participant& participant, const Channel& channel, const dds_topic_descriptor_t* type) {
+  return {dds_create_topic(participant.get(), type, channel.topic.c_str(), nullptr, nullptr), "topic " + channel.topic};
+}
+
+Qos endpoint_qos(const Channel& channel) {
+  Qos qos = make_qos(channel);
+  if (!channel.partition.empty()) dds_qset_partition1(qos.get(), channel.partition.c_str());
+  return qos;
+}
+
+}  // namespace
+
+Endpoint make_writer(const Participant& participant, const Channel& channel, const dds_topic_descriptor_t* type) {
+  Endpoint result;
+  result.topic = make_topic(participant, channel, type);
+  result.endpoint = Entity(dds_create_writer(participant.get(), result.topic.get(), endpoint_qos(channel).get(), nullptr),
+                           "a writer of " + channel.topic);
+  return result;
+}
+
+Endpoint make_reader(const Participant& participant, const Channel& channel, const dds_topic_descriptor_t* type,
+                     const dds_listener_t* listener) {
+  Endpoint result;
+  result.topic = make_topic(participant, channel, type);
+  result.endpoint =
+      Entity(dds_create_reader(participant.get(), result.topic.get(), endpoint_qos(channel).get(), listener),
+             "a reader of " + channel.topic);
+  return result;
+}
+
+void write(dds_entity_t writer, const void* sample) {
+  if (const dds_return_t code = dds_write(writer, sample); code != DDS_RETCODE_OK) {
+    throw RunError(fmt::format("DDS: a sample could not be written: {}", dds_strretcode(code)));
+  }
+}
+
+void take_all(dds_entity_t reader, void* context, void (*each)(void*, const void*, const dds_sample_info_t&)) {
+  constexpr int kBatch = 16;
+  void* samples[kBatch] = {};
+  dds_sample_info_t infos[kBatch];
+  for (;;) {
+    samples[0] = nullptr;
+    const dds_return_t count = dds_take(reader, samples, infos, kBatch, kBatch);
+    if (count <= 0) return;
+    for (int i = 0; i < count; ++i) each(context, samples[i], infos[i]);
+    dds_return_loan(reader, samples, count);
+    if (count < kBatch) return;
+  }
+}
+
+}  // namespace detail
+}  // namespace kilotwin::dds

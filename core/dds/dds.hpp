@@ -1,0 +1,159 @@
+/// RAII over the Cyclone DDS C API: a participant, typed writers and readers, and the few QoS profiles that the project
+/// uses. Errors are RunError with Cyclone's own words.
+#pragma once
+
+#include <dds/dds.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace kilotwin::dds {
+
+/// How a participant reaches others.
+struct Transport {
+  std::uint32_t domain = 0;
+  /// Addresses of the machines that take part, this one included. Empty: everybody is on this machine, and all traffic
+  /// stays on the loopback interface.
+  std::vector<std::string> peers;
+};
+
+/// Highest domain whose UDP ports (7400 + 250 domain + ...) exist.
+inline constexpr std::uint32_t kLastDomain = 230;
+/// For how long a process may be silent until the others take it for lost, s.
+inline constexpr double kLease_s = 2.0;
+
+/// The configuration that the transport gives Cyclone, as XML.
+[[nodiscard]] std::string cyclone_configuration(const Transport&);
+
+/// Who may hear what, for how long.
+enum class Delivery {
+  kFrame,      ///< reliable, keep-last 8 per publisher, volatile: tick topics
+  kRoster,     ///< reliable, keep-last 1, transient-local, with a lease: who is here
+  kLog,        ///< reliable, keep-all, transient-local: late readers get everything
+  kStatus,     ///< reliable, keep-last 1, transient-local
+  kRequest,    ///< reliable, keep-last 16, volatile: what outsiders ask
+  kTelemetry,  ///< best effort, keep-last 1, volatile
+};
+
+/// An entity handle that deletes what it names.
+class Entity {
+ public:
+  Entity() = default;
+  /// `what` says in an error what could not be made.
+  Entity(dds_entity_t handle, const std::string& what);
+  Entity(Entity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  Entity& operator=(Entity&& other) noexcept;
+  ~Entity();
+  [[nodiscard]] dds_entity_t get() const { return handle_; }
+
+ private:
+  dds_entity_t handle_ = 0;
+};
+
+class Participant {
+ public:
+  explicit Participant(const Transport&);
+  [[nodiscard]] dds_entity_t get() const { return participant_.get(); }
+
+ private:
+  Entity domain_;
+  Entity participant_;
+};
+
+/// A topic, its delivery, and the DDS partition that routes it ("" = the default one).
+struct Channel {
+  std::string topic;
+  Delivery delivery;
+  std::string partition;
+};
+
+namespace detail {
+struct Endpoint {
+  Entity topic, endpoint;
+};
+Endpoint make_writer(const Participant&, const Channel&, const dds_topic_descriptor_t*);
+Endpoint make_reader(const Participant&, const Channel&, const dds_topic_descriptor_t*, const dds_listener_t*);
+void write(dds_entity_t writer, const void* sample);
+/// Takes what there is and hands over every sample (valid or, where an instance went away, its key alone).
+void take_all(dds_entity_t reader, void* context, void (*each)(void* context, const void* sample, const dds_sample_info_t&));
+}  // namespace detail
+
+/// The descriptor that idlc made for T; specialised in core/federation/topics.hpp.
+template <class T>
+const dds_topic_descriptor_t* descriptor();
+
+template <class T>
+class Writer {
+ public:
+  Writer(const Participant& participant, const Channel& channel)
+      : endpoint_(detail::make_writer(participant, channel, descriptor<T>())) {}
+  void write(const T& sample) { detail::write(endpoint_.endpoint.get(), &sample); }
+  /// How many readers are matched at the moment.
+  [[nodiscard]] std::uint32_t readers() const {
+    dds_publication_matched_status_t status{};
+    dds_get_publication_matched_status(endpoint_.endpoint.get(), &status);
+    return status.current_count;
+  }
+  /// Waits until every matched reader has got everything, or `seconds` have passed.
+  bool flush(double seconds) const {
+    return dds_wait_for_acks(endpoint_.endpoint.get(), static_cast<dds_duration_t>(seconds * 1e9)) == DDS_RETCODE_OK;
+  }
+
+ private:
+  detail::Endpoint endpoint_;
+};
+
+/// What a reader is told besides the sample.
+struct SampleState {
+  bool valid;  ///< all fields are set; else only the key fields
+  bool alive;  ///< the instance has a writer that lives
+};
+
+/// Calls back on Cyclone's receive thread for every sample. The callback must be short and must not throw.
+template <class T>
+class Reader {
+ public:
+  using Callback = std::function<void(const T& sample, SampleState state)>;
+
+  Reader(const Participant& participant, const Channel& channel, Callback callback)
+      : callback_(std::make_unique<Callback>(std::move(callback))) {
+    dds_listener_t* listener = dds_create_listener(callback_.get());
+    dds_lset_data_available(listener, [](dds_entity_t reader, void* context) { take(reader, context); });
+    endpoint_ = detail::make_reader(participant, channel, descriptor<T>(), listener);
+    dds_delete_listener(listener);
+  }
+
+ private:
+  static void take(dds_entity_t reader, void* context) {
+    detail::take_all(reader, context, [](void* callback, const void* sample, const dds_sample_info_t& info) {
+      (*static_cast<Callback*>(callback))(
+          *static_cast<const T*>(sample),
+          SampleState{info.valid_data, info.instance_state == DDS_ALIVE_INSTANCE_STATE});
+    });
+  }
+
+  std::unique_ptr<Callback> callback_;  // outlives the endpoint, which is deleted first
+  detail::Endpoint endpoint_;
+};
+
+/// Picks a domain that nobody on this machine uses and keeps it for this process; freed when the process ends, however it
+/// ends. Throws UserError where `wanted` is in use, RunError where all are.
+class DomainClaim {
+ public:
+  static DomainClaim any();
+  static DomainClaim exactly(std::uint32_t wanted);
+  [[nodiscard]] std::uint32_t domain() const { return domain_; }
+  DomainClaim(DomainClaim&& other) noexcept : domain_(other.domain_), socket_(std::exchange(other.socket_, -1)) {}
+  ~DomainClaim();
+
+ private:
+  DomainClaim(std::uint32_t domain, int socket) : domain_(domain), socket_(socket) {}
+  std::uint32_t domain_;
+  int socket_;
+};
+
+}  // namespace kilotwin::dds

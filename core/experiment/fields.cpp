@@ -1,0 +1,185 @@
+#include "core/experiment/fields.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/descriptor.h>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <vector>
+
+#include "core/experiment/limits.hpp"
+#include "idl/experiment.pb.h"
+#include "idl/model.pb.h"
+
+namespace kilotwin {
+namespace pb = google::protobuf;
+
+namespace {
+
+using pb::FieldDescriptor;
+
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+/// Poses stay within the largest arena, times within the longest run.
+constexpr double kLongest_mm = 1e6, kLongest_s = 1e6;
+
+constexpr FieldRule kRules[] = {
+    {"Experiment.duration_s", 0, kLongest_s, "s", Lower::kExcluded},
+    {"Experiment.seed", -kUnlimited, kUnlimited, ""},
+    {"Experiment.tick_cycles", 32768, 1048576, "cycles"},
+
+    {"Arena.width_mm", 40, kLongest_mm, "mm"},
+    {"Arena.height_mm", 40, kLongest_mm, "mm"},
+
+    {"RobotGroup.count", 1, kMostRobots, "robots"},
+    {"Layout.x_mm", -kLongest_mm, kLongest_mm, "mm"},
+    {"Layout.y_mm", -kLongest_mm, kLongest_mm, "mm"},
+    {"GridLayout.pitch_mm", 2 * kRobotRadius_mm, kLongest_mm, "mm"},
+    {"GridLayout.columns", 0, kMostRobots, "robots"},
+    {"GridLayout.heading_deg", -360, 360, "degrees"},
+    {"RingsLayout.count", 1, kMostRobots, "robots"},
+    {"RingsLayout.radius_mm", 0, kLongest_mm, "mm"},
+    {"RingsLayout.heading_deg", -360, 360, "degrees"},
+    {"RandomLayout.width_mm", 2 * kRobotRadius_mm, kLongest_mm, "mm"},
+    {"RandomLayout.height_mm", 2 * kRobotRadius_mm, kLongest_mm, "mm"},
+    {"RandomLayout.min_gap_mm", 0, kLongest_mm, "mm"},
+    {"RandomLayout.heading_deg", -360, 360, "degrees"},
+
+    // Speeds and biases up to about ten times what robots do.
+    {"Motion.straight_speed_mm_s", 0, 200, "mm/s"},
+    {"Motion.turn_speed_mm_s", 0, 200, "mm/s"},
+    {"Motion.wheel_base_mm", 0, 100, "mm", Lower::kExcluded},
+    {"Motion.axle_offset_mm", -kRobotRadius_mm, kRobotRadius_mm, "mm"},
+    {"Motion.bias_mean_mm_s", -20, 20, "mm/s"},
+    {"Motion.bias_sd_mm_s", 0, 20, "mm/s"},
+    {"Motion.factor_variance_s", 0, 10, "s"},
+    {"Motion.calibrated_straight_duty", 0, 255, ""},
+    {"Motion.calibrated_turn_duty", 0, 255, ""},
+    {"RobotModel.robot", 0, kMostRobots - 1, ""},
+    {"RobotModel.bias_left_mm_s", -100, 100, "mm/s"},
+    {"RobotModel.bias_right_mm_s", -100, 100, "mm/s"},
+
+    {"Physics.sub_steps", 1, 4, ""},
+
+    {"Radio.range_mm", 2 * kRobotRadius_mm, kUnlimited, "mm", Lower::kExcluded},
+    {"Radio.oscillator_sd", 0, 0.05, ""},
+    {"Radio.loss", 0, 1, ""},
+
+    {"Station.start_broadcast_s", 0.05, 10, "s"},
+    {"Station.packet_interval_s", 0.05, kLongest_s, "s"},
+    {"HubEnvironment.x_mm", -kLongest_mm, kLongest_mm, "mm"},
+    {"HubEnvironment.y_mm", -kLongest_mm, kLongest_mm, "mm"},
+    {"HubEnvironment.radius_mm", 0, kUnlimited, "mm", Lower::kExcluded},
+
+    {"Recording.every_s", 0, kLongest_s, "s", Lower::kExcluded},
+
+    {"Deployment.partition_columns", 1, 64, ""},
+    {"Deployment.partition_rows", 1, 64, ""},
+    {"Deployment.hosts", 1, 64, ""},
+    {"Deployment.checkpoint_every_s", 0, kLongest_s, "s"},
+};
+
+using RuleTable = std::map<const FieldDescriptor*, const FieldRule*>;
+
+RuleTable rules_by_field() {
+  const pb::FileDescriptor* const files[] = {proto::Experiment::descriptor()->file(), proto::Model::descriptor()->file()};
+  RuleTable table;
+  for (const FieldRule& rule : kRules) {
+    const std::size_t dot = rule.field.find('.');
+    for (const pb::FileDescriptor* file : files) {
+      const pb::Descriptor* type = file->FindMessageTypeByName(std::string{rule.field.substr(0, dot)});
+      if (type == nullptr) continue;
+      if (const FieldDescriptor* field = type->FindFieldByName(std::string{rule.field.substr(dot + 1)})) table[field] = &rule;
+    }
+  }
+  return table;
+}
+
+/// Levenshtein's distance; swapped neighbours count as one.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1), row(b.size() + 1), next(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    next[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      next[j] = std::min({row[j] + 1, next[j - 1] + 1, row[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) next[j] = std::min(next[j], before[j - 2] + 1);
+    }
+    before.swap(row);
+    row.swap(next);
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::span<const FieldRule> field_rules() { return kRules; }
+
+const FieldRule* rule_of(const FieldDescriptor& field) {
+  static const RuleTable table = rules_by_field();
+  const auto found = table.find(&field);
+  return found == table.end() ? nullptr : found->second;
+}
+
+std::string number_text(double value) { return fmt::format("{:.15g}", value); }
+
+std::string range_text(const FieldRule& rule) {
+  if (rule.min == -kUnlimited && rule.max == kUnlimited) return "any";
+  const bool open = rule.lower == Lower::kExcluded;
+  const std::string min = number_text(rule.min), max = number_text(rule.max);
+  if (rule.max == kUnlimited) return (open ? "above " : "at least ") + min;
+  return open ? fmt::format("above {}, at most {}", min, max) : fmt::format("{}..{}", min, max);
+}
+
+std::string value_text(const FieldDescriptor& field) {
+  std::string text;
+  switch (field.cpp_type()) {
+    case FieldDescriptor::CPPTYPE_MESSAGE: return fmt::format("a block, {} {{ ... }}", field.name());
+    case FieldDescriptor::CPPTYPE_BOOL: return "true or false";
+    case FieldDescriptor::CPPTYPE_STRING: return "text in quotes";
+    case FieldDescriptor::CPPTYPE_ENUM:
+      text = field.enum_type()->value_count() > 1 ? "one of " : "";
+      for (int i = 0; i < field.enum_type()->value_count(); ++i) text += (i ? ", " : "") + field.enum_type()->value(i)->name();
+      return text;
+    case FieldDescriptor::CPPTYPE_DOUBLE: text = "a number"; break;
+    default: text = "a whole number"; break;
+  }
+  const FieldRule* const rule = rule_of(field);
+  if (rule == nullptr || range_text(*rule) == "any") return text;
+  return fmt::format("{}, {}{}{}", text, range_text(*rule), rule->unit.empty() ? "" : " ", rule->unit);
+}
+
+std::string default_text(const FieldDescriptor& field) {
+  if (!field.has_default_value()) return "";
+  switch (field.cpp_type()) {
+    case FieldDescriptor::CPPTYPE_BOOL: return field.default_value_bool() ? "true" : "false";
+    case FieldDescriptor::CPPTYPE_STRING: return field.default_value_string();
+    case FieldDescriptor::CPPTYPE_ENUM: return field.default_value_enum()->name();
+    case FieldDescriptor::CPPTYPE_UINT32: return std::to_string(field.default_value_uint32());
+    case FieldDescriptor::CPPTYPE_UINT64: return std::to_string(field.default_value_uint64());
+    case FieldDescriptor::CPPTYPE_DOUBLE: return number_text(field.default_value_double());
+    default: return "";
+  }
+}
+
+std::string field_names(const pb::Descriptor& type) {
+  std::string names;
+  for (int i = 0; i < type.field_count(); ++i) names += (i ? ", " : "") + type.field(i)->name();
+  return names;
+}
+
+std::string field_suggestion(std::string_view wrong, const pb::Descriptor& type) {
+  constexpr std::size_t kLongestName = 64;
+  if (wrong.size() > kLongestName) return "its fields are " + field_names(type);
+  std::string nearest;
+  std::size_t best = std::max<std::size_t>(2, wrong.size() / 3) + 1;
+  for (int i = 0; i < type.field_count(); ++i) {
+    const std::size_t distance = edit_distance(wrong, type.field(i)->name());
+    if (distance >= std::min(best, type.field(i)->name().size())) continue;
+    best = distance;
+    nearest = type.field(i)->name();
+  }
+  return nearest.empty() ? "its fields are " + field_names(type) : fmt::format("did you mean {}?", nearest);
+}
+
+}  // namespace kilotwin

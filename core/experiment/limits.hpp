@@ -1,0 +1,17 @@
+/// Limits of an experiment that are no range of one field.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/pose.hpp"
+
+namespace kilotwin {
+
+inline constexpr std::uint32_t kMostRobots = 100'000;  ///< in all groups together
+inline constexpr int kMostGroups = 256;
+/// ARK messages carry 10-bit robot ids, and 1023 marks an unused slot.
+inline constexpr std::uint32_t kMostArkRobots = 1022;
+/// Robots' centres may be this much closer than a diameter, for rounding's sake, mm.
+inline constexpr double kTouchTolerance_mm = 1e-6;
+
+}  // namespace kilotwin

@@ -1,0 +1,169 @@
+#include "core/federation/checkpoint.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+
+namespace kilotwin {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint32_t kFormat = 1;
+
+std::uint64_t hash_bytes(const std::string& bytes) {
+  std::uint64_t h = hash_mix(bytes.size() + 1, 0x9e3779b97f4a7c15u);
+  for (std::size_t i = 0; i < bytes.size(); i += 8) {
+    std::uint64_t word = 0;
+    for (std::size_t j = i; j < std::min(i + 8, bytes.size()); ++j) {
+      word |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[j])) << (8 * (j - i));
+    }
+    h = hash_chain(h, word);
+  }
+  return h;
+}
+
+std::string deterministic_bytes(const google::protobuf::Message& message) {
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    message.SerializeToCodedStream(&coded);
+  }
+  return bytes;
+}
+
+template <class State>
+std::vector<const State*> pick(const Checkpoint& checkpoint, bool (proto::CheckpointPart::*has)() const,
+                               const State& (proto::CheckpointPart::*get)() const) {
+  std::vector<const State*> result;
+  for (const proto::CheckpointPart& part : checkpoint.parts) {
+    if ((part.*has)()) result.push_back(&(part.*get)());
+  }
+  return result;
+}
+
+std::vector<fs::path> part_files(const fs::path& directory) {
+  std::vector<fs::path> files;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(directory, ignored)) {
+    if (entry.path().extension() == ".part") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+proto::CheckpointPart read_part(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  proto::CheckpointPart part;
+  if (!stream || !part.ParseFromIstream(&stream) || part.header().format() != kFormat) {
+    throw UserError(fmt::format("{}: not a part of a checkpoint that this program wrote; resume from another one", file.string()));
+  }
+  return part;
+}
+
+}  // namespace
+
+std::uint64_t Checkpoint::hash_chain() const {
+  for (const proto::StationState* state : station()) return state->hash_chain();
+  return 0;
+}
+
+std::vector<const proto::PhysicsState*> Checkpoint::physics() const {
+  return pick(*this, &proto::CheckpointPart::has_physics, &proto::CheckpointPart::physics);
+}
+std::vector<const proto::RadioState*> Checkpoint::radio() const {
+  return pick(*this, &proto::CheckpointPart::has_radio, &proto::CheckpointPart::radio);
+}
+std::vector<const proto::StationState*> Checkpoint::station() const {
+  return pick(*this, &proto::CheckpointPart::has_station, &proto::CheckpointPart::station);
+}
+std::vector<const proto::BehavioursState*> Checkpoint::behaviours() const {
+  return pick(*this, &proto::CheckpointPart::has_behaviours, &proto::CheckpointPart::behaviours);
+}
+
+std::uint64_t resumable_hash(const proto::Manifest& manifest) {
+  proto::Manifest core;
+  *core.mutable_experiment() = manifest.experiment();
+  core.mutable_experiment()->clear_name();
+  core.mutable_experiment()->clear_duration_s();
+  core.mutable_experiment()->clear_recording();
+  core.mutable_experiment()->clear_deployment();
+  for (proto::RobotGroup& group : *core.mutable_experiment()->mutable_robots()) group.clear_behaviour();
+  *core.mutable_program() = manifest.program();
+  for (proto::Program& program : *core.mutable_program()) program.clear_path();
+  *core.mutable_group_program() = manifest.group_program();
+  return hash_bytes(deterministic_bytes(core));
+}
+
+void write_checkpoint_part(const fs::path& run_directory, const RunPlan& plan, Tick tick, FederateId id,
+                           proto::CheckpointPart& part) {
+  proto::CheckpointHeader& header = *part.mutable_header();
+  header.set_format(kFormat);
+  header.set_run(plan.run());
+  header.set_tick(tick.count());
+  header.set_federate(plan.name(id));
+  header.set_parts(plan.federates());
+  header.set_experiment_hash(resumable_hash(plan.manifest));
+
+  const fs::path directory = run_directory / "checkpoints" / fmt::format("{:010}", tick.count());
+  const fs::path file = directory / fmt::format("{:04}.part", id.value());
+  const fs::path unfinished = directory / fmt::format("{:04}.{}", id.value(), getpid());
+  std::error_code ignored;
+  fs::create_directories(directory, ignored);
+  {
+    std::ofstream stream(unfinished, std::ios::binary);
+    if (!part.SerializeToOstream(&stream) || !stream.flush()) {
+      fs::remove(unfinished, ignored);
+      throw RunError(fmt::format("{}: the checkpoint cannot be written", file.string()));
+    }
+  }
+  std::error_code error;
+  fs::rename(unfinished, file, error);
+  if (error) throw RunError(fmt::format("{}: the checkpoint cannot be written: {}", file.string(), error.message()));
+}
+
+fs::path newest_checkpoint(const fs::path& run_directory) {
+  std::vector<fs::path> directories;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(run_directory / "checkpoints", ignored)) {
+    if (entry.is_directory()) directories.push_back(entry.path());
+  }
+  std::sort(directories.rbegin(), directories.rend());
+  for (const fs::path& directory : directories) {
+    const std::vector<fs::path> files = part_files(directory);
+    if (!files.empty() && read_part(files.front()).header().parts() == files.size()) return directory;
+  }
+  throw UserError(fmt::format("{}: no complete checkpoint; run with --checkpoint-every S to get some", run_directory.string()));
+}
+
+Checkpoint read_checkpoint(const fs::path& directory, const proto::Manifest& manifest) {
+  Checkpoint checkpoint;
+  for (const fs::path& file : part_files(directory)) {
+    proto::CheckpointPart part = read_part(file);
+    const proto::CheckpointHeader& header = part.header();
+    if (checkpoint.parts.empty()) checkpoint.tick = Tick{header.tick()};
+    if (header.tick() != checkpoint.tick.count()) {
+      throw UserError(fmt::format("{}: saved at tick {}, the other parts at {}", file.string(), header.tick(), checkpoint.tick.count()));
+    }
+    if (header.experiment_hash() != resumable_hash(manifest)) {
+      throw UserError(fmt::format("{}: saved by another experiment; only length, division, recording and checkpoints may differ",
+                                  file.string()));
+    }
+    checkpoint.parts.push_back(std::move(part));
+  }
+  if (checkpoint.parts.empty() || checkpoint.parts.size() != checkpoint.parts.front().header().parts()) {
+    throw UserError(fmt::format("{}: not a complete checkpoint; resume from another one", directory.string()));
+  }
+  return checkpoint;
+}
+
+}  // namespace kilotwin

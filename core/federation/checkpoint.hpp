@@ -1,0 +1,40 @@
+/// Checkpoints on disk: RUN/checkpoints/TICK/ holds one file per part, each put there whole. A checkpoint is complete when
+/// all its parts are there.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/experiment/plan.hpp"
+#include "idl/checkpoint.pb.h"
+
+namespace kilotwin {
+
+struct Checkpoint {
+  Tick tick;
+  std::vector<proto::CheckpointPart> parts;
+  /// H at `tick`.
+  [[nodiscard]] std::uint64_t hash_chain() const;
+  /// One kind of state out of all parts, as engines' load() takes it.
+  [[nodiscard]] std::vector<const proto::PhysicsState*> physics() const;
+  [[nodiscard]] std::vector<const proto::RadioState*> radio() const;
+  [[nodiscard]] std::vector<const proto::StationState*> station() const;
+  [[nodiscard]] std::vector<const proto::BehavioursState*> behaviours() const;
+};
+
+/// Names what a checkpoint can be resumed by: the experiment without what may differ (length, division, recording).
+[[nodiscard]] std::uint64_t resumable_hash(const proto::Manifest& manifest);
+
+/// Writes `part` (its header is filled in here) of the checkpoint of `tick`, saved by federate `id` of the plan.
+/// Throws RunError.
+void write_checkpoint_part(const std::filesystem::path& run_directory, const RunPlan& plan, Tick tick, FederateId id,
+                           proto::CheckpointPart& part);
+
+/// Directory of the newest complete checkpoint of a run. Throws UserError where there is none.
+[[nodiscard]] std::filesystem::path newest_checkpoint(const std::filesystem::path& run_directory);
+
+/// Throws UserError where it is incomplete, damaged, or of another experiment than the manifest's.
+[[nodiscard]] Checkpoint read_checkpoint(const std::filesystem::path& directory, const proto::Manifest& manifest);
+
+}  // namespace kilotwin

@@ -1,0 +1,116 @@
+/// A federate's inputs and outputs: rings of frames that receive threads fill, and writers of frames.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <array>
+#include <span>
+
+#include "core/base/error.hpp"
+#include "core/federation/session.hpp"
+
+namespace kilotwin {
+
+class InputBase {
+ public:
+  explicit InputBase(Session& session, std::vector<FederateId> publishers)
+      : session_(session), gate_(std::move(publishers), session.first()) {
+    session_.inputs_.push_back(this);
+  }
+  virtual ~InputBase() = default;
+  InputBase(const InputBase&) = delete;
+  [[nodiscard]] const TickGate& gate() const { return gate_; }
+
+ protected:
+  Session& session_;
+  TickGate gate_;  // guarded by the session's mutex
+};
+
+/// The frames of one topic from a fixed set of publishers.
+template <class Frame>
+class Input : public InputBase {
+ public:
+  using Wire = typename WireOf<Frame>::Type;
+
+  Input(Session& session, const dds::Channel& channel, std::vector<FederateId> publishers)
+      : InputBase(session, std::move(publishers)),
+        rings_(gate_.publishers().size()),
+        current_(gate_.publishers().size()),
+        topic_(channel.topic) {
+    reader_ = std::make_unique<dds::Reader<Wire>>(
+        session.participant(), channel, [this](const Wire& wire, dds::SampleState state) { take(wire, state); });
+  }
+
+  /// The frames of `tick`, by ascending publisher; they stay until the session asks for the next tick.
+  std::span<const Frame* const> at(Tick tick) {
+    for (std::size_t i = 0; i < rings_.size(); ++i) {
+      current_[i] = &rings_[i][static_cast<std::size_t>(tick.count() % kFrameRing)];
+      KILOTWIN_DEMAND(current_[i]->tick == tick);
+    }
+    return current_;
+  }
+
+ private:
+  void take(const Wire& wire, dds::SampleState state) {
+    if (!state.valid || wire.run != session_.plan().run()) return;
+    const std::lock_guard lock(session_.mutex());
+    const FederateId publisher{wire.publisher};
+    if (wire.tick < 0) {
+      gate_.hello(publisher);
+    } else {
+      switch (gate_.arrived(publisher, Tick{wire.tick})) {
+        case TickGate::Arrival::kRepeated: return;
+        case TickGate::Arrival::kUnexpected:
+          return session_.fail(fmt::format("{}: frame {} of federate {} was not expected", topic_, wire.tick, wire.publisher));
+        case TickGate::Arrival::kAccepted: break;
+      }
+      const auto index = static_cast<std::size_t>(gate_.index_of(publisher));
+      if (!from_wire(wire, rings_[index][static_cast<std::size_t>(wire.tick % kFrameRing)])) {
+        return session_.fail(fmt::format("{}: frame {} of {} is malformed", topic_, wire.tick, session_.plan().name(publisher)));
+      }
+      session_.mention(wire.directives);
+    }
+    session_.notify();
+  }
+
+  std::vector<std::array<Frame, kFrameRing>> rings_;
+  std::vector<const Frame*> current_;
+  std::string topic_;
+  std::unique_ptr<dds::Reader<Wire>> reader_;  // last: stops calling back before the rings go
+};
+
+class OutputBase {
+ public:
+  explicit OutputBase(Session& session) : session_(session) { session_.outputs_.push_back(this); }
+  virtual ~OutputBase() = default;
+  OutputBase(const OutputBase&) = delete;
+  virtual void hello() = 0;
+  virtual bool flush(double seconds) const = 0;
+
+ protected:
+  Session& session_;
+};
+
+template <class Frame>
+class Output : public OutputBase {
+ public:
+  using Wire = typename WireOf<Frame>::Type;
+
+  Output(Session& session, const dds::Channel& channel) : OutputBase(session), writer_(session.participant(), channel) {}
+
+  /// To be filled by the engine's emit, then sent with write(). Its arrays are reused from tick to tick.
+  Frame frame;
+  void write() { writer_.write(to_wire(session_.header(), frame)); }
+
+  void hello() override {
+    Frame nothing{};
+    nothing.tick = Tick{-1};
+    writer_.write(to_wire(session_.header(), nothing));
+  }
+  bool flush(double seconds) const override { return writer_.flush(seconds); }
+
+ private:
+  dds::Writer<Wire> writer_;
+};
+
+}  // namespace kilotwin

@@ -1,0 +1,20 @@
+#include "core/federation/interrupt.hpp"
+
+#include <csignal>
+
+namespace kilotwin {
+namespace {
+volatile std::sig_atomic_t received_signal = 0;
+}  // namespace
+
+void catch_interrupts() {
+  struct sigaction action{};
+  action.sa_handler = [](int signal) { received_signal = signal; };
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+int interrupted() { return received_signal; }
+
+}  // namespace kilotwin

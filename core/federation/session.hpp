@@ -1,0 +1,132 @@
+/// A federate's part in a federated run: it finds the others, steps when its inputs are in, and leaves in order.
+///
+///   assemble   write hellos on all outputs until everybody hears everybody (a reliable reader drops what it is sent before
+///              the first heartbeat of a writer; the hellos get that over with)
+///   loop       publish frames of tick k, wait for the inputs of tick k, step
+///   leave      wait until everything sent is acknowledged, say FINISHED
+///
+/// Any wait over 1 s says for whom. A federate that is lost, or that fails, ends the session of all others with a RunError
+/// that names it.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/dds/dds.hpp"
+#include "core/experiment/plan.hpp"
+#include "core/federation/schedule.hpp"
+#include "core/federation/tick_gate.hpp"
+#include "core/federation/wire.hpp"
+
+namespace kilotwin {
+
+/// What the session drives.
+class Federate {
+ public:
+  virtual ~Federate() = default;
+  /// Write the frames of `now`.
+  virtual void publish(Tick now) = 0;
+  /// All inputs of `now` are here; `last`: the run ends here, else the step from it follows.
+  virtual void inputs_complete(Tick now, bool last) { static_cast<void>(now), static_cast<void>(last); }
+  /// Advance the engine from `from` to the next tick.
+  virtual void step(Tick from) = 0;
+  /// This federate's share of h(now).
+  [[nodiscard]] virtual std::uint64_t hash_part() const = 0;
+  /// Write this federate's part of the checkpoint of `now`.
+  virtual void save(Tick now) = 0;
+  /// Add what is counted; `last`: nothing follows. Sequences must outlive the call.
+  virtual void count(WireLedger& ledger, bool last) { static_cast<void>(ledger), static_cast<void>(last); }
+  /// Called about every 100 ms while the session waits, and about as often while it steps.
+  virtual void idle() {}
+};
+
+class Session {
+ public:
+  /// `first`: the tick at which the run starts (0, or that of a checkpoint).
+  Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first);
+  ~Session();
+
+  /// Runs `federate` to the end of the run. Throws RunError where another federate is lost or failed, or the run was
+  /// interrupted, and UserError where another run is on the domain.
+  void run(Federate& federate);
+
+  [[nodiscard]] const RunPlan& plan() const { return plan_; }
+  [[nodiscard]] FederateId self() const { return self_; }
+  [[nodiscard]] const dds::Participant& participant() const { return participant_; }
+  [[nodiscard]] Tick first() const { return first_; }
+  /// Valid on the session's own thread.
+  [[nodiscard]] const RunSchedule& schedule() const { return schedule_; }
+  [[nodiscard]] Tick now() const { return now_; }
+  [[nodiscard]] WireHeader header() const { return {self_.value(), plan_.run(), known_}; }
+  /// One line: for whom the session waits; empty while it does not.
+  [[nodiscard]] std::string waiting_for() const { return waiting_for_; }
+  [[nodiscard]] bool paused() const { return paused_; }
+  /// Wall seconds since the first tick, pauses excluded.
+  [[nodiscard]] double wall_s() const;
+
+  /// Called from receive threads: guards what they write.
+  [[nodiscard]] std::mutex& mutex() { return mutex_; }
+  void notify() { arrived_.notify_one(); }
+  void mention(std::uint64_t directives) { schedule_.mention(directives); }  ///< with the mutex held
+  void fail(const std::string& line);                                          ///< with the mutex held
+  /// The ingress announces a directive (station only, own thread).
+  void announce(const Directive& directive);
+
+ private:
+  friend class InputBase;
+  friend class OutputBase;
+  struct Peer {
+    bool here = false, alive = false;
+    kilotwin_wire_MemberPhase phase = kilotwin_wire_ARRIVING;
+  };
+
+  void assemble(Federate&);
+  RunSchedule::Verdict await(Federate&, Tick now);
+  void write_member(kilotwin_wire_MemberPhase phase, const std::string& failure = {});
+  void on_member(const WireMember& member, dds::SampleState state);
+  void write_ledger(Federate&, bool last);
+  void save_once(Federate&, Tick now);
+  void check() const;
+  void complain(std::chrono::steady_clock::time_point since, const std::string& whom);
+  void leave(Federate&);
+  [[nodiscard]] std::string names(const std::vector<FederateId>&) const;
+
+  const RunPlan& plan_;
+  const FederateId self_;
+  const Tick first_;
+  Tick now_;
+  std::mutex mutex_;
+  std::condition_variable arrived_;
+  RunSchedule schedule_;          // log and mentions guarded by mutex_
+  std::uint32_t known_ = 0;       // schedule_.known() as of the last look: what own frames mention
+  std::string failure_;
+  bool failure_is_user_error_ = false;
+  std::string waiting_for_;
+  std::chrono::steady_clock::time_point next_complaint_, next_idle_;
+  bool paused_ = false;
+  std::vector<Peer> peers_;
+  std::vector<class InputBase*> inputs_;
+  std::vector<class OutputBase*> outputs_;
+  std::vector<std::uint64_t> hash_parts_;
+  Tick hash_first_;               // of hash_parts_
+  Tick saved_{-1};                // the last checkpoint
+  std::uint64_t step_ns_ = 0, exchange_ns_ = 0, wait_ns_ = 0, paused_ns_ = 0;
+  std::optional<std::chrono::steady_clock::time_point> started_, ended_;
+  bool finished_ = false;
+
+  dds::Participant participant_;  // before the endpoints, so that it outlives them
+  std::unique_ptr<dds::Writer<WireMember>> member_writer_;
+  std::unique_ptr<dds::Reader<WireMember>> member_reader_;
+  std::unique_ptr<dds::Writer<WireDirective>> directive_writer_;
+  std::unique_ptr<dds::Reader<WireDirective>> directive_reader_;
+  std::unique_ptr<dds::Writer<WireLedger>> ledger_writer_;
+};
+
+}  // namespace kilotwin

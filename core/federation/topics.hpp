@@ -1,0 +1,66 @@
+/// Every topic of the project: its type, its name and how it is delivered. The one place where names are spelled.
+#pragma once
+
+#include "core/dds/dds.hpp"
+#include "frames.h"
+#include "public.h"
+#include "session.h"
+
+namespace kilotwin {
+
+// Types of idl/, as idlc names them.
+using WireBodyFrame = kilotwin_wire_BodyFrame;
+using WireActuationFrame = kilotwin_wire_ActuationFrame;
+using WireRadioFrame = kilotwin_wire_RadioFrame;
+using WireOverheadFrame = kilotwin_wire_OverheadFrame;
+using WireMember = kilotwin_wire_Member;
+using WireDirective = kilotwin_wire_Directive;
+using WireLedger = kilotwin_wire_Ledger;
+using PublicRunControl = kilotwin_open_RunControl;
+using PublicOverheadPacket = kilotwin_open_OverheadPacket;
+using PublicTrackedPose = kilotwin_open_TrackedPose;
+using PublicRunStatus = kilotwin_open_RunStatus;
+using PublicRobotState = kilotwin_open_RobotState;
+
+namespace topics {
+
+using dds::Channel;
+using dds::Delivery;
+
+/// Poses of the robots that a partition owns, to the radio and the station.
+inline Channel bodies() { return {"kilotwin/bodies", Delivery::kFrame, ""}; }
+/// Bodies near the border, to the partition `to` alone.
+inline Channel ghosts(std::uint32_t to) { return {"kilotwin/ghosts", Delivery::kFrame, "to." + std::to_string(to)}; }
+inline Channel actuation() { return {"kilotwin/actuation", Delivery::kFrame, ""}; }
+/// What the radio tells the host `to`.
+inline Channel radio(std::uint32_t to) { return {"kilotwin/radio", Delivery::kFrame, "to." + std::to_string(to)}; }
+inline Channel overhead() { return {"kilotwin/overhead", Delivery::kFrame, ""}; }
+
+inline Channel members() { return {"kilotwin/members", Delivery::kRoster, ""}; }
+inline Channel directives() { return {"kilotwin/directives", Delivery::kLog, ""}; }
+inline Channel ledgers() { return {"kilotwin/ledgers", Delivery::kLog, ""}; }
+
+inline Channel run_control() { return {"kilotwin/run_control", Delivery::kRequest, ""}; }
+inline Channel overhead_packets() { return {"kilotwin/overhead_packets", Delivery::kRequest, ""}; }
+inline Channel tracked_poses() { return {"kilotwin/tracked_poses", Delivery::kRequest, ""}; }
+inline Channel run_status() { return {"kilotwin/run_status", Delivery::kStatus, ""}; }
+inline Channel robots() { return {"kilotwin/robots", Delivery::kTelemetry, ""}; }
+
+}  // namespace topics
+
+namespace dds {
+template <> inline const dds_topic_descriptor_t* descriptor<WireBodyFrame>() { return &kilotwin_wire_BodyFrame_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireActuationFrame>() { return &kilotwin_wire_ActuationFrame_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireRadioFrame>() { return &kilotwin_wire_RadioFrame_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireOverheadFrame>() { return &kilotwin_wire_OverheadFrame_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireMember>() { return &kilotwin_wire_Member_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireDirective>() { return &kilotwin_wire_Directive_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireLedger>() { return &kilotwin_wire_Ledger_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRunControl>() { return &kilotwin_open_RunControl_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<PublicOverheadPacket>() { return &kilotwin_open_OverheadPacket_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackedPose>() { return &kilotwin_open_TrackedPose_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRunStatus>() { return &kilotwin_open_RunStatus_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRobotState>() { return &kilotwin_open_RobotState_desc; }
+}  // namespace dds
+
+}  // namespace kilotwin

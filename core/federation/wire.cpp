@@ -1,0 +1,135 @@
+#include "core/federation/wire.hpp"
+
+#include <cstring>
+
+namespace kilotwin {
+namespace {
+
+static_assert(sizeof(IrMessage) == 10);
+static_assert(sizeof(OverheadPacket) == 11 && alignof(OverheadPacket) == 1);
+
+// A wire sequence that borrows `count` elements; Cyclone reads it and neither writes nor frees.
+template <class Sequence, class T>
+Sequence borrow(const T* data, std::size_t count) {
+  using Element = std::remove_pointer_t<decltype(Sequence::_buffer)>;
+  Sequence sequence{};
+  sequence._length = sequence._maximum = static_cast<std::uint32_t>(count * sizeof(T) / sizeof(Element));
+  sequence._buffer = const_cast<Element*>(reinterpret_cast<const Element*>(data));
+  sequence._release = false;
+  return sequence;
+}
+
+template <class Sequence, class T>
+Sequence borrow(const std::vector<T>& values) {
+  return borrow<Sequence>(values.data(), values.size());
+}
+
+// Copies a wire sequence into a vector of T; false where it does not hold whole Ts.
+template <class Sequence, class T>
+bool copy(const Sequence& sequence, std::vector<T>& values) {
+  constexpr std::size_t per_value = sizeof(T) / sizeof(*Sequence::_buffer);
+  if (sequence._length % per_value != 0) return false;
+  values.resize(sequence._length / per_value);
+  if (sequence._length != 0) std::memcpy(static_cast<void*>(values.data()), sequence._buffer, values.size() * sizeof(T));
+  return true;
+}
+
+using Octets = kilotwin_wire_Octets;
+using Shorts = kilotwin_wire_Shorts;
+using UShorts = kilotwin_wire_UShorts;
+using ULongs = kilotwin_wire_ULongs;
+using Doubles = kilotwin_wire_Doubles;
+
+template <class Wire>
+Wire headed(const WireHeader& header, Tick tick) {
+  Wire wire{};
+  wire.publisher = header.publisher;
+  wire.run = header.run;
+  wire.directives = header.directives;
+  wire.tick = tick.count();
+  return wire;
+}
+
+}  // namespace
+
+WireBodyFrame to_wire(const WireHeader& header, const BodyFrame& frame) {
+  auto wire = headed<WireBodyFrame>(header, frame.tick);
+  wire.robot = borrow<ULongs>(frame.robot);
+  wire.x_mm = borrow<Doubles>(frame.x_mm);
+  wire.y_mm = borrow<Doubles>(frame.y_mm);
+  wire.heading_rad = borrow<Doubles>(frame.heading_rad);
+  return wire;
+}
+
+bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
+  frame.tick = Tick{wire.tick};
+  const bool whole = copy(wire.robot, frame.robot) && copy(wire.x_mm, frame.x_mm) && copy(wire.y_mm, frame.y_mm) &&
+                     copy(wire.heading_rad, frame.heading_rad);
+  const std::size_t n = frame.robot.size();
+  return whole && frame.x_mm.size() == n && frame.y_mm.size() == n && frame.heading_rad.size() == n;
+}
+
+WireActuationFrame to_wire(const WireHeader& header, const ActuationFrame& frame) {
+  auto wire = headed<WireActuationFrame>(header, frame.tick);
+  wire.first_robot = frame.first_robot;
+  wire.motor_left = borrow<Octets>(frame.motor_left);
+  wire.motor_right = borrow<Octets>(frame.motor_right);
+  wire.led = borrow<Octets>(frame.led);
+  wire.life_cycle = borrow<Octets>(frame.life_cycle);
+  wire.tx_period = borrow<UShorts>(frame.tx_period);
+  wire.offer_robot = borrow<ULongs>(frame.offer_robot);
+  wire.offer_message = borrow<Octets>(frame.offer_message);
+  return wire;
+}
+
+bool from_wire(const WireActuationFrame& wire, ActuationFrame& frame) {
+  frame.tick = Tick{wire.tick};
+  frame.first_robot = wire.first_robot;
+  const bool whole = copy(wire.motor_left, frame.motor_left) && copy(wire.motor_right, frame.motor_right) &&
+                     copy(wire.led, frame.led) && copy(wire.life_cycle, frame.life_cycle) &&
+                     copy(wire.tx_period, frame.tx_period) && copy(wire.offer_robot, frame.offer_robot) &&
+                     copy(wire.offer_message, frame.offer_message);
+  const std::size_t n = frame.motor_left.size();
+  return whole && frame.motor_right.size() == n && frame.led.size() == n && frame.life_cycle.size() == n &&
+         frame.tx_period.size() == n && frame.offer_message.size() == frame.offer_robot.size();
+}
+
+WireRadioFrame to_wire(const WireHeader& header, const RadioFrame& frame) {
+  auto wire = headed<WireRadioFrame>(header, frame.tick);
+  wire.first_robot = frame.first_robot;
+  wire.kilo_ticks = borrow<Octets>(frame.kilo_ticks);
+  wire.ask = borrow<ULongs>(frame.ask);
+  wire.sent = borrow<ULongs>(frame.sent);
+  wire.reception_robot = borrow<ULongs>(frame.reception_robot);
+  wire.reception_message = borrow<UShorts>(frame.reception_message);
+  wire.reception_high_gain = borrow<Shorts>(frame.reception_high_gain);
+  wire.reception_low_gain = borrow<Shorts>(frame.reception_low_gain);
+  wire.messages = borrow<Octets>(frame.messages);
+  return wire;
+}
+
+bool from_wire(const WireRadioFrame& wire, RadioFrame& frame) {
+  frame.tick = Tick{wire.tick};
+  frame.first_robot = wire.first_robot;
+  const bool whole = copy(wire.kilo_ticks, frame.kilo_ticks) && copy(wire.ask, frame.ask) &&
+                     copy(wire.sent, frame.sent) && copy(wire.reception_robot, frame.reception_robot) &&
+                     copy(wire.reception_message, frame.reception_message) &&
+                     copy(wire.reception_high_gain, frame.reception_high_gain) &&
+                     copy(wire.reception_low_gain, frame.reception_low_gain) && copy(wire.messages, frame.messages);
+  const std::size_t n = frame.reception_robot.size();
+  return whole && frame.reception_message.size() == n && frame.reception_high_gain.size() == n &&
+         frame.reception_low_gain.size() == n;
+}
+
+WireOverheadFrame to_wire(const WireHeader& header, const OverheadFrame& frame) {
+  auto wire = headed<WireOverheadFrame>(header, frame.tick);
+  wire.packet = borrow<Octets>(frame.packets);
+  return wire;
+}
+
+bool from_wire(const WireOverheadFrame& wire, OverheadFrame& frame) {
+  frame.tick = Tick{wire.tick};
+  return copy(wire.packet, frame.packets);
+}
+
+}  // namespace kilotwin

@@ -1,0 +1,49 @@
+/// The books of a federated run: what the federates' ledgers add up to.
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <vector>
+
+#include "core/experiment/plan.hpp"
+#include "core/federation/hash_book.hpp"
+#include "core/federation/run_observer.hpp"
+#include "core/federation/topics.hpp"
+
+namespace kilotwin::ark {
+
+class RunBooks {
+ public:
+  /// `chain`: H(first - 1).
+  RunBooks(const RunPlan& plan, const dds::Participant& participant, Tick first, std::uint64_t chain);
+
+  /// Calls back with every H that has become known.
+  void advance(const std::function<void(Tick, std::uint64_t chain)>& each);
+  /// The last tick whose H is known, and that H.
+  [[nodiscard]] Tick hash_tick() const { return hashes_.tick(); }
+  [[nodiscard]] std::uint64_t chain() const { return hashes_.chain(); }
+  /// Every federate has sent its last ledger.
+  [[nodiscard]] bool complete();
+  /// What the ledgers say so far; the fields that they do not know are left alone.
+  void fill(RunTotals& totals);
+
+ private:
+  struct Account {
+    bool last = false;
+    std::uint64_t step_ns = 0, exchange_ns = 0, cpu_ns = 0;
+    std::uint32_t peak_memory_kib = 0, robots_failed = 0;
+    std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
+    std::vector<PairCount> pairs;
+  };
+  void on_ledger(const WireLedger&);
+  [[nodiscard]] Work work_of(std::uint32_t federate) const;
+
+  const RunPlan& plan_;
+  HashBook hashes_;                   // own thread
+  std::mutex mutex_;                  // guards what follows
+  std::vector<Account> accounts_;
+  std::vector<std::pair<Tick, std::vector<std::uint64_t>>> parts_;  // not yet in hashes_
+  dds::Reader<WireLedger> reader_;
+};
+
+}  // namespace kilotwin::ark

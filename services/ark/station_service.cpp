@@ -1,0 +1,223 @@
+#include "services/ark/station_service.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <deque>
+#include <thread>
+
+#include "core/base/error.hpp"
+#include "core/federation/frame_io.hpp"
+#include "core/federation/interrupt.hpp"
+#include "core/federation/pace.hpp"
+#include "services/ark/outside.hpp"
+#include "services/ark/run_books.hpp"
+#include "services/ark/station_engine.hpp"
+
+namespace kilotwin::ark {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// For how long the station waits for the other federates' last ledgers, s.
+constexpr double kBooksPatience_s = 5.0;
+/// A checkpoint asks for H of a tick at most one ledger (32 ticks) after it has become known.
+constexpr std::size_t kRecentHashes = 128;
+/// How often observers get robots' states, wall time.
+constexpr auto kRobotsPeriod = std::chrono::milliseconds(100);
+
+class StationFederate : public Federate {
+ public:
+  StationFederate(Session& session, StationEngine& engine, RunBooks& books, RunObserver& observer, const ServiceContext& context)
+      : session_(session),
+        context_(context),
+        engine_(engine),
+        books_(books),
+        observer_(observer),
+        outside_(session.plan(), session.participant()),
+        bodies_(session, topics::bodies(), session.plan().all_physics()),
+        actuation_(session, topics::actuation(), session.plan().all_behaviours()),
+        overhead_(session, topics::overhead()),
+        status_(session.participant(), topics::run_status()),
+        robots_(session.participant(), topics::robots()) {}
+
+  void publish(Tick now) override {
+    announce(now);
+    engine_.emit(overhead_.frame);
+    overhead_.write();
+  }
+
+  void inputs_complete(Tick now, bool last) override {
+    pace_.hold(now - session_.first());
+    const auto begun = Clock::now();
+    observer_.state(now, bodies_.at(now), actuation_.at(now), last);
+    recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());
+    if (begun >= next_robots_ && robots_.readers() > 0) publish_robots(now);
+    if (begun >= next_robots_) next_robots_ = begun + kRobotsPeriod;
+  }
+
+  void step(Tick from) override {
+    engine_.step(from, {bodies_.at(from), actuation_.at(from), session_.schedule().overhead_inputs()});
+  }
+
+  [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
+
+  void save(Tick now) override {
+    proto::CheckpointPart part;
+    engine_.save(*part.mutable_station());
+    unfinished_.push_back({now, std::move(part)});
+  }
+
+  void idle() override {
+    announce(session_.now());
+    settle();
+    const RunProgress progress = this->progress();
+    observer_.idle(progress);
+    publish_status(progress.paused ? kilotwin_open_PAUSED : kilotwin_open_RUNNING, progress);
+  }
+
+  /// Brings the books up to date, and writes checkpoint parts whose state hash has become known.
+  void settle() {
+    books_.advance([this](Tick tick, std::uint64_t chain) {
+      observer_.hash(tick, chain);
+      recent_.emplace_back(tick, chain);
+      if (recent_.size() > kRecentHashes) recent_.pop_front();
+    });
+    while (!unfinished_.empty() && books_.hash_tick() >= unfinished_.front().first) {
+      auto& [tick, part] = unfinished_.front();
+      for (const auto& [hash_tick, chain] : recent_) {
+        if (hash_tick == tick) part.mutable_station()->set_hash_chain(chain);
+      }
+      write_checkpoint_part(context_.run_directory, session_.plan(), tick, session_.plan().station(), part);
+      unfinished_.pop_front();
+    }
+  }
+
+  [[nodiscard]] RunProgress progress() {
+    RunTotals totals;
+    books_.fill(totals);
+    return {session_.now(), session_.wall_s(), totals.sent, totals.received, totals.robots_failed, session_.paused(),
+            session_.waiting_for()};
+  }
+
+  void publish_status(kilotwin_open_RunPhase phase, const RunProgress& progress) {
+    const RunPlan& plan = session_.plan();
+    PublicRunStatus status{};
+    status.run = plan.run();
+    plan.experiment().name().copy(status.name, sizeof status.name - 1);
+    status.phase = phase;
+    status.tick = progress.now.count();
+    status.last_tick = plan.last_tick.count();
+    status.simulated_s = plan.tick_length.seconds_at(progress.now);
+    status.wall_s = progress.wall_s;
+    status.robots = plan.robots();
+    status.robots_failed = progress.robots_failed;
+    status.sent = progress.sent;
+    status.received = progress.received;
+    progress.waiting_for.copy(status.note, sizeof status.note - 1);
+    status_.write(status);
+  }
+  void flush_status() const { status_.flush(1.0); }
+
+  [[nodiscard]] std::uint64_t recording_ns() const { return recording_ns_; }
+  [[nodiscard]] bool was_interrupted() const { return stop_announced_; }
+
+ private:
+  void announce(Tick now) {
+    for (const Directive& directive : outside_.take()) announce(now, directive);
+    if (interrupted() != 0 && !stop_announced_) {
+      stop_announced_ = true;
+      Directive stop;
+      stop.kind = DirectiveKind::kStop;
+      announce(now, stop);
+    }
+  }
+
+  void announce(Tick now, const Directive& unstamped) {
+    const Directive directive = ingress_.stamp(now, unstamped);
+    session_.announce(directive);
+    observer_.input(directive);
+  }
+
+  void publish_robots(Tick now) {
+    PublicRobotState state{};
+    state.run = session_.plan().run();
+    state.time_s = session_.plan().tick_length.seconds_at(now);
+    led_.resize(session_.plan().robots());
+    for (const ActuationFrame* frame : actuation_.at(now)) {
+      std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
+    }
+    for (const BodyFrame* frame : bodies_.at(now)) {
+      for (std::size_t i = 0; i < frame->robot.size(); ++i) {
+        state.robot = frame->robot[i];
+        state.x_mm = frame->x_mm[i];
+        state.y_mm = frame->y_mm[i];
+        state.heading_rad = frame->heading_rad[i];
+        state.led = led_[state.robot];
+        robots_.write(state);
+      }
+    }
+  }
+
+  Session& session_;
+  const ServiceContext& context_;
+  StationEngine& engine_;
+  RunBooks& books_;
+  RunObserver& observer_;
+  Ingress ingress_;
+  Outside outside_;
+  Input<BodyFrame> bodies_;
+  Input<ActuationFrame> actuation_;
+  Output<OverheadFrame> overhead_;
+  dds::Writer<PublicRunStatus> status_;
+  dds::Writer<PublicRobotState> robots_;
+  Clock::time_point next_robots_{};
+  Pace pace_{session_.plan()};
+  std::vector<std::uint8_t> led_;
+  std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash
+  std::deque<std::pair<Tick, std::uint64_t>> recent_;              // H of the latest ticks
+  std::uint64_t recording_ns_ = 0;
+  bool stop_announced_ = false;
+};
+
+}  // namespace
+
+RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObserver& observer) {
+  StationEngine engine(plan);
+  if (context.resumed) engine.load(context.first(), context.resumed->station());
+  Session session(plan, plan.station(), context.transport, context.first());
+  // The chain of a resumed run goes on from H at the checkpoint: its first own sum is that of the tick after.
+  RunBooks books(plan, session.participant(), first_hashed(context.first()), context.resumed ? context.resumed->hash_chain() : 0);
+  StationFederate federate(session, engine, books, observer, context);
+  RunTotals totals;
+  try {
+    federate.publish_status(kilotwin_open_STARTING, federate.progress());
+    session.run(federate);
+    const auto patience = Clock::now() + std::chrono::duration<double>(kBooksPatience_s);
+    while (!books.complete() && Clock::now() < patience) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  } catch (const UserError&) {
+    throw;
+  } catch (const std::exception& error) {
+    totals.failure = error.what();
+  }
+  federate.settle();
+  totals.first = context.first();
+  totals.last = books.hash_tick();
+  totals.state_hash = books.chain();
+  totals.wall_s = session.wall_s();
+  books.fill(totals);
+  totals.work_ns[static_cast<std::size_t>(Work::kRecording)] = federate.recording_ns();
+  totals.stopped_early = session.schedule().stopped_early();
+  if (totals.failure.empty() && federate.was_interrupted()) totals.failure = "interrupted";
+  if (totals.failure.empty() && totals.last != session.schedule().last()) {
+    totals.failure = fmt::format("the state hash is known up to tick {} of {} only: a service left without its last count",
+                                 totals.last.count(), session.schedule().last().count());
+  }
+  RunProgress progress = federate.progress();
+  progress.waiting_for = totals.failure;
+  federate.publish_status(totals.failure.empty() ? kilotwin_open_ENDED : kilotwin_open_BROKEN, progress);
+  federate.flush_status();
+  return totals;
+}
+
+}  // namespace kilotwin::ark

@@ -1,0 +1,26 @@
+/// Bodies in ascending order of their robots' ids, structure of arrays. The state of a body is its pose; there is no velocity.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace kilotwin::physics {
+
+struct Bodies {
+  std::vector<std::uint32_t> robot;
+  std::vector<double> x_mm, y_mm, heading_rad;  ///< heading in [-pi, pi)
+  std::vector<std::uint8_t> tracked;            ///< 1: a real robot; not driven, not moved by others
+  /// 1: the surroundings must be searched in the next step even if the body rests, because it moved, overlapped or came
+  /// new. It spares work and never changes a result.
+  std::vector<std::uint8_t> awake;
+
+  [[nodiscard]] std::size_t size() const { return robot.size(); }
+  void clear();
+  void add(std::uint32_t id, double x, double y, double heading, std::uint8_t is_tracked, std::uint8_t is_awake);
+  void add(const Bodies& other, std::size_t i);
+  /// Replaces the content by that of `all` in ascending ids, which must be unique up to identical copies.
+  void assign_sorted(const Bodies& all, std::vector<std::uint32_t>& order);
+  void swap(Bodies& other) noexcept;
+};
+
+}  // namespace kilotwin::physics

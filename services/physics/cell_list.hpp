@@ -1,0 +1,34 @@
+/// Neighbour search: bodies sorted by the cell of a square grid, ascending within a cell. The grid covers the plane and is
+/// folded onto a table of 2^k x 2^k cells, so that its memory depends on the number of bodies alone, wherever they are;
+/// bodies far apart may share a cell and are told apart by their distance.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace kilotwin::physics {
+
+class CellList {
+ public:
+  /// For searches up to `cutoff_mm`.
+  explicit CellList(double cutoff_mm);
+
+  /// Sorts the bodies; |x|, |y| below 10^7 mm are told apart, others share the outermost cells.
+  void build(const std::vector<double>& x_mm, const std::vector<double>& y_mm);
+
+  /// Writes the bodies whose centre lies within the cutoff of (x, y), without `self`, in ascending order; returns their
+  /// number. `found` grows as needed.
+  std::size_t find(double x_mm, double y_mm, std::uint32_t self, std::vector<std::uint32_t>& found) const;
+
+ private:
+  [[nodiscard]] std::uint32_t coordinate(double mm) const;
+
+  double cutoff_square_mm2_, cells_per_mm_;
+  std::uint32_t side_bits_ = 0, mask_ = 0;
+  std::vector<std::uint32_t> first_;        ///< per cell: where its bodies begin; one more entry at the end
+  std::vector<std::uint32_t> cell_of_;      ///< per body
+  std::vector<std::uint32_t> body_;         ///< sorted
+  std::vector<double> x_mm_, y_mm_;         ///< sorted
+};
+
+}  // namespace kilotwin::physics

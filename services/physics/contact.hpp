@@ -1,0 +1,95 @@
+/// Planar contact between discs, and between discs and the walls of the arena.
+///
+/// Within a tick the normal n of a pair stays that of the tick's start, and the gap is measured along it:
+///   gap = n . (p_j - p_i) - 2 r,
+/// which is never more than the true gap. In each of S sub-steps, all from the positions at its start (Jacobi):
+///   wanted  w_i = drive + pushes of neighbours that are driven at body i faster than they can follow it
+///                 (n . d_j - max(half of the gap, what i drives away by itself), at most the pusher's own drive)
+///                 + for an overlap, half of it away from each other, at most kSeparation_mm_s
+///   limited u_i : n . u_i <= half of the gap for every neighbour, the whole gap for walls; the excess along n is taken
+///                 off and the tangential part stays; where several limits contradict, all of the rest is scaled down.
+/// Both bodies of a pair close at most half of the gap, so no overlap arises, whatever they want, and 0 is always feasible.
+/// Sums run over neighbours in ascending ids. A body depends on its neighbours only: one hop per sub-step.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/pose.hpp"
+#include "core/experiment/plan.hpp"
+#include "services/physics/bodies.hpp"
+#include "services/physics/cell_list.hpp"
+#include "services/physics/drive.hpp"
+
+namespace kilotwin::physics {
+
+/// Overlapping bodies move apart at most at this speed each, mm/s: the speed of a wheel at the calibrated turn.
+inline constexpr double kSeparation_mm_s = 20;
+/// An overlap below this is rounding and is left alone, mm.
+inline constexpr double kOverlapTolerance_mm = 5e-10;
+
+/// What is fixed for a run.
+struct ContactLimits {
+  ContactLimits(const RunPlan&, const DriveModel&);
+
+  std::uint32_t sub_steps;
+  double separation_mm;   ///< of an overlapping body per sub-step
+  double stride_mm;       ///< no body moves further in a sub-step
+  double cutoff_mm;       ///< bodies whose centres are farther apart at the tick's start cannot meet within the tick
+  double margin_mm;       ///< from a partition's rectangle: all that can matter within a tick, and where bodies can get to
+  double x_limit_mm, y_limit_mm;  ///< the centre of a disc stays within +-limit
+
+  [[nodiscard]] bool outside(double x_mm, double y_mm) const;
+};
+
+class ContactSolver {
+ public:
+  ContactSolver(const RunPlan&, const DriveModel&);
+
+  /// Moves the bodies by one tick. Headings are advanced as well; bodies that moved or overlap are awake afterwards, all
+  /// others asleep.
+  void move(Bodies&, const Drives&);
+
+  [[nodiscard]] const ContactLimits& limits() const { return limits_; }
+
+ private:
+  struct Contact {
+    double normal_x, normal_y;  ///< from the body to the other
+    double gap_mm;              ///< at the tick's start
+    std::uint32_t other;        ///< index of the body; after link(), its slot
+  };
+  struct Slot {                 ///< a body that may move and has neighbours; slot 0 stands for all that cannot move
+    std::uint32_t body = 0;
+    std::uint32_t first_contact = 0;
+    double cos_turn = 1, sin_turn = 0;  ///< of a sub-step
+    bool near_wall = false;
+  };
+  struct Motion {               ///< of a slot within the tick
+    double x_mm = 0, y_mm = 0;              ///< displacement since the tick's start
+    double drive_x_mm = 0, drive_y_mm = 0;  ///< by the drive alone in the coming sub-step
+  };
+
+  /// False: everything rests.
+  bool find_contacts(Bodies&, const Drives&);
+  void search(const Bodies&, std::uint32_t body);
+  void link(const Drives&);
+  Motion next(const Bodies&, std::size_t slot);
+  /// Moves what has no neighbour, for the whole tick at once.
+  void move_free(Bodies&, const Drives&) const;
+  void place(Bodies&, std::uint32_t body, double to_x_mm, double to_y_mm) const;
+
+  ContactLimits limits_;
+  double axle_offset_mm_;
+  CellList cells_;
+  std::vector<Slot> slots_;
+  std::vector<Contact> contacts_;
+  std::vector<std::uint32_t> slot_of_;     ///< per body; 0: none
+  std::vector<std::uint32_t> drive_of_;    ///< per body; index of its drive + 1; 0: none
+  std::vector<std::uint32_t> pulled_;      ///< sleeping bodies beside one that is driven or overlaps
+  std::vector<std::uint8_t> is_pulled_, overlaps_;  ///< per body
+  std::vector<std::uint32_t> found_;
+  std::vector<double> half_gap_mm_;        ///< of the contacts of the body at hand
+  std::vector<Motion> now_, after_;        ///< per slot
+};
+
+}  // namespace kilotwin::physics

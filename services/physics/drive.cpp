@@ -1,0 +1,147 @@
+#include "services/physics/drive.hpp"
+
+#include <algorithm>
+
+#include "core/math/elementary.h"
+
+namespace kilotwin::physics {
+namespace {
+
+/// Above what Random::normal can return: its argument has 52 bits, and the normal distribution has less than 2^-54 beyond.
+constexpr double kTopNormal = 8.4;
+
+/// Up to this turn per step the two series below are exact to the last bit or so.
+constexpr double kSeriesTurn_rad = 0.125;
+
+/// sin(t) / t and (1 - cos(t)) / t^2 from the square of t.
+struct TurnSeries {
+  double sine, versine;
+};
+
+inline TurnSeries series_of(double square) {
+  const double sine =
+      1 + square * (-1.0 / 6 + square * (1.0 / 120 + square * (-1.0 / 5040 + square * (1.0 / 362880))));
+  const double versine =
+      0.5 + square * (-1.0 / 24 + square * (1.0 / 720 + square * (-1.0 / 40320 + square * (1.0 / 3628800))));
+  return {sine, versine};
+}
+
+inline Arc arc_from(TurnSeries s, double run_mm, double turn_rad, double axle_offset_mm) {
+  const double sin_turn = turn_rad * s.sine;
+  const double one_minus_cos = turn_rad * (turn_rad * s.versine);
+  return {run_mm * s.sine - axle_offset_mm * one_minus_cos,
+          run_mm * (turn_rad * s.versine) + axle_offset_mm * sin_turn, 1 - one_minus_cos, sin_turn};
+}
+
+/// The same quantities for turns of any size.
+TurnSeries large_turn(double turn_rad) {
+  double sin_half, cos_half;
+  kt_sincos(0.5 * turn_rad, &sin_half, &cos_half);
+  return {2 * sin_half * cos_half / turn_rad, 2 * (sin_half / turn_rad) * (sin_half / turn_rad)};
+}
+
+inline bool is_small(double turn_rad) { return turn_rad <= kSeriesTurn_rad && turn_rad >= -kSeriesTurn_rad; }
+
+double magnitude(double v) { return v < 0 ? -v : v; }
+
+}  // namespace
+
+Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm) {
+  const TurnSeries s = is_small(turn_rad) ? series_of(turn_rad * turn_rad) : large_turn(turn_rad);
+  return arc_from(s, run_mm, turn_rad, axle_offset_mm);
+}
+
+void Drives::reserve(std::size_t bodies) {
+  if (body.size() >= bodies) return;
+  body.resize(bodies);
+  for (auto* column : {&left_mm_s, &right_mm_s, &heading_rad, &run_mm, &turn_rad, &cos_heading, &sin_heading, &x_mm, &y_mm})
+    column->resize(bodies);
+}
+
+DriveModel::DriveModel(const RunPlan& plan)
+    : random_(plan.seed()),
+      tick_s_(plan.tick_length.seconds()),
+      wheel_base_mm_(plan.experiment().motion().wheel_base_mm()),
+      axle_offset_mm_(plan.experiment().motion().axle_offset_mm()),
+      bias_(plan.robots()) {
+  const proto::Motion& motion = plan.experiment().motion();
+  for (std::size_t duty = 0; duty < 256; ++duty) {
+    const auto d = static_cast<double>(duty);
+    straight_mm_s_[duty] =
+        motion.straight_speed_mm_s() * std::min(kTopDutyRatio, d / static_cast<double>(motion.calibrated_straight_duty()));
+    turn_mm_s_[duty] =
+        motion.turn_speed_mm_s() * std::min(kTopDutyRatio, d / static_cast<double>(motion.calibrated_turn_duty()));
+  }
+  if (motion.noise()) {
+    for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) {
+      if (plan.tracked(robot)) continue;
+      const auto draw = [&](std::uint32_t which) {
+        return motion.bias_mean_mm_s() + motion.bias_sd_mm_s() * random_.normal(Stream::kWheelBias, robot, Tick{0}, which);
+      };
+      bias_[robot] = {draw(0), draw(1)};
+    }
+    for (const proto::RobotModel& known : plan.experiment().robot_model()) {
+      if (known.robot() >= plan.robots()) continue;
+      if (known.has_bias_left_mm_s()) bias_[known.robot()].left_mm_s = known.bias_left_mm_s();
+      if (known.has_bias_right_mm_s()) bias_[known.robot()].right_mm_s = known.bias_right_mm_s();
+    }
+    if (motion.factor_variance_s() > 0) factor_sd_ = __builtin_sqrt(motion.factor_variance_s() / tick_s_);
+  }
+
+  double top_bias = 0;
+  for (const Bias& b : bias_) top_bias = std::max({top_bias, magnitude(b.left_mm_s), magnitude(b.right_mm_s)});
+  const double top_nominal = std::max(magnitude(straight_mm_s_[255]), magnitude(turn_mm_s_[255]));
+  const double top_wheel = (top_nominal + top_bias) * (1 + kTopNormal * factor_sd_);
+  // The centre's speed is convex in the wheels' speeds, so it is largest with both wheels forward, or one forward and one
+  // backward, at full speed.
+  top_speed_mm_s_ = top_wheel * std::max(1.0, 2 * axle_offset_mm_ / wheel_base_mm_);
+}
+
+bool DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Tick from, std::uint8_t motor_left,
+                     std::uint8_t motor_right, double heading_rad) const {
+  if ((motor_left | motor_right) == 0) return false;
+  const bool both = motor_left != 0 && motor_right != 0;
+  const std::array<double, 256>& nominal = both ? straight_mm_s_ : turn_mm_s_;
+  double left = nominal[motor_right] + bias_[robot].left_mm_s;
+  double right = nominal[motor_left] + bias_[robot].right_mm_s;
+  if (factor_sd_ > 0) {
+    left *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 0);
+    right *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 1);
+  }
+  const std::size_t n = drives.count++;
+  drives.body[n] = body;
+  drives.left_mm_s[n] = left;
+  drives.right_mm_s[n] = right;
+  drives.heading_rad[n] = heading_rad;
+  return true;
+}
+
+void DriveModel::integrate(Drives& drives) const {
+  const std::size_t count = drives.count;
+  const double* __restrict__ left = drives.left_mm_s.data();
+  const double* __restrict__ right = drives.right_mm_s.data();
+  double* __restrict__ run = drives.run_mm.data();
+  double* __restrict__ turn = drives.turn_rad.data();
+  double* __restrict__ x = drives.x_mm.data();
+  double* __restrict__ y = drives.y_mm.data();
+  double* __restrict__ c = drives.cos_heading.data();
+  double* __restrict__ s = drives.sin_heading.data();
+
+  const double half_tick_s = 0.5 * tick_s_, turn_per_speed = tick_s_ / wheel_base_mm_, offset_mm = axle_offset_mm_;
+  for (std::size_t i = 0; i < count; ++i) kt_sincos(drives.heading_rad[i], &s[i], &c[i]);
+  for (std::size_t i = 0; i < count; ++i) {
+    run[i] = (left[i] + right[i]) * half_tick_s;
+    turn[i] = (right[i] - left[i]) * turn_per_speed;
+    const Arc arc = arc_from(series_of(turn[i] * turn[i]), run[i], turn[i], offset_mm);
+    x[i] = c[i] * arc.forward_mm - s[i] * arc.sideways_mm;
+    y[i] = s[i] * arc.forward_mm + c[i] * arc.sideways_mm;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (is_small(turn[i])) continue;
+    const Arc arc = arc_of(run[i], turn[i], offset_mm);
+    x[i] = c[i] * arc.forward_mm - s[i] * arc.sideways_mm;
+    y[i] = s[i] * arc.forward_mm + c[i] * arc.sideways_mm;
+  }
+}
+
+}  // namespace kilotwin::physics

@@ -1,0 +1,19 @@
+#include "services/physics/engine.hpp"
+
+#include "core/base/error.hpp"
+#include "services/physics/contact.hpp"
+#include "services/physics/drive.hpp"
+#include "services/physics/planar_engine.hpp"
+
+namespace kilotwin::physics {
+
+std::unique_ptr<Engine> make_engine(const RunPlan& plan, PartitionId partition) {
+  switch (plan.experiment().physics().engine()) {
+    case proto::Physics::PLANAR: return std::make_unique<PlanarEngine>(plan, partition);
+  }
+  throw UserError("physics.engine: unknown engine; PLANAR would be right");
+}
+
+double ghost_margin_mm(const RunPlan& plan) { return ContactLimits(plan, DriveModel(plan)).margin_mm; }
+
+}  // namespace kilotwin::physics

@@ -1,0 +1,64 @@
+/// The planar engine: differential drive and contact of discs, over a partition of the arena.
+///
+///   step from tick k: known  = bodies listed at k + ghosts of k + tracked robots, within the margin of the rectangle
+///                     own    = those of the known whose pose at k lies in the rectangle
+///                     drive  : motors of k -> wanted motion of every known body
+///                     contact: S Jacobi passes over all known bodies
+///                     listed at k+1 = own
+/// Own bodies come out bit for bit as if one partition computed all: a body depends on one hop of neighbours per sub-step,
+/// and the margin holds S hops. Ghosts near the margin's rim come out wrong and are not used.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "services/physics/bodies.hpp"
+#include "services/physics/contact.hpp"
+#include "services/physics/drive.hpp"
+#include "services/physics/engine.hpp"
+
+namespace kilotwin::physics {
+
+class PlanarEngine final : public Engine {
+ public:
+  PlanarEngine(const RunPlan&, PartitionId);
+
+  void step(Tick from, const Inputs&) override;
+  void emit_bodies(BodyFrame&) const override;
+  void emit_ghosts(PartitionId neighbour, BodyFrame&) const override;
+  [[nodiscard]] const std::vector<PartitionId>& neighbours() const override { return neighbours_; }
+  [[nodiscard]] std::uint64_t hash_part() const override;
+  void save(proto::PhysicsState&) const override;
+  void load(Tick, std::span<const proto::PhysicsState* const> parts) override;
+
+ private:
+  void take_tracked(std::span<const TrackedPoseInput>);
+  void gather(std::span<const BodyFrame* const> ghosts);
+  void mark_own();
+  void read_motors(Tick from, std::span<const ActuationFrame* const>);
+  void list_own();
+  [[nodiscard]] bool is_own(double x_mm, double y_mm) const { return rectangle_.contains(x_mm, y_mm); }
+
+  PartitionGrid grid_;
+  PartitionId partition_;
+  Rectangle rectangle_;
+  std::uint32_t robots_;
+  std::vector<std::uint8_t> is_tracked_;   ///< per robot; empty where there is none
+  DriveModel drive_;
+  ContactSolver contact_;
+  std::vector<PartitionId> neighbours_;
+
+  Tick tick_;
+  Bodies listed_;
+  Bodies tracked_;                         ///< all tracked robots, wherever they are
+
+  // Within a step.
+  Bodies known_, unsorted_;
+  std::vector<std::uint8_t> own_;          ///< per known body, by its pose before the step; empty with one partition
+  std::vector<std::uint32_t> order_;
+  std::vector<const ActuationFrame*> frames_;
+  Drives drives_;
+};
+
+}  // namespace kilotwin::physics
