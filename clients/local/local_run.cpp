@@ -65,12 +65,12 @@ class LocalRun {
     auto next_idle = begun;
     Tick now = first_;
     RunTotals totals;
-    Pace pace(plan_);
+    const Pace pace(plan_);
     for (;; ++now) {
-      pace.hold(now - first_);
+      pace.hold(now - first_, static_cast<double>(ns(begun, Clock::now())) * 1e-9);
       if (interrupted() != 0) totals.failure = "interrupted";
       const bool last = schedule_.verdict(now) == RunSchedule::Verdict::kFinished || !totals.failure.empty();
-      if (schedule_.checkpoint_at(now)) save(now, chain);
+      if (options_.save_checkpoints && schedule_.checkpoint_at(now)) save(now, chain);
       const auto recorded_from = Clock::now();
       observer_.state(now, frames_of(now).all_bodies, frames_of(now).all_actuation, last);
       const auto recorded_to = Clock::now();

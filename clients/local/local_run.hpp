@@ -19,6 +19,7 @@ struct LocalOptions {
   std::optional<Checkpoint> resumed;
   /// Stamped inputs of an earlier run, to be applied at their ticks; pauses are passed over.
   std::vector<Directive> inputs;
+  bool save_checkpoints = true;
 };
 
 /// Runs the plan to its end, or until the process is interrupted, which the totals then name as their failure. Throws

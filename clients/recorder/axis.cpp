@@ -31,7 +31,8 @@ AxisTicks linear_ticks(double low, double high, int pieces) {
   AxisTicks ticks;
   const double step = round_step(high - low, pieces);
   const double largest = std::max(std::abs(low), std::abs(high));
-  if (largest >= 1e5 || largest < 1e-2) ticks.exponent = 3 * static_cast<int>(std::floor(std::log10(largest * (1 + kSlack)) / 3));
+  if (largest >= 1e5 || largest < 1e-2)
+    ticks.exponent = 3 * static_cast<int>(std::floor(std::log10(largest * (1 + kSlack)) / 3));
   const double unit = std::pow(10, ticks.exponent);
   const int decimals = std::clamp(static_cast<int>(-std::floor(std::log10(step / unit) + kSlack)), 0, 15);
   const double first = std::ceil(low / step - kSlack), last = std::floor(high / step + kSlack);
@@ -45,8 +46,9 @@ AxisTicks linear_ticks(double low, double high, int pieces) {
 AxisTicks logarithmic_ticks(double low, double high) {
   KILOTWIN_DEMAND(low > 0 && high > low);
   AxisTicks ticks;
-  const int first = static_cast<int>(std::floor(std::log10(low))), last = static_cast<int>(std::ceil(std::log10(high)));
-  const bool dense = last - first <= 3;
+  const int first = static_cast<int>(std::floor(std::log10(low))),
+            last = static_cast<int>(std::ceil(std::log10(high)));
+  const bool dense = high / low < 300;
   const int every = std::max(1, (last - first) / 8);
   for (int exponent = first; exponent <= last; exponent += every) {
     for (const int factor : {1, 2, 5}) {
@@ -67,7 +69,8 @@ std::string power_of_ten(int exponent) {
   constexpr std::array<std::string_view, 10> kRaised = {"\u2070", "\u00b9", "\u00b2", "\u00b3", "\u2074",
                                                         "\u2075", "\u2076", "\u2077", "\u2078", "\u2079"};
   std::string text = "10";
-  for (const char c : std::to_string(exponent)) text += c == '-' ? "\u207b" : kRaised[static_cast<std::size_t>(c - '0')];
+  for (const char c : std::to_string(exponent))
+    text += c == '-' ? "\u207b" : kRaised[static_cast<std::size_t>(c - '0')];
   return text;
 }
 

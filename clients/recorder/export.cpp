@@ -17,8 +17,7 @@ namespace {
 constexpr std::size_t kWriteAbove_bytes = 1 << 20;
 
 /// Appends "-12.3450": value (|value| < 1e9) rounded to `decimals` places. Never "-0.0000".
-template <int decimals>
-char* put_fixed(char* to, double value) {
+template <int decimals> char* put_fixed(char* to, double value) {
   constexpr std::int64_t kUnit = [] {
     std::int64_t unit = 1;
     for (int i = 0; i < decimals; ++i) unit *= 10;
@@ -51,36 +50,22 @@ std::string exact_seconds(Tick tick, TickLength length) {
   return text;
 }
 
-/// The instants 0, every_s, 2 every_s... in ticks, of which the first at or after each is meant.
-struct WantedTimes {
-  TickLength length;
-  double every_s;
-  [[nodiscard]] Tick tick(std::int64_t number) const { return length.at_or_after(static_cast<double>(number) * every_s); }
-  /// The first number whose tick is `from` or later.
-  [[nodiscard]] std::int64_t first_from(Tick from) const {
-    auto number = static_cast<std::int64_t>(length.seconds_at(from) / every_s);
-    while (number > 0 && tick(number - 1) >= from) --number;
-    while (tick(number) < from) ++number;
-    return number;
-  }
-};
-
 /// A readable multiple of the recorded interval, the nearest to what was asked for.
 std::string suggested_interval(double recorded_s, double asked_s) {
   return fmt::format("{:.10g}", recorded_s * std::max(1.0, std::round(asked_s / recorded_s)));
 }
 
-/// Whether the recording's schedule has a state within one tick after each wanted time. Both repeat, so that a thousand of
-/// them tell.
-void check_interval(const Reader& recording, const WantedTimes& wanted) {
-  const RecordingSchedule schedule(wanted.length, recording.header().every_s());
+/// Whether the recording's schedule has a state within one tick after each wanted time. Both repeat, so that a
+/// thousand of them tell.
+void check_interval(const Reader& recording, const RecordingSchedule& wanted, double every_s) {
+  const double recorded_s = recording.header().every_s();
+  const RecordingSchedule recorded(recording.tick_length(), recorded_s);
   for (std::int64_t number = 1; number <= 1000; ++number) {
     const Tick tick = wanted.tick(number);
-    if (schedule.at_or_after(tick) - tick > 1) {
-      throw UserError(fmt::format("--every {:.10g}: no multiple of the recorded interval; {} holds a state every {:.10g} s, so take {}",
-                                  wanted.every_s, recording.path().string(), recording.header().every_s(),
-                                  suggested_interval(recording.header().every_s(), wanted.every_s)));
-    }
+    if (recorded.at_or_after(tick) - tick <= 1) continue;
+    throw UserError(fmt::format(
+        "--every {:.10g}: no multiple of the recorded interval; {} holds a state every {:.10g} s, so take {}",
+        every_s, recording.path().string(), recorded_s, suggested_interval(recorded_s, every_s)));
   }
 }
 
@@ -115,19 +100,19 @@ std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path
   if (!(every_s >= 1e-3 && every_s <= 1e9)) {
     throw UserError(fmt::format("--every {}: out of range; expected 0.001 to 1e9 seconds", every_s));
   }
-  const WantedTimes wanted{recording.tick_length(), every_s};
-  check_interval(recording, wanted);
+  const RecordingSchedule wanted(recording.tick_length(), every_s);
+  check_interval(recording, wanted, every_s);
   OutputFile output(csv, OutputFile::Existing::kReplace);
   output.buffer() = "time_s,robot,x_mm,y_mm,heading_rad,led\n";
-  std::int64_t number = wanted.first_from(Tick{recording.header().first_tick()});
+  Tick next = wanted.at_or_after(Tick{recording.header().first_tick()});
   std::uint64_t rows = 0;
   while (const proto::StateRecord* state = recording.next_state()) {
     const Tick tick{state->tick()};
-    if (tick < wanted.tick(number)) continue;
-    append_rows(output.buffer(), *state, exact_seconds(tick, wanted.length));
+    if (tick < next) continue;
+    append_rows(output.buffer(), *state, exact_seconds(tick, recording.tick_length()));
     output.flush_if_above(kWriteAbove_bytes);
     rows += recording.header().robots();
-    number = wanted.first_from(tick + 1);
+    next = wanted.at_or_after(tick + 1);
   }
   output.close();
   return rows;
@@ -160,7 +145,8 @@ std::uint64_t export_messages(Reader& recording, const std::filesystem::path& cs
   std::uint64_t written = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + 1 < rows.size() && pair(rows[i]) == pair(rows[i + 1])) continue;
-    fmt::format_to(std::back_inserter(output.buffer()), "{},{},{}\n", rows[i].receiver, rows[i].sender, rows[i].count);
+    fmt::format_to(std::back_inserter(output.buffer()), "{},{},{}\n", rows[i].receiver, rows[i].sender,
+                   rows[i].count);
     output.flush_if_above(kWriteAbove_bytes);
     ++written;
   }

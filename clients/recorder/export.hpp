@@ -9,14 +9,15 @@
 namespace kilotwin::recorder {
 
 /// time_s,robot,x_mm,y_mm,heading_rad,led: one row per robot at 0, every_s, 2 every_s..., by time and then by robot.
-///   For each of these times the first recorded state at or after it is taken; time_s is the simulated time of that state's
-///   tick, exactly. Lengths with 4 decimals, angles with 6; led is rgb, each digit 0..3.
-/// Returns the number of rows. Throws UserError where the recording has no state within one tick after each such time, i.e.
-/// every_s is no multiple of the recorded interval, and RunError where the file cannot be written.
+/// For each of these times the first recorded state at or after it is taken; time_s is the simulated time of that
+/// state's tick, exactly. Lengths have 4 decimals, angles 6; led is rgb, each digit 0..3.
+/// Returns the number of rows. Throws UserError where the recording has no state within one tick after each such time,
+/// i.e. every_s is no multiple of the recorded interval, and RunError where the file cannot be written.
 std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s = 1);
 
-/// receiver,sender,count: how often each pair communicated, by receiver and then by sender; a robot's row with itself is
-/// what it sent with success. Returns the number of rows. Throws UserError where no messages were recorded.
+/// receiver,sender,count: how often each pair communicated, by receiver and then by sender; a robot's row with
+/// itself is what it sent with success. Returns the number of rows. Throws UserError where no messages were
+/// recorded.
 std::uint64_t export_messages(Reader& recording, const std::filesystem::path& csv);
 
 }  // namespace kilotwin::recorder

@@ -1,4 +1,5 @@
-/// Files as the recorder writes and reads them. Whatever fails is told in one line that names the file and the reason.
+/// Files as the recorder writes and reads them. Whatever fails is told in one line that names the file and the
+/// reason.
 #pragma once
 
 #include <cstddef>
@@ -22,10 +23,12 @@ class OutputFile {
 
   /// The bytes that wait to be handed to the kernel; to be appended to.
   [[nodiscard]] std::string& buffer() { return buffer_; }
-  /// Hands all of them over, after which they outlive this process. On failure throws RunError, and keeps what was not
-  /// written, so that a later call goes on where this one stopped.
+  /// Hands all of them over, after which they outlive this process. On failure throws RunError, and keeps what was
+  /// not written, so that a later call goes on where this one stopped.
   void flush();
-  void flush_if_above(std::size_t bytes) { if (buffer_.size() >= bytes) flush(); }
+  void flush_if_above(std::size_t bytes) {
+    if (buffer_.size() >= bytes) flush();
+  }
   /// flush(), and closes the file.
   void close();
   [[nodiscard]] const std::filesystem::path& path() const { return file_; }

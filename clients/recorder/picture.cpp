@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,7 +22,7 @@
 namespace kilotwin::recorder {
 namespace {
 
-constexpr double kMargin_px = 28, kGap_px = 26, kTitle_px = 66, kPanelTitle_px = 26, kPanelFoot_px = 48;
+constexpr double kMargin_px = 28, kGap_px = 26, kTitle_px = 56, kPanelTitle_px = 26, kPanelFoot_px = 48;
 constexpr double kCaption_px = 12;
 /// Places kept for the paths of all robots together.
 constexpr std::size_t kPathPoints = 160'000;
@@ -27,6 +30,11 @@ constexpr std::size_t kPathPoints = 160'000;
 constexpr double kUnitsPerPx = 10;
 /// Discs are not drawn smaller than this.
 constexpr double kLeastDisc_px = 1.8;
+
+constexpr std::string_view kFailedRim = "#d0021b", kStartDot = "#b4bcc6";
+/// Paths and ends by where in the swarm the robot began, from left to right.
+constexpr std::array<std::string_view, 6> kByStart = {"#2b4c9b", "#2387b5", "#2aa58a",
+                                                      "#d9a21b", "#e0702a", "#b8336a"};
 
 struct Box {
   double x_min_mm = 1e300, y_min_mm = 1e300, x_max_mm = -1e300, y_max_mm = -1e300;
@@ -36,7 +44,9 @@ struct Box {
     y_min_mm = std::min(y_min_mm, y);
     y_max_mm = std::max(y_max_mm, y);
   }
-  [[nodiscard]] Box widened(double by_mm) const { return {x_min_mm - by_mm, y_min_mm - by_mm, x_max_mm + by_mm, y_max_mm + by_mm}; }
+  [[nodiscard]] Box widened(double by_mm) const {
+    return {x_min_mm - by_mm, y_min_mm - by_mm, x_max_mm + by_mm, y_max_mm + by_mm};
+  }
   [[nodiscard]] double width_mm() const { return x_max_mm - x_min_mm; }
   [[nodiscard]] double height_mm() const { return y_max_mm - y_min_mm; }
 };
@@ -45,12 +55,18 @@ struct Box {
 class View {
  public:
   View(const Box& box, double width_px, double height_px)
-      : width_px_(width_px), height_px_(height_px),
+      : width_px_(width_px),
+        height_px_(height_px),
         px_per_mm_(std::min(width_px / box.width_mm(), height_px / box.height_mm())),
-        x_mm_((box.x_min_mm + box.x_max_mm) / 2), y_mm_((box.y_min_mm + box.y_max_mm) / 2) {}
+        x_mm_((box.x_min_mm + box.x_max_mm) / 2),
+        y_mm_((box.y_min_mm + box.y_max_mm) / 2) {}
   [[nodiscard]] double px_per_mm() const { return px_per_mm_; }
-  [[nodiscard]] long x(double x_mm) const { return std::lround(kUnitsPerPx * (width_px_ / 2 + (x_mm - x_mm_) * px_per_mm_)); }
-  [[nodiscard]] long y(double y_mm) const { return std::lround(kUnitsPerPx * (height_px_ / 2 - (y_mm - y_mm_) * px_per_mm_)); }
+  [[nodiscard]] long x(double x_mm) const {
+    return std::lround(kUnitsPerPx * (width_px_ / 2 + (x_mm - x_mm_) * px_per_mm_));
+  }
+  [[nodiscard]] long y(double y_mm) const {
+    return std::lround(kUnitsPerPx * (height_px_ / 2 - (y_mm - y_mm_) * px_per_mm_));
+  }
   [[nodiscard]] double length(double mm) const { return kUnitsPerPx * mm * px_per_mm_; }
   [[nodiscard]] double width_px() const { return width_px_; }
   [[nodiscard]] double height_px() const { return height_px_; }
@@ -65,41 +81,46 @@ void put(std::string& out, fmt::format_string<Arguments...> format, Arguments&&.
 }
 
 /// "30 s", "59.97 s", "1200 s": as exact as a tick, without zeros that say nothing.
-std::string time_text(double time_s) {
-  return fmt::format("{:g} s", std::round(time_s * 100) / 100);
+std::string time_text(double time_s) { return fmt::format("{:g} s", std::round(time_s * 100) / 100); }
+
+bool failed(const Snapshot& at, std::size_t robot) {
+  return at.life_cycle[robot] == static_cast<std::uint8_t>(LifeCycle::kFailed);
 }
 
-bool failed(const Snapshot& at, std::size_t robot) { return at.life_cycle[robot] == static_cast<std::uint8_t>(LifeCycle::kFailed); }
+double disc_units(const View& view) {
+  return std::max(view.length(2 * kRobotRadius_mm), kUnitsPerPx * kLeastDisc_px);
+}
 
-double disc_units(const View& view) { return std::max(view.length(2 * kRobotRadius_mm), kUnitsPerPx * kLeastDisc_px); }
-
-/// Robots as discs with their LED's colour and a tick towards the heading; failed ones with a red rim. A disc is a line of no
-/// length with round ends as thick as the disc: ten bytes.
+/// Robots as discs with their LED's colour and a tick towards the heading; failed ones with a red rim. A disc is a
+/// line of no length with round ends as thick as the disc: ten bytes.
 std::string draw_discs(const Snapshot& at, const View& view) {
   std::map<std::uint8_t, std::string> by_led;
   std::string rims, failed_rims, ticks;
-  const double disc = disc_units(view), rim = std::max(disc * 0.09, 1.5), tick = disc * 0.5;
+  const double disc = disc_units(view), rim = std::clamp(disc * 0.09, 1.5, 18.0), tick = disc * 0.5;
   for (std::size_t i = 0; i < at.x_mm.size(); ++i) {
     const long x = view.x(at.x_mm[i]), y = view.y(at.y_mm[i]);
     put(failed(at, i) ? failed_rims : rims, "M{} {}h1", x, y);
     put(by_led[at.led[i] & 63], "M{} {}h1", x, y);
-    put(ticks, "M{} {}l{} {}", x, y, std::lround(tick * std::cos(at.heading_rad[i])), -std::lround(tick * std::sin(at.heading_rad[i])));
+    put(ticks, "M{} {}l{} {}", x, y, std::lround(tick * std::cos(at.heading_rad[i])),
+        -std::lround(tick * std::sin(at.heading_rad[i])));
   }
   std::string out = "<g fill=\"none\" stroke-linecap=\"round\">\n";
   put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", svg::kInk, disc, rims);
   if (!failed_rims.empty()) {
-    put(out, "<path stroke=\"#d0021b\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", disc * 1.35, failed_rims);
+    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", kFailedRim,
+        disc + std::max(disc * 0.25, 26.0), failed_rims);
   }
   for (const auto& [led, discs] : by_led) {
-    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", svg::led_colour(led), std::max(disc - 2 * rim, disc * 0.5), discs);
+    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", svg::led_colour(led),
+        std::max(disc - 2 * rim, disc * 0.5), discs);
   }
-  put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" stroke-linecap=\"butt\" d=\"{}\"/>\n</g>\n", svg::kInk, std::max(disc * 0.1, 1.5), ticks);
+  put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" stroke-linecap=\"butt\" d=\"{}\"/>\n</g>\n", svg::kInk,
+      std::clamp(disc * 0.1, 1.5, 24.0), ticks);
   return out;
 }
 
 /// Ways of all robots, coloured by where in the swarm they began, so that one sees who went where and how they mix.
 std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
-  constexpr std::array<std::string_view, 6> kByStart = {"#2b4c9b", "#2387b5", "#2aa58a", "#d9a21b", "#e0702a", "#b8336a"};
   std::array<std::string, kByStart.size()> ways, ends;
   std::string starts;
   const Snapshot& first = paths.first();
@@ -125,14 +146,16 @@ std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
     put(ends[group], "M{} {}h1", x, y);
   }
   const double robots = static_cast<double>(paths.robots());
-  const double width = std::clamp(24 - 5 * std::log10(robots), 5.0, 18.0);
-  const double opacity = std::clamp(1.15 - 0.15 * std::log10(robots), 0.5, 0.95);
-  const double dot = std::clamp(disc_units(view), 12.0, 80.0) * std::clamp(1.1 - 0.15 * std::log10(robots), 0.5, 1.0);
+  const double width = std::clamp(24 - 5 * std::log10(robots), 3.5, 18.0);
+  const double opacity = std::clamp(1.3 - 0.2 * std::log10(robots), 0.4, 0.95);
+  const double dot =
+      std::clamp(disc_units(view), 12.0, 80.0) * std::clamp(1.1 - 0.15 * std::log10(robots), 0.5, 1.0);
   std::string out = "<g fill=\"none\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n";
-  put(out, "<path stroke=\"#b4bcc6\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", dot * 0.8, starts);
+  put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", kStartDot, dot * 0.8, starts);
   for (std::size_t group = 0; group < ways.size(); ++group) {
     if (ways[group].empty()) continue;
-    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" stroke-opacity=\"{:.2f}\" d=\"{}\"/>\n", kByStart[group], width, opacity, ways[group]);
+    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" stroke-opacity=\"{:.2f}\" d=\"{}\"/>\n", kByStart[group],
+        width, opacity, ways[group]);
   }
   for (std::size_t group = 0; group < ends.size(); ++group) {
     if (ends[group].empty()) continue;
@@ -146,24 +169,31 @@ std::string draw_arena(const View& view, double width_mm, double height_mm) {
   const auto clipped = [](long value, double px) {
     return std::clamp(value, -100L, static_cast<long>(kUnitsPerPx * px) + 100L);
   };
-  const long left = clipped(view.x(-width_mm / 2), view.width_px()), right = clipped(view.x(width_mm / 2), view.width_px());
-  const long top = clipped(view.y(height_mm / 2), view.height_px()), bottom = clipped(view.y(-height_mm / 2), view.height_px());
-  return fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#fbfcfd\" stroke=\"{}\" stroke-width=\"16\"/>\n", left, top,
-                     right - left, bottom - top, svg::kInk);
+  const long left = clipped(view.x(-width_mm / 2), view.width_px()),
+             right = clipped(view.x(width_mm / 2), view.width_px());
+  const long top = clipped(view.y(height_mm / 2), view.height_px()),
+             bottom = clipped(view.y(-height_mm / 2), view.height_px());
+  return fmt::format(
+      "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#fbfcfd\" stroke=\"{}\" stroke-width=\"16\"/>\n",
+      left, top, right - left, bottom - top, svg::kInk);
 }
 
 /// The dashed outline of what another panel shows enlarged.
 std::string draw_frame(const View& view, const Box& box) {
-  return fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"10\" stroke-dasharray=\"40 30\"/>\n",
-                     view.x(box.x_min_mm), view.y(box.y_max_mm), view.x(box.x_max_mm) - view.x(box.x_min_mm),
-                     view.y(box.y_min_mm) - view.y(box.y_max_mm), svg::kFaint);
+  return fmt::format(
+      "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"10\" "
+      "stroke-dasharray=\"40 30\"/>\n",
+      view.x(box.x_min_mm), view.y(box.y_max_mm), view.x(box.x_max_mm) - view.x(box.x_min_mm),
+      view.y(box.y_min_mm) - view.y(box.y_max_mm), svg::kFaint);
 }
 
 std::string scale_bar(const View& view, double x, double y) {
-  const double length_mm = round_step(view.width_px() / view.px_per_mm(), 7) ;
+  const double length_mm = round_step(view.width_px() / view.px_per_mm(), 10);
   const double length_px = length_mm * view.px_per_mm();
-  std::string out = fmt::format("<path d=\"M{0:.1f} {1:.1f}v6M{0:.1f} {2:.1f}h{3:.1f}M{4:.1f} {1:.1f}v6\" fill=\"none\" stroke=\"{5}\" stroke-width=\"1.6\"/>\n", x,
-                                y - 3, y, length_px, x + length_px, svg::kInk);
+  std::string out = fmt::format(
+      "<path d=\"M{0:.1f} {1:.1f}v6M{0:.1f} {2:.1f}h{3:.1f}M{4:.1f} {1:.1f}v6\" fill=\"none\" stroke=\"{5}\" "
+      "stroke-width=\"1.6\"/>\n",
+      x, y - 3, y, length_px, x + length_px, svg::kInk);
   return out + svg::text(x + length_px + 8, y + 4, kCaption_px, fmt::format("{:g} mm", length_mm));
 }
 
@@ -177,46 +207,57 @@ std::string led_legend(const Snapshot& at, double x, double y, double width_px) 
   }
   std::vector<std::pair<std::uint8_t, std::size_t>> order(counts.begin(), counts.end());
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
-  struct Entry {
-    std::string fill, rim, label;
-  };
-  std::vector<Entry> entries;
-  if (failures > 0) entries.push_back({"none", "#d0021b", fmt::format("failed {}", failures)});
-  for (const auto& [led, count] : order) {
-    entries.push_back({svg::led_colour(led), std::string(svg::kInk), fmt::format("LED {} {}", svg::led_name(led), count)});
-  }
   std::string out;
   const double end = x + width_px;
-  for (const Entry& entry : entries) {
-    const double width = 14 + svg::text_width_px(entry.label, kCaption_px) + 14;
-    if (x + width > end + 14) break;
-    put(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4.5\" fill=\"{}\" stroke=\"{}\" stroke-width=\"1.4\"/>\n", x + 5, y - 4, entry.fill, entry.rim);
-    out += svg::text(x + 14, y, kCaption_px, entry.label, svg::kFaint);
-    x += width;
+  const auto entry = [&](std::string_view fill, std::string_view rim, const std::string& label) {
+    const double width = 14 + svg::text_width_px(label, kCaption_px);
+    if (x + width > end + 16) return false;
+    put(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4.5\" fill=\"{}\" stroke=\"{}\" stroke-width=\"1.4\"/>\n",
+        x + 5, y - 4, fill, rim);
+    out += svg::text(x + 14, y, kCaption_px, label, svg::kFaint);
+    x += width + 10;
+    return true;
+  };
+  if (failures > 0) entry("none", kFailedRim, fmt::format("failed {}", failures));
+  out += svg::text(x, y, kCaption_px, "LED", svg::kFaint);
+  x += 30;
+  for (const auto& [led, count] : order) {
+    if (!entry(svg::led_colour(led), svg::kInk, fmt::format("{} {}", svg::led_name(led), count))) break;
   }
   return out;
 }
 
-/// A panel: title, drawing clipped to its frame, scale bar, a remark, and what explains it.
+/// What grey and coloured dots mean in the panel of paths.
+std::string path_legend(double x, double y) {
+  std::string out =
+      fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x + 5, y - 4, kStartDot);
+  out += svg::text(x + 14, y, kCaption_px, "start", svg::kFaint);
+  x += 62;
+  for (const std::string_view colour : kByStart) {
+    put(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x, y - 4, colour);
+    x += 10;
+  }
+  return out + svg::text(x, y, kCaption_px, "end, coloured by x at the start", svg::kFaint);
+}
+
+/// A drawing clipped to its frame, with what stands above it, and below it scale bar and remark.
 struct Panel {
-  std::string title, when, drawing, remark, legend;
+  std::string title, when, drawing, remark;
 };
 
 std::string draw_panel(const Panel& panel, const View& view, double x, double y) {
+  const double width = view.width_px(), height = view.height_px(), top = y + kPanelTitle_px,
+               below = top + height + 18;
   std::string out = svg::text(x, y + 16, 15, panel.title, svg::kInk, svg::Anchor::kStart, true);
-  out += svg::text(x + view.width_px(), y + 16, 13, panel.when, svg::kFaint, svg::Anchor::kEnd);
-  const double top = y + kPanelTitle_px;
-  put(out, "<svg x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2:.1f}\" height=\"{3:.1f}\" viewBox=\"0 0 {4:.0f} {5:.0f}\" overflow=\"hidden\">\n", x, top,
-      view.width_px(), view.height_px(), kUnitsPerPx * view.width_px(), kUnitsPerPx * view.height_px());
-  out += "<rect width=\"100%\" height=\"100%\" fill=\"#eef1f4\"/>\n";
-  out += panel.drawing;
-  out += "</svg>\n";
-  put(out, "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"{}\"/>\n", x, top, view.width_px(),
-      view.height_px(), svg::kLine);
-  const double below = top + view.height_px() + 18;
+  out += svg::text(x + width, y + 16, 13, panel.when, svg::kFaint, svg::Anchor::kEnd);
+  put(out, "<svg x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" viewBox=\"0 0 {:.0f} {:.0f}\" ", x,
+      top, width, height, kUnitsPerPx * width, kUnitsPerPx * height);
+  put(out, "overflow=\"hidden\">\n<rect width=\"100%\" height=\"100%\" fill=\"#eef1f4\"/>\n{}</svg>\n",
+      panel.drawing);
+  put(out, "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"{}\"/>\n", x,
+      top, width, height, svg::kLine);
   out += scale_bar(view, x + 1, below - 4);
-  out += svg::text(x + view.width_px(), below, kCaption_px, panel.remark, svg::kFaint, svg::Anchor::kEnd);
-  return out + panel.legend;
+  return out + svg::text(x + width, below, kCaption_px, panel.remark, svg::kFaint, svg::Anchor::kEnd);
 }
 
 Box extent(const Snapshot& at) {
@@ -231,8 +272,10 @@ Box zoomed(const Box& inner, const Box& outer) {
   Box wide = inner.widened(0.06 * size + 2 * kRobotRadius_mm);
   // A single robot or a row of them gets ground on all sides.
   const double least = 0.6 * size;
-  if (wide.width_mm() < least) wide = {wide.x_min_mm - least / 2, wide.y_min_mm, wide.x_max_mm + least / 2, wide.y_max_mm};
-  if (wide.height_mm() < least) wide = {wide.x_min_mm, wide.y_min_mm - least / 2, wide.x_max_mm, wide.y_max_mm + least / 2};
+  if (wide.width_mm() < least)
+    wide = {wide.x_min_mm - least / 2, wide.y_min_mm, wide.x_max_mm + least / 2, wide.y_max_mm};
+  if (wide.height_mm() < least)
+    wide = {wide.x_min_mm, wide.y_min_mm - least / 2, wide.x_max_mm, wide.y_max_mm + least / 2};
   const double ratio = std::min(outer.width_mm() / wide.width_mm(), outer.height_mm() / wide.height_mm());
   return ratio >= 1.7 ? wide : outer;
 }
@@ -241,65 +284,64 @@ Box zoomed(const Box& inner, const Box& outer) {
 
 std::string picture_svg(Reader& recording) {
   const Paths paths(recording, kPathPoints);
-  if (paths.empty()) throw UserError(fmt::format("{}: no state to draw; the run ended before its first one", recording.path().string()));
+  if (paths.empty()) {
+    throw UserError(
+        fmt::format("{}: no state to draw; the run ended before its first one", recording.path().string()));
+  }
   const proto::RecordingHeader& header = recording.header();
-
-  const Box arena = Box{-header.arena_width_mm() / 2, -header.arena_height_mm() / 2, header.arena_width_mm() / 2, header.arena_height_mm() / 2};
+  const double arena_width = header.arena_width_mm(), arena_height = header.arena_height_mm();
   Box everything;
   for (std::size_t i = 0; i < paths.robots(); ++i) {
     for (const Point& p : paths.path(i)) everything.add(p.x_mm, p.y_mm);
   }
-  const Box start = extent(paths.first());
-  const Box whole = arena.widened(0.01 * std::max(arena.width_mm(), arena.height_mm()));
+  const Box arena = Box{-arena_width / 2, -arena_height / 2, arena_width / 2, arena_height / 2};
+  const Box whole = arena.widened(0.01 * std::max(arena_width, arena_height));
   const Box shown = zoomed(everything, whole);
+  const Box start = extent(paths.first());
   const Box shown_at_start = zoomed(start, shown);
 
-  const bool below = shown.width_mm() > 2.2 * shown.height_mm();  // wide ones lie one below the other
-  const double width_px = below ? 900 : 384;
-  const double height_px = std::clamp(width_px * shown.height_mm() / shown.width_mm(), below ? 110.0 : 200.0, 560.0);
+  const bool stacked = shown.width_mm() > 2.2 * shown.height_mm();  // wide ones lie one below the other
+  const double width_px = stacked ? 900 : 384;
+  const double ratio = shown.height_mm() / shown.width_mm();
+  const double height_px = std::clamp(width_px * ratio, stacked ? 110.0 : 200.0, 560.0);
   const View view(shown, width_px, height_px), start_view(shown_at_start, width_px, height_px);
-
-  const auto remark = [&](const View& of, const View& against, std::string_view than) {
-    std::string text;
-    if (disc_units(of) > of.length(2 * kRobotRadius_mm) * 1.01) text += "discs larger than life";
-    const double factor = of.px_per_mm() / against.px_per_mm();
-    if (factor > 1.05) text += fmt::format("{}enlarged {:.1f} times{}", text.empty() ? "" : ", ", factor, than);
-    return text;
-  };
-  const View arena_view(whole, width_px, height_px);
-  const std::string part = view.px_per_mm() > 1.05 * arena_view.px_per_mm()
-                               ? fmt::format("part of the {:g} mm x {:g} mm arena", arena.width_mm(), arena.height_mm()) : "";
-  const bool start_zoomed = start_view.px_per_mm() > 1.05 * view.px_per_mm();
+  const double enlarged = start_view.px_per_mm() / view.px_per_mm();
+  const std::string part =
+      View(whole, width_px, height_px).px_per_mm() < 0.95 * view.px_per_mm() ? "part of the arena" : "";
+  const bool large_discs = disc_units(view) > 1.01 * view.length(2 * kRobotRadius_mm);
   const std::string from = time_text(paths.first().time_s), to = time_text(paths.last().time_s);
 
-  Panel panels[3];
-  panels[0] = {"Start", from, draw_arena(start_view, arena.width_mm(), arena.height_mm()) + draw_discs(paths.first(), start_view),
-               start_zoomed ? remark(start_view, view, ", dashed frame in Paths") : part, ""};
-  std::string ways = draw_arena(view, arena.width_mm(), arena.height_mm());
-  if (start_zoomed) ways += draw_frame(view, shown_at_start);
-  panels[1] = {"Paths", fmt::format("{} to {}", from, to), ways + draw_paths(paths, view, start), part.empty() ? "grey: start, dot: end" : part, ""};
-  panels[2] = {"End", to, draw_arena(view, arena.width_mm(), arena.height_mm()) + draw_discs(paths.last(), view), remark(view, view, ""), ""};
-  if (panels[2].remark.empty()) panels[2].remark = part;
+  const Panel start_panel{
+      "Start", from, draw_arena(start_view, arena_width, arena_height) + draw_discs(paths.first(), start_view),
+      enlarged > 1.05 ? fmt::format("enlarged {:.1f} times, see dashed frame", enlarged) : part};
+  const Panel paths_panel{"Paths", fmt::format("{} to {}", from, to),
+                          draw_arena(view, arena_width, arena_height) + draw_paths(paths, view, start) +
+                              (enlarged > 1.05 ? draw_frame(view, shown_at_start) : ""),
+                          part};
+  const Panel end_panel{"End", to, draw_arena(view, arena_width, arena_height) + draw_discs(paths.last(), view),
+                        large_discs ? "discs larger than life" : part};
 
-  const double step_x = below ? 0 : width_px + kGap_px, step_y = below ? kPanelTitle_px + height_px + kPanelFoot_px : 0;
-  const double total_width = 2 * kMargin_px + width_px + 2 * step_x;
-  const double total_height = kMargin_px + kTitle_px + kPanelTitle_px + height_px + kPanelFoot_px + 2 * step_y;
+  const double panel_height = kPanelTitle_px + height_px + kPanelFoot_px;
+  const double step_x = stacked ? 0 : width_px + kGap_px, step_y = stacked ? panel_height : 0;
+  const double top = kMargin_px + kTitle_px, foot = kPanelTitle_px + height_px + 38;
   const std::string name = svg::shortened(header.name().empty() ? "Kilotwin run" : header.name(), 60);
-  const std::string facts = fmt::format("{} robot{} \u00b7 seed {} \u00b7 {} simulated \u00b7 arena {:g} mm \u00d7 {:g} mm", header.robots(), header.robots() == 1 ? "" : "s",
-                                        header.seed(), to, header.arena_width_mm(), header.arena_height_mm());
+  const std::string facts =
+      fmt::format("{} robot{} \u00b7 seed {} \u00b7 {} simulated \u00b7 arena {:g} mm \u00d7 {:g} mm",
+                  header.robots(), header.robots() == 1 ? "" : "s", header.seed(), to, arena_width, arena_height);
   std::string body = svg::text(kMargin_px, kMargin_px + 16, 22, name, svg::kInk, svg::Anchor::kStart, true);
   body += svg::text(kMargin_px, kMargin_px + 38, 14, facts, svg::kFaint);
-  for (int i = 0; i < 3; ++i) {
-    const double x = kMargin_px + i * step_x, y = kMargin_px + kTitle_px - 10 + i * step_y;
-    const double foot = y + kPanelTitle_px + height_px + 38;
-    if (i == 0) panels[i].legend = led_legend(paths.first(), x, foot, width_px);
-    if (i == 1) panels[i].legend = svg::text(x, foot, kCaption_px, "colour: place at the start, from left to right", svg::kFaint);
-    if (i == 2) panels[i].legend = led_legend(paths.last(), x, foot, width_px);
-    body += draw_panel(panels[i], i == 0 ? start_view : view, x, y);
-  }
-  return svg::document(total_width, total_height, name, facts + ". Three panels: start, paths and end of all robots.", body);
+  double x = kMargin_px, y = top;
+  body += draw_panel(start_panel, start_view, x, y) + led_legend(paths.first(), x, y + foot, width_px);
+  x += step_x, y += step_y;
+  body += draw_panel(paths_panel, view, x, y) + path_legend(x, y + foot);
+  x += step_x, y += step_y;
+  body += draw_panel(end_panel, view, x, y) + led_legend(paths.last(), x, y + foot, width_px);
+  return svg::document(x + width_px + kMargin_px, y + panel_height + 6, name,
+                       facts + ". Three panels: start, paths and end of all robots.", body);
 }
 
-void write_picture(Reader& recording, const std::filesystem::path& file) { write_file(file, picture_svg(recording)); }
+void write_picture(Reader& recording, const std::filesystem::path& file) {
+  write_file(file, picture_svg(recording));
+}
 
 }  // namespace kilotwin::recorder

@@ -8,8 +8,8 @@
 
 namespace kilotwin::recorder {
 
-/// SVG with three panels, from all states that remain in the recording; about 100 to 250 bytes per robot for large swarms.
-/// Throws UserError where the recording has no state.
+/// SVG with three panels, from all states that remain in the recording; about 100 to 250 bytes per robot for large
+/// swarms. Throws UserError where the recording has no state.
 [[nodiscard]] std::string picture_svg(Reader& recording);
 
 /// Throws UserError as above, RunError where the file cannot be written.

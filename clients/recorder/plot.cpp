@@ -16,6 +16,8 @@ namespace {
 
 constexpr double kWidth_px = 720, kHeight_px = 460, kMargin_px = 24, kTickText_px = 12, kTitleText_px = 13;
 
+constexpr std::size_t kMostPoints = 40;
+
 /// One axis: a range of values laid over a range of pixels.
 struct Axis {
   double low = 0, high = 1;
@@ -83,29 +85,38 @@ std::string axis_title(const std::string& name, const std::string& unit, int exp
 }
 
 std::string line(double x1, double y1, double x2, double y2, std::string_view colour, double width) {
-  return fmt::format("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\" stroke=\"{}\" stroke-width=\"{:g}\"/>\n", x1, y1, x2, y2, colour, width);
+  return fmt::format("<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\" stroke=\"{}\" stroke-width=\"{:g}\"/>\n", x1, y1, x2,
+                     y2, colour, width);
 }
 
 std::string draw_series(const PlotSeries& series, const Axis& x, const Axis& y, std::string_view colour) {
   std::string path, bars, points;
   std::size_t drawn = 0;
+  // Where the line would vanish under the points, it stands alone, and bars have no feet.
+  const bool dense = series.line && series.x.size() > kMostPoints;
   for (std::size_t i = 0; i < series.x.size(); ++i) {
-    const bool visible = drawable(series, i) && (!x.logarithmic || series.x[i] > 0) && (!y.logarithmic || series.y[i] > 0);
+    const bool visible =
+        drawable(series, i) && (!x.logarithmic || series.x[i] > 0) && (!y.logarithmic || series.y[i] > 0);
     if (!visible) continue;
     const double px = x.position_px(series.x[i]), py = y.position_px(series.y[i]);
     path += fmt::format("{}{:.1f} {:.1f}", drawn++ == 0 ? "M" : "L", px, py);
     if (const double error = error_at(series, i); error > 0) {
       const double low = y.logarithmic ? std::max(series.y[i] - error, y.low) : series.y[i] - error;
       const double top = y.position_px(series.y[i] + error), bottom = y.position_px(low);
-      bars += fmt::format("M{0:.1f} {1:.1f}V{2:.1f}M{3:.1f} {1:.1f}h8M{3:.1f} {2:.1f}h8", px, top, bottom, px - 4);
+      bars += fmt::format("M{:.1f} {:.1f}V{:.1f}", px, top, bottom);
+      if (!dense) bars += fmt::format("M{0:.1f} {1:.1f}h8M{0:.1f} {2:.1f}h8", px - 4, top, bottom);
     }
-    if (series.points) points += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.6\"/>\n", px, py);
+    if (series.points && !dense) points += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.6\"/>\n", px, py);
   }
   std::string out;
   if (series.line && drawn > 1) {
-    out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\" stroke-linejoin=\"round\"/>\n", path, colour);
+    out +=
+        fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\" stroke-linejoin=\"round\"/>\n",
+                    path, colour);
   }
-  if (!bars.empty()) out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"/>\n", bars, colour);
+  if (!bars.empty())
+    out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\" stroke-opacity=\"{}\"/>\n",
+                       bars, colour, dense ? 0.4 : 1);
   if (!points.empty()) {
     out += fmt::format("<g fill=\"{}\" stroke=\"{}\" stroke-width=\"1\">\n{}</g>\n", colour, svg::kPaper, points);
   }
@@ -166,7 +177,8 @@ std::string plot_svg(const Plot& plot) {
   std::string body;
   double top = kMargin_px + 14;
   body += svg::text(left, top, 17, svg::shortened(plot.title, 64), svg::kInk, svg::Anchor::kStart, true);
-  if (!plot.subtitle.empty()) body += svg::text(left, top += 20, kTickText_px, svg::shortened(plot.subtitle, 100), svg::kFaint);
+  if (!plot.subtitle.empty())
+    body += svg::text(left, top += 20, kTickText_px, svg::shortened(plot.subtitle, 100), svg::kFaint);
   top += 22;
   body += draw_legend(plot, left, right, top);
   const double bottom = kHeight_px - kMargin_px - 38;
@@ -187,15 +199,19 @@ std::string plot_svg(const Plot& plot) {
   }
   body += line(left, bottom, right, bottom, svg::kInk, 1.2);
   body += line(left, top, left, bottom, svg::kInk, 1.2);
-  body += svg::text((left + right) / 2, kHeight_px - kMargin_px + 4, kTitleText_px, axis_title(plot.x_name, plot.x_unit, x.ticks.exponent),
-                    svg::kInk, svg::Anchor::kMiddle);
-  body += fmt::format("<g transform=\"translate({:.1f} {:.1f}) rotate(-90)\">\n{}</g>\n", kMargin_px + 10, (top + bottom) / 2,
-                      svg::text(0, 0, kTitleText_px, axis_title(plot.y_name, plot.y_unit, y.ticks.exponent), svg::kInk, svg::Anchor::kMiddle));
+  body += svg::text((left + right) / 2, kHeight_px - kMargin_px + 4, kTitleText_px,
+                    axis_title(plot.x_name, plot.x_unit, x.ticks.exponent), svg::kInk, svg::Anchor::kMiddle);
+  body += fmt::format("<g transform=\"translate({:.1f} {:.1f}) rotate(-90)\">\n{}</g>\n", kMargin_px + 10,
+                      (top + bottom) / 2,
+                      svg::text(0, 0, kTitleText_px, axis_title(plot.y_name, plot.y_unit, y.ticks.exponent),
+                                svg::kInk, svg::Anchor::kMiddle));
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     body += draw_series(plot.series[i], x, y, svg::kPalette[i % svg::kPalette.size()]);
   }
-  if (x_data.empty()) body += svg::text((left + right) / 2, (top + bottom) / 2, 14, "no data", svg::kFaint, svg::Anchor::kMiddle);
-  return svg::document(kWidth_px, kHeight_px, plot.title, fmt::format("{} against {}. {}", plot.y_name, plot.x_name, plot.subtitle), body);
+  if (x_data.empty())
+    body += svg::text((left + right) / 2, (top + bottom) / 2, 14, "no data", svg::kFaint, svg::Anchor::kMiddle);
+  return svg::document(kWidth_px, kHeight_px, plot.title,
+                       fmt::format("{} against {}. {}", plot.y_name, plot.x_name, plot.subtitle), body);
 }
 
 void write_plot(const Plot& plot, const std::filesystem::path& file) { write_file(file, plot_svg(plot)); }

@@ -8,9 +8,9 @@
 namespace kilotwin::recorder {
 
 struct PlotSeries {
-  std::string name;            ///< in the legend, which is left out for one series without a name
-  std::vector<double> x, y;    ///< of equal length; points that are not finite are left out
-  std::vector<double> error;   ///< half length of the bars; empty: none
+  std::string name;           ///< in the legend, which is left out for one series without a name
+  std::vector<double> x, y;   ///< of equal length; points that are not finite are left out
+  std::vector<double> error;  ///< half length of the bars; empty: none
   bool points = true;
   bool line = true;
 };
@@ -21,7 +21,7 @@ struct Plot {
   std::string x_name, x_unit;  ///< unit "" where there is none
   std::string y_name, y_unit;
   std::vector<std::string> x_categories;  ///< where x is no number: the names of x = 0, 1, 2...
-  bool x_logarithmic = false;  ///< ignored where some x <= 0
+  bool x_logarithmic = false;             ///< ignored where some x <= 0
   bool y_logarithmic = false;
   std::vector<PlotSeries> series;
 };

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <google/protobuf/stubs/logging.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -28,7 +29,8 @@ std::uint32_t get_u32(std::span<const std::uint8_t> from) {
 bool in_range(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
 
 bool all_within(const google::protobuf::RepeatedField<double>& values, double bound) {
-  return std::all_of(values.begin(), values.end(), [bound](double value) { return in_range(value, -bound, bound); });
+  return std::all_of(values.begin(), values.end(),
+                     [bound](double value) { return in_range(value, -bound, bound); });
 }
 
 bool valid_tick(std::int64_t tick) { return tick >= 0 && tick <= kLastTick; }
@@ -45,7 +47,8 @@ bool valid(const proto::RecordingHeader& header) {
 Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
   struct stat about {};
   const auto unreadable = [&](const std::string& reason) {
-    return UserError(fmt::format("{}: cannot be read: {}; expected a run directory or its recording.ktrec", file_.string(), reason));
+    return UserError(fmt::format("{}: cannot be read: {}; expected a run directory or its recording.ktrec",
+                                 file_.string(), reason));
   };
   const auto foreign = [&](std::string_view why) {
     return UserError(fmt::format("{}: not a Kilotwin recording; {}", file_.string(), why));
@@ -61,7 +64,8 @@ Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
     }
     header_ = std::move(*record_.mutable_header());
     if (header_.format() > kRecordingFormat) {
-      throw foreign(fmt::format("format {} of a newer version, this one reads format {}", header_.format(), kRecordingFormat));
+      throw foreign(fmt::format("format {} of a newer version, this one reads format {}", header_.format(),
+                                kRecordingFormat));
     }
     if (!valid(header_)) throw foreign("its header has values that no run has");
   } catch (...) {
@@ -101,7 +105,8 @@ bool Reader::fill(std::size_t bytes) {
   block_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(size - offset_, std::max(bytes, kBlock_bytes))));
   std::size_t got = 0;
   while (got < block_.size()) {
-    const ssize_t n = ::pread(descriptor_, block_.data() + got, block_.size() - got, static_cast<off_t>(block_from_ + got));
+    const ssize_t n =
+        ::pread(descriptor_, block_.data() + got, block_.size() - got, static_cast<off_t>(block_from_ + got));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) {
       block_.clear();
@@ -114,8 +119,8 @@ bool Reader::fill(std::size_t bytes) {
   return got >= bytes;
 }
 
-/// Reads the frame at offset_ into record_ and moves behind it. False at the end, with a warning where that is no whole
-/// frame's.
+/// Reads the frame at offset_ into record_ and moves behind it. False at the end, with a warning where that is no
+/// whole frame's.
 bool Reader::read_record() {
   warning_.clear();
   if (!fill(kFramePrefix_bytes)) {
@@ -133,7 +138,9 @@ bool Reader::read_record() {
     return false;
   }
   const std::span<const std::uint8_t> body = waiting().subspan(kFramePrefix_bytes, length);
-  if (::crc32_z(0, body.data(), body.size()) != crc || !record_.ParseFromArray(body.data(), static_cast<int>(length))) {
+  const google::protobuf::LogSilencer quiet;  // of text that is none it would tell on stderr
+  if (::crc32_z(0, body.data(), body.size()) != crc ||
+      !record_.ParseFromArray(body.data(), static_cast<int>(length))) {
     warn("damaged");
     return false;
   }
@@ -145,8 +152,7 @@ bool Reader::read_record() {
 const char* Reader::defect_of_record() const {
   const auto robots = static_cast<int>(header_.robots());
   switch (record_.kind_case()) {
-    case proto::Record::kHeader:
-      return "a second header";
+    case proto::Record::kHeader: return "a second header";
     case proto::Record::kState: {
       const proto::StateRecord& state = record_.state();
       if (state.x_mm_size() != robots || state.y_mm_size() != robots || state.heading_rad_size() != robots ||
@@ -173,10 +179,8 @@ const char* Reader::defect_of_record() const {
                          std::all_of(messages.sender().begin(), messages.sender().end(), known);
       return right ? nullptr : "messages of robots that are none";
     }
-    case proto::Record::kEnd:
-      return valid_tick(record_.end().tick()) ? nullptr : "an end at a tick that is none";
-    case proto::Record::KIND_NOT_SET:
-      return nullptr;
+    case proto::Record::kEnd: return valid_tick(record_.end().tick()) ? nullptr : "an end at a tick that is none";
+    case proto::Record::KIND_NOT_SET: return nullptr;
   }
   return nullptr;
 }

@@ -1,5 +1,5 @@
-/// Reader: the records of a recording, in order; also of one that still grows, of one that was cut off, and of any bytes at
-/// all: what it hands out has been checked.
+/// Reader: the records of a recording, in order; also of one that still grows, of one that was cut off, and of any
+/// bytes at all: what it hands out has been checked.
 #pragma once
 
 #include <cstdint>
@@ -30,16 +30,17 @@ class Reader {
   [[nodiscard]] TickLength tick_length() const { return TickLength{header_.tick_cycles()}; }
   [[nodiscard]] const std::filesystem::path& path() const { return file_; }
 
-  /// The next record after the header, valid until the next call; nullptr at the end. Where the file grows, a later call
-  /// goes on. States have one entry per robot in every field, finite poses and ascending ticks; messages name robots.
+  /// The next record after the header, valid until the next call; nullptr at the end. Where the file grows, a later
+  /// call goes on. States have one entry per robot in every field, finite poses and ascending ticks; messages name
+  /// robots.
   [[nodiscard]] const proto::Record* next();
   /// The next state among the records, nullptr at the end.
   [[nodiscard]] const proto::StateRecord* next_state();
   /// To the first record after the header again.
   void rewind();
 
-  /// After next() gave nullptr: whether the run's own end was reached. Without it and without a warning, the run was killed,
-  /// or goes on.
+  /// After next() gave nullptr: whether the run's own end was reached. Without it and without a warning, the run
+  /// was killed, or goes on.
   [[nodiscard]] bool ended() const { return ended_; }
   /// After next() gave nullptr: empty, or one line that tells where and how the file breaks off:
   /// "FILE: cut off at byte N; read up to there".
@@ -58,9 +59,9 @@ class Reader {
   proto::Record record_;
   std::string warning_;
   bool ended_ = false;
-  std::uint64_t offset_ = 0;        // of the next frame in the file
-  std::uint64_t records_from_ = 0;  // offset of the first frame after the header
-  std::int64_t last_state_ = 0;     // tick of the last state handed out
+  std::uint64_t offset_ = 0;         // of the next frame in the file
+  std::uint64_t records_from_ = 0;   // offset of the first frame after the header
+  std::int64_t last_state_ = 0;      // tick of the last state handed out
   std::vector<std::uint8_t> block_;  // bytes of the file from block_from_ on
   std::uint64_t block_from_ = 0;
 };

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "core/base/time.hpp"
 #include "idl/manifest.pb.h"
@@ -17,7 +18,8 @@ inline constexpr std::size_t kFramePrefix_bytes = 8;
 inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
 
 /// The header that belongs to a run which starts at `first_tick` with the state hash `first_hash`.
-[[nodiscard]] inline proto::RecordingHeader recording_header(const proto::Manifest& manifest, Tick first_tick = Tick{0},
+[[nodiscard]] inline proto::RecordingHeader recording_header(const proto::Manifest& manifest,
+                                                             Tick first_tick = Tick{0},
                                                              std::uint64_t first_hash = 0) {
   const proto::Experiment& experiment = manifest.experiment();
   proto::RecordingHeader header;
@@ -36,21 +38,41 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   return header;
 }
 
-/// At which ticks states are recorded: the first tick at or after 0, every_s, 2 every_s... A run's first and last states
-/// are recorded besides.
+/// A field of a state as the functions of this folder take it.
+[[nodiscard]] inline std::span<const double> values(const google::protobuf::RepeatedField<double>& field) {
+  return {field.data(), static_cast<std::size_t>(field.size())};
+}
+
+/// The first tick at or after `seconds` (>= 0), where a multiple of an interval that is meant to be a tick, and by
+/// rounding lies some nanoseconds behind it, counts as that tick.
+[[nodiscard]] inline Tick tick_at_or_after(TickLength length, double seconds) {
+  constexpr double kSlack_ticks = 1e-6;
+  const double ticks = seconds / length.seconds() - kSlack_ticks;
+  if (ticks <= 0) return Tick{0};
+  const auto whole = static_cast<std::int64_t>(ticks);
+  return Tick{static_cast<double>(whole) < ticks ? whole + 1 : whole};
+}
+
+/// At which ticks states are recorded: the first tick at or after 0, every_s, 2 every_s... A run's first and last
+/// states are recorded besides.
 class RecordingSchedule {
  public:
   RecordingSchedule(TickLength tick_length, double every_s) : tick_length_(tick_length), every_s_(every_s) {}
   [[nodiscard]] bool due(Tick tick) const { return at_or_after(tick) == tick; }
-  /// The first scheduled tick at or after `tick` (>= 0).
-  [[nodiscard]] Tick at_or_after(Tick tick) const {
-    // Rounding may put the multiple in question one off, so that its neighbours are looked at too.
-    auto multiple = static_cast<std::int64_t>(tick_length_.seconds_at(tick) / every_s_) - 1;
-    if (multiple < 0) multiple = 0;
-    Tick scheduled = tick_length_.at_or_after(static_cast<double>(multiple) * every_s_);
-    while (scheduled < tick) scheduled = tick_length_.at_or_after(static_cast<double>(++multiple) * every_s_);
-    return scheduled;
+  /// The tick of instant `number` * every_s.
+  [[nodiscard]] Tick tick(std::int64_t number) const {
+    return tick_at_or_after(tick_length_, static_cast<double>(number) * every_s_);
   }
+  /// The first instant whose tick is `from` (>= 0) or later.
+  [[nodiscard]] std::int64_t number_from(Tick from) const {
+    // The quotient lies within one of it; where an interval is shorter than a tick, several have the same tick.
+    auto number = static_cast<std::int64_t>(tick_length_.seconds_at(from) / every_s_);
+    while (number > 0 && tick(number - 1) >= from) --number;
+    while (tick(number) < from) ++number;
+    return number;
+  }
+  /// The first scheduled tick at or after `from` (>= 0).
+  [[nodiscard]] Tick at_or_after(Tick from) const { return tick(number_from(from)); }
 
  private:
   TickLength tick_length_;

@@ -14,8 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether the directory is this run's from now on. The mark is `programs`, which only one of several can make, so that
-/// also an empty directory that was there before goes to one run alone.
+/// Whether the directory is this run's from now on. The mark is `programs`, which only one of several can make, so
+/// that also an empty directory that was there before goes to one run alone.
 bool claim(const fs::path& directory) {
   const auto refuse = [](const fs::path& what) {
     return RunError(fmt::format("{}: cannot be created: {}", what.string(), system_reason()));
@@ -44,14 +44,16 @@ RunDirectory RunDirectory::create(const fs::path& wanted) {
   fs::path stem = wanted.lexically_normal();
   if (!stem.has_filename()) stem = stem.parent_path();  // "out/" is "out"
   std::error_code error;
-  if (stem.filename() == "." || stem.filename() == ".." || !stem.has_filename()) stem = fs::canonical(stem.empty() ? "/" : stem, error);
+  if (stem.filename() == "." || stem.filename() == ".." || !stem.has_filename())
+    stem = fs::canonical(stem.empty() ? "/" : stem, error);
   if (error) throw RunError(fmt::format("{}: cannot be read: {}", wanted.string(), error.message()));
   if (stem.has_parent_path()) fs::create_directories(stem.parent_path(), error);
   if (error) throw RunError(fmt::format("{}: cannot be created: {}", stem.parent_path().string(), error.message()));
   fs::path directory = stem;
   for (std::uint64_t number = 2;; ++number) {
     if (fs::exists(directory, error) && !fs::is_directory(directory, error)) {
-      if (directory == stem) throw UserError(fmt::format("{}: is a file; expected a directory to write the run to", stem.string()));
+      if (directory == stem)
+        throw UserError(fmt::format("{}: is a file; expected a directory to write the run to", stem.string()));
     } else if (claim(directory)) {
       return RunDirectory(directory);
     }
@@ -64,7 +66,8 @@ RunDirectory RunDirectory::open(const fs::path& run, Needs needs) {
   std::error_code error;
   const fs::file_status status = fs::status(run, error);
   if (!fs::exists(status)) {
-    throw UserError(fmt::format("{}: does not exist; expected the directory of a run, as runs/NAME-SEED", run.string()));
+    throw UserError(
+        fmt::format("{}: does not exist; expected the directory of a run, as runs/NAME-SEED", run.string()));
   }
   RunDirectory opened(run);
   if (!fs::is_directory(status)) {
@@ -73,8 +76,9 @@ RunDirectory RunDirectory::open(const fs::path& run, Needs needs) {
   }
   const fs::path file = needs == Needs::kRecording ? opened.recording_ : opened.manifest();
   if (!fs::exists(file, error)) {
-    throw UserError(fmt::format("{}: not a run directory, it has no {}; expected what `kilotwin run` wrote, as runs/NAME-SEED",
-                                opened.directory_.string(), file.filename().string()));
+    throw UserError(
+        fmt::format("{}: not a run directory, it has no {}; expected what `kilotwin run` wrote, as runs/NAME-SEED",
+                    opened.directory_.string(), file.filename().string()));
   }
   return opened;
 }

@@ -19,16 +19,17 @@ namespace kilotwin::recorder {
 
 class RunDirectory {
  public:
-  /// Makes a directory for a new run, and `programs` in it, without touching what is there: `wanted` where it does not exist
-  /// or is empty, else the first of wanted-2, wanted-3... that does not exist or is empty. Of several that start at the same
-  /// time each gets its own. Throws RunError where none can be made, UserError where `wanted` is a file.
+  /// Makes a directory for a new run, and `programs` in it, without touching what is there: `wanted` where it does
+  /// not exist or is empty, else the first of wanted-2, wanted-3... that does not exist or is empty. Of several
+  /// that start at the same time each gets its own. Throws RunError where none can be made, UserError where
+  /// `wanted` is a file.
   [[nodiscard]] static RunDirectory create(const std::filesystem::path& wanted);
   /// runs/NAME-SEED, which create() takes where the user names none.
   [[nodiscard]] static std::filesystem::path default_path(std::string_view name, std::uint64_t seed);
 
   enum class Needs { kRecording, kManifest };
-  /// A run that exists: its directory, or the recording in it (under whatever name). Throws UserError with what was expected
-  /// where the file in need is not there.
+  /// A run that exists: its directory, or the recording in it (under whatever name). Throws UserError with what was
+  /// expected where the file in need is not there.
   [[nodiscard]] static RunDirectory open(const std::filesystem::path& run, Needs needs);
 
   [[nodiscard]] const std::filesystem::path& path() const { return directory_; }
@@ -36,7 +37,9 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path manifest() const { return directory_ / "manifest.pb"; }
   [[nodiscard]] std::filesystem::path experiment() const { return directory_ / "experiment.txtpb"; }
   [[nodiscard]] std::filesystem::path programs() const { return directory_ / "programs"; }
-  [[nodiscard]] std::filesystem::path program(const std::string& sha256) const { return programs() / (sha256 + ".so"); }
+  [[nodiscard]] std::filesystem::path program(const std::string& sha256) const {
+    return programs() / (sha256 + ".so");
+  }
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }
   [[nodiscard]] std::filesystem::path checkpoints() const { return directory_ / "checkpoints"; }

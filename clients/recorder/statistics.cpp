@@ -48,7 +48,8 @@ void DisplacementObserver::add(double time_s, std::span<const double> x_mm, std:
 MeanSquareDisplacement mean_square_displacement(Reader& recording) {
   DisplacementObserver observer;
   while (const proto::StateRecord* state = recording.next_state()) {
-    observer.add(recording.tick_length().seconds_at(Tick{state->tick()}), state->x_mm(), state->y_mm());
+    observer.add(recording.tick_length().seconds_at(Tick{state->tick()}), values(state->x_mm()),
+                 values(state->y_mm()));
   }
   return observer.msd();
 }

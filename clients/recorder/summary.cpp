@@ -23,7 +23,8 @@ std::uint64_t parsed_hash(const std::string& digits) {
   std::uint64_t value = 0;
   const char* const last = digits.data() + digits.size();
   const auto [end, error] = std::from_chars(digits.data(), last, value, 16);
-  if (digits.size() != 16 || error != std::errc{} || end != last) throw std::invalid_argument("state_hash has 16 hex digits");
+  if (digits.size() != 16 || error != std::errc{} || end != last)
+    throw std::invalid_argument("state_hash has 16 hex digits");
   return value;
 }
 
@@ -78,21 +79,19 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"cpu_s", s.cpu_s},
       {"peak_memory_mib", s.peak_memory_mib},
       {"state_hash", fmt::format("{:016x}", s.state_hash)},
-      {"messages",
-       Json{{"attempted", s.messages.attempted},
-            {"sent", s.messages.sent},
-            {"received", s.messages.received},
-            {"collided", s.messages.collided}}},
+      {"messages", Json{{"attempted", s.messages.attempted},
+                        {"sent", s.messages.sent},
+                        {"received", s.messages.received},
+                        {"collided", s.messages.collided}}},
       {"robots_failed", s.robots_failed},
       {"recoveries", s.recoveries},
       {"moved_mm", Json{{"mean", s.moved_mm.mean}, {"max", s.moved_mm.max}}},
-      {"cost_ns_per_robot_tick",
-       Json{{"behaviours", s.cost_ns_per_robot_tick.behaviours},
-            {"physics", s.cost_ns_per_robot_tick.physics},
-            {"radio", s.cost_ns_per_robot_tick.radio},
-            {"station", s.cost_ns_per_robot_tick.station},
-            {"exchange", s.cost_ns_per_robot_tick.exchange},
-            {"recording", s.cost_ns_per_robot_tick.recording}}},
+      {"cost_ns_per_robot_tick", Json{{"behaviours", s.cost_ns_per_robot_tick.behaviours},
+                                      {"physics", s.cost_ns_per_robot_tick.physics},
+                                      {"radio", s.cost_ns_per_robot_tick.radio},
+                                      {"station", s.cost_ns_per_robot_tick.station},
+                                      {"exchange", s.cost_ns_per_robot_tick.exchange},
+                                      {"recording", s.cost_ns_per_robot_tick.recording}}},
   };
   write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
@@ -128,11 +127,13 @@ Summary read_summary(const std::filesystem::path& file) {
     const Json moved = json.value("moved_mm", none);
     s.moved_mm = {moved.value("mean", 0.0), moved.value("max", 0.0)};
     const Json cost = json.value("cost_ns_per_robot_tick", none);
-    s.cost_ns_per_robot_tick = {cost.value("behaviours", 0.0), cost.value("physics", 0.0),  cost.value("radio", 0.0),
-                                cost.value("station", 0.0),    cost.value("exchange", 0.0), cost.value("recording", 0.0)};
+    s.cost_ns_per_robot_tick = {cost.value("behaviours", 0.0), cost.value("physics", 0.0),
+                                cost.value("radio", 0.0),      cost.value("station", 0.0),
+                                cost.value("exchange", 0.0),   cost.value("recording", 0.0)};
     return s;
   } catch (const std::exception& error) {
-    throw UserError(fmt::format("{}: not a summary; expected the summary.json of a run directory ({})", file.string(), error.what()));
+    throw UserError(fmt::format("{}: not a summary; expected the summary.json of a run directory ({})",
+                                file.string(), error.what()));
   }
 }
 
@@ -143,18 +144,22 @@ std::string summary_text(const Summary& s, const std::filesystem::path& director
   };
   text += fmt::format("{}, seed {}: {}, {} simulated s ({} ticks)\n", s.name, s.seed, counted(s.robots, "robot"),
                       short_number(s.simulated_s), s.ticks);
-  std::string how = fmt::format("{} s of wall time, {} times real time, after {} s to start", short_number(s.wall_s),
-                                short_number(s.realtime_factor()), short_number(s.start_s));
+  std::string how = fmt::format("{} s of wall time, {} times real time, after {} s to start",
+                                short_number(s.wall_s), short_number(s.realtime_factor()), short_number(s.start_s));
   if (s.resumed_from_tick > 0) how += fmt::format("; resumed from tick {}", s.resumed_from_tick);
   line("took", how);
   std::string where = s.mode;
   if (s.mode == "federated") {
     where += fmt::format(": {}x{} {}, {}", s.partition_columns, s.partition_rows,
-                         s.partition_columns * s.partition_rows == 1 ? "partition" : "partitions", counted(s.hosts, "host"));
+                         s.partition_columns * s.partition_rows == 1 ? "partition" : "partitions",
+                         counted(s.hosts, "host"));
   }
-  if (s.recoveries > 0) where += fmt::format("; went back to a checkpoint {}", s.recoveries == 1 ? "once" : fmt::format("{} times", s.recoveries));
+  if (s.recoveries > 0)
+    where += fmt::format("; went back to a checkpoint {}",
+                         s.recoveries == 1 ? "once" : fmt::format("{} times", s.recoveries));
   line("mode", where);
-  line("moved", fmt::format("{} mm from start to end on average, {} mm at most", short_number(s.moved_mm.mean), short_number(s.moved_mm.max)));
+  line("moved", fmt::format("{} mm from start to end on average, {} mm at most", short_number(s.moved_mm.mean),
+                            short_number(s.moved_mm.max)));
   line("messages", fmt::format("{} sent of {} attempted; {} received, {} ({}) lost to collisions", s.messages.sent,
                                s.messages.attempted, s.messages.received, s.messages.collided,
                                percentage(s.messages.collided, s.messages.received + s.messages.collided)));
@@ -169,7 +174,8 @@ std::string summary_text(const Summary& s, const std::filesystem::path& director
     cost += fmt::format("{} {} {}", i == 0 ? ":" : ",", parts[i].first, short_number(parts[i].second));
   }
   line("cost", cost);
-  line("used", fmt::format("{} s of CPU time, {} MiB of memory", short_number(s.cpu_s), short_number(s.peak_memory_mib)));
+  line("used",
+       fmt::format("{} s of CPU time, {} MiB of memory", short_number(s.cpu_s), short_number(s.peak_memory_mib)));
   line("hash", fmt::format("{:016x}", s.state_hash));
   line("results", fmt::format("{}: summary.json, picture.svg, recording.ktrec", directory.string()));
   return text;

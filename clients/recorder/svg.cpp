@@ -12,7 +12,10 @@ std::size_t character_bytes(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
   if (first < 0x80) return 1;
-  const std::size_t length = first >= 0xf0 && first < 0xf5 ? 4 : first >= 0xe0 && first < 0xf0 ? 3 : first >= 0xc2 && first < 0xe0 ? 2 : 0;
+  const std::size_t length = first >= 0xf0 && first < 0xf5   ? 4
+                             : first >= 0xe0 && first < 0xf0 ? 3
+                             : first >= 0xc2 && first < 0xe0 ? 2
+                                                             : 0;
   if (length == 0 || length > text.size()) return 0;
   std::uint32_t code = first & (0xffu >> (length + 1));
   for (std::size_t i = 1; i < length; ++i) {
@@ -20,7 +23,8 @@ std::size_t character_bytes(std::string_view text) {
     code = code << 6 | (byte(i) & 0x3fu);
   }
   const bool shortest = length == 2 || (length == 3 && code >= 0x800) || (length == 4 && code >= 0x10000);
-  const bool xml = (code < 0xd800 || code > 0xdfff) && code <= 0x10ffff && (code & 0xfffe) != 0xfffe && code >= 0xa0;
+  const bool xml =
+      (code < 0xd800 || code > 0xdfff) && code <= 0x10ffff && (code & 0xfffe) != 0xfffe && code >= 0xa0;
   return shortest && xml ? length : 0;
 }
 
@@ -66,19 +70,21 @@ double text_width_px(std::string_view text, double size_px) {
   return 0.55 * size_px * static_cast<double>(characters);
 }
 
-std::string text(double x, double y, double size_px, std::string_view line, std::string_view colour, Anchor anchor, bool bold) {
+std::string text(double x, double y, double size_px, std::string_view line, std::string_view colour, Anchor anchor,
+                 bool bold) {
   const std::string_view where = anchor == Anchor::kStart    ? ""
                                  : anchor == Anchor::kMiddle ? " text-anchor=\"middle\""
                                                              : " text-anchor=\"end\"";
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:g}\" fill=\"{}\"{}{}>{}</text>\n", x, y, size_px, colour, where,
-                     bold ? " font-weight=\"600\"" : "", escaped(line));
+  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:g}\" fill=\"{}\"{}{}>{}</text>\n", x, y,
+                     size_px, colour, where, bold ? " font-weight=\"600\"" : "", escaped(line));
 }
 
 std::string document(double width_px, double height_px, std::string_view title, std::string_view description,
                      std::string_view body) {
   std::string out = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:g}\" height=\"{1:g}\" viewBox=\"0 0 {0:g} {1:g}\" role=\"img\" "
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:g}\" height=\"{1:g}\" viewBox=\"0 0 {0:g} {1:g}\" "
+      "role=\"img\" "
       "font-family=\"system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', Arial, sans-serif\">\n"
       "<title>{2}</title>\n<desc>{3}</desc>\n<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"{4}\"/>\n",
       width_px, height_px, escaped(title), escaped(description), kPaper);
@@ -100,7 +106,8 @@ std::string led_name(std::uint8_t led) {
   if (brightest == 0) return "off";
   const auto plain = [brightest](int channel) { return channel == 0 || channel == brightest; };
   if (!plain(r) || !plain(g) || !plain(b)) return fmt::format("rgb {}{}{}", r, g, b);
-  constexpr std::array<std::string_view, 8> kNames = {"off", "red", "green", "yellow", "blue", "magenta", "cyan", "white"};
+  constexpr std::array<std::string_view, 8> kNames = {"off",  "red",     "green", "yellow",
+                                                      "blue", "magenta", "cyan",  "white"};
   const std::size_t which = (r > 0 ? 1u : 0u) + (g > 0 ? 2u : 0u) + (b > 0 ? 4u : 0u);
   return fmt::format("{}{}", brightest < 2 ? "dim " : "", kNames[which]);
 }

@@ -9,9 +9,9 @@
 
 namespace kilotwin::recorder::svg {
 
-inline constexpr std::string_view kInk = "#1f2933";     ///< text and outlines
-inline constexpr std::string_view kFaint = "#66727f";   ///< what explains
-inline constexpr std::string_view kLine = "#c8d0d9";    ///< grids and frames
+inline constexpr std::string_view kInk = "#1f2933";    ///< text and outlines
+inline constexpr std::string_view kFaint = "#66727f";  ///< what explains
+inline constexpr std::string_view kLine = "#c8d0d9";   ///< grids and frames
 inline constexpr std::string_view kPaper = "#ffffff";
 
 /// Series and groups: distinguishable also with colour-blind eyes and in print.
@@ -30,13 +30,13 @@ inline constexpr std::array<std::string_view, 8> kPalette = {"#2563a8", "#d95f0e
 enum class Anchor { kStart, kMiddle, kEnd };
 
 /// A line of text with its baseline at (x, y), px.
-[[nodiscard]] std::string text(double x, double y, double size_px, std::string_view line, std::string_view colour = kInk,
-                               Anchor anchor = Anchor::kStart, bool bold = false);
+[[nodiscard]] std::string text(double x, double y, double size_px, std::string_view line,
+                               std::string_view colour = kInk, Anchor anchor = Anchor::kStart, bool bold = false);
 
-/// The document around `body`, on paper of its own so that it reads on light and dark pages. `description` is for those
-/// who hear it.
-[[nodiscard]] std::string document(double width_px, double height_px, std::string_view title, std::string_view description,
-                                   std::string_view body);
+/// The document around `body`, on paper of its own so that it reads on light and dark pages. `description` is for
+/// those who hear it.
+[[nodiscard]] std::string document(double width_px, double height_px, std::string_view title,
+                                   std::string_view description, std::string_view body);
 
 /// An LED of a robot, r | g << 2 | b << 4, as a colour on paper; off is a light grey.
 [[nodiscard]] std::string led_colour(std::uint8_t led);

@@ -33,7 +33,9 @@ void assign(google::protobuf::RepeatedField<double>* field, std::span<const doub
   field->Add(values.begin(), values.end());
 }
 
-void assign(std::string* field, std::span<const std::uint8_t> values) { field->assign(values.begin(), values.end()); }
+void assign(std::string* field, std::span<const std::uint8_t> values) {
+  field->assign(values.begin(), values.end());
+}
 
 }  // namespace
 
@@ -69,8 +71,9 @@ void Writer::append_hashes() {
 
 void Writer::state(const StateView& state) {
   if (state.tick.count() <= last_state_) return;
-  KILOTWIN_DEMAND(state.x_mm.size() == robots_ && state.y_mm.size() == robots_ && state.heading_rad.size() == robots_ &&
-                  state.led.size() == robots_ && state.life_cycle.size() == robots_);
+  KILOTWIN_DEMAND(state.x_mm.size() == robots_ && state.y_mm.size() == robots_ &&
+                  state.heading_rad.size() == robots_ && state.led.size() == robots_ &&
+                  state.life_cycle.size() == robots_);
   last_state_ = state.tick.count();
   proto::StateRecord& record = *state_.mutable_state();
   record.set_tick(state.tick.count());
@@ -101,7 +104,8 @@ void Writer::input(const proto::InputRecord& input) {
 }
 
 void Writer::messages(const proto::MessagesRecord& messages) {
-  KILOTWIN_DEMAND(messages.receiver_size() == messages.sender_size() && messages.sender_size() == messages.count_size());
+  KILOTWIN_DEMAND(messages.receiver_size() == messages.sender_size() &&
+                  messages.sender_size() == messages.count_size());
   *other_.mutable_messages() = messages;
   append(other_);
   other_.clear_messages();

@@ -1,7 +1,8 @@
 /// Writer: the recording of a run, as the run goes. One thread.
 ///
-/// What is older than about a second, or more than 256 KiB, is in the kernel and outlives a killed process. Time is looked
-/// at in each call; a run that makes none for long, because it is paused or waits, calls flush_if_due() while it waits.
+/// What is older than about a second, or more than 256 KiB, is in the kernel and outlives a killed process. Time is
+/// looked at in each call; a run that makes none for long, because it is paused or waits, calls flush_if_due()
+/// while it waits.
 #pragma once
 
 #include <cstdint>
@@ -22,20 +23,22 @@ struct StateView {
   std::span<const std::uint8_t> life_cycle;  ///< LifeCycle
 };
 
-/// Every function throws RunError where the file cannot be written, e.g. on a full disk: "FILE: cannot be written: reason".
+/// Every function throws RunError where the file cannot be written, e.g. on a full disk: "FILE: cannot be written:
+/// reason".
 class Writer {
  public:
   /// Creates the file, which must not exist, and writes the header at once.
   Writer(std::filesystem::path file, const proto::RecordingHeader& header);
 
-  /// A state, or a state hash H(tick). Ticks at or before the last one recorded are passed over: a run that went back to a
-  /// checkpoint repeats them, bit for bit.
+  /// A state, or a state hash H(tick). Ticks at or before the last one recorded are passed over: a run that went
+  /// back to a checkpoint repeats them, bit for bit.
   void state(const StateView& state);
   void hash(Tick tick, std::uint64_t chain);
   void input(const proto::InputRecord& input);
   /// Counts since the start; they take the place of what was recorded for the same pairs before.
   void messages(const proto::MessagesRecord& messages);
-  /// The last record of all, where the run came to its end. `failure`: one line, empty where it ended well. Closes the file.
+  /// The last record of all, where the run came to its end. `failure`: one line, empty where it ended well. Closes
+  /// the file.
   void end(Tick tick, std::uint64_t state_hash, const std::string& failure = {});
 
   /// Hands everything to the kernel.

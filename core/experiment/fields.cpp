@@ -82,14 +82,16 @@ constexpr FieldRule kRules[] = {
 using RuleTable = std::map<const FieldDescriptor*, const FieldRule*>;
 
 RuleTable rules_by_field() {
-  const pb::FileDescriptor* const files[] = {proto::Experiment::descriptor()->file(), proto::Model::descriptor()->file()};
+  const pb::FileDescriptor* const files[] = {proto::Experiment::descriptor()->file(),
+                                             proto::Model::descriptor()->file()};
   RuleTable table;
   for (const FieldRule& rule : kRules) {
     const std::size_t dot = rule.field.find('.');
     for (const pb::FileDescriptor* file : files) {
       const pb::Descriptor* type = file->FindMessageTypeByName(std::string{rule.field.substr(0, dot)});
       if (type == nullptr) continue;
-      if (const FieldDescriptor* field = type->FindFieldByName(std::string{rule.field.substr(dot + 1)})) table[field] = &rule;
+      if (const FieldDescriptor* field = type->FindFieldByName(std::string{rule.field.substr(dot + 1)}))
+        table[field] = &rule;
     }
   }
   return table;
@@ -103,7 +105,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     next[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
       next[j] = std::min({row[j] + 1, next[j - 1] + 1, row[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) next[j] = std::min(next[j], before[j - 2] + 1);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        next[j] = std::min(next[j], before[j - 2] + 1);
     }
     before.swap(row);
     row.swap(next);
@@ -139,7 +142,8 @@ std::string value_text(const FieldDescriptor& field) {
     case FieldDescriptor::CPPTYPE_STRING: return "text in quotes";
     case FieldDescriptor::CPPTYPE_ENUM:
       text = field.enum_type()->value_count() > 1 ? "one of " : "";
-      for (int i = 0; i < field.enum_type()->value_count(); ++i) text += (i ? ", " : "") + field.enum_type()->value(i)->name();
+      for (int i = 0; i < field.enum_type()->value_count(); ++i)
+        text += (i ? ", " : "") + field.enum_type()->value(i)->name();
       return text;
     case FieldDescriptor::CPPTYPE_DOUBLE: text = "a number"; break;
     default: text = "a whole number"; break;

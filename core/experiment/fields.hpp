@@ -20,7 +20,7 @@ enum class Lower { kIncluded, kExcluded };
 struct FieldRule {
   std::string_view field;  ///< "Arena.width_mm": message and field
   double min, max;
-  std::string_view unit;   ///< "" where the number has none
+  std::string_view unit;  ///< "" where the number has none
   Lower lower = Lower::kIncluded;
 
   [[nodiscard]] bool allows(double value) const {

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/pose.hpp"
+#include "core/experiment/fields.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/occupancy.hpp"
 #include "core/experiment/poses_csv.hpp"
@@ -29,9 +31,9 @@ bool beyond(double at_mm, double limit_mm) {
 /// The robots of one group, while they are being placed.
 struct Group {
   const proto::RobotGroup* spec;
-  std::string path;              ///< of the group in the experiment
+  std::string path;  ///< of the group in the experiment
   std::uint32_t first = 0, count = 0;
-  CsvPoses csv;                  ///< with a layout by poses
+  CsvPoses csv;  ///< with a layout by poses
   std::string csv_name;
 };
 
@@ -55,7 +57,8 @@ class Placement {
   }
   [[nodiscard]] UserError error_at(const Group& group, std::uint32_t robot, std::string_view text) const;
   [[nodiscard]] std::string described(std::uint32_t robot) const {
-    return fmt::format("robot {} at ({:.6g}, {:.6g}) mm", robot, placed_.x_mm[robot], placed_.y_mm[robot]);
+    const auto tenths = [](double at_mm) { return number_text(std::round(at_mm * 10) / 10 + 0.0); };
+    return fmt::format("robot {} at ({}, {}) mm", robot, tenths(placed_.x_mm[robot]), tenths(placed_.y_mm[robot]));
   }
 
   const LoadedExperiment& loaded_;
@@ -105,7 +108,8 @@ UserError Placement::error_at(const Group& group, std::uint32_t robot, std::stri
   return loaded_.locations.error(group.path + ".layout" + shape, text);
 }
 
-void Placement::set_heading(std::uint32_t robot, const proto::Layout& layout, proto::Heading heading, double heading_deg) {
+void Placement::set_heading(std::uint32_t robot, const proto::Layout& layout, proto::Heading heading,
+                            double heading_deg) {
   const double to_x_mm = layout.x_mm() - placed_.x_mm[robot], to_y_mm = layout.y_mm() - placed_.y_mm[robot];
   double angle_rad = 0;
   switch (heading) {
@@ -142,7 +146,8 @@ void Placement::place_rings(const Group& group) {
     for (std::uint32_t j = 0; j < rings.count(ring); ++j, ++robot) {
       double sine, cosine;
       kt_sincos(2 * kPi * j / rings.count(ring), &sine, &cosine);
-      set_position(robot, layout.x_mm() + rings.radius_mm(ring) * cosine, layout.y_mm() + rings.radius_mm(ring) * sine);
+      set_position(robot, layout.x_mm() + rings.radius_mm(ring) * cosine,
+                   layout.y_mm() + rings.radius_mm(ring) * sine);
       set_heading(robot, layout, rings.heading(), rings.heading_deg());
     }
   }
@@ -186,9 +191,9 @@ void Placement::place_random(const Group& group) {
     do {
       if (dart == kMostDarts) {
         throw error_at(group, robot,
-                       fmt::format("only {} of {} robots fit at random with gaps of {:.15g} mm; place fewer, widen the "
+                       fmt::format("only {} of {} robots fit at random with gaps of {} mm; place fewer, widen the "
                                    "rectangle or lower min_gap_mm (about half of the area can be covered)",
-                                   i, group.count, spec.min_gap_mm()));
+                                   i, group.count, number_text(spec.min_gap_mm())));
       }
       const double u = random_.uniform(Stream::kLayout, robot, Tick{0}, 2 * dart);
       const double v = random_.uniform(Stream::kLayout, robot, Tick{0}, 2 * dart + 1);
@@ -207,13 +212,13 @@ void Placement::check_placed(Occupancy& occupancy, const Group& group) const {
     const double x_mm = placed_.x_mm[robot], y_mm = placed_.y_mm[robot];
     if (beyond(x_mm, x_max_mm) || beyond(y_mm, y_max_mm)) {
       throw error_at(group, robot,
-                     fmt::format("{} reaches out of the arena; centres take x within +-{:.15g} mm and y within +-{:.15g} mm",
-                                 described(robot), x_max_mm, y_max_mm));
+                     fmt::format("{} reaches out of the arena; centres take x within +-{} mm and y within +-{} mm",
+                                 described(robot), number_text(x_max_mm), number_text(y_max_mm)));
     }
     if (const auto other = occupancy.first_within(x_mm, y_mm, kDiameter_mm - kTouchTolerance_mm)) {
       throw error_at(group, robot,
-                     fmt::format("{} overlaps {}; keep centres at least {:.15g} mm apart", described(robot), described(*other),
-                                 kDiameter_mm));
+                     fmt::format("{} overlaps {}; keep centres at least {} mm apart", described(robot),
+                                 described(*other), number_text(kDiameter_mm)));
     }
     occupancy.add(robot);
   }

@@ -14,7 +14,8 @@ namespace {
 std::string name_from(const std::filesystem::path& file) {
   std::string name = file.stem().string();
   for (char& c : name) {
-    const bool plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
+    const bool plain =
+        (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
     if (!plain) c = '-';
   }
   return name;
@@ -23,7 +24,7 @@ std::string name_from(const std::filesystem::path& file) {
 }  // namespace
 
 LoadedExperiment load_experiment(const std::filesystem::path& file) {
-  const std::string name = file.string();
+  const std::string name = one_line(file.string());
   LoadedExperiment loaded{{}, file, SourceLocations{name}};
   parse_text(name, read_text(file, name + ":1:1"), loaded.experiment, loaded.locations);
   if (!loaded.experiment.has_name()) loaded.experiment.set_name(name_from(file));
@@ -31,15 +32,16 @@ LoadedExperiment load_experiment(const std::filesystem::path& file) {
 }
 
 void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file) {
-  const std::string name = file.string();
+  const std::string name = one_line(file.string());
   proto::Model model;
   SourceLocations locations{name};
   parse_text(name, read_text(file, name + ":1:1"), model, locations);
 
-  proto::Experiment& experiment = loaded.experiment;
+  LoadedExperiment merged = loaded;
+  proto::Experiment& experiment = merged.experiment;
   if (model.has_motion()) {
     experiment.mutable_motion()->MergeFrom(model.motion());
-    loaded.locations.adopt(locations, "motion", "motion");
+    merged.locations.adopt(locations, "motion", "motion");
   }
   std::map<std::uint32_t, int> index_of;
   for (int i = experiment.robot_model_size(); i-- > 0;) {
@@ -59,8 +61,9 @@ void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file) {
     const auto [known, added] = index_of.emplace(robot, experiment.robot_model_size());
     if (added) experiment.add_robot_model();
     experiment.mutable_robot_model(known->second)->MergeFrom(model.robot(i));
-    loaded.locations.adopt(locations, from, fmt::format("robot_model[{}]", known->second));
+    merged.locations.adopt(locations, from, fmt::format("robot_model[{}]", known->second));
   }
+  loaded = std::move(merged);
 }
 
 }  // namespace kilotwin

@@ -19,18 +19,18 @@ struct LoadedExperiment {
   [[nodiscard]] std::filesystem::path resolve(const std::string& name) const { return file.parent_path() / name; }
 };
 
-/// Reads an experiment. Checks grammar and types alone; see validate.hpp for ranges and meaning. A missing name becomes the
-/// file's name without its ending, other characters than letters, digits, '-' and '_' replaced by '-'.
+/// Reads an experiment. Checks grammar and types alone; see validate.hpp for ranges and meaning. A missing name
+/// becomes the file's name without its ending, other characters than letters, digits, '-' and '_' replaced by '-'.
 /// Throws UserError "FILE:LINE:COLUMN: ...".
 [[nodiscard]] LoadedExperiment load_experiment(const std::filesystem::path& file);
 
 /// `--model FILE`: merges a proto::Model over experiment.motion and experiment.robot_model, robot by robot.
-/// Throws UserError that names a place in the model file.
+/// Throws UserError that names a place in the model file, and then changes nothing.
 void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file);
 
-/// Sets one field: "path.to[2].field=value". An index left out is 0; an index one past the end appends; messages on the way
-/// are created. Text needs no quotes, enum values go by name. `option` is how errors, now or in validation, call the
-/// argument; empty: "--set ARGUMENT". Changes nothing if it throws UserError.
+/// Sets one field: "path.to[2].field=value". An index left out is 0; an index one past the end appends; messages on
+/// the way are created. Text needs no quotes, enum values go by name. `option` is how errors, now or in validation,
+/// call the argument; empty: "--set ARGUMENT". Changes nothing if it throws UserError.
 void apply_override(LoadedExperiment& loaded, std::string_view argument, std::string_view option = {});
 
 /// `--robots N`: the first group's count.

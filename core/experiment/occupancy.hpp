@@ -1,4 +1,5 @@
-/// Which places are taken: a grid of cells hashed into a table, so that memory depends on the robots and not on the arena.
+/// Which places are taken: a grid of cells hashed into a table, so that memory depends on the robots and not on the
+/// arena.
 #pragma once
 
 #include <bit>
@@ -14,7 +15,10 @@ class Occupancy {
  public:
   /// Robots lie at (x_mm[i], y_mm[i]); the arrays outlive this and keep their size. Finds robots up to cell_mm away.
   Occupancy(double cell_mm, const std::vector<double>& x_mm, const std::vector<double>& y_mm)
-      : cell_mm_(cell_mm), x_mm_(x_mm), y_mm_(y_mm), next_(x_mm.size(), kNone),
+      : cell_mm_(cell_mm),
+        x_mm_(x_mm),
+        y_mm_(y_mm),
+        next_(x_mm.size(), kNone),
         head_(std::bit_ceil(2 * x_mm.size() + 1), kNone) {}
 
   void add(std::uint32_t robot) {

@@ -29,12 +29,11 @@ class Override {
 
  private:
   [[nodiscard]] UserError error(std::string_view text) const {
-    return UserError{fmt::format("{}: {}", one_line(option_), text)};
+    return UserError{fmt::format("{}: {}", one_line(option_, 200), text)};
   }
   Step parse_step(std::string_view segment, const pb::Descriptor& type) const;
   void assign(pb::Message& message, const Step& step, std::string_view value) const;
-  template <class Number>
-  Number number(const FieldDescriptor& field, std::string_view value) const;
+  template <class Number> Number number(const FieldDescriptor& field, std::string_view value) const;
   bool boolean(const FieldDescriptor& field, std::string_view value) const;
   const pb::EnumValueDescriptor* enumerator(const FieldDescriptor& field, std::string_view value) const;
   UserError unfit(const FieldDescriptor& field, std::string_view value) const {
@@ -75,8 +74,7 @@ void Override::demand_element(const pb::Message& message, const Step& step) cons
   }
 }
 
-template <class Number>
-Number Override::number(const FieldDescriptor& field, std::string_view value) const {
+template <class Number> Number Override::number(const FieldDescriptor& field, std::string_view value) const {
   Number result{};
   const auto [end, failure] = std::from_chars(value.data(), value.data() + value.size(), result);
   if (failure != std::errc{} || end != value.data() + value.size()) throw unfit(field, value);
@@ -102,9 +100,12 @@ void Override::assign(pb::Message& message, const Step& step, std::string_view v
   const bool append = list && step.index == reflection.FieldSize(message, field);
   // One of set, add and set-an-element, which reflection has per type.
   const auto put = [&](auto set, auto add, auto set_element, const auto& content) {
-    if (!list) (reflection.*set)(&message, field, content);
-    else if (append) (reflection.*add)(&message, field, content);
-    else (reflection.*set_element)(&message, field, step.index, content);
+    if (!list)
+      (reflection.*set)(&message, field, content);
+    else if (append)
+      (reflection.*add)(&message, field, content);
+    else
+      (reflection.*set_element)(&message, field, step.index, content);
   };
   using R = pb::Reflection;
   switch (field->cpp_type()) {
@@ -157,14 +158,17 @@ void Override::apply(LoadedExperiment& loaded) {
     const bool present = step.field->is_repeated() ? step.index < reflection.FieldSize(*message, step.field)
                                                    : reflection.HasField(*message, step.field);
     if (!present) created.push_back(path);
-    if (!step.field->is_repeated()) message = reflection.MutableMessage(message, step.field);
-    else if (!present) message = reflection.AddMessage(message, step.field);
-    else message = reflection.MutableRepeatedMessage(message, step.field, step.index);
+    if (!step.field->is_repeated())
+      message = reflection.MutableMessage(message, step.field);
+    else if (!present)
+      message = reflection.AddMessage(message, step.field);
+    else
+      message = reflection.MutableRepeatedMessage(message, step.field, step.index);
     rest = rest.substr(dot + 1);
   }
   loaded.experiment = std::move(changed);
-  for (std::string& block : created) loaded.locations.set_option(std::move(block), one_line(option_));
-  loaded.locations.set_option(std::move(path), one_line(option_));
+  for (std::string& block : created) loaded.locations.set_option(std::move(block), one_line(option_, 200));
+  loaded.locations.set_option(std::move(path), one_line(option_, 200));
 }
 
 }  // namespace

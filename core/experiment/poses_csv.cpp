@@ -51,7 +51,8 @@ void PosesReader::read_header(std::string_view row) {
   }
   degrees_ = header == kDegrees;
   if (!degrees_ && header != kRadians) {
-    throw error(row, row, fmt::format("the header is {}; it takes {} or {}", one_line(row, 60), kRadians, kDegrees));
+    throw error(row, row,
+                fmt::format("the header is {}; it takes {} or {}", one_line(row, 60), kRadians, kDegrees));
   }
   has_header_ = true;
 }
@@ -62,8 +63,9 @@ double PosesReader::number(std::string_view row, std::string_view cell, std::str
   const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   const bool whole = failure == std::errc{} && end == digits.data() + digits.size();
   if (whole && value - value == 0) return value;
-  throw error(row, digits.empty() ? cell : digits,
-              fmt::format("{} is {}; it takes a finite number", column, digits.empty() ? "empty" : one_line(digits, 60)));
+  throw error(
+      row, digits.empty() ? cell : digits,
+      fmt::format("{} is {}; it takes a finite number", column, digits.empty() ? "empty" : one_line(digits, 60)));
 }
 
 void PosesReader::read_row(std::string_view row) {
@@ -72,8 +74,9 @@ void PosesReader::read_row(std::string_view row) {
   for (std::size_t begin = 0; begin <= row.size(); ++columns) {
     const std::size_t end = std::min(row.find(',', begin), row.size());
     if (columns == value.size()) {
-      throw error(row, row.substr(begin), fmt::format("the row goes on after {} columns; it takes {}", columns,
-                                                      degrees_ ? kDegrees : kRadians));
+      throw error(
+          row, row.substr(begin),
+          fmt::format("the row goes on after {} columns; it takes {}", columns, degrees_ ? kDegrees : kRadians));
     }
     value[columns] = number(row, row.substr(begin, end - begin), kColumns[columns]);
     begin = end + 1;
@@ -84,7 +87,8 @@ void PosesReader::read_row(std::string_view row) {
                             degrees_ ? kDegrees : kRadians));
   }
   if (poses_.line.size() == kMostRobots) {
-    throw error(row, row, fmt::format("the file has more rows than {}; that many robots are the most", kMostRobots));
+    throw error(row, row,
+                fmt::format("the file has more rows than {}; that many robots are the most", kMostRobots));
   }
   const double heading_rad = degrees_ ? kt_fmod(value[2], 360) * (kPi / 180) : kt_fmod(value[2], 2 * kPi);
   poses_.x_mm.push_back(value[0]);
@@ -102,12 +106,14 @@ CsvPoses PosesReader::read(std::string_view text) {
     if (row.ends_with('\r')) row.remove_suffix(1);
     ++line_;
     if (trimmed(row).empty()) continue;
-    if (has_header_) read_row(row);
-    else read_header(row);
+    if (has_header_)
+      read_row(row);
+    else
+      read_header(row);
   }
   if (poses_.line.empty()) {
-    throw UserError{fmt::format("{}:{}:1: there are no poses; the file takes the header {} and a row per robot", name_,
-                                line_ + 1, kRadians)};
+    throw UserError{fmt::format("{}:{}:1: there are no poses; the file takes the header {} and a row per robot",
+                                name_, line_ + 1, kRadians)};
   }
   return std::move(poses_);
 }

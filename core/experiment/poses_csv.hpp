@@ -10,8 +10,8 @@ namespace kilotwin {
 
 struct CsvPoses {
   std::vector<double> x_mm, y_mm;
-  std::vector<double> heading_rad;   ///< in [-pi, pi)
-  std::vector<std::uint32_t> line;   ///< of the file, from 1
+  std::vector<double> heading_rad;  ///< in [-pi, pi)
+  std::vector<std::uint32_t> line;  ///< of the file, from 1
 };
 
 /// Blank lines are skipped; lines may end in CR LF. Throws UserError that names a place in the file, or begins with

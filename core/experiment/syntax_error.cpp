@@ -26,21 +26,30 @@ class Silent : public pb::io::ErrorCollector {
   void AddError(int, pb::io::ColumnNumber, const std::string&) override {}
 };
 
+/// The words that stand for numbers.
+bool is_not_finite(std::string word) {
+  for (char& c : word) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return word == "inf" || word == "infinity" || word == "nan";
+}
+
 /// Reads the text along the schema until something does not fit it.
 class Reader {
  public:
-  explicit Reader(const pb::Descriptor& root) { blocks_.push_back(Block{&root, nullptr, 0, {}}); }
+  explicit Reader(const pb::Descriptor& root) { blocks_.push_back(Block{&root, nullptr, 0, false, {}}); }
 
   /// The error at this token, if it is wrong there.
   std::optional<TextError> read(const Tokenizer::Token& token);
   /// The error of a text that ends here.
   [[nodiscard]] std::optional<TextError> end(const Tokenizer::Token& token) const;
+  /// True after a minus sign, which is one with the token that follows.
+  [[nodiscard]] bool within_value() const { return negative_; }
 
  private:
   struct Block {
     const pb::Descriptor* type;
     const FieldDescriptor* field;  ///< that it is the value of; null for the whole text
     int line;                      ///< where it opens
+    bool in_list;                  ///< one of several values in brackets
     std::set<std::string> given;   ///< names of the fields and oneofs that have a value
   };
   enum class Expected { kName, kColonOrBlock, kValue };
@@ -56,6 +65,7 @@ class Reader {
   const FieldDescriptor* field_ = nullptr;
   Expected expected_ = Expected::kName;
   bool in_list_ = false, negative_ = false;
+  Tokenizer::Token minus_;
 };
 
 std::optional<TextError> Reader::read(const Tokenizer::Token& token) {
@@ -64,11 +74,12 @@ std::optional<TextError> Reader::read(const Tokenizer::Token& token) {
     expected_ = Expected::kValue;
     return std::nullopt;
   }
-  if (expected_ == Expected::kColonOrBlock && token.text != "{" && token.text != "<") {
-    return at(token, fmt::format("{} is followed by {}; write {}", field_->name(), one_line(token.text, 60),
-                                 field_->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE
-                                     ? field_->name() + " { ... }"
-                                     : field_->name() + ": and " + value_text(*field_)));
+  const bool block = field_->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
+  const bool opens = token.text == "{" || token.text == "<" || (token.text == "[" && block);
+  if (expected_ == Expected::kColonOrBlock && !opens) {
+    return at(token,
+              fmt::format("{} is followed by {}; write {}", field_->name(), one_line(token.text, 60),
+                          block ? field_->name() + " { ... }" : field_->name() + ": and " + value_text(*field_)));
   }
   return read_value(token);
 }
@@ -76,9 +87,12 @@ std::optional<TextError> Reader::read(const Tokenizer::Token& token) {
 std::optional<TextError> Reader::read_name(const Tokenizer::Token& token) {
   Block& block = blocks_.back();
   if (token.text == "}" || token.text == ">") {
-    if (blocks_.size() == 1) return at(token, fmt::format("a closing {} has no block to close; remove it", token.text));
+    if (blocks_.size() == 1)
+      return at(token, fmt::format("a closing {} has no block to close; remove it", token.text));
+    field_ = block.field;
+    in_list_ = block.in_list;
+    expected_ = in_list_ ? Expected::kValue : Expected::kName;
     blocks_.pop_back();
-    in_list_ = false;
     return std::nullopt;
   }
   if (token.type != Tokenizer::TYPE_IDENTIFIER) return std::nullopt;
@@ -91,7 +105,8 @@ std::optional<TextError> Reader::read_name(const Tokenizer::Token& token) {
   if (!field_->is_repeated() && !block.given.insert(field_->name()).second) {
     return at(token, fmt::format("{} is given twice; give it once", field_->name()));
   }
-  if (const pb::OneofDescriptor* oneof = field_->containing_oneof(); oneof && !block.given.insert(oneof->name() + " of").second) {
+  if (const pb::OneofDescriptor* oneof = field_->containing_oneof();
+      oneof && !block.given.insert(oneof->name() + " of").second) {
     std::string members;
     for (int i = 0; i < oneof->field_count(); ++i) members += (i ? ", " : "") + oneof->field(i)->name();
     return at(token, fmt::format("{} is a second {}; give one of {}", field_->name(), oneof->name(), members));
@@ -111,14 +126,16 @@ std::optional<TextError> Reader::read_value(const Tokenizer::Token& token) {
     return std::nullopt;
   } else if (token.text == "-" && !block && !negative_) {
     negative_ = true;
+    minus_ = token;
   } else if (block && (token.text == "{" || token.text == "<")) {
-    blocks_.push_back(Block{field_->message_type(), field_, token.line, {}});
+    blocks_.push_back(Block{field_->message_type(), field_, token.line, in_list_, {}});
     expected_ = Expected::kName;
     in_list_ = false;
   } else if (block || !fits(token)) {
     const std::string value = one_line((negative_ ? "-" : "") + token.text, 60);
-    return at(token, fmt::format("{} is {}; it takes {}", field_->name(), value.empty() ? "left without a value" : value,
-                                 value_text(*field_)));
+    return at(negative_ ? minus_ : token,
+              fmt::format("{} is {}; it takes {}", field_->name(), value.empty() ? "left without a value" : value,
+                          value_text(*field_)));
   } else {
     negative_ = false;
     if (!in_list_) expected_ = Expected::kName;
@@ -132,15 +149,19 @@ bool Reader::fits(const Tokenizer::Token& token) const {
   switch (field_->cpp_type()) {
     case FieldDescriptor::CPPTYPE_STRING: return token.type == Tokenizer::TYPE_STRING && !negative_;
     case FieldDescriptor::CPPTYPE_BOOL:
-      return !negative_ && (token.text == "true" || token.text == "false" || token.text == "True" || token.text == "False" ||
-                            token.text == "t" || token.text == "f" || token.text == "0" || token.text == "1");
+      return !negative_ &&
+             (token.text == "true" || token.text == "false" || token.text == "True" || token.text == "False" ||
+              token.text == "t" || token.text == "f" || token.text == "0" || token.text == "1");
     case FieldDescriptor::CPPTYPE_ENUM:
-      if (integer) return Tokenizer::ParseInteger(token.text, 0x7fffffff, &whole) && !negative_ &&
-                          field_->enum_type()->FindValueByNumber(static_cast<int>(whole)) != nullptr;
+      if (integer)
+        return Tokenizer::ParseInteger(token.text, 0x7fffffff, &whole) && !negative_ &&
+               field_->enum_type()->FindValueByNumber(static_cast<int>(whole)) != nullptr;
       return field_->enum_type()->FindValueByName(token.text) != nullptr && !negative_;
-    case FieldDescriptor::CPPTYPE_UINT32: return integer && !negative_ && Tokenizer::ParseInteger(token.text, UINT32_MAX, &whole);
-    case FieldDescriptor::CPPTYPE_UINT64: return integer && !negative_ && Tokenizer::ParseInteger(token.text, UINT64_MAX, &whole);
-    default: return integer || token.type == Tokenizer::TYPE_FLOAT || token.type == Tokenizer::TYPE_IDENTIFIER;
+    case FieldDescriptor::CPPTYPE_UINT32:
+      return integer && !negative_ && Tokenizer::ParseInteger(token.text, UINT32_MAX, &whole);
+    case FieldDescriptor::CPPTYPE_UINT64:
+      return integer && !negative_ && Tokenizer::ParseInteger(token.text, UINT64_MAX, &whole);
+    default: return integer || token.type == Tokenizer::TYPE_FLOAT || is_not_finite(token.text);
   }
 }
 
@@ -149,8 +170,8 @@ std::optional<TextError> Reader::end(const Tokenizer::Token& token) const {
     return at(token, fmt::format("{} is left without a value; it takes {}", field_->name(), value_text(*field_)));
   }
   if (blocks_.size() == 1) return std::nullopt;
-  return at(token, fmt::format("the block {} of line {} is not closed; end it with }}", blocks_.back().field->name(),
-                               blocks_.back().line + 1));
+  return at(token, fmt::format("the block {} of line {} is not closed; end it with }}",
+                               blocks_.back().field->name(), blocks_.back().line + 1));
 }
 
 }  // namespace
@@ -165,13 +186,13 @@ TextError explained(const std::string& text, const pb::Descriptor& root, const T
   Reader reader{root};
   while (tokens.Next()) {
     const Tokenizer::Token& token = tokens.current();
-    if (std::tie(token.line, token.column) > std::tie(raw.line, raw.column)) break;
+    if (std::tie(token.line, token.column) > std::tie(raw.line, raw.column) && !reader.within_value()) break;
     if (auto error = reader.read(token)) return *error;
   }
   if (tokens.current().type == Tokenizer::TYPE_END) {
     if (auto error = reader.end(tokens.current())) return *error;
   }
-  std::string message = one_line(raw.message);
+  std::string message = one_line(raw.message, 200);
   while (message.ends_with('.')) message.pop_back();
   if (message.starts_with("Expected ")) message[0] = 'e';
   return TextError{raw.line, raw.column, message + "; write fields as name: value and blocks as name { ... }"};

@@ -15,9 +15,10 @@ struct TextError {
   std::string message;
 };
 
-/// The parser's first error of `text`, a message of type `root`, as "what is wrong; what would be right" at the very word
-/// that is wrong: an unknown field with the name that was meant, a value of another type with the type that is expected, a
-/// field given twice, a block left open.
-[[nodiscard]] TextError explained(const std::string& text, const google::protobuf::Descriptor& root, const TextError& raw);
+/// The parser's first error of `text`, a message of type `root`, as "what is wrong; what would be right" at the
+/// very word that is wrong: an unknown field with the name that was meant, a value of another type with the type that
+/// is expected, a field given twice, a block left open.
+[[nodiscard]] TextError explained(const std::string& text, const google::protobuf::Descriptor& root,
+                                  const TextError& raw);
 
 }  // namespace kilotwin

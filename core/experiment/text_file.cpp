@@ -52,8 +52,8 @@ void note_places(const pb::Message& message, const pb::TextFormat::ParseInfoTree
       }
       if (field->cpp_type() != pb::FieldDescriptor::CPPTYPE_MESSAGE) continue;
       if (const auto* nested = tree.GetTreeForNested(field, index)) {
-        const pb::Message& below =
-            field->is_repeated() ? reflection.GetRepeatedMessage(message, field, i) : reflection.GetMessage(message, field);
+        const pb::Message& below = field->is_repeated() ? reflection.GetRepeatedMessage(message, field, i)
+                                                        : reflection.GetMessage(message, field);
         note_places(below, *nested, element + ".", file, locations);
       }
     }
@@ -62,7 +62,8 @@ void note_places(const pb::Message& message, const pb::TextFormat::ParseInfoTree
 
 /// True if `path` names `root` or something below it.
 bool lies_in(std::string_view path, std::string_view root) {
-  return path.starts_with(root) && (path.size() == root.size() || path[root.size()] == '.' || path[root.size()] == '[');
+  return path.starts_with(root) &&
+         (path.size() == root.size() || path[root.size()] == '.' || path[root.size()] == '[');
 }
 
 }  // namespace
@@ -83,7 +84,8 @@ void SourceLocations::set_place(std::string path, std::string_view file, int lin
 
 void SourceLocations::set_option(std::string path, std::string_view option) {
   auto at = places_.lower_bound(path);
-  while (at != places_.end() && at->first.starts_with(path)) at = lies_in(at->first, path) ? places_.erase(at) : ++at;
+  while (at != places_.end() && at->first.starts_with(path))
+    at = lies_in(at->first, path) ? places_.erase(at) : ++at;
   places_.insert_or_assign(std::move(path), Place{source(option), 0, 0});
 }
 
@@ -91,7 +93,8 @@ void SourceLocations::adopt(const SourceLocations& other, std::string_view from,
   for (auto at = other.places_.lower_bound(from); at != other.places_.end() && at->first.starts_with(from); ++at) {
     if (!lies_in(at->first, from)) continue;
     const Place& place = at->second;
-    set_place(std::string{to} + at->first.substr(from.size()), other.sources_[place.source], place.line, place.column);
+    set_place(std::string{to} + at->first.substr(from.size()), other.sources_[place.source], place.line,
+              place.column);
   }
 }
 
@@ -133,14 +136,16 @@ std::string read_text(const std::filesystem::path& file, std::string_view where)
   std::ifstream in{file, std::ios::binary};
   if (!in) {
     const char* const reason = errno != 0 ? std::strerror(errno) : "it cannot be opened";
-    throw UserError{fmt::format("{}: {} cannot be read ({}); name a file that exists and may be read", where, name, reason)};
+    throw UserError{
+        fmt::format("{}: {} cannot be read ({}); name a file that exists and may be read", where, name, reason)};
   }
   std::string text;
   std::vector<char> block(std::size_t{1} << 16);
   while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
     text.append(block.data(), static_cast<std::size_t>(in.gcount()));
     if (text.size() > kLargestFile) {
-      throw UserError{fmt::format("{}: {} has more than {} MiB; files of this kind are smaller", where, name, kLargestFile >> 20)};
+      throw UserError{fmt::format("{}: {} has more than {} MiB; files of this kind are smaller", where, name,
+                                  kLargestFile >> 20)};
     }
   }
   return text;
@@ -155,7 +160,8 @@ void parse_text(std::string_view file, const std::string& text, pb::Message& mes
   parser.SetRecursionLimit(kDeepestNesting);
   pb::io::ArrayInputStream stream{text.data(), static_cast<int>(text.size())};
   if (!parser.Parse(&stream, &message)) {
-    const TextError error = explained(text, *message.GetDescriptor(), errors.error.value_or(TextError{0, 0, "not readable"}));
+    const TextError error =
+        explained(text, *message.GetDescriptor(), errors.error.value_or(TextError{0, 0, "not readable"}));
     throw UserError{fmt::format("{}:{}:{}: {}", file, error.line + 1, error.column + 1, error.message)};
   }
   note_places(message, tree, "", file, locations);

@@ -16,8 +16,8 @@ class Message;
 
 namespace kilotwin {
 
-/// Where the value of each field came from: a place in a file, or an option of the command line. A field is named by its
-/// path from the root message, "robots[0].layout.grid.pitch_mm".
+/// Where the value of each field came from: a place in a file, or an option of the command line. A field is named by
+/// its path from the root message, "robots[0].layout.grid.pitch_mm".
 class SourceLocations {
  public:
   /// `file` answers for whatever is absent, as FILE:1:1.
@@ -47,7 +47,7 @@ class SourceLocations {
 };
 
 /// `text` made fit for one line of a terminal: control characters as '?', the middle of what is overlong cut out.
-[[nodiscard]] std::string one_line(std::string_view text, std::size_t longest = 200);
+[[nodiscard]] std::string one_line(std::string_view text, std::size_t longest = 4096);
 
 /// The content of a file of at most 32 MiB. Throws UserError, beginning with `where`, if it cannot be read.
 [[nodiscard]] std::string read_text(const std::filesystem::path& file, std::string_view where);

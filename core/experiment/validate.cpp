@@ -95,13 +95,15 @@ void RangeCheck::check_number(const FieldDescriptor& field, double value, const 
 void check_name(const LoadedExperiment& loaded) {
   constexpr std::size_t kLongestName = 100;
   const std::string& name = loaded.experiment.name();
-  const std::size_t odd = name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_");
+  const std::size_t odd =
+      name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_");
   if (odd == std::string::npos && !name.empty() && name.size() <= kLongestName) return;
   throw loaded.locations.error("name", fmt::format("name is \"{}\"; it takes 1 to {} letters, digits, '-' and '_'",
                                                    one_line(name, 60), kLongestName));
 }
 
-void check_heading(const LoadedExperiment& loaded, const std::string& path, bool has_angle, proto::Heading heading) {
+void check_heading(const LoadedExperiment& loaded, const std::string& path, bool has_angle,
+                   proto::Heading heading) {
   if (!has_angle || heading == proto::HEADING_FIXED) return;
   throw loaded.locations.error(path + ".heading_deg",
                                "heading_deg has no effect here; add heading: HEADING_FIXED, or remove it");
@@ -119,9 +121,11 @@ void check_layout(const LoadedExperiment& loaded, const proto::RobotGroup& group
       with_heading(layout.rings(), "rings");
       const int counts = layout.rings().count_size(), radii = layout.rings().radius_mm_size();
       if (counts == radii && counts > 0) return;
-      throw loaded.locations.error(path + ".layout.rings",
-                                   fmt::format("rings has {} count and {} radius_mm; give as many of one as of the other, "
-                                               "at least one each", counts, radii));
+      throw loaded.locations.error(
+          path + ".layout.rings",
+          fmt::format("rings has {} count and {} radius_mm; give as many of one as of the other, "
+                      "at least one each",
+                      counts, radii));
     }
     case proto::Layout::kPoses:
       if (layout.poses().has_csv()) return;
@@ -141,10 +145,13 @@ void check_count(const LoadedExperiment& loaded, const proto::RobotGroup& group,
     const auto& counts = group.layout().rings().count();
     const std::uint64_t right = sum_of(counts);
     if (!group.has_count() || group.count() == right) return;
-    throw loaded.locations.error(path + ".count", fmt::format("count is {} but the rings hold {} robots; write {} or leave "
-                                                              "count out", group.count(), right, right));
+    throw loaded.locations.error(path + ".count",
+                                 fmt::format("count is {} but the rings hold {} robots; write {} or leave "
+                                             "count out",
+                                             group.count(), right, right));
   }
-  if (!group.has_count()) throw loaded.locations.error(path, "count is missing; state count: N, the number of robots");
+  if (!group.has_count())
+    throw loaded.locations.error(path, "count is missing; state count: N, the number of robots");
 }
 
 void check_behaviour(const LoadedExperiment& loaded, const proto::RobotGroup& group, const std::string& path) {
@@ -164,13 +171,15 @@ void check_behaviour(const LoadedExperiment& loaded, const proto::RobotGroup& gr
   }
 }
 
-void check_partition(const LoadedExperiment& loaded, const char* field, std::uint32_t count, const char* side, double side_mm) {
+void check_partition(const LoadedExperiment& loaded, const char* field, std::uint32_t count, const char* side,
+                     double side_mm) {
   const double cell_mm = side_mm / count, diameter_mm = 2 * kRobotRadius_mm;
   if (cell_mm >= diameter_mm) return;
-  throw loaded.locations.error(std::string{"deployment."} + field,
-                               fmt::format("{} is {}, which cuts the arena's {} of {} mm into cells of {:.3g} mm, smaller than "
-                                           "a robot; it takes at most {}", field, count, side, number_text(side_mm), cell_mm,
-                                           static_cast<int>(side_mm / diameter_mm)));
+  throw loaded.locations.error(
+      std::string{"deployment."} + field,
+      fmt::format("{} is {}, which cuts the arena's {} of {} mm into cells of {:.3g} mm, smaller than "
+                  "a robot; it takes at most {}",
+                  field, count, side, number_text(side_mm), cell_mm, static_cast<int>(side_mm / diameter_mm)));
 }
 
 void check_tick_multiples(const LoadedExperiment& loaded) {
@@ -183,9 +192,11 @@ void check_tick_multiples(const LoadedExperiment& loaded) {
   }
   const double checkpoint_s = experiment.deployment().checkpoint_every_s();
   if (checkpoint_s > 0 && checkpoint_s < tick_s) {
-    throw loaded.locations.error("deployment.checkpoint_every_s",
-                                 fmt::format("checkpoint_every_s is {}, shorter than a tick; it takes 0 for none, or at least "
-                                             "{} s", number_text(checkpoint_s), number_text(tick_s)));
+    throw loaded.locations.error(
+        "deployment.checkpoint_every_s",
+        fmt::format("checkpoint_every_s is {}, shorter than a tick; it takes 0 for none, or at least "
+                    "{} s",
+                    number_text(checkpoint_s), number_text(tick_s)));
   }
 }
 
@@ -199,8 +210,9 @@ void check_robot_models(const LoadedExperiment& loaded) {
     }
     int& entry = entry_of[model.robot()];
     if (entry >= 0) {
-      throw loaded.locations.error(path, fmt::format("robot {} has an entry already, at {}; keep one of them", model.robot(),
-                                                     loaded.locations.where(fmt::format("robot_model[{}]", entry))));
+      throw loaded.locations.error(
+          path, fmt::format("robot {} has an entry already, at {}; keep one of them", model.robot(),
+                            loaded.locations.where(fmt::format("robot_model[{}]", entry))));
     }
     entry = i;
   }
@@ -210,9 +222,9 @@ void check_station(const LoadedExperiment& loaded) {
   const proto::Station& station = loaded.experiment.station();
   for (int i = 0; i < station.environment_size(); ++i) {
     if (station.environment(i).kind_case() != proto::VirtualEnvironment::KIND_NOT_SET) continue;
-    throw loaded.locations.error(fmt::format("station.environment[{}]", i),
-                                 "environment has no kind; it takes " +
-                                     field_names(*proto::VirtualEnvironment::descriptor()) + " { ... }");
+    throw loaded.locations.error(
+        fmt::format("station.environment[{}]", i),
+        "environment has no kind; it takes " + field_names(*proto::VirtualEnvironment::descriptor()) + " { ... }");
   }
 }
 
@@ -225,17 +237,21 @@ std::uint64_t stated_count(const proto::RobotGroup& group) {
 
 void validate_total(const LoadedExperiment& loaded, std::uint64_t robots) {
   if (robots > kMostRobots) {
-    throw loaded.locations.error("robots", fmt::format("the groups have {} robots together; an experiment takes 1..{}", robots,
-                                                       kMostRobots));
+    throw loaded.locations.error(
+        "robots",
+        fmt::format("the groups have {} robots together; an experiment takes 1..{}", robots, kMostRobots));
   }
   if (loaded.experiment.station().environment_size() > 0 && robots > kMostArkRobots) {
-    throw loaded.locations.error("station.environment",
-                                 fmt::format("environment is given with {} robots, but ARK's messages address 10-bit ids; it "
-                                             "takes at most {} robots", robots, kMostArkRobots));
+    throw loaded.locations.error(
+        "station.environment",
+        fmt::format("environment is given with {} robots, but ARK's messages address 10-bit ids; it "
+                    "takes at most {} robots",
+                    robots, kMostArkRobots));
   }
   if (loaded.experiment.deployment().hosts() > robots) {
-    throw loaded.locations.error("deployment.hosts", fmt::format("hosts is {}, more than there are robots; it takes 1..{}",
-                                                                 loaded.experiment.deployment().hosts(), robots));
+    throw loaded.locations.error("deployment.hosts",
+                                 fmt::format("hosts is {}, more than there are robots; it takes 1..{}",
+                                             loaded.experiment.deployment().hosts(), robots));
   }
 }
 
@@ -246,12 +262,14 @@ void validate_fields(const LoadedExperiment& loaded) {
   check_tick_multiples(loaded);
   check_partition(loaded, "partition_columns", experiment.deployment().partition_columns(), "width",
                   experiment.arena().width_mm());
-  check_partition(loaded, "partition_rows", experiment.deployment().partition_rows(), "height", experiment.arena().height_mm());
+  check_partition(loaded, "partition_rows", experiment.deployment().partition_rows(), "height",
+                  experiment.arena().height_mm());
   check_robot_models(loaded);
   check_station(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
-    throw loaded.locations.error("robots", fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",
-                                                       experiment.robots_size(), kMostGroups));
+    throw loaded.locations.error("robots",
+                                 fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",
+                                             experiment.robots_size(), kMostGroups));
   }
   std::uint64_t total = 0;
   bool known = true;

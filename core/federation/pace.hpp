@@ -12,18 +12,15 @@ class Pace {
  public:
   explicit Pace(const RunPlan& plan) : factor_(plan.manifest.pace()), tick_s_(plan.tick_length.seconds()) {}
 
-  /// Returns when the wall time of `ticks` ticks after the first call has come; at once where the run goes as fast as it can.
-  void hold(std::int64_t ticks) {
+  /// Returns when `ticks` ticks may have passed; `wall_s`: how long the run has taken for them so far, pauses excluded.
+  void hold(std::int64_t ticks, double wall_s) const {
     if (factor_ <= 0) return;
-    if (ticks == 0) begun_ = Clock::now();
-    const std::chrono::duration<double> due(static_cast<double>(ticks) * tick_s_ / factor_);
-    std::this_thread::sleep_until(begun_ + std::chrono::duration_cast<Clock::duration>(due));
+    const double ahead_s = static_cast<double>(ticks) * tick_s_ / factor_ - wall_s;
+    if (ahead_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(ahead_s));
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
   double factor_, tick_s_;
-  Clock::time_point begun_ = Clock::now();
 };
 
 }  // namespace kilotwin

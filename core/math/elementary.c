@@ -10,6 +10,7 @@ __extension__ typedef unsigned __int128 Wide;
 typedef struct { double value, rest; } Pair;
 
 static const double kInfinity = __builtin_inf();
+static const Pair kNone = {0, 0};
 static const Pair kPi = {0x1.921fb54442d18p+1, 0x1.1a62633145c07p-53};
 static const Pair kHalfPi = {0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
 
@@ -145,7 +146,8 @@ static Reduced reduced(double x) {
     const double rest = ((first - value) - second) - turns * kHalfPi3;
     /* Next to a multiple of pi/2, so much may cancel that the third part is too short. */
     if (!(magnitude(value) < magnitude(turns) * 0x1p-60)) {
-      const Reduced result = {{value, rest}, (unsigned)((int)turns & 3)};
+      const double sum = value + rest;
+      const Reduced result = {{sum, (value - sum) + rest}, (unsigned)((int)turns & 3)};
       return result;
     }
   }
@@ -239,7 +241,7 @@ static const Pair kArcTable[33] = {
 static double angle_of(Pair y, Pair x, int left) {
   const int steep = y.value > x.value;
   Pair top = steep ? x : y, bottom = steep ? y : x;
-  Pair arc = {0, 0};
+  Pair arc = kNone;
   if (top.value < bottom.value * 0x1p-60) {
     arc.value = top.value / bottom.value;
   } else if (bottom.value != 0) {
@@ -260,15 +262,11 @@ static double angle_of(Pair y, Pair x, int left) {
       const double node = nearest(ratio * 32) * 0x1p-5;
       const Pair *known = kArcTable + (int)(node * 32);
       const double u = ((ratio - node) + ratio_rest) / (1 + ratio * node), z = u * u;
-      arc.value = known->value;
-      arc.rest = u + (known->rest + u * z * polynomial6(kArc, z));
-      const double sum = arc.value + arc.rest;
-      arc.rest = (u - (sum - arc.value)) + (known->rest + u * z * polynomial6(kArc, z));
-      arc.value = sum;
+      arc.value = known->value + u;
+      arc.rest = ((known->value - arc.value) + u) + (known->rest + u * z * polynomial6(kArc, z));
     }
   }
-  const Pair none = {0, 0};
-  const Pair base = steep ? kHalfPi : left ? kPi : none;
+  const Pair base = steep ? kHalfPi : left ? kPi : kNone;
   const double value = with_sign(arc.value, left != steep), rest = with_sign(arc.rest, left != steep);
   const double sum = base.value + value;
   return sum + (((base.value - sum) + value) + (base.rest + rest));

@@ -48,7 +48,7 @@ class StationFederate : public Federate {
   }
 
   void inputs_complete(Tick now, bool last) override {
-    pace_.hold(now - session_.first());
+    pace_.hold(now - session_.first(), session_.wall_s());
     const auto begun = Clock::now();
     observer_.state(now, bodies_.at(now), actuation_.at(now), last);
     recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());

@@ -52,12 +52,13 @@ void CellList::build(const std::vector<double>& x_mm, const std::vector<double>&
 }
 
 std::size_t CellList::find(double x_mm, double y_mm, std::uint32_t self, std::vector<std::uint32_t>& found) const {
+  if (found.size() <= body_.size()) found.resize(2 * body_.size());
   std::size_t count = 0;
+  std::uint32_t* const into = found.data();
   const auto scan = [&](std::uint32_t begin, std::uint32_t end) {
-    if (found.size() < count + (end - begin)) found.resize(2 * (count + (end - begin)));
     for (std::uint32_t m = begin; m < end; ++m) {
       const double dx = x_mm_[m] - x_mm, dy = y_mm_[m] - y_mm;
-      found[count] = body_[m];
+      into[count] = body_[m];
       count += static_cast<std::size_t>((dx * dx + dy * dy <= cutoff_square_mm2_) & (body_[m] != self));
     }
   };

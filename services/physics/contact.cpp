@@ -13,6 +13,27 @@ constexpr double kLimitTolerance_mm = 1e-14;
 /// Passes over the limits of a body. Two serve any two contacts that do not oppose each other.
 constexpr int kLimitPasses = 2;
 
+// By value, so that compilers take one instruction instead of a branch that they cannot predict.
+inline double larger(double a, double b) { return a > b ? a : b; }
+inline double smaller(double a, double b) { return a < b ? a : b; }
+
+using Two = double __attribute__((vector_size(16)));
+inline Two larger(Two a, Two b) { return a > b ? a : b; }
+inline Two smaller(Two a, Two b) { return a < b ? a : b; }
+inline Two firsts(Two a, Two b) { return __builtin_shufflevector(a, b, 0, 2); }
+inline Two seconds(Two a, Two b) { return __builtin_shufflevector(a, b, 1, 3); }
+
+constexpr std::uint32_t kNobody = 0xffffffffu;
+constexpr double kUnlimited_mm = 1e300;
+
+inline Two both(double a) { return Two{a, a}; }
+inline Two swapped(Two a) { return __builtin_shufflevector(a, a, 1, 0); }
+/// Takes off what a displacement closes along a normal beyond the limit; both lanes of `limit` are alike.
+inline Two limited(Two wanted, Two normal, Two limit) {
+  const Two product = wanted * normal;
+  return wanted - larger(product + swapped(product) - limit, Two{0, 0}) * normal;
+}
+
 }  // namespace
 
 ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
@@ -44,13 +65,13 @@ void ContactSolver::move(Bodies& bodies, const Drives& drives) {
   if (slots > 1) {
     link(drives);
     for (std::uint32_t s = 0; s < limits_.sub_steps; ++s) {
-      for (std::size_t slot = 1; slot < slots; ++slot) after_[slot] = next(bodies, slot);
+      any_overlap_ ? sub_step<true>(bodies) : sub_step<false>(bodies);
       now_.swap(after_);
     }
     for (std::size_t slot = 1; slot < slots; ++slot) {
       const std::uint32_t i = slots_[slot].body;
       const double x = bodies.x_mm[i], y = bodies.y_mm[i];
-      double to_x = x + now_[slot].x_mm, to_y = y + now_[slot].y_mm;
+      double to_x = x + now_[slot].shift_mm[0], to_y = y + now_[slot].shift_mm[1];
       if (!limits_.outside(x, y)) {  // The sum is rounded, a wall is not.
         to_x = std::clamp(to_x, -limits_.x_limit_mm, limits_.x_limit_mm);
         to_y = std::clamp(to_y, -limits_.y_limit_mm, limits_.y_limit_mm);
@@ -67,7 +88,8 @@ bool ContactSolver::find_contacts(Bodies& bodies, const Drives& drives) {
   const std::size_t count = bodies.size();
   if (drives.count == 0 && std::find(bodies.awake.begin(), bodies.awake.end(), 1) == bodies.awake.end()) return false;
   slots_.assign(1, Slot{});
-  contacts_.clear();
+  pair_count_ = 0;
+  any_overlap_ = false;
   drive_of_.assign(count, 0);
   for (std::size_t d = 0; d < drives.count; ++d) drive_of_[drives.body[d]] = static_cast<std::uint32_t>(d + 1);
   slot_of_.assign(count, 0);
@@ -78,8 +100,8 @@ bool ContactSolver::find_contacts(Bodies& bodies, const Drives& drives) {
   for (std::uint32_t i = 0; i < count; ++i) {
     if (bodies.awake[i] != 0 || drive_of_[i] != 0) search(bodies, i);
   }
-  // A sleeping body beside one that is driven or overlaps may be pushed.
-  for (const std::uint32_t i : pulled_) search(bodies, i);
+  // A sleeping body that touches one that is driven, or overlaps, may be moved.
+  for (std::size_t k = 0; k < pulled_.size(); ++k) search(bodies, pulled_[k]);
   return true;
 }
 
@@ -87,42 +109,51 @@ void ContactSolver::search(const Bodies& bodies, std::uint32_t i) {
   const double x = bodies.x_mm[i], y = bodies.y_mm[i];
   const std::size_t count = cells_.find(x, y, i, found_);
   if (count == 0) return;
-  const std::size_t first = contacts_.size();
-  contacts_.resize(first + count);
-  if (half_gap_mm_.size() < count) half_gap_mm_.resize(count);
-  const bool driven = drive_of_[i] != 0, rouses = driven || bodies.awake[i] != 0;
+  const std::size_t pairs = (count + 1) / 2, first = pair_count_;
+  if (pairs_.size() < first + pairs) pairs_.resize(2 * (first + pairs));
+  if (half_gap_mm_.size() < pairs) half_gap_mm_.resize(pairs);
+  const bool driven = drive_of_[i] != 0;
   bool may_move = driven || limits_.outside(x, y);
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::uint32_t j = found_[k];
-    const double dx = bodies.x_mm[j] - x, dy = bodies.y_mm[j] - y;
-    const double distance = __builtin_sqrt(dx * dx + dy * dy);
-    Contact& contact = contacts_[first + k];
-    contact.other = j;
-    if (distance > 0) {
-      const double inverse = 1 / distance;
-      contact.normal_x = dx * inverse;
-      contact.normal_y = dy * inverse;
-    } else {  // The same place: they part along x, the lower id to the left.
-      contact.normal_x = j > i ? 1 : -1;
-      contact.normal_y = 0;
+  for (std::size_t p = 0; p < pairs; ++p) {
+    const bool filled_up = 2 * p + 1 == count;
+    const std::uint32_t j[2] = {found_[2 * p], found_[filled_up ? 2 * p : 2 * p + 1]};
+    const Two dx = Two{bodies.x_mm[j[0]], bodies.x_mm[j[1]]} - x, dy = Two{bodies.y_mm[j[0]], bodies.y_mm[j[1]]} - y;
+    const Two square = dx * dx + dy * dy;
+    const Two distance = {__builtin_sqrt(square[0]), __builtin_sqrt(square[1])};
+    const Two inverse = 1 / distance;
+    ContactPair& pair = pairs_[first + p];
+    pair.normal_x = dx * inverse;
+    pair.normal_y = dy * inverse;
+    pair.gap_mm = distance - kDiameter_mm;
+    for (int k = 0; k < 2; ++k) {
+      pair.other[k] = j[k];
+      if (!(distance[k] > 0)) {  // The same place: they part along x, the lower id to the left.
+        pair.normal_x[k] = j[k] > i ? 1 : -1;
+        pair.normal_y[k] = 0;
+      }
+      const bool overlap = pair.gap_mm[k] < -kOverlapTolerance_mm, other_driven = drive_of_[j[k]] != 0;
+      if (overlap) {
+        overlaps_[i] = overlaps_[j[k]] = 1;
+        any_overlap_ = true;
+      }
+      may_move |= overlap || other_driven;
+      if ((driven || overlap) && !other_driven && bodies.awake[j[k]] == 0 && is_pulled_[j[k]] == 0) {
+        is_pulled_[j[k]] = 1;
+        pulled_.push_back(j[k]);
+      }
     }
-    contact.gap_mm = distance - kDiameter_mm;
-    const bool overlap = contact.gap_mm < -kOverlapTolerance_mm;
-    if (overlap) overlaps_[i] = overlaps_[j] = 1;
-    may_move |= overlap | (drive_of_[j] != 0);
-    if (rouses && (overlap || driven) && bodies.awake[j] == 0 && drive_of_[j] == 0 && is_pulled_[j] == 0) {
-      is_pulled_[j] = 1;
-      pulled_.push_back(j);
+    if (filled_up) {
+      pair.normal_x[1] = pair.normal_y[1] = 0;
+      pair.gap_mm[1] = kUnlimited_mm;
+      pair.other[1] = kNobody;
     }
   }
-  if (!may_move || bodies.tracked[i] != 0) {
-    contacts_.resize(first);
-    return;
-  }
+  if (!may_move || bodies.tracked[i] != 0) return;
+  pair_count_ = first + pairs;
   slot_of_[i] = static_cast<std::uint32_t>(slots_.size());
   Slot slot;
   slot.body = i;
-  slot.first_contact = static_cast<std::uint32_t>(first);
+  slot.first_pair = static_cast<std::uint32_t>(first);
   const double way_mm = limits_.sub_steps * limits_.stride_mm;
   slot.near_wall = x > limits_.x_limit_mm - way_mm || x < -limits_.x_limit_mm + way_mm || y > limits_.y_limit_mm - way_mm ||
                    y < -limits_.y_limit_mm + way_mm;
@@ -130,7 +161,9 @@ void ContactSolver::search(const Bodies& bodies, std::uint32_t i) {
 }
 
 void ContactSolver::link(const Drives& drives) {
-  for (Contact& contact : contacts_) contact.other = slot_of_[contact.other];
+  for (std::size_t p = 0; p < pair_count_; ++p) {
+    for (std::uint32_t& other : pairs_[p].other) other = other == kNobody ? 0 : slot_of_[other];
+  }
   const std::size_t count = slots_.size();
   now_.assign(count, Motion{});
   after_.assign(count, Motion{});
@@ -142,11 +175,11 @@ void ContactSolver::link(const Drives& drives) {
     const Arc arc = arc_of(drives.run_mm[d] * per_step, drives.turn_rad[d] * per_step, axle_offset_mm_);
     slot.cos_turn = arc.cos_turn;
     slot.sin_turn = arc.sin_turn;
-    now_[s].drive_x_mm = drives.cos_heading[d] * arc.forward_mm - drives.sin_heading[d] * arc.sideways_mm;
-    now_[s].drive_y_mm = drives.sin_heading[d] * arc.forward_mm + drives.cos_heading[d] * arc.sideways_mm;
+    now_[s].drive_mm = Two{drives.cos_heading[d] * arc.forward_mm - drives.sin_heading[d] * arc.sideways_mm,
+                           drives.sin_heading[d] * arc.forward_mm + drives.cos_heading[d] * arc.sideways_mm};
   }
   slots_.push_back(Slot{});  // Ends the contacts of the last slot.
-  slots_.back().first_contact = static_cast<std::uint32_t>(contacts_.size());
+  slots_.back().first_pair = static_cast<std::uint32_t>(pair_count_);
 }
 
 void ContactSolver::place(Bodies& bodies, std::uint32_t i, double to_x_mm, double to_y_mm) const {
@@ -159,8 +192,8 @@ void ContactSolver::place(Bodies& bodies, std::uint32_t i, double to_x_mm, doubl
 void ContactSolver::move_free(Bodies& bodies, const Drives& drives) const {
   const double way_mm = limits_.sub_steps * limits_.separation_mm;
   const auto held = [way_mm](double from_mm, double to_mm, double limit_mm) {
-    const double highest_mm = std::max(limit_mm, from_mm - way_mm), lowest_mm = std::min(-limit_mm, from_mm + way_mm);
-    return std::max(lowest_mm, std::min(highest_mm, to_mm));
+    const double highest_mm = larger(limit_mm, from_mm - way_mm), lowest_mm = smaller(-limit_mm, from_mm + way_mm);
+    return larger(lowest_mm, smaller(highest_mm, to_mm));
   };
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     const std::uint32_t drive = drive_of_[i];
@@ -174,74 +207,88 @@ void ContactSolver::move_free(Bodies& bodies, const Drives& drives) const {
   }
 }
 
-ContactSolver::Motion ContactSolver::next(const Bodies& bodies, std::size_t slot_index) {
-  const Slot& slot = slots_[slot_index];
-  const Motion me = now_[slot_index];
-  const Contact* const contacts = contacts_.data() + slot.first_contact;
-  const std::size_t count = slots_[slot_index + 1].first_contact - slot.first_contact;
-  double* const limit_mm = half_gap_mm_.data();
+template <bool kWithOverlaps>
+void ContactSolver::sub_step(const Bodies& bodies) {
+  const std::size_t slots = slots_.size() - 1;
+  const Motion* const now = now_.data();
+  Two* const limit_mm = half_gap_mm_.data();
+  const Two zero = {0, 0}, separation_mm = both(limits_.separation_mm);
+  for (std::size_t s = 1; s < slots; ++s) {
+    const Slot& slot = slots_[s];
+    const ContactPair* const pairs = pairs_.data() + slot.first_pair;
+    const std::size_t count = slots_[s + 1].first_pair - slot.first_pair;
+    const Two shift_mm = now[s].shift_mm, drive_mm = now[s].drive_mm;
 
-  double x = me.drive_x_mm, y = me.drive_y_mm;  // wanted, then limited
-  for (std::size_t k = 0; k < count; ++k) {
-    const Contact& c = contacts[k];
-    const Motion& other = now_[c.other];
-    const double gap = c.gap_mm + (c.normal_x * (other.x_mm - me.x_mm) + c.normal_y * (other.y_mm - me.y_mm));
-    const double half = std::max(0.0, 0.5 * gap);
-    const double advance = -(c.normal_x * other.drive_x_mm + c.normal_y * other.drive_y_mm);
-    const double retreat = -(c.normal_x * me.drive_x_mm + c.normal_y * me.drive_y_mm);
-    double push = std::max(0.0, advance - std::max(half, retreat));
-    if (gap < -kOverlapTolerance_mm) push += std::min(-0.5 * gap, limits_.separation_mm);
-    x -= push * c.normal_x;
-    y -= push * c.normal_y;
-    limit_mm[k] = half;
-  }
-
-  constexpr double kFar_mm = 1e300;
-  double left_mm = -kFar_mm, right_mm = kFar_mm, down_mm = -kFar_mm, up_mm = kFar_mm;
-  if (slot.near_wall) {
-    const double x_at = bodies.x_mm[slot.body] + me.x_mm, y_at = bodies.y_mm[slot.body] + me.y_mm;
-    right_mm = limits_.x_limit_mm - x_at;
-    left_mm = -limits_.x_limit_mm - x_at;
-    up_mm = limits_.y_limit_mm - y_at;
-    down_mm = -limits_.y_limit_mm - y_at;
-    // Outside of a wall it moves inwards, as far as its neighbours let it.
-    x += std::max(std::min(right_mm, 0.0), -limits_.separation_mm) + std::min(std::max(left_mm, 0.0), limits_.separation_mm);
-    y += std::max(std::min(up_mm, 0.0), -limits_.separation_mm) + std::min(std::max(down_mm, 0.0), limits_.separation_mm);
-    right_mm = std::max(right_mm, 0.0);
-    left_mm = std::min(left_mm, 0.0);
-    up_mm = std::max(up_mm, 0.0);
-    down_mm = std::min(down_mm, 0.0);
-  }
-
-  const double square = x * x + y * y;
-  if (square > limits_.stride_mm * limits_.stride_mm) {
-    const double scale = limits_.stride_mm / __builtin_sqrt(square);
-    x *= scale;
-    y *= scale;
-  }
-
-  for (int pass = 0; pass < kLimitPasses; ++pass) {
-    for (std::size_t k = 0; k < count; ++k) {
-      const Contact& c = contacts[k];
-      const double excess = std::max(0.0, c.normal_x * x + c.normal_y * y - limit_mm[k]);
-      x -= excess * c.normal_x;
-      y -= excess * c.normal_y;
+    // Pushes. Gaps and speeds of two neighbours at a time; the sum in ascending order.
+    Two wanted = drive_mm;
+    Two deepest = zero;
+    for (std::size_t p = 0; p < count; ++p) {
+      const ContactPair& c = pairs[p];
+      const Motion &a = now[c.other[0]], &b = now[c.other[1]];
+      const Two a_shift = a.shift_mm - shift_mm, b_shift = b.shift_mm - shift_mm;
+      const Two gap = c.gap_mm + (c.normal_x * firsts(a_shift, b_shift) + c.normal_y * seconds(a_shift, b_shift));
+      const Two half = larger(0.5 * gap, zero);
+      // Along the normal: what the neighbour drives, negative towards this body, and what this body drives.
+      const Two theirs = c.normal_x * firsts(a.drive_mm, b.drive_mm) + c.normal_y * seconds(a.drive_mm, b.drive_mm);
+      const Two mine = c.normal_x * firsts(drive_mm, drive_mm) + c.normal_y * seconds(drive_mm, drive_mm);
+      // They push where they drive faster than both the gap and this body's own retreat allow.
+      Two push = larger(smaller(-half, mine) - theirs, zero);
+      if constexpr (kWithOverlaps) {
+        const Two overlap = gap < -kOverlapTolerance_mm ? -gap : zero;
+        deepest = larger(deepest, overlap);
+        push += smaller(0.5 * overlap, separation_mm);
+        limit_mm[p] = gap;
+      } else {
+        limit_mm[p] = half;
+      }
+      wanted -= firsts(push, push) * firsts(c.normal_x, c.normal_y);
+      wanted -= seconds(push, push) * seconds(c.normal_x, c.normal_y);
     }
-    x = std::max(left_mm, std::min(right_mm, x));
-    y = std::max(down_mm, std::min(up_mm, y));
-  }
-  double scale = 1;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double closing = contacts[k].normal_x * x + contacts[k].normal_y * y;
-    if (closing > limit_mm[k] + kLimitTolerance_mm && scale * closing > limit_mm[k]) scale = limit_mm[k] / closing;
-  }
+    if constexpr (kWithOverlaps) {
+      const Two may_press = 0.5 * larger(deepest, swapped(deepest));
+      for (std::size_t p = 0; p < count; ++p) limit_mm[p] = larger(0.5 * (limit_mm[p] + may_press), zero);
+    }
 
-  Motion to;
-  to.x_mm = me.x_mm + scale * x;
-  to.y_mm = me.y_mm + scale * y;
-  to.drive_x_mm = slot.cos_turn * me.drive_x_mm - slot.sin_turn * me.drive_y_mm;
-  to.drive_y_mm = slot.sin_turn * me.drive_x_mm + slot.cos_turn * me.drive_y_mm;
-  return to;
+    Two low = both(-kUnlimited_mm), high = both(kUnlimited_mm);
+    if (slot.near_wall) {
+      const Two wall = {limits_.x_limit_mm, limits_.y_limit_mm};
+      const Two at = Two{bodies.x_mm[slot.body], bodies.y_mm[slot.body]} + shift_mm;
+      high = wall - at;
+      low = -wall - at;
+      // Outside of a wall it moves inwards, as far as its neighbours let it.
+      wanted += larger(smaller(high, zero), -separation_mm) + smaller(larger(low, zero), separation_mm);
+      high = larger(high, zero);
+      low = smaller(low, zero);
+    }
+    const double square = wanted[0] * wanted[0] + wanted[1] * wanted[1];
+    if (square > limits_.stride_mm * limits_.stride_mm) wanted *= both(limits_.stride_mm / __builtin_sqrt(square));
+
+    double scale = 1;
+    for (int pass = 0; pass < kLimitPasses; ++pass) {
+      for (std::size_t p = 0; p < count; ++p) {
+        const Two limit = limit_mm[p];
+        wanted = limited(wanted, firsts(pairs[p].normal_x, pairs[p].normal_y), firsts(limit, limit));
+        wanted = limited(wanted, seconds(pairs[p].normal_x, pairs[p].normal_y), seconds(limit, limit));
+      }
+      wanted = larger(smaller(wanted, high), low);
+      Two most = zero;
+      const Two x = firsts(wanted, wanted), y = seconds(wanted, wanted);
+      for (std::size_t p = 0; p < count; ++p) most = larger(pairs[p].normal_x * x + pairs[p].normal_y * y - limit_mm[p], most);
+      if (most[0] <= kLimitTolerance_mm && most[1] <= kLimitTolerance_mm) break;
+      if (pass + 1 < kLimitPasses) continue;
+      // The largest factor that brings it within all limits.
+      for (std::size_t p = 0; p < count; ++p) {
+        const Two closing = pairs[p].normal_x * x + pairs[p].normal_y * y;
+        for (int k = 0; k < 2; ++k) {
+          const double limit = limit_mm[p][k];
+          if (closing[k] > limit + kLimitTolerance_mm && scale * closing[k] > limit) scale = limit / closing[k];
+        }
+      }
+    }
+
+    after_[s].shift_mm = shift_mm + both(scale) * wanted;
+    after_[s].drive_mm = both(slot.cos_turn) * drive_mm + Two{-slot.sin_turn, slot.sin_turn} * swapped(drive_mm);
+  }
 }
 
 }  // namespace kilotwin::physics

@@ -9,6 +9,9 @@
 ///   limited u_i : n . u_i <= half of the gap for every neighbour, the whole gap for walls; the excess along n is taken
 ///                 off and the tangential part stays; where several limits contradict, all of the rest is scaled down.
 /// Both bodies of a pair close at most half of the gap, so no overlap arises, whatever they want, and 0 is always feasible.
+/// An overlap that was there from the start (a real robot moved into others, poses given so) would never part in a dense
+/// crowd that way. So a body that overlaps may press into others up to half of its own deepest overlap: overlaps spread,
+/// get smaller and vanish, and the deepest one never grows.
 /// Sums run over neighbours in ascending ids. A body depends on its neighbours only: one hop per sub-step.
 #pragma once
 
@@ -53,27 +56,31 @@ class ContactSolver {
   [[nodiscard]] const ContactLimits& limits() const { return limits_; }
 
  private:
-  struct Contact {
-    double normal_x, normal_y;  ///< from the body to the other
-    double gap_mm;              ///< at the tick's start
-    std::uint32_t other;        ///< index of the body; after link(), its slot
+  /// Two doubles, worked on by one instruction.
+  using Two = double __attribute__((vector_size(16)));
+
+  struct ContactPair {          ///< two contacts of a body; the last of an odd number is filled up by one that never acts
+    Two normal_x, normal_y;     ///< from the body to the other
+    Two gap_mm;                 ///< at the tick's start
+    std::uint32_t other[2];     ///< index of the body; after link(), its slot
   };
   struct Slot {                 ///< a body that may move and has neighbours; slot 0 stands for all that cannot move
     std::uint32_t body = 0;
-    std::uint32_t first_contact = 0;
+    std::uint32_t first_pair = 0;
     double cos_turn = 1, sin_turn = 0;  ///< of a sub-step
     bool near_wall = false;
   };
-  struct Motion {               ///< of a slot within the tick
-    double x_mm = 0, y_mm = 0;              ///< displacement since the tick's start
-    double drive_x_mm = 0, drive_y_mm = 0;  ///< by the drive alone in the coming sub-step
+  struct Motion {               ///< of a slot within the tick; x, y
+    Two shift_mm = {0, 0};      ///< displacement since the tick's start
+    Two drive_mm = {0, 0};      ///< by the drive alone in the coming sub-step
   };
 
   /// False: everything rests.
   bool find_contacts(Bodies&, const Drives&);
   void search(const Bodies&, std::uint32_t body);
   void link(const Drives&);
-  Motion next(const Bodies&, std::size_t slot);
+  template <bool kWithOverlaps>
+  void sub_step(const Bodies&);
   /// Moves what has no neighbour, for the whole tick at once.
   void move_free(Bodies&, const Drives&) const;
   void place(Bodies&, std::uint32_t body, double to_x_mm, double to_y_mm) const;
@@ -82,13 +89,15 @@ class ContactSolver {
   double axle_offset_mm_;
   CellList cells_;
   std::vector<Slot> slots_;
-  std::vector<Contact> contacts_;
+  std::vector<ContactPair> pairs_;
+  std::size_t pair_count_ = 0;
   std::vector<std::uint32_t> slot_of_;     ///< per body; 0: none
   std::vector<std::uint32_t> drive_of_;    ///< per body; index of its drive + 1; 0: none
   std::vector<std::uint32_t> pulled_;      ///< sleeping bodies beside one that is driven or overlaps
   std::vector<std::uint8_t> is_pulled_, overlaps_;  ///< per body
   std::vector<std::uint32_t> found_;
-  std::vector<double> half_gap_mm_;        ///< of the contacts of the body at hand
+  bool any_overlap_ = false;
+  std::vector<Two> half_gap_mm_;           ///< of the contacts of the body at hand
   std::vector<Motion> now_, after_;        ///< per slot
 };
 

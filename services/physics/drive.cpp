@@ -90,11 +90,14 @@ DriveModel::DriveModel(const RunPlan& plan)
 
   double top_bias = 0;
   for (const Bias& b : bias_) top_bias = std::max({top_bias, magnitude(b.left_mm_s), magnitude(b.right_mm_s)});
-  const double top_nominal = std::max(magnitude(straight_mm_s_[255]), magnitude(turn_mm_s_[255]));
-  const double top_wheel = (top_nominal + top_bias) * (1 + kTopNormal * factor_sd_);
-  // The centre's speed is convex in the wheels' speeds, so it is largest with both wheels forward, or one forward and one
-  // backward, at full speed.
-  top_speed_mm_s_ = top_wheel * std::max(1.0, 2 * axle_offset_mm_ / wheel_base_mm_);
+  // The centre's speed is linear in the wheels' speeds, so that of the nominal speeds and that of the biases add up; the
+  // latter is largest with both wheels forward, or one forward and one backward. The factors scale both.
+  const double lever = axle_offset_mm_ / wheel_base_mm_;
+  const double top_nominal =
+      std::max(magnitude(straight_mm_s_[255]), magnitude(turn_mm_s_[255]) * __builtin_sqrt(0.25 + lever * lever));
+  const double top_any = std::max(magnitude(straight_mm_s_[255]), magnitude(turn_mm_s_[255])) + top_bias;
+  const double widest = std::max(1.0, 2 * lever);
+  top_speed_mm_s_ = top_nominal + top_bias * widest + kTopNormal * factor_sd_ * top_any * widest;
 }
 
 bool DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Tick from, std::uint8_t motor_left,

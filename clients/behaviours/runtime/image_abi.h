@@ -78,7 +78,7 @@ struct KtImage {
 #else
 #define KT_ASSERT _Static_assert
 #endif
-KT_ASSERT(sizeof(struct KtRobot) == 56, "no padding");
+KT_ASSERT(sizeof(struct KtRobot) == 48, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
 KT_ASSERT(sizeof(struct KtEvents) == 16, "no padding");

@@ -1,0 +1,227 @@
+#include "clients/behaviours/engine.hpp"
+
+#include <algorithm>
+
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+constexpr std::uint32_t kNobody = 0xffffffffu;
+constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
+
+/// CRC-16/MCRF4XX over data and type.
+std::uint16_t message_crc(const IrMessage& message) {
+  std::uint32_t crc = 0xffff;
+  for (const std::uint8_t octet : message) {
+    std::uint32_t x = (octet ^ crc) & 0xff;
+    x = (x ^ x << 4) & 0xff;
+    crc = (crc >> 8 ^ x << 8 ^ x << 3 ^ x >> 4) & 0xffff;
+  }
+  return static_cast<std::uint16_t>(crc);
+}
+
+}  // namespace
+
+BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs)
+    : plan_(plan),
+      host_(host),
+      share_(plan.share(host)),
+      random_(plan.seed()),
+      programs_(std::move(programs)),
+      memory_(share_.size()),
+      presence_(share_.size(), Presence::kNone),
+      motor_left_(share_.size()),
+      motor_right_(share_.size()),
+      led_(share_.size()),
+      life_cycle_(share_.size(), static_cast<std::uint8_t>(LifeCycle::kIdle)),
+      tx_period_(share_.size(), kInitialTxPeriod),
+      holds_(share_.size()),
+      offers_(share_.size()),
+      message_(share_.size()),
+      asked_(share_.size()),
+      sent_(share_.size()),
+      first_reception_(share_.size() + 1),
+      running_robot_(kNobody) {
+  // Hosts of one process start at different slots, so that they seldom wait for each other.
+  const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
+  for (std::uint32_t s = 0; s < kSlots; ++s) {
+    for (std::uint32_t p = 0; p < programs_->size(); ++p) {
+      Group group{p, (first_slot + s) % kSlots, {}};
+      for (std::uint32_t i = 0; i < share_.size(); ++i) {
+        const std::uint32_t robot = share_.first + i;
+        if (robot % kSlots == group.slot && plan.program_of(robot) == p) group.robots.push_back(i);
+      }
+      for (const std::uint32_t i : group.robots) presence_[i] = Presence::kNew;
+      if (!group.robots.empty()) groups_.push_back(std::move(group));
+    }
+  }
+}
+
+void BehavioursEngine::gather(const RadioFrame& radio) {
+  auto own = [&](std::uint32_t robot) {
+    KILOTWIN_DEMAND(share_.contains(robot));
+    return robot - share_.first;
+  };
+  std::fill(asked_.begin(), asked_.end(), std::uint8_t{0});
+  std::fill(sent_.begin(), sent_.end(), std::uint8_t{0});
+  for (const std::uint32_t robot : radio.ask) asked_[own(robot)] = 1;
+  for (const std::uint32_t robot : radio.sent) sent_[own(robot)] = 1;
+
+  messages_.resize(radio.messages.size());
+  for (std::size_t m = 0; m < radio.messages.size(); ++m) {
+    const IrMessage& message = radio.messages[m];
+    std::copy_n(message.begin(), 9, messages_[m].data);
+    messages_[m].type = message[9];
+    messages_[m].crc = message_crc(message);
+  }
+  receptions_.resize(radio.reception_robot.size());
+  std::uint32_t next = 0;
+  for (std::uint32_t n = 0; n < receptions_.size(); ++n) {
+    const std::uint32_t i = own(radio.reception_robot[n]);
+    KILOTWIN_DEMAND(i + 1 >= next && radio.reception_message[n] < messages_.size());
+    while (next <= i) first_reception_[next++] = n;
+    receptions_[n] = {messages_[radio.reception_message[n]], radio.reception_low_gain[n], radio.reception_high_gain[n]};
+  }
+  while (next < first_reception_.size()) first_reception_[next++] = static_cast<std::uint32_t>(receptions_.size());
+}
+
+void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
+  KILOTWIN_DEMAND(radio.tick == from && radio.first_robot == share_.first && radio.kilo_ticks.size() == share_.size());
+  gather(radio);
+  std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
+  const FaultGuard guard;
+  for (const Group& group : groups_) {
+    const Program& program = programs_->program(group.program);
+    Slot& slot = program.slot(group.slot);
+    const std::lock_guard lock(slot.mutex);
+    const Executor executor(program, slot);
+    for (const std::uint32_t i : group.robots) run_robot(from, i, radio.kilo_ticks[i], program, slot, executor);
+    running_robot_.store(kNobody, std::memory_order_relaxed);
+  }
+}
+
+void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program& program,
+                                 const Slot& slot, const Executor& executor) {
+  if (presence_[i] == Presence::kFailed) return;
+  if (presence_[i] == Presence::kNew) reset_robot(from, i, program, slot);
+  RobotMemory& memory = memory_[i];
+  KtEvents events{receptions_.data() + first_reception_[i], first_reception_[i + 1] - first_reception_[i],
+                  static_cast<std::uint32_t>(sent_[i] & holds_[i])};
+  if (sent_[i] != 0) holds_[i] = 0;
+
+  auto robot = memory.get<KtRobot>(program, program.file.table.robot);
+  if (robot.deaf != 0) {
+    events.receptions = events.sent = 0;
+  } else {
+    const auto ticks = memory.get<std::uint32_t>(program, program.file.table.ticks);
+    memory.set(program, program.file.table.ticks, ticks + kilo_ticks);
+  }
+  const bool eventful = events.receptions > 0 || events.sent != 0;
+  if (!eventful && robot.parked != 0) return;
+
+  running_robot_.store(share_.first + i, std::memory_order_relaxed);
+  entries_.store(entries_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  memory.copy_in(slot);
+  if (eventful) {
+    if (const Fault fault = executor.interrupt(events); fault.signal != 0) return fail_robot(i, fault, program, slot);
+    if (executor.robot().reset != 0) {
+      reset_robot(from, i, program, slot);
+      memory.copy_in(slot);
+    }
+  }
+  if (executor.robot().parked == 0) {
+    if (const Fault fault = executor.run_main(); fault.signal != 0) return fail_robot(i, fault, program, slot);
+  }
+  robot = executor.robot();
+  if (robot.state != static_cast<std::uint8_t>(LifeCycle::kRunning)) holds_[i] = 0;
+  if (asked_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
+    KtMessage message{};
+    bool sends = false;
+    if (const Fault fault = executor.transmit(message, sends); fault.signal != 0) return fail_robot(i, fault, program, slot);
+    if (sends) {
+      std::copy_n(message.data, 9, message_[i].begin());
+      message_[i][9] = message.type;
+      holds_[i] = offers_[i] = 1;
+    }
+    robot = executor.robot();
+  }
+  note_outputs(i, robot, executor.tx_period());
+  if (!memory.copy_out(slot)) fail_robot(i, Fault{}, program, slot);
+}
+
+void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& program, const Slot& slot) {
+  const proto::Motion& motion = plan_.experiment().motion();
+  const std::uint32_t id = share_.first + i;
+  memory_[i].reset(program, slot);
+  auto robot = memory_[i].get<KtRobot>(program, program.file.table.robot);
+  robot.noise = random_.bits(Stream::kProgram, id, tick, 0);
+  robot.tick_cycles = plan_.tick_length.cycles();
+  robot.uid = static_cast<std::uint16_t>(id);
+  robot.straight_duty = static_cast<std::uint8_t>(motion.calibrated_straight_duty());
+  robot.turn_duty = static_cast<std::uint8_t>(motion.calibrated_turn_duty());
+  memory_[i].set(program, program.file.table.robot, robot);
+  presence_[i] = Presence::kAlive;
+  holds_[i] = 0;
+}
+
+void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Program& program, const Slot& slot) {
+  failures_.push_back({share_.first + i, describe(fault, program, slot)});
+  presence_[i] = Presence::kFailed;
+  life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kFailed);
+  motor_left_[i] = motor_right_[i] = 0;
+  holds_[i] = offers_[i] = 0;
+  memory_[i].release();
+}
+
+void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period) {
+  motor_left_[i] = robot.motors_on != 0 ? robot.duty_left : std::uint8_t{0};
+  motor_right_[i] = robot.motors_on != 0 ? robot.duty_right : std::uint8_t{0};
+  led_[i] = robot.led & 63;
+  life_cycle_[i] = robot.state;
+  tx_period_[i] = tx_period;
+}
+
+void BehavioursEngine::emit(ActuationFrame& frame) const {
+  frame.first_robot = share_.first;
+  frame.motor_left = motor_left_;
+  frame.motor_right = motor_right_;
+  frame.led = led_;
+  frame.life_cycle = life_cycle_;
+  frame.tx_period = tx_period_;
+  frame.offer_robot.clear();
+  frame.offer_message.clear();
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (offers_[i] == 0) continue;
+    frame.offer_robot.push_back(share_.first + i);
+    frame.offer_message.push_back(message_[i]);
+  }
+}
+
+std::uint64_t BehavioursEngine::hash_part() const {
+  std::uint64_t sum = 0;
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (presence_[i] == Presence::kNone) continue;
+    const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 | std::uint64_t{led_[i]} << 16 |
+                                  std::uint64_t{life_cycle_[i]} << 24 | std::uint64_t{tx_period_[i]} << 32 |
+                                  std::uint64_t{holds_[i]} << 48;
+    sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs});
+  }
+  return sum;
+}
+
+std::optional<BehavioursEngine::Running> BehavioursEngine::running() const {
+  const std::uint64_t entry = entries_.load(std::memory_order_acquire);
+  const std::uint32_t robot = running_robot_.load(std::memory_order_relaxed);
+  if (robot == kNobody) return std::nullopt;
+  return Running{robot, entry};
+}
+
+std::uint64_t BehavioursEngine::memory_octets() const {
+  std::uint64_t sum = 0;
+  for (const RobotMemory& memory : memory_) sum += memory.data().size() + memory.stack().size();
+  return sum;
+}
+
+}  // namespace kilotwin::behaviours

@@ -1,0 +1,104 @@
+/// The robots' programs of one host: messages and time in; motors, LEDs and messages out.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clients/behaviours/executor.hpp"
+#include "clients/behaviours/program_set.hpp"
+#include "core/experiment/plan.hpp"
+#include "core/federation/frames.hpp"
+#include "core/random/random.hpp"
+#include "idl/checkpoint.pb.h"
+
+namespace kilotwin::behaviours {
+
+/// In step k, for each robot in this order: its clock advances; kilo_message_tx_success if its message has left; receptions
+/// in order of arrival; the main program until it has used up the tick; kilo_message_tx if it is asked, runs, and holds no
+/// message. A message is held until it has left or the robot stops running.
+/// Robots of tracked groups have no program: motors 0, LED 0, life cycle IDLE.
+/// Pure, but for robots' code that faults: that stops its robot and is noted. Engines of one process may step in parallel.
+class BehavioursEngine {
+ public:
+  /// State at tick 0. `programs` are those of the plan's manifest.
+  BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs);
+
+  /// From tick `from` to the next. The frame is that of tick `from`, for this host.
+  void step(Tick from, const RadioFrame& radio);
+  void emit(ActuationFrame& frame) const;
+  /// Sum of entity_hash over own robots: motors, LED, life cycle, tx period, whether a message is held.
+  [[nodiscard]] std::uint64_t hash_part() const;
+
+  void save(proto::BehavioursState& state) const;
+  /// Takes own robots out of all parts of a checkpoint of tick `tick`. Throws RunError where a robot is missing or does not
+  /// fit its program.
+  void load(Tick tick, std::span<const proto::BehavioursState* const> parts);
+
+  struct Failure {
+    std::uint32_t robot = 0;
+    std::string text;  ///< one line: what its program did
+  };
+  /// Robots whose program has faulted, in the order in which it happened.
+  [[nodiscard]] const std::vector<Failure>& failures() const { return failures_; }
+  [[nodiscard]] std::uint32_t robots_failed() const { return static_cast<std::uint32_t>(failures_.size()); }
+
+  struct Running {
+    std::uint32_t robot = 0;
+    std::uint64_t entry = 0;  ///< how many robots have been entered since the start: the same number, the same call
+  };
+  /// Whose code runs at this moment, if any. May be called from any thread while another steps: who gets the same answer
+  /// twice knows that this robot has not returned in between.
+  [[nodiscard]] std::optional<Running> running() const;
+
+  /// Octets of memory that robots' programs take at present.
+  [[nodiscard]] std::uint64_t memory_octets() const;
+
+ private:
+  enum class Presence : std::uint8_t { kNone, kNew, kAlive, kFailed };
+
+  void gather(const RadioFrame& radio);
+  void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
+  void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);
+  void fail_robot(std::uint32_t i, const Fault&, const Program&, const Slot&);
+  void note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period);
+
+  const RunPlan& plan_;
+  const HostId host_;
+  const Share share_;
+  const Random random_;
+  const std::shared_ptr<ProgramSet> programs_;
+
+  /// Own robots by slot and program: the order in which they run.
+  struct Group {
+    std::uint32_t program = 0, slot = 0;
+    std::vector<std::uint32_t> robots;  ///< indices below, ascending
+  };
+  std::vector<Group> groups_;
+
+  // Per own robot; index i is robot share_.first + i.
+  std::vector<RobotMemory> memory_;
+  std::vector<Presence> presence_;
+  std::vector<std::uint8_t> motor_left_, motor_right_, led_, life_cycle_;
+  std::vector<std::uint16_t> tx_period_;
+  std::vector<std::uint8_t> holds_;    ///< a message that has not left
+  std::vector<std::uint8_t> offers_;   ///< a message that is new in this tick
+  std::vector<IrMessage> message_;     ///< where it offers one
+
+  std::vector<Failure> failures_;
+
+  // Of the step at hand; per own robot where not said otherwise.
+  std::vector<std::uint8_t> asked_, sent_;
+  std::vector<std::uint32_t> first_reception_;  ///< one more than robots
+  std::vector<KtReception> receptions_;         ///< ordered by robot, then by time of arrival
+  std::vector<KtMessage> messages_;             ///< with their checksums
+
+  std::atomic<std::uint32_t> running_robot_;
+  std::atomic<std::uint64_t> entries_{0};
+};
+
+}  // namespace kilotwin::behaviours

@@ -1,0 +1,127 @@
+#include "clients/behaviours/image.hpp"
+
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <cstring>
+#include <map>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+constexpr std::uint64_t kGuardOctets = 16 * 1024;
+constexpr std::uint64_t kSlotAlignment = 64 * 1024;
+
+void* pointer(std::uint64_t address) { return reinterpret_cast<void*>(address); }  // NOLINT
+
+void protect(std::uint64_t address, std::uint64_t size, int protection) {
+  if (size > 0 && mprotect(pointer(address), size, protection) != 0) {
+    throw RunError(std::string("memory for robots' programs: ") + std::strerror(errno));
+  }
+}
+
+struct Loaded {
+  std::unique_ptr<Program> program;
+  std::size_t users = 0;
+};
+
+struct Registry {
+  std::mutex mutex;
+  std::map<std::uint64_t, Loaded> programs;  // by address
+};
+
+Registry& registry() {
+  static Registry* const instance = new Registry;  // outlives every user, at exit as well
+  return *instance;
+}
+
+}  // namespace
+
+std::uint64_t Slot::size(const ElfFile& file) {
+  const std::uint64_t used = 2 * kStackOctets + kPage + file.memory.size() + 4 * kGuardOctets;
+  return (used + kSlotAlignment - 1) / kSlotAlignment * kSlotAlignment;
+}
+
+Slot::Slot(const ElfFile& file, std::uint64_t address)
+    : address_(address),
+      size_(size(file)),
+      stack_top_(address + kGuardOctets + kStackOctets),
+      control_(stack_top_ + 2 * kGuardOctets + kStackOctets),
+      image_(control_ + kPage),
+      data_offset_(file.data.first) {
+  void* mapped = mmap(pointer(address), size_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE, -1, 0);
+  if (mapped != pointer(address)) {
+    const int error = mapped == MAP_FAILED ? errno : EEXIST;
+    if (mapped != MAP_FAILED) munmap(mapped, size_);
+    throw RunError(std::string("memory for robots' programs: ") + std::strerror(error));
+  }
+  try {
+    const std::uint64_t interrupt_top = stack_top_ + kGuardOctets + kStackOctets;
+    protect(stack_top_ - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
+    protect(interrupt_top - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
+    protect(control_, kPage, PROT_READ | PROT_WRITE);
+    protect(image_, file.memory.size(), PROT_READ | PROT_WRITE);
+    *control() = {0, 0, interrupt_top};
+    auto* const image = at<std::uint8_t*>(0);
+    std::memcpy(image, file.memory.data(), file.memory.size());
+    for (const std::uint32_t offset : file.relocations) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, image + offset, sizeof word);
+      word += image_;
+      std::memcpy(image + offset, &word, sizeof word);
+    }
+    std::memcpy(image + file.table.control, &control_, sizeof control_);
+    protect(image_, file.memory.size(), PROT_NONE);
+    for (const ElfFile::Segment& segment : file.segments) {
+      const int protection = PROT_READ | (segment.writable ? PROT_WRITE : 0) | (segment.executable ? PROT_EXEC : 0);
+      const std::uint64_t first = page_down(segment.range.first);
+      protect(image_ + first, page_up(segment.range.last) - first, protection);
+    }
+    protect(image_ + file.relro.first, file.relro.last - file.relro.first, PROT_READ);
+    initial_data_.assign(data(), data() + (file.data.last - file.data.first));
+  } catch (...) {
+    munmap(pointer(address_), size_);
+    throw;
+  }
+}
+
+Slot::~Slot() { munmap(pointer(address_), size_); }
+
+Program::Program(ElfFile parsed, std::string program_name, std::string hash, std::uint64_t first)
+    : file(std::move(parsed)),
+      name(std::move(program_name)),
+      sha256(std::move(hash)),
+      address(first),
+      end(first + kSlots * Slot::size(file)) {
+  if (end > kLastAddress) throw RunError(name + ": the programs of this experiment do not fit into memory together");
+  for (std::uint32_t i = 0; i < kSlots; ++i) {
+    slots_.push_back(std::make_unique<Slot>(file, address + i * Slot::size(file)));
+  }
+}
+
+std::shared_ptr<Program> Program::load(std::string_view octets, const std::string& name, const std::string& sha256,
+                                       std::uint64_t address) {
+  const std::lock_guard lock(registry().mutex);
+  Loaded& loaded = registry().programs[address];
+  try {
+    if (!loaded.program) {
+      loaded.program = std::make_unique<Program>(ElfFile::parse(octets, name), name, sha256, address);
+    }
+    if (loaded.program->sha256 != sha256) {
+      throw RunError(name + ": this process already runs other programs; experiments with different programs need a process each");
+    }
+  } catch (...) {
+    if (loaded.users == 0) registry().programs.erase(address);
+    throw;
+  }
+  ++loaded.users;
+  return {loaded.program.get(), [](Program* program) {
+            const std::lock_guard guard(registry().mutex);
+            const auto entry = registry().programs.find(program->address);
+            if (--entry->second.users == 0) registry().programs.erase(entry);
+          }};
+}
+
+}  // namespace kilotwin::behaviours

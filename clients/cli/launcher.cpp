@@ -1,0 +1,211 @@
+#include "clients/cli/launcher.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+#include "clients/cli/progress.hpp"
+#include "core/base/error.hpp"
+#include "core/federation/interrupt.hpp"
+#include "core/federation/topics.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// For how long services may take to leave once they were asked to.
+constexpr auto kGrace = std::chrono::milliseconds(4000);
+constexpr auto kPoll = std::chrono::milliseconds(5);
+
+struct Child {
+  std::string name;
+  pid_t process = -1;
+  fs::path log;
+  bool running = false;
+  int status = 0;
+};
+
+/// The last line that a service wrote, without its "kilotwin: " prefix.
+std::string last_line(const fs::path& log) {
+  std::ifstream stream(log);
+  std::string line, last;
+  while (std::getline(stream, line)) {
+    if (!line.empty()) last = line;
+  }
+  constexpr std::string_view kPrefix = "kilotwin: ";
+  return last.starts_with(kPrefix) ? last.substr(kPrefix.size()) : last;
+}
+
+class Launcher {
+ public:
+  Launcher(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options)
+      : plan_(plan), directory_(directory), options_(options), progress_(plan, options.show_progress) {}
+
+  ~Launcher() { end_all(); }
+
+  void run() {
+    std::error_code ignored;
+    fs::create_directories(directory_.path() / "logs", ignored);
+    start(plan_.station(), {"station"});
+    start(plan_.comm(), {"comm"});
+    for (std::uint32_t p = 0; p < plan_.grid.size(); ++p) {
+      start(plan_.physics(PartitionId{p}),
+            {"physics", "--partition", fmt::format("{},{}", p % plan_.grid.columns(), p / plan_.grid.columns())});
+    }
+    for (std::uint32_t h = 0; h < plan_.hosts; ++h) {
+      start(plan_.behaviours(HostId{h}), {"behaviours", "--share", fmt::format("{}/{}", h + 1, plan_.hosts)});
+    }
+    // The launcher watches as any observer may.
+    const dds::Participant participant({options_.domain, {}});
+    const dds::Reader<PublicRunStatus> status(participant, topics::run_status(),
+                                              [this](const PublicRunStatus& sample, dds::SampleState state) {
+                                                if (state.valid && sample.run == plan_.run()) on_status(sample);
+                                              });
+    watch();
+  }
+
+ private:
+  void start(FederateId id, std::vector<std::string> words) {
+    Child child;
+    child.name = plan_.name(id);
+    std::string file = child.name;
+    std::replace_if(file.begin(), file.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '-');
+    child.log = directory_.path() / "logs" / (file + ".log");
+    words.insert(words.begin(), {"kilotwin", "service"});
+    for (const std::string& word : {std::string("--run"), directory_.path().string(), std::string("--domain"), std::to_string(options_.domain),
+                                    std::string("--start-monotonic"), fmt::format("{:.6f}", options_.start_monotonic_s), std::string("--end-with-parent")}) {
+      words.push_back(word);
+    }
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const int log = open(child.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    const pid_t parent = getpid();
+    child.process = fork();
+    if (child.process < 0) throw RunError(fmt::format("{} cannot be started: the system has no room for another process", child.name));
+    if (child.process == 0) {
+      // Only calls that are safe between fork and exec. A group of its own keeps the terminal's Ctrl-C from it: the
+      // launcher decides how the run ends.
+      setpgid(0, 0);
+      prctl(PR_SET_PDEATHSIG, SIGTERM);
+      if (getppid() != parent) _exit(1);
+      if (log >= 0) dup2(log, STDERR_FILENO);
+      if (const int nothing = open("/dev/null", O_RDWR); nothing >= 0) {
+        dup2(nothing, STDIN_FILENO);
+        dup2(nothing, STDOUT_FILENO);
+      }
+      execv("/proc/self/exe", argv.data());
+      _exit(127);
+    }
+    if (log >= 0) close(log);
+    child.running = true;
+    children_.push_back(std::move(child));
+  }
+
+  void on_status(const PublicRunStatus& sample) {
+    const std::lock_guard lock(mutex_);
+    latest_.now = Tick{sample.tick};
+    latest_.wall_s = sample.wall_s;
+    latest_.sent = sample.sent;
+    latest_.received = sample.received;
+    latest_.robots_failed = sample.robots_failed;
+    latest_.paused = sample.phase == kilotwin_open_PAUSED;
+    latest_.waiting_for = sample.note;
+    started_ = started_ || sample.phase != kilotwin_open_STARTING;
+  }
+
+  /// Collects children that have ended; true while any runs.
+  bool reap() {
+    bool any = false;
+    for (Child& child : children_) {
+      if (!child.running) continue;
+      int status = 0;
+      if (waitpid(child.process, &status, WNOHANG) != child.process) {
+        any = true;
+        continue;
+      }
+      child.running = false;
+      child.status = status;
+      const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+      if (!well && !ending_) {
+        // Whoever was killed is the culprit; whoever failed may only have noticed.
+        const bool killed = WIFSIGNALED(status);
+        if (culprit_ == nullptr || (killed && !WIFSIGNALED(culprit_->status))) culprit_ = &child;
+        if (!deadline_) deadline_ = Clock::now() + kGrace;
+      }
+    }
+    return any;
+  }
+
+  void watch() {
+    bool stop_sent = false;
+    while (reap()) {
+      if (interrupted() != 0 && !stop_sent) {
+        stop_sent = true;
+        interrupted_ = true;
+        if (children_[0].running) kill(children_[0].process, SIGTERM);  // the station ends the run in order
+        deadline_ = Clock::now() + kGrace;
+      }
+      if (deadline_ && Clock::now() > *deadline_) end_all();
+      {
+        const std::lock_guard lock(mutex_);
+        if (started_) progress_.show(latest_);
+      }
+      std::this_thread::sleep_for(kPoll);
+    }
+    progress_.clear();
+    if (interrupted_) throw RunError("interrupted; what was recorded so far is in " + directory_.path().string());
+    if (culprit_ == nullptr) return;
+    if (WIFSIGNALED(culprit_->status)) {
+      throw RunError(fmt::format("{} (process {}) was killed by signal {}; what was recorded so far is in {}", culprit_->name,
+                                 culprit_->process, WTERMSIG(culprit_->status), directory_.path().string()));
+    }
+    const std::string line = last_line(culprit_->log);
+    if (WEXITSTATUS(culprit_->status) == 2) throw UserError(line);
+    throw RunError(fmt::format("{}: {}; what was recorded so far is in {}", culprit_->name, line.empty() ? "failed" : line,
+                               directory_.path().string()));
+  }
+
+  /// Ends every child, by force if need be.
+  void end_all() {
+    ending_ = true;  // what ends from now on was told to
+    for (const int signal : {SIGTERM, SIGKILL}) {
+      for (const Child& child : children_) {
+        if (child.running) kill(child.process, signal);
+      }
+      const auto patience = Clock::now() + (signal == SIGTERM ? std::chrono::milliseconds(1000) : std::chrono::milliseconds(5000));
+      while (reap() && Clock::now() < patience) std::this_thread::sleep_for(kPoll);
+    }
+  }
+
+  const RunPlan& plan_;
+  const recorder::RunDirectory& directory_;
+  const LaunchOptions& options_;
+  ProgressBar progress_;
+  std::vector<Child> children_;
+  const Child* culprit_ = nullptr;
+  std::optional<Clock::time_point> deadline_;
+  bool interrupted_ = false, ending_ = false;
+  std::mutex mutex_;
+  RunProgress latest_;
+  bool started_ = false;
+};
+
+}  // namespace
+
+void launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options) {
+  Launcher(plan, directory, options).run();
+}
+
+}  // namespace kilotwin::cli

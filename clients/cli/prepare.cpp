@@ -1,0 +1,151 @@
+#include "clients/cli/prepare.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/text_format.h>
+
+#include <charconv>
+#include <fstream>
+#include <random>
+
+#include "clients/behaviours/compiler.hpp"
+#include "clients/recorder/file.hpp"
+#include "core/base/error.hpp"
+#include "core/experiment/layout.hpp"
+#include "core/experiment/plan.hpp"
+#include "core/federation/checkpoint.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+double parse_pace(const std::string& text) {
+  if (text == "max") return 0;
+  double factor = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), factor);
+  if (error != std::errc() || end != text.data() + text.size() || !(factor > 0) || !(factor < 1e9)) {
+    throw UserError(fmt::format("--pace: \"{}\" is no pace; give max, or a factor above 0 such as 1 for real time", text));
+  }
+  return factor;
+}
+
+/// Ids of runs only have to differ; results do not depend on them.
+std::uint64_t new_run_id() {
+  std::random_device device;
+  const std::uint64_t id = static_cast<std::uint64_t>(device()) << 32 | device();
+  return id != 0 ? id : 1;
+}
+
+/// Compiles each distinct program once and tells every group which one is its own.
+void build_programs(const LoadedExperiment& loaded, const RunArguments& arguments, proto::Manifest& manifest,
+                    std::vector<fs::path>& objects) {
+  for (const proto::RobotGroup& group : loaded.experiment.robots()) {
+    if (group.body() == proto::RobotGroup::TRACKED) {
+      manifest.add_group_program(kNoProgram);
+      continue;
+    }
+    std::vector<fs::path> sources;
+    for (const std::string& source : group.behaviour()) sources.push_back(loaded.resolve(source));
+    behaviours::CompileOptions options;
+    options.defines = arguments.define;
+    const behaviours::CompiledProgram compiled = behaviours::compile(sources, options);
+    int index = 0;
+    while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;
+    if (index == manifest.program_size()) {
+      proto::Program& program = *manifest.add_program();
+      program.set_path(group.behaviour(0));
+      program.set_sha256(compiled.sha256);
+      objects.push_back(compiled.file);
+    }
+    manifest.add_group_program(static_cast<std::uint32_t>(index));
+  }
+}
+
+fs::path checkpoint_directory(const fs::path& resume) {
+  if (fs::exists(resume / "0000.part")) return resume;
+  return newest_checkpoint(recorder::RunDirectory::open(resume, recorder::RunDirectory::Needs::kManifest).path());
+}
+
+}  // namespace
+
+std::pair<std::uint32_t, std::uint32_t> parse_partitions(const std::string& text) {
+  std::uint32_t columns = 0, rows = 0;
+  const char* const last = text.data() + text.size();
+  const auto [cross, error] = std::from_chars(text.data(), last, columns);
+  if (error == std::errc() && cross != last && *cross == 'x') {
+    const auto [end, second_error] = std::from_chars(cross + 1, last, rows);
+    if (second_error == std::errc() && end == last) return {columns, rows};
+  }
+  throw UserError(fmt::format("--partitions: \"{}\" is no grid; give COLUMNSxROWS such as 2x1", text));
+}
+
+LoadedExperiment load_with_overrides(const RunArguments& arguments) {
+  LoadedExperiment loaded = load_experiment(arguments.experiment);
+  if (!arguments.model.empty()) apply_model(loaded, arguments.model);
+  for (const std::string& assignment : arguments.set) apply_override(loaded, assignment);
+  if (arguments.robots) set_robots(loaded, *arguments.robots);
+  if (!arguments.behaviour.empty()) set_behaviour(loaded, arguments.behaviour);
+  if (arguments.seed) apply_override(loaded, fmt::format("seed={}", *arguments.seed), "--seed");
+  if (arguments.duration_s) apply_override(loaded, fmt::format("duration_s={}", *arguments.duration_s), "--duration");
+  if (arguments.hosts) apply_override(loaded, fmt::format("deployment.hosts={}", *arguments.hosts), "--hosts");
+  if (arguments.checkpoint_every_s) {
+    apply_override(loaded, fmt::format("deployment.checkpoint_every_s={}", *arguments.checkpoint_every_s), "--checkpoint-every");
+  }
+  if (!arguments.partitions.empty()) {
+    const auto [columns, rows] = parse_partitions(arguments.partitions);
+    apply_override(loaded, fmt::format("deployment.partition_columns={}", columns), "--partitions");
+    apply_override(loaded, fmt::format("deployment.partition_rows={}", rows), "--partitions");
+  }
+  return loaded;
+}
+
+Prepared prepare(const RunArguments& arguments) {
+  const LoadedExperiment loaded = load_with_overrides(arguments);
+  const PlacedRobots placed = place_robots(loaded);
+
+  proto::Manifest manifest;
+  manifest.set_format(1);
+  manifest.set_run(new_run_id());
+  *manifest.mutable_experiment() = with_counts(loaded, placed);
+  manifest.mutable_x_mm()->Add(placed.x_mm.begin(), placed.x_mm.end());
+  manifest.mutable_y_mm()->Add(placed.y_mm.begin(), placed.y_mm.end());
+  manifest.mutable_heading_rad()->Add(placed.heading_rad.begin(), placed.heading_rad.end());
+  manifest.set_mode(arguments.mode);
+  manifest.set_pace(parse_pace(arguments.pace));
+  manifest.set_resumed(!arguments.resume.empty());
+  std::vector<fs::path> objects;
+  build_programs(loaded, arguments, manifest, objects);
+  fs::path checkpoint;
+  if (manifest.resumed()) {
+    checkpoint = checkpoint_directory(arguments.resume);
+    static_cast<void>(read_checkpoint(checkpoint, manifest));
+  }
+
+  const proto::Experiment& experiment = manifest.experiment();
+  auto directory = recorder::RunDirectory::create(
+      arguments.out.empty() ? recorder::RunDirectory::default_path(experiment.name(), experiment.seed()) : arguments.out);
+  for (int i = 0; i < manifest.program_size(); ++i) {
+    fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i).sha256()), fs::copy_options::overwrite_existing);
+  }
+  for (const proto::RobotGroup& group : loaded.experiment.robots()) {
+    for (const std::string& source : group.behaviour()) {
+      fs::copy_file(loaded.resolve(source), directory.programs() / fs::path(source).filename(), fs::copy_options::overwrite_existing);
+    }
+  }
+  if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(experiment, &text);
+  recorder::write_file(directory.experiment(), text);
+  recorder::write_file(directory.manifest(), manifest.SerializeAsString());
+  return {std::move(directory), std::move(manifest)};
+}
+
+proto::Manifest read_manifest(const recorder::RunDirectory& directory) {
+  proto::Manifest manifest;
+  if (!manifest.ParseFromString(recorder::read_file(directory.manifest()))) {
+    throw UserError(fmt::format("{}: damaged; prepare the run again", directory.manifest().string()));
+  }
+  return manifest;
+}
+
+}  // namespace kilotwin::cli

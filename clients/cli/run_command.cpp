@@ -1,0 +1,75 @@
+#include "clients/cli/run_command.hpp"
+
+#include <fmt/format.h>
+
+#include "clients/behaviours/program_set.hpp"
+#include "clients/cli/launcher.hpp"
+#include "clients/cli/prepare.hpp"
+#include "clients/cli/progress.hpp"
+#include "clients/cli/run_recorder.hpp"
+#include "clients/local/local_run.hpp"
+#include "core/base/error.hpp"
+#include "core/federation/interrupt.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& directory) {
+  std::string text = fmt::format("prepared {}; start these, on any machine that has this directory, with the same --domain:\n",
+                                 directory.path().string());
+  const std::string run = directory.path().string();
+  for (std::uint32_t p = 0; p < plan.grid.size(); ++p) {
+    text += fmt::format("  kilotwin service physics --run {} --partition {},{}\n", run, p % plan.grid.columns(), p / plan.grid.columns());
+  }
+  text += fmt::format("  kilotwin service comm --run {}\n", run);
+  for (std::uint32_t h = 0; h < plan.hosts; ++h) {
+    text += fmt::format("  kilotwin service behaviours --run {} --share {}/{}\n", run, h + 1, plan.hosts);
+  }
+  text += fmt::format("  kilotwin service station --run {}\n", run);
+  return text;
+}
+
+void run_locally(const RunPlan& plan, const recorder::RunDirectory& directory, const RunArguments& arguments, double started_s) {
+  local::LocalOptions options;
+  options.threads = std::max(1u, arguments.threads);
+  options.run_directory = directory.path();
+  if (plan.manifest.resumed()) options.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);
+  const auto programs = behaviours::ProgramSet::load(plan.manifest, directory.path());
+  ProgressBar progress(plan, !arguments.quiet);
+  RunRecorder run_recorder(plan, directory, options.resumed, [&](const RunProgress& now) { progress.show(now); });
+  const RunTotals totals = local::run(plan, programs, options, run_recorder);
+  progress.clear();
+  const double first_tick_s = std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
+  run_recorder.finish(totals, first_tick_s - started_s);
+  if (!totals.failure.empty()) {
+    throw RunError(fmt::format("{}; what was recorded so far is in {}", totals.failure, directory.path().string()));
+  }
+}
+
+}  // namespace
+
+int run_command(const RunArguments& arguments, double start_monotonic_s) {
+  // The domain is claimed before anything is written, so that one in use leaves nothing behind.
+  std::optional<dds::DomainClaim> claim;
+  if (arguments.mode == "federated" && !arguments.prepare) {
+    claim.emplace(arguments.domain ? dds::DomainClaim::exactly(*arguments.domain) : dds::DomainClaim::any());
+  }
+  const Prepared prepared = prepare(arguments);
+  const RunPlan plan(prepared.manifest);
+  if (arguments.prepare) {
+    fmt::print("{}", prepared_text(plan, prepared.directory));
+    return 0;
+  }
+  catch_interrupts();
+  if (arguments.mode == "local") {
+    run_locally(plan, prepared.directory, arguments, start_monotonic_s);
+  } else {
+    launch(plan, prepared.directory, {claim->domain(), start_monotonic_s, !arguments.quiet});
+  }
+  if (!arguments.quiet) {
+    fmt::print("{}", recorder::summary_text(recorder::read_summary(prepared.directory.summary()), prepared.directory.path()));
+  }
+  return 0;
+}
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,136 @@
+#include "clients/cli/run_recorder.hpp"
+
+#include <algorithm>
+
+#include "clients/recorder/picture.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+proto::RecordingHeader header_of(const RunPlan& plan, const std::optional<Checkpoint>& resumed) {
+  return recorder::recording_header(plan.manifest, resumed ? resumed->tick : Tick{0}, resumed ? resumed->hash_chain() : 0);
+}
+
+}  // namespace
+
+RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory, const std::optional<Checkpoint>& resumed,
+                         std::function<void(const RunProgress&)> on_idle)
+    : plan_(plan),
+      directory_(directory),
+      writer_(directory.recording(), header_of(plan, resumed)),
+      when_(plan.tick_length, plan.experiment().recording().every_s()),
+      on_idle_(std::move(on_idle)),
+      x_mm_(plan.robots()),
+      y_mm_(plan.robots()),
+      heading_rad_(plan.robots()),
+      led_(plan.robots()),
+      life_cycle_(plan.robots()) {}
+
+void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies, std::span<const ActuationFrame* const> actuation,
+                        bool last) {
+  if (any_state_ && tick < next_ && !last) return;
+  if (!any_state_) first_tick_at_ = std::chrono::steady_clock::now();
+  any_state_ = true;
+  next_ = when_.at_or_after(tick + 1);
+  for (const BodyFrame* frame : bodies) {
+    for (std::size_t i = 0; i < frame->robot.size(); ++i) {
+      const std::uint32_t robot = frame->robot[i];
+      x_mm_[robot] = frame->x_mm[i];
+      y_mm_[robot] = frame->y_mm[i];
+      heading_rad_[robot] = frame->heading_rad[i];
+    }
+  }
+  for (const ActuationFrame* frame : actuation) {
+    std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
+    std::copy(frame->life_cycle.begin(), frame->life_cycle.end(), life_cycle_.begin() + frame->first_robot);
+  }
+  writer_.state({tick, x_mm_, y_mm_, heading_rad_, led_, life_cycle_});
+  displacement_.add(plan_.tick_length.seconds_at(tick), x_mm_, y_mm_);
+}
+
+void RunRecorder::hash(Tick tick, std::uint64_t chain) { writer_.hash(tick, chain); }
+
+void RunRecorder::input(const Directive& directive) { writer_.input(to_record(directive)); }
+
+void RunRecorder::idle(const RunProgress& progress) {
+  writer_.flush_if_due();
+  if (on_idle_) on_idle_(progress);
+}
+
+recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
+  if (plan_.experiment().recording().messages()) {
+    proto::MessagesRecord messages;
+    for (const PairCount& pair : totals.pairs) {
+      messages.add_receiver(pair.receiver);
+      messages.add_sender(pair.sender);
+      messages.add_count(pair.count);
+    }
+    writer_.messages(messages);
+  }
+  writer_.end(totals.last, totals.state_hash, totals.failure);
+
+  recorder::Summary summary;
+  summary.name = plan_.experiment().name();
+  summary.seed = plan_.seed();
+  summary.mode = plan_.manifest.mode();
+  summary.partition_columns = plan_.grid.columns();
+  summary.partition_rows = plan_.grid.rows();
+  summary.hosts = plan_.hosts;
+  summary.robots = plan_.robots();
+  summary.ticks = std::max<std::int64_t>(0, totals.last.count());
+  summary.resumed_from_tick = totals.first.count();
+  summary.simulated_s = plan_.tick_length.seconds() * static_cast<double>(summary.ticks);
+  summary.start_s = start_s;
+  summary.wall_s = totals.wall_s;
+  summary.cpu_s = totals.cpu_s;
+  summary.peak_memory_mib = totals.peak_memory_mib;
+  summary.state_hash = totals.state_hash;
+  summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
+  summary.robots_failed = totals.robots_failed;
+  summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
+  const double steps = static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());
+  const auto cost = [&](Work work) { return static_cast<double>(totals.work_ns[static_cast<std::size_t>(work)]) / steps; };
+  summary.cost_ns_per_robot_tick = {cost(Work::kBehaviours), cost(Work::kPhysics),  cost(Work::kRadio) + cost(Work::kStation),
+                                    cost(Work::kExchange),   cost(Work::kRecording)};
+  recorder::write_summary(summary, directory_.summary());
+  if (any_state_) {
+    recorder::Reader recording(directory_.recording());
+    recorder::write_picture(recording, directory_.picture());
+  }
+  return summary;
+}
+
+proto::InputRecord to_record(const Directive& directive) {
+  proto::InputRecord record;
+  record.set_sequence_number(directive.sequence_number);
+  record.set_tick(directive.tick.count());
+  record.set_kind(static_cast<proto::InputRecord::Kind>(directive.kind));
+  if (directive.kind == DirectiveKind::kStep) record.set_steps(directive.steps);
+  if (directive.kind == DirectiveKind::kOverheadInput) {
+    record.mutable_packet()->push_back(static_cast<char>(directive.packet.command));
+    record.mutable_packet()->append(directive.packet.message.begin(), directive.packet.message.end());
+  }
+  if (directive.kind == DirectiveKind::kTrackedPose) {
+    record.set_robot(directive.tracked_pose.robot);
+    record.set_x_mm(directive.tracked_pose.x_mm);
+    record.set_y_mm(directive.tracked_pose.y_mm);
+    record.set_heading_rad(directive.tracked_pose.heading_rad);
+  }
+  return record;
+}
+
+Directive from_record(const proto::InputRecord& record) {
+  Directive directive;
+  directive.sequence_number = record.sequence_number();
+  directive.tick = Tick{record.tick()};
+  directive.kind = static_cast<DirectiveKind>(record.kind());
+  directive.steps = record.steps();
+  if (record.packet().size() == 1 + directive.packet.message.size()) {
+    directive.packet.command = static_cast<OverheadCommand>(record.packet()[0]);
+    std::copy(record.packet().begin() + 1, record.packet().end(), directive.packet.message.begin());
+  }
+  directive.tracked_pose = {record.robot(), record.x_mm(), record.y_mm(), record.heading_rad()};
+  return directive;
+}
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,51 @@
+/// The observer of a run that records it, and what is written when the run is over.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+
+#include "clients/recorder/run_directory.hpp"
+#include "clients/recorder/statistics.hpp"
+#include "clients/recorder/summary.hpp"
+#include "clients/recorder/writer.hpp"
+#include "core/experiment/plan.hpp"
+#include "core/federation/checkpoint.hpp"
+#include "core/federation/run_observer.hpp"
+
+namespace kilotwin::cli {
+
+class RunRecorder : public RunObserver {
+ public:
+  /// `resumed`: where the run starts from a checkpoint. `on_idle`: told how far the run is; may be empty.
+  RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory, const std::optional<Checkpoint>& resumed,
+              std::function<void(const RunProgress&)> on_idle);
+
+  void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>, bool last) override;
+  void hash(Tick, std::uint64_t chain) override;
+  void input(const Directive&) override;
+  void idle(const RunProgress&) override;
+
+  /// Ends the recording, and writes summary and picture. `start_s`: wall time from the command to the first tick.
+  recorder::Summary finish(const RunTotals& totals, double start_s);
+  /// When the first state came: the first tick.
+  [[nodiscard]] std::chrono::steady_clock::time_point first_tick_at() const { return first_tick_at_; }
+
+ private:
+  const RunPlan& plan_;
+  const recorder::RunDirectory directory_;
+  recorder::Writer writer_;
+  recorder::RecordingSchedule when_;
+  recorder::DisplacementObserver displacement_;
+  std::function<void(const RunProgress&)> on_idle_;
+  std::vector<double> x_mm_, y_mm_, heading_rad_;
+  std::vector<std::uint8_t> led_, life_cycle_;
+  Tick next_{0};
+  bool any_state_ = false;
+  std::chrono::steady_clock::time_point first_tick_at_{};
+};
+
+[[nodiscard]] proto::InputRecord to_record(const Directive& directive);
+[[nodiscard]] Directive from_record(const proto::InputRecord& record);
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,90 @@
+#include "clients/cli/service_command.hpp"
+
+#include <fmt/format.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <csignal>
+
+#include "clients/behaviours/behaviours_service.hpp"
+#include "clients/cli/prepare.hpp"
+#include "clients/cli/run_recorder.hpp"
+#include "core/base/error.hpp"
+#include "core/federation/interrupt.hpp"
+#include "services/ark/station_service.hpp"
+#include "services/comm/comm_service.hpp"
+#include "services/physics/physics_service.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+/// "A<separator>B" with two numbers.
+std::optional<std::pair<std::uint32_t, std::uint32_t>> two_numbers(const std::string& text, char separator) {
+  std::uint32_t a = 0, b = 0;
+  const char* const last = text.data() + text.size();
+  const auto [middle, error] = std::from_chars(text.data(), last, a);
+  if (error != std::errc() || middle == last || *middle != separator) return std::nullopt;
+  const auto [end, second_error] = std::from_chars(middle + 1, last, b);
+  if (second_error != std::errc() || end != last) return std::nullopt;
+  return std::pair{a, b};
+}
+
+PartitionId parse_partition(const std::string& text, const PartitionGrid& grid) {
+  if (text.empty() && grid.size() == 1) return PartitionId{0};
+  const auto place = two_numbers(text, ',');
+  if (!place || place->first >= grid.columns() || place->second >= grid.rows()) {
+    throw UserError(fmt::format("--partition: \"{}\" is none of this run's {}x{} partitions; give COLUMN,ROW counted from 0",
+                                text, grid.columns(), grid.rows()));
+  }
+  return PartitionId{place->second * grid.columns() + place->first};
+}
+
+HostId parse_share(const std::string& text, std::uint32_t hosts) {
+  if (text.empty() && hosts == 1) return HostId{0};
+  const auto share = two_numbers(text, '/');
+  if (!share || share->second != hosts || share->first < 1 || share->first > hosts) {
+    throw UserError(fmt::format("--share: \"{}\" is no share of this run, which has {} hosts; give I/{} with I from 1 to {}", text,
+                                hosts, hosts, hosts));
+  }
+  return HostId{share->first - 1};
+}
+
+int run_station(const RunPlan& plan, const ServiceContext& context, const recorder::RunDirectory& directory, double started_s) {
+  RunRecorder run_recorder(plan, directory, context.resumed, {});
+  const RunTotals totals = ark::run_service(plan, context, run_recorder);
+  const double first_tick_s = std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
+  run_recorder.finish(totals, first_tick_s > 0 ? first_tick_s - started_s : 0);
+  if (totals.failure.empty()) return 0;
+  throw RunError(totals.failure);
+}
+
+}  // namespace
+
+int service_command(const ServiceArguments& arguments) {
+  const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  if (arguments.end_with_parent) {
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() == 1) throw RunError("the launcher is gone");
+  }
+  catch_interrupts();
+  const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
+  const RunPlan plan(read_manifest(directory));
+  ServiceContext context;
+  context.transport = {arguments.domain, arguments.peers};
+  context.run_directory = directory.path();
+  if (plan.manifest.resumed()) context.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);
+
+  if (arguments.service == "physics") {
+    physics::run_service(plan, parse_partition(arguments.partition, plan.grid), context);
+  } else if (arguments.service == "comm") {
+    comm::run_service(plan, context);
+  } else if (arguments.service == "behaviours") {
+    behaviours::run_service(plan, parse_share(arguments.share, plan.hosts), context);
+  } else {
+    return run_station(plan, context, directory, arguments.start_monotonic_s > 0 ? arguments.start_monotonic_s : now_s);
+  }
+  return 0;
+}
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,85 @@
+#include <gtest/gtest.h>
+
+#include "core/base/error.hpp"
+#include "tests/clients/behaviours/swarm.hpp"
+
+namespace kilotwin::behaviours::test {
+namespace {
+
+/// What all hosts save, read back from its octets.
+std::vector<proto::BehavioursState> saved(const Swarm& swarm) {
+  std::vector<proto::BehavioursState> parts;
+  for (const auto& host : swarm.hosts) {
+    proto::BehavioursState state;
+    host->save(state);
+    parts.emplace_back().ParseFromString(state.SerializeAsString());
+  }
+  return parts;
+}
+
+void load(Swarm& swarm, Tick tick, const std::vector<proto::BehavioursState>& parts) {
+  std::vector<const proto::BehavioursState*> pointers;
+  for (const proto::BehavioursState& part : parts) pointers.push_back(&part);
+  for (const auto& host : swarm.hosts) host->load(tick, pointers);
+  swarm.tick = tick;
+}
+
+Air next(const Swarm& swarm) {
+  Air air = echo(swarm.frame());
+  if (swarm.tick.count() < 3) {
+    air.receptions.clear();
+    for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) air.receptions.push_back({robot, message(kRun)});
+  }
+  return air;
+}
+
+TEST(Checkpoint, ContinuesOnOtherHostsAsIfNothingHadHappened) {
+  // Random walks, waits in the middle of functions, and robots that fault on the way.
+  const std::vector<std::string> texts{
+      std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c", std::string(KILOTWIN_BEHAVIOURS) + "/delay_walk.c",
+      program("static int depth(int n) { volatile int here = n; delay(7 + n); return n == 0 ? 0 : depth(n - 1) + here; }\n"
+              "static message_t m; static message_t* tx(void) { return &m; }\n"
+              "static void loop(void) { m.data[1] = depth(rand_soft() & 15); set_motors(m.data[1], rand());\n"
+              "  if (kilo_uid % 8 == 3 && kilo_ticks > 60) *(volatile int*)0 = 1; }")};
+  for (const int at : {0, 1, 2, 37, 100}) {
+    Swarm first(texts, 20, 3), second(texts, 20, 4);
+    for (int k = 0; k < at; ++k) first.step(next(first));
+    load(second, first.tick, saved(first));
+    ASSERT_TRUE(equal(first.frame(), second.frame())) << "saved at " << at;
+    ASSERT_EQ(first.hash(), second.hash());
+    for (int k = 0; k < 80; ++k) {
+      const Air air = next(first);
+      first.step(air);
+      second.step(air);
+      ASSERT_TRUE(equal(first.frame(), second.frame())) << "saved at " << at << ", " << k << " ticks later";
+      ASSERT_EQ(first.hash(), second.hash());
+    }
+    std::uint32_t failed_first = 0, failed_second = 0;
+    for (const auto& host : first.hosts) failed_first += host->robots_failed();
+    for (const auto& host : second.hosts) failed_second += host->robots_failed();
+    EXPECT_EQ(failed_first, failed_second);
+    if (at == 100) {
+      EXPECT_GT(failed_first, 0u);
+    }
+  }
+}
+
+TEST(Checkpoint, SavesWhatItHasLoaded) {
+  Swarm first({program("static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5), second({program(
+      "static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5);
+  for (int k = 0; k < 20; ++k) first.step(next(first));
+  const auto parts = saved(first);
+  load(second, first.tick, parts);
+  EXPECT_EQ(saved(second)[0].SerializeAsString(), parts[0].SerializeAsString());
+}
+
+TEST(Checkpoint, RejectsOneThatDoesNotFit) {
+  Swarm swarm({program("")}, 2), other({program("static uint8_t big[1000]; static void loop(void) { big[rand()%1000]++; }")}, 2);
+  swarm.start();
+  other.start();
+  EXPECT_THROW(load(swarm, swarm.tick, saved(other)), RunError);
+  EXPECT_THROW(load(swarm, swarm.tick, {}), RunError);
+}
+
+}  // namespace
+}  // namespace kilotwin::behaviours::test

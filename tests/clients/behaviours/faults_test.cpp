@@ -1,0 +1,75 @@
+#include <gtest/gtest.h>
+
+#include "tests/clients/behaviours/swarm.hpp"
+
+namespace kilotwin::behaviours::test {
+namespace {
+
+/// Robot 9 of 18 does `deed` when its clock shows 5; all count in their left motor.
+void one_fails(const std::string& deed, const std::string& told, const std::string& before = "", const std::string& after = "") {
+  Swarm swarm({program(before + "\nstatic uint8_t n;\nstatic void loop(void) { set_color(5); set_motors(++n, 1);\n"
+                                "  if (kilo_uid == 9 && kilo_ticks == 5) { " + deed + " } }\n" + after)},
+              18);
+  swarm.start();
+  swarm.steps(10);
+  const ActuationFrame frame = swarm.frame();
+  for (std::uint32_t robot = 0; robot < 18; ++robot) {
+    const bool failed = robot == 9;
+    EXPECT_EQ(LifeCycle{frame.life_cycle[robot]}, failed ? LifeCycle::kFailed : LifeCycle::kRunning) << robot;
+    EXPECT_EQ(frame.motor_left[robot], failed ? 0 : 11) << robot;
+    EXPECT_EQ(frame.led[robot], 5) << robot;
+  }
+  ASSERT_EQ(swarm.hosts[0]->robots_failed(), 1u);
+  EXPECT_EQ(swarm.hosts[0]->failures()[0].robot, 9u);
+  EXPECT_NE(swarm.hosts[0]->failures()[0].text.find(told), std::string::npos) << swarm.hosts[0]->failures()[0].text;
+}
+
+TEST(Faults, NullWrite) { one_fails("volatile int* p = (int*)(uintptr_t)(n - n); *p = 1;", "access to address 0x0 in loop()"); }
+
+TEST(Faults, WildJump) { one_fails("((void (*)(void))(uintptr_t)(n + 16))();", "access to address 0x16"); }
+
+TEST(Faults, WriteToCode) { one_fails("*(volatile uint8_t*)&loop = 0;", "access to address 0x2"); }
+
+TEST(Faults, DivisionByZero) { one_fails("volatile int zero = 0; n = n / zero;", "division by zero in loop()"); }
+
+TEST(Faults, StackOverflow) {
+  one_fails("n = deep(n);", "stack overflow",
+            "static int deep(int n) { volatile char room[300]; room[n & 127] = n; return deep(n + 1) + room[n & 127]; }");
+}
+
+TEST(Faults, LargeFrame) {
+  one_fails("volatile char room[1000000]; room[n] = 1;", "stack overflow");
+}
+
+TEST(Faults, FailedAssertion) {
+  one_fails("assert(n == 200);", "illegal instruction", "#include <assert.h>");
+}
+
+TEST(Faults, InACallback) {
+  Swarm swarm({program("static void rx(message_t* m, distance_measurement_t* d) { *(volatile char*)8 = 1; }")}, 4);
+  swarm.start();
+  Air air;
+  air.receptions = {{1, message(0)}};
+  swarm.step(air);
+  EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kFailed);
+  EXPECT_EQ(swarm.life_cycle(2), LifeCycle::kRunning);
+  swarm.step(air);  // a failed robot hears nothing
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), 1u);
+}
+
+TEST(Faults, AnEndedProgramIsSilentNotFailed) {
+  Swarm swarm({"#include <kilolib.h>\nint main(void) { kilo_init(); set_color(3); return 0; }\n"}, 1);
+  swarm.start();
+  EXPECT_EQ(swarm.led(0), 3);
+  EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kIdle);
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), 0u);
+}
+
+TEST(FaultsDeathTest, OtherFaultsOfTheProcessStayFatal) {
+  Swarm swarm({program("")}, 1);
+  swarm.start();
+  EXPECT_DEATH(std::raise(SIGSEGV); volatile int* nowhere = nullptr; *nowhere = 1;, "");
+}
+
+}  // namespace
+}  // namespace kilotwin::behaviours::test

@@ -1,0 +1,185 @@
+#include "clients/recorder/export.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "core/base/error.hpp"
+#include "tests/clients/recorder/synthetic.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+std::vector<std::string> lines_of(const std::filesystem::path& file) {
+  std::istringstream in(content(file));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+/// time_s of the rows of robot 0.
+std::vector<std::string> times_of(const std::filesystem::path& file) {
+  std::vector<std::string> times;
+  for (const std::string& line : lines_of(file)) {
+    const std::size_t comma = line.find(',');
+    if (line.compare(comma, 3, ",0,") == 0) times.push_back(line.substr(0, comma));
+  }
+  return times;
+}
+
+TEST(Export, TrajectoriesByTimeAndRobot) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(3), 62);
+  Reader reader(scratch / "r.ktrec");
+  EXPECT_EQ(export_trajectories(reader, scratch / "t.csv"), 9u);
+  EXPECT_EQ(lines_of(scratch / "t.csv"),
+            (std::vector<std::string>{
+                "time_s,robot,x_mm,y_mm,heading_rad,led",
+                "0,0,0.0000,0.0000,0.000000,000",
+                "0,1,10.0000,-5.0000,0.100000,100",
+                "0,2,20.0000,-10.0000,0.200000,200",
+                "1.015808,0,15.5000,0.0000,0.000000,000",  // tick 31 is the first at or after 1 s
+                "1.015808,1,25.5000,2.7500,0.100000,100",
+                "1.015808,2,35.5000,5.5000,0.200000,200",
+                "2.031616,0,31.0000,0.0000,0.000000,000",
+                "2.031616,1,41.0000,10.5000,0.100000,100",
+                "2.031616,2,51.0000,21.0000,0.200000,200",
+            }));
+}
+
+TEST(Export, NumbersAreRoundedAndNeverMinusZero) {
+  const Scratch scratch;
+  {
+    Writer writer(scratch / "r.ktrec", synthetic_header(3));
+    const std::vector<double> x{-0.00001, 0.00005, -1234.56785}, y{-0.5, 1e6, 999.99996},
+        heading{-3.1415926535, 3.14159265, -1e-9};
+    const std::vector<std::uint8_t> led{63, 1 | 2 << 2 | 3 << 4, 0xff}, life(3, 4);
+    writer.state({Tick{0}, x, y, heading, led, life});
+    writer.end(Tick{0}, 0);
+  }
+  Reader reader(scratch / "r.ktrec");
+  export_trajectories(reader, scratch / "t.csv");
+  EXPECT_EQ(
+      lines_of(scratch / "t.csv"),
+      (std::vector<std::string>{"time_s,robot,x_mm,y_mm,heading_rad,led", "0,0,0.0000,-0.5000,-3.141593,333",
+                                "0,1,0.0001,1000000.0000,3.141593,123", "0,2,-1234.5679,1000.0000,0.000000,333"}));
+}
+
+TEST(Export, WantedTimesTakeTheFirstStateAtOrAfter) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(1, 0.5), 160);  // states at ticks 0, 16, 31, 46, 62, ...
+  Reader reader(scratch / "r.ktrec");
+  export_trajectories(reader, scratch / "t.csv", 0.5);
+  EXPECT_EQ(times_of(scratch / "t.csv"),
+            (std::vector<std::string>{"0", "0.524288", "1.015808", "1.507328", "2.031616", "2.523136", "3.014656",
+                                      "3.506176", "4.030464", "4.521984", "5.013504"}));
+  reader.rewind();
+  export_trajectories(reader, scratch / "t.csv", 2);
+  EXPECT_EQ(times_of(scratch / "t.csv"), (std::vector<std::string>{"0", "2.031616", "4.030464"}));
+}
+
+TEST(Export, EveryTickRecordedServesAnyInterval) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(1, 0.032768), 100);
+  Reader reader(scratch / "r.ktrec");
+  export_trajectories(reader, scratch / "t.csv", 0.7);
+  EXPECT_EQ(times_of(scratch / "t.csv"),
+            (std::vector<std::string>{"0", "0.720896", "1.409024", "2.12992", "2.818048"}));
+  reader.rewind();
+  // Less than a tick: each state once.
+  EXPECT_EQ(export_trajectories(reader, scratch / "t.csv", 0.01), 101u);
+}
+
+TEST(Export, OtherIntervalsAreRefusedWithWhatWasRecorded) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(1, 2), 200);
+  for (const double every : {1.0, 3.0, 2.5, 0.1}) {
+    Reader reader(scratch / "r.ktrec");
+    try {
+      export_trajectories(reader, scratch / "t.csv", every);
+      FAIL() << every;
+    } catch (const UserError& error) {
+      EXPECT_NE(std::string(error.what()).find("holds a state every 2 s, so take "), std::string::npos)
+          << error.what();
+    }
+    EXPECT_FALSE(std::filesystem::exists(scratch / "t.csv"));
+  }
+  Reader reader(scratch / "r.ktrec");
+  EXPECT_THROW(export_trajectories(reader, scratch / "t.csv", 0), UserError);
+  EXPECT_THROW(export_trajectories(reader, scratch / "t.csv", -1), UserError);
+  EXPECT_THROW(export_trajectories(reader, scratch / "t.csv", std::nan("")), UserError);
+}
+
+TEST(Export, AResumedRunKeepsTheTimesOfTheWhole) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(1);
+  header.set_first_tick(40);
+  write_synthetic(scratch / "r.ktrec", header, 130);
+  Reader reader(scratch / "r.ktrec");
+  export_trajectories(reader, scratch / "t.csv");
+  EXPECT_EQ(times_of(scratch / "t.csv"), (std::vector<std::string>{"2.031616", "3.014656", "4.030464"}));
+}
+
+TEST(Export, ErrorsNameTheFile) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(2), 40);
+  Reader reader(scratch / "r.ktrec");
+  try {
+    export_trajectories(reader, scratch / "none/t.csv");
+    FAIL();
+  } catch (const RunError& error) {
+    EXPECT_EQ(error.what(), (scratch / "none/t.csv").string() + ": cannot be created: No such file or directory");
+  }
+  try {
+    export_trajectories(reader, "/dev/full");
+    FAIL();
+  } catch (const RunError& error) {
+    EXPECT_STREQ(error.what(), "/dev/full: cannot be written: No space left on device");
+  }
+}
+
+TEST(Export, MessagesByReceiverAndSender) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(2), 10);
+  Reader reader(scratch / "r.ktrec");
+  EXPECT_EQ(export_messages(reader, scratch / "m.csv"), 3u);
+  EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count\n0,0,9\n0,1,4\n1,0,7\n");
+}
+
+TEST(Export, LaterCountsOfAPairTakeThePlaceOfEarlier) {
+  const Scratch scratch;
+  {
+    Writer writer(scratch / "r.ktrec", synthetic_header(3));
+    for (const auto& [sender, count] : {std::pair{1u, 5u}, {2u, 6u}, {1u, 8u}}) {
+      proto::MessagesRecord messages;
+      messages.add_receiver(0);
+      messages.add_sender(sender);
+      messages.add_count(count);
+      writer.messages(messages);
+    }
+    writer.end(Tick{0}, 0);
+  }
+  Reader reader(scratch / "r.ktrec");
+  export_messages(reader, scratch / "m.csv");
+  EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count\n0,1,8\n0,2,6\n");
+}
+
+TEST(Export, MessagesThatWereNotRecordedAreAskedFor) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(2);
+  header.set_messages(false);
+  write_synthetic(scratch / "r.ktrec", header, 10);
+  Reader reader(scratch / "r.ktrec");
+  try {
+    export_messages(reader, scratch / "m.csv");
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_EQ(error.what(),
+              (scratch / "r.ktrec").string() + ": no message counts; run again with --set recording.messages=true");
+  }
+}
+
+}  // namespace
+}  // namespace kilotwin::recorder

@@ -1,0 +1,153 @@
+#include "clients/recorder/picture.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "clients/recorder/paths.hpp"
+#include "clients/recorder/svg.hpp"
+#include "core/base/error.hpp"
+#include "tests/clients/recorder/synthetic.hpp"
+#include "tests/clients/recorder/xml.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+std::string picture_of(const Scratch& scratch, const proto::RecordingHeader& header, std::int64_t ticks) {
+  std::filesystem::remove(scratch / "r.ktrec");
+  write_synthetic(scratch / "r.ktrec", header, ticks);
+  Reader reader(scratch / "r.ktrec");
+  return picture_svg(reader);
+}
+
+std::size_t discs(const Xml& xml, const std::string& colour) {
+  std::size_t count = 0;
+  for (const Element& element : xml.elements()) {
+    if (element.name != "path" || element.attribute("stroke") != colour) continue;
+    const std::string d = element.attribute("d");
+    count += static_cast<std::size_t>(std::count(d.begin(), d.end(), 'M'));
+  }
+  return count;
+}
+
+TEST(Picture, ShowsWhatThePersonMustKnow) {
+  const Scratch scratch;
+  const Xml xml(picture_of(scratch, synthetic_header(40), 300));
+  ASSERT_FALSE(xml.elements().empty());
+  EXPECT_EQ(xml.elements()[0].name, "svg");
+  for (const char* const text :
+       {"synthetic", "40 robots", "seed 42", "9.83 s simulated", "Start", "Paths", "End", "failed 1", " mm"}) {
+    EXPECT_TRUE(xml.has_text(text)) << text;
+  }
+  // Robot 1 has a dim red LED: once in the start panel, once in the end panel. One failed robot in each, too.
+  EXPECT_EQ(discs(xml, svg::led_colour(1)), 2u);
+  EXPECT_EQ(discs(xml, "#d0021b"), 2u);
+  // Background of its own, for light and dark pages.
+  const auto ground =
+      std::find_if(xml.elements().begin(), xml.elements().end(), [](const Element& e) { return e.name == "rect"; });
+  EXPECT_EQ(ground->attribute("fill"), "#ffffff");
+}
+
+TEST(Picture, EnlargesASmallSwarmAndSaysSo) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(3);
+  const Xml near(picture_of(scratch, header, 1000));
+  EXPECT_TRUE(near.has_text("enlarged"));
+  EXPECT_TRUE(near.has_text("dashed frame"));
+  header.set_arena_width_mm(60);
+  header.set_arena_height_mm(60);
+  const Xml full(picture_of(scratch, header, 1));
+  EXPECT_FALSE(full.has_text("enlarged"));
+}
+
+TEST(Picture, OddRunsAreDrawnToo) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(1);
+  header.set_name("<a & \"b\">\x01\xff \xc3\xa9");
+  const Xml one(picture_of(scratch, header, 0));
+  ASSERT_FALSE(one.elements().empty());
+  EXPECT_TRUE(one.has_text("<a & \"b\">?? \u00e9"));
+  for (const auto& [width, height] : {std::pair{1e6, 40.0}, {40.0, 1e6}, {20000.0, 20000.0}, {3000.0, 500.0}}) {
+    header.set_arena_width_mm(width);
+    header.set_arena_height_mm(height);
+    EXPECT_FALSE(Xml(picture_of(scratch, header, 5000)).elements().empty());
+  }
+}
+
+TEST(Picture, WithoutAStateThereIsNone) {
+  const Scratch scratch;
+  Writer(scratch / "r.ktrec", synthetic_header(1)).end(Tick{0}, 0);
+  Reader reader(scratch / "r.ktrec");
+  EXPECT_THROW((void)picture_svg(reader), UserError);
+}
+
+TEST(Picture, TenThousandRobotsStayBelowThreeMegabytes) {
+  const Scratch scratch;
+  constexpr std::uint32_t kRobots = 10'000;
+  proto::RecordingHeader header = synthetic_header(kRobots);
+  header.set_arena_width_mm(5000);
+  header.set_arena_height_mm(5000);
+  {
+    // Ways as crooked as can be: straight ones would be short.
+    Writer writer(scratch / "r.ktrec", header);
+    SyntheticState state(kRobots, Tick{0});
+    for (std::int64_t t = 0; t < 100; ++t) {
+      for (std::uint32_t i = 0; i < kRobots; ++i) {
+        const auto mixed = (static_cast<std::uint64_t>(t) * kRobots + i) * 0x9e3779b97f4a7c15u >> 32;
+        state.x_mm[i] = (i % 100) * 40.0 - 2000 + static_cast<double>(mixed % 600) - 300;
+        state.y_mm[i] = (i / 100) * 40.0 - 2000 + static_cast<double>(mixed / 600 % 600) - 300;
+      }
+      writer.state(state.view(Tick{t}));
+    }
+    writer.end(Tick{99}, 0);
+  }
+  Reader reader(scratch / "r.ktrec");
+  write_picture(reader, scratch / "p.svg");
+  EXPECT_LT(std::filesystem::file_size(scratch / "p.svg"), 3'000'000u);
+  EXPECT_FALSE(Xml(content(scratch / "p.svg")).elements().empty());
+}
+
+TEST(Paths, KeepFirstLastAndEvenlySpacedStates) {
+  const Scratch scratch;
+  {
+    Writer writer(scratch / "r.ktrec", synthetic_header(2));
+    for (std::int64_t t = 0; t < 1000; ++t) writer.state(SyntheticState(2, Tick{t}).view(Tick{t}));
+    writer.end(Tick{999}, 0);
+  }
+  Reader reader(scratch / "r.ktrec");
+  const Paths paths(reader, 100);
+  EXPECT_EQ(paths.states(), 1000u);
+  EXPECT_EQ(paths.first().time_s, 0);
+  EXPECT_DOUBLE_EQ(paths.last().time_s, 999 * 0.032768);
+  const std::vector<Point> path = paths.path(1);
+  EXPECT_GE(path.size(), 25u);
+  EXPECT_LE(path.size(), 51u);
+  EXPECT_EQ(path.front().x_mm, 10);
+  EXPECT_EQ(path.back().x_mm, 10 + 0.5f * 999);
+  const float step = path[1].x_mm - path[0].x_mm;
+  for (std::size_t i = 1; i + 1 < path.size(); ++i) EXPECT_EQ(path[i].x_mm - path[i - 1].x_mm, step);
+}
+
+TEST(Paths, SimplifiedStayWithinTheTolerance) {
+  std::vector<Point> path;
+  for (int i = 0; i <= 100; ++i)
+    path.push_back(
+        {static_cast<float>(i), i <= 50 ? 0.05f * static_cast<float>(i % 2) : static_cast<float>(i - 50)});
+  const std::vector<Point> simple = simplified(path, 0.2);
+  ASSERT_EQ(simple.size(), 3u);
+  EXPECT_EQ(simple[0].x_mm, 0);
+  EXPECT_NEAR(simple[1].x_mm, 50, 1);
+  EXPECT_EQ(simple[2].x_mm, 100);
+  EXPECT_EQ(simplified(std::vector<Point>{{1, 2}}, 1).size(), 1u);
+}
+
+TEST(Svg, LedNames) {
+  EXPECT_EQ(svg::led_name(0), "off");
+  EXPECT_EQ(svg::led_name(3), "red");
+  EXPECT_EQ(svg::led_name(1 << 2), "dim green");
+  EXPECT_EQ(svg::led_name(63), "white");
+  EXPECT_EQ(svg::led_name(1 | 3 << 2), "rgb 130");
+}
+
+}  // namespace
+}  // namespace kilotwin::recorder

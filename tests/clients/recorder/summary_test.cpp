@@ -1,0 +1,137 @@
+#include "clients/recorder/summary.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.hpp"
+#include "tests/clients/recorder/synthetic.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+Summary example() {
+  Summary s;
+  s.name = "disperse";
+  s.seed = 18'446'744'073'709'551'615u;
+  s.mode = "federated";
+  s.partition_columns = 2;
+  s.partition_rows = 3;
+  s.hosts = 4;
+  s.robots = 1000;
+  s.ticks = 2000;
+  s.resumed_from_tick = 500;
+  s.simulated_s = 65.536;
+  s.start_s = 0.25;
+  s.wall_s = 4.9152;
+  s.cpu_s = 9.5;
+  s.peak_memory_mib = 120.5;
+  s.state_hash = 0x00ab'cdef'0123'4567u;
+  s.messages = {40, 30, 200, 10};
+  s.robots_failed = 1;
+  s.recoveries = 2;
+  s.moved_mm = {12.5, 99};
+  s.cost_ns_per_robot_tick = {300, 200, 500, 1, 100, 10};
+  return s;
+}
+
+TEST(Summary, HasTheFieldsOfTheContract) {
+  const Scratch scratch;
+  write_summary(example(), scratch / "summary.json");
+  const auto json = nlohmann::json::parse(content(scratch / "summary.json"));
+  EXPECT_EQ(json["name"], "disperse");
+  EXPECT_EQ(json["seed"].get<std::uint64_t>(), 18'446'744'073'709'551'615u);
+  EXPECT_EQ(json["mode"], "federated");
+  EXPECT_EQ(json["partitions"], "2x3");
+  EXPECT_EQ(json["robots"], 1000);
+  EXPECT_EQ(json["ticks"], 2000);
+  EXPECT_EQ(json["simulated_s"], 65.536);
+  EXPECT_EQ(json["start_s"], 0.25);
+  EXPECT_EQ(json["wall_s"], 4.9152);
+  EXPECT_DOUBLE_EQ(json["realtime_factor"].get<double>(), 10);  // 1500 of 2000 ticks
+  EXPECT_EQ(json["state_hash"], "00abcdef01234567");
+  EXPECT_EQ(json["messages"],
+            (nlohmann::json{{"attempted", 40}, {"sent", 30}, {"received", 200}, {"collided", 10}}));
+  EXPECT_EQ(json["robots_failed"], 1);
+  EXPECT_EQ(json["recoveries"], 2);
+  EXPECT_EQ(json["cost_ns_per_robot_tick"], (nlohmann::json{{"behaviours", 300.0},
+                                                            {"physics", 200.0},
+                                                            {"radio", 500.0},
+                                                            {"station", 1.0},
+                                                            {"exchange", 100.0},
+                                                            {"recording", 10.0}}));
+  EXPECT_EQ(json["cpu_s"], 9.5);
+  EXPECT_EQ(json["peak_memory_mib"], 120.5);
+  EXPECT_EQ(json["hosts"], 4);
+  EXPECT_EQ(json["resumed_from_tick"], 500);
+  EXPECT_EQ(json["moved_mm"], (nlohmann::json{{"mean", 12.5}, {"max", 99.0}}));
+  EXPECT_EQ(json.size(), 20u);
+}
+
+TEST(Summary, ComesBackAsItWasWritten) {
+  const Scratch scratch;
+  write_summary(example(), scratch / "a.json");
+  write_summary(read_summary(scratch / "a.json"), scratch / "b.json");
+  EXPECT_EQ(content(scratch / "a.json"), content(scratch / "b.json"));
+  EXPECT_EQ(read_summary(scratch / "a.json").state_hash, 0x00ab'cdef'0123'4567u);
+  // Nothing else stays behind.
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 2);
+}
+
+TEST(Summary, RefusesWhatIsNone) {
+  const Scratch scratch;
+  const auto refused = [&](const std::string& text) {
+    put_content(scratch / "s.json", text);
+    try {
+      (void)read_summary(scratch / "s.json");
+    } catch (const UserError& error) {
+      const std::string line = error.what();
+      return line.rfind((scratch / "s.json").string() + ": not a summary; ", 0) == 0 &&
+             line.find('\n') == std::string::npos;
+    }
+    return false;
+  };
+  EXPECT_TRUE(refused(""));
+  EXPECT_TRUE(refused("[1, 2]"));
+  EXPECT_TRUE(refused("{\"name\": 3}"));
+  write_summary(example(), scratch / "a.json");
+  const std::string text = content(scratch / "a.json");
+  for (const std::string field : {"name", "seed", "partitions", "state_hash", "recoveries", "collided", "wall_s"}) {
+    std::string wrong = text;
+    wrong.replace(wrong.find('"' + field + '"'), field.size() + 2, "\"other\"");
+    EXPECT_TRUE(refused(wrong)) << field;
+  }
+  std::string wrong = text;
+  wrong.replace(wrong.find("00abcdef"), 8, "00abcdeg");
+  EXPECT_TRUE(refused(wrong));
+  EXPECT_THROW((void)read_summary(scratch / "none.json"), UserError);
+}
+
+TEST(Summary, RunsWithoutTimeHaveNoInfinities) {
+  const Scratch scratch;
+  const Summary empty;
+  write_summary(empty, scratch / "s.json");
+  EXPECT_EQ(nlohmann::json::parse(content(scratch / "s.json"))["realtime_factor"], 0.0);
+}
+
+TEST(Summary, TellsPeopleWhatHappenedInFewLines) {
+  Summary s = example();
+  for (const bool local : {false, true}) {
+    if (local) s.mode = "local";
+    const std::string text = summary_text(s, "runs/disperse-1");
+    const auto lines = std::count(text.begin(), text.end(), '\n');
+    EXPECT_GE(lines, 8);
+    EXPECT_LE(lines, 12);
+    for (const char* const fact :
+         {"disperse", "1000 robots", "65.5 simulated s", "10.0 times real time", "12.5 mm", "99.0 mm",
+          "30 sent of 40", "10 (4.76 %)", "1 robot\n", "1111 ns", "radio 500, behaviours 300", "00abcdef01234567",
+          "runs/disperse-1", "resumed from tick 500"}) {
+      EXPECT_NE(text.find(fact), std::string::npos) << fact << " in\n" << text;
+    }
+    EXPECT_EQ(text.find("2x3 partitions") != std::string::npos, !local);
+  }
+}
+
+}  // namespace
+}  // namespace kilotwin::recorder

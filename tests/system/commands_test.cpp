@@ -1,0 +1,148 @@
+// The commands of the contract, each from its arguments to its files.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "clients/recorder/reader.hpp"
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Commands : public testing::Test {
+ protected:
+  Words small(const Words& more = {}) const {
+    Words words{source("experiments/disperse.txtpb"), "--duration", "3", "--robots", "20", "--mode", "local"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  Scratch scratch;
+};
+
+TEST_F(Commands, CheckIsSilentWhenAllIsRight) {
+  for (const auto& entry : fs::directory_iterator(source("experiments"))) {
+    if (entry.path().extension() != ".txtpb") continue;
+    const Outcome outcome = kilotwin({"check", entry.path().string()}, scratch);
+    EXPECT_EQ(outcome.status, 0) << entry.path();
+    EXPECT_EQ(outcome.out + outcome.err, "");
+  }
+}
+
+TEST_F(Commands, RunWritesWhatTheContractNames) {
+  run(small(), scratch, "run");
+  const auto summary = nlohmann::json::parse(read(scratch / "run/summary.json"));
+  for (const char* field : {"name", "seed", "mode", "partitions", "robots", "ticks", "simulated_s", "start_s", "wall_s", "realtime_factor",
+                            "state_hash", "messages", "robots_failed", "recoveries"}) {
+    EXPECT_TRUE(summary.contains(field)) << field;
+  }
+  EXPECT_EQ(summary["robots"], 20);
+  EXPECT_EQ(summary["state_hash"].get<std::string>().size(), 16u);
+  EXPECT_GT(summary["messages"]["received"].get<int>(), 0);
+  for (const char* file : {"recording.ktrec", "experiment.txtpb", "picture.svg", "manifest.pb"}) EXPECT_TRUE(fs::exists(scratch.path() / "run" / file)) << file;
+}
+
+TEST_F(Commands, ExportWritesTrajectoriesAndMessages) {
+  run(small({"--set", "recording.messages=true"}), scratch, "run");
+  const Outcome outcome = kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv", "--messages", scratch / "m.csv"}, scratch);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const std::string trajectories = read(scratch / "t.csv");
+  EXPECT_EQ(trajectories.substr(0, trajectories.find('\n')), "time_s,robot,x_mm,y_mm,heading_rad,led");
+  EXPECT_EQ(std::count(trajectories.begin(), trajectories.end(), '\n'), 1 + 20 * 4);
+  EXPECT_EQ(read(scratch / "m.csv").substr(0, 22), "receiver,sender,count\n");
+}
+
+TEST_F(Commands, MessagesOfAFederatedRunAreThoseOfALocalOne) {
+  run(small({"--set", "recording.messages=true"}), scratch, "local");
+  Words words = small({"--set", "recording.messages=true", "--partitions", "2x1"});
+  words[6] = "federated";
+  run(words, scratch, "federated");
+  for (const char* name : {"local", "federated"}) {
+    ASSERT_EQ(kilotwin({"export", scratch / name, "--messages", scratch / (std::string(name) + ".csv")}, scratch).status, 0);
+  }
+  EXPECT_GT(read(scratch / "local.csv").size(), 100u);
+  EXPECT_EQ(read(scratch / "local.csv"), read(scratch / "federated.csv"));
+}
+
+TEST_F(Commands, ReplayVerifiesAndFindsWhatDiffers) {
+  run(small(), scratch, "run");
+  EXPECT_EQ(kilotwin({"replay", scratch / "run", "--verify"}, scratch).status, 0);
+  // Another recording beside the same manifest: the first state hash differs already.
+  run(small({"--seed", "2"}), scratch, "other");
+  fs::copy_file(scratch / "other/recording.ktrec", scratch / "run/recording.ktrec", fs::copy_options::overwrite_existing);
+  const Outcome differs = kilotwin({"replay", scratch / "run", "--verify"}, scratch);
+  EXPECT_EQ(differs.status, 1);
+  EXPECT_NE(differs.err.find("first tick that differs"), std::string::npos) << differs.err;
+}
+
+TEST_F(Commands, ACutRecordingIsReadUpToTheCut) {
+  run(small(), scratch, "run");
+  const std::string file = scratch / "run/recording.ktrec";
+  fs::resize_file(file, fs::file_size(file) * 2 / 3);
+  const Outcome outcome = kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv"}, scratch);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("cut off"), std::string::npos) << outcome.err;
+  EXPECT_GT(read(scratch / "t.csv").size(), 500u);
+}
+
+TEST_F(Commands, BuildMakesAProgramThatRuns) {
+  ASSERT_EQ(kilotwin({"build", source("behaviours/disperse.c"), "-o", scratch / "d.so"}, scratch).status, 0);
+  const auto built = run(small({"--behaviour", scratch / "d.so"}), scratch, "built");
+  EXPECT_EQ(built.state_hash, run(small(), scratch, "compiled").state_hash);
+}
+
+TEST_F(Commands, BuildForTheRealRobotPrintsSizes) {
+  const Outcome outcome = kilotwin({"build", source("behaviours/disperse.c"), "--avr"}, scratch);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("ATmega328P"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Commands, DefineReachesTheProgram) {
+  write(scratch / "p.c", "#include <kilolib.h>\nvoid setup(void) { set_color(COLOUR); }\nvoid loop(void) {}\n"
+                         "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  run(small({"--behaviour", scratch / "p.c", "--define", "COLOUR=RGB(3,0,1)"}), scratch, "run");
+  ASSERT_EQ(kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv"}, scratch).status, 0);
+  EXPECT_NE(read(scratch / "t.csv").find(",301\n"), std::string::npos);
+}
+
+TEST_F(Commands, AModelFileGivesARobotItsOwnBias) {
+  write(scratch / "m.txtpb", "motion { bias_sd_mm_s: 0 bias_mean_mm_s: 0 }\n");
+  const auto plain = run(small({"--model", scratch / "m.txtpb"}), scratch, "plain");
+  write(scratch / "own.txtpb", "motion { bias_sd_mm_s: 0 bias_mean_mm_s: 0 } robot { robot: 3 bias_left_mm_s: 1 bias_right_mm_s: -1 }\n");
+  EXPECT_NE(run(small({"--model", scratch / "own.txtpb"}), scratch, "own").state_hash, plain.state_hash);
+}
+
+TEST_F(Commands, SweepTabulatesAllCombinations) {
+  const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "9", "--duration", "2", "--seeds", "1..3", "--set",
+                                    "robots.layout.grid.pitch_mm=40,60", "--out", scratch / "sweep"}, scratch);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("robots.layout.grid.pitch_mm=60"), std::string::npos) << outcome.out;
+  const std::string csv = read(scratch / "sweep/sweep.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
+  EXPECT_TRUE(fs::exists(scratch / "sweep/sweep.svg"));
+}
+
+TEST_F(Commands, DoctorFindsThisMachineFit) {
+  const Outcome outcome = kilotwin({"doctor"}, scratch);
+  EXPECT_EQ(outcome.status, 0) << outcome.out;
+  EXPECT_NE(outcome.out.find("experiments will run here"), std::string::npos);
+}
+
+TEST_F(Commands, HelpIsEverywhere) {
+  for (const char* command : {"run", "service", "sweep", "check", "build", "export", "replay", "doctor"}) {
+    const Outcome outcome = kilotwin({command, "--help"}, scratch);
+    EXPECT_EQ(outcome.status, 0) << command;
+    EXPECT_GT(outcome.out.size(), 50u) << command;
+  }
+}
+
+TEST_F(Commands, AFailingRobotCostsNobodyElse) {
+  write(scratch / "p.c", "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 7 && kilo_ticks > 30) *(volatile int *)0 = 1; }\n"
+                         "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  EXPECT_EQ(run(small({"--behaviour", scratch / "p.c"}), scratch, "run").robots_failed, 1u);
+}
+
+}  // namespace
+}  // namespace kilotwin::test

@@ -1,0 +1,160 @@
+// Outsiders steer a run and watch it over the public topics, as any vendor's DDS may.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <memory>
+#include <mutex>
+
+#include "clients/recorder/reader.hpp"
+#include "core/federation/topics.hpp"
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+class Control : public testing::Test {
+ protected:
+  Control()
+      : domain_(dds::DomainClaim::any().domain()),
+        participant_({domain_, {}}),
+        control_(participant_, topics::run_control()),
+        overhead_(participant_, topics::overhead_packets()),
+        status_(participant_, topics::run_status(), [this](const PublicRunStatus& sample, dds::SampleState state) {
+          if (!state.valid) return;
+          const std::lock_guard lock(mutex_);
+          latest_ = sample;
+        }) {}
+
+  void start(const Words& more = {}) {
+    Words words{program(), "run", source("experiments/disperse.txtpb"), "--robots", "20", "--duration", "600", "--pace", "1",
+                "--partitions", "2x1", "--domain", std::to_string(domain_), "--out", scratch_ / "run"};
+    words.insert(words.end(), more.begin(), more.end());
+    process_ = std::make_unique<Process>(words, scratch_.path());
+    ASSERT_TRUE(eventually([this] { return control_.readers() > 0 && overhead_.readers() > 0 && latest().phase == kilotwin_open_RUNNING; }));
+  }
+
+  PublicRunStatus latest() {
+    const std::lock_guard lock(mutex_);
+    return latest_;
+  }
+
+  void ask(kilotwin_open_RunCommand command, std::uint32_t steps = 0) {
+    PublicRunControl sample{};
+    std::string("test").copy(sample.client, sizeof sample.client - 1);
+    sample.request = ++request_;
+    sample.command = command;
+    sample.steps = steps;
+    control_.write(sample);
+    control_.write(sample);  // a repeated sample is one request
+  }
+
+  bool paused_at(std::int64_t tick) {
+    return eventually([&] { return latest().phase == kilotwin_open_PAUSED && latest().tick == tick; });
+  }
+
+  Scratch scratch_;
+  std::uint32_t domain_;
+  dds::Participant participant_;
+  dds::Writer<PublicRunControl> control_;
+  dds::Writer<PublicOverheadPacket> overhead_;
+  std::mutex mutex_;
+  PublicRunStatus latest_{};
+  std::uint32_t request_ = 0;
+  std::unique_ptr<Process> process_;
+  dds::Reader<PublicRunStatus> status_;
+};
+
+TEST_F(Control, PausesStepsContinuesAndStops) {
+  start();
+  ask(kilotwin_open_PAUSE_RUN);
+  ASSERT_TRUE(eventually([this] { return latest().phase == kilotwin_open_PAUSED; }));
+  const std::int64_t at = latest().tick;
+  ask(kilotwin_open_STEP_RUN, 5);
+  ASSERT_TRUE(paused_at(at + 5));
+  ask(kilotwin_open_STEP_RUN, 1);
+  ASSERT_TRUE(paused_at(at + 6));
+  ask(kilotwin_open_CHECKPOINT_RUN);
+  ask(kilotwin_open_CONTINUE_RUN);
+  ASSERT_TRUE(eventually([&] { return latest().tick > at + 20; }));
+  ask(kilotwin_open_STOP_RUN);
+  const Outcome outcome = process_->wait(30);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  // All of it is in the recording, and steps again to the same hashes.
+  EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
+  const auto summary = recorder::read_summary(scratch_.path() / "run/summary.json");
+  const auto resumed = run({source("experiments/disperse.txtpb"), "--robots", "20", "--mode", "local", "--resume", scratch_ / "run", "--duration",
+                            std::to_string(summary.simulated_s - 1e-6)}, scratch_, "resumed");
+  EXPECT_EQ(resumed.state_hash, summary.state_hash);
+  EXPECT_EQ(resumed.resumed_from_tick, at + 6);
+}
+
+TEST_F(Control, OverheadPacketsFromOutsideAreStampedRecordedAndReplayed) {
+  start();
+  PublicOverheadPacket packet{};
+  std::string("test").copy(packet.client, sizeof packet.client - 1);
+  packet.request = 1;
+  packet.command = 2;
+  packet.message[9] = 0x85;  // WAKEUP: every robot goes idle
+  overhead_.write(packet);
+  const std::int64_t asked_at = latest().tick;
+  ASSERT_TRUE(eventually([&] { return latest().tick > asked_at + 60; }));
+  ask(kilotwin_open_STOP_RUN);
+  EXPECT_EQ(process_->wait(30).status, 0);
+  recorder::Reader reader(scratch_ / "run/recording.ktrec");
+  int inputs = 0;
+  std::string life_cycles;
+  while (const proto::Record* record = reader.next()) {
+    if (record->has_input() && record->input().kind() == proto::InputRecord::OVERHEAD_INPUT) ++inputs;
+    if (record->has_state()) life_cycles = record->state().life_cycle();
+  }
+  EXPECT_EQ(inputs, 1);
+  EXPECT_EQ(life_cycles, std::string(20, '\x01')) << "all idle";
+  EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
+}
+
+TEST_F(Control, RobotsAreTracedForWhoListens) {
+  std::array<std::atomic<int>, 20> seen{};
+  const dds::Reader<PublicRobotState> robots(participant_, topics::robots(), [&](const PublicRobotState& sample, dds::SampleState state) {
+    if (state.valid && sample.robot < seen.size()) ++seen[sample.robot];
+  });
+  start();
+  EXPECT_TRUE(eventually([&] { return std::all_of(seen.begin(), seen.end(), [](const auto& count) { return count >= 3; }); }));
+  ask(kilotwin_open_STOP_RUN);
+  EXPECT_EQ(process_->wait(30).status, 0);
+}
+
+TEST_F(Control, ATrackedRobotIsWhereTheTrackerSawIt) {
+  write(scratch_ / "hybrid.txtpb",
+        "arena { width_mm: 600 height_mm: 600 }\n"
+        "robots { count: 4 behaviour: \"" + source("behaviours/disperse.c") + "\" layout { grid { pitch_mm: 50 } } }\n"
+        "robots { count: 1 body: TRACKED layout { x_mm: 200 y_mm: 200 grid {} } }\n");
+  dds::Writer<PublicTrackedPose> poses(participant_, topics::tracked_poses());
+  Words words{program(), "run", scratch_ / "hybrid.txtpb", "--duration", "600", "--pace", "1", "--partitions", "2x2", "--domain",
+              std::to_string(domain_), "--out", scratch_ / "run"};
+  process_ = std::make_unique<Process>(words, scratch_.path());
+  ASSERT_TRUE(eventually([&] { return poses.readers() > 0 && latest().phase == kilotwin_open_RUNNING; }));
+  PublicTrackedPose pose{};
+  pose.robot = 4;
+  pose.x_mm = -150;  // over two partition borders at once
+  pose.y_mm = -120;
+  pose.heading_rad = 1;
+  poses.write(pose);
+  const std::int64_t at = latest().tick;
+  ASSERT_TRUE(eventually([&] { return latest().tick > at + 20; }));
+  ask(kilotwin_open_STOP_RUN);
+  EXPECT_EQ(process_->wait(30).status, 0);
+  recorder::Reader reader(scratch_ / "run/recording.ktrec");
+  double x = 0, y = 0;
+  while (const proto::StateRecord* state = reader.next_state()) {
+    x = state->x_mm(4);
+    y = state->y_mm(4);
+  }
+  EXPECT_EQ(x, -150);
+  EXPECT_EQ(y, -120);
+  EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
+}
+
+}  // namespace
+}  // namespace kilotwin::test

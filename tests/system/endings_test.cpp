@@ -1,0 +1,137 @@
+// However a run ends, nothing stays behind, and what was recorded is of use.
+#include <gtest/gtest.h>
+
+#include <csignal>
+
+#include "clients/recorder/reader.hpp"
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A run at real time's pace, so that it lasts until the test ends it.
+class Endings : public testing::Test {
+ protected:
+  Words long_run(const Words& more = {}) const {
+    Words words{program(), "run", source("experiments/disperse.txtpb"), "--duration", "600", "--pace", "1", "--partitions", "2x1",
+                "--set", "recording.every_s=0.1", "--out", scratch / "run"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  /// Waits until the run has recorded at least `states` states.
+  bool recorded(std::uint64_t states) const {
+    return eventually([&] {
+      try {
+        recorder::Reader reader(scratch / "run/recording.ktrec");
+        std::uint64_t count = 0;
+        while (reader.next_state() != nullptr) ++count;
+        return count >= states;
+      } catch (const std::exception&) {
+        return false;
+      }
+    });
+  }
+  void expect_nothing_left() const {
+    EXPECT_TRUE(eventually([&] { return processes_with(scratch / "run").empty(); }, 20));
+  }
+  void expect_usable_recording() {
+    const Outcome exported = kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv", "--every", "0.1"}, scratch);
+    EXPECT_EQ(exported.status, 0) << exported.err;
+    EXPECT_GT(read(scratch / "t.csv").size(), 10'000u);
+    const Outcome replayed = kilotwin({"replay", scratch / "run", "--verify"}, scratch);
+    EXPECT_EQ(replayed.status, 0) << replayed.err;
+  }
+  /// pid of the service whose command line has `word`.
+  pid_t service(const std::string& word) const {
+    for (const pid_t id : processes_with(scratch / "run")) {
+      const std::string line = read("/proc/" + std::to_string(id) + "/cmdline");
+      if (line.find(std::string("service") + '\0' + word) != std::string::npos) return id;
+    }
+    return -1;
+  }
+  static std::size_t shared_memory_files() {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator("/dev/shm"), fs::directory_iterator()));
+  }
+  Scratch scratch;
+};
+
+TEST_F(Endings, InterruptsEndARunInOrder) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    fs::remove_all(scratch / "run");
+    const std::size_t shared_before = shared_memory_files();
+    Process process(long_run(), scratch.path());
+    ASSERT_TRUE(recorded(20));
+    process.signal(signal);
+    const Outcome outcome = process.wait(20);
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.err.find("interrupted"), std::string::npos) << outcome.err;
+    expect_nothing_left();
+    EXPECT_LE(shared_memory_files(), shared_before);
+    EXPECT_TRUE(fs::exists(scratch / "run/summary.json"));
+    expect_usable_recording();
+  }
+}
+
+TEST_F(Endings, AnInterruptEndsALocalRunInOrder) {
+  Process process(long_run({"--mode", "local"}), scratch.path());
+  ASSERT_TRUE(recorded(20));
+  process.signal(SIGINT);
+  EXPECT_EQ(process.wait(20).status, 1);
+  EXPECT_TRUE(fs::exists(scratch / "run/summary.json"));
+  expect_usable_recording();
+}
+
+TEST_F(Endings, AKilledLauncherTakesItsServicesAlong) {
+  Process process(long_run(), scratch.path());
+  ASSERT_TRUE(recorded(20));
+  process.signal(SIGKILL);
+  process.wait(20);
+  expect_nothing_left();
+  expect_usable_recording();
+}
+
+TEST_F(Endings, AKilledServiceIsNamedInOneLine) {
+  for (const std::string victim : {"physics", "comm", "behaviours", "station"}) {
+    fs::remove_all(scratch / "run");
+    Process process(long_run(), scratch.path());
+    ASSERT_TRUE(recorded(20));
+    const pid_t id = service(victim);
+    ASSERT_GT(id, 0) << victim;
+    kill(id, SIGKILL);
+    const double killed_s = now_s();
+    const Outcome outcome = process.wait(20);
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.err.find(victim), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("killed"), std::string::npos) << outcome.err;
+    RecordProperty(victim + "_named_after_s", std::to_string(now_s() - killed_s));
+    expect_nothing_left();
+    expect_usable_recording();
+  }
+}
+
+TEST_F(Endings, AServiceThatStandsStillIsNamed) {
+  Process process(long_run(), scratch.path());
+  ASSERT_TRUE(recorded(20));
+  const pid_t id = service("comm");
+  ASSERT_GT(id, 0);
+  kill(id, SIGSTOP);
+  const Outcome outcome = process.wait(30);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("comm was lost"), std::string::npos) << outcome.err;
+  expect_nothing_left();
+  expect_usable_recording();
+}
+
+TEST_F(Endings, ASecondRunLeavesTheFirstAlone) {
+  const Words words{"run", source("experiments/disperse.txtpb"), "--duration", "1", "--mode", "local", "--quiet"};
+  ASSERT_EQ(kilotwin(words, scratch).status, 0);
+  const std::string before = read(scratch / "runs/disperse-1/summary.json");
+  ASSERT_EQ(kilotwin(words, scratch).status, 0);
+  EXPECT_EQ(read(scratch / "runs/disperse-1/summary.json"), before);
+  EXPECT_TRUE(fs::exists(scratch / "runs/disperse-1-2/summary.json"));
+}
+
+}  // namespace
+}  // namespace kilotwin::test

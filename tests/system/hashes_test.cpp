@@ -1,0 +1,95 @@
+// The crown jewel: one state hash, however a run is divided, whichever way it is run.
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "core/dds/dds.hpp"
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+/// The state hash of disperse with 100 robots and 10 s. Whoever changes a model changes this value, knowingly; it is the
+/// same for every compiler, optimisation level and sanitizer.
+constexpr std::uint64_t kGolden = 0;
+
+Words disperse(const Words& more) {
+  Words words{source("experiments/disperse.txtpb"), "--duration", "10"};
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+struct Division {
+  const char* name;
+  Words words;
+};
+
+class OneHash : public testing::TestWithParam<Division> {};
+
+TEST_P(OneHash, HoweverARunIsDivided) {
+  const Scratch scratch;
+  EXPECT_EQ(run(disperse(GetParam().words), scratch, "run").state_hash, kGolden);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Hashes, OneHash,
+    testing::Values(Division{"local_1x1", {"--mode", "local", "--partitions", "1x1"}},
+                    Division{"local_2x2_threads", {"--mode", "local", "--partitions", "2x2", "--threads", "2"}},
+                    Division{"local_3x2_hosts_threads", {"--mode", "local", "--partitions", "3x2", "--hosts", "3", "--threads", "4"}},
+                    Division{"local_40x1", {"--mode", "local", "--partitions", "40x1"}},
+                    Division{"federated_1x1", {"--partitions", "1x1"}},
+                    Division{"federated_2x1", {"--partitions", "2x1"}},
+                    Division{"federated_2x2_hosts", {"--partitions", "2x2", "--hosts", "2"}},
+                    Division{"federated_3x2_hosts", {"--partitions", "3x2", "--hosts", "3"}}),
+    [](const testing::TestParamInfo<Division>& tested) { return tested.param.name; });
+
+TEST(Hashes, DifferWithTheSeed) {
+  const Scratch scratch;
+  EXPECT_NE(run(disperse({"--mode", "local", "--seed", "2"}), scratch, "run").state_hash, kGolden);
+}
+
+TEST(Hashes, AreThoseOfServicesStartedByHand) {
+  const Scratch scratch;
+  const std::string directory = scratch / "run";
+  Words words = disperse({"--partitions", "2x1", "--hosts", "2", "--prepare", "--out", directory});
+  words.insert(words.begin(), "run");
+  ASSERT_EQ(kilotwin(words, scratch).status, 0);
+  // A free domain: one that a claim of this test's own has found and freed.
+  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
+  const auto service = [&](Words more) {
+    Words all{program(), "service"};
+    all.insert(all.end(), more.begin(), more.end());
+    all.insert(all.end(), {"--run", directory, "--domain", domain});
+    return std::make_unique<Process>(all, scratch.path());
+  };
+  std::vector<std::unique_ptr<Process>> services;
+  // In an order that nobody would choose.
+  services.push_back(service({"behaviours", "--share", "2/2"}));
+  services.push_back(service({"physics", "--partition", "1,0"}));
+  services.push_back(service({"station"}));
+  services.push_back(service({"comm"}));
+  services.push_back(service({"physics", "--partition", "0,0"}));
+  services.push_back(service({"behaviours", "--share", "1/2"}));
+  for (const auto& process : services) {
+    const Outcome outcome = process->wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+  }
+  EXPECT_EQ(recorder::read_summary(directory + "/summary.json").state_hash, kGolden);
+}
+
+TEST(Hashes, AreTheSameWithTheStationsVirtualEnvironment) {
+  const Scratch scratch;
+  const Words words{source("experiments/ark-hub.txtpb"), "--duration", "20"};
+  const auto with = [&](const Words& more, const std::string& name) {
+    Words all = words;
+    all.insert(all.end(), more.begin(), more.end());
+    return run(all, scratch, name);
+  };
+  const recorder::Summary local = with({"--mode", "local"}, "local");
+  const recorder::Summary federated = with({"--partitions", "2x2", "--hosts", "2"}, "federated");
+  EXPECT_EQ(local.state_hash, federated.state_hash);
+  EXPECT_EQ(local.messages.received, federated.messages.received);
+}
+
+}  // namespace
+}  // namespace kilotwin::test
