@@ -1,9 +1,9 @@
 #include "clients/behaviours/compiler.hpp"
 
-#include <array>
-#include <cstdio>
-#include <system_error>
 #include <unistd.h>
+
+#include <cstdlib>
+#include <system_error>
 
 #include "clients/behaviours/compiler_common.hpp"
 #include "clients/behaviours/elf_file.hpp"
@@ -24,6 +24,10 @@ void append(Arguments& to, const Arguments& more) { to.insert(to.end(), more.beg
 struct Compiler {
   std::string path, version;
   [[nodiscard]] bool is_clang() const { return version.find("clang") != std::string::npos; }
+  [[nodiscard]] int major_version() const {
+    const std::size_t at = version.find("version ");
+    return at == std::string::npos ? 0 : std::atoi(version.c_str() + at + 8);
+  }
 };
 
 Compiler find_compiler(const fs::path& wanted) {
@@ -47,10 +51,13 @@ Arguments code_flags(const Compiler& compiler) {
                   "-DF_CPU=8000000", "-funsigned-char", "-fpack-struct", "-fshort-enums", "-fcommon",
                   "-march=x86-64", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno",
                   "-fno-strict-aliasing", "-fwrapv", "-fno-delete-null-pointer-checks", "-fcf-protection=none",
-                  "-fno-stack-protector", "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-fdata-sections",
+                  "-fno-stack-protector", "-fstack-clash-protection", "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-fdata-sections",
                   "-ftrivial-auto-var-init=zero"};
   if (compiler.is_clang()) {
-    append(flags, {"-Xclang", "-enable-trivial-auto-var-init-zero-knowing-it-will-be-removed-from-clang"});
+    // Before 16, clang wants to be told twice.
+    if (compiler.major_version() < 16) {
+      flags.emplace_back("-enable-trivial-auto-var-init-zero-knowing-it-will-be-removed-from-clang");
+    }
   } else {
     append(flags, {"-fno-tree-loop-distribute-patterns", "-funsigned-bitfields"});
   }
@@ -69,6 +76,15 @@ Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
           "-ffile-prefix-map=" + runtime.string() + "=/kilotwin"};
 }
 
+/// Leaves the folders of the sources out of the result, so that the same content gives the same octets wherever it lies.
+Arguments place_flags(const std::vector<fs::path>& sources) {
+  Arguments flags{"-ffile-prefix-map=" + fs::current_path().string() + "=."};
+  for (const fs::path& source : sources) {
+    if (source.has_parent_path()) flags.push_back("-ffile-prefix-map=" + source.parent_path().string() + "=.");
+  }
+  return flags;
+}
+
 CompiledProgram checked(const fs::path& file, const std::string& octets) {
   (void)ElfFile::parse(octets, file.string());
   return {file, sha256_hex(octets)};
@@ -80,10 +96,12 @@ CompiledProgram given(const fs::path& file) {
   return checked(file, *octets);
 }
 
-/// A private name next to `file` that ceases to exist with this object.
+/// A private name next to `file`, in a directory that is made if need be, that ceases to exist with this object.
 class Temporary {
  public:
   explicit Temporary(const fs::path& file) : path_(file.string() + ".XXXXXX") {
+    std::error_code error;
+    fs::create_directories(file.parent_path(), error);
     const int descriptor = mkstemp(path_.data());
     if (descriptor < 0) throw RunError(path_ + ": cannot be written; is the disk full?");
     close(descriptor);
@@ -97,6 +115,34 @@ class Temporary {
   std::string path_;
 };
 
+/// Runs a compilation that ends in `-o FILE`, and keeps the file as `kept`. Throws UserError with the compiler's words.
+std::string build(Arguments arguments, const fs::path& kept, const std::vector<fs::path>& sources) {
+  const Temporary result(kept);
+  append(arguments, {"-o", result.path()});
+  const ProcessResult process = run_process(arguments);
+  if (process.status != 0) throw UserError(first_error_first(process.errors, sources));
+  const auto octets = read_file(result.path());
+  if (!octets || !write_file(kept, *octets)) throw RunError(kept.string() + ": cannot be written; is the disk full?");
+  return *octets;
+}
+
+/// The runtime as one object, made once per compiler.
+fs::path runtime_object(const Compiler& compiler, const Arguments& flags, const Arguments& includes, const fs::path& runtime,
+                        const std::string& content) {
+  const fs::path kept = runtime / (sha256_hex(content) + ".o");
+  std::error_code error;
+  if (fs::is_regular_file(kept, error)) return kept;
+  Arguments arguments{compiler.path, "-r", "-nostdlib"};
+  append(arguments, flags);
+  append(arguments, includes);
+  append(arguments, {"-I", runtime.string()});
+  for (const char* name : {"kilolib.c", "switch.c", "libc.c", "libm.c", "libprintf.c", "core/math/elementary.c"}) {
+    arguments.push_back((runtime / name).string());
+  }
+  (void)build(arguments, kept, {runtime / "kilolib.c"});
+  return kept;
+}
+
 }  // namespace
 
 CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptions& options) {
@@ -108,21 +154,20 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
   const fs::path runtime = unpacked_runtime(cache);
   const Arguments includes = include_flags(compiler, runtime);
 
-  Arguments common = code_flags(compiler);
-  append(common, defines);
+  const Arguments code = code_flags(compiler);
   Arguments files;
   for (const fs::path& source : sources) files.push_back(source.string());
 
   Arguments preprocess{compiler.path, "-E"};
-  append(preprocess, common);
-  append(preprocess, includes);
-  append(preprocess, files);
+  for (const Arguments& part : {code, defines, place_flags(sources), includes, files}) append(preprocess, part);
   const ProcessResult text = run_process(preprocess);
-  if (text.status != 0) throw UserError(first_error_first(text.errors, sources[0]));
+  if (text.status != 0) throw UserError(first_error_first(text.errors, sources));
 
   std::string content = runtime.filename().string() + '\n' + compiler.path + '\n' + compiler.version;
-  for (const std::string& flag : common) content += flag + '\n';
+  for (const std::string& flag : code) content += flag + '\n';
   for (const std::string& flag : kLinkFlags) content += flag + '\n';
+  const std::string runtime_content = content;
+  for (const std::string& flag : defines) content += flag + '\n';
   const fs::path kept = cache / "programs" / (sha256_hex(content + text.output) + ".so");
   if (const auto octets = read_file(kept)) {
     try {
@@ -131,25 +176,10 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
       // Damaged on disk: made again below.
     }
   }
-
-  std::error_code error;
-  fs::create_directories(kept.parent_path(), error);
-  const Temporary result(kept);
-  Arguments build{compiler.path};
-  append(build, common);
-  append(build, kLinkFlags);
-  append(build, includes);
-  append(build, {"-idirafter", runtime.string()});
-  append(build, files);
-  for (const char* name : {"kilolib.c", "switch.c", "libc.c", "libm.c", "libprintf.c", "core/math/elementary.c"}) {
-    build.push_back((runtime / name).string());
-  }
-  append(build, {"-o", result.path()});
-  const ProcessResult built = run_process(build);
-  if (built.status != 0) throw UserError(first_error_first(built.errors, sources[0]));
-  const auto octets = read_file(result.path());
-  if (!octets || !write_file(kept, *octets)) throw RunError(kept.string() + ": cannot be written; is the disk full?");
-  return checked(kept, *octets);
+  Arguments arguments{compiler.path};
+  for (const Arguments& part : {code, defines, kLinkFlags, place_flags(sources), includes, files}) append(arguments, part);
+  arguments.push_back(runtime_object(compiler, code, includes, runtime, runtime_content).string());
+  return checked(kept, build(arguments, kept, sources));
 }
 
 }  // namespace kilotwin::behaviours

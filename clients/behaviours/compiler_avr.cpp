@@ -63,7 +63,7 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
     const ProcessResult result = run_process(arguments);
-    if (result.status != 0) throw UserError(first_error_first(result.errors, source));
+    if (result.status != 0) throw UserError(first_error_first(result.errors, {source}));
     add_size(sum, run_process({size, object}).output);
   }
   return sum;

@@ -56,14 +56,27 @@ void check_sources(const std::vector<fs::path>& sources) {
   }
 }
 
-std::string first_error_first(const std::string& output, const fs::path& source) {
+namespace {
+
+/// The linker knows sources by their names alone.
+std::string as_named(const std::string& file, const std::vector<fs::path>& sources) {
+  for (const fs::path& source : sources) {
+    if (source.filename() == fs::path(file).filename()) return source.string();
+  }
+  return file;
+}
+
+}  // namespace
+
+std::string first_error_first(const std::string& output, const std::vector<fs::path>& sources) {
   static const std::regex kCompiler("(.+?:[0-9]+:[0-9]+: )(?:fatal )?error: (.*)");
-  static const std::regex kLinker("(?:.*[: ])?([^: ]+\\.[ch]:[0-9]+): ((?:undefined reference|multiple definition).*)");
+  static const std::regex kLinker("(?:.*[: ])?([^: ]+\\.[ch])(:[0-9]+): ((?:undefined reference|multiple definition).*)");
   static const std::regex kAnywhere("(?:.*: )?((?:undefined reference|multiple definition|fatal error|error).*)");
   std::vector<std::string> lines;
   std::istringstream stream(output);
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  std::string head = source.string() + ":1:1: error: the compiler failed";
+  const std::string first_source = sources.front().string();
+  std::string head = first_source + ":1:1: error: the compiler failed";
   std::smatch match;
   auto search = [&](const std::regex& pattern, auto text) {
     const auto found = std::find_if(lines.begin(), lines.end(),
@@ -75,8 +88,8 @@ std::string first_error_first(const std::string& output, const fs::path& source)
     return true;
   };
   search(kCompiler, [&] { return match.str(1) + "error: " + match.str(2); }) ||
-      search(kLinker, [&] { return match.str(1) + ":1: error: " + match.str(2); }) ||
-      search(kAnywhere, [&] { return source.string() + ":1:1: error: " + match.str(1); });
+      search(kLinker, [&] { return as_named(match.str(1), sources) + match.str(2) + ":1: error: " + match.str(3); }) ||
+      search(kAnywhere, [&] { return first_source + ":1:1: error: " + match.str(1); });
   for (const std::string& line : lines) head += "\n" + line;
   return head;
 }

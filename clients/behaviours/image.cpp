@@ -12,7 +12,9 @@ namespace kilotwin::behaviours {
 namespace {
 
 constexpr std::uint64_t kGuardOctets = 16 * 1024;
-constexpr std::uint64_t kSlotAlignment = 64 * 1024;
+constexpr const char* kTaken =
+    "the addresses of these robots' programs are taken by other programs in this process; run the experiments in processes "
+    "of their own";
 
 void* pointer(std::uint64_t address) { return reinterpret_cast<void*>(address); }  // NOLINT
 
@@ -41,7 +43,7 @@ Registry& registry() {
 
 std::uint64_t Slot::size(const ElfFile& file) {
   const std::uint64_t used = 2 * kStackOctets + kPage + file.memory.size() + 4 * kGuardOctets;
-  return (used + kSlotAlignment - 1) / kSlotAlignment * kSlotAlignment;
+  return (used + kAddressStep - 1) / kAddressStep * kAddressStep;
 }
 
 Slot::Slot(const ElfFile& file, std::uint64_t address)
@@ -55,6 +57,7 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
   if (mapped != pointer(address)) {
     const int error = mapped == MAP_FAILED ? errno : EEXIST;
     if (mapped != MAP_FAILED) munmap(mapped, size_);
+    if (error == EEXIST) throw RunError(kTaken);
     throw RunError(std::string("memory for robots' programs: ") + std::strerror(error));
   }
   try {
@@ -94,33 +97,27 @@ Program::Program(ElfFile parsed, std::string program_name, std::string hash, std
       name(std::move(program_name)),
       sha256(std::move(hash)),
       address(first),
-      end(first + kSlots * Slot::size(file)) {
-  if (end > kLastAddress) throw RunError(name + ": the programs of this experiment do not fit into memory together");
+      end(first + size(file)) {
+  KILOTWIN_DEMAND(first >= kFirstAddress && end <= kLastAddress);
   for (std::uint32_t i = 0; i < kSlots; ++i) {
     slots_.push_back(std::make_unique<Slot>(file, address + i * Slot::size(file)));
   }
 }
 
-std::shared_ptr<Program> Program::load(std::string_view octets, const std::string& name, const std::string& sha256,
+std::shared_ptr<Program> Program::load(ElfFile file, const std::string& name, const std::string& sha256,
                                        std::uint64_t address) {
   const std::lock_guard lock(registry().mutex);
-  Loaded& loaded = registry().programs[address];
-  try {
-    if (!loaded.program) {
-      loaded.program = std::make_unique<Program>(ElfFile::parse(octets, name), name, sha256, address);
-    }
-    if (loaded.program->sha256 != sha256) {
-      throw RunError(name + ": this process already runs other programs; experiments with different programs need a process each");
-    }
-  } catch (...) {
-    if (loaded.users == 0) registry().programs.erase(address);
-    throw;
+  auto entry = registry().programs.find(address);
+  if (entry == registry().programs.end()) {
+    auto program = std::make_unique<Program>(std::move(file), name, sha256, address);
+    entry = registry().programs.emplace(address, Loaded{std::move(program), 0}).first;
   }
-  ++loaded.users;
-  return {loaded.program.get(), [](Program* program) {
+  if (entry->second.program->sha256 != sha256) throw RunError(kTaken);
+  ++entry->second.users;
+  return {entry->second.program.get(), [](Program* program) {
             const std::lock_guard guard(registry().mutex);
-            const auto entry = registry().programs.find(program->address);
-            if (--entry->second.users == 0) registry().programs.erase(entry);
+            const auto own = registry().programs.find(program->address);
+            if (--own->second.users == 0) registry().programs.erase(own);
           }};
 }
 

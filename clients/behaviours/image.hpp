@@ -16,6 +16,7 @@ namespace kilotwin::behaviours {
 inline constexpr std::uint32_t kSlots = 8;
 /// Where images live. Free of everything else in a position-independent program, under sanitizers as well.
 inline constexpr std::uint64_t kFirstAddress = 0x20000000, kLastAddress = 0x70000000;
+inline constexpr std::uint64_t kAddressStep = 64 * 1024;  ///< slots begin at multiples of it
 inline constexpr std::uint64_t kStackOctets = 64 * 1024;
 
 /// One copy of an image with its stacks. From low to high addresses, each followed by a guard: main stack, interrupt stack,
@@ -52,10 +53,12 @@ class Slot {
 /// A program in all its slots.
 class Program {
  public:
-  /// The program at its address. Engines and program sets of one process share what is the same. Throws UserError where the
-  /// octets are no program, RunError where another one is loaded at this address or memory is short.
-  [[nodiscard]] static std::shared_ptr<Program> load(std::string_view octets, const std::string& name,
-                                                     const std::string& sha256, std::uint64_t address);
+  /// The program at this address. Engines and program sets of one process share what is the same. Throws RunError where
+  /// something else lies there or memory is short.
+  [[nodiscard]] static std::shared_ptr<Program> load(ElfFile file, const std::string& name, const std::string& sha256,
+                                                     std::uint64_t address);
+  /// Octets of address space that it takes.
+  [[nodiscard]] static std::uint64_t size(const ElfFile& file) { return kSlots * Slot::size(file); }
 
   Program(ElfFile file, std::string name, std::string sha256, std::uint64_t address);
 

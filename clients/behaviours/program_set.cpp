@@ -6,9 +6,22 @@
 
 namespace kilotwin::behaviours {
 
+namespace {
+
+/// A place for `size` octets that follows from the programs' hashes.
+std::uint64_t place_for(const std::string& hashes, std::uint64_t size) {
+  const std::uint64_t room = kLastAddress - kFirstAddress;
+  if (size > room) throw RunError("the programs of this experiment are too large to be in memory together");
+  const std::uint64_t places = (room - size) / kAddressStep + 1;
+  return kFirstAddress + std::stoull(sha256_hex(hashes).substr(0, 15), nullptr, 16) % places * kAddressStep;
+}
+
+}  // namespace
+
 std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest, const std::filesystem::path& run_directory) {
-  auto set = std::make_shared<ProgramSet>();
-  std::uint64_t address = kFirstAddress;
+  std::vector<ElfFile> files;
+  std::string hashes;
+  std::uint64_t size = 0;
   for (const proto::Program& program : manifest.program()) {
     const std::filesystem::path path = run_directory / "programs" / (program.sha256() + ".so");
     const auto octets = read_file(path);
@@ -18,7 +31,16 @@ std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest, co
     if (sha256_hex(*octets) != program.sha256()) {
       throw UserError(path.string() + ": its SHA-256 is not what its name says; copy it again from where the run was prepared");
     }
-    set->programs_.push_back(Program::load(*octets, program.path(), program.sha256(), address));
+    files.push_back(ElfFile::parse(*octets, path.string()));
+    size += Program::size(files.back());
+    hashes += program.sha256() + '\n';
+  }
+  auto set = std::make_shared<ProgramSet>();
+  std::uint64_t address = place_for(hashes, size);
+  for (int i = 0; i < manifest.program_size(); ++i) {
+    const proto::Program& program = manifest.program(i);
+    set->programs_.push_back(
+        Program::load(std::move(files[static_cast<std::size_t>(i)]), program.path(), program.sha256(), address));
     address = set->programs_.back()->end;
   }
   return set;

@@ -13,8 +13,10 @@ namespace kilotwin::behaviours {
 
 class ProgramSet {
  public:
-  /// Loads programs/SHA256.so of the run directory for each program of the manifest, in its order. Throws UserError where a
-  /// file is missing, is not what its name says, or is no program; RunError where memory is short.
+  /// Loads programs/SHA256.so of the run directory for each program of the manifest. Where they lie in memory follows from
+  /// their contents and order alone, so that checkpoints hold anywhere, and runs of different programs seldom meet in one
+  /// process. Throws UserError where a file is missing, is not what its name says, or is no program; RunError where memory is
+  /// short or the addresses are taken.
   [[nodiscard]] static std::shared_ptr<ProgramSet> load(const proto::Manifest&, const std::filesystem::path& run_directory);
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(programs_.size()); }

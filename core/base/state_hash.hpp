@@ -70,6 +70,8 @@ class HashState {
 }
 
 /// H(t) from H(t-1) and h(t).
-[[nodiscard]] inline std::uint64_t hash_chain(std::uint64_t previous, std::uint64_t sum) { return hash_mix(previous, sum); }
+[[nodiscard]] inline std::uint64_t hash_chain(std::uint64_t previous, std::uint64_t sum) {
+  return hash_mix(previous, sum);
+}
 
 }  // namespace kilotwin

@@ -28,7 +28,8 @@ proto::Manifest checked(proto::Manifest manifest) {
   const proto::Experiment& experiment = manifest.experiment();
   const proto::Deployment& deployment = experiment.deployment();
   require(experiment.tick_cycles() > 0, "tick_cycles is 0", "2^15..2^20");
-  require(experiment.duration_s() > 0 && experiment.duration_s() <= 1e6, "duration_s is out of range", "above 0, at most 1e6");
+  require(experiment.duration_s() > 0 && experiment.duration_s() <= 1e6, "duration_s is out of range",
+          "above 0, at most 1e6");
   require(experiment.arena().width_mm() > 0 && experiment.arena().height_mm() > 0, "the arena is empty", "40..1e6 mm");
   const auto divides = [](std::uint32_t n) { return n >= 1 && n <= 64; };
   require(divides(deployment.partition_columns()) && divides(deployment.partition_rows()) && divides(deployment.hosts()),
@@ -37,8 +38,10 @@ proto::Manifest checked(proto::Manifest manifest) {
   std::uint64_t robots = 0;
   for (const proto::RobotGroup& group : experiment.robots()) robots += group.count();
   const auto poses = static_cast<std::uint64_t>(manifest.x_mm_size());
-  require(poses == robots && manifest.y_mm_size() == manifest.x_mm_size() && manifest.heading_rad_size() == manifest.x_mm_size(),
-          "the initial poses do not match the " + std::to_string(robots) + " robots of the experiment", "one pose per robot");
+  require(poses == robots && manifest.y_mm_size() == manifest.x_mm_size() &&
+              manifest.heading_rad_size() == manifest.x_mm_size(),
+          "the initial poses do not match the " + std::to_string(robots) + " robots of the experiment",
+          "one pose per robot");
   require(manifest.group_program_size() == experiment.robots_size(), "group_program does not match the groups of robots",
           "one entry per group");
   for (const std::uint32_t program : manifest.group_program()) {
@@ -69,7 +72,9 @@ std::uint32_t cell_of(double offset_cells, std::uint32_t count) {
 }
 
 /// Distance of two intervals, 0 where they touch or overlap. Lower ends are never +infinity, upper ends never -infinity.
-double gap(double a_min, double a_max, double b_min, double b_max) { return std::max({0.0, b_min - a_max, a_min - b_max}); }
+double gap(double a_min, double a_max, double b_min, double b_max) {
+  return std::max({0.0, b_min - a_max, a_min - b_max});
+}
 
 }  // namespace
 
@@ -93,7 +98,8 @@ PartitionGrid::PartitionGrid(double arena_width_mm, double arena_height_mm, std:
   for (std::uint32_t row = 0; row < rows; ++row) {
     for (std::uint32_t column = 0; column < columns; ++column) {
       rectangles_.push_back({edge(x0_mm_, cell_width_mm_, column, columns), edge(y0_mm_, cell_height_mm_, row, rows),
-                             edge(x0_mm_, cell_width_mm_, column + 1, columns), edge(y0_mm_, cell_height_mm_, row + 1, rows)});
+                             edge(x0_mm_, cell_width_mm_, column + 1, columns),
+                             edge(y0_mm_, cell_height_mm_, row + 1, rows)});
     }
   }
 }
@@ -123,8 +129,8 @@ RunPlan::RunPlan(proto::Manifest given)
     : manifest(checked(std::move(given))),
       tick_length(experiment().tick_cycles()),
       last_tick(tick_length.at_or_after(experiment().duration_s())),
-      grid(experiment().arena().width_mm(), experiment().arena().height_mm(), experiment().deployment().partition_columns(),
-           experiment().deployment().partition_rows()),
+      grid(experiment().arena().width_mm(), experiment().arena().height_mm(),
+           experiment().deployment().partition_columns(), experiment().deployment().partition_rows()),
       hosts(experiment().deployment().hosts()),
       hash(hash_of(manifest)) {
   program_of_.reserve(robots());

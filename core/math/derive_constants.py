@@ -60,7 +60,8 @@ def rational(name, f, low, high, top, bottom):
             rows = [[x**j for j in range(top + 1)] + [-values[x] * x**(j + 1) for j in range(bottom)]
                     + [-(-1)**i * values[x] * mp.polyval(([mpf(1)] + b)[::-1], x)] for i, x in enumerate(reference)]
             s = lu_solve(matrix(rows), matrix([values[x] for x in reference]))
-            a, b, level = [s[j] for j in range(top + 1)], [s[top + 1 + j] for j in range(bottom)], abs(s[top + bottom + 1])
+            a, b = [s[j] for j in range(top + 1)], [s[top + 1 + j] for j in range(bottom)]
+            level = abs(s[top + bottom + 1])
         errors = [quotient(a, b, x) / values[x] - 1 for x in grid]
         peaks, first = [], 0
         for i in range(1, len(grid) + 1):
@@ -99,17 +100,21 @@ print(hexadecimal(rounded(pi)), hexadecimal(rounded(pi - rounded(pi))))
 
 quarter = (pi / 4 * mpf("1.001"))**2
 polynomial("sin: (sin(sqrt z)/sqrt z - 1)/z", lambda z: (sin(sqrt(z)) / sqrt(z) - 1) / z, 0, quarter, 7, lambda z: z)
-polynomial("cos: (cos(sqrt z) - 1 + z/2)/z^2", lambda z: (cos(sqrt(z)) - 1 + z / 2) / z**2, 0, quarter, 6, lambda z: z**2 / cos(sqrt(z)))
-polynomial("atan: (atan(sqrt z)/sqrt z - 1)/z", lambda z: (atan(sqrt(z)) / sqrt(z) - 1) / z, 0, mpf(1) / 256, 6, lambda z: z)
+polynomial("cos: (cos(sqrt z) - 1 + z/2)/z^2", lambda z: (cos(sqrt(z)) - 1 + z / 2) / z**2, 0, quarter, 6,
+           lambda z: z**2 / cos(sqrt(z)))
+polynomial("atan: (atan(sqrt z)/sqrt z - 1)/z", lambda z: (atan(sqrt(z)) / sqrt(z) - 1) / z, 0, mpf(1) / 256, 6,
+           lambda z: z)
 
 print("/* atan(i/32), i = 0..32: value, rest */")
 for i in range(33):
     value = atan(mpf(i) / 32)
-    print(f"{{{hexadecimal(rounded(value))}, {hexadecimal(rounded(value - rounded(value)))}}},", end="\n" if i % 2 else " ")
+    rest = rounded(value - rounded(value))
+    print(f"{{{hexadecimal(rounded(value))}, {hexadecimal(rest)}}},", end="\n" if i % 2 else " ")
 print()
 
 width = log(2) / 64 * mpf("1.001")
-polynomial("exp: (e^r - 1 - r)/r^2", series(lambda r: (exp(r) - 1 - r) / r**2, mpf(1) / 2), -width, width, 5, lambda r: r**2)
+polynomial("exp: (e^r - 1 - r)/r^2", series(lambda r: (exp(r) - 1 - r) / r**2, mpf(1) / 2),
+           -width, width, 5, lambda r: r**2)
 step = log(2) / 32
 step_high = rounded(step, 36)
 print("/* ln2/32 in parts of 36 and 53 bits, and its reciprocal */")
@@ -117,15 +122,16 @@ print(hexadecimal(step_high), hexadecimal(rounded(step - step_high)), hexadecima
 print("/* 2^(i/32): value, rest */")
 for i in range(32):
     value = mpf(2)**(mpf(i) / 32)
-    print(f"{{{hexadecimal(rounded(value))}, {hexadecimal(rounded(value - rounded(value)))}}},", end="\n" if i % 2 else " ")
+    rest = rounded(value - rounded(value))
+    print(f"{{{hexadecimal(rounded(value))}, {hexadecimal(rest)}}},", end="\n" if i % 2 else " ")
 
 polynomial("log: (log(1+r) - r + r^2/2)/r^3", series(lambda r: (log(1 + r) - r + r**2 / 2) / r**3, mpf(1) / 3),
            mpf(-1) / 64, mpf(1) / 64, 8, lambda r: r**2)
 ln2_high = floor(log(2) * 2**42) / 2**42
 print("/* ln2 to a multiple of 2^-42, and the rest */")
 print(hexadecimal(ln2_high), hexadecimal(rounded(log(2) - ln2_high)))
-print("/* For mantissas in [1 + j/64, 1 + (j+1)/64): c, about the reciprocal, a multiple of 2^-9; -log c (less ln2 from j = 27 on) to a "
-      "multiple of 2^-42; the rest */")
+print("/* For mantissas in [1 + j/64, 1 + (j+1)/64): c, about the reciprocal, a multiple of 2^-9; "
+      "-log c (less ln2 from j = 27 on) to a multiple of 2^-42; the rest */")
 for j in range(64):
     c = mpf(1) if j == 0 else mpf(1) / 2 if j == 63 else nint(512 / (1 + (j + mpf(1) / 2) / 64)) / 512
     value = -log(c) - (log(2) if j >= 27 else 0)

@@ -1,6 +1,6 @@
-/* Method, alike for all: reduce the argument without error to a small range, approximate there by a polynomial, and carry
- * what was rounded off (a pair `value, rest`) up to the last addition, so that about half a unit in the last place remains.
- * derive_constants.py prints every constant and table. Needs 64-bit IEEE arithmetic, round to nearest, no contraction. */
+/* Method, alike for all: reduce the argument without error to a small range, approximate there by a polynomial, and
+ * carry what was rounded off (a pair `value, rest`) up to the last addition, so that the error is little more than half a
+ * unit in the last place. derive_constants.py prints every constant and table. */
 #include "elementary.h"
 
 #include <stdint.h>
@@ -90,8 +90,8 @@ static const uint64_t kTwoOverPi[21] = {
 /* An angle less `quadrant` right angles; |remainder| <= pi/4. */
 typedef struct { Pair remainder; unsigned quadrant; } Reduced;
 
-/* For 1 <= |x|, finite: x 2/pi in whole numbers, from those 192 bits of 2/pi that count; the bits before them add multiples
- * of four right angles, and those behind less than 2^-137. */
+/* For 1 <= |x|, finite: x 2/pi in whole numbers, from those 192 bits of 2/pi that count; the bits before them add
+ * multiples of four right angles, and those behind less than 2^-137. */
 static Reduced reduced_exactly(double x) {
   const uint64_t mantissa = (bits_of(x) & 0xfffffffffffffu) | 0x10000000000000u;
   const int exponent = (int)(bits_of(x) >> 52 & 0x7ff) - 1075;
@@ -205,7 +205,8 @@ double kt_tan(double x) {
   const int odd = (int)(r.quadrant & 1);
   const Pair top = odd ? c : s, bottom = odd ? s : c;
   const double ratio = top.value / bottom.value, product = ratio * bottom.value;
-  const double missing = (top.value - product) - product_rest(ratio, bottom.value, product) + (top.rest - ratio * bottom.rest);
+  const double missing = (top.value - product) - product_rest(ratio, bottom.value, product) +
+                         (top.rest - ratio * bottom.rest);
   return with_sign(ratio + missing / bottom.value, odd);
 }
 
@@ -364,8 +365,8 @@ static const double kLogarithm[8] = {
 /* ln2 to a multiple of 2^-42, and the rest. */
 static const Pair kLn2 = {0x1.62e42fefa38p-1, 0x1.ef35793c7673p-45};
 
-/* For significands in [1 + j/64, 1 + (j+1)/64): c, about the reciprocal, a multiple of 2^-9; -log c, less ln2 from j = 27
- * (sqrt 2) on, to a multiple of 2^-42; the rest. No reduction at either side of 1, where the logarithm is small. */
+/* For significands in [1 + j/64, 1 + (j+1)/64): c, about the reciprocal, a multiple of 2^-9; -log c, less ln2 from
+ * j = 27 (sqrt 2) on, to a multiple of 2^-42; the rest. No reduction at either side of 1, where the logarithm is small. */
 static const struct { double c, value, rest; } kLogarithmTable[64] = {
     {0x1p+0, 0, 0}, {0x1.f4p-1, 0x1.8492528c9p-6, -0x1.aa0ba325a0c34p-45},
     {0x1.edp-1, 0x1.35c8bfaa1p-5, 0x1.8357d5ef9eb35p-44}, {0x1.e5p-1, 0x1.bbcebfc69p-5, -0x1.7bf868c317c2ap-46},
@@ -420,7 +421,8 @@ static Pair logarithm(double x) {
   const double base = (double)exponent * kLn2.value + kLogarithmTable[j].value;  /* Exact. */
   const double first = base + r, second = first - half;
   const double rest = ((((base - first) + r) + ((first - second) - half)) - half_rest + r_rest * (1 - r)) +
-                      (((double)exponent * kLn2.rest + kLogarithmTable[j].rest) + r * square * polynomial8(kLogarithm, r));
+                      (((double)exponent * kLn2.rest + kLogarithmTable[j].rest) +
+                       r * square * polynomial8(kLogarithm, r));
   const double value = second + rest;
   const Pair result = {value, (second - value) + rest};
   return result;

@@ -1,8 +1,8 @@
 /* Elementary functions whose last bit is the same on every CPU, compiler and optimisation level: only + - * / and sqrt,
  * no libm, no fused multiply-add. C, so that robots' programs link the very same code. Needs IEEE doubles, rounding to
  * nearest and -ffp-contract=off; with -fno-math-errno sqrt is an instruction (else it may be a call, to the same bits).
- * Special values are those of C (Annex F) but for one thing: every NaN returned is the positive quiet one, 0x7ff8000000000000.
- * Errors in units in the last place are the largest that tests/core/math finds; each stays within 2, kt_inverse_normal apart. */
+ * Special values are those of C (Annex F), but every NaN returned is the positive quiet one, 0x7ff8000000000000.
+ * Errors stated below, in units in the last place, bound what tests/core/math finds. */
 #ifndef KILOTWIN_CORE_MATH_ELEMENTARY_H
 #define KILOTWIN_CORE_MATH_ELEMENTARY_H
 

@@ -41,14 +41,15 @@ enum class Stream : std::uint16_t {
 }
 
 /// Numbers of one seed. The seed is the key; (stream, entity, tick, block) fill the 128 bits of the counter and no two of
-/// them share one. A block holds two draws: draws 2b and 2b+1 are the halves of block b. `pair` calls yield both of them
-/// for the price of one.
+/// them share one. A block holds two draws: draws 2b and 2b+1 are the halves of block b. The calls with `pair` yield
+/// both for the price of one.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)} {}
 
   /// 128 random bits: those of draws 2b and 2b+1. b < 2^16.
-  [[nodiscard]] std::array<std::uint32_t, 4> block(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t b) const {
+  [[nodiscard]] std::array<std::uint32_t, 4> block(Stream stream, std::uint32_t entity, Tick tick,
+                                                   std::uint32_t b) const {
     KILOTWIN_DEMAND(b < 0x10000u);
     const auto count = static_cast<std::uint64_t>(tick.count());
     return philox4x32({static_cast<std::uint32_t>(count), entity, static_cast<std::uint32_t>(stream) << 16 | b,
@@ -66,11 +67,13 @@ class Random {
   [[nodiscard]] double normal(Stream, std::uint32_t entity, Tick, std::uint32_t draw) const;
 
   // Draws 2b and 2b+1.
-  [[nodiscard]] std::array<std::uint64_t, 2> bits_pair(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t b) const {
+  [[nodiscard]] std::array<std::uint64_t, 2> bits_pair(Stream stream, std::uint32_t entity, Tick tick,
+                                                       std::uint32_t b) const {
     const auto word = block(stream, entity, tick, b);
     return {std::uint64_t{word[1]} << 32 | word[0], std::uint64_t{word[3]} << 32 | word[2]};
   }
-  [[nodiscard]] std::array<double, 2> uniform_pair(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t b) const {
+  [[nodiscard]] std::array<double, 2> uniform_pair(Stream stream, std::uint32_t entity, Tick tick,
+                                                   std::uint32_t b) const {
     const auto pair = bits_pair(stream, entity, tick, b);
     return {uniform_of(pair[0]), uniform_of(pair[1])};
   }

@@ -10,8 +10,8 @@ namespace {
 constexpr double kDiameter_mm = 2 * kRobotRadius_mm;
 /// By how much a limit may be missed because of rounding, mm. Sliding at a gap of 0 would stop without it.
 constexpr double kLimitTolerance_mm = 1e-14;
-/// Passes over the limits of a body. Two serve any two contacts that do not oppose each other.
-constexpr int kLimitPasses = 2;
+/// How many limits of a body are met exactly, the one that is missed most first; what is missed then scales all down.
+constexpr int kLimitRounds = 2;
 
 // By value, so that compilers take one instruction instead of a branch that they cannot predict.
 inline double larger(double a, double b) { return a > b ? a : b; }
@@ -28,12 +28,6 @@ constexpr double kUnlimited_mm = 1e300;
 
 inline Two both(double a) { return Two{a, a}; }
 inline Two swapped(Two a) { return __builtin_shufflevector(a, a, 1, 0); }
-/// Takes off what a displacement closes along a normal beyond the limit; both lanes of `limit` are alike.
-inline Two limited(Two wanted, Two normal, Two limit) {
-  const Two product = wanted * normal;
-  return wanted - larger(product + swapped(product) - limit, Two{0, 0}) * normal;
-}
-
 }  // namespace
 
 ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
@@ -180,6 +174,15 @@ void ContactSolver::link(const Drives& drives) {
   }
   slots_.push_back(Slot{});  // Ends the contacts of the last slot.
   slots_.back().first_pair = static_cast<std::uint32_t>(pair_count_);
+
+  // Bodies with equally many contacts one after the other, so that the loops over contacts are predictable.
+  const auto group = [&](std::size_t s) { return std::min<std::size_t>(slots_[s + 1].first_pair - slots_[s].first_pair, kMorePairs); };
+  pairs_end_.fill(0);
+  for (std::size_t s = 1; s < count; ++s) ++pairs_end_[group(s)];
+  for (std::size_t g = 1; g <= kMorePairs; ++g) pairs_end_[g] += pairs_end_[g - 1];
+  by_pairs_.resize(count - 1);
+  for (std::size_t s = count; --s > 0;) by_pairs_[--pairs_end_[group(s)]] = static_cast<std::uint32_t>(s);
+  for (std::size_t g = 0; g < kMorePairs; ++g) pairs_end_[g] = pairs_end_[g + 1];
 }
 
 void ContactSolver::place(Bodies& bodies, std::uint32_t i, double to_x_mm, double to_y_mm) const {
@@ -209,86 +212,104 @@ void ContactSolver::move_free(Bodies& bodies, const Drives& drives) const {
 
 template <bool kWithOverlaps>
 void ContactSolver::sub_step(const Bodies& bodies) {
-  const std::size_t slots = slots_.size() - 1;
+  const std::size_t end = by_pairs_.size();
+  std::size_t i = 0;
+  for (; i < pairs_end_[0]; ++i) move_slot<kWithOverlaps, 0>(bodies, by_pairs_[i]);
+  for (; i < pairs_end_[1]; ++i) move_slot<kWithOverlaps, 1>(bodies, by_pairs_[i]);
+  for (; i < pairs_end_[2]; ++i) move_slot<kWithOverlaps, 2>(bodies, by_pairs_[i]);
+  for (; i < pairs_end_[3]; ++i) move_slot<kWithOverlaps, 3>(bodies, by_pairs_[i]);
+  for (; i < end; ++i) move_slot<kWithOverlaps, kMorePairs>(bodies, by_pairs_[i]);
+}
+
+template <bool kWithOverlaps, std::size_t kPairs>
+inline void ContactSolver::move_slot(const Bodies& bodies, std::uint32_t s) {
   const Motion* const now = now_.data();
-  Two* const limit_mm = half_gap_mm_.data();
+  Two few_limits_mm[kPairs == kMorePairs ? 1 : kPairs + 1];
+  Two* const limit_mm = kPairs == kMorePairs ? half_gap_mm_.data() : few_limits_mm;
   const Two zero = {0, 0}, separation_mm = both(limits_.separation_mm);
-  for (std::size_t s = 1; s < slots; ++s) {
-    const Slot& slot = slots_[s];
-    const ContactPair* const pairs = pairs_.data() + slot.first_pair;
-    const std::size_t count = slots_[s + 1].first_pair - slot.first_pair;
-    const Two shift_mm = now[s].shift_mm, drive_mm = now[s].drive_mm;
+  const Slot& slot = slots_[s];
+  const ContactPair* const pairs = pairs_.data() + slot.first_pair;
+  const std::size_t count = kPairs == kMorePairs ? slots_[s + 1].first_pair - slot.first_pair : kPairs;
+  const Two shift_mm = now[s].shift_mm, drive_mm = now[s].drive_mm;
 
-    // Pushes. Gaps and speeds of two neighbours at a time; the sum in ascending order.
-    Two wanted = drive_mm;
-    Two deepest = zero;
-    for (std::size_t p = 0; p < count; ++p) {
-      const ContactPair& c = pairs[p];
-      const Motion &a = now[c.other[0]], &b = now[c.other[1]];
-      const Two a_shift = a.shift_mm - shift_mm, b_shift = b.shift_mm - shift_mm;
-      const Two gap = c.gap_mm + (c.normal_x * firsts(a_shift, b_shift) + c.normal_y * seconds(a_shift, b_shift));
-      const Two half = larger(0.5 * gap, zero);
-      // Along the normal: what the neighbour drives, negative towards this body, and what this body drives.
-      const Two theirs = c.normal_x * firsts(a.drive_mm, b.drive_mm) + c.normal_y * seconds(a.drive_mm, b.drive_mm);
-      const Two mine = c.normal_x * firsts(drive_mm, drive_mm) + c.normal_y * seconds(drive_mm, drive_mm);
-      // They push where they drive faster than both the gap and this body's own retreat allow.
-      Two push = larger(smaller(-half, mine) - theirs, zero);
-      if constexpr (kWithOverlaps) {
-        const Two overlap = gap < -kOverlapTolerance_mm ? -gap : zero;
-        deepest = larger(deepest, overlap);
-        push += smaller(0.5 * overlap, separation_mm);
-        limit_mm[p] = gap;
-      } else {
-        limit_mm[p] = half;
-      }
-      wanted -= firsts(push, push) * firsts(c.normal_x, c.normal_y);
-      wanted -= seconds(push, push) * seconds(c.normal_x, c.normal_y);
-    }
+  // Pushes. Gaps and speeds of two neighbours at a time; the sum in ascending order.
+  Two wanted = drive_mm;
+  Two deepest = zero;
+  for (std::size_t p = 0; p < count; ++p) {
+    const ContactPair& c = pairs[p];
+    const Motion &a = now[c.other[0]], &b = now[c.other[1]];
+    const Two a_shift = a.shift_mm - shift_mm, b_shift = b.shift_mm - shift_mm;
+    const Two gap = c.gap_mm + (c.normal_x * firsts(a_shift, b_shift) + c.normal_y * seconds(a_shift, b_shift));
+    const Two half = larger(0.5 * gap, zero);
+    // Along the normal: what the neighbour drives, negative towards this body, and what this body drives.
+    const Two theirs = c.normal_x * firsts(a.drive_mm, b.drive_mm) + c.normal_y * seconds(a.drive_mm, b.drive_mm);
+    const Two mine = c.normal_x * firsts(drive_mm, drive_mm) + c.normal_y * seconds(drive_mm, drive_mm);
+    // They push where they drive faster than both the gap and this body's own retreat allow.
+    Two push = larger(smaller(-half, mine) - theirs, zero);
     if constexpr (kWithOverlaps) {
-      const Two may_press = 0.5 * larger(deepest, swapped(deepest));
-      for (std::size_t p = 0; p < count; ++p) limit_mm[p] = larger(0.5 * (limit_mm[p] + may_press), zero);
+      const Two overlap = gap < -kOverlapTolerance_mm ? -gap : zero;
+      deepest = larger(deepest, overlap);
+      push += smaller(0.5 * overlap, separation_mm);
+      limit_mm[p] = gap;
+    } else {
+      limit_mm[p] = half;
     }
-
-    Two low = both(-kUnlimited_mm), high = both(kUnlimited_mm);
-    if (slot.near_wall) {
-      const Two wall = {limits_.x_limit_mm, limits_.y_limit_mm};
-      const Two at = Two{bodies.x_mm[slot.body], bodies.y_mm[slot.body]} + shift_mm;
-      high = wall - at;
-      low = -wall - at;
-      // Outside of a wall it moves inwards, as far as its neighbours let it.
-      wanted += larger(smaller(high, zero), -separation_mm) + smaller(larger(low, zero), separation_mm);
-      high = larger(high, zero);
-      low = smaller(low, zero);
-    }
-    const double square = wanted[0] * wanted[0] + wanted[1] * wanted[1];
-    if (square > limits_.stride_mm * limits_.stride_mm) wanted *= both(limits_.stride_mm / __builtin_sqrt(square));
-
-    double scale = 1;
-    for (int pass = 0; pass < kLimitPasses; ++pass) {
-      for (std::size_t p = 0; p < count; ++p) {
-        const Two limit = limit_mm[p];
-        wanted = limited(wanted, firsts(pairs[p].normal_x, pairs[p].normal_y), firsts(limit, limit));
-        wanted = limited(wanted, seconds(pairs[p].normal_x, pairs[p].normal_y), seconds(limit, limit));
-      }
-      wanted = larger(smaller(wanted, high), low);
-      Two most = zero;
-      const Two x = firsts(wanted, wanted), y = seconds(wanted, wanted);
-      for (std::size_t p = 0; p < count; ++p) most = larger(pairs[p].normal_x * x + pairs[p].normal_y * y - limit_mm[p], most);
-      if (most[0] <= kLimitTolerance_mm && most[1] <= kLimitTolerance_mm) break;
-      if (pass + 1 < kLimitPasses) continue;
-      // The largest factor that brings it within all limits.
-      for (std::size_t p = 0; p < count; ++p) {
-        const Two closing = pairs[p].normal_x * x + pairs[p].normal_y * y;
-        for (int k = 0; k < 2; ++k) {
-          const double limit = limit_mm[p][k];
-          if (closing[k] > limit + kLimitTolerance_mm && scale * closing[k] > limit) scale = limit / closing[k];
-        }
-      }
-    }
-
-    after_[s].shift_mm = shift_mm + both(scale) * wanted;
-    after_[s].drive_mm = both(slot.cos_turn) * drive_mm + Two{-slot.sin_turn, slot.sin_turn} * swapped(drive_mm);
+    wanted -= firsts(push, push) * firsts(c.normal_x, c.normal_y);
+    wanted -= seconds(push, push) * seconds(c.normal_x, c.normal_y);
   }
+  if constexpr (kWithOverlaps) {
+    const Two may_press = 0.5 * larger(deepest, swapped(deepest));
+    for (std::size_t p = 0; p < count; ++p) limit_mm[p] = larger(0.5 * (limit_mm[p] + may_press), zero);
+  }
+
+  // Both lanes of x, y and their bounds are alike from here on.
+  Two low_x = both(-kUnlimited_mm), high_x = both(kUnlimited_mm), low_y = low_x, high_y = high_x;
+  if (slot.near_wall) {
+    const Two wall = {limits_.x_limit_mm, limits_.y_limit_mm};
+    const Two at = Two{bodies.x_mm[slot.body], bodies.y_mm[slot.body]} + shift_mm;
+    const Two high = wall - at, low = -wall - at;
+    // Outside of a wall it moves inwards, as far as its neighbours let it.
+    wanted += larger(smaller(high, zero), -separation_mm) + smaller(larger(low, zero), separation_mm);
+    high_x = larger(firsts(high, high), zero);
+    high_y = larger(seconds(high, high), zero);
+    low_x = smaller(firsts(low, low), zero);
+    low_y = smaller(seconds(low, low), zero);
+  }
+  const double square = wanted[0] * wanted[0] + wanted[1] * wanted[1];
+  if (square > limits_.stride_mm * limits_.stride_mm) wanted *= both(limits_.stride_mm / __builtin_sqrt(square));
+
+  Two x = firsts(wanted, wanted), y = seconds(wanted, wanted);
+  for (int round = 0; round < kLimitRounds; ++round) {
+    Two excess = zero, normal_x = zero, normal_y = zero;
+    for (std::size_t p = 0; p < count; ++p) {
+      const Two beyond = pairs[p].normal_x * x + pairs[p].normal_y * y - limit_mm[p];
+      const auto worse = beyond > excess;
+      excess = worse ? beyond : excess;
+      normal_x = worse ? pairs[p].normal_x : normal_x;
+      normal_y = worse ? pairs[p].normal_y : normal_y;
+    }
+    const auto of_first = firsts(excess, excess) >= seconds(excess, excess);
+    excess = of_first ? firsts(excess, excess) : seconds(excess, excess);
+    x -= excess * (of_first ? firsts(normal_x, normal_x) : seconds(normal_x, normal_x));
+    y -= excess * (of_first ? firsts(normal_y, normal_y) : seconds(normal_y, normal_y));
+    x = larger(smaller(x, high_x), low_x);
+    y = larger(smaller(y, high_y), low_y);
+  }
+  Two most = zero;
+  for (std::size_t p = 0; p < count; ++p) most = larger(pairs[p].normal_x * x + pairs[p].normal_y * y - limit_mm[p], most);
+  double scale = 1;
+  if (larger(most, swapped(most))[0] > kLimitTolerance_mm) {
+    for (std::size_t p = 0; p < count; ++p) {
+      const Two closing = pairs[p].normal_x * x + pairs[p].normal_y * y;
+      for (int k = 0; k < 2; ++k) {
+        const double limit = limit_mm[p][k];
+        if (closing[k] > limit + kLimitTolerance_mm && scale * closing[k] > limit) scale = limit / closing[k];
+      }
+    }
+  }
+
+  after_[s].shift_mm = shift_mm + both(scale) * firsts(x, y);
+  after_[s].drive_mm = both(slot.cos_turn) * drive_mm + Two{-slot.sin_turn, slot.sin_turn} * swapped(drive_mm);
 }
 
 }  // namespace kilotwin::physics

@@ -7,7 +7,8 @@
 ///                 (n . d_j - max(half of the gap, what i drives away by itself), at most the pusher's own drive)
 ///                 + for an overlap, half of it away from each other, at most kSeparation_mm_s
 ///   limited u_i : n . u_i <= half of the gap for every neighbour, the whole gap for walls; the excess along n is taken
-///                 off and the tangential part stays; where several limits contradict, all of the rest is scaled down.
+///                 off and the tangential part stays, for the two limits that are missed most; where others are still
+///                 missed then, all of the rest is scaled down.
 /// Both bodies of a pair close at most half of the gap, so no overlap arises, whatever they want, and 0 is always feasible.
 /// An overlap that was there from the start (a real robot moved into others, poses given so) would never part in a dense
 /// crowd that way. So a body that overlaps may press into others up to half of its own deepest overlap: overlaps spread,
@@ -15,6 +16,7 @@
 /// Sums run over neighbours in ascending ids. A body depends on its neighbours only: one hop per sub-step.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -81,6 +83,8 @@ class ContactSolver {
   void link(const Drives&);
   template <bool kWithOverlaps>
   void sub_step(const Bodies&);
+  template <bool kWithOverlaps, std::size_t kPairs>
+  void move_slot(const Bodies&, std::uint32_t slot);
   /// Moves what has no neighbour, for the whole tick at once.
   void move_free(Bodies&, const Drives&) const;
   void place(Bodies&, std::uint32_t body, double to_x_mm, double to_y_mm) const;
@@ -91,6 +95,10 @@ class ContactSolver {
   std::vector<Slot> slots_;
   std::vector<ContactPair> pairs_;
   std::size_t pair_count_ = 0;
+  /// Slots with 0, 1, 2, 3 and more pairs of contacts, and where the first four groups end.
+  static constexpr std::size_t kMorePairs = 4;
+  std::vector<std::uint32_t> by_pairs_;
+  std::array<std::size_t, kMorePairs + 1> pairs_end_{};
   std::vector<std::uint32_t> slot_of_;     ///< per body; 0: none
   std::vector<std::uint32_t> drive_of_;    ///< per body; index of its drive + 1; 0: none
   std::vector<std::uint32_t> pulled_;      ///< sleeping bodies beside one that is driven or overlaps

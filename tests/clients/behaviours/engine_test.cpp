@@ -32,7 +32,7 @@ TEST(Engine, RobotsAreIdleUntilToldToRun) {
 }
 
 TEST(Engine, LoopRunsOncePerTickOnTheRobotsClock) {
-  Swarm swarm({program("static uint8_t n; static void loop(void) { ++n; if (n == kilo_ticks - 1) set_color(n); }")}, 1);
+  Swarm swarm({program("static uint8_t n; static void loop(void) { ++n; if (n == kilo_ticks) set_color(n); }")}, 1);
   swarm.start();
   for (std::uint8_t k = 2; k < 20; ++k) {
     swarm.step();
@@ -63,7 +63,7 @@ TEST(Engine, SeveralProgramsRunSideBySide) {
 }
 
 TEST(Engine, DelayTakesItsTimeWhileMessagesArrive) {
-  // 100 ms = 3.05 ticks: rounds of three ticks, and one of four where the rest has added up to a tick.
+  // 100 ms = 800000 cycles = 3.05 ticks. A wait is over in the tick into which its end falls; the rest adds up.
   Swarm swarm({program("static uint8_t heard, rounds;\n"
                        "static void rx(message_t* m, distance_measurement_t* d) { set_motors(++heard, rounds); }\n"
                        "static message_t m; static message_t* tx(void) { m.data[0] = kilo_ticks; return &m; }\n"
@@ -76,9 +76,9 @@ TEST(Engine, DelayTakesItsTimeWhileMessagesArrive) {
     swarm.step(air);
     const ActuationFrame frame = swarm.frame();
     EXPECT_EQ(frame.motor_left[0], k % 256);
-    EXPECT_EQ(frame.motor_right[0], static_cast<int>(k * 32.768 / 100) % 256) << k;
+    EXPECT_EQ(frame.motor_right[0], ((k + 1) * 262144 - 1) / 800000 % 256) << k;
     if (k == 2) {
-      EXPECT_EQ(frame.offer_message.at(0)[0], 4);  // kilo_ticks went on as well
+      EXPECT_EQ(frame.offer_message.at(0)[0], 3);  // kilo_ticks went on as well
     }
   }
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <stdlib.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <array>
@@ -17,11 +18,14 @@
 
 namespace kilotwin::recorder {
 
-/// A folder of its own that goes with the object.
+/// A folder of its own that goes with the object. In memory where possible: file systems on disks write a file that was
+/// cut and filled again to the disk when it is closed, and thousands of those take minutes.
 class Scratch {
  public:
   Scratch() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "kilotwin-recorder-XXXXXX").string();
+    const bool memory = ::access("/dev/shm", W_OK) == 0;
+    const std::filesystem::path folder = memory ? "/dev/shm" : std::filesystem::temp_directory_path();
+    std::string pattern = (folder / "kilotwin-recorder-XXXXXX").string();
     path_ = ::mkdtemp(pattern.data());
   }
   ~Scratch() {

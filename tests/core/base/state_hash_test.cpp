@@ -27,7 +27,8 @@ double worst_avalanche(int inputs, const Function& of) {
     const std::uint64_t base = of(words, -1);
     for (int bit = 0; bit < inputs; ++bit) {
       const std::uint64_t changed = base ^ of(words, bit);
-      for (unsigned out = 0; out < 64; ++out) flips[static_cast<std::size_t>(bit)][out] += static_cast<int>(changed >> out & 1);
+      auto& row = flips[static_cast<std::size_t>(bit)];
+      for (unsigned out = 0; out < 64; ++out) row[out] += static_cast<int>(changed >> out & 1);
     }
   }
   for (const auto& row : flips) {
@@ -97,7 +98,9 @@ TEST(StateHash, NoWordWipesOutWhatCameBefore) {
   std::set<std::uint64_t> seen;
   for (std::uint32_t id = 0; id < 256; ++id) {
     for (std::uint64_t first = 0; first < 64; ++first) {
-      for (std::uint64_t second = 0; second < 16; ++second) seen.insert(entity_hash(HashDomain::kRadio, id, {first, second}));
+      for (std::uint64_t second = 0; second < 16; ++second) {
+        seen.insert(entity_hash(HashDomain::kRadio, id, {first, second}));
+      }
     }
   }
   EXPECT_EQ(seen.size(), 256u * 64 * 16);

@@ -136,7 +136,8 @@ TEST(Accuracy, ArcFunctions) {
   const auto atan2 = [](long double y, long double x) { return std::atan2(y, x); };
   expect_within(1.0, "atan2", Range::uniform(-1000, 1000), Range::uniform(-1000, 1000), kt_atan2, atan2);
   expect_within(1.0, "atan2 anywhere", Range::spread(kSmallest, kMax), Range::spread(kSmallest, kMax), kt_atan2, atan2);
-  expect_within(1.0, "atan2 left anywhere", Range::spread(kSmallest, kMax), Range::spread(-kSmallest, -kMax), kt_atan2, atan2);
+  expect_within(1.0, "atan2 left anywhere", Range::spread(kSmallest, kMax), Range::spread(-kSmallest, -kMax), kt_atan2,
+                atan2);
   expect_within(1.0, "atan2 large", Range::spread(1e290, kMax), Range::spread(1e290, kMax), kt_atan2, atan2);
   expect_within(1.0, "atan2 subnormal", Range::spread(kSmallest, 1e-300), Range::spread(kSmallest, 1e-300), kt_atan2, atan2);
 }
@@ -187,7 +188,7 @@ TEST(Accuracy, FloorAndRemainderAreExact) {
   }
 }
 
-/// The quantile by Newton's method on the logarithm of the tail probability (tail <= 1/2), from a start that is good already.
+/// The quantile by Newton's method on the logarithm of the tail probability (tail <= 1/2), from a good start.
 long double tail_quantile(long double tail, long double start) {
   long double x = start;
   for (int i = 0; i < 4; ++i) {

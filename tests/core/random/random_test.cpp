@@ -131,7 +131,7 @@ double kolmogorov_smirnov(std::vector<double> values, const Distribution& distri
 
 TEST(Random, UniformIsUniform) {
   const Random random(1);
-  const auto values = sample([&](std::uint32_t e, Tick t, std::uint32_t i) { return random.uniform(Stream::kReception, e, t, i); });
+  const auto values = sample([&](auto e, Tick t, auto i) { return random.uniform(Stream::kReception, e, t, i); });
   const auto n = static_cast<double>(values.size());
   double sum = 0;
   std::array<double, 256> cells{};
@@ -150,7 +150,7 @@ TEST(Random, UniformIsUniform) {
 
 TEST(Random, NormalIsNormal) {
   const Random random(2);
-  const auto values = sample([&](std::uint32_t e, Tick t, std::uint32_t i) { return random.normal(Stream::kWheelFactor, e, t, i); });
+  const auto values = sample([&](auto e, Tick t, auto i) { return random.normal(Stream::kWheelFactor, e, t, i); });
   const auto n = static_cast<double>(values.size());
   std::array<double, 5> moment{};
   for (const double v : values) {
@@ -167,7 +167,7 @@ TEST(Random, NormalIsNormal) {
 TEST(Random, PlacesAreIndependent) {
   // The same places but for one coordinate: uncorrelated, in value and in distance from the middle.
   const Random random(3), other_seed(4);
-  const auto draw = [&](Stream stream, std::uint32_t e, Tick t, std::uint32_t i) { return random.uniform(stream, e, t, i); };
+  const auto draw = [&](Stream stream, auto e, Tick t, auto i) { return random.uniform(stream, e, t, i); };
   const auto base = sample([&](auto e, Tick t, auto i) { return draw(Stream::kReception, e, t, i); });
   const std::vector<std::vector<double>> others = {
       sample([&](auto e, Tick t, auto i) { return draw(Stream::kBackOff, e, t, i); }),

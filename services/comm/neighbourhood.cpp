@@ -1,0 +1,44 @@
+#include "services/comm/neighbourhood.hpp"
+
+namespace kilotwin::comm {
+namespace {
+
+/// Cells are this much larger than the range, so that rounding of a coordinate cannot put two robots in range of each other
+/// two cells apart.
+constexpr double kCellSlack = 1 + 1e-6;
+/// Eight cells a side, so that the 5 x 5 cells around a robot are distinct.
+constexpr std::uint32_t kLeastSideBits = 3;
+/// The table has one cell for so many robots: the experiments that matter put several into the reach of each other.
+constexpr std::uint32_t kRobotsPerCell = 4;
+
+}  // namespace
+
+Neighbourhood::Neighbourhood(double range_mm, std::uint32_t robots)
+    : range_square_(range_mm * range_mm), cells_per_mm_(1 / (range_mm * kCellSlack)), side_bits_(kLeastSideBits),
+      x_mm_(robots), y_mm_(robots), cell_of_(robots), sorted_(robots), sorted_x_mm_(robots), sorted_y_mm_(robots) {
+  while (cells() < robots / kRobotsPerCell) ++side_bits_;
+  mask_ = (1u << side_bits_) - 1;
+}
+
+void Neighbourhood::sort() {
+  const auto robots = static_cast<std::uint32_t>(x_mm_.size());
+  first_.assign(cells() + 1, 0);
+  for (std::uint32_t i = 0; i < robots; ++i) {
+    cell_of_[i] = cell_of(i);
+    ++first_[cell_of_[i]];
+  }
+  std::uint32_t sum = 0;
+  for (std::uint32_t& f : first_) {
+    sum += f;
+    f = sum;
+  }
+  // From the end, so that robots within a cell ascend and each entry of first_ ends at its cell's first robot.
+  for (std::uint32_t i = robots; i-- > 0;) {
+    const std::uint32_t place = --first_[cell_of_[i]];
+    sorted_[place] = i;
+    sorted_x_mm_[place] = x_mm_[i];
+    sorted_y_mm_[place] = y_mm_[i];
+  }
+}
+
+}  // namespace kilotwin::comm

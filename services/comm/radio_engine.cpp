@@ -1,0 +1,325 @@
+#include "services/comm/radio_engine.hpp"
+
+#include <algorithm>
+
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+#include "services/comm/message_octets.hpp"
+
+namespace kilotwin::comm {
+namespace {
+
+/// Readings of an overhead controller's copy: it hangs far above the arena, so robots read the weakest calibrated signal.
+constexpr double kOverheadDistance_mm = 33 + 65;
+/// Draws of Stream::kReception: a sender's id for its packet, counted down from here for the copies of a tick.
+constexpr std::uint32_t kLastDraw = (1u << 17) - 1;
+
+std::vector<Share> all_shares(const RunPlan& plan) {
+  std::vector<Share> shares;
+  for (std::uint32_t h = 0; h < plan.hosts; ++h) shares.push_back(plan.share(HostId{h}));
+  return shares;
+}
+
+}  // namespace
+
+RadioEngine::RadioEngine(const RunPlan& plan)
+    : shares_(all_shares(plan)),
+      cycles_per_tick_(plan.tick_length.cycles()),
+      loss_(plan.experiment().radio().loss()),
+      counts_pairs_(plan.experiment().recording().messages()),
+      random_(plan.seed()),
+      overhead_gains_(ranging_.gains(kOverheadDistance_mm)),
+      timers_(plan),
+      state_(plan.robots(), 0),
+      tx_period_(plan.robots(), 0),
+      message_(plan.robots()),
+      neighbourhood_(plan.experiment().radio().range_mm(), plan.robots()),
+      channel_(neighbourhood_),
+      receptions_(plan.robots()),
+      pairs_(counts_pairs_ ? plan.robots() : 0),
+      jammed_(plan.robots(), 0) {
+  for (std::uint32_t i = 0; i < plan.robots(); ++i) {
+    const Pose pose = plan.initial_pose(i);
+    neighbourhood_.place(i, pose.position_mm.x(), pose.position_mm.y());
+    real_.push_back(plan.tracked(i));
+  }
+}
+
+void RadioEngine::step(Tick from, const Inputs& inputs) {
+  KILOTWIN_DEMAND(from == tick_);
+  forget(begin_of(from));
+  read_poses(inputs.bodies);
+  read_actuation(inputs.actuation);
+  overhead_.command(inputs.overhead.packets, begin_of(from));
+  overhead_.advance(begin_of(from + 1));
+  contend(from);
+  arrive(from);
+  ++tick_;
+}
+
+void RadioEngine::read_poses(std::span<const BodyFrame* const> frames) {
+  for (const BodyFrame* frame : frames) {
+    for (std::size_t n = 0; n < frame->robot.size(); ++n) {
+      KILOTWIN_DEMAND(frame->robot[n] < state_.size());
+      neighbourhood_.place(frame->robot[n], frame->x_mm[n], frame->y_mm[n]);
+    }
+  }
+}
+
+void RadioEngine::read_actuation(std::span<const ActuationFrame* const> frames) {
+  for (const ActuationFrame* frame : frames) {
+    const std::size_t robots = frame->life_cycle.size();
+    KILOTWIN_DEMAND(frame->first_robot + robots <= state_.size() && frame->tx_period.size() == robots &&
+                    frame->offer_message.size() == frame->offer_robot.size());
+    std::copy(frame->tx_period.begin(), frame->tx_period.end(), tx_period_.begin() + frame->first_robot);
+    for (std::size_t n = 0; n < robots; ++n) {
+      const auto robot = static_cast<std::uint32_t>(frame->first_robot + n);
+      const auto life_cycle = static_cast<LifeCycle>(frame->life_cycle[n]);
+      const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed || real_[robot] != 0;
+      const bool running = life_cycle == LifeCycle::kRunning && real_[robot] == 0;
+      const int kept = state_[robot] & (kHolding | kFlying);
+      state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));
+      if (!running && kept != 0) drop_message(robot);
+    }
+    for (std::size_t n = 0; n < frame->offer_robot.size(); ++n) {
+      const std::uint32_t robot = frame->offer_robot[n];
+      KILOTWIN_DEMAND(robot < state_.size());
+      if (!is(robot, kRunning) || is(robot, kHolding)) continue;
+      state_[robot] |= kHolding;
+      message_[robot] = frame->offer_message[n];
+    }
+  }
+}
+
+void RadioEngine::drop_message(std::uint32_t robot) {
+  state_[robot] &= static_cast<std::uint8_t>(~kHolding);
+  if (!is(robot, kFlying)) return;
+  for (Transmission& transmission : channel_.all()) {
+    if (transmission.sender == robot && !transmission.aborted) transmission.orphaned = true;
+  }
+}
+
+/// What is over and overlaps nothing that is on the air at `begin` matters no more.
+void RadioEngine::forget(Cycles begin) {
+  Cycles oldest = begin;
+  for (const Transmission& transmission : channel_.all()) {
+    if (transmission.end >= begin) oldest = std::min(oldest, transmission.start);
+  }
+  for (const OverheadController::Copy& copy : overhead_.copies()) {
+    if (copy.end() >= begin) oldest = std::min(oldest, copy.start);
+  }
+  channel_.forget(oldest);
+  overhead_.forget(oldest);
+}
+
+/// A packet that ends at `end` arrives in the tick that begins there, so that nothing in a tick is of a later instant.
+void RadioEngine::contend(Tick now) {
+  const Cycles end = begin_of(now + 1);
+  channel_.locate();
+  timers_.begin_tick();
+  for (std::uint32_t i = 0; i < state_.size(); ++i) {
+    switch (state_[i] & (kRunning | kHolding | kFlying)) {
+      case kRunning | kHolding: schedule(i, end); break;
+      case kRunning:
+      case 0: timers_.pass(i, end); break;
+      default: break;  // flying: its timer waits for its packet
+    }
+  }
+  // Start pulses in the order of time: those of robots come about as we go, the overhead controller's are fixed.
+  const std::vector<OverheadController::Copy>& copies = overhead_.copies();
+  std::size_t next_copy = 0;
+  while (next_copy < copies.size() && copies[next_copy].start < begin_of(now)) ++next_copy;
+  const auto later = [](const Attempt& a, const Attempt& b) { return a.time != b.time ? a.time > b.time : a.robot > b.robot; };
+  for (;;) {
+    if (next_copy < copies.size() && (attempts_.empty() || copies[next_copy].start <= attempts_.front().time)) {
+      const Cycles start = copies[next_copy++].start;
+      for (Transmission& transmission : channel_.all()) {
+        if (transmission.notices(start)) abort(transmission, start, now);
+      }
+    } else if (!attempts_.empty()) {
+      std::pop_heap(attempts_.begin(), attempts_.end(), later);
+      const std::uint32_t robot = attempts_.back().robot;
+      attempts_.pop_back();
+      attempt(robot, now);
+    } else {
+      break;
+    }
+  }
+}
+
+/// Puts the next interrupt at which the robot may send on the heap; those before it take place.
+void RadioEngine::schedule(std::uint32_t robot, Cycles end) {
+  for (; timers_.next(robot) < end; timers_.interrupt(robot)) {
+    if (timers_.next_clock(robot) <= tx_period_[robot]) continue;
+    attempts_.push_back({timers_.next(robot), robot});
+    std::push_heap(attempts_.begin(), attempts_.end(),
+                   [](const Attempt& a, const Attempt& b) { return a.time != b.time ? a.time > b.time : a.robot > b.robot; });
+    return;
+  }
+}
+
+void RadioEngine::attempt(std::uint32_t robot, Tick now) {
+  const Cycles t = timers_.next(robot);
+  timers_.interrupt(robot);
+  if (senses(robot, t)) return schedule(robot, begin_of(now + 1));
+  ++counters_.attempted;
+  state_[robot] |= kFlying;
+  channel_.visit_heard(robot, [&](Transmission& other) {
+    if (other.notices(t)) abort(other, t, now);
+  });
+  channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
+}
+
+bool RadioEngine::senses(std::uint32_t robot, Cycles t) {
+  for (const OverheadController::Copy& copy : overhead_.copies()) {
+    if (copy.sensed_at(t)) return true;
+  }
+  bool busy = false;
+  channel_.visit_heard(robot, [&](const Transmission& other) { busy = busy || other.sensed_at(t); });
+  return busy;
+}
+
+void RadioEngine::abort(Transmission& transmission, Cycles t, Tick now) {
+  const std::uint32_t robot = transmission.sender;
+  ++counters_.aborted;
+  transmission.aborted = true;
+  transmission.end = transmission.start + kStartPulse;
+  state_[robot] &= static_cast<std::uint8_t>(~kFlying);
+  // A robot aborts at most once between two of its interrupts, so their count tells its aborts in a tick apart.
+  const std::uint64_t bits = random_.bits(Stream::kBackOff, robot, now, timers_.counts()[robot]);
+  timers_.back_off(robot, t, static_cast<std::uint8_t>(bits >> 56));
+  if (is(robot, kRunning | kHolding)) schedule(robot, begin_of(now + 1));
+  else timers_.pass(robot, begin_of(now + 1));
+}
+
+void RadioEngine::arrive(Tick now) {
+  const Cycles begin = begin_of(now), end = begin_of(now + 1);
+  arrivals_.clear();
+  sent_.clear();
+  const std::vector<Transmission>& transmissions = channel_.all();
+  for (std::uint32_t i = 0; i < transmissions.size(); ++i) {
+    const Transmission& x = transmissions[i];
+    if (!x.aborted && x.end >= begin && x.end < end) arrivals_.push_back({x.end, x.sender, i});
+  }
+  const std::vector<OverheadController::Copy>& copies = overhead_.copies();
+  for (std::uint32_t i = 0; i < copies.size(); ++i) {
+    if (copies[i].end() >= begin && copies[i].end() < end) arrivals_.push_back({copies[i].end(), kOverhead, i});
+  }
+  std::sort(arrivals_.begin(), arrivals_.end(),
+            [](const Arrival& a, const Arrival& b) { return a.end != b.end ? a.end < b.end : a.sender < b.sender; });
+
+  receptions_.clear();
+  if (!arrivals_.empty()) neighbourhood_.sort();
+  std::uint32_t ordinal = 0;
+  for (const Arrival& arrival : arrivals_) {
+    if (arrival.sender == kOverhead) {
+      receive_copy(copies[arrival.index], ordinal++, now);
+    } else {
+      finish(arrival.index, end);
+      receive_packet(transmissions[arrival.index], now);
+    }
+  }
+  receptions_.close();
+  std::sort(sent_.begin(), sent_.end());
+}
+
+/// Success: the sender's timer goes on. An interrupt that fell into the packet takes place now.
+void RadioEngine::finish(std::uint32_t index, Cycles end) {
+  const Transmission& transmission = channel_.all()[index];
+  const std::uint32_t robot = transmission.sender;
+  ++counters_.sent;
+  if (counts_pairs_) pairs_.add(robot, robot);
+  state_[robot] &= static_cast<std::uint8_t>(~kFlying);
+  timers_.restart_clock(robot);
+  timers_.pass(robot, end);
+  if (transmission.orphaned) return;
+  state_[robot] &= static_cast<std::uint8_t>(~kHolding);
+  sent_.push_back(robot);
+}
+
+void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
+  bool drowned = false;
+  for (const OverheadController::Copy& copy : overhead_.copies()) {
+    drowned = drowned || copy.overlaps(packet.start, packet.end);
+  }
+  channel_.find_rivals(packet.sender, packet.start, packet.end, rivals_);
+  receptions_.begin_message(packet.message);
+  neighbourhood_.visit(packet.sender, [&](std::uint32_t receiver, double square_mm2) {
+    if (!is(receiver, kReceptive)) return;
+    bool lost = drowned;
+    for (const std::uint32_t rival : rivals_) lost = lost || neighbourhood_.in_range(receiver, rival);
+    if (lost) {
+      ++counters_.collided;
+    } else if (fades(receiver, now, packet.sender)) {
+      ++counters_.faded;
+    } else {
+      ++counters_.received;
+      receptions_.add(receiver, ranging_.gains(__builtin_sqrt(square_mm2)));
+      if (counts_pairs_) pairs_.add(receiver, packet.sender);
+    }
+  });
+}
+
+void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32_t ordinal, Tick now) {
+  std::fill(jammed_.begin(), jammed_.end(), std::uint8_t{0});
+  for (const Transmission& transmission : channel_.all()) {
+    if (!transmission.overlaps(copy.start, copy.end())) continue;
+    jammed_[transmission.sender] = 1;
+    neighbourhood_.visit(transmission.sender, [&](std::uint32_t receiver, double) { jammed_[receiver] = 1; });
+  }
+  receptions_.begin_message(copy.message);
+  for (std::uint32_t receiver = 0; receiver < state_.size(); ++receiver) {
+    if (!is(receiver, kReceptive)) continue;
+    if (jammed_[receiver] != 0) {
+      ++counters_.collided;
+    } else if (fades(receiver, now, kLastDraw - ordinal)) {
+      ++counters_.faded;
+    } else {
+      ++counters_.received;
+      receptions_.add(receiver, overhead_gains_);
+    }
+  }
+}
+
+bool RadioEngine::fades(std::uint32_t receiver, Tick now, std::uint32_t draw) const {
+  return loss_ > 0 && random_.uniform(Stream::kReception, receiver, now, draw) < loss_;
+}
+
+void RadioEngine::emit(HostId host, RadioFrame& frame) const {
+  const Share share = shares_[host.value()];
+  frame.tick = tick_;
+  frame.first_robot = share.first;
+  frame.kilo_ticks.assign(timers_.counts().begin() + share.first, timers_.counts().begin() + share.last);
+  frame.ask.clear();
+  const Cycles from = begin_of(tick_ + 1), until = begin_of(tick_ + 2);
+  for (std::uint32_t i = share.first; i < share.last; ++i) {
+    if ((state_[i] & (kRunning | kHolding | kFlying)) != kRunning) continue;
+    if (timers_.exceeds(i, tx_period_[i], from, until)) frame.ask.push_back(i);
+  }
+  frame.sent.clear();
+  for (const std::uint32_t robot : sent_) {
+    if (share.contains(robot)) frame.sent.push_back(robot);
+  }
+  frame.reception_robot.clear();
+  frame.reception_message.clear();
+  frame.reception_high_gain.clear();
+  frame.reception_low_gain.clear();
+  frame.messages.clear();
+  receptions_.emit(share, frame);
+}
+
+std::uint64_t RadioEngine::hash_part() const {
+  std::uint64_t sum = overhead_.hash();
+  for (std::uint32_t i = 0; i < state_.size(); ++i) {
+    const std::uint64_t counts = timers_.count_word(i) | std::uint64_t{state_[i]} << 32 | std::uint64_t{receptions_.count(i)} << 40;
+    sum += entity_hash(HashDomain::kRadio, i, {timers_.time_word(i), counts});
+  }
+  for (const Transmission& x : channel_.all()) {
+    const auto [first, second] = words(x.message);
+    sum += entity_hash(HashDomain::kRadio, x.sender,
+                       {static_cast<std::uint64_t>(x.start), static_cast<std::uint64_t>(x.end), first, second});
+  }
+  return sum;
+}
+
+}  // namespace kilotwin::comm

@@ -1,0 +1,144 @@
+/// The infrared channel of the swarm: the robots' clocks, when each of them sends, and who receives what.
+///
+/// step from tick k simulates [k, k+1), to the cycle, with the frames of tick k:
+///   poses, life cycles and tx_periods are read; offers fill empty slots; the overhead controller takes its packets
+///   contend : in the order of time, every robot that holds a message tries to send at its timer's interrupts
+///   arrive  : packets that end in the interval are received by the robots in range of their sender
+///
+/// Sending. At an interrupt of its timer a robot that is RUNNING, holds a message and whose tx_clock exceeds its tx_period
+/// tries to send. If it hears a packet whose leading byte is over, it waits for its next interrupt. Else its start pulse
+/// goes out. For two bits it hears nothing; another start pulse that it hears in the rest of the leading byte makes it give
+/// up, and its timer interrupts it once more after a random time (back-off). A packet that goes on to its end is a
+/// success: tx_clock starts again and the host is told.
+///
+/// Receiving. A packet is received at every robot within radio.range_mm of its sender unless anything else that is in
+/// range there overlaps it in time: another packet, an aborted packet's start pulse, a copy of the overhead controller,
+/// the receiver's own sending. Then all of them are lost there. Robots that are SLEEPING or FAILED, or whose bodies are
+/// real, receive nothing.
+///
+/// The slot. A robot's message lies in its host's slot and here from its offer until success. Both sides empty it when the
+/// robot is not RUNNING; what is on the air then goes to its end unreported.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/experiment/plan.hpp"
+#include "core/federation/frames.hpp"
+#include "core/federation/run_observer.hpp"
+#include "core/random/random.hpp"
+#include "idl/checkpoint.pb.h"
+#include "services/comm/channel.hpp"
+#include "services/comm/neighbourhood.hpp"
+#include "services/comm/overhead_controller.hpp"
+#include "services/comm/pair_counts.hpp"
+#include "services/comm/ranging.hpp"
+#include "services/comm/reception_log.hpp"
+#include "services/comm/tick_timers.hpp"
+
+namespace kilotwin::comm {
+
+class RadioEngine {
+ public:
+  /// What a step from tick k reads; every frame is of tick k, in any order. Robots that no frame lists stay as they were.
+  struct Inputs {
+    std::span<const BodyFrame* const> bodies;
+    std::span<const ActuationFrame* const> actuation;
+    const OverheadFrame& overhead;
+  };
+
+  /// Messages of robots since the start. attempted = sent + aborted + those on the air. Over all packets sent and all
+  /// robots that could receive them: received + collided + faded. Copies of the overhead controller count as receptions
+  /// only.
+  struct Counters {
+    std::uint64_t attempted = 0;  ///< start pulses
+    std::uint64_t sent = 0;       ///< whole packets
+    std::uint64_t received = 0;
+    std::uint64_t collided = 0;   ///< receptions lost because something overlapped
+    std::uint64_t aborted = 0;    ///< given up in the leading byte
+    std::uint64_t faded = 0;      ///< receptions lost by radio.loss
+  };
+
+  explicit RadioEngine(const RunPlan&);
+
+  /// Advances from tick `from`, which must be the present one, to `from` + 1.
+  void step(Tick from, const Inputs&);
+  /// The frame of the present tick for one host.
+  void emit(HostId, RadioFrame&) const;
+  [[nodiscard]] std::uint64_t hash_part() const;
+  [[nodiscard]] const Counters& counters() const { return counters_; }
+  /// By receiver, then sender; receiver == sender: its own successes. Empty unless recording.messages.
+  [[nodiscard]] std::vector<PairCount> pair_counts() const { return pairs_.all(); }
+
+  void save(proto::RadioState&) const;
+  /// Continues from what was saved at `tick`. Throws RunError where it does not fit the plan.
+  void load(Tick tick, std::span<const proto::RadioState* const> parts);
+
+ private:
+  // What a robot's state is made of.
+  static constexpr std::uint8_t kRunning = 1;    ///< its life cycle is RUNNING
+  static constexpr std::uint8_t kReceptive = 2;  ///< it can receive
+  static constexpr std::uint8_t kHolding = 4;    ///< its slot holds a message
+  static constexpr std::uint8_t kFlying = 8;     ///< it is sending
+
+  struct Attempt {
+    Cycles time;
+    std::uint32_t robot;
+  };
+  struct Arrival {
+    Cycles end;
+    std::uint32_t sender;  ///< kOverhead: a copy
+    std::uint32_t index;   ///< of the transmission, or of the copy
+  };
+  static constexpr std::uint32_t kOverhead = 0xffffffffu;
+
+  [[nodiscard]] bool is(std::uint32_t robot, std::uint8_t bits) const { return (state_[robot] & bits) == bits; }
+  [[nodiscard]] Cycles begin_of(Tick tick) const { return tick.count() * cycles_per_tick_; }
+
+  void read_poses(std::span<const BodyFrame* const>);
+  void read_actuation(std::span<const ActuationFrame* const>);
+  void drop_message(std::uint32_t robot);
+  void forget(Cycles begin);
+
+  void contend(Tick now);
+  void schedule(std::uint32_t robot, Cycles end);
+  void attempt(std::uint32_t robot, Tick now);
+  [[nodiscard]] bool senses(std::uint32_t robot, Cycles t);
+  void abort(Transmission&, Cycles t, Tick now);
+
+  void arrive(Tick now);
+  void finish(std::uint32_t transmission, Cycles end);
+  void receive_packet(const Transmission&, Tick now);
+  void receive_copy(const OverheadController::Copy&, std::uint32_t ordinal, Tick now);
+  [[nodiscard]] bool fades(std::uint32_t receiver, Tick now, std::uint32_t draw) const;
+
+  const std::vector<Share> shares_;  ///< per host
+  const Cycles cycles_per_tick_;
+  const double loss_;
+  const bool counts_pairs_;
+  const Random random_;
+  const Ranging ranging_;
+  const Gains overhead_gains_;
+
+  Tick tick_;
+  TickTimers timers_;
+  std::vector<std::uint8_t> state_, real_;  ///< per robot
+  std::vector<std::uint16_t> tx_period_;    ///< per robot
+  std::vector<IrMessage> message_;          ///< per robot: what its slot holds
+  Neighbourhood neighbourhood_;
+  Channel channel_;
+  OverheadController overhead_;
+  std::vector<std::uint32_t> sent_;  ///< in the last tick, ascending
+  ReceptionLog receptions_;          ///< of the last tick
+  Counters counters_;
+  PairCounts pairs_;
+
+  // Within a step.
+  std::vector<Attempt> attempts_;  ///< a heap, earliest first
+  std::vector<Arrival> arrivals_;
+  std::vector<std::uint32_t> rivals_;
+  std::vector<std::uint8_t> jammed_;
+};
+
+}  // namespace kilotwin::comm

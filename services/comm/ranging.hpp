@@ -1,0 +1,39 @@
+/// Readings of the two distance amplifiers for a sender at a distance.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace kilotwin::comm {
+
+struct Gains {
+  std::int16_t high, low;  ///< 10-bit ADC counts
+};
+
+/// The nominal calibration of core/base/ir_calibration.h, linear between its entries; beyond the last it decays
+/// exponentially with the length constant of the table's own curve.
+class Ranging {
+ public:
+  Ranging();
+  /// `distance_mm`: of disc centres, >= 0.
+  [[nodiscard]] Gains gains(double distance_mm) const {
+    const double step = (distance_mm - kContact_mm) * (1.0 / kStep_mm);
+    if (!(step > 0)) return rounded(high_[0], low_[0]);
+    if (step >= kEntries - 1) return {0, 0};
+    const auto i = static_cast<std::size_t>(step);
+    const double part = step - static_cast<double>(i);
+    return rounded(high_[i] + part * (high_[i + 1] - high_[i]), low_[i] + part * (low_[i + 1] - low_[i]));
+  }
+
+ private:
+  static constexpr double kContact_mm = 33, kStep_mm = 5;
+  /// Beyond entry 60, at 333 mm, readings are below half a count.
+  static constexpr int kEntries = 61;
+
+  static Gains rounded(double high, double low) {
+    return {static_cast<std::int16_t>(high + 0.5), static_cast<std::int16_t>(low + 0.5)};
+  }
+  std::array<double, kEntries> high_, low_;
+};
+
+}  // namespace kilotwin::comm

@@ -1,0 +1,24 @@
+#include "services/comm/tick_timers.hpp"
+
+#include "core/random/random.hpp"
+
+namespace kilotwin::comm {
+
+TickTimers::TickTimers(const RunPlan& plan) {
+  const std::uint32_t robots = plan.robots();
+  next_.reserve(robots);
+  period_.reserve(robots);
+  clock_.assign(robots, 0);
+  compare_.assign(robots, kRegular);
+  count_.assign(robots, 0);
+  const Random random(plan.seed());
+  const double spread = plan.experiment().radio().oscillator_sd();
+  for (std::uint32_t i = 0; i < robots; ++i) {
+    const double rate = 1 + spread * random.normal(Stream::kOscillator, i, Tick{0}, 0);
+    const double period = static_cast<double>(kTimerCounts * kTimerCount) / rate;
+    period_.push_back(static_cast<std::uint32_t>(period + 0.5));
+    next_.push_back(static_cast<Cycles>(period * random.uniform(Stream::kOscillator, i, Tick{0}, 1)));
+  }
+}
+
+}  // namespace kilotwin::comm
