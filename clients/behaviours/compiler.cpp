@@ -78,7 +78,9 @@ Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
 
 /// Leaves the folders of the sources out of the result, so that the same content gives the same octets wherever it lies.
 Arguments place_flags(const std::vector<fs::path>& sources) {
-  Arguments flags{"-ffile-prefix-map=" + fs::current_path().string() + "=."};
+  std::error_code error;
+  Arguments flags;
+  if (const fs::path here = fs::current_path(error); !error) flags.push_back("-ffile-prefix-map=" + here.string() + "=.");
   for (const fs::path& source : sources) {
     if (source.has_parent_path()) flags.push_back("-ffile-prefix-map=" + source.parent_path().string() + "=.");
   }

@@ -1,9 +1,10 @@
 #include "clients/behaviours/compiler_common.hpp"
 
 #include <algorithm>
-#include <cctype>
-#include <regex>
+
+#include <optional>
 #include <sstream>
+#include <string_view>
 #include <system_error>
 
 #include "clients/behaviours/files.hpp"
@@ -13,6 +14,12 @@
 
 namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
+namespace {
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
+}  // namespace
 
 fs::path unpacked_runtime(const fs::path& cache) {
   static const std::string content_hash = [] {
@@ -32,10 +39,14 @@ fs::path unpacked_runtime(const fs::path& cache) {
 }
 
 std::vector<std::string> define_flags(const std::vector<std::string>& defines) {
-  static const std::regex kMacro("[A-Za-z_][A-Za-z0-9_]*(=[^\\n]*)?");
+  auto is_macro = [](std::string_view define) {
+    const std::string_view name = define.substr(0, define.find('='));
+    return !name.empty() && !is_digit(name[0]) && define.find('\n') == std::string_view::npos &&
+           std::all_of(name.begin(), name.end(), [](char c) { return c == '_' || is_digit(c) || is_letter(c); });
+  };
   std::vector<std::string> flags;
   for (const std::string& define : defines) {
-    if (!std::regex_match(define, kMacro)) {
+    if (!is_macro(define)) {
       throw UserError("--define " + define + ": not a macro; write NAME or NAME=VALUE, as in TAU_S=2.5");
     }
     flags.push_back("-D" + define);
@@ -58,40 +69,77 @@ void check_sources(const std::vector<fs::path>& sources) {
 
 namespace {
 
-/// The linker knows sources by their names alone.
-std::string as_named(const std::string& file, const std::vector<fs::path>& sources) {
-  for (const fs::path& source : sources) {
-    if (source.filename() == fs::path(file).filename()) return source.string();
+/// Removes ":NUMBER" from the end; false where there is none.
+bool drop_number(std::string_view& text) {
+  std::size_t end = text.size();
+  while (end > 0 && is_digit(text[end - 1])) --end;
+  if (end == text.size() || end < 2 || text[end - 1] != ':') return false;
+  text = text.substr(0, end - 1);
+  return true;
+}
+
+/// "FILE:LINE:COLUMN: error: WHAT" of a compiler, whose fatal errors are errors here.
+std::optional<std::string> compiler_error(std::string_view line) {
+  for (const std::string_view mark : {": error: ", ": fatal error: "}) {
+    const std::size_t at = line.find(mark);
+    if (at == std::string_view::npos) continue;
+    const std::string_view place = line.substr(0, at);
+    std::string_view file = place;
+    if (drop_number(file) && drop_number(file)) {
+      return std::string(place) + ": error: " + std::string(line.substr(at + mark.size()));
+    }
   }
-  return file;
+  return std::nullopt;
+}
+
+std::size_t linker_complaint(std::string_view line) {
+  return std::min(line.find("undefined reference"), line.find("multiple definition"));
+}
+
+/// "... FILE:LINE: WHAT" of a linker, which knows sources by their names alone and no columns.
+std::optional<std::string> linker_error(std::string_view line, const std::vector<fs::path>& sources) {
+  const std::size_t at = linker_complaint(line);
+  if (at == std::string_view::npos || at < 2 || line.substr(at - 2, 2) != ": ") return std::nullopt;
+  const std::string_view place = line.substr(0, at - 2);
+  std::string_view file = place;
+  if (!drop_number(file)) return std::nullopt;
+  const std::string number(place.substr(file.size()));
+  if (const std::size_t before = file.find_last_of(": "); before != std::string_view::npos) file.remove_prefix(before + 1);
+  std::string named(file);
+  for (const fs::path& source : sources) {
+    if (source.filename() == fs::path(named).filename()) named = source.string();
+  }
+  return named + number + ":1: error: " + std::string(line.substr(at));
+}
+
+/// What says nothing of a place.
+std::optional<std::string> placeless_error(std::string_view line, const fs::path& source) {
+  const std::size_t at = std::min(linker_complaint(line), line.find("error"));
+  if (at == std::string_view::npos) return std::nullopt;
+  return source.string() + ":1:1: error: " + std::string(line.substr(at));
 }
 
 }  // namespace
 
 std::string first_error_first(const std::string& output, const std::vector<fs::path>& sources) {
-  static const std::regex kCompiler("(.+?:[0-9]+:[0-9]+: )(?:fatal )?error: (.*)");
-  static const std::regex kLinker("(?:.*[: ])?([^: ]+\\.[ch])(:[0-9]+): ((?:undefined reference|multiple definition).*)");
-  static const std::regex kAnywhere("(?:.*: )?((?:undefined reference|multiple definition|fatal error|error).*)");
   std::vector<std::string> lines;
   std::istringstream stream(output);
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  const std::string first_source = sources.front().string();
-  std::string head = first_source + ":1:1: error: the compiler failed";
-  std::smatch match;
-  auto search = [&](const std::regex& pattern, auto text) {
-    const auto found = std::find_if(lines.begin(), lines.end(),
-                                    [&](const std::string& line) { return std::regex_match(line, pattern); });
-    if (found == lines.end()) return false;
-    std::regex_match(*found, match, pattern);
-    head = text();
-    lines.erase(found);
-    return true;
+  std::optional<std::string> head;
+  auto look_for = [&](auto parse) {
+    for (auto line = lines.begin(); line != lines.end() && !head; ++line) {
+      head = parse(*line);
+      if (!head) continue;
+      lines.erase(line);
+      return;
+    }
   };
-  search(kCompiler, [&] { return match.str(1) + "error: " + match.str(2); }) ||
-      search(kLinker, [&] { return as_named(match.str(1), sources) + match.str(2) + ":1: error: " + match.str(3); }) ||
-      search(kAnywhere, [&] { return first_source + ":1:1: error: " + match.str(1); });
-  for (const std::string& line : lines) head += "\n" + line;
-  return head;
+  look_for(compiler_error);
+  look_for([&](const std::string& line) { return linker_error(line, sources); });
+  look_for([&](const std::string& line) { return placeless_error(line, sources.front()); });
+  std::string text = head.value_or(sources.front().string() + ":1:1: error: the compiler failed");
+  for (const std::string& line : lines) text += "\n" + line;
+  return text;
 }
 
 }  // namespace kilotwin::behaviours

@@ -44,6 +44,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       sent_(share_.size()),
       first_reception_(share_.size() + 1),
       running_robot_(kNobody) {
+  KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.manifest.program_size()));
   // Hosts of one process start at different slots, so that they seldom wait for each other.
   const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
   for (std::uint32_t s = 0; s < kSlots; ++s) {
@@ -88,7 +89,8 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
 }
 
 void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
-  KILOTWIN_DEMAND(radio.tick == from && radio.first_robot == share_.first && radio.kilo_ticks.size() == share_.size());
+  KILOTWIN_DEMAND(from == now_ && radio.tick == from && radio.first_robot == share_.first && radio.kilo_ticks.size() == share_.size());
+  ++now_;
   gather(radio);
   std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
   const FaultGuard guard;
@@ -179,11 +181,14 @@ void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::
   motor_left_[i] = robot.motors_on != 0 ? robot.duty_left : std::uint8_t{0};
   motor_right_[i] = robot.motors_on != 0 ? robot.duty_right : std::uint8_t{0};
   led_[i] = robot.led & 63;
-  life_cycle_[i] = robot.state;
+  // A sleeping robot that has woken up to listen is, for the radio, one that is idle.
+  const bool listens = robot.state == static_cast<std::uint8_t>(LifeCycle::kSleeping) && robot.deaf == 0;
+  life_cycle_[i] = listens ? static_cast<std::uint8_t>(LifeCycle::kIdle) : robot.state;
   tx_period_[i] = tx_period;
 }
 
 void BehavioursEngine::emit(ActuationFrame& frame) const {
+  frame.tick = now_;
   frame.first_robot = share_.first;
   frame.motor_left = motor_left_;
   frame.motor_right = motor_right_;

@@ -22,6 +22,7 @@ namespace kilotwin::behaviours {
 /// in order of arrival; the main program until it has used up the tick; kilo_message_tx if it is asked, runs, and holds no
 /// message. A message is held until it has left or the robot stops running.
 /// Robots of tracked groups have no program: motors 0, LED 0, life cycle IDLE.
+/// A sleeping robot wakes every 8 s to listen and shows as IDLE meanwhile.
 /// Pure, but for robots' code that faults: that stops its robot and is noted. Engines of one process may step in parallel.
 class BehavioursEngine {
  public:
@@ -43,7 +44,7 @@ class BehavioursEngine {
     std::uint32_t robot = 0;
     std::string text;  ///< one line: what its program did
   };
-  /// Robots whose program has faulted, in the order in which it happened.
+  /// Robots whose program has faulted: new ones are appended.
   [[nodiscard]] const std::vector<Failure>& failures() const { return failures_; }
   [[nodiscard]] std::uint32_t robots_failed() const { return static_cast<std::uint32_t>(failures_.size()); }
 
@@ -72,6 +73,8 @@ class BehavioursEngine {
   const Share share_;
   const Random random_;
   const std::shared_ptr<ProgramSet> programs_;
+
+  Tick now_;
 
   /// Own robots by slot and program: the order in which they run.
   struct Group {

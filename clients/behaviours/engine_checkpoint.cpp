@@ -48,13 +48,14 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
   }
 }
 
-void BehavioursEngine::load(Tick, std::span<const proto::BehavioursState* const> parts) {
+void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* const> parts) {
   std::vector<const proto::RobotProgramState*> saved(share_.size(), nullptr);
   for (const proto::BehavioursState* part : parts) {
     for (const proto::RobotProgramState& robot : part->robot()) {
       if (share_.contains(robot.robot())) saved[robot.robot() - share_.first] = &robot;
     }
   }
+  now_ = tick;
   failures_.clear();
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
     const std::uint32_t id = share_.first + i;

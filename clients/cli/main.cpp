@@ -15,6 +15,7 @@
 #include "clients/cli/sweep_command.hpp"
 #include "clients/recorder/export.hpp"
 #include "core/base/error.hpp"
+#include "core/dds/dds.hpp"
 #include "core/experiment/validate.hpp"
 
 namespace kilotwin::cli {

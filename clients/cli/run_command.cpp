@@ -9,6 +9,7 @@
 #include "clients/cli/run_recorder.hpp"
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
+#include "core/dds/dds.hpp"
 #include "core/federation/interrupt.hpp"
 
 namespace kilotwin::cli {

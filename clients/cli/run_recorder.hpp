@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "clients/recorder/run_directory.hpp"
 #include "clients/recorder/statistics.hpp"

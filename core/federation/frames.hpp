@@ -45,7 +45,7 @@ struct RadioFrame {
   std::vector<std::uint32_t> ask;                ///< ascending
   std::vector<std::uint32_t> sent;               ///< ascending
   std::vector<std::uint32_t> reception_robot;    ///< ordered by robot, then by time of arrival
-  std::vector<std::uint16_t> reception_message;  ///< index into messages
+  std::vector<std::uint32_t> reception_message;  ///< index into messages
   std::vector<std::int16_t> reception_high_gain, reception_low_gain;
   std::vector<IrMessage> messages;
 };

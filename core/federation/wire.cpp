@@ -101,7 +101,7 @@ WireRadioFrame to_wire(const WireHeader& header, const RadioFrame& frame) {
   wire.ask = borrow<ULongs>(frame.ask);
   wire.sent = borrow<ULongs>(frame.sent);
   wire.reception_robot = borrow<ULongs>(frame.reception_robot);
-  wire.reception_message = borrow<UShorts>(frame.reception_message);
+  wire.reception_message = borrow<ULongs>(frame.reception_message);
   wire.reception_high_gain = borrow<Shorts>(frame.reception_high_gain);
   wire.reception_low_gain = borrow<Shorts>(frame.reception_low_gain);
   wire.messages = borrow<Octets>(frame.messages);

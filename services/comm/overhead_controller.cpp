@@ -48,7 +48,7 @@ void OverheadController::save(proto::OverheadControllerState& state) const {
   for (const IrMessage& message : waiting_) append(*state.mutable_waiting(), message);
   for (const Copy& copy : copies_) {
     state.add_copy_start(copy.start);
-    append(*state.mutable_copy_message(), copy.message);
+    append(*state.mutable_copy_messages(), copy.message);
   }
 }
 
@@ -60,7 +60,7 @@ void OverheadController::load(const proto::OverheadControllerState& state) {
   for (std::size_t i = 0; i < state.waiting().size() / message_.size(); ++i) waiting_.push_back(message_at(state.waiting(), i));
   copies_.clear();
   for (int i = 0; i < state.copy_start_size(); ++i) {
-    copies_.push_back({state.copy_start(i), message_at(state.copy_message(), static_cast<std::size_t>(i))});
+    copies_.push_back({state.copy_start(i), message_at(state.copy_messages(), static_cast<std::size_t>(i))});
   }
 }
 

@@ -58,12 +58,15 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
 }
 
 void RadioEngine::read_poses(std::span<const BodyFrame* const> frames) {
+  std::size_t listed = 0;
   for (const BodyFrame* frame : frames) {
     for (std::size_t n = 0; n < frame->robot.size(); ++n) {
       KILOTWIN_DEMAND(frame->robot[n] < state_.size());
       neighbourhood_.place(frame->robot[n], frame->x_mm[n], frame->y_mm[n]);
     }
+    listed += frame->robot.size();
   }
+  KILOTWIN_DEMAND(listed == state_.size());
 }
 
 void RadioEngine::read_actuation(std::span<const ActuationFrame* const> frames) {
@@ -112,6 +115,10 @@ void RadioEngine::forget(Cycles begin) {
   overhead_.forget(oldest);
 }
 
+bool RadioEngine::later(const Attempt& a, const Attempt& b) {
+  return a.time != b.time ? a.time > b.time : a.robot > b.robot;
+}
+
 /// A packet that ends at `end` arrives in the tick that begins there, so that nothing in a tick is of a later instant.
 void RadioEngine::contend(Tick now) {
   const Cycles end = begin_of(now + 1);
@@ -129,7 +136,6 @@ void RadioEngine::contend(Tick now) {
   const std::vector<OverheadController::Copy>& copies = overhead_.copies();
   std::size_t next_copy = 0;
   while (next_copy < copies.size() && copies[next_copy].start < begin_of(now)) ++next_copy;
-  const auto later = [](const Attempt& a, const Attempt& b) { return a.time != b.time ? a.time > b.time : a.robot > b.robot; };
   for (;;) {
     if (next_copy < copies.size() && (attempts_.empty() || copies[next_copy].start <= attempts_.front().time)) {
       const Cycles start = copies[next_copy++].start;
@@ -152,8 +158,7 @@ void RadioEngine::schedule(std::uint32_t robot, Cycles end) {
   for (; timers_.next(robot) < end; timers_.interrupt(robot)) {
     if (timers_.next_clock(robot) <= tx_period_[robot]) continue;
     attempts_.push_back({timers_.next(robot), robot});
-    std::push_heap(attempts_.begin(), attempts_.end(),
-                   [](const Attempt& a, const Attempt& b) { return a.time != b.time ? a.time > b.time : a.robot > b.robot; });
+    std::push_heap(attempts_.begin(), attempts_.end(), later);
     return;
   }
 }
@@ -270,14 +275,8 @@ void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32
   receptions_.begin_message(copy.message);
   for (std::uint32_t receiver = 0; receiver < state_.size(); ++receiver) {
     if (!is(receiver, kReceptive)) continue;
-    if (jammed_[receiver] != 0) {
-      ++counters_.collided;
-    } else if (fades(receiver, now, kLastDraw - ordinal)) {
-      ++counters_.faded;
-    } else {
-      ++counters_.received;
-      receptions_.add(receiver, overhead_gains_);
-    }
+    if (jammed_[receiver] != 0 || fades(receiver, now, kLastDraw - ordinal)) continue;
+    receptions_.add(receiver, overhead_gains_);
   }
 }
 

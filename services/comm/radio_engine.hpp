@@ -41,7 +41,8 @@ namespace kilotwin::comm {
 
 class RadioEngine {
  public:
-  /// What a step from tick k reads; every frame is of tick k, in any order. Robots that no frame lists stay as they were.
+  /// What a step from tick k reads; every frame is of tick k, in any order. Bodies list every robot once. Robots that no
+  /// actuation frame covers stay as they were.
   struct Inputs {
     std::span<const BodyFrame* const> bodies;
     std::span<const ActuationFrame* const> actuation;
@@ -49,8 +50,7 @@ class RadioEngine {
   };
 
   /// Messages of robots since the start. attempted = sent + aborted + those on the air. Over all packets sent and all
-  /// robots that could receive them: received + collided + faded. Copies of the overhead controller count as receptions
-  /// only.
+  /// robots that could receive them: received + collided + faded. The overhead controller's copies do not count.
   struct Counters {
     std::uint64_t attempted = 0;  ///< start pulses
     std::uint64_t sent = 0;       ///< whole packets
@@ -61,6 +61,8 @@ class RadioEngine {
   };
 
   explicit RadioEngine(const RunPlan&);
+  RadioEngine(const RadioEngine&) = delete;
+  RadioEngine& operator=(const RadioEngine&) = delete;
 
   /// Advances from tick `from`, which must be the present one, to `from` + 1.
   void step(Tick from, const Inputs&);
@@ -86,6 +88,7 @@ class RadioEngine {
     Cycles time;
     std::uint32_t robot;
   };
+  static bool later(const Attempt& a, const Attempt& b);
   struct Arrival {
     Cycles end;
     std::uint32_t sender;  ///< kOverhead: a copy

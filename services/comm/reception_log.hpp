@@ -6,6 +6,7 @@
 
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/comm/ranging.hpp"
 
 namespace kilotwin::comm {
@@ -27,6 +28,10 @@ class ReceptionLog {
   [[nodiscard]] std::uint32_t count(std::uint32_t robot) const { return first_[robot + 1] - first_[robot]; }
   /// Appends the receptions of a share of the robots, and the messages that it received.
   void emit(Share share, RadioFrame& frame) const;
+
+  void save(proto::RadioState&) const;
+  /// Throws RunError where the part does not fit.
+  void load(const proto::RadioState&);
 
  private:
   struct Reception {

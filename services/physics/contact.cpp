@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "core/base/error.hpp"
-
 namespace kilotwin::physics {
 namespace {
 
@@ -28,6 +26,7 @@ constexpr double kUnlimited_mm = 1e300;
 
 inline Two both(double a) { return Two{a, a}; }
 inline Two swapped(Two a) { return __builtin_shufflevector(a, a, 1, 0); }
+
 }  // namespace
 
 ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
@@ -278,34 +277,37 @@ inline void ContactSolver::move_slot(const Bodies& bodies, std::uint32_t s) {
   const double square = wanted[0] * wanted[0] + wanted[1] * wanted[1];
   if (square > limits_.stride_mm * limits_.stride_mm) wanted *= both(limits_.stride_mm / __builtin_sqrt(square));
 
+  // Takes off what is most beyond a limit, and again; what is beyond another limit then scales down all.
   Two x = firsts(wanted, wanted), y = seconds(wanted, wanted);
-  for (int round = 0; round < kLimitRounds; ++round) {
+  x = larger(smaller(x, high_x), low_x);
+  y = larger(smaller(y, high_y), low_y);
+  double scale = 1;
+  for (int round = 0;; ++round) {
     Two excess = zero, normal_x = zero, normal_y = zero;
     for (std::size_t p = 0; p < count; ++p) {
       const Two beyond = pairs[p].normal_x * x + pairs[p].normal_y * y - limit_mm[p];
       const auto worse = beyond > excess;
-      excess = worse ? beyond : excess;
+      excess = larger(beyond, excess);
       normal_x = worse ? pairs[p].normal_x : normal_x;
       normal_y = worse ? pairs[p].normal_y : normal_y;
     }
+    if (larger(excess, swapped(excess))[0] <= kLimitTolerance_mm) break;
+    if (round == kLimitRounds) {
+      for (std::size_t p = 0; p < count; ++p) {
+        const Two closing = pairs[p].normal_x * x + pairs[p].normal_y * y;
+        for (int k = 0; k < 2; ++k) {
+          const double limit = limit_mm[p][k];
+          if (closing[k] > limit + kLimitTolerance_mm && scale * closing[k] > limit) scale = limit / closing[k];
+        }
+      }
+      break;
+    }
     const auto of_first = firsts(excess, excess) >= seconds(excess, excess);
-    excess = of_first ? firsts(excess, excess) : seconds(excess, excess);
+    excess = larger(excess, swapped(excess));
     x -= excess * (of_first ? firsts(normal_x, normal_x) : seconds(normal_x, normal_x));
     y -= excess * (of_first ? firsts(normal_y, normal_y) : seconds(normal_y, normal_y));
     x = larger(smaller(x, high_x), low_x);
     y = larger(smaller(y, high_y), low_y);
-  }
-  Two most = zero;
-  for (std::size_t p = 0; p < count; ++p) most = larger(pairs[p].normal_x * x + pairs[p].normal_y * y - limit_mm[p], most);
-  double scale = 1;
-  if (larger(most, swapped(most))[0] > kLimitTolerance_mm) {
-    for (std::size_t p = 0; p < count; ++p) {
-      const Two closing = pairs[p].normal_x * x + pairs[p].normal_y * y;
-      for (int k = 0; k < 2; ++k) {
-        const double limit = limit_mm[p][k];
-        if (closing[k] > limit + kLimitTolerance_mm && scale * closing[k] > limit) scale = limit / closing[k];
-      }
-    }
   }
 
   after_[s].shift_mm = shift_mm + both(scale) * firsts(x, y);

@@ -11,7 +11,9 @@
 __attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtControl* kt_control = 0;
 
 #define SAVE "push %rbx\n push %rbp\n push %r12\n push %r13\n push %r14\n push %r15\n"
-#define RESTORE "pop %r15\n pop %r14\n pop %r13\n pop %r12\n pop %rbp\n pop %rbx\n ret\n"
+#define RESTORE "pop %r15\n pop %r14\n pop %r13\n pop %r12\n pop %rbp\n pop %rbx\n"
+/* Returns elsewhere than where the call came from: a jump, which processors predict where they would mistake a return. */
+#define CROSS "pop %rcx\n jmp *%rcx\n"
 #define FUNCTION(name) ".globl " #name "\n .hidden " #name "\n .type " #name ", @function\n" #name ":\n"
 #define END(name) ".size " #name ", .-" #name "\n"
 
@@ -20,12 +22,12 @@ __asm__(
     /* void kt_enter(struct KtControl*) */
     FUNCTION(kt_enter) SAVE
     "mov %rsp, (%rdi)\n"
-    "mov 8(%rdi), %rsp\n" RESTORE END(kt_enter)
+    "mov 8(%rdi), %rsp\n" RESTORE CROSS END(kt_enter)
     /* void kt_wait(void): called by the robot; returns in the next tick. */
     FUNCTION(kt_wait) SAVE
     "mov kt_control(%rip), %rdi\n"
     "mov %rsp, 8(%rdi)\n"
-    "mov (%rdi), %rsp\n" RESTORE END(kt_wait)
+    "mov (%rdi), %rsp\n" RESTORE CROSS END(kt_wait)
     /* uint64_t kt_call(struct KtControl*, function, argument) */
     FUNCTION(kt_call) SAVE
     "mov %rsp, (%rdi)\n"
@@ -35,4 +37,4 @@ __asm__(
     "call *%rax\n" END(kt_call)
     FUNCTION(kt_leave)
     "mov kt_control(%rip), %rdi\n"
-    "mov (%rdi), %rsp\n" RESTORE END(kt_leave));
+    "mov (%rdi), %rsp\n" RESTORE "ret\n" END(kt_leave));

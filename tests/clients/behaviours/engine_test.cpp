@@ -184,12 +184,22 @@ TEST(Engine, ASleepingRobotListensEveryEightSeconds) {
   swarm.start();
   swarm.step(to_all(swarm, message(kSleep)));
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kSleeping);
-  int asleep = 0;
-  while (swarm.life_cycle(0) == LifeCycle::kSleeping && asleep < 400) {
-    swarm.step(to_all(swarm, message(kWakeup)));
-    ++asleep;
+  // The radio tells a robot what was on the air in a tick if it was not asleep at the tick's beginning.
+  int until_it_listens = 0;
+  while (swarm.life_cycle(0) == LifeCycle::kSleeping && until_it_listens < 400) {
+    swarm.step(to_all(swarm, message(kWakeup)));  // in vain
+    ++until_it_listens;
   }
-  EXPECT_NEAR(asleep * 0.032768, 8, 0.1);
+  EXPECT_NEAR(until_it_listens * 0.032768, 8, 0.1);
+  EXPECT_EQ(swarm.led(0), 63);
+  swarm.steps(2);
+  EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kSleeping);  // nothing was heard
+  while (swarm.life_cycle(0) == LifeCycle::kSleeping) swarm.step();
+  swarm.step();
+  swarm.step(to_all(swarm, message(kWakeup)));
+  swarm.steps(300);
+  EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kIdle);
+  EXPECT_EQ(swarm.led(0), 0);
 }
 
 TEST(Engine, ReadUidTurnsWhereTheBitIsSet) {

@@ -1,0 +1,64 @@
+// Cost of the radio engine per robot and tick on one core: step, emit and hash, hosts not counted. The counter
+// ns_per_robot_tick is what to watch. All robots send as often as the firmware lets them.
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "tests/services/comm/fake_hosts.hpp"
+
+namespace {
+
+using namespace kilotwin;
+using testing::Facing;
+using Clock = std::chrono::steady_clock;
+
+/// 128 ticks are 4.2 s: eight messages of each robot.
+constexpr int kWarmUp = 64, kTicks = 128;
+
+void run(benchmark::State& state, const std::string& experiment, double pitch_mm, bool broadcast) {
+  const auto robots = static_cast<std::uint32_t>(state.range(0));
+  const RunPlan plan = testing::make_plan(experiment, testing::grid_crowd(robots, pitch_mm, Facing::kRandom));
+  testing::Swarm swarm(plan);
+  if (broadcast) swarm.hosts.overhead.packets.push_back({OverheadCommand::kRepeat, {}});
+  for (int k = 0; k < kWarmUp; ++k) swarm.step();
+  const auto before = swarm.radio.counters();
+  std::uint64_t sum = 0;
+  for (auto _ : state) {
+    std::chrono::nanoseconds spent{0};
+    for (int k = 0; k < kTicks; ++k) {
+      const auto begun = Clock::now();
+      swarm.radio.step(swarm.now, swarm.hosts.inputs());
+      const auto stepped = Clock::now();
+      swarm.hosts.answer(swarm.now, HostId{0}, swarm.frames[0]);
+      swarm.hosts.overhead.packets.clear();
+      ++swarm.now;
+      const auto answered = Clock::now();
+      swarm.emit();
+      sum += swarm.radio.hash_part();
+      spent += stepped - begun + (Clock::now() - answered);
+    }
+    state.SetIterationTime(std::chrono::duration<double>(spent).count());
+  }
+  benchmark::DoNotOptimize(sum);
+  const double steps = static_cast<double>(state.iterations()) * kTicks * robots;
+  state.counters["ns_per_robot_tick"] =
+      benchmark::Counter(steps / 1e9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  const auto after = swarm.radio.counters();
+  state.counters["received_per_robot_tick"] = static_cast<double>(after.received - before.received) / steps;
+}
+
+const std::string kArena = "arena { width_mm: 10000 height_mm: 10000 } radio { range_mm: 100 }";
+
+void disperse_cluster(benchmark::State& state) { run(state, kArena, 40, false); }
+void open_field(benchmark::State& state) { run(state, kArena, 200, false); }
+void overhead_broadcast(benchmark::State& state) { run(state, kArena, 40, true); }
+
+BENCHMARK(disperse_cluster)->Arg(100)->Arg(1000)->Arg(10000)->UseManualTime();
+BENCHMARK(open_field)->Arg(1000)->UseManualTime();
+BENCHMARK(overhead_broadcast)->Arg(1000)->UseManualTime();
+
+}  // namespace
+
+BENCHMARK_MAIN();

@@ -1,0 +1,149 @@
+#include "services/ark/station_engine.hpp"
+
+#include <algorithm>
+
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+
+namespace kilotwin::ark {
+namespace {
+
+constexpr std::uint8_t kRunMessage = 0x88;  // kilolib's message types: RUN
+constexpr double kArkSecondsPerPacket = 0.05, kShortestPerRobot_s = 1.0;
+
+OverheadPacket run_packet() {
+  OverheadPacket packet{OverheadCommand::kRepeat, {}};
+  packet.message.back() = kRunMessage;
+  return packet;
+}
+
+double robot_interval_s(std::uint32_t robots) {
+  return std::max(kShortestPerRobot_s, robots * kArkSecondsPerPacket / static_cast<double>(kArkSlots));
+}
+
+std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
+  std::uint64_t word = 0;
+  for (std::size_t i = from; i < std::min(from + 8, packet.message.size()); ++i) word = word << 8 | packet.message[i];
+  return word;
+}
+
+}  // namespace
+
+StationEngine::StationEngine(const RunPlan& plan)
+    : plan_(plan),
+      start_ends_(plan.tick_length.at_or_after(plan.experiment().station().start_broadcast_s())),
+      packet_ticks_(plan.tick_length.at_or_after(plan.experiment().station().packet_interval_s()).count()),
+      robot_ticks_(plan.tick_length.at_or_after(robot_interval_s(plan.robots())).count()),
+      packets_{run_packet()},
+      next_packet_(start_ends_ + packet_ticks_) {
+  for (const proto::VirtualEnvironment& description : plan.experiment().station().environment()) {
+    environments_.push_back(make_environment(description));
+  }
+  if (!environments_.empty()) {
+    served_.resize(plan.robots(), Tick{-robot_ticks_});
+    turns_.resize(plan.robots(), 0);
+    seen_.resize(plan.robots());
+  }
+}
+
+void StationEngine::see(const Inputs& inputs) {
+  for (const BodyFrame* frame : inputs.bodies) {
+    for (std::size_t i = 0; i < frame->robot.size(); ++i) {
+      TrackedRobot& robot = seen_[frame->robot[i]];
+      robot.robot = frame->robot[i];
+      robot.p_WR.position_mm = {frame->x_mm[i], frame->y_mm[i]};
+      robot.p_WR.heading_rad = frame->heading_rad[i];
+    }
+  }
+  for (const ActuationFrame* frame : inputs.actuation) {
+    for (std::size_t i = 0; i < frame->led.size(); ++i) seen_[frame->first_robot + i].led = frame->led[i];
+  }
+}
+
+void StationEngine::send_own(const Inputs& inputs) {
+  if (now_ == start_ends_) {
+    packets_.push_back({OverheadCommand::kStop, {}});
+    repeating_ = false;
+    return;
+  }
+  if (environments_.empty() || now_ < next_packet_) return;
+  std::array<ArkMessage, kArkSlots> messages;
+  std::size_t count = 0;
+  see(inputs);
+  while (count < kArkSlots && now_ - served_[next_robot_] >= robot_ticks_) {
+    messages[count++] = environments_[turns_[next_robot_] % environments_.size()]->sense(seen_[next_robot_]);
+    served_[next_robot_] = now_;
+    ++turns_[next_robot_];
+    next_robot_ = (next_robot_ + 1) % plan_.robots();
+  }
+  if (count > 0) {
+    packets_.push_back({OverheadCommand::kRepeat, pack(std::span(messages).first(count))});
+  } else if (repeating_) {
+    packets_.push_back({OverheadCommand::kStop, {}});
+  } else {
+    return;
+  }
+  repeating_ = count > 0;
+  next_packet_ = now_ + packet_ticks_;
+}
+
+void StationEngine::step(Tick from, const Inputs& inputs) {
+  KILOTWIN_DEMAND(from == now_);
+  ++now_;
+  packets_.assign(inputs.outside.begin(), inputs.outside.end());
+  // The own packet of this tick, if any, is not sent; a later one overrides what came from outside.
+  if (packets_.empty()) send_own(inputs);
+}
+
+void StationEngine::emit(OverheadFrame& frame) const {
+  frame.tick = now_;
+  frame.packets.assign(packets_.begin(), packets_.end());
+}
+
+std::uint64_t StationEngine::hash_part() const {
+  std::uint64_t sum = entity_hash(HashDomain::kStation, 0, {next_robot_, static_cast<std::uint64_t>(next_packet_.count()),
+                                                            static_cast<std::uint64_t>(repeating_), packets_.size()});
+  for (std::uint32_t i = 0; i < packets_.size(); ++i) {
+    sum += entity_hash(HashDomain::kStation, 1 + i, {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0), word_of(packets_[i], 8)});
+  }
+  return sum;
+}
+
+void StationEngine::save(proto::StationState& state) const {
+  state.set_next_packet_tick(next_packet_.count());
+  state.set_repeating_own(repeating_);
+  for (const OverheadPacket& packet : packets_) {
+    state.mutable_packets()->push_back(static_cast<char>(packet.command));
+    state.mutable_packets()->append(packet.message.begin(), packet.message.end());
+  }
+  for (const Tick served : served_) state.add_served_tick(served.count());
+  for (const std::uint32_t turns : turns_) state.add_turns(turns);
+}
+
+void StationEngine::load(Tick tick, std::span<const proto::StationState* const> parts) {
+  constexpr std::size_t kPacketOctets = 11;
+  if (parts.size() != 1 || static_cast<std::size_t>(parts[0]->served_tick_size()) != served_.size() ||
+      static_cast<std::size_t>(parts[0]->turns_size()) != turns_.size() || parts[0]->packets().size() % kPacketOctets != 0) {
+    throw RunError("the checkpoint holds no station's state of this experiment");
+  }
+  const proto::StationState& state = *parts[0];
+  now_ = tick;
+  next_packet_ = Tick{state.next_packet_tick()};
+  repeating_ = state.repeating_own();
+  packets_.clear();
+  for (std::size_t from = 0; from < state.packets().size(); from += kPacketOctets) {
+    OverheadPacket packet;
+    packet.command = static_cast<OverheadCommand>(state.packets()[from]);
+    std::copy_n(state.packets().begin() + static_cast<std::ptrdiff_t>(from) + 1, packet.message.size(), packet.message.begin());
+    packets_.push_back(packet);
+  }
+  for (std::size_t i = 0; i < served_.size(); ++i) {
+    served_[i] = Tick{state.served_tick(static_cast<int>(i))};
+    turns_[i] = state.turns(static_cast<int>(i));
+  }
+  // Robots are served in a circle: those before the next one have had one turn more.
+  next_robot_ = 0;
+  while (next_robot_ < turns_.size() && turns_[next_robot_] > turns_.back()) ++next_robot_;
+}
+
+}  // namespace kilotwin::ark

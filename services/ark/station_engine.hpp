@@ -1,0 +1,63 @@
+/// The ARK base station: starts the robots by overhead broadcast, then answers them for its virtual environments.
+///
+/// Tick 0: RUN, repeated by the overhead controller. After start_broadcast_s: STOP, so that the air is free. Then, with
+/// environments, at most one packet per packet_interval_s with ARK messages for the three robots that have waited longest,
+/// none of which hears more often than every max(1 s, N * 0.05 s / 3) (ARK's users' rule); a packet is repeated until the
+/// next, and STOP follows when nobody's turn has come. A packet from outside takes the place of the station's own.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/experiment/plan.hpp"
+#include "core/federation/frames.hpp"
+#include "idl/checkpoint.pb.h"
+#include "services/ark/virtual_environment.hpp"
+
+namespace kilotwin::ark {
+
+/// What a step from tick k reads; every frame is of tick k.
+struct Inputs {
+  std::span<const BodyFrame* const> bodies;
+  std::span<const ActuationFrame* const> actuation;
+  std::span<const OverheadPacket> outside;  ///< stamped by the ingress for this tick, in order
+};
+
+class StationEngine {
+ public:
+  /// State at tick 0.
+  explicit StationEngine(const RunPlan& plan);
+
+  void step(Tick from, const Inputs& inputs);
+  /// The packets of the present tick.
+  void emit(OverheadFrame& frame) const;
+  [[nodiscard]] std::uint64_t hash_part() const;
+  void save(proto::StationState& state) const;
+  /// Throws RunError where no part holds a station's state.
+  void load(Tick tick, std::span<const proto::StationState* const> parts);
+
+ private:
+  /// The station's own packet at `now_`, if one is due.
+  void send_own(const Inputs& inputs);
+  void see(const Inputs& inputs);
+
+  const RunPlan& plan_;
+  const Tick start_ends_;                  ///< when RUN gives way to STOP
+  const std::int64_t packet_ticks_;        ///< at least, between two packets
+  const std::int64_t robot_ticks_;         ///< at least, between two messages to one robot
+  std::vector<std::unique_ptr<VirtualEnvironment>> environments_;
+
+  Tick now_;
+  std::vector<OverheadPacket> packets_;    ///< of now_
+  std::uint32_t next_robot_ = 0;           ///< whose turn it is: robots are served in a circle
+  Tick next_packet_{0};
+  bool repeating_ = true;                  ///< the controller repeats an own packet
+  std::vector<Tick> served_;               ///< per robot, where there are environments: when it was told a reading last
+  std::vector<std::uint32_t> turns_;       ///< per robot: how often; environments answer by turns
+
+  std::vector<TrackedRobot> seen_;         ///< of the step at hand
+};
+
+}  // namespace kilotwin::ark

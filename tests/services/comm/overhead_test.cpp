@@ -1,0 +1,170 @@
+// The overhead controller on the air: when its copies come, and what they do to robots' packets.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/services/comm/fake_hosts.hpp"
+
+namespace kilotwin::comm {
+namespace {
+
+using testing::make_plan;
+using testing::Swarm;
+
+constexpr Cycles kTick = 262144;
+constexpr Cycles kPeriod = 83272;
+const IrMessage kWord{1, 2, 3, 4, 5, 6, 7, 8, 9, 0x88};
+
+/// Copies that have arrived before the end of tick `ticks` - 1 if the first one starts at tick `first`.
+std::int64_t copies_until(std::int64_t first, std::int64_t ticks) {
+  const Cycles last_start = (ticks - first) * kTick - 1 - kPacket;
+  return last_start < 0 ? 0 : last_start / kPeriod + 1;
+}
+
+TEST(Overhead, RepeatsEvery10_409Milliseconds) {
+  EXPECT_NEAR(kPeriod / kNominalClockHz, 0.010409, 1e-9);
+  // Two robots at the ends of a large arena: everybody hears it.
+  const RunPlan plan = make_plan("arena { width_mm: 100000 }", {{-40000, 0, 0}, {40000, 300, 0}});
+  Swarm swarm(plan);
+  swarm.hosts.sends.assign(2, 0);
+  for (int k = 0; k < 5; ++k) swarm.step();
+  swarm.hosts.overhead.packets = {{OverheadCommand::kRepeat, kWord}};
+  std::vector<std::int64_t> heard(2, 0);
+  for (int k = 5; k < 500; ++k) {
+    swarm.step();
+    const RadioFrame& frame = swarm.frames[0];
+    for (std::size_t n = 0; n < frame.reception_robot.size(); ++n) {
+      ++heard[frame.reception_robot[n]];
+      EXPECT_EQ(frame.messages[frame.reception_message[n]], kWord);
+      EXPECT_EQ(frame.reception_high_gain[n], 148);
+      EXPECT_EQ(frame.reception_low_gain[n], 110);
+    }
+    EXPECT_EQ(heard[0], copies_until(5, swarm.now.count()));
+    EXPECT_EQ(heard[1], heard[0]);
+  }
+  EXPECT_GT(heard[0], 1500);
+  EXPECT_EQ(swarm.radio.counters().received, 0u);  // robots' messages only
+}
+
+/// Copies heard by a silent robot in each of the ticks after the packets of one frame.
+std::vector<std::size_t> heard_after(const std::vector<OverheadPacket>& packets, int ticks, std::vector<IrMessage>* messages) {
+  const RunPlan plan = make_plan("", {{0, 0, 0}});
+  Swarm swarm(plan);
+  swarm.hosts.sends[0] = 0;
+  swarm.hosts.overhead.packets = packets;
+  std::vector<std::size_t> heard;
+  for (int k = 0; k < ticks; ++k) {
+    swarm.step();
+    heard.push_back(swarm.frames[0].reception_robot.size());
+    for (const std::uint32_t index : swarm.frames[0].reception_message) messages->push_back(swarm.frames[0].messages[index]);
+  }
+  return heard;
+}
+
+TEST(Overhead, OnceIsOnceAndStopIsSilence) {
+  std::vector<IrMessage> messages;
+  EXPECT_EQ(heard_after({{OverheadCommand::kOnce, kWord}}, 3, &messages), (std::vector<std::size_t>{1, 0, 0}));
+  EXPECT_EQ(heard_after({{OverheadCommand::kStop, kWord}}, 3, &messages), (std::vector<std::size_t>{0, 0, 0}));
+  const RunPlan plan = make_plan("", {{0, 0, 0}});
+  Swarm swarm(plan);
+  swarm.hosts.sends[0] = 0;
+  swarm.hosts.overhead.packets = {{OverheadCommand::kRepeat, kWord}};
+  for (int k = 0; k < 10; ++k) swarm.step();
+  swarm.hosts.overhead.packets = {{OverheadCommand::kStop, {}}};
+  swarm.step();  // a copy that was on the air ends in this tick
+  EXPECT_LE(swarm.frames[0].reception_robot.size(), 1u);
+  for (int k = 0; k < 10; ++k) {
+    swarm.step();
+    EXPECT_TRUE(swarm.frames[0].reception_robot.empty());
+  }
+}
+
+TEST(Overhead, PacketsOfOneTickGoOutInOrder) {
+  std::vector<IrMessage> messages;
+  heard_after({{OverheadCommand::kRepeat, {1}}, {OverheadCommand::kOnce, {2}}, {OverheadCommand::kOnce, {3}},
+               {OverheadCommand::kRepeat, {4}}}, 3, &messages);
+  ASSERT_GE(messages.size(), 7u);
+  const std::uint8_t expected[] = {1, 2, 3, 4, 4, 4, 4};
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(messages[i][0], expected[i]);
+}
+
+/// Lone robots, each with a silent listener; their first attempt is predicted from the phase of the copies, which run from
+/// tick 0 on: sensed where a copy's leading byte is over, given up where a copy starts within the own leading byte, drowned
+/// where a copy overlaps otherwise.
+TEST(Overhead, JamsRobotsAsThePhasesSay) {
+  constexpr std::uint32_t kPairs = 1000;
+  std::vector<testing::ScenePose> poses;
+  for (std::uint32_t i = 0; i < kPairs; ++i) {
+    const double x = 500.0 * (i % 32), y = 500.0 * (i / 32);
+    poses.push_back({x, y, 0});
+    poses.push_back({x + 50, y, 0});
+  }
+  const RunPlan plan = make_plan("radio { range_mm: 100 }", poses);
+  const TickTimers timers(plan);
+  Swarm swarm(plan);
+  for (std::uint32_t i = 0; i < kPairs; ++i) swarm.hosts.sends[2 * i + 1] = 0;
+  swarm.hosts.overhead.packets = {{OverheadCommand::kRepeat, kWord}};
+  enum Fate { kSensed, kDrowned, kClean, kGivenUp };
+  std::vector<Fate> fate;
+  std::vector<std::int64_t> due;
+  int number[4] = {};
+  for (std::uint32_t i = 0; i < kPairs; ++i) {
+    const Cycles start = timers.next(2 * i) + 15 * timers.period(2 * i), into = start % kPeriod, until_next = kPeriod - into;
+    if (into >= 2418 && into < 34970) fate.push_back(kSensed);
+    else if (into < 2418) fate.push_back(kDrowned);
+    else if (until_next >= 34970) fate.push_back(kClean);
+    else if (until_next >= 538 && until_next < 2418) fate.push_back(kGivenUp);
+    else fate.push_back(kDrowned);
+    due.push_back((start + kPacket) / kTick + 1);
+    ++number[fate.back()];
+  }
+  for (const int n : number) EXPECT_GT(n, 10);
+  std::vector<std::int64_t> sent(kPairs, 0), heard(kPairs, 0);
+  while (swarm.now.count() < 19) {
+    swarm.step();
+    const RadioFrame& frame = swarm.frames[0];
+    for (const std::uint32_t robot : frame.sent) if (sent[robot / 2] == 0) sent[robot / 2] = swarm.now.count();
+    for (std::size_t n = 0; n < frame.reception_robot.size(); ++n) {
+      const std::uint32_t pair = frame.reception_robot[n] / 2;
+      if (frame.messages[frame.reception_message[n]][9] != 0x88 && heard[pair] == 0) heard[pair] = swarm.now.count();
+    }
+  }
+  for (std::uint32_t i = 0; i < kPairs; ++i) {
+    switch (fate[i]) {
+      case kClean:
+        EXPECT_EQ(sent[i], due[i]);
+        EXPECT_EQ(heard[i], due[i]);
+        break;
+      case kDrowned:
+        EXPECT_EQ(sent[i], due[i]);
+        EXPECT_TRUE(heard[i] == 0 || heard[i] > due[i] + 10);
+        break;
+      case kSensed: EXPECT_TRUE(sent[i] == 0 || sent[i] > due[i]); break;
+      case kGivenUp: break;
+    }
+  }
+  EXPECT_GE(swarm.radio.counters().aborted, static_cast<std::uint64_t>(number[kGivenUp]));
+}
+
+/// Copies that overlap a robot's packet are lost within its range and at itself, and nowhere else.
+TEST(Overhead, IsDrownedOutNearASender) {
+  const RunPlan plan = make_plan("radio { range_mm: 100 }", {{0, 0, 0}, {50, 0, 0}, {500, 0, 0}});
+  Swarm swarm(plan);
+  swarm.hosts.sends = {1, 0, 0};
+  swarm.hosts.overhead.packets = {{OverheadCommand::kRepeat, kWord}};
+  std::vector<std::int64_t> heard(3, 0);
+  while (swarm.now.count() < 1000) {
+    swarm.step();
+    const RadioFrame& frame = swarm.frames[0];
+    for (std::size_t n = 0; n < frame.reception_robot.size(); ++n) {
+      heard[frame.reception_robot[n]] += frame.messages[frame.reception_message[n]] == kWord;
+    }
+  }
+  EXPECT_EQ(heard[2], copies_until(0, 1000));
+  EXPECT_EQ(heard[0], heard[1]);
+  EXPECT_LT(heard[0], heard[2]);
+  EXPECT_GE(heard[0], heard[2] - 2 * static_cast<std::int64_t>(swarm.radio.counters().attempted));
+}
+
+}  // namespace
+}  // namespace kilotwin::comm
