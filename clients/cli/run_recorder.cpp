@@ -90,8 +90,13 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
   const double steps = static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());
   const auto cost = [&](Work work) { return static_cast<double>(totals.work_ns[static_cast<std::size_t>(work)]) / steps; };
-  summary.cost_ns_per_robot_tick = {cost(Work::kBehaviours), cost(Work::kPhysics),  cost(Work::kRadio) + cost(Work::kStation),
-                                    cost(Work::kExchange),   cost(Work::kRecording)};
+  auto& costs = summary.cost_ns_per_robot_tick;
+  costs.behaviours = cost(Work::kBehaviours);
+  costs.physics = cost(Work::kPhysics);
+  costs.radio = cost(Work::kRadio);
+  costs.station = cost(Work::kStation);
+  costs.exchange = cost(Work::kExchange);
+  costs.recording = cost(Work::kRecording);
   recorder::write_summary(summary, directory_.summary());
   if (any_state_) {
     recorder::Reader recording(directory_.recording());
