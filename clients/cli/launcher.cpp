@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 /// For how long services may take to leave once they were asked to.
-constexpr auto kGrace = std::chrono::milliseconds(4000);
+constexpr auto kGrace = std::chrono::milliseconds(3000);
 constexpr auto kPoll = std::chrono::milliseconds(5);
 
 struct Child {
@@ -54,7 +54,7 @@ class Launcher {
 
   ~Launcher() { end_all(); }
 
-  void run() {
+  int run() {
     std::error_code ignored;
     fs::create_directories(directory_.path() / "logs", ignored);
     start(plan_.station(), {"station"});
@@ -72,7 +72,7 @@ class Launcher {
                                               [this](const PublicRunStatus& sample, dds::SampleState state) {
                                                 if (state.valid && sample.run == plan_.run()) on_status(sample);
                                               });
-    watch();
+    return watch();
   }
 
  private:
@@ -138,17 +138,17 @@ class Launcher {
       child.running = false;
       child.status = status;
       const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
-      if (!well && !ending_) {
-        // Whoever was killed is the culprit; whoever failed may only have noticed.
-        const bool killed = WIFSIGNALED(status);
-        if (culprit_ == nullptr || (killed && !WIFSIGNALED(culprit_->status))) culprit_ = &child;
-        if (!deadline_) deadline_ = Clock::now() + kGrace;
+      if (!well && !ending_ && !interrupted_ && culprit_ == nullptr) {
+        // The first to end is the culprit: whoever only noticed its loss ends later.
+        culprit_ = &child;
+        name_culprit();
+        deadline_ = Clock::now() + kGrace;
       }
     }
     return any;
   }
 
-  void watch() {
+  int watch() {
     bool stop_sent = false;
     while (reap()) {
       if (interrupted() != 0 && !stop_sent) {
@@ -165,16 +165,30 @@ class Launcher {
       std::this_thread::sleep_for(kPoll);
     }
     progress_.clear();
-    if (interrupted_) throw RunError("interrupted; what was recorded so far is in " + directory_.path().string());
-    if (culprit_ == nullptr) return;
+    if (culprit_ == nullptr && interrupted_) {
+      fmt::print(stderr, "kilotwin: interrupted; what was recorded so far is in {}\n", directory_.path().string());
+      return 1;
+    }
+    return status_;
+  }
+
+  /// Says who broke the run, at once: what follows is only cleaning up.
+  void name_culprit() {
+    progress_.clear();
+    const std::string so_far = "what was recorded so far is in " + directory_.path().string();
+    status_ = 1;
     if (WIFSIGNALED(culprit_->status)) {
-      throw RunError(fmt::format("{} (process {}) was killed by signal {}; what was recorded so far is in {}", culprit_->name,
-                                 culprit_->process, WTERMSIG(culprit_->status), directory_.path().string()));
+      fmt::print(stderr, "kilotwin: {} (process {}) was killed by signal {}; {}\n", culprit_->name, culprit_->process,
+                 WTERMSIG(culprit_->status), so_far);
+      return;
     }
     const std::string line = last_line(culprit_->log);
-    if (WEXITSTATUS(culprit_->status) == 2) throw UserError(line);
-    throw RunError(fmt::format("{}: {}; what was recorded so far is in {}", culprit_->name, line.empty() ? "failed" : line,
-                               directory_.path().string()));
+    if (WEXITSTATUS(culprit_->status) == 2) {
+      status_ = 2;
+      fmt::print(stderr, "{}\n", line);
+    } else {
+      fmt::print(stderr, "kilotwin: {}: {}; {}\n", culprit_->name, line.empty() ? "failed" : line, so_far);
+    }
   }
 
   /// Ends every child, by force if need be.
@@ -195,6 +209,7 @@ class Launcher {
   ProgressBar progress_;
   std::vector<Child> children_;
   const Child* culprit_ = nullptr;
+  int status_ = 0;
   std::optional<Clock::time_point> deadline_;
   bool interrupted_ = false, ending_ = false;
   std::mutex mutex_;
@@ -204,8 +219,8 @@ class Launcher {
 
 }  // namespace
 
-void launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options) {
-  Launcher(plan, directory, options).run();
+int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options) {
+  return Launcher(plan, directory, options).run();
 }
 
 }  // namespace kilotwin::cli

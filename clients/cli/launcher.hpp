@@ -13,8 +13,8 @@ struct LaunchOptions {
   bool show_progress = true;
 };
 
-/// Returns when all services have left. Throws RunError that names the first service that was lost or failed, UserError
-/// where a service found the input bad (a domain in use).
-void launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options);
+/// Returns the exit status when all services have left. The first service that was lost or failed is named on stderr as soon
+/// as it is known. Throws RunError where a service cannot be started.
+int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options);
 
 }  // namespace kilotwin::cli

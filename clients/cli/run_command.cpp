@@ -65,7 +65,8 @@ int run_command(const RunArguments& arguments, double start_monotonic_s) {
   if (arguments.mode == "local") {
     run_locally(plan, prepared.directory, arguments, start_monotonic_s);
   } else {
-    launch(plan, prepared.directory, {claim->domain(), start_monotonic_s, !arguments.quiet});
+    const int status = launch(plan, prepared.directory, {claim->domain(), start_monotonic_s, !arguments.quiet});
+    if (status != 0) return status;
   }
   if (!arguments.quiet) {
     fmt::print("{}", recorder::summary_text(recorder::read_summary(prepared.directory.summary()), prepared.directory.path()));

@@ -61,7 +61,7 @@ void StationEngine::see(const Inputs& inputs) {
 }
 
 void StationEngine::send_own(const Inputs& inputs) {
-  if (now_ == start_ends_) {
+  if (now_ == start_ends_ && repeating_) {
     packets_.push_back({OverheadCommand::kStop, {}});
     repeating_ = false;
     return;
@@ -91,8 +91,10 @@ void StationEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == now_);
   ++now_;
   packets_.assign(inputs.outside.begin(), inputs.outside.end());
-  // The own packet of this tick, if any, is not sent; a later one overrides what came from outside.
-  if (packets_.empty()) send_own(inputs);
+  if (packets_.empty()) return send_own(inputs);
+  // What the controller does now is not the station's to stop; the next own packet overrides it, an interval later.
+  repeating_ = false;
+  next_packet_ = std::max(next_packet_, now_ + packet_ticks_);
 }
 
 void StationEngine::emit(OverheadFrame& frame) const {

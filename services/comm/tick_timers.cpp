@@ -1,5 +1,7 @@
 #include "services/comm/tick_timers.hpp"
 
+#include <algorithm>
+
 #include "core/random/random.hpp"
 
 namespace kilotwin::comm {
@@ -19,6 +21,7 @@ TickTimers::TickTimers(const RunPlan& plan) {
     period_.push_back(static_cast<std::uint32_t>(period + 0.5));
     next_.push_back(static_cast<Cycles>(period * random.uniform(Stream::kOscillator, i, Tick{0}, 1)));
   }
+  shortest_period_ = robots == 0 ? 0 : *std::min_element(period_.begin(), period_.end());
 }
 
 }  // namespace kilotwin::comm

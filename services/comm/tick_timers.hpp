@@ -54,6 +54,7 @@ class TickTimers {
   /// Whether tx_clock exceeds `tx_period` at an interrupt in [from, until), if nothing is sent before.
   [[nodiscard]] bool exceeds(std::uint32_t i, std::uint16_t tx_period, Cycles from, Cycles until) const {
     std::uint16_t clock = clock_[i];
+    if (until - next_[i] <= kLookAhead * shortest_period_ && clock + kMostAhead <= tx_period) return false;
     std::uint8_t compare = compare_[i];
     for (Cycles t = next_[i]; t < until; compare = kRegular) {
       clock = sum(clock, compare);
@@ -81,6 +82,12 @@ class TickTimers {
     return compare == kRegular ? period_[i] : period_[i] * Cycles{kRegular - compare} / kTimerCounts;
   }
 
+  /// In so many periods of a timer come at most so many interrupts, one of them for a back-off, and so tx_clock rises by at
+  /// most kMostAhead: most robots need no closer look.
+  static constexpr Cycles kLookAhead = 3;
+  static constexpr int kMostAhead = (kLookAhead + 2) * kRegular;
+
+  Cycles shortest_period_ = 0;
   std::vector<Cycles> next_;
   std::vector<std::uint32_t> period_;
   std::vector<std::uint16_t> clock_;    ///< tx_clock

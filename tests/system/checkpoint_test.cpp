@@ -57,7 +57,7 @@ TEST_F(Checkpoints, OfAnotherExperimentAreRefused) {
 }
 
 TEST_F(Checkpoints, OfARunWithoutAnyAreAskedForInVain) {
-  run(experiment({"--mode", "local", "--duration", "1"}), scratch, "none");
+  run(experiment({"--mode", "local"}), scratch, "none");
   Words words = experiment({"--mode", "local", "--resume", scratch / "none"});
   words.insert(words.begin(), "run");
   const Outcome outcome = kilotwin(words, scratch);

@@ -49,6 +49,10 @@ bool Process::running() {
   return !ended_;
 }
 
+bool Process::says(const std::string& text, double seconds) const {
+  return eventually([&] { return read(err_).find(text) != std::string::npos; }, seconds);
+}
+
 Outcome Process::wait(double seconds) {
   if (!eventually([this] { return !running(); }, seconds)) {
     ADD_FAILURE() << "process " << process_ << " did not end within " << seconds << " s";

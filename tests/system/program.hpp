@@ -30,6 +30,8 @@ class Process {
   /// Waits for its end; kills it after `seconds`, a bound against hanging.
   Outcome wait(double seconds = 120);
   [[nodiscard]] bool running();
+  /// Whether it writes `text` to stderr within `seconds`, which is what it promises.
+  [[nodiscard]] bool says(const std::string& text, double seconds) const;
 
  private:
   pid_t process_ = -1;

@@ -137,8 +137,8 @@ TEST(Mac, TouchingRobotsThatAlwaysSendLoseNothingSilently) {
   EXPECT_LE(c.attempted - c.sent - c.aborted, poses.size());
   EXPECT_EQ(c.received + c.collided, c.sent);
   EXPECT_GT(c.received, c.sent / 100 * 98);
-  EXPECT_GT(c.aborted, 50u);
-  EXPECT_GT(c.collided, 10u);
+  EXPECT_GT(c.aborted, 0u);
+  EXPECT_GT(c.collided, 0u);
 }
 
 /// With a program that never sends, tx_clock runs through its 16 bits; the robot is asked exactly when it exceeds.

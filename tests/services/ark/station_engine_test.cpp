@@ -1,0 +1,255 @@
+#include "services/ark/station_engine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "core/base/error.hpp"
+#include "tests/support/scenes.hpp"
+
+namespace kilotwin::ark {
+namespace {
+
+constexpr std::uint8_t kRun = 0x88;
+const std::string kHub = "station { environment { hub { radius_mm: 300 } } } ";
+
+RunPlan plan_of(std::uint32_t robots, const std::string& experiment = "") {
+  return testing::make_plan(experiment, testing::grid_crowd(robots, 40, testing::Facing::kRandom));
+}
+
+/// A station with robots at rest, divided into some frames.
+class Scene {
+ public:
+  explicit Scene(const RunPlan& plan, std::uint32_t parts = 1) : station(plan), bodies_(parts), actuation_(parts) {
+    for (std::uint32_t i = 0; i < plan.robots(); ++i) {
+      const Pose pose = plan.initial_pose(i);
+      bodies_[i % parts].add(i, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
+    }
+    for (std::uint32_t p = 0; p < parts; ++p) {
+      const std::uint32_t first = plan.robots() * p / parts, last = plan.robots() * (p + 1) / parts;
+      actuation_[p] = testing::motors(Tick{0}, std::vector<std::uint8_t>(last - first, 0), std::vector<std::uint8_t>(last - first, 0), first);
+      body_frames_.push_back(&bodies_[p]);
+      actuation_frames_.push_back(&actuation_[p]);
+    }
+    std::reverse(body_frames_.begin(), body_frames_.end());
+    station.emit(frame);
+  }
+  void step(const std::vector<OverheadPacket>& outside = {}) {
+    station.step(now, {body_frames_, actuation_frames_, outside});
+    station.emit(frame);
+    ++now;
+  }
+
+  StationEngine station;
+  OverheadFrame frame;
+  Tick now;
+
+ private:
+  std::vector<BodyFrame> bodies_;
+  std::vector<ActuationFrame> actuation_;
+  std::vector<const BodyFrame*> body_frames_;
+  std::vector<const ActuationFrame*> actuation_frames_;
+};
+
+bool equal(const OverheadPacket& a, const OverheadPacket& b) { return a.command == b.command && a.message == b.message; }
+
+TEST(StationEngine, BroadcastsRunThenStops) {
+  const RunPlan plan = plan_of(5, "station { start_broadcast_s: 0.25 }");
+  Scene scene(plan);
+  ASSERT_EQ(scene.frame.tick, Tick{0});
+  ASSERT_EQ(scene.frame.packets.size(), 1u);
+  EXPECT_EQ(scene.frame.packets[0].command, OverheadCommand::kRepeat);
+  EXPECT_EQ(scene.frame.packets[0].message, (IrMessage{0, 0, 0, 0, 0, 0, 0, 0, 0, kRun}));
+  for (int k = 1; k < 200; ++k) {
+    scene.step();
+    EXPECT_EQ(scene.frame.tick, Tick{k});
+    ASSERT_EQ(scene.frame.packets.size(), k == 8 ? 1u : 0u);  // 0.25 s = 7.6 ticks
+    if (k == 8) {
+      EXPECT_EQ(scene.frame.packets[0].command, OverheadCommand::kStop);
+    }
+  }
+}
+
+/// Packets and messages of a run, with the limits checked on the way: packets at least one interval apart, a robot at
+/// most once per max(1 s, N * 0.05 s / 3), and never a robot before one that has waited longer.
+std::size_t messages_within_limits(std::uint32_t robots, double packet_interval_s, std::int64_t ticks) {
+  const RunPlan plan = plan_of(robots, "station { packet_interval_s: " + std::to_string(packet_interval_s) +
+                                           " environment { hub { radius_mm: 300 } } }");
+  Scene scene(plan);
+  std::map<std::uint16_t, std::int64_t> last;
+  std::int64_t last_packet = 0;
+  std::size_t messages = 0;
+  const double least_s = std::max(1.0, robots * 0.05 / 3);
+  while (scene.now.count() < ticks) {
+    scene.step();
+    EXPECT_LE(scene.frame.packets.size(), 1u);
+    if (scene.frame.packets.empty()) continue;
+    if (last_packet > 0) {
+      EXPECT_GE(plan.tick_length.seconds_at(Tick{scene.now.count() - last_packet}), packet_interval_s);
+    }
+    last_packet = scene.now.count();
+    if (scene.frame.packets[0].command != OverheadCommand::kRepeat) continue;
+    EXPECT_EQ(scene.frame.packets[0].message[9], 0);
+    std::int64_t longest_left = -1;
+    std::vector<std::uint16_t> addressed;
+    for (const ArkMessage& message : unpack(scene.frame.packets[0].message)) {
+      if (message.id == kArkNobody) continue;
+      EXPECT_LT(message.id, robots);
+      EXPECT_LE(message.type, 1);
+      ++messages;
+      if (last.contains(message.id)) {
+        EXPECT_GE(plan.tick_length.seconds_at(Tick{scene.now.count() - last[message.id]}), least_s);
+        longest_left = std::max(longest_left, last[message.id]);
+      }
+      addressed.push_back(message.id);
+    }
+    for (std::uint16_t robot = 0; robot < robots; ++robot) {
+      if (std::find(addressed.begin(), addressed.end(), robot) != addressed.end()) continue;
+      EXPECT_TRUE(longest_left < 0 || (last.contains(robot) && last[robot] >= longest_left));
+    }
+    for (const std::uint16_t robot : addressed) last[robot] = scene.now.count();
+  }
+  EXPECT_EQ(last.size(), std::min<std::size_t>(robots, 3 * messages));
+  return messages;
+}
+
+TEST(StationEngine, ServesRobotsInTurnWithinTheLimits) {
+  const double seconds = 3000 * 0.032768;
+  // Few robots: each about once a second (31 ticks); many: three per packet, a packet every two ticks.
+  EXPECT_NEAR(static_cast<double>(messages_within_limits(5, 0.05, 3000)), 5 * seconds / 1.0158, 10);
+  EXPECT_NEAR(static_cast<double>(messages_within_limits(1000, 0.05, 3000)), 3 * 3000 / 2, 30);
+  EXPECT_NEAR(static_cast<double>(messages_within_limits(100, 0.5, 3000)), 3 * 3000 / 16, 10);
+  messages_within_limits(1, 0.05, 500);
+  messages_within_limits(60, 0.05, 3000);
+  messages_within_limits(64, 0.09, 3000);
+}
+
+TEST(StationEngine, TellsWhatTheTrackerSaw) {
+  const RunPlan plan = plan_of(9, "station { environment { hub { x_mm: 40 y_mm: 0 radius_mm: 30 } } }");
+  Scene scene(plan);
+  std::size_t inside = 0;
+  const auto hub = make_environment(plan.experiment().station().environment(0));
+  for (int k = 0; k < 40; ++k) {
+    scene.step();
+    if (scene.frame.packets.empty() || scene.frame.packets[0].command != OverheadCommand::kRepeat) continue;
+    for (const ArkMessage& message : unpack(scene.frame.packets[0].message)) {
+      if (message.id == kArkNobody) continue;
+      EXPECT_EQ(message, hub->sense({message.id, plan.initial_pose(message.id), 0}));
+      inside += message.type;
+    }
+  }
+  EXPECT_EQ(inside, 1u);  // the robot at (40, 0)
+}
+
+TEST(StationEngine, FreesTheAirWhileNobodyIsDue) {
+  const RunPlan plan = plan_of(3, kHub);
+  Scene scene(plan);
+  int repeats = 0, stops = 0;
+  for (int k = 0; k < 310; ++k) {
+    scene.step();
+    for (const OverheadPacket& packet : scene.frame.packets) {
+      repeats += packet.command == OverheadCommand::kRepeat;
+      stops += packet.command == OverheadCommand::kStop;
+    }
+  }
+  EXPECT_NEAR(repeats, 10, 1);
+  EXPECT_NEAR(stops, repeats, 1);
+}
+
+TEST(StationEngine, ForwardsPacketsFromOutsideInOrder) {
+  const RunPlan plan = plan_of(1000, kHub);
+  Scene scene(plan);
+  const std::vector<OverheadPacket> outside{{OverheadCommand::kOnce, {1, 2, 3, 4, 5, 6, 7, 8, 9, 0x83}},
+                                            {OverheadCommand::kRepeat, {9, 8, 7, 6, 5, 4, 3, 2, 1, 0x42}},
+                                            {OverheadCommand::kStop, {}}};
+  for (int k = 1; k < 100; ++k) {
+    if (k % 7 != 0) {
+      scene.step();
+      continue;
+    }
+    scene.step(outside);
+    ASSERT_EQ(scene.frame.packets.size(), 3u);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(equal(scene.frame.packets[i], outside[i]));
+    scene.step();  // 33 ms later: the overhead controller is not ready for the next
+    EXPECT_TRUE(scene.frame.packets.empty());
+  }
+}
+
+/// What somebody outside repeats goes on until somebody outside ends it, where the station has nothing of its own to say.
+TEST(StationEngine, DoesNotStopWhatComesFromOutside) {
+  for (int when : {3, 8, 20}) {
+    const RunPlan plan = plan_of(5);
+    Scene scene(plan);
+    for (int k = 1; k < 60; ++k) {
+      if (k == when) {
+        scene.step({{OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0x42}}});
+      } else {
+        scene.step();
+        EXPECT_TRUE(scene.frame.packets.empty() || k < when) << k;
+      }
+    }
+  }
+}
+
+TEST(StationEngine, DivisionOfTheFramesChangesNothing) {
+  const RunPlan plan = plan_of(100, kHub);
+  Scene one(plan), many(plan, 7);
+  for (int k = 0; k < 400; ++k) {
+    one.step();
+    many.step();
+    ASSERT_EQ(one.station.hash_part(), many.station.hash_part());
+    ASSERT_EQ(one.frame.packets.size(), many.frame.packets.size());
+  }
+}
+
+TEST(StationEngine, LoadedEngineGoesOnAsTheSavedOne) {
+  for (const std::uint32_t robots : {1u, 2u, 3u, 4u, 50u, 100u, 1022u}) {
+    const RunPlan plan = plan_of(robots, "station { environment { hub { } } environment { hub { x_mm: 500 } } } ");
+    std::mt19937 random(robots);
+    Scene scene(plan);
+    std::unique_ptr<Scene> loaded;
+    for (int k = 0; k < 1500; ++k) {
+      std::vector<OverheadPacket> outside;
+      if (random() % 20 == 0) outside.push_back({OverheadCommand::kRepeat, {static_cast<std::uint8_t>(random())}});
+      scene.step(outside);
+      if (loaded) {
+        loaded->step(outside);
+        ASSERT_EQ(loaded->station.hash_part(), scene.station.hash_part()) << robots << " " << k;
+        ASSERT_EQ(loaded->frame.packets.size(), scene.frame.packets.size());
+        for (std::size_t i = 0; i < scene.frame.packets.size(); ++i) {
+          ASSERT_TRUE(equal(loaded->frame.packets[i], scene.frame.packets[i]));
+        }
+      }
+      if (random() % 9 != 0) continue;
+      proto::StationState part, read;
+      scene.station.save(part);
+      ASSERT_TRUE(read.ParseFromString(part.SerializeAsString()));
+      const proto::StationState* const parts[] = {&read};
+      loaded = std::make_unique<Scene>(plan);
+      loaded->station.load(scene.now, parts);
+      loaded->now = scene.now;
+      OverheadFrame frame;
+      loaded->station.emit(frame);
+      ASSERT_EQ(frame.tick, scene.now);
+      ASSERT_EQ(frame.packets.size(), scene.frame.packets.size());
+      ASSERT_EQ(loaded->station.hash_part(), scene.station.hash_part());
+    }
+  }
+}
+
+TEST(StationEngine, RejectsAnotherExperimentsState) {
+  const RunPlan plan = plan_of(5, kHub), other = plan_of(6, kHub);
+  StationEngine engine(plan);
+  proto::StationState part;
+  StationEngine(other).save(part);
+  const proto::StationState* const parts[] = {&part};
+  EXPECT_THROW(engine.load(Tick{0}, parts), RunError);
+  EXPECT_THROW(engine.load(Tick{0}, {}), RunError);
+}
+
+}  // namespace
+}  // namespace kilotwin::ark
