@@ -67,7 +67,8 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
     }
     writer_.messages(messages);
   }
-  writer_.end(totals.last, totals.state_hash, totals.failure);
+  // A run that broke before any state hash was known ended where it began.
+  writer_.end(std::max(totals.last, totals.first), totals.state_hash, totals.failure);
 
   recorder::Summary summary;
   summary.name = plan_.experiment().name();

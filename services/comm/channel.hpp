@@ -11,21 +11,23 @@ namespace kilotwin::comm {
 
 class Channel {
  public:
-  explicit Channel(const Neighbourhood& neighbourhood) : neighbourhood_(neighbourhood), newest_(neighbourhood.cells(), kNone) {}
+  explicit Channel(const Neighbourhood& neighbourhood)
+      : neighbourhood_(neighbourhood), newest_(neighbourhood.cells(), kNone) {}
 
   /// Files all transmissions by where their senders are now.
   void locate();
   void add(const Transmission&);
   /// Forgets what is over at `t`. Call locate() before the next search.
-  void forget(Cycles t) { std::erase_if(all_, [t](const Transmission& x) { return x.end <= t; }); }
+  void forget(Cycles t) {
+    std::erase_if(all_, [t](const Transmission& x) { return x.end <= t; });
+  }
 
   /// In the order in which they were added.
   [[nodiscard]] std::vector<Transmission>& all() { return all_; }
   [[nodiscard]] const std::vector<Transmission>& all() const { return all_; }
 
   /// Calls f(transmission) for the transmissions of other robots in range of `robot`, in no particular order.
-  template <class F>
-  void visit_heard(std::uint32_t robot, F f) {
+  template <class F> void visit_heard(std::uint32_t robot, F f) {
     visit_near(robot, 1, [&](Transmission& x) {
       if (x.sender != robot && neighbourhood_.in_range(robot, x.sender)) f(x);
     });
@@ -37,8 +39,7 @@ class Channel {
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  template <class F>
-  void visit_near(std::uint32_t robot, std::uint32_t ranges, F f) {
+  template <class F> void visit_near(std::uint32_t robot, std::uint32_t ranges, F f) {
     neighbourhood_.visit_cells(robot, ranges, [&](std::uint32_t cell) {
       for (std::uint32_t i = newest_[cell]; i != kNone; i = older_[i]) f(all_[i]);
     });

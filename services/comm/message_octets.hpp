@@ -11,9 +11,7 @@
 
 namespace kilotwin::comm {
 
-inline void append(std::string& octets, const IrMessage& message) {
-  octets.append(message.begin(), message.end());
-}
+inline void append(std::string& octets, const IrMessage& message) { octets.append(message.begin(), message.end()); }
 
 /// Message `i` of a string of messages. Throws RunError where the string ends before.
 inline IrMessage message_at(const std::string& octets, std::size_t i) {

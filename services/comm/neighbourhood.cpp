@@ -14,8 +14,15 @@ constexpr std::uint32_t kRobotsPerCell = 4;
 }  // namespace
 
 Neighbourhood::Neighbourhood(double range_mm, std::uint32_t robots)
-    : range_square_(range_mm * range_mm), cells_per_mm_(1 / (range_mm * kCellSlack)), side_bits_(kLeastSideBits),
-      x_mm_(robots), y_mm_(robots), cell_of_(robots), sorted_(robots), sorted_x_mm_(robots), sorted_y_mm_(robots) {
+    : range_square_(range_mm * range_mm),
+      cells_per_mm_(1 / (range_mm * kCellSlack)),
+      side_bits_(kLeastSideBits),
+      x_mm_(robots),
+      y_mm_(robots),
+      cell_of_(robots),
+      sorted_(robots),
+      sorted_x_mm_(robots),
+      sorted_y_mm_(robots) {
   while (cells() < robots / kRobotsPerCell) ++side_bits_;
   mask_ = (1u << side_bits_) - 1;
 }

@@ -29,8 +29,7 @@ class Neighbourhood {
   [[nodiscard]] double range_square() const { return range_square_; }
 
   /// Calls f(other, squared distance) for every other robot in range, in no particular order.
-  template <class F>
-  void visit(std::uint32_t robot, F f) const {
+  template <class F> void visit(std::uint32_t robot, F f) const {
     const double x = x_mm_[robot], y = y_mm_[robot];
     const auto scan = [&](std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t m = begin; m < end; ++m) {
@@ -46,7 +45,8 @@ class Neighbourhood {
       if (!folded) {
         scan(first_[line + column - 1], first_[line + column + 2]);
       } else {
-        for (std::uint32_t c = column - 1; c != column + 2; ++c) scan(first_[line + (c & mask_)], first_[line + (c & mask_) + 1]);
+        for (std::uint32_t c = column - 1; c != column + 2; ++c)
+          scan(first_[line + (c & mask_)], first_[line + (c & mask_) + 1]);
       }
     }
   }
@@ -55,8 +55,7 @@ class Neighbourhood {
   [[nodiscard]] std::uint32_t cells() const { return 1u << (2 * side_bits_); }
   [[nodiscard]] std::uint32_t cell_of(std::uint32_t robot) const { return cell_of(x_mm_[robot], y_mm_[robot]); }
   /// Calls f(cell) for the cells of all places within `ranges` (1 or 2) ranges of a robot.
-  template <class F>
-  void visit_cells(std::uint32_t robot, std::uint32_t ranges, F f) const {
+  template <class F> void visit_cells(std::uint32_t robot, std::uint32_t ranges, F f) const {
     const std::uint32_t column = coordinate(x_mm_[robot]), row = coordinate(y_mm_[robot]);
     for (std::uint32_t r = row - ranges; r != row + ranges + 1; ++r) {
       for (std::uint32_t c = column - ranges; c != column + ranges + 1; ++c) {
@@ -71,7 +70,8 @@ class Neighbourhood {
 
   [[nodiscard]] std::uint32_t coordinate(double mm) const {
     // The offset makes it positive, so that the conversion rounds down.
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>((std::min(std::max(mm, -kFar_mm), kFar_mm) + kFar_mm) * cells_per_mm_));
+    return static_cast<std::uint32_t>(
+        static_cast<std::int32_t>((std::min(std::max(mm, -kFar_mm), kFar_mm) + kFar_mm) * cells_per_mm_));
   }
   [[nodiscard]] std::uint32_t cell_of(double x_mm, double y_mm) const {
     return (coordinate(y_mm) & mask_) << side_bits_ | (coordinate(x_mm) & mask_);

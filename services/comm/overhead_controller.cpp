@@ -32,8 +32,9 @@ void OverheadController::forget(Cycles t) {
 
 std::uint64_t OverheadController::hash() const {
   const auto [low, high] = words(message_);
-  std::uint64_t sum = entity_hash(HashDomain::kRadio, 0xffffffffu,
-                                  {static_cast<std::uint64_t>(next_), repeating_, repeating_ ? low : 0, repeating_ ? high : 0});
+  std::uint64_t sum =
+      entity_hash(HashDomain::kRadio, 0xffffffffu,
+                  {static_cast<std::uint64_t>(next_), repeating_, repeating_ ? low : 0, repeating_ ? high : 0});
   for (std::uint32_t i = 0; i < waiting_.size(); ++i) {
     const auto [first, second] = words(waiting_[i]);
     sum += entity_hash(HashDomain::kRadio, 0xfffffffeu, {i, first, second});
@@ -57,7 +58,8 @@ void OverheadController::load(const proto::OverheadControllerState& state) {
   repeating_ = state.repeating();
   message_ = message_at(state.message(), 0);
   waiting_.clear();
-  for (std::size_t i = 0; i < state.waiting().size() / message_.size(); ++i) waiting_.push_back(message_at(state.waiting(), i));
+  for (std::size_t i = 0; i < state.waiting().size() / message_.size(); ++i)
+    waiting_.push_back(message_at(state.waiting(), i));
   copies_.clear();
   for (int i = 0; i < state.copy_start_size(); ++i) {
     copies_.push_back({state.copy_start(i), message_at(state.copy_messages(), static_cast<std::size_t>(i))});

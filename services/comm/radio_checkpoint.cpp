@@ -9,7 +9,8 @@ namespace {
 constexpr char kAborted = 1, kOrphaned = 2;
 
 void require(bool condition) {
-  if (!condition) throw RunError("the radio's part of the checkpoint does not fit the experiment; resume from another one");
+  if (!condition)
+    throw RunError("the radio's part of the checkpoint does not fit the experiment; resume from another one");
 }
 
 std::size_t size_of(int size) { return static_cast<std::size_t>(size); }
@@ -29,7 +30,8 @@ void RadioEngine::save(proto::RadioState& part) const {
     part.add_transmission_start(x.start);
     part.add_transmission_end(x.end);
     part.add_transmission_sender(x.sender);
-    part.mutable_transmission_flags()->push_back(static_cast<char>((x.aborted ? kAborted : 0) | (x.orphaned ? kOrphaned : 0)));
+    part.mutable_transmission_flags()->push_back(
+        static_cast<char>((x.aborted ? kAborted : 0) | (x.orphaned ? kOrphaned : 0)));
     append(*part.mutable_transmission_messages(), x.message);
   }
   overhead_.save(*part.mutable_overhead());
@@ -77,9 +79,11 @@ void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> part
   overhead_.load(part.overhead());
   sent_.assign(part.sent().begin(), part.sent().end());
   receptions_.load(part);
-  counters_ = {part.attempted(), part.messages_sent(), part.received(), part.collided(), part.aborted(), part.faded()};
+  counters_ = {part.attempted(), part.messages_sent(), part.received(),
+               part.collided(),  part.aborted(),       part.faded()};
   pairs_.clear();
-  require(part.pair_sender_size() == part.pair_receiver_size() && part.pair_count_size() == part.pair_receiver_size());
+  require(part.pair_sender_size() == part.pair_receiver_size() &&
+          part.pair_count_size() == part.pair_receiver_size());
   for (int n = 0; counts_pairs_ && n < part.pair_receiver_size(); ++n) {
     require(part.pair_receiver(n) < robots);
     pairs_.add(part.pair_receiver(n), part.pair_sender(n), part.pair_count(n));
@@ -105,7 +109,8 @@ void ReceptionLog::load(const proto::RadioState& part) {
   for (std::size_t n = 0; n < messages; ++n) messages_.push_back(message_at(part.received_messages(), n));
   for (int n = 0; n < receptions; ++n) {
     require(part.reception_robot(n) + 1 < first_.size() && part.reception_message(n) < messages);
-    arrived_.push_back({part.reception_robot(n), part.reception_message(n),
+    arrived_.push_back({part.reception_robot(n),
+                        part.reception_message(n),
                         {static_cast<std::int16_t>(part.reception_high_gain(n)),
                          static_cast<std::int16_t>(part.reception_low_gain(n))}});
   }

@@ -193,8 +193,10 @@ void RadioEngine::abort(Transmission& transmission, Cycles t, Tick now) {
   // A robot aborts at most once between two of its interrupts, so their count tells its aborts in a tick apart.
   const std::uint64_t bits = random_.bits(Stream::kBackOff, robot, now, timers_.counts()[robot]);
   timers_.back_off(robot, t, static_cast<std::uint8_t>(bits >> 56));
-  if (is(robot, kRunning | kHolding)) schedule(robot, begin_of(now + 1));
-  else timers_.pass(robot, begin_of(now + 1));
+  if (is(robot, kRunning | kHolding))
+    schedule(robot, begin_of(now + 1));
+  else
+    timers_.pass(robot, begin_of(now + 1));
 }
 
 void RadioEngine::arrive(Tick now) {
@@ -210,8 +212,9 @@ void RadioEngine::arrive(Tick now) {
   for (std::uint32_t i = 0; i < copies.size(); ++i) {
     if (copies[i].end() >= begin && copies[i].end() < end) arrivals_.push_back({copies[i].end(), kOverhead, i});
   }
-  std::sort(arrivals_.begin(), arrivals_.end(),
-            [](const Arrival& a, const Arrival& b) { return a.end != b.end ? a.end < b.end : a.sender < b.sender; });
+  std::sort(arrivals_.begin(), arrivals_.end(), [](const Arrival& a, const Arrival& b) {
+    return a.end != b.end ? a.end < b.end : a.sender < b.sender;
+  });
 
   receptions_.clear();
   if (!arrivals_.empty()) neighbourhood_.sort();
@@ -310,7 +313,8 @@ void RadioEngine::emit(HostId host, RadioFrame& frame) const {
 std::uint64_t RadioEngine::hash_part() const {
   std::uint64_t sum = overhead_.hash();
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
-    const std::uint64_t counts = timers_.count_word(i) | std::uint64_t{state_[i]} << 32 | std::uint64_t{receptions_.count(i)} << 40;
+    const std::uint64_t counts =
+        timers_.count_word(i) | std::uint64_t{state_[i]} << 32 | std::uint64_t{receptions_.count(i)} << 40;
     sum += entity_hash(HashDomain::kRadio, i, {timers_.time_word(i), counts});
   }
   for (const Transmission& x : channel_.all()) {

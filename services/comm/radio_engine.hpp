@@ -55,9 +55,9 @@ class RadioEngine {
     std::uint64_t attempted = 0;  ///< start pulses
     std::uint64_t sent = 0;       ///< whole packets
     std::uint64_t received = 0;
-    std::uint64_t collided = 0;   ///< receptions lost because something overlapped
-    std::uint64_t aborted = 0;    ///< given up in the leading byte
-    std::uint64_t faded = 0;      ///< receptions lost by radio.loss
+    std::uint64_t collided = 0;  ///< receptions lost because something overlapped
+    std::uint64_t aborted = 0;   ///< given up in the leading byte
+    std::uint64_t faded = 0;     ///< receptions lost by radio.loss
   };
 
   explicit RadioEngine(const RunPlan&);

@@ -39,9 +39,10 @@ class ReceptionLog {
     Gains gains;
   };
   std::vector<IrMessage> messages_;
-  std::vector<Reception> arrived_;    ///< in order of arrival
-  std::vector<Reception> sorted_;     ///< by robot
-  std::vector<std::uint32_t> first_;  ///< per robot: where its receptions begin in sorted_; one more entry at the end
+  std::vector<Reception> arrived_;  ///< in order of arrival
+  std::vector<Reception> sorted_;   ///< by robot
+  std::vector<std::uint32_t>
+      first_;  ///< per robot: where its receptions begin in sorted_; one more entry at the end
   mutable std::vector<std::uint32_t> number_;  ///< scratch of emit: per message, its index in the frame
 };
 

@@ -76,7 +76,9 @@ class TickTimers {
   }
 
  private:
-  static std::uint16_t sum(std::uint16_t clock, std::uint8_t compare) { return static_cast<std::uint16_t>(clock + compare); }
+  static std::uint16_t sum(std::uint16_t clock, std::uint8_t compare) {
+    return static_cast<std::uint16_t>(clock + compare);
+  }
   /// Nominal cycles from where the timer equals `compare` to where it equals 255 next.
   [[nodiscard]] Cycles until_regular(std::uint32_t i, std::uint8_t compare) const {
     return compare == kRegular ? period_[i] : period_[i] * Cycles{kRegular - compare} / kTimerCounts;
@@ -90,7 +92,7 @@ class TickTimers {
   Cycles shortest_period_ = 0;
   std::vector<Cycles> next_;
   std::vector<std::uint32_t> period_;
-  std::vector<std::uint16_t> clock_;    ///< tx_clock
+  std::vector<std::uint16_t> clock_;  ///< tx_clock
   std::vector<std::uint8_t> compare_;
   std::vector<std::uint8_t> count_;
 };

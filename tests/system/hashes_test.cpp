@@ -23,6 +23,7 @@ struct Division {
   const char* name;
   Words words;
 };
+void PrintTo(const Division& division, std::ostream* out) { *out << division.name; }
 
 class OneHash : public testing::TestWithParam<Division> {};
 

@@ -25,7 +25,8 @@ TEST(ArkMessage, ComesBackAsItWasPacked) {
            static_cast<std::uint16_t>(random() % 1024)};
     }
     const auto back = unpack(pack(messages));
-    for (std::size_t i = 0; i < 3; ++i) ASSERT_EQ(back[i], i < messages.size() ? messages[i] : (ArkMessage{1023, 0, 0}));
+    for (std::size_t i = 0; i < 3; ++i)
+      ASSERT_EQ(back[i], i < messages.size() ? messages[i] : (ArkMessage{1023, 0, 0}));
   }
 }
 

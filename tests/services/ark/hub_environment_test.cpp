@@ -17,7 +17,8 @@ std::unique_ptr<VirtualEnvironment> hub(double x_mm, double y_mm, double radius_
   return make_environment(description);
 }
 
-ArkMessage seen_from(const VirtualEnvironment& environment, double x_mm, double y_mm, double heading_rad, std::uint32_t robot = 7) {
+ArkMessage seen_from(const VirtualEnvironment& environment, double x_mm, double y_mm, double heading_rad,
+                     std::uint32_t robot = 7) {
   return environment.sense({robot, {{x_mm, y_mm}, heading_rad}, 0});
 }
 
@@ -37,7 +38,8 @@ TEST(HubEnvironment, BearsAnticlockwiseFromTheHeading) {
   EXPECT_EQ(seen_from(*environment, 100, 0, 0).payload, 180);
   EXPECT_EQ(seen_from(*environment, 0, 100, 0).payload, 270);
   EXPECT_EQ(seen_from(*environment, 0, 100, kPi / 2).payload, 180);
-  EXPECT_EQ(seen_from(*environment, -100, 0, 0.25 * kPi / 180).payload, 0);  // -0.25 degrees is nearest to 0, not to 360
+  EXPECT_EQ(seen_from(*environment, -100, 0, 0.25 * kPi / 180).payload,
+            0);  // -0.25 degrees is nearest to 0, not to 360
   EXPECT_EQ(seen_from(*environment, -100, 0, kPi / 180).payload, 359);
 }
 

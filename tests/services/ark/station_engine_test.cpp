@@ -31,7 +31,8 @@ class Scene {
     }
     for (std::uint32_t p = 0; p < parts; ++p) {
       const std::uint32_t first = plan.robots() * p / parts, last = plan.robots() * (p + 1) / parts;
-      actuation_[p] = testing::motors(Tick{0}, std::vector<std::uint8_t>(last - first, 0), std::vector<std::uint8_t>(last - first, 0), first);
+      actuation_[p] = testing::motors(Tick{0}, std::vector<std::uint8_t>(last - first, 0),
+                                      std::vector<std::uint8_t>(last - first, 0), first);
       body_frames_.push_back(&bodies_[p]);
       actuation_frames_.push_back(&actuation_[p]);
     }
@@ -55,7 +56,9 @@ class Scene {
   std::vector<const ActuationFrame*> actuation_frames_;
 };
 
-bool equal(const OverheadPacket& a, const OverheadPacket& b) { return a.command == b.command && a.message == b.message; }
+bool equal(const OverheadPacket& a, const OverheadPacket& b) {
+  return a.command == b.command && a.message == b.message;
+}
 
 TEST(StationEngine, BroadcastsRunThenStops) {
   const RunPlan plan = plan_of(5, "station { start_broadcast_s: 0.25 }");

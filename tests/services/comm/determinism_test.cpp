@@ -51,7 +51,8 @@ void expect_equal(const RadioFrame& a, const RadioFrame& b) {
 
 constexpr std::uint32_t kRobots = 150;
 
-RunPlan crowd_plan(const std::string& experiment, std::uint32_t columns = 1, std::uint32_t rows = 1, std::uint32_t hosts = 1) {
+RunPlan crowd_plan(const std::string& experiment, std::uint32_t columns = 1, std::uint32_t rows = 1,
+                   std::uint32_t hosts = 1) {
   return make_plan(experiment + " arena { width_mm: 900 height_mm: 900 } recording { messages: true }",
                    testing::random_crowd(kRobots, 800, 800, 33, 7), columns, rows, hosts);
 }
@@ -74,8 +75,10 @@ void stir(testing::FakeHosts& hosts, Tick now) {
   hosts.place();
   if (draw(20) == 0) {
     for (std::uint64_t n = draw(4); n-- > 0;) {
-      constexpr OverheadCommand kCommands[] = {OverheadCommand::kStop, OverheadCommand::kRepeat, OverheadCommand::kOnce};
-      hosts.overhead.packets.push_back({kCommands[draw(3)], {static_cast<std::uint8_t>(draw(256)), 1, 2, 3, 4, 5, 6, 7, 8, 0x7f}});
+      constexpr OverheadCommand kCommands[] = {OverheadCommand::kStop, OverheadCommand::kRepeat,
+                                               OverheadCommand::kOnce};
+      hosts.overhead.packets.push_back(
+          {kCommands[draw(3)], {static_cast<std::uint8_t>(draw(256)), 1, 2, 3, 4, 5, 6, 7, 8, 0x7f}});
     }
   }
 }
@@ -84,7 +87,8 @@ TEST(Determinism, PartitionsAndHostsChangeNothing) {
   const std::string experiment = "radio { range_mm: 120 loss: 0.1 oscillator_sd: 0.02 } ";
   const RunPlan one = crowd_plan(experiment);
   Swarm whole(one);
-  const RunPlan plans[] = {crowd_plan(experiment, 3, 2, 4), crowd_plan(experiment, 1, 5, 64), crowd_plan(experiment, 4, 4, 3)};
+  const RunPlan plans[] = {crowd_plan(experiment, 3, 2, 4), crowd_plan(experiment, 1, 5, 64),
+                           crowd_plan(experiment, 4, 4, 3)};
   std::vector<std::unique_ptr<Swarm>> divided;
   for (const RunPlan& plan : plans) divided.push_back(std::make_unique<Swarm>(plan));
   for (int k = 0; k < 1500; ++k) {
@@ -113,7 +117,8 @@ TEST(Determinism, HasItsGoldenHash) {
     stir(swarm.hosts, swarm.now);
     swarm.step();
     chain = hash_chain(chain, swarm.radio.hash_part());
-    for (const std::int16_t gain : swarm.frames[0].reception_high_gain) chain = hash_chain(chain, static_cast<std::uint64_t>(gain));
+    for (const std::int16_t gain : swarm.frames[0].reception_high_gain)
+      chain = hash_chain(chain, static_cast<std::uint64_t>(gain));
   }
   EXPECT_EQ(chain, 0x9cb934f5ae087e83u);
 }
@@ -134,7 +139,8 @@ TEST(Determinism, LoadedEngineGoesOnAsTheSavedOne) {
       if (random() % 7 == 0) {
         proto::RadioState part;
         swarm.radio.save(part);
-        for (const std::int64_t end : part.transmission_end()) straddled += end >= swarm.now.count() * plan.tick_length.cycles();
+        for (const std::int64_t end : part.transmission_end())
+          straddled += end >= swarm.now.count() * plan.tick_length.cycles();
         const std::string octets = part.SerializeAsString();
         proto::RadioState read;
         ASSERT_TRUE(read.ParseFromString(octets));
@@ -186,8 +192,9 @@ TEST(Determinism, SeedAndInputsShowInTheHash) {
 TEST(Fuzz, TheBooksBalance) {
   for (std::uint32_t round = 0; round < 12; ++round) {
     const std::uint32_t cycles[] = {262144, 32768, 1048576, 200001};
-    const RunPlan plan = crowd_plan("tick_cycles: " + std::to_string(cycles[round % 4]) + " seed: " + std::to_string(round) +
-                                    " radio { range_mm: " + std::to_string(40 + 30 * round) + " oscillator_sd: 0.05 } ");
+    const RunPlan plan =
+        crowd_plan("tick_cycles: " + std::to_string(cycles[round % 4]) + " seed: " + std::to_string(round) +
+                   " radio { range_mm: " + std::to_string(40 + 30 * round) + " oscillator_sd: 0.05 } ");
     Swarm swarm(plan);
     std::mt19937_64 random(round);
     std::vector<std::vector<IrMessage>> given(kRobots);
@@ -207,8 +214,10 @@ TEST(Fuzz, TheBooksBalance) {
       const RadioFrame& frame = swarm.frames[0];
       ASSERT_EQ(frame.kilo_ticks.size(), kRobots);
       ASSERT_TRUE(std::is_sorted(frame.reception_robot.begin(), frame.reception_robot.end()));
-      ASSERT_TRUE(std::adjacent_find(frame.ask.begin(), frame.ask.end(), std::greater_equal<>()) == frame.ask.end());
-      ASSERT_TRUE(std::adjacent_find(frame.sent.begin(), frame.sent.end(), std::greater_equal<>()) == frame.sent.end());
+      ASSERT_TRUE(std::adjacent_find(frame.ask.begin(), frame.ask.end(), std::greater_equal<>()) ==
+                  frame.ask.end());
+      ASSERT_TRUE(std::adjacent_find(frame.sent.begin(), frame.sent.end(), std::greater_equal<>()) ==
+                  frame.sent.end());
       for (const std::uint32_t robot : frame.sent) ASSERT_LE(++reported[robot], given[robot].size());
       for (std::size_t n = 0; n < frame.reception_robot.size(); ++n) {
         const IrMessage& message = frame.messages.at(frame.reception_message[n]);

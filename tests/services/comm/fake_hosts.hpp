@@ -17,8 +17,13 @@ namespace kilotwin::testing {
 class FakeHosts {
  public:
   explicit FakeHosts(const RunPlan& plan)
-      : life_cycle(plan.robots(), static_cast<std::uint8_t>(LifeCycle::kRunning)), tx_period(plan.robots(), 3906),
-        sends(plan.robots(), 1), plan_(plan), bodies_(plan.grid.size()), actuation_(plan.hosts), slot_(plan.robots(), 0) {
+      : life_cycle(plan.robots(), static_cast<std::uint8_t>(LifeCycle::kRunning)),
+        tx_period(plan.robots(), 3906),
+        sends(plan.robots(), 1),
+        plan_(plan),
+        bodies_(plan.grid.size()),
+        actuation_(plan.hosts),
+        slot_(plan.robots(), 0) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) poses.push_back({});
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
@@ -27,7 +32,8 @@ class FakeHosts {
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       const Share share = plan.share(HostId{h});
       ActuationFrame& frame = actuation_[h];
-      frame = motors(Tick{0}, std::vector<std::uint8_t>(share.size(), 0), std::vector<std::uint8_t>(share.size(), 0), share.first);
+      frame = motors(Tick{0}, std::vector<std::uint8_t>(share.size(), 0),
+                     std::vector<std::uint8_t>(share.size(), 0), share.first);
       for (std::uint32_t i = 0; i < share.size(); ++i) {
         frame.life_cycle[i] = life_cycle[share.first + i];
         frame.tx_period[i] = tx_period[share.first + i];
@@ -47,8 +53,8 @@ class FakeHosts {
   /// The message that a robot hands over.
   std::function<IrMessage(std::uint32_t robot, Tick)> message = [](std::uint32_t robot, Tick tick) {
     const auto t = static_cast<std::uint64_t>(tick.count());
-    return IrMessage{static_cast<std::uint8_t>(robot), static_cast<std::uint8_t>(robot >> 8), static_cast<std::uint8_t>(t),
-                     static_cast<std::uint8_t>(t >> 8)};
+    return IrMessage{static_cast<std::uint8_t>(robot), static_cast<std::uint8_t>(robot >> 8),
+                     static_cast<std::uint8_t>(t), static_cast<std::uint8_t>(t >> 8)};
   };
   std::vector<ScenePose> poses;
   OverheadFrame overhead;
@@ -86,7 +92,9 @@ class FakeHosts {
   }
 
  private:
-  [[nodiscard]] bool running(std::uint32_t i) const { return life_cycle[i] == static_cast<std::uint8_t>(LifeCycle::kRunning); }
+  [[nodiscard]] bool running(std::uint32_t i) const {
+    return life_cycle[i] == static_cast<std::uint8_t>(LifeCycle::kRunning);
+  }
 
   const RunPlan& plan_;
   std::vector<BodyFrame> bodies_;

@@ -102,7 +102,8 @@ TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
 }
 
 TEST(Mac, LaterOneWaitsForItsNextTick) {
-  for (const auto& [least, most] : {std::pair{kListening, kListening + 500}, std::pair{kPacket - 3000, kPacket - 1}}) {
+  for (const auto& [least, most] :
+       {std::pair{kListening, kListening + 500}, std::pair{kPacket - 3000, kPacket - 1}}) {
     const Duel duel = make_duel(least, most);
     const TickTimers timers(duel.plan);
     const std::uint32_t later = 1 - duel.earlier;
@@ -143,7 +144,8 @@ TEST(Mac, TouchingRobotsThatAlwaysSendLoseNothingSilently) {
 
 /// With a program that never sends, tx_clock runs through its 16 bits; the robot is asked exactly when it exceeds.
 TEST(Mac, AsksExactlyWhereAnAttemptCouldTakePlace) {
-  const RunPlan plan = make_plan("radio { oscillator_sd: 0.05 }", testing::grid_crowd(20, 200, testing::Facing::kRight));
+  const RunPlan plan =
+      make_plan("radio { oscillator_sd: 0.05 }", testing::grid_crowd(20, 200, testing::Facing::kRight));
   Swarm swarm(plan);
   swarm.hosts.sends.assign(20, 0);
   TickTimers timers(plan);
@@ -195,6 +197,43 @@ TEST(Mac, SlotIsEmptiedOutsideRunning) {
     EXPECT_GE(swarm.radio.counters().sent, stopped.sent + 3);
   }
   EXPECT_LE(unreported, 1u);
+}
+
+/// The robot is stopped at the border of the ticks between which its packet is on the air: the packet is whole and heard, but
+/// its success belongs to nobody.
+TEST(Mac, WhatIsOnTheAirEndsUnreported) {
+  int straddling = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const RunPlan plan = seeded(kExact, seed, {{0, 0, 0}, {40, 0, 0}});
+    const TickTimers timers(plan);
+    const Cycles start = timers.next(0) + 15 * timers.period(0);
+    if (start / kTick == (start + kPacket) / kTick) continue;
+    ++straddling;
+    Swarm swarm(plan);
+    swarm.hosts.sends[1] = 0;
+    while (swarm.now.count() < start / kTick) swarm.step();
+    swarm.hosts.life_cycle[0] = kIdle;  // counts from the next tick on
+    std::size_t reported = 0;
+    RadioEngine loaded(plan);
+    for (int k = 0; k < 20; ++k) {
+      swarm.step();
+      reported += swarm.frames[0].sent.size();
+      if (k > 0) continue;
+      proto::RadioState part;
+      swarm.radio.save(part);
+      const proto::RadioState* const parts[] = {&part};
+      loaded.load(swarm.now, parts);
+      loaded.step(swarm.now, swarm.hosts.inputs());
+      RadioFrame frame;
+      loaded.emit(HostId{0}, frame);
+      EXPECT_TRUE(frame.sent.empty());
+      EXPECT_EQ(loaded.counters().sent, 1u);
+    }
+    EXPECT_EQ(reported, 0u);
+    EXPECT_EQ(swarm.radio.counters().sent, 1u);
+    EXPECT_EQ(swarm.radio.counters().received, 1u);
+  }
+  EXPECT_GE(straddling, 5);
 }
 
 TEST(Mac, OnlyRunningRobotsSend) {

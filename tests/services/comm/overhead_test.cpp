@@ -47,7 +47,8 @@ TEST(Overhead, RepeatsEvery10_409Milliseconds) {
 }
 
 /// Copies heard by a silent robot in each of the ticks after the packets of one frame.
-std::vector<std::size_t> heard_after(const std::vector<OverheadPacket>& packets, int ticks, std::vector<IrMessage>* messages) {
+std::vector<std::size_t> heard_after(const std::vector<OverheadPacket>& packets, int ticks,
+                                     std::vector<IrMessage>* messages) {
   const RunPlan plan = make_plan("", {{0, 0, 0}});
   Swarm swarm(plan);
   swarm.hosts.sends[0] = 0;
@@ -56,7 +57,8 @@ std::vector<std::size_t> heard_after(const std::vector<OverheadPacket>& packets,
   for (int k = 0; k < ticks; ++k) {
     swarm.step();
     heard.push_back(swarm.frames[0].reception_robot.size());
-    for (const std::uint32_t index : swarm.frames[0].reception_message) messages->push_back(swarm.frames[0].messages[index]);
+    for (const std::uint32_t index : swarm.frames[0].reception_message)
+      messages->push_back(swarm.frames[0].messages[index]);
   }
   return heard;
 }
@@ -81,8 +83,11 @@ TEST(Overhead, OnceIsOnceAndStopIsSilence) {
 
 TEST(Overhead, PacketsOfOneTickGoOutInOrder) {
   std::vector<IrMessage> messages;
-  heard_after({{OverheadCommand::kRepeat, {1}}, {OverheadCommand::kOnce, {2}}, {OverheadCommand::kOnce, {3}},
-               {OverheadCommand::kRepeat, {4}}}, 3, &messages);
+  heard_after({{OverheadCommand::kRepeat, {1}},
+               {OverheadCommand::kOnce, {2}},
+               {OverheadCommand::kOnce, {3}},
+               {OverheadCommand::kRepeat, {4}}},
+              3, &messages);
   ASSERT_GE(messages.size(), 7u);
   const std::uint8_t expected[] = {1, 2, 3, 4, 4, 4, 4};
   for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(messages[i][0], expected[i]);
@@ -109,12 +114,18 @@ TEST(Overhead, JamsRobotsAsThePhasesSay) {
   std::vector<std::int64_t> due;
   int number[4] = {};
   for (std::uint32_t i = 0; i < kPairs; ++i) {
-    const Cycles start = timers.next(2 * i) + 15 * timers.period(2 * i), into = start % kPeriod, until_next = kPeriod - into;
-    if (into >= 2418 && into < 34970) fate.push_back(kSensed);
-    else if (into < 2418) fate.push_back(kDrowned);
-    else if (until_next >= 34970) fate.push_back(kClean);
-    else if (until_next >= 538 && until_next < 2418) fate.push_back(kGivenUp);
-    else fate.push_back(kDrowned);
+    const Cycles start = timers.next(2 * i) + 15 * timers.period(2 * i), into = start % kPeriod,
+                 until_next = kPeriod - into;
+    if (into >= 2418 && into < 34970)
+      fate.push_back(kSensed);
+    else if (into < 2418)
+      fate.push_back(kDrowned);
+    else if (until_next >= 34970)
+      fate.push_back(kClean);
+    else if (until_next >= 538 && until_next < 2418)
+      fate.push_back(kGivenUp);
+    else
+      fate.push_back(kDrowned);
     due.push_back((start + kPacket) / kTick + 1);
     ++number[fate.back()];
   }
@@ -123,10 +134,12 @@ TEST(Overhead, JamsRobotsAsThePhasesSay) {
   while (swarm.now.count() < 19) {
     swarm.step();
     const RadioFrame& frame = swarm.frames[0];
-    for (const std::uint32_t robot : frame.sent) if (sent[robot / 2] == 0) sent[robot / 2] = swarm.now.count();
+    for (const std::uint32_t robot : frame.sent)
+      if (sent[robot / 2] == 0) sent[robot / 2] = swarm.now.count();
     for (std::size_t n = 0; n < frame.reception_robot.size(); ++n) {
       const std::uint32_t pair = frame.reception_robot[n] / 2;
-      if (frame.messages[frame.reception_message[n]][9] != 0x88 && heard[pair] == 0) heard[pair] = swarm.now.count();
+      if (frame.messages[frame.reception_message[n]][9] != 0x88 && heard[pair] == 0)
+        heard[pair] = swarm.now.count();
     }
   }
   for (std::uint32_t i = 0; i < kPairs; ++i) {
@@ -144,6 +157,26 @@ TEST(Overhead, JamsRobotsAsThePhasesSay) {
     }
   }
   EXPECT_GE(swarm.radio.counters().aborted, static_cast<std::uint64_t>(number[kGivenUp]));
+}
+
+/// A copy that starts with a tick is heard by a robot that began to send in the tick before.
+TEST(Overhead, InterruptsAcrossTheBorderOfTicks) {
+  int cases[2] = {};
+  for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
+    const RunPlan plan = make_plan("radio { oscillator_sd: 0 } seed: " + std::to_string(seed), {{0, 0, 0}});
+    const TickTimers timers(plan);
+    const Cycles start = timers.next(0) + 15 * timers.period(0), border = (start / kTick + 1) * kTick;
+    if (border - start >= kListening) continue;
+    Swarm swarm(plan);
+    while (swarm.now.count() < border / kTick) swarm.step();
+    swarm.hosts.overhead.packets = {{OverheadCommand::kOnce, kWord}};
+    swarm.step();
+    const bool noticed = border - start >= kDeaf;
+    EXPECT_EQ(swarm.radio.counters().aborted, noticed ? 1u : 0u);
+    ++cases[noticed];
+  }
+  EXPECT_GT(cases[0], 0);
+  EXPECT_GT(cases[1], 0);
 }
 
 /// Copies that overlap a robot's packet are lost within its range and at itself, and nowhere else.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <string>
 
 #include "services/comm/neighbourhood.hpp"
@@ -15,8 +16,7 @@ using testing::make_plan;
 using testing::Swarm;
 
 /// Runs a swarm and hands every reception to f(frame, index).
-template <class F>
-void run(Swarm& swarm, std::int64_t ticks, F f) {
+template <class F> void run(Swarm& swarm, std::int64_t ticks, F f) {
   for (std::int64_t k = 0; k < ticks; ++k) {
     swarm.step();
     for (const RadioFrame& frame : swarm.frames) {
@@ -37,9 +37,12 @@ TEST(Reception, ReachesToTheRangeAndNoFarther) {
 }
 
 TEST(Reception, DeliversWhatWasSentAndCountsPairs) {
-  const RunPlan plan = make_plan("radio { range_mm: 100 } recording { messages: true }", {{0, 0, 0}, {50, 0, 0}, {500, 0, 0}});
+  const RunPlan plan =
+      make_plan("radio { range_mm: 100 } recording { messages: true }", {{0, 0, 0}, {50, 0, 0}, {500, 0, 0}});
   Swarm swarm(plan);
-  swarm.hosts.message = [](std::uint32_t robot, Tick) { return IrMessage{9, 8, 7, 6, 5, 4, 3, 2, 1, static_cast<std::uint8_t>(robot)}; };
+  swarm.hosts.message = [](std::uint32_t robot, Tick) {
+    return IrMessage{9, 8, 7, 6, 5, 4, 3, 2, 1, static_cast<std::uint8_t>(robot)};
+  };
   std::vector<std::uint32_t> heard(2, 0);
   run(swarm, 640, [&](const RadioFrame& frame, std::size_t n) {
     const IrMessage& message = frame.messages[frame.reception_message[n]];
@@ -49,9 +52,11 @@ TEST(Reception, DeliversWhatWasSentAndCountsPairs) {
     ++heard[receiver];
   });
   std::vector<std::uint32_t> table;
-  for (const PairCount& pair : swarm.radio.pair_counts()) table.insert(table.end(), {pair.receiver, pair.sender, pair.count});
+  for (const PairCount& pair : swarm.radio.pair_counts())
+    table.insert(table.end(), {pair.receiver, pair.sender, pair.count});
   ASSERT_EQ(table.size(), 15u);
-  EXPECT_EQ(table, (std::vector<std::uint32_t>{0, 0, table[2], 0, 1, heard[0], 1, 0, heard[1], 1, 1, table[11], 2, 2, table[14]}));
+  EXPECT_EQ(table, (std::vector<std::uint32_t>{0, 0, table[2], 0, 1, heard[0], 1, 0, heard[1], 1, 1, table[11], 2,
+                                               2, table[14]}));
   EXPECT_GE(table[2], heard[1]);
   EXPECT_GE(table[11], heard[0]);
   EXPECT_EQ(table[2] + table[11] + table[14], swarm.radio.counters().sent);
@@ -77,6 +82,12 @@ TEST(Reception, HiddenTerminalsLoseAsOftenAsTheyOverlap) {
   EXPECT_EQ(c.sent, 2 * kLines);
   EXPECT_EQ(c.received, received);
   EXPECT_EQ(c.received + c.collided, 2 * kLines);
+  // Exactly those whose phases say so: also where one ends a tick before the other.
+  const TickTimers timers(plan);
+  std::uint64_t overlaps = 0;
+  for (std::uint32_t i = 0; i < kLines; ++i)
+    overlaps += std::abs(timers.next(3 * i) - timers.next(3 * i + 2)) < kPacket;
+  EXPECT_EQ(c.collided, 2 * overlaps);
   const double q = 34970.0 / 262144.0, p = 2 * q - q * q;
   EXPECT_NEAR(static_cast<double>(c.collided) / 2, p * kLines, 4.5 * std::sqrt(kLines * p * (1 - p)));
 }

@@ -73,7 +73,8 @@ TEST(TickTimers, PredictExactlyWhatHappens) {
       const bool predicted = timers.exceeds(0, 3906, from, from + 262144);
       timers.pass(0, from);
       bool exceeded = false;
-      for (; timers.next(0) < from + 262144; timers.interrupt(0)) exceeded = exceeded || timers.next_clock(0) > 3906;
+      for (; timers.next(0) < from + 262144; timers.interrupt(0))
+        exceeded = exceeded || timers.next_clock(0) > 3906;
       ASSERT_EQ(predicted, exceeded) << seed << " " << from;
     }
   }
