@@ -57,7 +57,7 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
   const std::string object = (folder.path() / "program.o").string();
   AvrSize sum;
   for (const fs::path& source : sources) {
-    std::vector<std::string> arguments{gcc, "-mmcu=atmega328p", "-Os", "-std=gnu11", "-DF_CPU=8000000", "-funsigned-char",
+    std::vector<std::string> arguments{gcc, "-mmcu=atmega328p", "-Os", "-std=gnu11", "-fno-common", "-DF_CPU=8000000", "-funsigned-char",
                                        "-funsigned-bitfields", "-fpack-struct", "-fshort-enums",
                                        "-fdiagnostics-color=never", "-isystem", (runtime / "kilolib").string()};
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
