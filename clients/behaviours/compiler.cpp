@@ -122,7 +122,7 @@ std::string build(Arguments arguments, const fs::path& kept, const std::vector<f
   const Temporary result(kept);
   append(arguments, {"-o", result.path()});
   const ProcessResult process = run_process(arguments);
-  if (process.status != 0) throw UserError(first_error_first(process.errors, sources));
+  if (process.status != 0) throw UserError(first_error(process.errors, sources));
   const auto octets = read_file(result.path());
   if (!octets || !write_file(kept, *octets)) throw RunError(kept.string() + ": cannot be written; is the disk full?");
   return *octets;
@@ -163,7 +163,7 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
   Arguments preprocess{compiler.path, "-E"};
   for (const Arguments& part : {code, defines, place_flags(sources), includes, files}) append(preprocess, part);
   const ProcessResult text = run_process(preprocess);
-  if (text.status != 0) throw UserError(first_error_first(text.errors, sources));
+  if (text.status != 0) throw UserError(first_error(text.errors, sources));
 
   std::string content = runtime.filename().string() + '\n' + compiler.path + '\n' + compiler.version;
   for (const std::string& flag : code) content += flag + '\n';

@@ -35,15 +35,14 @@ std::string required_tool(const char* name, const char* package) {
   return path.string();
 }
 
-/// Adds what avr-size says of one object: text, data and bss in the second line.
-void add_size(AvrSize& sum, const std::string& table) {
+/// What avr-size says of an object: text, data and bss in the second line.
+AvrSize parsed_size(const std::string& table) {
   std::istringstream stream(table);
   std::string header;
   std::getline(stream, header);
   std::uint32_t text = 0, data = 0, bss = 0;
   if (!(stream >> text >> data >> bss)) throw RunError("avr-size said something unexpected: " + table);
-  sum.flash_octets += text + data;
-  sum.ram_octets += data + bss;
+  return {text + data, data + bss};
 }
 
 }  // namespace
@@ -54,19 +53,24 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
   const std::string size = required_tool("avr-size", "binutils-avr");
   const fs::path runtime = unpacked_runtime(cache_directory(options.cache_directory));
   const TemporaryFolder folder;
-  const std::string object = (folder.path() / "program.o").string();
-  AvrSize sum;
+  std::vector<std::string> link{gcc, "-mmcu=atmega328p", "-r", "-nostartfiles", "-Wl,-d"};
   for (const fs::path& source : sources) {
+    const std::string object = (folder.path() / (std::to_string(link.size()) + ".o")).string();
     std::vector<std::string> arguments{gcc, "-mmcu=atmega328p", "-Os", "-std=gnu11", "-fno-common", "-DF_CPU=8000000", "-funsigned-char",
                                        "-funsigned-bitfields", "-fpack-struct", "-fshort-enums",
                                        "-fdiagnostics-color=never", "-isystem", (runtime / "kilolib").string()};
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
     const ProcessResult result = run_process(arguments);
-    if (result.status != 0) throw UserError(first_error_first(result.errors, {source}));
-    add_size(sum, run_process({size, object}).output);
+    if (result.status != 0) throw UserError(first_error(result.errors, {source}));
+    link.push_back(object);
   }
-  return sum;
+  // One object of all, with the variables that several files share and what is used of the C library; kilolib stays open.
+  const std::string whole = (folder.path() / "program.o").string();
+  link.insert(link.end(), {"-Wl,--start-group", "-lm", "-lc", "-lgcc", "-Wl,--end-group", "-o", whole});
+  const ProcessResult linked = run_process(link);
+  if (linked.status != 0) throw UserError(first_error(linked.errors, sources));
+  return parsed_size(run_process({size, whole}).output);
 }
 
 }  // namespace kilotwin::behaviours

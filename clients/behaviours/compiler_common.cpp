@@ -109,7 +109,14 @@ std::optional<std::string> linker_error(std::string_view line, const std::vector
   for (const fs::path& source : sources) {
     if (source.filename() == fs::path(named).filename()) named = source.string();
   }
-  return named + number + ":1: error: " + std::string(line.substr(at));
+  // Where the first of several definitions is, the linker tells by the name of a temporary file.
+  return named + number + ":1: error: " + std::string(line.substr(at, line.find("; ", at) - at));
+}
+
+/// Only the runtime calls main(), so its place would tell a user nothing.
+std::optional<std::string> missing_main(std::string_view line, const fs::path& source) {
+  if (line.find("undefined reference to `main'") == std::string_view::npos) return std::nullopt;
+  return source.string() + ":1:1: error: there is no main(); a program has one that calls kilo_init() and kilo_start(setup, loop)";
 }
 
 /// What says nothing of a place.
@@ -121,25 +128,26 @@ std::optional<std::string> placeless_error(std::string_view line, const fs::path
 
 }  // namespace
 
-std::string first_error_first(const std::string& output, const std::vector<fs::path>& sources) {
+std::string first_error(const std::string& output, const std::vector<fs::path>& sources) {
   std::vector<std::string> lines;
   std::istringstream stream(output);
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  std::optional<std::string> head;
+  std::string first;
+  std::size_t count = 0;
   auto look_for = [&](auto parse) {
-    for (auto line = lines.begin(); line != lines.end() && !head; ++line) {
-      head = parse(*line);
-      if (!head) continue;
-      lines.erase(line);
-      return;
+    if (count > 0) return;
+    for (const std::string& line : lines) {
+      const std::optional<std::string> found = parse(line);
+      if (found && count++ == 0) first = *found;
     }
   };
   look_for(compiler_error);
+  look_for([&](const std::string& line) { return missing_main(line, sources.front()); });
   look_for([&](const std::string& line) { return linker_error(line, sources); });
   look_for([&](const std::string& line) { return placeless_error(line, sources.front()); });
-  std::string text = head.value_or(sources.front().string() + ":1:1: error: the compiler failed");
-  for (const std::string& line : lines) text += "\n" + line;
-  return text;
+  if (count == 0) return sources.front().string() + ":1:1: error: the compiler failed";
+  if (count > 1) first += " (" + std::to_string(count - 1) + (count == 2 ? " more error)" : " more errors)");
+  return first;
 }
 
 }  // namespace kilotwin::behaviours

@@ -1,5 +1,6 @@
 #include "clients/behaviours/files.hpp"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -19,6 +20,14 @@ bool usable(const fs::path& directory) {
   std::error_code error;
   fs::create_directories(directory, error);
   return fs::is_directory(directory, error) && access(directory.c_str(), W_OK | X_OK) == 0;
+}
+
+/// Makes it if need be; false where it is a link, another user's, or open to others.
+bool own_private_directory(const fs::path& directory) {
+  struct stat status {};
+  if (mkdir(directory.c_str(), 0700) != 0 && errno != EEXIST) return false;
+  return lstat(directory.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == geteuid() &&
+         (status.st_mode & 077) == 0 && access(directory.c_str(), W_OK | X_OK) == 0;
 }
 
 fs::path from_environment(const char* name) {
@@ -63,6 +72,9 @@ fs::path cache_directory(const fs::path& wanted) {
     return home / ".cache/kilotwin";
   }
   std::error_code error;
+  // Without a home: a directory that all runs of this user share, where nobody else can write.
+  const fs::path shared = fs::temp_directory_path(error) / ("kilotwin-" + std::to_string(geteuid()));
+  if (own_private_directory(shared)) return shared;
   std::string temporary = (fs::temp_directory_path(error) / "kilotwin-XXXXXX").string();
   if (mkdtemp(temporary.data()) == nullptr) {
     throw RunError("no directory for compiled programs: " + temporary + ": " + std::strerror(errno) +

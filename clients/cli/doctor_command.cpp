@@ -33,8 +33,9 @@ struct Finding {
 class Scratch {
  public:
   Scratch() {
-    std::string pattern = (fs::temp_directory_path() / "kilotwin-doctor-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw UserError("no directory for temporary files can be written; set TMPDIR to one");
+    std::error_code error;
+    std::string pattern = (fs::temp_directory_path(error) / "kilotwin-doctor-XXXXXX").string();
+    if (error || mkdtemp(pattern.data()) == nullptr) throw UserError("no directory for temporary files can be written; set TMPDIR to one");
     path_ = pattern;
   }
   ~Scratch() {
@@ -49,18 +50,18 @@ class Scratch {
 };
 
 Finding check_compiler() {
-  const Scratch scratch;
-  const fs::path source = scratch.path() / "probe.c";
-  std::ofstream(source) << "#include <kilolib.h>\nvoid setup(void){}\nvoid loop(void){}\n"
-                           "int main(void){kilo_init();kilo_start(setup,loop);return 0;}\n";
-  behaviours::CompileOptions options;
-  options.cache_directory = scratch.path() / "cache";
   try {
+    const Scratch scratch;
+    const fs::path source = scratch.path() / "probe.c";
+    std::ofstream(source) << "#include <kilolib.h>\nvoid setup(void){}\nvoid loop(void){}\n"
+                             "int main(void){kilo_init();kilo_start(setup,loop);return 0;}\n";
+    behaviours::CompileOptions options;
+    options.cache_directory = scratch.path() / "cache";
     const auto begun = Clock::now();
     static_cast<void>(behaviours::compile({source}, options));
     return {fmt::format("a behaviour compiles in {:.2f} s", std::chrono::duration<double>(Clock::now() - begun).count()), ""};
   } catch (const std::exception& error) {
-    return {error.what(), "install a C compiler: apt-get install gcc libc6-dev", true};
+    return {error.what(), "what it says; a C compiler comes with: apt-get install gcc libc6-dev", true};
   }
 }
 
@@ -116,7 +117,7 @@ Finding check_machine() {
   const unsigned cores = std::thread::hardware_concurrency();
   const double memory_gib = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1u << 30);
   std::error_code error;
-  const fs::space_info space = fs::space(fs::current_path(), error);
+  const fs::space_info space = fs::space(".", error);
   const double free_gib = error ? 0 : static_cast<double>(space.available) / (1u << 30);
   Finding finding{fmt::format("{} cores, {:.1f} GiB of memory, {:.1f} GiB free here", cores, memory_gib, free_gib), ""};
   if (!error && free_gib < 0.2) finding.remedy = "make room, or put runs elsewhere with --out";

@@ -3,18 +3,19 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/prctl.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <fstream>
 #include <mutex>
 #include <thread>
 
 #include "clients/cli/progress.hpp"
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
 #include "core/federation/interrupt.hpp"
 #include "core/federation/topics.hpp"
 
@@ -31,20 +32,23 @@ constexpr auto kPoll = std::chrono::milliseconds(5);
 struct Child {
   std::string name;
   pid_t process = -1;
-  fs::path log;
+  int log = -1;  ///< what it says on stderr
   bool running = false;
   int status = 0;
 };
 
-/// The last line that a service wrote, without its "kilotwin: " prefix.
-std::string last_line(const fs::path& log) {
-  std::ifstream stream(log);
-  std::string line, last;
-  while (std::getline(stream, line)) {
-    if (!line.empty()) last = line;
-  }
+/// The last line that a service wrote, without its "kilotwin: " prefix. By descriptor: the file may have been removed.
+std::string last_line(int log) {
+  char tail[4096];
+  struct stat status {};
+  if (log < 0 || fstat(log, &status) != 0) return {};
+  const ssize_t octets = pread(log, tail, sizeof tail, std::max<off_t>(0, status.st_size - static_cast<off_t>(sizeof tail)));
+  std::string_view text(tail, static_cast<std::size_t>(std::max<ssize_t>(0, octets)));
+  text = text.substr(0, text.find_last_not_of('\n') + 1);
+  if (const std::size_t before = text.rfind('\n'); before != std::string_view::npos) text.remove_prefix(before + 1);
   constexpr std::string_view kPrefix = "kilotwin: ";
-  return last.starts_with(kPrefix) ? last.substr(kPrefix.size()) : last;
+  if (text.starts_with(kPrefix)) text.remove_prefix(kPrefix.size());
+  return std::string(text);
 }
 
 class Launcher {
@@ -52,7 +56,12 @@ class Launcher {
   Launcher(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options)
       : plan_(plan), directory_(directory), options_(options), progress_(plan, options.show_progress) {}
 
-  ~Launcher() { end_all(); }
+  ~Launcher() {
+    end_all();
+    for (const Child& child : children_) {
+      if (child.log >= 0) close(child.log);
+    }
+  }
 
   int run() {
     std::error_code ignored;
@@ -72,6 +81,9 @@ class Launcher {
                                               [this](const PublicRunStatus& sample, dds::SampleState state) {
                                                 if (state.valid && sample.run == plan_.run()) on_status(sample);
                                               });
+    const dds::Reader<WireMember> members(participant, topics::members(), [this](const WireMember& sample, dds::SampleState state) {
+      if (state.valid && sample.run == plan_.run()) on_member(sample);
+    });
     return watch();
   }
 
@@ -81,26 +93,24 @@ class Launcher {
     child.name = plan_.name(id);
     std::string file = child.name;
     std::replace_if(file.begin(), file.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '-');
-    child.log = directory_.path() / "logs" / (file + ".log");
     words.insert(words.begin(), {"kilotwin", "service"});
-    for (const std::string& word : {std::string("--run"), directory_.path().string(), std::string("--domain"), std::to_string(options_.domain),
-                                    std::string("--start-monotonic"), fmt::format("{:.6f}", options_.start_monotonic_s), std::string("--end-with-parent")}) {
-      words.push_back(word);
-    }
+    words.insert(words.end(), {"--run", directory_.path().string(), "--domain", std::to_string(options_.domain), "--start-monotonic",
+                               fmt::format("{:.6f}", options_.start_monotonic_s)});
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
-    const int log = open(child.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    const fs::path log = directory_.path() / "logs" / (file + ".log");
+    child.log = open(log.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0644);
     const pid_t parent = getpid();
     child.process = fork();
     if (child.process < 0) throw RunError(fmt::format("{} cannot be started: the system has no room for another process", child.name));
     if (child.process == 0) {
       // Only calls that are safe between fork and exec. A group of its own keeps the terminal's Ctrl-C from it: the
-      // launcher decides how the run ends.
+      // launcher decides how the run ends. The signal at its parent's death outlives exec.
       setpgid(0, 0);
       prctl(PR_SET_PDEATHSIG, SIGTERM);
       if (getppid() != parent) _exit(1);
-      if (log >= 0) dup2(log, STDERR_FILENO);
+      if (child.log >= 0) dup2(child.log, STDERR_FILENO);
       if (const int nothing = open("/dev/null", O_RDWR); nothing >= 0) {
         dup2(nothing, STDIN_FILENO);
         dup2(nothing, STDOUT_FILENO);
@@ -108,7 +118,6 @@ class Launcher {
       execv("/proc/self/exe", argv.data());
       _exit(127);
     }
-    if (log >= 0) close(log);
     child.running = true;
     children_.push_back(std::move(child));
   }
@@ -122,7 +131,16 @@ class Launcher {
     latest_.robots_failed = sample.robots_failed;
     latest_.paused = sample.phase == kilotwin_open_PAUSED;
     latest_.waiting_for = sample.note;
-    started_ = started_ || sample.phase != kilotwin_open_STARTING;
+    // While it starts there is something to show only if it waits for somebody.
+    started_ = started_ || sample.phase != kilotwin_open_STARTING || sample.note[0] != '\0';
+  }
+
+  void on_member(const WireMember& sample) {
+    // Whoever left because of another says so; the first of the others is where it broke.
+    const std::string_view failure = sample.failure;
+    if (sample.phase != kilotwin_wire_FAILED || failure.starts_with("left: ")) return;
+    const std::lock_guard lock(mutex_);
+    if (told_.empty()) told_ = fmt::format("{}: {}", sample.name, failure);
   }
 
   /// Collects children that have ended; true while any runs.
@@ -166,7 +184,7 @@ class Launcher {
     }
     progress_.clear();
     if (culprit_ == nullptr && interrupted_) {
-      fmt::print(stderr, "kilotwin: interrupted; what was recorded so far is in {}\n", directory_.path().string());
+      say(fmt::format("kilotwin: interrupted; what was recorded so far is in {}", directory_.path().string()));
       return 1;
     }
     return status_;
@@ -178,17 +196,18 @@ class Launcher {
     const std::string so_far = "what was recorded so far is in " + directory_.path().string();
     status_ = 1;
     if (WIFSIGNALED(culprit_->status)) {
-      fmt::print(stderr, "kilotwin: {} (process {}) was killed by signal {}; {}\n", culprit_->name, culprit_->process,
-                 WTERMSIG(culprit_->status), so_far);
+      say(fmt::format("kilotwin: {} (process {}) was killed by signal {}; {}", culprit_->name, culprit_->process,
+                      WTERMSIG(culprit_->status), so_far));
       return;
     }
     const std::string line = last_line(culprit_->log);
     if (WEXITSTATUS(culprit_->status) == 2) {
       status_ = 2;
-      fmt::print(stderr, "{}\n", line);
-    } else {
-      fmt::print(stderr, "kilotwin: {}: {}; {}\n", culprit_->name, line.empty() ? "failed" : line, so_far);
+      return say(line);
     }
+    const std::lock_guard lock(mutex_);
+    const std::string why = !told_.empty() ? told_ : fmt::format("{}: {}", culprit_->name, line.empty() ? "failed" : line);
+    say(fmt::format("kilotwin: {}; {}", why, so_far));
   }
 
   /// Ends every child, by force if need be.
@@ -212,9 +231,10 @@ class Launcher {
   int status_ = 0;
   std::optional<Clock::time_point> deadline_;
   bool interrupted_ = false, ending_ = false;
-  std::mutex mutex_;
+  std::mutex mutex_;  // guards what follows
   RunProgress latest_;
   bool started_ = false;
+  std::string told_;  // what the first federate that failed on its own said
 };
 
 }  // namespace

@@ -1,6 +1,8 @@
 // The program `kilotwin`: arguments in, exit status out. Every command is a function of its own file.
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -15,6 +17,7 @@
 #include "clients/cli/sweep_command.hpp"
 #include "clients/recorder/export.hpp"
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
 #include "core/dds/dds.hpp"
 #include "core/experiment/validate.hpp"
 
@@ -91,7 +94,7 @@ int export_command(const ExportArguments& arguments) {
     if (csv.empty()) return;
     recorder::Reader reader(directory.recording());
     const std::uint64_t rows = write(reader, csv);
-    if (!reader.warning().empty()) fmt::print(stderr, "kilotwin: {}\n", reader.warning());
+    if (!reader.warning().empty()) say("kilotwin: " + reader.warning());
     fmt::print("{}: {} rows\n", csv.string(), rows);
   };
   each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) { return recorder::export_trajectories(reader, csv, arguments.every_s); });
@@ -127,7 +130,6 @@ int main_of(int argc, char** argv) {
   service_app.add_option("--peer", service.peers, "address of a machine that takes part, this one included; none: all on this machine")
       ->allow_extra_args(false);
   service_app.add_option("--start-monotonic", service.start_monotonic_s, "when the run was asked for")->group("");
-  service_app.add_flag("--end-with-parent", service.end_with_parent, "leave with the process that started this one")->group("");
 
   SweepArguments sweep;
   CLI::App& sweep_app = *app.add_subcommand("sweep", "many local runs on all cores, one table and a plot");
@@ -167,7 +169,7 @@ int main_of(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "kilotwin: {}; see kilotwin --help\n", error.what());
+    say(fmt::format("kilotwin: {}; see kilotwin --help", error.what()));
     return kBadInput;
   }
 
@@ -189,13 +191,17 @@ int main_of(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace kilotwin;
+  // A descriptor of these that is closed would go to the next file opened, and that file would get what is said.
+  for (int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) return cli::kFailed;
+  }
   try {
     return cli::main_of(argc, argv);
   } catch (const UserError& error) {
-    fmt::print(stderr, "{}\n", error.what());
+    say(error.what());
     return cli::kBadInput;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "kilotwin: {}\n", error.what());
+    say(fmt::format("kilotwin: {}", error.what()));
     return cli::kFailed;
   }
 }

@@ -118,25 +118,37 @@ Prepared prepare(const RunArguments& arguments) {
   fs::path checkpoint;
   if (manifest.resumed()) {
     checkpoint = checkpoint_directory(arguments.resume);
-    static_cast<void>(read_checkpoint(checkpoint, manifest));
+    const RunPlan plan(manifest);
+    if (const Tick from = read_checkpoint(checkpoint, manifest).tick; from >= plan.last_tick) {
+      throw UserError(fmt::format("--resume: {} was saved at {:.3f} s, and the run ends at {:.3f} s; give a longer --duration", checkpoint.string(),
+                                  plan.tick_length.seconds_at(from), plan.tick_length.seconds_at(plan.last_tick)));
+    }
   }
 
   const proto::Experiment& experiment = manifest.experiment();
   auto directory = recorder::RunDirectory::create(
       arguments.out.empty() ? recorder::RunDirectory::default_path(experiment.name(), experiment.seed()) : arguments.out);
-  for (int i = 0; i < manifest.program_size(); ++i) {
-    fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i).sha256()), fs::copy_options::overwrite_existing);
-  }
-  for (const proto::RobotGroup& group : loaded.experiment.robots()) {
-    for (const std::string& source : group.behaviour()) {
-      fs::copy_file(loaded.resolve(source), directory.programs() / fs::path(source).filename(), fs::copy_options::overwrite_existing);
+  try {
+    for (int i = 0; i < manifest.program_size(); ++i) {
+      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i).sha256()), fs::copy_options::overwrite_existing);
     }
+    for (const proto::RobotGroup& group : loaded.experiment.robots()) {
+      for (const std::string& source : group.behaviour()) {
+        fs::copy_file(loaded.resolve(source), directory.programs() / fs::path(source).filename(), fs::copy_options::overwrite_existing);
+      }
+    }
+    if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
+    std::string text;
+    google::protobuf::TextFormat::PrintToString(experiment, &text);
+    recorder::write_file(directory.experiment(), text);
+    recorder::write_file(directory.manifest(), manifest.SerializeAsString());
+  } catch (const std::exception& error) {
+    std::error_code ignored;
+    fs::remove_all(directory.path(), ignored);
+    const auto* const copying = dynamic_cast<const fs::filesystem_error*>(&error);
+    if (copying == nullptr) throw;
+    throw RunError(fmt::format("{}: cannot be copied to {}: {}", copying->path1().string(), copying->path2().string(), copying->code().message()));
   }
-  if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
-  std::string text;
-  google::protobuf::TextFormat::PrintToString(experiment, &text);
-  recorder::write_file(directory.experiment(), text);
-  recorder::write_file(directory.manifest(), manifest.SerializeAsString());
   return {std::move(directory), std::move(manifest)};
 }
 

@@ -4,6 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
+
+#include "core/base/say.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -43,16 +46,15 @@ void ProgressBar::show(const RunProgress& progress) {
   if (!shown_ || now < next_) return;
   next_ = now + (terminal_ ? std::chrono::milliseconds(kBarPeriod) : std::chrono::milliseconds(kLinePeriod));
   if (terminal_) {
-    fmt::print(stderr, "\r\x1b[K{}", line(progress, true));
-    std::fflush(stderr);
+    std::fputs(("\r\x1b[K" + line(progress, true)).c_str(), stderr);
     on_screen_ = true;
   } else {
-    fmt::print(stderr, "{}\n", line(progress, false));
+    say(line(progress, false));
   }
 }
 
 void ProgressBar::clear() {
-  if (on_screen_) fmt::print(stderr, "\r\x1b[K");
+  if (on_screen_) std::fputs("\r\x1b[K", stderr);
   on_screen_ = false;
 }
 

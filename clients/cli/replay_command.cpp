@@ -11,6 +11,8 @@
 #include "clients/local/local_run.hpp"
 #include "clients/recorder/reader.hpp"
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
+#include "core/federation/frame_check.hpp"
 #include "core/federation/interrupt.hpp"
 
 namespace kilotwin::cli {
@@ -32,7 +34,7 @@ Recorded read_recorded(recorder::Reader& reader) {
     }
     if (record->has_input()) recorded.inputs.push_back(from_record(record->input()));
   }
-  if (!reader.warning().empty()) fmt::print(stderr, "kilotwin: {}\n", reader.warning());
+  if (!reader.warning().empty()) say("kilotwin: " + reader.warning());
   if (recorded.chain.empty()) throw UserError(fmt::format("{}: no state hashes in it; there is nothing to verify", reader.path().string()));
   return recorded;
 }
@@ -68,6 +70,11 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   recorder::Reader reader(directory.recording());
   Recorded recorded = read_recorded(reader);
   const RunPlan plan(read_manifest(directory));
+  for (const Directive& input : recorded.inputs) {
+    if (const char* const wrong = defect(input, plan); wrong != nullptr) {
+      throw UserError(fmt::format("{}: input {} is none of this run: {}", reader.path().string(), input.sequence_number, wrong));
+    }
+  }
 
   local::LocalOptions options;
   if (plan.manifest.resumed()) options.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);

@@ -15,10 +15,19 @@
 namespace kilotwin::cli {
 namespace {
 
+/// As a shell takes it for one word.
+std::string quoted(const std::string& word) {
+  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+,:=@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string result = "'";
+  for (const char c : word) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return result + "'";
+}
+
 std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& directory) {
   std::string text = fmt::format("prepared {}; start these, on any machine that has this directory, with the same --domain:\n",
                                  directory.path().string());
-  const std::string run = directory.path().string();
+  const std::string run = quoted(directory.path().string());
   for (std::uint32_t p = 0; p < plan.grid.size(); ++p) {
     text += fmt::format("  kilotwin service physics --run {} --partition {},{}\n", run, p % plan.grid.columns(), p / plan.grid.columns());
   }

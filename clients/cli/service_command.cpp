@@ -1,11 +1,8 @@
 #include "clients/cli/service_command.hpp"
 
 #include <fmt/format.h>
-#include <sys/prctl.h>
-#include <unistd.h>
 
 #include <charconv>
-#include <csignal>
 
 #include "clients/behaviours/behaviours_service.hpp"
 #include "clients/cli/prepare.hpp"
@@ -63,10 +60,6 @@ int run_station(const RunPlan& plan, const ServiceContext& context, const record
 
 int service_command(const ServiceArguments& arguments) {
   const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-  if (arguments.end_with_parent) {
-    prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (getppid() == 1) throw RunError("the launcher is gone");
-  }
   catch_interrupts();
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
   const RunPlan plan(read_manifest(directory));

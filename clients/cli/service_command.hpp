@@ -16,7 +16,6 @@ struct ServiceArguments {
   std::uint32_t domain = 0;
   std::vector<std::string> peers;
   double start_monotonic_s = 0;        ///< when the command was given, steady clock; for start_s
-  bool end_with_parent = false;        ///< leave when the process that started this one dies
 };
 
 /// Returns the exit status. Throws UserError and RunError.

@@ -7,9 +7,12 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <thread>
 
 #include "clients/cli/prepare.hpp"
@@ -19,6 +22,7 @@
 #include "clients/recorder/statistics.hpp"
 #include "clients/recorder/summary.hpp"
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
 #include "core/federation/interrupt.hpp"
 
 namespace kilotwin::cli {
@@ -27,9 +31,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostRuns = 100'000;
+constexpr auto kPoll = std::chrono::milliseconds(5);
+/// For how long runs may take to end once they were asked to.
+constexpr auto kGrace = std::chrono::milliseconds(3000);
 
-std::vector<std::uint64_t> parse_seeds(const std::string& text, std::uint64_t own) {
-  if (text.empty()) return {own};
+std::vector<std::uint64_t> parse_seeds(const std::string& text) {
   std::uint64_t first = 0, last = 0;
   const char* const end = text.data() + text.size();
   auto [position, error] = std::from_chars(text.data(), end, first);
@@ -83,7 +89,8 @@ struct Job {
 
 std::vector<std::string> words_of(const SweepArguments& arguments, const Point& point, const Job& job) {
   std::vector<std::string> words{"kilotwin", "run", arguments.run.experiment.string(), "--mode", "local", "--quiet",
-                                 "--seed", std::to_string(job.seed), "--out", job.directory.string()};
+                                 "--out", job.directory.string()};
+  if (!arguments.seeds.empty()) words.insert(words.end(), {"--seed", std::to_string(job.seed)});
   for (const std::string& set : point) words.insert(words.end(), {"--set", set});
   for (const std::string& define : arguments.run.define) words.insert(words.end(), {"--define", define});
   if (arguments.run.duration_s) words.insert(words.end(), {"--duration", fmt::format("{}", *arguments.run.duration_s)});
@@ -131,6 +138,10 @@ void run_all(std::vector<Job>& jobs, const SweepArguments& arguments, const std:
   std::map<pid_t, Job*> running;
   std::size_t next = 0, done = 0;
   const bool terminal = isatty(STDERR_FILENO) == 1;
+  std::optional<std::chrono::steady_clock::time_point> patience;  // of runs that were told to end
+  const auto tell = [&running](int signal) {
+    for (const auto& [process, job] : running) kill(process, signal);
+  };
   while (done < jobs.size()) {
     while (running.size() < at_a_time && next < jobs.size() && interrupted() == 0) {
       Job& job = jobs[next++];
@@ -139,19 +150,24 @@ void run_all(std::vector<Job>& jobs, const SweepArguments& arguments, const std:
     }
     if (running.empty()) throw RunError("interrupted");
     int status = 0;
-    const pid_t ended = waitpid(-1, &status, 0);
-    if (ended < 0) {  // a signal
-      for (const auto& [process, job] : running) kill(process, SIGTERM);
+    const pid_t ended = waitpid(-1, &status, WNOHANG);
+    if (ended <= 0) {
+      if (interrupted() != 0 && !patience) {
+        patience = std::chrono::steady_clock::now() + kGrace;
+        tell(SIGTERM);
+      }
+      if (patience && std::chrono::steady_clock::now() > *patience) tell(SIGKILL);
+      std::this_thread::sleep_for(kPoll);
       continue;
     }
     if (const auto found = running.find(ended); found != running.end()) {
       found->second->well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
       running.erase(found);
       ++done;
-      if (terminal) fmt::print(stderr, "\r\x1b[K{} of {} runs done", done, jobs.size());
+      if (terminal) std::fputs(fmt::format("\r\x1b[K{} of {} runs done", done, jobs.size()).c_str(), stderr);
     }
   }
-  if (terminal) fmt::print(stderr, "\r\x1b[K");
+  if (terminal) std::fputs("\r\x1b[K", stderr);
 }
 
 /// The observables of the runs at one point.
@@ -188,19 +204,20 @@ int sweep_command(const SweepArguments& arguments) {
   const std::vector<Point> points = combinations(arguments.set);
   // Every point is checked before the first run, so that a wrong value costs nothing.
   std::string name;
-  std::uint64_t own_seed = 1;
+  std::vector<std::uint64_t> own_seeds;
   for (const Point& point : points) {
     RunArguments one = arguments.run;
     one.set = point;
     const LoadedExperiment loaded = load_with_overrides(one);
     name = loaded.experiment.name();
-    own_seed = loaded.experiment.seed();
+    own_seeds.push_back(loaded.experiment.seed());
   }
-  const std::vector<std::uint64_t> seeds = parse_seeds(arguments.seeds, own_seed);
+  std::vector<std::uint64_t> seeds;
+  if (!arguments.seeds.empty()) seeds = parse_seeds(arguments.seeds);
   const auto directory = recorder::RunDirectory::create(arguments.out.empty() ? fs::path("runs") / (name + "-sweep") : arguments.out);
   std::vector<Job> jobs;
   for (std::size_t point = 0; point < points.size(); ++point) {
-    for (const std::uint64_t seed : seeds) {
+    for (const std::uint64_t seed : arguments.seeds.empty() ? std::vector{own_seeds[point]} : seeds) {
       jobs.push_back({point, seed, directory.path() / fmt::format("{:04}-{}", point, seed)});
     }
   }
@@ -214,7 +231,7 @@ int sweep_command(const SweepArguments& arguments) {
       observe(job, observed[job.point]);
     } else {
       ++failed;
-      fmt::print(stderr, "kilotwin: {} with seed {} failed: {}\n", label(points[job.point]), job.seed, read_log(job.directory.string() + ".log"));
+      say(fmt::format("kilotwin: {} with seed {} failed: {}", label(points[job.point]), job.seed, read_log(job.directory.string() + ".log")));
     }
   }
 
@@ -222,7 +239,7 @@ int sweep_command(const SweepArguments& arguments) {
   fmt::print("{:<40} {:>5} {:>22} {:>18} {:>20} {:>20} {:>10}\n", "at", "runs", "MSD at the end, mm^2", "moved, mm", "sent", "received", "x real t.");
   recorder::Plot plot;
   plot.title = name + ": mean square displacement";
-  plot.subtitle = fmt::format("{} {} per curve; bars: standard error over {}", seeds.size(), seeds.size() == 1 ? "run" : "runs", "runs");
+  plot.subtitle = fmt::format("{} {} per curve; bars: standard error over {}", std::max<std::size_t>(1, seeds.size()), seeds.size() <= 1 ? "run" : "runs", "runs");
   plot.x_name = "time";
   plot.x_unit = "s";
   plot.y_name = "MSD";

@@ -5,9 +5,12 @@
 #include <atomic>
 #include <barrier>
 #include <chrono>
+#include <exception>
+#include <mutex>
 #include <thread>
 
 #include "clients/behaviours/engine.hpp"
+#include "clients/behaviours/watchdog.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_book.hpp"
 #include "core/federation/interrupt.hpp"
@@ -60,6 +63,9 @@ class LocalRun {
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) emit(task, frames_of(first_));
     if (first_hashed(first_) == first_) chain = close_tick(first_, chain);
 
+    std::vector<const behaviours::BehavioursEngine*> engines;
+    for (const auto& engine : hosts_) engines.push_back(engine.get());
+    const behaviours::Watchdog watchdog(engines);
     Workers workers(*this, options_.threads);
     const auto begun = Clock::now();
     auto next_idle = begun;
@@ -67,9 +73,11 @@ class LocalRun {
     RunTotals totals;
     const Pace pace(plan_);
     for (;; ++now) {
-      pace.hold(now - first_, static_cast<double>(ns(begun, Clock::now())) * 1e-9);
-      if (interrupted() != 0) totals.failure = "interrupted";
-      const bool last = schedule_.verdict(now) == RunSchedule::Verdict::kFinished || !totals.failure.empty();
+      const auto wall_s = [begun] { return static_cast<double>(ns(begun, Clock::now())) * 1e-9; };
+      pace.hold(now - first_, wall_s, [&] { observer_.idle(progress(now, wall_s())); });
+      const bool finished = schedule_.verdict(now) == RunSchedule::Verdict::kFinished;
+      if (!finished && interrupted() != 0) totals.failure = "interrupted";
+      const bool last = finished || !totals.failure.empty();
       if (options_.save_checkpoints && schedule_.checkpoint_at(now)) save(now, chain);
       const auto recorded_from = Clock::now();
       observer_.state(now, frames_of(now).all_bodies, frames_of(now).all_actuation, last);
@@ -117,14 +125,24 @@ class LocalRun {
     void step(Tick from) {
       from_ = from;
       next_task_ = 0;
-      if (threads_.empty()) return work();
+      if (threads_.empty()) return share_tasks();
       barrier_.arrive_and_wait();
       work();
       barrier_.arrive_and_wait();
+      if (failure_) std::rethrow_exception(failure_);
     }
 
    private:
+    /// Whatever a task throws is thrown again on the run's own thread, once all have stopped.
     void work() {
+      try {
+        share_tasks();
+      } catch (...) {
+        const std::lock_guard lock(failure_mutex_);
+        failure_ = std::current_exception();
+      }
+    }
+    void share_tasks() {
       auto begun = Clock::now();
       // Hosts first: they take longest.
       const std::uint32_t tasks = run_.plan_.federates();
@@ -143,6 +161,8 @@ class LocalRun {
     std::atomic<std::uint32_t> next_task_{0};
     Tick from_;
     bool done_ = false;
+    std::mutex failure_mutex_;
+    std::exception_ptr failure_;
   };
 
   static std::uint64_t ns(Clock::time_point from, Clock::time_point to) {

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <map>
+#include <mutex>
+
 #include "core/base/error.hpp"
 
 namespace kilotwin::dds {
@@ -37,9 +40,33 @@ Entity::~Entity() {
   if (handle_ > 0) dds_delete(handle_);
 }
 
+namespace {
+
+struct SharedDomain {
+  Entity entity;
+  int users = 0;
+};
+std::mutex domains_mutex;
+std::map<std::uint32_t, SharedDomain> domains;  // of this process
+
+}  // namespace
+
+Domain::Domain(const Transport& transport) : id_(transport.domain) {
+  const std::lock_guard lock(domains_mutex);
+  SharedDomain& shared = domains[id_];
+  if (shared.users == 0) {
+    shared.entity = Entity(dds_create_domain(id_, cyclone_configuration(transport).c_str()), fmt::format("domain {}", id_));
+  }
+  ++shared.users;
+}
+
+Domain::~Domain() {
+  const std::lock_guard lock(domains_mutex);
+  if (--domains[id_].users == 0) domains.erase(id_);
+}
+
 Participant::Participant(const Transport& transport)
-    : domain_(dds_create_domain(transport.domain, cyclone_configuration(transport).c_str()),
-              fmt::format("domain {}", transport.domain)),
+    : domain_(transport),
       participant_(dds_create_participant(transport.domain, nullptr, nullptr),
                    fmt::format("a participant in domain {}", transport.domain)) {}
 
@@ -62,6 +89,8 @@ Qos make_qos(const Channel& channel) {
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
       dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
       dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, static_cast<dds_duration_t>(kLease_s * 1e9));
+      // One that leaves takes nobody else of the same key along.
+      dds_qset_writer_data_lifecycle(qos.get(), false);
       break;
     case Delivery::kLog:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);

@@ -4,6 +4,7 @@
 
 #include <dds/dds.h>
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -32,7 +33,7 @@ inline constexpr double kLease_s = 2.0;
 /// Who may hear what, for how long.
 enum class Delivery {
   kFrame,      ///< reliable, keep-last 8 per publisher, volatile: tick topics
-  kRoster,     ///< reliable, keep-last 1, transient-local, with a lease: who is here
+  kRoster,     ///< reliable, keep-last 1, transient-local, with a lease: who is here. An instance lives while any writer does
   kLog,        ///< reliable, keep-all, transient-local: late readers get everything
   kStatus,     ///< reliable, keep-last 1, transient-local
   kRequest,    ///< reliable, keep-last 16, volatile: what outsiders ask
@@ -54,13 +55,25 @@ class Entity {
   dds_entity_t handle_ = 0;
 };
 
+/// Cyclone knows a domain once per process, with one configuration: participants share it, and the last one ends it.
+class Domain {
+ public:
+  explicit Domain(const Transport&);
+  ~Domain();
+  Domain(const Domain&) = delete;
+
+ private:
+  std::uint32_t id_;
+};
+
 class Participant {
  public:
+  /// Where the process has a participant in the domain already, that one's peers count.
   explicit Participant(const Transport&);
   [[nodiscard]] dds_entity_t get() const { return participant_.get(); }
 
  private:
-  Entity domain_;
+  Domain domain_;
   Entity participant_;
 };
 
@@ -120,23 +133,40 @@ class Reader {
   using Callback = std::function<void(const T& sample, SampleState state)>;
 
   Reader(const Participant& participant, const Channel& channel, Callback callback)
-      : callback_(std::make_unique<Callback>(std::move(callback))) {
-    dds_listener_t* listener = dds_create_listener(callback_.get());
-    dds_lset_data_available(listener, [](dds_entity_t reader, void* context) { take(reader, context); });
-    endpoint_ = detail::make_reader(participant, channel, descriptor<T>(), listener);
-    dds_delete_listener(listener);
+      : receiver_(std::make_unique<Receiver>(std::move(callback))) {
+    const std::unique_ptr<dds_listener_t, void (*)(dds_listener_t*)> listener(dds_create_listener(receiver_.get()),
+                                                                              dds_delete_listener);
+    dds_lset_data_available(listener.get(), [](dds_entity_t reader, void* receiver) { take(reader, receiver); });
+    receiver_->turn.store(0, std::memory_order_release);
+    endpoint_ = detail::make_reader(participant, channel, descriptor<T>(), listener.get());
+  }
+  Reader(const Reader&) = delete;
+  /// Returns when the last callback has returned.
+  ~Reader() {
+    endpoint_ = {};
+    static_cast<void>(receiver_->turn.load(std::memory_order_acquire));
   }
 
  private:
+  struct Receiver {
+    explicit Receiver(Callback given) : callback(std::move(given)) {}
+    const Callback callback;
+    /// Orders construction, callbacks and destruction. Cyclone's own locks do so too, but a checker of races cannot look
+    /// into them.
+    std::atomic<std::uint64_t> turn{0};
+  };
+
   static void take(dds_entity_t reader, void* context) {
-    detail::take_all(reader, context, [](void* callback, const void* sample, const dds_sample_info_t& info) {
-      (*static_cast<Callback*>(callback))(
-          *static_cast<const T*>(sample),
-          SampleState{info.valid_data, info.instance_state == DDS_ALIVE_INSTANCE_STATE});
+    auto& receiver = *static_cast<Receiver*>(context);
+    static_cast<void>(receiver.turn.load(std::memory_order_acquire));
+    detail::take_all(reader, context, [](void* to, const void* sample, const dds_sample_info_t& info) {
+      static_cast<Receiver*>(to)->callback(*static_cast<const T*>(sample),
+                                           SampleState{info.valid_data, info.instance_state == DDS_ALIVE_INSTANCE_STATE});
     });
+    receiver.turn.fetch_add(1, std::memory_order_release);
   }
 
-  std::unique_ptr<Callback> callback_;  // outlives the endpoint, which is deleted first
+  std::unique_ptr<Receiver> receiver_;
   detail::Endpoint endpoint_;
 };
 

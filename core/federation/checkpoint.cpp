@@ -154,6 +154,9 @@ Checkpoint read_checkpoint(const fs::path& directory, const proto::Manifest& man
     if (header.tick() != checkpoint.tick.count()) {
       throw UserError(fmt::format("{}: saved at tick {}, the other parts at {}", file.string(), header.tick(), checkpoint.tick.count()));
     }
+    if (!checkpoint.parts.empty() && header.run() != checkpoint.parts.front().header().run()) {
+      throw UserError(fmt::format("{}: saved by another run than the other parts; resume from another checkpoint", file.string()));
+    }
     if (header.experiment_hash() != resumable_hash(manifest)) {
       throw UserError(fmt::format("{}: saved by another experiment; only length, division, recording and checkpoints may differ",
                                   file.string()));

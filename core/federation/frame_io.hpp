@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/base/error.hpp"
+#include "core/federation/frame_check.hpp"
 #include "core/federation/session.hpp"
 
 namespace kilotwin {
@@ -19,7 +20,8 @@ class InputBase {
   }
   virtual ~InputBase() = default;
   InputBase(const InputBase&) = delete;
-  [[nodiscard]] const TickGate& gate() const { return gate_; }
+  /// With the session's mutex held.
+  [[nodiscard]] TickGate& gate() { return gate_; }
 
  protected:
   Session& session_;
@@ -57,19 +59,22 @@ class Input : public InputBase {
     const FederateId publisher{wire.publisher};
     if (wire.tick < 0) {
       gate_.hello(publisher);
-    } else {
-      switch (gate_.arrived(publisher, Tick{wire.tick})) {
-        case TickGate::Arrival::kRepeated: return;
-        case TickGate::Arrival::kUnexpected:
-          return session_.fail(fmt::format("{}: frame {} of federate {} was not expected", topic_, wire.tick, wire.publisher));
-        case TickGate::Arrival::kAccepted: break;
-      }
-      const auto index = static_cast<std::size_t>(gate_.index_of(publisher));
-      if (!from_wire(wire, rings_[index][static_cast<std::size_t>(wire.tick % kFrameRing)])) {
-        return session_.fail(fmt::format("{}: frame {} of {} is malformed", topic_, wire.tick, session_.plan().name(publisher)));
-      }
-      session_.mention(wire.directives);
+      return session_.notify();
     }
+    switch (gate_.arrived(publisher, Tick{wire.tick})) {
+      case TickGate::Arrival::kRepeated: return;
+      case TickGate::Arrival::kUnexpected:
+        return session_.fail(fmt::format("{}: frame {} of federate {} was not expected", topic_, wire.tick, wire.publisher));
+      case TickGate::Arrival::kAccepted: break;
+    }
+    const auto index = static_cast<std::size_t>(gate_.index_of(publisher));
+    Frame& frame = rings_[index][static_cast<std::size_t>(wire.tick % kFrameRing)];
+    const char* const wrong =
+        from_wire(wire, frame) ? defect(frame, session_.plan(), publisher, session_.self()) : "its arrays differ in length";
+    if (wrong != nullptr) {
+      return session_.fail(fmt::format("{}: frame {} of {} is malformed: {}", topic_, wire.tick, session_.plan().name(publisher), wrong));
+    }
+    session_.mention(wire.directives);
     session_.notify();
   }
 

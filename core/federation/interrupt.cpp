@@ -11,8 +11,9 @@ void catch_interrupts() {
   struct sigaction action{};
   action.sa_handler = [](int signal) { received_signal = signal; };
   sigemptyset(&action.sa_mask);
-  sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second Ctrl-C ends the process, whatever it does
+  sigaction(SIGINT, &action, nullptr);
 }
 
 int interrupted() { return received_signal; }

@@ -1,10 +1,12 @@
 /// Keeps a run from going faster than wall time allows.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
 #include "core/experiment/plan.hpp"
+#include "core/federation/interrupt.hpp"
 
 namespace kilotwin {
 
@@ -12,14 +14,21 @@ class Pace {
  public:
   explicit Pace(const RunPlan& plan) : factor_(plan.manifest.pace()), tick_s_(plan.tick_length.seconds()) {}
 
-  /// Returns when `ticks` ticks may have passed; `wall_s`: how long the run has taken for them so far, pauses excluded.
-  void hold(std::int64_t ticks, double wall_s) const {
+  /// Returns when `ticks` ticks may have passed, or the process is interrupted. `wall_s()`: how long the run has taken for
+  /// them so far, pauses excluded. `idle()` is called about every 100 ms meanwhile.
+  template <class Wall, class Idle>
+  void hold(std::int64_t ticks, Wall wall_s, Idle idle) const {
     if (factor_ <= 0) return;
-    const double ahead_s = static_cast<double>(ticks) * tick_s_ / factor_ - wall_s;
-    if (ahead_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(ahead_s));
+    while (interrupted() == 0) {
+      const double ahead_s = static_cast<double>(ticks) * tick_s_ / factor_ - wall_s();
+      if (ahead_s <= 0) return;
+      std::this_thread::sleep_for(std::chrono::duration<double>(std::min(ahead_s, kIdle_s)));
+      if (ahead_s > kIdle_s) idle();
+    }
   }
 
  private:
+  static constexpr double kIdle_s = 0.1;
   double factor_, tick_s_;
 };
 

@@ -8,11 +8,11 @@ RunSchedule::RunSchedule(Tick first, Tick last, std::int64_t checkpoint_every)
     : first_(first), last_(last), checkpoint_every_(checkpoint_every) {}
 
 void RunSchedule::add(const Directive& directive) {
-  if (directive.sequence_number < log_.size()) return;
+  if (directive.sequence_number < known_) return;
   out_of_order_.emplace(directive.sequence_number, directive);
-  for (auto next = out_of_order_.begin(); next != out_of_order_.end() && next->first == log_.size();
-       next = out_of_order_.erase(next)) {
-    log_.push_back(next->second);
+  for (auto next = out_of_order_.begin(); next != out_of_order_.end() && next->first == known_; next = out_of_order_.erase(next)) {
+    pending_.push_back(next->second);
+    ++known_;
   }
 }
 
@@ -26,13 +26,16 @@ void RunSchedule::apply_until(Tick now) {
       pause_again_ = Tick{-1};
     }
   }
-  for (; applied_ < log_.size() && log_[applied_].tick <= now; ++applied_) {
-    const Directive& directive = log_[applied_];
+  for (; !pending_.empty() && pending_.front().tick <= now; pending_.pop_front()) {
+    const Directive& directive = pending_.front();
     switch (directive.kind) {
       case DirectiveKind::kPause: paused_ = true; break;
       case DirectiveKind::kContinue: paused_ = false; pause_again_ = Tick{-1}; break;
       case DirectiveKind::kStep: paused_ = false; pause_again_ = directive.tick + std::max<std::int64_t>(1, directive.steps); break;
-      case DirectiveKind::kStop: stopped_ = now < last_; last_ = std::min(last_, now); break;
+      case DirectiveKind::kStop:
+        stopped_ = stopped_ || now < last_;
+        last_ = std::min(last_, now);
+        break;
       case DirectiveKind::kCheckpoint: checkpoints_.push_back(directive.tick); break;
       case DirectiveKind::kOverheadInput: overhead_inputs_.push_back(directive.packet); break;
       case DirectiveKind::kTrackedPose: tracked_poses_.push_back(directive.tracked_pose); break;

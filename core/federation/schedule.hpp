@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <vector>
 
@@ -41,7 +42,7 @@ class RunSchedule {
   /// A frame mentions that `count` directives exist.
   void mention(std::uint64_t count) { if (count > mentioned_) mentioned_ = count; }
   /// How many directives are known without a gap: what own frames mention.
-  [[nodiscard]] std::uint32_t known() const { return static_cast<std::uint32_t>(log_.size()); }
+  [[nodiscard]] std::uint32_t known() const { return known_; }
 
   enum class Verdict { kStep, kAwaitDirective, kPaused, kFinished };
   /// What a federate at `now` that has all its inputs does next. Ask with non-decreasing ticks.
@@ -56,18 +57,16 @@ class RunSchedule {
   /// Where the run ends as far as is known.
   [[nodiscard]] Tick last() const { return last_; }
   [[nodiscard]] bool stopped_early() const { return stopped_; }
-  /// All directives known so far, in sequence.
-  [[nodiscard]] const std::vector<Directive>& log() const { return log_; }
 
  private:
   void apply_until(Tick now);
 
   Tick first_, last_;
   std::int64_t checkpoint_every_;
-  std::vector<Directive> log_;                     // contiguous from sequence number 0
+  std::uint32_t known_ = 0;
+  std::deque<Directive> pending_;                  // known, in sequence, and not applied yet
   std::map<std::uint64_t, Directive> out_of_order_;
   std::uint64_t mentioned_ = 0;
-  std::size_t applied_ = 0;                        // of log_
   bool paused_ = false;
   bool stopped_ = false;
   Tick pause_again_{-1};                           // after a kStep; negative: never

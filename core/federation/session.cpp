@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
 #include "core/federation/frame_io.hpp"
 #include "core/federation/hash_book.hpp"
 #include "core/federation/interrupt.hpp"
@@ -22,6 +23,8 @@ constexpr auto kIdlePeriod = milliseconds(100);
 constexpr auto kComplainAfter = milliseconds(1000);
 constexpr auto kComplainEvery = milliseconds(5000);
 constexpr double kFlush_s = 2.0;
+/// For how long a directive that frames mention may fail to come from a station that lives.
+constexpr auto kDirectivePatience = milliseconds(10'000);
 /// Ticks per ledger sample.
 constexpr std::size_t kLedgerTicks = 32;
 
@@ -29,15 +32,10 @@ std::uint64_t elapsed_ns(Clock::time_point from, Clock::time_point to) {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(to - from).count());
 }
 
-Directive from_wire(const WireDirective& wire) {
-  Directive directive;
-  directive.sequence_number = wire.sequence_number;
-  directive.tick = Tick{wire.tick};
-  directive.kind = static_cast<DirectiveKind>(wire.kind);
-  directive.steps = wire.steps;
-  if (wire.packet._length == sizeof(OverheadPacket)) std::copy_n(wire.packet._buffer, wire.packet._length, reinterpret_cast<std::uint8_t*>(&directive.packet));
-  directive.tracked_pose = {wire.robot, wire.x_mm, wire.y_mm, wire.heading_rad};
-  return directive;
+std::string host_name() {
+  char name[64] = {};
+  gethostname(name, sizeof name - 1);
+  return name;
 }
 
 }  // namespace
@@ -58,10 +56,7 @@ Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& tra
   } else {
     directive_reader_ = std::make_unique<dds::Reader<WireDirective>>(
         participant_, topics::directives(), [this](const WireDirective& wire, dds::SampleState state) {
-          if (!state.valid || wire.run != plan_.run()) return;
-          const std::lock_guard lock(mutex_);
-          schedule_.add(from_wire(wire));
-          notify();
+          if (state.valid && wire.run == plan_.run()) on_directive(wire);
         });
   }
   write_member(kilotwin_wire_ARRIVING);
@@ -74,7 +69,9 @@ Session::~Session() = default;
 
 double Session::wall_s() const {
   if (!started_) return 0;
-  return static_cast<double>(elapsed_ns(*started_, ended_.value_or(Clock::now())) - paused_ns_) * 1e-9;
+  const auto until = ended_.value_or(Clock::now());
+  const std::uint64_t pausing_ns = paused_since_ ? elapsed_ns(*paused_since_, until) : 0;
+  return static_cast<double>(elapsed_ns(*started_, until) - paused_ns_ - pausing_ns) * 1e-9;
 }
 
 void Session::fail(const std::string& line) {
@@ -93,8 +90,17 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
   if (member.publisher >= peers_.size()) return;
   Peer& peer = peers_[member.publisher];
   if (state.valid) {
+    const bool is_other_self = member.publisher == self_.value() &&
+                               (member.process != static_cast<std::uint32_t>(getpid()) || member.host != host_name());
+    if (is_other_self) {
+      // Who came later leaves; who is at work does not mind.
+      if (phase_ != kilotwin_wire_ARRIVING) return;
+      is_double_ = failure_is_user_error_ = true;
+      return fail(fmt::format("{} of this run was started already (process {} on {}); start each service once", plan_.name(self_),
+                              member.process, member.host));
+    }
     peer.here = true;
-    peer.phase = member.phase;
+    peer.phase = std::max(peer.phase, member.phase);
     if (member.plan_hash != plan_.hash) {
       return fail(fmt::format("{} on {} runs another experiment than this service; give all the same run directory",
                               member.name, member.host));
@@ -110,28 +116,38 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
   notify();
 }
 
+void Session::on_directive(const WireDirective& wire) {
+  const std::lock_guard lock(mutex_);
+  Directive directive;
+  const char* const wrong = from_wire(wire, directive) ? defect(directive, plan_) : "its packet is of another length";
+  if (wrong != nullptr) return fail(fmt::format("directive {} is malformed: {}", wire.sequence_number, wrong));
+  schedule_.add(directive);
+  notify();
+}
+
 void Session::write_member(kilotwin_wire_MemberPhase phase, const std::string& failure) {
+  {
+    const std::lock_guard lock(mutex_);
+    phase_ = phase;
+  }
   WireMember member{};
-  char host[64] = {};
-  gethostname(host, sizeof host - 1);
   const std::string name = plan_.name(self_);
   member.publisher = self_.value();
   member.run = plan_.run();
   member.plan_hash = plan_.hash;
   member.phase = phase;
   name.copy(member.name, sizeof member.name - 1);
-  std::copy_n(host, sizeof host, member.host);
+  host_name().copy(member.host, sizeof member.host - 1);
   member.process = static_cast<std::uint32_t>(getpid());
   failure.copy(member.failure, sizeof member.failure - 1);
   member_writer_->write(member);
 }
 
-std::string Session::names(const std::vector<FederateId>& ids) const {
+std::string Session::names(std::vector<FederateId> ids) const {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   std::string result;
-  for (const FederateId id : ids) {
-    const std::string name = plan_.name(id);
-    if (result.find(name) == std::string::npos) result += (result.empty() ? "" : "; ") + name;
-  }
+  for (const FederateId id : ids) result += (result.empty() ? "" : "; ") + plan_.name(id);
   return result;
 }
 
@@ -146,81 +162,128 @@ void Session::check() const {
   }
 }
 
-void Session::complain(Clock::time_point since, const std::string& whom) {
+void Session::complain(Clock::duration waited, const std::string& whom) {
   const auto now = Clock::now();
-  if (now < next_complaint_ || now < since + kComplainAfter) return;
+  if (now < next_complaint_) return;
   next_complaint_ = now + kComplainEvery;
   waiting_for_ = whom;
-  fmt::print(stderr, "{} has waited {:.0f} s for {}\n", plan_.name(self_), static_cast<double>(elapsed_ns(since, now)) * 1e-9, whom);
+  say(fmt::format("{} has waited {:.0f} s for {}", plan_.name(self_), std::chrono::duration<double>(waited).count(), whom));
+}
+
+bool Session::hears_all() const {
+  return std::all_of(inputs_.begin(), inputs_.end(), [](InputBase* input) { return input->gate().heard_all(); });
+}
+
+/// Whom assembly waits for: those who have not arrived, else those whose frames do not come through; empty: nobody.
+std::string Session::awaited_in_assembly() const {
+  std::vector<FederateId> absent, silent, deaf;
+  for (std::uint32_t i = 0; i < peers_.size(); ++i) {
+    if (!peers_[i].here) absent.push_back(FederateId{i});
+    else if (peers_[i].phase == kilotwin_wire_ARRIVING) deaf.push_back(FederateId{i});
+  }
+  if (!absent.empty()) return names(absent) + " to arrive";
+  for (InputBase* input : inputs_) {
+    for (const FederateId id : input->gate().unheard()) silent.push_back(id);
+  }
+  if (!silent.empty()) return "the frames of " + names(silent) + " to come through";
+  return deaf.empty() ? "" : names(deaf) + " to hear all others";
 }
 
 void Session::assemble(Federate& federate) {
   const auto since = Clock::now();
-  next_complaint_ = since;
-  bool hears_all = false;
+  next_complaint_ = since + kComplainAfter;
+  next_idle_ = since;
+  auto next_hello = since;
   for (;;) {
-    for (OutputBase* output : outputs_) output->hello();
+    if (Clock::now() >= next_hello) {
+      next_hello = Clock::now() + kHelloPeriod;
+      for (OutputBase* output : outputs_) output->hello();
+    }
     std::unique_lock lock(mutex_);
-    if (!hears_all && std::all_of(inputs_.begin(), inputs_.end(), [](InputBase* input) { return input->gate().heard_all(); })) {
-      hears_all = true;
+    if (phase_ == kilotwin_wire_ARRIVING && hears_all()) {
       lock.unlock();
       write_member(kilotwin_wire_HEARS_ALL);
       lock.lock();
     }
     check();
     if (interrupted() != 0) throw RunError(fmt::format("stopped by signal {} before the first tick", interrupted()));
-    std::vector<FederateId> late;
-    for (std::uint32_t i = 0; i < peers_.size(); ++i) {
-      if (!peers_[i].here || peers_[i].phase == kilotwin_wire_ARRIVING) late.push_back(FederateId{i});
-    }
-    if (hears_all && late.empty()) break;
-    complain(since, names(late) + " to arrive");
-    arrived_.wait_for(lock, kHelloPeriod);
+    const std::string whom = awaited_in_assembly();
+    if (whom.empty()) break;
+    complain(Clock::now() - since, whom);
+    arrived_.wait_until(lock, next_hello);
     lock.unlock();
-    federate.idle();
+    if (const auto now = Clock::now(); now >= next_idle_) {
+      next_idle_ = now + kIdlePeriod;
+      federate.idle();
+    }
   }
   waiting_for_.clear();
 }
 
+void Session::note_pause(bool pause) {
+  if (pause == paused()) return;
+  if (pause) {
+    paused_since_ = Clock::now();
+  } else {
+    paused_ns_ += elapsed_ns(*paused_since_, Clock::now());
+    paused_since_.reset();
+  }
+}
+
+/// For whom the step from `now` waits. Throws RunError where it would wait in vain.
+std::string Session::awaited(Tick now, Clock::duration waited) const {
+  std::vector<FederateId> late;
+  for (InputBase* input : inputs_) {
+    for (const FederateId id : input->gate().missing(now)) late.push_back(id);
+  }
+  for (const FederateId id : late) {
+    if (!peers_[id.value()].alive) throw RunError(fmt::format("{} left without its frame of tick {}", plan_.name(id), now.count()));
+  }
+  if (!late.empty()) return names(late) + fmt::format(" (tick {})", now.count());
+  if (!peers_[plan_.station().value()].alive || waited > kDirectivePatience) {
+    throw RunError("a directive that was mentioned did not come from the station");
+  }
+  return "a directive of the station";
+}
+
 RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
-  const auto since = Clock::now();
-  next_complaint_ = since;
-  auto pause_since = since;
+  auto since = Clock::now();
+  next_complaint_ = since + kComplainAfter;
   std::unique_lock lock(mutex_);
+  for (InputBase* input : inputs_) input->gate().reading(now);
   for (;;) {
     check();
     RunSchedule::Verdict verdict = RunSchedule::Verdict::kAwaitDirective;
     const bool ready = std::all_of(inputs_.begin(), inputs_.end(), [now](InputBase* input) { return input->gate().ready(now); });
     if (ready) verdict = schedule_.verdict(now);
     known_ = schedule_.known();
-    const bool pause = verdict == RunSchedule::Verdict::kPaused;
-    if (pause != paused_) {
-      if (pause) pause_since = Clock::now();
-      if (!pause) paused_ns_ += elapsed_ns(pause_since, Clock::now());
-      paused_ = pause;
+    note_pause(verdict == RunSchedule::Verdict::kPaused);
+    if (verdict == RunSchedule::Verdict::kStep || verdict == RunSchedule::Verdict::kFinished) {
+      waiting_for_.clear();
+      return verdict;
     }
-    if (verdict == RunSchedule::Verdict::kStep || verdict == RunSchedule::Verdict::kFinished) break;
-    const auto slept = Clock::now();
-    if (!pause && slept >= since + kComplainAfter) {
-      std::vector<FederateId> late;
-      for (InputBase* input : inputs_) {
-        for (const FederateId id : input->gate().missing(now)) late.push_back(id);
-      }
-      complain(since, late.empty() ? "a directive of the station" : names(late) + fmt::format(" (tick {})", now.count()));
+    const auto at = Clock::now();
+    if (paused()) {
+      since = at;
+    } else if (at >= since + kComplainAfter) {
+      const std::string whom = awaited(now, at - since);
+      // The station ends an interrupted run in order, but not one that has come to a halt.
+      if (interrupted() != 0) throw RunError(fmt::format("stopped by signal {} while it waited for {}", interrupted(), whom));
+      complain(at - since, whom);
     }
-    if (slept >= next_idle_) {
-      next_idle_ = slept + kIdlePeriod;
-      lock.unlock();
-      if (pause) write_ledger(federate, false);
-      if (pause && schedule_.checkpoint_at(now)) save_once(federate, now);
-      federate.idle();
-      lock.lock();
+    if (at < next_idle_) {
+      arrived_.wait_until(lock, next_idle_);
       continue;
     }
-    arrived_.wait_for(lock, kIdlePeriod);
+    next_idle_ = at + kIdlePeriod;
+    lock.unlock();
+    if (paused()) {
+      write_ledger(federate, false);
+      if (schedule_.checkpoint_at(now)) save_once(federate, now);
+    }
+    federate.idle();
+    lock.lock();
   }
-  waiting_for_.clear();
-  return schedule_.verdict(now);
 }
 
 void Session::save_once(Federate& federate, Tick now) {
@@ -259,22 +322,7 @@ void Session::announce(const Directive& directive) {
     schedule_.add(directive);
     known_ = schedule_.known();
   }
-  WireDirective wire{};
-  wire.sequence_number = directive.sequence_number;
-  wire.run = plan_.run();
-  wire.tick = directive.tick.count();
-  wire.kind = static_cast<kilotwin_wire_DirectiveKind>(directive.kind);
-  wire.steps = directive.steps;
-  OverheadPacket packet = directive.packet;
-  if (directive.kind == DirectiveKind::kOverheadInput) {
-    wire.packet._length = wire.packet._maximum = sizeof packet;
-    wire.packet._buffer = reinterpret_cast<std::uint8_t*>(&packet);
-  }
-  wire.robot = directive.tracked_pose.robot;
-  wire.x_mm = directive.tracked_pose.x_mm;
-  wire.y_mm = directive.tracked_pose.y_mm;
-  wire.heading_rad = directive.tracked_pose.heading_rad;
-  directive_writer_->write(wire);
+  directive_writer_->write(to_wire(plan_.run(), directive));
 }
 
 void Session::run(Federate& federate) {
@@ -313,11 +361,13 @@ void Session::run(Federate& federate) {
     // Tell the others why, so that all name the same culprit; a failure that came from them is theirs to tell.
     const std::string line = error.what();
     bool own = false;
+    if (!ended_) ended_ = Clock::now();
     {
       const std::lock_guard lock(mutex_);
       own = failure_.empty();
       finished_ = true;
     }
+    if (is_double_) throw;
     try {
       write_member(kilotwin_wire_FAILED, own ? line : "left: " + line);
       member_writer_->flush(0.5);
@@ -331,6 +381,7 @@ void Session::run(Federate& federate) {
 void Session::leave(Federate& federate) {
   write_ledger(federate, true);
   for (const OutputBase* output : outputs_) output->flush(kFlush_s);
+  if (directive_writer_) directive_writer_->flush(kFlush_s);
   ledger_writer_->flush(kFlush_s);
   {
     const std::lock_guard lock(mutex_);

@@ -6,7 +6,7 @@
 ///   leave      wait until everything sent is acknowledged, say FINISHED
 ///
 /// Any wait over 1 s says for whom. A federate that is lost, or that fails, ends the session of all others with a RunError
-/// that names it.
+/// that names it; so does one that left while something of it is still missing, and a frame that cannot be ours.
 #pragma once
 
 #include <atomic>
@@ -54,7 +54,7 @@ class Session {
   ~Session();
 
   /// Runs `federate` to the end of the run. Throws RunError where another federate is lost or failed, or the run was
-  /// interrupted, and UserError where another run is on the domain.
+  /// interrupted, and UserError where another run is on the domain, or this very federate runs already.
   void run(Federate& federate);
 
   [[nodiscard]] const RunPlan& plan() const { return plan_; }
@@ -67,7 +67,9 @@ class Session {
   [[nodiscard]] WireHeader header() const { return {self_.value(), plan_.run(), known_}; }
   /// One line: for whom the session waits; empty while it does not.
   [[nodiscard]] std::string waiting_for() const { return waiting_for_; }
-  [[nodiscard]] bool paused() const { return paused_; }
+  /// The first tick has begun.
+  [[nodiscard]] bool started() const { return started_.has_value(); }
+  [[nodiscard]] bool paused() const { return paused_since_.has_value(); }
   /// Wall seconds since the first tick, pauses excluded.
   [[nodiscard]] double wall_s() const;
 
@@ -91,12 +93,17 @@ class Session {
   RunSchedule::Verdict await(Federate&, Tick now);
   void write_member(kilotwin_wire_MemberPhase phase, const std::string& failure = {});
   void on_member(const WireMember& member, dds::SampleState state);
+  void on_directive(const WireDirective& wire);
   void write_ledger(Federate&, bool last);
   void save_once(Federate&, Tick now);
   void check() const;
-  void complain(std::chrono::steady_clock::time_point since, const std::string& whom);
+  void note_pause(bool pause);
+  [[nodiscard]] bool hears_all() const;
+  [[nodiscard]] std::string awaited_in_assembly() const;
+  [[nodiscard]] std::string awaited(Tick now, std::chrono::steady_clock::duration waited) const;
+  void complain(std::chrono::steady_clock::duration waited, const std::string& whom);
   void leave(Federate&);
-  [[nodiscard]] std::string names(const std::vector<FederateId>&) const;
+  [[nodiscard]] std::string names(std::vector<FederateId>) const;
 
   const RunPlan& plan_;
   const FederateId self_;
@@ -108,9 +115,10 @@ class Session {
   std::uint32_t known_ = 0;       // schedule_.known() as of the last look: what own frames mention
   std::string failure_;
   bool failure_is_user_error_ = false;
+  bool is_double_ = false;        // another process is this federate already
+  kilotwin_wire_MemberPhase phase_ = kilotwin_wire_ARRIVING;
   std::string waiting_for_;
   std::chrono::steady_clock::time_point next_complaint_, next_idle_;
-  bool paused_ = false;
   std::vector<Peer> peers_;
   std::vector<class InputBase*> inputs_;
   std::vector<class OutputBase*> outputs_;
@@ -118,7 +126,7 @@ class Session {
   Tick hash_first_;               // of hash_parts_
   Tick saved_{-1};                // the last checkpoint
   std::uint64_t step_ns_ = 0, exchange_ns_ = 0, wait_ns_ = 0, paused_ns_ = 0;
-  std::optional<std::chrono::steady_clock::time_point> started_, ended_;
+  std::optional<std::chrono::steady_clock::time_point> started_, ended_, paused_since_;
   bool finished_ = false;
 
   dds::Participant participant_;  // before the endpoints, so that it outlives them

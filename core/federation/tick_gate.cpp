@@ -5,7 +5,7 @@
 namespace kilotwin {
 
 TickGate::TickGate(std::vector<FederateId> publishers, Tick first)
-    : publishers_(std::move(publishers)), newest_(publishers_.size(), first - 1), hello_(publishers_.size(), false) {
+    : publishers_(std::move(publishers)), newest_(publishers_.size(), first - 1), reading_(first), hello_(publishers_.size(), false) {
   std::sort(publishers_.begin(), publishers_.end());
 }
 
@@ -26,7 +26,7 @@ TickGate::Arrival TickGate::arrived(FederateId publisher, Tick tick) {
   if (index < 0) return Arrival::kUnexpected;
   Tick& newest = newest_[static_cast<std::size_t>(index)];
   if (tick <= newest) return Arrival::kRepeated;
-  if (tick > newest + 1) return Arrival::kUnexpected;
+  if (tick > newest + 1 || tick - reading_ >= kFrameRing) return Arrival::kUnexpected;
   newest = tick;
   return Arrival::kAccepted;
 }

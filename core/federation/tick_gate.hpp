@@ -16,15 +16,17 @@ inline constexpr std::int64_t kFrameRing = 8;
 /// (reliable delivery).
 class TickGate {
  public:
-  /// `first`: the tick of the first frame expected from everybody.
+  /// `first`: the tick of the first frame expected from everybody, and where the reader stands.
   TickGate(std::vector<FederateId> publishers, Tick first);
 
   /// A hello, which carries no state, was heard. False: nobody expects this publisher here.
   bool hello(FederateId publisher);
   enum class Arrival { kAccepted, kRepeated, kUnexpected };
   /// A frame was heard. kRepeated: an older one again, or one from before `first`. kUnexpected: not one of ours, or one
-  /// that leaves a gap.
+  /// that leaves a gap or runs ahead of the reader by the whole ring.
   Arrival arrived(FederateId publisher, Tick tick);
+  /// The reader has come to `tick`: it reads the frames of that tick, and is done with those before.
+  void reading(Tick tick) { reading_ = tick; }
 
   /// Every publisher has said hello.
   [[nodiscard]] bool heard_all() const;
@@ -41,6 +43,7 @@ class TickGate {
  private:
   std::vector<FederateId> publishers_;
   std::vector<Tick> newest_;  // first - 1: nothing yet
+  Tick reading_;
   std::vector<bool> hello_;
 };
 

@@ -127,6 +127,35 @@ WireOverheadFrame to_wire(const WireHeader& header, const OverheadFrame& frame) 
   return wire;
 }
 
+WireDirective to_wire(std::uint64_t run, const Directive& directive) {
+  WireDirective wire{};
+  wire.sequence_number = directive.sequence_number;
+  wire.run = run;
+  wire.tick = directive.tick.count();
+  wire.kind = static_cast<kilotwin_wire_DirectiveKind>(directive.kind);
+  wire.steps = directive.steps;
+  if (directive.kind == DirectiveKind::kOverheadInput) {
+    wire.packet = borrow<decltype(wire.packet)>(&directive.packet, 1);
+  }
+  wire.robot = directive.tracked_pose.robot;
+  wire.x_mm = directive.tracked_pose.x_mm;
+  wire.y_mm = directive.tracked_pose.y_mm;
+  wire.heading_rad = directive.tracked_pose.heading_rad;
+  return wire;
+}
+
+bool from_wire(const WireDirective& wire, Directive& directive) {
+  directive.sequence_number = wire.sequence_number;
+  directive.tick = Tick{wire.tick};
+  directive.kind = static_cast<DirectiveKind>(wire.kind);
+  directive.steps = wire.steps;
+  directive.tracked_pose = {wire.robot, wire.x_mm, wire.y_mm, wire.heading_rad};
+  if (directive.kind != DirectiveKind::kOverheadInput) return true;
+  if (wire.packet._length != sizeof(OverheadPacket)) return false;
+  std::memcpy(static_cast<void*>(&directive.packet), wire.packet._buffer, sizeof(OverheadPacket));
+  return true;
+}
+
 bool from_wire(const WireOverheadFrame& wire, OverheadFrame& frame) {
   frame.tick = Tick{wire.tick};
   return copy(wire.packet, frame.packets);

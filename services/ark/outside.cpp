@@ -4,6 +4,12 @@
 #include <cmath>
 
 namespace kilotwin::ark {
+namespace {
+
+/// A tracker that sees a robot farther from the arena's centre is wrong: arenas are at most 1e6 mm wide.
+constexpr double kFarthest_mm = 1e7;
+
+}  // namespace
 
 Outside::Outside(const RunPlan& plan, const dds::Participant& participant)
     : plan_(plan),
@@ -58,8 +64,8 @@ void Outside::on_overhead_packet(const PublicOverheadPacket& sample) {
 
 void Outside::on_tracked_pose(const PublicTrackedPose& sample) {
   const std::lock_guard lock(mutex_);
-  const bool sound = std::isfinite(sample.x_mm) && std::isfinite(sample.y_mm) && std::isfinite(sample.heading_rad) &&
-                     std::abs(sample.heading_rad) < 100;
+  // False where a value is not finite, too.
+  const bool sound = std::abs(sample.x_mm) <= kFarthest_mm && std::abs(sample.y_mm) <= kFarthest_mm && std::abs(sample.heading_rad) < 100;
   if (!ours(sample.run) || !sound || sample.robot >= plan_.robots() || !plan_.tracked(sample.robot)) return;
   Directive directive;
   directive.kind = DirectiveKind::kTrackedPose;

@@ -1,5 +1,7 @@
 #include "services/ark/run_books.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "core/base/error.hpp"
@@ -9,14 +11,30 @@ namespace kilotwin::ark {
 RunBooks::RunBooks(const RunPlan& plan, const dds::Participant& participant, Tick first, std::uint64_t chain)
     : plan_(plan),
       hashes_(plan.federates(), first, chain),
-      accounts_(plan.federates()),
+      accounts_(plan.federates(), Account{.next = first}),
       reader_(participant, topics::ledgers(), [this](const WireLedger& ledger, dds::SampleState state) {
         if (state.valid && ledger.run == plan_.run() && ledger.publisher < accounts_.size()) on_ledger(ledger);
       }) {}
 
+/// Ledgers of one federate follow each other without a gap, and none goes past the run's end.
+bool RunBooks::fits(const WireLedger& ledger, const Account& account) const {
+  const std::uint32_t pairs = ledger.pair_receiver._length;
+  const auto all_robots = [&](const auto& sequence) {
+    return std::all_of(sequence._buffer, sequence._buffer + sequence._length, [this](std::uint32_t robot) { return robot < plan_.robots(); });
+  };
+  return !account.last && ledger.first_tick == account.next.count() &&
+         ledger.hash_parts._length <= plan_.last_tick + 1 - account.next && ledger.pair_sender._length == pairs &&
+         ledger.pair_count._length == pairs && all_robots(ledger.pair_receiver) && all_robots(ledger.pair_sender);
+}
+
 void RunBooks::on_ledger(const WireLedger& ledger) {
   const std::lock_guard lock(mutex_);
   Account& account = accounts_[ledger.publisher];
+  if (!fits(ledger, account)) {
+    if (malformed_.empty()) malformed_ = fmt::format("{}: a ledger does not fit the run", plan_.name(FederateId{ledger.publisher}));
+    return;
+  }
+  account.next = account.next + ledger.hash_parts._length;
   account.last = ledger.last;
   account.step_ns = ledger.step_ns;
   account.exchange_ns = ledger.exchange_ns;
@@ -27,8 +45,7 @@ void RunBooks::on_ledger(const WireLedger& ledger) {
   account.sent = ledger.sent;
   account.received = ledger.received;
   account.collided = ledger.collided;
-  const std::uint32_t pairs = std::min({ledger.pair_receiver._length, ledger.pair_sender._length, ledger.pair_count._length});
-  for (std::uint32_t i = 0; i < pairs; ++i) {
+  for (std::uint32_t i = 0; i < ledger.pair_count._length; ++i) {
     account.pairs.push_back({ledger.pair_receiver._buffer[i], ledger.pair_sender._buffer[i], ledger.pair_count._buffer[i]});
   }
   if (ledger.hash_parts._length != 0) {
@@ -41,6 +58,7 @@ void RunBooks::advance(const std::function<void(Tick, std::uint64_t)>& each) {
   std::vector<std::pair<Tick, std::vector<std::uint64_t>>> parts;
   {
     const std::lock_guard lock(mutex_);
+    if (!malformed_.empty()) throw RunError(malformed_);
     parts.swap(parts_);
   }
   for (const auto& [tick, values] : parts) KILOTWIN_DEMAND(hashes_.add(tick, values));

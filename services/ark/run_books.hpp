@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "core/experiment/plan.hpp"
@@ -17,7 +18,7 @@ class RunBooks {
   /// `chain`: H(first - 1).
   RunBooks(const RunPlan& plan, const dds::Participant& participant, Tick first, std::uint64_t chain);
 
-  /// Calls back with every H that has become known.
+  /// Calls back with every H that has become known. Throws RunError where a ledger came that cannot be ours.
   void advance(const std::function<void(Tick, std::uint64_t chain)>& each);
   /// The last tick whose H is known, and that H.
   [[nodiscard]] Tick hash_tick() const { return hashes_.tick(); }
@@ -29,13 +30,15 @@ class RunBooks {
 
  private:
   struct Account {
+    Tick next;  ///< of the hash parts that come next
     bool last = false;
     std::uint64_t step_ns = 0, exchange_ns = 0, cpu_ns = 0;
     std::uint32_t peak_memory_kib = 0, robots_failed = 0;
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
-    std::vector<PairCount> pairs;
+    std::vector<PairCount> pairs{};
   };
   void on_ledger(const WireLedger&);
+  [[nodiscard]] bool fits(const WireLedger&, const Account&) const;
   [[nodiscard]] Work work_of(std::uint32_t federate) const;
 
   const RunPlan& plan_;
@@ -43,6 +46,7 @@ class RunBooks {
   std::mutex mutex_;                  // guards what follows
   std::vector<Account> accounts_;
   std::vector<std::pair<Tick, std::vector<std::uint64_t>>> parts_;  // not yet in hashes_
+  std::string malformed_;             // the first ledger that was
   dds::Reader<WireLedger> reader_;
 };
 

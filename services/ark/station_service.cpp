@@ -21,8 +21,6 @@ using Clock = std::chrono::steady_clock;
 
 /// For how long the station waits for the other federates' last ledgers, s.
 constexpr double kBooksPatience_s = 5.0;
-/// A checkpoint asks for H of a tick at most one ledger (32 ticks) after it has become known.
-constexpr std::size_t kRecentHashes = 128;
 /// How often observers get robots' states, wall time.
 constexpr auto kRobotsPeriod = std::chrono::milliseconds(100);
 
@@ -48,7 +46,7 @@ class StationFederate : public Federate {
   }
 
   void inputs_complete(Tick now, bool last) override {
-    pace_.hold(now - session_.first(), session_.wall_s());
+    pace_.hold(now - session_.first(), [this] { return session_.wall_s(); }, [this] { idle(); });
     const auto begun = Clock::now();
     observer_.state(now, bodies_.at(now), actuation_.at(now), last);
     recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());
@@ -65,7 +63,8 @@ class StationFederate : public Federate {
   void save(Tick now) override {
     proto::CheckpointPart part;
     engine_.save(*part.mutable_station());
-    unfinished_.push_back({now, std::move(part)});
+    unfinished_.emplace_back(now, std::move(part));
+    settle();
   }
 
   void idle() override {
@@ -73,24 +72,19 @@ class StationFederate : public Federate {
     settle();
     const RunProgress progress = this->progress();
     observer_.idle(progress);
-    publish_status(progress.paused ? kilotwin_open_PAUSED : kilotwin_open_RUNNING, progress);
+    publish_status(!session_.started()  ? kilotwin_open_STARTING
+                   : progress.paused ? kilotwin_open_PAUSED
+                                     : kilotwin_open_RUNNING,
+                   progress);
   }
 
   /// Brings the books up to date, and writes checkpoint parts whose state hash has become known.
   void settle() {
+    write_checkpoint();
     books_.advance([this](Tick tick, std::uint64_t chain) {
       observer_.hash(tick, chain);
-      recent_.emplace_back(tick, chain);
-      if (recent_.size() > kRecentHashes) recent_.pop_front();
+      write_checkpoint();
     });
-    while (!unfinished_.empty() && books_.hash_tick() >= unfinished_.front().first) {
-      auto& [tick, part] = unfinished_.front();
-      for (const auto& [hash_tick, chain] : recent_) {
-        if (hash_tick == tick) part.mutable_station()->set_hash_chain(chain);
-      }
-      write_checkpoint_part(context_.run_directory, session_.plan(), tick, session_.plan().station(), part);
-      unfinished_.pop_front();
-    }
   }
 
   [[nodiscard]] RunProgress progress() {
@@ -123,6 +117,16 @@ class StationFederate : public Federate {
   [[nodiscard]] bool was_interrupted() const { return stop_announced_; }
 
  private:
+  /// Writes the part of the checkpoint of the tick whose state hash is the last one known, if there is one. The books know
+  /// no tick beyond that at which the station stands, so a part that comes to be saved is never too late.
+  void write_checkpoint() {
+    if (unfinished_.empty() || unfinished_.front().first != books_.hash_tick()) return;
+    auto& [tick, part] = unfinished_.front();
+    part.mutable_station()->set_hash_chain(books_.chain());
+    write_checkpoint_part(context_.run_directory, session_.plan(), tick, session_.plan().station(), part);
+    unfinished_.pop_front();
+  }
+
   void announce(Tick now) {
     for (const Directive& directive : outside_.take()) announce(now, directive);
     if (interrupted() != 0 && !stop_announced_) {
@@ -175,7 +179,6 @@ class StationFederate : public Federate {
   Pace pace_{session_.plan()};
   std::vector<std::uint8_t> led_;
   std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash
-  std::deque<std::pair<Tick, std::uint64_t>> recent_;              // H of the latest ticks
   std::uint64_t recording_ns_ = 0;
   bool stop_announced_ = false;
 };
@@ -200,7 +203,11 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   } catch (const std::exception& error) {
     totals.failure = error.what();
   }
-  federate.settle();
+  try {
+    federate.settle();
+  } catch (const std::exception& error) {
+    if (totals.failure.empty()) totals.failure = error.what();
+  }
   totals.first = context.first();
   totals.last = books.hash_tick();
   totals.state_hash = books.chain();

@@ -6,26 +6,10 @@ namespace kilotwin::physics {
 namespace {
 
 constexpr double kDiameter_mm = 2 * kRobotRadius_mm;
-/// By how much a limit may be missed because of rounding, mm. Sliding at a gap of 0 would stop without it.
-constexpr double kLimitTolerance_mm = 1e-14;
-/// How many limits of a body are met exactly, the one that is missed most first; what is missed then scales all down.
-constexpr int kLimitRounds = 2;
+constexpr double kOverlapSquare_mm2 = (kDiameter_mm - kOverlapTolerance_mm) * (kDiameter_mm - kOverlapTolerance_mm);
 
-// By value, so that compilers take one instruction instead of a branch that they cannot predict.
-inline double larger(double a, double b) { return a > b ? a : b; }
-inline double smaller(double a, double b) { return a < b ? a : b; }
-
-using Two = double __attribute__((vector_size(16)));
-inline Two larger(Two a, Two b) { return a > b ? a : b; }
-inline Two smaller(Two a, Two b) { return a < b ? a : b; }
-inline Two firsts(Two a, Two b) { return __builtin_shufflevector(a, b, 0, 2); }
-inline Two seconds(Two a, Two b) { return __builtin_shufflevector(a, b, 1, 3); }
-
-constexpr std::uint32_t kNobody = 0xffffffffu;
-constexpr double kUnlimited_mm = 1e300;
-
-inline Two both(double a) { return Two{a, a}; }
-inline Two swapped(Two a) { return __builtin_shufflevector(a, a, 1, 0); }
+/// Where a lane has no contact: so far away that it never acts.
+constexpr double kNoContact_mm = 1e100;
 
 }  // namespace
 
@@ -35,153 +19,225 @@ ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
   const double sub_step_s = plan.tick_length.seconds() / steps;
   separation_mm = kSeparation_mm_s * sub_step_s;
   stride_mm = std::max(separation_mm, drive.top_speed_mm_s() * sub_step_s);
-  // Before its last sub-step a pair has closed by at most 2 strides in each, and there half of the gap must be less than a
-  // stride to matter.
+  // A pair closes by at most 2 strides in a sub-step, and where half of its gap is more than a stride it does not matter. So
+  // it matters in sub-step s = 1..S only if its gap is at most 2 s strides at the tick's start.
   cutoff_mm = kDiameter_mm + 2 * steps * stride_mm;
-  // A hop per sub-step, and the way of a body that leaves the rectangle in this tick.
-  margin_mm = steps * cutoff_mm + steps * stride_mm;
+  // A hop per sub-step, each as far as a pair matters in it, and the way of a body that leaves the rectangle in this tick.
+  margin_mm = steps * kDiameter_mm + steps * (steps + 1) * stride_mm + steps * stride_mm;
   x_limit_mm = plan.experiment().arena().width_mm() / 2 - kRobotRadius_mm;
   y_limit_mm = plan.experiment().arena().height_mm() / 2 - kRobotRadius_mm;
 }
-
-ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
-    : limits_(plan, drive), axle_offset_mm_(drive.axle_offset_mm()), cells_(limits_.cutoff_mm) {}
 
 bool ContactLimits::outside(double x_mm, double y_mm) const {
   return x_mm > x_limit_mm || x_mm < -x_limit_mm || y_mm > y_limit_mm || y_mm < -y_limit_mm;
 }
 
-void ContactSolver::move(Bodies& bodies, const Drives& drives) {
-  if (!find_contacts(bodies, drives)) return;
-  move_free(bodies, drives);
-  const std::size_t slots = slots_.size();
-  if (slots > 1) {
-    link(drives);
-    for (std::uint32_t s = 0; s < limits_.sub_steps; ++s) {
-      any_overlap_ ? sub_step<true>(bodies) : sub_step<false>(bodies);
-      now_.swap(after_);
-    }
-    for (std::size_t slot = 1; slot < slots; ++slot) {
-      const std::uint32_t i = slots_[slot].body;
-      const double x = bodies.x_mm[i], y = bodies.y_mm[i];
-      double to_x = x + now_[slot].shift_mm[0], to_y = y + now_[slot].shift_mm[1];
-      if (!limits_.outside(x, y)) {  // The sum is rounded, a wall is not.
-        to_x = std::clamp(to_x, -limits_.x_limit_mm, limits_.x_limit_mm);
-        to_y = std::clamp(to_y, -limits_.y_limit_mm, limits_.y_limit_mm);
-      }
-      place(bodies, i, to_x, to_y);
-    }
-  }
-  for (std::size_t d = 0; d < drives.count; ++d) {
-    bodies.heading_rad[drives.body[d]] = wrapped(drives.heading_rad[d] + drives.turn_rad[d]);
-  }
-}
+ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
+    : limits_(plan, drive), sub_step_part_(1.0 / limits_.sub_steps), candidates_(limits_.cutoff_mm) {}
 
-bool ContactSolver::find_contacts(Bodies& bodies, const Drives& drives) {
-  const std::size_t count = bodies.size();
-  if (drives.count == 0 && std::find(bodies.awake.begin(), bodies.awake.end(), 1) == bodies.awake.end()) return false;
-  slots_.assign(1, Slot{});
-  pair_count_ = 0;
-  any_overlap_ = false;
-  drive_of_.assign(count, 0);
-  for (std::size_t d = 0; d < drives.count; ++d) drive_of_[drives.body[d]] = static_cast<std::uint32_t>(d + 1);
-  slot_of_.assign(count, 0);
-  cells_.build(bodies.x_mm, bodies.y_mm);
-  overlaps_.assign(count, 0);
-  is_pulled_.assign(count, 0);
-  pulled_.clear();
+bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& own, const std::vector<Duties>& duties) {
+  const auto count = static_cast<std::uint32_t>(bodies.size());
+  driven_.resize(count);
+  active_.resize(count);
+  int any_active = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (bodies.awake[i] != 0 || drive_of_[i] != 0) search(bodies, i);
+    driven_[i] = duties[i].any();
+    active_[i] = driven_[i] | bodies.awake[i];
+    any_active |= active_[i];
   }
-  // A sleeping body that touches one that is driven, or overlaps, may be moved.
-  for (std::size_t k = 0; k < pulled_.size(); ++k) search(bodies, pulled_[k]);
+  if (any_active == 0) return false;
+
+  candidates_.update(bodies);
+  hops_.assign(count, 0);
+  for (std::uint32_t i = 0; i < own.size(); ++i) hops_[i] = own[i] != 0 ? 0 : kOutOfReach;
+  overlaps_.assign(count, 0);
+  seat_of_.assign(count, ContactPass::kStill);
+  movers_.clear();
+  reached_.clear();
+  other_count_ = 0;
+  any_overlap_ = false;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (hops_[i] == 0 && may_be_touched(i)) search(bodies, i);
+  }
+  for (std::size_t k = 0; k < reached_.size(); ++k) {
+    const std::uint32_t i = reached_[k];
+    if (hops_[i] < limits_.sub_steps) {
+      search(bodies, i);
+    } else if (driven_[i] != 0) {
+      movers_.push_back({i, 0, 0});
+    }
+  }
+  seat_movers();
   return true;
 }
 
-void ContactSolver::search(const Bodies& bodies, std::uint32_t i) {
-  const double x = bodies.x_mm[i], y = bodies.y_mm[i];
-  const std::size_t count = cells_.find(x, y, i, found_);
-  if (count == 0) return;
-  const std::size_t pairs = (count + 1) / 2, first = pair_count_;
-  if (pairs_.size() < first + pairs) pairs_.resize(2 * (first + pairs));
-  if (half_gap_mm_.size() < pairs) half_gap_mm_.resize(pairs);
-  const bool driven = drive_of_[i] != 0;
-  bool may_move = driven || limits_.outside(x, y);
-  for (std::size_t p = 0; p < pairs; ++p) {
-    const bool filled_up = 2 * p + 1 == count;
-    const std::uint32_t j[2] = {found_[2 * p], found_[filled_up ? 2 * p : 2 * p + 1]};
-    const Two dx = Two{bodies.x_mm[j[0]], bodies.x_mm[j[1]]} - x, dy = Two{bodies.y_mm[j[0]], bodies.y_mm[j[1]]} - y;
-    const Two square = dx * dx + dy * dy;
-    const Two distance = {__builtin_sqrt(square[0]), __builtin_sqrt(square[1])};
-    const Two inverse = 1 / distance;
-    ContactPair& pair = pairs_[first + p];
-    pair.normal_x = dx * inverse;
-    pair.normal_y = dy * inverse;
-    pair.gap_mm = distance - kDiameter_mm;
-    for (int k = 0; k < 2; ++k) {
-      pair.other[k] = j[k];
-      if (!(distance[k] > 0)) {  // The same place: they part along x, the lower id to the left.
-        pair.normal_x[k] = j[k] > i ? 1 : -1;
-        pair.normal_y[k] = 0;
-      }
-      const bool overlap = pair.gap_mm[k] < -kOverlapTolerance_mm, other_driven = drive_of_[j[k]] != 0;
-      if (overlap) {
-        overlaps_[i] = overlaps_[j[k]] = 1;
-        any_overlap_ = true;
-      }
-      may_move |= overlap || other_driven;
-      if ((driven || overlap) && !other_driven && bodies.awake[j[k]] == 0 && is_pulled_[j[k]] == 0) {
-        is_pulled_[j[k]] = 1;
-        pulled_.push_back(j[k]);
-      }
-    }
-    if (filled_up) {
-      pair.normal_x[1] = pair.normal_y[1] = 0;
-      pair.gap_mm[1] = kUnlimited_mm;
-      pair.other[1] = kNobody;
-    }
+/// A sleeping body stays so unless somebody beside it is driven, moved or overlaps.
+bool ContactSolver::may_be_touched(std::uint32_t i) const {
+  if (active_[i] != 0) return true;
+  for (const std::uint32_t j : candidates_.of(i)) {
+    if (active_[j] != 0) return true;
   }
-  if (!may_move || bodies.tracked[i] != 0) return;
-  pair_count_ = first + pairs;
-  slot_of_[i] = static_cast<std::uint32_t>(slots_.size());
-  Slot slot;
-  slot.body = i;
-  slot.first_pair = static_cast<std::uint32_t>(first);
-  const double way_mm = limits_.sub_steps * limits_.stride_mm;
-  slot.near_wall = x > limits_.x_limit_mm - way_mm || x < -limits_.x_limit_mm + way_mm || y > limits_.y_limit_mm - way_mm ||
-                   y < -limits_.y_limit_mm + way_mm;
-  slots_.push_back(slot);
+  return false;
 }
 
-void ContactSolver::link(const Drives& drives) {
-  for (std::size_t p = 0; p < pair_count_; ++p) {
-    for (std::uint32_t& other : pairs_[p].other) other = other == kNobody ? 0 : slot_of_[other];
+void ContactSolver::search(const Bodies& bodies, std::uint32_t i) {
+  const double x = bodies.x_mm[i], y = bodies.y_mm[i], cutoff_square_mm2 = limits_.cutoff_mm * limits_.cutoff_mm;
+  const auto candidates = candidates_.of(i);
+  const std::size_t first = other_count_;
+  if (others_.size() < first + candidates.size() + 1) others_.resize(2 * (first + candidates.size() + 1));
+  std::uint32_t* const others = others_.data() + first;
+  std::uint32_t contacts = 0;
+  int overlaps = 0, beside_driven = 0;
+  for (const std::uint32_t j : candidates) {
+    const double dx = bodies.x_mm[j] - x, dy = bodies.y_mm[j] - y, square = dx * dx + dy * dy;
+    const int within = square <= cutoff_square_mm2;
+    others[contacts] = j;
+    contacts += static_cast<std::uint32_t>(within);
+    overlaps |= square < kOverlapSquare_mm2;
+    beside_driven |= within & driven_[j];
   }
-  const std::size_t count = slots_.size();
-  now_.assign(count, Motion{});
-  after_.assign(count, Motion{});
-  const double per_step = 1.0 / limits_.sub_steps;
-  for (std::size_t s = 1; s < count; ++s) {
-    Slot& slot = slots_[s];
-    if (drive_of_[slot.body] == 0) continue;
-    const std::size_t d = drive_of_[slot.body] - 1;
-    const Arc arc = arc_of(drives.run_mm[d] * per_step, drives.turn_rad[d] * per_step, axle_offset_mm_);
-    slot.cos_turn = arc.cos_turn;
-    slot.sin_turn = arc.sin_turn;
-    now_[s].drive_mm = Two{drives.cos_heading[d] * arc.forward_mm - drives.sin_heading[d] * arc.sideways_mm,
-                           drives.sin_heading[d] * arc.forward_mm + drives.cos_heading[d] * arc.sideways_mm};
+  overlaps_[i] = static_cast<std::uint8_t>(overlaps);
+  if (contacts == 0 || bodies.tracked[i] != 0) return;
+  if ((driven_[i] | overlaps | beside_driven) == 0 && !limits_.outside(x, y)) return;
+  any_overlap_ |= overlaps != 0;
+  movers_.push_back({i, static_cast<std::uint32_t>(first), contacts});
+  other_count_ = first + contacts;
+  for (std::uint32_t p = 0; p < contacts; ++p) {
+    if (hops_[others[p]] != kOutOfReach) continue;
+    hops_[others[p]] = static_cast<std::uint8_t>(hops_[i] + 1);
+    reached_.push_back(others[p]);
   }
-  slots_.push_back(Slot{});  // Ends the contacts of the last slot.
-  slots_.back().first_pair = static_cast<std::uint32_t>(pair_count_);
+}
 
-  // Bodies with equally many contacts one after the other, so that the loops over contacts are predictable.
-  const auto group = [&](std::size_t s) { return std::min<std::size_t>(slots_[s + 1].first_pair - slots_[s].first_pair, kMorePairs); };
-  pairs_end_.fill(0);
-  for (std::size_t s = 1; s < count; ++s) ++pairs_end_[group(s)];
-  for (std::size_t g = 1; g <= kMorePairs; ++g) pairs_end_[g] += pairs_end_[g - 1];
-  by_pairs_.resize(count - 1);
-  for (std::size_t s = count; --s > 0;) by_pairs_[--pairs_end_[group(s)]] = static_cast<std::uint32_t>(s);
-  for (std::size_t g = 0; g < kMorePairs; ++g) pairs_end_[g] = pairs_end_[g + 1];
+void ContactSolver::seat_movers() {
+  // Those with equally many contacts one after the other; within a group their order, and so that of hops, stays.
+  std::array<std::uint32_t, kMostContacts + 3> begin{};
+  const auto group = [](const Mover& m) { return std::min(m.contacts, kMostContacts + 1); };
+  for (const Mover& m : movers_) ++begin[group(m) + 1];
+  for (std::size_t g = 1; g < begin.size(); ++g) begin[g] += begin[g - 1];
+  auto next = begin;
+  by_group_.resize(movers_.size());
+  for (std::uint32_t m = 0; m < movers_.size(); ++m) by_group_[next[group(movers_[m])]++] = m;
+
+  pass_.clear();
+  for (std::size_t g = 0; g + 1 < begin.size(); ++g) {
+    for (std::uint32_t at = begin[g]; at < begin[g + 1]; at += kLanes) {
+      const std::uint32_t size = std::min(static_cast<std::uint32_t>(kLanes), begin[g + 1] - at);
+      std::uint32_t contacts = 0;
+      for (std::uint32_t lane = 0; lane < size; ++lane) contacts = std::max(contacts, movers_[by_group_[at + lane]].contacts);
+      pass_.add_batch(contacts, limits_.sub_steps - hops_[movers_[by_group_[at]].body]);
+      for (std::uint32_t lane = 0; lane < size; ++lane) seat_of_[movers_[by_group_[at + lane]].body] = pass_.seat(lane);
+    }
+  }
+  pass_.rest();
+}
+
+void ContactSolver::fill_contacts(const Bodies& bodies) {
+  const double way_mm = limits_.sub_steps * limits_.stride_mm;
+  const double x_free_mm = limits_.x_limit_mm - way_mm, y_free_mm = limits_.y_limit_mm - way_mm;
+  for (std::size_t at = 0; at < by_group_.size();) {
+    ContactPass::Batch& batch = pass_.batch_of(seat_of_[movers_[by_group_[at]].body]);
+    Mover movers[kLanes];
+    std::size_t size = 0;
+    for (; at < by_group_.size() && size < kLanes; ++at, ++size) {
+      movers[size] = movers_[by_group_[at]];
+      if (&pass_.batch_of(seat_of_[movers[size].body]) != &batch) break;
+      const double x = bodies.x_mm[movers[size].body], y = bodies.y_mm[movers[size].body];
+      batch.x_mm[size] = x;
+      batch.y_mm[size] = y;
+      batch.near_wall |= x > x_free_mm || x < -x_free_mm || y > y_free_mm || y < -y_free_mm;
+    }
+    for (std::size_t lane = size; lane < kLanes; ++lane) movers[lane] = {movers[0].body, 0, 0};
+    fill_contacts(bodies, batch, movers);
+  }
+}
+
+void ContactSolver::fill_contacts(const Bodies& bodies, const ContactPass::Batch& batch, const Mover* movers) {
+  std::uint32_t here[kLanes];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) here[lane] = movers[lane].body;
+  const Lanes x = gather(bodies.x_mm.data(), here), y = gather(bodies.y_mm.data(), here);
+  ContactPass::Contact* const contacts = pass_.contacts_of(batch);
+  for (std::uint32_t p = 0; p < batch.contacts; ++p) {
+    std::uint32_t there[kLanes];
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      there[lane] = p < movers[lane].contacts ? others_[movers[lane].first + p] : here[lane];
+    }
+    const Lanes dx = gather(bodies.x_mm.data(), there) - x, dy = gather(bodies.y_mm.data(), there) - y;
+    const Lanes distance = root(dx * dx + dy * dy), inverse = all(1) / distance;
+    ContactPass::Contact& contact = contacts[p];
+    contact.normal_x = dx * inverse;
+    contact.normal_y = dy * inverse;
+    contact.gap_mm = distance - all(kDiameter_mm);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) contact.other[lane] = seat_of_[there[lane]];
+    if (!(smallest(distance) > 0)) fill_coincident(contact, distance, here, there);
+  }
+}
+
+void ContactSolver::fill_coincident(ContactPass::Contact& contact, const Lanes& distance_mm, const std::uint32_t* here,
+                                    const std::uint32_t* there) {
+  double distance[kLanes], gap[kLanes], normal_x[kLanes], normal_y[kLanes];
+  store(distance_mm, distance);
+  store(contact.gap_mm, gap);
+  store(contact.normal_x, normal_x);
+  store(contact.normal_y, normal_y);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (distance[lane] > 0) continue;
+    // Two in the same place part along x, the lower id to the left.
+    normal_x[lane] = there[lane] < here[lane] ? -1 : 1;
+    normal_y[lane] = 0;
+    if (there[lane] != here[lane]) continue;
+    contact.other[lane] = ContactPass::kStill;
+    gap[lane] = kNoContact_mm;
+  }
+  contact.gap_mm = load(gap);
+  contact.normal_x = load(normal_x);
+  contact.normal_y = load(normal_y);
+}
+
+void ContactSolver::move(Bodies& bodies, const Drives& drives) {
+  for (std::size_t d = 0; d < drives.count; ++d) {
+    const std::uint32_t i = drives.body[d];
+    const ContactPass::Seat seat = seat_of_[i];
+    if (seat == ContactPass::kStill) {
+      move_alone(bodies, i, drives.x_mm[d], drives.y_mm[d]);
+    } else {
+      ContactPass::Batch& batch = pass_.batch_of(seat);
+      batch.cos_turn[ContactPass::lane_of(seat)] = drives.cos_turn[d];
+      batch.sin_turn[ContactPass::lane_of(seat)] = drives.sin_turn[d];
+      pass_.set_drive(seat, drives.x_mm[d], drives.y_mm[d]);
+    }
+    bodies.heading_rad[i] = wrapped(drives.heading_rad[d] + drives.turn_rad[d]);
+  }
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (hops_[i] != 0) {
+      bodies.awake[i] = hops_[i] != kOutOfReach;
+    } else if (bodies.awake[i] != 0 && driven_[i] == 0 && seat_of_[i] == ContactPass::kStill) {
+      move_alone(bodies, i, 0, 0);
+    }
+  }
+  if (movers_.empty()) return;
+  fill_contacts(bodies);
+  pass_.run(limits_, any_overlap_);
+  for (const Mover& m : movers_) {
+    if (hops_[m.body] != 0) break;
+    const double x = bodies.x_mm[m.body], y = bodies.y_mm[m.body];
+    double to_x = x + pass_.shift_x_mm(seat_of_[m.body]), to_y = y + pass_.shift_y_mm(seat_of_[m.body]);
+    if (!limits_.outside(x, y)) {  // The sum is rounded, a wall is not.
+      to_x = std::clamp(to_x, -limits_.x_limit_mm, limits_.x_limit_mm);
+      to_y = std::clamp(to_y, -limits_.y_limit_mm, limits_.y_limit_mm);
+    }
+    place(bodies, m.body, to_x, to_y);
+  }
+}
+
+void ContactSolver::move_alone(Bodies& bodies, std::uint32_t i, double way_x_mm, double way_y_mm) const {
+  if (bodies.tracked[i] != 0) return;
+  const double inwards_mm = limits_.sub_steps * limits_.separation_mm;
+  const auto held = [inwards_mm](double from_mm, double to_mm, double limit_mm) {
+    return std::max(std::min(-limit_mm, from_mm + inwards_mm), std::min(std::max(limit_mm, from_mm - inwards_mm), to_mm));
+  };
+  place(bodies, i, held(bodies.x_mm[i], bodies.x_mm[i] + way_x_mm, limits_.x_limit_mm),
+        held(bodies.y_mm[i], bodies.y_mm[i] + way_y_mm, limits_.y_limit_mm));
 }
 
 void ContactSolver::place(Bodies& bodies, std::uint32_t i, double to_x_mm, double to_y_mm) const {
@@ -189,129 +245,6 @@ void ContactSolver::place(Bodies& bodies, std::uint32_t i, double to_x_mm, doubl
   bodies.x_mm[i] = to_x_mm;
   bodies.y_mm[i] = to_y_mm;
   bodies.awake[i] = static_cast<std::uint8_t>(overlaps_[i] | moved | limits_.outside(to_x_mm, to_y_mm));
-}
-
-void ContactSolver::move_free(Bodies& bodies, const Drives& drives) const {
-  const double way_mm = limits_.sub_steps * limits_.separation_mm;
-  const auto held = [way_mm](double from_mm, double to_mm, double limit_mm) {
-    const double highest_mm = larger(limit_mm, from_mm - way_mm), lowest_mm = smaller(-limit_mm, from_mm + way_mm);
-    return larger(lowest_mm, smaller(highest_mm, to_mm));
-  };
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    const std::uint32_t drive = drive_of_[i];
-    if (slot_of_[i] != 0 || (drive == 0 && bodies.awake[i] == 0)) continue;
-    double x = bodies.x_mm[i], y = bodies.y_mm[i];
-    if (bodies.tracked[i] == 0) {
-      x = held(x, drive != 0 ? x + drives.x_mm[drive - 1] : x, limits_.x_limit_mm);
-      y = held(y, drive != 0 ? y + drives.y_mm[drive - 1] : y, limits_.y_limit_mm);
-    }
-    place(bodies, i, x, y);
-  }
-}
-
-template <bool kWithOverlaps>
-void ContactSolver::sub_step(const Bodies& bodies) {
-  const std::size_t end = by_pairs_.size();
-  std::size_t i = 0;
-  for (; i < pairs_end_[0]; ++i) move_slot<kWithOverlaps, 0>(bodies, by_pairs_[i]);
-  for (; i < pairs_end_[1]; ++i) move_slot<kWithOverlaps, 1>(bodies, by_pairs_[i]);
-  for (; i < pairs_end_[2]; ++i) move_slot<kWithOverlaps, 2>(bodies, by_pairs_[i]);
-  for (; i < pairs_end_[3]; ++i) move_slot<kWithOverlaps, 3>(bodies, by_pairs_[i]);
-  for (; i < end; ++i) move_slot<kWithOverlaps, kMorePairs>(bodies, by_pairs_[i]);
-}
-
-template <bool kWithOverlaps, std::size_t kPairs>
-inline void ContactSolver::move_slot(const Bodies& bodies, std::uint32_t s) {
-  const Motion* const now = now_.data();
-  Two few_limits_mm[kPairs == kMorePairs ? 1 : kPairs + 1];
-  Two* const limit_mm = kPairs == kMorePairs ? half_gap_mm_.data() : few_limits_mm;
-  const Two zero = {0, 0}, separation_mm = both(limits_.separation_mm);
-  const Slot& slot = slots_[s];
-  const ContactPair* const pairs = pairs_.data() + slot.first_pair;
-  const std::size_t count = kPairs == kMorePairs ? slots_[s + 1].first_pair - slot.first_pair : kPairs;
-  const Two shift_mm = now[s].shift_mm, drive_mm = now[s].drive_mm;
-
-  // Pushes. Gaps and speeds of two neighbours at a time; the sum in ascending order.
-  Two wanted = drive_mm;
-  Two deepest = zero;
-  for (std::size_t p = 0; p < count; ++p) {
-    const ContactPair& c = pairs[p];
-    const Motion &a = now[c.other[0]], &b = now[c.other[1]];
-    const Two a_shift = a.shift_mm - shift_mm, b_shift = b.shift_mm - shift_mm;
-    const Two gap = c.gap_mm + (c.normal_x * firsts(a_shift, b_shift) + c.normal_y * seconds(a_shift, b_shift));
-    const Two half = larger(0.5 * gap, zero);
-    // Along the normal: what the neighbour drives, negative towards this body, and what this body drives.
-    const Two theirs = c.normal_x * firsts(a.drive_mm, b.drive_mm) + c.normal_y * seconds(a.drive_mm, b.drive_mm);
-    const Two mine = c.normal_x * firsts(drive_mm, drive_mm) + c.normal_y * seconds(drive_mm, drive_mm);
-    // They push where they drive faster than both the gap and this body's own retreat allow.
-    Two push = larger(smaller(-half, mine) - theirs, zero);
-    if constexpr (kWithOverlaps) {
-      const Two overlap = gap < -kOverlapTolerance_mm ? -gap : zero;
-      deepest = larger(deepest, overlap);
-      push += smaller(0.5 * overlap, separation_mm);
-      limit_mm[p] = gap;
-    } else {
-      limit_mm[p] = half;
-    }
-    wanted -= firsts(push, push) * firsts(c.normal_x, c.normal_y);
-    wanted -= seconds(push, push) * seconds(c.normal_x, c.normal_y);
-  }
-  if constexpr (kWithOverlaps) {
-    const Two may_press = 0.5 * larger(deepest, swapped(deepest));
-    for (std::size_t p = 0; p < count; ++p) limit_mm[p] = larger(0.5 * (limit_mm[p] + may_press), zero);
-  }
-
-  // Both lanes of x, y and their bounds are alike from here on.
-  Two low_x = both(-kUnlimited_mm), high_x = both(kUnlimited_mm), low_y = low_x, high_y = high_x;
-  if (slot.near_wall) {
-    const Two wall = {limits_.x_limit_mm, limits_.y_limit_mm};
-    const Two at = Two{bodies.x_mm[slot.body], bodies.y_mm[slot.body]} + shift_mm;
-    const Two high = wall - at, low = -wall - at;
-    // Outside of a wall it moves inwards, as far as its neighbours let it.
-    wanted += larger(smaller(high, zero), -separation_mm) + smaller(larger(low, zero), separation_mm);
-    high_x = larger(firsts(high, high), zero);
-    high_y = larger(seconds(high, high), zero);
-    low_x = smaller(firsts(low, low), zero);
-    low_y = smaller(seconds(low, low), zero);
-  }
-  const double square = wanted[0] * wanted[0] + wanted[1] * wanted[1];
-  if (square > limits_.stride_mm * limits_.stride_mm) wanted *= both(limits_.stride_mm / __builtin_sqrt(square));
-
-  // Takes off what is most beyond a limit, and again; what is beyond another limit then scales down all.
-  Two x = firsts(wanted, wanted), y = seconds(wanted, wanted);
-  x = larger(smaller(x, high_x), low_x);
-  y = larger(smaller(y, high_y), low_y);
-  double scale = 1;
-  for (int round = 0;; ++round) {
-    Two excess = zero, normal_x = zero, normal_y = zero;
-    for (std::size_t p = 0; p < count; ++p) {
-      const Two beyond = pairs[p].normal_x * x + pairs[p].normal_y * y - limit_mm[p];
-      const auto worse = beyond > excess;
-      excess = larger(beyond, excess);
-      normal_x = worse ? pairs[p].normal_x : normal_x;
-      normal_y = worse ? pairs[p].normal_y : normal_y;
-    }
-    if (larger(excess, swapped(excess))[0] <= kLimitTolerance_mm) break;
-    if (round == kLimitRounds) {
-      for (std::size_t p = 0; p < count; ++p) {
-        const Two closing = pairs[p].normal_x * x + pairs[p].normal_y * y;
-        for (int k = 0; k < 2; ++k) {
-          const double limit = limit_mm[p][k];
-          if (closing[k] > limit + kLimitTolerance_mm && scale * closing[k] > limit) scale = limit / closing[k];
-        }
-      }
-      break;
-    }
-    const auto of_first = firsts(excess, excess) >= seconds(excess, excess);
-    excess = larger(excess, swapped(excess));
-    x -= excess * (of_first ? firsts(normal_x, normal_x) : seconds(normal_x, normal_x));
-    y -= excess * (of_first ? firsts(normal_y, normal_y) : seconds(normal_y, normal_y));
-    x = larger(smaller(x, high_x), low_x);
-    y = larger(smaller(y, high_y), low_y);
-  }
-
-  after_[s].shift_mm = shift_mm + both(scale) * firsts(x, y);
-  after_[s].drive_mm = both(slot.cos_turn) * drive_mm + Two{-slot.sin_turn, slot.sin_turn} * swapped(drive_mm);
 }
 
 }  // namespace kilotwin::physics

@@ -13,7 +13,9 @@
 /// An overlap that was there from the start (a real robot moved into others, poses given so) would never part in a dense
 /// crowd that way. So a body that overlaps may press into others up to half of its own deepest overlap: overlaps spread,
 /// get smaller and vanish, and the deepest one never grows.
-/// Sums run over neighbours in ascending ids. A body depends on its neighbours only: one hop per sub-step.
+/// Sums run over neighbours in ascending ids. A body depends on its neighbours only: one hop per sub-step. So of the bodies
+/// of other partitions only those are computed that own ones reach by contacts, and one that is h hops away only in the
+/// first S - h sub-steps.
 #pragma once
 
 #include <array>
@@ -23,7 +25,8 @@
 #include "core/base/pose.hpp"
 #include "core/experiment/plan.hpp"
 #include "services/physics/bodies.hpp"
-#include "services/physics/cell_list.hpp"
+#include "services/physics/candidate_list.hpp"
+#include "services/physics/contact_pass.hpp"
 #include "services/physics/drive.hpp"
 
 namespace kilotwin::physics {
@@ -47,66 +50,58 @@ struct ContactLimits {
   [[nodiscard]] bool outside(double x_mm, double y_mm) const;
 };
 
+/// A tick is find(), then the drives of those that ask for one, then move().
 class ContactSolver {
  public:
   ContactSolver(const RunPlan&, const DriveModel&);
 
-  /// Moves the bodies by one tick. Headings are advanced as well; bodies that moved or overlap are awake afterwards, all
-  /// others asleep.
+  /// Finds who may touch whom. `own`: per body, whether its next pose is asked for; empty: of all. False: everything rests.
+  bool find(const Bodies&, const std::vector<std::uint8_t>& own, const std::vector<Duties>&);
+  /// Whether the drive of this driven body can matter.
+  [[nodiscard]] bool asks_drive(std::uint32_t body) const { return hops_[body] != kOutOfReach; }
+  /// The part of a tick over which its drive is to be integrated: a sub-step where it may meet others, else all of it.
+  [[nodiscard]] double drive_part(std::uint32_t body) const { return seat_of_[body] != ContactPass::kStill ? sub_step_part_ : 1; }
+  /// Moves the own bodies by one tick and advances their headings; others keep their poses. Own bodies that moved, overlap
+  /// or are outside the arena are awake afterwards.
   void move(Bodies&, const Drives&);
 
   [[nodiscard]] const ContactLimits& limits() const { return limits_; }
 
  private:
-  /// Two doubles, worked on by one instruction.
-  using Two = double __attribute__((vector_size(16)));
+  static constexpr std::uint8_t kOutOfReach = 255;
+  /// Bodies with more contacts than this share a group.
+  static constexpr std::uint32_t kMostContacts = 7;
 
-  struct ContactPair {          ///< two contacts of a body; the last of an odd number is filled up by one that never acts
-    Two normal_x, normal_y;     ///< from the body to the other
-    Two gap_mm;                 ///< at the tick's start
-    std::uint32_t other[2];     ///< index of the body; after link(), its slot
-  };
-  struct Slot {                 ///< a body that may move and has neighbours; slot 0 stands for all that cannot move
-    std::uint32_t body = 0;
-    std::uint32_t first_pair = 0;
-    double cos_turn = 1, sin_turn = 0;  ///< of a sub-step
-    bool near_wall = false;
-  };
-  struct Motion {               ///< of a slot within the tick; x, y
-    Two shift_mm = {0, 0};      ///< displacement since the tick's start
-    Two drive_mm = {0, 0};      ///< by the drive alone in the coming sub-step
+  /// A body that may be moved by contacts, or whose drive moves one.
+  struct Mover {
+    std::uint32_t body, first, contacts;  ///< into others_
   };
 
-  /// False: everything rests.
-  bool find_contacts(Bodies&, const Drives&);
+  [[nodiscard]] bool may_be_touched(std::uint32_t body) const;
   void search(const Bodies&, std::uint32_t body);
-  void link(const Drives&);
-  template <bool kWithOverlaps>
-  void sub_step(const Bodies&);
-  template <bool kWithOverlaps, std::size_t kPairs>
-  void move_slot(const Bodies&, std::uint32_t slot);
-  /// Moves what has no neighbour, for the whole tick at once.
-  void move_free(Bodies&, const Drives&) const;
+  void seat_movers();
+  void fill_contacts(const Bodies&);
+  void fill_contacts(const Bodies&, const ContactPass::Batch&, const Mover* movers);
+  /// Where bodies are in the same place, which for one and the same body means that the lane has no such contact.
+  static void fill_coincident(ContactPass::Contact&, const Lanes& distance_mm, const std::uint32_t* here,
+                              const std::uint32_t* there);
+  void move_alone(Bodies&, std::uint32_t body, double way_x_mm, double way_y_mm) const;
   void place(Bodies&, std::uint32_t body, double to_x_mm, double to_y_mm) const;
 
   ContactLimits limits_;
-  double axle_offset_mm_;
-  CellList cells_;
-  std::vector<Slot> slots_;
-  std::vector<ContactPair> pairs_;
-  std::size_t pair_count_ = 0;
-  /// Slots with 0, 1, 2, 3 and more pairs of contacts, and where the first four groups end.
-  static constexpr std::size_t kMorePairs = 4;
-  std::vector<std::uint32_t> by_pairs_;
-  std::array<std::size_t, kMorePairs + 1> pairs_end_{};
-  std::vector<std::uint32_t> slot_of_;     ///< per body; 0: none
-  std::vector<std::uint32_t> drive_of_;    ///< per body; index of its drive + 1; 0: none
-  std::vector<std::uint32_t> pulled_;      ///< sleeping bodies beside one that is driven or overlaps
-  std::vector<std::uint8_t> is_pulled_, overlaps_;  ///< per body
-  std::vector<std::uint32_t> found_;
+  double sub_step_part_;
+  CandidateList candidates_;
+  ContactPass pass_;
+  std::vector<Mover> movers_;              ///< own ones first, then by hops
+  std::vector<std::uint32_t> others_;      ///< the contacts of the movers
+  std::size_t other_count_ = 0;
   bool any_overlap_ = false;
-  std::vector<Two> half_gap_mm_;           ///< of the contacts of the body at hand
-  std::vector<Motion> now_, after_;        ///< per slot
+  // Per body.
+  std::vector<std::uint8_t> hops_;         ///< by contacts from the own bodies, or kOutOfReach
+  std::vector<std::uint8_t> driven_, active_, overlaps_;
+  std::vector<ContactPass::Seat> seat_of_;
+  std::vector<std::uint32_t> reached_;     ///< others' bodies, by hops
+  std::vector<std::uint32_t> by_group_;    ///< movers in the order of their seats
 };
 
 }  // namespace kilotwin::physics

@@ -54,7 +54,7 @@ Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm) {
 void Drives::reserve(std::size_t bodies) {
   if (body.size() >= bodies) return;
   body.resize(bodies);
-  for (auto* column : {&left_mm_s, &right_mm_s, &heading_rad, &run_mm, &turn_rad, &cos_heading, &sin_heading, &x_mm, &y_mm})
+  for (auto* column : {&left_mm_s, &right_mm_s, &heading_rad, &part, &x_mm, &y_mm, &cos_turn, &sin_turn, &turn_rad})
     column->resize(bodies);
 }
 
@@ -100,13 +100,12 @@ DriveModel::DriveModel(const RunPlan& plan)
   top_speed_mm_s_ = top_nominal + top_bias * widest + kTopNormal * factor_sd_ * top_any * widest;
 }
 
-bool DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Tick from, std::uint8_t motor_left,
-                     std::uint8_t motor_right, double heading_rad) const {
-  if ((motor_left | motor_right) == 0) return false;
-  const bool both = motor_left != 0 && motor_right != 0;
+void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Tick from, Duties duties, double heading_rad,
+                     double part) const {
+  const bool both = duties.left != 0 && duties.right != 0;
   const std::array<double, 256>& nominal = both ? straight_mm_s_ : turn_mm_s_;
-  double left = nominal[motor_right] + bias_[robot].left_mm_s;
-  double right = nominal[motor_left] + bias_[robot].right_mm_s;
+  double left = nominal[duties.right] + bias_[robot].left_mm_s;
+  double right = nominal[duties.left] + bias_[robot].right_mm_s;
   if (factor_sd_ > 0) {
     left *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 0);
     right *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 1);
@@ -116,34 +115,42 @@ bool DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Ti
   drives.left_mm_s[n] = left;
   drives.right_mm_s[n] = right;
   drives.heading_rad[n] = heading_rad;
-  return true;
+  drives.part[n] = part;
 }
 
 void DriveModel::integrate(Drives& drives) const {
   const std::size_t count = drives.count;
   const double* __restrict__ left = drives.left_mm_s.data();
   const double* __restrict__ right = drives.right_mm_s.data();
-  double* __restrict__ run = drives.run_mm.data();
+  const double* __restrict__ part = drives.part.data();
   double* __restrict__ turn = drives.turn_rad.data();
   double* __restrict__ x = drives.x_mm.data();
   double* __restrict__ y = drives.y_mm.data();
-  double* __restrict__ c = drives.cos_heading.data();
-  double* __restrict__ s = drives.sin_heading.data();
+  double* __restrict__ c = drives.cos_turn.data();
+  double* __restrict__ s = drives.sin_turn.data();
 
   const double half_tick_s = 0.5 * tick_s_, turn_per_speed = tick_s_ / wheel_base_mm_, offset_mm = axle_offset_mm_;
+  // The cosine and sine of the heading first, then of the turn, in the same columns.
   for (std::size_t i = 0; i < count; ++i) kt_sincos(drives.heading_rad[i], &s[i], &c[i]);
-  for (std::size_t i = 0; i < count; ++i) {
-    run[i] = (left[i] + right[i]) * half_tick_s;
-    turn[i] = (right[i] - left[i]) * turn_per_speed;
-    const Arc arc = arc_from(series_of(turn[i] * turn[i]), run[i], turn[i], offset_mm);
+  const auto drive = [&](std::size_t i, const Arc& arc) {
     x[i] = c[i] * arc.forward_mm - s[i] * arc.sideways_mm;
     y[i] = s[i] * arc.forward_mm + c[i] * arc.sideways_mm;
+    c[i] = arc.cos_turn;
+    s[i] = arc.sin_turn;
+  };
+  const auto run_mm = [&](std::size_t i) { return (left[i] + right[i]) * half_tick_s * part[i]; };
+  int any_large = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    turn[i] = (right[i] - left[i]) * turn_per_speed;
+    any_large |= !is_small(turn[i]);
+  }
+  if (any_large != 0) {
+    for (std::size_t i = 0; i < count; ++i) drive(i, arc_of(run_mm(i), turn[i] * part[i], offset_mm));
+    return;
   }
   for (std::size_t i = 0; i < count; ++i) {
-    if (is_small(turn[i])) continue;
-    const Arc arc = arc_of(run[i], turn[i], offset_mm);
-    x[i] = c[i] * arc.forward_mm - s[i] * arc.sideways_mm;
-    y[i] = s[i] * arc.forward_mm + c[i] * arc.sideways_mm;
+    const double t = turn[i] * part[i];
+    drive(i, arc_from(series_of(t * t), run_mm(i), t, offset_mm));
   }
 }
 

@@ -24,14 +24,22 @@ struct Arc {
 /// ahead of it.
 [[nodiscard]] Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm);
 
-/// The driven robots of one tick, structure of arrays, ascending. Kept between ticks for its memory alone.
+/// What a robot's program set its motors to.
+struct Duties {
+  std::uint8_t left = 0, right = 0;
+
+  [[nodiscard]] bool any() const { return (left | right) != 0; }
+};
+
+/// Driven robots of one tick, structure of arrays, ascending. Kept between ticks for its memory alone.
 struct Drives {
   std::vector<std::uint32_t> body;               ///< index of the body
   std::vector<double> left_mm_s, right_mm_s;     ///< actual speeds of the wheels
   std::vector<double> heading_rad;               ///< at the start of the tick
-  std::vector<double> run_mm, turn_rad;          ///< of the reference point, over the tick
-  std::vector<double> cos_heading, sin_heading;  ///< at the start of the tick
-  std::vector<double> x_mm, y_mm;                ///< displacement of the centre over the tick, if nothing is in the way
+  std::vector<double> part;                      ///< of the tick, over which the next four are meant
+  std::vector<double> x_mm, y_mm;                ///< displacement of the centre, if nothing is in the way
+  std::vector<double> cos_turn, sin_turn;
+  std::vector<double> turn_rad;                  ///< over the whole tick
   std::size_t count = 0;
 
   void reserve(std::size_t bodies);
@@ -42,13 +50,11 @@ class DriveModel {
  public:
   explicit DriveModel(const RunPlan&);
 
-  /// Adds a robot to the drives if either duty is above 0; says whether it did. The left motor drives the right-hand wheel.
-  bool add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, std::uint8_t motor_left, std::uint8_t motor_right,
-           double heading_rad) const;
+  /// Adds a robot to the drives; either duty is above 0. The left motor drives the right-hand wheel.
+  void add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, Duties, double heading_rad, double part) const;
   /// Fills what follows from the wheels' speeds and the headings.
   void integrate(Drives&) const;
 
-  [[nodiscard]] double axle_offset_mm() const { return axle_offset_mm_; }
   /// No disc's centre is ever driven faster, mm/s.
   [[nodiscard]] double top_speed_mm_s() const { return top_speed_mm_s_; }
   [[nodiscard]] double bias_left_mm_s(std::uint32_t robot) const { return bias_[robot].left_mm_s; }

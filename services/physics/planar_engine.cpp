@@ -36,8 +36,10 @@ void PlanarEngine::step(Tick from, const Inputs& inputs) {
   gather(inputs.ghosts);
   mark_own();
   read_motors(from, inputs.actuation);
-  drive_.integrate(drives_);
-  contact_.move(known_, drives_);
+  if (contact_.find(known_, own_, duties_)) {
+    set_off(from);
+    contact_.move(known_, drives_);
+  }
   list_own();
   ++tick_;
 }
@@ -89,20 +91,27 @@ void PlanarEngine::read_motors(Tick from, std::span<const ActuationFrame* const>
     return a->first_robot < b->first_robot;
   });
   for (const ActuationFrame* frame : frames_) KILOTWIN_DEMAND(frame->tick == from);
-  drives_.reserve(known_.size());
-  drives_.count = 0;
+  duties_.assign(known_.size(), Duties{});
   std::size_t body = 0;
   for (const ActuationFrame* frame : frames_) {
     const std::uint32_t first = frame->first_robot;
     const auto size = static_cast<std::uint32_t>(frame->motor_left.size());
     while (body < known_.size() && known_.robot[body] < first) ++body;
     for (; body < known_.size() && known_.robot[body] - first < size; ++body) {
-      if (known_.tracked[body] != 0) continue;
-      const std::uint32_t robot = known_.robot[body];
-      drive_.add(drives_, static_cast<std::uint32_t>(body), robot, from, frame->motor_left[robot - first],
-                 frame->motor_right[robot - first], known_.heading_rad[body]);
+      const std::uint32_t entry = known_.robot[body] - first;
+      if (known_.tracked[body] == 0) duties_[body] = {frame->motor_left[entry], frame->motor_right[entry]};
     }
   }
+}
+
+void PlanarEngine::set_off(Tick from) {
+  drives_.reserve(known_.size());
+  drives_.count = 0;
+  for (std::uint32_t i = 0; i < known_.size(); ++i) {
+    if (!duties_[i].any() || !contact_.asks_drive(i)) continue;
+    drive_.add(drives_, i, known_.robot[i], from, duties_[i], known_.heading_rad[i], contact_.drive_part(i));
+  }
+  drive_.integrate(drives_);
 }
 
 void PlanarEngine::list_own() {

@@ -37,6 +37,7 @@ class PlanarEngine final : public Engine {
   void gather(std::span<const BodyFrame* const> ghosts);
   void mark_own();
   void read_motors(Tick from, std::span<const ActuationFrame* const>);
+  void set_off(Tick from);
   void list_own();
   [[nodiscard]] bool is_own(double x_mm, double y_mm) const { return rectangle_.contains(x_mm, y_mm); }
 
@@ -58,6 +59,7 @@ class PlanarEngine final : public Engine {
   std::vector<std::uint8_t> own_;          ///< per known body, by its pose before the step; empty with one partition
   std::vector<std::uint32_t> order_;
   std::vector<const ActuationFrame*> frames_;
+  std::vector<Duties> duties_;             ///< per known body
   Drives drives_;
 };
 

@@ -69,6 +69,15 @@ TEST(RunSchedule, StopsWhileItRunsAndWhileItPauses) {
   EXPECT_EQ(paused.verdict(Tick{7}), Verdict::kFinished);
 }
 
+TEST(RunSchedule, ASecondStopChangesNothing) {
+  RunSchedule schedule(Tick{0}, Tick{100}, 0);
+  schedule.add(directive(0, 7, DirectiveKind::kStop));
+  schedule.add(directive(1, 7, DirectiveKind::kStop));
+  EXPECT_EQ(schedule.verdict(Tick{7}), Verdict::kFinished);
+  EXPECT_TRUE(schedule.stopped_early());
+  EXPECT_EQ(schedule.last(), Tick{7});
+}
+
 TEST(RunSchedule, AStopBeyondTheEndChangesNothing) {
   RunSchedule schedule(Tick{0}, Tick{5}, 0);
   schedule.add(directive(0, 9, DirectiveKind::kStop));

@@ -35,6 +35,14 @@ TEST(TickGate, RefusesStrangersAndGapsAndPassesOverRepeats) {
   EXPECT_FALSE(gate.hello(FederateId{9}));
 }
 
+TEST(TickGate, RefusesWhoWouldLapTheReader) {
+  TickGate gate({FederateId{1}}, Tick{3});
+  for (int t = 3; t < 3 + kFrameRing; ++t) EXPECT_EQ(gate.arrived(FederateId{1}, Tick{t}), TickGate::Arrival::kAccepted);
+  EXPECT_EQ(gate.arrived(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kUnexpected);
+  gate.reading(Tick{4});
+  EXPECT_EQ(gate.arrived(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kAccepted);
+}
+
 TEST(TickGate, CountsHellosApartFromFrames) {
   TickGate gate({FederateId{1}, FederateId{2}}, Tick{0});
   EXPECT_TRUE(gate.hello(FederateId{2}));

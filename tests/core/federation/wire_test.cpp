@@ -66,6 +66,30 @@ TEST(Wire, CarriesActuationAndRadioAndOverhead) {
   EXPECT_EQ(overhead_in.packets[0].message, overhead.packets[0].message);
 }
 
+TEST(Wire, CarriesDirectives) {
+  Directive out;
+  out.sequence_number = 5;
+  out.tick = Tick{77};
+  out.kind = DirectiveKind::kOverheadInput;
+  out.packet = {OverheadCommand::kOnce, IrMessage{1, 2, 3, 4, 5, 6, 7, 8, 9, 10}};
+  WireDirective wire = to_wire(3, out);
+  EXPECT_EQ(wire.run, 3u);
+  Directive in;
+  ASSERT_TRUE(from_wire(wire, in));
+  EXPECT_EQ(in.sequence_number, 5u);
+  EXPECT_EQ(in.tick, Tick{77});
+  EXPECT_EQ(in.packet.command, OverheadCommand::kOnce);
+  EXPECT_EQ(in.packet.message, out.packet.message);
+  wire.packet._length = 10;
+  EXPECT_FALSE(from_wire(wire, in));
+
+  out.kind = DirectiveKind::kTrackedPose;
+  out.tracked_pose = {4, 1, 2, 3};
+  ASSERT_TRUE(from_wire(to_wire(3, out), in));
+  EXPECT_EQ(in.tracked_pose.robot, 4u);
+  EXPECT_EQ(in.tracked_pose.heading_rad, 3);
+}
+
 TEST(Wire, RefusesArraysThatDisagree) {
   BodyFrame bodies;
   bodies.add(1, 2, 3, 4);

@@ -1,0 +1,166 @@
+#include "services/physics/contact_pass.hpp"
+
+#include <algorithm>
+
+#include "services/physics/contact.hpp"
+
+namespace kilotwin::physics {
+namespace {
+
+/// By how much a limit may be missed because of rounding, mm. Sliding at a gap of 0 would stop without it.
+constexpr double kLimitTolerance_mm = 1e-14;
+/// How many limits of a body are met exactly, the one that is missed most first; what is missed then scales all down.
+constexpr int kLimitRounds = 2;
+
+}  // namespace
+
+void ContactPass::clear() {
+  batches_.clear();
+  contact_count_ = 0;
+  add_batch(0, 0);
+}
+
+ContactPass::Batch& ContactPass::add_batch(std::uint32_t contacts, std::uint32_t passes) {
+  Batch& batch = batches_.emplace_back();
+  batch.first_contact = static_cast<std::uint32_t>(contact_count_);
+  batch.contacts = contacts;
+  batch.passes = passes;
+  contact_count_ += contacts;
+  if (contacts_.size() < contact_count_) contacts_.resize(2 * contact_count_);
+  if (limit_mm_.size() < contacts) limit_mm_.resize(contacts);
+  return batch;
+}
+
+void ContactPass::rest() {
+  now_.assign(batches_.size() * kColumns * kLanes, 0);
+  after_.assign(now_.size(), 0);
+}
+
+void ContactPass::set_drive(Seat seat, double x_mm, double y_mm) {
+  now_[seat + 2 * kLanes] = x_mm;
+  now_[seat + 3 * kLanes] = y_mm;
+}
+
+void ContactPass::run(const ContactLimits& limits, bool with_overlaps) {
+  for (std::uint32_t step = 0; step < limits.sub_steps; ++step) {
+    with_overlaps ? sub_step<true>(limits, step) : sub_step<false>(limits, step);
+    now_.swap(after_);
+  }
+}
+
+template <bool kWithOverlaps>
+void ContactPass::sub_step(const ContactLimits& limits, std::uint32_t step) {
+  for (std::size_t b = 1; b < batches_.size(); ++b) {
+    if (step < batches_[b].passes) {
+      move<kWithOverlaps>(limits, batches_[b], now_.data() + b * kColumns * kLanes, after_.data() + b * kColumns * kLanes);
+    }
+  }
+}
+
+template <bool kWithOverlaps>
+inline void ContactPass::move(const ContactLimits& limits, const Batch& batch, const double* now, double* after) {
+  const double* const motion = now_.data();
+  const Contact* const contacts = contacts_.data() + batch.first_contact;
+  const std::size_t count = batch.contacts;
+  Lanes* const limit_mm = limit_mm_.data();
+  const Lanes zero = all(0), a_half = all(0.5), separation_mm = all(limits.separation_mm);
+  const Lanes shift_x = load(now), shift_y = load(now + kLanes);
+  const Lanes drive_x = load(now + 2 * kLanes), drive_y = load(now + 3 * kLanes);
+
+  // Pushes; the sum in ascending order.
+  Lanes x = drive_x, y = drive_y, deepest = zero;
+  for (std::size_t p = 0; p < count; ++p) {
+    const Contact& c = contacts[p];
+    const Lanes gap = c.gap_mm + (c.normal_x * (gather(motion, c.other) - shift_x) +
+                                  c.normal_y * (gather(motion + kLanes, c.other) - shift_y));
+    const Lanes half = larger(a_half * gap, zero);
+    // Along the normal: what the neighbour drives, negative towards this body, and what this body drives.
+    const Lanes theirs = c.normal_x * gather(motion + 2 * kLanes, c.other) + c.normal_y * gather(motion + 3 * kLanes, c.other);
+    const Lanes mine = c.normal_x * drive_x + c.normal_y * drive_y;
+    // It pushes where it drives faster than both the gap and this body's own retreat allow.
+    Lanes push = larger(smaller(-half, mine) - theirs, zero);
+    if constexpr (kWithOverlaps) {
+      const Lanes overlap = chosen(all(-kOverlapTolerance_mm) > gap, -gap, zero);
+      deepest = larger(deepest, overlap);
+      push = push + smaller(a_half * overlap, separation_mm);
+      limit_mm[p] = gap;
+    } else {
+      limit_mm[p] = half;
+    }
+    x = x - push * c.normal_x;
+    y = y - push * c.normal_y;
+  }
+  if constexpr (kWithOverlaps) {
+    for (std::size_t p = 0; p < count; ++p) limit_mm[p] = larger(a_half * (limit_mm[p] + a_half * deepest), zero);
+  }
+
+  Lanes low_x = zero, low_y = zero, high_x = zero, high_y = zero;
+  if (batch.near_wall) {
+    const Lanes at_x = load(batch.x_mm) + shift_x, at_y = load(batch.y_mm) + shift_y;
+    high_x = all(limits.x_limit_mm) - at_x;
+    high_y = all(limits.y_limit_mm) - at_y;
+    low_x = all(-limits.x_limit_mm) - at_x;
+    low_y = all(-limits.y_limit_mm) - at_y;
+    // Outside of a wall it moves inwards, as far as its neighbours let it.
+    x = x + (larger(smaller(high_x, zero), -separation_mm) + smaller(larger(low_x, zero), separation_mm));
+    y = y + (larger(smaller(high_y, zero), -separation_mm) + smaller(larger(low_y, zero), separation_mm));
+    high_x = larger(high_x, zero);
+    high_y = larger(high_y, zero);
+    low_x = smaller(low_x, zero);
+    low_y = smaller(low_y, zero);
+  }
+  const Lanes square = x * x + y * y, stride = all(limits.stride_mm), stride_square = stride * stride;
+  if (largest(square) > limits.stride_mm * limits.stride_mm) {
+    const Lanes shortening = chosen(square > stride_square, stride / root(square), all(1));
+    x = x * shortening;
+    y = y * shortening;
+  }
+
+  // Takes off what is most beyond a limit, and again; what is beyond another limit then scales down all.
+  const auto hold_at_walls = [&] {
+    if (!batch.near_wall) return;
+    x = larger(smaller(x, high_x), low_x);
+    y = larger(smaller(y, high_y), low_y);
+  };
+  const auto closing = [&](std::size_t p) { return contacts[p].normal_x * x + contacts[p].normal_y * y; };
+  hold_at_walls();
+  Lanes excess = zero;
+  for (int round = 0; round < kLimitRounds; ++round) {
+    Lanes normal_x = zero, normal_y = zero;
+    excess = zero;
+    for (std::size_t p = 0; p < count; ++p) {
+      const Lanes beyond = closing(p) - limit_mm[p];
+      const auto worse = beyond > excess;
+      excess = larger(excess, beyond);
+      normal_x = chosen(worse, contacts[p].normal_x, normal_x);
+      normal_y = chosen(worse, contacts[p].normal_y, normal_y);
+    }
+    if (!(largest(excess) > kLimitTolerance_mm)) break;
+    excess = chosen(excess > all(kLimitTolerance_mm), excess, zero);
+    x = x - excess * normal_x;
+    y = y - excess * normal_y;
+    hold_at_walls();
+  }
+  if (largest(excess) > kLimitTolerance_mm) {
+    excess = zero;
+    for (std::size_t p = 0; p < count; ++p) excess = larger(excess, closing(p) - limit_mm[p]);
+  }
+  if (largest(excess) > kLimitTolerance_mm) {
+    Lanes scale = all(1);
+    for (std::size_t p = 0; p < count; ++p) {
+      const Lanes along = closing(p), limit = limit_mm[p];
+      const auto missed = (along > limit + all(kLimitTolerance_mm)) & (scale * along > limit);
+      scale = chosen(missed, limit / along, scale);
+    }
+    x = scale * x;
+    y = scale * y;
+  }
+
+  const Lanes cos_turn = load(batch.cos_turn), sin_turn = load(batch.sin_turn);
+  store(shift_x + x, after);
+  store(shift_y + y, after + kLanes);
+  store(cos_turn * drive_x - sin_turn * drive_y, after + 2 * kLanes);
+  store(sin_turn * drive_x + cos_turn * drive_y, after + 3 * kLanes);
+}
+
+}  // namespace kilotwin::physics

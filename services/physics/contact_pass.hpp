@@ -1,0 +1,72 @@
+/// The Jacobi passes of a tick over the bodies in contact, a body per lane. contact.hpp states the law.
+///
+/// Bodies with equally many contacts make up a batch, so that all lanes are at work. A body's seat says where its motion is
+/// kept: the batch and the lane. Seat 0 stands for all that stay where they are.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/physics/lanes.hpp"
+
+namespace kilotwin::physics {
+
+struct ContactLimits;
+
+class ContactPass {
+ public:
+  using Seat = std::uint32_t;
+  static constexpr Seat kStill = 0;
+
+  /// One contact of each body of a batch.
+  struct Contact {
+    Lanes normal_x, normal_y;      ///< from the body to the other
+    Lanes gap_mm;                  ///< at the tick's start; huge where a lane has no such contact
+    Seat other[kLanes];
+  };
+  struct Batch {
+    double x_mm[kLanes] = {}, y_mm[kLanes] = {};            ///< at the tick's start
+    double cos_turn[kLanes] = {}, sin_turn[kLanes] = {};    ///< of a sub-step; read where the body is driven
+    std::uint32_t first_contact = 0, contacts = 0;
+    std::uint32_t passes = 0;      ///< it is moved in the first so many sub-steps
+    bool near_wall = false;        ///< any of its bodies
+  };
+
+  /// Starts a tick with batch 0 alone, in which nothing moves.
+  void clear();
+  /// Appends a batch; its contacts are to be filled in.
+  Batch& add_batch(std::uint32_t contacts, std::uint32_t passes);
+  [[nodiscard]] Contact* contacts_of(const Batch& batch) { return contacts_.data() + batch.first_contact; }
+  [[nodiscard]] Batch& batch_of(Seat seat) { return batches_[seat / (kColumns * kLanes)]; }
+  [[nodiscard]] static std::size_t lane_of(Seat seat) { return seat % kLanes; }
+  /// Of the batch appended last.
+  [[nodiscard]] Seat seat(std::size_t lane) const {
+    return static_cast<Seat>((batches_.size() - 1) * kColumns * kLanes + lane);
+  }
+  /// Once all batches are there: displacement by the drive alone in the first sub-step.
+  void set_drive(Seat, double x_mm, double y_mm);
+  void rest();
+
+  void run(const ContactLimits&, bool with_overlaps);
+
+  /// Displacement over the tick.
+  [[nodiscard]] double shift_x_mm(Seat seat) const { return now_[seat]; }
+  [[nodiscard]] double shift_y_mm(Seat seat) const { return now_[seat + kLanes]; }
+
+ private:
+  /// Of the motion of a batch: displacement since the tick's start, x, y; by the drive alone in the coming sub-step, x, y.
+  static constexpr std::size_t kColumns = 4;
+
+  template <bool kWithOverlaps>
+  void sub_step(const ContactLimits&, std::uint32_t step);
+  template <bool kWithOverlaps>
+  void move(const ContactLimits&, const Batch&, const double* now, double* after);
+
+  std::vector<Batch> batches_;
+  std::vector<Contact> contacts_;
+  std::size_t contact_count_ = 0;
+  std::vector<double> now_, after_;
+  std::vector<Lanes> limit_mm_;            ///< of the contacts of the batch at hand
+};
+
+}  // namespace kilotwin::physics

@@ -1,0 +1,475 @@
+// Real sessions over DDS, in threads of this process, with federates that do next to nothing.
+#include "core/federation/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <map>
+#include <thread>
+
+#include "core/base/error.hpp"
+#include "core/federation/frame_io.hpp"
+#include "tests/support/scenes.hpp"
+
+namespace kilotwin {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::int64_t kLast = 60;
+
+/// What tests do to a federate: all called on its own thread.
+struct Hooks {
+  std::function<void(Session&)> on_publish, on_idle;
+  std::function<void(BodyFrame&)> spoil_bodies;
+  std::function<void(ActuationFrame&)> spoil_actuation;
+  std::function<void(RadioFrame&)> spoil_radio;
+  std::function<void(OverheadFrame&)> spoil_overhead;
+};
+
+/// A federate of each kind: one partition, radio, station, one host.
+class Tiny : public Federate {
+ public:
+  Tiny(Session& session, const Hooks& hooks) : session_(session), hooks_(hooks), plan_(session.plan()) {
+    const FederateId self = session.self();
+    const std::vector<FederateId> physics = plan_.all_physics(), hosts = plan_.all_behaviours();
+    if (self == physics[0]) {
+      actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
+      bodies_ = std::make_unique<Output<BodyFrame>>(session, topics::bodies());
+    } else if (self == plan_.comm()) {
+      bodies_in_ = std::make_unique<Input<BodyFrame>>(session, topics::bodies(), physics);
+      actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
+      overhead_in_ = std::make_unique<Input<OverheadFrame>>(session, topics::overhead(), std::vector{plan_.station()});
+      radio_ = std::make_unique<Output<RadioFrame>>(session, topics::radio(0));
+    } else if (self == plan_.station()) {
+      bodies_in_ = std::make_unique<Input<BodyFrame>>(session, topics::bodies(), physics);
+      actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
+      overhead_ = std::make_unique<Output<OverheadFrame>>(session, topics::overhead());
+    } else {
+      radio_in_ = std::make_unique<Input<RadioFrame>>(session, topics::radio(0), std::vector{plan_.comm()});
+      actuation_ = std::make_unique<Output<ActuationFrame>>(session, topics::actuation());
+    }
+  }
+
+  void publish(Tick now) override {
+    if (hooks_.on_publish) hooks_.on_publish(session_);
+    const std::uint32_t robots = plan_.robots();
+    send(bodies_, now, hooks_.spoil_bodies, [&](BodyFrame& frame) {
+      frame.clear();
+      for (std::uint32_t i = 0; i < robots; ++i) frame.add(i, 50.0 * i, 0, 0);
+    });
+    send(actuation_, now, hooks_.spoil_actuation, [&](ActuationFrame& frame) {
+      frame.first_robot = 0;
+      frame.motor_left.assign(robots, 0);
+      frame.motor_right = frame.led = frame.life_cycle = frame.motor_left;
+      frame.tx_period.assign(robots, 3906);
+      frame.offer_robot = {0, 2};
+      frame.offer_message.resize(2);
+    });
+    send(radio_, now, hooks_.spoil_radio, [&](RadioFrame& frame) {
+      frame.first_robot = 0;
+      frame.kilo_ticks.assign(robots, 1);
+      frame.ask = {1};
+      frame.sent = {0, 1};
+      frame.reception_robot = {0, 0, 2};
+      frame.reception_message = {1, 0, 1};
+      frame.reception_high_gain = frame.reception_low_gain = {1, 2, 3};
+      frame.messages.resize(2);
+    });
+    send(overhead_, now, hooks_.spoil_overhead, [](OverheadFrame& frame) { frame.packets.resize(1); });
+  }
+  void inputs_complete(Tick now, bool is_last) override {
+    if (is_last) last = now;
+  }
+  void step(Tick from) override {
+    if (bodies_in_) {
+      EXPECT_EQ(bodies_in_->at(from)[0]->tick, from);
+    }
+    if (radio_in_) {
+      EXPECT_EQ(radio_in_->at(from)[0]->reception_robot.size(), 3u);
+    }
+    for (const OverheadPacket& packet : session_.schedule().overhead_inputs()) {
+      inputs += std::to_string(packet.message[0]) + " at " + std::to_string(from.count()) + "; ";
+    }
+  }
+  std::uint64_t hash_part() const override { return 1; }
+  void save(Tick now) override { saved.push_back(now.count()); }
+  void idle() override {
+    if (hooks_.on_idle) hooks_.on_idle(session_);
+  }
+
+  std::string inputs;
+  std::vector<std::int64_t> saved;
+  Tick last{-1};
+
+ private:
+  template <class Frame, class Spoil, class Fill>
+  void send(const std::unique_ptr<Output<Frame>>& output, Tick now, const Spoil& spoil, Fill fill) {
+    if (!output) return;
+    fill(output->frame);
+    output->frame.tick = now;
+    if (spoil && now == Tick{10}) spoil(output->frame);
+    output->write();
+  }
+
+  Session& session_;
+  const Hooks& hooks_;
+  const RunPlan& plan_;
+  std::unique_ptr<Input<BodyFrame>> bodies_in_;
+  std::unique_ptr<Input<ActuationFrame>> actuation_in_;
+  std::unique_ptr<Input<RadioFrame>> radio_in_;
+  std::unique_ptr<Input<OverheadFrame>> overhead_in_;
+  std::unique_ptr<Output<BodyFrame>> bodies_;
+  std::unique_ptr<Output<ActuationFrame>> actuation_;
+  std::unique_ptr<Output<RadioFrame>> radio_;
+  std::unique_ptr<Output<OverheadFrame>> overhead_;
+};
+
+/// Thrown by a hook: a federate that vanishes without a word.
+struct Vanishes {};
+
+class Sessions : public ::testing::Test {
+ protected:
+  struct Outcome {
+    std::string failure, inputs;
+    std::vector<std::int64_t> saved;
+    Tick last{-1};
+    double wall_s = 0;
+  };
+
+  ~Sessions() override { join(); }
+
+  void start(FederateId id) {
+    threads_.emplace_back([this, id] {
+      Outcome& outcome = outcomes_[id.value()];
+      Session session(plan_, id, {claim_.domain(), {}}, Tick{0});
+      Tiny federate(session, hooks_[id.value()]);
+      try {
+        session.run(federate);
+      } catch (const std::exception& error) {
+        outcome.failure = error.what();
+      } catch (const Vanishes&) {
+        outcome.failure = "vanished";
+      }
+      outcome.inputs = federate.inputs;
+      outcome.saved = federate.saved;
+      outcome.last = federate.last;
+      outcome.wall_s = session.wall_s();
+    });
+  }
+  void start_all() {
+    for (std::uint32_t i = 0; i < plan_.federates(); ++i) start(FederateId{i});
+  }
+  void join() {
+    for (std::thread& thread : threads_) thread.join();
+    threads_.clear();
+  }
+  void run_all() {
+    start_all();
+    join();
+  }
+  Hooks& of(FederateId id) { return hooks_[id.value()]; }
+  void expect_all_end_at(std::int64_t tick) {
+    for (const Outcome& outcome : outcomes_) {
+      EXPECT_EQ(outcome.failure, "");
+      EXPECT_EQ(outcome.last, Tick{tick});
+    }
+  }
+  /// Every federate but `culprit` says why the run ended, and names it.
+  void expect_all_name(FederateId culprit, const std::string& text) {
+    for (std::uint32_t i = 0; i < outcomes_.size(); ++i) {
+      if (i == culprit.value()) continue;
+      EXPECT_NE(outcomes_[i].failure.find(text), std::string::npos) << plan_.name(FederateId{i}) << ": " << outcomes_[i].failure;
+    }
+  }
+  void expect_malformed(const std::string& why) {
+    bool told = false;
+    for (const Outcome& outcome : outcomes_) {
+      EXPECT_NE(outcome.failure, "");
+      told = told || outcome.failure.find("malformed: " + why) != std::string::npos;
+    }
+    EXPECT_TRUE(told) << outcomes_[0].failure << '\n' << outcomes_[1].failure << '\n' << outcomes_[2].failure << '\n' << outcomes_[3].failure;
+  }
+  WireMember member(FederateId id, kilotwin_wire_MemberPhase phase) const {
+    WireMember sample{};
+    sample.publisher = id.value();
+    sample.run = plan_.run();
+    sample.plan_hash = plan_.hash;
+    sample.phase = phase;
+    sample.process = 1;
+    return sample;
+  }
+
+  const RunPlan plan_ = testing::make_plan("duration_s: " + std::to_string(kLast * 0.032768 - 1e-3) + " robots { count: 3 }",
+                                           {{0, 0, 0}, {50, 0, 0}, {100, 0, 0}});
+  const dds::DomainClaim claim_ = dds::DomainClaim::any();
+  const FederateId physics_ = plan_.physics(PartitionId{0}), host_ = plan_.behaviours(HostId{0});
+  std::array<Hooks, 4> hooks_;
+  std::array<Outcome, 4> outcomes_;
+  std::vector<std::thread> threads_;
+};
+
+TEST_F(Sessions, RunToTheEndTogether) {
+  run_all();
+  expect_all_end_at(kLast);
+}
+
+/// Stands in for the station's ingress.
+class Director {
+ public:
+  explicit Director(Session& session) : session_(session) {}
+  void announce(DirectiveKind kind, std::uint32_t steps = 0, std::uint8_t octet = 0) {
+    Directive directive;
+    directive.kind = kind;
+    directive.steps = steps;
+    directive.packet.message[0] = octet;
+    session_.announce(ingress_.stamp(session_.now(), directive));
+  }
+
+ private:
+  Session& session_;
+  Ingress ingress_;
+};
+
+TEST_F(Sessions, PauseStepSaveAndStopAlike) {
+  std::optional<Director> director;
+  int turn = 0;
+  const auto act = [&](Session& session) {
+    if (!director) director.emplace(session);
+    if (turn == 0 && session.now() == Tick{8}) {
+      ++turn;
+      director->announce(DirectiveKind::kPause);  // at 12
+      director->announce(DirectiveKind::kOverheadInput, 0, 7);
+    } else if (turn == 1 && session.paused()) {
+      ++turn;
+      director->announce(DirectiveKind::kCheckpoint);
+      director->announce(DirectiveKind::kOverheadInput, 0, 8);
+    } else if (turn == 2 && session.paused()) {
+      ++turn;
+      director->announce(DirectiveKind::kStep, 3);
+    } else if (turn == 3 && session.paused() && session.now() == Tick{15}) {
+      ++turn;
+      // All at once, while the run stands: saved here, and gone on to the next decision only.
+      director->announce(DirectiveKind::kCheckpoint);
+      director->announce(DirectiveKind::kContinue);
+      director->announce(DirectiveKind::kPause);
+      director->announce(DirectiveKind::kStop);
+      director->announce(DirectiveKind::kStop);
+    }
+  };
+  of(plan_.station()).on_publish = of(plan_.station()).on_idle = act;
+  run_all();
+  const Tick last = outcomes_[0].last;
+  EXPECT_GE(last, Tick{15});
+  expect_all_end_at(last.count());
+  for (const Outcome& outcome : outcomes_) {
+    EXPECT_EQ(outcome.inputs, "7 at 12; 8 at 12; ");
+    EXPECT_EQ(outcome.saved, (std::vector<std::int64_t>{12, 15}));
+  }
+}
+
+TEST_F(Sessions, TakeDirectivesOfTheLastTicks) {
+  std::optional<Director> director;
+  of(plan_.station()).on_publish = [&](Session& session) {
+    if (!director) director.emplace(session);
+    if (session.now() >= Tick{kLast - 6}) director->announce(DirectiveKind::kOverheadInput, 0, 1);
+  };
+  run_all();
+  expect_all_end_at(kLast);
+  for (const Outcome& outcome : outcomes_) EXPECT_EQ(outcome.inputs, outcomes_[0].inputs);
+}
+
+TEST_F(Sessions, DoNotCountPauses) {
+  std::optional<Director> director;
+  std::chrono::steady_clock::time_point paused_at{};
+  double while_paused_s = 0;
+  of(plan_.station()).on_publish = of(plan_.station()).on_idle = [&](Session& session) {
+    if (!director) director.emplace(session);
+    if (session.now() == Tick{0} && session.started() && paused_at == std::chrono::steady_clock::time_point{}) {
+      paused_at = std::chrono::steady_clock::now();
+      director->announce(DirectiveKind::kPause);
+    } else if (session.paused() && std::chrono::steady_clock::now() > paused_at + 500ms) {
+      while_paused_s = session.wall_s();
+      director->announce(DirectiveKind::kContinue);
+      paused_at += 1h;
+    }
+  };
+  run_all();
+  expect_all_end_at(kLast);
+  const double from_pause_s = 0.4;
+  EXPECT_GT(while_paused_s, 0);
+  EXPECT_LT(while_paused_s, from_pause_s) << "also not while it lasts";
+}
+
+TEST_F(Sessions, NameTheOneThatFails) {
+  of(host_).on_publish = [](Session& session) {
+    if (session.now() == Tick{5}) throw RunError("the disk is full");
+  };
+  run_all();
+  EXPECT_EQ(outcomes_[host_.value()].failure, "the disk is full");
+  expect_all_name(host_, "behaviours 1/1");
+  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("the disk is full"), std::string::npos) << outcomes_[1].failure;
+}
+
+TEST_F(Sessions, NameTheOneThatVanishes) {
+  of(host_).on_publish = [](Session& session) {
+    if (session.now() == Tick{5}) throw Vanishes{};
+  };
+  run_all();
+  expect_all_name(host_, "behaviours 1/1 was lost");
+}
+
+TEST_F(Sessions, DoNotWaitForOneThatLeftTooEarly) {
+  // It says that it is done, but part of what it owes is missing.
+  const dds::Participant participant({claim_.domain(), {}});
+  of(host_).on_publish = [&](Session& session) {
+    if (session.now() != Tick{5}) return;
+    dds::Writer<WireMember> writer(participant, topics::members());
+    writer.write(member(host_, kilotwin_wire_FINISHED));
+    writer.flush(5);
+    throw Vanishes{};
+  };
+  run_all();
+  expect_all_name(host_, "behaviours 1/1");
+  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("left without its frame of tick 5"), std::string::npos) << outcomes_[1].failure;
+}
+
+TEST_F(Sessions, SayForWhomTheyWait) {
+  std::atomic<bool> said{false};
+  of(plan_.station()).on_idle = [&](Session& session) {
+    if (session.waiting_for().find("behaviours 1/1 to arrive") != std::string::npos) said = true;
+  };
+  for (std::uint32_t i = 0; i < host_.value(); ++i) start(FederateId{i});
+  for (int i = 0; i < 500 && !said; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_TRUE(said);
+  start(host_);
+  join();
+  expect_all_end_at(kLast);
+}
+
+TEST_F(Sessions, StartedTwiceLeaveTheFirstAlone) {
+  const dds::Participant participant({claim_.domain(), {}});
+  dds::Writer<WireMember> first(participant, topics::members());
+  first.write(member(host_, kilotwin_wire_STEPPING));
+  start(host_);
+  join();
+  EXPECT_NE(outcomes_[host_.value()].failure.find("behaviours 1/1 of this run was started already"), std::string::npos)
+      << outcomes_[host_.value()].failure;
+}
+
+TEST_F(Sessions, AreNotKeptFromTheirWorkByASecondStart) {
+  // The newcomer says that it arrives, and leaves when it finds its place taken.
+  const dds::Participant participant({claim_.domain(), {}});
+  of(plan_.station()).on_publish = [&](Session& session) {
+    if (session.now() != Tick{20}) return;
+    dds::Writer<WireMember> writer(participant, topics::members());
+    writer.write(member(host_, kilotwin_wire_ARRIVING));
+    writer.flush(5);
+  };
+  run_all();
+  expect_all_end_at(kLast);
+}
+
+// Frames that no engine may see.
+TEST_F(Sessions, RefuseARobotOutOfRange) {
+  of(physics_).spoil_bodies = [](BodyFrame& frame) { frame.robot[2] = 1'000'000; };
+  run_all();
+  expect_malformed("its robots");
+}
+TEST_F(Sessions, RefuseAPoseThatIsNotFinite) {
+  of(physics_).spoil_bodies = [](BodyFrame& frame) { frame.y_mm[1] = std::numeric_limits<double>::quiet_NaN(); };
+  run_all();
+  expect_malformed("a pose");
+}
+TEST_F(Sessions, RefuseArraysOfUnequalLength) {
+  of(physics_).spoil_bodies = [](BodyFrame& frame) { frame.heading_rad.pop_back(); };
+  run_all();
+  expect_malformed("its arrays");
+}
+TEST_F(Sessions, RefuseAnotherShareOfRobots) {
+  of(host_).spoil_actuation = [](ActuationFrame& frame) { frame.first_robot = 0xfffffffe; };
+  run_all();
+  expect_malformed("it is not of the host's share");
+}
+TEST_F(Sessions, RefuseAnOfferOfAStranger) {
+  of(host_).spoil_actuation = [](ActuationFrame& frame) { frame.offer_robot[1] = 3; };
+  run_all();
+  expect_malformed("it offers");
+}
+TEST_F(Sessions, RefuseAReceptionWithoutMessage) {
+  of(plan_.comm()).spoil_radio = [](RadioFrame& frame) { frame.reception_message[1] = 2; };
+  run_all();
+  expect_malformed("a reception");
+}
+TEST_F(Sessions, RefuseReceptionsOutOfOrder) {
+  of(plan_.comm()).spoil_radio = [](RadioFrame& frame) { frame.reception_robot = {2, 0, 1}; };
+  run_all();
+  expect_malformed("its receptions");
+}
+TEST_F(Sessions, RefuseAnUnknownCommand) {
+  of(plan_.station()).spoil_overhead = [](OverheadFrame& frame) { frame.packets[0].command = static_cast<OverheadCommand>(9); };
+  run_all();
+  expect_malformed("a packet's command");
+}
+
+/// Someone who knows the run's id, and writes what he likes.
+class Strangers : public Sessions {
+ protected:
+  template <class Wire>
+  void interfere(const dds::Channel& channel, const Wire& sample) {
+    of(plan_.station()).on_publish = [this, channel, sample](Session& session) {
+      if (session.now() != Tick{20}) return;
+      dds::Writer<Wire> writer(participant_, channel);
+      writer.write(sample);
+      writer.flush(5);
+    };
+    run_all();
+  }
+  const dds::Participant participant_{{claim_.domain(), {}}};
+};
+
+TEST_F(Strangers, AreRefusedAsPublishers) {
+  WireBodyFrame frame{};
+  frame.run = plan_.run();
+  frame.publisher = 99;
+  frame.tick = std::numeric_limits<std::int64_t>::max();
+  interfere(topics::bodies(), frame);
+  for (const Outcome& outcome : outcomes_) EXPECT_NE(outcome.failure.find("was not expected"), std::string::npos) << outcome.failure;
+}
+
+TEST_F(Strangers, OfAnotherRunAreNotHeard) {
+  WireBodyFrame frame{};
+  frame.run = plan_.run() + 1;
+  frame.tick = 1'000'000;
+  interfere(topics::bodies(), frame);
+  expect_all_end_at(kLast);
+}
+
+TEST_F(Strangers, CannotDirectARobotThatIsNone) {
+  WireDirective directive{};
+  directive.run = plan_.run();
+  directive.kind = kilotwin_wire_TRACKED_POSE;
+  directive.tick = 30;
+  directive.robot = 1'000'000'000;
+  interfere(topics::directives(), directive);
+  EXPECT_NE(outcomes_[0].failure.find("malformed: its robot"), std::string::npos) << outcomes_[0].failure;
+}
+
+TEST_F(Strangers, CannotSendHalfAPacket) {
+  WireDirective directive{};
+  directive.run = plan_.run();
+  directive.kind = kilotwin_wire_OVERHEAD_INPUT;
+  interfere(topics::directives(), directive);
+  EXPECT_NE(outcomes_[0].failure.find("malformed: its packet"), std::string::npos) << outcomes_[0].failure;
+}
+
+TEST_F(Strangers, OfAnotherRunOnTheDomainAreNamed) {
+  WireMember other = member(host_, kilotwin_wire_STEPPING);
+  other.run = plan_.run() + 1;
+  interfere(topics::members(), other);
+  for (const Outcome& outcome : outcomes_) EXPECT_NE(outcome.failure.find("in use by another run"), std::string::npos) << outcome.failure;
+}
+
+}  // namespace
+}  // namespace kilotwin
