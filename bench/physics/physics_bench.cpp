@@ -1,5 +1,6 @@
-// Cost of the planar engine per robot and tick, sub-steps included, 1000 robots on one core. The counter ns_per_robot_tick
-// is what to watch. Each scene is run for `seconds` of simulated time per iteration from the same start.
+// Cost of the planar engine per robot and tick, sub-steps included, on one core. The counter ns_per_robot_tick is what to
+// watch; of several partitions it is the sum, with the ghosts that they send each other. Each scene is run for some ticks per
+// iteration from the same start.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
@@ -37,6 +38,38 @@ void run(benchmark::State& state, const std::string& experiment, const std::vect
       benchmark::Counter(steps / 1e9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
+/// Disperses from a 40 mm grid over 2 x 2 partitions; all of them in turn.
+void run_partitions(benchmark::State& state, std::uint32_t robots, std::int64_t ticks) {
+  const RunPlan plan = testing::make_plan("arena { width_mm: 10000 height_mm: 10000 }",
+                                          testing::grid_crowd(robots, 40, Facing::kRandom), 2, 2);
+  ActuationFrame frame = testing::motors(Tick{0}, std::vector<std::uint8_t>(robots, 70), std::vector<std::uint8_t>(robots, 70));
+  const ActuationFrame* const frames[] = {&frame};
+  BodyFrame ghosts[4][4];  // from, to
+  for (auto _ : state) {
+    state.PauseTiming();
+    std::vector<physics::PlanarEngine> engines;
+    for (std::uint32_t p = 0; p < 4; ++p) engines.emplace_back(plan, PartitionId{p});
+    state.ResumeTiming();
+    for (std::int64_t k = 0; k < ticks; ++k) {
+      frame.tick = Tick{k};
+      for (std::uint32_t p = 0; p < 4; ++p) {
+        for (const PartitionId q : engines[p].neighbours()) engines[p].emit_ghosts(q, ghosts[p][q.value()]);
+      }
+      for (std::uint32_t p = 0; p < 4; ++p) {
+        const BodyFrame* in[3];
+        for (std::uint32_t q = 0, n = 0; q < 4; ++q) {
+          if (q != p) in[n++] = &ghosts[q][p];
+        }
+        engines[p].step(Tick{k}, {in, frames, {}});
+      }
+    }
+    for (const physics::PlanarEngine& engine : engines) benchmark::DoNotOptimize(engine.hash_part());
+  }
+  const double steps = static_cast<double>(state.iterations()) * static_cast<double>(ticks) * robots;
+  state.counters["ns_per_robot_tick"] =
+      benchmark::Counter(steps / 1e9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
 const std::string kArena = "arena { width_mm: 10000 height_mm: 10000 }";
 
 void open_field(benchmark::State& state) { run(state, kArena, testing::grid_crowd(kRobots, 200, Facing::kRandom), 300, 70, 70); }
@@ -58,6 +91,9 @@ void step_noise(benchmark::State& state) {
 void resting_cluster(benchmark::State& state) {
   run(state, kArena, testing::grid_crowd(kRobots, 33, Facing::kRandom), 300, 0, 0);
 }
+void partitions_2x2_of_100(benchmark::State& state) { run_partitions(state, 100, 1000); }
+void partitions_2x2_of_1000(benchmark::State& state) { run_partitions(state, kRobots, 300); }
+void whole_of_100(benchmark::State& state) { run(state, kArena, testing::grid_crowd(100, 40, Facing::kRandom), 1000, 70, 70); }
 
 BENCHMARK(open_field);
 BENCHMARK(disperse_cluster);
@@ -66,6 +102,9 @@ BENCHMARK(tightest_packing_inwards);
 BENCHMARK(turning_cluster);
 BENCHMARK(step_noise);
 BENCHMARK(resting_cluster);
+BENCHMARK(whole_of_100);
+BENCHMARK(partitions_2x2_of_100);
+BENCHMARK(partitions_2x2_of_1000);
 
 }  // namespace
 

@@ -138,7 +138,7 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& flags, const 
   append(arguments, flags);
   append(arguments, includes);
   append(arguments, {"-I", runtime.string()});
-  for (const char* name : {"kilolib.c", "switch.c", "libc.c", "libm.c", "libprintf.c", "core/math/elementary.c"}) {
+  for (const char* name : {"kilolib.c", "switch.c", "libavr.c", "libc.c", "libm.c", "libprintf.c", "core/math/elementary.c"}) {
     arguments.push_back((runtime / name).string());
   }
   (void)build(arguments, kept, {runtime / "kilolib.c"});

@@ -22,11 +22,12 @@ struct CompiledProgram {
 /// Compiles C sources, together with the embedded runtime, into one shared object with pinned flags. The result is kept in
 /// the cache by the content of everything that goes into it; the same content gives the same octets. A single .so is
 /// checked and returned as it is.
-/// Throws UserError: "FILE:LINE:COLUMN: error: ..." of the first error, then the rest of the compiler's output; or, where
-/// the machine has no compiler, the package to install.
+/// Throws UserError: "FILE:LINE:COLUMN: error: ..." of the first error, and how many more there are; or, where the machine
+/// has no compiler, the package to install.
 [[nodiscard]] CompiledProgram compile(const std::vector<std::filesystem::path>& sources, const CompileOptions& options = {});
 
-/// What a program needs of an ATmega328P (32 KiB of flash, 2 KiB of RAM), kilolib and the C library not included.
+/// What a program needs of an ATmega328P (32 KiB of flash, 2 KiB of RAM), with what it uses of the C library and without
+/// kilolib.
 struct AvrSize {
   std::uint32_t flash_octets = 0;  ///< code, constants, initial values
   std::uint32_t ram_octets = 0;    ///< globals and statics

@@ -18,8 +18,8 @@ namespace kilotwin::behaviours {
 /// Throws UserError where there is no source, or one that is not a readable file named *.c.
 void check_sources(const std::vector<std::filesystem::path>& sources);
 
-/// The first error of a compiler's or linker's output as "FILE:LINE:COLUMN: error: ...", then all other lines. FILE is one
-/// of the sources as they were named, or a header.
-[[nodiscard]] std::string first_error_first(const std::string& output, const std::vector<std::filesystem::path>& sources);
+/// The first error of a compiler's or linker's output as one line, "FILE:LINE:COLUMN: error: ...", and how many more there
+/// are. FILE is one of the sources as they were named, or a header.
+[[nodiscard]] std::string first_error(const std::string& output, const std::vector<std::filesystem::path>& sources);
 
 }  // namespace kilotwin::behaviours

@@ -15,7 +15,7 @@ namespace kilotwin::behaviours {
 [[nodiscard]] bool write_file(const std::filesystem::path&, std::string_view octets);
 
 /// A directory that this user may write to: `wanted` if given, else $XDG_CACHE_HOME/kilotwin or ~/.cache/kilotwin; where
-/// none of them can be had, a new private directory of the system's temporary files. Throws RunError where that fails too.
+/// none of them can be had, a private directory of this user among the system's temporary files. Throws RunError where that fails too.
 [[nodiscard]] std::filesystem::path cache_directory(const std::filesystem::path& wanted);
 
 }  // namespace kilotwin::behaviours

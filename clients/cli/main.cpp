@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <chrono>
 #include <filesystem>
+#include <limits>
 
 #include "clients/behaviours/compiler.hpp"
 #include "clients/cli/doctor_command.hpp"
@@ -26,6 +28,18 @@ namespace {
 
 constexpr int kFailed = 1, kBadInput = 2;
 
+/// A seed is decimal, whatever zeros are before it; what does not fit would be another seed than the one asked for.
+std::string decimal_seed(std::string& text) {
+  std::uint64_t seed = 0;
+  const char* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, seed);
+  if (error != std::errc() || end != last) {
+    return fmt::format("\"{}\" is no seed; give a whole number, 0..{}", text, std::numeric_limits<std::uint64_t>::max());
+  }
+  text = std::to_string(seed);
+  return {};
+}
+
 void add_experiment_options(CLI::App& app, RunArguments& arguments) {
   app.add_option("experiment", arguments.experiment, "experiment file (*.txtpb)")->required();
   app.add_option("--duration", arguments.duration_s, "simulated time, s");
@@ -42,7 +56,7 @@ void add_run(CLI::App& app, RunArguments& arguments) {
   app.add_option("--partitions", arguments.partitions, "COLUMNSxROWS of physics partitions");
   app.add_option("--hosts", arguments.hosts, "hosts of behaviours, each with a share of the robots");
   app.add_option("--threads", arguments.threads, "threads of a local run")->check(CLI::Range(1, 256))->capture_default_str();
-  app.add_option("--seed", arguments.seed, "seed of all randomness");
+  app.add_option("--seed", arguments.seed, "seed of all randomness")->transform(CLI::Validator(decimal_seed, "UINT"));
   app.add_option("--set", arguments.set, "FIELD=VALUE, e.g. robots[0].layout.grid.pitch_mm=33")->allow_extra_args(false);
   app.add_option("--pace", arguments.pace, "max, or a factor of real time")->capture_default_str();
   app.add_option("--checkpoint-every", arguments.checkpoint_every_s, "simulated time between checkpoints, s");
@@ -66,7 +80,7 @@ int build_command(const BuildArguments& arguments) {
   if (arguments.avr) {
     constexpr double kFlash = 32768, kRam = 2048;
     const behaviours::AvrSize size = behaviours::compile_for_avr(arguments.sources, options);
-    fmt::print("ATmega328P: {} octets of flash ({:.1f} % of 32 KiB), {} octets of RAM ({:.1f} % of 2 KiB); kilolib not included\n",
+    fmt::print("ATmega328P: {} octets of flash ({:.1f} % of 32 KiB), {} octets of RAM ({:.1f} % of 2 KiB), without kilolib and the stack\n",
                size.flash_octets, 100 * size.flash_octets / kFlash, size.ram_octets, 100 * size.ram_octets / kRam);
     return 0;
   }
@@ -169,7 +183,14 @@ int main_of(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    say(fmt::format("kilotwin: {}; see kilotwin --help", error.what()));
+    const std::vector<CLI::App*> commands = app.get_subcommands();
+    if (commands.empty() && argc > 1 && argv[1][0] != '-') {
+      std::string known;
+      for (const CLI::App* command : app.get_subcommands({})) known += (known.empty() ? "" : ", ") + command->get_name();
+      say(fmt::format("kilotwin: \"{}\" is no command; there are {}; see kilotwin --help", argv[1], known));
+    } else {
+      say(fmt::format("kilotwin: {}; see kilotwin{} --help", error.what(), commands.empty() ? "" : " " + commands.front()->get_name()));
+    }
     return kBadInput;
   }
 

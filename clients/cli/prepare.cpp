@@ -61,6 +61,41 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
   }
 }
 
+/// The experiment with all overrides, such that it runs again from where it lies: with the programs as they were compiled
+/// and copies of the files of poses. Throws filesystem_error.
+std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manifest& manifest, const recorder::RunDirectory& directory) {
+  proto::Experiment experiment = manifest.experiment();
+  std::string text;
+  for (int g = 0; g < experiment.robots_size(); ++g) {
+    proto::RobotGroup& group = *experiment.mutable_robots(g);
+    if (group.layout().has_poses()) {
+      const std::string copy = fmt::format("poses-{}.csv", g);
+      fs::copy_file(loaded.resolve(group.layout().poses().csv()), directory.path() / copy, fs::copy_options::overwrite_existing);
+      group.mutable_layout()->mutable_poses()->set_csv(copy);
+    }
+    const std::uint32_t program = manifest.group_program(g);
+    if (program == kNoProgram) continue;
+    text += fmt::format("# robots[{}] run {}\n", g, group.behaviour(0));
+    group.clear_behaviour();
+    const fs::path object = directory.program(manifest.program(static_cast<int>(program)).sha256());
+    group.add_behaviour(object.lexically_relative(directory.path()).string());
+  }
+  std::string fields;
+  google::protobuf::TextFormat::PrintToString(experiment, &fields);
+  return text + fields;
+}
+
+/// One process per service has room on a machine only as far as DDS numbers them (core/dds/dds.cpp); the launcher and
+/// whoever watches take part as well.
+void check_processes(const proto::Deployment& deployment) {
+  constexpr std::uint32_t kMost = 110;
+  const std::uint32_t partitions = deployment.partition_columns() * deployment.partition_rows();
+  if (const std::uint32_t processes = partitions + deployment.hosts() + 2; processes > kMost) {
+    throw UserError(fmt::format("--partitions {}x{}: {} processes, more than the {} that run on one machine; divide less, or use --mode local",
+                                deployment.partition_columns(), deployment.partition_rows(), processes, kMost));
+  }
+}
+
 fs::path checkpoint_directory(const fs::path& resume) {
   if (fs::exists(resume / "0000.part")) return resume;
   return newest_checkpoint(recorder::RunDirectory::open(resume, recorder::RunDirectory::Needs::kManifest).path());
@@ -101,6 +136,7 @@ LoadedExperiment load_with_overrides(const RunArguments& arguments) {
 
 Prepared prepare(const RunArguments& arguments) {
   const LoadedExperiment loaded = load_with_overrides(arguments);
+  if (arguments.mode == "federated" && !arguments.prepare) check_processes(loaded.experiment.deployment());
   const PlacedRobots placed = place_robots(loaded);
 
   proto::Manifest manifest;
@@ -138,9 +174,7 @@ Prepared prepare(const RunArguments& arguments) {
       }
     }
     if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
-    std::string text;
-    google::protobuf::TextFormat::PrintToString(experiment, &text);
-    recorder::write_file(directory.experiment(), text);
+    recorder::write_file(directory.experiment(), experiment_as_run(loaded, manifest, directory));
     recorder::write_file(directory.manifest(), manifest.SerializeAsString());
   } catch (const std::exception& error) {
     std::error_code ignored;

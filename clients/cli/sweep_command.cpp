@@ -231,7 +231,8 @@ int sweep_command(const SweepArguments& arguments) {
       observe(job, observed[job.point]);
     } else {
       ++failed;
-      say(fmt::format("kilotwin: {} with seed {} failed: {}", label(points[job.point]), job.seed, read_log(job.directory.string() + ".log")));
+      const std::string at = points[job.point].empty() ? name : label(points[job.point]);
+      say(fmt::format("kilotwin: {} with seed {} failed: {}", at, job.seed, read_log(job.directory.string() + ".log")));
     }
   }
 

@@ -19,6 +19,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr auto kHelloPeriod = milliseconds(10);
+/// How often idle work is done, and how far by wall time the books may lag behind where a run goes slowly.
 constexpr auto kIdlePeriod = milliseconds(100);
 constexpr auto kComplainAfter = milliseconds(1000);
 constexpr auto kComplainEvery = milliseconds(5000);
@@ -277,10 +278,8 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
     }
     next_idle_ = at + kIdlePeriod;
     lock.unlock();
-    if (paused()) {
-      write_ledger(federate, false);
-      if (schedule_.checkpoint_at(now)) save_once(federate, now);
-    }
+    write_ledger(federate, false);
+    if (paused() && schedule_.checkpoint_at(now)) save_once(federate, now);
     federate.idle();
     lock.lock();
   }
@@ -349,7 +348,6 @@ void Session::run(Federate& federate) {
       wait_ns_ += elapsed_ns(published, released);
       step_ns_ += elapsed_ns(released, stepped);
       if (stepped >= next_idle_) {
-        // So that the books lag behind by wall time no more than that, also where the run goes slowly.
         next_idle_ = stepped + kIdlePeriod;
         write_ledger(federate, false);
         federate.idle();

@@ -49,6 +49,7 @@ TEST_F(BadInput, InAProgramGivesTheCompilersOwnMessage) {
   const Outcome outcome = kilotwin({"run", experiment("robots { count: 3 behaviour: \"broken.c\" }\n"), "--mode", "local"}, scratch);
   EXPECT_EQ(outcome.status, 2);
   expect_in("broken.c:3:11: error: ", outcome.err);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   EXPECT_FALSE(fs::exists(scratch / "runs"));
   EXPECT_EQ(kilotwin({"build", scratch / "broken.c"}, scratch).status, 2);
 }
@@ -64,7 +65,11 @@ TEST_F(BadInput, InArguments) {
   expect_in("--duration", refusal({"run", good, "--duration", "nan"}));
   expect_in("--domain", refusal({"run", good, "--domain", "1000"}));
   expect_in("--help", refusal({"run"}));
-  expect_in("--help", refusal({"ruin", good}));
+  expect_in("no command", refusal({"ruin", good}));
+  expect_in("--seed", refusal({"run", good, "--seed", "-1"}));
+  expect_in("--seed", refusal({"run", good, "--seed", "18446744073709551616"}));
+  expect_in("4098 processes", refusal({"run", good, "--partitions", "64x64", "--hosts", "1", "--set", "arena.width_mm=100000", "--set",
+                                       "arena.height_mm=100000"}));
 }
 
 TEST_F(BadInput, ThatIsNoRecording) {

@@ -97,6 +97,28 @@ TEST_F(Commands, BuildForTheRealRobotPrintsSizes) {
   const Outcome outcome = kilotwin({"build", source("behaviours/disperse.c"), "--avr"}, scratch);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("ATmega328P"), std::string::npos) << outcome.out;
+  // Two files share 1000 octets that neither initialises.
+  write(scratch / "a.c", "char shared[1000];\nvoid other(void);\nint main(void) { other(); return 0; }\n");
+  write(scratch / "b.c", "char shared[1000];\nvoid other(void) { shared[0] = 1; }\n");
+  EXPECT_NE(kilotwin({"build", scratch / "a.c", scratch / "b.c", "--avr"}, scratch).out.find(" 1000 octets of RAM"), std::string::npos);
+}
+
+TEST_F(Commands, TheExperimentAsRunRunsAgain) {
+  write(scratch / "poses.csv", "x_mm,y_mm,heading_rad\n0,0,0\n60,0,1\n");
+  write(scratch / "part.h", "#define COLOUR RGB(0, 2, 0)\n");
+  write(scratch / "p.c", "#include <kilolib.h>\n#include \"part.h\"\nvoid setup(void) { set_color(COLOUR); set_motors(SPEED, SPEED); }\n"
+                         "void loop(void) {}\nint main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  write(scratch / "e.txtpb", "duration_s: 3\nrobots { behaviour: \"p.c\" layout { poses { csv: \"poses.csv\" } } }\n");
+  const auto first = run({scratch / "e.txtpb", "--mode", "local", "--define", "SPEED=60", "--set", "motion.noise=false"}, scratch, "first");
+  for (const char* file : {"e.txtpb", "poses.csv", "part.h", "p.c"}) fs::remove(scratch.path() / file);
+  const auto again = run({scratch / "first/experiment.txtpb", "--mode", "local"}, scratch, "again");
+  EXPECT_EQ(again.state_hash, first.state_hash);
+  EXPECT_EQ(again.name, "e");
+}
+
+TEST_F(Commands, SeedsAreDecimalAndReachTheWholeRange) {
+  EXPECT_EQ(run(small({"--seed", "010"}), scratch, "zeros").seed, 10u);
+  EXPECT_EQ(run(small({"--seed", "18446744073709551615"}), scratch, "last").seed, 18446744073709551615u);
 }
 
 TEST_F(Commands, DefineReachesTheProgram) {

@@ -56,6 +56,7 @@ volatile uint8_t tx_mask = 1;
 uint16_t tx_clock, tx_increment = 255;
 
 volatile uint8_t PORTB, PORTC, PORTD, DDRB, DDRC, DDRD, PINB, PINC, PIND;
+volatile uint8_t UCSR0A = 1 << UDRE0, UCSR0B, UCSR0C, UBRR0H, UBRR0L, UDR0;
 
 /* Time. */
 

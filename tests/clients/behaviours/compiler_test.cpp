@@ -49,7 +49,11 @@ TEST(Compiler, ErrorsNameTheUsersLine) {
   const std::string link = folder.write("c.c", "#include <kilolib.h>\nvoid helper(void);\nint main(void) {\n  helper();\n}\n");
   EXPECT_TRUE(error_of({link}).starts_with(link + ":4:1: error: undefined reference to `helper'")) << error_of({link});
   const std::string no_main = folder.write("d.c", "int x;\n");
-  EXPECT_TRUE(error_of({no_main}).find("undefined reference to `main'") != std::string::npos) << error_of({no_main});
+  EXPECT_TRUE(error_of({no_main}).starts_with(no_main + ":1:1: error: there is no main()")) << error_of({no_main});
+  const std::string several = folder.write("f.c", "#include <kilolib.h>\nint main(void) {\n  one = 1;\n  two = 2;\n  three();\n}\n");
+  EXPECT_EQ(error_of({several}), several + ":3:3: error: 'one' undeclared (first use in this function) (1 more error)");
+  const std::string twice = folder.write("g.c", "int main(void) { return 0; }\n");
+  EXPECT_EQ(error_of({twice, link}).find('\n'), std::string::npos) << error_of({twice, link});
   const std::string avr = folder.write("e.c", "#include <kilolib.h>\nint main(void) { return oops; }\n");
   try {
     (void)compile_for_avr({avr}, cached());

@@ -21,6 +21,11 @@ long random(void);
 void srandom(unsigned long seed);
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
 void* bsearch(const void* key, const void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
+/* A robot's heap has 4 KiB. */
+void* malloc(size_t size);
+void* calloc(size_t count, size_t size);
+void* realloc(void* block, size_t size);
+void free(void* block);
 _Noreturn void exit(int status);
 _Noreturn void abort(void);
 

@@ -1,0 +1,81 @@
+/* EEPROM and heap of an ATmega328P. */
+#include <avr/eeprom.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { EEPROM_OCTETS = E2END + 1 };
+
+static uint8_t eeprom[EEPROM_OCTETS] = {[0 ... E2END] = 0xff};
+
+/* No variable of a program lies at such a low address. */
+static uint8_t* cell(const void* address) {
+  const uintptr_t number = (uintptr_t)address;
+  return number < EEPROM_OCTETS ? eeprom + number : (uint8_t*)number;
+}
+
+void eeprom_read_block(void* to, const void* address, size_t size) {
+  for (size_t i = 0; i < size; ++i) ((uint8_t*)to)[i] = *cell((const uint8_t*)address + i);
+}
+
+void eeprom_write_block(const void* from, void* address, size_t size) {
+  for (size_t i = 0; i < size; ++i) *cell((uint8_t*)address + i) = ((const uint8_t*)from)[i];
+}
+
+#define ACCESS(name, type)                            \
+  type eeprom_read_##name(const type* address) {      \
+    type value;                                       \
+    eeprom_read_block(&value, address, sizeof value); \
+    return value;                                     \
+  }                                                   \
+  void eeprom_write_##name(type* address, type value) { eeprom_write_block(&value, address, sizeof value); }
+ACCESS(byte, uint8_t)
+ACCESS(word, uint16_t)
+ACCESS(dword, uint32_t)
+ACCESS(float, float)
+
+/* A heap twice as large as the robot's whole memory, as pointers are four times as long: blocks in a row, each with its
+ * size before it, the lowest bit set while it is in use. First fit; neighbours that are free are joined on the way. */
+enum { HEAP_OCTETS = 4096, HEADER = sizeof(size_t), ALIGNMENT = 8 };
+
+static uint64_t heap[HEAP_OCTETS / sizeof(uint64_t)];
+
+static size_t* header(size_t at) { return (size_t*)((uint8_t*)heap + at); }
+
+void* malloc(size_t wanted) {
+  if (wanted > HEAP_OCTETS) return NULL;
+  const size_t needed = (wanted + HEADER + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+  if (*header(0) == 0) *header(0) = HEAP_OCTETS;
+  for (size_t at = 0; at < HEAP_OCTETS; at += *header(at) & ~(size_t)1) {
+    if (*header(at) & 1) continue;
+    size_t next = at + *header(at);
+    while (next < HEAP_OCTETS && !(*header(next) & 1)) next += *header(next);
+    const size_t room = next - at;
+    *header(at) = room;
+    if (room < needed) continue;
+    if (room > needed) *header(at + needed) = room - needed;
+    *header(at) = needed | 1;
+    return header(at) + 1;
+  }
+  return NULL;
+}
+
+void free(void* block) {
+  if (block != NULL) ((size_t*)block)[-1] &= ~(size_t)1;
+}
+
+void* calloc(size_t count, size_t size) {
+  if (size != 0 && count > HEAP_OCTETS / size) return NULL;
+  void* block = malloc(count * size);
+  return block == NULL ? NULL : memset(block, 0, count * size);
+}
+
+void* realloc(void* block, size_t wanted) {
+  if (block == NULL) return malloc(wanted);
+  const size_t size = (((size_t*)block)[-1] & ~(size_t)1) - HEADER;
+  if (wanted <= size) return block;
+  void* larger = malloc(wanted);
+  if (larger == NULL) return NULL;
+  memcpy(larger, block, size);
+  free(block);
+  return larger;
+}
