@@ -1,8 +1,10 @@
 #include "clients/behaviours/files.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -48,8 +50,10 @@ std::optional<std::string> read_file(const fs::path& path) {
 }
 
 bool write_file(const fs::path& path, std::string_view octets) {
-  std::string temporary = path.string() + ".XXXXXX";
-  const int descriptor = mkstemp(temporary.data());
+  // As readable as the user's other files (mkstemp would keep it from a colleague who replays the run).
+  static std::atomic<unsigned> counter{0};
+  const std::string temporary = path.string() + '.' + std::to_string(getpid()) + '.' + std::to_string(counter++);
+  const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor < 0) return false;
   while (!octets.empty()) {
     const ssize_t written = write(descriptor, octets.data(), octets.size());

@@ -17,7 +17,7 @@
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/interrupt.hpp"
-#include "core/federation/topics.hpp"
+#include "core/federation/session.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -130,7 +130,8 @@ class Launcher {
     latest_.received = sample.received;
     latest_.robots_failed = sample.robots_failed;
     latest_.paused = sample.phase == kilotwin_open_PAUSED;
-    latest_.waiting_for = sample.note;
+    const bool over = sample.phase == kilotwin_open_ENDED || sample.phase == kilotwin_open_BROKEN;
+    latest_.waiting_for = over ? "" : sample.note;
     // While it starts there is something to show only if it waits for somebody.
     started_ = started_ || sample.phase != kilotwin_open_STARTING || sample.note[0] != '\0';
   }
@@ -138,7 +139,7 @@ class Launcher {
   void on_member(const WireMember& sample) {
     // Whoever left because of another says so; the first of the others is where it broke.
     const std::string_view failure = sample.failure;
-    if (sample.phase != kilotwin_wire_FAILED || failure.starts_with("left: ")) return;
+    if (sample.phase != kilotwin_wire_FAILED || failure.starts_with(kLeft)) return;
     const std::lock_guard lock(mutex_);
     if (told_.empty()) told_ = fmt::format("{}: {}", sample.name, failure);
   }

@@ -23,6 +23,7 @@
 #include "clients/recorder/summary.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/experiment/validate.hpp"
 #include "core/federation/interrupt.hpp"
 
 namespace kilotwin::cli {
@@ -46,7 +47,7 @@ std::vector<std::uint64_t> parse_seeds(const std::string& text) {
     throw UserError(fmt::format("--seeds: \"{}\" is no range; give FIRST..LAST such as 1..20", text));
   }
   std::vector<std::uint64_t> seeds;
-  for (std::uint64_t seed = first; seed <= last; ++seed) seeds.push_back(seed);
+  for (std::uint64_t i = 0; i <= last - first; ++i) seeds.push_back(first + i);
   return seeds;
 }
 
@@ -129,7 +130,7 @@ std::string read_log(const fs::path& file) {
   while (std::getline(stream, line)) {
     if (!line.empty()) last = line;
   }
-  return last;
+  return last.empty() ? "it said nothing; is the disk full?" : last;
 }
 
 void run_all(std::vector<Job>& jobs, const SweepArguments& arguments, const std::vector<Point>& points) {
@@ -148,7 +149,10 @@ void run_all(std::vector<Job>& jobs, const SweepArguments& arguments, const std:
       job.process = start(words_of(arguments, points[job.point], job), job.directory.string() + ".log");
       running[job.process] = &job;
     }
-    if (running.empty()) throw RunError("interrupted");
+    if (running.empty()) {
+      if (terminal) std::fputs("\r\x1b[K", stderr);
+      throw RunError("interrupted; the runs that were done are there, a table is not");
+    }
     int status = 0;
     const pid_t ended = waitpid(-1, &status, WNOHANG);
     if (ended <= 0) {
@@ -209,6 +213,7 @@ int sweep_command(const SweepArguments& arguments) {
     RunArguments one = arguments.run;
     one.set = point;
     const LoadedExperiment loaded = load_with_overrides(one);
+    validate(loaded);
     name = loaded.experiment.name();
     own_seeds.push_back(loaded.experiment.seed());
   }

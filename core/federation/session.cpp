@@ -106,7 +106,10 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
       return fail(fmt::format("{} on {} runs another experiment than this service; give all the same run directory",
                               member.name, member.host));
     }
-    if (member.phase == kilotwin_wire_FAILED) return fail(fmt::format("{}: {}", member.name, member.failure));
+    if (member.phase == kilotwin_wire_FAILED) {
+      const std::string_view failure = member.failure;
+      return fail(failure.starts_with(kLeft) ? std::string(failure.substr(kLeft.size())) : fmt::format("{}: {}", member.name, failure));
+    }
   }
   const bool was_alive = peer.alive;
   peer.alive = state.alive;
@@ -367,7 +370,7 @@ void Session::run(Federate& federate) {
     }
     if (is_double_) throw;
     try {
-      write_member(kilotwin_wire_FAILED, own ? line : "left: " + line);
+      write_member(kilotwin_wire_FAILED, own ? line : std::string(kLeft) + line);
       member_writer_->flush(0.5);
     } catch (const std::exception&) {
       // The connection itself may be what broke; the first error is the one to tell.

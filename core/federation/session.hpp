@@ -17,6 +17,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/dds/dds.hpp"
@@ -26,6 +27,9 @@
 #include "core/federation/wire.hpp"
 
 namespace kilotwin {
+
+/// How the failure of a federate begins that left because of another: what follows is the other's.
+inline constexpr std::string_view kLeft = "left: ";
 
 /// What the session drives.
 class Federate {

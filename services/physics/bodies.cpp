@@ -1,7 +1,5 @@
 #include "services/physics/bodies.hpp"
 
-#include <algorithm>
-
 namespace kilotwin::physics {
 
 void Bodies::clear() {
@@ -26,17 +24,22 @@ void Bodies::add(const Bodies& other, std::size_t i) {
   add(other.robot[i], other.x_mm[i], other.y_mm[i], other.heading_rad[i], other.tracked[i], other.awake[i]);
 }
 
-void Bodies::assign_sorted(const Bodies& all, std::vector<std::uint32_t>& order) {
-  order.resize(all.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  // Copies of a robot are told apart by their place, so that no two entries compare equal.
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return all.robot[a] != all.robot[b] ? all.robot[a] < all.robot[b] : a < b;
-  });
-  clear();
-  for (const std::uint32_t i : order) {
-    if (robot.empty() || robot.back() != all.robot[i]) add(all, i);
-  }
+void Bodies::resize(std::size_t size) {
+  robot.resize(size);
+  x_mm.resize(size);
+  y_mm.resize(size);
+  heading_rad.resize(size);
+  tracked.resize(size);
+  awake.resize(size);
+}
+
+void Bodies::set(std::size_t to, const Bodies& other, std::size_t i) {
+  robot[to] = other.robot[i];
+  x_mm[to] = other.x_mm[i];
+  y_mm[to] = other.y_mm[i];
+  heading_rad[to] = other.heading_rad[i];
+  tracked[to] = other.tracked[i];
+  awake[to] = other.awake[i];
 }
 
 void Bodies::swap(Bodies& other) noexcept {

@@ -18,8 +18,9 @@ struct Bodies {
   void clear();
   void add(std::uint32_t id, double x, double y, double heading, std::uint8_t is_tracked, std::uint8_t is_awake);
   void add(const Bodies& other, std::size_t i);
-  /// Replaces the content by that of `all` in ascending ids, which must be unique up to identical copies.
-  void assign_sorted(const Bodies& all, std::vector<std::uint32_t>& order);
+  void resize(std::size_t);
+  /// Overwrites entry `to`.
+  void set(std::size_t to, const Bodies& other, std::size_t i);
   void swap(Bodies& other) noexcept;
 };
 

@@ -48,6 +48,7 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
   if (any_active == 0) return false;
 
   candidates_.update(bodies);
+  has_others_ = !own.empty();
   hops_.assign(count, 0);
   for (std::uint32_t i = 0; i < own.size(); ++i) hops_[i] = own[i] != 0 ? 0 : kOutOfReach;
   overlaps_.assign(count, 0);
@@ -102,6 +103,7 @@ void ContactSolver::search(const Bodies& bodies, std::uint32_t i) {
   any_overlap_ |= overlaps != 0;
   movers_.push_back({i, static_cast<std::uint32_t>(first), contacts});
   other_count_ = first + contacts;
+  if (!has_others_) return;
   for (std::uint32_t p = 0; p < contacts; ++p) {
     if (hops_[others[p]] != kOutOfReach) continue;
     hops_[others[p]] = static_cast<std::uint8_t>(hops_[i] + 1);
@@ -110,24 +112,24 @@ void ContactSolver::search(const Bodies& bodies, std::uint32_t i) {
 }
 
 void ContactSolver::seat_movers() {
-  // Those with equally many contacts one after the other; within a group their order, and so that of hops, stays.
-  std::array<std::uint32_t, kMostContacts + 3> begin{};
-  const auto group = [](const Mover& m) { return std::min(m.contacts, kMostContacts + 1); };
-  for (const Mover& m : movers_) ++begin[group(m) + 1];
-  for (std::size_t g = 1; g < begin.size(); ++g) begin[g] += begin[g - 1];
-  auto next = begin;
-  by_group_.resize(movers_.size());
-  for (std::uint32_t m = 0; m < movers_.size(); ++m) by_group_[next[group(movers_[m])]++] = m;
+  // By the number of contacts, so that lanes have work alike; those with equally many stay in the order of hops.
+  std::array<std::uint32_t, kMostContacts + 2> end{};
+  const auto key = [](const Mover& m) { return std::min(m.contacts, kMostContacts); };
+  for (const Mover& m : movers_) ++end[key(m) + 1];
+  for (std::size_t k = 1; k < end.size(); ++k) end[k] += end[k - 1];
+  seated_.resize(movers_.size());
+  for (const Mover& m : movers_) seated_[end[key(m)]++] = m;
 
   pass_.clear();
-  for (std::size_t g = 0; g + 1 < begin.size(); ++g) {
-    for (std::uint32_t at = begin[g]; at < begin[g + 1]; at += kLanes) {
-      const std::uint32_t size = std::min(static_cast<std::uint32_t>(kLanes), begin[g + 1] - at);
-      std::uint32_t contacts = 0;
-      for (std::uint32_t lane = 0; lane < size; ++lane) contacts = std::max(contacts, movers_[by_group_[at + lane]].contacts);
-      pass_.add_batch(contacts, limits_.sub_steps - hops_[movers_[by_group_[at]].body]);
-      for (std::uint32_t lane = 0; lane < size; ++lane) seat_of_[movers_[by_group_[at + lane]].body] = pass_.seat(lane);
+  for (std::size_t at = 0; at < seated_.size(); at += kLanes) {
+    const std::size_t size = std::min(kLanes, seated_.size() - at);
+    std::uint32_t contacts = 0, hops = limits_.sub_steps;
+    for (std::size_t lane = 0; lane < size; ++lane) {
+      contacts = std::max(contacts, seated_[at + lane].contacts);
+      hops = std::min<std::uint32_t>(hops, hops_[seated_[at + lane].body]);
     }
+    pass_.add_batch(contacts, limits_.sub_steps - hops);
+    for (std::size_t lane = 0; lane < size; ++lane) seat_of_[seated_[at + lane].body] = pass_.seat(lane);
   }
   pass_.rest();
 }
@@ -135,19 +137,21 @@ void ContactSolver::seat_movers() {
 void ContactSolver::fill_contacts(const Bodies& bodies) {
   const double way_mm = limits_.sub_steps * limits_.stride_mm;
   const double x_free_mm = limits_.x_limit_mm - way_mm, y_free_mm = limits_.y_limit_mm - way_mm;
-  for (std::size_t at = 0; at < by_group_.size();) {
-    ContactPass::Batch& batch = pass_.batch_of(seat_of_[movers_[by_group_[at]].body]);
+  for (std::size_t at = 0; at < seated_.size(); at += kLanes) {
+    ContactPass::Batch& batch = pass_.batch_of(seat_of_[seated_[at].body]);
+    const std::size_t size = std::min(kLanes, seated_.size() - at);
     Mover movers[kLanes];
-    std::size_t size = 0;
-    for (; at < by_group_.size() && size < kLanes; ++at, ++size) {
-      movers[size] = movers_[by_group_[at]];
-      if (&pass_.batch_of(seat_of_[movers[size].body]) != &batch) break;
-      const double x = bodies.x_mm[movers[size].body], y = bodies.y_mm[movers[size].body];
-      batch.x_mm[size] = x;
-      batch.y_mm[size] = y;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (lane < size) {
+        movers[lane] = seated_[at + lane];
+      } else {
+        movers[lane] = {seated_[at].body, 0, 0};  // The last batch is filled up.
+      }
+      const double x = bodies.x_mm[movers[lane].body], y = bodies.y_mm[movers[lane].body];
+      batch.x_mm[lane] = x;
+      batch.y_mm[lane] = y;
       batch.near_wall |= x > x_free_mm || x < -x_free_mm || y > y_free_mm || y < -y_free_mm;
     }
-    for (std::size_t lane = size; lane < kLanes; ++lane) movers[lane] = {movers[0].body, 0, 0};
     fill_contacts(bodies, batch, movers);
   }
 }
@@ -215,11 +219,11 @@ void ContactSolver::move(Bodies& bodies, const Drives& drives) {
       move_alone(bodies, i, 0, 0);
     }
   }
-  if (movers_.empty()) return;
+  if (seated_.empty()) return;
   fill_contacts(bodies);
   pass_.run(limits_, any_overlap_);
-  for (const Mover& m : movers_) {
-    if (hops_[m.body] != 0) break;
+  for (const Mover& m : seated_) {
+    if (hops_[m.body] != 0) continue;
     const double x = bodies.x_mm[m.body], y = bodies.y_mm[m.body];
     double to_x = x + pass_.shift_x_mm(seat_of_[m.body]), to_y = y + pass_.shift_y_mm(seat_of_[m.body]);
     if (!limits_.outside(x, y)) {  // The sum is rounded, a wall is not.

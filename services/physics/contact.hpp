@@ -69,7 +69,7 @@ class ContactSolver {
 
  private:
   static constexpr std::uint8_t kOutOfReach = 255;
-  /// Bodies with more contacts than this share a group.
+  /// Bodies with more contacts than this are not told apart.
   static constexpr std::uint32_t kMostContacts = 7;
 
   /// A body that may be moved by contacts, or whose drive moves one.
@@ -92,16 +92,15 @@ class ContactSolver {
   double sub_step_part_;
   CandidateList candidates_;
   ContactPass pass_;
-  std::vector<Mover> movers_;              ///< own ones first, then by hops
+  std::vector<Mover> movers_, seated_;     ///< by hops; by seats
   std::vector<std::uint32_t> others_;      ///< the contacts of the movers
   std::size_t other_count_ = 0;
-  bool any_overlap_ = false;
+  bool any_overlap_ = false, has_others_ = false;
   // Per body.
   std::vector<std::uint8_t> hops_;         ///< by contacts from the own bodies, or kOutOfReach
   std::vector<std::uint8_t> driven_, active_, overlaps_;
   std::vector<ContactPass::Seat> seat_of_;
   std::vector<std::uint32_t> reached_;     ///< others' bodies, by hops
-  std::vector<std::uint32_t> by_group_;    ///< movers in the order of their seats
 };
 
 }  // namespace kilotwin::physics

@@ -1,6 +1,6 @@
 /// The Jacobi passes of a tick over the bodies in contact, a body per lane. contact.hpp states the law.
 ///
-/// Bodies with equally many contacts make up a batch, so that all lanes are at work. A body's seat says where its motion is
+/// A batch takes bodies with about as many contacts, so that all lanes are at work. A body's seat says where its motion is
 /// kept: the batch and the lane. Seat 0 stands for all that stay where they are.
 #pragma once
 

@@ -15,7 +15,8 @@ PlanarEngine::PlanarEngine(const RunPlan& plan, PartitionId partition)
       robots_(plan.robots()),
       drive_(plan),
       contact_(plan, drive_),
-      neighbours_(plan.grid.neighbours(partition, contact_.limits().margin_mm)) {
+      neighbours_(plan.grid.neighbours(partition, contact_.limits().margin_mm)),
+      merge_(robots_) {
   for (std::uint32_t robot = 0; robot < robots_; ++robot) {
     const Pose pose = plan.initial_pose(robot);
     const double x = pose.position_mm.x(), y = pose.position_mm.y(), heading = wrapped(pose.heading_rad);
@@ -34,7 +35,6 @@ void PlanarEngine::step(Tick from, const Inputs& inputs) {
   take_tracked(inputs.tracked);
   for (const BodyFrame* frame : inputs.ghosts) KILOTWIN_DEMAND(frame->tick == from);
   gather(inputs.ghosts);
-  mark_own();
   read_motors(from, inputs.actuation);
   if (contact_.find(known_, own_, duties_)) {
     set_off(from);
@@ -56,33 +56,50 @@ void PlanarEngine::take_tracked(std::span<const TrackedPoseInput> inputs) {
 }
 
 void PlanarEngine::gather(std::span<const BodyFrame* const> ghosts) {
-  if (ghosts.empty() && tracked_.size() == 0) {
+  if (grid_.size() == 1 && tracked_.size() == 0) {
     known_.swap(listed_);
     return;
   }
-  const double margin_mm = contact_.limits().margin_mm;
-  unsorted_.clear();
-  for (std::size_t i = 0; i < listed_.size(); ++i) {
-    if (listed_.tracked[i] == 0) unsorted_.add(listed_, i);
+  // List 0 is what was listed, 1 the tracked ones, the others are ghosts.
+  for (std::uint32_t i = 0; i < listed_.size(); ++i) {
+    if (listed_.tracked[i] == 0) merge_.add(listed_.robot[i], {0, i});
   }
-  for (std::size_t i = 0; i < tracked_.size(); ++i) {
-    if (rectangle_.distance_mm(tracked_.x_mm[i], tracked_.y_mm[i]) <= margin_mm) unsorted_.add(tracked_, i);
-  }
-  for (const BodyFrame* frame : ghosts) {
-    for (std::size_t i = 0; i < frame->robot.size(); ++i) {
-      const std::uint32_t robot = frame->robot[i];
-      if (!is_tracked_.empty() && is_tracked_[robot] != 0) continue;
-      unsorted_.add(robot, frame->x_mm[i], frame->y_mm[i], frame->heading_rad[i], 0, 1);
+  for (std::uint32_t i = 0; i < tracked_.size(); ++i) {
+    if (rectangle_.distance_mm(tracked_.x_mm[i], tracked_.y_mm[i]) <= contact_.limits().margin_mm) {
+      merge_.add(tracked_.robot[i], {1, i});
     }
   }
-  known_.assign_sorted(unsorted_, order_);
-}
-
-void PlanarEngine::mark_own() {
-  own_.clear();
+  for (std::uint32_t g = 0; g < ghosts.size(); ++g) {
+    for (std::uint32_t i = 0; i < ghosts[g]->robot.size(); ++i) {
+      const std::uint32_t robot = ghosts[g]->robot[i];
+      if (is_tracked_.empty() || is_tracked_[robot] == 0) merge_.add(robot, {2 + g, i});
+    }
+  }
+  known_.swap(previous_);
+  known_.resize(merge_.size());
+  std::size_t n = 0, before = 0;
+  merge_.drain([&](std::uint32_t robot, Merge::Entry from) {
+    known_.robot[n] = robot;
+    if (from.list < 2) {
+      known_.set(n, from.list == 0 ? listed_ : tracked_, from.index);
+    } else {
+      const BodyFrame& frame = *ghosts[from.list - 2];
+      const double x = frame.x_mm[from.index], y = frame.y_mm[from.index];
+      while (before < previous_.size() && previous_.robot[before] < robot) ++before;
+      // One that the last step did not move here, and that is where it was, was not moved anywhere.
+      const bool asleep = before < previous_.size() && previous_.robot[before] == robot && previous_.awake[before] == 0 &&
+                          previous_.x_mm[before] == x && previous_.y_mm[before] == y;
+      known_.x_mm[n] = x;
+      known_.y_mm[n] = y;
+      known_.heading_rad[n] = frame.heading_rad[from.index];
+      known_.tracked[n] = 0;
+      known_.awake[n] = !asleep;
+    }
+    ++n;
+  });
   if (grid_.size() == 1) return;
-  own_.resize(known_.size());
-  for (std::size_t i = 0; i < known_.size(); ++i) own_[i] = is_own(known_.x_mm[i], known_.y_mm[i]) ? 1 : 0;
+  own_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) own_[i] = is_own(known_.x_mm[i], known_.y_mm[i]);
 }
 
 void PlanarEngine::read_motors(Tick from, std::span<const ActuationFrame* const> frames) {
@@ -140,6 +157,11 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   const double margin_mm = contact_.limits().margin_mm;
   for (std::size_t i = 0; i < listed_.size(); ++i) {
     const double x = listed_.x_mm[i], y = listed_.y_mm[i];
+    // Most lie far off; the distance itself takes a root.
+    if (x < rectangle.x_min_mm - margin_mm || x > rectangle.x_max_mm + margin_mm || y < rectangle.y_min_mm - margin_mm ||
+        y > rectangle.y_max_mm + margin_mm) {
+      continue;
+    }
     if (listed_.tracked[i] == 0 && rectangle.distance_mm(x, y) <= margin_mm) {
       frame.add(listed_.robot[i], x, y, listed_.heading_rad[i]);
     }
@@ -166,7 +188,7 @@ void PlanarEngine::save(proto::PhysicsState& state) const {
 }
 
 void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> parts) {
-  Bodies all, sorted;
+  Bodies all;
   std::vector<std::uint8_t> seen(robots_, 0);
   for (const proto::PhysicsState* part : parts) {
     const int size = part->robot_size();
@@ -183,13 +205,14 @@ void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> p
   if (all.size() != robots_) {
     throw RunError("checkpoint: physics: holds " + std::to_string(all.size()) + " of " + std::to_string(robots_) + " robots");
   }
-  sorted.assign_sorted(all, order_);
+  for (std::uint32_t i = 0; i < all.size(); ++i) merge_.add(all.robot[i], {0, i});
   listed_.clear();
   tracked_.clear();
-  for (std::size_t i = 0; i < sorted.size(); ++i) {
-    if (sorted.tracked[i] != 0) tracked_.add(sorted, i);
-    if (is_own(sorted.x_mm[i], sorted.y_mm[i])) listed_.add(sorted, i);
-  }
+  known_.clear();
+  merge_.drain([&](std::uint32_t, Merge::Entry from) {
+    if (all.tracked[from.index] != 0) tracked_.add(all, from.index);
+    if (is_own(all.x_mm[from.index], all.y_mm[from.index])) listed_.add(all, from.index);
+  });
   tick_ = tick;
 }
 

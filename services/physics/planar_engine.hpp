@@ -6,7 +6,7 @@
 ///                     contact: S Jacobi passes over all known bodies
 ///                     listed at k+1 = own
 /// Own bodies come out bit for bit as if one partition computed all: a body depends on one hop of neighbours per sub-step,
-/// and the margin holds S hops. Ghosts near the margin's rim come out wrong and are not used.
+/// and the margin holds S hops. Others are computed as far as own ones depend on them, and their poses are not used.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,7 @@
 #include "services/physics/contact.hpp"
 #include "services/physics/drive.hpp"
 #include "services/physics/engine.hpp"
+#include "services/physics/merge.hpp"
 
 namespace kilotwin::physics {
 
@@ -35,7 +36,6 @@ class PlanarEngine final : public Engine {
  private:
   void take_tracked(std::span<const TrackedPoseInput>);
   void gather(std::span<const BodyFrame* const> ghosts);
-  void mark_own();
   void read_motors(Tick from, std::span<const ActuationFrame* const>);
   void set_off(Tick from);
   void list_own();
@@ -55,9 +55,9 @@ class PlanarEngine final : public Engine {
   Bodies tracked_;                         ///< all tracked robots, wherever they are
 
   // Within a step.
-  Bodies known_, unsorted_;
+  Bodies known_, previous_;                ///< of the present step and of the one before
   std::vector<std::uint8_t> own_;          ///< per known body, by its pose before the step; empty with one partition
-  std::vector<std::uint32_t> order_;
+  Merge merge_;
   std::vector<const ActuationFrame*> frames_;
   std::vector<Duties> duties_;             ///< per known body
   Drives drives_;

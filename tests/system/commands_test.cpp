@@ -146,6 +146,21 @@ TEST_F(Commands, SweepTabulatesAllCombinations) {
   EXPECT_TRUE(fs::exists(scratch / "sweep/sweep.svg"));
 }
 
+TEST_F(Commands, SweepRefusesAPointThatCannotRunBeforeTheFirstRun) {
+  const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--duration", "1", "--set", "robots.count=9,5000", "--out",
+                                    scratch / "sweep"}, scratch);
+  EXPECT_EQ(outcome.status, 2) << outcome.err;
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_FALSE(fs::exists(scratch / "sweep"));
+}
+
+TEST_F(Commands, SweepReachesTheLastSeed) {
+  const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "4", "--duration", "1", "--seeds",
+                                    "18446744073709551614..18446744073709551615", "--out", scratch / "sweep"}, scratch);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_TRUE(fs::exists(scratch / "sweep/0000-18446744073709551615/summary.json"));
+}
+
 TEST_F(Commands, DoctorFindsThisMachineFit) {
   const Outcome outcome = kilotwin({"doctor"}, scratch);
   EXPECT_EQ(outcome.status, 0) << outcome.out;
