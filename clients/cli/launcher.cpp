@@ -179,7 +179,7 @@ class Launcher {
       if (deadline_ && Clock::now() > *deadline_) end_all();
       {
         const std::lock_guard lock(mutex_);
-        if (started_) progress_.show(latest_);
+        if (started_ && !interrupted_) progress_.show(latest_);
       }
       std::this_thread::sleep_for(kPoll);
     }
@@ -207,7 +207,7 @@ class Launcher {
       return say(line);
     }
     const std::lock_guard lock(mutex_);
-    const std::string why = !told_.empty() ? told_ : fmt::format("{}: {}", culprit_->name, line.empty() ? "failed" : line);
+    const std::string why = !told_.empty() ? told_ : fmt::format("{}: {}", culprit_->name, line.empty() ? "failed without a word; is the disk full?" : line);
     say(fmt::format("kilotwin: {}; {}", why, so_far));
   }
 

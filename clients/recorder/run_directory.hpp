@@ -1,6 +1,6 @@
 /// RunDirectory: where the files of one run lie.
 ///   manifest.pb      the experiment as resolved, for machines: kilotwin.proto.Manifest
-///   experiment.txtpb the experiment as run, for people
+///   experiment.txtpb the experiment as run; it runs again from there
 ///   programs/        the behaviours as built, SHA256.so
 ///   recording.ktrec  what happened: idl/recording.proto
 ///   summary.json     clients/recorder/summary.hpp

@@ -216,10 +216,7 @@ void Session::assemble(Federate& federate) {
     complain(Clock::now() - since, whom);
     arrived_.wait_until(lock, next_hello);
     lock.unlock();
-    if (const auto now = Clock::now(); now >= next_idle_) {
-      next_idle_ = now + kIdlePeriod;
-      federate.idle();
-    }
+    if (Clock::now() >= next_idle_) idle(federate);
   }
   waiting_for_.clear();
 }
@@ -279,13 +276,18 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
       arrived_.wait_until(lock, next_idle_);
       continue;
     }
-    next_idle_ = at + kIdlePeriod;
     lock.unlock();
-    write_ledger(federate, false);
     if (paused() && schedule_.checkpoint_at(now)) save_once(federate, now);
-    federate.idle();
+    idle(federate);
     lock.lock();
   }
+}
+
+/// The books lag behind by wall time no more than the period of this, also where the run goes slowly or stands.
+void Session::idle(Federate& federate) {
+  next_idle_ = Clock::now() + kIdlePeriod;
+  write_ledger(federate, false);
+  federate.idle();
 }
 
 void Session::save_once(Federate& federate, Tick now) {
@@ -350,11 +352,7 @@ void Session::run(Federate& federate) {
       exchange_ns_ += elapsed_ns(begun, published);
       wait_ns_ += elapsed_ns(published, released);
       step_ns_ += elapsed_ns(released, stepped);
-      if (stepped >= next_idle_) {
-        next_idle_ = stepped + kIdlePeriod;
-        write_ledger(federate, false);
-        federate.idle();
-      }
+      if (stepped >= next_idle_) idle(federate);
     }
     ended_ = Clock::now();
     leave(federate);

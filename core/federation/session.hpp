@@ -99,6 +99,7 @@ class Session {
   void on_member(const WireMember& member, dds::SampleState state);
   void on_directive(const WireDirective& wire);
   void write_ledger(Federate&, bool last);
+  void idle(Federate&);
   void save_once(Federate&, Tick now);
   void check() const;
   void note_pause(bool pause);

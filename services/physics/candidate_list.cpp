@@ -5,7 +5,7 @@
 namespace kilotwin::physics {
 namespace {
 
-/// A wider one is rebuilt less often and holds more; the cost is flat from 6 to 12 mm.
+/// A wider one is rebuilt less often and holds more; the cost is flat from 8 to 12 mm.
 constexpr double kSkin_mm = 10;
 /// What two bodies may have moved towards each other, less what rounding may hide.
 constexpr double kWay_mm = 0.499 * kSkin_mm;

@@ -1,7 +1,5 @@
 #include "services/physics/contact_pass.hpp"
 
-#include <algorithm>
-
 #include "services/physics/contact.hpp"
 
 namespace kilotwin::physics {
@@ -20,7 +18,7 @@ void ContactPass::clear() {
   add_batch(0, 0);
 }
 
-ContactPass::Batch& ContactPass::add_batch(std::uint32_t contacts, std::uint32_t passes) {
+void ContactPass::add_batch(std::uint32_t contacts, std::uint32_t passes) {
   Batch& batch = batches_.emplace_back();
   batch.first_contact = static_cast<std::uint32_t>(contact_count_);
   batch.contacts = contacts;
@@ -28,7 +26,6 @@ ContactPass::Batch& ContactPass::add_batch(std::uint32_t contacts, std::uint32_t
   contact_count_ += contacts;
   if (contacts_.size() < contact_count_) contacts_.resize(2 * contact_count_);
   if (limit_mm_.size() < contacts) limit_mm_.resize(contacts);
-  return batch;
 }
 
 void ContactPass::rest() {

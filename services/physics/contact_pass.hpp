@@ -34,8 +34,8 @@ class ContactPass {
 
   /// Starts a tick with batch 0 alone, in which nothing moves.
   void clear();
-  /// Appends a batch; its contacts are to be filled in.
-  Batch& add_batch(std::uint32_t contacts, std::uint32_t passes);
+  /// Appends a batch; its places and contacts are to be filled in.
+  void add_batch(std::uint32_t contacts, std::uint32_t passes);
   [[nodiscard]] Contact* contacts_of(const Batch& batch) { return contacts_.data() + batch.first_contact; }
   [[nodiscard]] Batch& batch_of(Seat seat) { return batches_[seat / (kColumns * kLanes)]; }
   [[nodiscard]] static std::size_t lane_of(Seat seat) { return seat % kLanes; }
@@ -43,10 +43,12 @@ class ContactPass {
   [[nodiscard]] Seat seat(std::size_t lane) const {
     return static_cast<Seat>((batches_.size() - 1) * kColumns * kLanes + lane);
   }
-  /// Once all batches are there: displacement by the drive alone in the first sub-step.
-  void set_drive(Seat, double x_mm, double y_mm);
+  /// Once all batches are there: nobody drives.
   void rest();
+  /// Displacement by the drive alone in the first sub-step.
+  void set_drive(Seat, double x_mm, double y_mm);
 
+  /// All sub-steps. `with_overlaps`: whether any bodies overlap at the tick's start; none do later where none did then.
   void run(const ContactLimits&, bool with_overlaps);
 
   /// Displacement over the tick.

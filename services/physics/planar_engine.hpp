@@ -2,8 +2,9 @@
 ///
 ///   step from tick k: known  = bodies listed at k + ghosts of k + tracked robots, within the margin of the rectangle
 ///                     own    = those of the known whose pose at k lies in the rectangle
-///                     drive  : motors of k -> wanted motion of every known body
-///                     contact: S Jacobi passes over all known bodies
+///                     find   : who may touch whom, and which of the others own bodies depend on
+///                     drive  : motors of k -> wanted motion of these
+///                     contact: S Jacobi passes over these
 ///                     listed at k+1 = own
 /// Own bodies come out bit for bit as if one partition computed all: a body depends on one hop of neighbours per sub-step,
 /// and the margin holds S hops. Others are computed as far as own ones depend on them, and their poses are not used.

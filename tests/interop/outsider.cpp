@@ -158,7 +158,7 @@ class Outsider {
   }
 
   void speak_from_above() {
-    for (const std::uint8_t led : {0x03, 0x30}) {  // red, blue
+    for (const std::uint8_t led : {std::uint8_t{0x03}, std::uint8_t{0x30}}) {  // red, blue
       OverheadPacket packet;
       packet.client(kClient);
       packet.request(++request_);

@@ -68,7 +68,7 @@ TEST_F(BadInput, InArguments) {
   expect_in("no command", refusal({"ruin", good}));
   expect_in("--seed", refusal({"run", good, "--seed", "-1"}));
   expect_in("--seed", refusal({"run", good, "--seed", "18446744073709551616"}));
-  expect_in("4098 processes", refusal({"run", good, "--partitions", "64x64", "--hosts", "1", "--set", "arena.width_mm=100000", "--set",
+  expect_in("4099 processes", refusal({"run", good, "--partitions", "64x64", "--hosts", "1", "--set", "arena.width_mm=100000", "--set",
                                        "arena.height_mm=100000"}));
 }
 

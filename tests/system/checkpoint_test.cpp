@@ -36,6 +36,32 @@ TEST_F(Checkpoints, OfALocalRunAreResumedFederated) {
   EXPECT_EQ(resumed.state_hash, whole.state_hash);
 }
 
+TEST_F(Checkpoints, OfARunThatIsFarAheadOfItsBooksHoldTheChain) {
+  // One robot takes thousands of ticks a second: the state hash of a checkpoint's tick is known well after it, or before.
+  const Words words{source("experiments/disperse.txtpb"), "--robots", "1", "--partitions", "1x1"};
+  const auto with = [&](const Words& more) {
+    Words all = words;
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  const auto whole = run(with({"--duration", "120", "--mode", "local"}), scratch, "whole");
+  run(with({"--duration", "110", "--checkpoint-every", "9"}), scratch, "saving");
+  int resumed = 0;
+  for (const auto& checkpoint : std::filesystem::directory_iterator(scratch / "saving/checkpoints")) {
+    const std::string name = "resumed-" + std::to_string(++resumed);
+    EXPECT_EQ(run(with({"--duration", "120", "--mode", "local", "--resume", checkpoint.path().string()}), scratch, name).state_hash, whole.state_hash)
+        << checkpoint.path();
+  }
+  EXPECT_EQ(resumed, 12);
+}
+
+TEST_F(Checkpoints, BeyondTheEndAreRefused) {
+  run(experiment({"--mode", "local", "--checkpoint-every", "5"}), scratch, "saved");
+  const Outcome outcome = kilotwin({"run", source("experiments/disperse.txtpb"), "--duration", "2", "--mode", "local", "--resume", scratch / "saved"}, scratch);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("--duration"), std::string::npos) << outcome.err;
+}
+
 TEST_F(Checkpoints, KeepTheStacksOfProgramsThatBlock) {
   const Words blocking{"--behaviour", source("behaviours/delay_walk.c")};
   const auto with = [&](Words more) {

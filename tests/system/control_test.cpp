@@ -114,6 +114,23 @@ TEST_F(Control, OverheadPacketsFromOutsideAreStampedRecordedAndReplayed) {
   EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
 }
 
+TEST_F(Control, ALedgerThatCannotBeOursEndsTheRunInOneLine) {
+  dds::Writer<WireLedger> ledgers(participant_, topics::ledgers());
+  start({"--quiet"});
+  ASSERT_TRUE(eventually([&] { return ledgers.readers() > 0; }));
+  std::uint64_t part = 1;
+  WireLedger ledger{};
+  ledger.run = latest().run;
+  ledger.first_tick = 1'000'000'000'000;
+  ledger.hash_parts._length = ledger.hash_parts._maximum = 1;
+  ledger.hash_parts._buffer = &part;
+  ledgers.write(ledger);
+  const Outcome outcome = process_->wait(30);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("a ledger does not fit the run"), std::string::npos) << outcome.err;
+}
+
 TEST_F(Control, RobotsAreTracedForWhoListens) {
   std::array<std::atomic<int>, 20> seen{};
   const dds::Reader<PublicRobotState> robots(participant_, topics::robots(), [&](const PublicRobotState& sample, dds::SampleState state) {

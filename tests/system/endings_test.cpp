@@ -75,6 +75,59 @@ TEST_F(Endings, InterruptsEndARunInOrder) {
   }
 }
 
+TEST_F(Endings, InterruptsDoNotWaitForASlowPace) {
+  Words words = long_run();
+  words[6] = "0.01";  // over 3 s a tick
+  Process process(words, scratch.path());
+  ASSERT_TRUE(recorded(1));
+  const double asked_at_s = now_s();
+  process.signal(SIGINT);
+  EXPECT_EQ(process.wait(20).status, 1);
+  EXPECT_LT(now_s() - asked_at_s, 3) << "before the launcher would use force";
+  EXPECT_TRUE(fs::exists(scratch / "run/summary.json"));
+}
+
+TEST_F(Endings, AProgramThatDoesNotReturnIsNamedAndCanBeInterrupted) {
+  write(scratch / "hangs.c", "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 3 && kilo_ticks > 30) for (;;) {} }\n"
+                             "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  for (const std::string mode : {"local", "federated"}) {
+    fs::remove_all(scratch / "run");
+    Process process(long_run({"--mode", mode, "--behaviour", scratch / "hangs.c"}), scratch.path());
+    const std::string named = "the program of robot 3 has not returned";
+    EXPECT_TRUE(mode == "local" ? process.says(named, 30) : eventually([&] {
+      return read(scratch / "run/logs/behaviours-1-1.log").find(named) != std::string::npos;
+    }));
+    process.signal(SIGINT);
+    EXPECT_EQ(process.wait(20).status, 1);
+    expect_nothing_left();
+  }
+}
+
+TEST_F(Endings, AServiceStartedTwiceLeavesTheRunAlone) {
+  Process process(long_run({"--domain", "229"}), scratch.path());
+  ASSERT_TRUE(recorded(5));
+  const Outcome second = kilotwin({"service", "comm", "--run", scratch / "run", "--domain", "229"}, scratch);
+  EXPECT_EQ(second.status, 2);
+  EXPECT_NE(second.err.find("was started already"), std::string::npos) << second.err;
+  EXPECT_TRUE(process.running());
+  process.signal(SIGINT);
+  EXPECT_NE(process.wait(20).err.find("interrupted"), std::string::npos);
+  expect_usable_recording();
+}
+
+TEST_F(Endings, AFullDiskIsNamedInOneLine) {
+  // A limit on the size of files fails writing as a full disk does; the program is compiled before, without it.
+  ASSERT_EQ(kilotwin({"build", source("behaviours/disperse.c"), "-o", scratch / "warm.so"}, scratch).status, 0);
+  Words words = long_run({"--quiet", "--set", "recording.every_s=0.01"});
+  words[6] = "max";
+  words.insert(words.begin(), {"/bin/sh", "-c", "trap '' XFSZ; ulimit -f 8192; exec \"$@\"", "sh"});
+  const Outcome outcome = Process(words, scratch.path()).wait(60);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("recording.ktrec: cannot be written: File too large"), std::string::npos) << outcome.err;
+  expect_nothing_left();
+}
+
 TEST_F(Endings, AnInterruptEndsALocalRunInOrder) {
   Process process(long_run({"--mode", "local"}), scratch.path());
   ASSERT_TRUE(recorded(5));

@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "weak.h"
+
 enum { EEPROM_OCTETS = E2END + 1 };
 
 static uint8_t eeprom[EEPROM_OCTETS] = {[0 ... E2END] = 0xff};

@@ -3,6 +3,8 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "weak.h"
 #undef memcpy
 #undef memset
 

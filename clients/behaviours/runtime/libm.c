@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "core/math/elementary.h"
+#include "weak.h"
 
 double sin(double x) { return kt_sin(x); }
 double cos(double x) { return kt_cos(x); }

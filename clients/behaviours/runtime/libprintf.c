@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/math/elementary.h"
+#include "weak.h"
 
 struct Output {
   char* to;

@@ -126,7 +126,7 @@ const Odd kPrograms[] = {
     {"wide_arithmetic",
      "uint64_t product; int64_t quotient; float f = 0.1f; double d;\n"
      "void setup(void) {}\n"
-     "void loop(void) { product = (uint64_t)0xffffffffu * 0xffffffffu; quotient = -(int64_t)product / 7; d += f; f *= 1.01f; uint8_t wrapped = 250; wrapped += 10;\n"
+     "void loop(void) { product = (uint64_t)0xffffffffu * 0xffffffffu; quotient = (int64_t)product / 7; d += f; f *= 1.01f; uint8_t wrapped = 250; wrapped += 10;\n"
      "  set_color(product == 0xfffffffe00000001u && quotient < 0 && d > 0 && wrapped == 4 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
     {"heap",
