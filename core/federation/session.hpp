@@ -80,6 +80,8 @@ class Session {
   /// Called from receive threads: guards what they write.
   [[nodiscard]] std::mutex& mutex() { return mutex_; }
   void notify() { arrived_.notify_one(); }
+  /// Nobody steps before all hear all, this federate included.
+  [[nodiscard]] bool expects_frames() const { return phase_ != kilotwin_wire_ARRIVING; }  ///< with the mutex held
   void mention(std::uint64_t directives) { schedule_.mention(directives); }  ///< with the mutex held
   void fail(const std::string& line);                                          ///< with the mutex held
   /// The ingress announces a directive (station only, own thread).

@@ -39,8 +39,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::uint32_t kSimulatedRobots = 6;  // as in outsider.txtpb
 constexpr std::uint32_t kTrackedRobot = 6;
 constexpr std::uint32_t kRobots = 7;
-/// Kilotwin's participants listen on the ports of the indices 0 to 119 of the domain.
-constexpr std::uint32_t kIndices = 120;
+/// Kilotwin's participants listen on the ports of the indices 0 to 120 of the domain.
+constexpr std::uint32_t kIndices = 121;
 constexpr char kClient[] = "fast dds";
 
 /// What a factory of Fast DDS gives, or an exception that names it.

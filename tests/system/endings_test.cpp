@@ -118,7 +118,7 @@ TEST_F(Endings, AServiceStartedTwiceLeavesTheRunAlone) {
 TEST_F(Endings, AFullDiskIsNamedInOneLine) {
   // A limit on the size of files fails writing as a full disk does; the program is compiled before, without it.
   ASSERT_EQ(kilotwin({"build", source("behaviours/disperse.c"), "-o", scratch / "warm.so"}, scratch).status, 0);
-  Words words = long_run({"--quiet", "--set", "recording.every_s=0.01"});
+  Words words = long_run({"--quiet", "--set", "recording.every_s=0.04"});
   words[6] = "max";
   words.insert(words.begin(), {"/bin/sh", "-c", "trap '' XFSZ; ulimit -f 8192; exec \"$@\"", "sh"});
   const Outcome outcome = Process(words, scratch.path()).wait(60);
