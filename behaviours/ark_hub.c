@@ -53,8 +53,10 @@ static void loop(void) {
     move(STOP);
   } else {
     set_color(RGB(0, 0, 3));
-    if (bearing_deg <= AHEAD_DEG || bearing_deg >= 360 - AHEAD_DEG) move(STRAIGHT);
-    else move(bearing_deg < 180 ? LEFT : RIGHT);
+    if (bearing_deg <= AHEAD_DEG || bearing_deg >= 360 - AHEAD_DEG)
+      move(STRAIGHT);
+    else
+      move(bearing_deg < 180 ? LEFT : RIGHT);
   }
 }
 

@@ -33,8 +33,10 @@ static void walk_at_random(void) {
   if (motion != STOP && kilo_ticks < motion_until) return;
   const uint8_t choice = rand_soft();
   motion_until = kilo_ticks + TICKS_PER_SEC + choice % TICKS_PER_SEC;
-  if (choice & 0x80) move(STRAIGHT);
-  else move(choice & 0x40 ? LEFT : RIGHT);
+  if (choice & 0x80)
+    move(STRAIGHT);
+  else
+    move(choice & 0x40 ? LEFT : RIGHT);
 }
 
 static void receive(message_t* message, distance_measurement_t* strength) {

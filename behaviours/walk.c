@@ -25,8 +25,10 @@ static void turn_left(void) {
 
 static void loop(void) {
   if (kilo_ticks < leg_ends_at) return;
-  if (turning) go_straight();
-  else turn_left();
+  if (turning)
+    go_straight();
+  else
+    turn_left();
 }
 
 int main(void) {

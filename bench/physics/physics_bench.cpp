@@ -33,7 +33,8 @@ void run(benchmark::State& state, const std::string& experiment, const std::vect
     }
     benchmark::DoNotOptimize(engine.hash_part());
   }
-  const double steps = static_cast<double>(state.iterations()) * static_cast<double>(ticks) * static_cast<double>(poses.size());
+  const double steps =
+      static_cast<double>(state.iterations()) * static_cast<double>(ticks) * static_cast<double>(poses.size());
   state.counters["ns_per_robot_tick"] =
       benchmark::Counter(steps / 1e9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
@@ -42,7 +43,8 @@ void run(benchmark::State& state, const std::string& experiment, const std::vect
 void run_partitions(benchmark::State& state, std::uint32_t robots, std::int64_t ticks) {
   const RunPlan plan = testing::make_plan("arena { width_mm: 10000 height_mm: 10000 }",
                                           testing::grid_crowd(robots, 40, Facing::kRandom), 2, 2);
-  ActuationFrame frame = testing::motors(Tick{0}, std::vector<std::uint8_t>(robots, 70), std::vector<std::uint8_t>(robots, 70));
+  ActuationFrame frame =
+      testing::motors(Tick{0}, std::vector<std::uint8_t>(robots, 70), std::vector<std::uint8_t>(robots, 70));
   const ActuationFrame* const frames[] = {&frame};
   BodyFrame ghosts[4][4];  // from, to
   for (auto _ : state) {
@@ -72,7 +74,9 @@ void run_partitions(benchmark::State& state, std::uint32_t robots, std::int64_t 
 
 const std::string kArena = "arena { width_mm: 10000 height_mm: 10000 }";
 
-void open_field(benchmark::State& state) { run(state, kArena, testing::grid_crowd(kRobots, 200, Facing::kRandom), 300, 70, 70); }
+void open_field(benchmark::State& state) {
+  run(state, kArena, testing::grid_crowd(kRobots, 200, Facing::kRandom), 300, 70, 70);
+}
 void disperse_cluster(benchmark::State& state) {
   run(state, kArena, testing::grid_crowd(kRobots, 40, Facing::kRandom), 300, 70, 70);
 }
@@ -86,14 +90,17 @@ void turning_cluster(benchmark::State& state) {
   run(state, kArena, testing::grid_crowd(kRobots, 40, Facing::kRandom), 300, 70, 0);
 }
 void step_noise(benchmark::State& state) {
-  run(state, kArena + " motion { factor_variance_s: 0.001 }", testing::grid_crowd(kRobots, 200, Facing::kRandom), 300, 70, 70);
+  run(state, kArena + " motion { factor_variance_s: 0.001 }", testing::grid_crowd(kRobots, 200, Facing::kRandom),
+      300, 70, 70);
 }
 void resting_cluster(benchmark::State& state) {
   run(state, kArena, testing::grid_crowd(kRobots, 33, Facing::kRandom), 300, 0, 0);
 }
 void partitions_2x2_of_100(benchmark::State& state) { run_partitions(state, 100, 1000); }
 void partitions_2x2_of_1000(benchmark::State& state) { run_partitions(state, kRobots, 300); }
-void whole_of_100(benchmark::State& state) { run(state, kArena, testing::grid_crowd(100, 40, Facing::kRandom), 1000, 70, 70); }
+void whole_of_100(benchmark::State& state) {
+  run(state, kArena, testing::grid_crowd(100, 40, Facing::kRandom), 1000, 70, 70);
+}
 
 BENCHMARK(open_field);
 BENCHMARK(disperse_cluster);

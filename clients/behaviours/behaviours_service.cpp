@@ -29,7 +29,8 @@ class BehavioursFederate : public Federate {
     engine_.step(from, *radio_.at(from)[0]);
     for (; told_ < engine_.failures().size(); ++told_) {
       const auto& failure = engine_.failures()[told_];
-      say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot, session_.plan().tick_length.seconds_at(from), failure.text));
+      say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot,
+                      session_.plan().tick_length.seconds_at(from), failure.text));
     }
   }
 

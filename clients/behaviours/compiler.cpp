@@ -47,11 +47,33 @@ Compiler find_compiler(const fs::path& wanted) {
 /// As kilolib is built for the robot (unsigned char, packed structs, short enums, common globals of avr-gcc's age), with
 /// what makes results equal everywhere: no contraction, no libm, wrapping integers, locals that start as zero, one CPU.
 Arguments code_flags(const Compiler& compiler) {
-  Arguments flags{"-std=gnu11", "-O2", "-g", "-w", "-fdiagnostics-color=never", "-nostdinc", "-ffreestanding", "-fno-builtin",
-                  "-DF_CPU=8000000", "-funsigned-char", "-fpack-struct", "-fshort-enums", "-fcommon",
-                  "-march=x86-64", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno",
-                  "-fno-strict-aliasing", "-fwrapv", "-fno-delete-null-pointer-checks", "-fcf-protection=none",
-                  "-fno-stack-protector", "-fstack-clash-protection", "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-fdata-sections",
+  Arguments flags{"-std=gnu11",
+                  "-O2",
+                  "-g",
+                  "-w",
+                  "-fdiagnostics-color=never",
+                  "-nostdinc",
+                  "-ffreestanding",
+                  "-fno-builtin",
+                  "-DF_CPU=8000000",
+                  "-funsigned-char",
+                  "-fpack-struct",
+                  "-fshort-enums",
+                  "-fcommon",
+                  "-march=x86-64",
+                  "-fPIC",
+                  "-fvisibility=hidden",
+                  "-ffp-contract=off",
+                  "-fno-math-errno",
+                  "-fno-strict-aliasing",
+                  "-fwrapv",
+                  "-fno-delete-null-pointer-checks",
+                  "-fcf-protection=none",
+                  "-fno-stack-protector",
+                  "-fstack-clash-protection",
+                  "-fno-asynchronous-unwind-tables",
+                  "-ffunction-sections",
+                  "-fdata-sections",
                   "-ftrivial-auto-var-init=zero"};
   if (compiler.is_clang()) {
     // Before 16, clang wants to be told twice.
@@ -64,15 +86,20 @@ Arguments code_flags(const Compiler& compiler) {
   return flags;
 }
 
-const Arguments kLinkFlags{"-shared", "-nostdlib", "-Wl,-Bsymbolic", "-Wl,-z,relro", "-Wl,-z,now", "-Wl,-z,noexecstack",
-                           "-Wl,-z,separate-code", "-Wl,--no-undefined", "-Wl,--gc-sections", "-Wl,--build-id=none",
-                           "-Wl,-e,kilotwin_image"};
+const Arguments kLinkFlags{"-shared",           "-nostdlib",           "-Wl,-Bsymbolic",       "-Wl,-z,relro",
+                           "-Wl,-z,now",        "-Wl,-z,noexecstack",  "-Wl,-z,separate-code", "-Wl,--no-undefined",
+                           "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,kilotwin_image"};
 
 /// Headers: ours before the compiler's own, no others.
 Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
   std::string own = run_process({compiler.path, "-print-file-name=include"}).output;
   while (!own.empty() && own.back() == '\n') own.pop_back();
-  return {"-isystem", (runtime / "kilolib").string(), "-isystem", (runtime / "libc").string(), "-isystem", own,
+  return {"-isystem",
+          (runtime / "kilolib").string(),
+          "-isystem",
+          (runtime / "libc").string(),
+          "-isystem",
+          own,
           "-ffile-prefix-map=" + runtime.string() + "=/kilotwin"};
 }
 
@@ -80,7 +107,8 @@ Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
 Arguments place_flags(const std::vector<fs::path>& sources) {
   std::error_code error;
   Arguments flags;
-  if (const fs::path here = fs::current_path(error); !error) flags.push_back("-ffile-prefix-map=" + here.string() + "=.");
+  if (const fs::path here = fs::current_path(error); !error)
+    flags.push_back("-ffile-prefix-map=" + here.string() + "=.");
   for (const fs::path& source : sources) {
     if (source.has_parent_path()) flags.push_back("-ffile-prefix-map=" + source.parent_path().string() + "=.");
   }
@@ -124,13 +152,14 @@ std::string build(Arguments arguments, const fs::path& kept, const std::vector<f
   const ProcessResult process = run_process(arguments);
   if (process.status != 0) throw UserError(first_error(process.errors, sources));
   const auto octets = read_file(result.path());
-  if (!octets || !write_file(kept, *octets)) throw RunError(kept.string() + ": cannot be written; is the disk full?");
+  if (!octets || !write_file(kept, *octets))
+    throw RunError(kept.string() + ": cannot be written; is the disk full?");
   return *octets;
 }
 
 /// The runtime as one object, made once per compiler.
-fs::path runtime_object(const Compiler& compiler, const Arguments& flags, const Arguments& includes, const fs::path& runtime,
-                        const std::string& content) {
+fs::path runtime_object(const Compiler& compiler, const Arguments& flags, const Arguments& includes,
+                        const fs::path& runtime, const std::string& content) {
   const fs::path kept = runtime / (sha256_hex(content) + ".o");
   std::error_code error;
   if (fs::is_regular_file(kept, error)) return kept;
@@ -138,7 +167,8 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& flags, const 
   append(arguments, flags);
   append(arguments, includes);
   append(arguments, {"-I", runtime.string()});
-  for (const char* name : {"kilolib.c", "switch.c", "libavr.c", "libc.c", "libm.c", "libprintf.c", "core/math/elementary.c"}) {
+  for (const char* name :
+       {"kilolib.c", "switch.c", "libavr.c", "libc.c", "libm.c", "libprintf.c", "core/math/elementary.c"}) {
     arguments.push_back((runtime / name).string());
   }
   (void)build(arguments, kept, {runtime / "kilolib.c"});
@@ -179,7 +209,8 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
     }
   }
   Arguments arguments{compiler.path};
-  for (const Arguments& part : {code, defines, kLinkFlags, place_flags(sources), includes, files}) append(arguments, part);
+  for (const Arguments& part : {code, defines, kLinkFlags, place_flags(sources), includes, files})
+    append(arguments, part);
   arguments.push_back(runtime_object(compiler, code, includes, runtime, runtime_content).string());
   return checked(kept, build(arguments, kept, sources));
 }

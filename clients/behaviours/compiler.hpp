@@ -24,7 +24,8 @@ struct CompiledProgram {
 /// checked and returned as it is.
 /// Throws UserError: "FILE:LINE:COLUMN: error: ..." of the first error, and how many more there are; or, where the machine
 /// has no compiler, the package to install.
-[[nodiscard]] CompiledProgram compile(const std::vector<std::filesystem::path>& sources, const CompileOptions& options = {});
+[[nodiscard]] CompiledProgram compile(const std::vector<std::filesystem::path>& sources,
+                                      const CompileOptions& options = {});
 
 /// What a program needs of an ATmega328P (32 KiB of flash, 2 KiB of RAM), with what it uses of the C library and without
 /// kilolib.
@@ -34,6 +35,7 @@ struct AvrSize {
 };
 
 /// Compiles the sources with avr-gcc for the real robot. Throws UserError as compile() does.
-[[nodiscard]] AvrSize compile_for_avr(const std::vector<std::filesystem::path>& sources, const CompileOptions& options = {});
+[[nodiscard]] AvrSize compile_for_avr(const std::vector<std::filesystem::path>& sources,
+                                      const CompileOptions& options = {});
 
 }  // namespace kilotwin::behaviours

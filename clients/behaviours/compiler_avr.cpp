@@ -56,9 +56,18 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
   std::vector<std::string> link{gcc, "-mmcu=atmega328p", "-r", "-nostartfiles", "-Wl,-d"};
   for (const fs::path& source : sources) {
     const std::string object = (folder.path() / (std::to_string(link.size()) + ".o")).string();
-    std::vector<std::string> arguments{gcc, "-mmcu=atmega328p", "-Os", "-std=gnu11", "-DF_CPU=8000000", "-funsigned-char",
-                                       "-funsigned-bitfields", "-fpack-struct", "-fshort-enums",
-                                       "-fdiagnostics-color=never", "-isystem", (runtime / "kilolib").string()};
+    std::vector<std::string> arguments{gcc,
+                                       "-mmcu=atmega328p",
+                                       "-Os",
+                                       "-std=gnu11",
+                                       "-DF_CPU=8000000",
+                                       "-funsigned-char",
+                                       "-funsigned-bitfields",
+                                       "-fpack-struct",
+                                       "-fshort-enums",
+                                       "-fdiagnostics-color=never",
+                                       "-isystem",
+                                       (runtime / "kilolib").string()};
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
     const ProcessResult result = run_process(arguments);

@@ -24,7 +24,8 @@ bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z')
 fs::path unpacked_runtime(const fs::path& cache) {
   static const std::string content_hash = [] {
     std::string all;
-    for (const RuntimeFile& file : runtime_files()) all.append(file.name).append(1, '\0').append(file.text).append(1, '\0');
+    for (const RuntimeFile& file : runtime_files())
+      all.append(file.name).append(1, '\0').append(file.text).append(1, '\0');
     return sha256_hex(all);
   }();
   const fs::path folder = cache / ("runtime-" + content_hash.substr(0, 16));
@@ -59,10 +60,12 @@ void check_sources(const std::vector<fs::path>& sources) {
   for (const fs::path& source : sources) {
     std::error_code error;
     if (!fs::is_regular_file(source, error)) {
-      throw UserError(source.string() + ": no such file; a program is one or more C files, or a .so of `kilotwin build`");
+      throw UserError(source.string() +
+                      ": no such file; a program is one or more C files, or a .so of `kilotwin build`");
     }
     if (source.extension() != ".c") {
-      throw UserError(source.string() + ": not a C source; a program is one or more .c files, or a .so of `kilotwin build`");
+      throw UserError(source.string() +
+                      ": not a C source; a program is one or more .c files, or a .so of `kilotwin build`");
     }
   }
 }
@@ -104,7 +107,8 @@ std::optional<std::string> linker_error(std::string_view line, const std::vector
   std::string_view file = place;
   if (!drop_number(file)) return std::nullopt;
   const std::string number(place.substr(file.size()));
-  if (const std::size_t before = file.find_last_of(": "); before != std::string_view::npos) file.remove_prefix(before + 1);
+  if (const std::size_t before = file.find_last_of(": "); before != std::string_view::npos)
+    file.remove_prefix(before + 1);
   std::string named(file);
   for (const fs::path& source : sources) {
     if (source.filename() == fs::path(named).filename()) named = source.string();
@@ -116,7 +120,8 @@ std::optional<std::string> linker_error(std::string_view line, const std::vector
 /// Only the runtime calls main(), so its place would tell a user nothing.
 std::optional<std::string> missing_main(std::string_view line, const fs::path& source) {
   if (line.find("undefined reference to `main'") == std::string_view::npos) return std::nullopt;
-  return source.string() + ":1:1: error: there is no main(); a program has one that calls kilo_init() and kilo_start(setup, loop)";
+  return source.string() +
+         ":1:1: error: there is no main(); a program has one that calls kilo_init() and kilo_start(setup, loop)";
 }
 
 /// What says nothing of a place.

@@ -37,15 +37,13 @@ class Parser {
   }
 
   /// A structure at this place of the file or of the image, if it lies inside.
-  template <class T, class Octets>
-  static std::optional<T> at(const Octets& from, std::uint64_t offset) {
+  template <class T, class Octets> static std::optional<T> at(const Octets& from, std::uint64_t offset) {
     if (offset > from.size() || from.size() - offset < sizeof(T)) return std::nullopt;
     T value;
     std::memcpy(&value, from.data() + offset, sizeof(T));
     return value;
   }
-  template <class T, class Octets>
-  T required(const Octets& from, std::uint64_t offset, const char* what) const {
+  template <class T, class Octets> T required(const Octets& from, std::uint64_t offset, const char* what) const {
     const auto value = at<T>(from, offset);
     if (!value) fail(what);
     return *value;
@@ -54,7 +52,8 @@ class Parser {
   void read_header() {
     header_ = required<Elf64_Ehdr>(octets_, 0, "too short");
     require(std::memcmp(header_.e_ident, ELFMAG, SELFMAG) == 0 && header_.e_ident[EI_CLASS] == ELFCLASS64 &&
-                header_.e_ident[EI_DATA] == ELFDATA2LSB && header_.e_type == ET_DYN && header_.e_machine == EM_X86_64,
+                header_.e_ident[EI_DATA] == ELFDATA2LSB && header_.e_type == ET_DYN &&
+                header_.e_machine == EM_X86_64,
             "no shared object for x86-64");
     require(header_.e_phentsize == sizeof(Elf64_Phdr) && header_.e_phnum <= 64, "strange program headers");
   }
@@ -63,7 +62,8 @@ class Parser {
     std::uint64_t end = 0;
     for (std::uint64_t i = 0; i < header_.e_phnum; ++i) {
       const auto h = required<Elf64_Phdr>(octets_, header_.e_phoff + i * sizeof(Elf64_Phdr), "cut off");
-      if (h.p_type == PT_INTERP || (h.p_type == PT_TLS && h.p_memsz > 0)) fail("it needs an operating system below it");
+      if (h.p_type == PT_INTERP || (h.p_type == PT_TLS && h.p_memsz > 0))
+        fail("it needs an operating system below it");
       if (h.p_type == PT_DYNAMIC) dynamic_ = {h.p_vaddr, h.p_vaddr + std::min(h.p_memsz, kMostOctets)};
       if (h.p_type == PT_GNU_RELRO) {
         require(h.p_vaddr <= kMostOctets && h.p_memsz <= kMostOctets, "too large");
@@ -72,7 +72,8 @@ class Parser {
       if (h.p_type != PT_LOAD || h.p_memsz == 0) continue;
       require(h.p_vaddr <= kMostOctets && h.p_memsz <= kMostOctets && h.p_filesz <= h.p_memsz, "too large");
       require(h.p_offset <= octets_.size() && h.p_filesz <= octets_.size() - h.p_offset, "cut off");
-      const ElfFile::Segment segment{{h.p_vaddr, h.p_vaddr + h.p_memsz}, (h.p_flags & PF_W) != 0, (h.p_flags & PF_X) != 0};
+      const ElfFile::Segment segment{
+          {h.p_vaddr, h.p_vaddr + h.p_memsz}, (h.p_flags & PF_W) != 0, (h.p_flags & PF_X) != 0};
       require(page_down(h.p_vaddr) >= end, "segments overlap");
       require(!(segment.writable && segment.executable), "a segment is both writable and executable");
       end = page_up(segment.range.last);
@@ -113,7 +114,9 @@ class Parser {
     }
   }
 
-  void store(std::uint64_t offset, std::uint64_t value) { std::memcpy(file_.memory.data() + offset, &value, sizeof value); }
+  void store(std::uint64_t offset, std::uint64_t value) {
+    std::memcpy(file_.memory.data() + offset, &value, sizeof value);
+  }
 
   void relocate_table(std::uint64_t table, std::uint64_t size) {
     require(size <= kMostOctets && size % sizeof(Elf64_Rela) == 0, "strange relocations");
@@ -131,7 +134,8 @@ class Parser {
         case R_X86_64_JUMP_SLOT:
         case R_X86_64_64: {
           const std::uint64_t index = ELF64_R_SYM(r.r_info);
-          const auto symbol = required<Elf64_Sym>(file_.memory, symbols_ + index * sizeof(Elf64_Sym), "strange symbols");
+          const auto symbol =
+              required<Elf64_Sym>(file_.memory, symbols_ + index * sizeof(Elf64_Sym), "strange symbols");
           if (ELF64_R_TYPE(r.r_info) != R_X86_64_64) value = 0;
           if (symbol.st_shndx == SHN_UNDEF) {
             require(ELF64_ST_BIND(symbol.st_info) == STB_WEAK, "it needs a function that is not there");
@@ -164,7 +168,8 @@ class Parser {
     std::uint64_t first = kMostOctets, last = 0;
     for (const ElfFile::Segment& segment : file_.segments) {
       if (!segment.writable) {
-        require(segment.range.last <= file_.relro.first || segment.range.first >= file_.relro.last, "strange program headers");
+        require(segment.range.last <= file_.relro.first || segment.range.first >= file_.relro.last,
+                "strange program headers");
         continue;
       }
       if (segment.range.last <= file_.relro.last) continue;
@@ -173,7 +178,8 @@ class Parser {
     }
     require(first < last, "it has no data");
     for (const ElfFile::Segment& segment : file_.segments) {
-      require(segment.writable || segment.range.last <= first || segment.range.first >= last, "strange program headers");
+      require(segment.writable || segment.range.last <= first || segment.range.first >= last,
+              "strange program headers");
     }
     file_.data = {first, last};
   }
@@ -183,11 +189,11 @@ class Parser {
     require(table.magic == KT_IMAGE_MAGIC, "it was made for something else");
     require(table.version == KT_IMAGE_VERSION, "it was made by another version of kilotwin");
     auto executable = [&](std::uint64_t offset) {
-      return std::any_of(file_.segments.begin(), file_.segments.end(), [&](const ElfFile::Segment& s) {
-        return s.executable && s.range.contains(offset, 1);
-      });
+      return std::any_of(file_.segments.begin(), file_.segments.end(),
+                         [&](const ElfFile::Segment& s) { return s.executable && s.range.contains(offset, 1); });
     };
-    for (const std::uint64_t offset : {table.boot, table.enter, table.call, table.leave, table.interrupts, table.transmit}) {
+    for (const std::uint64_t offset :
+         {table.boot, table.enter, table.call, table.leave, table.interrupts, table.transmit}) {
       require(executable(offset), "its table of functions is damaged");
     }
     require(file_.data.contains(table.robot, sizeof(KtRobot)) && file_.data.contains(table.ticks, 4) &&
@@ -219,7 +225,8 @@ class Parser {
         const auto symbol = at<Elf64_Sym>(octets_, section->sh_offset + offset);
         if (!symbol || ELF64_ST_TYPE(symbol->st_info) != STT_FUNC || symbol->st_name >= names.size()) continue;
         const std::string_view name = names.substr(symbol->st_name, 200);
-        file_.functions.push_back({symbol->st_value, symbol->st_size, std::string(name.substr(0, name.find('\0')))});
+        file_.functions.push_back(
+            {symbol->st_value, symbol->st_size, std::string(name.substr(0, name.find('\0')))});
       }
     }
     std::stable_sort(file_.functions.begin(), file_.functions.end(),

@@ -31,13 +31,14 @@ class ElfFile {
     std::string name;
   };
 
-  std::vector<std::uint8_t> memory;       ///< the image as if it lay at address 0; whole pages
-  std::vector<std::uint32_t> relocations; ///< ascending offsets of 64-bit words to which the image's address is added
-  std::vector<Segment> segments;          ///< ascending, no page shared
-  Range relro;                            ///< whole pages: read-only once relocated
-  Range data;                             ///< what stays writable: a robot's globals and statics
-  KtImage table{};                        ///< with offsets for addresses
-  std::vector<Function> functions;        ///< for the text of faults; ascending
+  std::vector<std::uint8_t> memory;  ///< the image as if it lay at address 0; whole pages
+  std::vector<std::uint32_t>
+      relocations;                  ///< ascending offsets of 64-bit words to which the image's address is added
+  std::vector<Segment> segments;    ///< ascending, no page shared
+  Range relro;                      ///< whole pages: read-only once relocated
+  Range data;                       ///< what stays writable: a robot's globals and statics
+  KtImage table{};                  ///< with offsets for addresses
+  std::vector<Function> functions;  ///< for the text of faults; ascending
 
   /// The function that holds this offset, or "".
   [[nodiscard]] std::string function_at(std::uint64_t offset) const;

@@ -83,13 +83,15 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
     const std::uint32_t i = own(radio.reception_robot[n]);
     KILOTWIN_DEMAND(i + 1 >= next && radio.reception_message[n] < messages_.size());
     while (next <= i) first_reception_[next++] = n;
-    receptions_[n] = {messages_[radio.reception_message[n]], radio.reception_low_gain[n], radio.reception_high_gain[n]};
+    receptions_[n] = {messages_[radio.reception_message[n]], radio.reception_low_gain[n],
+                      radio.reception_high_gain[n]};
   }
   while (next < first_reception_.size()) first_reception_[next++] = static_cast<std::uint32_t>(receptions_.size());
 }
 
 void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
-  KILOTWIN_DEMAND(from == now_ && radio.tick == from && radio.first_robot == share_.first && radio.kilo_ticks.size() == share_.size());
+  KILOTWIN_DEMAND(from == now_ && radio.tick == from && radio.first_robot == share_.first &&
+                  radio.kilo_ticks.size() == share_.size());
   ++now_;
   gather(radio);
   std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
@@ -127,7 +129,8 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   entries_.store(entries_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
   memory.copy_in(slot);
   if (eventful) {
-    if (const Fault fault = executor.interrupt(events); fault.signal != 0) return fail_robot(i, fault, program, slot);
+    if (const Fault fault = executor.interrupt(events); fault.signal != 0)
+      return fail_robot(i, fault, program, slot);
     if (executor.robot().reset != 0) {
       reset_robot(from, i, program, slot);
       memory.copy_in(slot);
@@ -141,7 +144,8 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   if (asked_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
     KtMessage message{};
     bool sends = false;
-    if (const Fault fault = executor.transmit(message, sends); fault.signal != 0) return fail_robot(i, fault, program, slot);
+    if (const Fault fault = executor.transmit(message, sends); fault.signal != 0)
+      return fail_robot(i, fault, program, slot);
     if (sends) {
       std::copy_n(message.data, 9, message_[i].begin());
       message_[i][9] = message.type;
@@ -208,9 +212,9 @@ std::uint64_t BehavioursEngine::hash_part() const {
   std::uint64_t sum = 0;
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
     if (presence_[i] == Presence::kNone) continue;
-    const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 | std::uint64_t{led_[i]} << 16 |
-                                  std::uint64_t{life_cycle_[i]} << 24 | std::uint64_t{tx_period_[i]} << 32 |
-                                  std::uint64_t{holds_[i]} << 48;
+    const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 |
+                                  std::uint64_t{led_[i]} << 16 | std::uint64_t{life_cycle_[i]} << 24 |
+                                  std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48;
     sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs});
   }
   return sum;

@@ -88,9 +88,9 @@ class BehavioursEngine {
   std::vector<Presence> presence_;
   std::vector<std::uint8_t> motor_left_, motor_right_, led_, life_cycle_;
   std::vector<std::uint16_t> tx_period_;
-  std::vector<std::uint8_t> holds_;    ///< a message that has not left
-  std::vector<std::uint8_t> offers_;   ///< a message that is new in this tick
-  std::vector<IrMessage> message_;     ///< where it offers one
+  std::vector<std::uint8_t> holds_;   ///< a message that has not left
+  std::vector<std::uint8_t> offers_;  ///< a message that is new in this tick
+  std::vector<IrMessage> message_;    ///< where it offers one
 
   std::vector<Failure> failures_;
 

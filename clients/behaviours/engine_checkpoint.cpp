@@ -18,7 +18,17 @@ std::string text(std::span<const std::uint8_t> octets) {
 
 /// RobotProgramState.host: these octets in this order, then the text of a failure.
 enum Field : std::size_t {
-  kPresence, kLeft, kRight, kLed, kLifeCycle, kPeriodLow, kPeriodHigh, kHolds, kOffers, kMessage, kFields = kMessage + 10
+  kPresence,
+  kLeft,
+  kRight,
+  kLed,
+  kLifeCycle,
+  kPeriodLow,
+  kPeriodHigh,
+  kHolds,
+  kOffers,
+  kMessage,
+  kFields = kMessage + 10
 };
 
 }  // namespace

@@ -30,7 +30,8 @@ void RobotMemory::reset(const Program& program, const Slot& slot) {
 
 void RobotMemory::restore(const Program& program, const Slot& slot, std::span<const std::uint8_t> data,
                           std::span<const std::uint8_t> stack) {
-  if (data.size() != program.data_size() || stack.size() > kStackOctets || stack.size() < 56 || slot.initial_data().empty()) {
+  if (data.size() != program.data_size() || stack.size() > kStackOctets || stack.size() < 56 ||
+      slot.initial_data().empty()) {
     throw RunError(program.name + ": the checkpoint was made with another program");
   }
   resize(static_cast<std::uint32_t>(data.size()), static_cast<std::uint32_t>(stack.size()));

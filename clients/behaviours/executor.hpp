@@ -17,7 +17,8 @@ class RobotMemory {
   /// As at reset: initial data, and a stack from which the main program starts.
   void reset(const Program&, const Slot&);
   /// From a checkpoint. Throws RunError where the sizes do not fit the program.
-  void restore(const Program&, const Slot&, std::span<const std::uint8_t> data, std::span<const std::uint8_t> stack);
+  void restore(const Program&, const Slot&, std::span<const std::uint8_t> data,
+               std::span<const std::uint8_t> stack);
   void release() { *this = RobotMemory(); }
 
   void copy_in(const Slot& slot) const {
@@ -40,17 +41,17 @@ class RobotMemory {
 
   [[nodiscard]] std::span<std::uint8_t> data() { return {octets_.get(), data_octets_}; }
   [[nodiscard]] std::span<const std::uint8_t> data() const { return {octets_.get(), data_octets_}; }
-  [[nodiscard]] std::span<const std::uint8_t> stack() const { return {octets_.get() + data_octets_, stack_octets_}; }
+  [[nodiscard]] std::span<const std::uint8_t> stack() const {
+    return {octets_.get() + data_octets_, stack_octets_};
+  }
 
   /// A variable of the robot: `offset` is one of ElfFile::table.
-  template <class T>
-  [[nodiscard]] T get(const Program& program, std::uint64_t offset) const {
+  template <class T> [[nodiscard]] T get(const Program& program, std::uint64_t offset) const {
     T value;
     std::memcpy(&value, octets_.get() + (offset - program.file.data.first), sizeof value);
     return value;
   }
-  template <class T>
-  void set(const Program& program, std::uint64_t offset, const T& value) {
+  template <class T> void set(const Program& program, std::uint64_t offset, const T& value) {
     std::memcpy(octets_.get() + (offset - program.file.data.first), &value, sizeof value);
   }
 

@@ -32,7 +32,8 @@ void handle(int signal, siginfo_t* info, void* context) {
     return;
   }
   auto& registers = static_cast<ucontext_t*>(context)->uc_mcontext.gregs;
-  watch.fault = {signal, reinterpret_cast<std::uint64_t>(info->si_addr), static_cast<std::uint64_t>(registers[REG_RIP])};
+  watch.fault = {signal, reinterpret_cast<std::uint64_t>(info->si_addr),
+                 static_cast<std::uint64_t>(registers[REG_RIP])};
   constexpr greg_t kDirectionFlag = 0x400;
   registers[REG_EFL] &= ~kDirectionFlag;
   registers[REG_RIP] = static_cast<greg_t>(watch.leave);

@@ -1,8 +1,8 @@
 /// Robots' code runs inside this process. What faults there costs the robot, not the process.
 #pragma once
 
-#include <cstdint>
 #include <csignal>
+#include <cstdint>
 #include <vector>
 
 namespace kilotwin::behaviours {

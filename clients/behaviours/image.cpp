@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::uint64_t kGuardOctets = 16 * 1024;
 constexpr const char* kTaken =
-    "the addresses of these robots' programs are taken by other programs in this process; run the experiments in processes "
+    "the addresses of these robots' programs are taken by other programs in this process; run the experiments in "
+    "processes "
     "of their own";
 
 void* pointer(std::uint64_t address) { return reinterpret_cast<void*>(address); }  // NOLINT
@@ -53,7 +54,8 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
       control_(stack_top_ + 2 * kGuardOctets + kStackOctets),
       image_(control_ + kPage),
       data_offset_(file.data.first) {
-  void* mapped = mmap(pointer(address), size_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE, -1, 0);
+  void* mapped = mmap(pointer(address), size_, PROT_NONE,
+                      MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE, -1, 0);
   if (mapped != pointer(address)) {
     const int error = mapped == MAP_FAILED ? errno : EEXIST;
     if (mapped != MAP_FAILED) munmap(mapped, size_);

@@ -33,9 +33,10 @@ class Slot {
   [[nodiscard]] static std::uint64_t size(const ElfFile&);
 
   /// A function or variable of the image; `offset` is one of ElfFile::table.
-  template <class T>
-  [[nodiscard]] T at(std::uint64_t offset) const { return reinterpret_cast<T>(image_ + offset); }  // NOLINT
-  [[nodiscard]] KtControl* control() const { return reinterpret_cast<KtControl*>(control_); }      // NOLINT
+  template <class T> [[nodiscard]] T at(std::uint64_t offset) const {
+    return reinterpret_cast<T>(image_ + offset);
+  }                                                                                            // NOLINT
+  [[nodiscard]] KtControl* control() const { return reinterpret_cast<KtControl*>(control_); }  // NOLINT
   [[nodiscard]] std::uint8_t* data() const { return at<std::uint8_t*>(data_offset_); }
   /// One past the highest octet of the main stack; aligned to 16.
   [[nodiscard]] std::uint64_t stack_top() const { return stack_top_; }
@@ -55,8 +56,8 @@ class Program {
  public:
   /// The program at this address. Engines and program sets of one process share what is the same. Throws RunError where
   /// something else lies there or memory is short.
-  [[nodiscard]] static std::shared_ptr<Program> load(ElfFile file, const std::string& name, const std::string& sha256,
-                                                     std::uint64_t address);
+  [[nodiscard]] static std::shared_ptr<Program> load(ElfFile file, const std::string& name,
+                                                     const std::string& sha256, std::uint64_t address);
   /// Octets of address space that it takes.
   [[nodiscard]] static std::uint64_t size(const ElfFile& file) { return kSlots * Slot::size(file); }
 

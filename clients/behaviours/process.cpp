@@ -45,9 +45,18 @@ struct Pipe {
 
 std::vector<std::string> plain_environment() {
   std::vector<std::string> result{"LC_ALL=C", "SOURCE_DATE_EPOCH=0"};
-  constexpr std::array<std::string_view, 12> kDropped{
-      "LC_", "LANG", "CPATH=", "C_INCLUDE_PATH=", "LIBRARY_PATH=", "COMPILER_PATH=", "GCC_", "DEPENDENCIES_OUTPUT=",
-      "SUNPRO_DEPENDENCIES=", "SOURCE_DATE_EPOCH=", "LD_RUN_PATH=", "COLLECT_"};
+  constexpr std::array<std::string_view, 12> kDropped{"LC_",
+                                                      "LANG",
+                                                      "CPATH=",
+                                                      "C_INCLUDE_PATH=",
+                                                      "LIBRARY_PATH=",
+                                                      "COMPILER_PATH=",
+                                                      "GCC_",
+                                                      "DEPENDENCIES_OUTPUT=",
+                                                      "SUNPRO_DEPENDENCIES=",
+                                                      "SOURCE_DATE_EPOCH=",
+                                                      "LD_RUN_PATH=",
+                                                      "COLLECT_"};
   for (char** entry = environ; *entry != nullptr; ++entry) {
     const std::string_view text = *entry;
     bool dropped = false;
@@ -74,8 +83,10 @@ void drain(const Pipe& output, const Pipe& errors, ProcessResult& result) {
     for (std::size_t i = 0; i < ends.size(); ++i) {
       if (ends[i].fd < 0 || ends[i].revents == 0) continue;
       const ssize_t count = read(ends[i].fd, buffer.data(), buffer.size());
-      if (count > 0) texts[i]->append(buffer.data(), static_cast<std::size_t>(count));
-      else if (count == 0 || errno != EINTR) ends[i].fd = -1;
+      if (count > 0)
+        texts[i]->append(buffer.data(), static_cast<std::size_t>(count));
+      else if (count == 0 || errno != EINTR)
+        ends[i].fd = -1;
     }
   }
 }
@@ -116,7 +127,8 @@ std::filesystem::path find_executable(std::string_view name) {
     if (const std::string_view directory = rest.substr(0, length); directory.starts_with('/')) {
       std::filesystem::path candidate = std::filesystem::path(directory) / name;
       std::error_code error;
-      if (std::filesystem::is_regular_file(candidate, error) && access(candidate.c_str(), X_OK) == 0) return candidate;
+      if (std::filesystem::is_regular_file(candidate, error) && access(candidate.c_str(), X_OK) == 0)
+        return candidate;
     }
     rest.remove_prefix(std::min(length + 1, rest.size()));
   }

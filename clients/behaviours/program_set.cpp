@@ -18,7 +18,8 @@ std::uint64_t place_for(const std::string& hashes, std::uint64_t size) {
 
 }  // namespace
 
-std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest, const std::filesystem::path& run_directory) {
+std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest,
+                                             const std::filesystem::path& run_directory) {
   std::vector<ElfFile> files;
   std::string hashes;
   std::uint64_t size = 0;
@@ -29,7 +30,8 @@ std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest, co
       throw UserError(path.string() + ": cannot be read; the run directory must hold the programs of its manifest");
     }
     if (sha256_hex(*octets) != program.sha256()) {
-      throw UserError(path.string() + ": its SHA-256 is not what its name says; copy it again from where the run was prepared");
+      throw UserError(path.string() +
+                      ": its SHA-256 is not what its name says; copy it again from where the run was prepared");
     }
     files.push_back(ElfFile::parse(*octets, path.string()));
     size += Program::size(files.back());

@@ -17,7 +17,8 @@ class ProgramSet {
   /// their contents and order alone, so that checkpoints hold anywhere, and runs of different programs seldom meet in one
   /// process. Throws UserError where a file is missing, is not what its name says, or is no program; RunError where memory is
   /// short or the addresses are taken.
-  [[nodiscard]] static std::shared_ptr<ProgramSet> load(const proto::Manifest&, const std::filesystem::path& run_directory);
+  [[nodiscard]] static std::shared_ptr<ProgramSet> load(const proto::Manifest&,
+                                                        const std::filesystem::path& run_directory);
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(programs_.size()); }
   /// `index` as in RunPlan::program_of.

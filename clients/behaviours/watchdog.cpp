@@ -45,7 +45,8 @@ void Watchdog::watch() {
       if (!hangs) continue;
       if (running->entry != named) {
         named = running->entry;
-        say(fmt::format("the program of robot {} has not returned for over 1 s; it may loop for ever", running->robot));
+        say(fmt::format("the program of robot {} has not returned for over 1 s; it may loop for ever",
+                        running->robot));
       }
       if (interrupted() != 0) {
         say(fmt::format("kilotwin: interrupted while the program of robot {} did not return", running->robot));

@@ -35,7 +35,8 @@ class Scratch {
   Scratch() {
     std::error_code error;
     std::string pattern = (fs::temp_directory_path(error) / "kilotwin-doctor-XXXXXX").string();
-    if (error || mkdtemp(pattern.data()) == nullptr) throw UserError("no directory for temporary files can be written; set TMPDIR to one");
+    if (error || mkdtemp(pattern.data()) == nullptr)
+      throw UserError("no directory for temporary files can be written; set TMPDIR to one");
     path_ = pattern;
   }
   ~Scratch() {
@@ -59,7 +60,9 @@ Finding check_compiler() {
     options.cache_directory = scratch.path() / "cache";
     const auto begun = Clock::now();
     static_cast<void>(behaviours::compile({source}, options));
-    return {fmt::format("a behaviour compiles in {:.2f} s", std::chrono::duration<double>(Clock::now() - begun).count()), ""};
+    return {fmt::format("a behaviour compiles in {:.2f} s",
+                        std::chrono::duration<double>(Clock::now() - begun).count()),
+            ""};
   } catch (const std::exception& error) {
     return {error.what(), "what it says; a C compiler comes with: apt-get install gcc libc6-dev", true};
   }
@@ -73,13 +76,18 @@ Finding check_dds(std::optional<std::uint32_t> wanted) {
     const dds::Participant participant({claim.domain(), {}});
     std::atomic<bool> heard{false};
     const dds::Reader<PublicRunStatus> reader(participant, topics::run_status(),
-                                              [&](const PublicRunStatus& sample, dds::SampleState state) { if (state.valid && sample.run == 1) heard = true; });
+                                              [&](const PublicRunStatus& sample, dds::SampleState state) {
+                                                if (state.valid && sample.run == 1) heard = true;
+                                              });
     dds::Writer<PublicRunStatus> writer(participant, topics::run_status());
     PublicRunStatus sample{};
     sample.run = 1;
     writer.write(sample);
-    while (!heard && Clock::now() < begun + std::chrono::seconds(3)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    if (!heard) return {"DDS: a sample written on the loopback interface did not come back", "check that the interface lo is up: ip link set lo up", true};
+    while (!heard && Clock::now() < begun + std::chrono::seconds(3))
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (!heard)
+      return {"DDS: a sample written on the loopback interface did not come back",
+              "check that the interface lo is up: ip link set lo up", true};
     return {fmt::format("DDS works on the loopback interface (domain {} is free)", claim.domain()), ""};
   } catch (const std::exception& error) {
     return {error.what(), "check that the interface lo is up and that no firewall drops UDP on it", true};
@@ -89,8 +97,11 @@ Finding check_dds(std::optional<std::uint32_t> wanted) {
 Finding check_address_space() {
   // Programs are loaded at fixed addresses (clients/behaviours/image.hpp).
   constexpr std::uintptr_t kProbe = 0x20000000;
-  void* const at = mmap(reinterpret_cast<void*>(kProbe), 4096, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0);
-  if (at == MAP_FAILED) return {"the addresses at which programs are loaded are taken", "run without a preloaded library or unlimited stack (ulimit -s 8192)", true};
+  void* const at = mmap(reinterpret_cast<void*>(kProbe), 4096, PROT_NONE,
+                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0);
+  if (at == MAP_FAILED)
+    return {"the addresses at which programs are loaded are taken",
+            "run without a preloaded library or unlimited stack (ulimit -s 8192)", true};
   munmap(at, 4096);
   return {"the addresses at which programs are loaded are free", ""};
 }
@@ -100,7 +111,8 @@ Finding check_receive_buffer() {
   std::uint64_t bytes = 0;
   if (!(stream >> bytes)) return {"the size of UDP receive buffers is not known here", ""};
   if (bytes < 1'000'000) {
-    return {fmt::format("UDP receive buffers hold at most {} KiB: enough for about {} robots in a federated run", bytes / 1024, bytes / 64),
+    return {fmt::format("UDP receive buffers hold at most {} KiB: enough for about {} robots in a federated run",
+                        bytes / 1024, bytes / 64),
             "for larger swarms: sysctl -w net.core.rmem_max=8388608"};
   }
   return {fmt::format("UDP receive buffers may hold {} KiB", bytes / 1024), ""};
@@ -109,17 +121,20 @@ Finding check_receive_buffer() {
 Finding check_files() {
   rlimit limit{};
   getrlimit(RLIMIT_NOFILE, &limit);
-  if (limit.rlim_cur < 256) return {fmt::format("a process may open {} files only", limit.rlim_cur), "ulimit -n 1024"};
+  if (limit.rlim_cur < 256)
+    return {fmt::format("a process may open {} files only", limit.rlim_cur), "ulimit -n 1024"};
   return {fmt::format("a process may open {} files", limit.rlim_cur), ""};
 }
 
 Finding check_machine() {
   const unsigned cores = std::thread::hardware_concurrency();
-  const double memory_gib = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1u << 30);
+  const double memory_gib =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1u << 30);
   std::error_code error;
   const fs::space_info space = fs::space(".", error);
   const double free_gib = error ? 0 : static_cast<double>(space.available) / (1u << 30);
-  Finding finding{fmt::format("{} cores, {:.1f} GiB of memory, {:.1f} GiB free here", cores, memory_gib, free_gib), ""};
+  Finding finding{fmt::format("{} cores, {:.1f} GiB of memory, {:.1f} GiB free here", cores, memory_gib, free_gib),
+                  ""};
   if (!error && free_gib < 0.2) finding.remedy = "make room, or put runs elsewhere with --out";
   return finding;
 }
@@ -128,14 +143,16 @@ Finding check_avr() {
   for (const char* directory : {"/usr/bin", "/usr/local/bin"}) {
     if (fs::exists(fs::path(directory) / "avr-gcc")) return {"avr-gcc is here: `kilotwin build --avr` works", ""};
   }
-  return {"avr-gcc is not here: `kilotwin build --avr` will not work", "apt-get install gcc-avr avr-libc binutils-avr"};
+  return {"avr-gcc is not here: `kilotwin build --avr` will not work",
+          "apt-get install gcc-avr avr-libc binutils-avr"};
 }
 
 }  // namespace
 
 int doctor_command(std::optional<std::uint32_t> domain) {
-  const std::function<Finding()> checks[] = {check_machine, check_compiler, [&] { return check_dds(domain); }, check_address_space,
-                                             check_receive_buffer, check_files, check_avr};
+  const std::function<Finding()> checks[] = {
+      check_machine, check_compiler, [&] { return check_dds(domain); }, check_address_space, check_receive_buffer,
+      check_files,   check_avr};
   bool healthy = true;
   for (const auto& check : checks) {
     const Finding finding = check();
@@ -143,7 +160,8 @@ int doctor_command(std::optional<std::uint32_t> domain) {
     fmt::print("{} {}{}{}\n", mark, finding.found, finding.remedy.empty() ? "" : "; remedy: ", finding.remedy);
     healthy = healthy && !finding.fatal;
   }
-  fmt::print("{}\n", healthy ? "experiments will run here" : "experiments will not run here until the above is mended");
+  fmt::print("{}\n",
+             healthy ? "experiments will run here" : "experiments will not run here until the above is mended");
   return healthy ? 0 : 1;
 }
 

@@ -42,7 +42,8 @@ std::string last_line(int log) {
   char tail[4096];
   struct stat status {};
   if (log < 0 || fstat(log, &status) != 0) return {};
-  const ssize_t octets = pread(log, tail, sizeof tail, std::max<off_t>(0, status.st_size - static_cast<off_t>(sizeof tail)));
+  const ssize_t octets =
+      pread(log, tail, sizeof tail, std::max<off_t>(0, status.st_size - static_cast<off_t>(sizeof tail)));
   std::string_view text(tail, static_cast<std::size_t>(std::max<ssize_t>(0, octets)));
   text = text.substr(0, text.find_last_not_of('\n') + 1);
   if (const std::size_t before = text.rfind('\n'); before != std::string_view::npos) text.remove_prefix(before + 1);
@@ -81,9 +82,10 @@ class Launcher {
                                               [this](const PublicRunStatus& sample, dds::SampleState state) {
                                                 if (state.valid && sample.run == plan_.run()) on_status(sample);
                                               });
-    const dds::Reader<WireMember> members(participant, topics::members(), [this](const WireMember& sample, dds::SampleState state) {
-      if (state.valid && sample.run == plan_.run()) on_member(sample);
-    });
+    const dds::Reader<WireMember> members(participant, topics::members(),
+                                          [this](const WireMember& sample, dds::SampleState state) {
+                                            if (state.valid && sample.run == plan_.run()) on_member(sample);
+                                          });
     return watch();
   }
 
@@ -92,10 +94,11 @@ class Launcher {
     Child child;
     child.name = plan_.name(id);
     std::string file = child.name;
-    std::replace_if(file.begin(), file.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '-');
+    std::replace_if(
+        file.begin(), file.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '-');
     words.insert(words.begin(), {"kilotwin", "service"});
-    words.insert(words.end(), {"--run", directory_.path().string(), "--domain", std::to_string(options_.domain), "--start-monotonic",
-                               fmt::format("{:.6f}", options_.start_monotonic_s)});
+    words.insert(words.end(), {"--run", directory_.path().string(), "--domain", std::to_string(options_.domain),
+                               "--start-monotonic", fmt::format("{:.6f}", options_.start_monotonic_s)});
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -103,7 +106,8 @@ class Launcher {
     child.log = open(log.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0644);
     const pid_t parent = getpid();
     child.process = fork();
-    if (child.process < 0) throw RunError(fmt::format("{} cannot be started: the system has no room for another process", child.name));
+    if (child.process < 0)
+      throw RunError(fmt::format("{} cannot be started: the system has no room for another process", child.name));
     if (child.process == 0) {
       // Only calls that are safe between fork and exec. A group of its own keeps the terminal's Ctrl-C from it: the
       // launcher decides how the run ends. The signal at its parent's death outlives exec.
@@ -207,7 +211,10 @@ class Launcher {
       return say(line);
     }
     const std::lock_guard lock(mutex_);
-    const std::string why = !told_.empty() ? told_ : fmt::format("{}: {}", culprit_->name, line.empty() ? "failed without a word; is the disk full?" : line);
+    const std::string why = !told_.empty()
+                                ? told_
+                                : fmt::format("{}: {}", culprit_->name,
+                                              line.empty() ? "failed without a word; is the disk full?" : line);
     say(fmt::format("kilotwin: {}; {}", why, so_far));
   }
 
@@ -218,7 +225,8 @@ class Launcher {
       for (const Child& child : children_) {
         if (child.running) kill(child.process, signal);
       }
-      const auto patience = Clock::now() + (signal == SIGTERM ? std::chrono::milliseconds(1000) : std::chrono::milliseconds(5000));
+      const auto patience =
+          Clock::now() + (signal == SIGTERM ? std::chrono::milliseconds(1000) : std::chrono::milliseconds(5000));
       while (reap() && Clock::now() < patience) std::this_thread::sleep_for(kPoll);
     }
   }

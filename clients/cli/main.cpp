@@ -34,7 +34,8 @@ std::string decimal_seed(std::string& text) {
   const char* const last = text.data() + text.size();
   const auto [end, error] = std::from_chars(text.data(), last, seed);
   if (error != std::errc() || end != last) {
-    return fmt::format("\"{}\" is no seed; give a whole number, 0..{}", text, std::numeric_limits<std::uint64_t>::max());
+    return fmt::format("\"{}\" is no seed; give a whole number, 0..{}", text,
+                       std::numeric_limits<std::uint64_t>::max());
   }
   text = std::to_string(seed);
   return {};
@@ -45,19 +46,25 @@ void add_experiment_options(CLI::App& app, RunArguments& arguments) {
   app.add_option("--duration", arguments.duration_s, "simulated time, s");
   app.add_option("--robots", arguments.robots, "replaces the first robot group's count");
   app.add_option("--behaviour", arguments.behaviour, "replaces the first robot group's program (.c or .so)");
-  app.add_option("--define", arguments.define, "NAME=VALUE: a macro for programs that are compiled")->allow_extra_args(false);
+  app.add_option("--define", arguments.define, "NAME=VALUE: a macro for programs that are compiled")
+      ->allow_extra_args(false);
   app.add_option("--model", arguments.model, "model of motion (*.txtpb) in place of the experiment's");
 }
 
 void add_run(CLI::App& app, RunArguments& arguments) {
   add_experiment_options(app, arguments);
   app.add_option("--mode", arguments.mode, "federated: services as processes over DDS; local: all in this process")
-      ->check(CLI::IsMember({"local", "federated"}))->capture_default_str();
+      ->check(CLI::IsMember({"local", "federated"}))
+      ->capture_default_str();
   app.add_option("--partitions", arguments.partitions, "COLUMNSxROWS of physics partitions");
   app.add_option("--hosts", arguments.hosts, "hosts of behaviours, each with a share of the robots");
-  app.add_option("--threads", arguments.threads, "threads of a local run")->check(CLI::Range(1, 256))->capture_default_str();
-  app.add_option("--seed", arguments.seed, "seed of all randomness")->transform(CLI::Validator(decimal_seed, "UINT"));
-  app.add_option("--set", arguments.set, "FIELD=VALUE, e.g. robots[0].layout.grid.pitch_mm=33")->allow_extra_args(false);
+  app.add_option("--threads", arguments.threads, "threads of a local run")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  app.add_option("--seed", arguments.seed, "seed of all randomness")
+      ->transform(CLI::Validator(decimal_seed, "UINT"));
+  app.add_option("--set", arguments.set, "FIELD=VALUE, e.g. robots[0].layout.grid.pitch_mm=33")
+      ->allow_extra_args(false);
   app.add_option("--pace", arguments.pace, "max, or a factor of real time")->capture_default_str();
   app.add_option("--checkpoint-every", arguments.checkpoint_every_s, "simulated time between checkpoints, s");
   app.add_option("--resume", arguments.resume, "start from the newest checkpoint of that run");
@@ -80,8 +87,10 @@ int build_command(const BuildArguments& arguments) {
   if (arguments.avr) {
     constexpr double kFlash = 32768, kRam = 2048;
     const behaviours::AvrSize size = behaviours::compile_for_avr(arguments.sources, options);
-    fmt::print("ATmega328P: {} octets of flash ({:.1f} % of 32 KiB), {} octets of RAM ({:.1f} % of 2 KiB), without kilolib and the stack\n",
-               size.flash_octets, 100 * size.flash_octets / kFlash, size.ram_octets, 100 * size.ram_octets / kRam);
+    fmt::print(
+        "ATmega328P: {} octets of flash ({:.1f} % of 32 KiB), {} octets of RAM ({:.1f} % of 2 KiB), without "
+        "kilolib and the stack\n",
+        size.flash_octets, 100 * size.flash_octets / kFlash, size.ram_octets, 100 * size.ram_octets / kRam);
     return 0;
   }
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
@@ -111,13 +120,17 @@ int export_command(const ExportArguments& arguments) {
     if (!reader.warning().empty()) say("kilotwin: " + reader.warning());
     fmt::print("{}: {} rows\n", csv.string(), rows);
   };
-  each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) { return recorder::export_trajectories(reader, csv, arguments.every_s); });
-  each(arguments.messages, [&](recorder::Reader& reader, const auto& csv) { return recorder::export_messages(reader, csv); });
+  each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) {
+    return recorder::export_trajectories(reader, csv, arguments.every_s);
+  });
+  each(arguments.messages,
+       [&](recorder::Reader& reader, const auto& csv) { return recorder::export_messages(reader, csv); });
   return 0;
 }
 
 int main_of(int argc, char** argv) {
-  const double started_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  const double started_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   CLI::App app{"Kilotwin: one experiment of simulated and real Kilobots, as services over DDS"};
   app.name("kilotwin");
   app.require_subcommand(1);
@@ -135,13 +148,18 @@ int main_of(int argc, char** argv) {
   ServiceArguments service;
   CLI::App& service_app = *app.add_subcommand("service", "run one service in the foreground");
   service_app.add_option("service", service.service, "physics, comm, station or behaviours")
-      ->required()->check(CLI::IsMember({"physics", "comm", "station", "behaviours"}));
+      ->required()
+      ->check(CLI::IsMember({"physics", "comm", "station", "behaviours"}));
   service_app.add_option("--run", service.run, "directory that `kilotwin run --prepare` wrote")->required();
-  service_app.add_option("--partition", service.partition, "physics: COLUMN,ROW, counted from 0 at the bottom left");
+  service_app.add_option("--partition", service.partition,
+                         "physics: COLUMN,ROW, counted from 0 at the bottom left");
   service_app.add_option("--share", service.share, "behaviours: I/N, counted from 1");
   service_app.add_option("--domain", service.domain, "DDS domain, the same for all services of a run")
-      ->check(CLI::Range(0u, dds::kLastDomain))->capture_default_str();
-  service_app.add_option("--peer", service.peers, "address of a machine that takes part, this one included; none: all on this machine")
+      ->check(CLI::Range(0u, dds::kLastDomain))
+      ->capture_default_str();
+  service_app
+      .add_option("--peer", service.peers,
+                  "address of a machine that takes part, this one included; none: all on this machine")
       ->allow_extra_args(false);
   service_app.add_option("--start-monotonic", service.start_monotonic_s, "when the run was asked for")->group("");
 
@@ -154,7 +172,8 @@ int main_of(int argc, char** argv) {
   sweep_app.add_option("--out", sweep.out, "directory (default: runs/NAME-sweep)");
 
   BuildArguments build;
-  CLI::App& build_app = *app.add_subcommand("build", "build a behaviour for simulation, or check it for the real robot");
+  CLI::App& build_app =
+      *app.add_subcommand("build", "build a behaviour for simulation, or check it for the real robot");
   build_app.add_option("program", build.sources, "C sources")->required();
   build_app.add_option("-o", build.out, "shared object to write (default: PROGRAM.so here)");
   build_app.add_option("--define", build.define, "NAME=VALUE")->allow_extra_args(false);
@@ -175,7 +194,8 @@ int main_of(int argc, char** argv) {
   replay_app.add_flag("--quiet", replay_quiet, "nothing on the screen");
 
   std::optional<std::uint32_t> doctor_domain;
-  CLI::App& doctor_app = *app.add_subcommand("doctor", "what on this machine would keep an experiment from running");
+  CLI::App& doctor_app =
+      *app.add_subcommand("doctor", "what on this machine would keep an experiment from running");
   doctor_app.add_option("--domain", doctor_domain, "the DDS domain to look at");
 
   try {
@@ -186,10 +206,12 @@ int main_of(int argc, char** argv) {
     const std::vector<CLI::App*> commands = app.get_subcommands();
     if (commands.empty() && argc > 1 && argv[1][0] != '-') {
       std::string known;
-      for (const CLI::App* command : app.get_subcommands({})) known += (known.empty() ? "" : ", ") + command->get_name();
+      for (const CLI::App* command : app.get_subcommands({}))
+        known += (known.empty() ? "" : ", ") + command->get_name();
       say(fmt::format("kilotwin: \"{}\" is no command; there are {}; see kilotwin --help", argv[1], known));
     } else {
-      say(fmt::format("kilotwin: {}; see kilotwin{} --help", error.what(), commands.empty() ? "" : " " + commands.front()->get_name()));
+      say(fmt::format("kilotwin: {}; see kilotwin{} --help", error.what(),
+                      commands.empty() ? "" : " " + commands.front()->get_name()));
     }
     return kBadInput;
   }

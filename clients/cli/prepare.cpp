@@ -24,7 +24,8 @@ double parse_pace(const std::string& text) {
   double factor = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), factor);
   if (error != std::errc() || end != text.data() + text.size() || !(factor > 0) || !(factor < 1e9)) {
-    throw UserError(fmt::format("--pace: \"{}\" is no pace; give max, or a factor above 0 such as 1 for real time", text));
+    throw UserError(
+        fmt::format("--pace: \"{}\" is no pace; give max, or a factor above 0 such as 1 for real time", text));
   }
   return factor;
 }
@@ -63,14 +64,16 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
 
 /// The experiment with all overrides, such that it runs again from where it lies: with the programs as they were compiled
 /// and copies of the files of poses. Throws filesystem_error.
-std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manifest& manifest, const recorder::RunDirectory& directory) {
+std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manifest& manifest,
+                              const recorder::RunDirectory& directory) {
   proto::Experiment experiment = manifest.experiment();
   std::string text;
   for (int g = 0; g < experiment.robots_size(); ++g) {
     proto::RobotGroup& group = *experiment.mutable_robots(g);
     if (group.layout().has_poses()) {
       const std::string copy = fmt::format("poses-{}.csv", g);
-      fs::copy_file(loaded.resolve(group.layout().poses().csv()), directory.path() / copy, fs::copy_options::overwrite_existing);
+      fs::copy_file(loaded.resolve(group.layout().poses().csv()), directory.path() / copy,
+                    fs::copy_options::overwrite_existing);
       group.mutable_layout()->mutable_poses()->set_csv(copy);
     }
     const std::uint32_t program = manifest.group_program(g);
@@ -91,8 +94,10 @@ void check_processes(const proto::Deployment& deployment) {
   constexpr std::uint32_t kMost = 110;
   const std::uint32_t partitions = deployment.partition_columns() * deployment.partition_rows();
   if (const std::uint32_t processes = partitions + deployment.hosts() + 2; processes > kMost) {
-    throw UserError(fmt::format("--partitions {}x{}: {} processes, more than the {} that run on one machine; divide less, or use --mode local",
-                                deployment.partition_columns(), deployment.partition_rows(), processes, kMost));
+    throw UserError(
+        fmt::format("--partitions {}x{}: {} processes, more than the {} that run on one machine; divide less, or "
+                    "use --mode local",
+                    deployment.partition_columns(), deployment.partition_rows(), processes, kMost));
   }
 }
 
@@ -121,10 +126,12 @@ LoadedExperiment load_with_overrides(const RunArguments& arguments) {
   if (arguments.robots) set_robots(loaded, *arguments.robots);
   if (!arguments.behaviour.empty()) set_behaviour(loaded, arguments.behaviour);
   if (arguments.seed) apply_override(loaded, fmt::format("seed={}", *arguments.seed), "--seed");
-  if (arguments.duration_s) apply_override(loaded, fmt::format("duration_s={}", *arguments.duration_s), "--duration");
+  if (arguments.duration_s)
+    apply_override(loaded, fmt::format("duration_s={}", *arguments.duration_s), "--duration");
   if (arguments.hosts) apply_override(loaded, fmt::format("deployment.hosts={}", *arguments.hosts), "--hosts");
   if (arguments.checkpoint_every_s) {
-    apply_override(loaded, fmt::format("deployment.checkpoint_every_s={}", *arguments.checkpoint_every_s), "--checkpoint-every");
+    apply_override(loaded, fmt::format("deployment.checkpoint_every_s={}", *arguments.checkpoint_every_s),
+                   "--checkpoint-every");
   }
   if (!arguments.partitions.empty()) {
     const auto [columns, rows] = parse_partitions(arguments.partitions);
@@ -156,21 +163,25 @@ Prepared prepare(const RunArguments& arguments) {
     checkpoint = checkpoint_directory(arguments.resume);
     const RunPlan plan(manifest);
     if (const Tick from = read_checkpoint(checkpoint, manifest).tick; from >= plan.last_tick) {
-      throw UserError(fmt::format("--resume: {} was saved at {:.3f} s, and the run ends at {:.3f} s; give a longer --duration", checkpoint.string(),
-                                  plan.tick_length.seconds_at(from), plan.tick_length.seconds_at(plan.last_tick)));
+      throw UserError(fmt::format(
+          "--resume: {} was saved at {:.3f} s, and the run ends at {:.3f} s; give a longer --duration",
+          checkpoint.string(), plan.tick_length.seconds_at(from), plan.tick_length.seconds_at(plan.last_tick)));
     }
   }
 
   const proto::Experiment& experiment = manifest.experiment();
   auto directory = recorder::RunDirectory::create(
-      arguments.out.empty() ? recorder::RunDirectory::default_path(experiment.name(), experiment.seed()) : arguments.out);
+      arguments.out.empty() ? recorder::RunDirectory::default_path(experiment.name(), experiment.seed())
+                            : arguments.out);
   try {
     for (int i = 0; i < manifest.program_size(); ++i) {
-      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i).sha256()), fs::copy_options::overwrite_existing);
+      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i).sha256()),
+                    fs::copy_options::overwrite_existing);
     }
     for (const proto::RobotGroup& group : loaded.experiment.robots()) {
       for (const std::string& source : group.behaviour()) {
-        fs::copy_file(loaded.resolve(source), directory.programs() / fs::path(source).filename(), fs::copy_options::overwrite_existing);
+        fs::copy_file(loaded.resolve(source), directory.programs() / fs::path(source).filename(),
+                      fs::copy_options::overwrite_existing);
       }
     }
     if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
@@ -181,7 +192,8 @@ Prepared prepare(const RunArguments& arguments) {
     fs::remove_all(directory.path(), ignored);
     const auto* const copying = dynamic_cast<const fs::filesystem_error*>(&error);
     if (copying == nullptr) throw;
-    throw RunError(fmt::format("{}: cannot be copied to {}: {}", copying->path1().string(), copying->path2().string(), copying->code().message()));
+    throw RunError(fmt::format("{}: cannot be copied to {}: {}", copying->path1().string(),
+                               copying->path2().string(), copying->code().message()));
   }
   return {std::move(directory), std::move(manifest)};
 }

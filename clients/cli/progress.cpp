@@ -16,8 +16,13 @@ constexpr auto kLinePeriod = std::chrono::seconds(5);
 }  // namespace
 
 ProgressBar::ProgressBar(const RunPlan& plan, bool shown)
-    : tick_length_(plan.tick_length), last_(plan.last_tick), robots_(plan.robots()), shown_(shown), terminal_(isatty(STDERR_FILENO) == 1),
-      next_(std::chrono::steady_clock::now() + (terminal_ ? std::chrono::milliseconds(0) : std::chrono::milliseconds(kLinePeriod))) {}
+    : tick_length_(plan.tick_length),
+      last_(plan.last_tick),
+      robots_(plan.robots()),
+      shown_(shown),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      next_(std::chrono::steady_clock::now() +
+            (terminal_ ? std::chrono::milliseconds(0) : std::chrono::milliseconds(kLinePeriod))) {}
 
 ProgressBar::~ProgressBar() { clear(); }
 
@@ -28,7 +33,8 @@ std::string ProgressBar::line(const RunProgress& progress, bool bar) const {
   if (bar) {
     const double part = end_s > 0 ? std::clamp(simulated_s / end_s, 0.0, 1.0) : 1.0;
     const int filled = static_cast<int>(part * kBarWidth);
-    text = fmt::format("[{}{}] ", std::string(static_cast<std::size_t>(filled), '#'), std::string(static_cast<std::size_t>(kBarWidth - filled), '.'));
+    text = fmt::format("[{}{}] ", std::string(static_cast<std::size_t>(filled), '#'),
+                       std::string(static_cast<std::size_t>(kBarWidth - filled), '.'));
   }
   text += fmt::format("{:.1f} of {:.1f} s", simulated_s, end_s);
   const double stepped_s = simulated_s - tick_length_.seconds_at(std::max(first_, Tick{0}));

@@ -35,7 +35,8 @@ Recorded read_recorded(recorder::Reader& reader) {
     if (record->has_input()) recorded.inputs.push_back(from_record(record->input()));
   }
   if (!reader.warning().empty()) say("kilotwin: " + reader.warning());
-  if (recorded.chain.empty()) throw UserError(fmt::format("{}: no state hashes in it; there is nothing to verify", reader.path().string()));
+  if (recorded.chain.empty())
+    throw UserError(fmt::format("{}: no state hashes in it; there is nothing to verify", reader.path().string()));
   return recorded;
 }
 
@@ -50,8 +51,9 @@ class Verifier : public RunObserver {
     if (index < 0 || index >= static_cast<std::int64_t>(recorded_.chain.size())) return;
     const std::uint64_t expected = recorded_.chain[static_cast<std::size_t>(index)];
     if (chain != expected) {
-      throw RunError(fmt::format("tick {}: the state hash is {:016x}, recorded was {:016x}; this is the first tick that differs",
-                                 tick.count(), chain, expected));
+      throw RunError(fmt::format(
+          "tick {}: the state hash is {:016x}, recorded was {:016x}; this is the first tick that differs",
+          tick.count(), chain, expected));
     }
     ++verified_;
   }
@@ -72,7 +74,8 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   const RunPlan plan(read_manifest(directory));
   for (const Directive& input : recorded.inputs) {
     if (const char* const wrong = defect(input, plan); wrong != nullptr) {
-      throw UserError(fmt::format("{}: input {} is none of this run: {}", reader.path().string(), input.sequence_number, wrong));
+      throw UserError(fmt::format("{}: input {} is none of this run: {}", reader.path().string(),
+                                  input.sequence_number, wrong));
     }
   }
 
@@ -87,7 +90,8 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   stop.tick = recorded.first_hash + static_cast<std::int64_t>(recorded.chain.size()) - 1;
   options.inputs = recorded.inputs;
   options.inputs.push_back(stop);
-  std::stable_sort(options.inputs.begin(), options.inputs.end(), [](const Directive& a, const Directive& b) { return a.tick < b.tick; });
+  std::stable_sort(options.inputs.begin(), options.inputs.end(),
+                   [](const Directive& a, const Directive& b) { return a.tick < b.tick; });
   for (std::size_t i = 0; i < options.inputs.size(); ++i) options.inputs[i].sequence_number = i;
   options.save_checkpoints = false;
 
@@ -101,7 +105,8 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   if (verifier.verified() != recorded.chain.size()) {
     throw RunError(fmt::format("{} of {} recorded ticks were reached", verifier.verified(), recorded.chain.size()));
   }
-  if (!quiet) fmt::print("verified: {} ticks, every state hash agrees ({:016x})\n", verifier.verified(), totals.state_hash);
+  if (!quiet)
+    fmt::print("verified: {} ticks, every state hash agrees ({:016x})\n", verifier.verified(), totals.state_hash);
   return 0;
 }
 

@@ -25,11 +25,13 @@ std::string quoted(const std::string& word) {
 }
 
 std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& directory) {
-  std::string text = fmt::format("prepared {}; start these, on any machine that has this directory, with the same --domain:\n",
-                                 directory.path().string());
+  std::string text =
+      fmt::format("prepared {}; start these, on any machine that has this directory, with the same --domain:\n",
+                  directory.path().string());
   const std::string run = quoted(directory.path().string());
   for (std::uint32_t p = 0; p < plan.grid.size(); ++p) {
-    text += fmt::format("  kilotwin service physics --run {} --partition {},{}\n", run, p % plan.grid.columns(), p / plan.grid.columns());
+    text += fmt::format("  kilotwin service physics --run {} --partition {},{}\n", run, p % plan.grid.columns(),
+                        p / plan.grid.columns());
   }
   text += fmt::format("  kilotwin service comm --run {}\n", run);
   for (std::uint32_t h = 0; h < plan.hosts; ++h) {
@@ -39,7 +41,8 @@ std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& dir
   return text;
 }
 
-void run_locally(const RunPlan& plan, const recorder::RunDirectory& directory, const RunArguments& arguments, double started_s) {
+void run_locally(const RunPlan& plan, const recorder::RunDirectory& directory, const RunArguments& arguments,
+                 double started_s) {
   local::LocalOptions options;
   options.threads = std::max(1u, arguments.threads);
   options.run_directory = directory.path();
@@ -49,7 +52,8 @@ void run_locally(const RunPlan& plan, const recorder::RunDirectory& directory, c
   RunRecorder run_recorder(plan, directory, options.resumed, [&](const RunProgress& now) { progress.show(now); });
   const RunTotals totals = local::run(plan, programs, options, run_recorder);
   progress.clear();
-  const double first_tick_s = std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
+  const double first_tick_s =
+      std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
   run_recorder.finish(totals, first_tick_s - started_s);
   if (!totals.failure.empty()) {
     throw RunError(fmt::format("{}; what was recorded so far is in {}", totals.failure, directory.path().string()));
@@ -78,7 +82,8 @@ int run_command(const RunArguments& arguments, double start_monotonic_s) {
     if (status != 0) return status;
   }
   if (!arguments.quiet) {
-    fmt::print("{}", recorder::summary_text(recorder::read_summary(prepared.directory.summary()), prepared.directory.path()));
+    fmt::print("{}", recorder::summary_text(recorder::read_summary(prepared.directory.summary()),
+                                            prepared.directory.path()));
   }
   return 0;
 }

@@ -8,13 +8,14 @@ namespace kilotwin::cli {
 namespace {
 
 proto::RecordingHeader header_of(const RunPlan& plan, const std::optional<Checkpoint>& resumed) {
-  return recorder::recording_header(plan.manifest, resumed ? resumed->tick : Tick{0}, resumed ? resumed->hash_chain() : 0);
+  return recorder::recording_header(plan.manifest, resumed ? resumed->tick : Tick{0},
+                                    resumed ? resumed->hash_chain() : 0);
 }
 
 }  // namespace
 
-RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory, const std::optional<Checkpoint>& resumed,
-                         std::function<void(const RunProgress&)> on_idle)
+RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory,
+                         const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle)
     : plan_(plan),
       directory_(directory),
       writer_(directory.recording(), header_of(plan, resumed)),
@@ -26,8 +27,8 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       led_(plan.robots()),
       life_cycle_(plan.robots()) {}
 
-void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies, std::span<const ActuationFrame* const> actuation,
-                        bool last) {
+void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
+                        std::span<const ActuationFrame* const> actuation, bool last) {
   if (any_state_ && tick < next_ && !last) return;
   if (!any_state_) first_tick_at_ = std::chrono::steady_clock::now();
   any_state_ = true;
@@ -89,8 +90,11 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
   summary.robots_failed = totals.robots_failed;
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
-  const double steps = static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());
-  const auto cost = [&](Work work) { return static_cast<double>(totals.work_ns[static_cast<std::size_t>(work)]) / steps; };
+  const double steps =
+      static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());
+  const auto cost = [&](Work work) {
+    return static_cast<double>(totals.work_ns[static_cast<std::size_t>(work)]) / steps;
+  };
   auto& costs = summary.cost_ns_per_robot_tick;
   costs.behaviours = cost(Work::kBehaviours);
   costs.physics = cost(Work::kPhysics);

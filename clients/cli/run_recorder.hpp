@@ -19,8 +19,8 @@ namespace kilotwin::cli {
 class RunRecorder : public RunObserver {
  public:
   /// `resumed`: where the run starts from a checkpoint. `on_idle`: told how far the run is; may be empty.
-  RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory, const std::optional<Checkpoint>& resumed,
-              std::function<void(const RunProgress&)> on_idle);
+  RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory,
+              const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle);
 
   void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>, bool last) override;
   void hash(Tick, std::uint64_t chain) override;

@@ -31,8 +31,9 @@ PartitionId parse_partition(const std::string& text, const PartitionGrid& grid) 
   if (text.empty() && grid.size() == 1) return PartitionId{0};
   const auto place = two_numbers(text, ',');
   if (!place || place->first >= grid.columns() || place->second >= grid.rows()) {
-    throw UserError(fmt::format("--partition: \"{}\" is none of this run's {}x{} partitions; give COLUMN,ROW counted from 0",
-                                text, grid.columns(), grid.rows()));
+    throw UserError(
+        fmt::format("--partition: \"{}\" is none of this run's {}x{} partitions; give COLUMN,ROW counted from 0",
+                    text, grid.columns(), grid.rows()));
   }
   return PartitionId{place->second * grid.columns() + place->first};
 }
@@ -41,16 +42,19 @@ HostId parse_share(const std::string& text, std::uint32_t hosts) {
   if (text.empty() && hosts == 1) return HostId{0};
   const auto share = two_numbers(text, '/');
   if (!share || share->second != hosts || share->first < 1 || share->first > hosts) {
-    throw UserError(fmt::format("--share: \"{}\" is no share of this run, which has {} hosts; give I/{} with I from 1 to {}", text,
-                                hosts, hosts, hosts));
+    throw UserError(
+        fmt::format("--share: \"{}\" is no share of this run, which has {} hosts; give I/{} with I from 1 to {}",
+                    text, hosts, hosts, hosts));
   }
   return HostId{share->first - 1};
 }
 
-int run_station(const RunPlan& plan, const ServiceContext& context, const recorder::RunDirectory& directory, double started_s) {
+int run_station(const RunPlan& plan, const ServiceContext& context, const recorder::RunDirectory& directory,
+                double started_s) {
   RunRecorder run_recorder(plan, directory, context.resumed, {});
   const RunTotals totals = ark::run_service(plan, context, run_recorder);
-  const double first_tick_s = std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
+  const double first_tick_s =
+      std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
   run_recorder.finish(totals, first_tick_s > 0 ? first_tick_s - started_s : 0);
   if (totals.failure.empty()) return 0;
   throw RunError(totals.failure);
@@ -75,7 +79,8 @@ int service_command(const ServiceArguments& arguments) {
   } else if (arguments.service == "behaviours") {
     behaviours::run_service(plan, parse_share(arguments.share, plan.hosts), context);
   } else {
-    return run_station(plan, context, directory, arguments.start_monotonic_s > 0 ? arguments.start_monotonic_s : now_s);
+    return run_station(plan, context, directory,
+                       arguments.start_monotonic_s > 0 ? arguments.start_monotonic_s : now_s);
   }
   return 0;
 }

@@ -58,7 +58,8 @@ std::vector<Point> combinations(const std::vector<std::string>& sets) {
   std::vector<Point> points{{}};
   for (const std::string& set : sets) {
     const std::size_t equals = set.find('=');
-    if (equals == std::string::npos) throw UserError(fmt::format("--set: \"{}\" has no value; give FIELD=V1,V2", set));
+    if (equals == std::string::npos)
+      throw UserError(fmt::format("--set: \"{}\" has no value; give FIELD=V1,V2", set));
     std::vector<Point> more;
     for (const Point& point : points) {
       for (std::size_t from = equals + 1; from <= set.size();) {
@@ -89,14 +90,22 @@ struct Job {
 };
 
 std::vector<std::string> words_of(const SweepArguments& arguments, const Point& point, const Job& job) {
-  std::vector<std::string> words{"kilotwin", "run", arguments.run.experiment.string(), "--mode", "local", "--quiet",
-                                 "--out", job.directory.string()};
+  std::vector<std::string> words{"kilotwin",
+                                 "run",
+                                 arguments.run.experiment.string(),
+                                 "--mode",
+                                 "local",
+                                 "--quiet",
+                                 "--out",
+                                 job.directory.string()};
   if (!arguments.seeds.empty()) words.insert(words.end(), {"--seed", std::to_string(job.seed)});
   for (const std::string& set : point) words.insert(words.end(), {"--set", set});
   for (const std::string& define : arguments.run.define) words.insert(words.end(), {"--define", define});
-  if (arguments.run.duration_s) words.insert(words.end(), {"--duration", fmt::format("{}", *arguments.run.duration_s)});
+  if (arguments.run.duration_s)
+    words.insert(words.end(), {"--duration", fmt::format("{}", *arguments.run.duration_s)});
   if (arguments.run.robots) words.insert(words.end(), {"--robots", std::to_string(*arguments.run.robots)});
-  if (!arguments.run.behaviour.empty()) words.insert(words.end(), {"--behaviour", arguments.run.behaviour.string()});
+  if (!arguments.run.behaviour.empty())
+    words.insert(words.end(), {"--behaviour", arguments.run.behaviour.string()});
   if (!arguments.run.model.empty()) words.insert(words.end(), {"--model", arguments.run.model.string()});
   return words;
 }
@@ -219,7 +228,8 @@ int sweep_command(const SweepArguments& arguments) {
   }
   std::vector<std::uint64_t> seeds;
   if (!arguments.seeds.empty()) seeds = parse_seeds(arguments.seeds);
-  const auto directory = recorder::RunDirectory::create(arguments.out.empty() ? fs::path("runs") / (name + "-sweep") : arguments.out);
+  const auto directory =
+      recorder::RunDirectory::create(arguments.out.empty() ? fs::path("runs") / (name + "-sweep") : arguments.out);
   std::vector<Job> jobs;
   for (std::size_t point = 0; point < points.size(); ++point) {
     for (const std::uint64_t seed : arguments.seeds.empty() ? std::vector{own_seeds[point]} : seeds) {
@@ -237,26 +247,31 @@ int sweep_command(const SweepArguments& arguments) {
     } else {
       ++failed;
       const std::string at = points[job.point].empty() ? name : label(points[job.point]);
-      say(fmt::format("kilotwin: {} with seed {} failed: {}", at, job.seed, read_log(job.directory.string() + ".log")));
+      say(fmt::format("kilotwin: {} with seed {} failed: {}", at, job.seed,
+                      read_log(job.directory.string() + ".log")));
     }
   }
 
   std::string csv = "point,runs,msd_mm2,msd_se_mm2,moved_mm,moved_se_mm,sent,received,collided,realtime_factor\n";
-  fmt::print("{:<40} {:>5} {:>22} {:>18} {:>20} {:>20} {:>10}\n", "at", "runs", "MSD at the end, mm^2", "moved, mm", "sent", "received", "x real t.");
+  fmt::print("{:<40} {:>5} {:>22} {:>18} {:>20} {:>20} {:>10}\n", "at", "runs", "MSD at the end, mm^2", "moved, mm",
+             "sent", "received", "x real t.");
   recorder::Plot plot;
   plot.title = name + ": mean square displacement";
-  plot.subtitle = fmt::format("{} {} per curve; bars: standard error over {}", std::max<std::size_t>(1, seeds.size()), seeds.size() <= 1 ? "run" : "runs", "runs");
+  plot.subtitle = fmt::format("{} {} per curve; bars: standard error over {}",
+                              std::max<std::size_t>(1, seeds.size()), seeds.size() <= 1 ? "run" : "runs", "runs");
   plot.x_name = "time";
   plot.x_unit = "s";
   plot.y_name = "MSD";
   plot.y_unit = "mm^2";
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Observed& at = observed[i];
-    fmt::print("{:<40} {:>5} {:>22} {:>18} {:>20} {:>20} {:>10.1f}\n", points[i].empty() ? name : label(points[i]), at.msd_mm2.count(),
-               with_error(at.msd_mm2), with_error(at.moved_mm), with_error(at.sent), with_error(at.received), at.realtime.mean());
-    csv += fmt::format("\"{}\",{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.6g}\n", label(points[i]), at.msd_mm2.count(),
-                       at.msd_mm2.mean(), at.msd_mm2.standard_error(), at.moved_mm.mean(), at.moved_mm.standard_error(), at.sent.mean(),
-                       at.received.mean(), at.collided.mean(), at.realtime.mean());
+    fmt::print("{:<40} {:>5} {:>22} {:>18} {:>20} {:>20} {:>10.1f}\n", points[i].empty() ? name : label(points[i]),
+               at.msd_mm2.count(), with_error(at.msd_mm2), with_error(at.moved_mm), with_error(at.sent),
+               with_error(at.received), at.realtime.mean());
+    csv += fmt::format("\"{}\",{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.6g}\n",
+                       label(points[i]), at.msd_mm2.count(), at.msd_mm2.mean(), at.msd_mm2.standard_error(),
+                       at.moved_mm.mean(), at.moved_mm.standard_error(), at.sent.mean(), at.received.mean(),
+                       at.collided.mean(), at.realtime.mean());
     recorder::PlotSeries series;
     series.name = label(points[i]);
     series.x = at.time_s;
@@ -269,7 +284,8 @@ int sweep_command(const SweepArguments& arguments) {
   }
   recorder::write_file(directory.path() / "sweep.csv", csv);
   recorder::write_plot(plot, directory.path() / "sweep.svg");
-  fmt::print("table {}, plot {}\n", (directory.path() / "sweep.csv").string(), (directory.path() / "sweep.svg").string());
+  fmt::print("table {}, plot {}\n", (directory.path() / "sweep.csv").string(),
+             (directory.path() / "sweep.svg").string());
   return failed == 0 ? 0 : 1;
 }
 

@@ -6,11 +6,11 @@
 namespace kilotwin::cli {
 
 struct SweepArguments {
-  RunArguments run;                 ///< what all runs share
-  std::string seeds;                ///< "A..B", or one number; empty: the experiment's own
-  std::vector<std::string> set;     ///< FIELD=V1,V2,...: one run per value, all combinations
-  std::uint32_t jobs = 0;           ///< runs at a time; 0: one per core
-  std::filesystem::path out;        ///< default: runs/NAME-sweep
+  RunArguments run;              ///< what all runs share
+  std::string seeds;             ///< "A..B", or one number; empty: the experiment's own
+  std::vector<std::string> set;  ///< FIELD=V1,V2,...: one run per value, all combinations
+  std::uint32_t jobs = 0;        ///< runs at a time; 0: one per core
+  std::filesystem::path out;     ///< default: runs/NAME-sweep
 };
 
 /// Returns the exit status: 1 where some run failed. Throws UserError.

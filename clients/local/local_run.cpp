@@ -42,12 +42,17 @@ struct Frames {
 
 class LocalRun {
  public:
-  LocalRun(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs, const LocalOptions& options,
-           RunObserver& observer)
-      : plan_(plan), options_(options), observer_(observer), radio_(plan), station_(plan),
+  LocalRun(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs,
+           const LocalOptions& options, RunObserver& observer)
+      : plan_(plan),
+        options_(options),
+        observer_(observer),
+        radio_(plan),
+        station_(plan),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()) {
-    for (std::uint32_t p = 0; p < plan.grid.size(); ++p) physics_.push_back(physics::make_engine(plan, PartitionId{p}));
+    for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
+      physics_.push_back(physics::make_engine(plan, PartitionId{p}));
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
     }
@@ -236,10 +241,14 @@ class LocalRun {
   void save(Tick now, std::uint64_t chain) {
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
       proto::CheckpointPart part;
-      if (task < physics_.size()) physics_[task]->save(*part.mutable_physics());
-      else if (task == physics_.size()) radio_.save(*part.mutable_radio());
-      else if (task == physics_.size() + 1) station_.save(*part.mutable_station());
-      else hosts_[task - physics_.size() - 2]->save(*part.mutable_behaviours());
+      if (task < physics_.size())
+        physics_[task]->save(*part.mutable_physics());
+      else if (task == physics_.size())
+        radio_.save(*part.mutable_radio());
+      else if (task == physics_.size() + 1)
+        station_.save(*part.mutable_station());
+      else
+        hosts_[task - physics_.size() - 2]->save(*part.mutable_behaviours());
       if (part.has_station()) part.mutable_station()->set_hash_chain(chain);
       write_checkpoint_part(options_.run_directory, plan_, now, FederateId{task}, part);
     }
@@ -263,7 +272,9 @@ class LocalRun {
   }
 
   void fill(RunTotals& totals) const {
-    const auto add = [&](Work work, std::uint64_t value) { totals.work_ns[static_cast<std::size_t>(work)] += value; };
+    const auto add = [&](Work work, std::uint64_t value) {
+      totals.work_ns[static_cast<std::size_t>(work)] += value;
+    };
     for (std::uint32_t task = 0; task < task_ns_.size(); ++task) {
       add(task < physics_.size()        ? Work::kPhysics
           : task == physics_.size()     ? Work::kRadio
@@ -281,7 +292,9 @@ class LocalRun {
     for (const auto& engine : hosts_) totals.robots_failed += engine->robots_failed();
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6; };
+    const auto seconds = [](const timeval& t) {
+      return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6;
+    };
     totals.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
     totals.peak_memory_mib = static_cast<double>(usage.ru_maxrss) / 1024.0;
   }
@@ -302,8 +315,8 @@ class LocalRun {
 
 }  // namespace
 
-RunTotals run(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs, const LocalOptions& options,
-              RunObserver& observer) {
+RunTotals run(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs,
+              const LocalOptions& options, RunObserver& observer) {
   return LocalRun(plan, programs, options, observer).run();
 }
 

@@ -24,7 +24,7 @@ struct LocalOptions {
 
 /// Runs the plan to its end, or until the process is interrupted, which the totals then name as their failure. Throws
 /// RunError where a checkpoint cannot be written.
-RunTotals run(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs, const LocalOptions& options,
-              RunObserver& observer);
+RunTotals run(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs,
+              const LocalOptions& options, RunObserver& observer);
 
 }  // namespace kilotwin::local

@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 /// that also an empty directory that was there before goes to one run alone.
 bool claim(const fs::path& directory) {
   const auto refuse = [](const fs::path& what) {
-    return RunError(fmt::format("{}: cannot be created: {}; choose another place with --out", what.string(), system_reason()));
+    return RunError(
+        fmt::format("{}: cannot be created: {}; choose another place with --out", what.string(), system_reason()));
   };
   if (::mkdir(directory.c_str(), 0777) != 0) {
     if (errno != EEXIST) throw refuse(directory);
@@ -49,7 +50,8 @@ RunDirectory RunDirectory::create(const fs::path& wanted) {
   if (error) throw RunError(fmt::format("{}: cannot be read: {}", wanted.string(), error.message()));
   if (stem.has_parent_path()) fs::create_directories(stem.parent_path(), error);
   if (error) {
-    throw RunError(fmt::format("{}: cannot be created: {}; choose another place with --out", stem.parent_path().string(), error.message()));
+    throw RunError(fmt::format("{}: cannot be created: {}; choose another place with --out",
+                               stem.parent_path().string(), error.message()));
   }
   fs::path directory = stem;
   for (std::uint64_t number = 2;; ++number) {

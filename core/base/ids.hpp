@@ -6,8 +6,7 @@
 
 namespace kilotwin {
 
-template <class Tag>
-class Id {
+template <class Tag> class Id {
  public:
   constexpr Id() = default;
   constexpr explicit Id(std::uint32_t value) : value_(value) {}
@@ -26,7 +25,14 @@ using FederateId = Id<struct FederateTag>;    ///< index in the plan: partitions
 /// What a robot is doing, as kilolib numbers it (facts of the firmware), and FAILED, which no firmware knows: its program
 /// faulted in simulation.
 enum class LifeCycle : std::uint8_t {
-  kSleeping = 0, kIdle = 1, kBattery = 2, kSetup = 3, kRunning = 4, kCharging = 5, kMoving = 6, kFailed = 255
+  kSleeping = 0,
+  kIdle = 1,
+  kBattery = 2,
+  kSetup = 3,
+  kRunning = 4,
+  kCharging = 5,
+  kMoving = 6,
+  kFailed = 255
 };
 
 }  // namespace kilotwin

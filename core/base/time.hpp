@@ -15,7 +15,10 @@ class Tick {
   constexpr explicit Tick(std::int64_t count) : count_(count) {}
   [[nodiscard]] constexpr std::int64_t count() const { return count_; }
   constexpr auto operator<=>(const Tick&) const = default;
-  constexpr Tick& operator++() { ++count_; return *this; }
+  constexpr Tick& operator++() {
+    ++count_;
+    return *this;
+  }
   friend constexpr Tick operator+(Tick t, std::int64_t n) { return Tick{t.count_ + n}; }
   friend constexpr Tick operator-(Tick t, std::int64_t n) { return Tick{t.count_ - n}; }
   friend constexpr std::int64_t operator-(Tick a, Tick b) { return a.count_ - b.count_; }

@@ -21,7 +21,8 @@ std::string cyclone_configuration(const Transport& transport) {
       R"(<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>64000B</FragmentSize></General>)"
       R"(<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>120</MaxAutoParticipantIndex>)"
       R"(<LeaseDuration>{}ms</LeaseDuration><Peers>{}</Peers></Discovery></Domain></CycloneDDS>)",
-      local ? R"(<Interfaces><NetworkInterface name="lo"/></Interfaces>)" : "", static_cast<int>(kLease_s * 1000), peers);
+      local ? R"(<Interfaces><NetworkInterface name="lo"/></Interfaces>)" : "", static_cast<int>(kLease_s * 1000),
+      peers);
 }
 
 Entity::Entity(dds_entity_t handle, const std::string& what) : handle_(handle) {
@@ -55,7 +56,8 @@ Domain::Domain(const Transport& transport) : id_(transport.domain) {
   const std::lock_guard lock(domains_mutex);
   SharedDomain& shared = domains[id_];
   if (shared.users == 0) {
-    shared.entity = Entity(dds_create_domain(id_, cyclone_configuration(transport).c_str()), fmt::format("domain {}", id_));
+    shared.entity =
+        Entity(dds_create_domain(id_, cyclone_configuration(transport).c_str()), fmt::format("domain {}", id_));
   }
   ++shared.users;
 }
@@ -95,8 +97,8 @@ Qos make_qos(const Channel& channel) {
     case Delivery::kLog:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
       dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_ALL, -1, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED,
-                                  DDS_LENGTH_UNLIMITED);
+      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_ALL, -1, DDS_LENGTH_UNLIMITED,
+                                  DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
       break;
     case Delivery::kStatus:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
@@ -113,7 +115,8 @@ Qos make_qos(const Channel& channel) {
 
 // A topic's QoS must agree between all who make it, so routing by partition is set on the endpoint alone.
 Entity make_topic(const Participant& participant, const Channel& channel, const dds_topic_descriptor_t* type) {
-  return {dds_create_topic(participant.get(), type, channel.topic.c_str(), nullptr, nullptr), "topic " + channel.topic};
+  return {dds_create_topic(participant.get(), type, channel.topic.c_str(), nullptr, nullptr),
+          "topic " + channel.topic};
 }
 
 Qos endpoint_qos(const Channel& channel) {
@@ -127,8 +130,9 @@ Qos endpoint_qos(const Channel& channel) {
 Endpoint make_writer(const Participant& participant, const Channel& channel, const dds_topic_descriptor_t* type) {
   Endpoint result;
   result.topic = make_topic(participant, channel, type);
-  result.endpoint = Entity(dds_create_writer(participant.get(), result.topic.get(), endpoint_qos(channel).get(), nullptr),
-                           "a writer of " + channel.topic);
+  result.endpoint =
+      Entity(dds_create_writer(participant.get(), result.topic.get(), endpoint_qos(channel).get(), nullptr),
+             "a writer of " + channel.topic);
   return result;
 }
 

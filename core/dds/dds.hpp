@@ -32,8 +32,8 @@ inline constexpr double kLease_s = 2.0;
 
 /// Who may hear what, for how long.
 enum class Delivery {
-  kFrame,      ///< reliable, keep-last 8 per publisher, volatile: tick topics
-  kRoster,     ///< reliable, keep-last 1, transient-local, with a lease: who is here. An instance lives while any writer does
+  kFrame,  ///< reliable, keep-last 8 per publisher, volatile: tick topics
+  kRoster,  ///< reliable, keep-last 1, transient-local, with a lease: who is here. An instance lives while any writer does
   kLog,        ///< reliable, keep-all, transient-local: late readers get everything
   kStatus,     ///< reliable, keep-last 1, transient-local
   kRequest,    ///< reliable, keep-last 16, volatile: what outsiders ask
@@ -92,15 +92,14 @@ Endpoint make_writer(const Participant&, const Channel&, const dds_topic_descrip
 Endpoint make_reader(const Participant&, const Channel&, const dds_topic_descriptor_t*, const dds_listener_t*);
 void write(dds_entity_t writer, const void* sample);
 /// Takes what there is and hands over every sample (valid or, where an instance went away, its key alone).
-void take_all(dds_entity_t reader, void* context, void (*each)(void* context, const void* sample, const dds_sample_info_t&));
+void take_all(dds_entity_t reader, void* context,
+              void (*each)(void* context, const void* sample, const dds_sample_info_t&));
 }  // namespace detail
 
 /// The descriptor that idlc made for T; specialised in core/federation/topics.hpp.
-template <class T>
-const dds_topic_descriptor_t* descriptor();
+template <class T> const dds_topic_descriptor_t* descriptor();
 
-template <class T>
-class Writer {
+template <class T> class Writer {
  public:
   Writer(const Participant& participant, const Channel& channel)
       : endpoint_(detail::make_writer(participant, channel, descriptor<T>())) {}
@@ -113,7 +112,8 @@ class Writer {
   }
   /// Waits until every matched reader has got everything, or `seconds` have passed.
   bool flush(double seconds) const {
-    return dds_wait_for_acks(endpoint_.endpoint.get(), static_cast<dds_duration_t>(seconds * 1e9)) == DDS_RETCODE_OK;
+    return dds_wait_for_acks(endpoint_.endpoint.get(), static_cast<dds_duration_t>(seconds * 1e9)) ==
+           DDS_RETCODE_OK;
   }
 
  private:
@@ -127,8 +127,7 @@ struct SampleState {
 };
 
 /// Calls back on Cyclone's receive thread for every sample. The callback must be short and must not throw.
-template <class T>
-class Reader {
+template <class T> class Reader {
  public:
   using Callback = std::function<void(const T& sample, SampleState state)>;
 
@@ -160,8 +159,9 @@ class Reader {
     auto& receiver = *static_cast<Receiver*>(context);
     static_cast<void>(receiver.turn.load(std::memory_order_acquire));
     detail::take_all(reader, context, [](void* to, const void* sample, const dds_sample_info_t& info) {
-      static_cast<Receiver*>(to)->callback(*static_cast<const T*>(sample),
-                                           SampleState{info.valid_data, info.instance_state == DDS_ALIVE_INSTANCE_STATE});
+      static_cast<Receiver*>(to)->callback(
+          *static_cast<const T*>(sample),
+          SampleState{info.valid_data, info.instance_state == DDS_ALIVE_INSTANCE_STATE});
     });
     receiver.turn.fetch_add(1, std::memory_order_release);
   }

@@ -62,7 +62,8 @@ DomainClaim DomainClaim::exactly(std::uint32_t wanted) {
   }
   const int fd = claim_name(wanted);
   if (fd >= 0) return {wanted, fd};  // outsiders may have joined already: that the port is taken says nothing here
-  throw UserError(fmt::format("--domain: {} is in use by another run; choose another, or leave --domain away", wanted));
+  throw UserError(
+      fmt::format("--domain: {} is in use by another run; choose another, or leave --domain away", wanted));
 }
 
 DomainClaim::~DomainClaim() {

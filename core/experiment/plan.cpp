@@ -30,9 +30,11 @@ proto::Manifest checked(proto::Manifest manifest) {
   require(experiment.tick_cycles() > 0, "tick_cycles is 0", "2^15..2^20");
   require(experiment.duration_s() > 0 && experiment.duration_s() <= 1e6, "duration_s is out of range",
           "above 0, at most 1e6");
-  require(experiment.arena().width_mm() > 0 && experiment.arena().height_mm() > 0, "the arena is empty", "40..1e6 mm");
+  require(experiment.arena().width_mm() > 0 && experiment.arena().height_mm() > 0, "the arena is empty",
+          "40..1e6 mm");
   const auto divides = [](std::uint32_t n) { return n >= 1 && n <= 64; };
-  require(divides(deployment.partition_columns()) && divides(deployment.partition_rows()) && divides(deployment.hosts()),
+  require(divides(deployment.partition_columns()) && divides(deployment.partition_rows()) &&
+              divides(deployment.hosts()),
           "partition_columns, partition_rows or hosts is out of range", "1..64 each");
 
   std::uint64_t robots = 0;
@@ -42,12 +44,13 @@ proto::Manifest checked(proto::Manifest manifest) {
               manifest.heading_rad_size() == manifest.x_mm_size(),
           "the initial poses do not match the " + std::to_string(robots) + " robots of the experiment",
           "one pose per robot");
-  require(manifest.group_program_size() == experiment.robots_size(), "group_program does not match the groups of robots",
-          "one entry per group");
+  require(manifest.group_program_size() == experiment.robots_size(),
+          "group_program does not match the groups of robots", "one entry per group");
   for (const std::uint32_t program : manifest.group_program()) {
-    require(program == kNoProgram || program < static_cast<std::uint32_t>(manifest.program_size()),
-            "group_program names program " + std::to_string(program) + " of " + std::to_string(manifest.program_size()),
-            "an index into program");
+    require(
+        program == kNoProgram || program < static_cast<std::uint32_t>(manifest.program_size()),
+        "group_program names program " + std::to_string(program) + " of " + std::to_string(manifest.program_size()),
+        "an index into program");
   }
   return manifest;
 }
@@ -78,7 +81,9 @@ double gap(double a_min, double a_max, double b_min, double b_max) {
 
 }  // namespace
 
-double Rectangle::distance_mm(double x_mm, double y_mm) const { return distance_mm(Rectangle{x_mm, y_mm, x_mm, y_mm}); }
+double Rectangle::distance_mm(double x_mm, double y_mm) const {
+  return distance_mm(Rectangle{x_mm, y_mm, x_mm, y_mm});
+}
 
 double Rectangle::distance_mm(const Rectangle& other) const {
   const double dx_mm = gap(x_min_mm, x_max_mm, other.x_min_mm, other.x_max_mm);
@@ -86,9 +91,14 @@ double Rectangle::distance_mm(const Rectangle& other) const {
   return __builtin_sqrt(dx_mm * dx_mm + dy_mm * dy_mm);
 }
 
-PartitionGrid::PartitionGrid(double arena_width_mm, double arena_height_mm, std::uint32_t columns, std::uint32_t rows)
-    : columns_(columns), rows_(rows), x0_mm_(-arena_width_mm / 2), y0_mm_(-arena_height_mm / 2),
-      cell_width_mm_(arena_width_mm / columns), cell_height_mm_(arena_height_mm / rows) {
+PartitionGrid::PartitionGrid(double arena_width_mm, double arena_height_mm, std::uint32_t columns,
+                             std::uint32_t rows)
+    : columns_(columns),
+      rows_(rows),
+      x0_mm_(-arena_width_mm / 2),
+      y0_mm_(-arena_height_mm / 2),
+      cell_width_mm_(arena_width_mm / columns),
+      cell_height_mm_(arena_height_mm / rows) {
   KILOTWIN_DEMAND(columns >= 1 && rows >= 1 && arena_width_mm > 0 && arena_height_mm > 0);
   constexpr double infinity = std::numeric_limits<double>::infinity();
   const auto edge = [](double first_mm, double cell_mm, std::uint32_t i, std::uint32_t count) {
@@ -97,9 +107,9 @@ PartitionGrid::PartitionGrid(double arena_width_mm, double arena_height_mm, std:
   rectangles_.reserve(std::size_t{columns} * rows);
   for (std::uint32_t row = 0; row < rows; ++row) {
     for (std::uint32_t column = 0; column < columns; ++column) {
-      rectangles_.push_back({edge(x0_mm_, cell_width_mm_, column, columns), edge(y0_mm_, cell_height_mm_, row, rows),
-                             edge(x0_mm_, cell_width_mm_, column + 1, columns),
-                             edge(y0_mm_, cell_height_mm_, row + 1, rows)});
+      rectangles_.push_back(
+          {edge(x0_mm_, cell_width_mm_, column, columns), edge(y0_mm_, cell_height_mm_, row, rows),
+           edge(x0_mm_, cell_width_mm_, column + 1, columns), edge(y0_mm_, cell_height_mm_, row + 1, rows)});
     }
   }
 }
@@ -109,7 +119,9 @@ PartitionId PartitionGrid::owner(double x_mm, double y_mm) const {
   std::uint32_t column = cell_of((x_mm - x0_mm_) / cell_width_mm_, columns_);
   std::uint32_t row = cell_of((y_mm - y0_mm_) / cell_height_mm_, rows_);
   // The quotient is rounded; the edges decide. The outermost ones are infinite and end the loops.
-  const auto at = [this](std::uint32_t c, std::uint32_t r) -> const Rectangle& { return rectangles_[r * columns_ + c]; };
+  const auto at = [this](std::uint32_t c, std::uint32_t r) -> const Rectangle& {
+    return rectangles_[r * columns_ + c];
+  };
   while (x_mm < at(column, row).x_min_mm) --column;
   while (column + 1 < columns_ && x_mm >= at(column, row).x_max_mm) ++column;
   while (y_mm < at(column, row).y_min_mm) --row;

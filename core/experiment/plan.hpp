@@ -62,10 +62,10 @@ class RunPlan {
 
   const proto::Manifest manifest;
   const TickLength tick_length;
-  const Tick last_tick;          ///< where the run ends
+  const Tick last_tick;  ///< where the run ends
   const PartitionGrid grid;
   const std::uint32_t hosts;
-  const std::uint64_t hash;      ///< of what determines results and topology; alike in all federates of a run
+  const std::uint64_t hash;  ///< of what determines results and topology; alike in all federates of a run
 
   [[nodiscard]] const proto::Experiment& experiment() const { return manifest.experiment(); }
   [[nodiscard]] std::uint64_t run() const { return manifest.run(); }

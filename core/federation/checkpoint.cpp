@@ -65,7 +65,8 @@ proto::CheckpointPart read_part(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   proto::CheckpointPart part;
   if (!stream || !part.ParseFromIstream(&stream) || part.header().format() != kFormat) {
-    throw UserError(fmt::format("{}: not a part of a checkpoint that this program wrote; resume from another one", file.string()));
+    throw UserError(fmt::format("{}: not a part of a checkpoint that this program wrote; resume from another one",
+                                file.string()));
   }
   return part;
 }
@@ -128,7 +129,8 @@ void write_checkpoint_part(const fs::path& run_directory, const RunPlan& plan, T
   }
   std::error_code error;
   fs::rename(unfinished, file, error);
-  if (error) throw RunError(fmt::format("{}: the checkpoint cannot be written: {}", file.string(), error.message()));
+  if (error)
+    throw RunError(fmt::format("{}: the checkpoint cannot be written: {}", file.string(), error.message()));
 }
 
 fs::path newest_checkpoint(const fs::path& run_directory) {
@@ -142,7 +144,8 @@ fs::path newest_checkpoint(const fs::path& run_directory) {
     const std::vector<fs::path> files = part_files(directory);
     if (!files.empty() && read_part(files.front()).header().parts() == files.size()) return directory;
   }
-  throw UserError(fmt::format("{}: no complete checkpoint; run with --checkpoint-every S to get some", run_directory.string()));
+  throw UserError(
+      fmt::format("{}: no complete checkpoint; run with --checkpoint-every S to get some", run_directory.string()));
 }
 
 Checkpoint read_checkpoint(const fs::path& directory, const proto::Manifest& manifest) {
@@ -152,14 +155,17 @@ Checkpoint read_checkpoint(const fs::path& directory, const proto::Manifest& man
     const proto::CheckpointHeader& header = part.header();
     if (checkpoint.parts.empty()) checkpoint.tick = Tick{header.tick()};
     if (header.tick() != checkpoint.tick.count()) {
-      throw UserError(fmt::format("{}: saved at tick {}, the other parts at {}", file.string(), header.tick(), checkpoint.tick.count()));
+      throw UserError(fmt::format("{}: saved at tick {}, the other parts at {}", file.string(), header.tick(),
+                                  checkpoint.tick.count()));
     }
     if (!checkpoint.parts.empty() && header.run() != checkpoint.parts.front().header().run()) {
-      throw UserError(fmt::format("{}: saved by another run than the other parts; resume from another checkpoint", file.string()));
+      throw UserError(fmt::format("{}: saved by another run than the other parts; resume from another checkpoint",
+                                  file.string()));
     }
     if (header.experiment_hash() != resumable_hash(manifest)) {
-      throw UserError(fmt::format("{}: saved by another experiment; only length, division, recording and checkpoints may differ",
-                                  file.string()));
+      throw UserError(fmt::format(
+          "{}: saved by another experiment; only length, division, recording and checkpoints may differ",
+          file.string()));
     }
     checkpoint.parts.push_back(std::move(part));
   }

@@ -28,8 +28,8 @@ struct Checkpoint {
 
 /// Writes `part` (its header is filled in here) of the checkpoint of `tick`, saved by federate `id` of the plan.
 /// Throws RunError.
-void write_checkpoint_part(const std::filesystem::path& run_directory, const RunPlan& plan, Tick tick, FederateId id,
-                           proto::CheckpointPart& part);
+void write_checkpoint_part(const std::filesystem::path& run_directory, const RunPlan& plan, Tick tick,
+                           FederateId id, proto::CheckpointPart& part);
 
 /// Directory of the newest complete checkpoint of a run. Throws UserError where there is none.
 [[nodiscard]] std::filesystem::path newest_checkpoint(const std::filesystem::path& run_directory);

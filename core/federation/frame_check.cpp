@@ -8,7 +8,9 @@ namespace kilotwin {
 namespace {
 
 /// The robots of the host that federate `id` is.
-Share share_of(const RunPlan& plan, FederateId id) { return plan.share(HostId{id.value() - plan.behaviours(HostId{0}).value()}); }
+Share share_of(const RunPlan& plan, FederateId id) {
+  return plan.share(HostId{id.value() - plan.behaviours(HostId{0}).value()});
+}
 
 bool ascending_within(const std::vector<std::uint32_t>& robots, Share share) {
   return std::adjacent_find(robots.begin(), robots.end(), std::greater_equal<>()) == robots.end() &&
@@ -20,35 +22,42 @@ bool all_finite(const std::vector<double>& values) {
 }
 
 bool known(OverheadCommand command) {
-  return command == OverheadCommand::kStop || command == OverheadCommand::kRepeat || command == OverheadCommand::kOnce;
+  return command == OverheadCommand::kStop || command == OverheadCommand::kRepeat ||
+         command == OverheadCommand::kOnce;
 }
 
 }  // namespace
 
 const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, FederateId) {
-  if (!ascending_within(frame.robot, {0, plan.robots()})) return "its robots are not ascending ids of the experiment";
-  if (!all_finite(frame.x_mm) || !all_finite(frame.y_mm) || !all_finite(frame.heading_rad)) return "a pose is not finite";
+  if (!ascending_within(frame.robot, {0, plan.robots()}))
+    return "its robots are not ascending ids of the experiment";
+  if (!all_finite(frame.x_mm) || !all_finite(frame.y_mm) || !all_finite(frame.heading_rad))
+    return "a pose is not finite";
   return nullptr;
 }
 
 const char* defect(const ActuationFrame& frame, const RunPlan& plan, FederateId publisher, FederateId) {
   const Share share = share_of(plan, publisher);
-  if (frame.first_robot != share.first || frame.motor_left.size() != share.size()) return "it is not of the host's share of robots";
+  if (frame.first_robot != share.first || frame.motor_left.size() != share.size())
+    return "it is not of the host's share of robots";
   if (!ascending_within(frame.offer_robot, share)) return "it offers messages of robots that are not the host's";
   return nullptr;
 }
 
 const char* defect(const RadioFrame& frame, const RunPlan& plan, FederateId, FederateId reader) {
   const Share share = share_of(plan, reader);
-  if (frame.first_robot != share.first || frame.kilo_ticks.size() != share.size()) return "it is not for this host's share of robots";
-  if (!ascending_within(frame.ask, share) || !ascending_within(frame.sent, share)) return "it asks robots that are not this host's";
+  if (frame.first_robot != share.first || frame.kilo_ticks.size() != share.size())
+    return "it is not for this host's share of robots";
+  if (!ascending_within(frame.ask, share) || !ascending_within(frame.sent, share))
+    return "it asks robots that are not this host's";
   const std::vector<std::uint32_t>& receivers = frame.reception_robot;
   if (!std::is_sorted(receivers.begin(), receivers.end()) ||
       (!receivers.empty() && !(share.contains(receivers.front()) && share.contains(receivers.back())))) {
     return "its receptions are not ordered, or by robots that are not this host's";
   }
   const auto there = [&](std::uint32_t message) { return message < frame.messages.size(); };
-  if (!std::all_of(frame.reception_message.begin(), frame.reception_message.end(), there)) return "a reception names no message";
+  if (!std::all_of(frame.reception_message.begin(), frame.reception_message.end(), there))
+    return "a reception names no message";
   return nullptr;
 }
 
@@ -65,11 +74,13 @@ const char* defect(const Directive& directive, const RunPlan& plan) {
     case DirectiveKind::kStep:
     case DirectiveKind::kStop:
     case DirectiveKind::kCheckpoint: return nullptr;
-    case DirectiveKind::kOverheadInput: return known(directive.packet.command) ? nullptr : "its packet's command is unknown";
+    case DirectiveKind::kOverheadInput:
+      return known(directive.packet.command) ? nullptr : "its packet's command is unknown";
     case DirectiveKind::kTrackedPose: {
       const TrackedPoseInput& pose = directive.tracked_pose;
       if (pose.robot >= plan.robots() || !plan.tracked(pose.robot)) return "its robot is none that is tracked";
-      if (!std::isfinite(pose.x_mm) || !std::isfinite(pose.y_mm) || !std::isfinite(pose.heading_rad)) return "its pose is not finite";
+      if (!std::isfinite(pose.x_mm) || !std::isfinite(pose.y_mm) || !std::isfinite(pose.heading_rad))
+        return "its pose is not finite";
       return nullptr;
     }
   }

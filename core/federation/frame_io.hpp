@@ -29,8 +29,7 @@ class InputBase {
 };
 
 /// The frames of one topic from a fixed set of publishers.
-template <class Frame>
-class Input : public InputBase {
+template <class Frame> class Input : public InputBase {
  public:
   using Wire = typename WireOf<Frame>::Type;
 
@@ -61,19 +60,22 @@ class Input : public InputBase {
       gate_.hello(publisher);
       return session_.notify();
     }
-    if (!session_.expects_frames()) return;  // from a run in full swing, in which our place is taken: the roster will say so
+    if (!session_.expects_frames())
+      return;  // from a run in full swing, in which our place is taken: the roster will say so
     switch (gate_.arrived(publisher, Tick{wire.tick})) {
       case TickGate::Arrival::kRepeated: return;
       case TickGate::Arrival::kUnexpected:
-        return session_.fail(fmt::format("{}: frame {} of federate {} was not expected", topic_, wire.tick, wire.publisher));
+        return session_.fail(
+            fmt::format("{}: frame {} of federate {} was not expected", topic_, wire.tick, wire.publisher));
       case TickGate::Arrival::kAccepted: break;
     }
     const auto index = static_cast<std::size_t>(gate_.index_of(publisher));
     Frame& frame = rings_[index][static_cast<std::size_t>(wire.tick % kFrameRing)];
-    const char* const wrong =
-        from_wire(wire, frame) ? defect(frame, session_.plan(), publisher, session_.self()) : "its arrays differ in length";
+    const char* const wrong = from_wire(wire, frame) ? defect(frame, session_.plan(), publisher, session_.self())
+                                                     : "its arrays differ in length";
     if (wrong != nullptr) {
-      return session_.fail(fmt::format("{}: frame {} of {} is malformed: {}", topic_, wire.tick, session_.plan().name(publisher), wrong));
+      return session_.fail(fmt::format("{}: frame {} of {} is malformed: {}", topic_, wire.tick,
+                                       session_.plan().name(publisher), wrong));
     }
     session_.mention(wire.directives);
     session_.notify();
@@ -97,12 +99,12 @@ class OutputBase {
   Session& session_;
 };
 
-template <class Frame>
-class Output : public OutputBase {
+template <class Frame> class Output : public OutputBase {
  public:
   using Wire = typename WireOf<Frame>::Type;
 
-  Output(Session& session, const dds::Channel& channel) : OutputBase(session), writer_(session.participant(), channel) {}
+  Output(Session& session, const dds::Channel& channel)
+      : OutputBase(session), writer_(session.participant(), channel) {}
 
   /// To be filled by the engine's emit, then sent with write(). Its arrays are reused from tick to tick.
   Frame frame;

@@ -19,9 +19,17 @@ struct BodyFrame {
   std::vector<std::uint32_t> robot;
   std::vector<double> x_mm, y_mm, heading_rad;
 
-  void clear() { robot.clear(); x_mm.clear(); y_mm.clear(); heading_rad.clear(); }
+  void clear() {
+    robot.clear();
+    x_mm.clear();
+    y_mm.clear();
+    heading_rad.clear();
+  }
   void add(std::uint32_t id, double x, double y, double heading) {
-    robot.push_back(id); x_mm.push_back(x); y_mm.push_back(y); heading_rad.push_back(heading);
+    robot.push_back(id);
+    x_mm.push_back(x);
+    y_mm.push_back(y);
+    heading_rad.push_back(heading);
   }
 };
 

@@ -8,7 +8,7 @@ volatile std::sig_atomic_t received_signal = 0;
 }  // namespace
 
 void catch_interrupts() {
-  struct sigaction action{};
+  struct sigaction action {};
   action.sa_handler = [](int signal) { received_signal = signal; };
   sigemptyset(&action.sa_mask);
   sigaction(SIGTERM, &action, nullptr);

@@ -16,8 +16,7 @@ class Pace {
 
   /// Returns when `ticks` ticks may have passed, or the process is interrupted. `wall_s()`: how long the run has taken for
   /// them so far, pauses excluded. `idle()` is called about every 100 ms meanwhile.
-  template <class Wall, class Idle>
-  void hold(std::int64_t ticks, Wall wall_s, Idle idle) const {
+  template <class Wall, class Idle> void hold(std::int64_t ticks, Wall wall_s, Idle idle) const {
     if (factor_ <= 0) return;
     while (interrupted() == 0) {
       const double ahead_s = static_cast<double>(ticks) * tick_s_ / factor_ - wall_s();

@@ -22,7 +22,7 @@ struct PairCount {
 /// How far a run is.
 struct RunProgress {
   Tick now;
-  double wall_s = 0;  ///< since the first tick, pauses excluded
+  double wall_s = 0;                     ///< since the first tick, pauses excluded
   std::uint64_t sent = 0, received = 0;  ///< messages since the start
   std::uint32_t robots_failed = 0;
   bool paused = false;
@@ -34,7 +34,8 @@ class RunObserver {
  public:
   virtual ~RunObserver() = default;
   /// The complete state of a tick: bodies of all partitions, actuation of all hosts. `last`: the run ends here.
-  virtual void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>, bool last) = 0;
+  virtual void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>,
+                     bool last) = 0;
   /// H(tick).
   virtual void hash(Tick, std::uint64_t chain) = 0;
   /// A stamped input was announced.
@@ -48,7 +49,7 @@ enum class Work : std::uint8_t { kBehaviours, kPhysics, kRadio, kStation, kExcha
 
 /// What a run adds up to.
 struct RunTotals {
-  Tick first, last;            ///< last: where it ended, which may be before the experiment's end
+  Tick first, last;  ///< last: where it ended, which may be before the experiment's end
   std::uint64_t state_hash = 0;
   double wall_s = 0;           ///< from the first to the last tick, pauses excluded
   double cpu_s = 0;            ///< of all processes

@@ -10,7 +10,8 @@ RunSchedule::RunSchedule(Tick first, Tick last, std::int64_t checkpoint_every)
 void RunSchedule::add(const Directive& directive) {
   if (directive.sequence_number < known_) return;
   out_of_order_.emplace(directive.sequence_number, directive);
-  for (auto next = out_of_order_.begin(); next != out_of_order_.end() && next->first == known_; next = out_of_order_.erase(next)) {
+  for (auto next = out_of_order_.begin(); next != out_of_order_.end() && next->first == known_;
+       next = out_of_order_.erase(next)) {
     pending_.push_back(next->second);
     ++known_;
   }
@@ -30,8 +31,14 @@ void RunSchedule::apply_until(Tick now) {
     const Directive& directive = pending_.front();
     switch (directive.kind) {
       case DirectiveKind::kPause: paused_ = true; break;
-      case DirectiveKind::kContinue: paused_ = false; pause_again_ = Tick{-1}; break;
-      case DirectiveKind::kStep: paused_ = false; pause_again_ = directive.tick + std::max<std::int64_t>(1, directive.steps); break;
+      case DirectiveKind::kContinue:
+        paused_ = false;
+        pause_again_ = Tick{-1};
+        break;
+      case DirectiveKind::kStep:
+        paused_ = false;
+        pause_again_ = directive.tick + std::max<std::int64_t>(1, directive.steps);
+        break;
       case DirectiveKind::kStop:
         stopped_ = stopped_ || now < last_;
         last_ = std::min(last_, now);
@@ -68,8 +75,14 @@ Directive Ingress::stamp(Tick now, Directive directive) {
   directive.sequence_number = next_sequence_number_++;
   directive.tick = tick;
   switch (directive.kind) {
-    case DirectiveKind::kPause: pausing_ = true; steps_end_ = Tick{-1}; break;
-    case DirectiveKind::kContinue: pausing_ = false; steps_end_ = Tick{-1}; break;
+    case DirectiveKind::kPause:
+      pausing_ = true;
+      steps_end_ = Tick{-1};
+      break;
+    case DirectiveKind::kContinue:
+      pausing_ = false;
+      steps_end_ = Tick{-1};
+      break;
     case DirectiveKind::kStep:
       pausing_ = false;
       steps_end_ = tick + std::max<std::int64_t>(1, directive.steps);

@@ -20,7 +20,15 @@ namespace kilotwin {
 /// How far ahead of the ingress' own tick a directive takes effect, ticks.
 inline constexpr std::int64_t kAnnounceAhead = 4;
 
-enum class DirectiveKind : std::uint8_t { kPause, kContinue, kStep, kStop, kCheckpoint, kOverheadInput, kTrackedPose };
+enum class DirectiveKind : std::uint8_t {
+  kPause,
+  kContinue,
+  kStep,
+  kStop,
+  kCheckpoint,
+  kOverheadInput,
+  kTrackedPose
+};
 
 struct Directive {
   std::uint64_t sequence_number = 0;
@@ -40,7 +48,9 @@ class RunSchedule {
   /// Takes a directive, in any order of arrival, repeated or not.
   void add(const Directive&);
   /// A frame mentions that `count` directives exist.
-  void mention(std::uint64_t count) { if (count > mentioned_) mentioned_ = count; }
+  void mention(std::uint64_t count) {
+    if (count > mentioned_) mentioned_ = count;
+  }
   /// How many directives are known without a gap: what own frames mention.
   [[nodiscard]] std::uint32_t known() const { return known_; }
 
@@ -64,16 +74,16 @@ class RunSchedule {
   Tick first_, last_;
   std::int64_t checkpoint_every_;
   std::uint32_t known_ = 0;
-  std::deque<Directive> pending_;                  // known, in sequence, and not applied yet
+  std::deque<Directive> pending_;  // known, in sequence, and not applied yet
   std::map<std::uint64_t, Directive> out_of_order_;
   std::uint64_t mentioned_ = 0;
   bool paused_ = false;
   bool stopped_ = false;
-  Tick pause_again_{-1};                           // after a kStep; negative: never
-  Tick inputs_tick_{-1};                           // of the two lists below
+  Tick pause_again_{-1};  // after a kStep; negative: never
+  Tick inputs_tick_{-1};  // of the two lists below
   std::vector<OverheadPacket> overhead_inputs_;
   std::vector<TrackedPoseInput> tracked_poses_;
-  std::vector<Tick> checkpoints_;                  // asked for
+  std::vector<Tick> checkpoints_;  // asked for
 };
 
 /// Stamps what comes from outside: the one place where a tick is chosen for it.
@@ -84,9 +94,9 @@ class Ingress {
 
  private:
   std::uint64_t next_sequence_number_ = 0;
-  Tick latest_{0};             // no later directive takes effect before an earlier one
-  bool pausing_ = false;       // the run stands, or will stand, at latest_: what comes now takes effect there
-  Tick steps_end_{-1};         // where a kStep pauses again
+  Tick latest_{0};        // no later directive takes effect before an earlier one
+  bool pausing_ = false;  // the run stands, or will stand, at latest_: what comes now takes effect there
+  Tick steps_end_{-1};    // where a kStep pauses again
 };
 
 }  // namespace kilotwin

@@ -91,14 +91,15 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
   if (member.publisher >= peers_.size()) return;
   Peer& peer = peers_[member.publisher];
   if (state.valid) {
-    const bool is_other_self = member.publisher == self_.value() &&
-                               (member.process != static_cast<std::uint32_t>(getpid()) || member.host != host_name());
+    const bool is_other_self =
+        member.publisher == self_.value() &&
+        (member.process != static_cast<std::uint32_t>(getpid()) || member.host != host_name());
     if (is_other_self) {
       // Who came later leaves; who is at work does not mind.
       if (phase_ != kilotwin_wire_ARRIVING) return;
       is_double_ = failure_is_user_error_ = true;
-      return fail(fmt::format("{} of this run was started already (process {} on {}); start each service once", plan_.name(self_),
-                              member.process, member.host));
+      return fail(fmt::format("{} of this run was started already (process {} on {}); start each service once",
+                              plan_.name(self_), member.process, member.host));
     }
     peer.here = true;
     peer.phase = std::max(peer.phase, member.phase);
@@ -108,14 +109,15 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
     }
     if (member.phase == kilotwin_wire_FAILED) {
       const std::string_view failure = member.failure;
-      return fail(failure.starts_with(kLeft) ? std::string(failure.substr(kLeft.size())) : fmt::format("{}: {}", member.name, failure));
+      return fail(failure.starts_with(kLeft) ? std::string(failure.substr(kLeft.size()))
+                                             : fmt::format("{}: {}", member.name, failure));
     }
   }
   const bool was_alive = peer.alive;
   peer.alive = state.alive;
   if (was_alive && !peer.alive && peer.phase != kilotwin_wire_FINISHED && !finished_) {
-    return fail(fmt::format("{} was lost (it ended, or did not answer for {} s)", plan_.name(FederateId{member.publisher}),
-                            dds::kLease_s));
+    return fail(fmt::format("{} was lost (it ended, or did not answer for {} s)",
+                            plan_.name(FederateId{member.publisher}), dds::kLease_s));
   }
   notify();
 }
@@ -123,7 +125,8 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
 void Session::on_directive(const WireDirective& wire) {
   const std::lock_guard lock(mutex_);
   Directive directive;
-  const char* const wrong = from_wire(wire, directive) ? defect(directive, plan_) : "its packet is of another length";
+  const char* const wrong =
+      from_wire(wire, directive) ? defect(directive, plan_) : "its packet is of another length";
   if (wrong != nullptr) return fail(fmt::format("directive {} is malformed: {}", wire.sequence_number, wrong));
   schedule_.add(directive);
   notify();
@@ -171,7 +174,8 @@ void Session::complain(Clock::duration waited, const std::string& whom) {
   if (now < next_complaint_) return;
   next_complaint_ = now + kComplainEvery;
   waiting_for_ = whom;
-  say(fmt::format("{} has waited {:.0f} s for {}", plan_.name(self_), std::chrono::duration<double>(waited).count(), whom));
+  say(fmt::format("{} has waited {:.0f} s for {}", plan_.name(self_), std::chrono::duration<double>(waited).count(),
+                  whom));
 }
 
 bool Session::hears_all() const {
@@ -182,8 +186,10 @@ bool Session::hears_all() const {
 std::string Session::awaited_in_assembly() const {
   std::vector<FederateId> absent, silent, deaf;
   for (std::uint32_t i = 0; i < peers_.size(); ++i) {
-    if (!peers_[i].here) absent.push_back(FederateId{i});
-    else if (peers_[i].phase == kilotwin_wire_ARRIVING) deaf.push_back(FederateId{i});
+    if (!peers_[i].here)
+      absent.push_back(FederateId{i});
+    else if (peers_[i].phase == kilotwin_wire_ARRIVING)
+      deaf.push_back(FederateId{i});
   }
   if (!absent.empty()) return names(absent) + " to arrive";
   for (InputBase* input : inputs_) {
@@ -210,7 +216,8 @@ void Session::assemble(Federate& federate) {
       lock.lock();
     }
     check();
-    if (interrupted() != 0) throw RunError(fmt::format("stopped by signal {} before the first tick", interrupted()));
+    if (interrupted() != 0)
+      throw RunError(fmt::format("stopped by signal {} before the first tick", interrupted()));
     const std::string whom = awaited_in_assembly();
     if (whom.empty()) break;
     complain(Clock::now() - since, whom);
@@ -238,7 +245,8 @@ std::string Session::awaited(Tick now, Clock::duration waited) const {
     for (const FederateId id : input->gate().missing(now)) late.push_back(id);
   }
   for (const FederateId id : late) {
-    if (!peers_[id.value()].alive) throw RunError(fmt::format("{} left without its frame of tick {}", plan_.name(id), now.count()));
+    if (!peers_[id.value()].alive)
+      throw RunError(fmt::format("{} left without its frame of tick {}", plan_.name(id), now.count()));
   }
   if (!late.empty()) return names(late) + fmt::format(" (tick {})", now.count());
   if (!peers_[plan_.station().value()].alive || waited > kDirectivePatience) {
@@ -255,7 +263,8 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
   for (;;) {
     check();
     RunSchedule::Verdict verdict = RunSchedule::Verdict::kAwaitDirective;
-    const bool ready = std::all_of(inputs_.begin(), inputs_.end(), [now](InputBase* input) { return input->gate().ready(now); });
+    const bool ready =
+        std::all_of(inputs_.begin(), inputs_.end(), [now](InputBase* input) { return input->gate().ready(now); });
     if (ready) verdict = schedule_.verdict(now);
     known_ = schedule_.known();
     note_pause(verdict == RunSchedule::Verdict::kPaused);
@@ -269,7 +278,8 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
     } else if (at >= since + kComplainAfter) {
       const std::string whom = awaited(now, at - since);
       // The station ends an interrupted run in order, but not one that has come to a halt.
-      if (interrupted() != 0) throw RunError(fmt::format("stopped by signal {} while it waited for {}", interrupted(), whom));
+      if (interrupted() != 0)
+        throw RunError(fmt::format("stopped by signal {} while it waited for {}", interrupted(), whom));
       complain(at - since, whom);
     }
     if (at < next_idle_) {
@@ -311,7 +321,9 @@ void Session::write_ledger(Federate& federate, bool last) {
   ledger.wait_ns = wait_ns_;
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  const auto ns = [](const timeval& t) { return static_cast<std::uint64_t>(t.tv_sec) * 1'000'000'000u + static_cast<std::uint64_t>(t.tv_usec) * 1000u; };
+  const auto ns = [](const timeval& t) {
+    return static_cast<std::uint64_t>(t.tv_sec) * 1'000'000'000u + static_cast<std::uint64_t>(t.tv_usec) * 1000u;
+  };
   ledger.cpu_ns = ns(usage.ru_utime) + ns(usage.ru_stime);
   ledger.peak_memory_kib = static_cast<std::uint32_t>(usage.ru_maxrss);
   federate.count(ledger, last);

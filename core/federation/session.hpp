@@ -82,8 +82,8 @@ class Session {
   void notify() { arrived_.notify_one(); }
   /// Nobody steps before all hear all, this federate included.
   [[nodiscard]] bool expects_frames() const { return phase_ != kilotwin_wire_ARRIVING; }  ///< with the mutex held
-  void mention(std::uint64_t directives) { schedule_.mention(directives); }  ///< with the mutex held
-  void fail(const std::string& line);                                          ///< with the mutex held
+  void mention(std::uint64_t directives) { schedule_.mention(directives); }               ///< with the mutex held
+  void fail(const std::string& line);                                                     ///< with the mutex held
   /// The ingress announces a directive (station only, own thread).
   void announce(const Directive& directive);
 
@@ -118,11 +118,11 @@ class Session {
   Tick now_;
   std::mutex mutex_;
   std::condition_variable arrived_;
-  RunSchedule schedule_;          // log and mentions guarded by mutex_
-  std::uint32_t known_ = 0;       // schedule_.known() as of the last look: what own frames mention
+  RunSchedule schedule_;     // log and mentions guarded by mutex_
+  std::uint32_t known_ = 0;  // schedule_.known() as of the last look: what own frames mention
   std::string failure_;
   bool failure_is_user_error_ = false;
-  bool is_double_ = false;        // another process is this federate already
+  bool is_double_ = false;  // another process is this federate already
   kilotwin_wire_MemberPhase phase_ = kilotwin_wire_ARRIVING;
   std::string waiting_for_;
   std::chrono::steady_clock::time_point next_complaint_, next_idle_;
@@ -130,8 +130,8 @@ class Session {
   std::vector<class InputBase*> inputs_;
   std::vector<class OutputBase*> outputs_;
   std::vector<std::uint64_t> hash_parts_;
-  Tick hash_first_;               // of hash_parts_
-  Tick saved_{-1};                // the last checkpoint
+  Tick hash_first_;  // of hash_parts_
+  Tick saved_{-1};   // the last checkpoint
   std::uint64_t step_ns_ = 0, exchange_ns_ = 0, wait_ns_ = 0, paused_ns_ = 0;
   std::optional<std::chrono::steady_clock::time_point> started_, ended_, paused_since_;
   bool finished_ = false;

@@ -5,7 +5,10 @@
 namespace kilotwin {
 
 TickGate::TickGate(std::vector<FederateId> publishers, Tick first)
-    : publishers_(std::move(publishers)), newest_(publishers_.size(), first - 1), reading_(first), hello_(publishers_.size(), false) {
+    : publishers_(std::move(publishers)),
+      newest_(publishers_.size(), first - 1),
+      reading_(first),
+      hello_(publishers_.size(), false) {
   std::sort(publishers_.begin(), publishers_.end());
 }
 

@@ -30,7 +30,9 @@ using dds::Delivery;
 /// Poses of the robots that a partition owns, to the radio and the station.
 inline Channel bodies() { return {"kilotwin/bodies", Delivery::kFrame, ""}; }
 /// Bodies near the border, to the partition `to` alone.
-inline Channel ghosts(std::uint32_t to) { return {"kilotwin/ghosts", Delivery::kFrame, "to." + std::to_string(to)}; }
+inline Channel ghosts(std::uint32_t to) {
+  return {"kilotwin/ghosts", Delivery::kFrame, "to." + std::to_string(to)};
+}
 inline Channel actuation() { return {"kilotwin/actuation", Delivery::kFrame, ""}; }
 /// What the radio tells the host `to`.
 inline Channel radio(std::uint32_t to) { return {"kilotwin/radio", Delivery::kFrame, "to." + std::to_string(to)}; }
@@ -49,18 +51,38 @@ inline Channel robots() { return {"kilotwin/robots", Delivery::kTelemetry, ""}; 
 }  // namespace topics
 
 namespace dds {
-template <> inline const dds_topic_descriptor_t* descriptor<WireBodyFrame>() { return &kilotwin_wire_BodyFrame_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<WireActuationFrame>() { return &kilotwin_wire_ActuationFrame_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<WireRadioFrame>() { return &kilotwin_wire_RadioFrame_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<WireOverheadFrame>() { return &kilotwin_wire_OverheadFrame_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireBodyFrame>() {
+  return &kilotwin_wire_BodyFrame_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<WireActuationFrame>() {
+  return &kilotwin_wire_ActuationFrame_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<WireRadioFrame>() {
+  return &kilotwin_wire_RadioFrame_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<WireOverheadFrame>() {
+  return &kilotwin_wire_OverheadFrame_desc;
+}
 template <> inline const dds_topic_descriptor_t* descriptor<WireMember>() { return &kilotwin_wire_Member_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<WireDirective>() { return &kilotwin_wire_Directive_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireDirective>() {
+  return &kilotwin_wire_Directive_desc;
+}
 template <> inline const dds_topic_descriptor_t* descriptor<WireLedger>() { return &kilotwin_wire_Ledger_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<PublicRunControl>() { return &kilotwin_open_RunControl_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<PublicOverheadPacket>() { return &kilotwin_open_OverheadPacket_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackedPose>() { return &kilotwin_open_TrackedPose_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<PublicRunStatus>() { return &kilotwin_open_RunStatus_desc; }
-template <> inline const dds_topic_descriptor_t* descriptor<PublicRobotState>() { return &kilotwin_open_RobotState_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRunControl>() {
+  return &kilotwin_open_RunControl_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicOverheadPacket>() {
+  return &kilotwin_open_OverheadPacket_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackedPose>() {
+  return &kilotwin_open_TrackedPose_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRunStatus>() {
+  return &kilotwin_open_RunStatus_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRobotState>() {
+  return &kilotwin_open_RobotState_desc;
+}
 }  // namespace dds
 
 }  // namespace kilotwin

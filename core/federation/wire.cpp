@@ -9,8 +9,7 @@ static_assert(sizeof(IrMessage) == 10);
 static_assert(sizeof(OverheadPacket) == 11 && alignof(OverheadPacket) == 1);
 
 // A wire sequence that borrows `count` elements; Cyclone reads it and neither writes nor frees.
-template <class Sequence, class T>
-Sequence borrow(const T* data, std::size_t count) {
+template <class Sequence, class T> Sequence borrow(const T* data, std::size_t count) {
   using Element = std::remove_pointer_t<decltype(Sequence::_buffer)>;
   Sequence sequence{};
   sequence._length = sequence._maximum = static_cast<std::uint32_t>(count * sizeof(T) / sizeof(Element));
@@ -19,18 +18,17 @@ Sequence borrow(const T* data, std::size_t count) {
   return sequence;
 }
 
-template <class Sequence, class T>
-Sequence borrow(const std::vector<T>& values) {
+template <class Sequence, class T> Sequence borrow(const std::vector<T>& values) {
   return borrow<Sequence>(values.data(), values.size());
 }
 
 // Copies a wire sequence into a vector of T; false where it does not hold whole Ts.
-template <class Sequence, class T>
-bool copy(const Sequence& sequence, std::vector<T>& values) {
+template <class Sequence, class T> bool copy(const Sequence& sequence, std::vector<T>& values) {
   constexpr std::size_t per_value = sizeof(T) / sizeof(*Sequence::_buffer);
   if (sequence._length % per_value != 0) return false;
   values.resize(sequence._length / per_value);
-  if (sequence._length != 0) std::memcpy(static_cast<void*>(values.data()), sequence._buffer, values.size() * sizeof(T));
+  if (sequence._length != 0)
+    std::memcpy(static_cast<void*>(values.data()), sequence._buffer, values.size() * sizeof(T));
   return true;
 }
 
@@ -40,8 +38,7 @@ using UShorts = kilotwin_wire_UShorts;
 using ULongs = kilotwin_wire_ULongs;
 using Doubles = kilotwin_wire_Doubles;
 
-template <class Wire>
-Wire headed(const WireHeader& header, Tick tick) {
+template <class Wire> Wire headed(const WireHeader& header, Tick tick) {
   Wire wire{};
   wire.publisher = header.publisher;
   wire.run = header.run;

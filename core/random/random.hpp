@@ -12,13 +12,13 @@ namespace kilotwin {
 
 /// One name per purpose; a value, once released, keeps its meaning.
 enum class Stream : std::uint16_t {
-  kWheelBias = 1,        ///< draw 0 left, 1 right; tick 0
-  kWheelFactor = 2,      ///< draw 0 left, 1 right; per tick
-  kLayout = 3,           ///< placement of robots
-  kOscillator = 4,       ///< draw 0 rate, 1 phase; tick 0
-  kBackOff = 5,          ///< per aborted attempt
-  kReception = 6,        ///< loss at a receiver
-  kProgram = 7,          ///< what a robot's program calls hardware noise (rand_hard, readings)
+  kWheelBias = 1,    ///< draw 0 left, 1 right; tick 0
+  kWheelFactor = 2,  ///< draw 0 left, 1 right; per tick
+  kLayout = 3,       ///< placement of robots
+  kOscillator = 4,   ///< draw 0 rate, 1 phase; tick 0
+  kBackOff = 5,      ///< per aborted attempt
+  kReception = 6,    ///< loss at a receiver
+  kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
 };
 
 /// Philox4x32 with 10 rounds. Multipliers and key increments are those of the paper (the increments: the golden ratio and
@@ -45,7 +45,8 @@ enum class Stream : std::uint16_t {
 /// both for the price of one.
 class Random {
  public:
-  explicit Random(std::uint64_t seed) : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)} {}
+  explicit Random(std::uint64_t seed)
+      : key_{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)} {}
 
   /// 128 random bits: those of draws 2b and 2b+1. b < 2^16.
   [[nodiscard]] std::array<std::uint32_t, 4> block(Stream stream, std::uint32_t entity, Tick tick,
@@ -53,7 +54,8 @@ class Random {
     KILOTWIN_DEMAND(b < 0x10000u);
     const auto count = static_cast<std::uint64_t>(tick.count());
     return philox4x32({static_cast<std::uint32_t>(count), entity, static_cast<std::uint32_t>(stream) << 16 | b,
-                       static_cast<std::uint32_t>(count >> 32)}, key_);
+                       static_cast<std::uint32_t>(count >> 32)},
+                      key_);
   }
   /// 64 random bits. draw < 2^17.
   [[nodiscard]] std::uint64_t bits(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t draw) const {

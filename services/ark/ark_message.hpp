@@ -28,7 +28,8 @@ inline constexpr std::uint16_t kArkNobody = 1023;
   for (std::size_t i = 0; i < kArkSlots; ++i) {
     const ArkMessage message = i < messages.size() ? messages[i] : ArkMessage{kArkNobody, 0, 0};
     packed[3 * i] = static_cast<std::uint8_t>(message.id >> 2);
-    packed[3 * i + 1] = static_cast<std::uint8_t>((message.id & 3) << 6 | (message.type & 15) << 2 | (message.payload >> 8 & 3));
+    packed[3 * i + 1] =
+        static_cast<std::uint8_t>((message.id & 3) << 6 | (message.type & 15) << 2 | (message.payload >> 8 & 3));
     packed[3 * i + 2] = static_cast<std::uint8_t>(message.payload & 255);
   }
   return packed;

@@ -14,11 +14,17 @@ constexpr double kFarthest_mm = 1e7;
 Outside::Outside(const RunPlan& plan, const dds::Participant& participant)
     : plan_(plan),
       run_control_(participant, topics::run_control(),
-                   [this](const PublicRunControl& sample, dds::SampleState state) { if (state.valid) on_run_control(sample); }),
+                   [this](const PublicRunControl& sample, dds::SampleState state) {
+                     if (state.valid) on_run_control(sample);
+                   }),
       overhead_packets_(participant, topics::overhead_packets(),
-                        [this](const PublicOverheadPacket& sample, dds::SampleState state) { if (state.valid) on_overhead_packet(sample); }),
+                        [this](const PublicOverheadPacket& sample, dds::SampleState state) {
+                          if (state.valid) on_overhead_packet(sample);
+                        }),
       tracked_poses_(participant, topics::tracked_poses(),
-                     [this](const PublicTrackedPose& sample, dds::SampleState state) { if (state.valid) on_tracked_pose(sample); }) {}
+                     [this](const PublicTrackedPose& sample, dds::SampleState state) {
+                       if (state.valid) on_tracked_pose(sample);
+                     }) {}
 
 std::vector<Directive> Outside::take() {
   const std::lock_guard lock(mutex_);
@@ -39,7 +45,10 @@ void Outside::on_run_control(const PublicRunControl& sample) {
   switch (sample.command) {
     case kilotwin_open_PAUSE_RUN: directive.kind = DirectiveKind::kPause; break;
     case kilotwin_open_CONTINUE_RUN: directive.kind = DirectiveKind::kContinue; break;
-    case kilotwin_open_STEP_RUN: directive.kind = DirectiveKind::kStep; directive.steps = sample.steps; break;
+    case kilotwin_open_STEP_RUN:
+      directive.kind = DirectiveKind::kStep;
+      directive.steps = sample.steps;
+      break;
     case kilotwin_open_STOP_RUN: directive.kind = DirectiveKind::kStop; break;
     case kilotwin_open_CHECKPOINT_RUN: directive.kind = DirectiveKind::kCheckpoint; break;
     default: return;
@@ -65,7 +74,8 @@ void Outside::on_overhead_packet(const PublicOverheadPacket& sample) {
 void Outside::on_tracked_pose(const PublicTrackedPose& sample) {
   const std::lock_guard lock(mutex_);
   // False where a value is not finite, too.
-  const bool sound = std::abs(sample.x_mm) <= kFarthest_mm && std::abs(sample.y_mm) <= kFarthest_mm && std::abs(sample.heading_rad) < 100;
+  const bool sound = std::abs(sample.x_mm) <= kFarthest_mm && std::abs(sample.y_mm) <= kFarthest_mm &&
+                     std::abs(sample.heading_rad) < 100;
   if (!ours(sample.run) || !sound || sample.robot >= plan_.robots() || !plan_.tracked(sample.robot)) return;
   Directive directive;
   directive.kind = DirectiveKind::kTrackedPose;

@@ -20,7 +20,8 @@ RunBooks::RunBooks(const RunPlan& plan, const dds::Participant& participant, Tic
 bool RunBooks::fits(const WireLedger& ledger, const Account& account) const {
   const std::uint32_t pairs = ledger.pair_receiver._length;
   const auto all_robots = [&](const auto& sequence) {
-    return std::all_of(sequence._buffer, sequence._buffer + sequence._length, [this](std::uint32_t robot) { return robot < plan_.robots(); });
+    return std::all_of(sequence._buffer, sequence._buffer + sequence._length,
+                       [this](std::uint32_t robot) { return robot < plan_.robots(); });
   };
   return !account.last && ledger.first_tick == account.next.count() &&
          ledger.hash_parts._length <= plan_.last_tick + 1 - account.next && ledger.pair_sender._length == pairs &&
@@ -31,7 +32,8 @@ void RunBooks::on_ledger(const WireLedger& ledger) {
   const std::lock_guard lock(mutex_);
   Account& account = accounts_[ledger.publisher];
   if (!fits(ledger, account)) {
-    if (malformed_.empty()) malformed_ = fmt::format("{}: a ledger does not fit the run", plan_.name(FederateId{ledger.publisher}));
+    if (malformed_.empty())
+      malformed_ = fmt::format("{}: a ledger does not fit the run", plan_.name(FederateId{ledger.publisher}));
     return;
   }
   account.next = account.next + ledger.hash_parts._length;
@@ -46,11 +48,13 @@ void RunBooks::on_ledger(const WireLedger& ledger) {
   account.received = ledger.received;
   account.collided = ledger.collided;
   for (std::uint32_t i = 0; i < ledger.pair_count._length; ++i) {
-    account.pairs.push_back({ledger.pair_receiver._buffer[i], ledger.pair_sender._buffer[i], ledger.pair_count._buffer[i]});
+    account.pairs.push_back(
+        {ledger.pair_receiver._buffer[i], ledger.pair_sender._buffer[i], ledger.pair_count._buffer[i]});
   }
   if (ledger.hash_parts._length != 0) {
-    parts_.emplace_back(Tick{ledger.first_tick}, std::vector<std::uint64_t>(ledger.hash_parts._buffer,
-                                                                            ledger.hash_parts._buffer + ledger.hash_parts._length));
+    parts_.emplace_back(Tick{ledger.first_tick},
+                        std::vector<std::uint64_t>(ledger.hash_parts._buffer,
+                                                   ledger.hash_parts._buffer + ledger.hash_parts._length));
   }
 }
 

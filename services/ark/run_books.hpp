@@ -42,11 +42,11 @@ class RunBooks {
   [[nodiscard]] Work work_of(std::uint32_t federate) const;
 
   const RunPlan& plan_;
-  HashBook hashes_;                   // own thread
-  std::mutex mutex_;                  // guards what follows
+  HashBook hashes_;   // own thread
+  std::mutex mutex_;  // guards what follows
   std::vector<Account> accounts_;
   std::vector<std::pair<Tick, std::vector<std::uint64_t>>> parts_;  // not yet in hashes_
-  std::string malformed_;             // the first ledger that was
+  std::string malformed_;                                           // the first ledger that was
   dds::Reader<WireLedger> reader_;
 };
 

@@ -23,7 +23,8 @@ double robot_interval_s(std::uint32_t robots) {
 
 std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
   std::uint64_t word = 0;
-  for (std::size_t i = from; i < std::min(from + 8, packet.message.size()); ++i) word = word << 8 | packet.message[i];
+  for (std::size_t i = from; i < std::min(from + 8, packet.message.size()); ++i)
+    word = word << 8 | packet.message[i];
   return word;
 }
 
@@ -103,10 +104,13 @@ void StationEngine::emit(OverheadFrame& frame) const {
 }
 
 std::uint64_t StationEngine::hash_part() const {
-  std::uint64_t sum = entity_hash(HashDomain::kStation, 0, {next_robot_, static_cast<std::uint64_t>(next_packet_.count()),
-                                                            static_cast<std::uint64_t>(repeating_), packets_.size()});
+  std::uint64_t sum = entity_hash(HashDomain::kStation, 0,
+                                  {next_robot_, static_cast<std::uint64_t>(next_packet_.count()),
+                                   static_cast<std::uint64_t>(repeating_), packets_.size()});
   for (std::uint32_t i = 0; i < packets_.size(); ++i) {
-    sum += entity_hash(HashDomain::kStation, 1 + i, {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0), word_of(packets_[i], 8)});
+    sum += entity_hash(
+        HashDomain::kStation, 1 + i,
+        {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0), word_of(packets_[i], 8)});
   }
   return sum;
 }
@@ -125,7 +129,8 @@ void StationEngine::save(proto::StationState& state) const {
 void StationEngine::load(Tick tick, std::span<const proto::StationState* const> parts) {
   constexpr std::size_t kPacketOctets = 11;
   if (parts.size() != 1 || static_cast<std::size_t>(parts[0]->served_tick_size()) != served_.size() ||
-      static_cast<std::size_t>(parts[0]->turns_size()) != turns_.size() || parts[0]->packets().size() % kPacketOctets != 0) {
+      static_cast<std::size_t>(parts[0]->turns_size()) != turns_.size() ||
+      parts[0]->packets().size() % kPacketOctets != 0) {
     throw RunError("the checkpoint holds no station's state of this experiment");
   }
   const proto::StationState& state = *parts[0];
@@ -136,7 +141,8 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
   for (std::size_t from = 0; from < state.packets().size(); from += kPacketOctets) {
     OverheadPacket packet;
     packet.command = static_cast<OverheadCommand>(state.packets()[from]);
-    std::copy_n(state.packets().begin() + static_cast<std::ptrdiff_t>(from) + 1, packet.message.size(), packet.message.begin());
+    std::copy_n(state.packets().begin() + static_cast<std::ptrdiff_t>(from) + 1, packet.message.size(),
+                packet.message.begin());
     packets_.push_back(packet);
   }
   for (std::size_t i = 0; i < served_.size(); ++i) {

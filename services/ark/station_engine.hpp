@@ -44,20 +44,20 @@ class StationEngine {
   void see(const Inputs& inputs);
 
   const RunPlan& plan_;
-  const Tick start_ends_;                  ///< when RUN gives way to STOP
-  const std::int64_t packet_ticks_;        ///< at least, between two packets
-  const std::int64_t robot_ticks_;         ///< at least, between two messages to one robot
+  const Tick start_ends_;            ///< when RUN gives way to STOP
+  const std::int64_t packet_ticks_;  ///< at least, between two packets
+  const std::int64_t robot_ticks_;   ///< at least, between two messages to one robot
   std::vector<std::unique_ptr<VirtualEnvironment>> environments_;
 
   Tick now_;
-  std::vector<OverheadPacket> packets_;    ///< of now_
-  std::uint32_t next_robot_ = 0;           ///< whose turn it is: robots are served in a circle
+  std::vector<OverheadPacket> packets_;  ///< of now_
+  std::uint32_t next_robot_ = 0;         ///< whose turn it is: robots are served in a circle
   Tick next_packet_{0};
-  bool repeating_ = true;                  ///< the controller repeats an own packet
-  std::vector<Tick> served_;               ///< per robot, where there are environments: when it was told a reading last
-  std::vector<std::uint32_t> turns_;       ///< per robot: how often; environments answer by turns
+  bool repeating_ = true;             ///< the controller repeats an own packet
+  std::vector<Tick> served_;          ///< per robot, where there are environments: when it was told a reading last
+  std::vector<std::uint32_t> turns_;  ///< per robot: how often; environments answer by turns
 
-  std::vector<TrackedRobot> seen_;         ///< of the step at hand
+  std::vector<TrackedRobot> seen_;  ///< of the step at hand
 };
 
 }  // namespace kilotwin::ark

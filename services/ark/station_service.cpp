@@ -26,7 +26,8 @@ constexpr auto kRobotsPeriod = std::chrono::milliseconds(100);
 
 class StationFederate : public Federate {
  public:
-  StationFederate(Session& session, StationEngine& engine, RunBooks& books, RunObserver& observer, const ServiceContext& context)
+  StationFederate(Session& session, StationEngine& engine, RunBooks& books, RunObserver& observer,
+                  const ServiceContext& context)
       : session_(session),
         context_(context),
         engine_(engine),
@@ -46,7 +47,8 @@ class StationFederate : public Federate {
   }
 
   void inputs_complete(Tick now, bool last) override {
-    pace_.hold(now - session_.first(), [this] { return session_.wall_s(); }, [this] { idle(); });
+    pace_.hold(
+        now - session_.first(), [this] { return session_.wall_s(); }, [this] { idle(); });
     const auto begun = Clock::now();
     observer_.state(now, bodies_.at(now), actuation_.at(now), last);
     recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());
@@ -72,9 +74,9 @@ class StationFederate : public Federate {
     settle();
     const RunProgress progress = this->progress();
     observer_.idle(progress);
-    publish_status(!session_.started()  ? kilotwin_open_STARTING
-                   : progress.paused ? kilotwin_open_PAUSED
-                                     : kilotwin_open_RUNNING,
+    publish_status(!session_.started() ? kilotwin_open_STARTING
+                   : progress.paused   ? kilotwin_open_PAUSED
+                                       : kilotwin_open_RUNNING,
                    progress);
   }
 
@@ -90,8 +92,8 @@ class StationFederate : public Federate {
   [[nodiscard]] RunProgress progress() {
     RunTotals totals;
     books_.fill(totals);
-    return {session_.now(), session_.wall_s(), totals.sent, totals.received, totals.robots_failed, session_.paused(),
-            session_.waiting_for()};
+    return {session_.now(),       session_.wall_s(), totals.sent,           totals.received,
+            totals.robots_failed, session_.paused(), session_.waiting_for()};
   }
 
   void publish_status(kilotwin_open_RunPhase phase, const RunProgress& progress) {
@@ -190,7 +192,8 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   if (context.resumed) engine.load(context.first(), context.resumed->station());
   Session session(plan, plan.station(), context.transport, context.first());
   // The chain of a resumed run goes on from H at the checkpoint: its first own sum is that of the tick after.
-  RunBooks books(plan, session.participant(), first_hashed(context.first()), context.resumed ? context.resumed->hash_chain() : 0);
+  RunBooks books(plan, session.participant(), first_hashed(context.first()),
+                 context.resumed ? context.resumed->hash_chain() : 0);
   StationFederate federate(session, engine, books, observer, context);
   RunTotals totals;
   try {
@@ -217,8 +220,9 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   totals.stopped_early = session.schedule().stopped_early();
   if (totals.failure.empty() && federate.was_interrupted()) totals.failure = "interrupted";
   if (totals.failure.empty() && totals.last != session.schedule().last()) {
-    totals.failure = fmt::format("the state hash is known up to tick {} of {} only: a service left without its last count",
-                                 totals.last.count(), session.schedule().last().count());
+    totals.failure =
+        fmt::format("the state hash is known up to tick {} of {} only: a service left without its last count",
+                    totals.last.count(), session.schedule().last().count());
   }
   RunProgress progress = federate.progress();
   progress.waiting_for = totals.failure;

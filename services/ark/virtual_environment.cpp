@@ -19,7 +19,8 @@ class HubEnvironment : public VirtualEnvironment {
     const double bearing_deg = (kt_atan2(y_mm, x_mm) - robot.p_WR.heading_rad) * (180 / kPi);
     auto degrees = static_cast<int>(kt_floor(bearing_deg + 0.5)) % 360;
     if (degrees < 0) degrees += 360;
-    return {static_cast<std::uint16_t>(robot.robot), static_cast<std::uint8_t>(inside ? 1 : 0), static_cast<std::uint16_t>(degrees)};
+    return {static_cast<std::uint16_t>(robot.robot), static_cast<std::uint8_t>(inside ? 1 : 0),
+            static_cast<std::uint16_t>(degrees)};
   }
 
  private:

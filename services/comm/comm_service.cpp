@@ -27,7 +27,9 @@ class CommFederate : public Federate {
     }
   }
 
-  void step(Tick from) override { engine_.step(from, {bodies_.at(from), actuation_.at(from), *overhead_.at(from)[0]}); }
+  void step(Tick from) override {
+    engine_.step(from, {bodies_.at(from), actuation_.at(from), *overhead_.at(from)[0]});
+  }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 

@@ -11,7 +11,8 @@ void Bodies::clear() {
   awake.clear();
 }
 
-void Bodies::add(std::uint32_t id, double x, double y, double heading, std::uint8_t is_tracked, std::uint8_t is_awake) {
+void Bodies::add(std::uint32_t id, double x, double y, double heading, std::uint8_t is_tracked,
+                 std::uint8_t is_awake) {
   robot.push_back(id);
   x_mm.push_back(x);
   y_mm.push_back(y);

@@ -27,9 +27,9 @@ class CandidateList {
   [[nodiscard]] bool is_good(const Bodies&) const;
 
   CellList cells_;
-  std::vector<std::uint32_t> robot_;     ///< when it was built
-  std::vector<double> x_mm_, y_mm_;      ///< when it was built
-  std::vector<std::uint32_t> first_;     ///< per body: where its candidates begin; one more entry at the end
+  std::vector<std::uint32_t> robot_;  ///< when it was built
+  std::vector<double> x_mm_, y_mm_;   ///< when it was built
+  std::vector<std::uint32_t> first_;  ///< per body: where its candidates begin; one more entry at the end
   std::vector<std::uint32_t> others_, found_;
 };
 

@@ -13,7 +13,8 @@ constexpr double kFar_mm = 1e7;
 
 }  // namespace
 
-CellList::CellList(double cutoff_mm) : cutoff_square_mm2_(cutoff_mm * cutoff_mm), cells_per_mm_(1 / (cutoff_mm * kCellSlack)) {}
+CellList::CellList(double cutoff_mm)
+    : cutoff_square_mm2_(cutoff_mm * cutoff_mm), cells_per_mm_(1 / (cutoff_mm * kCellSlack)) {}
 
 inline std::uint32_t CellList::coordinate(double mm) const {
   const double clamped = std::min(std::max(mm, -kFar_mm), kFar_mm);
@@ -69,7 +70,8 @@ std::size_t CellList::find(double x_mm, double y_mm, std::uint32_t self, std::ve
     if (!folded) {
       scan(first_[line + column - 1], first_[line + column + 2]);
     } else {
-      for (std::uint32_t c = column - 1; c != column + 2; ++c) scan(first_[line + (c & mask_)], first_[line + (c & mask_) + 1]);
+      for (std::uint32_t c = column - 1; c != column + 2; ++c)
+        scan(first_[line + (c & mask_)], first_[line + (c & mask_) + 1]);
     }
   }
   // Few entries, almost in order: insertion.

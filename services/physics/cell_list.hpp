@@ -25,10 +25,10 @@ class CellList {
 
   double cutoff_square_mm2_, cells_per_mm_;
   std::uint32_t side_bits_ = 0, mask_ = 0;
-  std::vector<std::uint32_t> first_;        ///< per cell: where its bodies begin; one more entry at the end
-  std::vector<std::uint32_t> cell_of_;      ///< per body
-  std::vector<std::uint32_t> body_;         ///< sorted
-  std::vector<double> x_mm_, y_mm_;         ///< sorted
+  std::vector<std::uint32_t> first_;    ///< per cell: where its bodies begin; one more entry at the end
+  std::vector<std::uint32_t> cell_of_;  ///< per body
+  std::vector<std::uint32_t> body_;     ///< sorted
+  std::vector<double> x_mm_, y_mm_;     ///< sorted
 };
 
 }  // namespace kilotwin::physics

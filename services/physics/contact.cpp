@@ -35,7 +35,8 @@ bool ContactLimits::outside(double x_mm, double y_mm) const {
 ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
     : limits_(plan, drive), sub_step_part_(1.0 / limits_.sub_steps), candidates_(limits_.cutoff_mm) {}
 
-bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& own, const std::vector<Duties>& duties) {
+bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& own,
+                         const std::vector<Duties>& duties) {
   const auto count = static_cast<std::uint32_t>(bodies.size());
   driven_.resize(count);
   active_.resize(count);
@@ -177,8 +178,8 @@ void ContactSolver::fill_contacts(const Bodies& bodies, const ContactPass::Batch
   }
 }
 
-void ContactSolver::fill_coincident(ContactPass::Contact& contact, const Lanes& distance_mm, const std::uint32_t* here,
-                                    const std::uint32_t* there) {
+void ContactSolver::fill_coincident(ContactPass::Contact& contact, const Lanes& distance_mm,
+                                    const std::uint32_t* here, const std::uint32_t* there) {
   double distance[kLanes], gap[kLanes], normal_x[kLanes], normal_y[kLanes];
   store(distance_mm, distance);
   store(contact.gap_mm, gap);
@@ -238,7 +239,8 @@ void ContactSolver::move_alone(Bodies& bodies, std::uint32_t i, double way_x_mm,
   if (bodies.tracked[i] != 0) return;
   const double inwards_mm = limits_.sub_steps * limits_.separation_mm;
   const auto held = [inwards_mm](double from_mm, double to_mm, double limit_mm) {
-    return std::max(std::min(-limit_mm, from_mm + inwards_mm), std::min(std::max(limit_mm, from_mm - inwards_mm), to_mm));
+    return std::max(std::min(-limit_mm, from_mm + inwards_mm),
+                    std::min(std::max(limit_mm, from_mm - inwards_mm), to_mm));
   };
   place(bodies, i, held(bodies.x_mm[i], bodies.x_mm[i] + way_x_mm, limits_.x_limit_mm),
         held(bodies.y_mm[i], bodies.y_mm[i] + way_y_mm, limits_.y_limit_mm));

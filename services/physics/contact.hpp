@@ -41,10 +41,11 @@ struct ContactLimits {
   ContactLimits(const RunPlan&, const DriveModel&);
 
   std::uint32_t sub_steps;
-  double separation_mm;   ///< of an overlapping body per sub-step
-  double stride_mm;       ///< no body moves further in a sub-step
-  double cutoff_mm;       ///< bodies whose centres are farther apart at the tick's start cannot meet within the tick
-  double margin_mm;       ///< from a partition's rectangle: all that can matter within a tick, and where bodies can get to
+  double separation_mm;  ///< of an overlapping body per sub-step
+  double stride_mm;      ///< no body moves further in a sub-step
+  double cutoff_mm;      ///< bodies whose centres are farther apart at the tick's start cannot meet within the tick
+  double
+      margin_mm;  ///< from a partition's rectangle: all that can matter within a tick, and where bodies can get to
   double x_limit_mm, y_limit_mm;  ///< the centre of a disc stays within +-limit
 
   [[nodiscard]] bool outside(double x_mm, double y_mm) const;
@@ -60,7 +61,9 @@ class ContactSolver {
   /// Whether the drive of this driven body can matter.
   [[nodiscard]] bool asks_drive(std::uint32_t body) const { return hops_[body] != kOutOfReach; }
   /// The part of a tick over which its drive is to be integrated: a sub-step where it may meet others, else all of it.
-  [[nodiscard]] double drive_part(std::uint32_t body) const { return seat_of_[body] != ContactPass::kStill ? sub_step_part_ : 1; }
+  [[nodiscard]] double drive_part(std::uint32_t body) const {
+    return seat_of_[body] != ContactPass::kStill ? sub_step_part_ : 1;
+  }
   /// Moves the own bodies by one tick and advances their headings; others keep their poses. Own bodies that moved, overlap
   /// or are outside the arena are awake afterwards.
   void move(Bodies&, const Drives&);
@@ -92,15 +95,15 @@ class ContactSolver {
   double sub_step_part_;
   CandidateList candidates_;
   ContactPass pass_;
-  std::vector<Mover> movers_, seated_;     ///< by hops; by seats
-  std::vector<std::uint32_t> others_;      ///< the contacts of the movers
+  std::vector<Mover> movers_, seated_;  ///< by hops; by seats
+  std::vector<std::uint32_t> others_;   ///< the contacts of the movers
   std::size_t other_count_ = 0;
   bool any_overlap_ = false, has_others_ = false;
   // Per body.
-  std::vector<std::uint8_t> hops_;         ///< by contacts from the own bodies, or kOutOfReach
+  std::vector<std::uint8_t> hops_;  ///< by contacts from the own bodies, or kOutOfReach
   std::vector<std::uint8_t> driven_, active_, overlaps_;
   std::vector<ContactPass::Seat> seat_of_;
-  std::vector<std::uint32_t> reached_;     ///< others' bodies, by hops
+  std::vector<std::uint32_t> reached_;  ///< others' bodies, by hops
 };
 
 }  // namespace kilotwin::physics

@@ -45,11 +45,11 @@ void ContactPass::run(const ContactLimits& limits, bool with_overlaps) {
   }
 }
 
-template <bool kWithOverlaps>
-void ContactPass::sub_step(const ContactLimits& limits, std::uint32_t step) {
+template <bool kWithOverlaps> void ContactPass::sub_step(const ContactLimits& limits, std::uint32_t step) {
   for (std::size_t b = 1; b < batches_.size(); ++b) {
     if (step < batches_[b].passes) {
-      move<kWithOverlaps>(limits, batches_[b], now_.data() + b * kColumns * kLanes, after_.data() + b * kColumns * kLanes);
+      move<kWithOverlaps>(limits, batches_[b], now_.data() + b * kColumns * kLanes,
+                          after_.data() + b * kColumns * kLanes);
     }
   }
 }
@@ -72,7 +72,8 @@ inline void ContactPass::move(const ContactLimits& limits, const Batch& batch, c
                                   c.normal_y * (gather(motion + kLanes, c.other) - shift_y));
     const Lanes half = larger(a_half * gap, zero);
     // Along the normal: what the neighbour drives, negative towards this body, and what this body drives.
-    const Lanes theirs = c.normal_x * gather(motion + 2 * kLanes, c.other) + c.normal_y * gather(motion + 3 * kLanes, c.other);
+    const Lanes theirs =
+        c.normal_x * gather(motion + 2 * kLanes, c.other) + c.normal_y * gather(motion + 3 * kLanes, c.other);
     const Lanes mine = c.normal_x * drive_x + c.normal_y * drive_y;
     // It pushes where it drives faster than both the gap and this body's own retreat allow.
     Lanes push = larger(smaller(-half, mine) - theirs, zero);

@@ -20,16 +20,16 @@ class ContactPass {
 
   /// One contact of each body of a batch.
   struct Contact {
-    Lanes normal_x, normal_y;      ///< from the body to the other
-    Lanes gap_mm;                  ///< at the tick's start; huge where a lane has no such contact
+    Lanes normal_x, normal_y;  ///< from the body to the other
+    Lanes gap_mm;              ///< at the tick's start; huge where a lane has no such contact
     Seat other[kLanes];
   };
   struct Batch {
-    double x_mm[kLanes] = {}, y_mm[kLanes] = {};            ///< at the tick's start
-    double cos_turn[kLanes] = {}, sin_turn[kLanes] = {};    ///< of a sub-step; read where the body is driven
+    double x_mm[kLanes] = {}, y_mm[kLanes] = {};          ///< at the tick's start
+    double cos_turn[kLanes] = {}, sin_turn[kLanes] = {};  ///< of a sub-step; read where the body is driven
     std::uint32_t first_contact = 0, contacts = 0;
-    std::uint32_t passes = 0;      ///< it is moved in the first so many sub-steps
-    bool near_wall = false;        ///< any of its bodies
+    std::uint32_t passes = 0;  ///< it is moved in the first so many sub-steps
+    bool near_wall = false;    ///< any of its bodies
   };
 
   /// Starts a tick with batch 0 alone, in which nothing moves.
@@ -59,16 +59,14 @@ class ContactPass {
   /// Of the motion of a batch: displacement since the tick's start, x, y; by the drive alone in the coming sub-step, x, y.
   static constexpr std::size_t kColumns = 4;
 
-  template <bool kWithOverlaps>
-  void sub_step(const ContactLimits&, std::uint32_t step);
-  template <bool kWithOverlaps>
-  void move(const ContactLimits&, const Batch&, const double* now, double* after);
+  template <bool kWithOverlaps> void sub_step(const ContactLimits&, std::uint32_t step);
+  template <bool kWithOverlaps> void move(const ContactLimits&, const Batch&, const double* now, double* after);
 
   std::vector<Batch> batches_;
   std::vector<Contact> contacts_;
   std::size_t contact_count_ = 0;
   std::vector<double> now_, after_;
-  std::vector<Lanes> limit_mm_;            ///< of the contacts of the batch at hand
+  std::vector<Lanes> limit_mm_;  ///< of the contacts of the batch at hand
 };
 
 }  // namespace kilotwin::physics

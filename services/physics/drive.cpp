@@ -67,8 +67,8 @@ DriveModel::DriveModel(const RunPlan& plan)
   const proto::Motion& motion = plan.experiment().motion();
   for (std::size_t duty = 0; duty < 256; ++duty) {
     const auto d = static_cast<double>(duty);
-    straight_mm_s_[duty] =
-        motion.straight_speed_mm_s() * std::min(kTopDutyRatio, d / static_cast<double>(motion.calibrated_straight_duty()));
+    straight_mm_s_[duty] = motion.straight_speed_mm_s() *
+                           std::min(kTopDutyRatio, d / static_cast<double>(motion.calibrated_straight_duty()));
     turn_mm_s_[duty] =
         motion.turn_speed_mm_s() * std::min(kTopDutyRatio, d / static_cast<double>(motion.calibrated_turn_duty()));
   }
@@ -76,7 +76,8 @@ DriveModel::DriveModel(const RunPlan& plan)
     for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) {
       if (plan.tracked(robot)) continue;
       const auto draw = [&](std::uint32_t which) {
-        return motion.bias_mean_mm_s() + motion.bias_sd_mm_s() * random_.normal(Stream::kWheelBias, robot, Tick{0}, which);
+        return motion.bias_mean_mm_s() +
+               motion.bias_sd_mm_s() * random_.normal(Stream::kWheelBias, robot, Tick{0}, which);
       };
       bias_[robot] = {draw(0), draw(1)};
     }
@@ -100,8 +101,8 @@ DriveModel::DriveModel(const RunPlan& plan)
   top_speed_mm_s_ = top_nominal + top_bias * widest + kTopNormal * factor_sd_ * top_any * widest;
 }
 
-void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Tick from, Duties duties, double heading_rad,
-                     double part) const {
+void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Tick from, Duties duties,
+                     double heading_rad, double part) const {
   const bool both = duties.left != 0 && duties.right != 0;
   const std::array<double, 256>& nominal = both ? straight_mm_s_ : turn_mm_s_;
   double left = nominal[duties.right] + bias_[robot].left_mm_s;

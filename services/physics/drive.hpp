@@ -33,13 +33,13 @@ struct Duties {
 
 /// Driven robots of one tick, structure of arrays, ascending. Kept between ticks for its memory alone.
 struct Drives {
-  std::vector<std::uint32_t> body;               ///< index of the body
-  std::vector<double> left_mm_s, right_mm_s;     ///< actual speeds of the wheels
-  std::vector<double> heading_rad;               ///< at the start of the tick
-  std::vector<double> part;                      ///< of the tick, over which the next four are meant
-  std::vector<double> x_mm, y_mm;                ///< displacement of the centre, if nothing is in the way
+  std::vector<std::uint32_t> body;            ///< index of the body
+  std::vector<double> left_mm_s, right_mm_s;  ///< actual speeds of the wheels
+  std::vector<double> heading_rad;            ///< at the start of the tick
+  std::vector<double> part;                   ///< of the tick, over which the next four are meant
+  std::vector<double> x_mm, y_mm;             ///< displacement of the centre, if nothing is in the way
   std::vector<double> cos_turn, sin_turn;
-  std::vector<double> turn_rad;                  ///< over the whole tick
+  std::vector<double> turn_rad;  ///< over the whole tick
   std::size_t count = 0;
 
   void reserve(std::size_t bodies);
@@ -51,7 +51,8 @@ class DriveModel {
   explicit DriveModel(const RunPlan&);
 
   /// Adds a robot to the drives; either duty is above 0. The left motor drives the right-hand wheel.
-  void add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, Duties, double heading_rad, double part) const;
+  void add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, Duties, double heading_rad,
+           double part) const;
   /// Fills what follows from the wheels' speeds and the headings.
   void integrate(Drives&) const;
 
@@ -67,9 +68,9 @@ class DriveModel {
 
   Random random_;
   double tick_s_, wheel_base_mm_, axle_offset_mm_;
-  double factor_sd_ = 0;                                    ///< of f in one tick; 0: f = 1
-  std::array<double, 256> straight_mm_s_{}, turn_mm_s_{};   ///< nominal speed of a wheel by its motor's duty
-  std::vector<Bias> bias_;                                  ///< per robot
+  double factor_sd_ = 0;                                   ///< of f in one tick; 0: f = 1
+  std::array<double, 256> straight_mm_s_{}, turn_mm_s_{};  ///< nominal speed of a wheel by its motor's duty
+  std::vector<Bias> bias_;                                 ///< per robot
   double top_speed_mm_s_ = 0;
 };
 

@@ -17,9 +17,9 @@ namespace kilotwin::physics {
 
 /// What a step from tick k reads; every frame is of tick k.
 struct Inputs {
-  std::span<const BodyFrame* const> ghosts;             ///< one per neighbour, in any order
-  std::span<const ActuationFrame* const> actuation;     ///< in any order; a robot that no frame covers is at rest
-  std::span<const TrackedPoseInput> tracked;            ///< alike for all partitions; the last of a robot counts
+  std::span<const BodyFrame* const> ghosts;          ///< one per neighbour, in any order
+  std::span<const ActuationFrame* const> actuation;  ///< in any order; a robot that no frame covers is at rest
+  std::span<const TrackedPoseInput> tracked;         ///< alike for all partitions; the last of a robot counts
 };
 
 /// Ownership. The owner of a robot in the step from tick k is the partition whose rectangle holds its pose at k. It

@@ -25,8 +25,7 @@ class Merge {
   [[nodiscard]] std::size_t size() const { return size_; }
 
   /// Calls take(robot, entry) in ascending order and is empty afterwards.
-  template <class Take>
-  void drain(Take&& take) {
+  template <class Take> void drain(Take&& take) {
     for (std::uint32_t word = 0; word < marks_.size(); ++word) {
       for (std::uint64_t left = marks_[word]; left != 0; left &= left - 1) {
         const std::uint32_t robot = word * 64 + static_cast<std::uint32_t>(std::countr_zero(left));

@@ -14,7 +14,8 @@ std::vector<FederateId> federates_of(const RunPlan& plan, const std::vector<Part
 
 class PhysicsFederate : public Federate {
  public:
-  PhysicsFederate(Session& session, PartitionId partition, std::unique_ptr<Engine> engine, const ServiceContext& context)
+  PhysicsFederate(Session& session, PartitionId partition, std::unique_ptr<Engine> engine,
+                  const ServiceContext& context)
       : session_(session),
         context_(context),
         partition_(partition),

@@ -87,8 +87,9 @@ void PlanarEngine::gather(std::span<const BodyFrame* const> ghosts) {
       const double x = frame.x_mm[from.index], y = frame.y_mm[from.index];
       while (before < previous_.size() && previous_.robot[before] < robot) ++before;
       // One that the last step did not move here, and that is where it was, was not moved anywhere.
-      const bool asleep = before < previous_.size() && previous_.robot[before] == robot && previous_.awake[before] == 0 &&
-                          previous_.x_mm[before] == x && previous_.y_mm[before] == y;
+      const bool asleep = before < previous_.size() && previous_.robot[before] == robot &&
+                          previous_.awake[before] == 0 && previous_.x_mm[before] == x &&
+                          previous_.y_mm[before] == y;
       known_.x_mm[n] = x;
       known_.y_mm[n] = y;
       known_.heading_rad[n] = frame.heading_rad[from.index];
@@ -104,9 +105,8 @@ void PlanarEngine::gather(std::span<const BodyFrame* const> ghosts) {
 
 void PlanarEngine::read_motors(Tick from, std::span<const ActuationFrame* const> frames) {
   frames_.assign(frames.begin(), frames.end());
-  std::sort(frames_.begin(), frames_.end(), [](const ActuationFrame* a, const ActuationFrame* b) {
-    return a->first_robot < b->first_robot;
-  });
+  std::sort(frames_.begin(), frames_.end(),
+            [](const ActuationFrame* a, const ActuationFrame* b) { return a->first_robot < b->first_robot; });
   for (const ActuationFrame* frame : frames_) KILOTWIN_DEMAND(frame->tick == from);
   duties_.assign(known_.size(), Duties{});
   std::size_t body = 0;
@@ -158,8 +158,8 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   for (std::size_t i = 0; i < listed_.size(); ++i) {
     const double x = listed_.x_mm[i], y = listed_.y_mm[i];
     // Most lie far off; the distance itself takes a root.
-    if (x < rectangle.x_min_mm - margin_mm || x > rectangle.x_max_mm + margin_mm || y < rectangle.y_min_mm - margin_mm ||
-        y > rectangle.y_max_mm + margin_mm) {
+    if (x < rectangle.x_min_mm - margin_mm || x > rectangle.x_max_mm + margin_mm ||
+        y < rectangle.y_min_mm - margin_mm || y > rectangle.y_max_mm + margin_mm) {
       continue;
     }
     if (listed_.tracked[i] == 0 && rectangle.distance_mm(x, y) <= margin_mm) {
@@ -197,13 +197,15 @@ void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> p
     for (int i = 0; i < size; ++i) {
       const std::uint32_t robot = part->robot(i);
       if (robot >= robots_) throw RunError("checkpoint: physics: unknown robot " + std::to_string(robot));
-      if (seen[robot]++ != 0) throw RunError("checkpoint: physics: robot " + std::to_string(robot) + " occurs twice");
+      if (seen[robot]++ != 0)
+        throw RunError("checkpoint: physics: robot " + std::to_string(robot) + " occurs twice");
       const bool tracked = !is_tracked_.empty() && is_tracked_[robot] != 0;
       all.add(robot, part->x_mm(i), part->y_mm(i), part->heading_rad(i), tracked, 1);
     }
   }
   if (all.size() != robots_) {
-    throw RunError("checkpoint: physics: holds " + std::to_string(all.size()) + " of " + std::to_string(robots_) + " robots");
+    throw RunError("checkpoint: physics: holds " + std::to_string(all.size()) + " of " + std::to_string(robots_) +
+                   " robots");
   }
   for (std::uint32_t i = 0; i < all.size(); ++i) merge_.add(all.robot[i], {0, i});
   listed_.clear();

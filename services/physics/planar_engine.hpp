@@ -46,21 +46,21 @@ class PlanarEngine final : public Engine {
   PartitionId partition_;
   Rectangle rectangle_;
   std::uint32_t robots_;
-  std::vector<std::uint8_t> is_tracked_;   ///< per robot; empty where there is none
+  std::vector<std::uint8_t> is_tracked_;  ///< per robot; empty where there is none
   DriveModel drive_;
   ContactSolver contact_;
   std::vector<PartitionId> neighbours_;
 
   Tick tick_;
   Bodies listed_;
-  Bodies tracked_;                         ///< all tracked robots, wherever they are
+  Bodies tracked_;  ///< all tracked robots, wherever they are
 
   // Within a step.
-  Bodies known_, previous_;                ///< of the present step and of the one before
-  std::vector<std::uint8_t> own_;          ///< per known body, by its pose before the step; empty with one partition
+  Bodies known_, previous_;        ///< of the present step and of the one before
+  std::vector<std::uint8_t> own_;  ///< per known body, by its pose before the step; empty with one partition
   Merge merge_;
   std::vector<const ActuationFrame*> frames_;
-  std::vector<Duties> duties_;             ///< per known body
+  std::vector<Duties> duties_;  ///< per known body
   Drives drives_;
 };
 

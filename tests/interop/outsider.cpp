@@ -1,6 +1,8 @@
 // Joins a run of tests/interop/outsider.txtpb with eProsima Fast DDS. Of Kilotwin it has idl/public.idl alone: names of topics and
 // QoS are those of docs/join.md, written down once more.
 // Usage: outsider DOMAIN. Prints a line for each thing proven. Exit status 0: all were; 1: one was not; 2: bad arguments.
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -9,8 +11,6 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
 
 #include <algorithm>
 #include <charconv>
@@ -44,8 +44,7 @@ constexpr std::uint32_t kIndices = 121;
 constexpr char kClient[] = "fast dds";
 
 /// What a factory of Fast DDS gives, or an exception that names it.
-template <class T>
-T* made(T* entity, const std::string& what) {
+template <class T> T* made(T* entity, const std::string& what) {
   if (entity == nullptr) throw std::runtime_error("Fast DDS cannot make " + what);
   return entity;
 }
@@ -71,7 +70,8 @@ fast::DomainParticipantQos loopback_only() {
 class Participant {
  public:
   explicit Participant(std::uint32_t domain)
-      : participant_(made(factory().create_participant(domain, loopback_only()), "a participant in domain " + std::to_string(domain))),
+      : participant_(made(factory().create_participant(domain, loopback_only()),
+                          "a participant in domain " + std::to_string(domain))),
         publisher_(made(participant_->create_publisher(fast::PUBLISHER_QOS_DEFAULT), "a publisher")),
         subscriber_(made(participant_->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT), "a subscriber")) {}
   Participant(const Participant&) = delete;
@@ -80,8 +80,7 @@ class Participant {
     factory().delete_participant(participant_);
   }
 
-  template <class PubSubType>
-  fast::DataWriter* writer(const std::string& name) {
+  template <class PubSubType> fast::DataWriter* writer(const std::string& name) {
     fast::DataWriterQos qos = fast::DATAWRITER_QOS_DEFAULT;
     qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
     qos.history().kind = fast::KEEP_LAST_HISTORY_QOS;
@@ -92,7 +91,8 @@ class Participant {
 
   /// The last sample of each instance is kept.
   template <class PubSubType>
-  fast::DataReader* reader(const std::string& name, fast::ReliabilityQosPolicyKind reliability, fast::DurabilityQosPolicyKind durability) {
+  fast::DataReader* reader(const std::string& name, fast::ReliabilityQosPolicyKind reliability,
+                           fast::DurabilityQosPolicyKind durability) {
     fast::DataReaderQos qos = fast::DATAREADER_QOS_DEFAULT;
     qos.reliability().kind = reliability;
     qos.durability().kind = durability;
@@ -104,10 +104,10 @@ class Participant {
  private:
   static fast::DomainParticipantFactory& factory() { return *fast::DomainParticipantFactory::get_instance(); }
 
-  template <class PubSubType>
-  fast::Topic* topic(const std::string& name) {
+  template <class PubSubType> fast::Topic* topic(const std::string& name) {
     const fast::TypeSupport type(new PubSubType);
-    if (type.register_type(participant_) != ReturnCode_t::RETCODE_OK) throw std::runtime_error("Fast DDS cannot register the type of " + name);
+    if (type.register_type(participant_) != ReturnCode_t::RETCODE_OK)
+      throw std::runtime_error("Fast DDS cannot register the type of " + name);
     return made(participant_->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT), "topic " + name);
   }
 
@@ -124,22 +124,26 @@ class Outsider {
         control_(participant_.writer<RunControlPubSubType>("kilotwin/run_control")),
         overhead_(participant_.writer<OverheadPacketPubSubType>("kilotwin/overhead_packets")),
         tracker_(participant_.writer<TrackedPosePubSubType>("kilotwin/tracked_poses")),
-        status_reader_(participant_.reader<RunStatusPubSubType>("kilotwin/run_status", fast::RELIABLE_RELIABILITY_QOS,
-                                                                fast::TRANSIENT_LOCAL_DURABILITY_QOS)),
-        robots_reader_(participant_.reader<RobotStatePubSubType>("kilotwin/robots", fast::BEST_EFFORT_RELIABILITY_QOS,
-                                                                 fast::VOLATILE_DURABILITY_QOS)) {}
+        status_reader_(participant_.reader<RunStatusPubSubType>(
+            "kilotwin/run_status", fast::RELIABLE_RELIABILITY_QOS, fast::TRANSIENT_LOCAL_DURABILITY_QOS)),
+        robots_reader_(participant_.reader<RobotStatePubSubType>(
+            "kilotwin/robots", fast::BEST_EFFORT_RELIABILITY_QOS, fast::VOLATILE_DURABILITY_QOS)) {}
 
   void watch() {
     await("kilotwin/run_status to say that the run is RUNNING", 60s, [this] { return status_.phase() == RUNNING; });
-    proven("reads kilotwin/run_status: run %016llx, \"%s\", %u robots, tick %lld of %lld", static_cast<unsigned long long>(status_.run()),
-           status_.name().c_str(), status_.robots(), static_cast<long long>(status_.tick()), static_cast<long long>(status_.last_tick()));
-    demand(status_.robots() == kRobots && status_.run() != 0 && status_.note().size() == 0, "the status is not that of outsider.txtpb");
+    proven("reads kilotwin/run_status: run %016llx, \"%s\", %u robots, tick %lld of %lld",
+           static_cast<unsigned long long>(status_.run()), status_.name().c_str(), status_.robots(),
+           static_cast<long long>(status_.tick()), static_cast<long long>(status_.last_tick()));
+    demand(status_.robots() == kRobots && status_.run() != 0 && status_.note().size() == 0,
+           "the status is not that of outsider.txtpb");
 
     await("kilotwin/robots to show every robot", 10s, [this] { return robots_.size() == kRobots; });
     const RobotState& real = robots_.at(kTrackedRobot);
-    demand(real.run() == status_.run() && real.x_mm() == 300 && real.y_mm() == 300 && real.heading_rad() == 0 && real.led() == 0,
+    demand(real.run() == status_.run() && real.x_mm() == 300 && real.y_mm() == 300 && real.heading_rad() == 0 &&
+               real.led() == 0,
            "the tracked robot does not stand where the experiment puts it");
-    proven("reads kilotwin/robots: all %u, robot %u at (%g, %g) mm", kRobots, kTrackedRobot, real.x_mm(), real.y_mm());
+    proven("reads kilotwin/robots: all %u, robot %u at (%g, %g) mm", kRobots, kTrackedRobot, real.x_mm(),
+           real.y_mm());
   }
 
   void pause_and_step() {
@@ -148,12 +152,15 @@ class Outsider {
     proven("PAUSE: the run stands at tick %lld", static_cast<long long>(at));
 
     constexpr std::uint32_t kSteps = 5;
-    ask(STEP_RUN, kSteps, "PAUSED five ticks on", [&] { return status_.phase() == PAUSED && status_.tick() >= at + kSteps; });
+    ask(STEP_RUN, kSteps, "PAUSED five ticks on",
+        [&] { return status_.phase() == PAUSED && status_.tick() >= at + kSteps; });
     const std::int64_t then = stands_still();
-    demand(then == at + kSteps, "after STEP 5 the run stands at tick " + std::to_string(then) + " instead of " + std::to_string(at + kSteps));
+    demand(then == at + kSteps, "after STEP 5 the run stands at tick " + std::to_string(then) + " instead of " +
+                                    std::to_string(at + kSteps));
     proven("STEP 5, said %d times: the run stands at tick %lld", repetitions_, static_cast<long long>(then));
 
-    ask(CONTINUE_RUN, 0, "RUNNING, and ten ticks on", [&] { return status_.phase() == RUNNING && status_.tick() > then + 10; });
+    ask(CONTINUE_RUN, 0, "RUNNING, and ten ticks on",
+        [&] { return status_.phase() == RUNNING && status_.tick() > then + 10; });
     proven("CONTINUE: the run has come to tick %lld", static_cast<long long>(status_.tick()));
   }
 
@@ -165,20 +172,23 @@ class Outsider {
       packet.command(2);
       packet.message()[0] = led;
       packet.message()[9] = 0x42;
-      await("every simulated robot to show the colour of the overhead packet", 20s,
-            [&] {
-              return std::all_of(robots_.begin(), robots_.end(), [&](const auto& entry) {
-                return entry.first >= kSimulatedRobots || entry.second.led() == led;
-              });
-            },
-            [&] { write(overhead_, packet); });
+      await(
+          "every simulated robot to show the colour of the overhead packet", 20s,
+          [&] {
+            return std::all_of(robots_.begin(), robots_.end(), [&](const auto& entry) {
+              return entry.first >= kSimulatedRobots || entry.second.led() == led;
+            });
+          },
+          [&] { write(overhead_, packet); });
     }
     proven("publishes kilotwin/overhead_packets: all %u simulated robots turn red, then blue", kSimulatedRobots);
   }
 
   void track() {
     // Values that no rounding would leave as they are.
-    struct { double x_mm, y_mm, heading_rad; } const places[] = {{-201.1, 123.7, 0.3}, {250 / 3.0, -311.9, -2.9}};
+    struct {
+      double x_mm, y_mm, heading_rad;
+    } const places[] = {{-201.1, 123.7, 0.3}, {250 / 3.0, -311.9, -2.9}};
     for (const auto& place : places) {
       TrackedPose pose;
       pose.robot(kTrackedRobot);
@@ -207,8 +217,7 @@ class Outsider {
     if (!condition) throw std::runtime_error(otherwise);
   }
 
-  template <class... Arguments>
-  static void proven(const char* format, Arguments... arguments) {
+  template <class... Arguments> static void proven(const char* format, Arguments... arguments) {
     std::printf(format, arguments...);
     std::printf("\n");
     std::fflush(stdout);
@@ -216,7 +225,9 @@ class Outsider {
 
   /// Reads until the condition holds, and calls `meanwhile` five times a second. A writer may see a reader before the reader
   /// sees it, and what is sent in between is lost; so an outsider says a thing until it sees the effect.
-  void await(const std::string& what, Clock::duration patience, const Condition& holds, const std::function<void()>& meanwhile = [] {}) {
+  void await(
+      const std::string& what, Clock::duration patience, const Condition& holds,
+      const std::function<void()>& meanwhile = [] {}) {
     const auto begun = Clock::now();
     auto next = begun;
     for (;;) {
@@ -262,7 +273,8 @@ class Outsider {
   }
 
   static void write(fast::DataWriter* writer, auto& sample) {
-    if (!writer->write(&sample)) throw std::runtime_error("Fast DDS cannot write a sample of " + writer->get_topic()->get_name());
+    if (!writer->write(&sample))
+      throw std::runtime_error("Fast DDS cannot write a sample of " + writer->get_topic()->get_name());
   }
 
   void read() {
@@ -281,8 +293,8 @@ class Outsider {
     if (statuses_ == 0) return "none";
     static constexpr const char* kPhases[] = {"STARTING", "RUNNING", "PAUSED", "ENDED", "BROKEN"};
     const auto phase = static_cast<std::uint32_t>(status_.phase());
-    return std::string(phase < std::size(kPhases) ? kPhases[phase] : "an unknown phase") + " at tick " + std::to_string(status_.tick()) +
-           " " + status_.note().c_str();
+    return std::string(phase < std::size(kPhases) ? kPhases[phase] : "an unknown phase") + " at tick " +
+           std::to_string(status_.tick()) + " " + status_.note().c_str();
   }
 
   Participant participant_;

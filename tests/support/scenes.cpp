@@ -32,7 +32,8 @@ RunPlan make_plan(const std::string& experiment, const std::vector<ScenePose>& p
   proto::Manifest manifest;
   manifest.set_run(1);
   proto::Experiment& e = *manifest.mutable_experiment();
-  if (!google::protobuf::TextFormat::ParseFromString(experiment, &e)) throw std::runtime_error("scene does not parse: " + experiment);
+  if (!google::protobuf::TextFormat::ParseFromString(experiment, &e))
+    throw std::runtime_error("scene does not parse: " + experiment);
   if (e.robots_size() == 0) e.add_robots()->set_count(static_cast<std::uint32_t>(poses.size()));
   manifest.add_program()->set_path("scene.c");
   std::size_t robots = 0;
@@ -49,10 +50,10 @@ RunPlan make_plan(const std::string& experiment, const std::vector<ScenePose>& p
   return RunPlan(std::move(manifest));
 }
 
-RunPlan make_plan(const std::string& experiment, const std::vector<ScenePose>& poses, std::uint32_t columns, std::uint32_t rows,
-                  std::uint32_t hosts) {
-  return make_plan(experiment + " deployment { partition_columns: " + std::to_string(columns) + " partition_rows: " +
-                       std::to_string(rows) + " hosts: " + std::to_string(hosts) + " }",
+RunPlan make_plan(const std::string& experiment, const std::vector<ScenePose>& poses, std::uint32_t columns,
+                  std::uint32_t rows, std::uint32_t hosts) {
+  return make_plan(experiment + " deployment { partition_columns: " + std::to_string(columns) +
+                       " partition_rows: " + std::to_string(rows) + " hosts: " + std::to_string(hosts) + " }",
                    poses);
 }
 
@@ -63,7 +64,8 @@ std::vector<ScenePose> grid_crowd(std::uint32_t robots, double pitch_mm, Facing 
   Scatter scatter(seed);
   std::vector<ScenePose> poses;
   for (std::uint32_t i = 0; i < robots; ++i) {
-    const double x = (i % columns - (columns - 1) / 2.0) * pitch_mm, y = (i / columns - (rows - 1) / 2.0) * pitch_mm;
+    const double x = (i % columns - (columns - 1) / 2.0) * pitch_mm,
+                 y = (i / columns - (rows - 1) / 2.0) * pitch_mm;
     const double random = scatter.heading();
     const double heading = facing == Facing::kRight ? 0 : facing == Facing::kRandom ? random : std::atan2(-y, -x);
     poses.push_back({x, y, heading});
@@ -71,7 +73,8 @@ std::vector<ScenePose> grid_crowd(std::uint32_t robots, double pitch_mm, Facing 
   return poses;
 }
 
-std::vector<ScenePose> random_crowd(std::uint32_t robots, double width_mm, double height_mm, double spacing_mm, std::uint64_t seed) {
+std::vector<ScenePose> random_crowd(std::uint32_t robots, double width_mm, double height_mm, double spacing_mm,
+                                    std::uint64_t seed) {
   Scatter scatter(seed);
   std::vector<ScenePose> poses;
   for (std::uint32_t attempts = 0; poses.size() < robots; ++attempts) {
@@ -79,7 +82,8 @@ std::vector<ScenePose> random_crowd(std::uint32_t robots, double width_mm, doubl
     const double x = (scatter.uniform() - 0.5) * width_mm, y = (scatter.uniform() - 0.5) * height_mm;
     bool free = true;
     for (const ScenePose& other : poses) {
-      free = free && (other.x_mm - x) * (other.x_mm - x) + (other.y_mm - y) * (other.y_mm - y) >= spacing_mm * spacing_mm;
+      free = free &&
+             (other.x_mm - x) * (other.x_mm - x) + (other.y_mm - y) * (other.y_mm - y) >= spacing_mm * spacing_mm;
     }
     if (free) poses.push_back({x, y, scatter.heading()});
   }

@@ -27,7 +27,9 @@ class BadInput : public testing::Test {
     return outcome.err;
   }
   std::string refusal_of(const std::string& text) { return refusal({"run", experiment(text), "--mode", "local"}); }
-  static void expect_in(const std::string& part, const std::string& line) { EXPECT_NE(line.find(part), std::string::npos) << line; }
+  static void expect_in(const std::string& part, const std::string& line) {
+    EXPECT_NE(line.find(part), std::string::npos) << line;
+  }
   Scratch scratch;
 };
 
@@ -38,15 +40,18 @@ TEST_F(BadInput, InTheExperimentNamesItsPlace) {
   expect_in("e.txtpb:1:", refusal_of("duration_s: -1\nrobots { count: 3 " + behaviour() + "}\n"));
   expect_in("e.txtpb:1:", refusal_of("duration_s: nan\nrobots { count: 3 " + behaviour() + "}\n"));
   expect_in("e.txtpb:", refusal_of("robots { count: 4 " + behaviour() + "layout { grid { pitch_mm: 20 } } }\n"));
-  expect_in("e.txtpb:", refusal_of("arena { width_mm: 100 height_mm: 100 }\nrobots { count: 50 " + behaviour() + "layout { grid {} } }\n"));
+  expect_in("e.txtpb:", refusal_of("arena { width_mm: 100 height_mm: 100 }\nrobots { count: 50 " + behaviour() +
+                                   "layout { grid {} } }\n"));
   expect_in("nothing.c", refusal_of("robots { count: 3 behaviour: \"nothing.c\" }\n"));
-  expect_in("partition", refusal_of("deployment { partition_columns: 0 }\nrobots { count: 3 " + behaviour() + "}\n"));
+  expect_in("partition",
+            refusal_of("deployment { partition_columns: 0 }\nrobots { count: 3 " + behaviour() + "}\n"));
   expect_in("nowhere.txtpb", refusal({"run", scratch / "nowhere.txtpb"}));
 }
 
 TEST_F(BadInput, InAProgramGivesTheCompilersOwnMessage) {
   write(scratch / "broken.c", "#include <kilolib.h>\nvoid setup(void) {\n  int x = y;\n}\n");
-  const Outcome outcome = kilotwin({"run", experiment("robots { count: 3 behaviour: \"broken.c\" }\n"), "--mode", "local"}, scratch);
+  const Outcome outcome =
+      kilotwin({"run", experiment("robots { count: 3 behaviour: \"broken.c\" }\n"), "--mode", "local"}, scratch);
   EXPECT_EQ(outcome.status, 2);
   expect_in("broken.c:3:11: error: ", outcome.err);
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
@@ -68,8 +73,8 @@ TEST_F(BadInput, InArguments) {
   expect_in("no command", refusal({"ruin", good}));
   expect_in("--seed", refusal({"run", good, "--seed", "-1"}));
   expect_in("--seed", refusal({"run", good, "--seed", "18446744073709551616"}));
-  expect_in("4099 processes", refusal({"run", good, "--partitions", "64x64", "--hosts", "1", "--set", "arena.width_mm=100000", "--set",
-                                       "arena.height_mm=100000"}));
+  expect_in("4099 processes", refusal({"run", good, "--partitions", "64x64", "--hosts", "1", "--set",
+                                       "arena.width_mm=100000", "--set", "arena.height_mm=100000"}));
 }
 
 TEST_F(BadInput, ThatIsNoRecording) {
@@ -82,7 +87,8 @@ TEST_F(BadInput, ThatIsNoRecording) {
 
 TEST_F(BadInput, ADomainInUseByAnotherRun) {
   const dds::DomainClaim claim = dds::DomainClaim::any();
-  expect_in("in use", refusal({"run", experiment("robots { count: 3 " + behaviour() + "}\n"), "--domain", std::to_string(claim.domain())}));
+  expect_in("in use", refusal({"run", experiment("robots { count: 3 " + behaviour() + "}\n"), "--domain",
+                               std::to_string(claim.domain())}));
 }
 
 TEST_F(BadInput, ADomainInUseByServicesStartedByHand) {
@@ -97,7 +103,11 @@ TEST_F(BadInput, ADomainInUseByServicesStartedByHand) {
 }
 
 TEST_F(BadInput, APartitionOrShareThatIsNone) {
-  ASSERT_EQ(kilotwin({"run", experiment("robots { count: 3 " + behaviour() + "}\n"), "--prepare", "--out", scratch / "run"}, scratch).status, 0);
+  ASSERT_EQ(kilotwin({"run", experiment("robots { count: 3 " + behaviour() + "}\n"), "--prepare", "--out",
+                      scratch / "run"},
+                     scratch)
+                .status,
+            0);
   expect_in("--partition", refusal({"service", "physics", "--run", scratch / "run", "--partition", "1,0"}));
   expect_in("--share", refusal({"service", "behaviours", "--run", scratch / "run", "--share", "2/2"}));
 }

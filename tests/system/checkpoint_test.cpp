@@ -19,14 +19,17 @@ class Checkpoints : public testing::Test {
 
 TEST_F(Checkpoints, SavedOn2x2AreResumedOn1x1InEitherMode) {
   const auto whole = run(experiment({"--mode", "local"}), scratch, "whole");
-  const auto saving = run(experiment({"--partitions", "2x2", "--hosts", "2", "--checkpoint-every", "5"}), scratch, "saving");
+  const auto saving =
+      run(experiment({"--partitions", "2x2", "--hosts", "2", "--checkpoint-every", "5"}), scratch, "saving");
   EXPECT_EQ(saving.state_hash, whole.state_hash) << "saving changes nothing";
 
-  const auto local = run(experiment({"--mode", "local", "--partitions", "1x1", "--resume", scratch / "saving"}), scratch, "local");
+  const auto local =
+      run(experiment({"--mode", "local", "--partitions", "1x1", "--resume", scratch / "saving"}), scratch, "local");
   EXPECT_EQ(local.state_hash, whole.state_hash);
   EXPECT_GT(local.resumed_from_tick, 0);
   EXPECT_EQ(local.messages.sent, whole.messages.sent);
-  const auto federated = run(experiment({"--partitions", "3x1", "--hosts", "3", "--resume", scratch / "saving"}), scratch, "federated");
+  const auto federated = run(experiment({"--partitions", "3x1", "--hosts", "3", "--resume", scratch / "saving"}),
+                             scratch, "federated");
   EXPECT_EQ(federated.state_hash, whole.state_hash);
 }
 
@@ -49,7 +52,10 @@ TEST_F(Checkpoints, OfARunThatIsFarAheadOfItsBooksHoldTheChain) {
   int resumed = 0;
   for (const auto& checkpoint : std::filesystem::directory_iterator(scratch / "saving/checkpoints")) {
     const std::string name = "resumed-" + std::to_string(++resumed);
-    EXPECT_EQ(run(with({"--duration", "120", "--mode", "local", "--resume", checkpoint.path().string()}), scratch, name).state_hash, whole.state_hash)
+    EXPECT_EQ(
+        run(with({"--duration", "120", "--mode", "local", "--resume", checkpoint.path().string()}), scratch, name)
+            .state_hash,
+        whole.state_hash)
         << checkpoint.path();
   }
   EXPECT_EQ(resumed, 12);
@@ -57,7 +63,9 @@ TEST_F(Checkpoints, OfARunThatIsFarAheadOfItsBooksHoldTheChain) {
 
 TEST_F(Checkpoints, BeyondTheEndAreRefused) {
   run(experiment({"--mode", "local", "--checkpoint-every", "5"}), scratch, "saved");
-  const Outcome outcome = kilotwin({"run", source("experiments/disperse.txtpb"), "--duration", "2", "--mode", "local", "--resume", scratch / "saved"}, scratch);
+  const Outcome outcome = kilotwin({"run", source("experiments/disperse.txtpb"), "--duration", "2", "--mode",
+                                    "local", "--resume", scratch / "saved"},
+                                   scratch);
   EXPECT_EQ(outcome.status, 2);
   EXPECT_NE(outcome.err.find("--duration"), std::string::npos) << outcome.err;
 }
@@ -69,7 +77,9 @@ TEST_F(Checkpoints, KeepTheStacksOfProgramsThatBlock) {
     return experiment(more);
   };
   const auto whole = run(with({"--mode", "local", "--checkpoint-every", "5"}), scratch, "whole");
-  const auto resumed = run(with({"--mode", "local", "--partitions", "2x2", "--hosts", "3", "--resume", scratch / "whole"}), scratch, "resumed");
+  const auto resumed =
+      run(with({"--mode", "local", "--partitions", "2x2", "--hosts", "3", "--resume", scratch / "whole"}), scratch,
+          "resumed");
   EXPECT_EQ(resumed.state_hash, whole.state_hash);
 }
 

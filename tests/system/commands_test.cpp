@@ -34,19 +34,21 @@ TEST_F(Commands, CheckIsSilentWhenAllIsRight) {
 TEST_F(Commands, RunWritesWhatTheContractNames) {
   run(small(), scratch, "run");
   const auto summary = nlohmann::json::parse(read(scratch / "run/summary.json"));
-  for (const char* field : {"name", "seed", "mode", "partitions", "robots", "ticks", "simulated_s", "start_s", "wall_s", "realtime_factor",
-                            "state_hash", "messages", "robots_failed", "recoveries"}) {
+  for (const char* field : {"name", "seed", "mode", "partitions", "robots", "ticks", "simulated_s", "start_s",
+                            "wall_s", "realtime_factor", "state_hash", "messages", "robots_failed", "recoveries"}) {
     EXPECT_TRUE(summary.contains(field)) << field;
   }
   EXPECT_EQ(summary["robots"], 20);
   EXPECT_EQ(summary["state_hash"].get<std::string>().size(), 16u);
   EXPECT_GT(summary["messages"]["received"].get<int>(), 0);
-  for (const char* file : {"recording.ktrec", "experiment.txtpb", "picture.svg", "manifest.pb"}) EXPECT_TRUE(fs::exists(scratch.path() / "run" / file)) << file;
+  for (const char* file : {"recording.ktrec", "experiment.txtpb", "picture.svg", "manifest.pb"})
+    EXPECT_TRUE(fs::exists(scratch.path() / "run" / file)) << file;
 }
 
 TEST_F(Commands, ExportWritesTrajectoriesAndMessages) {
   run(small({"--set", "recording.messages=true"}), scratch, "run");
-  const Outcome outcome = kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv", "--messages", scratch / "m.csv"}, scratch);
+  const Outcome outcome = kilotwin(
+      {"export", scratch / "run", "--trajectories", scratch / "t.csv", "--messages", scratch / "m.csv"}, scratch);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const std::string trajectories = read(scratch / "t.csv");
   EXPECT_EQ(trajectories.substr(0, trajectories.find('\n')), "time_s,robot,x_mm,y_mm,heading_rad,led");
@@ -60,7 +62,9 @@ TEST_F(Commands, MessagesOfAFederatedRunAreThoseOfALocalOne) {
   words[6] = "federated";
   run(words, scratch, "federated");
   for (const char* name : {"local", "federated"}) {
-    ASSERT_EQ(kilotwin({"export", scratch / name, "--messages", scratch / (std::string(name) + ".csv")}, scratch).status, 0);
+    ASSERT_EQ(
+        kilotwin({"export", scratch / name, "--messages", scratch / (std::string(name) + ".csv")}, scratch).status,
+        0);
   }
   EXPECT_GT(read(scratch / "local.csv").size(), 100u);
   EXPECT_EQ(read(scratch / "local.csv"), read(scratch / "federated.csv"));
@@ -71,7 +75,8 @@ TEST_F(Commands, ReplayVerifiesAndFindsWhatDiffers) {
   EXPECT_EQ(kilotwin({"replay", scratch / "run", "--verify"}, scratch).status, 0);
   // Another recording beside the same manifest: the first state hash differs already.
   run(small({"--seed", "2"}), scratch, "other");
-  fs::copy_file(scratch / "other/recording.ktrec", scratch / "run/recording.ktrec", fs::copy_options::overwrite_existing);
+  fs::copy_file(scratch / "other/recording.ktrec", scratch / "run/recording.ktrec",
+                fs::copy_options::overwrite_existing);
   const Outcome differs = kilotwin({"replay", scratch / "run", "--verify"}, scratch);
   EXPECT_EQ(differs.status, 1);
   EXPECT_NE(differs.err.find("first tick that differs"), std::string::npos) << differs.err;
@@ -100,16 +105,22 @@ TEST_F(Commands, BuildForTheRealRobotPrintsSizes) {
   // Two files share 1000 octets that neither initialises.
   write(scratch / "a.c", "char shared[1000];\nvoid other(void);\nint main(void) { other(); return 0; }\n");
   write(scratch / "b.c", "char shared[1000];\nvoid other(void) { shared[0] = 1; }\n");
-  EXPECT_NE(kilotwin({"build", scratch / "a.c", scratch / "b.c", "--avr"}, scratch).out.find(" 1000 octets of RAM"), std::string::npos);
+  EXPECT_NE(kilotwin({"build", scratch / "a.c", scratch / "b.c", "--avr"}, scratch).out.find(" 1000 octets of RAM"),
+            std::string::npos);
 }
 
 TEST_F(Commands, TheExperimentAsRunRunsAgain) {
   write(scratch / "poses.csv", "x_mm,y_mm,heading_rad\n0,0,0\n60,0,1\n");
   write(scratch / "part.h", "#define COLOUR RGB(0, 2, 0)\n");
-  write(scratch / "p.c", "#include <kilolib.h>\n#include \"part.h\"\nvoid setup(void) { set_color(COLOUR); set_motors(SPEED, SPEED); }\n"
-                         "void loop(void) {}\nint main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
-  write(scratch / "e.txtpb", "duration_s: 3\nrobots { behaviour: \"p.c\" layout { poses { csv: \"poses.csv\" } } }\n");
-  const auto first = run({scratch / "e.txtpb", "--mode", "local", "--define", "SPEED=60", "--set", "motion.noise=false"}, scratch, "first");
+  write(scratch / "p.c",
+        "#include <kilolib.h>\n#include \"part.h\"\nvoid setup(void) { set_color(COLOUR); set_motors(SPEED, "
+        "SPEED); }\n"
+        "void loop(void) {}\nint main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  write(scratch / "e.txtpb",
+        "duration_s: 3\nrobots { behaviour: \"p.c\" layout { poses { csv: \"poses.csv\" } } }\n");
+  const auto first =
+      run({scratch / "e.txtpb", "--mode", "local", "--define", "SPEED=60", "--set", "motion.noise=false"}, scratch,
+          "first");
   for (const char* file : {"e.txtpb", "poses.csv", "part.h", "p.c"}) fs::remove(scratch.path() / file);
   const auto again = run({scratch / "first/experiment.txtpb", "--mode", "local"}, scratch, "again");
   EXPECT_EQ(again.state_hash, first.state_hash);
@@ -122,8 +133,9 @@ TEST_F(Commands, SeedsAreDecimalAndReachTheWholeRange) {
 }
 
 TEST_F(Commands, DefineReachesTheProgram) {
-  write(scratch / "p.c", "#include <kilolib.h>\nvoid setup(void) { set_color(COLOUR); }\nvoid loop(void) {}\n"
-                         "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  write(scratch / "p.c",
+        "#include <kilolib.h>\nvoid setup(void) { set_color(COLOUR); }\nvoid loop(void) {}\n"
+        "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
   run(small({"--behaviour", scratch / "p.c", "--define", "COLOUR=RGB(3,0,1)"}), scratch, "run");
   ASSERT_EQ(kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv"}, scratch).status, 0);
   EXPECT_NE(read(scratch / "t.csv").find(",301\n"), std::string::npos);
@@ -132,13 +144,16 @@ TEST_F(Commands, DefineReachesTheProgram) {
 TEST_F(Commands, AModelFileGivesARobotItsOwnBias) {
   write(scratch / "m.txtpb", "motion { bias_sd_mm_s: 0 bias_mean_mm_s: 0 }\n");
   const auto plain = run(small({"--model", scratch / "m.txtpb"}), scratch, "plain");
-  write(scratch / "own.txtpb", "motion { bias_sd_mm_s: 0 bias_mean_mm_s: 0 } robot { robot: 3 bias_left_mm_s: 1 bias_right_mm_s: -1 }\n");
+  write(scratch / "own.txtpb",
+        "motion { bias_sd_mm_s: 0 bias_mean_mm_s: 0 } robot { robot: 3 bias_left_mm_s: 1 bias_right_mm_s: -1 }\n");
   EXPECT_NE(run(small({"--model", scratch / "own.txtpb"}), scratch, "own").state_hash, plain.state_hash);
 }
 
 TEST_F(Commands, SweepTabulatesAllCombinations) {
-  const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "9", "--duration", "2", "--seeds", "1..3", "--set",
-                                    "robots.layout.grid.pitch_mm=40,60", "--out", scratch / "sweep"}, scratch);
+  const Outcome outcome =
+      kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "9", "--duration", "2", "--seeds",
+                "1..3", "--set", "robots.layout.grid.pitch_mm=40,60", "--out", scratch / "sweep"},
+               scratch);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("robots.layout.grid.pitch_mm=60"), std::string::npos) << outcome.out;
   const std::string csv = read(scratch / "sweep/sweep.csv");
@@ -147,16 +162,19 @@ TEST_F(Commands, SweepTabulatesAllCombinations) {
 }
 
 TEST_F(Commands, SweepRefusesAPointThatCannotRunBeforeTheFirstRun) {
-  const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--duration", "1", "--set", "robots.count=9,5000", "--out",
-                                    scratch / "sweep"}, scratch);
+  const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--duration", "1", "--set",
+                                    "robots.count=9,5000", "--out", scratch / "sweep"},
+                                   scratch);
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   EXPECT_FALSE(fs::exists(scratch / "sweep"));
 }
 
 TEST_F(Commands, SweepReachesTheLastSeed) {
-  const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "4", "--duration", "1", "--seeds",
-                                    "18446744073709551614..18446744073709551615", "--out", scratch / "sweep"}, scratch);
+  const Outcome outcome =
+      kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "4", "--duration", "1", "--seeds",
+                "18446744073709551614..18446744073709551615", "--out", scratch / "sweep"},
+               scratch);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_TRUE(fs::exists(scratch / "sweep/0000-18446744073709551615/summary.json"));
 }
@@ -176,8 +194,10 @@ TEST_F(Commands, HelpIsEverywhere) {
 }
 
 TEST_F(Commands, AFailingRobotCostsNobodyElse) {
-  write(scratch / "p.c", "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 7 && kilo_ticks > 30) *(volatile int *)0 = 1; }\n"
-                         "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  write(scratch / "p.c",
+        "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 7 && kilo_ticks > 30) "
+        "*(volatile int *)0 = 1; }\n"
+        "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
   EXPECT_EQ(run(small({"--behaviour", scratch / "p.c"}), scratch, "run").robots_failed, 1u);
 }
 

@@ -28,11 +28,26 @@ class Control : public testing::Test {
         }) {}
 
   void start(const Words& more = {}) {
-    Words words{program(), "run", source("experiments/disperse.txtpb"), "--robots", "20", "--duration", "600", "--pace", "1",
-                "--partitions", "2x1", "--domain", std::to_string(domain_), "--out", scratch_ / "run"};
+    Words words{program(),
+                "run",
+                source("experiments/disperse.txtpb"),
+                "--robots",
+                "20",
+                "--duration",
+                "600",
+                "--pace",
+                "1",
+                "--partitions",
+                "2x1",
+                "--domain",
+                std::to_string(domain_),
+                "--out",
+                scratch_ / "run"};
     words.insert(words.end(), more.begin(), more.end());
     process_ = std::make_unique<Process>(words, scratch_.path());
-    ASSERT_TRUE(eventually([this] { return control_.readers() > 0 && overhead_.readers() > 0 && latest().phase == kilotwin_open_RUNNING; }));
+    ASSERT_TRUE(eventually([this] {
+      return control_.readers() > 0 && overhead_.readers() > 0 && latest().phase == kilotwin_open_RUNNING;
+    }));
   }
 
   PublicRunStatus latest() {
@@ -84,8 +99,9 @@ TEST_F(Control, PausesStepsContinuesAndStops) {
   // All of it is in the recording, and steps again to the same hashes.
   EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
   const auto summary = recorder::read_summary(scratch_.path() / "run/summary.json");
-  const auto resumed = run({source("experiments/disperse.txtpb"), "--robots", "20", "--mode", "local", "--resume", scratch_ / "run", "--duration",
-                            std::to_string(summary.simulated_s - 1e-6)}, scratch_, "resumed");
+  const auto resumed = run({source("experiments/disperse.txtpb"), "--robots", "20", "--mode", "local", "--resume",
+                            scratch_ / "run", "--duration", std::to_string(summary.simulated_s - 1e-6)},
+                           scratch_, "resumed");
   EXPECT_EQ(resumed.state_hash, summary.state_hash);
   EXPECT_EQ(resumed.resumed_from_tick, at + 6);
 }
@@ -133,11 +149,13 @@ TEST_F(Control, ALedgerThatCannotBeOursEndsTheRunInOneLine) {
 
 TEST_F(Control, RobotsAreTracedForWhoListens) {
   std::array<std::atomic<int>, 20> seen{};
-  const dds::Reader<PublicRobotState> robots(participant_, topics::robots(), [&](const PublicRobotState& sample, dds::SampleState state) {
-    if (state.valid && sample.robot < seen.size()) ++seen[sample.robot];
-  });
+  const dds::Reader<PublicRobotState> robots(participant_, topics::robots(),
+                                             [&](const PublicRobotState& sample, dds::SampleState state) {
+                                               if (state.valid && sample.robot < seen.size()) ++seen[sample.robot];
+                                             });
   start();
-  EXPECT_TRUE(eventually([&] { return std::all_of(seen.begin(), seen.end(), [](const auto& count) { return count >= 3; }); }));
+  EXPECT_TRUE(eventually(
+      [&] { return std::all_of(seen.begin(), seen.end(), [](const auto& count) { return count >= 3; }); }));
   ask(kilotwin_open_STOP_RUN);
   EXPECT_EQ(process_->wait(30).status, 0);
 }
@@ -145,11 +163,24 @@ TEST_F(Control, RobotsAreTracedForWhoListens) {
 TEST_F(Control, ATrackedRobotIsWhereTheTrackerSawIt) {
   write(scratch_ / "hybrid.txtpb",
         "arena { width_mm: 600 height_mm: 600 }\n"
-        "robots { count: 4 behaviour: \"" + source("behaviours/disperse.c") + "\" layout { grid { pitch_mm: 50 } } }\n"
-        "robots { count: 1 body: TRACKED layout { x_mm: 200 y_mm: 200 grid {} } }\n");
+        "robots { count: 4 behaviour: \"" +
+            source("behaviours/disperse.c") +
+            "\" layout { grid { pitch_mm: 50 } } }\n"
+            "robots { count: 1 body: TRACKED layout { x_mm: 200 y_mm: 200 grid {} } }\n");
   dds::Writer<PublicTrackedPose> poses(participant_, topics::tracked_poses());
-  Words words{program(), "run", scratch_ / "hybrid.txtpb", "--duration", "600", "--pace", "1", "--partitions", "2x2", "--domain",
-              std::to_string(domain_), "--out", scratch_ / "run"};
+  Words words{program(),
+              "run",
+              scratch_ / "hybrid.txtpb",
+              "--duration",
+              "600",
+              "--pace",
+              "1",
+              "--partitions",
+              "2x2",
+              "--domain",
+              std::to_string(domain_),
+              "--out",
+              scratch_ / "run"};
   process_ = std::make_unique<Process>(words, scratch_.path());
   ASSERT_TRUE(eventually([&] { return poses.readers() > 0 && latest().phase == kilotwin_open_RUNNING; }));
   PublicTrackedPose pose{};

@@ -16,8 +16,19 @@ namespace fs = std::filesystem;
 class Endings : public testing::Test {
  protected:
   Words long_run(const Words& more = {}) const {
-    Words words{program(), "run", source("experiments/disperse.txtpb"), "--duration", "600", "--pace", "1", "--partitions", "2x1",
-                "--set", "recording.every_s=0.1", "--out", scratch / "run"};
+    Words words{program(),
+                "run",
+                source("experiments/disperse.txtpb"),
+                "--duration",
+                "600",
+                "--pace",
+                "1",
+                "--partitions",
+                "2x1",
+                "--set",
+                "recording.every_s=0.1",
+                "--out",
+                scratch / "run"};
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -38,7 +49,8 @@ class Endings : public testing::Test {
     EXPECT_TRUE(eventually([&] { return processes_with(scratch / "run").empty(); }, 20));
   }
   void expect_usable_recording() {
-    const Outcome exported = kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv", "--every", "0.1"}, scratch);
+    const Outcome exported =
+        kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv", "--every", "0.1"}, scratch);
     EXPECT_EQ(exported.status, 0) << exported.err;
     EXPECT_GT(read(scratch / "t.csv").size(), 10'000u);
     const Outcome replayed = kilotwin({"replay", scratch / "run", "--verify"}, scratch);
@@ -88,8 +100,10 @@ TEST_F(Endings, InterruptsDoNotWaitForASlowPace) {
 }
 
 TEST_F(Endings, AProgramThatDoesNotReturnIsNamedAndCanBeInterrupted) {
-  write(scratch / "hangs.c", "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 3 && kilo_ticks > 30) for (;;) {} }\n"
-                             "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  write(scratch / "hangs.c",
+        "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 3 && kilo_ticks > 30) for "
+        "(;;) {} }\n"
+        "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
   for (const std::string mode : {"local", "federated"}) {
     fs::remove_all(scratch / "run");
     Process process(long_run({"--mode", mode, "--behaviour", scratch / "hangs.c"}), scratch.path());
@@ -124,7 +138,8 @@ TEST_F(Endings, AFullDiskIsNamedInOneLine) {
   const Outcome outcome = Process(words, scratch.path()).wait(60);
   EXPECT_EQ(outcome.status, 1);
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  EXPECT_NE(outcome.err.find("recording.ktrec: cannot be written: File too large"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("recording.ktrec: cannot be written: File too large"), std::string::npos)
+      << outcome.err;
   expect_nothing_left();
 }
 

@@ -60,7 +60,8 @@ Outcome Process::wait(double seconds) {
     waitpid(process_, &wait_status_, 0);
     ended_ = true;
   }
-  return {WIFEXITED(wait_status_) ? WEXITSTATUS(wait_status_) : 128 + WTERMSIG(wait_status_), read(out_), read(err_)};
+  return {WIFEXITED(wait_status_) ? WEXITSTATUS(wait_status_) : 128 + WTERMSIG(wait_status_), read(out_),
+          read(err_)};
 }
 
 Scratch::Scratch() {
@@ -116,6 +117,8 @@ std::vector<pid_t> processes_with(const std::string& text) {
 
 void sleep_briefly() { std::this_thread::sleep_for(std::chrono::milliseconds(2)); }
 
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace kilotwin::test

@@ -14,7 +14,7 @@ namespace kilotwin::test {
 using Words = std::vector<std::string>;
 
 struct Outcome {
-  int status = -1;      ///< exit status, or 128 + signal
+  int status = -1;  ///< exit status, or 128 + signal
   std::string out, err;
 };
 
@@ -65,14 +65,12 @@ recorder::Summary run(Words words, const Scratch& scratch, const std::string& na
 /// Processes whose command line mentions `text`.
 std::vector<pid_t> processes_with(const std::string& text);
 /// Polls until `condition` holds; false after `seconds`, a bound against hanging.
-template <class Condition>
-bool eventually(Condition condition, double seconds = 30);
+template <class Condition> bool eventually(Condition condition, double seconds = 30);
 
 void sleep_briefly();
 double now_s();
 
-template <class Condition>
-bool eventually(Condition condition, double seconds) {
+template <class Condition> bool eventually(Condition condition, double seconds) {
   for (const double end = now_s() + seconds; now_s() < end; sleep_briefly()) {
     if (condition()) return true;
   }

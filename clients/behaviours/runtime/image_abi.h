@@ -29,13 +29,13 @@ struct KtRobot {
   uint8_t duty_right;
   uint8_t led;
   uint8_t in_interrupt;
-  uint8_t parked;        /* the main program does nothing until a message of the overhead controller arrives */
-  uint8_t deaf;          /* interrupts are off: asleep, or the program has ended */
+  uint8_t parked; /* the main program does nothing until a message of the overhead controller arrives */
+  uint8_t deaf;   /* interrupts are off: asleep, or the program has ended */
   uint8_t bootloader;
-  uint8_t reset;         /* the memory is to be made anew */
-  uint8_t motion;        /* what calibration messages asked for */
+  uint8_t reset;  /* the memory is to be made anew */
+  uint8_t motion; /* what calibration messages asked for */
   uint8_t motion_done;
-  uint64_t waits;        /* how often the program has waited for a tick */
+  uint64_t waits; /* how often the program has waited for a tick */
 };
 
 struct KtMessage {
@@ -61,16 +61,16 @@ struct KtEvents {
 struct KtImage {
   uint64_t magic;
   uint64_t version;
-  uint64_t control;     /* of the KtControl*; the loader writes it */
-  uint64_t robot;       /* of the KtRobot */
-  uint64_t ticks;       /* of kilo_ticks, uint32_t */
-  uint64_t tx_period;   /* of kilo_tx_period, uint16_t */
-  uint64_t boot;        /* void(void): where a robot starts */
-  uint64_t enter;       /* void(KtControl*): continues the main program until it waits */
-  uint64_t call;        /* uint64_t(KtControl*, function, argument): runs a function on the interrupt stack */
-  uint64_t leave;       /* the way back to the host out of both, from anywhere */
-  uint64_t interrupts;  /* uint64_t(const KtEvents*) */
-  uint64_t transmit;    /* uint64_t(KtMessage*): 1 if the robot sends, else 0 */
+  uint64_t control;    /* of the KtControl*; the loader writes it */
+  uint64_t robot;      /* of the KtRobot */
+  uint64_t ticks;      /* of kilo_ticks, uint32_t */
+  uint64_t tx_period;  /* of kilo_tx_period, uint16_t */
+  uint64_t boot;       /* void(void): where a robot starts */
+  uint64_t enter;      /* void(KtControl*): continues the main program until it waits */
+  uint64_t call;       /* uint64_t(KtControl*, function, argument): runs a function on the interrupt stack */
+  uint64_t leave;      /* the way back to the host out of both, from anywhere */
+  uint64_t interrupts; /* uint64_t(const KtEvents*) */
+  uint64_t transmit;   /* uint64_t(KtMessage*): 1 if the robot sends, else 0 */
 };
 
 #ifdef __cplusplus

@@ -254,9 +254,7 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
         follow_calibration();
         rest_of_tick();
         break;
-      default: /* IDLE, CHARGING */
-        set_color(0);
-        park();
+      default: /* IDLE, CHARGING */ set_color(0); park();
     }
   }
 }
@@ -305,7 +303,8 @@ static void calibrate(const calibmsg_t* wish) {
       kilo_turn_right = wish->turn_right;
       break;
     case CALIB_STRAIGHT:
-      start_motion(STRAIGHT, kilo_straight_left != wish->straight_left || kilo_straight_right != wish->straight_right);
+      start_motion(STRAIGHT,
+                   kilo_straight_left != wish->straight_left || kilo_straight_right != wish->straight_right);
       kilo_straight_left = wish->straight_left;
       kilo_straight_right = wish->straight_right;
       break;
@@ -365,9 +364,12 @@ static uint64_t interrupts(const struct KtEvents* events) {
     __builtin_memcpy(&rx_msg, &reception->message, sizeof rx_msg);
     rx_dist.low_gain = reception->low_gain;
     rx_dist.high_gain = reception->high_gain;
-    if (robot.bootloader) boot_loader(rx_msg.type);
-    else if (rx_msg.type < BOOT) kilo_message_rx(&rx_msg, &rx_dist);
-    else obey(&rx_msg);
+    if (robot.bootloader)
+      boot_loader(rx_msg.type);
+    else if (rx_msg.type < BOOT)
+      kilo_message_rx(&rx_msg, &rx_dist);
+    else
+      obey(&rx_msg);
   }
   robot.in_interrupt = 0;
   return 0;
@@ -384,16 +386,7 @@ static uint64_t transmit(struct KtMessage* out) {
 }
 
 __attribute__((visibility("default"), used)) const struct KtImage kilotwin_image = {
-    KT_IMAGE_MAGIC,
-    KT_IMAGE_VERSION,
-    (uint64_t)&kt_control,
-    (uint64_t)&robot,
-    (uint64_t)&kilo_ticks,
-    (uint64_t)&kilo_tx_period,
-    (uint64_t)&boot,
-    (uint64_t)&kt_enter,
-    (uint64_t)&kt_call,
-    (uint64_t)&kt_leave,
-    (uint64_t)&interrupts,
-    (uint64_t)&transmit,
+    KT_IMAGE_MAGIC,        KT_IMAGE_VERSION,          (uint64_t)&kt_control, (uint64_t)&robot,
+    (uint64_t)&kilo_ticks, (uint64_t)&kilo_tx_period, (uint64_t)&boot,       (uint64_t)&kt_enter,
+    (uint64_t)&kt_call,    (uint64_t)&kt_leave,       (uint64_t)&interrupts, (uint64_t)&transmit,
 };

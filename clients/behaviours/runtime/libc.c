@@ -153,7 +153,8 @@ void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, co
   }
 }
 
-void* bsearch(const void* key, const void* base, size_t count, size_t size, int (*compare)(const void*, const void*)) {
+void* bsearch(const void* key, const void* base, size_t count, size_t size,
+              int (*compare)(const void*, const void*)) {
   const unsigned char* first = base;
   while (count > 0) {
     const unsigned char* middle = first + count / 2 * size;

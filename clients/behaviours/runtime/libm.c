@@ -62,6 +62,8 @@ float sqrtf(float x) {
   float name##f(float x) { return (float)name(x); }
 #define BINARY(name) \
   float name##f(float x, float y) { return (float)name(x, y); }
-UNARY(sin) UNARY(cos) UNARY(tan) UNARY(asin) UNARY(acos) UNARY(atan) UNARY(exp) UNARY(log) UNARY(log2) UNARY(log10)
-UNARY(fabs) UNARY(floor) UNARY(ceil) UNARY(round) UNARY(trunc) UNARY(square) UNARY(sinh) UNARY(cosh) UNARY(tanh)
-BINARY(atan2) BINARY(pow) BINARY(fmod) BINARY(hypot) BINARY(fmin) BINARY(fmax) BINARY(copysign)
+UNARY(sin)
+UNARY(cos)
+UNARY(tan) UNARY(asin) UNARY(acos) UNARY(atan) UNARY(exp) UNARY(log) UNARY(log2) UNARY(log10) UNARY(fabs)
+    UNARY(floor) UNARY(ceil) UNARY(round) UNARY(trunc) UNARY(square) UNARY(sinh) UNARY(cosh) UNARY(tanh)
+        BINARY(atan2) BINARY(pow) BINARY(fmod) BINARY(hypot) BINARY(fmin) BINARY(fmax) BINARY(copysign)

@@ -46,7 +46,8 @@ static char* digits(char* end, uint64_t value, unsigned base, int least, char te
 
 enum { MOST_DIGITS = 40, MOST_DECIMALS = 15 };
 
-static void put_integer(struct Output* out, struct Field* field, uint64_t value, char sign, unsigned base, char ten) {
+static void put_integer(struct Output* out, struct Field* field, uint64_t value, char sign, unsigned base,
+                        char ten) {
   char text[MOST_DIGITS];
   int least = field->precision < 0 ? 1 : field->precision;
   if (least > MOST_DIGITS) least = MOST_DIGITS;
@@ -96,10 +97,14 @@ int vsnprintf(char* to, size_t size, const char* format, va_list arguments) {
     }
     struct Field field = {0, 0, 0, 0, -1};
     for (++format;; ++format) {
-      if (*format == '-') field.left = 1;
-      else if (*format == '0') field.zero = 1;
-      else if (*format == '+') field.plus = 1;
-      else break;
+      if (*format == '-')
+        field.left = 1;
+      else if (*format == '0')
+        field.zero = 1;
+      else if (*format == '+')
+        field.plus = 1;
+      else
+        break;
     }
     if (*format == '*') {
       field.width = va_arg(arguments, int);
@@ -108,7 +113,8 @@ int vsnprintf(char* to, size_t size, const char* format, va_list arguments) {
     for (; *format >= '0' && *format <= '9'; ++format) field.width = field.width * 10 + *format - '0';
     if (*format == '.') {
       field.precision = 0;
-      for (++format; *format >= '0' && *format <= '9'; ++format) field.precision = field.precision * 10 + *format - '0';
+      for (++format; *format >= '0' && *format <= '9'; ++format)
+        field.precision = field.precision * 10 + *format - '0';
     }
     int longs = 0;
     for (; *format == 'h' || *format == 'l' || *format == 'z'; ++format) longs += *format != 'h';
@@ -117,7 +123,10 @@ int vsnprintf(char* to, size_t size, const char* format, va_list arguments) {
       case 'i': {
         const int64_t value = longs ? va_arg(arguments, long) : va_arg(arguments, int);
         put_integer(&out, &field, value < 0 ? 0 - (uint64_t)value : (uint64_t)value,
-                    (char)(value < 0 ? '-' : field.plus ? '+' : 0), 10, 'a');
+                    (char)(value < 0    ? '-'
+                           : field.plus ? '+'
+                                        : 0),
+                    10, 'a');
         break;
       }
       case 'u':

@@ -28,7 +28,8 @@ Air next(const Swarm& swarm) {
   Air air = echo(swarm.frame());
   if (swarm.tick.count() < 3) {
     air.receptions.clear();
-    for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot) air.receptions.push_back({robot, message(kRun)});
+    for (std::uint32_t robot = 0; robot < swarm.plan->robots(); ++robot)
+      air.receptions.push_back({robot, message(kRun)});
   }
   return air;
 }
@@ -37,7 +38,8 @@ TEST(Checkpoint, ContinuesOnOtherHostsAsIfNothingHadHappened) {
   // Random walks, waits in the middle of functions, and robots that fault on the way.
   const std::vector<std::string> texts{
       std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c", std::string(KILOTWIN_BEHAVIOURS) + "/delay_walk.c",
-      program("static int depth(int n) { volatile int here = n; delay(7 + n); return n == 0 ? 0 : depth(n - 1) + here; }\n"
+      program("static int depth(int n) { volatile int here = n; delay(7 + n); return n == 0 ? 0 : depth(n - 1) + "
+              "here; }\n"
               "static message_t m; static message_t* tx(void) { return &m; }\n"
               "static void loop(void) { m.data[1] = depth(rand_soft() & 15); set_motors(m.data[1], rand());\n"
               "  if (kilo_uid % 8 == 3 && kilo_ticks > 60) *(volatile int*)0 = 1; }")};
@@ -65,8 +67,8 @@ TEST(Checkpoint, ContinuesOnOtherHostsAsIfNothingHadHappened) {
 }
 
 TEST(Checkpoint, SavesWhatItHasLoaded) {
-  Swarm first({program("static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5), second({program(
-      "static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5);
+  Swarm first({program("static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5),
+      second({program("static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5);
   for (int k = 0; k < 20; ++k) first.step(next(first));
   const auto parts = saved(first);
   load(second, first.tick, parts);
@@ -74,7 +76,8 @@ TEST(Checkpoint, SavesWhatItHasLoaded) {
 }
 
 TEST(Checkpoint, RejectsOneThatDoesNotFit) {
-  Swarm swarm({program("")}, 2), other({program("static uint8_t big[1000]; static void loop(void) { big[rand()%1000]++; }")}, 2);
+  Swarm swarm({program("")}, 2),
+      other({program("static uint8_t big[1000]; static void loop(void) { big[rand()%1000]++; }")}, 2);
   swarm.start();
   other.start();
   EXPECT_THROW(load(swarm, swarm.tick, saved(other)), RunError);

@@ -42,16 +42,22 @@ TEST(Compiler, AllBehavioursCompileForSimulationAndRobot) {
 
 TEST(Compiler, ErrorsNameTheUsersLine) {
   const Folder folder;
-  const std::string syntax = folder.write("a.c", "#include <kilolib.h>\n\nint main(void) {\n  undeclared = 1;\n}\n");
+  const std::string syntax =
+      folder.write("a.c", "#include <kilolib.h>\n\nint main(void) {\n  undeclared = 1;\n}\n");
   EXPECT_TRUE(error_of({syntax}).starts_with(syntax + ":4:3: error: ")) << error_of({syntax});
-  const std::string header = folder.write("b.c", "#include <kilolib.h>\n#include <unistd.h>\nint main(void) { return 0; }\n");
+  const std::string header =
+      folder.write("b.c", "#include <kilolib.h>\n#include <unistd.h>\nint main(void) { return 0; }\n");
   EXPECT_TRUE(error_of({header}).starts_with(header + ":2:10: error: unistd.h")) << error_of({header});
-  const std::string link = folder.write("c.c", "#include <kilolib.h>\nvoid helper(void);\nint main(void) {\n  helper();\n}\n");
-  EXPECT_TRUE(error_of({link}).starts_with(link + ":4:1: error: undefined reference to `helper'")) << error_of({link});
+  const std::string link =
+      folder.write("c.c", "#include <kilolib.h>\nvoid helper(void);\nint main(void) {\n  helper();\n}\n");
+  EXPECT_TRUE(error_of({link}).starts_with(link + ":4:1: error: undefined reference to `helper'"))
+      << error_of({link});
   const std::string no_main = folder.write("d.c", "int x;\n");
   EXPECT_TRUE(error_of({no_main}).starts_with(no_main + ":1:1: error: there is no main()")) << error_of({no_main});
-  const std::string several = folder.write("f.c", "#include <kilolib.h>\nint main(void) {\n  one = 1;\n  two = 2;\n  three();\n}\n");
-  EXPECT_EQ(error_of({several}), several + ":3:3: error: 'one' undeclared (first use in this function) (1 more error)");
+  const std::string several =
+      folder.write("f.c", "#include <kilolib.h>\nint main(void) {\n  one = 1;\n  two = 2;\n  three();\n}\n");
+  EXPECT_EQ(error_of({several}),
+            several + ":3:3: error: 'one' undeclared (first use in this function) (1 more error)");
   const std::string twice = folder.write("g.c", "int main(void) { return 0; }\n");
   EXPECT_EQ(error_of({twice, link}).find('\n'), std::string::npos) << error_of({twice, link});
   const std::string avr = folder.write("e.c", "#include <kilolib.h>\nint main(void) { return oops; }\n");
@@ -81,8 +87,9 @@ TEST(Compiler, KeepsResultsByContent) {
   const Folder folder;
   CompileOptions options{{}, {}, folder.path() / "cache"};
   folder.write("part.h", "#define COLOUR 1\n");
-  const fs::path source = folder.write("a.c", "#include <kilolib.h>\n#include \"part.h\"\n#ifndef K\n#define K 0\n#endif\n"
-                                              "int main(void) { set_color(COLOUR + K); kilo_start(0, 0); }\n");
+  const fs::path source = folder.write("a.c",
+                                       "#include <kilolib.h>\n#include \"part.h\"\n#ifndef K\n#define K 0\n#endif\n"
+                                       "int main(void) { set_color(COLOUR + K); kilo_start(0, 0); }\n");
   const CompiledProgram first = compile({source}, options);
   EXPECT_EQ(first.sha256, sha256_hex(read_file(first.file).value()));
   const auto written = fs::last_write_time(first.file);
@@ -103,15 +110,21 @@ TEST(Compiler, KeepsResultsByContent) {
 
 TEST(Compiler, SeveralSourcesAndReadySharedObjects) {
   const Folder folder;
-  const fs::path a = folder.write("a.c", "#include <kilolib.h>\nuint8_t shared;\nvoid helper(void);\n"
-                                         "int main(void) { kilo_init(); helper(); kilo_start(helper, helper); }\n");
-  const fs::path b = folder.write("b.c", "#include \"kilolib.h\"\nuint8_t shared;\nvoid helper(void) { set_color(++shared); }\n");
+  const fs::path a = folder.write("a.c",
+                                  "#include <kilolib.h>\nuint8_t shared;\nvoid helper(void);\n"
+                                  "int main(void) { kilo_init(); helper(); kilo_start(helper, helper); }\n");
+  const fs::path b =
+      folder.write("b.c", "#include \"kilolib.h\"\nuint8_t shared;\nvoid helper(void) { set_color(++shared); }\n");
   const CompiledProgram built = compile({a, b}, cached());
   const fs::path copy = folder.write("ready.so", read_file(built.file).value());
   const CompiledProgram ready = compile({copy}, cached());
   EXPECT_EQ(ready.file, copy);
   EXPECT_EQ(ready.sha256, built.sha256);
-  EXPECT_NE(error_of({folder.write("other.so", "\x7f" "ELF")}).find("not a program for simulated robots"), std::string::npos);
+  EXPECT_NE(error_of({folder.write("other.so",
+                                   "\x7f"
+                                   "ELF")})
+                .find("not a program for simulated robots"),
+            std::string::npos);
 }
 
 TEST(Compiler, ClangGivesTheSameBehaviour) {

@@ -33,7 +33,8 @@ TEST(ElfFile, EveryCutIsToldPlainly) {
       (void)ElfFile::parse(octets.substr(0, size), "cut.so");
       EXPECT_GT(size, 2 * kPage);  // what is behind the segments serves debuggers
     } catch (const UserError& error) {
-      EXPECT_TRUE(std::string(error.what()).starts_with("cut.so: not a program for simulated robots: ")) << error.what();
+      EXPECT_TRUE(std::string(error.what()).starts_with("cut.so: not a program for simulated robots: "))
+          << error.what();
     }
   }
 }

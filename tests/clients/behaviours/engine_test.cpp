@@ -18,7 +18,9 @@ Air to_all(const Swarm& swarm, const IrMessage& what) {
 }
 
 TEST(Engine, RobotsAreIdleUntilToldToRun) {
-  Swarm swarm({program("static void setup(void) { set_color(1); set_motors(10, 20); }\nstatic void loop(void) { set_color(2); }")}, 3);
+  Swarm swarm({program("static void setup(void) { set_color(1); set_motors(10, 20); }\nstatic void loop(void) { "
+                       "set_color(2); }")},
+              3);
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kIdle);
   swarm.steps(3);
   EXPECT_EQ(swarm.life_cycle(2), LifeCycle::kIdle);
@@ -56,7 +58,9 @@ TEST(Engine, GlobalsAndStaticsArePrivate) {
 }
 
 TEST(Engine, SeveralProgramsRunSideBySide) {
-  Swarm swarm({program("static void loop(void) { set_color(1); }"), program("static void loop(void) { set_color(2); }")}, 9);
+  Swarm swarm(
+      {program("static void loop(void) { set_color(1); }"), program("static void loop(void) { set_color(2); }")},
+      9);
   swarm.start();
   EXPECT_EQ(swarm.led(8), 1);
   EXPECT_EQ(swarm.led(9), 2);
@@ -94,9 +98,11 @@ TEST(Engine, ShortDelaysAddUp) {
 }
 
 TEST(Engine, WaitingForTheClockLetsTimePass) {
-  Swarm swarm({program("static uint8_t n;\n"
-                       "static void loop(void) { uint32_t t = kilo_ticks + 4; while (kilo_ticks < t) {} set_motors(++n, 0); }")},
-              1);
+  Swarm swarm(
+      {program(
+          "static uint8_t n;\n"
+          "static void loop(void) { uint32_t t = kilo_ticks + 4; while (kilo_ticks < t) {} set_motors(++n, 0); }")},
+      1);
   swarm.start();
   swarm.steps(40);
   EXPECT_NEAR(swarm.frame().motor_left[0], 10, 1);
@@ -242,7 +248,10 @@ TEST(Engine, HostsOnThreadsEqualOneHost) {
 }
 
 TEST(Engine, TheRunningRobotIsKnownToOtherThreads) {
-  Swarm swarm({program("static void loop(void) { if (kilo_uid == 2) for (volatile uint32_t i = 0; i < 500000000; ++i) {} }")}, 3);
+  Swarm swarm(
+      {program(
+          "static void loop(void) { if (kilo_uid == 2) for (volatile uint32_t i = 0; i < 500000000; ++i) {} }")},
+      3);
   EXPECT_FALSE(swarm.hosts[0]->running().has_value());
   swarm.step();
   Air run = to_all(swarm, message(kRun));

@@ -6,9 +6,12 @@ namespace kilotwin::behaviours::test {
 namespace {
 
 /// Robot 9 of 18 does `deed` when its clock shows 5; all count in their left motor.
-void one_fails(const std::string& deed, const std::string& told, const std::string& before = "", const std::string& after = "") {
-  Swarm swarm({program(before + "\nstatic uint8_t n;\nstatic void loop(void) { set_color(5); set_motors(++n, 1);\n"
-                                "  if (kilo_uid == 9 && kilo_ticks == 5) { " + deed + " } }\n" + after)},
+void one_fails(const std::string& deed, const std::string& told, const std::string& before = "",
+               const std::string& after = "") {
+  Swarm swarm({program(before +
+                       "\nstatic uint8_t n;\nstatic void loop(void) { set_color(5); set_motors(++n, 1);\n"
+                       "  if (kilo_uid == 9 && kilo_ticks == 5) { " +
+                       deed + " } }\n" + after)},
               18);
   swarm.start();
   swarm.steps(10);
@@ -24,7 +27,9 @@ void one_fails(const std::string& deed, const std::string& told, const std::stri
   EXPECT_NE(swarm.hosts[0]->failures()[0].text.find(told), std::string::npos) << swarm.hosts[0]->failures()[0].text;
 }
 
-TEST(Faults, NullWrite) { one_fails("volatile int* p = (int*)(uintptr_t)(n - n); *p = 1;", "access to address 0x0 in loop()"); }
+TEST(Faults, NullWrite) {
+  one_fails("volatile int* p = (int*)(uintptr_t)(n - n); *p = 1;", "access to address 0x0 in loop()");
+}
 
 TEST(Faults, WildJump) { one_fails("((void (*)(void))(uintptr_t)(n + 16))();", "access to address 0x1"); }
 
@@ -33,17 +38,14 @@ TEST(Faults, WriteToCode) { one_fails("*(volatile uint8_t*)&loop = 0;", "access 
 TEST(Faults, DivisionByZero) { one_fails("volatile int zero = 0; n = n / zero;", "division by zero in loop()"); }
 
 TEST(Faults, StackOverflow) {
-  one_fails("n = deep(n);", "stack overflow",
-            "static int deep(int n) { volatile char room[300]; room[n & 127] = n; return deep(n + 1) + room[n & 127]; }");
+  one_fails(
+      "n = deep(n);", "stack overflow",
+      "static int deep(int n) { volatile char room[300]; room[n & 127] = n; return deep(n + 1) + room[n & 127]; }");
 }
 
-TEST(Faults, LargeFrame) {
-  one_fails("volatile char room[1000000]; room[n] = 1;", "stack overflow");
-}
+TEST(Faults, LargeFrame) { one_fails("volatile char room[1000000]; room[n] = 1;", "stack overflow"); }
 
-TEST(Faults, FailedAssertion) {
-  one_fails("assert(n == 200);", "illegal instruction", "#include <assert.h>");
-}
+TEST(Faults, FailedAssertion) { one_fails("assert(n == 200);", "illegal instruction", "#include <assert.h>"); }
 
 TEST(Faults, InACallback) {
   Swarm swarm({program("static void rx(message_t* m, distance_measurement_t* d) { *(volatile char*)8 = 1; }")}, 4);

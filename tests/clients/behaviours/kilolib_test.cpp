@@ -22,8 +22,8 @@ IrMessage asked(Swarm& swarm) {
 
 /// Runs `statements` in setup(), which fill report[0..8], and returns them.
 IrMessage report(const std::string& statements, const std::string& before = "") {
-  Swarm swarm({program(before + "\nstatic message_t m;\nstatic void setup(void) {\n uint8_t* report = m.data;\n" + statements +
-                       "\n}\nstatic message_t* tx(void) { return &m; }\n")},
+  Swarm swarm({program(before + "\nstatic message_t m;\nstatic void setup(void) {\n uint8_t* report = m.data;\n" +
+                       statements + "\n}\nstatic message_t* tx(void) { return &m; }\n")},
               1);
   swarm.start();
   EXPECT_EQ(swarm.hosts[0]->robots_failed(), 0u);
@@ -39,7 +39,8 @@ TEST(Kilolib, ChecksumsAreThoseOfTheFirmware) {
       "message_t x; memset(&x, 0, sizeof x); uint16_t c = message_crc(&x); memcpy(report, &c, 2);\n"
       "x.type = RUN; c = message_crc(&x); memcpy(report + 2, &c, 2);\n"
       "x.type = RESET; c = message_crc(&x); memcpy(report + 4, &c, 2);\n"
-      "report[6] = sizeof(message_t); report[7] = sizeof(enum { A, B }); report[8] = sizeof(struct { char a; int32_t b; });");
+      "report[6] = sizeof(message_t); report[7] = sizeof(enum { A, B }); report[8] = sizeof(struct { char a; "
+      "int32_t b; });");
   EXPECT_EQ(word(r, 0), 0x9C87);
   EXPECT_EQ(word(r, 2), 0x94C7);
   EXPECT_EQ(word(r, 4), 0x2A14);
@@ -49,10 +50,11 @@ TEST(Kilolib, ChecksumsAreThoseOfTheFirmware) {
 }
 
 TEST(Kilolib, ReceivedMessagesCarryTheirChecksum) {
-  Swarm swarm({program("static void rx(message_t* m, distance_measurement_t* d) {\n"
-                       "  if (m->crc == message_crc(m) && m->crc == 0x9C87 && d->high_gain == 400 && d->low_gain == 300)\n"
-                       "    set_color(RGB(0, 3, 0));\n}\n")},
-              1);
+  Swarm swarm(
+      {program("static void rx(message_t* m, distance_measurement_t* d) {\n"
+               "  if (m->crc == message_crc(m) && m->crc == 0x9C87 && d->high_gain == 400 && d->low_gain == 300)\n"
+               "    set_color(RGB(0, 3, 0));\n}\n")},
+      1);
   swarm.start();
   Air air;
   air.receptions = {{0, message(0)}};
@@ -91,8 +93,9 @@ TEST(Kilolib, HardRandomNumbersDifferBetweenRobotsAndNotBetweenRuns) {
 
 TEST(Kilolib, RandIsThatOfAvrLibc) {
   // x = 16807 x mod 2^31 - 1 from 1: 16807, 282475249, 1622650073, 984943658; rand() gives them mod 2^15.
-  const IrMessage r = report("for (int i = 0; i < 4; ++i) { uint16_t x = rand(); memcpy(report + 2 * i, &x, 2); }\n"
-                             "srand(1); report[8] = rand() == 16807;");
+  const IrMessage r = report(
+      "for (int i = 0; i < 4; ++i) { uint16_t x = rand(); memcpy(report + 2 * i, &x, 2); }\n"
+      "srand(1); report[8] = rand() == 16807;");
   EXPECT_EQ(word(r, 0), 16807 % 32768);
   EXPECT_EQ(word(r, 2), 282475249 % 32768);
   EXPECT_EQ(word(r, 4), 1622650073 % 32768);
@@ -117,10 +120,11 @@ TEST(Kilolib, EstimatesTheMeasuredDistance) {
 }
 
 TEST(Kilolib, CalibrationAndIdentityAreTheRobotsOwn) {
-  const IrMessage r = report("report[0] = kilo_uid; report[1] = kilo_straight_left; report[2] = kilo_straight_right;\n"
-                             "report[3] = kilo_turn_left; report[4] = kilo_turn_right; uint16_t p = kilo_tx_period;\n"
-                             "memcpy(report + 5, &p, 2); report[7] = get_voltage() > 682; report[8] = kilo_irhigh[2] == 864;",
-                             "extern uint16_t kilo_irhigh[14];");
+  const IrMessage r = report(
+      "report[0] = kilo_uid; report[1] = kilo_straight_left; report[2] = kilo_straight_right;\n"
+      "report[3] = kilo_turn_left; report[4] = kilo_turn_right; uint16_t p = kilo_tx_period;\n"
+      "memcpy(report + 5, &p, 2); report[7] = get_voltage() > 682; report[8] = kilo_irhigh[2] == 864;",
+      "extern uint16_t kilo_irhigh[14];");
   EXPECT_EQ(r[0], 0);
   EXPECT_EQ(r[1], 70);
   EXPECT_EQ(r[2], 70);
@@ -132,10 +136,11 @@ TEST(Kilolib, CalibrationAndIdentityAreTheRobotsOwn) {
 }
 
 TEST(Kilolib, MathematicsAreTheCoresOwn) {
-  const IrMessage r = report("volatile double x = 1.2345; double y = sin(x); memcpy(report, &y, 8); report[8] =\n"
-                             "round(-2.5) == -3 && floor(-0.5) == -1 && ceil(0.2) == 1 && sqrt(2.25) == 1.5 && fabs(-x) == x\n"
-                             "&& trunc(-1.7) == -1 && lround(1.5) == 2 && atan2f(1, 1) == (float)M_PI_4 && fmod(7, 4) == 3;",
-                             "#include <math.h>");
+  const IrMessage r = report(
+      "volatile double x = 1.2345; double y = sin(x); memcpy(report, &y, 8); report[8] =\n"
+      "round(-2.5) == -3 && floor(-0.5) == -1 && ceil(0.2) == 1 && sqrt(2.25) == 1.5 && fabs(-x) == x\n"
+      "&& trunc(-1.7) == -1 && lround(1.5) == 2 && atan2f(1, 1) == (float)M_PI_4 && fmod(7, 4) == 3;",
+      "#include <math.h>");
   double y = 0;
   std::memcpy(&y, r.data(), sizeof y);
   EXPECT_EQ(y, kt_sin(1.2345));
@@ -144,7 +149,8 @@ TEST(Kilolib, MathematicsAreTheCoresOwn) {
 
 TEST(Kilolib, CLibraryFormatsSortsAndSearches) {
   const IrMessage r = report(
-      "char text[40]; int n = snprintf(text, sizeof text, \"%d|%5u|%-3d|%04x|%s|%c|%.2f|%+d%%\", -7, 42u, 5, 0xBEu, \"ab\", 'z',\n"
+      "char text[40]; int n = snprintf(text, sizeof text, \"%d|%5u|%-3d|%04x|%s|%c|%.2f|%+d%%\", -7, 42u, 5, "
+      "0xBEu, \"ab\", 'z',\n"
       "  3.14159, 9);\n"
       "report[0] = strcmp(text, \"-7|   42|5  |00be|ab|z|3.14|+9%\") == 0; report[1] = n == (int)strlen(text);\n"
       "int v[5] = {3, 1, 2, -5, 1}; qsort(v, 5, sizeof v[0], order);\n"
@@ -152,8 +158,10 @@ TEST(Kilolib, CLibraryFormatsSortsAndSearches) {
       "int key = 2; report[3] = bsearch(&key, v, 5, sizeof v[0], order) == &v[3];\n"
       "memmove(text + 1, \"-7|\" - 0 ? text : 0, 5); report[4] = memcmp(text, \"--7|  \", 6) == 0;\n"
       "report[5] = strstr(\"kilobot\", \"bot\") != 0 && strchr(\"abc\", 'd') == 0 && atoi(\" -12x\") == -12;\n"
-      "report[6] = snprintf(text, 4, \"%d\", 123456) == 6 && strcmp(text, \"123\") == 0; printf(\"dropped %d\", 1);",
-      "#include <stdio.h>\nstatic int order(const void* a, const void* b) { return *(const int*)a - *(const int*)b; }");
+      "report[6] = snprintf(text, 4, \"%d\", 123456) == 6 && strcmp(text, \"123\") == 0; printf(\"dropped %d\", "
+      "1);",
+      "#include <stdio.h>\nstatic int order(const void* a, const void* b) { return *(const int*)a - *(const "
+      "int*)b; }");
   for (std::size_t i = 0; i <= 6; ++i) EXPECT_EQ(r[i], 1) << i;
 }
 
@@ -161,9 +169,11 @@ TEST(Kilolib, BuffersBetweenCallbacksAndLoop) {
   Swarm swarm({"#include <kilolib.h>\n#include <message_buffered.h>\n#include <debug.h>\n"
                "static void setup(void) {}\n"
                "static void loop(void) { distance_measurement_t d; message_t* m;\n"
-               "  while ((m = rxbuffer_peek(&d)) != 0) { set_color(m->data[0]); m->data[0]++; txbuffer_push(m); rxbuffer_pop(); }\n"
+               "  while ((m = rxbuffer_peek(&d)) != 0) { set_color(m->data[0]); m->data[0]++; txbuffer_push(m); "
+               "rxbuffer_pop(); }\n"
                "  printf(\"%d\", 1); }\n"
-               "int main(void) { kilo_init(); debug_init(); kilo_message_buffered(); kilo_start(setup, loop); return 0; }\n"},
+               "int main(void) { kilo_init(); debug_init(); kilo_message_buffered(); kilo_start(setup, loop); "
+               "return 0; }\n"},
               1);
   swarm.start();
   Air air;

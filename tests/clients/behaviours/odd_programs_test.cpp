@@ -56,7 +56,8 @@ const Odd kPrograms[] = {
     {"own_rand_and_memcpy",
      "#include <stddef.h>\n"
      "static unsigned state = 1; int rand(void) { return (state = state * 5 + 3) & 0xff; }\n"
-     "void *memcpy(void *to, const void *from, size_t n) { char *t = to; const char *f = from; while (n--) *t++ = *f++; return to; }\n"
+     "void *memcpy(void *to, const void *from, size_t n) { char *t = to; const char *f = from; while (n--) *t++ = "
+     "*f++; return to; }\n"
      "struct big { char octets[200]; } x, y;\n"
      "void setup(void) { x.octets[199] = 9; }\n"
      "void loop(void) { y = x; rand(); set_color(y.octets[199] == 9 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
@@ -66,7 +67,8 @@ const Odd kPrograms[] = {
      "enum state { WAIT, GO = 5, DONE } state = WAIT;\n"
      "bool ready = false;\n"
      "void setup(void) { ready = true; }\n"
-     "void loop(void) { if (ready == true && state != DONE) state = state == WAIT ? GO : DONE; set_color(RGB(ready * 3, 0, 0)); }\n"
+     "void loop(void) { if (ready == true && state != DONE) state = state == WAIT ? GO : DONE; set_color(RGB(ready "
+     "* 3, 0, 0)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
     {"recursion_and_big_arrays",
      "uint8_t map[64][64]; int32_t history[2000];\n"
@@ -75,13 +77,15 @@ const Odd kPrograms[] = {
      "  if (x < 0 || y < 0 || x > 31 || y > 31 || map[x][y]) return;\n"
      "  map[x][y] = 1; fill(x + 1, y); fill(x - 1, y); fill(x, y + 1); fill(x, y - 1); }\n"
      "void setup(void) { fill(3, 3); }\n"
-     "void loop(void) { history[kilo_ticks % 2000] = fibonacci(10); set_color(map[31][31] && history[kilo_ticks % 2000] == 55 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
+     "void loop(void) { history[kilo_ticks % 2000] = fibonacci(10); set_color(map[31][31] && history[kilo_ticks % "
+     "2000] == 55 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
     {"main_with_locals_that_callbacks_use",
      "static uint16_t *shared;\n"
      "void setup(void) { *shared += 1; }\n"
      "void loop(void) { *shared += 1; set_color(*shared > 1000 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
-     "int main(int argc, char **argv) { uint16_t local = 1000; char text[300]; for (int i = 0; i < 300; i++) text[i] = i;\n"
+     "int main(int argc, char **argv) { uint16_t local = 1000; char text[300]; for (int i = 0; i < 300; i++) "
+     "text[i] = i;\n"
      "  shared = &local; kilo_init(); kilo_start(setup, loop); return text[5]; }\n"},
     {"callbacks_installed_late",
      "message_t out; volatile uint8_t heard, left; uint8_t installed;\n"
@@ -89,31 +93,37 @@ const Odd kPrograms[] = {
      "message_t *tx() { return &out; }\n"
      "void success() { left = 1; }\n"
      "void setup() { out.type = NORMAL; out.data[0] = 7; out.crc = message_crc(&out); }\n"
-     "void loop() { if (kilo_ticks > 40 && !installed) { kilo_message_rx = rx; kilo_message_tx = tx; kilo_message_tx_success = success; installed = 1; }\n"
+     "void loop() { if (kilo_ticks > 40 && !installed) { kilo_message_rx = rx; kilo_message_tx = tx; "
+     "kilo_message_tx_success = success; installed = 1; }\n"
      "  set_color(heard && left ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main() { kilo_init(); kilo_start(setup, loop); }\n"},
     {"messages_sent_from_setup",
      "#include <message_buffered.h>\n"
      "uint8_t heard;\n"
-     "void setup(void) { message_t m = {.type = NORMAL}; m.data[0] = 42; m.crc = message_crc(&m); for (int i = 0; i < 3; i++) txbuffer_push(&m); }\n"
-     "void loop(void) { distance_measurement_t d; message_t *m; while ((m = rxbuffer_peek(&d)) != NULL) { heard += m->data[0] == 42; rxbuffer_pop(); }\n"
+     "void setup(void) { message_t m = {.type = NORMAL}; m.data[0] = 42; m.crc = message_crc(&m); for (int i = 0; "
+     "i < 3; i++) txbuffer_push(&m); }\n"
+     "void loop(void) { distance_measurement_t d; message_t *m; while ((m = rxbuffer_peek(&d)) != NULL) { heard += "
+     "m->data[0] == 42; rxbuffer_pop(); }\n"
      "  set_color(heard ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_message_buffered(); kilo_start(setup, loop); return 0; }\n"},
     {"tables_of_functions_and_unions",
      "typedef union { float f; uint32_t u; uint8_t octet[4]; } word_t;\n"
      "static void wait(void); static void go(void);\n"
-     "static const struct { void (*run)(void); const char *name; uint8_t next : 4, repeats : 4; } states[] = {{wait, \"wait\", 1, 3}, {go, \"go\", 0, 2}};\n"
+     "static const struct { void (*run)(void); const char *name; uint8_t next : 4, repeats : 4; } states[] = "
+     "{{wait, \"wait\", 1, 3}, {go, \"go\", 0, 2}};\n"
      "static uint8_t state, count; static word_t w = {.f = 1.0f};\n"
      "static void wait(void) {} static void go(void) {}\n"
      "void setup(void) {}\n"
-     "void loop(void) { states[state].run(); if (++count >= states[state].repeats) { state = states[state].next; count = 0; }\n"
+     "void loop(void) { states[state].run(); if (++count >= states[state].repeats) { state = states[state].next; "
+     "count = 0; }\n"
      "  set_color(w.u == 0x3f800000 && states[1].name[0] == 'g' ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
     {"jumps_and_switches",
      "void setup(void) {}\n"
      "void loop(void) { static int step; register int n = 0; goto middle;\n"
      "  again: ++n;\n"
-     "  middle: switch (step++ & 3) { default: case 3: n += 8; break; case 0: for (n = 4; n > 0; n--) if (n == 2) goto again; case 1 ... 2: n |= 1; }\n"
+     "  middle: switch (step++ & 3) { default: case 3: n += 8; break; case 0: for (n = 4; n > 0; n--) if (n == 2) "
+     "goto again; case 1 ... 2: n |= 1; }\n"
      "  set_color(n > 0 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
     {"text_without_a_terminal",
@@ -126,29 +136,38 @@ const Odd kPrograms[] = {
     {"wide_arithmetic",
      "uint64_t product; int64_t quotient; float f = 0.1f; double d;\n"
      "void setup(void) {}\n"
-     "void loop(void) { product = (uint64_t)0xffffffffu * 0xffffffffu; quotient = (int64_t)product / 7; d += f; f *= 1.01f; uint8_t wrapped = 250; wrapped += 10;\n"
-     "  set_color(product == 0xfffffffe00000001u && quotient < 0 && d > 0 && wrapped == 4 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
+     "void loop(void) { product = (uint64_t)0xffffffffu * 0xffffffffu; quotient = (int64_t)product / 7; d += f; f "
+     "*= 1.01f; uint8_t wrapped = 250; wrapped += 10;\n"
+     "  set_color(product == 0xfffffffe00000001u && quotient < 0 && d > 0 && wrapped == 4 ? RGB(3, 0, 0) : RGB(0, "
+     "0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
     {"heap",
      "#include <stdlib.h>\n#include <string.h>\n"
      "typedef struct node { struct node *next; uint8_t value; } node;\n"
      "node *list; uint16_t wrong;\n"
      "void setup(void) {}\n"
-     "void loop(void) { node *n = malloc(sizeof *n); if (!n) wrong++; n->value = kilo_ticks; n->next = list; list = n;\n"
-     "  char *text = calloc(20, 5); if (!text || text[99]) wrong++; memset(text, 1, 100); text = realloc(text, 500); if (!text || text[99] != 1) wrong++; free(text);\n"
-     "  uint8_t length = 0; for (node **at = &list; *at;) { if (++length > 5) { node *old = *at; *at = old->next; free(old); } else at = &(*at)->next; }\n"
+     "void loop(void) { node *n = malloc(sizeof *n); if (!n) wrong++; n->value = kilo_ticks; n->next = list; list "
+     "= n;\n"
+     "  char *text = calloc(20, 5); if (!text || text[99]) wrong++; memset(text, 1, 100); text = realloc(text, "
+     "500); if (!text || text[99] != 1) wrong++; free(text);\n"
+     "  uint8_t length = 0; for (node **at = &list; *at;) { if (++length > 5) { node *old = *at; *at = old->next; "
+     "free(old); } else at = &(*at)->next; }\n"
      "  if (malloc(100000) || malloc((size_t)-1)) wrong++;\n"
      "  set_color(!wrong && length <= 6 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
     {"registers_of_the_robot",
      "#define BAUD 38400\n"
-     "#include <avr/eeprom.h>\n#include <avr/interrupt.h>\n#include <avr/io.h>\n#include <avr/pgmspace.h>\n#include <avr/wdt.h>\n#include <util/delay.h>\n"
+     "#include <avr/eeprom.h>\n#include <avr/interrupt.h>\n#include <avr/io.h>\n#include "
+     "<avr/pgmspace.h>\n#include <avr/wdt.h>\n#include <util/delay.h>\n"
      "#include <util/setbaud.h>\n"
      "const uint8_t primes[] PROGMEM = {2, 3, 5}; uint16_t EEMEM stored; uint8_t block[4], erased;\n"
-     "void setup(void) { wdt_disable(); UBRR0H = UBRRH_VALUE; UBRR0L = UBRRL_VALUE; while (!(UCSR0A & _BV(UDRE0))); UDR0 = 'x';\n"
-     "  erased = eeprom_read_byte((uint8_t *)0xB0); eeprom_update_word(&stored, kilo_uid + 1); eeprom_write_dword((uint32_t *)1020, 0x04030201); DDRB |= _BV(5); }\n"
+     "void setup(void) { wdt_disable(); UBRR0H = UBRRH_VALUE; UBRR0L = UBRRL_VALUE; while (!(UCSR0A & "
+     "_BV(UDRE0))); UDR0 = 'x';\n"
+     "  erased = eeprom_read_byte((uint8_t *)0xB0); eeprom_update_word(&stored, kilo_uid + 1); "
+     "eeprom_write_dword((uint32_t *)1020, 0x04030201); DDRB |= _BV(5); }\n"
      "void loop(void) { cli(); PORTB ^= 1 << 5; sei(); wdt_reset(); eeprom_read_block(block, (void *)1020, 4);\n"
-     "  set_color(erased == 0xff && eeprom_read_word(&stored) == kilo_uid + 1 && block[3] == 4 && pgm_read_byte(&primes[2]) == 5 && UBRR_VALUE == 12 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
+     "  set_color(erased == 0xff && eeprom_read_word(&stored) == kilo_uid + 1 && block[3] == 4 && "
+     "pgm_read_byte(&primes[2]) == 5 && UBRR_VALUE == 12 ? RGB(3, 0, 0) : RGB(0, 0, 3)); }\n"
      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n"},
 };
 

@@ -36,12 +36,15 @@ std::string program(const std::string& body) {
          "static void setup(void);\n"
          "static void loop(void);\n#line 1\n" +
          body +
-         (body.find("void rx(") == std::string::npos ? "\nstatic void rx(message_t* m, distance_measurement_t* d) {}" : "") +
+         (body.find("void rx(") == std::string::npos
+              ? "\nstatic void rx(message_t* m, distance_measurement_t* d) {}"
+              : "") +
          (body.find("* tx(") == std::string::npos ? "\nstatic message_t* tx(void) { return 0; }" : "") +
          (body.find("void tx_success(") == std::string::npos ? "\nstatic void tx_success(void) {}" : "") +
          (body.find("void setup(") == std::string::npos ? "\nstatic void setup(void) {}" : "") +
          (body.find("void loop(") == std::string::npos ? "\nstatic void loop(void) {}" : "") +
-         "\nint main(void) { kilo_init(); kilo_message_rx = rx; kilo_message_tx = tx; kilo_message_tx_success = tx_success;\n"
+         "\nint main(void) { kilo_init(); kilo_message_rx = rx; kilo_message_tx = tx; kilo_message_tx_success = "
+         "tx_success;\n"
          "  kilo_start(setup, loop); return 0; }\n";
 }
 
@@ -81,7 +84,8 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
   manifest.mutable_experiment()->mutable_motion()->set_calibrated_turn_duty(60);
   for (std::size_t p = 0; p < texts.size(); ++p) {
     const bool is_path = texts[p].ends_with(".c") && texts[p].find('\n') == std::string::npos;
-    const fs::path source = is_path ? fs::path(texts[p]) : folder.write("program" + std::to_string(p) + ".c", texts[p]);
+    const fs::path source =
+        is_path ? fs::path(texts[p]) : folder.write("program" + std::to_string(p) + ".c", texts[p]);
     const CompiledProgram compiled = compile({source}, cached());
     folder.write("programs/" + compiled.sha256 + ".so", read_file(compiled.file).value());
     proto::Program& entry = *manifest.add_program();
@@ -159,8 +163,9 @@ Air echo(const ActuationFrame& frame) {
 }
 
 bool equal(const ActuationFrame& a, const ActuationFrame& b) {
-  return a.motor_left == b.motor_left && a.motor_right == b.motor_right && a.led == b.led && a.life_cycle == b.life_cycle &&
-         a.tx_period == b.tx_period && a.offer_robot == b.offer_robot && a.offer_message == b.offer_message;
+  return a.motor_left == b.motor_left && a.motor_right == b.motor_right && a.led == b.led &&
+         a.life_cycle == b.life_cycle && a.tx_period == b.tx_period && a.offer_robot == b.offer_robot &&
+         a.offer_message == b.offer_message;
 }
 
 }  // namespace kilotwin::behaviours::test

@@ -35,7 +35,8 @@ class Folder {
 [[nodiscard]] std::string program(const std::string& body);
 
 [[nodiscard]] IrMessage message(std::uint8_t type, std::uint8_t first_octet = 0);
-inline constexpr std::uint8_t kReset = 0x83, kSleep = 0x84, kWakeup = 0x85, kVoltage = 0x87, kRun = 0x88, kReadUid = 0x89;
+inline constexpr std::uint8_t kReset = 0x83, kSleep = 0x84, kWakeup = 0x85, kVoltage = 0x87, kRun = 0x88,
+                              kReadUid = 0x89;
 
 /// What the radio tells all robots in one tick.
 struct Air {

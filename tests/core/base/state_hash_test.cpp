@@ -16,8 +16,7 @@ namespace {
 
 /// `of(bit)` is a function's value with that input bit flipped, `of(-1)` without. Counts, for each input and output bit, how
 /// often the one flips the other; returns the largest distance of the frequency from 1/2, in standard errors.
-template <class Function>
-double worst_avalanche(int inputs, const Function& of) {
+template <class Function> double worst_avalanche(int inputs, const Function& of) {
   constexpr int kRounds = 4096;
   std::mt19937_64 random(9);
   double worst = 0;
@@ -32,7 +31,8 @@ double worst_avalanche(int inputs, const Function& of) {
     }
   }
   for (const auto& row : flips) {
-    for (const int count : row) worst = std::fmax(worst, std::fabs(count - kRounds / 2.0) / std::sqrt(kRounds / 4.0));
+    for (const int count : row)
+      worst = std::fmax(worst, std::fabs(count - kRounds / 2.0) / std::sqrt(kRounds / 4.0));
   }
   return worst;
 }
@@ -61,8 +61,10 @@ TEST(StateHash, IdAndDomainAvalanche) {
   const auto of = [](const std::array<std::uint64_t, 4>& w, int bit) {
     auto id = static_cast<std::uint32_t>(w[0] & 0xfff);
     std::uint64_t domain = 1 + (w[1] & 3);
-    if (bit >= 32) domain ^= std::uint64_t{1} << (bit - 32);
-    else if (bit >= 0) id ^= std::uint32_t{1} << bit;
+    if (bit >= 32)
+      domain ^= std::uint64_t{1} << (bit - 32);
+    else if (bit >= 0)
+      id ^= std::uint32_t{1} << bit;
     return entity_hash(static_cast<HashDomain>(domain), id, {w[2]});
   };
   EXPECT_LT(worst_avalanche(35, of), 6);
@@ -114,7 +116,8 @@ TEST(StateHash, OrderNumberAndPlaceOfWordsCount) {
     ++cases;
   };
   for (std::uint32_t id = 0; id < 300; ++id) {
-    for (const HashDomain domain : {HashDomain::kBody, HashDomain::kProgram, HashDomain::kRadio, HashDomain::kStation}) {
+    for (const HashDomain domain :
+         {HashDomain::kBody, HashDomain::kProgram, HashDomain::kRadio, HashDomain::kStation}) {
       add(entity_hash(domain, id, {}));
       add(entity_hash(domain, id, {0}));
       add(entity_hash(domain, id, {0, 0}));

@@ -18,8 +18,7 @@ namespace kilotwin::dds {
 namespace {
 
 /// Values that a receive thread collects and a test waits for.
-template <class T>
-class Mailbox {
+template <class T> class Mailbox {
  public:
   void put(T value) {
     const std::lock_guard lock(mutex_);
@@ -54,9 +53,10 @@ TEST(Dds, CarriesSamplesToALateReader) {
   Writer<PublicRunStatus> writer(participant, topics::run_status());
   writer.write(status_of(7));
   Mailbox<std::uint64_t> box;
-  const Reader<PublicRunStatus> reader(participant, topics::run_status(), [&](const PublicRunStatus& sample, SampleState state) {
-    if (state.valid) box.put(sample.run);
-  });
+  const Reader<PublicRunStatus> reader(participant, topics::run_status(),
+                                       [&](const PublicRunStatus& sample, SampleState state) {
+                                         if (state.valid) box.put(sample.run);
+                                       });
   ASSERT_TRUE(box.wait_for(1));
   EXPECT_EQ(box.values()[0], 7u);
 }
@@ -66,7 +66,9 @@ TEST(Dds, RoutesByPartition) {
   const Participant participant({claim.domain(), {}});
   Mailbox<std::uint64_t> first, second;
   const auto collect = [](Mailbox<std::uint64_t>& box) {
-    return [&box](const WireBodyFrame& sample, SampleState state) { if (state.valid) box.put(sample.run); };
+    return [&box](const WireBodyFrame& sample, SampleState state) {
+      if (state.valid) box.put(sample.run);
+    };
   };
   const Reader<WireBodyFrame> to_first(participant, topics::ghosts(1), collect(first));
   const Reader<WireBodyFrame> to_second(participant, topics::ghosts(2), collect(second));

@@ -28,7 +28,8 @@ TEST(HashBook, ChainsSumsInWhateverOrderSharesCome) {
     while (book.tick() < Tick{kTicks - 1}) {
       const std::size_t who = random() % kFederates;
       const std::size_t count = std::min<std::size_t>(random() % 9, kTicks - sent[who]);
-      ASSERT_TRUE(book.add(Tick{static_cast<std::int64_t>(sent[who])}, std::span(shares[who]).subspan(sent[who], count)));
+      ASSERT_TRUE(
+          book.add(Tick{static_cast<std::int64_t>(sent[who])}, std::span(shares[who]).subspan(sent[who], count)));
       sent[who] += count;
       while (book.advance()) {}
     }

@@ -167,7 +167,11 @@ class Federation {
   }
 
  private:
-  struct Frame { int from; Tick tick; std::uint32_t mentions; };
+  struct Frame {
+    int from;
+    Tick tick;
+    std::uint32_t mentions;
+  };
   struct Member {
     RunSchedule schedule;
     Tick now;
@@ -180,8 +184,9 @@ class Federation {
 
   void ask() {
     if (federates_[0].done) return;
-    static constexpr DirectiveKind kinds[] = {DirectiveKind::kPause, DirectiveKind::kContinue, DirectiveKind::kStep,
-                                              DirectiveKind::kOverheadInput, DirectiveKind::kContinue, DirectiveKind::kContinue};
+    static constexpr DirectiveKind kinds[] = {DirectiveKind::kPause,    DirectiveKind::kContinue,
+                                              DirectiveKind::kStep,     DirectiveKind::kOverheadInput,
+                                              DirectiveKind::kContinue, DirectiveKind::kContinue};
     Directive wanted = directive(0, 0, kinds[random_() % 6], 1 + static_cast<std::uint32_t>(random_() % 7));
     const Directive stamped = ingress_.stamp(federates_[0].now, wanted);
     federates_[0].schedule.add(stamped);
@@ -224,7 +229,8 @@ class Federation {
       case Verdict::kStep: break;
     }
     if (!member.schedule.overhead_inputs().empty()) {
-      member.history += std::to_string(member.schedule.overhead_inputs().size()) + " inputs at " + std::to_string(member.now.count()) + "; ";
+      member.history += std::to_string(member.schedule.overhead_inputs().size()) + " inputs at " +
+                        std::to_string(member.now.count()) + "; ";
     }
     ++member.now;
     member.published = false;

@@ -40,7 +40,8 @@ class Tiny : public Federate {
     } else if (self == plan_.comm()) {
       bodies_in_ = std::make_unique<Input<BodyFrame>>(session, topics::bodies(), physics);
       actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
-      overhead_in_ = std::make_unique<Input<OverheadFrame>>(session, topics::overhead(), std::vector{plan_.station()});
+      overhead_in_ =
+          std::make_unique<Input<OverheadFrame>>(session, topics::overhead(), std::vector{plan_.station()});
       radio_ = std::make_unique<Output<RadioFrame>>(session, topics::radio(0));
     } else if (self == plan_.station()) {
       bodies_in_ = std::make_unique<Input<BodyFrame>>(session, topics::bodies(), physics);
@@ -180,7 +181,8 @@ class Sessions : public ::testing::Test {
   void expect_all_name(FederateId culprit, const std::string& text) {
     for (std::uint32_t i = 0; i < outcomes_.size(); ++i) {
       if (i == culprit.value()) continue;
-      EXPECT_NE(outcomes_[i].failure.find(text), std::string::npos) << plan_.name(FederateId{i}) << ": " << outcomes_[i].failure;
+      EXPECT_NE(outcomes_[i].failure.find(text), std::string::npos)
+          << plan_.name(FederateId{i}) << ": " << outcomes_[i].failure;
     }
   }
   void expect_malformed(const std::string& why) {
@@ -189,7 +191,10 @@ class Sessions : public ::testing::Test {
       EXPECT_NE(outcome.failure, "");
       told = told || outcome.failure.find("malformed: " + why) != std::string::npos;
     }
-    EXPECT_TRUE(told) << outcomes_[0].failure << '\n' << outcomes_[1].failure << '\n' << outcomes_[2].failure << '\n' << outcomes_[3].failure;
+    EXPECT_TRUE(told) << outcomes_[0].failure << '\n'
+                      << outcomes_[1].failure << '\n'
+                      << outcomes_[2].failure << '\n'
+                      << outcomes_[3].failure;
   }
   WireMember member(FederateId id, kilotwin_wire_MemberPhase phase) const {
     WireMember sample{};
@@ -201,8 +206,9 @@ class Sessions : public ::testing::Test {
     return sample;
   }
 
-  const RunPlan plan_ = testing::make_plan("duration_s: " + std::to_string(kLast * 0.032768 - 1e-3) + " robots { count: 3 }",
-                                           {{0, 0, 0}, {50, 0, 0}, {100, 0, 0}});
+  const RunPlan plan_ =
+      testing::make_plan("duration_s: " + std::to_string(kLast * 0.032768 - 1e-3) + " robots { count: 3 }",
+                         {{0, 0, 0}, {50, 0, 0}, {100, 0, 0}});
   const dds::DomainClaim claim_ = dds::DomainClaim::any();
   const FederateId physics_ = plan_.physics(PartitionId{0}), host_ = plan_.behaviours(HostId{0});
   std::array<Hooks, 4> hooks_;
@@ -309,7 +315,8 @@ TEST_F(Sessions, NameTheOneThatFails) {
   run_all();
   EXPECT_EQ(outcomes_[host_.value()].failure, "the disk is full");
   expect_all_name(host_, "behaviours 1/1");
-  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("the disk is full"), std::string::npos) << outcomes_[1].failure;
+  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("the disk is full"), std::string::npos)
+      << outcomes_[1].failure;
 }
 
 TEST_F(Sessions, NameTheOneThatVanishes) {
@@ -332,7 +339,8 @@ TEST_F(Sessions, DoNotWaitForOneThatLeftTooEarly) {
   };
   run_all();
   expect_all_name(host_, "behaviours 1/1");
-  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("left without its frame of tick 5"), std::string::npos) << outcomes_[1].failure;
+  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("left without its frame of tick 5"), std::string::npos)
+      << outcomes_[1].failure;
 }
 
 TEST_F(Sessions, SayForWhomTheyWait) {
@@ -354,7 +362,8 @@ TEST_F(Sessions, StartedTwiceLeaveTheFirstAlone) {
   first.write(member(host_, kilotwin_wire_STEPPING));
   start(host_);
   join();
-  EXPECT_NE(outcomes_[host_.value()].failure.find("behaviours 1/1 of this run was started already"), std::string::npos)
+  EXPECT_NE(outcomes_[host_.value()].failure.find("behaviours 1/1 of this run was started already"),
+            std::string::npos)
       << outcomes_[host_.value()].failure;
 }
 
@@ -408,7 +417,9 @@ TEST_F(Sessions, RefuseReceptionsOutOfOrder) {
   expect_malformed("its receptions");
 }
 TEST_F(Sessions, RefuseAnUnknownCommand) {
-  of(plan_.station()).spoil_overhead = [](OverheadFrame& frame) { frame.packets[0].command = static_cast<OverheadCommand>(9); };
+  of(plan_.station()).spoil_overhead = [](OverheadFrame& frame) {
+    frame.packets[0].command = static_cast<OverheadCommand>(9);
+  };
   run_all();
   expect_malformed("a packet's command");
 }
@@ -416,8 +427,7 @@ TEST_F(Sessions, RefuseAnUnknownCommand) {
 /// Someone who knows the run's id, and writes what he likes.
 class Strangers : public Sessions {
  protected:
-  template <class Wire>
-  void interfere(const dds::Channel& channel, const Wire& sample) {
+  template <class Wire> void interfere(const dds::Channel& channel, const Wire& sample) {
     of(plan_.station()).on_publish = [this, channel, sample](Session& session) {
       if (session.now() != Tick{20}) return;
       dds::Writer<Wire> writer(participant_, channel);
@@ -435,7 +445,8 @@ TEST_F(Strangers, AreRefusedAsPublishers) {
   frame.publisher = 99;
   frame.tick = std::numeric_limits<std::int64_t>::max();
   interfere(topics::bodies(), frame);
-  for (const Outcome& outcome : outcomes_) EXPECT_NE(outcome.failure.find("was not expected"), std::string::npos) << outcome.failure;
+  for (const Outcome& outcome : outcomes_)
+    EXPECT_NE(outcome.failure.find("was not expected"), std::string::npos) << outcome.failure;
 }
 
 TEST_F(Strangers, OfAnotherRunAreNotHeard) {
@@ -468,7 +479,8 @@ TEST_F(Strangers, OfAnotherRunOnTheDomainAreNamed) {
   WireMember other = member(host_, kilotwin_wire_STEPPING);
   other.run = plan_.run() + 1;
   interfere(topics::members(), other);
-  for (const Outcome& outcome : outcomes_) EXPECT_NE(outcome.failure.find("in use by another run"), std::string::npos) << outcome.failure;
+  for (const Outcome& outcome : outcomes_)
+    EXPECT_NE(outcome.failure.find("in use by another run"), std::string::npos) << outcome.failure;
 }
 
 }  // namespace

@@ -37,7 +37,8 @@ TEST(TickGate, RefusesStrangersAndGapsAndPassesOverRepeats) {
 
 TEST(TickGate, RefusesWhoWouldLapTheReader) {
   TickGate gate({FederateId{1}}, Tick{3});
-  for (int t = 3; t < 3 + kFrameRing; ++t) EXPECT_EQ(gate.arrived(FederateId{1}, Tick{t}), TickGate::Arrival::kAccepted);
+  for (int t = 3; t < 3 + kFrameRing; ++t)
+    EXPECT_EQ(gate.arrived(FederateId{1}, Tick{t}), TickGate::Arrival::kAccepted);
   EXPECT_EQ(gate.arrived(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kUnexpected);
   gate.reading(Tick{4});
   EXPECT_EQ(gate.arrived(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kAccepted);

@@ -53,7 +53,8 @@ class Range {
 using One = std::function<double(double)>;
 using OneExact = std::function<long double(long double)>;
 
-void expect_within(double limit_ulp, const std::string& name, const Range& range, const One& f, const OneExact& exact) {
+void expect_within(double limit_ulp, const std::string& name, const Range& range, const One& f,
+                   const OneExact& exact) {
   std::mt19937_64 random(20180901);
   double worst = 0, worst_at = 0;
   for (int i = 0; i < kSamples; ++i) {
@@ -96,8 +97,8 @@ TEST(Accuracy, SineAndCosine) {
 }
 
 TEST(Accuracy, Tangent) {
-  for (const auto& range : {Range::uniform(-7, 7), Range::uniform(-1e6, 1e6), Range::spread(1e6, kMax),
-                            Range::spread(1e-300, 1e6)}) {
+  for (const auto& range :
+       {Range::uniform(-7, 7), Range::uniform(-1e6, 1e6), Range::spread(1e6, kMax), Range::spread(1e-300, 1e6)}) {
     expect_within(1.0, "tan", range, kt_tan, tangent);
   }
 }
@@ -135,11 +136,13 @@ TEST(Accuracy, ArcFunctions) {
   }
   const auto atan2 = [](long double y, long double x) { return std::atan2(y, x); };
   expect_within(1.0, "atan2", Range::uniform(-1000, 1000), Range::uniform(-1000, 1000), kt_atan2, atan2);
-  expect_within(1.0, "atan2 anywhere", Range::spread(kSmallest, kMax), Range::spread(kSmallest, kMax), kt_atan2, atan2);
-  expect_within(1.0, "atan2 left anywhere", Range::spread(kSmallest, kMax), Range::spread(-kSmallest, -kMax), kt_atan2,
+  expect_within(1.0, "atan2 anywhere", Range::spread(kSmallest, kMax), Range::spread(kSmallest, kMax), kt_atan2,
                 atan2);
+  expect_within(1.0, "atan2 left anywhere", Range::spread(kSmallest, kMax), Range::spread(-kSmallest, -kMax),
+                kt_atan2, atan2);
   expect_within(1.0, "atan2 large", Range::spread(1e290, kMax), Range::spread(1e290, kMax), kt_atan2, atan2);
-  expect_within(1.0, "atan2 subnormal", Range::spread(kSmallest, 1e-300), Range::spread(kSmallest, 1e-300), kt_atan2, atan2);
+  expect_within(1.0, "atan2 subnormal", Range::spread(kSmallest, 1e-300), Range::spread(kSmallest, 1e-300),
+                kt_atan2, atan2);
 }
 
 TEST(Accuracy, ExponentialAndLogarithm) {
@@ -160,8 +163,10 @@ TEST(Accuracy, Power) {
   const auto of_size = [](double x, double y) { return kt_pow(std::fabs(x), y); };
   const auto of_size_exact = [&pow](long double x, long double y) { return pow(std::fabs(x), y); };
   expect_within(0.7, "pow", Range::uniform(0, 100), Range::uniform(-150, 150), of_size, of_size_exact);
-  expect_within(0.7, "pow near 1", Range::uniform(0.99, 1.01), Range::uniform(-60000, 60000), of_size, of_size_exact);
-  expect_within(1.1, "pow anywhere", Range::spread(kSmallest, kMax), Range::spread(1e-20, 1e3), of_size, of_size_exact);
+  expect_within(0.7, "pow near 1", Range::uniform(0.99, 1.01), Range::uniform(-60000, 60000), of_size,
+                of_size_exact);
+  expect_within(1.1, "pow anywhere", Range::spread(kSmallest, kMax), Range::spread(1e-20, 1e3), of_size,
+                of_size_exact);
   const auto square = [](double x) { return kt_pow(x, 2); };
   expect_within(0.6, "square", Range::uniform(-1e10, 1e10), square, [](long double x) { return x * x; });
 }
@@ -169,7 +174,8 @@ TEST(Accuracy, Power) {
 TEST(Accuracy, Hypotenuse) {
   const auto hypot = [](long double x, long double y) { return std::hypot(x, y); };
   expect_within(1.25, "hypot", Range::uniform(-1000, 1000), Range::uniform(-1000, 1000), kt_hypot, hypot);
-  expect_within(1.25, "hypot anywhere", Range::spread(kSmallest, kMax), Range::spread(kSmallest, kMax), kt_hypot, hypot);
+  expect_within(1.25, "hypot anywhere", Range::spread(kSmallest, kMax), Range::spread(kSmallest, kMax), kt_hypot,
+                hypot);
 }
 
 TEST(Accuracy, FloorAndRemainderAreExact) {
@@ -207,8 +213,9 @@ TEST(Accuracy, InverseNormal) {
       const double tail = range(random);
       const double p = upper_half ? 1 - tail : tail;  // Exact: `tail` is drawn on the grid of 2^-53 there.
       const double value = kt_inverse_normal(p);
-      const long double exact = upper_half ? tail_quantile(1 - static_cast<long double>(p), static_cast<long double>(value))
-                                           : -tail_quantile(static_cast<long double>(p), -static_cast<long double>(value));
+      const long double exact =
+          upper_half ? tail_quantile(1 - static_cast<long double>(p), static_cast<long double>(value))
+                     : -tail_quantile(static_cast<long double>(p), -static_cast<long double>(value));
       worst = std::fmax(worst, std::fabs(static_cast<double>((static_cast<long double>(value) - exact) / exact)));
       worst_ulp = std::fmax(worst_ulp, error_ulp(value, exact));
     }
@@ -224,7 +231,8 @@ TEST(Accuracy, InverseNormal) {
   // About the median the quantile is sqrt(2 pi) q (1 + pi q^2 / 3 + 7 pi^2 q^4 / 30 + ...).
   std::mt19937_64 random(78);
   for (int i = 0; i < 10000; ++i) {
-    const double q = static_cast<double>(static_cast<std::int64_t>(random() >> 11) - (std::int64_t{1} << 52)) * 0x1p-62;
+    const double q =
+        static_cast<double>(static_cast<std::int64_t>(random() >> 11) - (std::int64_t{1} << 52)) * 0x1p-62;
     const auto exact_q = static_cast<long double>((0.5 + q) - 0.5);
     const long double pi = 3.14159265358979323846264338L, square = pi * exact_q * exact_q;
     const long double exact = std::sqrt(2 * pi) * exact_q * (1 + square / 3 + 7 * square * square / 30);

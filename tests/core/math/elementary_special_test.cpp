@@ -26,15 +26,33 @@ TEST(Special, OneNanForAll) {
   for (const double x : {kNan, -kNan, other}) {
     double s = 0, c = 0;
     kt_sincos(x, &s, &c);
-    for (const double y : {s, c, kt_sin(x), kt_cos(x), kt_tan(x), kt_atan(x), kt_atan2(x, 1), kt_atan2(1, x), kt_asin(x),
-                           kt_acos(x), kt_exp(x), kt_log(x), kt_pow(x, 2), kt_pow(2, x), kt_floor(x), kt_fmod(x, 1),
-                           kt_fmod(1, x), kt_hypot(x, 1), kt_hypot(1, x), kt_inverse_normal(x)}) {
+    for (const double y : {s,
+                           c,
+                           kt_sin(x),
+                           kt_cos(x),
+                           kt_tan(x),
+                           kt_atan(x),
+                           kt_atan2(x, 1),
+                           kt_atan2(1, x),
+                           kt_asin(x),
+                           kt_acos(x),
+                           kt_exp(x),
+                           kt_log(x),
+                           kt_pow(x, 2),
+                           kt_pow(2, x),
+                           kt_floor(x),
+                           kt_fmod(x, 1),
+                           kt_fmod(1, x),
+                           kt_hypot(x, 1),
+                           kt_hypot(1, x),
+                           kt_inverse_normal(x)}) {
       EXPECT_BITS(y, kNan);
     }
   }
-  for (const double y : {kt_sin(kInf), kt_cos(-kInf), kt_tan(kInf), kt_asin(1.0000000000000002), kt_acos(-1.5), kt_log(-1),
-                         kt_log(-kInf), kt_pow(-8, 1.0 / 3), kt_fmod(1, 0), kt_fmod(kInf, 2), kt_inverse_normal(-0.1),
-                         kt_inverse_normal(1.1), kt_inverse_normal(kInf), kt_inverse_normal(-kInf)}) {
+  for (const double y :
+       {kt_sin(kInf), kt_cos(-kInf), kt_tan(kInf), kt_asin(1.0000000000000002), kt_acos(-1.5), kt_log(-1),
+        kt_log(-kInf), kt_pow(-8, 1.0 / 3), kt_fmod(1, 0), kt_fmod(kInf, 2), kt_inverse_normal(-0.1),
+        kt_inverse_normal(1.1), kt_inverse_normal(kInf), kt_inverse_normal(-kInf)}) {
     EXPECT_BITS(y, kNan);
   }
 }
@@ -107,8 +125,9 @@ TEST(Special, ExponentialAndLogarithm) {
 }
 
 TEST(Special, PowerAgreesWithTheStandard) {
-  const double values[] = {0.0, -0.0, 0.5, -0.5, 1, -1, 2, -2, 3, -3, 2.5, -2.5, kInf, -kInf, 1e300, -1e300,
-                           kSmallest, -kSmallest, 0x1p53, -0x1p53, 9007199254740991.0};
+  const double values[] = {0.0,   -0.0,   0.5,       -0.5,       1,      -1,      2,
+                           -2,    3,      -3,        2.5,        -2.5,   kInf,    -kInf,
+                           1e300, -1e300, kSmallest, -kSmallest, 0x1p53, -0x1p53, 9007199254740991.0};
   for (const double x : values) {
     for (const double y : values) {
       const double expected = std::pow(x, y);

@@ -29,7 +29,8 @@ void PrintTo(const GridCase& grid, std::ostream* out) {
 }
 
 std::string name_of(const testing::TestParamInfo<GridCase>& info) {
-  return std::to_string(info.param.columns) + "x" + std::to_string(info.param.rows) + "_" + std::to_string(info.index);
+  return std::to_string(info.param.columns) + "x" + std::to_string(info.param.rows) + "_" +
+         std::to_string(info.index);
 }
 
 class Grids : public testing::TestWithParam<GridCase> {
@@ -63,7 +64,8 @@ TEST_P(Grids, EdgesBelongToTheRightAndUpperPartition) {
     const double y_mm = std::isinf(r.y_min_mm) ? -GetParam().height_mm / 2 : r.y_min_mm;
     EXPECT_EQ(grid_.owner(x_mm, y_mm), PartitionId{p});
     for (const double dx : {std::nextafter(x_mm, -kInf), x_mm, std::nextafter(x_mm, kInf)}) {
-      for (const double dy : {std::nextafter(y_mm, -kInf), y_mm, std::nextafter(y_mm, kInf)}) expect_one_owner(dx, dy);
+      for (const double dy : {std::nextafter(y_mm, -kInf), y_mm, std::nextafter(y_mm, kInf)})
+        expect_one_owner(dx, dy);
     }
     if (!std::isinf(r.x_min_mm)) {
       EXPECT_EQ(grid_.owner(std::nextafter(x_mm, -kInf), y_mm), PartitionId{p - 1});
@@ -109,8 +111,9 @@ TEST_P(Grids, NeighboursAreMutualAscendingAndWithinTheMargin) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Grids,
-                         testing::Values(GridCase{2000, 2000, 1, 1}, GridCase{2000, 1000, 2, 1}, GridCase{1000, 2000, 1, 3},
-                                         GridCase{1999.7, 733.1, 7, 3}, GridCase{1e6, 40, 64, 1}, GridCase{0.3, 0.7, 10, 9},
+                         testing::Values(GridCase{2000, 2000, 1, 1}, GridCase{2000, 1000, 2, 1},
+                                         GridCase{1000, 2000, 1, 3}, GridCase{1999.7, 733.1, 7, 3},
+                                         GridCase{1e6, 40, 64, 1}, GridCase{0.3, 0.7, 10, 9},
                                          GridCase{2400, 1600, 12, 8}),
                          name_of);
 
@@ -126,7 +129,8 @@ TEST(PartitionGrid, NumbersRunByRowsFromTheBottom) {
 TEST(PartitionGrid, DiagonalNeighboursTouch) {
   const PartitionGrid grid(900, 900, 3, 3);
   EXPECT_EQ(grid.neighbours(PartitionId{4}, 0).size(), 8u);
-  EXPECT_EQ(grid.neighbours(PartitionId{0}, 0), (std::vector<PartitionId>{PartitionId{1}, PartitionId{3}, PartitionId{4}}));
+  EXPECT_EQ(grid.neighbours(PartitionId{0}, 0),
+            (std::vector<PartitionId>{PartitionId{1}, PartitionId{3}, PartitionId{4}}));
   EXPECT_EQ(grid.neighbours(PartitionId{0}, 299.9).size(), 3u);
   EXPECT_EQ(grid.neighbours(PartitionId{0}, 300).size(), 7u);  // The far corner is 300 sqrt 2 away.
   EXPECT_EQ(grid.neighbours(PartitionId{0}, 425).size(), 8u);
@@ -288,7 +292,8 @@ TEST(RunPlan, RefusesWhatItCannotRead) {
   EXPECT_TRUE(wrong([](proto::Manifest& m) { m.add_group_program(0); }));
   EXPECT_TRUE(wrong([](proto::Manifest& m) { m.set_group_program(0, 2); }));
   EXPECT_TRUE(wrong([](proto::Manifest& m) { m.mutable_experiment()->mutable_deployment()->set_hosts(0); }));
-  EXPECT_TRUE(wrong([](proto::Manifest& m) { m.mutable_experiment()->mutable_deployment()->set_partition_rows(0); }));
+  EXPECT_TRUE(
+      wrong([](proto::Manifest& m) { m.mutable_experiment()->mutable_deployment()->set_partition_rows(0); }));
   EXPECT_TRUE(wrong([](proto::Manifest& m) { m.mutable_experiment()->set_tick_cycles(0); }));
   EXPECT_TRUE(wrong([](proto::Manifest& m) { m.mutable_experiment()->set_duration_s(std::nan("")); }));
   EXPECT_TRUE(wrong([](proto::Manifest& m) { m.mutable_experiment()->mutable_arena()->set_height_mm(0); }));

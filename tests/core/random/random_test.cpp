@@ -46,7 +46,8 @@ TEST(Random, EveryPartOfThePlaceReachesTheCounter) {
   for (std::uint16_t stream = 1; stream <= 7; ++stream) {
     for (std::uint32_t entity = 0; entity < 12; ++entity) {
       for (int tick = -3; tick < 12; ++tick) {
-        for (std::uint32_t b = 0; b < 12; ++b) near.insert(random.block(static_cast<Stream>(stream), entity, Tick{tick}, b));
+        for (std::uint32_t b = 0; b < 12; ++b)
+          near.insert(random.block(static_cast<Stream>(stream), entity, Tick{tick}, b));
       }
     }
   }
@@ -93,8 +94,7 @@ TEST(Random, GoldenBits) {
 }
 
 /// 2^17 numbers over entities, ticks and draws.
-template <class Draw>
-std::vector<double> sample(const Draw& draw) {
+template <class Draw> std::vector<double> sample(const Draw& draw) {
   std::vector<double> values;
   for (std::uint32_t entity = 0; entity < 256; ++entity) {
     for (int tick = 0; tick < 128; ++tick) {

@@ -117,8 +117,8 @@ TEST(Contact, ARobotSlidesRoundAnImmovableOne) {
   EXPECT_GE(least_mm, 33 - 1e-9);
   EXPECT_LE(least_mm, 33.01);
   const auto poses = swarm.poses();
-  EXPECT_GT(poses[0].x_mm, 60);                 // past it
-  EXPECT_GT(poses[0].y_mm, 32.9);               // at the height to which it slid
+  EXPECT_GT(poses[0].x_mm, 60);    // past it
+  EXPECT_GT(poses[0].y_mm, 32.9);  // at the height to which it slid
   EXPECT_EQ(poses[1].x_mm, 0);
   EXPECT_EQ(poses[1].y_mm, 0);
 }
@@ -198,7 +198,8 @@ TEST(Contact, NobodyLeavesTheArena) {
   swarm.set_all_motors(255, 255);
   for (int k = 0; k < 1500; ++k) {
     if (k % 200 == 0) {
-      for (std::uint32_t r = 0; r < 120; r += 3) swarm.set_motors(r, k % 400 == 0 ? 255 : 70, k % 400 == 0 ? 70 : 255);
+      for (std::uint32_t r = 0; r < 120; r += 3)
+        swarm.set_motors(r, k % 400 == 0 ? 255 : 70, k % 400 == 0 ? 70 : 255);
     }
     swarm.step();
     for (const ScenePose& p : swarm.poses()) {
@@ -221,7 +222,8 @@ TEST(Contact, OverlappingRobotsPartSmoothly) {
     swarm.step();
     const auto now = swarm.poses();
     for (std::size_t r = 0; r < now.size(); ++r) {
-      ASSERT_LE(std::hypot(now[r].x_mm - before[r].x_mm, now[r].y_mm - before[r].y_mm), limits.sub_steps * limits.stride_mm + 1e-9);
+      ASSERT_LE(std::hypot(now[r].x_mm - before[r].x_mm, now[r].y_mm - before[r].y_mm),
+                limits.sub_steps * limits.stride_mm + 1e-9);
     }
     const double now_overlap = largest_overlap_mm(now);
     ASSERT_LE(now_overlap, overlap + 1e-9);

@@ -17,7 +17,8 @@ using testing::Swarm;
 constexpr double kAxleOffset_mm = 9.2, kWheelBase_mm = 25, kTick_s = 0.032768;
 
 ScenePose axle_of(const ScenePose& p) {
-  return {p.x_mm - kAxleOffset_mm * std::cos(p.heading_rad), p.y_mm - kAxleOffset_mm * std::sin(p.heading_rad), p.heading_rad};
+  return {p.x_mm - kAxleOffset_mm * std::cos(p.heading_rad), p.y_mm - kAxleOffset_mm * std::sin(p.heading_rad),
+          p.heading_rad};
 }
 
 TEST(Drive, StraightRunsAtTenMillimetresPerSecond) {
@@ -35,7 +36,8 @@ TEST(Drive, StraightRunsAtTenMillimetresPerSecond) {
 }
 
 TEST(Drive, DutyScalesSpeedUpToHalfMore) {
-  for (const auto& [duty, ratio] : {std::pair{35, 0.5}, {70, 1.0}, {84, 1.2}, {105, 1.5}, {255, 1.5}, {1, 1.0 / 70}}) {
+  for (const auto& [duty, ratio] :
+       {std::pair{35, 0.5}, {70, 1.0}, {84, 1.2}, {105, 1.5}, {255, 1.5}, {1, 1.0 / 70}}) {
     const RunPlan plan = make_plan("motion { noise: false }", {{0, 0, 0}});
     Swarm swarm(plan);
     swarm.set_all_motors(static_cast<std::uint8_t>(duty), static_cast<std::uint8_t>(duty));
@@ -77,7 +79,8 @@ TEST(Drive, PivotingDiscCentreMovesOnACircleAroundTheStandingLeg) {
   Swarm swarm(plan);
   swarm.set_all_motors(70, 0);
   const ScenePose start = axle_of({50, -20, 1.1});
-  const double leg_x = start.x_mm - kWheelBase_mm / 2 * std::sin(1.1), leg_y = start.y_mm + kWheelBase_mm / 2 * std::cos(1.1);
+  const double leg_x = start.x_mm - kWheelBase_mm / 2 * std::sin(1.1),
+               leg_y = start.y_mm + kWheelBase_mm / 2 * std::cos(1.1);
   const double radius_mm = std::hypot(kWheelBase_mm / 2, kAxleOffset_mm);
   for (int k = 0; k < 300; ++k) {
     swarm.step();
@@ -88,8 +91,8 @@ TEST(Drive, PivotingDiscCentreMovesOnACircleAroundTheStandingLeg) {
 
 TEST(Drive, ArcOfABiasedRobotIsTheExactCircle) {
   const double left_mm_s = 10 - 1.5, right_mm_s = 10 + 2.25;
-  const RunPlan plan =
-      make_plan("robot_model { robot: 0 bias_left_mm_s: -1.5 bias_right_mm_s: 2.25 } duration_s: 60", {{10, 20, -2.0}});
+  const RunPlan plan = make_plan(
+      "robot_model { robot: 0 bias_left_mm_s: -1.5 bias_right_mm_s: 2.25 } duration_s: 60", {{10, 20, -2.0}});
   Swarm swarm(plan);
   swarm.set_all_motors(70, 70);
   const ScenePose axle = axle_of({10, 20, -2.0});
@@ -97,8 +100,10 @@ TEST(Drive, ArcOfABiasedRobotIsTheExactCircle) {
   for (int k = 1; k <= 1831; ++k) {
     swarm.step();
     const double heading = -2.0 + rate * k * kTick_s;
-    const double x = axle.x_mm + radius_mm * (std::sin(heading) - std::sin(-2.0)) + kAxleOffset_mm * std::cos(heading);
-    const double y = axle.y_mm - radius_mm * (std::cos(heading) - std::cos(-2.0)) + kAxleOffset_mm * std::sin(heading);
+    const double x =
+        axle.x_mm + radius_mm * (std::sin(heading) - std::sin(-2.0)) + kAxleOffset_mm * std::cos(heading);
+    const double y =
+        axle.y_mm - radius_mm * (std::cos(heading) - std::cos(-2.0)) + kAxleOffset_mm * std::sin(heading);
     const ScenePose pose = swarm.poses()[0];
     ASSERT_NEAR(pose.x_mm, x, 1e-9);
     ASSERT_NEAR(pose.y_mm, y, 1e-9);
@@ -122,7 +127,8 @@ TEST(Drive, LargeTurnsPerTickFollowTheSameCircle) {
 
 TEST(Drive, SeriesAndLargeFormAgreeAtTheirBorder) {
   for (const double sign : {-1.0, 1.0}) {
-    const physics::Arc below = physics::arc_of(3, sign * 0.125, 9.2), above = physics::arc_of(3, sign * 0.12500000000000003, 9.2);
+    const physics::Arc below = physics::arc_of(3, sign * 0.125, 9.2),
+                       above = physics::arc_of(3, sign * 0.12500000000000003, 9.2);
     EXPECT_NEAR(below.forward_mm, above.forward_mm, 2e-14);
     EXPECT_NEAR(below.sideways_mm, above.sideways_mm, 2e-14);
     EXPECT_NEAR(below.cos_turn, std::cos(sign * 0.125), 2e-16);
@@ -136,7 +142,8 @@ TEST(Drive, BiasActsOnBothWheelsWhileEitherIsDrivenAndOnNoneAtStop) {
   Swarm turning(plan), resting(plan);
   turning.set_all_motors(70, 0);
   turning.step();
-  EXPECT_NEAR(turning.poses()[0].heading_rad, 20 / kWheelBase_mm * kTick_s, 1e-14);  // 21 - 1: the still wheel creeps
+  EXPECT_NEAR(turning.poses()[0].heading_rad, 20 / kWheelBase_mm * kTick_s,
+              1e-14);  // 21 - 1: the still wheel creeps
   resting.run(100);
   EXPECT_EQ(resting.poses()[0].x_mm, 0);
   EXPECT_EQ(resting.poses()[0].heading_rad, 0);
@@ -149,7 +156,8 @@ TEST(Drive, NoiseOffSilencesTheStatedBias) {
 }
 
 TEST(Drive, AHalfStatedBiasKeepsTheDrawOfTheOtherWheel) {
-  const RunPlan plain = make_plan("", {{0, 0, 0}}), stated = make_plan("robot_model { robot: 0 bias_left_mm_s: 0.5 }", {{0, 0, 0}});
+  const RunPlan plain = make_plan("", {{0, 0, 0}}),
+                stated = make_plan("robot_model { robot: 0 bias_left_mm_s: 0.5 }", {{0, 0, 0}});
   const physics::DriveModel a(plain), b(stated);
   EXPECT_EQ(b.bias_left_mm_s(0), 0.5);
   EXPECT_EQ(b.bias_right_mm_s(0), a.bias_right_mm_s(0));
@@ -181,7 +189,8 @@ TEST(Drive, BiasesFollowTheSeedsDistribution) {
 double way_variance(std::uint32_t tick_cycles, double variance_s) {
   constexpr std::uint32_t kRobots = 4000;
   const std::string text = "tick_cycles: " + std::to_string(tick_cycles) +
-                           " arena { width_mm: 100000 height_mm: 100000 } motion { bias_mean_mm_s: 0 bias_sd_mm_s: 0 factor_variance_s: " +
+                           " arena { width_mm: 100000 height_mm: 100000 } motion { bias_mean_mm_s: 0 bias_sd_mm_s: "
+                           "0 factor_variance_s: " +
                            std::to_string(variance_s) + " }";
   const auto start = testing::grid_crowd(kRobots, 200, testing::Facing::kRight);
   const RunPlan plan = make_plan(text, start);
@@ -209,7 +218,8 @@ TEST(Drive, StepNoiseVarianceDoesNotDependOnTheTickLength) {
 
 TEST(Drive, NobodyIsDrivenFasterThanTheTopSpeed) {
   const auto start = testing::grid_crowd(500, 300, testing::Facing::kRandom);
-  const RunPlan plan = make_plan("arena { width_mm: 100000 height_mm: 100000 } motion { factor_variance_s: 0.01 }", start);
+  const RunPlan plan =
+      make_plan("arena { width_mm: 100000 height_mm: 100000 } motion { factor_variance_s: 0.01 }", start);
   const physics::DriveModel drive(plan);
   Swarm swarm(plan);
   auto before = start;

@@ -51,10 +51,12 @@ TEST_P(Partitions, AnyGridGivesTheSameBits) {
   // The spacing may be less than a diameter: overlaps must part alike as well.
   const auto crowd = testing::random_crowd(c.robots, c.side_mm - 34, c.side_mm - 34, c.spacing_mm, c.seed);
   const std::string text = "seed: " + std::to_string(c.seed) + " arena { width_mm: " + std::to_string(c.side_mm) +
-                           " height_mm: " + std::to_string(c.side_mm) + " } physics { sub_steps: " + std::to_string(c.sub_steps) +
+                           " height_mm: " + std::to_string(c.side_mm) +
+                           " } physics { sub_steps: " + std::to_string(c.sub_steps) +
                            " } motion { factor_variance_s: 0.0001 }";
   for (const Grid grid : kGrids) {
-    const RunPlan whole = make_plan(text, crowd), cut = make_plan(text, crowd, grid.columns, grid.rows, grid.columns);
+    const RunPlan whole = make_plan(text, crowd),
+                  cut = make_plan(text, crowd, grid.columns, grid.rows, grid.columns);
     Swarm a(whole), b(cut);
     for (std::uint32_t k = 0; k < 300; ++k) {
       drive(a, c.robots, k);
@@ -68,8 +70,9 @@ TEST_P(Partitions, AnyGridGivesTheSameBits) {
 }
 
 INSTANTIATE_TEST_SUITE_P(RandomCrowds, Partitions,
-                         ::testing::Values(Case{1, 150, 600, 33, 4}, Case{2, 200, 640, 33, 4}, Case{3, 80, 600, 33, 3},
-                                           Case{4, 150, 600, 33, 2}, Case{5, 150, 600, 33, 1}, Case{6, 120, 500, 20, 4},
+                         ::testing::Values(Case{1, 150, 600, 33, 4}, Case{2, 200, 640, 33, 4},
+                                           Case{3, 80, 600, 33, 3}, Case{4, 150, 600, 33, 2},
+                                           Case{5, 150, 600, 33, 1}, Case{6, 120, 500, 20, 4},
                                            Case{7, 60, 300, 28, 4}));
 
 TEST(Partition, ATightGridDrivenInwardsGivesTheSameBits) {
@@ -134,7 +137,8 @@ TEST(Partition, TheOldOwnerListsARobotInTheTickInWhichItLeaves) {
 
 TEST(Partition, RobotsExactlyOnBordersHaveOneOwner) {
   // Borders at x = 0, and at y = 0: half-open rectangles.
-  const std::vector<ScenePose> start = {{0, 0, 0}, {0, 100, kPi}, {-100, 0, -kPi / 2}, {0, -100, kPi / 2}, {100, 0, 1}};
+  const std::vector<ScenePose> start = {
+      {0, 0, 0}, {0, 100, kPi}, {-100, 0, -kPi / 2}, {0, -100, kPi / 2}, {100, 0, 1}};
   const RunPlan whole = make_plan("", start), cut = make_plan("", start, 2, 2);
   Swarm a(whole), b(cut);
   std::vector<std::uint32_t> by;
@@ -153,7 +157,8 @@ TEST(Partition, RobotsExactlyOnBordersHaveOneOwner) {
 TEST(Partition, SavedOnManyPartitionsContinuesOnOthers) {
   const auto crowd = testing::random_crowd(150, 560, 560, 33, 21);
   const std::string text = "arena { width_mm: 600 height_mm: 600 }";
-  const RunPlan four = make_plan(text, crowd, 2, 2), one = make_plan(text, crowd), six = make_plan(text, crowd, 3, 2);
+  const RunPlan four = make_plan(text, crowd, 2, 2), one = make_plan(text, crowd),
+                six = make_plan(text, crowd, 3, 2);
   Swarm a(four), b(one), c(six);
   std::uint32_t k = 0;
   for (; k < 157; ++k) {
@@ -192,7 +197,8 @@ TEST(Partition, DamagedCheckpointsAreRefused) {
 }
 
 TEST(Partition, TrackedRobotsJumpBetweenPartitions) {
-  const std::string text = "arena { width_mm: 1000 height_mm: 1000 } robots { count: 60 } robots { count: 2 body: TRACKED }";
+  const std::string text =
+      "arena { width_mm: 1000 height_mm: 1000 } robots { count: 60 } robots { count: 2 body: TRACKED }";
   auto crowd = testing::random_crowd(62, 500, 500, 34, 8);
   crowd[60] = {480, 480, 0};
   crowd[61] = {-480, 480, 0};
@@ -239,7 +245,8 @@ TEST(Partition, GhostsAreExactlyWhatLiesWithinTheMargin) {
       swarm.engine(p).emit_ghosts(q, ghosts);
       std::vector<std::uint32_t> expected;
       for (std::size_t i = 0; i < all.robot.size(); ++i) {
-        if (plan.grid.rectangle(q).distance_mm(all.x_mm[i], all.y_mm[i]) <= margin_mm) expected.push_back(all.robot[i]);
+        if (plan.grid.rectangle(q).distance_mm(all.x_mm[i], all.y_mm[i]) <= margin_mm)
+          expected.push_back(all.robot[i]);
       }
       EXPECT_EQ(ghosts.robot, expected);
       EXPECT_EQ(ghosts.tick, Tick{0});

@@ -14,7 +14,8 @@ namespace kilotwin::testing {
 class Swarm {
  public:
   explicit Swarm(const RunPlan& plan) : plan_(plan), left_(plan.robots(), 0), right_(plan.robots(), 0) {
-    for (std::uint32_t p = 0; p < plan.grid.size(); ++p) engines_.push_back(physics::make_engine(plan, PartitionId{p}));
+    for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
+      engines_.push_back(physics::make_engine(plan, PartitionId{p}));
   }
 
   void set_motors(std::uint32_t robot, std::uint8_t left, std::uint8_t right) {

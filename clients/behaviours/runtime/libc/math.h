@@ -20,17 +20,23 @@
 #define isfinite(x) __builtin_isfinite(x)
 #define signbit(x) __builtin_signbit(x)
 
-#define KILOTWIN_UNARY(name) double name(double x); float name##f(float x);
-#define KILOTWIN_BINARY(name) double name(double x, double y); float name##f(float x, float y);
-KILOTWIN_UNARY(sin) KILOTWIN_UNARY(cos) KILOTWIN_UNARY(tan) KILOTWIN_UNARY(asin) KILOTWIN_UNARY(acos)
-KILOTWIN_UNARY(atan) KILOTWIN_UNARY(exp) KILOTWIN_UNARY(log) KILOTWIN_UNARY(log2) KILOTWIN_UNARY(log10)
-KILOTWIN_UNARY(sqrt) KILOTWIN_UNARY(fabs) KILOTWIN_UNARY(floor) KILOTWIN_UNARY(ceil) KILOTWIN_UNARY(round)
-KILOTWIN_UNARY(trunc) KILOTWIN_UNARY(square) KILOTWIN_UNARY(sinh) KILOTWIN_UNARY(cosh) KILOTWIN_UNARY(tanh)
-KILOTWIN_BINARY(atan2) KILOTWIN_BINARY(pow) KILOTWIN_BINARY(fmod) KILOTWIN_BINARY(hypot) KILOTWIN_BINARY(fmin)
-KILOTWIN_BINARY(fmax) KILOTWIN_BINARY(copysign)
+#define KILOTWIN_UNARY(name) \
+  double name(double x);     \
+  float name##f(float x);
+#define KILOTWIN_BINARY(name)      \
+  double name(double x, double y); \
+  float name##f(float x, float y);
+KILOTWIN_UNARY(sin)
+KILOTWIN_UNARY(cos)
+KILOTWIN_UNARY(tan) KILOTWIN_UNARY(asin) KILOTWIN_UNARY(acos) KILOTWIN_UNARY(atan) KILOTWIN_UNARY(exp)
+    KILOTWIN_UNARY(log) KILOTWIN_UNARY(log2) KILOTWIN_UNARY(log10) KILOTWIN_UNARY(sqrt) KILOTWIN_UNARY(fabs)
+        KILOTWIN_UNARY(floor) KILOTWIN_UNARY(ceil) KILOTWIN_UNARY(round) KILOTWIN_UNARY(trunc)
+            KILOTWIN_UNARY(square) KILOTWIN_UNARY(sinh) KILOTWIN_UNARY(cosh) KILOTWIN_UNARY(tanh)
+                KILOTWIN_BINARY(atan2) KILOTWIN_BINARY(pow) KILOTWIN_BINARY(fmod) KILOTWIN_BINARY(hypot)
+                    KILOTWIN_BINARY(fmin) KILOTWIN_BINARY(fmax) KILOTWIN_BINARY(copysign)
 #undef KILOTWIN_UNARY
 #undef KILOTWIN_BINARY
-long lround(double x);
+                        long lround(double x);
 long lrint(double x);
 
 #endif

@@ -20,7 +20,8 @@ int rand_r(unsigned long* state);
 long random(void);
 void srandom(unsigned long seed);
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
-void* bsearch(const void* key, const void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
+void* bsearch(const void* key, const void* base, size_t count, size_t size,
+              int (*compare)(const void*, const void*));
 /* A robot's heap has 4 KiB. */
 void* malloc(size_t size);
 void* calloc(size_t count, size_t size);

@@ -10,7 +10,7 @@ extern volatile uint8_t UCSR0A, UCSR0B, UCSR0C, UBRR0H, UBRR0L, UDR0;
 enum { U2X0 = 1, UDRE0 = 5, TXC0 = 6, RXC0 = 7, TXEN0 = 3, RXEN0 = 4, UCSZ00 = 1, UCSZ01 = 2 };
 
 #define _BV(bit) (1 << (bit))
-#define bit_is_set(sfr, bit) ((sfr) & _BV(bit))
-#define bit_is_clear(sfr, bit) (!((sfr) & _BV(bit)))
+#define bit_is_set(sfr, bit) ((sfr)&_BV(bit))
+#define bit_is_clear(sfr, bit) (!((sfr)&_BV(bit)))
 
 #endif
