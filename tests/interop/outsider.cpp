@@ -1,6 +1,7 @@
-// Joins a run of tests/interop/outsider.txtpb with eProsima Fast DDS. Of Kilotwin it has idl/public.idl alone: names of topics and
-// QoS are those of docs/join.md, written down once more.
-// Usage: outsider DOMAIN. Prints a line for each thing proven. Exit status 0: all were; 1: one was not; 2: bad arguments.
+// Joins a run of tests/interop/outsider.txtpb with eProsima Fast DDS. Of Kilotwin it has idl/public.idl alone: names of
+// topics and QoS are those of docs/join.md, written down once more.
+// Usage: outsider DOMAIN. Prints a line for each thing proven.
+// Exit status 0: all were; 1: one was not; 2: bad arguments.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -223,8 +224,8 @@ class Outsider {
     std::fflush(stdout);
   }
 
-  /// Reads until the condition holds, and calls `meanwhile` five times a second. A writer may see a reader before the reader
-  /// sees it, and what is sent in between is lost; so an outsider says a thing until it sees the effect.
+  /// Reads until the condition holds, and calls `meanwhile` five times a second. A writer may see a reader before the
+  /// reader sees it, and what is sent in between is lost; so an outsider says a thing until it sees the effect.
   void await(
       const std::string& what, Clock::duration patience, const Condition& holds,
       const std::function<void()>& meanwhile = [] {}) {
