@@ -16,7 +16,7 @@ cleanup() {
 }
 trap cleanup EXIT
 
-if ! ip netns add "$a" 2>"$scratch/why" || ! ip netns add "$b" 2>>"$scratch/why"; then
+if ! { ip netns add "$a" && ip netns add "$b" && ip netns exec "$a" true; } 2>"$scratch/why"; then
   echo "network namespaces cannot be made here: $(cat "$scratch/why")"
   exit 77
 fi
