@@ -22,7 +22,7 @@ using PartitionId = Id<struct PartitionTag>;  ///< row * columns + column
 using HostId = Id<struct HostTag>;            ///< 0..hosts-1
 using FederateId = Id<struct FederateTag>;    ///< index in the plan: partitions, radio, station, hosts
 
-/// What a robot is doing, as kilolib numbers it (facts of the firmware), and FAILED, which no firmware knows: its program
+/// What a robot is doing, as kilolib numbers it, and FAILED, which no firmware knows: its program
 /// faulted in simulation.
 enum class LifeCycle : std::uint8_t {
   kSleeping = 0,
