@@ -18,18 +18,6 @@ namespace fs = std::filesystem;
 
 constexpr std::uint32_t kFormat = 1;
 
-std::uint64_t hash_bytes(const std::string& bytes) {
-  std::uint64_t h = hash_mix(bytes.size() + 1, 0x9e3779b97f4a7c15u);
-  for (std::size_t i = 0; i < bytes.size(); i += 8) {
-    std::uint64_t word = 0;
-    for (std::size_t j = i; j < std::min(i + 8, bytes.size()); ++j) {
-      word |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[j])) << (8 * (j - i));
-    }
-    h = hash_chain(h, word);
-  }
-  return h;
-}
-
 std::string deterministic_bytes(const google::protobuf::Message& message) {
   std::string bytes;
   {
