@@ -32,7 +32,7 @@ TEST(Compiler, AllBehavioursCompileForSimulationAndRobot) {
     if (entry.path().extension() != ".c") continue;
     EXPECT_EQ(error_of({entry.path()}), "no error");
     const AvrSize size = compile_for_avr({entry.path()}, cached());
-    EXPECT_GT(size.flash_octets, 50u) << entry.path();
+    EXPECT_GT(size.flash_octets, 30u) << entry.path();
     EXPECT_LT(size.flash_octets, 8000u) << entry.path();
     EXPECT_LT(size.ram_octets, 500u) << entry.path();
     ++count;
