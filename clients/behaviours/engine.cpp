@@ -34,6 +34,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       presence_(share_.size(), Presence::kNone),
       motor_left_(share_.size()),
       motor_right_(share_.size()),
+      spin_up_(share_.size()),
       led_(share_.size()),
       life_cycle_(share_.size(), static_cast<std::uint8_t>(LifeCycle::kIdle)),
       tx_period_(share_.size(), kInitialTxPeriod),
@@ -108,6 +109,7 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
 
 void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program& program,
                                  const Slot& slot, const Executor& executor) {
+  spin_up_[i] = 0;
   if (presence_[i] == Presence::kFailed) return;
   if (presence_[i] == Presence::kNew) reset_robot(from, i, program, slot);
   RobotMemory& memory = memory_[i];
@@ -154,7 +156,10 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     robot = executor.robot();
   }
   note_outputs(i, robot, executor.tx_period());
-  if (!memory.copy_out(slot)) fail_robot(i, Fault{}, program, slot);
+  if (!memory.copy_out(slot)) return fail_robot(i, Fault{}, program, slot);
+  if (robot.spin_up == 0) return;
+  robot.spin_up = 0;
+  memory.set(program, program.file.table.robot, robot);
 }
 
 void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& program, const Slot& slot) {
@@ -176,7 +181,7 @@ void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Pro
   failures_.push_back({share_.first + i, describe(fault, program, slot)});
   presence_[i] = Presence::kFailed;
   life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kFailed);
-  motor_left_[i] = motor_right_[i] = 0;
+  motor_left_[i] = motor_right_[i] = spin_up_[i] = 0;
   holds_[i] = offers_[i] = 0;
   memory_[i].release();
 }
@@ -184,6 +189,7 @@ void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Pro
 void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period) {
   motor_left_[i] = robot.motors_on != 0 ? robot.duty_left : std::uint8_t{0};
   motor_right_[i] = robot.motors_on != 0 ? robot.duty_right : std::uint8_t{0};
+  spin_up_[i] = robot.motors_on != 0 ? robot.spin_up : std::uint8_t{0};
   led_[i] = robot.led & 63;
   // A sleeping robot that has woken up to listen is, for the radio, one that is idle.
   const bool listens = robot.state == static_cast<std::uint8_t>(LifeCycle::kSleeping) && robot.deaf == 0;
@@ -196,6 +202,7 @@ void BehavioursEngine::emit(ActuationFrame& frame) const {
   frame.first_robot = share_.first;
   frame.motor_left = motor_left_;
   frame.motor_right = motor_right_;
+  frame.spin_up = spin_up_;
   frame.led = led_;
   frame.life_cycle = life_cycle_;
   frame.tx_period = tx_period_;
@@ -214,7 +221,8 @@ std::uint64_t BehavioursEngine::hash_part() const {
     if (presence_[i] == Presence::kNone) continue;
     const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 |
                                   std::uint64_t{led_[i]} << 16 | std::uint64_t{life_cycle_[i]} << 24 |
-                                  std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48;
+                                  std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48 |
+                                  std::uint64_t{spin_up_[i]} << 49;
     sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs});
   }
   return sum;

@@ -86,7 +86,7 @@ class BehavioursEngine {
   // Per own robot; index i is robot share_.first + i.
   std::vector<RobotMemory> memory_;
   std::vector<Presence> presence_;
-  std::vector<std::uint8_t> motor_left_, motor_right_, led_, life_cycle_;
+  std::vector<std::uint8_t> motor_left_, motor_right_, spin_up_, led_, life_cycle_;
   std::vector<std::uint16_t> tx_period_;
   std::vector<std::uint8_t> holds_;   ///< a message that has not left
   std::vector<std::uint8_t> offers_;  ///< a message that is new in this tick

@@ -28,7 +28,8 @@ enum Field : std::size_t {
   kHolds,
   kOffers,
   kMessage,
-  kFields = kMessage + 10
+  kSpinUp = kMessage + 10,
+  kFields
 };
 
 }  // namespace
@@ -44,6 +45,7 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
     fields[kPresence] = static_cast<std::uint8_t>(presence_[i]);
     fields[kLeft] = motor_left_[i];
     fields[kRight] = motor_right_[i];
+    fields[kSpinUp] = spin_up_[i];
     fields[kLed] = led_[i];
     fields[kLifeCycle] = life_cycle_[i];
     fields[kPeriodLow] = static_cast<std::uint8_t>(tx_period_[i] & 0xff);
@@ -88,6 +90,7 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     }
     motor_left_[i] = fields[kLeft];
     motor_right_[i] = fields[kRight];
+    spin_up_[i] = fields[kSpinUp];
     led_[i] = fields[kLed];
     life_cycle_[i] = fields[kLifeCycle];
     tx_period_[i] = static_cast<std::uint16_t>(fields[kPeriodLow] | fields[kPeriodHigh] << 8);

@@ -43,6 +43,7 @@ struct ActuationFrame {
   std::vector<std::uint16_t> tx_period;               ///< kilo_tx_period, counts of 128 us
   std::vector<std::uint32_t> offer_robot;             ///< ascending
   std::vector<IrMessage> offer_message;
+  std::vector<std::uint8_t> spin_up;  ///< per robot, 1: both motors were kicked before they got the duties above
 };
 
 /// What the radio tells one host.

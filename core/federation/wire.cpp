@@ -76,6 +76,7 @@ WireActuationFrame to_wire(const WireHeader& header, const ActuationFrame& frame
   wire.tx_period = borrow<UShorts>(frame.tx_period);
   wire.offer_robot = borrow<ULongs>(frame.offer_robot);
   wire.offer_message = borrow<Octets>(frame.offer_message);
+  wire.spin_up = borrow<Octets>(frame.spin_up);
   return wire;
 }
 
@@ -85,10 +86,11 @@ bool from_wire(const WireActuationFrame& wire, ActuationFrame& frame) {
   const bool whole = copy(wire.motor_left, frame.motor_left) && copy(wire.motor_right, frame.motor_right) &&
                      copy(wire.led, frame.led) && copy(wire.life_cycle, frame.life_cycle) &&
                      copy(wire.tx_period, frame.tx_period) && copy(wire.offer_robot, frame.offer_robot) &&
-                     copy(wire.offer_message, frame.offer_message);
+                     copy(wire.offer_message, frame.offer_message) && copy(wire.spin_up, frame.spin_up);
   const std::size_t n = frame.motor_left.size();
   return whole && frame.motor_right.size() == n && frame.led.size() == n && frame.life_cycle.size() == n &&
-         frame.tx_period.size() == n && frame.offer_message.size() == frame.offer_robot.size();
+         frame.tx_period.size() == n && frame.offer_message.size() == frame.offer_robot.size() &&
+         frame.spin_up.size() == n;
 }
 
 WireRadioFrame to_wire(const WireHeader& header, const RadioFrame& frame) {

@@ -1,6 +1,8 @@
 #include "services/physics/drive.hpp"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "core/math/elementary.h"
 
@@ -63,50 +65,80 @@ DriveModel::DriveModel(const RunPlan& plan)
       tick_s_(plan.tick_length.seconds()),
       wheel_base_mm_(plan.experiment().motion().wheel_base_mm()),
       axle_offset_mm_(plan.experiment().motion().axle_offset_mm()),
-      bias_(plan.robots()) {
+      dead_band_duty_(static_cast<std::uint8_t>(std::min(plan.experiment().motion().dead_band_duty(), 254u))),
+      kick_part_(std::min(1.0, plan.experiment().motion().spin_up_s() / tick_s_)),
+      bias_(plan.robots(), {0, 0}) {
   const proto::Motion& motion = plan.experiment().motion();
-  for (std::size_t duty = 0; duty < 256; ++duty) {
-    const auto d = static_cast<double>(duty);
-    straight_mm_s_[duty] = motion.straight_speed_mm_s() *
-                           std::min(kTopDutyRatio, d / static_cast<double>(motion.calibrated_straight_duty()));
-    turn_mm_s_[duty] =
-        motion.turn_speed_mm_s() * std::min(kTopDutyRatio, d / static_cast<double>(motion.calibrated_turn_duty()));
-  }
+  const RobotParameters parameters(plan);
+  make_curves(motion, parameters);
+  double top_bias = 0;
   if (motion.noise()) {
     for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) {
-      if (plan.tracked(robot)) continue;
-      const auto draw = [&](std::uint32_t which) {
-        return motion.bias_mean_mm_s() +
-               motion.bias_sd_mm_s() * random_.normal(Stream::kWheelBias, robot, Tick{0}, which);
-      };
-      bias_[robot] = {draw(0), draw(1)};
-    }
-    for (const proto::RobotModel& known : plan.experiment().robot_model()) {
-      if (known.robot() >= plan.robots()) continue;
-      if (known.has_bias_left_mm_s()) bias_[known.robot()].left_mm_s = known.bias_left_mm_s();
-      if (known.has_bias_right_mm_s()) bias_[known.robot()].right_mm_s = known.bias_right_mm_s();
+      bias_[robot] = parameters.bias(robot);
+      top_bias = std::max({top_bias, magnitude(bias_[robot].left_mm_s), magnitude(bias_[robot].right_mm_s)});
     }
     if (motion.factor_variance_s() > 0) factor_sd_ = __builtin_sqrt(motion.factor_variance_s() / tick_s_);
   }
 
-  double top_bias = 0;
-  for (const Bias& b : bias_) top_bias = std::max({top_bias, magnitude(b.left_mm_s), magnitude(b.right_mm_s)});
+  double top_straight = 0, top_turn = 0;
+  for (const Curves& curves : curves_of_) {
+    top_straight =
+        std::max({top_straight, curves_[curves.straight_left][255], curves_[curves.straight_right][255]});
+    top_turn = std::max({top_turn, curves_[curves.turn_left][255], curves_[curves.turn_right][255]});
+  }
   // The centre's speed is linear in the wheels' speeds, so that of the nominal speeds and that of the biases add up; the
-  // latter is largest with both wheels forward, or one forward and one backward. The factors scale both.
+  // latter is largest with both wheels forward, or one forward and one backward. The factors scale both. Both wheels
+  // forward at different speeds are slower than both at the faster one, or than it alone.
   const double lever = axle_offset_mm_ / wheel_base_mm_;
   const double top_nominal =
-      std::max(magnitude(straight_mm_s_[255]), magnitude(turn_mm_s_[255]) * __builtin_sqrt(0.25 + lever * lever));
-  const double top_any = std::max(magnitude(straight_mm_s_[255]), magnitude(turn_mm_s_[255])) + top_bias;
-  const double widest = std::max(1.0, 2 * lever);
+      std::max(top_straight, std::max(top_straight, top_turn) * __builtin_sqrt(0.25 + lever * lever));
+  const double top_any = std::max(top_straight, top_turn) + top_bias;
+  const double widest = std::max(1.0, 2 * magnitude(lever));
   top_speed_mm_s_ = top_nominal + top_bias * widest + kTopNormal * factor_sd_ * top_any * widest;
+}
+
+void DriveModel::make_curves(const proto::Motion& motion, const RobotParameters& parameters) {
+  std::map<std::pair<bool, std::uint8_t>, std::uint16_t> known;
+  const auto curve_of = [&](bool turn, std::uint8_t calibrated) {
+    const auto [entry, is_new] = known.try_emplace({turn, calibrated}, static_cast<std::uint16_t>(curves_.size()));
+    if (is_new) {
+      Curve& curve = curves_.emplace_back();
+      for (std::size_t duty = std::size_t{dead_band_duty_} + 1; duty < 256; ++duty) {
+        const double slope = motion.duty_slope(), of_calibrated = static_cast<double>(duty) / calibrated;
+        const double ratio = slope * of_calibrated + (1 - slope);
+        curve[duty] = (turn ? motion.turn_speed_mm_s() : motion.straight_speed_mm_s()) *
+                      std::clamp(ratio, 0.0, motion.top_speed_ratio());
+      }
+    }
+    return entry->second;
+  };
+  for (std::uint32_t robot = 0; robot < parameters.robots(); ++robot) {
+    const Calibration& own = parameters.calibration(robot);
+    curves_of_.push_back({curve_of(true, own.turn_left), curve_of(true, own.turn_right),
+                          curve_of(false, own.straight_left), curve_of(false, own.straight_right)});
+  }
+}
+
+/// A kick, then the duties; the mean over the tick, whose arc differs from that of one after the other by micrometres.
+DriveModel::Speeds DriveModel::kicked(std::uint32_t robot, Duties duties) const {
+  const Curves& curves = curves_of_[robot];
+  const WheelBias& bias = bias_[robot];
+  const double kick = kick_part_, after = (duties.left | duties.right) != 0 ? 1 - kick_part_ : 0;
+  const Speeds full = nominal(curves, 255, 255), set = nominal(curves, duties.left, duties.right);
+  return {kick * (full.left_mm_s + bias.left_mm_s) + after * (set.left_mm_s + bias.left_mm_s),
+          kick * (full.right_mm_s + bias.right_mm_s) + after * (set.right_mm_s + bias.right_mm_s)};
 }
 
 void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Tick from, Duties duties,
                      double heading_rad, double part) const {
-  const bool both = duties.left != 0 && duties.right != 0;
-  const std::array<double, 256>& nominal = both ? straight_mm_s_ : turn_mm_s_;
-  double left = nominal[duties.right] + bias_[robot].left_mm_s;
-  double right = nominal[duties.left] + bias_[robot].right_mm_s;
+  auto [left, right] = nominal(curves_of_[robot], duties.left, duties.right);
+  left += bias_[robot].left_mm_s;
+  right += bias_[robot].right_mm_s;
+  if (duties.spin_up != 0) {
+    const Speeds mean = kicked(robot, duties);
+    left = mean.left_mm_s;
+    right = mean.right_mm_s;
+  }
   if (factor_sd_ > 0) {
     left *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 0);
     right *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 1);

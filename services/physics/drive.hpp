@@ -7,12 +7,10 @@
 
 #include "core/base/time.hpp"
 #include "core/experiment/plan.hpp"
+#include "core/model/robot_parameters.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::physics {
-
-/// A duty above the calibrated one speeds a wheel up to this ratio and no further.
-inline constexpr double kTopDutyRatio = 1.5;
 
 /// Displacement of the disc's centre in the frame that the body had at the start, mm, and its turn, rad.
 struct Arc {
@@ -24,11 +22,12 @@ struct Arc {
 /// ahead of it.
 [[nodiscard]] Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm);
 
-/// What a robot's program set its motors to.
+/// What turns a robot's motors in a tick; see DriveModel::acting.
 struct Duties {
   std::uint8_t left = 0, right = 0;
+  std::uint8_t spin_up = 0;  ///< 1: both run at full duty before
 
-  [[nodiscard]] bool any() const { return (left | right) != 0; }
+  [[nodiscard]] bool any() const { return (left | right | spin_up) != 0; }
 };
 
 /// Driven robots of one tick, structure of arrays, ascending. Kept between ticks for its memory alone.
@@ -45,12 +44,19 @@ struct Drives {
   void reserve(std::size_t bodies);
 };
 
-/// Actual speed of a wheel = f (v + b) while either motor is on, 0 when both are off (seed, section 2.2).
+/// Actual speed of a wheel = f (v + b) while either motor turns, 0 when both rest (seed, section 2.2). v follows from the
+/// motor's duty and the robot's calibration: idl/model.proto states the curve.
 class DriveModel {
  public:
   explicit DriveModel(const RunPlan&);
 
-  /// Adds a robot to the drives; either duty is above 0. The left motor drives the right-hand wheel.
+  /// What of a program's duties turns a motor: none in the dead band, and no kick where the model has none.
+  [[nodiscard]] Duties acting(std::uint8_t left, std::uint8_t right, std::uint8_t spin_up) const {
+    return {left > dead_band_duty_ ? left : std::uint8_t{0}, right > dead_band_duty_ ? right : std::uint8_t{0},
+            kick_part_ > 0 ? spin_up : std::uint8_t{0}};
+  }
+
+  /// Adds a robot to the drives; its duties are acting and not all 0. The left motor drives the right-hand wheel.
   void add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, Duties, double heading_rad,
            double part) const;
   /// Fills what follows from the wheels' speeds and the headings.
@@ -62,15 +68,31 @@ class DriveModel {
   [[nodiscard]] double bias_right_mm_s(std::uint32_t robot) const { return bias_[robot].right_mm_s; }
 
  private:
-  struct Bias {
-    double left_mm_s = 0, right_mm_s = 0;
+  /// Speed of a wheel by its motor's duty, mm/s.
+  using Curve = std::array<double, 256>;
+  /// Indices into curves_, by motor.
+  struct Curves {
+    std::uint16_t turn_left, turn_right, straight_left, straight_right;
   };
+  struct Speeds {
+    double left_mm_s, right_mm_s;  ///< of the wheels
+  };
+
+  void make_curves(const proto::Motion&, const RobotParameters&);
+  [[nodiscard]] Speeds nominal(const Curves& of, std::uint8_t left, std::uint8_t right) const {
+    if (left != 0 && right != 0) return {curves_[of.straight_right][right], curves_[of.straight_left][left]};
+    return {curves_[of.turn_right][right], curves_[of.turn_left][left]};
+  }
+  [[nodiscard]] Speeds kicked(std::uint32_t robot, Duties) const;
 
   Random random_;
   double tick_s_, wheel_base_mm_, axle_offset_mm_;
-  double factor_sd_ = 0;                                   ///< of f in one tick; 0: f = 1
-  std::array<double, 256> straight_mm_s_{}, turn_mm_s_{};  ///< nominal speed of a wheel by its motor's duty
-  std::vector<Bias> bias_;                                 ///< per robot
+  std::uint8_t dead_band_duty_;
+  double kick_part_;      ///< of a tick, for which a kick lasts
+  double factor_sd_ = 0;  ///< of f in one tick; 0: f = 1
+  std::vector<Curve> curves_;
+  std::vector<Curves> curves_of_;  ///< per robot
+  std::vector<WheelBias> bias_;    ///< per robot
   double top_speed_mm_s_ = 0;
 };
 

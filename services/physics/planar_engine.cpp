@@ -116,7 +116,8 @@ void PlanarEngine::read_motors(Tick from, std::span<const ActuationFrame* const>
     while (body < known_.size() && known_.robot[body] < first) ++body;
     for (; body < known_.size() && known_.robot[body] - first < size; ++body) {
       const std::uint32_t entry = known_.robot[body] - first;
-      if (known_.tracked[body] == 0) duties_[body] = {frame->motor_left[entry], frame->motor_right[entry]};
+      if (known_.tracked[body] != 0) continue;
+      duties_[body] = drive_.acting(frame->motor_left[entry], frame->motor_right[entry], frame->spin_up[entry]);
     }
   }
 }

@@ -100,6 +100,7 @@ ActuationFrame motors(Tick tick, const std::vector<std::uint8_t>& left, const st
   frame.led.assign(left.size(), 0);
   frame.life_cycle.assign(left.size(), static_cast<std::uint8_t>(LifeCycle::kRunning));
   frame.tx_period.assign(left.size(), 0);
+  frame.spin_up.assign(left.size(), 0);
   return frame;
 }
 

@@ -35,7 +35,9 @@ struct KtRobot {
   uint8_t reset;  /* the memory is to be made anew */
   uint8_t motion; /* what calibration messages asked for */
   uint8_t motion_done;
-  uint64_t waits; /* how often the program has waited for a tick */
+  uint64_t waits;  /* how often the program has waited for a tick */
+  uint8_t spin_up; /* spinup_motors() was called; the host takes note once a tick */
+  uint8_t unused[7];
 };
 
 struct KtMessage {
@@ -78,7 +80,7 @@ struct KtImage {
 #else
 #define KT_ASSERT _Static_assert
 #endif
-KT_ASSERT(sizeof(struct KtRobot) == 48, "no padding");
+KT_ASSERT(sizeof(struct KtRobot) == 56, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
 KT_ASSERT(sizeof(struct KtEvents) == 16, "no padding");

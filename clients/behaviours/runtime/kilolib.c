@@ -97,9 +97,11 @@ void set_motors(uint8_t left, uint8_t right) {
   robot.duty_right = right;
 }
 
+/* The kick itself is the physics engine's: 15 ms at full duty within the tick for which the next duties hold. */
 void spinup_motors(void) {
-  set_motors(255, 255);
   delay(15);
+  set_motors(255, 255);
+  robot.spin_up = 1;
 }
 
 void set_color(uint8_t color) { robot.led = color & 63; }

@@ -49,6 +49,27 @@ TEST(Kilolib, ChecksumsAreThoseOfTheFirmware) {
   EXPECT_EQ(r[8], 5);
 }
 
+TEST(Kilolib, SpinUpIsToldOnceWithTheDutiesThatFollowIt) {
+  // A kick takes 15 ms of the program's time, two of them and a half fit into a tick.
+  Swarm swarm(
+      {program("static void loop(void) { spinup_motors(); set_motors(70, (uint8_t)(kilo_ticks & 1)); }\n"),
+       program("static void loop(void) { if (kilo_ticks == 20) spinup_motors(); else set_motors(1, 2); }\n")},
+      1);
+  swarm.start();
+  int kicks = 0, others = 0;
+  for (int k = 0; k < 100; ++k) {
+    swarm.step();
+    const ActuationFrame frame = swarm.frame();
+    kicks += frame.spin_up[0];
+    others += frame.spin_up[1];
+    // Never a whole tick at full duty, unless the program leaves it so.
+    EXPECT_EQ(frame.motor_left[0], 70);
+    EXPECT_EQ(frame.motor_left[1] == 255, frame.spin_up[1] == 1);
+  }
+  EXPECT_GE(kicks, 65);  // it waits a tick for every 32.768 ms that kicks take
+  EXPECT_EQ(others, 1);
+}
+
 TEST(Kilolib, ReceivedMessagesCarryTheirChecksum) {
   Swarm swarm(
       {program("static void rx(message_t* m, distance_measurement_t* d) {\n"

@@ -131,6 +131,7 @@ ActuationFrame Swarm::frame() const {
     append(all.led, part.led);
     append(all.life_cycle, part.life_cycle);
     append(all.tx_period, part.tx_period);
+    append(all.spin_up, part.spin_up);
     append(all.offer_robot, part.offer_robot);
     append(all.offer_message, part.offer_message);
   }
@@ -164,7 +165,7 @@ Air echo(const ActuationFrame& frame) {
 
 bool equal(const ActuationFrame& a, const ActuationFrame& b) {
   return a.motor_left == b.motor_left && a.motor_right == b.motor_right && a.led == b.led &&
-         a.life_cycle == b.life_cycle && a.tx_period == b.tx_period && a.offer_robot == b.offer_robot &&
+         a.life_cycle == b.life_cycle && a.tx_period == b.tx_period && a.spin_up == b.spin_up && a.offer_robot == b.offer_robot &&
          a.offer_message == b.offer_message;
 }
 

@@ -65,6 +65,7 @@ class Tiny : public Federate {
       frame.motor_left.assign(robots, 0);
       frame.motor_right = frame.led = frame.life_cycle = frame.motor_left;
       frame.tx_period.assign(robots, 3906);
+      frame.spin_up.assign(robots, 0);
       frame.offer_robot = {0, 2};
       frame.offer_message.resize(2);
     });

@@ -35,12 +35,14 @@ TEST(Wire, CarriesActuationAndRadioAndOverhead) {
   actuation.life_cycle = {4, 1};
   actuation.tx_period = {3906, 100};
   actuation.offer_robot = {11};
+  actuation.spin_up = {0, 1};
   actuation.offer_message = {IrMessage{1, 2, 3, 4, 5, 6, 7, 8, 9, 0}};
   ActuationFrame actuation_in;
   ASSERT_TRUE(from_wire(to_wire(kHeader, actuation), actuation_in));
   EXPECT_EQ(actuation_in.first_robot, 10u);
   EXPECT_EQ(actuation_in.offer_message, actuation.offer_message);
   EXPECT_EQ(actuation_in.tx_period, actuation.tx_period);
+  EXPECT_EQ(actuation_in.spin_up, actuation.spin_up);
 
   RadioFrame radio;
   radio.tick = Tick{2};

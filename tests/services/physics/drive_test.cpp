@@ -57,6 +57,78 @@ TEST(Drive, CalibratedDutiesAreSeparateForStraightAndTurn) {
   EXPECT_NEAR(swarm.poses()[1].heading_rad, 20 / kWheelBase_mm * 10 * kTick_s, 1e-12);
 }
 
+TEST(Drive, DutiesUpToTheDeadBandTurnNothing) {
+  const RunPlan plan = make_plan("motion { dead_band_duty: 60 }", {{0, 0, 0}, {200, 0, 0}, {400, 0, 0}});
+  Swarm swarm(plan);
+  swarm.set_motors(0, 60, 60);
+  swarm.set_motors(1, 61, 60);  // a turn: the other motor rests
+  swarm.run(10);
+  const auto poses = swarm.poses();
+  EXPECT_EQ(poses[0].x_mm, 0);
+  EXPECT_EQ(poses[0].heading_rad, 0);
+  const physics::DriveModel drive(plan);
+  const double right = 20 * 61.0 / 70 + drive.bias_right_mm_s(1), left = drive.bias_left_mm_s(1);
+  EXPECT_NEAR(poses[1].heading_rad, (right - left) / kWheelBase_mm * 10 * kTick_s, 1e-12);
+}
+
+TEST(Drive, SlopeAndTopSpeedShapeTheCurve) {
+  // 1 + 5 (d / 75 - 1) is Kilombo's line through its offset, (d - 60) / 15.
+  for (const auto& [duty, ratio] :
+       {std::pair{60, 0.0}, {68, 8.0 / 15}, {75, 1.0}, {82, 22.0 / 15}, {90, 2.0}, {255, 2.0}, {40, 0.0}}) {
+    const RunPlan plan = make_plan(
+        "motion { noise: false duty_slope: 5 top_speed_ratio: 2 calibrated_straight_duty: 75 }", {{0, 0, 0}});
+    Swarm swarm(plan);
+    swarm.set_all_motors(static_cast<std::uint8_t>(duty), static_cast<std::uint8_t>(duty));
+    swarm.run(100);
+    EXPECT_NEAR(swarm.poses()[0].x_mm, 10 * ratio * 100 * kTick_s, 1e-9) << duty;
+  }
+}
+
+TEST(Drive, EachMotorHasItsRobotsOwnCalibration) {
+  const std::string text =
+      "motion { noise: false } "
+      "robot_model { robot: 0 straight_left: 50 straight_right: 80 turn_left: 90 turn_right: 40 }";
+  const RunPlan plan = make_plan(text, {{0, 0, 0}, {0, 200, 0}});
+  Swarm swarm(plan);
+  swarm.set_motors(0, 50, 80);
+  swarm.set_motors(1, 70, 70);
+  swarm.run(50);
+  EXPECT_NEAR(swarm.poses()[0].x_mm, 500 * kTick_s, 1e-9);
+  EXPECT_EQ(swarm.poses()[0].heading_rad, 0);
+  EXPECT_NEAR(swarm.poses()[1].x_mm, 500 * kTick_s, 1e-9);
+  swarm.set_motors(0, 90, 0);
+  swarm.run(10);
+  EXPECT_NEAR(swarm.poses()[0].heading_rad, 20 / kWheelBase_mm * 10 * kTick_s, 1e-12);
+  swarm.set_motors(0, 0, 40);
+  swarm.run(10);
+  EXPECT_NEAR(swarm.poses()[0].heading_rad, 0, 1e-12);
+  // The duty of another robot's left motor drives the right-hand wheel at 50 / 80 of the calibrated speed.
+  swarm.set_motors(0, 40, 80);
+  swarm.run(1);
+  EXPECT_NEAR(swarm.poses()[0].heading_rad, -10 * (1 - 40.0 / 50) / kWheelBase_mm * kTick_s, 1e-12);
+}
+
+TEST(Drive, AKickIsFifteenMillisecondsAtFullDuty) {
+  const std::string text = "motion { noise: false";
+  const std::vector<ScenePose> start = {{0, 0, 0}, {0, 200, 0}, {0, 400, 0}};
+  const RunPlan with = make_plan(text + " }", start), without = make_plan(text + " spin_up_s: 0 }", start);
+  for (const RunPlan* plan : {&with, &without}) {
+    const double kick_s = plan == &with ? 0.015 : 0;
+    Swarm swarm(*plan);
+    swarm.set_motors(0, 70, 70);
+    swarm.set_motors(1, 70, 0);
+    for (std::uint32_t robot = 0; robot < 3; ++robot) swarm.kick(robot);
+    swarm.step();
+    swarm.set_all_motors(0, 0);
+    swarm.step();
+    const auto poses = swarm.poses();
+    EXPECT_NEAR(poses[0].x_mm, 15 * kick_s + 10 * (kTick_s - kick_s), 1e-12);
+    EXPECT_NEAR(poses[1].heading_rad, 20 / kWheelBase_mm * (kTick_s - kick_s), 1e-13);
+    EXPECT_NEAR(poses[2].x_mm, 15 * kick_s, 1e-12);  // nothing is set after the kick
+    EXPECT_EQ(poses[2].heading_rad, 0);
+  }
+}
+
 TEST(Drive, LeftMotorTurnsLeftAndFullTurnTakesTwoPiWheelBasesPerSpeed) {
   const RunPlan plan = make_plan("motion { noise: false }", {{0, 0, 0}, {300, 0, 0}});
   Swarm swarm(plan);

@@ -13,7 +13,8 @@ namespace kilotwin::testing {
 
 class Swarm {
  public:
-  explicit Swarm(const RunPlan& plan) : plan_(plan), left_(plan.robots(), 0), right_(plan.robots(), 0) {
+  explicit Swarm(const RunPlan& plan)
+      : plan_(plan), left_(plan.robots(), 0), right_(plan.robots(), 0), spin_up_(plan.robots(), 0) {
     for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
       engines_.push_back(physics::make_engine(plan, PartitionId{p}));
   }
@@ -22,6 +23,8 @@ class Swarm {
     left_[robot] = left;
     right_[robot] = right;
   }
+  /// The next step begins with a kick of both motors.
+  void kick(std::uint32_t robot) { spin_up_[robot] = 1; }
   void set_all_motors(std::uint8_t left, std::uint8_t right) {
     for (std::uint32_t r = 0; r < plan_.robots(); ++r) set_motors(r, left, right);
   }
@@ -37,7 +40,9 @@ class Swarm {
       const Share share = plan_.share(HostId{h});
       frames.push_back(motors(tick_, {left_.begin() + share.first, left_.begin() + share.last},
                               {right_.begin() + share.first, right_.begin() + share.last}, share.first));
+      frames.back().spin_up.assign(spin_up_.begin() + share.first, spin_up_.begin() + share.last);
     }
+    spin_up_.assign(spin_up_.size(), 0);
     std::vector<const ActuationFrame*> actuation;
     for (const ActuationFrame& frame : frames) actuation.push_back(&frame);
     for (std::uint32_t p = 0; p < engines_.size(); ++p) {
@@ -100,7 +105,7 @@ class Swarm {
 
   const RunPlan& plan_;
   std::vector<std::unique_ptr<physics::Engine>> engines_;
-  std::vector<std::uint8_t> left_, right_;
+  std::vector<std::uint8_t> left_, right_, spin_up_;
   Tick tick_;
 };
 
