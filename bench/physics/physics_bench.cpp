@@ -1,13 +1,14 @@
-// Cost of the planar engine per robot and tick, sub-steps included, on one core. The counter ns_per_robot_tick is what to
+// Cost of the physics engines (planar unless the name says otherwise) per robot and tick, sub-steps included, on one core. The counter ns_per_robot_tick is what to
 // watch; of several partitions it is the sum, with the ghosts that they send each other. Each scene is run for some ticks per
 // iteration from the same start.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "services/physics/planar_engine.hpp"
+#include "services/physics/engine.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace {
@@ -25,13 +26,13 @@ void run(benchmark::State& state, const std::string& experiment, const std::vect
   const ActuationFrame* const frames[] = {&frame};
   for (auto _ : state) {
     state.PauseTiming();
-    physics::PlanarEngine engine(plan, PartitionId{0});
+    const auto engine = physics::make_engine(plan, PartitionId{0});
     state.ResumeTiming();
     for (std::int64_t k = 0; k < ticks; ++k) {
       frame.tick = Tick{k};
-      engine.step(Tick{k}, {{}, frames, {}});
+      engine->step(Tick{k}, {{}, frames, {}});
     }
-    benchmark::DoNotOptimize(engine.hash_part());
+    benchmark::DoNotOptimize(engine->hash_part());
   }
   const double steps =
       static_cast<double>(state.iterations()) * static_cast<double>(ticks) * static_cast<double>(poses.size());
@@ -49,23 +50,23 @@ void run_partitions(benchmark::State& state, std::uint32_t robots, std::int64_t 
   BodyFrame ghosts[4][4];  // from, to
   for (auto _ : state) {
     state.PauseTiming();
-    std::vector<physics::PlanarEngine> engines;
-    for (std::uint32_t p = 0; p < 4; ++p) engines.emplace_back(plan, PartitionId{p});
+    std::vector<std::unique_ptr<physics::Engine>> engines;
+    for (std::uint32_t p = 0; p < 4; ++p) engines.push_back(physics::make_engine(plan, PartitionId{p}));
     state.ResumeTiming();
     for (std::int64_t k = 0; k < ticks; ++k) {
       frame.tick = Tick{k};
       for (std::uint32_t p = 0; p < 4; ++p) {
-        for (const PartitionId q : engines[p].neighbours()) engines[p].emit_ghosts(q, ghosts[p][q.value()]);
+        for (const PartitionId q : engines[p]->neighbours()) engines[p]->emit_ghosts(q, ghosts[p][q.value()]);
       }
       for (std::uint32_t p = 0; p < 4; ++p) {
         const BodyFrame* in[3];
         for (std::uint32_t q = 0, n = 0; q < 4; ++q) {
           if (q != p) in[n++] = &ghosts[q][p];
         }
-        engines[p].step(Tick{k}, {in, frames, {}});
+        engines[p]->step(Tick{k}, {in, frames, {}});
       }
     }
-    for (const physics::PlanarEngine& engine : engines) benchmark::DoNotOptimize(engine.hash_part());
+    for (const auto& engine : engines) benchmark::DoNotOptimize(engine->hash_part());
   }
   const double steps = static_cast<double>(state.iterations()) * static_cast<double>(ticks) * robots;
   state.counters["ns_per_robot_tick"] =
@@ -102,6 +103,11 @@ void whole_of_100(benchmark::State& state) {
   run(state, kArena, testing::grid_crowd(100, 40, Facing::kRandom), 1000, 70, 70);
 }
 
+void kinematic_cluster(benchmark::State& state) {
+  run(state, kArena + " physics { engine: KINEMATIC }", testing::grid_crowd(kRobots, 40, Facing::kRandom), 300, 70,
+      70);
+}
+
 BENCHMARK(open_field);
 BENCHMARK(disperse_cluster);
 BENCHMARK(tightest_packing);
@@ -109,6 +115,7 @@ BENCHMARK(tightest_packing_inwards);
 BENCHMARK(turning_cluster);
 BENCHMARK(step_noise);
 BENCHMARK(resting_cluster);
+BENCHMARK(kinematic_cluster);
 BENCHMARK(whole_of_100);
 BENCHMARK(partitions_2x2_of_100);
 BENCHMARK(partitions_2x2_of_1000);

@@ -1,0 +1,205 @@
+#include "services/physics/population.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+
+namespace kilotwin::physics {
+
+Population::Population(const RunPlan& plan, PartitionId partition, DriveModel drive, double margin_mm)
+    : drive_(std::move(drive)),
+      grid_(plan.grid),
+      rectangle_(plan.grid.rectangle(partition)),
+      margin_mm_(margin_mm),
+      robots_(plan.robots()),
+      neighbours_(plan.grid.neighbours(partition, margin_mm)),
+      merge_(robots_) {
+  for (std::uint32_t robot = 0; robot < robots_; ++robot) {
+    const Pose pose = plan.initial_pose(robot);
+    const double x = pose.position_mm.x(), y = pose.position_mm.y(), heading = wrapped(pose.heading_rad);
+    const bool tracked = plan.tracked(robot);
+    if (tracked) {
+      is_tracked_.resize(robots_, 0);
+      is_tracked_[robot] = 1;
+      tracked_.add(robot, x, y, heading, 1, 1);
+    }
+    if (is_own(x, y)) listed_.add(robot, x, y, heading, tracked, 1);
+  }
+}
+
+void Population::begin(Tick from, const Inputs& inputs) {
+  KILOTWIN_DEMAND(from == tick_);
+  take_tracked(inputs.tracked);
+  for (const BodyFrame* frame : inputs.ghosts) KILOTWIN_DEMAND(frame->tick == from);
+  gather(inputs.ghosts);
+  read_motors(from, inputs.actuation);
+}
+
+void Population::take_tracked(std::span<const TrackedPoseInput> inputs) {
+  for (const TrackedPoseInput& input : inputs) {
+    const auto found = std::lower_bound(tracked_.robot.begin(), tracked_.robot.end(), input.robot);
+    KILOTWIN_DEMAND(found != tracked_.robot.end() && *found == input.robot);
+    const auto i = static_cast<std::size_t>(found - tracked_.robot.begin());
+    tracked_.x_mm[i] = input.x_mm;
+    tracked_.y_mm[i] = input.y_mm;
+    tracked_.heading_rad[i] = wrapped(input.heading_rad);
+  }
+}
+
+void Population::gather(std::span<const BodyFrame* const> ghosts) {
+  if (grid_.size() == 1 && tracked_.size() == 0) {
+    known_.swap(listed_);
+    return;
+  }
+  // List 0 is what was listed, 1 the tracked ones, the others are ghosts.
+  for (std::uint32_t i = 0; i < listed_.size(); ++i) {
+    if (listed_.tracked[i] == 0) merge_.add(listed_.robot[i], {0, i});
+  }
+  for (std::uint32_t i = 0; i < tracked_.size(); ++i) {
+    if (rectangle_.distance_mm(tracked_.x_mm[i], tracked_.y_mm[i]) <= margin_mm_) {
+      merge_.add(tracked_.robot[i], {1, i});
+    }
+  }
+  for (std::uint32_t g = 0; g < ghosts.size(); ++g) {
+    for (std::uint32_t i = 0; i < ghosts[g]->robot.size(); ++i) {
+      const std::uint32_t robot = ghosts[g]->robot[i];
+      if (is_tracked_.empty() || is_tracked_[robot] == 0) merge_.add(robot, {2 + g, i});
+    }
+  }
+  known_.swap(previous_);
+  known_.resize(merge_.size());
+  std::size_t n = 0, before = 0;
+  merge_.drain([&](std::uint32_t robot, Merge::Entry from) {
+    known_.robot[n] = robot;
+    if (from.list < 2) {
+      known_.set(n, from.list == 0 ? listed_ : tracked_, from.index);
+    } else {
+      const BodyFrame& frame = *ghosts[from.list - 2];
+      const double x = frame.x_mm[from.index], y = frame.y_mm[from.index];
+      while (before < previous_.size() && previous_.robot[before] < robot) ++before;
+      // One that the last step did not move here, and that is where it was, was not moved anywhere.
+      const bool asleep = before < previous_.size() && previous_.robot[before] == robot &&
+                          previous_.awake[before] == 0 && previous_.x_mm[before] == x &&
+                          previous_.y_mm[before] == y;
+      known_.x_mm[n] = x;
+      known_.y_mm[n] = y;
+      known_.heading_rad[n] = frame.heading_rad[from.index];
+      known_.tracked[n] = 0;
+      known_.awake[n] = !asleep;
+    }
+    ++n;
+  });
+  if (grid_.size() == 1) return;
+  own_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) own_[i] = is_own(known_.x_mm[i], known_.y_mm[i]);
+}
+
+void Population::read_motors(Tick from, std::span<const ActuationFrame* const> frames) {
+  frames_.assign(frames.begin(), frames.end());
+  std::sort(frames_.begin(), frames_.end(),
+            [](const ActuationFrame* a, const ActuationFrame* b) { return a->first_robot < b->first_robot; });
+  for (const ActuationFrame* frame : frames_) KILOTWIN_DEMAND(frame->tick == from);
+  duties_.assign(known_.size(), Duties{});
+  std::size_t body = 0;
+  for (const ActuationFrame* frame : frames_) {
+    const std::uint32_t first = frame->first_robot;
+    const auto size = static_cast<std::uint32_t>(frame->motor_left.size());
+    while (body < known_.size() && known_.robot[body] < first) ++body;
+    for (; body < known_.size() && known_.robot[body] - first < size; ++body) {
+      const std::uint32_t entry = known_.robot[body] - first;
+      if (known_.tracked[body] != 0) continue;
+      duties_[body] = drive_.acting(frame->motor_left[entry], frame->motor_right[entry], frame->spin_up[entry]);
+    }
+  }
+}
+
+void Population::end() {
+  ++tick_;
+  if (grid_.size() == 1) {
+    listed_.swap(known_);
+    return;
+  }
+  listed_.clear();
+  for (std::size_t i = 0; i < known_.size(); ++i) {
+    if (own_[i] != 0) listed_.add(known_, i);
+  }
+}
+
+void Population::emit_bodies(BodyFrame& frame) const {
+  frame.tick = tick_;
+  frame.robot = listed_.robot;
+  frame.x_mm = listed_.x_mm;
+  frame.y_mm = listed_.y_mm;
+  frame.heading_rad = listed_.heading_rad;
+}
+
+void Population::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
+  frame.clear();
+  frame.tick = tick_;
+  const Rectangle& rectangle = grid_.rectangle(neighbour);
+  for (std::size_t i = 0; i < listed_.size(); ++i) {
+    const double x = listed_.x_mm[i], y = listed_.y_mm[i];
+    // Most lie far off; the distance itself takes a root.
+    if (x < rectangle.x_min_mm - margin_mm_ || x > rectangle.x_max_mm + margin_mm_ ||
+        y < rectangle.y_min_mm - margin_mm_ || y > rectangle.y_max_mm + margin_mm_) {
+      continue;
+    }
+    if (listed_.tracked[i] == 0 && rectangle.distance_mm(x, y) <= margin_mm_) {
+      frame.add(listed_.robot[i], x, y, listed_.heading_rad[i]);
+    }
+  }
+}
+
+std::uint64_t Population::hash_part() const {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < listed_.size(); ++i) {
+    sum += entity_hash(HashDomain::kBody, listed_.robot[i],
+                       {hash_bits(listed_.x_mm[i]), hash_bits(listed_.y_mm[i]), hash_bits(listed_.heading_rad[i])});
+  }
+  return sum;
+}
+
+void Population::save(proto::PhysicsState& state) const {
+  state.Clear();
+  const auto size = static_cast<int>(listed_.size());
+  state.mutable_robot()->Add(listed_.robot.begin(), listed_.robot.end());
+  state.mutable_x_mm()->Add(listed_.x_mm.begin(), listed_.x_mm.end());
+  state.mutable_y_mm()->Add(listed_.y_mm.begin(), listed_.y_mm.end());
+  state.mutable_heading_rad()->Add(listed_.heading_rad.begin(), listed_.heading_rad.end());
+  KILOTWIN_DEMAND(state.robot_size() == size && state.heading_rad_size() == size);
+}
+
+void Population::load(Tick tick, std::span<const proto::PhysicsState* const> parts) {
+  Bodies all;
+  std::vector<std::uint8_t> seen(robots_, 0);
+  for (const proto::PhysicsState* part : parts) {
+    const int size = part->robot_size();
+    if (part->x_mm_size() != size || part->y_mm_size() != size || part->heading_rad_size() != size)
+      throw RunError("checkpoint: physics: columns of unequal length; the file is damaged");
+    for (int i = 0; i < size; ++i) {
+      const std::uint32_t robot = part->robot(i);
+      if (robot >= robots_) throw RunError("checkpoint: physics: unknown robot " + std::to_string(robot));
+      if (seen[robot]++ != 0)
+        throw RunError("checkpoint: physics: robot " + std::to_string(robot) + " occurs twice");
+      const bool tracked = !is_tracked_.empty() && is_tracked_[robot] != 0;
+      all.add(robot, part->x_mm(i), part->y_mm(i), part->heading_rad(i), tracked, 1);
+    }
+  }
+  if (all.size() != robots_) {
+    throw RunError("checkpoint: physics: holds " + std::to_string(all.size()) + " of " + std::to_string(robots_) +
+                   " robots");
+  }
+  for (std::uint32_t i = 0; i < all.size(); ++i) merge_.add(all.robot[i], {0, i});
+  listed_.clear();
+  tracked_.clear();
+  known_.clear();
+  merge_.drain([&](std::uint32_t, Merge::Entry from) {
+    if (all.tracked[from.index] != 0) tracked_.add(all, from.index);
+    if (is_own(all.x_mm[from.index], all.y_mm[from.index])) listed_.add(all, from.index);
+  });
+  tick_ = tick;
+}
+
+}  // namespace kilotwin::physics
