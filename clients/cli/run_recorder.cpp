@@ -46,7 +46,7 @@ void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
     std::copy(frame->life_cycle.begin(), frame->life_cycle.end(), life_cycle_.begin() + frame->first_robot);
   }
   writer_.state({tick, x_mm_, y_mm_, heading_rad_, led_, life_cycle_});
-  displacement_.add(plan_.tick_length.seconds_at(tick), x_mm_, y_mm_);
+  displacement_.add(x_mm_, y_mm_);
 }
 
 void RunRecorder::hash(Tick tick, std::uint64_t chain) { writer_.hash(tick, chain); }

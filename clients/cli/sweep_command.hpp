@@ -1,4 +1,4 @@
-/// `kilotwin sweep`: many local runs on all cores, one table with standard errors, and a plot.
+/// `kilotwin sweep`: many local runs on all cores, a table and curves with standard errors, and plots.
 #pragma once
 
 #include "clients/cli/run_arguments.hpp"
@@ -8,7 +8,8 @@ namespace kilotwin::cli {
 struct SweepArguments {
   RunArguments run;              ///< what all runs share
   std::string seeds;             ///< "A..B", or one number; empty: the experiment's own
-  std::vector<std::string> set;  ///< FIELD=V1,V2,...: one run per value, all combinations
+  std::vector<std::string> set;  ///< FIELD=V1,V2,... or FIELD=A..B: one run per value, all combinations
+  std::string plot = "msd";      ///< the observable that the plots show: clients/recorder/observables.hpp
   std::uint32_t jobs = 0;        ///< runs at a time; 0: one per core
   std::filesystem::path out;     ///< default: runs/NAME-sweep
 };

@@ -90,7 +90,7 @@ std::string line(double x1, double y1, double x2, double y2, std::string_view co
 }
 
 std::string draw_series(const PlotSeries& series, const Axis& x, const Axis& y, std::string_view colour) {
-  std::string path, bars, points;
+  std::string path, bars, points, band_top, band_bottom;
   std::size_t drawn = 0;
   // Where the line would vanish under the points, it stands alone, and bars have no feet.
   const bool dense = series.line && series.x.size() > kMostPoints;
@@ -99,16 +99,24 @@ std::string draw_series(const PlotSeries& series, const Axis& x, const Axis& y, 
         drawable(series, i) && (!x.logarithmic || series.x[i] > 0) && (!y.logarithmic || series.y[i] > 0);
     if (!visible) continue;
     const double px = x.position_px(series.x[i]), py = y.position_px(series.y[i]);
+    if (series.band) {
+      const double error = error_at(series, i);
+      const double low = y.logarithmic ? std::max(series.y[i] - error, y.low) : series.y[i] - error;
+      band_top += fmt::format("{}{:.1f} {:.1f}", drawn == 0 ? "M" : "L", px, y.position_px(series.y[i] + error));
+      band_bottom.insert(0, fmt::format("L{:.1f} {:.1f}", px, y.position_px(low)));
+    }
     path += fmt::format("{}{:.1f} {:.1f}", drawn++ == 0 ? "M" : "L", px, py);
     if (const double error = error_at(series, i); error > 0) {
       const double low = y.logarithmic ? std::max(series.y[i] - error, y.low) : series.y[i] - error;
       const double top = y.position_px(series.y[i] + error), bottom = y.position_px(low);
-      bars += fmt::format("M{:.1f} {:.1f}V{:.1f}", px, top, bottom);
-      if (!dense) bars += fmt::format("M{0:.1f} {1:.1f}h8M{0:.1f} {2:.1f}h8", px - 4, top, bottom);
+      if (!series.band) bars += fmt::format("M{:.1f} {:.1f}V{:.1f}", px, top, bottom);
+      if (!series.band && !dense) bars += fmt::format("M{0:.1f} {1:.1f}h8M{0:.1f} {2:.1f}h8", px - 4, top, bottom);
     }
     if (series.points && !dense) points += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.6\"/>\n", px, py);
   }
   std::string out;
+  if (series.band && drawn > 1)
+    out += fmt::format("<path d=\"{}{}Z\" fill=\"{}\" fill-opacity=\"0.2\"/>\n", band_top, band_bottom, colour);
   if (series.line && drawn > 1) {
     out +=
         fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\" stroke-linejoin=\"round\"/>\n",

@@ -13,6 +13,7 @@ struct PlotSeries {
   std::vector<double> error;  ///< half length of the bars; empty: none
   bool points = true;
   bool line = true;
+  bool band = false;  ///< errors as a shaded band instead of bars
 };
 
 struct Plot {

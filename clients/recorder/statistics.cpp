@@ -22,36 +22,21 @@ double Sample::standard_error() const {
   return count_ < 2 ? 0 : standard_deviation() / std::sqrt(static_cast<double>(count_));
 }
 
-void DisplacementObserver::add(double time_s, std::span<const double> x_mm, std::span<const double> y_mm) {
+void DisplacementObserver::add(std::span<const double> x_mm, std::span<const double> y_mm) {
   if (start_x_mm_.empty()) {
     start_x_mm_.assign(x_mm.begin(), x_mm.end());
     start_y_mm_.assign(y_mm.begin(), y_mm.end());
-    start_s_ = time_s;
   }
   KILOTWIN_DEMAND(x_mm.size() == start_x_mm_.size() && y_mm.size() == start_y_mm_.size());
-  Sample squares, distances;
+  Sample distances;
   max_distance_mm_ = 0;
   for (std::size_t i = 0; i < x_mm.size(); ++i) {
     const double dx = x_mm[i] - start_x_mm_[i], dy = y_mm[i] - start_y_mm_[i];
-    const double square = dx * dx + dy * dy;
-    const double distance = std::sqrt(square);
-    squares.add(square);
+    const double distance = std::sqrt(dx * dx + dy * dy);
     distances.add(distance);
     max_distance_mm_ = std::max(max_distance_mm_, distance);
   }
   mean_distance_mm_ = distances.mean();
-  msd_.time_s.push_back(time_s - start_s_);
-  msd_.msd_mm2.push_back(squares.mean());
-  msd_.standard_error_mm2.push_back(squares.standard_error());
-}
-
-MeanSquareDisplacement mean_square_displacement(Reader& recording) {
-  DisplacementObserver observer;
-  while (const proto::StateRecord* state = recording.next_state()) {
-    observer.add(recording.tick_length().seconds_at(Tick{state->tick()}), values(state->x_mm()),
-                 values(state->y_mm()));
-  }
-  return observer.msd();
 }
 
 }  // namespace kilotwin::recorder

@@ -1,11 +1,9 @@
-/// What a sweep tells of many runs or robots: means with standard errors, and the mean square displacement.
+/// What a sweep tells of many runs or robots: means with standard errors, and displacements.
 #pragma once
 
 #include <cstddef>
 #include <span>
 #include <vector>
-
-#include "clients/recorder/reader.hpp"
 
 namespace kilotwin::recorder {
 
@@ -25,29 +23,17 @@ class Sample {
   double mean_ = 0, squares_ = 0;
 };
 
-/// Mean over robots of the squared distance from where each was in the first state, over time since that state.
-struct MeanSquareDisplacement {
-  std::vector<double> time_s;
-  std::vector<double> msd_mm2;
-  std::vector<double> standard_error_mm2;  ///< over robots, taken as independent
-};
-
-/// Collects it state by state; every state has the same robots.
+/// How far robots are from where they were in the first state. Every state has the same robots.
 class DisplacementObserver {
  public:
-  void add(double time_s, std::span<const double> x_mm, std::span<const double> y_mm);
-  [[nodiscard]] const MeanSquareDisplacement& msd() const { return msd_; }
+  void add(std::span<const double> x_mm, std::span<const double> y_mm);
   /// Distances between first and last place; 0 before the second state.
   [[nodiscard]] double mean_distance_mm() const { return mean_distance_mm_; }
   [[nodiscard]] double max_distance_mm() const { return max_distance_mm_; }
 
  private:
   std::vector<double> start_x_mm_, start_y_mm_;
-  double start_s_ = 0, mean_distance_mm_ = 0, max_distance_mm_ = 0;
-  MeanSquareDisplacement msd_;
+  double mean_distance_mm_ = 0, max_distance_mm_ = 0;
 };
-
-/// Of all states that remain in a recording.
-[[nodiscard]] MeanSquareDisplacement mean_square_displacement(Reader& recording);
 
 }  // namespace kilotwin::recorder

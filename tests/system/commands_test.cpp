@@ -161,6 +161,36 @@ TEST_F(Commands, SweepTabulatesAllCombinations) {
   EXPECT_TRUE(fs::exists(scratch / "sweep/sweep.svg"));
 }
 
+TEST_F(Commands, SweepOverARangeOfNumbersPlotsTheResponse) {
+  const Outcome outcome = kilotwin({"sweep", source("experiments/diffusion.txtpb"), "--duration", "3", "--set",
+                                    "physics.sub_steps=1..4", "--plot", "spread", "--out", scratch / "sweep"},
+                                   scratch);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(read(scratch / "sweep/response.svg").find("physics.sub_steps"), std::string::npos);
+  // Of each point the states at 0, 1, 2 and 3 s, and a header.
+  const std::string curves = read(scratch / "sweep/curves.csv");
+  EXPECT_EQ(std::count(curves.begin(), curves.end(), '\n'), 1 + 4 * 4);
+  EXPECT_NE(curves.find("\"physics.sub_steps=4\",0,1,0,"), std::string::npos) << curves;
+  EXPECT_EQ(kilotwin({"sweep", source("experiments/diffusion.txtpb"), "--plot", "speed"}, scratch).status, 2);
+}
+
+TEST_F(Commands, AnInterruptedSweepTellsOfTheRunsThatWereDone) {
+  // The first runs are short, those after them would take minutes.
+  Process sweep({program(), "sweep", source("experiments/diffusion.txtpb"), "--set", "duration_s=1,1000000",
+                 "--seeds", "1..2", "--jobs", "2", "--out", scratch / "sweep"},
+                scratch.path());
+  ASSERT_TRUE(eventually([&] {
+    return fs::exists(scratch / "sweep/0000-1/summary.json") && fs::exists(scratch / "sweep/0000-2/summary.json") &&
+           fs::exists(scratch / "sweep/0001-2/recording.ktrec");
+  }));
+  sweep.signal(SIGINT);
+  const Outcome outcome = sweep.wait();
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("interrupted; 2 of 4 runs were done"), std::string::npos) << outcome.err;
+  EXPECT_NE(read(scratch / "sweep/sweep.csv").find("\"duration_s=1\",2,"), std::string::npos);
+  EXPECT_TRUE(processes_with(scratch / "sweep").empty());
+}
+
 TEST_F(Commands, SweepRefusesAPointThatCannotRunBeforeTheFirstRun) {
   const Outcome outcome = kilotwin({"sweep", source("experiments/disperse.txtpb"), "--duration", "1", "--set",
                                     "robots.count=9,5000", "--out", scratch / "sweep"},

@@ -11,9 +11,9 @@
 #include <thread>
 
 #include "clients/recorder/export.hpp"
+#include "clients/recorder/observables.hpp"
 #include "clients/recorder/picture.hpp"
 #include "clients/recorder/reader.hpp"
-#include "clients/recorder/statistics.hpp"
 #include "core/base/error.hpp"
 #include "tests/clients/recorder/synthetic.hpp"
 
@@ -192,7 +192,8 @@ void use_in_every_way(const std::filesystem::path& file, const Scratch& scratch)
         EXPECT_EQ(svg.substr(svg.size() - 7), "</svg>\n");
       }
       if (way == 3) {
-        for (const double msd : mean_square_displacement(reader).msd_mm2) EXPECT_TRUE(std::isfinite(msd));
+        const ObservableCurves curves = observe(reader);
+        for (const double msd : curves.of(Observable::kMsd)) EXPECT_TRUE(std::isfinite(msd));
       }
       if (way == 4) {
         while (reader.next() != nullptr) EXPECT_EQ(reader.warning(), "");

@@ -1,0 +1,243 @@
+#include "clients/cli/sweep_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "clients/recorder/reader.hpp"
+#include "clients/recorder/summary.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+using recorder::kObservables;
+using recorder::Sample;
+
+/// More than these cannot be told apart in one plot.
+constexpr std::size_t kMostCurves = 8;
+
+std::string with_error(const Sample& sample) {
+  if (sample.count() == 0) return "-";
+  if (sample.count() == 1) return fmt::format("{:.5g}", sample.mean());
+  return fmt::format("{:.5g} ±{:.2g}", sample.mean(), sample.standard_error());
+}
+
+/// Columns as in CSV: mean and standard error; nothing where there is no value.
+std::string csv_pair(const Sample& sample) {
+  if (sample.count() == 0) return ",,";
+  return fmt::format(",{:.10g},{:.4g}", sample.mean(), sample.standard_error());
+}
+
+std::string csv_header(const std::string& first) {
+  std::string text = first;
+  for (const recorder::ObservableInfo& o : kObservables)
+    text += fmt::format(",{0}{1},{0}_se{1}", o.name, o.column_suffix);
+  return text;
+}
+
+/// A text as a CSV field.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + '"';
+}
+
+/// Lays rows out in columns, the first to the left and the others to the right. "±" is one character of two bytes.
+std::string laid_out(const std::vector<std::vector<std::string>>& rows) {
+  const auto width_of = [](const std::string& cell) {
+    return static_cast<std::size_t>(std::count_if(
+        cell.begin(), cell.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+  };
+  std::vector<std::size_t> width(rows[0].size(), 0);
+  for (const auto& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) width[i] = std::max(width[i], width_of(row[i]));
+  }
+  std::string text;
+  for (const auto& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::string padding(width[i] - width_of(row[i]), ' ');
+      text += i == 0 ? row[i] + padding : "   " + padding + row[i];
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+}  // namespace
+
+SweepReport::SweepReport(std::string name, std::vector<SweepPoint> points, recorder::Observable plotted)
+    : name_(std::move(name)), points_(std::move(points)), plotted_(plotted), observed_(points_.size()) {
+  // The field with the most numbers.
+  std::size_t most = 1;
+  for (std::size_t field = 0; field < points_[0].size(); ++field) {
+    std::set<double> numbers;
+    bool all_numbers = true;
+    for (const SweepPoint& point : points_) {
+      const auto number = number_of(point[field]);
+      if (number) numbers.insert(*number);
+      all_numbers = all_numbers && number;
+    }
+    if (all_numbers && numbers.size() > most) {
+      most = numbers.size();
+      response_field_ = field;
+    }
+  }
+}
+
+void SweepReport::add(std::size_t point, const std::filesystem::path& run) {
+  const recorder::Summary summary = recorder::read_summary(run / "summary.json");
+  recorder::Reader reader(run / "recording.ktrec");
+  const recorder::ObservableCurves curves = recorder::observe(reader);
+  Observed& at = observed_[point];
+  ++runs_;
+  at.sent.add(static_cast<double>(summary.messages.sent));
+  at.received.add(static_cast<double>(summary.messages.received));
+  at.collided.add(static_cast<double>(summary.messages.collided));
+  at.failed.add(summary.robots_failed);
+  at.realtime.add(summary.realtime_factor());
+  const std::size_t states = curves.time_s.size();
+  if (states > at.time_s.size()) at.time_s = curves.time_s;
+  if (states > at.over_time.size()) at.over_time.resize(states);
+  for (std::size_t o = 0; o < kObservables.size(); ++o) {
+    for (std::size_t i = 0; i < states; ++i) {
+      const double value = curves.value[o][i];
+      if (!std::isfinite(value)) continue;
+      at.over_time[i][o].add(value);
+      if (i + 1 == states) at.at_end[o].add(value);
+    }
+  }
+}
+
+std::string SweepReport::name_of(std::size_t point) const {
+  return points_[point].empty() ? name_ : label(points_[point]);
+}
+
+std::string SweepReport::table() const {
+  std::vector<std::string> header{"at the end", "runs"};
+  for (const recorder::ObservableInfo& o : kObservables)
+    header.push_back(o.unit.empty() ? std::string(o.name) : fmt::format("{}, {}", o.name, o.unit));
+  const bool messages =
+      std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.sent.mean() > 0; });
+  const bool failures =
+      std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.failed.mean() > 0; });
+  if (messages) header.insert(header.end(), {"sent", "received"});
+  if (failures) header.emplace_back("robots failed");
+  header.emplace_back("x real time");
+  std::vector<std::vector<std::string>> rows{header};
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Observed& at = observed_[i];
+    std::vector<std::string> row{name_of(i), std::to_string(at.realtime.count())};
+    for (const Sample& sample : at.at_end) row.push_back(with_error(sample));
+    if (messages) row.insert(row.end(), {with_error(at.sent), with_error(at.received)});
+    if (failures) row.push_back(with_error(at.failed));
+    row.push_back(fmt::format("{:.0f}", at.realtime.mean()));
+    rows.push_back(std::move(row));
+  }
+  return laid_out(rows);
+}
+
+std::string SweepReport::table_csv() const {
+  std::string csv = csv_header("point,runs") +
+                    ",sent,sent_se,received,received_se,collided,collided_se,robots_failed,realtime_factor\n";
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Observed& at = observed_[i];
+    csv += fmt::format("{},{}", quoted(name_of(i)), at.realtime.count());
+    for (const Sample& sample : at.at_end) csv += csv_pair(sample);
+    for (const Sample* sample : {&at.sent, &at.received, &at.collided}) csv += csv_pair(*sample);
+    csv += fmt::format(",{:.6g},{:.6g}\n", at.failed.mean(), at.realtime.mean());
+  }
+  return csv;
+}
+
+std::string SweepReport::curves_csv() const {
+  std::string csv = csv_header("point,time_s,runs") + "\n";
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Observed& at = observed_[i];
+    const std::string point = quoted(name_of(i));
+    for (std::size_t k = 0; k < at.over_time.size(); ++k) {
+      csv += fmt::format("{},{:.10g},{}", point, at.time_s[k], at.over_time[k][0].count());
+      for (const Sample& sample : at.over_time[k]) csv += csv_pair(sample);
+      csv += '\n';
+    }
+  }
+  return csv;
+}
+
+std::string SweepReport::runs_text() const {
+  std::size_t least = observed_[0].realtime.count(), most = least;
+  for (const Observed& at : observed_) {
+    least = std::min(least, at.realtime.count());
+    most = std::max(most, at.realtime.count());
+  }
+  if (most <= 1) return "one run each";
+  return least == most ? fmt::format("{} runs each", most) : fmt::format("{} to {} runs each", least, most);
+}
+
+recorder::Plot SweepReport::plot() const {
+  const recorder::ObservableInfo& observable = kObservables[static_cast<std::size_t>(plotted_)];
+  recorder::Plot plot;
+  plot.title = fmt::format("{}: {}", name_, observable.title);
+  plot.y_name = observable.title;
+  if (plotted_ == recorder::Observable::kMsd) plot.y_name = "MSD";
+  plot.y_unit = observable.unit;
+  return plot;
+}
+
+recorder::Plot SweepReport::curves() const {
+  recorder::Plot plot = this->plot();
+  const bool errors =
+      std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.realtime.count() > 1; });
+  plot.subtitle = runs_text() + (errors ? "; shaded: standard error of the mean" : "");
+  plot.x_name = "time";
+  plot.x_unit = "s";
+  // Of many points some, evenly from the first to the last.
+  const std::size_t curves = std::min(points_.size(), kMostCurves);
+  if (curves < points_.size()) plot.subtitle += fmt::format("; {} of {} points", curves, points_.size());
+  for (std::size_t curve = 0; curve < curves; ++curve) {
+    const std::size_t i = curves < 2 ? 0 : curve * (points_.size() - 1) / (curves - 1);
+    const Observed& at = observed_[i];
+    recorder::PlotSeries series;
+    series.name = points_[i].empty() ? "" : name_of(i);
+    series.x = at.time_s;
+    for (const Samples& samples : at.over_time) {
+      const Sample& sample = samples[static_cast<std::size_t>(plotted_)];
+      series.y.push_back(sample.count() > 0 ? sample.mean() : std::nan(""));
+      series.error.push_back(sample.standard_error());
+    }
+    series.points = false;
+    series.band = true;
+    plot.series.push_back(std::move(series));
+  }
+  return plot;
+}
+
+recorder::Plot SweepReport::response() const {
+  recorder::Plot plot = this->plot();
+  const bool errors =
+      std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.realtime.count() > 1; });
+  plot.subtitle = "at the end of the runs, " + runs_text() + (errors ? "; bars: standard error of the mean" : "");
+  plot.x_name = field_of(points_[0][response_field_]);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Sample& sample = observed_[i].at_end[static_cast<std::size_t>(plotted_)];
+    SweepPoint others = points_[i];
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(response_field_));
+    const std::string name = label(others);
+    const auto found = std::find(names.begin(), names.end(), name);
+    const auto index = static_cast<std::size_t>(found - names.begin());
+    if (found == names.end()) {
+      if (names.size() == kMostCurves) continue;
+      names.push_back(name);
+      plot.series.emplace_back().name = name;
+    }
+    if (sample.count() == 0) continue;
+    plot.series[index].x.push_back(*number_of(points_[i][response_field_]));
+    plot.series[index].y.push_back(sample.mean());
+    plot.series[index].error.push_back(sample.standard_error());
+  }
+  return plot;
+}
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,110 @@
+#include "clients/recorder/observables.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "clients/recorder/statistics.hpp"
+#include "core/base/error.hpp"
+#include "core/math/elementary.h"
+
+namespace kilotwin::recorder {
+
+double mean_nearest_distance_mm(std::span<const double> x_mm, std::span<const double> y_mm) {
+  const std::size_t robots = x_mm.size();
+  if (robots < 2) return std::numeric_limits<double>::quiet_NaN();
+  const auto [low_x, high_x] = std::minmax_element(x_mm.begin(), x_mm.end());
+  const auto [low_y, high_y] = std::minmax_element(y_mm.begin(), y_mm.end());
+  // Columns of robots sorted by y, about as wide as robots are far apart.
+  const double width_mm = *high_x - *low_x, height_mm = *high_y - *low_y;
+  const auto count = static_cast<double>(robots);
+  const double column_mm = std::max({std::sqrt(width_mm * height_mm / count), width_mm / count, 1e-6});
+  const double from_x_mm = *low_x;
+  const auto column_of = [&](double x) { return static_cast<std::size_t>((x - from_x_mm) / column_mm); };
+  const std::size_t columns = column_of(*high_x) + 1;
+  std::vector<std::size_t> first(columns + 1, 0), order(robots);
+  for (const double x : x_mm) ++first[column_of(x) + 1];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    const std::size_t column_a = column_of(x_mm[a]), column_b = column_of(x_mm[b]);
+    return column_a != column_b ? column_a < column_b : y_mm[a] != y_mm[b] ? y_mm[a] < y_mm[b] : a < b;
+  });
+
+  Sample nearest;
+  for (std::size_t robot = 0; robot < robots; ++robot) {
+    double best = std::numeric_limits<double>::infinity();  // squared
+    const double x = x_mm[robot], y = y_mm[robot];
+    const auto look_at = [&](std::size_t other) {
+      const double dx = x_mm[other] - x, dy = y_mm[other] - y;
+      if (other != robot) best = std::min(best, dx * dx + dy * dy);
+      return dy * dy <= best;
+    };
+    const auto search = [&](std::size_t column) {
+      const auto begin = order.begin() + static_cast<std::ptrdiff_t>(first[column]);
+      const auto end = order.begin() + static_cast<std::ptrdiff_t>(first[column + 1]);
+      const auto middle =
+          std::lower_bound(begin, end, y, [&](std::size_t other, double at) { return y_mm[other] < at; });
+      for (auto up = middle; up != end && look_at(*up); ++up) {}
+      for (auto down = middle; down != begin && look_at(*(down - 1)); --down) {}
+    };
+    const std::size_t own = column_of(x);
+    search(own);
+    for (std::size_t away = 1; away < columns; ++away) {
+      const double gap_mm = static_cast<double>(away - 1) * column_mm;
+      if (gap_mm * gap_mm > best) break;
+      if (own >= away) search(own - away);
+      if (own + away < columns) search(own + away);
+    }
+    nearest.add(std::sqrt(best));
+  }
+  return nearest.mean();
+}
+
+void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::span<const double> y_mm,
+                             std::span<const double> heading_rad) {
+  if (curves_.time_s.empty()) {
+    start_x_mm_.assign(x_mm.begin(), x_mm.end());
+    start_y_mm_.assign(y_mm.begin(), y_mm.end());
+  }
+  const std::size_t robots = start_x_mm_.size();
+  KILOTWIN_DEMAND(x_mm.size() == robots && y_mm.size() == robots && heading_rad.size() == robots);
+  Sample square, distance, x, y, cosine, sine;
+  for (std::size_t i = 0; i < robots; ++i) {
+    const double dx = x_mm[i] - start_x_mm_[i], dy = y_mm[i] - start_y_mm_[i];
+    square.add(dx * dx + dy * dy);
+    distance.add(std::sqrt(dx * dx + dy * dy));
+    x.add(x_mm[i]);
+    y.add(y_mm[i]);
+    double c = 0, s = 0;
+    kt_sincos(heading_rad[i], &s, &c);
+    cosine.add(c);
+    sine.add(s);
+  }
+  Sample from_centroid;
+  for (std::size_t i = 0; i < robots; ++i) {
+    const double dx = x_mm[i] - x.mean(), dy = y_mm[i] - y.mean();
+    from_centroid.add(dx * dx + dy * dy);
+  }
+  curves_.time_s.push_back(time_s);
+  const auto put = [this](Observable o, double value) {
+    curves_.value[static_cast<std::size_t>(o)].push_back(value);
+  };
+  put(Observable::kMsd, square.mean());
+  put(Observable::kDisplacement, distance.mean());
+  put(Observable::kSpread, std::sqrt(from_centroid.mean()));
+  put(Observable::kNearest, mean_nearest_distance_mm(x_mm, y_mm));
+  put(Observable::kPolarisation, std::sqrt(cosine.mean() * cosine.mean() + sine.mean() * sine.mean()));
+}
+
+ObservableCurves observe(Reader& recording) {
+  ObservableObserver observer;
+  while (const proto::StateRecord* state = recording.next_state()) {
+    observer.add(recording.tick_length().seconds_at(Tick{state->tick()}), values(state->x_mm()),
+                 values(state->y_mm()), values(state->heading_rad()));
+  }
+  return observer.curves();
+}
+
+}  // namespace kilotwin::recorder

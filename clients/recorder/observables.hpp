@@ -1,0 +1,66 @@
+/// Observables: the few quantities over time that say something of any swarm, from a recording.
+///
+///   msd            mean over robots of the squared distance from where each was in the first state, mm^2
+///   displacement   mean over robots of that distance, mm
+///   spread         root mean square distance of the robots from their centroid, mm
+///   nearest        mean over robots of the distance to the nearest other, centre to centre, mm
+///   polarisation   length of the mean of all heading vectors, 0 (no common direction) .. 1 (all alike)
+///
+/// A quantity that a run does not have, such as the nearest other of a single robot, is NaN.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "clients/recorder/reader.hpp"
+
+namespace kilotwin::recorder {
+
+enum class Observable : std::uint8_t { kMsd, kDisplacement, kSpread, kNearest, kPolarisation };
+
+struct ObservableInfo {
+  std::string_view name;   ///< in tables and on the command line
+  std::string_view title;  ///< in plots
+  std::string_view unit;   ///< in plots; empty where there is none
+  std::string_view column_suffix;
+};
+
+inline constexpr std::array<ObservableInfo, 5> kObservables = {{
+    {"msd", "mean square displacement", "mm\u00b2", "_mm2"},
+    {"displacement", "displacement", "mm", "_mm"},
+    {"spread", "spread about the centroid", "mm", "_mm"},
+    {"nearest", "distance to the nearest robot", "mm", "_mm"},
+    {"polarisation", "polarisation", "", ""},
+}};
+
+/// Of one run, per recorded state.
+struct ObservableCurves {
+  std::vector<double> time_s;
+  std::array<std::vector<double>, kObservables.size()> value;
+
+  [[nodiscard]] const std::vector<double>& of(Observable o) const { return value[static_cast<std::size_t>(o)]; }
+};
+
+/// Collects them state by state; every state has the same robots.
+class ObservableObserver {
+ public:
+  void add(double time_s, std::span<const double> x_mm, std::span<const double> y_mm,
+           std::span<const double> heading_rad);
+  [[nodiscard]] const ObservableCurves& curves() const { return curves_; }
+
+ private:
+  std::vector<double> start_x_mm_, start_y_mm_;
+  ObservableCurves curves_;
+};
+
+/// Of all states that remain in a recording.
+[[nodiscard]] ObservableCurves observe(Reader& recording);
+
+/// Mean over robots of the distance to the nearest other; NaN for fewer than two.
+[[nodiscard]] double mean_nearest_distance_mm(std::span<const double> x_mm, std::span<const double> y_mm);
+
+}  // namespace kilotwin::recorder
