@@ -78,6 +78,8 @@ int sweep_command(const SweepArguments& arguments) {
   const auto directory =
       recorder::RunDirectory::create(arguments.out.empty() ? fs::path("runs") / (name + "-sweep") : arguments.out)
           .path();
+  std::error_code ignored;
+  fs::remove(directory / "programs", ignored);  // each run has its own
   std::vector<SweepRun> runs;
   for (std::size_t point = 0; point < points.size(); ++point) {
     for (const std::uint64_t seed : seeds.empty() ? std::vector{own_seeds[point]} : seeds) {

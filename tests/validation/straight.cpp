@@ -1,0 +1,93 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "clients/recorder/statistics.hpp"
+#include "tests/validation/reference.hpp"
+#include "tests/validation/straight_theory.hpp"
+#include "tests/validation/validations.hpp"
+
+namespace kilotwin::validation {
+namespace {
+
+/// Of the recorded states, at 0, 1, 2... s, the first by which everybody drives: displacements are counted from there, and
+/// nothing depends on how a run starts.
+constexpr std::size_t kFirstState = 1;
+
+std::string seeds(int count) { return fmt::format("1..{}", count); }
+
+}  // namespace
+
+void validate_bias(Runs& runs, Verdicts& verdicts, Effort effort) {
+  const StraightTheory model;
+  verdicts.section("wheel biases of 120 robots by the seed's estimator (6 displacements of 10 s): straight.txtpb");
+  const std::vector<Recorded> swarms =
+      runs.sweep(runs.source("experiments/straight.txtpb"),
+                 {"--robots", "120", "--duration", "62", "--seeds", seeds(effort.quick ? 2 : 20)});
+  recorder::Sample all, deviation, mean;
+  for (const Recorded& run : swarms) {
+    recorder::Sample biases;
+    for (std::size_t i = 0; i < run.robots(); ++i) {
+      const WheelBias bias = estimate_bias(run.track(i, kFirstState), model, 10, 6);
+      biases.add(bias.left_mm_s);
+      biases.add(bias.right_mm_s);
+      all.add(bias.left_mm_s);
+      all.add(bias.right_mm_s);
+    }
+    mean.add(biases.mean());
+    deviation.add(biases.standard_deviation());
+  }
+  // Standard errors of 240 Gaussian draws with the spread that was asked for.
+  const double draws = 240, mean_error = model.bias_sd_mm_s / std::sqrt(draws),
+               deviation_error = model.bias_sd_mm_s / std::sqrt(2 * (draws - 1));
+  const auto count = static_cast<double>(swarms.size());
+  verdicts.near_in_errors("mean of b, 120 robots", "mm/s",
+                          {mean.mean() /* of seeds */, mean_error / std::sqrt(count)}, {model.bias_mean_mm_s}, 3);
+  verdicts.near_in_errors("sd of b, 120 robots", "mm/s", {deviation.mean(), deviation_error / std::sqrt(count)},
+                          {model.bias_sd_mm_s}, 3);
+}
+
+void validate_straight(Runs& runs, Verdicts& verdicts, Effort effort) {
+  const StraightTheory model;
+  verdicts.section("mean square displacement of 600 robots driving straight on: straight.txtpb");
+  const std::vector<Recorded> swarms = runs.sweep(runs.source("experiments/straight.txtpb"),
+                                                  {"--duration", "62", "--seeds", seeds(effort.quick ? 1 : 10)});
+  const auto measured_at = [&](double time_s, double& exact_s) {
+    recorder::Sample robots;  // they are independent, whichever run they are of
+    for (const Recorded& run : swarms) {
+      const std::size_t at = run.state_at(run.time_s[kFirstState] + time_s);
+      exact_s = run.time_s[at] - run.time_s[kFirstState];
+      for (std::size_t i = 0; i < run.robots(); ++i) {
+        const double dx = run.x_mm[at][i] - run.x_mm[kFirstState][i],
+                     dy = run.y_mm[at][i] - run.y_mm[kFirstState][i];
+        robots.add(dx * dx + dy * dy);
+      }
+    }
+    return Figure{robots.mean(), robots.standard_error()};
+  };
+  for (const double time_s : {10.0, 20.0, 30.0, 40.0, 50.0, 60.0}) {
+    double exact_s = 0;
+    const Figure measured = measured_at(time_s, exact_s);
+    verdicts.near_in_errors(fmt::format("closed form, {:.0f} s", time_s), "mm^2", measured,
+                            {model.msd_mm2(exact_s)}, 3);
+  }
+  for (const ReferencePoint& point : kStraightNoise) {
+    double exact_s = 0;
+    const Figure measured = measured_at(point.time_s, exact_s);
+    // The peer's robots set out late; the closed form takes our figure to the same time.
+    const double scale = model.msd_mm2(point.time_s - kStraightLag_s) / model.msd_mm2(exact_s);
+    verdicts.near_in_errors(fmt::format("peer (1000 robots), {:.0f} s", point.time_s), "mm^2",
+                            {measured.value * scale, measured.error * scale}, {point.value, point.error}, 3);
+  }
+  const std::vector<Recorded> clean =
+      runs.sweep(runs.source("experiments/straight.txtpb"),
+                 {"--duration", "62", "--robots", "4", "--set", "motion.noise=false"});
+  const Recorded& run = clean[0];
+  const std::size_t end = run.time_s.size() - 1;
+  verdicts.near_in_parts("noise free: speed", "mm/s",
+                         {std::sqrt(run.msd_mm2(kFirstState, end)) / (run.time_s[end] - run.time_s[kFirstState])},
+                         {10}, 1e-9, 0);
+}
+
+}  // namespace kilotwin::validation

@@ -1,0 +1,21 @@
+/// What is validated, one function each: it runs what it needs and adds its rows.
+#pragma once
+
+#include "tests/validation/runs.hpp"
+#include "tests/validation/verdicts.hpp"
+
+namespace kilotwin::validation {
+
+/// How much is run: `quick` in seconds, for every change; else in a minute or two, with small standard errors.
+struct Effort {
+  bool quick = false;
+};
+
+/// The seed's estimator gives back the wheel biases that robots were given.
+void validate_bias(Runs&, Verdicts&, Effort);
+/// The mean square displacement of robots that drive straight on: closed form and peer.
+void validate_straight(Runs&, Verdicts&, Effort);
+/// The mean square displacement of a dense crowd that walks at random: peer, with and without contact.
+void validate_diffusion(Runs&, Verdicts&, Effort);
+
+}  // namespace kilotwin::validation
