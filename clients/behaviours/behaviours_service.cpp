@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "clients/behaviours/engine.hpp"
+#include "clients/behaviours/robot_logs.hpp"
 #include "clients/behaviours/watchdog.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_io.hpp"
@@ -18,7 +19,8 @@ class BehavioursFederate : public Federate {
         host_(host),
         engine_(engine),
         radio_(session, topics::radio(host.value()), {session.plan().comm()}),
-        actuation_(session, topics::actuation()) {}
+        actuation_(session, topics::actuation()),
+        logs_(context.run_directory, session.plan().tick_length, context.first(), session.plan().share(host)) {}
 
   void publish(Tick) override {
     engine_.emit(actuation_.frame);
@@ -27,6 +29,7 @@ class BehavioursFederate : public Federate {
 
   void step(Tick from) override {
     engine_.step(from, *radio_.at(from)[0]);
+    logs_.write(from, engine_.printed());
     for (; told_ < engine_.failures().size(); ++told_) {
       const auto& failure = engine_.failures()[told_];
       say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot,
@@ -51,6 +54,7 @@ class BehavioursFederate : public Federate {
   BehavioursEngine& engine_;
   Input<RadioFrame> radio_;
   Output<ActuationFrame> actuation_;
+  RobotLogs logs_;
   std::size_t told_ = 0;  // of the engine's failures
 };
 

@@ -2,13 +2,17 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <memory>
+#include <set>
 #include <system_error>
 
 #include "clients/behaviours/compiler_common.hpp"
 #include "clients/behaviours/elf_file.hpp"
 #include "clients/behaviours/files.hpp"
 #include "clients/behaviours/process.hpp"
+#include "clients/behaviours/program_text.hpp"
 #include "clients/behaviours/sha256.hpp"
 #include "core/base/error.hpp"
 
@@ -47,14 +51,11 @@ Compiler find_compiler(const fs::path& wanted) {
 /// As kilolib is built for the robot (unsigned char, packed structs, short enums, common globals of avr-gcc's age), with
 /// what makes results equal everywhere: no contraction, no libm, wrapping integers, locals that start as zero, one CPU.
 Arguments code_flags(const Compiler& compiler) {
-  Arguments flags{"-std=gnu11",
-                  "-O2",
+  Arguments flags{"-O2",
                   "-g",
                   "-w",
                   "-fdiagnostics-color=never",
                   "-nostdinc",
-                  "-ffreestanding",
-                  "-fno-builtin",
                   "-DF_CPU=8000000",
                   "-funsigned-char",
                   "-fpack-struct",
@@ -86,6 +87,16 @@ Arguments code_flags(const Compiler& compiler) {
   return flags;
 }
 
+/// The runtime is the C library: no function of it may be made a call of another.
+const Arguments kRuntimeFlags{"-std=gnu11", "-ffreestanding", "-fno-builtin", "-fno-common"};
+
+/// Robots have neither exceptions nor threads, and avr-gcc no C++ library.
+Arguments language_flags(bool cpp) {
+  if (!cpp) return {"-std=gnu11"};
+  return {"-std=gnu++17", "-fno-exceptions",     "-fno-rtti",  "-fno-threadsafe-statics",
+          "-fpermissive", "-fno-use-cxa-atexit", "-nostdinc++"};
+}
+
 const Arguments kLinkFlags{"-shared",           "-nostdlib",           "-Wl,-Bsymbolic",       "-Wl,-z,relro",
                            "-Wl,-z,now",        "-Wl,-z,noexecstack",  "-Wl,-z,separate-code", "-Wl,--no-undefined",
                            "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,kilotwin_image"};
@@ -100,6 +111,8 @@ Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
           (runtime / "libc").string(),
           "-isystem",
           own,
+          "-include",
+          (runtime / "machine.h").string(),
           "-ffile-prefix-map=" + runtime.string() + "=/kilotwin"};
 }
 
@@ -117,7 +130,7 @@ Arguments place_flags(const std::vector<fs::path>& sources) {
 
 CompiledProgram checked(const fs::path& file, const std::string& octets) {
   (void)ElfFile::parse(octets, file.string());
-  return {file, sha256_hex(octets)};
+  return {file, sha256_hex(octets), {}};
 }
 
 CompiledProgram given(const fs::path& file) {
@@ -158,49 +171,76 @@ std::string build(Arguments arguments, const fs::path& kept, const std::vector<f
 }
 
 /// The runtime as one object, made once per compiler.
-fs::path runtime_object(const Compiler& compiler, const Arguments& flags, const Arguments& includes,
-                        const fs::path& runtime, const std::string& content) {
+fs::path runtime_object(const Compiler& compiler, const Arguments& includes, const fs::path& runtime,
+                        const std::string& content) {
   const fs::path kept = runtime / (sha256_hex(content) + ".o");
   std::error_code error;
   if (fs::is_regular_file(kept, error)) return kept;
   Arguments arguments{compiler.path, "-r", "-nostdlib"};
-  append(arguments, flags);
+  append(arguments, code_flags(compiler));
+  append(arguments, kRuntimeFlags);
   append(arguments, includes);
   append(arguments, {"-I", runtime.string()});
-  for (const char* name :
-       {"kilolib.c", "switch.c", "libavr.c", "libc.c", "libm.c", "libprintf.c", "core/math/elementary.c"}) {
+  for (const char* name : {"kilolib.c", "machine.c", "switch.c", "libavr.c", "libc.c", "libcomplex.c", "libm.c",
+                           "libnumbers.c", "libstdio.c", "core/math/elementary.c"}) {
     arguments.push_back((runtime / name).string());
   }
   (void)build(arguments, kept, {runtime / "kilolib.c"});
   return kept;
 }
 
-}  // namespace
+/// Functions and variables that a linker did not find.
+std::set<std::string> undefined_names(const std::string& errors) {
+  constexpr std::string_view kMark = "undefined reference to `";
+  std::set<std::string> names;
+  for (std::size_t at = errors.find(kMark); at != std::string::npos; at = errors.find(kMark, at + 1)) {
+    const std::size_t first = at + kMark.size();
+    names.insert(errors.substr(first, errors.find_first_of("'(", first) - first));
+  }
+  names.erase("main");
+  return names;
+}
 
-CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptions& options) {
-  if (sources.size() == 1 && sources[0].extension() == ".so") return given(sources[0]);
-  check_sources(sources);
-  const Arguments defines = define_flags(options.defines);
-  const Compiler compiler = find_compiler(options.compiler);
-  const fs::path cache = cache_directory(options.cache_directory);
-  const fs::path runtime = unpacked_runtime(cache);
-  const Arguments includes = include_flags(compiler, runtime);
+/// What the linker said of a program whose sources are not all there.
+struct Incomplete {
+  std::string errors;
+};
 
-  const Arguments code = code_flags(compiler);
-  Arguments files;
-  for (const fs::path& source : sources) files.push_back(source.string());
+/// One compiler with everything that does not depend on the program.
+struct Toolchain {
+  Compiler compiler;
+  fs::path cache, runtime;
+  Arguments code, includes, defines;
 
-  Arguments preprocess{compiler.path, "-E"};
-  for (const Arguments& part : {code, defines, place_flags(sources), includes, files}) append(preprocess, part);
-  const ProcessResult text = run_process(preprocess);
-  if (text.status != 0) throw UserError(first_error(text.errors, sources));
+  /// Compiles and links, or takes the result of an earlier time. Throws Incomplete where functions are missing, UserError for
+  /// all other errors.
+  [[nodiscard]] CompiledProgram make(const ProgramText& text, const Arguments& dialect) const;
 
+ private:
+  [[nodiscard]] Arguments flags_for(const ProgramText& text, const fs::path& file, const Arguments& dialect) const {
+    Arguments result = language_flags(is_cpp(file));
+    for (const Arguments& part : {code, dialect, defines, place_flags(text.sources), includes})
+      append(result, part);
+    return result;
+  }
+};
+
+CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialect) const {
   std::string content = runtime.filename().string() + '\n' + compiler.path + '\n' + compiler.version;
   for (const std::string& flag : code) content += flag + '\n';
   for (const std::string& flag : kLinkFlags) content += flag + '\n';
   const std::string runtime_content = content;
   for (const std::string& flag : defines) content += flag + '\n';
-  const fs::path kept = cache / "programs" / (sha256_hex(content + text.output) + ".so");
+  for (const std::string& flag : dialect) content += flag + '\n';
+  for (const fs::path& file : text.files) {
+    Arguments preprocess{compiler.path, "-E"};
+    append(preprocess, flags_for(text, file, dialect));
+    preprocess.push_back(file.string());
+    const ProcessResult preprocessed = run_process(preprocess);
+    if (preprocessed.status != 0) throw UserError(first_error(preprocessed.errors, text.sources));
+    content += sha256_hex(preprocessed.output);
+  }
+  const fs::path kept = cache / "programs" / (sha256_hex(content) + ".so");
   if (const auto octets = read_file(kept)) {
     try {
       return checked(kept, *octets);
@@ -208,11 +248,118 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
       // Damaged on disk: made again below.
     }
   }
-  Arguments arguments{compiler.path};
-  for (const Arguments& part : {code, defines, kLinkFlags, place_flags(sources), includes, files})
-    append(arguments, part);
-  arguments.push_back(runtime_object(compiler, code, includes, runtime, runtime_content).string());
-  return checked(kept, build(arguments, kept, sources));
+  Arguments link{compiler.path};
+  append(link, kLinkFlags);
+  std::vector<std::unique_ptr<Temporary>> objects;
+  for (const fs::path& file : text.files) {
+    objects.push_back(std::make_unique<Temporary>(kept));
+    Arguments arguments{compiler.path, "-c"};
+    append(arguments, flags_for(text, file, dialect));
+    append(arguments, {file.string(), "-o", objects.back()->path()});
+    const ProcessResult process = run_process(arguments);
+    if (process.status != 0) throw UserError(first_error(process.errors, text.sources));
+    link.push_back(objects.back()->path());
+  }
+  link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
+  append(link, {"-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
+  const Temporary result(kept);
+  append(link, {"-o", result.path()});
+  const ProcessResult linked = run_process(link);
+  if (linked.status != 0) {
+    if (!undefined_names(linked.errors).empty()) throw Incomplete{linked.errors};
+    throw UserError(first_error(linked.errors, text.sources));
+  }
+  const auto octets = read_file(result.path());
+  if (!octets || !write_file(kept, *octets))
+    throw RunError(kept.string() + ": cannot be written; is the disk full?");
+  return checked(kept, *octets);
+}
+
+bool mentions(const std::vector<fs::path>& sources, std::string_view word) {
+  for (const fs::path& source : sources) {
+    if (read_file(source).value_or("").find(word) != std::string::npos) return true;
+  }
+  return false;
+}
+
+/// Makes the program; adds sources that are missing as long as some are found.
+CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sources, const Arguments& dialect) {
+  std::vector<std::string> notes;
+  for (;;) {
+    ProgramText text = program_text(sources, toolchain.cache);
+    const bool simulator = std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end();
+    if (simulator && mentions(text.sources, "UserdataSize")) text.files.push_back(toolchain.runtime / "userdata.c");
+    try {
+      CompiledProgram program = toolchain.make(text, dialect);
+      notes.insert(notes.begin(), text.notes.begin(), text.notes.end());
+      program.notes = std::move(notes);
+      return program;
+    } catch (const Incomplete& incomplete) {
+      const std::vector<fs::path> more = sources_with(undefined_names(incomplete.errors), text);
+      if (more.empty()) throw UserError(first_error(incomplete.errors, text.sources));
+      for (const fs::path& source : more) {
+        notes.push_back(source.string() + ": compiled too; it has what the program lacks");
+        sources.push_back(source);
+      }
+    }
+  }
+}
+
+/// A way to understand a program that is none in the robot's own compiler's eyes.
+struct Dialect {
+  Arguments flags;
+  std::string note;
+};
+
+/// What could help after this error, likeliest first.
+std::vector<Dialect> dialects_for(const std::string& error, const std::vector<fs::path>& sources,
+                                  const fs::path& runtime) {
+  auto says = [&](std::string_view word) { return error.find(word) != std::string::npos; };
+  std::vector<Dialect> result;
+  if (says("undefined reference"))
+    result.push_back({{"-fgnu89-inline"}, "compiled with inline functions as before C99"});
+  if (says("'debug_info_t' undeclared"))
+    result.push_back({{"-DKILOTWIN_NO_DEBUG_INFO"}, "compiled without debug_info_t"});
+  if (says("undeclared") || says("unknown type name") || says("was not declared")) {
+    result.push_back(
+        {{"-include", (runtime / "headers.h").string()}, "compiled with headers that it does not include"});
+    result.push_back({{"-include", (runtime / "headers.h").string(), "-DKILOTWIN_NO_DEBUG_INFO"},
+                      "compiled with headers that it does not include, without debug_info_t"});
+  }
+  if (mentions(sources, "SIMULATOR")) {
+    result.push_back({{"-DSIMULATOR"}, "compiled with SIMULATOR, as for Kilombo"});
+    result.push_back({{"-DSIMULATOR", "-include", (runtime / "headers.h").string()},
+                      "compiled with SIMULATOR, as for Kilombo, with headers that it does not include"});
+  }
+  return result;
+}
+
+}  // namespace
+
+CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptions& options) {
+  if (sources.size() == 1 && sources[0].extension() == ".so") return given(sources[0]);
+  check_sources(sources);
+  Toolchain toolchain;
+  toolchain.defines = define_flags(options.defines);
+  toolchain.compiler = find_compiler(options.compiler);
+  toolchain.cache = cache_directory(options.cache_directory);
+  toolchain.runtime = unpacked_runtime(toolchain.cache);
+  toolchain.includes = include_flags(toolchain.compiler, toolchain.runtime);
+  toolchain.code = code_flags(toolchain.compiler);
+  try {
+    return complete(toolchain, sources, {});
+  } catch (const UserError& error) {
+    for (const Dialect& dialect : dialects_for(error.what(), sources, toolchain.runtime)) {
+      try {
+        CompiledProgram program = complete(toolchain, sources, dialect.flags);
+        program.notes.push_back(sources.front().string() + ": " + dialect.note);
+        return program;
+      } catch (const UserError&) {
+        // The first error is the one that tells.
+      }
+    }
+    throw;
+  }
 }
 
 }  // namespace kilotwin::behaviours

@@ -1,4 +1,4 @@
-/// Turns robots' programs, plain C written for kilolib, into what this simulation runs, and checks them for the real robot.
+/// Turns robots' programs, C or C++ written for kilolib, into what this simulation runs, and checks them for the real robot.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,13 @@ struct CompileOptions {
 };
 
 struct CompiledProgram {
-  std::filesystem::path file;  ///< a self-contained shared object
-  std::string sha256;          ///< of its octets
+  std::filesystem::path file;      ///< a self-contained shared object
+  std::string sha256;              ///< of its octets
+  std::vector<std::string> notes;  ///< what a user should know of how it was compiled, one line each
 };
 
-/// Compiles C sources, together with the embedded runtime, into one shared object with pinned flags. The result is kept in
+/// Compiles C and C++ sources, together with the embedded runtime, into one shared object with pinned flags. Copies of
+/// kilolib next to them are left aside, and sources that they lack are looked for around them (program_text.hpp). The result is kept in
 /// the cache by the content of everything that goes into it; the same content gives the same octets. A single .so is
 /// checked and returned as it is.
 /// Throws UserError: "FILE:LINE:COLUMN: error: ..." of the first error, and how many more there are; or, where the machine

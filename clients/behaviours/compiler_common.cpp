@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "clients/behaviours/files.hpp"
+#include "clients/behaviours/program_text.hpp"
 #include "clients/behaviours/runtime_files.hpp"
 #include "clients/behaviours/sha256.hpp"
 #include "core/base/error.hpp"
@@ -61,11 +62,12 @@ void check_sources(const std::vector<fs::path>& sources) {
     std::error_code error;
     if (!fs::is_regular_file(source, error)) {
       throw UserError(source.string() +
-                      ": no such file; a program is one or more C files, or a .so of `kilotwin build`");
+                      ": no such file; a program is one or more C or C++ files, or a .so of `kilotwin build`");
     }
-    if (source.extension() != ".c") {
-      throw UserError(source.string() +
-                      ": not a C source; a program is one or more .c files, or a .so of `kilotwin build`");
+    if (source.extension() != ".c" && !is_cpp(source)) {
+      throw UserError(
+          source.string() +
+          ": not a C or C++ source; a program is one or more .c or .cpp files, or a .so of `kilotwin build`");
     }
   }
 }
@@ -93,6 +95,17 @@ std::optional<std::string> compiler_error(std::string_view line) {
     }
   }
   return std::nullopt;
+}
+
+/// "FILE:LINE: Error: WHAT" of an assembler, at an asm statement.
+std::optional<std::string> assembler_error(std::string_view line) {
+  constexpr std::string_view kMark = ": Error: ";
+  const std::size_t at = line.find(kMark);
+  if (at == std::string_view::npos) return std::nullopt;
+  const std::string_view place = line.substr(0, at);
+  std::string_view file = place;
+  if (!drop_number(file)) return std::nullopt;
+  return std::string(place) + ":1: error: " + std::string(line.substr(at + kMark.size()));
 }
 
 std::size_t linker_complaint(std::string_view line) {
@@ -147,6 +160,7 @@ std::string first_error(const std::string& output, const std::vector<fs::path>& 
     }
   };
   look_for(compiler_error);
+  look_for(assembler_error);
   look_for([&](const std::string& line) { return missing_main(line, sources.front()); });
   look_for([&](const std::string& line) { return linker_error(line, sources); });
   look_for([&](const std::string& line) { return placeless_error(line, sources.front()); });

@@ -95,6 +95,7 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
                   radio.kilo_ticks.size() == share_.size());
   ++now_;
   gather(radio);
+  printed_.clear();
   std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
   const FaultGuard guard;
   for (const Group& group : groups_) {
@@ -102,7 +103,11 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
     Slot& slot = program.slot(group.slot);
     const std::lock_guard lock(slot.mutex);
     const Executor executor(program, slot);
-    for (const std::uint32_t i : group.robots) run_robot(from, i, radio.kilo_ticks[i], program, slot, executor);
+    slot.control()->log_length = slot.control()->log_lost = 0;
+    for (const std::uint32_t i : group.robots) {
+      run_robot(from, i, radio.kilo_ticks[i], program, slot, executor);
+      if (slot.control()->log_length != 0) take_log(i, slot);
+    }
     running_robot_.store(kNobody, std::memory_order_relaxed);
   }
 }
@@ -184,6 +189,15 @@ void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Pro
   motor_left_[i] = motor_right_[i] = spin_up_[i] = 0;
   holds_[i] = offers_[i] = 0;
   memory_[i].release();
+}
+
+void BehavioursEngine::take_log(std::uint32_t i, const Slot& slot) {
+  KtControl& control = *slot.control();
+  // The robot may have written anything here.
+  const std::uint32_t length = std::min<std::uint32_t>(control.log_length, KT_LOG_OCTETS);
+  printed_.push_back({share_.first + i, std::string(control.log, length)});
+  if (control.log_lost != 0) printed_.back().text += "... (" + std::to_string(control.log_lost) + " more octets)\n";
+  control.log_length = control.log_lost = 0;
 }
 
 void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period) {

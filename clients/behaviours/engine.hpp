@@ -48,6 +48,13 @@ class BehavioursEngine {
   [[nodiscard]] const std::vector<Failure>& failures() const { return failures_; }
   [[nodiscard]] std::uint32_t robots_failed() const { return static_cast<std::uint32_t>(failures_.size()); }
 
+  struct Printed {
+    std::uint32_t robot = 0;
+    std::string text;
+  };
+  /// What robots printed in the last step, in the order in which they ran. Not part of their state.
+  [[nodiscard]] const std::vector<Printed>& printed() const { return printed_; }
+
   struct Running {
     std::uint32_t robot = 0;
     std::uint64_t entry = 0;  ///< how many robots have been entered since the start: the same number, the same call
@@ -66,6 +73,7 @@ class BehavioursEngine {
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
   void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);
   void fail_robot(std::uint32_t i, const Fault&, const Program&, const Slot&);
+  void take_log(std::uint32_t i, const Slot&);
   void note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period);
 
   const RunPlan& plan_;
@@ -93,6 +101,7 @@ class BehavioursEngine {
   std::vector<IrMessage> message_;    ///< where it offers one
 
   std::vector<Failure> failures_;
+  std::vector<Printed> printed_;
 
   // Of the step at hand; per own robot where not said otherwise.
   std::vector<std::uint8_t> asked_, sent_;

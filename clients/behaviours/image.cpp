@@ -68,7 +68,7 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
     protect(interrupt_top - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
     protect(control_, kPage, PROT_READ | PROT_WRITE);
     protect(image_, file.memory.size(), PROT_READ | PROT_WRITE);
-    *control() = {0, 0, interrupt_top};
+    control()->interrupt_stack = interrupt_top;
     auto* const image = at<std::uint8_t*>(0);
     std::memcpy(image, file.memory.data(), file.memory.size());
     for (const std::uint32_t offset : file.relocations) {

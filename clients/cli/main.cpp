@@ -94,6 +94,7 @@ int build_command(const BuildArguments& arguments) {
     return 0;
   }
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
+  for (const std::string& note : compiled.notes) say("note: " + note);
   const std::filesystem::path out =
       arguments.out.empty() ? arguments.sources.front().stem().string() + ".so" : arguments.out.string();
   std::error_code error;

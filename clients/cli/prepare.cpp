@@ -10,6 +10,7 @@
 #include "clients/behaviours/compiler.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
 #include "core/experiment/layout.hpp"
 #include "core/experiment/plan.hpp"
 #include "core/federation/checkpoint.hpp"
@@ -50,6 +51,7 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
     behaviours::CompileOptions options;
     options.defines = arguments.define;
     const behaviours::CompiledProgram compiled = behaviours::compile(sources, options);
+    for (const std::string& note : compiled.notes) say("note: " + note);
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;
     if (index == manifest.program_size()) {

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "clients/behaviours/engine.hpp"
+#include "clients/behaviours/robot_logs.hpp"
 #include "clients/behaviours/watchdog.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_book.hpp"
@@ -55,6 +56,9 @@ class LocalRun {
       physics_.push_back(physics::make_engine(plan, PartitionId{p}));
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
+      if (!options.run_directory.empty())
+        logs_.push_back(std::make_unique<behaviours::RobotLogs>(options.run_directory, plan.tick_length, first_,
+                                                                plan.share(HostId{h})));
     }
     if (options.resumed) load(*options.resumed);
     for (const Directive& directive : options.inputs) schedule_.add(directive);
@@ -206,7 +210,9 @@ class LocalRun {
     } else if (task == partitions + 1) {
       station_.step(from, {in.all_bodies, in.all_actuation, schedule_.overhead_inputs()});
     } else {
-      hosts_[task - partitions - 2]->step(from, in.radio[task - partitions - 2]);
+      const std::size_t host = task - partitions - 2;
+      hosts_[host]->step(from, in.radio[host]);
+      if (!logs_.empty()) logs_[host]->write(from, hosts_[host]->printed());
     }
   }
 
@@ -306,6 +312,7 @@ class LocalRun {
   comm::RadioEngine radio_;
   ark::StationEngine station_;
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
+  std::vector<std::unique_ptr<behaviours::RobotLogs>> logs_;  // per host, where there is a run directory
   const Tick first_;
   RunSchedule schedule_;
   Frames frames_[2];  // of even and of odd ticks: while one is read the other is written

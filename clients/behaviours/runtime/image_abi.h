@@ -5,13 +5,18 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 1u
+#define KT_IMAGE_VERSION 2u
+/* Room for what a robot prints in one tick; a serial line of 38400 baud takes 126 octets in a tick. */
+#define KT_LOG_OCTETS 3584
 
 /* The host's page in a slot: not part of any robot's memory. */
 struct KtControl {
   uint64_t host_stack;      /* the host's stack pointer while robot code runs */
   uint64_t robot_stack;     /* the main program's stack pointer while it waits */
   uint64_t interrupt_stack; /* where callbacks start */
+  uint32_t log_length;      /* of the text that the robot has printed since the host last emptied the log */
+  uint32_t log_lost;        /* octets that found no room */
+  char log[KT_LOG_OCTETS];
 };
 
 /* Simulated hardware of one robot and the state of its firmware; part of the robot's memory. */

@@ -55,9 +55,6 @@ volatile uint8_t rx_busy;
 volatile uint8_t tx_mask = 1;
 uint16_t tx_clock, tx_increment = 255;
 
-volatile uint8_t PORTB, PORTC, PORTD, DDRB, DDRC, DDRD, PINB, PINC, PIND;
-volatile uint8_t UCSR0A = 1 << UDRE0, UCSR0B, UCSR0C, UBRR0H, UBRR0L, UDR0;
-
 /* Time. */
 
 static void wait_for_tick(void) {
@@ -75,6 +72,13 @@ static void spend(uint64_t cycles) {
     robot.debt_cycles -= robot.tick_cycles;
     wait_for_tick();
   }
+}
+
+/* For what the rest of the runtime lets a program wait for. */
+void kilotwin_spend(unsigned long long cycles) { spend(cycles); }
+
+void kilotwin_sleep(void) {
+  if (!robot.in_interrupt) wait_for_tick();
 }
 
 volatile uint32_t* kilotwin_clock(void) {
@@ -96,6 +100,8 @@ void set_motors(uint8_t left, uint8_t right) {
   robot.duty_left = left;
   robot.duty_right = right;
 }
+
+volatile uint8_t* kilotwin_motor_duty(uint8_t right) { return right ? &robot.duty_right : &robot.duty_left; }
 
 /* The kick itself is the physics engine's: 15 ms at full duty within the tick for which the next duties hold. */
 void spinup_motors(void) {
@@ -267,7 +273,12 @@ _Noreturn void kilotwin_end(void) {
   for (;;) park();
 }
 
+/* Constructors of a C++ program's globals; the linker makes the ends. */
+extern void (*__init_array_start[])(void) __attribute__((weak, visibility("hidden")));
+extern void (*__init_array_end[])(void) __attribute__((weak, visibility("hidden")));
+
 static void boot(void) {
+  for (void (**construct)(void) = __init_array_start; construct < __init_array_end; ++construct) (*construct)();
   main();
   kilotwin_end();
 }

@@ -1,9 +1,20 @@
-/* EEPROM and heap of an ATmega328P. */
+/* Registers, EEPROM and heap of an ATmega328P. */
 #include <avr/eeprom.h>
+#include <avr/io.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "weak.h"
+
+/* clang-format off */
+volatile uint8_t PINB, DDRB, PORTB, PINC, DDRC, PORTC, PIND, DDRD, PORTD, TIFR0, TIFR1, TIFR2, PCIFR, EIFR,
+    EIMSK, GPIOR0, EECR, EEDR, EEARL, EEARH, GTCCR, TCCR0A, TCCR0B, TCNT0, OCR0A, OCR0B, GPIOR1, GPIOR2,
+    SPCR, SPSR, SPDR, ACSR, SMCR, MCUSR, MCUCR, SPMCSR, SPL, SPH, SREG, WDTCSR, CLKPR, PRR, OSCCAL, PCICR,
+    EICRA, PCMSK0, PCMSK1, PCMSK2, TIMSK0, TIMSK1, TIMSK2, ADCSRB, ADMUX, DIDR0, DIDR1, TCCR1A, TCCR1B,
+    TCCR1C, TCCR2A, TCCR2B, TCNT2, ASSR, TWBR, TWSR, TWAR, TWDR, TWCR, TWAMR, UCSR0A = 1 << UDRE0, UCSR0B,
+    UCSR0C, UBRR0L, UBRR0H, UDR0;
+volatile uint16_t EEAR, SP, TCNT1, ICR1, OCR1A, OCR1B, UBRR0;
+/* clang-format on */
 
 enum { EEPROM_OCTETS = E2END + 1 };
 

@@ -1,12 +1,11 @@
-/* Strings, numbers, sorting, random numbers: what robots' programs use of the C library. */
+/* Strings, characters, sorting, random numbers: what robots' programs use of the C library. */
 #include <ctype.h>
+#include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "weak.h"
-#undef memcpy
-#undef memset
 
 _Noreturn void kilotwin_end(void);
 
@@ -84,6 +83,44 @@ char* strcat(char* to, const char* from) {
   return to;
 }
 
+char* stpcpy(char* to, const char* from) {
+  const size_t length = strlen(from);
+  memcpy(to, from, length + 1);
+  return to + length;
+}
+
+char* strncat(char* to, const char* from, size_t most) {
+  const size_t length = strnlen(from, most);
+  char* end = to + strlen(to);
+  memcpy(end, from, length);
+  end[length] = 0;
+  return to;
+}
+
+size_t strlcpy(char* to, const char* from, size_t size) {
+  const size_t length = strlen(from);
+  if (size > 0) {
+    const size_t copied = length < size ? length : size - 1;
+    memcpy(to, from, copied);
+    to[copied] = 0;
+  }
+  return length;
+}
+
+size_t strlcat(char* to, const char* from, size_t size) {
+  const size_t length = strnlen(to, size);
+  return length + strlcpy(to + length, from, size - length);
+}
+
+void* memccpy(void* to, const void* from, int last, size_t size) {
+  unsigned char* t = to;
+  const unsigned char* f = from;
+  while (size-- > 0) {
+    if ((*t++ = *f++) == (unsigned char)last) return t;
+  }
+  return NULL;
+}
+
 char* strchr(const char* text, int c) { return memchr(text, c, strlen(text) + 1); }
 
 char* strrchr(const char* text, int c) {
@@ -101,20 +138,109 @@ char* strstr(const char* text, const char* part) {
   }
 }
 
+size_t strspn(const char* text, const char* of) {
+  size_t length = 0;
+  while (text[length] != 0 && strchr(of, text[length]) != NULL) ++length;
+  return length;
+}
+
+size_t strcspn(const char* text, const char* not_of) {
+  size_t length = 0;
+  while (text[length] != 0 && strchr(not_of, text[length]) == NULL) ++length;
+  return length;
+}
+
+char* strpbrk(const char* text, const char* any_of) {
+  text += strcspn(text, any_of);
+  return *text == 0 ? NULL : (char*)text;
+}
+
+char* strtok_r(char* text, const char* between, char** place) {
+  if (text == NULL) text = *place;
+  if (text == NULL) return NULL;
+  text += strspn(text, between);
+  if (*text == 0) {
+    *place = NULL;
+    return NULL;
+  }
+  char* end = text + strcspn(text, between);
+  *place = *end == 0 ? NULL : end + 1;
+  *end = 0;
+  return text;
+}
+
+static char* token_place;
+
+char* strtok(char* text, const char* between) { return strtok_r(text, between, &token_place); }
+
+char* strsep(char** text, const char* between) {
+  char* first = *text;
+  if (first == NULL) return NULL;
+  char* end = first + strcspn(first, between);
+  *text = *end == 0 ? NULL : end + 1;
+  *end = 0;
+  return first;
+}
+
+char* strdup(const char* text) {
+  char* copy = malloc(strlen(text) + 1);
+  return copy == NULL ? NULL : strcpy(copy, text);
+}
+
+char* strlwr(char* text) {
+  for (char* at = text; *at; ++at) *at = (char)tolower(*at);
+  return text;
+}
+
+char* strupr(char* text) {
+  for (char* at = text; *at; ++at) *at = (char)toupper(*at);
+  return text;
+}
+
+char* strrev(char* text) {
+  for (size_t i = 0, k = strlen(text); i + 1 < k; ++i) {
+    const char swapped = text[i];
+    text[i] = text[--k];
+    text[k] = swapped;
+  }
+  return text;
+}
+
+char* strerror(int number) {
+  (void)number;
+  return (char*)"error";
+}
+
+int strncasecmp(const char* a, const char* b, size_t most) {
+  for (; most > 0; --most, ++a, ++b) {
+    const int difference = tolower((unsigned char)*a) - tolower((unsigned char)*b);
+    if (difference != 0 || *a == 0) return difference;
+  }
+  return 0;
+}
+
+int strcasecmp(const char* a, const char* b) { return strncasecmp(a, b, SIZE_MAX); }
+
+int isdigit(int c) { return c >= '0' && c <= '9'; }
+int isupper(int c) { return c >= 'A' && c <= 'Z'; }
+int islower(int c) { return c >= 'a' && c <= 'z'; }
+int isxdigit(int c) { return isdigit(c) || (c >= 'A' && c <= 'F') || (c >= 'a' && c <= 'f'); }
+int isalpha(int c) { return isupper(c) || islower(c); }
+int isalnum(int c) { return isalpha(c) || isdigit(c); }
+int isspace(int c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+int isblank(int c) { return c == ' ' || c == '\t'; }
+int iscntrl(int c) { return (c >= 0 && c < ' ') || c == 127; }
+int isprint(int c) { return c >= ' ' && c < 127; }
+int isgraph(int c) { return c > ' ' && c < 127; }
+int ispunct(int c) { return isgraph(c) && !isalnum(c); }
+int isascii(int c) { return c >= 0 && c < 128; }
+int toascii(int c) { return c & 127; }
+int toupper(int c) { return islower(c) ? c - 'a' + 'A' : c; }
+int tolower(int c) { return isupper(c) ? c - 'A' + 'a' : c; }
+
 int abs(int value) { return value < 0 ? -value : value; }
 long labs(long value) { return value < 0 ? -value : value; }
 long long llabs(long long value) { return value < 0 ? -value : value; }
-
-long atol(const char* text) {
-  while (isspace(*text)) ++text;
-  const int negative = *text == '-';
-  if (*text == '-' || *text == '+') ++text;
-  unsigned long value = 0;
-  for (; isdigit(*text); ++text) value = value * 10 + (unsigned long)(*text - '0');
-  return (long)(negative ? 0 - value : value);
-}
-
-int atoi(const char* text) { return (int)atol(text); }
 
 /* Park and Miller's generator in Schrage's form, as avr-libc has it: state 0 stands for 123459876. */
 static int32_t next_random(int32_t* state) {
@@ -138,6 +264,12 @@ int rand_r(unsigned long* state) {
 
 long random(void) { return (long)((uint32_t)next_random(&random_state) % ((uint32_t)RANDOM_MAX + 1)); }
 void srandom(unsigned long seed) { random_state = (int32_t)seed; }
+
+long random_r(unsigned long* state) {
+  int32_t x = (int32_t)*state;
+  next_random(&x);
+  return (long)(*state = (unsigned long)x);
+}
 
 /* Insertion sort: stable, small, and fast for the few elements that a robot has. */
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*)) {
@@ -169,3 +301,26 @@ void* bsearch(const void* key, const void* base, size_t count, size_t size,
   }
   return NULL;
 }
+
+div_t div(int numerator, int denominator) {
+  const div_t result = {numerator / denominator, numerator % denominator};
+  return result;
+}
+
+ldiv_t ldiv(long numerator, long denominator) {
+  const ldiv_t result = {numerator / denominator, numerator % denominator};
+  return result;
+}
+
+char* getenv(const char* name) {
+  (void)name;
+  return NULL;
+}
+
+/* A robot's program does not end. */
+int atexit(void (*function)(void)) {
+  (void)function;
+  return 0;
+}
+
+int errno;

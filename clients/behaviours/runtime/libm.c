@@ -27,6 +27,50 @@ double square(double x) { return x * x; }
 double sinh(double x) { return (kt_exp(x) - kt_exp(-x)) / 2; }
 double cosh(double x) { return (kt_exp(x) + kt_exp(-x)) / 2; }
 double tanh(double x) { return x > 20 ? 1 : x < -20 ? -1 : 1 - 2 / (kt_exp(2 * x) + 1); }
+double asinh(double x) {
+  const double size = fabs(x);
+  return copysign(kt_log(size + sqrt(size * size + 1)), x);
+}
+double acosh(double x) { return kt_log(x + sqrt(x * x - 1)); }
+double atanh(double x) { return kt_log((1 + x) / (1 - x)) / 2; }
+double exp2(double x) { return kt_pow(2, x); }
+double expm1(double x) { return fabs(x) < 1e-5 ? x + x * x / 2 : kt_exp(x) - 1; }
+double log1p(double x) { return fabs(x) < 1e-5 ? x - x * x / 2 : kt_log(1 + x); }
+double fdim(double x, double y) { return x > y ? x - y : 0; }
+double fma(double x, double y, double z) { return x * y + z; }
+
+/* A third of the logarithm, and one step of Newton's. */
+double cbrt(double x) {
+  if (x == 0 || x - x != 0) return x;
+  const double size = fabs(x);
+  const double root = kt_exp(kt_log(size) / 3);
+  return copysign(root - (root - size / (root * root)) / 3, x);
+}
+
+double modf(double x, double* whole) {
+  *whole = trunc(x);
+  return isinf(x) ? copysign(0, x) : copysign(x - *whole, x);
+}
+
+double frexp(double x, int* exponent) {
+  *exponent = 0;
+  if (x == 0 || x - x != 0) return x;
+  for (; fabs(x) >= 1; x /= 2) ++*exponent;
+  for (; fabs(x) < 0.5; x *= 2) --*exponent;
+  return x;
+}
+
+double ldexp(double x, int exponent) {
+  for (; exponent > 0 && x - x == 0; --exponent) x *= 2;
+  for (; exponent < 0 && x != 0; ++exponent) x /= 2;
+  return x;
+}
+
+void sincos(double x, double* sine, double* cosine) {
+  *sine = kt_sin(x);
+  *cosine = kt_cos(x);
+}
+
 double fmin(double x, double y) { return isnan(x) || y < x ? y : x; }
 double fmax(double x, double y) { return isnan(x) || y > x ? y : x; }
 
@@ -36,14 +80,24 @@ double round(double x) {
   return rest >= 0.5 ? whole + copysign(1, x) : whole;
 }
 
-long lround(double x) { return (long)round(x); }
-
 /* To the nearest integer, halves to even. */
-long lrint(double x) {
+double rint(double x) {
   const double low = kt_floor(x), rest = x - low;
-  const long whole = (long)low;
-  return rest > 0.5 || (rest == 0.5 && (whole & 1)) ? whole + 1 : whole;
+  if (rest != 0.5) return rest > 0.5 ? low + 1 : low;
+  return kt_floor(low / 2) * 2 == low ? low : low + 1;
 }
+double nearbyint(double x) { return rint(x); }
+
+double remainder(double x, double y) {
+  const double rest = kt_fmod(x, y), half = fabs(y) / 2;
+  if (fabs(rest) < half || (fabs(rest) == half && !(lrint((x - rest) / y) & 1))) return rest;
+  return rest - copysign(y, rest);
+}
+
+long lround(double x) { return (long)round(x); }
+long lrint(double x) { return (long)rint(x); }
+long long llround(double x) { return (long long)round(x); }
+long long llrint(double x) { return (long long)rint(x); }
 
 /* One instruction, correctly rounded. */
 double sqrt(double x) {
@@ -58,12 +112,34 @@ float sqrtf(float x) {
   return root;
 }
 
-#define UNARY(name) \
-  float name##f(float x) { return (float)name(x); }
-#define BINARY(name) \
-  float name##f(float x, float y) { return (float)name(x, y); }
-UNARY(sin)
-UNARY(cos)
-UNARY(tan) UNARY(asin) UNARY(acos) UNARY(atan) UNARY(exp) UNARY(log) UNARY(log2) UNARY(log10) UNARY(fabs)
-    UNARY(floor) UNARY(ceil) UNARY(round) UNARY(trunc) UNARY(square) UNARY(sinh) UNARY(cosh) UNARY(tanh)
-        BINARY(atan2) BINARY(pow) BINARY(fmod) BINARY(hypot) BINARY(fmin) BINARY(fmax) BINARY(copysign)
+/* clang-format off */
+#define UNARY(name) float name##f(float x) { return (float)name(x); }
+#define BINARY(name) float name##f(float x, float y) { return (float)name(x, y); }
+UNARY(sin) UNARY(cos) UNARY(tan) UNARY(asin) UNARY(acos) UNARY(atan) UNARY(sinh) UNARY(cosh) UNARY(tanh)
+UNARY(asinh) UNARY(acosh) UNARY(atanh) UNARY(exp) UNARY(exp2) UNARY(expm1) UNARY(log) UNARY(log2) UNARY(log10)
+UNARY(log1p) UNARY(cbrt) UNARY(fabs) UNARY(floor) UNARY(ceil) UNARY(round) UNARY(trunc) UNARY(rint)
+UNARY(nearbyint) UNARY(square)
+BINARY(atan2) BINARY(pow) BINARY(fmod) BINARY(remainder) BINARY(hypot) BINARY(fmin) BINARY(fmax) BINARY(fdim)
+BINARY(copysign)
+    /* clang-format on */
+    long lroundf(float x) {
+  return lround(x);
+}
+long lrintf(float x) { return lrint(x); }
+long long llroundf(float x) { return llround(x); }
+long long llrintf(float x) { return llrint(x); }
+float fmaf(float x, float y, float z) { return (float)((double)x * y + z); }
+float frexpf(float x, int* exponent) { return (float)frexp(x, exponent); }
+float ldexpf(float x, int exponent) { return (float)ldexp(x, exponent); }
+
+float modff(float x, float* whole) {
+  double part;
+  const float rest = (float)modf(x, &part);
+  *whole = (float)part;
+  return rest;
+}
+
+void sincosf(float x, float* sine, float* cosine) {
+  *sine = sinf(x);
+  *cosine = cosf(x);
+}

@@ -1,14 +1,90 @@
-/* printf over the serial line of a robot under development. Simulated robots have no serial line: with and without DEBUG
- * the text is dropped, but with DEBUG the arguments are evaluated and checked. */
+/* printf() over the serial line of a robot under development: with DEBUG the text goes to the robot's log and, after
+ * debug_init(), takes the time that 38400 baud take; without DEBUG it is compiled to nothing. Further ARGoS' way to debug: a
+ * structure debug_info_t of the program's own. */
 #ifndef KILOTWIN_DEBUG_H
 #define KILOTWIN_DEBUG_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #ifdef DEBUG
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
 #include <stdio.h>
-#define debug_init() ((void)0)
+
+#ifndef BAUD
+#define BAUD 38400
+#endif
+
+#ifdef __AVR__
+
+static int debug_putchar(char c, FILE* stream) {
+  (void)stream;
+  UDR0 = c;
+  loop_until_bit_is_set(UCSR0A, UDRE0);
+  return 0;
+}
+
+static void debug_init(void) {
+  static FILE debug_stdout = FDEV_SETUP_STREAM(debug_putchar, NULL, _FDEV_SETUP_WRITE);
+  DDRD |= _BV(1);
+#include <util/setbaud.h>
+  UBRR0 = UBRR_VALUE;
+  UCSR0C |= _BV(UCSZ01) | _BV(UCSZ00);
+  UCSR0B |= _BV(TXEN0);
+  stdout = &debug_stdout;
+}
+
 #else
+
+void kilotwin_serial_line(unsigned long baud);
+
+static inline void debug_init(void) {
+#ifdef NONBLOCKING
+  kilotwin_serial_line(0);
+#else
+  kilotwin_serial_line(BAUD);
+#endif
+}
+
+#endif
+
+#else
+
 #define debug_init()
 #define printf(...)
+
+#endif
+
+/* A program that sets fields without having defined debug_info_t is one for the robot, where they vanish. */
+#if defined(__AVR__) || defined(KILOTWIN_NO_DEBUG_INFO)
+
+#define debug_info_create() ((void)0)
+#define debug_info_destroy() ((void)0)
+#define debug_info_set(field, value)
+#define debug_info_get(field)
+#else
+
+void* kilotwin_debug_info(unsigned long size);
+
+#define debug_info_create() ((void)0)
+#define debug_info_destroy() ((void)0)
+#define debug_info_get(field) (((debug_info_t*)kilotwin_debug_info(sizeof(debug_info_t)))->field)
+#define debug_info_set(field, value) (debug_info_get(field) = (value))
+
+#endif
+
+#ifdef __AVR__
+#define debug_print(...)
+#else
+int kilotwin_print(const char* format, ...);
+#define debug_print(...) kilotwin_print(__VA_ARGS__)
+#endif
+
+#ifdef __cplusplus
+}
 #endif
 
 #endif

@@ -44,17 +44,18 @@ extern message_tx_success_t kilo_message_tx_success;
 /* Distance of the sender, centre to centre, mm. */
 uint8_t estimate_distance(const distance_measurement_t* d);
 void delay(uint16_t ms);
-uint8_t rand_hard(void);
-uint8_t rand_soft(void);
+/* Without void, so that in C arguments too many are passed over as on the robot. */
+uint8_t rand_hard();
+uint8_t rand_soft();
 void rand_seed(uint8_t seed);
-int16_t get_ambientlight(void);
-int16_t get_voltage(void);
-int16_t get_temperature(void);
+int16_t get_ambientlight();
+int16_t get_voltage();
+int16_t get_temperature();
 void set_motors(uint8_t left, uint8_t right);
 /* Both motors at full duty for 15 ms, to overcome static friction. */
-void spinup_motors(void);
+void spinup_motors();
 void set_color(uint8_t color);
-void kilo_init(void);
+void kilo_init();
 /* Runs setup() once and loop() for ever when the overhead controller says RUN. Does not return. */
 void kilo_start(void (*setup)(void), void (*loop)(void));
 

@@ -3,6 +3,6 @@
 #ifdef NDEBUG
 #define assert(condition) ((void)0)
 #else
-_Noreturn void abort(void);
+#include <stdlib.h>
 #define assert(condition) ((condition) ? (void)0 : abort())
 #endif

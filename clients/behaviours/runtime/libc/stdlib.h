@@ -4,21 +4,51 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define RAND_MAX 0x7fff
 #define RANDOM_MAX 0x7fffffff
 #define EXIT_SUCCESS 0
 #define EXIT_FAILURE 1
+#define alloca(size) __builtin_alloca(size)
+
+typedef struct {
+  int quot, rem;
+} div_t;
+typedef struct {
+  long quot, rem;
+} ldiv_t;
 
 int abs(int value);
 long labs(long value);
 long long llabs(long long value);
+div_t div(int numerator, int denominator);
+ldiv_t ldiv(long numerator, long denominator);
 int atoi(const char* text);
 long atol(const char* text);
+long long atoll(const char* text);
+double atof(const char* text);
+long strtol(const char* text, char** end, int base);
+unsigned long strtoul(const char* text, char** end, int base);
+long long strtoll(const char* text, char** end, int base);
+unsigned long long strtoull(const char* text, char** end, int base);
+double strtod(const char* text, char** end);
+float strtof(const char* text, char** end);
+/* avr-libc's: the text of a number in a base of 2..36; with a sign in base 10 only. */
+char* itoa(int value, char* to, int base);
+char* ltoa(long value, char* to, int base);
+char* utoa(unsigned value, char* to, int base);
+char* ultoa(unsigned long value, char* to, int base);
+/* avr-libc's: fixed point with `decimals`, right-aligned in `width`, left-aligned if that is negative. */
+char* dtostrf(double value, signed char width, unsigned char decimals, char* to);
 int rand(void);
 void srand(unsigned seed);
 int rand_r(unsigned long* state);
 long random(void);
 void srandom(unsigned long seed);
+long random_r(unsigned long* state);
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
 void* bsearch(const void* key, const void* base, size_t count, size_t size,
               int (*compare)(const void*, const void*));
@@ -27,7 +57,13 @@ void* malloc(size_t size);
 void* calloc(size_t count, size_t size);
 void* realloc(void* block, size_t size);
 void free(void* block);
-_Noreturn void exit(int status);
-_Noreturn void abort(void);
+char* getenv(const char* name);
+int atexit(void (*function)(void));
+void exit(int status) __attribute__((noreturn));
+void abort(void) __attribute__((noreturn));
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,0 +1,29 @@
+/* Programs written for Kilombo. They run here as on the robot: every robot has its own globals, mydata points to one of
+ * them, and the simulator's callbacks are left out. Programs that compile with SIMULATOR alone find its names here too. */
+#ifndef KILOTWIN_KILOMBO_H
+#define KILOTWIN_KILOMBO_H
+
+#include <kilolib.h>
+
+#define REGISTER_USERDATA(type) \
+  type myuserdata;              \
+  type* mydata = &myuserdata;
+
+#define SET_CALLBACK(event, function)
+
+#ifdef SIMULATOR
+#include <jansson.h>
+#include <params.h>
+#define register_callback(event, function) ((void)0)
+#define register_user_lighting(function) ((void)0)
+#define register_user_obstacles(function) ((void)0)
+#define set_callback_params(function) ((void)0)
+#define set_callback_reset(function) ((void)0)
+#define set_callback_botinfo(function) ((void)0)
+#define set_callback_json_state(function) ((void)0)
+#define set_callback_global_setup(function) ((void)0)
+#define set_callback_obstacles(function) ((void)0)
+#define set_callback_lighting(function) ((void)0)
+#endif
+
+#endif

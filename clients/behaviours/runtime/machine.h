@@ -1,0 +1,29 @@
+/* Included before every program: what avr-gcc knows and a host's compiler does not. */
+#ifndef KILOTWIN_MACHINE_H
+#define KILOTWIN_MACHINE_H
+
+#define __flash
+#define __memx
+#define __builtin_avr_nop() ((void)0)
+#define __builtin_avr_sei() ((void)0)
+#define __builtin_avr_cli() ((void)0)
+#define __builtin_avr_wdr() ((void)0)
+#define __builtin_avr_sleep() kilotwin_sleep()
+#define __builtin_avr_delay_cycles(cycles) kilotwin_spend(cycles)
+#define __builtin_avr_swap(octet) ((unsigned char)((octet) << 4 | (unsigned char)(octet) >> 4))
+#ifdef __cplusplus
+extern "C" {
+#endif
+void kilotwin_sleep(void);
+void kilotwin_spend(unsigned long long cycles);
+#ifdef __cplusplus
+}
+#endif
+/* Instructions that programs write as they stand. */
+__asm__(
+    ".macro sei\n.endm\n"
+    ".macro cli\n.endm\n"
+    ".macro wdr\n.endm\n"
+    ".macro sleep\n.endm\n");
+
+#endif
