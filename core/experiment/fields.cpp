@@ -68,6 +68,8 @@ constexpr FieldRule kRules[] = {
     {"RobotModel.straight_right", 1, 255, ""},
 
     {"Physics.sub_steps", 1, 4, ""},
+    {"Physics.tilt_deg", 0, 45, "degrees"},
+    {"Physics.downhill_deg", -360, 360, "degrees"},
 
     {"Radio.range_mm", 2 * kRobotRadius_mm, kUnlimited, "mm", Lower::kExcluded},
     {"Radio.oscillator_sd", 0, 0.05, ""},

@@ -218,6 +218,28 @@ void check_robot_models(const LoadedExperiment& loaded) {
   }
 }
 
+/// What one engine takes and another does not.
+void check_engine(const LoadedExperiment& loaded) {
+  const proto::Physics& physics = loaded.experiment.physics();
+  const auto level_floor = [&](const char* field, bool given, double value) {
+    if (!given || value == 0 || physics.engine() == proto::Physics::ODE) return;
+    throw loaded.locations.error(
+        std::string{"physics."} + field,
+        fmt::format("{} is {}, but the floor of the {} engine is level; add engine: ODE, or remove it", field,
+                    number_text(value), proto::Physics::Engine_Name(physics.engine())));
+  };
+  level_floor("tilt_deg", physics.has_tilt_deg(), physics.tilt_deg());
+  level_floor("downhill_deg", physics.has_downhill_deg(), physics.downhill_deg());
+  constexpr double kLeastAxleOffset_mm = 1;
+  const double offset_mm = loaded.experiment.motion().axle_offset_mm();
+  if (physics.engine() != proto::Physics::ODE || offset_mm >= kLeastAxleOffset_mm) return;
+  throw loaded.locations.error(
+      "motion.axle_offset_mm",
+      fmt::format("axle_offset_mm is {}, with which a robot of the ODE engine falls over its rear legs; it takes "
+                  "{}..{} mm there",
+                  number_text(offset_mm), number_text(kLeastAxleOffset_mm), number_text(kRobotRadius_mm)));
+}
+
 void check_station(const LoadedExperiment& loaded) {
   const proto::Station& station = loaded.experiment.station();
   for (int i = 0; i < station.environment_size(); ++i) {
@@ -266,6 +288,7 @@ void validate_fields(const LoadedExperiment& loaded) {
                   experiment.arena().height_mm());
   check_robot_models(loaded);
   check_station(loaded);
+  check_engine(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",

@@ -31,7 +31,8 @@ bool known(OverheadCommand command) {
 const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, FederateId) {
   if (!ascending_within(frame.robot, {0, plan.robots()}))
     return "its robots are not ascending ids of the experiment";
-  if (!all_finite(frame.x_mm) || !all_finite(frame.y_mm) || !all_finite(frame.heading_rad))
+  if (!all_finite(frame.x_mm) || !all_finite(frame.y_mm) || !all_finite(frame.heading_rad) ||
+      !all_finite(frame.spatial))
     return "a pose is not finite";
   return nullptr;
 }

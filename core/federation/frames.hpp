@@ -18,12 +18,16 @@ struct BodyFrame {
   Tick tick;
   std::vector<std::uint32_t> robot;
   std::vector<double> x_mm, y_mm, heading_rad;
+  std::vector<double> spatial;  ///< of ghosts of the ODE engine: kSpatialColumns per robot; else empty
+
+  static constexpr std::size_t kSpatialColumns = 11;
 
   void clear() {
     robot.clear();
     x_mm.clear();
     y_mm.clear();
     heading_rad.clear();
+    spatial.clear();
   }
   void add(std::uint32_t id, double x, double y, double heading) {
     robot.push_back(id);

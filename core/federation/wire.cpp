@@ -55,15 +55,17 @@ WireBodyFrame to_wire(const WireHeader& header, const BodyFrame& frame) {
   wire.x_mm = borrow<Doubles>(frame.x_mm);
   wire.y_mm = borrow<Doubles>(frame.y_mm);
   wire.heading_rad = borrow<Doubles>(frame.heading_rad);
+  wire.spatial = borrow<Doubles>(frame.spatial);
   return wire;
 }
 
 bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
   frame.tick = Tick{wire.tick};
   const bool whole = copy(wire.robot, frame.robot) && copy(wire.x_mm, frame.x_mm) && copy(wire.y_mm, frame.y_mm) &&
-                     copy(wire.heading_rad, frame.heading_rad);
+                     copy(wire.heading_rad, frame.heading_rad) && copy(wire.spatial, frame.spatial);
   const std::size_t n = frame.robot.size();
-  return whole && frame.x_mm.size() == n && frame.y_mm.size() == n && frame.heading_rad.size() == n;
+  return whole && frame.x_mm.size() == n && frame.y_mm.size() == n && frame.heading_rad.size() == n &&
+         (frame.spatial.empty() || frame.spatial.size() == BodyFrame::kSpatialColumns * n);
 }
 
 WireActuationFrame to_wire(const WireHeader& header, const ActuationFrame& frame) {

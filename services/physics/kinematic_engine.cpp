@@ -16,7 +16,7 @@ KinematicEngine::KinematicEngine(const RunPlan& plan, PartitionId partition, con
       x_limit_mm_(plan.experiment().arena().width_mm() / 2 - kRobotRadius_mm),
       y_limit_mm_(plan.experiment().arena().height_mm() / 2 - kRobotRadius_mm) {}
 
-void KinematicEngine::move(Tick from) {
+void KinematicEngine::move(Tick from, const Inputs&) {
   Bodies& known = population_.known();
   const std::vector<std::uint8_t>& own = population_.own();
   const std::vector<Duties>& duties = population_.duties();

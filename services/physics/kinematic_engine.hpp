@@ -17,7 +17,7 @@ class KinematicEngine final : public PopulationEngine {
 
  private:
   KinematicEngine(const RunPlan&, PartitionId, const DriveModel&);
-  void move(Tick from) override;
+  void move(Tick from, const Inputs&) override;
 
   double x_limit_mm_, y_limit_mm_;  ///< the centre of a disc stays within +-limit
   Drives drives_;                   ///< within a step

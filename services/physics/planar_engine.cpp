@@ -8,7 +8,7 @@ PlanarEngine::PlanarEngine(const RunPlan& plan, PartitionId partition)
 PlanarEngine::PlanarEngine(const RunPlan& plan, PartitionId partition, const DriveModel& drive)
     : PopulationEngine(plan, partition, drive, ContactLimits(plan, drive).margin_mm), contact_(plan, drive) {}
 
-void PlanarEngine::move(Tick from) {
+void PlanarEngine::move(Tick from, const Inputs&) {
   Bodies& known = population_.known();
   if (!contact_.find(known, population_.own(), population_.duties())) return;
   set_off(from);

@@ -19,7 +19,7 @@ class PlanarEngine final : public PopulationEngine {
 
  private:
   PlanarEngine(const RunPlan&, PartitionId, const DriveModel&);
-  void move(Tick from) override;
+  void move(Tick from, const Inputs&) override;
   void set_off(Tick from);
 
   ContactSolver contact_;

@@ -31,6 +31,7 @@ class Population {
 
   // Between begin() and end(): ascending ids.
   [[nodiscard]] Bodies& known() { return known_; }
+  [[nodiscard]] const Bodies& known() const { return known_; }
   /// Per known body, whether the partition owns it; empty: all of them.
   [[nodiscard]] const std::vector<std::uint8_t>& own() const { return own_; }
   /// Per known body; 0 for tracked ones and those that no frame covers.
@@ -78,7 +79,7 @@ class PopulationEngine : public Engine {
  public:
   void step(Tick from, const Inputs& inputs) final {
     population_.begin(from, inputs);
-    move(from);
+    move(from, inputs);
     population_.end();
   }
   void emit_bodies(BodyFrame& frame) const override { population_.emit_bodies(frame); }
@@ -96,7 +97,7 @@ class PopulationEngine : public Engine {
   PopulationEngine(const RunPlan& plan, PartitionId partition, DriveModel drive, double margin_mm)
       : population_(plan, partition, std::move(drive), margin_mm) {}
   /// From tick `from` to the next: own bodies get their new poses; those of others may be left as they are.
-  virtual void move(Tick from) = 0;
+  virtual void move(Tick from, const Inputs&) = 0;
 
   Population population_;
 };

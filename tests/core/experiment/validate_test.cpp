@@ -68,6 +68,15 @@ TEST_F(Validate, OneLineForEveryMistake) {
        "smaller than a robot; "
        "it takes at most 30"},
       {kGroup + "deployment { hosts: 5 }", "e.txtpb:2:14: hosts is 5, more than there are robots; it takes 1..4"},
+      // What an engine cannot do.
+      {kGroup + "physics { tilt_deg: 3 }",
+       "e.txtpb:2:11: tilt_deg is 3, but the floor of the PLANAR engine is level; add engine: ODE, or remove it"},
+      {kGroup + "physics { engine: KINEMATIC\n downhill_deg: 3 }",
+       "e.txtpb:3:2: downhill_deg is 3, but the floor of the KINEMATIC engine is level; add engine: ODE, or remove "
+       "it"},
+      {kGroup + "physics { engine: ODE }\nmotion { axle_offset_mm: 0 }",
+       "e.txtpb:3:10: axle_offset_mm is 0, with which a robot of the ODE engine falls over its rear legs; it takes "
+       "1..16.5 mm there"},
       // Times against the tick.
       {kGroup + "recording { every_s: 0.03 }",
        "e.txtpb:2:13: every_s is 0.03, shorter than a tick; it takes at least 0.032768 s"},

@@ -23,6 +23,13 @@ TEST(Wire, CarriesBodies) {
   EXPECT_EQ(in.x_mm, out.x_mm);
   EXPECT_EQ(in.y_mm, out.y_mm);
   EXPECT_EQ(in.heading_rad, out.heading_rad);
+  EXPECT_EQ(in.spatial, out.spatial);
+  // What comes with robots comes whole.
+  out.spatial.assign(BodyFrame::kSpatialColumns * out.robot.size(), 0.5);
+  ASSERT_TRUE(from_wire(to_wire(kHeader, out), in));
+  EXPECT_EQ(in.spatial, out.spatial);
+  out.spatial.pop_back();
+  EXPECT_FALSE(from_wire(to_wire(kHeader, out), in));
 }
 
 TEST(Wire, CarriesActuationAndRadioAndOverhead) {

@@ -1,0 +1,156 @@
+#include "services/physics/ode_world.hpp"
+
+#include <cstdarg>
+#include <mutex>
+#include <vector>
+
+#include <ode/ode.h>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::physics {
+namespace {
+
+/// The part of an overlap that a step closes (ODE's manual: 0.1..0.8). The solver's error shows as overlap, the less the more
+/// of it is closed: 0.2 mm in a crowd of 1000 that all drive to its centre, 0.8 mm with 0.2.
+constexpr double kErrorReduction = 0.8;
+/// Compliance of all constraints, 1/g per step: a millionth of that of a robot's mass, enough to make four points of support
+/// solvable, too little to be seen.
+constexpr double kCompliance_1_g = 1e-7;
+/// Overlapping bodies part at most at this speed, mm/s: as in the planar engine.
+constexpr double kParting_mm_s = 20;
+/// Sweeps of the iterative solver.
+constexpr int kSweeps = 20;
+
+/// ODE's random numbers are one sequence of the process.
+std::mutex& random_numbers() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+/// Set by ODE's message handler. The only message that worlds of contacts give rise to is the exact solver's, when
+/// rounding lets it find no step to go; it then leaves forces out.
+thread_local bool solver_gave_up = false;
+void take_message(int, const char*, va_list) { solver_gave_up = true; }
+
+void start_ode() {
+  static const bool started = [] {
+    dSetMessageHandler(&take_message);
+    return dInitODE2(0) != 0;
+  }();
+  KILOTWIN_DEMAND(started);
+}
+
+}  // namespace
+
+Inertia Inertia::cylinder(double mass_g, double radius_mm, double height_mm) {
+  const double across = mass_g * (3 * radius_mm * radius_mm + height_mm * height_mm) / 12;
+  return {mass_g, {across, across, mass_g * radius_mm * radius_mm / 2}};
+}
+
+struct OdeWorld::Handles {
+  dWorldID world = nullptr;
+  dJointGroupID contacts = nullptr;
+  dThreadingImplementationID threading = nullptr;
+  std::vector<dBodyID> bodies;
+};
+
+OdeWorld::OdeWorld(Vector3 gravity_mm_s2, double step_s) : step_s_(step_s), handles_(std::make_unique<Handles>()) {
+  start_ode();
+  Handles& h = *handles_;
+  h.world = dWorldCreate();
+  h.contacts = dJointGroupCreate(0);
+  // Worlds share one work list by default, which two threads must not use at a time.
+  h.threading = dThreadingAllocateSelfThreadedImplementation();
+  dWorldSetStepThreadingImplementation(h.world, dThreadingImplementationGetFunctions(h.threading), h.threading);
+  dWorldSetGravity(h.world, gravity_mm_s2[0], gravity_mm_s2[1], gravity_mm_s2[2]);
+  dWorldSetERP(h.world, kErrorReduction);
+  dWorldSetCFM(h.world, kCompliance_1_g);
+  dWorldSetContactMaxCorrectingVel(h.world, kParting_mm_s);
+  dWorldSetContactSurfaceLayer(h.world, 0);
+  dWorldSetAutoDisableFlag(h.world, 0);
+  dWorldSetQuickStepNumIterations(h.world, kSweeps);
+}
+
+OdeWorld::~OdeWorld() {
+  if (!handles_) return;
+  dJointGroupDestroy(handles_->contacts);
+  dWorldDestroy(handles_->world);
+  dThreadingFreeImplementation(handles_->threading);
+}
+
+OdeWorld::OdeWorld(OdeWorld&&) noexcept = default;
+
+void OdeWorld::clear() {
+  dJointGroupEmpty(handles_->contacts);
+  for (const dBodyID body : handles_->bodies) dBodyDestroy(body);
+  handles_->bodies.clear();
+}
+
+std::uint32_t OdeWorld::add(const Inertia& inertia, const RigidState& state) {
+  const dBodyID body = dBodyCreate(handles_->world);
+  dMass mass;
+  const Vector3& moment = inertia.moment_g_mm2;
+  dMassSetParameters(&mass, inertia.mass_g, 0, 0, 0, moment[0], moment[1], moment[2], 0, 0, 0);
+  dBodySetMass(body, &mass);
+  dBodySetPosition(body, state.position_mm[0], state.position_mm[1], state.position_mm[2]);
+  dBodySetQuaternion(body, state.rotation.data());
+  dBodySetLinearVel(body, state.velocity_mm_s[0], state.velocity_mm_s[1], state.velocity_mm_s[2]);
+  dBodySetAngularVel(body, state.spin_rad_s[0], state.spin_rad_s[1], state.spin_rad_s[2]);
+  handles_->bodies.push_back(body);
+  return static_cast<std::uint32_t>(handles_->bodies.size() - 1);
+}
+
+void OdeWorld::add(const TouchPoint& touch) {
+  dContact contact{};
+  for (int k = 0; k < 3; ++k) {
+    contact.geom.pos[k] = touch.at_mm[static_cast<std::size_t>(k)];
+    contact.geom.normal[k] = touch.normal[static_cast<std::size_t>(k)];
+    contact.fdir1[k] = touch.axis[static_cast<std::size_t>(k)];
+  }
+  contact.surface.mode = dContactFDir1 | dContactAxisDep;
+  if (touch.friction != TouchPoint::Friction::kNone) {
+    contact.surface.mode |= dContactMotion1 | dContactMotion2;
+    if (touch.friction == TouchPoint::Friction::kCoulomb) contact.surface.mode |= dContactApprox1;
+    contact.surface.mu = touch.grip[0];
+    contact.surface.mu2 = touch.grip[1];
+    contact.surface.motion1 = touch.motion_mm_s[0];
+    contact.surface.motion2 = touch.motion_mm_s[1];
+  }
+  if (touch.gap_mm > 0) {
+    contact.surface.mode |= dContactMotionN;
+    contact.surface.motionN = -touch.gap_mm / step_s_;
+  } else {
+    contact.geom.depth = -touch.gap_mm;
+  }
+  const dJointID joint = dJointCreateContact(handles_->world, handles_->contacts, &contact);
+  const dBodyID other = touch.other == TouchPoint::kStanding ? nullptr : handles_->bodies[touch.other];
+  dJointAttach(joint, handles_->bodies[touch.body], other);
+}
+
+bool OdeWorld::step(Solver solver, std::uint64_t seed) {
+  solver_gave_up = false;
+  if (solver == Solver::kExact) {
+    KILOTWIN_DEMAND(dWorldStep(handles_->world, step_s_) != 0);
+  } else {
+    const std::lock_guard lock(random_numbers());
+    dRandSetSeed(static_cast<unsigned long>(seed & 0xffffffff));
+    KILOTWIN_DEMAND(dWorldQuickStep(handles_->world, step_s_) != 0);
+  }
+  dJointGroupEmpty(handles_->contacts);
+  return !solver_gave_up;
+}
+
+void OdeWorld::read(std::uint32_t body, RigidState& state) const {
+  const dBodyID id = handles_->bodies[body];
+  const dReal *position = dBodyGetPosition(id), *rotation = dBodyGetQuaternion(id),
+              *velocity = dBodyGetLinearVel(id), *spin = dBodyGetAngularVel(id);
+  for (std::size_t k = 0; k < 3; ++k) {
+    state.position_mm[k] = position[k];
+    state.velocity_mm_s[k] = velocity[k];
+    state.spin_rad_s[k] = spin[k];
+  }
+  for (std::size_t k = 0; k < 4; ++k) state.rotation[k] = rotation[k];
+}
+
+}  // namespace kilotwin::physics
