@@ -25,6 +25,7 @@ class Parser {
     find_data();
     read_table();
     read_functions();
+    find_kept();
     return std::move(file_);
   }
 
@@ -197,7 +198,8 @@ class Parser {
       require(executable(offset), "its table of functions is damaged");
     }
     require(file_.data.contains(table.robot, sizeof(KtRobot)) && file_.data.contains(table.ticks, 4) &&
-                file_.data.contains(table.tx_period, 2) && file_.relro.contains(table.control, 8),
+                file_.data.contains(table.tx_period, 2) && file_.relro.contains(table.control, 8) &&
+                file_.relro.contains(table.surroundings, 8),
             "its table of functions is damaged");
     // Each address of the table must be relocated, and with it nothing that is not an address.
     constexpr std::uint64_t kAddresses = (sizeof(KtImage) - offsetof(KtImage, control)) / 8;
@@ -210,6 +212,25 @@ class Parser {
     }
     require(count == kAddresses, "its table of functions is damaged");
     file_.table = table;
+  }
+
+  /// Sections that a reset does not touch. A file without names of sections has none.
+  void find_kept() {
+    const auto section_at = [&](std::uint64_t i) {
+      return at<Elf64_Shdr>(octets_, header_.e_shoff + i * sizeof(Elf64_Shdr));
+    };
+    const auto strings = section_at(header_.e_shstrndx);
+    if (!strings || strings->sh_offset > octets_.size()) return;
+    const std::string_view names = octets_.substr(strings->sh_offset, strings->sh_size);
+    for (std::uint64_t i = 0; i < header_.e_shnum; ++i) {
+      const auto section = section_at(i);
+      if (!section || section->sh_name >= names.size() || !file_.data.contains(section->sh_addr, section->sh_size))
+        continue;
+      const std::string_view name = names.substr(section->sh_name);
+      const std::string_view whole = name.substr(0, name.find('\0'));
+      if (whole.starts_with(".noinit") || whole == "kilotwin_eeprom")
+        file_.kept.push_back({section->sh_addr, section->sh_addr + section->sh_size});
+    }
   }
 
   /// Names of functions, for people only: what is damaged here is left out.

@@ -9,6 +9,15 @@ namespace kilotwin::behaviours {
 namespace {
 
 constexpr std::uint32_t kNobody = 0xffffffffu;
+/// How long the reception of a message takes: 13 octets of 10 bits of 269 cycles (kilolib).
+constexpr std::uint64_t kPacketCycles = 13 * 10 * 269;
+
+/// Readings where nothing else is said: light in the middle of the range; a charged battery, above 682, the firmware's threshold
+/// for full; 25 degrees Celsius, 314 mV (data sheet of the ATmega328P, temperature sensor) of 1.1 V in 1024 steps.
+constexpr double kLightReading = 512, kVoltageReading = 700, kTemperatureReading = 292;
+/// Makes rand_hard() random, and readings of an even battery differ by one count now and then.
+constexpr double kVoltageSd = 0.5;
+
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
 
 /// CRC-16/MCRF4XX over data and type.
@@ -29,8 +38,10 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       host_(host),
       share_(plan.share(host)),
       random_(plan.seed()),
+      parameters_(plan),
       programs_(std::move(programs)),
       memory_(share_.size()),
+      eeprom_(share_.size()),
       presence_(share_.size(), Presence::kNone),
       motor_left_(share_.size()),
       motor_right_(share_.size()),
@@ -135,10 +146,12 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   running_robot_.store(share_.first + i, std::memory_order_relaxed);
   entries_.store(entries_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
   memory.copy_in(slot);
+  surround(i, slot, events.receptions);
   if (eventful) {
     if (const Fault fault = executor.interrupt(events); fault.signal != 0)
       return fail_robot(i, fault, program, slot);
     if (executor.robot().reset != 0) {
+      static_cast<void>(memory.copy_out(slot));
       reset_robot(from, i, program, slot);
       memory.copy_in(slot);
     }
@@ -160,6 +173,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     }
     robot = executor.robot();
   }
+  keep_eeprom(i, slot);
   note_outputs(i, robot, executor.tx_period());
   if (!memory.copy_out(slot)) return fail_robot(i, Fault{}, program, slot);
   if (robot.spin_up == 0) return;
@@ -167,16 +181,40 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   memory.set(program, program.file.table.robot, robot);
 }
 
+/// What the robot in the slot senses in this tick.
+void BehavioursEngine::surround(std::uint32_t i, const Slot& slot, std::uint32_t receptions) {
+  KtSurroundings& around = *slot.surroundings();
+  around.light = kLightReading;
+  around.light_sd = 0;
+  around.voltage = kVoltageReading;
+  around.voltage_sd = kVoltageSd;
+  around.temperature = kTemperatureReading;
+  around.temperature_sd = 0;
+  around.receiving_cycles = receptions * kPacketCycles;
+  around.receiving_from = 0;
+  around.eeprom = eeprom_[i] ? eeprom_[i]->data() : nullptr;
+  around.eeprom_filled = around.eeprom_written = around.charging = 0;
+}
+
+void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
+  const KtSurroundings& around = *slot.surroundings();
+  if (around.eeprom_written == 0 || eeprom_[i]) return;
+  eeprom_[i] = std::make_unique<Eeprom>();
+  std::copy_n(around.eeprom_copy, eeprom_[i]->size(), eeprom_[i]->begin());
+}
+
 void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& program, const Slot& slot) {
-  const proto::Motion& motion = plan_.experiment().motion();
   const std::uint32_t id = share_.first + i;
+  const Calibration& calibration = parameters_.calibration(id);
   memory_[i].reset(program, slot);
   auto robot = memory_[i].get<KtRobot>(program, program.file.table.robot);
   robot.noise = random_.bits(Stream::kProgram, id, tick, 0);
   robot.tick_cycles = plan_.tick_length.cycles();
   robot.uid = static_cast<std::uint16_t>(id);
-  robot.straight_duty = static_cast<std::uint8_t>(motion.calibrated_straight_duty());
-  robot.turn_duty = static_cast<std::uint8_t>(motion.calibrated_turn_duty());
+  robot.turn_left = calibration.turn_left;
+  robot.turn_right = calibration.turn_right;
+  robot.straight_left = calibration.straight_left;
+  robot.straight_right = calibration.straight_right;
   memory_[i].set(program, program.file.table.robot, robot);
   presence_[i] = Presence::kAlive;
   holds_[i] = 0;

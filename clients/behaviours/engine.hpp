@@ -1,6 +1,7 @@
 /// The robots' programs of one host: messages and time in; motors, LEDs and messages out.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -11,8 +12,10 @@
 
 #include "clients/behaviours/executor.hpp"
 #include "clients/behaviours/program_set.hpp"
+#include "core/base/eeprom_layout.h"
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
+#include "core/model/robot_parameters.hpp"
 #include "core/random/random.hpp"
 #include "idl/checkpoint.pb.h"
 
@@ -26,6 +29,8 @@ namespace kilotwin::behaviours {
 /// Pure, but for robots' code that faults: that stops its robot and is noted. Engines of one process may step in parallel.
 class BehavioursEngine {
  public:
+  using Eeprom = std::array<std::uint8_t, KILOTWIN_EEPROM_OCTETS>;
+
   /// State at tick 0. `programs` are those of the plan's manifest.
   BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs);
 
@@ -63,6 +68,9 @@ class BehavioursEngine {
   /// twice knows that this robot has not returned in between.
   [[nodiscard]] std::optional<Running> running() const;
 
+  /// What robot `id`, one of this host's, has in its EEPROM; nullptr where that is what calibration has left.
+  [[nodiscard]] const Eeprom* eeprom(std::uint32_t id) const { return eeprom_[id - share_.first].get(); }
+
   /// Octets of memory that robots' programs take at present.
   [[nodiscard]] std::uint64_t memory_octets() const;
 
@@ -71,6 +79,8 @@ class BehavioursEngine {
 
   void gather(const RadioFrame& radio);
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
+  void surround(std::uint32_t i, const Slot&, std::uint32_t receptions);
+  void keep_eeprom(std::uint32_t i, const Slot&);
   void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);
   void fail_robot(std::uint32_t i, const Fault&, const Program&, const Slot&);
   void take_log(std::uint32_t i, const Slot&);
@@ -80,6 +90,7 @@ class BehavioursEngine {
   const HostId host_;
   const Share share_;
   const Random random_;
+  const RobotParameters parameters_;
   const std::shared_ptr<ProgramSet> programs_;
 
   Tick now_;
@@ -93,6 +104,7 @@ class BehavioursEngine {
 
   // Per own robot; index i is robot share_.first + i.
   std::vector<RobotMemory> memory_;
+  std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< of those that have written to it
   std::vector<Presence> presence_;
   std::vector<std::uint8_t> motor_left_, motor_right_, spin_up_, led_, life_cycle_;
   std::vector<std::uint16_t> tx_period_;

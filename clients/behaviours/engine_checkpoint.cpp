@@ -54,6 +54,7 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
     fields[kOffers] = offers_[i];
     std::copy(message_[i].begin(), message_[i].end(), fields.begin() + kMessage);
     robot.set_host(text(fields));
+    if (eeprom_[i]) robot.set_eeprom(text(*eeprom_[i]));
   }
   for (const Failure& failure : failures_) {
     state.mutable_robot(static_cast<int>(failure.robot - share_.first))->mutable_host()->append(failure.text);
@@ -87,6 +88,11 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
       memory_[i].restore(program, program.slot(id % kSlots), octets(saved[i]->memory()), octets(saved[i]->stack()));
     } else if (presence == Presence::kFailed) {
       failures_.push_back({id, saved[i]->host().substr(kFields)});
+    }
+    eeprom_[i].reset();
+    if (const auto eeprom = octets(saved[i]->eeprom()); eeprom.size() == KILOTWIN_EEPROM_OCTETS) {
+      eeprom_[i] = std::make_unique<Eeprom>();
+      std::copy(eeprom.begin(), eeprom.end(), eeprom_[i]->begin());
     }
     motor_left_[i] = fields[kLeft];
     motor_right_[i] = fields[kRight];

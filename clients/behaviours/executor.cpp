@@ -1,8 +1,10 @@
 #include "clients/behaviours/executor.hpp"
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <vector>
 
 #include "core/base/error.hpp"
 
@@ -23,8 +25,24 @@ void RobotMemory::reset(const Program& program, const Slot& slot) {
   // What the entry into the main program pops: six registers, the address where it starts, and an end for back-traces.
   std::array<std::uint64_t, 8> frame{};
   frame[6] = slot.image_address() + program.file.table.boot;
+  // What a reset does not touch, of a robot that has run before.
+  std::vector<std::uint8_t> kept;
+  if (octets_) {
+    for (const ElfFile::Range& range : program.file.kept) {
+      const std::uint8_t* const first = octets_.get() + (range.first - program.file.data.first);
+      kept.insert(kept.end(), first, first + (range.last - range.first));
+    }
+  }
   resize(static_cast<std::uint32_t>(program.data_size()), sizeof frame);
   std::memcpy(octets_.get(), slot.initial_data().data(), data_octets_);
+  auto from = kept.cbegin();
+  if (!kept.empty()) {
+    for (const ElfFile::Range& range : program.file.kept) {
+      const auto size = static_cast<std::ptrdiff_t>(range.last - range.first);
+      std::copy_n(from, size, octets_.get() + (range.first - program.file.data.first));
+      from += size;
+    }
+  }
   std::memcpy(octets_.get() + data_octets_, frame.data(), sizeof frame);
 }
 

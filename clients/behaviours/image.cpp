@@ -43,7 +43,7 @@ Registry& registry() {
 }  // namespace
 
 std::uint64_t Slot::size(const ElfFile& file) {
-  const std::uint64_t used = 2 * kStackOctets + kPage + file.memory.size() + 4 * kGuardOctets;
+  const std::uint64_t used = 2 * kStackOctets + 2 * kPage + file.memory.size() + 4 * kGuardOctets;
   return (used + kAddressStep - 1) / kAddressStep * kAddressStep;
 }
 
@@ -52,7 +52,7 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
       size_(size(file)),
       stack_top_(address + kGuardOctets + kStackOctets),
       control_(stack_top_ + 2 * kGuardOctets + kStackOctets),
-      image_(control_ + kPage),
+      image_(control_ + 2 * kPage),
       data_offset_(file.data.first) {
   void* mapped = mmap(pointer(address), size_, PROT_NONE,
                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE, -1, 0);
@@ -66,7 +66,7 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
     const std::uint64_t interrupt_top = stack_top_ + kGuardOctets + kStackOctets;
     protect(stack_top_ - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
     protect(interrupt_top - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
-    protect(control_, kPage, PROT_READ | PROT_WRITE);
+    protect(control_, 2 * kPage, PROT_READ | PROT_WRITE);
     protect(image_, file.memory.size(), PROT_READ | PROT_WRITE);
     control()->interrupt_stack = interrupt_top;
     auto* const image = at<std::uint8_t*>(0);
@@ -78,6 +78,8 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
       std::memcpy(image + offset, &word, sizeof word);
     }
     std::memcpy(image + file.table.control, &control_, sizeof control_);
+    const KtSurroundings* const around = surroundings();
+    std::memcpy(image + file.table.surroundings, static_cast<const void*>(&around), sizeof around);
     protect(image_, file.memory.size(), PROT_NONE);
     for (const ElfFile::Segment& segment : file.segments) {
       const int protection = PROT_READ | (segment.writable ? PROT_WRITE : 0) | (segment.executable ? PROT_EXEC : 0);

@@ -20,7 +20,7 @@ inline constexpr std::uint64_t kAddressStep = 64 * 1024;  ///< slots begin at mu
 inline constexpr std::uint64_t kStackOctets = 64 * 1024;
 
 /// One copy of an image with its stacks. From low to high addresses, each followed by a guard: main stack, interrupt stack,
-/// control page, image. Code and constants are not writable, data and stacks not executable.
+/// control page and surroundings, image. Code and constants are not writable, data and stacks not executable.
 class Slot {
  public:
   /// Maps the slot. Throws RunError where the addresses are taken or memory is short.
@@ -37,6 +37,9 @@ class Slot {
     return reinterpret_cast<T>(image_ + offset);
   }                                                                                            // NOLINT
   [[nodiscard]] KtControl* control() const { return reinterpret_cast<KtControl*>(control_); }  // NOLINT
+  [[nodiscard]] KtSurroundings* surroundings() const {
+    return reinterpret_cast<KtSurroundings*>(control_ + kPage);
+  }  // NOLINT
   [[nodiscard]] std::uint8_t* data() const { return at<std::uint8_t*>(data_offset_); }
   /// One past the highest octet of the main stack; aligned to 16.
   [[nodiscard]] std::uint64_t stack_top() const { return stack_top_; }

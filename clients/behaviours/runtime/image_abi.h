@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 2u
+#define KT_IMAGE_VERSION 3u
 /* Room for what a robot prints in one tick; a serial line of 38400 baud takes 126 octets in a tick. */
 #define KT_LOG_OCTETS 3584
 
@@ -21,14 +21,14 @@ struct KtControl {
 
 /* Simulated hardware of one robot and the state of its firmware; part of the robot's memory. */
 struct KtRobot {
-  uint64_t noise;        /* host: state of the generator behind rand_hard */
-  uint64_t debt_cycles;  /* time that the program spent in delays and has still to wait for */
-  uint32_t tick_cycles;  /* host: length of a tick */
-  uint32_t clock_reads;  /* in the present tick */
-  uint16_t uid;          /* host */
-  uint8_t straight_duty; /* host: calibrated duties */
-  uint8_t turn_duty;     /* host */
-  uint8_t state;         /* kilotwin::LifeCycle */
+  uint64_t noise;       /* host: state of the generator behind rand_hard */
+  uint64_t debt_cycles; /* time that the program spent in delays and has still to wait for */
+  uint32_t tick_cycles; /* host: length of a tick */
+  uint32_t clock_reads; /* in the present tick */
+  uint16_t uid;         /* host: what calibration has found out, as a robot's first EEPROM has it */
+  uint8_t turn_left;    /* host */
+  uint8_t turn_right;   /* host */
+  uint8_t state;        /* kilotwin::LifeCycle */
   uint8_t motors_on;
   uint8_t duty_left;
   uint8_t duty_right;
@@ -40,9 +40,14 @@ struct KtRobot {
   uint8_t reset;  /* the memory is to be made anew */
   uint8_t motion; /* what calibration messages asked for */
   uint8_t motion_done;
-  uint64_t waits;  /* how often the program has waited for a tick */
-  uint8_t spin_up; /* spinup_motors() was called; the host takes note once a tick */
-  uint8_t unused[7];
+  uint64_t waits;         /* how often the program has waited for a tick */
+  uint8_t spin_up;        /* spinup_motors() was called; the host takes note once a tick */
+  uint8_t straight_left;  /* host */
+  uint8_t straight_right; /* host */
+  uint8_t heard;          /* something was received while a sleeping robot listened */
+  int16_t adc;            /* the last conversion, which get_voltage() leaves where a message's strength should be */
+  uint8_t trigger_lost;   /* it has */
+  uint8_t unused;
 };
 
 struct KtMessage {
@@ -64,20 +69,40 @@ struct KtEvents {
   uint32_t sent; /* 1: the robot's own message has left */
 };
 
+/* What surrounds the robot that runs: the host's page in a slot, no part of any robot's memory. Readings are expected values of
+ * this robot's converter, 10-bit counts; sd is the standard deviation of one reading. */
+struct KtSurroundings {
+  double light;
+  double light_sd;
+  double voltage;
+  double voltage_sd;
+  double temperature;
+  double temperature_sd;
+  uint64_t receiving_cycles; /* of this tick, in which the converter is busy with a message's strength */
+  uint64_t receiving_from;   /* 0 on entry; else one more than when in the tick that begins */
+  uint8_t* eeprom;           /* the robot's own 1024 octets; NULL: as calibration has left them */
+  uint8_t eeprom_filled;     /* 0 on entry; 1: eeprom_copy holds what calibration has left */
+  uint8_t eeprom_written;    /* 0 on entry */
+  uint8_t charging;          /* a charger's voltage is on its contacts */
+  uint8_t unused[5];
+  uint8_t eeprom_copy[1024];
+};
+
 /* The entry point of the ELF file points to this table. Addresses are those of the slot. */
 struct KtImage {
   uint64_t magic;
   uint64_t version;
-  uint64_t control;    /* of the KtControl*; the loader writes it */
-  uint64_t robot;      /* of the KtRobot */
-  uint64_t ticks;      /* of kilo_ticks, uint32_t */
-  uint64_t tx_period;  /* of kilo_tx_period, uint16_t */
-  uint64_t boot;       /* void(void): where a robot starts */
-  uint64_t enter;      /* void(KtControl*): continues the main program until it waits */
-  uint64_t call;       /* uint64_t(KtControl*, function, argument): runs a function on the interrupt stack */
-  uint64_t leave;      /* the way back to the host out of both, from anywhere */
-  uint64_t interrupts; /* uint64_t(const KtEvents*) */
-  uint64_t transmit;   /* uint64_t(KtMessage*): 1 if the robot sends, else 0 */
+  uint64_t control;      /* of the KtControl*; the loader writes it */
+  uint64_t robot;        /* of the KtRobot */
+  uint64_t ticks;        /* of kilo_ticks, uint32_t */
+  uint64_t tx_period;    /* of kilo_tx_period, uint16_t */
+  uint64_t boot;         /* void(void): where a robot starts */
+  uint64_t enter;        /* void(KtControl*): continues the main program until it waits */
+  uint64_t call;         /* uint64_t(KtControl*, function, argument): runs a function on the interrupt stack */
+  uint64_t leave;        /* the way back to the host out of both, from anywhere */
+  uint64_t interrupts;   /* uint64_t(const KtEvents*) */
+  uint64_t transmit;     /* uint64_t(KtMessage*): 1 if the robot sends, else 0 */
+  uint64_t surroundings; /* of the KtSurroundings*; the loader writes it */
 };
 
 #ifdef __cplusplus
@@ -89,6 +114,7 @@ KT_ASSERT(sizeof(struct KtRobot) == 56, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
 KT_ASSERT(sizeof(struct KtEvents) == 16, "no padding");
-KT_ASSERT(sizeof(struct KtImage) == 96, "no padding");
+KT_ASSERT(sizeof(struct KtSurroundings) == 1104, "no padding");
+KT_ASSERT(sizeof(struct KtImage) == 104, "no padding");
 
 #endif

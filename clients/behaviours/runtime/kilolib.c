@@ -5,7 +5,8 @@
 #include <stddef.h>
 #include <util/delay.h>
 
-#include "core/base/ir_calibration.h"
+#include "core/base/eeprom_layout.h"
+#include "core/math/elementary.h"
 #include "image_abi.h"
 
 enum { SLEEPING, IDLE, BATTERY, SETUP, RUNNING, CHARGING, MOVING };
@@ -15,12 +16,14 @@ enum { CYCLES_PER_MS = 8000 };
 /* Readings of the clock after which a tick has certainly passed for a program that does nothing else. */
 enum { CLOCK_READS_PER_TICK = 4096 };
 
-/* A charged battery: above 682, the firmware's own threshold for "full". */
-enum { VOLTAGE_READING = 700 };
-/* 25 degrees Celsius: 314 mV (data sheet of the ATmega328P, temperature sensor) of 1.1 V in 1024 steps. */
-enum { TEMPERATURE_READING = 292 };
-/* The middle of the range: no light is modelled. */
-enum { LIGHT_READING = 512 };
+/* How long a call takes (the converter at 1 MHz, 13 clocks; at 62.5 kHz for the temperature; a call in vain). */
+enum {
+  READING_CYCLES = 150,
+  TEMPERATURE_CYCLES = 1720,
+  BUSY_CYCLES = 20,
+  RAND_HARD_CYCLES = 8 * 2 * 2 * READING_CYCLES
+};
+enum { HIGHEST_READING = 1023 };
 
 void kt_enter(struct KtControl*);
 void kt_wait(void);
@@ -28,6 +31,9 @@ uint64_t kt_call(struct KtControl*, uint64_t function, void* argument);
 void kt_leave(void);
 int main();
 extern struct KtControl* kt_control;
+
+/* Read-only once the loader has set it. */
+__attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtSurroundings* kt_surroundings = 0;
 
 static struct KtRobot robot = {.state = IDLE};
 
@@ -112,16 +118,82 @@ void spinup_motors(void) {
 
 void set_color(uint8_t color) { robot.led = color & 63; }
 
-int16_t get_ambientlight(void) { return LIGHT_READING; }
-int16_t get_voltage(void) { return VOLTAGE_READING; }
-int16_t get_temperature(void) { return TEMPERATURE_READING; }
+/* EEPROM, the size of an ATmega328P's. */
+uint8_t* kt_eeprom(void) {
+  struct KtSurroundings* around = kt_surroundings;
+  if (around->eeprom != NULL) return around->eeprom;
+  if (!around->eeprom_filled) {
+    const struct KilotwinCalibration own = {robot.uid, robot.turn_left, robot.turn_right, robot.straight_left,
+                                            robot.straight_right};
+    kilotwin_fill_eeprom(around->eeprom_copy, own);
+    around->eeprom_filled = 1;
+  }
+  return around->eeprom_copy;
+}
+
+void kt_write_eeprom(uint16_t address, uint8_t value) {
+  kt_eeprom()[address] = value;
+  kt_surroundings->eeprom_written = 1;
+}
 
 /* SplitMix64, seeded by the host for each robot and each reset. */
-uint8_t rand_hard(void) {
+static uint64_t noise(void) {
   uint64_t z = robot.noise += 0x9e3779b97f4a7c15u;
   z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
   z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-  return (uint8_t)(z >> 56);
+  return z;
+}
+
+/* Receptions occupy one stretch of the tick, which begins anywhere in it and may go on at its beginning. Callbacks come when
+ * a message is complete. */
+static uint8_t is_receiving(void) {
+  struct KtSurroundings* around = kt_surroundings;
+  if (around->receiving_cycles == 0 || robot.in_interrupt) return 0;
+  if (around->receiving_from == 0) around->receiving_from = 1 + (noise() >> 11) % robot.tick_cycles;
+  const uint64_t now = robot.debt_cycles % robot.tick_cycles + robot.tick_cycles + 1;
+  return (now - around->receiving_from) % robot.tick_cycles < around->receiving_cycles;
+}
+
+/* The converter's count for an expected value and its noise. */
+static int16_t convert(double expected, double sd) {
+  if (sd > 0) expected += sd * kt_inverse_normal(((double)(noise() >> 12) + 0.5) * 0x1p-52);
+  expected = kt_floor(expected + 0.5);
+  return (int16_t)(expected < 0 ? 0 : expected > HIGHEST_READING ? HIGHEST_READING : expected);
+}
+
+static int16_t reading(double expected, double sd, uint64_t cycles) {
+  if (is_receiving()) {
+    spend(BUSY_CYCLES);
+    return -1;
+  }
+  spend(cycles);
+  robot.trigger_lost = 0;
+  return robot.adc = convert(expected, sd);
+}
+
+int16_t get_ambientlight(void) {
+  return reading(kt_surroundings->light, kt_surroundings->light_sd, READING_CYCLES);
+}
+
+int16_t get_temperature(void) {
+  return reading(kt_surroundings->temperature, kt_surroundings->temperature_sd, TEMPERATURE_CYCLES);
+}
+
+/* As in the firmware, the converter is not put back to the next message: that message's high-gain strength is what was
+ * converted here. */
+int16_t get_voltage(void) {
+  const int16_t voltage = reading(kt_surroundings->voltage, kt_surroundings->voltage_sd, READING_CYCLES);
+  if (voltage >= 0) robot.trigger_lost = 1;
+  return voltage;
+}
+
+/* The firmware makes each bit of the lowest bits of pairs of voltage readings that differ; of independent readings that is a
+ * fair bit. A battery without noise gives readings that never differ, and all bits alike. */
+uint8_t rand_hard(void) {
+  spend(RAND_HARD_CYCLES);
+  robot.trigger_lost = 0;
+  if (!(kt_surroundings->voltage_sd > 0)) return convert(kt_surroundings->voltage, 0) & 1 ? 255 : 0;
+  return (uint8_t)(noise() >> 56);
 }
 
 static uint8_t soft_seed = 0xaa, soft_count;
@@ -181,17 +253,25 @@ uint8_t estimate_distance(const distance_measurement_t* distance) {
 
 /* The state machine. */
 
+static uint16_t high_octet_first(const uint8_t* octet) { return (uint16_t)(octet[0] << 8 | octet[1]); }
+
 void kilo_init(void) {
-  static const uint16_t high[] = KILOTWIN_IR_HIGH, low[] = KILOTWIN_IR_LOW;
-  for (int i = 0; i < KILOTWIN_IR_ENTRIES; ++i) {
-    kilo_irhigh[i] = high[i];
-    kilo_irlow[i] = low[i];
-  }
+  enum { TX_PINS = 1 << 0 | 1 << 1 | 1 << 2 | 1 << 6 | 1 << 7 };
+  const uint8_t* eeprom = kt_eeprom();
+  tx_mask = eeprom[KILOTWIN_EEPROM_TX_MASK];
+  if (tx_mask & ~TX_PINS) tx_mask = 1 << 0;
   kilo_ticks = 0;
   kilo_tx_period = 3906;
-  kilo_uid = robot.uid;
-  kilo_turn_left = kilo_turn_right = robot.turn_duty;
-  kilo_straight_left = kilo_straight_right = robot.straight_duty;
+  kilo_uid = (uint16_t)(eeprom[KILOTWIN_EEPROM_UID] | eeprom[KILOTWIN_EEPROM_UID + 1] << 8);
+  kilo_turn_left = eeprom[KILOTWIN_EEPROM_TURN_LEFT];
+  kilo_turn_right = eeprom[KILOTWIN_EEPROM_TURN_RIGHT];
+  kilo_straight_left = eeprom[KILOTWIN_EEPROM_STRAIGHT_LEFT];
+  kilo_straight_right = eeprom[KILOTWIN_EEPROM_STRAIGHT_RIGHT];
+  for (int i = 0; i < KILOTWIN_IR_ENTRIES; ++i) {
+    kilo_irlow[i] = high_octet_first(eeprom + KILOTWIN_EEPROM_IR_LOW + 2 * i);
+    kilo_irhigh[i] = high_octet_first(eeprom + KILOTWIN_EEPROM_IR_HIGH + 2 * i);
+  }
+  robot.motors_on = robot.duty_left = robot.duty_right = 0;
   robot.state = IDLE;
 }
 
@@ -207,6 +287,7 @@ static void park(void) {
 }
 
 static void follow_calibration(void) {
+  if (robot.motion == STAND) set_motors(0, 0);
   if (robot.motion == robot.motion_done) return;
   robot.motion_done = robot.motion;
   const uint8_t left = robot.motion == TURN_LEFT || robot.motion == STRAIGHT;
@@ -224,14 +305,28 @@ static void follow_calibration(void) {
 }
 
 static void sleep_and_listen(void) {
-  /* On a robot 10 ms; here what is heard in one tick is told in the one after. */
-  enum { ASLEEP_MS = 8000, LISTENING_TICKS = 2 };
+  /* On a robot 10 ms; here what is heard in one tick is told in the one after. A robot that hears something as it is about to
+   * sleep again listens on for a while. */
+  enum { ASLEEP_MS = 8000, LISTENING_TICKS = 2, LISTENING_ON_MS = 100 };
+  set_color(0);
   robot.deaf = 1;
   delay(ASLEEP_MS);
-  robot.deaf = 0;
+  robot.deaf = robot.heard = 0;
   set_color(RGB(3, 3, 3));
   for (int i = 0; i < LISTENING_TICKS; ++i) rest_of_tick();
+  if (robot.heard) {
+    set_color(RGB(3, 0, 0));
+    delay(LISTENING_ON_MS);
+  }
   set_color(0);
+}
+
+static void show_charge(void) {
+  const int16_t voltage = get_voltage();
+  set_color(voltage > 682   ? RGB(0, 3, 0)
+            : voltage > 648 ? RGB(0, 0, 3)
+            : voltage > 614 ? RGB(3, 3, 0)
+                            : RGB(3, 0, 0));
 }
 
 void kilo_start(void (*setup)(void), void (*loop)(void)) {
@@ -241,8 +336,8 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
     switch (robot.state) {
       case SLEEPING: sleep_and_listen(); break;
       case BATTERY:
-        set_color(VOLTAGE_READING > 682 ? RGB(0, 3, 0) : RGB(3, 0, 0));
-        park();
+        show_charge();
+        rest_of_tick();
         break;
       case SETUP:
         if (!has_setup) {
@@ -285,8 +380,21 @@ static void boot(void) {
 
 /* Messages of the overhead controller. */
 
-static void motors_on(void) { robot.motors_on = 1; }
-static void motors_off(void) { robot.motors_on = 0; }
+static void connect_motors(uint8_t on) {
+  robot.motors_on = on;
+  set_motors(0, 0);
+}
+static void motors_on(void) { connect_motors(1); }
+static void motors_off(void) { connect_motors(0); }
+
+static void save_calibration(void) {
+  kt_write_eeprom(KILOTWIN_EEPROM_UID, (uint8_t)kilo_uid);
+  kt_write_eeprom(KILOTWIN_EEPROM_UID + 1, (uint8_t)(kilo_uid >> 8));
+  kt_write_eeprom(KILOTWIN_EEPROM_TURN_LEFT, kilo_turn_left);
+  kt_write_eeprom(KILOTWIN_EEPROM_TURN_RIGHT, kilo_turn_right);
+  kt_write_eeprom(KILOTWIN_EEPROM_STRAIGHT_LEFT, kilo_straight_left);
+  kt_write_eeprom(KILOTWIN_EEPROM_STRAIGHT_RIGHT, kilo_straight_right);
+}
 
 static void start_motion(uint8_t motion, uint8_t changed) {
   if (robot.motion != motion || changed) {
@@ -299,6 +407,7 @@ static void calibrate(const calibmsg_t* wish) {
   switch (wish->mode) {
     case CALIB_SAVE:
       if (robot.state == MOVING) {
+        save_calibration();
         motors_off();
         robot.state = IDLE;
       }
@@ -376,7 +485,9 @@ static uint64_t interrupts(const struct KtEvents* events) {
     const struct KtReception* reception = &events->reception[i];
     __builtin_memcpy(&rx_msg, &reception->message, sizeof rx_msg);
     rx_dist.low_gain = reception->low_gain;
-    rx_dist.high_gain = reception->high_gain;
+    rx_dist.high_gain = robot.trigger_lost ? robot.adc : reception->high_gain;
+    robot.trigger_lost = 0;
+    robot.heard = 1;
     if (robot.bootloader)
       boot_loader(rx_msg.type);
     else if (rx_msg.type < BOOT)
@@ -399,7 +510,17 @@ static uint64_t transmit(struct KtMessage* out) {
 }
 
 __attribute__((visibility("default"), used)) const struct KtImage kilotwin_image = {
-    KT_IMAGE_MAGIC,        KT_IMAGE_VERSION,          (uint64_t)&kt_control, (uint64_t)&robot,
-    (uint64_t)&kilo_ticks, (uint64_t)&kilo_tx_period, (uint64_t)&boot,       (uint64_t)&kt_enter,
-    (uint64_t)&kt_call,    (uint64_t)&kt_leave,       (uint64_t)&interrupts, (uint64_t)&transmit,
+    KT_IMAGE_MAGIC,
+    KT_IMAGE_VERSION,
+    (uint64_t)&kt_control,
+    (uint64_t)&robot,
+    (uint64_t)&kilo_ticks,
+    (uint64_t)&kilo_tx_period,
+    (uint64_t)&boot,
+    (uint64_t)&kt_enter,
+    (uint64_t)&kt_call,
+    (uint64_t)&kt_leave,
+    (uint64_t)&interrupts,
+    (uint64_t)&transmit,
+    (uint64_t)&kt_surroundings,
 };

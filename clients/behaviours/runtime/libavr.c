@@ -18,20 +18,26 @@ volatile uint16_t EEAR, SP, TCNT1, ICR1, OCR1A, OCR1B, UBRR0;
 
 enum { EEPROM_OCTETS = E2END + 1 };
 
-static uint8_t eeprom[EEPROM_OCTETS] = {[0 ... E2END] = 0xff};
+uint8_t* kt_eeprom(void);
+void kt_write_eeprom(uint16_t address, uint8_t value);
 
-/* No variable of a program lies at such a low address. */
-static uint8_t* cell(const void* address) {
-  const uintptr_t number = (uintptr_t)address;
-  return number < EEPROM_OCTETS ? eeprom + number : (uint8_t*)number;
-}
-
+/* Addresses are numbers up to E2END, or those of EEMEM variables: no variable of a program lies at such a low address. */
 void eeprom_read_block(void* to, const void* address, size_t size) {
-  for (size_t i = 0; i < size; ++i) ((uint8_t*)to)[i] = *cell((const uint8_t*)address + i);
+  const uint8_t* from = address;
+  for (size_t i = 0; i < size; ++i, ++from) {
+    ((uint8_t*)to)[i] = (uintptr_t)from < EEPROM_OCTETS ? kt_eeprom()[(uintptr_t)from] : *from;
+  }
 }
 
 void eeprom_write_block(const void* from, void* address, size_t size) {
-  for (size_t i = 0; i < size; ++i) *cell((uint8_t*)address + i) = ((const uint8_t*)from)[i];
+  uint8_t* to = address;
+  for (size_t i = 0; i < size; ++i, ++to) {
+    const uint8_t value = ((const uint8_t*)from)[i];
+    if ((uintptr_t)to < EEPROM_OCTETS)
+      kt_write_eeprom((uint16_t)(uintptr_t)to, value);
+    else
+      *to = value;
+  }
 }
 
 #define ACCESS(name, type)                            \

@@ -163,7 +163,7 @@ const Odd kPrograms[] = {
      "const uint8_t primes[] PROGMEM = {2, 3, 5}; uint16_t EEMEM stored; uint8_t block[4], erased;\n"
      "void setup(void) { wdt_disable(); UBRR0H = UBRRH_VALUE; UBRR0L = UBRRL_VALUE; while (!(UCSR0A & "
      "_BV(UDRE0))); UDR0 = 'x';\n"
-     "  erased = eeprom_read_byte((uint8_t *)0xB0); eeprom_update_word(&stored, kilo_uid + 1); "
+     "  erased = eeprom_read_byte((uint8_t *)0xC0); eeprom_update_word(&stored, kilo_uid + 1); "
      "eeprom_write_dword((uint32_t *)1020, 0x04030201); DDRB |= _BV(5); }\n"
      "void loop(void) { cli(); PORTB ^= 1 << 5; sei(); wdt_reset(); eeprom_read_block(block, (void *)1020, 4);\n"
      "  set_color(erased == 0xff && eeprom_read_word(&stored) == kilo_uid + 1 && block[3] == 4 && "

@@ -1,12 +1,12 @@
-/* 1 KiB of EEPROM per robot, erased (all ones) at the start. Addresses are numbers from 0 on, or those of EEMEM variables.
- * Unlike on a robot, the content does not outlive a RESET of the overhead controller. */
+/* 1 KiB of EEPROM per robot, with kilolib's calibration in it (core/base/eeprom_layout.h) and erased elsewhere. Addresses are
+ * numbers from 0 on, or those of EEMEM variables, which lie in memory of their own. What is written outlives a RESET. */
 #ifndef KILOTWIN_AVR_EEPROM_H
 #define KILOTWIN_AVR_EEPROM_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-#define EEMEM
+#define EEMEM __attribute__((section("kilotwin_eeprom")))
 #define E2END 0x3FF
 #define eeprom_is_ready() 1
 #define eeprom_busy_wait() ((void)0)
