@@ -192,6 +192,11 @@ class Launcher {
       say(fmt::format("kilotwin: interrupted; what was recorded so far is in {}", directory_.path().string()));
       return 1;
     }
+    // Bad input is bad input whoever of several finds it first, and whoever leaves first because of it.
+    const auto refused = [](const Child& child) {
+      return WIFEXITED(child.status) && WEXITSTATUS(child.status) == 2;
+    };
+    if (culprit_ != nullptr && std::any_of(children_.begin(), children_.end(), refused)) return 2;
     return status_;
   }
 
