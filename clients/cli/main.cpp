@@ -105,13 +105,15 @@ int build_command(const BuildArguments& arguments) {
 }
 
 struct ExportArguments {
-  std::filesystem::path run, trajectories, messages;
+  std::filesystem::path run, trajectories, bodies, messages;
   double every_s = 1;
 };
 
 int export_command(const ExportArguments& arguments) {
-  if (arguments.trajectories.empty() && arguments.messages.empty()) {
-    throw UserError("export: nothing to export; give --trajectories FILE.csv, --messages FILE.csv or both");
+  if (arguments.trajectories.empty() && arguments.bodies.empty() && arguments.messages.empty()) {
+    throw UserError(
+        "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv or "
+        "several");
   }
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kRecording);
   const auto each = [&](const std::filesystem::path& csv, auto&& write) {
@@ -123,6 +125,9 @@ int export_command(const ExportArguments& arguments) {
   };
   each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) {
     return recorder::export_trajectories(reader, csv, arguments.every_s);
+  });
+  each(arguments.bodies, [&](recorder::Reader& reader, const auto& csv) {
+    return recorder::export_bodies(reader, csv, arguments.every_s);
   });
   each(arguments.messages,
        [&](recorder::Reader& reader, const auto& csv) { return recorder::export_messages(reader, csv); });
@@ -187,6 +192,7 @@ int main_of(int argc, char** argv) {
   CLI::App& export_app = *app.add_subcommand("export", "CSV files from a recorded run");
   export_app.add_option("run", exported.run, "run directory or recording")->required();
   export_app.add_option("--trajectories", exported.trajectories, "time_s,robot,x_mm,y_mm,heading_rad,led");
+  export_app.add_option("--bodies", exported.bodies, "movable bodies: time_s,body,x_mm,y_mm,heading_rad");
   export_app.add_option("--messages", exported.messages, "receiver,sender,count");
   export_app.add_option("--every", exported.every_s, "between rows of a robot, s")->capture_default_str();
 

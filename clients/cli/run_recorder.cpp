@@ -25,7 +25,10 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       y_mm_(plan.robots()),
       heading_rad_(plan.robots()),
       led_(plan.robots()),
-      life_cycle_(plan.robots()) {}
+      life_cycle_(plan.robots()),
+      movable_x_mm_(plan.movables()),
+      movable_y_mm_(plan.movables()),
+      movable_heading_rad_(plan.movables()) {}
 
 void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
                         std::span<const ActuationFrame* const> actuation, bool last) {
@@ -40,12 +43,19 @@ void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
       y_mm_[robot] = frame->y_mm[i];
       heading_rad_[robot] = frame->heading_rad[i];
     }
+    const MovableColumns& movable = frame->movable;
+    for (std::size_t i = 0; i < movable.body.size(); ++i) {
+      movable_x_mm_[movable.body[i]] = movable.x_mm[i];
+      movable_y_mm_[movable.body[i]] = movable.y_mm[i];
+      movable_heading_rad_[movable.body[i]] = movable.heading_rad[i];
+    }
   }
   for (const ActuationFrame* frame : actuation) {
     std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
     std::copy(frame->life_cycle.begin(), frame->life_cycle.end(), life_cycle_.begin() + frame->first_robot);
   }
-  writer_.state({tick, x_mm_, y_mm_, heading_rad_, led_, life_cycle_});
+  writer_.state(
+      {tick, x_mm_, y_mm_, heading_rad_, led_, life_cycle_, movable_x_mm_, movable_y_mm_, movable_heading_rad_});
   displacement_.add(x_mm_, y_mm_);
 }
 

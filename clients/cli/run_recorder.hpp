@@ -41,6 +41,7 @@ class RunRecorder : public RunObserver {
   std::function<void(const RunProgress&)> on_idle_;
   std::vector<double> x_mm_, y_mm_, heading_rad_;
   std::vector<std::uint8_t> led_, life_cycle_;
+  std::vector<double> movable_x_mm_, movable_y_mm_, movable_heading_rad_;
   Tick next_{0};
   bool any_state_ = false;
   std::chrono::steady_clock::time_point first_tick_at_{};

@@ -69,7 +69,7 @@ void check_interval(const Reader& recording, const RecordingSchedule& wanted, do
   }
 }
 
-void append_rows(std::string& text, const proto::StateRecord& state, const std::string& time) {
+std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, const std::string& time) {
   constexpr std::size_t kLongestNumbers = 80;
   const auto robots = static_cast<std::size_t>(state.x_mm_size());
   const std::size_t start = text.size();
@@ -92,30 +92,57 @@ void append_rows(std::string& text, const proto::StateRecord& state, const std::
     *to++ = '\n';
   }
   text.resize(static_cast<std::size_t>(to - text.data()));
+  return robots;
 }
 
-}  // namespace
+std::uint64_t append_body_rows(std::string& text, const proto::StateRecord& state, const std::string& time) {
+  for (int i = 0; i < state.movable_x_mm_size(); ++i) {
+    char number[80];
+    char* to = put_fixed<4>(number, state.movable_x_mm(i));
+    *to++ = ',';
+    to = put_fixed<4>(to, state.movable_y_mm(i));
+    *to++ = ',';
+    to = put_fixed<6>(to, state.movable_heading_rad(i));
+    text += fmt::format("{},{},{}\n", time, i, std::string_view(number, static_cast<std::size_t>(to - number)));
+  }
+  return static_cast<std::uint64_t>(state.movable_x_mm_size());
+}
 
-std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s) {
+/// Rows of the states that are wanted; `append` adds those of one state and says how many.
+template <class Append>
+std::uint64_t export_states(Reader& recording, const std::filesystem::path& csv, double every_s,
+                            const char* columns, Append append) {
   if (!(every_s >= 1e-3 && every_s <= 1e9)) {
     throw UserError(fmt::format("--every {}: out of range; expected 0.001 to 1e9 seconds", every_s));
   }
   const RecordingSchedule wanted(recording.tick_length(), every_s);
   check_interval(recording, wanted, every_s);
   OutputFile output(csv, OutputFile::Existing::kReplace);
-  output.buffer() = "time_s,robot,x_mm,y_mm,heading_rad,led\n";
+  output.buffer() = columns;
   Tick next = wanted.at_or_after(Tick{recording.header().first_tick()});
   std::uint64_t rows = 0;
   while (const proto::StateRecord* state = recording.next_state()) {
     const Tick tick{state->tick()};
     if (tick < next) continue;
-    append_rows(output.buffer(), *state, exact_seconds(tick, recording.tick_length()));
+    rows += append(output.buffer(), *state, exact_seconds(tick, recording.tick_length()));
     output.flush_if_above(kWriteAbove_bytes);
-    rows += recording.header().robots();
     next = wanted.at_or_after(tick + 1);
   }
   output.close();
   return rows;
+}
+
+}  // namespace
+
+std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s) {
+  return export_states(recording, csv, every_s, "time_s,robot,x_mm,y_mm,heading_rad,led\n", append_rows);
+}
+
+std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& csv, double every_s) {
+  if (recording.header().movable_size() == 0) {
+    throw UserError(fmt::format("{}: no movable bodies; the experiment names none", recording.path().string()));
+  }
+  return export_states(recording, csv, every_s, "time_s,body,x_mm,y_mm,heading_rad\n", append_body_rows);
 }
 
 std::uint64_t export_messages(Reader& recording, const std::filesystem::path& csv) {

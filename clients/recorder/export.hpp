@@ -15,6 +15,10 @@ namespace kilotwin::recorder {
 /// i.e. every_s is no multiple of the recorded interval, and RunError where the file cannot be written.
 std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s = 1);
 
+/// time_s,body,x_mm,y_mm,heading_rad: the same of movable bodies; x, y is a body's centre. Throws UserError where the
+/// experiment has none.
+std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& csv, double every_s = 1);
+
 /// receiver,sender,count: how often each pair communicated, by receiver and then by sender; a robot's row with
 /// itself is what it sent with success. Returns the number of rows. Throws UserError where no messages were
 /// recorded.

@@ -14,6 +14,9 @@ void take(Snapshot& snapshot, const proto::StateRecord& state, TickLength length
   snapshot.heading_rad.assign(state.heading_rad().begin(), state.heading_rad().end());
   snapshot.led.assign(state.led().begin(), state.led().end());
   snapshot.life_cycle.assign(state.life_cycle().begin(), state.life_cycle().end());
+  snapshot.movable_x_mm.assign(state.movable_x_mm().begin(), state.movable_x_mm().end());
+  snapshot.movable_y_mm.assign(state.movable_y_mm().begin(), state.movable_y_mm().end());
+  snapshot.movable_heading_rad.assign(state.movable_heading_rad().begin(), state.movable_heading_rad().end());
 }
 
 double distance_from_segment_mm(Point p, Point a, Point b) {

@@ -15,6 +15,7 @@ struct Snapshot {
   double time_s = 0;
   std::vector<double> x_mm, y_mm, heading_rad;
   std::vector<std::uint8_t> led, life_cycle;
+  std::vector<double> movable_x_mm, movable_y_mm, movable_heading_rad;
 };
 
 struct Point {

@@ -18,6 +18,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
+#include "core/experiment/world.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -164,8 +165,47 @@ std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
   return out + "</g>\n";
 }
 
+std::string outline(const View& view, const std::vector<Point2>& corners) {
+  std::string d;
+  for (const Point2 corner : corners)
+    put(d, "{}{} {}", d.empty() ? 'M' : 'L', view.x(corner.x_mm), view.y(corner.y_mm));
+  return d + "Z";
+}
+
+std::string draw_shape(const View& view, const Convex& shape, const Place& place, std::string_view style) {
+  if (shape.is_disc()) {
+    return fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"{:.1f}\" {}/>\n", view.x(place.x_mm), view.y(place.y_mm),
+                       view.length(shape.radius_mm()), style);
+  }
+  std::vector<Point2> corners;
+  for (const Point2 corner : shape.corners()) corners.push_back(place.to_arena(corner));
+  return fmt::format("<path d=\"{}\" {}/>\n", outline(view, corners), style);
+}
+
+/// Obstacles, and the movable bodies where they are in this state.
+std::string draw_bodies(const World& world, const Snapshot& at, const View& view) {
+  std::string out;
+  for (const ObstacleBody& body : world.obstacles)
+    out += draw_shape(view, body.shape, body.place, "fill=\"#8b95a1\" stroke=\"#2b3440\" stroke-width=\"10\"");
+  for (std::size_t i = 0; i < world.movables.size(); ++i) {
+    const Place place = Place::at(at.movable_x_mm[i], at.movable_y_mm[i], at.movable_heading_rad[i]);
+    out +=
+        draw_shape(view, world.movables[i].shape, place, "fill=\"#e9d8b4\" stroke=\"#8a6d3b\" stroke-width=\"14\"");
+  }
+  return out;
+}
+
+/// Walls that are no rectangle, on a ground that tells inside from outside.
+std::string draw_walls(const View& view, const ArenaShape& arena) {
+  const std::string style = fmt::format("fill=\"#fbfcfd\" stroke=\"{}\" stroke-width=\"16\"", svg::kInk);
+  if (arena.kind() == ArenaShape::Kind::kCircle)
+    return draw_shape(view, Convex::disc(arena.radius_mm()), {}, style);
+  return fmt::format("<path d=\"{}\" {}/>\n", outline(view, arena.corners()), style);
+}
+
 /// The arena's walls as far as the view shows them, on a ground that tells inside from outside.
-std::string draw_arena(const View& view, double width_mm, double height_mm) {
+std::string draw_arena(const View& view, const World& world, double width_mm, double height_mm) {
+  if (world.arena.kind() != ArenaShape::Kind::kRectangle) return draw_walls(view, world.arena);
   const auto clipped = [](long value, double px) {
     return std::clamp(value, -100L, static_cast<long>(kUnitsPerPx * px) + 100L);
   };
@@ -290,9 +330,29 @@ std::string picture_svg(Reader& recording) {
   }
   const proto::RecordingHeader& header = recording.header();
   const double arena_width = header.arena_width_mm(), arena_height = header.arena_height_mm();
+  proto::Experiment stated;
+  *stated.mutable_arena() = header.arena();
+  *stated.mutable_obstacle() = header.obstacle();
+  *stated.mutable_movable() = header.movable();
+  const World world(stated);
+  const auto ground = [&](const View& of, const Snapshot& at) {
+    return draw_arena(of, world, arena_width, arena_height) + draw_bodies(world, at, of);
+  };
   Box everything;
   for (std::size_t i = 0; i < paths.robots(); ++i) {
     for (const Point& p : paths.path(i)) everything.add(p.x_mm, p.y_mm);
+  }
+  Box movables;
+  for (const Snapshot* at : {&paths.first(), &paths.last()}) {
+    for (std::size_t i = 0; i < world.movables.size(); ++i) {
+      const double reach_mm = world.movables[i].shape.reach_mm();
+      for (const double way_mm : {-reach_mm, reach_mm})
+        movables.add(at->movable_x_mm[i] + way_mm, at->movable_y_mm[i] + way_mm);
+    }
+  }
+  if (!world.movables.empty()) {
+    everything.add(movables.x_min_mm, movables.y_min_mm);
+    everything.add(movables.x_max_mm, movables.y_max_mm);
   }
   const Box arena = Box{-arena_width / 2, -arena_height / 2, arena_width / 2, arena_height / 2};
   const Box whole = arena.widened(0.01 * std::max(arena_width, arena_height));
@@ -312,22 +372,24 @@ std::string picture_svg(Reader& recording) {
   const std::string from = time_text(paths.first().time_s), to = time_text(paths.last().time_s);
 
   const Panel start_panel{
-      "Start", from, draw_arena(start_view, arena_width, arena_height) + draw_discs(paths.first(), start_view),
+      "Start", from, ground(start_view, paths.first()) + draw_discs(paths.first(), start_view),
       enlarged > 1.05 ? fmt::format("enlarged {:.1f} times, see dashed frame", enlarged) : part};
   const Panel paths_panel{"Paths", fmt::format("{} to {}", from, to),
-                          draw_arena(view, arena_width, arena_height) + draw_paths(paths, view, start) +
+                          ground(view, paths.last()) + draw_paths(paths, view, start) +
                               (enlarged > 1.05 ? draw_frame(view, shown_at_start) : ""),
                           part};
-  const Panel end_panel{"End", to, draw_arena(view, arena_width, arena_height) + draw_discs(paths.last(), view),
+  const Panel end_panel{"End", to, ground(view, paths.last()) + draw_discs(paths.last(), view),
                         large_discs ? "discs larger than life" : part};
 
   const double panel_height = kPanelTitle_px + height_px + kPanelFoot_px;
   const double step_x = stacked ? 0 : width_px + kGap_px, step_y = stacked ? panel_height : 0;
   const double top = kMargin_px + kTitle_px, foot = kPanelTitle_px + height_px + 38;
   const std::string name = svg::shortened(header.name().empty() ? "Kilotwin run" : header.name(), 60);
-  const std::string facts =
-      fmt::format("{} robot{} \u00b7 seed {} \u00b7 {} simulated \u00b7 arena {:g} mm \u00d7 {:g} mm",
-                  header.robots(), header.robots() == 1 ? "" : "s", header.seed(), to, arena_width, arena_height);
+  const std::string facts = fmt::format("{} robot{} \u00b7 seed {} \u00b7 {} simulated \u00b7 arena {}",
+                                        header.robots(), header.robots() == 1 ? "" : "s", header.seed(), to,
+                                        world.arena.kind() == ArenaShape::Kind::kRectangle
+                                            ? fmt::format("{:g} mm \u00d7 {:g} mm", arena_width, arena_height)
+                                            : world.arena.described());
   std::string body = svg::text(kMargin_px, kMargin_px + 16, 22, name, svg::kInk, svg::Anchor::kStart, true);
   body += svg::text(kMargin_px, kMargin_px + 38, 14, facts, svg::kFaint);
   double x = kMargin_px, y = top;

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <stdexcept>
 #include <utility>
 
 #include "clients/recorder/file.hpp"
@@ -35,11 +36,25 @@ bool all_within(const google::protobuf::RepeatedField<double>& values, double bo
 
 bool valid_tick(std::int64_t tick) { return tick >= 0 && tick <= kLastTick; }
 
+/// Whether walls and bodies are such as can be drawn.
+bool valid_world(const proto::RecordingHeader& header) {
+  proto::Experiment experiment;
+  *experiment.mutable_arena() = header.arena();
+  *experiment.mutable_obstacle() = header.obstacle();
+  *experiment.mutable_movable() = header.movable();
+  try {
+    static_cast<void>(World(experiment));
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
+  return true;
+}
+
 /// Whether the fields have the ranges of idl/experiment.proto.
 bool valid(const proto::RecordingHeader& header) {
   return in_range(header.tick_cycles(), 1 << 15, 1 << 20) && in_range(header.robots(), 1, kMostRobots) &&
          in_range(header.every_s(), 1e-3, 1e9) && in_range(header.arena_width_mm(), 1, 1e6) &&
-         in_range(header.arena_height_mm(), 1, 1e6) && valid_tick(header.first_tick());
+         in_range(header.arena_height_mm(), 1, 1e6) && valid_tick(header.first_tick()) && valid_world(header);
 }
 
 }  // namespace
@@ -159,9 +174,15 @@ const char* Reader::defect_of_record() const {
           state.led().size() != header_.robots() || state.life_cycle().size() != header_.robots()) {
         return "a state of another number of robots";
       }
+      const int movables = header_.movable_size();
+      if (state.movable_x_mm_size() != movables || state.movable_y_mm_size() != movables ||
+          state.movable_heading_rad_size() != movables) {
+        return "a state of another number of movable bodies";
+      }
       if (!valid_tick(state.tick()) || state.tick() <= last_state_) return "a state out of order";
       if (!all_within(state.x_mm(), kFarthest_mm) || !all_within(state.y_mm(), kFarthest_mm) ||
-          !all_within(state.heading_rad(), 2 * kPi)) {
+          !all_within(state.heading_rad(), 2 * kPi) || !all_within(state.movable_x_mm(), kFarthest_mm) ||
+          !all_within(state.movable_y_mm(), kFarthest_mm) || !all_within(state.movable_heading_rad(), 2 * kPi)) {
         return "a state with a pose that is none";
       }
       return nullptr;

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/base/time.hpp"
+#include "core/experiment/world.hpp"
 #include "idl/manifest.pb.h"
 #include "idl/recording.pb.h"
 
@@ -30,8 +31,12 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   header.set_tick_cycles(experiment.tick_cycles());
   header.set_robots(static_cast<std::uint32_t>(manifest.x_mm_size()));
   header.set_every_s(experiment.recording().every_s());
-  header.set_arena_width_mm(experiment.arena().width_mm());
-  header.set_arena_height_mm(experiment.arena().height_mm());
+  const ArenaShape arena(experiment.arena());
+  header.set_arena_width_mm(2 * arena.half_width_mm());
+  header.set_arena_height_mm(2 * arena.half_height_mm());
+  if (arena.kind() != ArenaShape::Kind::kRectangle) *header.mutable_arena() = experiment.arena();
+  *header.mutable_obstacle() = experiment.obstacle();
+  *header.mutable_movable() = experiment.movable();
   header.set_messages(experiment.recording().messages());
   header.set_first_tick(first_tick.count());
   header.set_first_hash(first_hash);

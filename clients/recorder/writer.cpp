@@ -42,6 +42,7 @@ void assign(std::string* field, std::span<const std::uint8_t> values) {
 Writer::Writer(std::filesystem::path file, const proto::RecordingHeader& header)
     : output_(std::move(file), OutputFile::Existing::kRefuse),
       robots_(header.robots()),
+      movables_(static_cast<std::size_t>(header.movable_size())),
       last_state_(header.first_tick() - 1),
       last_hash_(header.first_tick() - 1) {
   *other_.mutable_header() = header;
@@ -73,7 +74,8 @@ void Writer::state(const StateView& state) {
   if (state.tick.count() <= last_state_) return;
   KILOTWIN_DEMAND(state.x_mm.size() == robots_ && state.y_mm.size() == robots_ &&
                   state.heading_rad.size() == robots_ && state.led.size() == robots_ &&
-                  state.life_cycle.size() == robots_);
+                  state.life_cycle.size() == robots_ && state.movable_x_mm.size() == movables_ &&
+                  state.movable_y_mm.size() == movables_ && state.movable_heading_rad.size() == movables_);
   last_state_ = state.tick.count();
   proto::StateRecord& record = *state_.mutable_state();
   record.set_tick(state.tick.count());
@@ -82,6 +84,9 @@ void Writer::state(const StateView& state) {
   assign(record.mutable_heading_rad(), state.heading_rad);
   assign(record.mutable_led(), state.led);
   assign(record.mutable_life_cycle(), state.life_cycle);
+  assign(record.mutable_movable_x_mm(), state.movable_x_mm);
+  assign(record.mutable_movable_y_mm(), state.movable_y_mm);
+  assign(record.mutable_movable_heading_rad(), state.movable_heading_rad);
   append(state_);
   flush_if_due();
 }

@@ -19,8 +19,9 @@ namespace kilotwin::recorder {
 struct StateView {
   Tick tick;
   std::span<const double> x_mm, y_mm, heading_rad;
-  std::span<const std::uint8_t> led;         ///< r | g << 2 | b << 4
-  std::span<const std::uint8_t> life_cycle;  ///< LifeCycle
+  std::span<const std::uint8_t> led;                                              ///< r | g << 2 | b << 4
+  std::span<const std::uint8_t> life_cycle;                                       ///< LifeCycle
+  std::span<const double> movable_x_mm{}, movable_y_mm{}, movable_heading_rad{};  ///< per movable body, from 0
 };
 
 /// Every function throws RunError where the file cannot be written, e.g. on a full disk: "FILE: cannot be written:
@@ -54,6 +55,7 @@ class Writer {
 
   OutputFile output_;
   const std::uint32_t robots_;
+  const std::size_t movables_;
   std::int64_t last_state_, last_hash_;
   std::int64_t flushed_ns_ = 0;
   std::uint64_t bytes_ = 0;

@@ -11,6 +11,7 @@
 #include "core/experiment/occupancy.hpp"
 #include "core/experiment/poses_csv.hpp"
 #include "core/experiment/validate.hpp"
+#include "core/experiment/world.hpp"
 #include "core/math/elementary.h"
 #include "core/random/random.hpp"
 
@@ -40,7 +41,12 @@ struct Group {
 class Placement {
  public:
   explicit Placement(const LoadedExperiment& loaded)
-      : loaded_(loaded), experiment_(loaded.experiment), random_(experiment_.seed()) {}
+      : loaded_(loaded), experiment_(loaded.experiment), random_(experiment_.seed()), world_(experiment_) {
+    for (const MovableBodyModel& body : world_.movables) {
+      movable_places_.push_back(
+          Place::at(body.pose.position_mm.x(), body.pose.position_mm.y(), body.pose.heading_rad));
+    }
+  }
   PlacedRobots place();
 
  private:
@@ -49,7 +55,10 @@ class Placement {
   void place_rings(const Group& group);
   void place_poses(const Group& group);
   void place_random(const Group& group);
+  void check_movables() const;
   void check_placed(Occupancy& occupancy, const Group& group) const;
+  /// The path of an obstacle or movable body that a disc around the point reaches into by more than rounding, or nothing.
+  [[nodiscard]] std::string body_within(double x_mm, double y_mm, double radius_mm) const;
   void set_heading(std::uint32_t robot, const proto::Layout& layout, proto::Heading heading, double heading_deg);
   void set_position(std::uint32_t robot, double x_mm, double y_mm) {
     placed_.x_mm[robot] = x_mm;
@@ -64,6 +73,8 @@ class Placement {
   const LoadedExperiment& loaded_;
   const proto::Experiment& experiment_;
   const Random random_;
+  const World world_;
+  std::vector<Place> movable_places_;
   std::vector<Group> groups_;
   PlacedRobots placed_;
 };
@@ -172,7 +183,7 @@ void Placement::place_random(const Group& group) {
     return Span{std::max(middle_mm - extent_mm / 2, -arena_mm / 2) + kRobotRadius_mm,
                 std::min(middle_mm + extent_mm / 2, arena_mm / 2) - kRobotRadius_mm};
   };
-  const double width_mm = experiment_.arena().width_mm(), height_mm = experiment_.arena().height_mm();
+  const double width_mm = 2 * world_.arena.half_width_mm(), height_mm = 2 * world_.arena.half_height_mm();
   const Span x = span(layout.x_mm(), spec.has_width_mm() ? spec.width_mm() : width_mm, width_mm);
   const Span y = span(layout.y_mm(), spec.has_height_mm() ? spec.height_mm() : height_mm, height_mm);
   if (x.min_mm > x.max_mm || y.min_mm > y.max_mm) {
@@ -180,6 +191,11 @@ void Placement::place_random(const Group& group) {
   }
 
   const double distance_mm = kDiameter_mm + spec.min_gap_mm();
+  const bool walls_are_straight = world_.arena.kind() == ArenaShape::Kind::kRectangle;
+  const auto blocked = [&](double x_mm, double y_mm) {
+    return (!walls_are_straight && world_.arena.clearance_mm({x_mm, y_mm}) < kRobotRadius_mm) ||
+           !body_within(x_mm, y_mm, kRobotRadius_mm + spec.min_gap_mm()).empty();
+  };
   Occupancy occupancy{distance_mm, placed_.x_mm, placed_.y_mm};
   for (const Group& other : groups_) {
     if (other.spec->layout().has_random() && other.first >= group.first) continue;
@@ -199,21 +215,69 @@ void Placement::place_random(const Group& group) {
       const double v = random_.uniform(Stream::kLayout, robot, Tick{0}, 2 * dart + 1);
       set_position(robot, x.min_mm + u * (x.max_mm - x.min_mm), y.min_mm + v * (y.max_mm - y.min_mm));
       ++dart;
-    } while (occupancy.first_within(placed_.x_mm[robot], placed_.y_mm[robot], distance_mm));
+    } while (occupancy.first_within(placed_.x_mm[robot], placed_.y_mm[robot], distance_mm) ||
+             blocked(placed_.x_mm[robot], placed_.y_mm[robot]));
     occupancy.add(robot);
     set_heading(robot, layout, spec.heading(), spec.heading_deg());
   }
 }
 
+std::string Placement::body_within(double x_mm, double y_mm, double radius_mm) const {
+  const auto reaches = [&](const Convex& shape, const Place& place) {
+    const double dx_mm = place.x_mm - x_mm, dy_mm = place.y_mm - y_mm, far_mm = shape.reach_mm() + radius_mm;
+    return dx_mm * dx_mm + dy_mm * dy_mm < far_mm * far_mm &&
+           shape.nearest(place, {x_mm, y_mm}).distance_mm < radius_mm - kTouchTolerance_mm;
+  };
+  for (std::size_t i = 0; i < world_.obstacles.size(); ++i) {
+    if (reaches(world_.obstacles[i].shape, world_.obstacles[i].place)) return fmt::format("obstacle[{}]", i);
+  }
+  for (std::size_t i = 0; i < world_.movables.size(); ++i) {
+    if (reaches(world_.movables[i].shape, movable_places_[i])) return fmt::format("movable[{}]", i);
+  }
+  return {};
+}
+
+void Placement::check_movables() const {
+  for (std::size_t i = 0; i < world_.movables.size(); ++i) {
+    const std::string path = fmt::format("movable[{}]", i);
+    const Convex& shape = world_.movables[i].shape;
+    if (world_.arena.clearance_mm(shape, movable_places_[i]) < -kTouchTolerance_mm) {
+      throw loaded_.locations.error(path, fmt::format("{} reaches out of the arena; move it inwards", path));
+    }
+    const auto refuse_overlap = [&](const std::string& other, const Convex& its, const Place& place) {
+      const double far_mm = shape.reach_mm() + its.reach_mm();
+      const double dx_mm = place.x_mm - movable_places_[i].x_mm, dy_mm = place.y_mm - movable_places_[i].y_mm;
+      if (dx_mm * dx_mm + dy_mm * dy_mm > far_mm * far_mm) return;
+      if (separation_mm(shape, movable_places_[i], its, place) >= -kTouchTolerance_mm) return;
+      throw loaded_.locations.error(path, fmt::format("{} overlaps {}; move them apart", path, other));
+    };
+    for (std::size_t k = 0; k < world_.obstacles.size(); ++k)
+      refuse_overlap(fmt::format("obstacle[{}]", k), world_.obstacles[k].shape, world_.obstacles[k].place);
+    for (std::size_t k = 0; k < i; ++k)
+      refuse_overlap(fmt::format("movable[{}]", k), world_.movables[k].shape, movable_places_[k]);
+  }
+}
+
 void Placement::check_placed(Occupancy& occupancy, const Group& group) const {
-  const double x_max_mm = experiment_.arena().width_mm() / 2 - kRobotRadius_mm;
-  const double y_max_mm = experiment_.arena().height_mm() / 2 - kRobotRadius_mm;
+  const bool walls_are_straight = world_.arena.kind() == ArenaShape::Kind::kRectangle;
+  const double x_max_mm = world_.arena.half_width_mm() - kRobotRadius_mm;
+  const double y_max_mm = world_.arena.half_height_mm() - kRobotRadius_mm;
   for (std::uint32_t robot = group.first; robot < group.first + group.count; ++robot) {
     const double x_mm = placed_.x_mm[robot], y_mm = placed_.y_mm[robot];
     if (beyond(x_mm, x_max_mm) || beyond(y_mm, y_max_mm)) {
       throw error_at(group, robot,
                      fmt::format("{} reaches out of the arena; centres take x within +-{} mm and y within +-{} mm",
                                  described(robot), number_text(x_max_mm), number_text(y_max_mm)));
+    }
+    if (!walls_are_straight && world_.arena.clearance_mm({x_mm, y_mm}) < kRobotRadius_mm - kTouchTolerance_mm) {
+      throw error_at(group, robot,
+                     fmt::format("{} reaches out of the arena, a {}; keep centres {} mm from its wall",
+                                 described(robot), world_.arena.described(), number_text(kRobotRadius_mm)));
+    }
+    if (const std::string body = body_within(x_mm, y_mm, kRobotRadius_mm); !body.empty()) {
+      throw error_at(group, robot,
+                     fmt::format("{} overlaps {}; keep its centre {} mm from it", described(robot), body,
+                                 number_text(kRobotRadius_mm)));
     }
     if (const auto other = occupancy.first_within(x_mm, y_mm, kDiameter_mm - kTouchTolerance_mm)) {
       throw error_at(group, robot,
@@ -225,6 +289,7 @@ void Placement::check_placed(Occupancy& occupancy, const Group& group) const {
 }
 
 PlacedRobots Placement::place() {
+  check_movables();
   measure();
   Occupancy occupancy{kDiameter_mm, placed_.x_mm, placed_.y_mm};
   for (const Group& group : groups_) {

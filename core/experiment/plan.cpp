@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
@@ -53,6 +54,15 @@ proto::Manifest checked(proto::Manifest manifest) {
         "an index into program");
   }
   return manifest;
+}
+
+World world_of(const proto::Experiment& experiment) {
+  try {
+    return World(experiment);
+  } catch (const std::invalid_argument& error) {
+    throw UserError(std::string("manifest: a shape of the experiment is wrong: ") + error.what() +
+                    "; prepare the run again");
+  }
 }
 
 /// Of all fields but `mode`: a local and a federated run of the same experiment are the same run.
@@ -141,13 +151,15 @@ RunPlan::RunPlan(proto::Manifest given)
     : manifest(checked(std::move(given))),
       tick_length(experiment().tick_cycles()),
       last_tick(tick_length.at_or_after(experiment().duration_s())),
-      grid(experiment().arena().width_mm(), experiment().arena().height_mm(),
+      world(world_of(experiment())),
+      grid(2 * world.arena.half_width_mm(), 2 * world.arena.half_height_mm(),
            experiment().deployment().partition_columns(), experiment().deployment().partition_rows()),
       hosts(experiment().deployment().hosts()),
       hash(hash_of(manifest)) {
   program_of_.reserve(robots());
   for (int group = 0; group < experiment().robots_size(); ++group) {
     program_of_.insert(program_of_.end(), experiment().robots(group).count(), manifest.group_program(group));
+    immobile_.insert(immobile_.end(), experiment().robots(group).count(), experiment().robots(group).immobile());
   }
 }
 

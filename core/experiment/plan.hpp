@@ -10,6 +10,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/time.hpp"
+#include "core/experiment/world.hpp"
 #include "idl/manifest.pb.h"
 
 namespace kilotwin {
@@ -63,6 +64,7 @@ class RunPlan {
   const proto::Manifest manifest;
   const TickLength tick_length;
   const Tick last_tick;  ///< where the run ends
+  const World world;     ///< walls, obstacles, movable bodies
   const PartitionGrid grid;
   const std::uint32_t hosts;
   const std::uint64_t hash;  ///< of what determines results and topology; alike in all federates of a run
@@ -79,6 +81,10 @@ class RunPlan {
   /// Index of the robot's program in manifest.program, or kNoProgram where its group is tracked.
   [[nodiscard]] std::uint32_t program_of(std::uint32_t robot) const { return program_of_[robot]; }
   [[nodiscard]] bool tracked(std::uint32_t robot) const { return program_of_[robot] == kNoProgram; }
+  /// Whether the robot is a beacon: motors have no effect on it, and nothing moves it.
+  [[nodiscard]] bool immobile(std::uint32_t robot) const { return immobile_[robot] != 0; }
+  /// Bodies that robots can push, numbered from 0: world.movables.
+  [[nodiscard]] std::uint32_t movables() const { return static_cast<std::uint32_t>(world.movables.size()); }
   /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;
@@ -102,6 +108,7 @@ class RunPlan {
   }
 
   std::vector<std::uint32_t> program_of_;
+  std::vector<std::uint8_t> immobile_;
 };
 
 }  // namespace kilotwin

@@ -5,11 +5,13 @@
 #include <google/protobuf/message.h>
 
 #include <numeric>
+#include <stdexcept>
 
 #include "core/base/time.hpp"
 #include "core/experiment/fields.hpp"
 #include "core/experiment/layout.hpp"
 #include "core/experiment/limits.hpp"
+#include "core/experiment/world.hpp"
 
 namespace kilotwin {
 namespace pb = google::protobuf;
@@ -218,8 +220,8 @@ void check_robot_models(const LoadedExperiment& loaded) {
   }
 }
 
-/// What one engine takes and another does not.
-void check_engine(const LoadedExperiment& loaded) {
+/// What the floor and the robots of the ODE engine take and others do not.
+void check_legs(const LoadedExperiment& loaded) {
   const proto::Physics& physics = loaded.experiment.physics();
   const auto level_floor = [&](const char* field, bool given, double value) {
     if (!given || value == 0 || physics.engine() == proto::Physics::ODE) return;
@@ -238,6 +240,83 @@ void check_engine(const LoadedExperiment& loaded) {
       fmt::format("axle_offset_mm is {}, with which a robot of the ODE engine falls over its rear legs; it takes "
                   "{}..{} mm there",
                   number_text(offset_mm), number_text(kLeastAxleOffset_mm), number_text(kRobotRadius_mm)));
+}
+
+void check_arena(const LoadedExperiment& loaded) {
+  const proto::Arena& arena = loaded.experiment.arena();
+  if (arena.shape_case() == proto::Arena::SHAPE_NOT_SET) return;
+  const std::string shape = arena.has_circle() ? "circle" : "polygon";
+  for (const char* const field : {"width_mm", "height_mm"}) {
+    const bool given = field[0] == 'w' ? arena.has_width_mm() : arena.has_height_mm();
+    if (given) {
+      throw loaded.locations.error(std::string{"arena."} + field,
+                                   fmt::format("{} has no effect beside {}; remove one of them", field, shape));
+    }
+  }
+  try {
+    static_cast<void>(ArenaShape(arena));
+  } catch (const std::invalid_argument& error) {
+    throw loaded.locations.error(
+        "arena." + shape, fmt::format("{} is wrong: {}; {}", shape, error.what(),
+                                      arena.has_circle() ? "state radius_mm"
+                                                         : "it takes the 3 to 32 corners of a convex polygon in "
+                                                           "order, around the origin"));
+  }
+}
+
+template <class Bodies>
+void check_shapes(const LoadedExperiment& loaded, const Bodies& bodies, const char* list, int most) {
+  if (bodies.size() > most) {
+    throw loaded.locations.error(
+        list, fmt::format("there are {} of {}; an experiment takes at most {}", bodies.size(), list, most));
+  }
+  for (int i = 0; i < bodies.size(); ++i) {
+    const auto& body = bodies.Get(i);
+    const std::string path = fmt::format("{}[{}]", list, i);
+    if (body.shape_case() == 0) {
+      throw loaded.locations.error(
+          path, fmt::format("{} has no shape; it takes box, cylinder or polygon {{ ... }}", list));
+    }
+    try {
+      Point2 centre;
+      static_cast<void>(shape_of(body, centre));
+    } catch (const std::invalid_argument& error) {
+      const char* const shape = body.has_box() ? "box" : body.has_cylinder() ? "cylinder" : "polygon";
+      const char* const right = body.has_box()        ? "state width_mm and length_mm"
+                                : body.has_cylinder() ? "state radius_mm"
+                                                      : "it takes the 3 to 32 corners of a convex polygon in order";
+      throw loaded.locations.error(path + "." + shape,
+                                   fmt::format("{} is wrong: {}; {}", shape, error.what(), right));
+    }
+  }
+}
+
+void check_bodies(const LoadedExperiment& loaded) {
+  const proto::Experiment& experiment = loaded.experiment;
+  check_shapes(loaded, experiment.obstacle(), "obstacle", kMostObstacles);
+  check_shapes(loaded, experiment.movable(), "movable", kMostMovables);
+  for (int i = 0; i < experiment.movable_size(); ++i) {
+    if (experiment.movable(i).has_mass_g()) continue;
+    throw loaded.locations.error(fmt::format("movable[{}]", i),
+                                 "mass_g is missing; state mass_g: M, what it weighs");
+  }
+}
+
+/// What an engine does not compute is refused, never left out.
+void check_engine(const LoadedExperiment& loaded) {
+  const proto::Experiment& experiment = loaded.experiment;
+  const auto refuse = [&](const std::string& path, std::string_view what) {
+    throw loaded.locations.error(
+        path, fmt::format("the {} engine knows no {}; remove it or choose another physics.engine",
+                          proto::Physics::Engine_Name(experiment.physics().engine()), what));
+  };
+  if (experiment.arena().has_circle()) refuse("arena.circle", "round walls");
+  if (experiment.arena().has_polygon()) refuse("arena.polygon", "walls along a polygon");
+  if (experiment.obstacle_size() > 0) refuse("obstacle[0]", "obstacles");
+  if (experiment.movable_size() > 0) refuse("movable[0]", "movable bodies");
+  for (int g = 0; g < experiment.robots_size(); ++g) {
+    if (experiment.robots(g).immobile()) refuse(fmt::format("robots[{}].immobile", g), "immobile robots");
+  }
 }
 
 void check_station(const LoadedExperiment& loaded) {
@@ -282,13 +361,17 @@ void validate_fields(const LoadedExperiment& loaded) {
   RangeCheck{loaded.locations}.check(experiment);
   check_name(loaded);
   check_tick_multiples(loaded);
+  check_arena(loaded);
+  check_bodies(loaded);
+  check_engine(loaded);
+  check_legs(loaded);
+  const ArenaShape arena(experiment.arena());
   check_partition(loaded, "partition_columns", experiment.deployment().partition_columns(), "width",
-                  experiment.arena().width_mm());
+                  2 * arena.half_width_mm());
   check_partition(loaded, "partition_rows", experiment.deployment().partition_rows(), "height",
-                  experiment.arena().height_mm());
+                  2 * arena.half_height_mm());
   check_robot_models(loaded);
   check_station(loaded);
-  check_engine(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",

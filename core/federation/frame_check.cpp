@@ -34,6 +34,21 @@ const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, Fede
   if (!all_finite(frame.x_mm) || !all_finite(frame.y_mm) || !all_finite(frame.heading_rad) ||
       !all_finite(frame.spatial))
     return "a pose is not finite";
+  const MovableColumns& movable = frame.movable;
+  if (!ascending_within(movable.body, {0, plan.movables()}))
+    return "its movable bodies are not ascending numbers of the experiment";
+  for (const auto* column : {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm_s, &movable.vy_mm_s,
+                             &movable.turn_rad_s}) {
+    if (!all_finite(*column)) return "a movable body's state is not finite";
+  }
+  const PressedColumns& pressed = frame.pressed;
+  if (!std::includes(frame.robot.begin(), frame.robot.end(), pressed.robot.begin(), pressed.robot.end()) ||
+      !ascending_within(pressed.robot, {0, plan.robots()}))
+    return "its pressed robots are not ascending robots of the frame";
+  if (!all_finite(pressed.slip_x_mm_s) || !all_finite(pressed.slip_y_mm_s) || !all_finite(pressed.force_N))
+    return "a contact's state is not finite";
+  const auto known_body = [&](std::uint32_t other) { return other < plan.robots() + plan.movables(); };
+  if (!std::all_of(pressed.other.begin(), pressed.other.end(), known_body)) return "a contact is with nobody";
   return nullptr;
 }
 

@@ -13,6 +13,36 @@ namespace kilotwin {
 /// An infrared message without its CRC: data[9], type.
 using IrMessage = std::array<std::uint8_t, 10>;
 
+/// Movable bodies, structure of arrays, ascending numbers.
+struct MovableColumns {
+  std::vector<std::uint32_t> body;
+  std::vector<double> x_mm, y_mm, heading_rad;  ///< of the centre; heading in [-pi, pi)
+  std::vector<double> vx_mm_s, vy_mm_s, turn_rad_s;
+
+  void clear() {
+    body.clear();
+    for (auto* column : {&x_mm, &y_mm, &heading_rad, &vx_mm_s, &vy_mm_s, &turn_rad_s}) column->clear();
+  }
+};
+
+/// Robots that touch others or slip against their drive; ascending ids.
+struct PressedColumns {
+  std::vector<std::uint32_t> robot;
+  std::vector<double> slip_x_mm_s, slip_y_mm_s;  ///< per robot: velocity less that of its drive
+  std::vector<std::uint8_t> contacts;            ///< per robot: how many entries of the next two are its own
+  std::vector<std::uint32_t> other;  ///< ascending within a robot: another robot, or robots + movable body
+  std::vector<double> force_N;       ///< above 0
+
+  void clear() {
+    robot.clear();
+    slip_x_mm_s.clear();
+    slip_y_mm_s.clear();
+    contacts.clear();
+    other.clear();
+    force_N.clear();
+  }
+};
+
 /// Poses of the robots that a partition owns, or of those that a neighbour must see. Ascending ids.
 struct BodyFrame {
   Tick tick;
@@ -21,6 +51,8 @@ struct BodyFrame {
   std::vector<double> spatial;  ///< of ghosts of the ODE engine: kSpatialColumns per robot; else empty
 
   static constexpr std::size_t kSpatialColumns = 11;
+  MovableColumns movable;
+  PressedColumns pressed;  ///< in ghosts only
 
   void clear() {
     robot.clear();
@@ -28,6 +60,8 @@ struct BodyFrame {
     y_mm.clear();
     heading_rad.clear();
     spatial.clear();
+    movable.clear();
+    pressed.clear();
   }
   void add(std::uint32_t id, double x, double y, double heading) {
     robot.push_back(id);

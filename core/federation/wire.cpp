@@ -1,6 +1,7 @@
 #include "core/federation/wire.hpp"
 
 #include <cstring>
+#include <numeric>
 
 namespace kilotwin {
 namespace {
@@ -56,6 +57,19 @@ WireBodyFrame to_wire(const WireHeader& header, const BodyFrame& frame) {
   wire.y_mm = borrow<Doubles>(frame.y_mm);
   wire.heading_rad = borrow<Doubles>(frame.heading_rad);
   wire.spatial = borrow<Doubles>(frame.spatial);
+  wire.movable = borrow<ULongs>(frame.movable.body);
+  wire.movable_x_mm = borrow<Doubles>(frame.movable.x_mm);
+  wire.movable_y_mm = borrow<Doubles>(frame.movable.y_mm);
+  wire.movable_heading_rad = borrow<Doubles>(frame.movable.heading_rad);
+  wire.movable_vx_mm_s = borrow<Doubles>(frame.movable.vx_mm_s);
+  wire.movable_vy_mm_s = borrow<Doubles>(frame.movable.vy_mm_s);
+  wire.movable_turn_rad_s = borrow<Doubles>(frame.movable.turn_rad_s);
+  wire.pressed = borrow<ULongs>(frame.pressed.robot);
+  wire.slip_x_mm_s = borrow<Doubles>(frame.pressed.slip_x_mm_s);
+  wire.slip_y_mm_s = borrow<Doubles>(frame.pressed.slip_y_mm_s);
+  wire.contacts = borrow<Octets>(frame.pressed.contacts);
+  wire.contact_other = borrow<ULongs>(frame.pressed.other);
+  wire.contact_N = borrow<Doubles>(frame.pressed.force_N);
   return wire;
 }
 
@@ -64,8 +78,29 @@ bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
   const bool whole = copy(wire.robot, frame.robot) && copy(wire.x_mm, frame.x_mm) && copy(wire.y_mm, frame.y_mm) &&
                      copy(wire.heading_rad, frame.heading_rad) && copy(wire.spatial, frame.spatial);
   const std::size_t n = frame.robot.size();
-  return whole && frame.x_mm.size() == n && frame.y_mm.size() == n && frame.heading_rad.size() == n &&
-         (frame.spatial.empty() || frame.spatial.size() == BodyFrame::kSpatialColumns * n);
+  if (!whole || frame.x_mm.size() != n || frame.y_mm.size() != n || frame.heading_rad.size() != n) return false;
+  if (!frame.spatial.empty() && frame.spatial.size() != BodyFrame::kSpatialColumns * n) return false;
+  MovableColumns& movable = frame.movable;
+  if (!copy(wire.movable, movable.body) || !copy(wire.movable_x_mm, movable.x_mm) ||
+      !copy(wire.movable_y_mm, movable.y_mm) || !copy(wire.movable_heading_rad, movable.heading_rad) ||
+      !copy(wire.movable_vx_mm_s, movable.vx_mm_s) || !copy(wire.movable_vy_mm_s, movable.vy_mm_s) ||
+      !copy(wire.movable_turn_rad_s, movable.turn_rad_s)) {
+    return false;
+  }
+  for (const auto* column : {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm_s, &movable.vy_mm_s,
+                             &movable.turn_rad_s}) {
+    if (column->size() != movable.body.size()) return false;
+  }
+  PressedColumns& pressed = frame.pressed;
+  if (!copy(wire.pressed, pressed.robot) || !copy(wire.slip_x_mm_s, pressed.slip_x_mm_s) ||
+      !copy(wire.slip_y_mm_s, pressed.slip_y_mm_s) || !copy(wire.contacts, pressed.contacts) ||
+      !copy(wire.contact_other, pressed.other) || !copy(wire.contact_N, pressed.force_N)) {
+    return false;
+  }
+  const std::size_t p = pressed.robot.size();
+  return pressed.slip_x_mm_s.size() == p && pressed.slip_y_mm_s.size() == p && pressed.contacts.size() == p &&
+         pressed.other.size() == pressed.force_N.size() &&
+         std::accumulate(pressed.contacts.begin(), pressed.contacts.end(), std::size_t{0}) == pressed.other.size();
 }
 
 WireActuationFrame to_wire(const WireHeader& header, const ActuationFrame& frame) {

@@ -33,7 +33,8 @@ TEST_F(Load, SyntaxErrorsNameTheWordAndTheRemedy) {
   const BadSyntax cases[] = {
       {"arena {\n  widht_mm: 3\n}", "e.txtpb:2:3: unknown field widht_mm in arena; did you mean width_mm?"},
       {"robot { count: 3 }", "e.txtpb:1:1: unknown field robot; did you mean robots?"},
-      {"arena { gravity: 3 }", "e.txtpb:1:9: unknown field gravity in arena; its fields are width_mm, height_mm"},
+      {"arena { gravity: 3 }",
+       "e.txtpb:1:9: unknown field gravity in arena; its fields are width_mm, height_mm, circle, polygon"},
       {"radio { range_mm: \"far\" }", "e.txtpb:1:19: range_mm is \"far\"; it takes a number, above 33 mm"},
       {"radio { range_mm: far }", "e.txtpb:1:19: range_mm is far; it takes a number, above 33 mm"},
       {"arena { width_mm: -wide }", "e.txtpb:1:19: width_mm is -wide; it takes a number, 40..1000000 mm"},

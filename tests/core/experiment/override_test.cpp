@@ -45,12 +45,13 @@ TEST_F(Override, MistakesNameTheArgumentAndWhatThereIs) {
   const std::pair<std::string, std::string> cases[] = {
       {"arena.widht_mm=3",
        "--set arena.widht_mm=3: unknown field widht_mm in Arena; did you mean width_mm? "
-       "Its fields are width_mm, height_mm"},
-      {"arena.depth=3", "--set arena.depth=3: unknown field depth in Arena; its fields are width_mm, height_mm"},
+       "Its fields are width_mm, height_mm, circle, polygon"},
+      {"arena.depth=3",
+       "--set arena.depth=3: unknown field depth in Arena; its fields are width_mm, height_mm, circle, polygon"},
       {"=3",
        "--set =3: unknown field  in Experiment; its fields are name, duration_s, seed, tick_cycles, arena, robots, "
        "motion, "
-       "robot_model, physics, radio, station, recording, deployment"},
+       "robot_model, physics, radio, station, recording, deployment, movable, obstacle"},
       {"seed", "--set seed: there is no value; write FIELD=VALUE, for instance arena.width_mm=1000"},
       {"seed=x", "--set seed=x: seed cannot be x; it takes a whole number"},
       {"seed=", "--set seed=: seed cannot be empty; it takes a whole number"},
@@ -60,7 +61,9 @@ TEST_F(Override, MistakesNameTheArgumentAndWhatThereIs) {
        "--set arena.width_mm=wide: width_mm cannot be wide; it takes a number, 40..1000000 mm"},
       {"motion.noise=no", "--set motion.noise=no: noise cannot be no; it takes true or false"},
       {"robots.body=GHOST", "--set robots.body=GHOST: body cannot be GHOST; it takes one of SIMULATED, TRACKED"},
-      {"arena=3", "--set arena=3: arena is a block and takes no value; set one of its fields: width_mm, height_mm"},
+      {"arena=3",
+       "--set arena=3: arena is a block and takes no value; set one of its fields: width_mm, height_mm, "
+       "circle, polygon"},
       {"seed.x=3", "--set seed.x=3: seed has no fields of its own; write seed=VALUE"},
       {"arena[0].width_mm=3", "--set arena[0].width_mm=3: arena is no list; write it without an index"},
       {"robots[2].count=3",
