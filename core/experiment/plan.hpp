@@ -79,6 +79,12 @@ class RunPlan {
   /// Index of the robot's program in manifest.program, or kNoProgram where its group is tracked.
   [[nodiscard]] std::uint32_t program_of(std::uint32_t robot) const { return program_of_[robot]; }
   [[nodiscard]] bool tracked(std::uint32_t robot) const { return program_of_[robot] == kNoProgram; }
+  /// Whether the robot runs firmware for its own processor. The radio simulates that processor.
+  [[nodiscard]] bool firmware(std::uint32_t robot) const {
+    return !tracked(robot) && manifest.program(static_cast<int>(program_of_[robot])).firmware();
+  }
+  /// Whether any robot does.
+  [[nodiscard]] bool has_firmware() const;
   /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;

@@ -19,6 +19,7 @@ enum class Stream : std::uint16_t {
   kBackOff = 5,      ///< per aborted attempt
   kReception = 6,    ///< loss at a receiver
   kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
+  kConverter = 35,   ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 
 /// Philox4x32 with 10 rounds. Multipliers and key increments are those of the paper (the increments: the golden ratio and
