@@ -1,6 +1,7 @@
 #include "clients/behaviours/engine.hpp"
 
 #include <algorithm>
+#include <cstdio>
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
@@ -61,6 +62,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
   const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
   for (std::uint32_t s = 0; s < kSlots; ++s) {
     for (std::uint32_t p = 0; p < programs_->size(); ++p) {
+      if (plan.manifest.program(static_cast<int>(p)).firmware()) continue;
       Group group{p, (first_slot + s) % kSlots, {}};
       for (std::uint32_t i = 0; i < share_.size(); ++i) {
         const std::uint32_t robot = share_.first + i;
@@ -69,6 +71,9 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       for (const std::uint32_t i : group.robots) presence_[i] = Presence::kNew;
       if (!group.robots.empty()) groups_.push_back(std::move(group));
     }
+  }
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (plan.firmware(share_.first + i)) presence_[i] = Presence::kFirmware;
   }
 }
 
@@ -120,6 +125,30 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
       if (slot.control()->log_length != 0) take_log(i, slot);
     }
     running_robot_.store(kNobody, std::memory_order_relaxed);
+  }
+  relay_firmware(radio);
+}
+
+/// Robots that run firmware show in the next frame what their processors have set by this one: as with programs that have
+/// run in between, so that the same motion comes at the same time from either kind.
+void BehavioursEngine::relay_firmware(const RadioFrame& radio) {
+  for (std::size_t n = 0; n < radio.firmware_robot.size(); ++n) {
+    const std::uint32_t robot = radio.firmware_robot[n], i = robot - share_.first;
+    KILOTWIN_DEMAND(share_.contains(robot) && presence_[i] == Presence::kFirmware);
+    motor_left_[i] = radio.firmware_motor_left[n];
+    motor_right_[i] = radio.firmware_motor_right[n];
+    spin_up_[i] = radio.firmware_spin_up[n];
+    led_[i] = radio.firmware_led[n];
+    const bool failed = life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kFailed);
+    life_cycle_[i] = radio.firmware_life_cycle[n];
+    if (const std::uint32_t fault = radio.firmware_fault[n]; fault != 0 && !failed) {
+      constexpr const char* kCauses[] = {"", "no instruction of the ATmega328P",
+                                         "an access to memory that the ATmega328P does not have"};
+      char text[128];
+      std::snprintf(text, sizeof text, "its firmware executed %s, at 0x%04x of the flash",
+                    kCauses[std::min(fault >> 24, 2u)], fault & 0xffffffu);
+      failures_.push_back({robot, text});
+    }
   }
 }
 

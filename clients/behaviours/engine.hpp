@@ -24,6 +24,7 @@ namespace kilotwin::behaviours {
 /// In step k, for each robot in this order: its clock advances; kilo_message_tx_success if its message has left; receptions
 /// in order of arrival; the main program until it has used up the tick; kilo_message_tx if it is asked, runs, and holds no
 /// message. A message is held until it has left or the robot stops running.
+/// Robots that run firmware have it in the radio; their motors and LEDs are passed on from its frame.
 /// Robots of tracked groups have no program: motors 0, LED 0, life cycle IDLE.
 /// A sleeping robot wakes every 8 s to listen and shows as IDLE meanwhile.
 /// Pure, but for robots' code that faults: that stops its robot and is noted. Engines of one process may step in parallel.
@@ -75,9 +76,10 @@ class BehavioursEngine {
   [[nodiscard]] std::uint64_t memory_octets() const;
 
  private:
-  enum class Presence : std::uint8_t { kNone, kNew, kAlive, kFailed };
+  enum class Presence : std::uint8_t { kNone, kNew, kAlive, kFailed, kFirmware };
 
   void gather(const RadioFrame& radio);
+  void relay_firmware(const RadioFrame& radio);
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
   void surround(std::uint32_t i, const Slot&, std::uint32_t receptions);
   void keep_eeprom(std::uint32_t i, const Slot&);

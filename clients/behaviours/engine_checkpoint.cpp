@@ -78,7 +78,8 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     }
     const auto fields = octets(saved[i]->host());
     const auto presence = Presence{fields[kPresence]};
-    if (presence > Presence::kFailed || (presence == Presence::kNone) != tracked) {
+    if (presence > Presence::kFirmware || (presence == Presence::kNone) != tracked ||
+        (presence == Presence::kFirmware) != plan_.firmware(id)) {
       throw RunError("robot " + std::to_string(id) + " was of another kind when the checkpoint was made");
     }
     presence_[i] = presence;
@@ -86,7 +87,7 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     if (presence == Presence::kAlive) {
       const Program& program = programs_->program(plan_.program_of(id));
       memory_[i].restore(program, program.slot(id % kSlots), octets(saved[i]->memory()), octets(saved[i]->stack()));
-    } else if (presence == Presence::kFailed) {
+    } else if (presence == Presence::kFailed || saved[i]->host().size() > kFields) {
       failures_.push_back({id, saved[i]->host().substr(kFields)});
     }
     eeprom_[i].reset();

@@ -24,6 +24,7 @@ std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest,
   std::string hashes;
   std::uint64_t size = 0;
   for (const proto::Program& program : manifest.program()) {
+    if (program.firmware()) continue;
     const std::filesystem::path path = run_directory / "programs" / (program.sha256() + ".so");
     const auto octets = read_file(path);
     if (!octets) {
@@ -39,10 +40,13 @@ std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest,
   }
   auto set = std::make_shared<ProgramSet>();
   std::uint64_t address = place_for(hashes, size);
-  for (int i = 0; i < manifest.program_size(); ++i) {
-    const proto::Program& program = manifest.program(i);
-    set->programs_.push_back(
-        Program::load(std::move(files[static_cast<std::size_t>(i)]), program.path(), program.sha256(), address));
+  std::size_t next = 0;
+  for (const proto::Program& program : manifest.program()) {
+    if (program.firmware()) {
+      set->programs_.push_back(nullptr);
+      continue;
+    }
+    set->programs_.push_back(Program::load(std::move(files[next++]), program.path(), program.sha256(), address));
     address = set->programs_.back()->end;
   }
   return set;

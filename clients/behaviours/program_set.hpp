@@ -13,7 +13,8 @@ namespace kilotwin::behaviours {
 
 class ProgramSet {
  public:
-  /// Loads programs/SHA256.so of the run directory for each program of the manifest. Where they lie in memory follows from
+  /// Loads programs/SHA256.so of the run directory for each program of the manifest but firmware, which is none for this
+  /// machine. Where they lie in memory follows from
   /// their contents and order alone, so that checkpoints hold anywhere, and runs of different programs seldom meet in one
   /// process. Throws UserError where a file is missing, is not what its name says, or is no program; RunError where memory is
   /// short or the addresses are taken.
@@ -22,6 +23,7 @@ class ProgramSet {
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(programs_.size()); }
   /// `index` as in RunPlan::program_of.
+  /// Not of firmware.
   [[nodiscard]] const Program& program(std::uint32_t index) const { return *programs_[index]; }
 
  private:

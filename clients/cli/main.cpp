@@ -45,7 +45,8 @@ void add_experiment_options(CLI::App& app, RunArguments& arguments) {
   app.add_option("experiment", arguments.experiment, "experiment file (*.txtpb)")->required();
   app.add_option("--duration", arguments.duration_s, "simulated time, s");
   app.add_option("--robots", arguments.robots, "replaces the first robot group's count");
-  app.add_option("--behaviour", arguments.behaviour, "replaces the first robot group's program (.c or .so)");
+  app.add_option("--behaviour", arguments.behaviour,
+                 "replaces the first robot group's program (.c, .so, .elf or .hex)");
   app.add_option("--define", arguments.define, "NAME=VALUE: a macro for programs that are compiled")
       ->allow_extra_args(false);
   app.add_option("--model", arguments.model, "model of motion (*.txtpb) in place of the experiment's");

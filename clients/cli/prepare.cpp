@@ -8,6 +8,9 @@
 #include <random>
 
 #include "clients/behaviours/compiler.hpp"
+#include "clients/behaviours/files.hpp"
+#include "clients/behaviours/sha256.hpp"
+#include "clients/firmware/flash_image.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -38,6 +41,14 @@ std::uint64_t new_run_id() {
   return id != 0 ? id : 1;
 }
 
+/// Firmware runs as it is. Throws UserError where the file is none.
+behaviours::CompiledProgram checked_firmware(const fs::path& file) {
+  const auto octets = behaviours::read_file(file);
+  if (!octets) throw UserError(file.string() + ": cannot be read; give an .elf or .hex file");
+  static_cast<void>(firmware::parse_firmware(*octets, file.string()));
+  return {file, behaviours::sha256_hex(*octets), {}};
+}
+
 /// Compiles each distinct program once and tells every group which one is its own.
 void build_programs(const LoadedExperiment& loaded, const RunArguments& arguments, proto::Manifest& manifest,
                     std::vector<fs::path>& objects) {
@@ -48,9 +59,13 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
     }
     std::vector<fs::path> sources;
     for (const std::string& source : group.behaviour()) sources.push_back(loaded.resolve(source));
+    const bool is_firmware = firmware::is_firmware(sources.front());
+    if (is_firmware && sources.size() > 1)
+      throw UserError(fmt::format("{}: firmware is one file; link its parts first", sources.front().string()));
     behaviours::CompileOptions options;
     options.defines = arguments.define;
-    const behaviours::CompiledProgram compiled = behaviours::compile(sources, options);
+    const behaviours::CompiledProgram compiled =
+        is_firmware ? checked_firmware(sources.front()) : behaviours::compile(sources, options);
     for (const std::string& note : compiled.notes) say("note: " + note);
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;
@@ -58,6 +73,7 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
       proto::Program& program = *manifest.add_program();
       program.set_path(group.behaviour(0));
       program.set_sha256(compiled.sha256);
+      if (is_firmware) program.set_firmware(true);
       objects.push_back(compiled.file);
     }
     manifest.add_group_program(static_cast<std::uint32_t>(index));
@@ -82,7 +98,7 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
     if (program == kNoProgram) continue;
     text += fmt::format("# robots[{}] run {}\n", g, group.behaviour(0));
     group.clear_behaviour();
-    const fs::path object = directory.program(manifest.program(static_cast<int>(program)).sha256());
+    const fs::path object = directory.program(manifest.program(static_cast<int>(program)));
     group.add_behaviour(object.lexically_relative(directory.path()).string());
   }
   std::string fields;
@@ -177,7 +193,7 @@ Prepared prepare(const RunArguments& arguments) {
                             : arguments.out);
   try {
     for (int i = 0; i < manifest.program_size(); ++i) {
-      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i).sha256()),
+      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i)),
                     fs::copy_options::overwrite_existing);
     }
     for (const proto::RobotGroup& group : loaded.experiment.robots()) {

@@ -94,6 +94,7 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
                    [](const Directive& a, const Directive& b) { return a.tick < b.tick; });
   for (std::size_t i = 0; i < options.inputs.size(); ++i) options.inputs[i].sequence_number = i;
   options.save_checkpoints = false;
+  options.run_directory = directory.path();
 
   catch_interrupts();
   const auto programs = behaviours::ProgramSet::load(plan.manifest, directory.path());

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <thread>
 
 #include "clients/behaviours/behaviours_service.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/run_recorder.hpp"
+#include "clients/firmware/firmware_swarm.hpp"
 #include "core/base/error.hpp"
 #include "core/federation/interrupt.hpp"
 #include "services/ark/station_service.hpp"
@@ -75,7 +78,8 @@ int service_command(const ServiceArguments& arguments) {
   if (arguments.service == "physics") {
     physics::run_service(plan, parse_partition(arguments.partition, plan.grid), context);
   } else if (arguments.service == "comm") {
-    comm::run_service(plan, context);
+    const std::uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
+    comm::run_service(plan, context, firmware::make_firmware_robots(plan, directory.path(), threads, true));
   } else if (arguments.service == "behaviours") {
     behaviours::run_service(plan, parse_share(arguments.share, plan.hosts), context);
   } else {

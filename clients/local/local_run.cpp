@@ -12,6 +12,7 @@
 #include "clients/behaviours/engine.hpp"
 #include "clients/behaviours/robot_logs.hpp"
 #include "clients/behaviours/watchdog.hpp"
+#include "clients/firmware/firmware_swarm.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_book.hpp"
 #include "core/federation/interrupt.hpp"
@@ -48,7 +49,8 @@ class LocalRun {
       : plan_(plan),
         options_(options),
         observer_(observer),
-        radio_(plan),
+        radio_(plan, firmware::make_firmware_robots(plan, options.run_directory, options.threads,
+                                                    options.save_checkpoints)),
         station_(plan),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()) {
@@ -56,7 +58,7 @@ class LocalRun {
       physics_.push_back(physics::make_engine(plan, PartitionId{p}));
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
-      if (!options.run_directory.empty())
+      if (!options.run_directory.empty() && options.save_checkpoints)
         logs_.push_back(std::make_unique<behaviours::RobotLogs>(options.run_directory, plan.tick_length, first_,
                                                                 plan.share(HostId{h})));
     }

@@ -15,11 +15,11 @@ namespace kilotwin::local {
 
 struct LocalOptions {
   std::uint32_t threads = 1;
-  std::filesystem::path run_directory;  ///< where checkpoints go
+  std::filesystem::path run_directory;  ///< where programs are, and where checkpoints and logs go
   std::optional<Checkpoint> resumed;
   /// Stamped inputs of an earlier run, to be applied at their ticks; pauses are passed over.
   std::vector<Directive> inputs;
-  bool save_checkpoints = true;
+  bool save_checkpoints = true;  ///< and logs
 };
 
 /// Runs the plan to its end, or until the process is interrupted, which the totals then name as their failure. Throws

@@ -1,7 +1,7 @@
 /// RunDirectory: where the files of one run lie.
 ///   manifest.pb      the experiment as resolved, for machines: kilotwin.proto.Manifest
 ///   experiment.txtpb the experiment as run; it runs again from there
-///   programs/        the behaviours as built, SHA256.so
+///   programs/        the behaviours as built, SHA256.so, and firmware as it was given, SHA256.elf or .hex
 ///   recording.ktrec  what happened: idl/recording.proto
 ///   summary.json     clients/recorder/summary.hpp
 ///   picture.svg      clients/recorder/picture.hpp
@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "core/base/time.hpp"
+#include "idl/manifest.pb.h"
 
 namespace kilotwin::recorder {
 
@@ -37,8 +38,10 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path manifest() const { return directory_ / "manifest.pb"; }
   [[nodiscard]] std::filesystem::path experiment() const { return directory_ / "experiment.txtpb"; }
   [[nodiscard]] std::filesystem::path programs() const { return directory_ / "programs"; }
-  [[nodiscard]] std::filesystem::path program(const std::string& sha256) const {
-    return programs() / (sha256 + ".so");
+  [[nodiscard]] std::filesystem::path program(const proto::Program& program) const {
+    const std::string ending =
+        program.firmware() ? std::filesystem::path(program.path()).extension().string() : ".so";
+    return programs() / (program.sha256() + ending);
   }
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }

@@ -163,6 +163,11 @@ RunPlan::RunPlan(proto::Manifest given)
   }
 }
 
+bool RunPlan::has_firmware() const {
+  return std::any_of(manifest.program().begin(), manifest.program().end(),
+                     [](const proto::Program& program) { return program.firmware(); });
+}
+
 Pose RunPlan::initial_pose(std::uint32_t robot) const {
   const int i = static_cast<int>(robot);
   return {{manifest.x_mm(i), manifest.y_mm(i)}, manifest.heading_rad(i)};

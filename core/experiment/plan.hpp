@@ -85,6 +85,12 @@ class RunPlan {
   [[nodiscard]] bool immobile(std::uint32_t robot) const { return immobile_[robot] != 0; }
   /// Bodies that robots can push, numbered from 0: world.movables.
   [[nodiscard]] std::uint32_t movables() const { return static_cast<std::uint32_t>(world.movables.size()); }
+  /// Whether the robot runs firmware for its own processor. The radio simulates that processor.
+  [[nodiscard]] bool firmware(std::uint32_t robot) const {
+    return !tracked(robot) && manifest.program(static_cast<int>(program_of_[robot])).firmware();
+  }
+  /// Whether any robot does.
+  [[nodiscard]] bool has_firmware() const;
   /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;

@@ -66,6 +66,10 @@ const char* defect(const RadioFrame& frame, const RunPlan& plan, FederateId, Fed
     return "it is not for this host's share of robots";
   if (!ascending_within(frame.ask, share) || !ascending_within(frame.sent, share))
     return "it asks robots that are not this host's";
+  const auto runs_firmware = [&](std::uint32_t robot) { return plan.firmware(robot); };
+  if (!ascending_within(frame.firmware_robot, share) ||
+      !std::all_of(frame.firmware_robot.begin(), frame.firmware_robot.end(), runs_firmware))
+    return "it shows firmware robots that are none of this host's";
   const std::vector<std::uint32_t>& receivers = frame.reception_robot;
   if (!std::is_sorted(receivers.begin(), receivers.end()) ||
       (!receivers.empty() && !(share.contains(receivers.front()) && share.contains(receivers.back())))) {

@@ -95,6 +95,11 @@ struct RadioFrame {
   std::vector<std::uint32_t> reception_message;  ///< index into messages
   std::vector<std::int16_t> reception_high_gain, reception_low_gain;
   std::vector<IrMessage> messages;
+  // Robots that run firmware: what their processors show at the end of the tick, which their host passes on.
+  std::vector<std::uint32_t> firmware_robot;  ///< ascending
+  std::vector<std::uint8_t> firmware_motor_left, firmware_motor_right, firmware_spin_up, firmware_led,
+      firmware_life_cycle;
+  std::vector<std::uint32_t> firmware_fault;  ///< 0, or cause << 24 | address in flash
 };
 
 enum class OverheadCommand : std::uint8_t { kStop = 0, kRepeat = 2, kOnce = 6 };

@@ -141,20 +141,35 @@ WireRadioFrame to_wire(const WireHeader& header, const RadioFrame& frame) {
   wire.reception_high_gain = borrow<Shorts>(frame.reception_high_gain);
   wire.reception_low_gain = borrow<Shorts>(frame.reception_low_gain);
   wire.messages = borrow<Octets>(frame.messages);
+  wire.firmware_robot = borrow<ULongs>(frame.firmware_robot);
+  wire.firmware_motor_left = borrow<Octets>(frame.firmware_motor_left);
+  wire.firmware_motor_right = borrow<Octets>(frame.firmware_motor_right);
+  wire.firmware_spin_up = borrow<Octets>(frame.firmware_spin_up);
+  wire.firmware_led = borrow<Octets>(frame.firmware_led);
+  wire.firmware_life_cycle = borrow<Octets>(frame.firmware_life_cycle);
+  wire.firmware_fault = borrow<ULongs>(frame.firmware_fault);
   return wire;
 }
 
 bool from_wire(const WireRadioFrame& wire, RadioFrame& frame) {
   frame.tick = Tick{wire.tick};
   frame.first_robot = wire.first_robot;
-  const bool whole = copy(wire.kilo_ticks, frame.kilo_ticks) && copy(wire.ask, frame.ask) &&
-                     copy(wire.sent, frame.sent) && copy(wire.reception_robot, frame.reception_robot) &&
-                     copy(wire.reception_message, frame.reception_message) &&
-                     copy(wire.reception_high_gain, frame.reception_high_gain) &&
-                     copy(wire.reception_low_gain, frame.reception_low_gain) && copy(wire.messages, frame.messages);
-  const std::size_t n = frame.reception_robot.size();
+  const bool whole =
+      copy(wire.kilo_ticks, frame.kilo_ticks) && copy(wire.ask, frame.ask) && copy(wire.sent, frame.sent) &&
+      copy(wire.reception_robot, frame.reception_robot) && copy(wire.reception_message, frame.reception_message) &&
+      copy(wire.reception_high_gain, frame.reception_high_gain) &&
+      copy(wire.reception_low_gain, frame.reception_low_gain) && copy(wire.messages, frame.messages) &&
+      copy(wire.firmware_robot, frame.firmware_robot) &&
+      copy(wire.firmware_motor_left, frame.firmware_motor_left) &&
+      copy(wire.firmware_motor_right, frame.firmware_motor_right) &&
+      copy(wire.firmware_spin_up, frame.firmware_spin_up) && copy(wire.firmware_led, frame.firmware_led) &&
+      copy(wire.firmware_life_cycle, frame.firmware_life_cycle) && copy(wire.firmware_fault, frame.firmware_fault);
+  const std::size_t n = frame.reception_robot.size(), f = frame.firmware_robot.size();
   return whole && frame.reception_message.size() == n && frame.reception_high_gain.size() == n &&
-         frame.reception_low_gain.size() == n;
+         frame.reception_low_gain.size() == n && frame.firmware_motor_left.size() == f &&
+         frame.firmware_motor_right.size() == f && frame.firmware_led.size() == f &&
+         frame.firmware_spin_up.size() == f && frame.firmware_life_cycle.size() == f &&
+         frame.firmware_fault.size() == f;
 }
 
 WireOverheadFrame to_wire(const WireHeader& header, const OverheadFrame& frame) {

@@ -20,6 +20,7 @@ enum class Stream : std::uint16_t {
   kReception = 6,    ///< loss at a receiver
   kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
   kSolver = 20,      ///< what ODE's iterative solver starts from; per sub-step, of the lowest robot that takes part
+  kConverter = 35,   ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 
 /// Philox4x32 with 10 rounds. Multipliers and key increments are those of the paper (the increments: the golden ratio and

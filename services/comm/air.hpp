@@ -36,6 +36,7 @@ struct Transmission {
   bool aborted = false;   ///< given up in its leading byte
   bool orphaned = false;  ///< its sender has left RUNNING; its end is not reported to the host
   IrMessage message{};
+  bool over = false;  ///< of a firmware robot, which has ended it: how is known
 
   [[nodiscard]] bool overlaps(Cycles from, Cycles until) const { return start < until && from < end; }
   /// Whether another robot's receiver is busy with it at an instant.

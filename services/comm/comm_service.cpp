@@ -73,8 +73,8 @@ class CommFederate : public Federate {
 
 }  // namespace
 
-void run_service(const RunPlan& plan, const ServiceContext& context) {
-  RadioEngine engine(plan);
+void run_service(const RunPlan& plan, const ServiceContext& context, std::unique_ptr<FirmwareRobots> firmware) {
+  RadioEngine engine(plan, std::move(firmware));
   if (context.resumed) engine.load(context.first(), context.resumed->radio());
   Session session(plan, plan.comm(), context.transport, context.first());
   CommFederate federate(session, engine, context);

@@ -1,11 +1,15 @@
 /// The radio engine as a federate: bodies, actuation and overhead packets in, radio frames to every host out.
 #pragma once
 
+#include <memory>
+
 #include "core/federation/service_context.hpp"
+#include "services/comm/firmware_robots.hpp"
 
 namespace kilotwin::comm {
 
-/// Returns at the end of the run. Throws as Session::run does.
-void run_service(const RunPlan& plan, const ServiceContext& context);
+/// Returns at the end of the run. `firmware`: the plan's firmware robots, null where there are none. Throws as Session::run
+/// does.
+void run_service(const RunPlan& plan, const ServiceContext& context, std::unique_ptr<FirmwareRobots> firmware);
 
 }  // namespace kilotwin::comm

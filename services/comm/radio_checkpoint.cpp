@@ -6,7 +6,7 @@
 namespace kilotwin::comm {
 namespace {
 
-constexpr char kAborted = 1, kOrphaned = 2;
+constexpr char kAborted = 1, kOrphaned = 2, kOver = 4;
 
 void require(bool condition) {
   if (!condition)
@@ -31,10 +31,11 @@ void RadioEngine::save(proto::RadioState& part) const {
     part.add_transmission_end(x.end);
     part.add_transmission_sender(x.sender);
     part.mutable_transmission_flags()->push_back(
-        static_cast<char>((x.aborted ? kAborted : 0) | (x.orphaned ? kOrphaned : 0)));
+        static_cast<char>((x.aborted ? kAborted : 0) | (x.orphaned ? kOrphaned : 0) | (x.over ? kOver : 0)));
     append(*part.mutable_transmission_messages(), x.message);
   }
   overhead_.save(*part.mutable_overhead());
+  if (firmware_) firmware_->save(part);
   part.mutable_sent()->Add(sent_.begin(), sent_.end());
   receptions_.save(part);
   part.set_attempted(counters_.attempted);
@@ -74,9 +75,10 @@ void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> part
     const char flags = part.transmission_flags()[size_of(n)];
     channel_.all().push_back({part.transmission_start(n), part.transmission_end(n), part.transmission_sender(n),
                               (flags & kAborted) != 0, (flags & kOrphaned) != 0,
-                              message_at(part.transmission_messages(), size_of(n))});
+                              message_at(part.transmission_messages(), size_of(n)), (flags & kOver) != 0});
   }
   overhead_.load(part.overhead());
+  if (firmware_) firmware_->load(begin_of(tick), part);
   sent_.assign(part.sent().begin(), part.sent().end());
   receptions_.load(part);
   counters_ = {part.attempted(), part.messages_sent(), part.received(),

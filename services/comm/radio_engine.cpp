@@ -22,7 +22,7 @@ std::vector<Share> all_shares(const RunPlan& plan) {
 
 }  // namespace
 
-RadioEngine::RadioEngine(const RunPlan& plan)
+RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> firmware)
     : shares_(all_shares(plan)),
       cycles_per_tick_(plan.tick_length.cycles()),
       loss_(plan.experiment().radio().loss()),
@@ -37,12 +37,16 @@ RadioEngine::RadioEngine(const RunPlan& plan)
       channel_(neighbourhood_),
       receptions_(plan.robots()),
       pairs_(counts_pairs_ ? plan.robots() : 0),
+      firmware_robots_(std::move(firmware)),
       jammed_(plan.robots(), 0) {
   for (std::uint32_t i = 0; i < plan.robots(); ++i) {
     const Pose pose = plan.initial_pose(i);
     neighbourhood_.place(i, pose.position_mm.x(), pose.position_mm.y());
-    real_.push_back(plan.tracked(i));
+    apart_.push_back(plan.tracked(i) || plan.firmware(i));
   }
+  KILOTWIN_DEMAND(!plan.has_firmware() || firmware_robots_ != nullptr);
+  if (plan.has_firmware())
+    firmware_.emplace(plan, *firmware_robots_, timers_, neighbourhood_, ranging_, overhead_gains_);
 }
 
 void RadioEngine::step(Tick from, const Inputs& inputs) {
@@ -78,11 +82,13 @@ void RadioEngine::read_actuation(std::span<const ActuationFrame* const> frames) 
     for (std::size_t n = 0; n < robots; ++n) {
       const auto robot = static_cast<std::uint32_t>(frame->first_robot + n);
       const auto life_cycle = static_cast<LifeCycle>(frame->life_cycle[n]);
-      const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed || real_[robot] != 0;
-      const bool running = life_cycle == LifeCycle::kRunning && real_[robot] == 0;
+      const bool deaf =
+          life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed || apart_[robot] != 0;
+      const bool running = life_cycle == LifeCycle::kRunning && apart_[robot] == 0;
       const int kept = state_[robot] & (kHolding | kFlying);
       state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));
       if (!running && kept != 0) drop_message(robot);
+      if (firmware_ && firmware_->has(robot) && firmware_->listening(robot)) state_[robot] |= kFirmware;
     }
     for (std::size_t n = 0; n < frame->offer_robot.size(); ++n) {
       const std::uint32_t robot = frame->offer_robot[n];
@@ -132,23 +138,61 @@ void RadioEngine::contend(Tick now) {
       default: break;  // flying: its timer waits for its packet
     }
   }
-  // Start pulses in the order of time: those of robots come about as we go, the overhead controller's are fixed.
   const std::vector<OverheadController::Copy>& copies = overhead_.copies();
-  std::size_t next_copy = 0;
-  while (next_copy < copies.size() && copies[next_copy].start < begin_of(now)) ++next_copy;
+  next_copy_ = 0;
+  while (next_copy_ < copies.size() && copies[next_copy_].start < begin_of(now)) ++next_copy_;
+  simulated_ = begin_of(now);
+  if (!firmware_) return contend_until(end, now);
+  firmware_->begin_tick();
+  while (simulated_ < end) {
+    const Cycles until = std::min(simulated_ + FirmwareAir::kSpan, end);
+    contend_until(until, now);
+    run_firmware(simulated_, until, now);
+    simulated_ = until;
+  }
+  firmware_->end_tick();
+}
+
+/// Start pulses in the order of time: those of robots come about as we go, the overhead controller's are fixed.
+void RadioEngine::contend_until(Cycles end, Tick now) {
+  const std::vector<OverheadController::Copy>& copies = overhead_.copies();
   for (;;) {
-    if (next_copy < copies.size() && (attempts_.empty() || copies[next_copy].start <= attempts_.front().time)) {
-      const Cycles start = copies[next_copy++].start;
+    const bool copy = next_copy_ < copies.size() && copies[next_copy_].start < end;
+    const bool robot = !attempts_.empty() && attempts_.front().time < end;
+    if (copy && (!robot || copies[next_copy_].start <= attempts_.front().time)) {
+      const Cycles start = copies[next_copy_++].start;
       for (Transmission& transmission : channel_.all()) {
         if (transmission.notices(start)) abort(transmission, start, now);
       }
-    } else if (!attempts_.empty()) {
+    } else if (robot) {
       std::pop_heap(attempts_.begin(), attempts_.end(), later);
-      const std::uint32_t robot = attempts_.back().robot;
+      const std::uint32_t sender = attempts_.back().robot;
       attempts_.pop_back();
-      attempt(robot, now);
+      attempt(sender, now);
     } else {
       break;
+    }
+  }
+}
+
+/// What firmware robots have on the air becomes transmissions; they themselves see to when they give up.
+void RadioEngine::run_firmware(Cycles from, Cycles until, Tick now) {
+  using Kind = PulseDecoder::Event;
+  for (const FirmwareAir::Event& event : firmware_->advance(from, until, channel_, overhead_)) {
+    if (event.kind == Kind::kStarted) {
+      ++counters_.attempted;
+      abort_who_notices(event.robot, event.time, now);
+      channel_.add({event.time, event.end, event.robot, false, false, {}});
+      continue;
+    }
+    for (Transmission& x : channel_.all()) {
+      if (x.sender != event.robot || x.over) continue;
+      x.over = true;
+      x.end = event.end;
+      x.message = event.message;
+      if (event.kind == Kind::kReceived) continue;
+      ++counters_.aborted;
+      x.aborted = true;
     }
   }
 }
@@ -164,15 +208,21 @@ void RadioEngine::schedule(std::uint32_t robot, Cycles end) {
 }
 
 void RadioEngine::attempt(std::uint32_t robot, Tick now) {
-  const Cycles t = timers_.next(robot);
+  // Where a firmware robot has made it give up, the next attempt may be due in a span that has been simulated already.
+  const Cycles t = std::max(timers_.next(robot), simulated_);
   timers_.interrupt(robot);
   if (senses(robot, t)) return schedule(robot, begin_of(now + 1));
   ++counters_.attempted;
   state_[robot] |= kFlying;
+  abort_who_notices(robot, t, now);
+  channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
+}
+
+/// A start pulse of `robot`: robots in range that are about to begin a packet give up.
+void RadioEngine::abort_who_notices(std::uint32_t robot, Cycles t, Tick now) {
   channel_.visit_heard(robot, [&](Transmission& other) {
     if (other.notices(t)) abort(other, t, now);
   });
-  channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
 }
 
 bool RadioEngine::senses(std::uint32_t robot, Cycles t) {
@@ -186,6 +236,7 @@ bool RadioEngine::senses(std::uint32_t robot, Cycles t) {
 
 void RadioEngine::abort(Transmission& transmission, Cycles t, Tick now) {
   const std::uint32_t robot = transmission.sender;
+  if (firmware_ && firmware_->has(robot)) return;  // it notices by itself
   ++counters_.aborted;
   transmission.aborted = true;
   transmission.end = transmission.start + kStartPulse;
@@ -206,7 +257,8 @@ void RadioEngine::arrive(Tick now) {
   const std::vector<Transmission>& transmissions = channel_.all();
   for (std::uint32_t i = 0; i < transmissions.size(); ++i) {
     const Transmission& x = transmissions[i];
-    if (!x.aborted && x.end >= begin && x.end < end) arrivals_.push_back({x.end, x.sender, i});
+    if (!x.aborted && x.end >= begin && x.end < end && (x.over || !apart_[x.sender]))
+      arrivals_.push_back({x.end, x.sender, i});
   }
   const std::vector<OverheadController::Copy>& copies = overhead_.copies();
   for (std::uint32_t i = 0; i < copies.size(); ++i) {
@@ -237,6 +289,7 @@ void RadioEngine::finish(std::uint32_t index, Cycles end) {
   const std::uint32_t robot = transmission.sender;
   ++counters_.sent;
   if (counts_pairs_) pairs_.add(robot, robot);
+  if (firmware_ && firmware_->has(robot)) return;
   state_[robot] &= static_cast<std::uint8_t>(~kFlying);
   timers_.restart_clock(robot);
   timers_.pass(robot, end);
@@ -253,16 +306,21 @@ void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
   channel_.find_rivals(packet.sender, packet.start, packet.end, rivals_);
   receptions_.begin_message(packet.message);
   neighbourhood_.visit(packet.sender, [&](std::uint32_t receiver, double square_mm2) {
-    if (!is(receiver, kReceptive)) return;
+    if ((state_[receiver] & (kReceptive | kFirmware)) == 0) return;
     bool lost = drowned;
     for (const std::uint32_t rival : rivals_) lost = lost || neighbourhood_.in_range(receiver, rival);
+    const bool firmware = is(receiver, kFirmware);
     if (lost) {
       ++counters_.collided;
-    } else if (fades(receiver, now, packet.sender)) {
+    } else if (firmware ? firmware_->fades(receiver, packet.sender, packet.start)
+                        : fades(receiver, now, packet.sender)) {
       ++counters_.faded;
     } else {
       ++counters_.received;
-      receptions_.add(receiver, ranging_.gains(__builtin_sqrt(square_mm2)));
+      if (firmware)
+        firmware_->note_reception(receiver, packet.message);
+      else
+        receptions_.add(receiver, ranging_.gains(__builtin_sqrt(square_mm2)));
       if (counts_pairs_) pairs_.add(receiver, packet.sender);
     }
   });
@@ -277,9 +335,13 @@ void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32
   }
   receptions_.begin_message(copy.message);
   for (std::uint32_t receiver = 0; receiver < state_.size(); ++receiver) {
-    if (!is(receiver, kReceptive)) continue;
-    if (jammed_[receiver] != 0 || fades(receiver, now, kLastDraw - ordinal)) continue;
-    receptions_.add(receiver, overhead_gains_);
+    if ((state_[receiver] & (kReceptive | kFirmware)) == 0 || jammed_[receiver] != 0) continue;
+    if (is(receiver, kFirmware)) {
+      if (!firmware_->fades(receiver, FirmwareAir::kOverhead, copy.start))
+        firmware_->note_reception(receiver, copy.message);
+    } else if (!fades(receiver, now, kLastDraw - ordinal)) {
+      receptions_.add(receiver, overhead_gains_);
+    }
   }
 }
 
@@ -308,10 +370,34 @@ void RadioEngine::emit(HostId host, RadioFrame& frame) const {
   frame.reception_low_gain.clear();
   frame.messages.clear();
   receptions_.emit(share, frame);
+  emit_firmware(share, frame);
+}
+
+void RadioEngine::emit_firmware(Share share, RadioFrame& frame) const {
+  frame.firmware_robot.clear();
+  frame.firmware_motor_left.clear();
+  frame.firmware_motor_right.clear();
+  frame.firmware_spin_up.clear();
+  frame.firmware_led.clear();
+  frame.firmware_life_cycle.clear();
+  frame.firmware_fault.clear();
+  if (!firmware_) return;
+  const auto ids = firmware_->ids();
+  for (std::uint32_t i = 0; i < ids.size(); ++i) {
+    if (!share.contains(ids[i])) continue;
+    const FirmwareRobots::Outputs& out = firmware_->outputs(i);
+    frame.firmware_robot.push_back(ids[i]);
+    frame.firmware_motor_left.push_back(out.motor_left);
+    frame.firmware_motor_right.push_back(out.motor_right);
+    frame.firmware_spin_up.push_back(out.spun_up ? 1 : 0);
+    frame.firmware_led.push_back(out.led);
+    frame.firmware_life_cycle.push_back(static_cast<std::uint8_t>(firmware_->life_cycle(i)));
+    frame.firmware_fault.push_back(std::uint32_t{out.fault} << 24 | out.fault_at);
+  }
 }
 
 std::uint64_t RadioEngine::hash_part() const {
-  std::uint64_t sum = overhead_.hash();
+  std::uint64_t sum = overhead_.hash() + (firmware_ ? firmware_->hash() : 0);
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     const std::uint64_t counts =
         timers_.count_word(i) | std::uint64_t{state_[i]} << 32 | std::uint64_t{receptions_.count(i)} << 40;

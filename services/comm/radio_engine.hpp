@@ -18,9 +18,14 @@
 ///
 /// The slot. A robot's message lies in its host's slot and here from its offer until success. Both sides empty it when the
 /// robot is not RUNNING; what is on the air then goes to its end unreported.
+///
+/// Robots that run real firmware do all this themselves, bit by bit: firmware_air.hpp. What they send takes part in the
+/// above as transmissions do.
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,6 +35,7 @@
 #include "core/random/random.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"
+#include "services/comm/firmware_air.hpp"
 #include "services/comm/neighbourhood.hpp"
 #include "services/comm/overhead_controller.hpp"
 #include "services/comm/pair_counts.hpp"
@@ -60,7 +66,8 @@ class RadioEngine {
     std::uint64_t faded = 0;     ///< receptions lost by radio.loss
   };
 
-  explicit RadioEngine(const RunPlan&);
+  /// `firmware`: the robots of the plan that run firmware, at tick 0; needed where there are any.
+  explicit RadioEngine(const RunPlan&, std::unique_ptr<FirmwareRobots> firmware = nullptr);
   RadioEngine(const RadioEngine&) = delete;
   RadioEngine& operator=(const RadioEngine&) = delete;
 
@@ -83,6 +90,7 @@ class RadioEngine {
   static constexpr std::uint8_t kReceptive = 2;  ///< it can receive
   static constexpr std::uint8_t kHolding = 4;    ///< its slot holds a message
   static constexpr std::uint8_t kFlying = 8;     ///< it is sending
+  static constexpr std::uint8_t kFirmware = 16;  ///< it runs firmware, and that listens
 
   struct Attempt {
     Cycles time;
@@ -105,6 +113,9 @@ class RadioEngine {
   void forget(Cycles begin);
 
   void contend(Tick now);
+  void contend_until(Cycles end, Tick now);
+  void run_firmware(Cycles from, Cycles until, Tick now);
+  void abort_who_notices(std::uint32_t robot, Cycles t, Tick now);
   void schedule(std::uint32_t robot, Cycles end);
   void attempt(std::uint32_t robot, Tick now);
   [[nodiscard]] bool senses(std::uint32_t robot, Cycles t);
@@ -114,6 +125,7 @@ class RadioEngine {
   void finish(std::uint32_t transmission, Cycles end);
   void receive_packet(const Transmission&, Tick now);
   void receive_copy(const OverheadController::Copy&, std::uint32_t ordinal, Tick now);
+  void emit_firmware(Share, RadioFrame&) const;
   [[nodiscard]] bool fades(std::uint32_t receiver, Tick now, std::uint32_t draw) const;
 
   const std::vector<Share> shares_;  ///< per host
@@ -126,9 +138,9 @@ class RadioEngine {
 
   Tick tick_;
   TickTimers timers_;
-  std::vector<std::uint8_t> state_, real_;  ///< per robot
-  std::vector<std::uint16_t> tx_period_;    ///< per robot
-  std::vector<IrMessage> message_;          ///< per robot: what its slot holds
+  std::vector<std::uint8_t> state_, apart_;  ///< per robot; apart: it runs firmware, or its body is real
+  std::vector<std::uint16_t> tx_period_;     ///< per robot
+  std::vector<IrMessage> message_;           ///< per robot: what its slot holds
   Neighbourhood neighbourhood_;
   Channel channel_;
   OverheadController overhead_;
@@ -137,7 +149,12 @@ class RadioEngine {
   Counters counters_;
   PairCounts pairs_;
 
+  const std::unique_ptr<FirmwareRobots> firmware_robots_;
+  std::optional<FirmwareAir> firmware_;  ///< where there are firmware robots
+
   // Within a step.
+  std::size_t next_copy_ = 0;      ///< of the overhead controller, whose start pulse is to come
+  Cycles simulated_ = 0;           ///< firmware robots have run so far
   std::vector<Attempt> attempts_;  ///< a heap, earliest first
   std::vector<Arrival> arrivals_;
   std::vector<std::uint32_t> rivals_;

@@ -8,6 +8,7 @@ namespace kilotwin::comm {
 
 struct Gains {
   std::int16_t high, low;  ///< 10-bit ADC counts
+  bool operator==(const Gains&) const = default;
 };
 
 /// The nominal calibration of core/base/ir_calibration.h, linear between its entries; beyond the last it decays

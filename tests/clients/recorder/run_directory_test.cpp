@@ -22,7 +22,12 @@ TEST(RunDirectory, NamesItsFiles) {
   EXPECT_TRUE(fs::is_directory(run.programs()));
   EXPECT_EQ(run.manifest(), run.path() / "manifest.pb");
   EXPECT_EQ(run.experiment(), run.path() / "experiment.txtpb");
-  EXPECT_EQ(run.program("00ff"), run.path() / "programs/00ff.so");
+  proto::Program program;
+  program.set_path("../walk.hex");
+  program.set_sha256("00ff");
+  EXPECT_EQ(run.program(program), run.path() / "programs/00ff.so");
+  program.set_firmware(true);
+  EXPECT_EQ(run.program(program), run.path() / "programs/00ff.hex");
   EXPECT_EQ(run.recording(), run.path() / "recording.ktrec");
   EXPECT_EQ(run.summary(), run.path() / "summary.json");
   EXPECT_EQ(run.picture(), run.path() / "picture.svg");

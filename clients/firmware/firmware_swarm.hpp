@@ -1,0 +1,70 @@
+/// All robots of a run that run firmware, on several threads.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "clients/firmware/mcu.hpp"
+#include "core/experiment/plan.hpp"
+#include "services/comm/firmware_robots.hpp"
+
+namespace kilotwin::firmware {
+
+class Crew;
+
+/// Each robot was switched on within the last tick of its own clock before the run began, such that its first timer interrupt
+/// comes when that of a robot with a native program would: rate and phase of clocks are those of comm::TickTimers.
+class FirmwareSwarm final : public comm::FirmwareRobots {
+ public:
+  /// Reads programs/ of the run directory. `threads`: how many run robots at a time; results do not depend on it.
+  /// What robots print goes to logs/robot-ID.txt there, if they print at all
+  /// and `keeps_logs`. Throws UserError where a program is missing or
+  /// damaged.
+  FirmwareSwarm(const RunPlan&, const std::filesystem::path& run_directory, std::uint32_t threads, bool keeps_logs);
+  ~FirmwareSwarm() override;
+
+  [[nodiscard]] std::span<const std::uint32_t> ids() const override { return ids_; }
+  void run(comm::Cycles until, std::span<const std::uint32_t> robots,
+           const std::vector<std::vector<comm::Pulse>>& light,
+           std::vector<std::vector<comm::Cycles>>& flashes) override;
+  void commit() override;
+  void begin_tick() override;
+  [[nodiscard]] Outputs outputs(std::uint32_t i) const override;
+  [[nodiscard]] std::uint64_t word(std::uint32_t i) const override;
+  [[nodiscard]] std::string save(std::uint32_t i) const override;
+  void load(std::uint32_t i, comm::Cycles now, const std::string& octets) override;
+
+  /// The processor of robot i, for tests.
+  [[nodiscard]] const Mcu& mcu(std::uint32_t i) const { return *robots_[i].mcu; }
+
+ private:
+  struct Robot {
+    std::unique_ptr<Mcu> mcu;
+    comm::Cycles switched_on;  ///< at most 0
+    comm::Cycles period;       ///< nominal cycles of 2^18 own ones
+    bool has_run = false;      ///< since the last commit
+    bool spun_up = false;
+    bool has_printed = false;
+    std::vector<Light> light;
+  };
+
+  [[nodiscard]] OwnCycles own(const Robot&, comm::Cycles) const;
+  [[nodiscard]] comm::Cycles nominal(const Robot&, OwnCycles) const;
+  void run_robot(Robot&, comm::Cycles until, const std::vector<comm::Pulse>& light,
+                 std::vector<comm::Cycles>& flashes);
+  void write_log(std::uint32_t i);
+
+  std::filesystem::path logs_;  ///< empty: none are kept
+  bool appends_logs_;           ///< the run continues an earlier one
+  std::vector<std::uint32_t> ids_;
+  std::vector<Robot> robots_;
+  std::unique_ptr<Crew> crew_;
+};
+
+/// The plan's firmware robots; null where there are none.
+[[nodiscard]] std::unique_ptr<comm::FirmwareRobots> make_firmware_robots(const RunPlan&,
+                                                                         const std::filesystem::path& run_directory,
+                                                                         std::uint32_t threads, bool keeps_logs);
+
+}  // namespace kilotwin::firmware

@@ -1,0 +1,53 @@
+/// The robots that run real firmware, as the radio drives them: light in, light out, to the cycle. Implemented by
+/// clients/firmware.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "services/comm/air.hpp"
+#include "services/comm/ranging.hpp"
+
+namespace kilotwin::comm {
+
+/// A pulse of infrared light at a receiver.
+struct Pulse {
+  Cycles time;
+  Gains gains;
+  bool operator==(const Pulse&) const = default;
+};
+
+class FirmwareRobots {
+ public:
+  struct Outputs {
+    std::uint8_t motor_left = 0, motor_right = 0, led = 0;  ///< as in ActuationFrame
+    bool spun_up = false;                                   ///< both motors ran at full duty in the last tick
+    bool listening = true;                                  ///< neither halted nor asleep with its clocks off
+    std::uint8_t fault = 0;                                 ///< firmware::Halt of one that has faulted, else 0
+    std::uint32_t fault_at = 0;                             ///< address in flash, octets
+  };
+
+  virtual ~FirmwareRobots() = default;
+  /// Their ids, ascending. Below, robots are named by their index in it.
+  [[nodiscard]] virtual std::span<const std::uint32_t> ids() const = 0;
+
+  /// Runs robots to `until`, each from where commit() left it, even where it has run since. light[i]: what falls on robot i,
+  /// ascending; flashes[i]: set to the starts of its own pulses, before `until`. Both have an entry per robot; only `robots` are touched.
+  virtual void run(Cycles until, std::span<const std::uint32_t> robots,
+                   const std::vector<std::vector<Pulse>>& light, std::vector<std::vector<Cycles>>& flashes) = 0;
+  /// All have run to the same instant, and there is no way back.
+  virtual void commit() = 0;
+
+  /// A tick begins.
+  virtual void begin_tick() = 0;
+  [[nodiscard]] virtual Outputs outputs(std::uint32_t i) const = 0;
+  /// A word of its state, for the state hash.
+  [[nodiscard]] virtual std::uint64_t word(std::uint32_t i) const = 0;
+  [[nodiscard]] virtual std::string save(std::uint32_t i) const = 0;
+  /// What save() made, at `now`. Throws RunError where it does not fit.
+  virtual void load(std::uint32_t i, Cycles now, const std::string& octets) = 0;
+};
+
+}  // namespace kilotwin::comm
