@@ -218,7 +218,8 @@ struct Toolchain {
 
  private:
   [[nodiscard]] Arguments flags_for(const ProgramText& text, const fs::path& file, const Arguments& dialect) const {
-    Arguments result = language_flags(is_cpp(file));
+    const bool as_cpp = std::find(dialect.begin(), dialect.end(), "c++") != dialect.end();
+    Arguments result = language_flags(as_cpp || is_cpp(file));
     for (const Arguments& part : {code, dialect, defines, place_flags(text.sources), includes})
       append(result, part);
     return result;
@@ -287,8 +288,8 @@ CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sourc
   std::vector<std::string> notes;
   for (;;) {
     ProgramText text = program_text(sources, toolchain.cache);
-    const bool simulator = std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end();
-    if (simulator && mentions(text.sources, "UserdataSize")) text.files.push_back(toolchain.runtime / "userdata.c");
+    if (std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end())
+      text.files.push_back(toolchain.runtime / "simulator.c");
     try {
       CompiledProgram program = toolchain.make(text, dialect);
       notes.insert(notes.begin(), text.notes.begin(), text.notes.end());
@@ -316,21 +317,24 @@ std::vector<Dialect> dialects_for(const std::string& error, const std::vector<fs
                                   const fs::path& runtime) {
   auto says = [&](std::string_view word) { return error.find(word) != std::string::npos; };
   std::vector<Dialect> result;
+  const Arguments headers{"-include", (runtime / "headers.h").string()};
+  const std::string with_headers = "compiled with headers that it does not include";
   if (says("undefined reference"))
     result.push_back({{"-fgnu89-inline"}, "compiled with inline functions as before C99"});
   if (says("'debug_info_t' undeclared"))
     result.push_back({{"-DKILOTWIN_NO_DEBUG_INFO"}, "compiled without debug_info_t"});
   if (says("undeclared") || says("unknown type name") || says("was not declared")) {
+    result.push_back({headers, with_headers});
     result.push_back(
-        {{"-include", (runtime / "headers.h").string()}, "compiled with headers that it does not include"});
-    result.push_back({{"-include", (runtime / "headers.h").string(), "-DKILOTWIN_NO_DEBUG_INFO"},
-                      "compiled with headers that it does not include, without debug_info_t"});
+        {{"-DKILOTWIN_NO_DEBUG_INFO", headers[0], headers[1]}, with_headers + ", without debug_info_t"});
   }
   if (mentions(sources, "SIMULATOR")) {
-    result.push_back({{"-DSIMULATOR"}, "compiled with SIMULATOR, as for Kilombo"});
-    result.push_back({{"-DSIMULATOR", "-include", (runtime / "headers.h").string()},
-                      "compiled with SIMULATOR, as for Kilombo, with headers that it does not include"});
+    const std::string for_kilombo = "compiled with SIMULATOR, as for Kilombo";
+    result.push_back({{"-DSIMULATOR"}, for_kilombo});
+    result.push_back({{"-DSIMULATOR", headers[0], headers[1]}, for_kilombo + "; " + with_headers});
   }
+  if (!says("undefined reference") && !says("No such file"))
+    result.push_back({{"-x", "c++", headers[0], headers[1]}, "compiled as C++, " + with_headers.substr(9)});
   return result;
 }
 

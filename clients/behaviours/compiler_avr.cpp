@@ -6,6 +6,7 @@
 #include "clients/behaviours/compiler_common.hpp"
 #include "clients/behaviours/files.hpp"
 #include "clients/behaviours/process.hpp"
+#include "clients/behaviours/program_text.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
@@ -54,12 +55,13 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
   const fs::path runtime = unpacked_runtime(cache_directory(options.cache_directory));
   const TemporaryFolder folder;
   std::vector<std::string> link{gcc, "-mmcu=atmega328p", "-r", "-nostartfiles", "-Wl,-d"};
-  for (const fs::path& source : sources) {
+  const ProgramText text = program_text(sources, cache_directory(options.cache_directory));
+  for (const fs::path& source : text.files) {
     const std::string object = (folder.path() / (std::to_string(link.size()) + ".o")).string();
     std::vector<std::string> arguments{gcc,
                                        "-mmcu=atmega328p",
                                        "-Os",
-                                       "-std=gnu11",
+                                       is_cpp(source) ? "-std=gnu++11" : "-std=gnu11",
                                        "-DF_CPU=8000000",
                                        "-funsigned-char",
                                        "-funsigned-bitfields",
@@ -71,7 +73,7 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
     const ProcessResult result = run_process(arguments);
-    if (result.status != 0) throw UserError(first_error(result.errors, {source}));
+    if (result.status != 0) throw UserError(first_error(result.errors, text.sources));
     link.push_back(object);
   }
   // One object of all, with the variables that several files share and what is used of the C library; kilolib stays open.

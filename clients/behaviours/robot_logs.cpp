@@ -43,7 +43,7 @@ void RobotLogs::cut(Tick first, const Share& share) {
     if (!text) continue;
     std::size_t kept = 0;
     while (kept < text->size() &&
-           std::strtod(text->c_str() + kept, nullptr) < tick_length_.seconds_at(first) - 1e-4) {
+           std::strtod(text->c_str() + kept, nullptr) < tick_length_.seconds_at(first) - 0.00051) {
       const std::size_t end = text->find('\n', kept);
       kept = end == std::string::npos ? text->size() : end + 1;
     }

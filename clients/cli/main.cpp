@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "clients/behaviours/compiler.hpp"
+#include "clients/behaviours/robot_warnings.hpp"
 #include "clients/cli/doctor_command.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/replay_command.hpp"
@@ -96,6 +97,9 @@ int build_command(const BuildArguments& arguments) {
   }
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
   for (const std::string& note : compiled.notes) say("note: " + note);
+  if (arguments.sources.front().extension() != ".so") {
+    for (const std::string& warning : behaviours::robot_warnings(arguments.sources, options)) say(warning);
+  }
   const std::filesystem::path out =
       arguments.out.empty() ? arguments.sources.front().stem().string() + ".so" : arguments.out.string();
   std::error_code error;

@@ -2,7 +2,6 @@
 #include <float.h>
 #include <kilolib.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>

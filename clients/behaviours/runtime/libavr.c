@@ -52,9 +52,9 @@ ACCESS(word, uint16_t)
 ACCESS(dword, uint32_t)
 ACCESS(float, float)
 
-/* A heap twice as large as the robot's whole memory, as pointers are four times as long: blocks in a row, each with its
+/* A heap of four times the robot's whole memory, as pointers are four times as long: blocks in a row, each with its
  * size before it, the lowest bit set while it is in use. First fit; neighbours that are free are joined on the way. */
-enum { HEAP_OCTETS = 4096, HEADER = sizeof(size_t), ALIGNMENT = 8 };
+enum { HEAP_OCTETS = 8192, HEADER = sizeof(size_t), ALIGNMENT = 8 };
 
 static uint64_t heap[HEAP_OCTETS / sizeof(uint64_t)];
 

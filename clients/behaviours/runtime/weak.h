@@ -16,7 +16,7 @@ WEAK(isalpha) WEAK(isalnum) WEAK(isspace) WEAK(isblank) WEAK(iscntrl) WEAK(ispri
 WEAK(isascii) WEAK(toascii) WEAK(toupper) WEAK(tolower) WEAK(fdevopen) WEAK(printf) WEAK(vprintf) WEAK(fprintf)
 WEAK(vfprintf) WEAK(sprintf) WEAK(vsprintf) WEAK(snprintf) WEAK(vsnprintf) WEAK(puts) WEAK(putchar) WEAK(fputs)
 WEAK(fputc) WEAK(putc) WEAK(fwrite) WEAK(fflush) WEAK(perror) WEAK(sscanf) WEAK(vsscanf) WEAK(fopen)
-WEAK(fclose) WEAK(scanf) WEAK(fscanf) WEAK(fgets) WEAK(fgetc) WEAK(getc) WEAK(getchar) WEAK(fread) WEAK(feof)
+WEAK(fclose) WEAK(scanf) WEAK(fscanf) WEAK(fgets) WEAK(fgetc) WEAK(getc) WEAK(getchar) WEAK(fread) WEAK(feof) WEAK(fseek) WEAK(ftell) WEAK(rewind) WEAK(remove)
 WEAK(ferror) WEAK(clearerr) WEAK(sin) WEAK(sinf) WEAK(cos) WEAK(cosf) WEAK(tan) WEAK(tanf) WEAK(asin)
 WEAK(asinf) WEAK(acos) WEAK(acosf) WEAK(atan) WEAK(atanf) WEAK(sinh) WEAK(sinhf) WEAK(cosh) WEAK(coshf)
 WEAK(tanh) WEAK(tanhf) WEAK(asinh) WEAK(asinhf) WEAK(acosh) WEAK(acoshf) WEAK(atanh) WEAK(atanhf) WEAK(exp)

@@ -4,11 +4,11 @@
 
 #include <stdint.h>
 
-typedef struct __attribute__((packed)) {
+typedef struct message_t {
   uint8_t data[9]; /* payload */
   uint8_t type;    /* message_type_t; below 0x80 it is the user's to choose */
   uint16_t crc;    /* message_crc() of the above */
-} message_t;
+} __attribute__((packed)) message_t;
 
 typedef enum {
   NORMAL = 0,

@@ -52,7 +52,7 @@ long random_r(unsigned long* state);
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
 void* bsearch(const void* key, const void* base, size_t count, size_t size,
               int (*compare)(const void*, const void*));
-/* A robot's heap has 4 KiB. */
+/* A robot's heap has 8 KiB. */
 void* malloc(size_t size);
 void* calloc(size_t count, size_t size);
 void* realloc(void* block, size_t size);
