@@ -19,8 +19,10 @@ struct Validation {
   void (*run)(Runs&, Verdicts&, Effort);
 };
 
-constexpr Validation kValidations[] = {
-    {"bias", validate_bias}, {"straight", validate_straight}, {"diffusion", validate_diffusion}};
+constexpr Validation kValidations[] = {{"bias", validate_bias},
+                                       {"straight", validate_straight},
+                                       {"diffusion", validate_diffusion},
+                                       {"packing", validate_packing}};
 
 int usage() {
   std::string names;

@@ -17,5 +17,7 @@ void validate_bias(Runs&, Verdicts&, Effort);
 void validate_straight(Runs&, Verdicts&, Effort);
 /// The mean square displacement of a dense crowd that walks at random: peer, with and without contact.
 void validate_diffusion(Runs&, Verdicts&, Effort);
+/// How far discs overlap where a packed crowd presses inwards.
+void validate_packing(Runs&, Verdicts&, Effort);
 
 }  // namespace kilotwin::validation
