@@ -108,6 +108,18 @@ void kinematic_cluster(benchmark::State& state) {
       70);
 }
 
+const std::string kOde = kArena + " physics { engine: ODE }";
+
+void ode_open_field(benchmark::State& state) {
+  run(state, kOde, testing::grid_crowd(kRobots, 200, Facing::kRandom), 30, 70, 70);
+}
+void ode_cluster(benchmark::State& state) {
+  run(state, kOde, testing::grid_crowd(kRobots, 40, Facing::kRandom), 30, 70, 70);
+}
+void ode_tightest_packing_inwards(benchmark::State& state) {
+  run(state, kOde, testing::grid_crowd(kRobots, 33, Facing::kInwards), 30, 70, 70);
+}
+
 BENCHMARK(open_field);
 BENCHMARK(disperse_cluster);
 BENCHMARK(tightest_packing);
@@ -116,6 +128,9 @@ BENCHMARK(turning_cluster);
 BENCHMARK(step_noise);
 BENCHMARK(resting_cluster);
 BENCHMARK(kinematic_cluster);
+BENCHMARK(ode_open_field);
+BENCHMARK(ode_cluster);
+BENCHMARK(ode_tightest_packing_inwards);
 BENCHMARK(whole_of_100);
 BENCHMARK(partitions_2x2_of_100);
 BENCHMARK(partitions_2x2_of_1000);

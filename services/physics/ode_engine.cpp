@@ -99,7 +99,9 @@ OdeLimits::OdeLimits(const RunPlan& plan, const DriveModel& drive)
       std::max(kSeparation_mm_s, drive.top_speed_mm_s()) + __builtin_sqrt(2 * along_mm_s2 * diagonal_mm);
   const double stride_mm = top_speed_mm_s * tick_s;
   reach_mm = 2 * stride_mm;
-  margin_mm = kReachHops * (2 * kRobotRadius_mm + reach_mm) + stride_mm;
+  const double hop_mm = 2 * kRobotRadius_mm + reach_mm;
+  rim_mm = (kReachHops - 1) * hop_mm;
+  margin_mm = kReachHops * hop_mm + stride_mm;
   x_limit_mm = width_mm / 2 - kRobotRadius_mm;
   y_limit_mm = height_mm / 2 - kRobotRadius_mm;
 }
@@ -108,6 +110,7 @@ OdeEngine::OdeEngine(const RunPlan& plan, PartitionId partition) : OdeEngine(pla
 
 OdeEngine::OdeEngine(const RunPlan& plan, PartitionId partition, const DriveModel& drive)
     : PopulationEngine(plan, partition, drive, OdeLimits(plan, drive).margin_mm),
+      rectangle_(plan.grid.rectangle(partition)),
       limits_(plan, drive),
       random_(plan.seed()),
       inertia_(Inertia::cylinder(10, kRobotRadius_mm, kRobotHeight_mm)),
@@ -142,9 +145,11 @@ void OdeEngine::move(Tick from, const Inputs& inputs) {
   const std::vector<std::uint8_t>& own = population_.own();
   read_ghosts(inputs);
   now_.resize(known.size());
+  stands_.resize(known.size());
   for (std::size_t i = 0; i < known.size(); ++i) {
-    now_[i] = known.tracked[i] != 0 ? upright(known.x_mm[i], known.y_mm[i], known.heading_rad[i])
-                                    : states_[known.robot[i]];
+    const double x = known.x_mm[i], y = known.y_mm[i];
+    now_[i] = known.tracked[i] != 0 ? upright(x, y, known.heading_rad[i]) : states_[known.robot[i]];
+    stands_[i] = known.tracked[i] != 0 || rectangle_.distance_mm(x, y) > limits_.rim_mm;
   }
   set_off(from);
   candidates_.update(known);
@@ -155,7 +160,7 @@ void OdeEngine::move(Tick from, const Inputs& inputs) {
   for (const std::uint32_t end : group_end_) {
     const std::span<const std::uint32_t> group(order_.data() + first, order_.data() + end);
     first = end;
-    if (known.tracked[group[0]] != 0) continue;  // Tracked ones are groups of their own.
+    if (stands_[group[0]] != 0) continue;  // These are groups of their own.
     if (!own.empty() && std::none_of(group.begin(), group.end(), [&](std::uint32_t i) { return own[i] != 0; }))
       continue;
     if (rests(group)) {
@@ -212,11 +217,11 @@ void OdeEngine::make_groups() {
   };
   for (std::uint32_t i = 0; i < count; ++i) {
     leader_[i] = i;
-    if (known.tracked[i] != 0) continue;
+    if (stands_[i] != 0) continue;
     for (const std::uint32_t j : candidates_.of(i)) {
       if (j >= i) break;
       const double dx = known.x_mm[i] - known.x_mm[j], dy = known.y_mm[i] - known.y_mm[j];
-      if (known.tracked[j] != 0 || dx * dx + dy * dy > reach_square_mm2) continue;
+      if (stands_[j] != 0 || dx * dx + dy * dy > reach_square_mm2) continue;
       const std::uint32_t a = leader(i), b = leader(j);
       leader_[std::max(a, b)] = std::min(a, b);
     }
@@ -285,7 +290,7 @@ bool OdeEngine::step_group(Tick from, std::span<const std::uint32_t> group, Solv
     for (const std::uint32_t i : group) {
       touch_floor(i);
       touch_walls(i);
-      touch_others(i);
+      touch_others(i, (s + 1) * limits_.sub_step_s);
     }
     const std::uint32_t lowest = population_.known().robot[group[0]];
     if (!world_.step(solver, random_.bits(Stream::kSolver, lowest, from, s))) return false;
@@ -359,21 +364,23 @@ void OdeEngine::touch_walls(std::uint32_t i) {
   }
 }
 
-void OdeEngine::touch_others(std::uint32_t i) {
-  const Bodies& known = population_.known();
+void OdeEngine::touch_others(std::uint32_t i, double since_s) {
   const Vector3& here = now_[i].position_mm;
   TouchPoint touch;
   touch.body = in_world_[i];
   touch.axis = {0, 0, 1};
   for (const std::uint32_t j : candidates_.of(i)) {
-    const bool tracked = known.tracked[j] != 0;
-    if (!tracked && (j < i || leader_[j] != leader_[i])) continue;
-    const Vector3& there = now_[j].position_mm;
+    const bool stands = stands_[j] != 0;
+    if (!stands && (j < i || leader_[j] != leader_[i])) continue;
+    Vector3 there = now_[j].position_mm;
+    if (stands) {
+      for (std::size_t k = 0; k < 2; ++k) there[k] += now_[j].velocity_mm_s[k] * since_s;
+    }
     const double dx = here[0] - there[0], dy = here[1] - there[1];
     const double distance_mm = __builtin_sqrt(dx * dx + dy * dy);
     touch.gap_mm = distance_mm - 2 * kRobotRadius_mm;
     if (touch.gap_mm > limits_.reach_mm) continue;
-    touch.other = tracked ? TouchPoint::kStanding : in_world_[j];
+    touch.other = stands ? TouchPoint::kStanding : in_world_[j];
     touch.normal = level(dx, dy, {i < j ? -1.0 : 1.0, 0, 0});
     for (std::size_t k = 0; k < 2; ++k)
       touch.at_mm[k] = there[k] + touch.normal[k] * (kRobotRadius_mm + touch.gap_mm / 2);

@@ -10,7 +10,8 @@
 /// group's next state is a function of its robots, their motors and the seed: the same in any mode, thread, process and
 /// machine with the same libode, and after a checkpoint. Neighbours' robots within the margin are simulated along with the
 /// own ones, so a group comes out the same in any partition that knows all of it. One that reaches farther than
-/// kReachHops beyond the border is cut there: over partition grids, and for these alone, results are alike, not the same.
+/// kReachHops - 1 robots beyond the border is cut there, and the ghosts behind the cut go on at their velocities: over
+/// partition grids, and for such groups alone, results are alike, not the same.
 #pragma once
 
 #include <array>
@@ -36,9 +37,10 @@ struct OdeLimits {
 
   std::uint32_t sub_steps;
   double sub_step_s;
-  double top_speed_mm_s;          ///< nobody is faster: driven, parting, or sliding down the whole arena
-  double reach_mm;                ///< two gaps wider than this do not close within a tick
-  double margin_mm;               ///< of ghosts
+  double top_speed_mm_s;  ///< nobody is faster: driven, parting, or sliding down the whole arena
+  double reach_mm;        ///< two gaps wider than this do not close within a tick
+  double rim_mm;          ///< ghosts farther than this from the rectangle may touch others that are not known
+  double margin_mm;       ///< of ghosts
   double x_limit_mm, y_limit_mm;  ///< the centre of a robot stays within +-limit
 
   [[nodiscard]] bool outside(double x_mm, double y_mm) const;
@@ -65,11 +67,12 @@ class OdeEngine final : public PopulationEngine {
   [[nodiscard]] bool step_group(Tick from, std::span<const std::uint32_t> group, Solver);
   void touch_floor(std::uint32_t body);
   void touch_walls(std::uint32_t body);
-  void touch_others(std::uint32_t body);
+  void touch_others(std::uint32_t body, double since_s);
   [[nodiscard]] RigidState upright(double x_mm, double y_mm, double heading_rad) const;
   /// Neither walls nor others are within reach.
   [[nodiscard]] bool stands_free(std::uint32_t body) const;
 
+  Rectangle rectangle_;
   OdeLimits limits_;
   Random random_;
   Inertia inertia_;
@@ -85,6 +88,8 @@ class OdeEngine final : public PopulationEngine {
   // Within a step; per known body.
   Drives drives_;
   std::vector<std::uint32_t> drive_of_, leader_, in_world_;
+  /// 1: it is not simulated: where a tracker says, or a ghost at the rim, which moves on as it does.
+  std::vector<std::uint8_t> stands_;
   std::vector<RigidState> now_;
   std::vector<Vector3> start_axis_;               ///< where a body looked at the tick's start, level
   std::vector<std::uint32_t> order_, group_end_;  ///< bodies sorted by group

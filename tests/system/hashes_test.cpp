@@ -79,6 +79,28 @@ TEST(Hashes, AreThoseOfServicesStartedByHand) {
   EXPECT_EQ(recorder::read_summary(directory + "/summary.json").state_hash, kGolden);
 }
 
+// ODE's results are a function of the experiment and the partition grid; which threads and processes compute them is not
+// seen. The crowd is tight, so that both of its solvers work, on two threads at a time.
+TEST(Hashes, OfTheOdeEngineAreTheSameInThreadsAndProcesses) {
+  const Scratch scratch;
+  const auto with = [&](const Words& more, const std::string& name) {
+    Words words{source("experiments/disperse.txtpb"),
+                "--duration",
+                "4",
+                "--partitions",
+                "2x1",
+                "--set",
+                "physics.engine=ODE",
+                "--set",
+                "robots.layout.grid.pitch_mm=33"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words, scratch, name).state_hash;
+  };
+  const std::uint64_t local = with({"--mode", "local"}, "local");
+  EXPECT_EQ(with({"--mode", "local", "--threads", "2", "--hosts", "2"}, "threads"), local);
+  EXPECT_EQ(with({"--hosts", "2"}, "federated"), local);
+}
+
 TEST(Hashes, AreTheSameWithTheStationsVirtualEnvironment) {
   const Scratch scratch;
   const Words words{source("experiments/ark-hub.txtpb"), "--duration", "20"};
