@@ -79,6 +79,12 @@ class RunPlan {
   /// Index of the robot's program in manifest.program, or kNoProgram where its group is tracked.
   [[nodiscard]] std::uint32_t program_of(std::uint32_t robot) const { return program_of_[robot]; }
   [[nodiscard]] bool tracked(std::uint32_t robot) const { return program_of_[robot] == kNoProgram; }
+  /// The robot's kilo_uid as it is calibrated: its number, or counted through its group from where the group says.
+  [[nodiscard]] std::uint16_t uid_of(std::uint32_t robot) const { return uid_of_[robot]; }
+  /// Whether hosts of behaviours need poses: for light, and for batteries that can be charged.
+  [[nodiscard]] bool hosts_see_bodies() const {
+    return experiment().has_light() || experiment().battery().charger_size() > 0;
+  }
   /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;
@@ -102,6 +108,7 @@ class RunPlan {
   }
 
   std::vector<std::uint32_t> program_of_;
+  std::vector<std::uint16_t> uid_of_;
 };
 
 }  // namespace kilotwin
