@@ -30,6 +30,7 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   header.set_tick_cycles(experiment.tick_cycles());
   header.set_robots(static_cast<std::uint32_t>(manifest.x_mm_size()));
   header.set_every_s(experiment.recording().every_s());
+  if (experiment.has_light()) *header.mutable_light() = experiment.light();
   header.set_arena_width_mm(experiment.arena().width_mm());
   header.set_arena_height_mm(experiment.arena().height_mm());
   header.set_messages(experiment.recording().messages());
