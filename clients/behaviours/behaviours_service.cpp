@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
+#include "clients/behaviours/eeprom_files.hpp"
 #include "clients/behaviours/engine.hpp"
 #include "clients/behaviours/robot_logs.hpp"
 #include "clients/behaviours/watchdog.hpp"
@@ -20,7 +23,9 @@ class BehavioursFederate : public Federate {
         engine_(engine),
         radio_(session, topics::radio(host.value()), {session.plan().comm()}),
         actuation_(session, topics::actuation()),
-        logs_(context.run_directory, session.plan().tick_length, context.first(), session.plan().share(host)) {}
+        logs_(context.run_directory, session.plan().tick_length, context.first(), session.plan().share(host)) {
+    if (session.plan().hosts_see_bodies()) bodies_.emplace(session, topics::bodies(), session.plan().all_physics());
+  }
 
   void publish(Tick) override {
     engine_.emit(actuation_.frame);
@@ -28,7 +33,7 @@ class BehavioursFederate : public Federate {
   }
 
   void step(Tick from) override {
-    engine_.step(from, *radio_.at(from)[0]);
+    engine_.step(from, *radio_.at(from)[0], bodies_ ? bodies_->at(from) : std::span<const BodyFrame* const>());
     logs_.write(from, engine_.printed());
     for (; told_ < engine_.failures().size(); ++told_) {
       const auto& failure = engine_.failures()[told_];
@@ -45,7 +50,10 @@ class BehavioursFederate : public Federate {
     write_checkpoint_part(context_.run_directory, session_.plan(), now, session_.plan().behaviours(host_), part);
   }
 
-  void count(WireLedger& ledger, bool) override { ledger.robots_failed = engine_.robots_failed(); }
+  void count(WireLedger& ledger, bool last) override {
+    ledger.robots_failed = engine_.robots_failed();
+    if (last) write_eeproms(engine_, session_.plan().share(host_), context_.run_directory);
+  }
 
  private:
   Session& session_;
@@ -53,6 +61,7 @@ class BehavioursFederate : public Federate {
   const HostId host_;
   BehavioursEngine& engine_;
   Input<RadioFrame> radio_;
+  std::optional<Input<BodyFrame>> bodies_;  // only where the experiment has something to sense by place
   Output<ActuationFrame> actuation_;
   RobotLogs logs_;
   std::size_t told_ = 0;  // of the engine's failures

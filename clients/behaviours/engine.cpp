@@ -10,15 +10,6 @@ namespace kilotwin::behaviours {
 namespace {
 
 constexpr std::uint32_t kNobody = 0xffffffffu;
-/// How long the reception of a message takes: 13 octets of 10 bits of 269 cycles (kilolib).
-constexpr std::uint64_t kPacketCycles = 13 * 10 * 269;
-
-/// Readings where nothing else is said: light in the middle of the range; a charged battery, above 682, the firmware's threshold
-/// for full; 25 degrees Celsius, 314 mV (data sheet of the ATmega328P, temperature sensor) of 1.1 V in 1024 steps.
-constexpr double kLightReading = 512, kVoltageReading = 700, kTemperatureReading = 292;
-/// Makes rand_hard() random, and readings of an even battery differ by one count now and then.
-constexpr double kVoltageSd = 0.5;
-
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
 
 /// CRC-16/MCRF4XX over data and type.
@@ -41,6 +32,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       random_(plan.seed()),
       parameters_(plan),
       programs_(std::move(programs)),
+      senses_(plan, share_),
       memory_(share_.size()),
       eeprom_(share_.size()),
       presence_(share_.size(), Presence::kNone),
@@ -58,6 +50,11 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       first_reception_(share_.size() + 1),
       running_robot_(kNobody) {
   KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.manifest.program_size()));
+  for (const proto::RobotEeprom& brought : plan.manifest.eeprom()) {
+    if (!share_.contains(brought.robot())) continue;
+    auto& eeprom = eeprom_[brought.robot() - share_.first] = std::make_unique<Eeprom>();
+    std::copy_n(brought.content().begin(), eeprom->size(), eeprom->begin());
+  }
   // Hosts of one process start at different slots, so that they seldom wait for each other.
   const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
   for (std::uint32_t s = 0; s < kSlots; ++s) {
@@ -106,11 +103,12 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
   while (next < first_reception_.size()) first_reception_[next++] = static_cast<std::uint32_t>(receptions_.size());
 }
 
-void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
+void BehavioursEngine::step(Tick from, const RadioFrame& radio, std::span<const BodyFrame* const> bodies) {
   KILOTWIN_DEMAND(from == now_ && radio.tick == from && radio.first_robot == share_.first &&
                   radio.kilo_ticks.size() == share_.size());
   ++now_;
   gather(radio);
+  senses_.at(from, bodies);
   printed_.clear();
   std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
   const FaultGuard guard;
@@ -127,6 +125,8 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio) {
     running_robot_.store(kNobody, std::memory_order_relaxed);
   }
   relay_firmware(radio);
+  if (!senses_.has_batteries()) return;
+  for (std::uint32_t i = 0; i < share_.size(); ++i) use_battery(i);
 }
 
 /// Robots that run firmware show in the next frame what their processors have set by this one: as with programs that have
@@ -152,10 +152,29 @@ void BehavioursEngine::relay_firmware(const RadioFrame& radio) {
   }
 }
 
+void BehavioursEngine::use_battery(std::uint32_t i) {
+  if (presence_[i] == Presence::kNone || presence_[i] == Presence::kFailed) return;
+  constexpr auto kFlat = static_cast<std::uint8_t>(LifeCycle::kFlat);
+  if (life_cycle_[i] == kFlat) {
+    senses_.rest(i);
+    if (senses_.can_restart(i)) life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kIdle);
+    return;
+  }
+  const bool asleep = life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kSleeping);
+  senses_.spend(i, {motor_left_[i], motor_right_[i], led_[i], asleep, sent_[i] != 0});
+  if (!senses_.is_flat(i)) return;
+  // Off: what its memory held is lost.
+  presence_[i] = Presence::kNew;
+  memory_[i].release();
+  life_cycle_[i] = kFlat;
+  motor_left_[i] = motor_right_[i] = spin_up_[i] = led_[i] = 0;
+  holds_[i] = offers_[i] = 0;
+}
+
 void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program& program,
                                  const Slot& slot, const Executor& executor) {
   spin_up_[i] = 0;
-  if (presence_[i] == Presence::kFailed) return;
+  if (presence_[i] == Presence::kFailed || life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kFlat)) return;
   if (presence_[i] == Presence::kNew) reset_robot(from, i, program, slot);
   RobotMemory& memory = memory_[i];
   KtEvents events{receptions_.data() + first_reception_[i], first_reception_[i + 1] - first_reception_[i],
@@ -213,16 +232,9 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
 /// What the robot in the slot senses in this tick.
 void BehavioursEngine::surround(std::uint32_t i, const Slot& slot, std::uint32_t receptions) {
   KtSurroundings& around = *slot.surroundings();
-  around.light = kLightReading;
-  around.light_sd = 0;
-  around.voltage = kVoltageReading;
-  around.voltage_sd = kVoltageSd;
-  around.temperature = kTemperatureReading;
-  around.temperature_sd = 0;
-  around.receiving_cycles = receptions * kPacketCycles;
-  around.receiving_from = 0;
+  senses_.surround(i, receptions, around);
   around.eeprom = eeprom_[i] ? eeprom_[i]->data() : nullptr;
-  around.eeprom_filled = around.eeprom_written = around.charging = 0;
+  around.eeprom_filled = around.eeprom_written = 0;
 }
 
 void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
@@ -239,7 +251,7 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
   auto robot = memory_[i].get<KtRobot>(program, program.file.table.robot);
   robot.noise = random_.bits(Stream::kProgram, id, tick, 0);
   robot.tick_cycles = plan_.tick_length.cycles();
-  robot.uid = static_cast<std::uint16_t>(id);
+  robot.uid = plan_.uid_of(id);
   robot.turn_left = calibration.turn_left;
   robot.turn_right = calibration.turn_right;
   robot.straight_left = calibration.straight_left;
@@ -304,7 +316,12 @@ std::uint64_t BehavioursEngine::hash_part() const {
                                   std::uint64_t{led_[i]} << 16 | std::uint64_t{life_cycle_[i]} << 24 |
                                   std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48 |
                                   std::uint64_t{spin_up_[i]} << 49;
-    sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs});
+    if (senses_.has_batteries()) {
+      const auto charge = static_cast<std::uint64_t>(senses_.charge(i));
+      sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs, charge});
+    } else {
+      sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs});
+    }
   }
   return sum;
 }

@@ -12,6 +12,7 @@
 
 #include "clients/behaviours/executor.hpp"
 #include "clients/behaviours/program_set.hpp"
+#include "clients/behaviours/robot_senses.hpp"
 #include "core/base/eeprom_layout.h"
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
@@ -26,7 +27,8 @@ namespace kilotwin::behaviours {
 /// message. A message is held until it has left or the robot stops running.
 /// Robots that run firmware have it in the radio; their motors and LEDs are passed on from its frame.
 /// Robots of tracked groups have no program: motors 0, LED 0, life cycle IDLE.
-/// A sleeping robot wakes every 8 s to listen and shows as IDLE meanwhile.
+/// A sleeping robot wakes every 8 s to listen and shows as IDLE meanwhile. One whose battery is flat shows as FLAT, and
+/// starts anew once it is charged.
 /// Pure, but for robots' code that faults: that stops its robot and is noted. Engines of one process may step in parallel.
 class BehavioursEngine {
  public:
@@ -35,10 +37,12 @@ class BehavioursEngine {
   /// State at tick 0. `programs` are those of the plan's manifest.
   BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs);
 
-  /// From tick `from` to the next. The frame is that of tick `from`, for this host.
-  void step(Tick from, const RadioFrame& radio);
+  /// From tick `from` to the next. The frames are those of tick `from`: the radio's for this host, and the bodies of all
+  /// partitions where RunPlan::hosts_see_bodies().
+  void step(Tick from, const RadioFrame& radio, std::span<const BodyFrame* const> bodies = {});
   void emit(ActuationFrame& frame) const;
-  /// Sum of entity_hash over own robots: motors, LED, life cycle, tx period, whether a message is held.
+  /// Sum of entity_hash over own robots: motors, LED, life cycle, tx period, whether a message is held;
+  /// where there are batteries, their charge.
   [[nodiscard]] std::uint64_t hash_part() const;
 
   void save(proto::BehavioursState& state) const;
@@ -81,6 +85,7 @@ class BehavioursEngine {
   void gather(const RadioFrame& radio);
   void relay_firmware(const RadioFrame& radio);
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
+  void use_battery(std::uint32_t i);
   void surround(std::uint32_t i, const Slot&, std::uint32_t receptions);
   void keep_eeprom(std::uint32_t i, const Slot&);
   void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);
@@ -105,6 +110,7 @@ class BehavioursEngine {
   std::vector<Group> groups_;
 
   // Per own robot; index i is robot share_.first + i.
+  RobotSenses senses_;
   std::vector<RobotMemory> memory_;
   std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< of those that have written to it
   std::vector<Presence> presence_;

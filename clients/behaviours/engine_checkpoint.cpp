@@ -54,6 +54,10 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
     fields[kOffers] = offers_[i];
     std::copy(message_[i].begin(), message_[i].end(), fields.begin() + kMessage);
     robot.set_host(text(fields));
+    if (senses_.has_batteries()) {
+      robot.set_charge(senses_.charge(i));
+      robot.set_drain(senses_.drain(i));
+    }
     if (eeprom_[i]) robot.set_eeprom(text(*eeprom_[i]));
   }
   for (const Failure& failure : failures_) {
@@ -90,6 +94,7 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     } else if (presence == Presence::kFailed || saved[i]->host().size() > kFields) {
       failures_.push_back({id, saved[i]->host().substr(kFields)});
     }
+    if (senses_.has_batteries()) senses_.restore(i, saved[i]->charge(), saved[i]->drain());
     eeprom_[i].reset();
     if (const auto eeprom = octets(saved[i]->eeprom()); eeprom.size() == KILOTWIN_EEPROM_OCTETS) {
       eeprom_[i] = std::make_unique<Eeprom>();

@@ -16,6 +16,7 @@
 #include "core/base/say.hpp"
 #include "core/experiment/layout.hpp"
 #include "core/experiment/plan.hpp"
+#include "core/experiment/surroundings.hpp"
 #include "core/federation/checkpoint.hpp"
 
 namespace kilotwin::cli {
@@ -94,12 +95,25 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
                     fs::copy_options::overwrite_existing);
       group.mutable_layout()->mutable_poses()->set_csv(copy);
     }
+    if (group.has_eeprom()) {
+      const std::string copy = fmt::format("eeprom-{}", g);
+      fs::copy(loaded.resolve(group.eeprom()), directory.path() / copy, fs::copy_options::overwrite_existing);
+      group.set_eeprom(copy);
+    }
     const std::uint32_t program = manifest.group_program(g);
     if (program == kNoProgram) continue;
     text += fmt::format("# robots[{}] run {}\n", g, group.behaviour(0));
     group.clear_behaviour();
     const fs::path object = directory.program(manifest.program(static_cast<int>(program)));
     group.add_behaviour(object.lexically_relative(directory.path()).string());
+  }
+  for (int i = 0; i < experiment.light().image_size(); ++i) {
+    proto::LightImage& image = *experiment.mutable_light()->mutable_image(i);
+    for (int k = 0; k < image.png_size(); ++k) {
+      const std::string copy = fmt::format("light-{}-{}.png", i, k);
+      fs::copy_file(loaded.resolve(image.png(k)), directory.path() / copy, fs::copy_options::overwrite_existing);
+      image.set_png(k, copy);
+    }
   }
   std::string fields;
   google::protobuf::TextFormat::PrintToString(experiment, &fields);
@@ -171,6 +185,10 @@ Prepared prepare(const RunArguments& arguments) {
   manifest.mutable_x_mm()->Add(placed.x_mm.begin(), placed.x_mm.end());
   manifest.mutable_y_mm()->Add(placed.y_mm.begin(), placed.y_mm.end());
   manifest.mutable_heading_rad()->Add(placed.heading_rad.begin(), placed.heading_rad.end());
+  for (proto::LightRaster& raster : read_light_rasters(loaded)) *manifest.add_light_raster() = std::move(raster);
+  std::vector<std::uint32_t> counts;
+  for (const proto::RobotGroup& group : manifest.experiment().robots()) counts.push_back(group.count());
+  for (proto::RobotEeprom& eeprom : read_eeproms(loaded, counts)) *manifest.add_eeprom() = std::move(eeprom);
   manifest.set_mode(arguments.mode);
   manifest.set_pace(parse_pace(arguments.pace));
   manifest.set_resumed(!arguments.resume.empty());

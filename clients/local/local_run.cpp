@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "clients/behaviours/eeprom_files.hpp"
 #include "clients/behaviours/engine.hpp"
 #include "clients/behaviours/robot_logs.hpp"
 #include "clients/behaviours/watchdog.hpp"
@@ -107,6 +108,10 @@ class LocalRun {
     totals.last = now;
     totals.state_hash = chain;
     totals.stopped_early = schedule_.stopped_early();
+    if (!options_.run_directory.empty()) {
+      for (std::uint32_t h = 0; h < plan_.hosts; ++h)
+        behaviours::write_eeproms(*hosts_[h], plan_.share(HostId{h}), options_.run_directory);
+    }
     fill(totals);
     return totals;
   }
@@ -213,7 +218,7 @@ class LocalRun {
       station_.step(from, {in.all_bodies, in.all_actuation, schedule_.overhead_inputs()});
     } else {
       const std::size_t host = task - partitions - 2;
-      hosts_[host]->step(from, in.radio[host]);
+      hosts_[host]->step(from, in.radio[host], in.all_bodies);
       if (!logs_.empty()) logs_[host]->write(from, hosts_[host]->printed());
     }
   }

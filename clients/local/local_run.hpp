@@ -15,7 +15,7 @@ namespace kilotwin::local {
 
 struct LocalOptions {
   std::uint32_t threads = 1;
-  std::filesystem::path run_directory;  ///< where programs are, and where checkpoints and logs go
+  std::filesystem::path run_directory;  ///< where programs are; where checkpoints, logs and robots' EEPROMs go
   std::optional<Checkpoint> resumed;
   /// Stamped inputs of an earlier run, to be applied at their ticks; pauses are passed over.
   std::vector<Directive> inputs;

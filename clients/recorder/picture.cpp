@@ -19,6 +19,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
 #include "core/experiment/world.hpp"
+#include "core/senses/light_source.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -32,7 +33,7 @@ constexpr double kUnitsPerPx = 10;
 /// Discs are not drawn smaller than this.
 constexpr double kLeastDisc_px = 1.8;
 
-constexpr std::string_view kFailedRim = "#d0021b", kStartDot = "#b4bcc6";
+constexpr std::string_view kFailedRim = "#d0021b", kStartDot = "#b4bcc6", kLamp = "#f5a623";
 /// Paths and ends by where in the swarm the robot began, from left to right.
 constexpr std::array<std::string_view, 6> kByStart = {"#2b4c9b", "#2387b5", "#2aa58a",
                                                       "#d9a21b", "#e0702a", "#b8336a"};
@@ -218,6 +219,26 @@ std::string draw_arena(const View& view, const World& world, double width_mm, do
       left, top, right - left, bottom - top, svg::kInk);
 }
 
+/// The lamps as they are at an instant: suns, hollow where they are off.
+std::string draw_lamps(const proto::Light& light, double time_s, const View& view) {
+  constexpr double kRadius = 55, kRay = 100;
+  std::string out;
+  for (const proto::LightSource& source : light.source()) {
+    const senses::Lamp lamp = senses::lamp_at(source, time_s);
+    const auto x = static_cast<double>(view.x(lamp.x_mm)), y = static_cast<double>(view.y(lamp.y_mm));
+    std::string rays;
+    for (int i = 0; i < 8; ++i) {
+      const double c = std::cos(i * kPi / 4), s = std::sin(i * kPi / 4);
+      put(rays, "M{:.0f} {:.0f}L{:.0f} {:.0f}", x + 1.3 * kRadius * c, y + 1.3 * kRadius * s, x + kRay * c,
+          y + kRay * s);
+    }
+    put(out, "<circle cx=\"{:.0f}\" cy=\"{:.0f}\" r=\"{:.0f}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"12\"/>\n",
+        x, y, kRadius, lamp.intensity > 0 ? kLamp : std::string_view("none"), kLamp);
+    put(out, "<path d=\"{}\" stroke=\"{}\" stroke-width=\"16\"/>\n", rays, kLamp);
+  }
+  return out;
+}
+
 /// The dashed outline of what another panel shows enlarged.
 std::string draw_frame(const View& view, const Box& box) {
   return fmt::format(
@@ -372,13 +393,17 @@ std::string picture_svg(Reader& recording) {
   const std::string from = time_text(paths.first().time_s), to = time_text(paths.last().time_s);
 
   const Panel start_panel{
-      "Start", from, ground(start_view, paths.first()) + draw_discs(paths.first(), start_view),
+      "Start", from,
+      ground(start_view, paths.first()) + draw_discs(paths.first(), start_view) +
+          draw_lamps(header.light(), paths.first().time_s, start_view),
       enlarged > 1.05 ? fmt::format("enlarged {:.1f} times, see dashed frame", enlarged) : part};
   const Panel paths_panel{"Paths", fmt::format("{} to {}", from, to),
                           ground(view, paths.last()) + draw_paths(paths, view, start) +
                               (enlarged > 1.05 ? draw_frame(view, shown_at_start) : ""),
                           part};
-  const Panel end_panel{"End", to, ground(view, paths.last()) + draw_discs(paths.last(), view),
+  const Panel end_panel{"End", to,
+                        ground(view, paths.last()) + draw_discs(paths.last(), view) +
+                            draw_lamps(header.light(), paths.last().time_s, view),
                         large_discs ? "discs larger than life" : part};
 
   const double panel_height = kPanelTitle_px + height_px + kPanelFoot_px;

@@ -37,6 +37,7 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   if (arena.kind() != ArenaShape::Kind::kRectangle) *header.mutable_arena() = experiment.arena();
   *header.mutable_obstacle() = experiment.obstacle();
   *header.mutable_movable() = experiment.movable();
+  if (experiment.has_light()) *header.mutable_light() = experiment.light();
   header.set_messages(experiment.recording().messages());
   header.set_first_tick(first_tick.count());
   header.set_first_hash(first_hash);

@@ -22,8 +22,8 @@ using PartitionId = Id<struct PartitionTag>;  ///< row * columns + column
 using HostId = Id<struct HostTag>;            ///< 0..hosts-1
 using FederateId = Id<struct FederateTag>;    ///< index in the plan: partitions, radio, station, hosts
 
-/// What a robot is doing, as kilolib numbers it, and FAILED, which no firmware knows: its program
-/// faulted in simulation.
+/// What a robot is doing, as kilolib numbers it, and what no firmware knows: FLAT, and FAILED: its
+/// program faulted in simulation.
 enum class LifeCycle : std::uint8_t {
   kSleeping = 0,
   kIdle = 1,
@@ -32,6 +32,7 @@ enum class LifeCycle : std::uint8_t {
   kRunning = 4,
   kCharging = 5,
   kMoving = 6,
+  kFlat = 254,  ///< off: its battery is empty
   kFailed = 255
 };
 

@@ -53,6 +53,18 @@ proto::Manifest checked(proto::Manifest manifest) {
         "group_program names program " + std::to_string(program) + " of " + std::to_string(manifest.program_size()),
         "an index into program");
   }
+  int rasters = 0;
+  for (const proto::LightImage& image : experiment.light().image()) rasters += image.png_size();
+  require(manifest.light_raster_size() == rasters, "the pictures of light do not match the experiment",
+          "one raster per picture");
+  for (const proto::LightRaster& raster : manifest.light_raster()) {
+    const std::uint64_t pixels = std::uint64_t{raster.columns()} * raster.rows();
+    require(pixels > 0 && raster.brightness().size() == pixels, "a picture of light is damaged",
+            "as many octets as pixels");
+  }
+  for (const proto::RobotEeprom& eeprom : manifest.eeprom()) {
+    require(eeprom.robot() < robots && eeprom.content().size() == 1024, "an EEPROM is damaged", "1024 octets");
+  }
   return manifest;
 }
 
@@ -157,9 +169,14 @@ RunPlan::RunPlan(proto::Manifest given)
       hosts(experiment().deployment().hosts()),
       hash(hash_of(manifest)) {
   program_of_.reserve(robots());
+  uid_of_.reserve(robots());
   for (int group = 0; group < experiment().robots_size(); ++group) {
-    program_of_.insert(program_of_.end(), experiment().robots(group).count(), manifest.group_program(group));
-    immobile_.insert(immobile_.end(), experiment().robots(group).count(), experiment().robots(group).immobile());
+    const proto::RobotGroup& robots_of_group = experiment().robots(group);
+    program_of_.insert(program_of_.end(), robots_of_group.count(), manifest.group_program(group));
+    immobile_.insert(immobile_.end(), robots_of_group.count(), robots_of_group.immobile());
+    std::uint32_t uid =
+        robots_of_group.has_first_uid() ? robots_of_group.first_uid() : static_cast<std::uint32_t>(uid_of_.size());
+    while (uid_of_.size() < program_of_.size()) uid_of_.push_back(static_cast<std::uint16_t>(uid++));
   }
 }
 

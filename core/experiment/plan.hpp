@@ -91,6 +91,12 @@ class RunPlan {
   }
   /// Whether any robot does.
   [[nodiscard]] bool has_firmware() const;
+  /// The robot's kilo_uid as it is calibrated: its number, or counted through its group from where the group says.
+  [[nodiscard]] std::uint16_t uid_of(std::uint32_t robot) const { return uid_of_[robot]; }
+  /// Whether hosts of behaviours need poses: for light, and for batteries that can be charged.
+  [[nodiscard]] bool hosts_see_bodies() const {
+    return experiment().has_light() || experiment().battery().charger_size() > 0;
+  }
   /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;
@@ -115,6 +121,7 @@ class RunPlan {
 
   std::vector<std::uint32_t> program_of_;
   std::vector<std::uint8_t> immobile_;
+  std::vector<std::uint16_t> uid_of_;
 };
 
 }  // namespace kilotwin

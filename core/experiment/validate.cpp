@@ -11,6 +11,7 @@
 #include "core/experiment/fields.hpp"
 #include "core/experiment/layout.hpp"
 #include "core/experiment/limits.hpp"
+#include "core/experiment/surroundings.hpp"
 #include "core/experiment/world.hpp"
 
 namespace kilotwin {
@@ -372,6 +373,7 @@ void validate_fields(const LoadedExperiment& loaded) {
                   2 * arena.half_height_mm());
   check_robot_models(loaded);
   check_station(loaded);
+  validate_surroundings(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",
@@ -391,6 +393,9 @@ void validate_fields(const LoadedExperiment& loaded) {
   if (known) validate_total(loaded, total);
 }
 
-void validate(const LoadedExperiment& loaded) { static_cast<void>(place_robots(loaded)); }
+void validate(const LoadedExperiment& loaded) {
+  static_cast<void>(place_robots(loaded));
+  static_cast<void>(read_light_rasters(loaded));
+}
 
 }  // namespace kilotwin

@@ -27,7 +27,7 @@ namespace topics {
 using dds::Channel;
 using dds::Delivery;
 
-/// Poses of the robots that a partition owns, to the radio and the station.
+/// Poses of the robots that a partition owns, to the radio and the station, and to hosts where RunPlan::hosts_see_bodies().
 inline Channel bodies() { return {"kilotwin/bodies", Delivery::kFrame, ""}; }
 /// Bodies near the border, to the partition `to` alone.
 inline Channel ghosts(std::uint32_t to) {

@@ -20,6 +20,9 @@ enum class Stream : std::uint16_t {
   kReception = 6,    ///< loss at a receiver
   kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
   kSolver = 20,      ///< what ODE's iterative solver starts from; per sub-step, of the lowest robot that takes part
+  kLightSensor = 25,  ///< draw 0 logarithm of the gain, 1 offset; tick 0
+  kBattery = 26,      ///< draw 0 charge at the start
+  kTemperature = 27,  ///< draw 0 offset of a robot's sensor
   kConverter = 35,   ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 

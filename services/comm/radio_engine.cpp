@@ -82,8 +82,8 @@ void RadioEngine::read_actuation(std::span<const ActuationFrame* const> frames) 
     for (std::size_t n = 0; n < robots; ++n) {
       const auto robot = static_cast<std::uint32_t>(frame->first_robot + n);
       const auto life_cycle = static_cast<LifeCycle>(frame->life_cycle[n]);
-      const bool deaf =
-          life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed || apart_[robot] != 0;
+      const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed ||
+                        life_cycle == LifeCycle::kFlat || apart_[robot] != 0;
       const bool running = life_cycle == LifeCycle::kRunning && apart_[robot] == 0;
       const int kept = state_[robot] & (kHolding | kFlying);
       state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));

@@ -1,5 +1,6 @@
 #include "tests/clients/behaviours/swarm.hpp"
 
+#include <google/protobuf/text_format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -77,8 +78,10 @@ RadioFrame Air::frame(Tick tick, const Share& share) const {
   return frame;
 }
 
-Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::uint32_t host_count) {
+Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::uint32_t host_count,
+             const std::string& experiment, const std::function<void(proto::Manifest&)>& edit) {
   proto::Manifest manifest;
+  EXPECT_TRUE(google::protobuf::TextFormat::ParseFromString(experiment, manifest.mutable_experiment()));
   manifest.set_run(1);
   manifest.mutable_experiment()->mutable_deployment()->set_hosts(host_count);
   manifest.mutable_experiment()->mutable_motion()->set_calibrated_turn_duty(60);
@@ -99,7 +102,12 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
       manifest.add_heading_rad(0);
     }
   }
+  if (edit) edit(manifest);
   plan = std::make_unique<RunPlan>(manifest);
+  for (std::uint32_t robot = 0; robot < plan->robots(); ++robot) {
+    const Pose pose = plan->initial_pose(robot);
+    bodies.add(robot, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
+  }
   programs = ProgramSet::load(plan->manifest, folder.path());
   for (std::uint32_t h = 0; h < host_count; ++h) {
     hosts.push_back(std::make_unique<BehavioursEngine>(*plan, HostId{h}, programs));
@@ -107,7 +115,10 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
 }
 
 void Swarm::step(const Air& air) {
-  for (std::uint32_t h = 0; h < hosts.size(); ++h) hosts[h]->step(tick, air.frame(tick, plan->share(HostId{h})));
+  bodies.tick = tick;
+  const BodyFrame* const all[] = {&bodies};
+  for (std::uint32_t h = 0; h < hosts.size(); ++h)
+    hosts[h]->step(tick, air.frame(tick, plan->share(HostId{h})), all);
   ++tick;
 }
 
@@ -165,8 +176,8 @@ Air echo(const ActuationFrame& frame) {
 
 bool equal(const ActuationFrame& a, const ActuationFrame& b) {
   return a.motor_left == b.motor_left && a.motor_right == b.motor_right && a.led == b.led &&
-         a.life_cycle == b.life_cycle && a.tx_period == b.tx_period && a.spin_up == b.spin_up && a.offer_robot == b.offer_robot &&
-         a.offer_message == b.offer_message;
+         a.life_cycle == b.life_cycle && a.tx_period == b.tx_period && a.spin_up == b.spin_up &&
+         a.offer_robot == b.offer_robot && a.offer_message == b.offer_message;
 }
 
 }  // namespace kilotwin::behaviours::test

@@ -55,7 +55,9 @@ struct Air {
 class Swarm {
  public:
   /// `robots` of each program (C text, or the path of a .c file), on `hosts` hosts.
-  Swarm(const std::vector<std::string>& programs, std::uint32_t robots, std::uint32_t hosts = 1);
+  /// `experiment`: more of it, in text format; `edit` has the last word. Robots stand in rows, 40 mm apart, and look to the right.
+  Swarm(const std::vector<std::string>& programs, std::uint32_t robots, std::uint32_t hosts = 1,
+        const std::string& experiment = "", const std::function<void(proto::Manifest&)>& edit = {});
 
   /// One tick of all hosts.
   void step(const Air& air = {});
@@ -75,6 +77,7 @@ class Swarm {
   std::unique_ptr<RunPlan> plan;
   std::shared_ptr<ProgramSet> programs;
   std::vector<std::unique_ptr<BehavioursEngine>> hosts;
+  BodyFrame bodies;  ///< where all robots are
   Tick tick;
 };
 

@@ -48,6 +48,22 @@ TEST(Picture, ShowsWhatThePersonMustKnow) {
   EXPECT_EQ(ground->attribute("fill"), "#ffffff");
 }
 
+TEST(Picture, ShowsLampsWhereTheyAre) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(4);
+  proto::LightSource& lamp = *header.mutable_light()->add_source();
+  lamp.add_switch_s(0.001);
+  lamp.mutable_circle();
+  const Xml xml(picture_of(scratch, header, 300));
+  int shining = 0, off = 0;
+  for (const Element& element : xml.elements()) {
+    if (element.name != "circle" || element.attribute("stroke") != "#f5a623") continue;
+    ++(element.attribute("fill") == "none" ? off : shining);
+  }
+  EXPECT_EQ(shining, 1) << "at the start";
+  EXPECT_EQ(off, 1) << "at the end";
+}
+
 TEST(Picture, EnlargesASmallSwarmAndSaysSo) {
   const Scratch scratch;
   proto::RecordingHeader header = synthetic_header(3);

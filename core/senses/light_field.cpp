@@ -1,0 +1,93 @@
+#include "core/senses/light_field.hpp"
+
+#include "core/base/error.hpp"
+#include "core/math/elementary.h"
+#include "core/random/random.hpp"
+
+namespace kilotwin::senses {
+
+LightField::LightField(const RunPlan& plan, Share share)
+    : plan_(plan),
+      light_(plan.experiment().light()),
+      share_(share),
+      anchor_z_mm_(light_.sensor().height_mm()),
+      gain_(share.size()),
+      offset_(share.size()),
+      x_mm_(plan.robots()),
+      y_mm_(plan.robots()),
+      heading_rad_(plan.robots()) {
+  const proto::LightSensor& sensor = light_.sensor();
+  double s = 0, c = 0;
+  kt_sincos(sensor.angle_deg() * (kPi / 180), &s, &c);
+  anchor_x_mm_ = sensor.radius_mm() * c;
+  anchor_y_mm_ = sensor.radius_mm() * s;
+
+  const Random random(plan.seed());
+  for (std::uint32_t i = 0; i < share.size(); ++i) {
+    const auto draw = random.normal_pair(Stream::kLightSensor, share.first + i, Tick{0}, 0);
+    gain_[i] = kt_exp(sensor.gain_sd() * draw[0]);
+    offset_[i] = sensor.offset_sd() * draw[1];
+  }
+  for (const proto::RobotModel& robot : plan.experiment().robot_model()) {
+    if (!share.contains(robot.robot())) continue;
+    if (robot.has_light_gain()) gain_[robot.robot() - share.first] = robot.light_gain();
+    if (robot.has_light_offset()) offset_[robot.robot() - share.first] = robot.light_offset();
+  }
+
+  int rasters = 0;
+  for (const proto::LightImage& image : light_.image()) {
+    images_.emplace_back(image, plan.manifest, rasters);
+    rasters += image.png_size();
+  }
+  if (light_.shadows()) shadows_.emplace(sensor.body_height_mm());
+}
+
+void LightField::at(Tick tick, std::span<const BodyFrame* const> bodies) {
+  std::size_t robots = 0;
+  for (const BodyFrame* frame : bodies) {
+    KILOTWIN_DEMAND(frame->tick == tick);
+    robots += frame->robot.size();
+    for (std::size_t n = 0; n < frame->robot.size(); ++n) {
+      const std::uint32_t robot = frame->robot[n];
+      if (!shadows_ && !share_.contains(robot)) continue;
+      x_mm_[robot] = frame->x_mm[n];
+      y_mm_[robot] = frame->y_mm[n];
+      heading_rad_[robot] = frame->heading_rad[n];
+    }
+  }
+  KILOTWIN_DEMAND(robots == plan_.robots());
+  if (shadows_) shadows_->prepare(x_mm_, y_mm_);
+
+  const double time_s = plan_.tick_length.seconds_at(tick);
+  lamps_.clear();
+  for (const proto::LightSource& source : light_.source()) {
+    const Lamp lamp = lamp_at(source, time_s);
+    if (lamp.intensity > 0) lamps_.push_back(lamp);
+  }
+  for (LightImage& image : images_) image.at(time_s);
+}
+
+double LightField::light(double x_mm, double y_mm, double z_mm, std::uint32_t self) const {
+  double sum = light_.ambient();
+  for (const Lamp& lamp : lamps_) {
+    if (shadows_ && shadows_->hides(lamp, x_mm, y_mm, z_mm, self)) continue;
+    sum += reading_of(lamp, x_mm, y_mm, z_mm, light_.sensor().cosine());
+  }
+  for (const LightImage& image : images_) sum += image.reading(x_mm, y_mm);
+  return sum;
+}
+
+double LightField::reading(std::uint32_t id) const {
+  double s = 0, c = 0;
+  kt_sincos(heading_rad_[id], &s, &c);
+  const double x_mm = x_mm_[id] + c * anchor_x_mm_ - s * anchor_y_mm_;
+  const double y_mm = y_mm_[id] + s * anchor_x_mm_ + c * anchor_y_mm_;
+  return gain_[id - share_.first] * light(x_mm, y_mm, anchor_z_mm_, id) + offset_[id - share_.first];
+}
+
+double LightField::sd(double reading) const {
+  const double floor = light_.sensor().noise_floor(), relative = light_.sensor().noise_relative() * reading;
+  return __builtin_sqrt(floor * floor + relative * relative);
+}
+
+}  // namespace kilotwin::senses
