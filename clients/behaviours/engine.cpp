@@ -153,7 +153,7 @@ void BehavioursEngine::relay_firmware(const RadioFrame& radio) {
 }
 
 void BehavioursEngine::use_battery(std::uint32_t i) {
-  if (presence_[i] == Presence::kNone || presence_[i] == Presence::kFailed) return;
+  if (presence_[i] != Presence::kNew && presence_[i] != Presence::kAlive) return;
   constexpr auto kFlat = static_cast<std::uint8_t>(LifeCycle::kFlat);
   if (life_cycle_[i] == kFlat) {
     senses_.rest(i);
