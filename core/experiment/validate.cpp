@@ -311,6 +311,7 @@ void check_engine(const LoadedExperiment& loaded) {
         path, fmt::format("the {} engine knows no {}; remove it or choose another physics.engine",
                           proto::Physics::Engine_Name(experiment.physics().engine()), what));
   };
+  if (experiment.physics().engine() == proto::Physics::PLANAR) return;
   if (experiment.arena().has_circle()) refuse("arena.circle", "round walls");
   if (experiment.arena().has_polygon()) refuse("arena.polygon", "walls along a polygon");
   if (experiment.obstacle_size() > 0) refuse("obstacle[0]", "obstacles");

@@ -37,17 +37,21 @@ const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, Fede
   const MovableColumns& movable = frame.movable;
   if (!ascending_within(movable.body, {0, plan.movables()}))
     return "its movable bodies are not ascending numbers of the experiment";
-  for (const auto* column : {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm_s, &movable.vy_mm_s,
-                             &movable.turn_rad_s}) {
+  for (const auto* column :
+       {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm, &movable.vy_mm, &movable.turn_rad}) {
     if (!all_finite(*column)) return "a movable body's state is not finite";
   }
   const PressedColumns& pressed = frame.pressed;
   if (!std::includes(frame.robot.begin(), frame.robot.end(), pressed.robot.begin(), pressed.robot.end()) ||
       !ascending_within(pressed.robot, {0, plan.robots()}))
     return "its pressed robots are not ascending robots of the frame";
-  if (!all_finite(pressed.slip_x_mm_s) || !all_finite(pressed.slip_y_mm_s) || !all_finite(pressed.force_N))
+  if (!all_finite(pressed.slip_x_mm) || !all_finite(pressed.slip_y_mm) || !all_finite(pressed.push_mm))
     return "a contact's state is not finite";
-  const auto known_body = [&](std::uint32_t other) { return other < plan.robots() + plan.movables(); };
+  constexpr std::uint32_t kMostWalls = 32;
+  const auto obstacles = static_cast<std::uint32_t>(plan.world.obstacles.size());
+  const auto known_body = [&](std::uint32_t other) {
+    return other < plan.robots() + plan.movables() + obstacles + kMostWalls;
+  };
   if (!std::all_of(pressed.other.begin(), pressed.other.end(), known_body)) return "a contact is with nobody";
   return nullptr;
 }

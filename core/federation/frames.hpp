@@ -17,29 +17,29 @@ using IrMessage = std::array<std::uint8_t, 10>;
 struct MovableColumns {
   std::vector<std::uint32_t> body;
   std::vector<double> x_mm, y_mm, heading_rad;  ///< of the centre; heading in [-pi, pi)
-  std::vector<double> vx_mm_s, vy_mm_s, turn_rad_s;
+  std::vector<double> vx_mm, vy_mm, turn_rad;
 
   void clear() {
     body.clear();
-    for (auto* column : {&x_mm, &y_mm, &heading_rad, &vx_mm_s, &vy_mm_s, &turn_rad_s}) column->clear();
+    for (auto* column : {&x_mm, &y_mm, &heading_rad, &vx_mm, &vy_mm, &turn_rad}) column->clear();
   }
 };
 
 /// Robots that touch others or slip against their drive; ascending ids.
 struct PressedColumns {
   std::vector<std::uint32_t> robot;
-  std::vector<double> slip_x_mm_s, slip_y_mm_s;  ///< per robot: velocity less that of its drive
-  std::vector<std::uint8_t> contacts;            ///< per robot: how many entries of the next two are its own
-  std::vector<std::uint32_t> other;  ///< ascending within a robot: another robot, or robots + movable body
-  std::vector<double> force_N;       ///< above 0
+  std::vector<double> slip_x_mm, slip_y_mm;  ///< per robot: velocity less that of its drive
+  std::vector<std::uint8_t> contacts;        ///< per robot: how many entries of the next two are its own
+  std::vector<std::uint32_t> other;          ///< ascending within a robot: another robot, or robots + movable body
+  std::vector<double> push_mm;               ///< above 0
 
   void clear() {
     robot.clear();
-    slip_x_mm_s.clear();
-    slip_y_mm_s.clear();
+    slip_x_mm.clear();
+    slip_y_mm.clear();
     contacts.clear();
     other.clear();
-    force_N.clear();
+    push_mm.clear();
   }
 };
 

@@ -61,15 +61,15 @@ WireBodyFrame to_wire(const WireHeader& header, const BodyFrame& frame) {
   wire.movable_x_mm = borrow<Doubles>(frame.movable.x_mm);
   wire.movable_y_mm = borrow<Doubles>(frame.movable.y_mm);
   wire.movable_heading_rad = borrow<Doubles>(frame.movable.heading_rad);
-  wire.movable_vx_mm_s = borrow<Doubles>(frame.movable.vx_mm_s);
-  wire.movable_vy_mm_s = borrow<Doubles>(frame.movable.vy_mm_s);
-  wire.movable_turn_rad_s = borrow<Doubles>(frame.movable.turn_rad_s);
+  wire.movable_vx_mm = borrow<Doubles>(frame.movable.vx_mm);
+  wire.movable_vy_mm = borrow<Doubles>(frame.movable.vy_mm);
+  wire.movable_turn_rad = borrow<Doubles>(frame.movable.turn_rad);
   wire.pressed = borrow<ULongs>(frame.pressed.robot);
-  wire.slip_x_mm_s = borrow<Doubles>(frame.pressed.slip_x_mm_s);
-  wire.slip_y_mm_s = borrow<Doubles>(frame.pressed.slip_y_mm_s);
+  wire.slip_x_mm = borrow<Doubles>(frame.pressed.slip_x_mm);
+  wire.slip_y_mm = borrow<Doubles>(frame.pressed.slip_y_mm);
   wire.contacts = borrow<Octets>(frame.pressed.contacts);
   wire.contact_other = borrow<ULongs>(frame.pressed.other);
-  wire.contact_N = borrow<Doubles>(frame.pressed.force_N);
+  wire.contact_push_mm = borrow<Doubles>(frame.pressed.push_mm);
   return wire;
 }
 
@@ -83,23 +83,23 @@ bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
   MovableColumns& movable = frame.movable;
   if (!copy(wire.movable, movable.body) || !copy(wire.movable_x_mm, movable.x_mm) ||
       !copy(wire.movable_y_mm, movable.y_mm) || !copy(wire.movable_heading_rad, movable.heading_rad) ||
-      !copy(wire.movable_vx_mm_s, movable.vx_mm_s) || !copy(wire.movable_vy_mm_s, movable.vy_mm_s) ||
-      !copy(wire.movable_turn_rad_s, movable.turn_rad_s)) {
+      !copy(wire.movable_vx_mm, movable.vx_mm) || !copy(wire.movable_vy_mm, movable.vy_mm) ||
+      !copy(wire.movable_turn_rad, movable.turn_rad)) {
     return false;
   }
-  for (const auto* column : {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm_s, &movable.vy_mm_s,
-                             &movable.turn_rad_s}) {
+  for (const auto* column :
+       {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm, &movable.vy_mm, &movable.turn_rad}) {
     if (column->size() != movable.body.size()) return false;
   }
   PressedColumns& pressed = frame.pressed;
-  if (!copy(wire.pressed, pressed.robot) || !copy(wire.slip_x_mm_s, pressed.slip_x_mm_s) ||
-      !copy(wire.slip_y_mm_s, pressed.slip_y_mm_s) || !copy(wire.contacts, pressed.contacts) ||
-      !copy(wire.contact_other, pressed.other) || !copy(wire.contact_N, pressed.force_N)) {
+  if (!copy(wire.pressed, pressed.robot) || !copy(wire.slip_x_mm, pressed.slip_x_mm) ||
+      !copy(wire.slip_y_mm, pressed.slip_y_mm) || !copy(wire.contacts, pressed.contacts) ||
+      !copy(wire.contact_other, pressed.other) || !copy(wire.contact_push_mm, pressed.push_mm)) {
     return false;
   }
   const std::size_t p = pressed.robot.size();
-  return pressed.slip_x_mm_s.size() == p && pressed.slip_y_mm_s.size() == p && pressed.contacts.size() == p &&
-         pressed.other.size() == pressed.force_N.size() &&
+  return pressed.slip_x_mm.size() == p && pressed.slip_y_mm.size() == p && pressed.contacts.size() == p &&
+         pressed.other.size() == pressed.push_mm.size() &&
          std::accumulate(pressed.contacts.begin(), pressed.contacts.end(), std::size_t{0}) == pressed.other.size();
 }
 

@@ -33,15 +33,12 @@ void ContactPass::rest() {
   after_.assign(now_.size(), 0);
 }
 
-void ContactPass::set_drive(Seat seat, double x_mm, double y_mm) {
-  now_[seat + 2 * kLanes] = x_mm;
-  now_[seat + 3 * kLanes] = y_mm;
-}
-
-void ContactPass::run(const ContactLimits& limits, bool with_overlaps) {
-  for (std::uint32_t step = 0; step < limits.sub_steps; ++step) {
-    with_overlaps ? sub_step<true>(limits, step) : sub_step<false>(limits, step);
-    now_.swap(after_);
+void ContactPass::set_off() {
+  for (std::size_t b = 1; b < batches_.size(); ++b) {
+    const Batch& batch = batches_[b];
+    double* const now = now_.data() + b * kColumns * kLanes;
+    store(load(batch.drive_x_mm) + load(batch.slip_x_mm), now + 2 * kLanes);
+    store(load(batch.drive_y_mm) + load(batch.slip_y_mm), now + 3 * kLanes);
   }
 }
 
@@ -55,39 +52,48 @@ template <bool kWithOverlaps> void ContactPass::sub_step(const ContactLimits& li
 }
 
 template <bool kWithOverlaps>
-inline void ContactPass::move(const ContactLimits& limits, const Batch& batch, const double* now, double* after) {
+inline void ContactPass::move(const ContactLimits& limits, Batch& batch, const double* now, double* after) {
   const double* const motion = now_.data();
-  const Contact* const contacts = contacts_.data() + batch.first_contact;
+  Contact* const contacts = contacts_.data() + batch.first_contact;
   const std::size_t count = batch.contacts;
   Lanes* const limit_mm = limit_mm_.data();
   const Lanes zero = all(0), a_half = all(0.5), separation_mm = all(limits.separation_mm);
+  const Lanes touch_mm = all(limits.touch_mm);
   const Lanes shift_x = load(now), shift_y = load(now + kLanes);
-  const Lanes drive_x = load(now + 2 * kLanes), drive_y = load(now + 3 * kLanes);
+  const Lanes swing_x = load(now + 2 * kLanes), swing_y = load(now + 3 * kLanes);
+  const Lanes drive_x = load(batch.drive_x_mm), drive_y = load(batch.drive_y_mm);
+  const Lanes old_slip_x = load(batch.slip_x_mm), old_slip_y = load(batch.slip_y_mm);
 
-  // Pushes; the sum in ascending order.
-  Lanes x = drive_x, y = drive_y, deepest = zero;
+  // Forces of the contacts; the sum in ascending order.
+  Lanes slip_x = old_slip_x, slip_y = old_slip_y, apart_x = zero, apart_y = zero, deepest = zero;
   for (std::size_t p = 0; p < count; ++p) {
-    const Contact& c = contacts[p];
+    Contact& c = contacts[p];
     const Lanes gap = c.gap_mm + (c.normal_x * (gather(motion, c.other) - shift_x) +
                                   c.normal_y * (gather(motion + kLanes, c.other) - shift_y));
-    const Lanes half = larger(a_half * gap, zero);
-    // Along the normal: what the neighbour drives, negative towards this body, and what this body drives.
-    const Lanes theirs =
-        c.normal_x * gather(motion + 2 * kLanes, c.other) + c.normal_y * gather(motion + 3 * kLanes, c.other);
-    const Lanes mine = c.normal_x * drive_x + c.normal_y * drive_y;
-    // It pushes where it drives faster than both the gap and this body's own retreat allow.
-    Lanes push = larger(smaller(-half, mine) - theirs, zero);
+    const Lanes closing = c.normal_x * (swing_x - gather(motion + 2 * kLanes, c.other)) +
+                          c.normal_y * (swing_y - gather(motion + 3 * kLanes, c.other));
+    c.push_mm = larger(c.push_mm + c.gain * (closing - larger(gap - touch_mm, zero)), zero);
+    slip_x = slip_x - c.push_mm * c.normal_x;
+    slip_y = slip_y - c.push_mm * c.normal_y;
     if constexpr (kWithOverlaps) {
       const Lanes overlap = chosen(all(-kOverlapTolerance_mm) > gap, -gap, zero);
       deepest = larger(deepest, overlap);
-      push = push + smaller(a_half * overlap, separation_mm);
+      const Lanes apart = smaller(a_half * overlap, separation_mm);
+      apart_x = apart_x - apart * c.normal_x;
+      apart_y = apart_y - apart * c.normal_y;
       limit_mm[p] = gap;
     } else {
-      limit_mm[p] = half;
+      limit_mm[p] = larger(a_half * gap, zero);
     }
-    x = x - push * c.normal_x;
-    y = y - push * c.normal_y;
   }
+  // The ground takes off as much of the slip as its grip allows.
+  const Lanes grip = load(batch.grip_mm), square_slip = slip_x * slip_x + slip_y * slip_y;
+  if (largest(square_slip) > 0) {
+    const Lanes slip = root(square_slip), keep = chosen(slip > grip, (slip - grip) / slip, zero);
+    slip_x = slip_x * keep;
+    slip_y = slip_y * keep;
+  }
+  Lanes x = drive_x + slip_x, y = drive_y + slip_y;
   if constexpr (kWithOverlaps) {
     for (std::size_t p = 0; p < count; ++p) limit_mm[p] = larger(a_half * (limit_mm[p] + a_half * deepest), zero);
   }
@@ -99,6 +105,12 @@ inline void ContactPass::move(const ContactLimits& limits, const Batch& batch, c
     high_y = all(limits.y_limit_mm) - at_y;
     low_x = all(-limits.x_limit_mm) - at_x;
     low_y = all(-limits.y_limit_mm) - at_y;
+    const Lanes most_x = larger(high_x, zero), least_x = smaller(low_x, zero);
+    const Lanes most_y = larger(high_y, zero), least_y = smaller(low_y, zero);
+    slip_x = slip_x + (larger(smaller(x, most_x), least_x) - x);
+    slip_y = slip_y + (larger(smaller(y, most_y), least_y) - y);
+    x = larger(smaller(x, most_x), least_x);
+    y = larger(smaller(y, most_y), least_y);
     // Outside of a wall it moves inwards, as far as its neighbours let it.
     x = x + (larger(smaller(high_x, zero), -separation_mm) + smaller(larger(low_x, zero), separation_mm));
     y = y + (larger(smaller(high_y, zero), -separation_mm) + smaller(larger(low_y, zero), separation_mm));
@@ -106,6 +118,11 @@ inline void ContactPass::move(const ContactLimits& limits, const Batch& batch, c
     high_y = larger(high_y, zero);
     low_x = smaller(low_x, zero);
     low_y = smaller(low_y, zero);
+  }
+  const Lanes velocity_x = drive_x + slip_x, velocity_y = drive_y + slip_y;
+  if constexpr (kWithOverlaps) {
+    x = x + apart_x;
+    y = y + apart_y;
   }
   const Lanes square = x * x + y * y, stride = all(limits.stride_mm), stride_square = stride * stride;
   if (largest(square) > limits.stride_mm * limits.stride_mm) {
@@ -157,8 +174,15 @@ inline void ContactPass::move(const ContactLimits& limits, const Batch& batch, c
   const Lanes cos_turn = load(batch.cos_turn), sin_turn = load(batch.sin_turn);
   store(shift_x + x, after);
   store(shift_y + y, after + kLanes);
-  store(cos_turn * drive_x - sin_turn * drive_y, after + 2 * kLanes);
-  store(sin_turn * drive_x + cos_turn * drive_y, after + 3 * kLanes);
+  store((velocity_x + velocity_x) - (drive_x + old_slip_x), after + 2 * kLanes);
+  store((velocity_y + velocity_y) - (drive_y + old_slip_y), after + 3 * kLanes);
+  store(slip_x, batch.slip_x_mm);
+  store(slip_y, batch.slip_y_mm);
+  store(cos_turn * drive_x - sin_turn * drive_y, batch.drive_x_mm);
+  store(sin_turn * drive_x + cos_turn * drive_y, batch.drive_y_mm);
 }
+
+template void ContactPass::sub_step<true>(const ContactLimits&, std::uint32_t);
+template void ContactPass::sub_step<false>(const ContactLimits&, std::uint32_t);
 
 }  // namespace kilotwin::physics

@@ -22,10 +22,16 @@ class ContactPass {
   struct Contact {
     Lanes normal_x, normal_y;  ///< from the body to the other
     Lanes gap_mm;              ///< at the tick's start; huge where a lane has no such contact
+    Lanes push_mm;             ///< force of the contact
+    Lanes gain;                ///< by which the force grows with what the two close
     Seat other[kLanes];
   };
   struct Batch {
-    double x_mm[kLanes] = {}, y_mm[kLanes] = {};          ///< at the tick's start
+    double x_mm[kLanes] = {}, y_mm[kLanes] = {};  ///< at the tick's start
+    double drive_x_mm[kLanes] = {},
+           drive_y_mm[kLanes] = {};                         ///< velocity by the drive alone in the coming sub-step
+    double slip_x_mm[kLanes] = {}, slip_y_mm[kLanes] = {};  ///< velocity less that of the drive
+    double grip_mm[kLanes] = {};                          ///< the force with which the ground holds it to its drive
     double cos_turn[kLanes] = {}, sin_turn[kLanes] = {};  ///< of a sub-step; read where the body is driven
     std::uint32_t first_contact = 0, contacts = 0;
     std::uint32_t passes = 0;  ///< it is moved in the first so many sub-steps
@@ -43,24 +49,36 @@ class ContactPass {
   [[nodiscard]] Seat seat(std::size_t lane) const {
     return static_cast<Seat>((batches_.size() - 1) * kColumns * kLanes + lane);
   }
-  /// Once all batches are there: nobody drives.
+  /// Once all batches are there: nobody moves.
   void rest();
-  /// Displacement by the drive alone in the first sub-step.
-  void set_drive(Seat, double x_mm, double y_mm);
+  /// Once drives and slips are filled in: velocities at the tick's start.
+  void set_off();
 
   /// All sub-steps. `with_overlaps`: whether any bodies overlap at the tick's start; none do later where none did then.
-  void run(const ContactLimits&, bool with_overlaps);
+  /// `others(step)` moves what is not a disc: it reads now() and writes after().
+  template <class Others>
+  void run(const ContactLimits& limits, std::uint32_t sub_steps, bool with_overlaps, Others&& others) {
+    for (std::uint32_t step = 0; step < sub_steps; ++step) {
+      with_overlaps ? sub_step<true>(limits, step) : sub_step<false>(limits, step);
+      others(step);
+      now_.swap(after_);
+    }
+  }
+  /// Of a seat, kLanes apart: displacement since the tick's start, x, y; velocity, carried on as it changes, x, y.
+  [[nodiscard]] const double* now(Seat seat) const { return now_.data() + seat; }
+  [[nodiscard]] double* after(Seat seat) { return after_.data() + seat; }
+  [[nodiscard]] double* start(Seat seat) { return now_.data() + seat; }
 
   /// Displacement over the tick.
   [[nodiscard]] double shift_x_mm(Seat seat) const { return now_[seat]; }
   [[nodiscard]] double shift_y_mm(Seat seat) const { return now_[seat + kLanes]; }
 
  private:
-  /// Of the motion of a batch: displacement since the tick's start, x, y; by the drive alone in the coming sub-step, x, y.
+  /// As now() says.
   static constexpr std::size_t kColumns = 4;
 
   template <bool kWithOverlaps> void sub_step(const ContactLimits&, std::uint32_t step);
-  template <bool kWithOverlaps> void move(const ContactLimits&, const Batch&, const double* now, double* after);
+  template <bool kWithOverlaps> void move(const ContactLimits&, Batch&, const double* now, double* after);
 
   std::vector<Batch> batches_;
   std::vector<Contact> contacts_;

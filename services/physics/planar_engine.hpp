@@ -17,11 +17,27 @@ class PlanarEngine final : public PopulationEngine {
  public:
   PlanarEngine(const RunPlan&, PartitionId);
 
+  void emit_bodies(BodyFrame&) const override;
+  void emit_ghosts(PartitionId neighbour, BodyFrame&) const override;
+  [[nodiscard]] std::uint64_t hash_part() const override;
+  void save(proto::PhysicsState&) const override;
+  void load(Tick, std::span<const proto::PhysicsState* const> parts) override;
+
  private:
   PlanarEngine(const RunPlan&, PartitionId, const DriveModel&);
   void move(Tick from, const Inputs&) override;
+  void take(const Inputs&);
   void set_off(Tick from);
+  void list_movables();
+  void add_movables(BodyFrame&) const;
+  [[nodiscard]] bool is_own(const MovableState& body) const { return rectangle_.contains(body.x_mm, body.y_mm); }
 
+  PartitionGrid grid_;
+  Rectangle rectangle_;
+  double margin_mm_, slack_mm_;
+  std::vector<double> reach_mm_;              ///< per movable body
+  std::vector<std::uint8_t> own_movable_;     ///< per movable body, by its pose before the step
+  std::vector<std::uint8_t> listed_movable_;  ///< per movable body: whose state the partition publishes and hashes
   ContactSolver contact_;
   Drives drives_;  ///< within a step
 };

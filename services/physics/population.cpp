@@ -14,7 +14,8 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
       rectangle_(plan.grid.rectangle(partition)),
       margin_mm_(margin_mm),
       robots_(plan.robots()),
-      neighbours_(plan.grid.neighbours(partition, margin_mm)),
+      // All partitions know all movable bodies.
+      neighbours_(plan.grid.neighbours(partition, plan.movables() > 0 ? 1e300 : margin_mm)),
       merge_(robots_) {
   for (std::uint32_t robot = 0; robot < robots_; ++robot) {
     const Pose pose = plan.initial_pose(robot);

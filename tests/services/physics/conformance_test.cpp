@@ -27,13 +27,14 @@ struct Tested {
   double relative_tolerance;  ///< of speeds and turn rates against the drive's closed form
   double place_tolerance_mm;  ///< of places, and of overlaps
   double balance_mm;          ///< how far two that push against each other with the same force may drift in 10 s
+  double rest_gap_mm;         ///< between robots that rest against each other, at most
 };
 void PrintTo(const Tested& engine, std::ostream* out) { *out << engine.name; }
 
 constexpr Tested kEngines[] = {
-    {"PLANAR", true, true, 1e-9, 1e-6, 1e-6},
-    {"KINEMATIC", false, true, 1e-9, 1e-6, 0},
-    {"ODE", true, false, 1e-3, 0.01, 1},
+    {"PLANAR", true, true, 1e-9, 1e-6, 1e-6, 0.35},
+    {"KINEMATIC", false, true, 1e-9, 1e-6, 0, 0},
+    {"ODE", true, false, 1e-3, 0.01, 1, 0.01},
 };
 
 class Conformance : public ::testing::TestWithParam<Tested> {
@@ -177,9 +178,9 @@ TEST_P(Conformance, RobotsHeadOnDoNotPassEachOther) {
     EXPECT_NEAR(end[0].x_mm, 98.304 - 40, tolerance_mm());
     return;
   }
-  EXPECT_NEAR(distance_mm(end[0], end[1]), 33, tolerance_mm());
-  EXPECT_NEAR(end[0].x_mm, -16.5, GetParam().balance_mm);
-  EXPECT_NEAR(end[1].x_mm, 16.5, GetParam().balance_mm);
+  EXPECT_NEAR(distance_mm(end[0], end[1]), 33, GetParam().rest_gap_mm);
+  EXPECT_NEAR(end[0].x_mm, -16.5, GetParam().balance_mm + GetParam().rest_gap_mm / 2);
+  EXPECT_NEAR(end[1].x_mm, 16.5, GetParam().balance_mm + GetParam().rest_gap_mm / 2);
 }
 
 TEST_P(Conformance, ACrowdDrivenInwardsDoesNotOverlap) {
@@ -205,7 +206,7 @@ TEST_P(Conformance, TrackedRobotsAreWhereTheTrackerSaysAndAreNotMoved) {
     ASSERT_EQ(swarm.poses()[2].x_mm, 0);
   }
   if (GetParam().contact) {
-    EXPECT_NEAR(swarm.poses()[0].x_mm, -33, tolerance_mm());
+    EXPECT_NEAR(swarm.poses()[0].x_mm, -33, GetParam().rest_gap_mm);
   }
   // It jumps, its heading comes wrapped, and its partition with it.
   swarm.step({{2, 200, -150, 7}});

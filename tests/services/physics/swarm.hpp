@@ -79,6 +79,21 @@ class Swarm {
     return all;
   }
 
+  /// Poses of all movable bodies; one that is listed twice or not at all is an error.
+  [[nodiscard]] std::vector<ScenePose> movables() const {
+    std::vector<ScenePose> all(plan_.movables());
+    std::size_t found = 0;
+    for (const auto& engine : engines_) {
+      BodyFrame frame;
+      engine->emit_bodies(frame);
+      for (std::size_t i = 0; i < frame.movable.body.size(); ++i, ++found) {
+        all[frame.movable.body[i]] = {frame.movable.x_mm[i], frame.movable.y_mm[i], frame.movable.heading_rad[i]};
+      }
+    }
+    if (found != all.size()) throw std::runtime_error("a movable body is listed twice or by nobody");
+    return all;
+  }
+
   [[nodiscard]] std::uint64_t hash() const {
     std::uint64_t sum = 0;
     for (const auto& engine : engines_) sum += engine->hash_part();
