@@ -7,6 +7,7 @@
 #include "clients/behaviours/eeprom_files.hpp"
 #include "clients/behaviours/engine.hpp"
 #include "clients/behaviours/robot_logs.hpp"
+#include "clients/behaviours/running_note.hpp"
 #include "clients/behaviours/watchdog.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_io.hpp"
@@ -40,6 +41,11 @@ class BehavioursFederate : public Federate {
       say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot,
                       session_.plan().tick_length.seconds_at(from), failure.text));
     }
+    for (; warned_ < engine_.warnings().size(); ++warned_) {
+      const auto& warning = engine_.warnings()[warned_];
+      say(fmt::format("robot {} at {:.3f} s: {}", warning.robot, session_.plan().tick_length.seconds_at(from),
+                      warning.text));
+    }
   }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
@@ -64,7 +70,7 @@ class BehavioursFederate : public Federate {
   std::optional<Input<BodyFrame>> bodies_;  // only where the experiment has something to sense by place
   Output<ActuationFrame> actuation_;
   RobotLogs logs_;
-  std::size_t told_ = 0;  // of the engine's failures
+  std::size_t told_ = 0, warned_ = 0;  // of the engine's failures and warnings
 };
 
 }  // namespace
@@ -73,6 +79,8 @@ void run_service(const RunPlan& plan, HostId host, const ServiceContext& context
   BehavioursEngine engine(plan, host, ProgramSet::load(plan.manifest, context.run_directory));
   if (context.resumed) engine.load(context.first(), context.resumed->behaviours());
   Session session(plan, plan.behaviours(host), context.transport, context.first());
+  RunningNote note(context.run_directory, host);
+  engine.note_running_in(note.place());
   const Watchdog watchdog({&engine});
   BehavioursFederate federate(session, host, engine, context);
   session.run(federate);

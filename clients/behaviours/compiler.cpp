@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <set>
 #include <system_error>
 
 #include "clients/behaviours/compiler_common.hpp"
+#include "clients/behaviours/cycle_counters.hpp"
 #include "clients/behaviours/elf_file.hpp"
 #include "clients/behaviours/files.hpp"
+#include "clients/behaviours/loop_barriers.hpp"
 #include "clients/behaviours/process.hpp"
 #include "clients/behaviours/program_text.hpp"
 #include "clients/behaviours/sha256.hpp"
@@ -51,38 +54,23 @@ Compiler find_compiler(const fs::path& wanted) {
 /// As kilolib is built for the robot (unsigned char, packed structs, short enums, common globals of avr-gcc's age), with
 /// what makes results equal everywhere: no contraction, no libm, wrapping integers, locals that start as zero, one CPU.
 Arguments code_flags(const Compiler& compiler) {
-  Arguments flags{"-O2",
-                  "-g",
-                  "-w",
-                  "-fdiagnostics-color=never",
-                  "-nostdinc",
-                  "-DF_CPU=8000000",
-                  "-funsigned-char",
-                  "-fpack-struct",
-                  "-fshort-enums",
-                  "-fcommon",
-                  "-march=x86-64",
-                  "-fPIC",
-                  "-fvisibility=hidden",
-                  "-ffp-contract=off",
-                  "-fno-math-errno",
-                  "-fno-strict-aliasing",
-                  "-fwrapv",
-                  "-fno-delete-null-pointer-checks",
-                  "-fcf-protection=none",
-                  "-fno-stack-protector",
-                  "-fstack-clash-protection",
-                  "-fno-asynchronous-unwind-tables",
-                  "-ffunction-sections",
-                  "-fdata-sections",
-                  "-ftrivial-auto-var-init=zero"};
+  Arguments flags{
+      "-O2", "-g1", "-w", "-fdiagnostics-color=never", "-nostdinc", "-DF_CPU=8000000", "-funsigned-char",
+      "-fpack-struct", "-fshort-enums", "-fcommon", "-march=x86-64", "-fPIC", "-fvisibility=hidden",
+      "-ffp-contract=off", "-fno-math-errno", "-fno-strict-aliasing", "-fwrapv", "-fno-delete-null-pointer-checks",
+      "-fcf-protection=none", "-fno-stack-protector", "-fstack-clash-protection", "-fno-asynchronous-unwind-tables",
+      // What the counters of cycles rely on: whatever lies below the stack pointer is free, jumps tell where they
+      // go, recursion uses the stack, and loops that do nothing stay.
+      "-mno-red-zone", "-fno-jump-tables", "-fno-optimize-sibling-calls", "-fno-finite-loops",
+      "-ffunction-sections", "-fdata-sections", "-ftrivial-auto-var-init=zero"};
   if (compiler.is_clang()) {
     // Before 16, clang wants to be told twice.
     if (compiler.major_version() < 16) {
       flags.emplace_back("-enable-trivial-auto-var-init-zero-knowing-it-will-be-removed-from-clang");
     }
   } else {
-    append(flags, {"-fno-tree-loop-distribute-patterns", "-funsigned-bitfields"});
+    append(flags, {"-fno-tree-loop-distribute-patterns", "-funsigned-bitfields",
+                   "-fno-isolate-erroneous-paths-dereference"});
   }
   return flags;
 }
@@ -170,22 +158,69 @@ std::string build(Arguments arguments, const fs::path& kept, const std::vector<f
   return *octets;
 }
 
+/// Runs a compilation to assembly. Nothing where it fails; `errors` is then what the compiler said.
+std::optional<std::string> assembly_of(Arguments arguments, const fs::path& place, std::string& errors) {
+  const Temporary result(place);
+  append(arguments, {"-S", "-o", result.path()});
+  const ProcessResult process = run_process(arguments);
+  errors = process.errors;
+  if (process.status != 0) return std::nullopt;
+  return read_file(result.path());
+}
+
+/// One source to assembly that counts cycles, with loops that see what interrupts change. The text that is compiled for that
+/// differs from the source; what the compiler says of it is said of the source.
+std::string counted_assembly(const Arguments& compiler, const fs::path& source, const std::string& preprocessed,
+                             const std::vector<fs::path>& sources, const fs::path& place) {
+  const Temporary marked(place);
+  if (!write_file(marked.path(), with_loop_barriers(preprocessed)))
+    throw RunError(place.string() + ": cannot be written; is the disk full?");
+  std::string errors;
+  Arguments arguments;
+  for (std::size_t i = 0; i < compiler.size(); ++i) {
+    if (compiler[i] == "-include")
+      ++i;  // is in the text already
+    else
+      arguments.push_back(compiler[i]);
+  }
+  append(arguments, {"-x", is_cpp(source) ? "c++-cpp-output" : "cpp-output", marked.path()});
+  auto assembly = assembly_of(arguments, place, errors);
+  if (!assembly) {
+    arguments = compiler;
+    arguments.push_back(source.string());
+    assembly = assembly_of(arguments, place, errors);
+  }
+  if (!assembly) throw UserError(first_error(errors, sources));
+  return with_cycle_counters(*assembly);
+}
+
 /// The runtime as one object, made once per compiler.
 fs::path runtime_object(const Compiler& compiler, const Arguments& includes, const fs::path& runtime,
                         const std::string& content) {
   const fs::path kept = runtime / (sha256_hex(content) + ".o");
   std::error_code error;
   if (fs::is_regular_file(kept, error)) return kept;
-  Arguments arguments{compiler.path, "-r", "-nostdlib"};
-  append(arguments, code_flags(compiler));
-  append(arguments, kRuntimeFlags);
-  append(arguments, includes);
-  append(arguments, {"-I", runtime.string()});
-  for (const char* name : {"kilolib.c", "machine.c", "switch.c", "libavr.c", "libc.c", "libcomplex.c", "libm.c",
-                           "libnumbers.c", "libstdio.c", "core/math/elementary.c"}) {
+  Arguments compile{compiler.path};
+  append(compile, code_flags(compiler));
+  append(compile, kRuntimeFlags);
+  append(compile, includes);
+  append(compile, {"-I", runtime.string()});
+  Arguments link = compile;
+  append(link, {"-r", "-nostdlib", (runtime / "switch.c").string(), "-x", "assembler"});
+  std::vector<std::unique_ptr<Temporary>> parts;
+  for (const char* name : {"kilolib.c", "machine.c", "libavr.c", "libc.c", "libcomplex.c", "libm.c", "libnumbers.c",
+                           "libstdio.c", "core/math/elementary.c"}) {
+    Arguments arguments = compile;
     arguments.push_back((runtime / name).string());
+    std::string errors;
+    const auto assembly = assembly_of(arguments, kept, errors);
+    if (!assembly) throw UserError(first_error(errors, {runtime / name}));
+    parts.push_back(std::make_unique<Temporary>(kept));
+    if (!write_file(parts.back()->path(), with_cycle_counters(*assembly)))
+      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    link.push_back(parts.back()->path());
   }
-  (void)build(arguments, kept, {runtime / "kilolib.c"});
+  (void)build(link, kept, {runtime / "kilolib.c"});
   return kept;
 }
 
@@ -233,13 +268,15 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
   const std::string runtime_content = content;
   for (const std::string& flag : defines) content += flag + '\n';
   for (const std::string& flag : dialect) content += flag + '\n';
+  std::vector<std::string> preprocessed;
   for (const fs::path& file : text.files) {
     Arguments preprocess{compiler.path, "-E"};
     append(preprocess, flags_for(text, file, dialect));
     preprocess.push_back(file.string());
-    const ProcessResult preprocessed = run_process(preprocess);
-    if (preprocessed.status != 0) throw UserError(first_error(preprocessed.errors, text.sources));
-    content += sha256_hex(preprocessed.output);
+    ProcessResult process = run_process(preprocess);
+    if (process.status != 0) throw UserError(first_error(process.errors, text.sources));
+    content += sha256_hex(process.output);
+    preprocessed.push_back(std::move(process.output));
   }
   const fs::path kept = cache / "programs" / (sha256_hex(content) + ".so");
   if (const auto octets = read_file(kept)) {
@@ -251,16 +288,18 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
   }
   Arguments link{compiler.path};
   append(link, kLinkFlags);
-  std::vector<std::unique_ptr<Temporary>> objects;
-  for (const fs::path& file : text.files) {
-    objects.push_back(std::make_unique<Temporary>(kept));
-    Arguments arguments{compiler.path, "-c"};
-    append(arguments, flags_for(text, file, dialect));
-    append(arguments, {file.string(), "-o", objects.back()->path()});
-    const ProcessResult process = run_process(arguments);
-    if (process.status != 0) throw UserError(first_error(process.errors, text.sources));
-    link.push_back(objects.back()->path());
+  append(link, {"-x", "assembler"});
+  std::vector<std::unique_ptr<Temporary>> parts;
+  for (std::size_t i = 0; i < text.files.size(); ++i) {
+    Arguments compile{compiler.path};
+    append(compile, flags_for(text, text.files[i], dialect));
+    parts.push_back(std::make_unique<Temporary>(kept));
+    const std::string assembly = counted_assembly(compile, text.files[i], preprocessed[i], text.sources, kept);
+    if (!write_file(parts.back()->path(), assembly))
+      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    link.push_back(parts.back()->path());
   }
+  append(link, {"-x", "none"});
   link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
   append(link, {"-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
   const Temporary result(kept);

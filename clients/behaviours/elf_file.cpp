@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 #include <optional>
+#include <utility>
 
 #include "core/base/error.hpp"
 
@@ -26,6 +27,7 @@ class Parser {
     read_table();
     read_functions();
     find_kept();
+    read_lines();
     return std::move(file_);
   }
 
@@ -198,12 +200,12 @@ class Parser {
       require(executable(offset), "its table of functions is damaged");
     }
     require(file_.data.contains(table.robot, sizeof(KtRobot)) && file_.data.contains(table.ticks, 4) &&
-                file_.data.contains(table.tx_period, 2) && file_.relro.contains(table.control, 8) &&
+                file_.data.contains(table.tx_period, 2) && file_.relro.contains(table.exchange, 8) &&
                 file_.relro.contains(table.surroundings, 8),
             "its table of functions is damaged");
     // Each address of the table must be relocated, and with it nothing that is not an address.
-    constexpr std::uint64_t kAddresses = (sizeof(KtImage) - offsetof(KtImage, control)) / 8;
-    const std::uint64_t first = header_.e_entry + offsetof(KtImage, control);
+    constexpr std::uint64_t kAddresses = (sizeof(KtImage) - offsetof(KtImage, exchange)) / 8;
+    const std::uint64_t first = header_.e_entry + offsetof(KtImage, exchange);
     const auto lower = std::lower_bound(file_.relocations.begin(), file_.relocations.end(), first - 23);
     std::uint64_t count = 0;
     for (auto it = lower; it != file_.relocations.end() && *it < first + 8 * kAddresses; ++it) {
@@ -252,6 +254,24 @@ class Parser {
     }
     std::stable_sort(file_.functions.begin(), file_.functions.end(),
                      [](const ElfFile::Function& a, const ElfFile::Function& b) { return a.offset < b.offset; });
+  }
+
+  /// The same holds for lines.
+  void read_lines() {
+    const auto names = at<Elf64_Shdr>(octets_, header_.e_shoff + header_.e_shstrndx * sizeof(Elf64_Shdr));
+    if (!names) return;
+    for (std::uint64_t i = 0; i < header_.e_shnum; ++i) {
+      const auto section = at<Elf64_Shdr>(octets_, header_.e_shoff + i * sizeof(Elf64_Shdr));
+      if (!section || section->sh_type != SHT_PROGBITS || section->sh_offset > octets_.size()) continue;
+      const std::uint64_t at_name = names->sh_offset + section->sh_name;
+      if (at_name >= octets_.size()) continue;
+      const std::string_view rest = octets_.substr(at_name, 32), name = rest.substr(0, rest.find('\0'));
+      for (const auto& [wanted, octets] : {std::pair{".debug_line", &file_.lines.debug_line},
+                                           {".debug_line_str", &file_.lines.debug_line_str},
+                                           {".debug_str", &file_.lines.debug_str}}) {
+        if (name == wanted) *octets = octets_.substr(section->sh_offset, section->sh_size);
+      }
+    }
   }
 
   std::string_view octets_;

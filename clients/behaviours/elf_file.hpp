@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/behaviours/line_table.hpp"
 #include "clients/behaviours/runtime/image_abi.h"
 
 namespace kilotwin::behaviours {
@@ -40,6 +41,8 @@ class ElfFile {
   std::vector<Range> kept;          ///< parts of data that outlive a reset: .noinit and EEMEM variables
   KtImage table{};                  ///< with offsets for addresses
   std::vector<Function> functions;  ///< for the text of faults; ascending
+
+  LineTables lines;
 
   /// The function that holds this offset, or "".
   [[nodiscard]] std::string function_at(std::uint64_t offset) const;

@@ -9,7 +9,14 @@
 namespace kilotwin::behaviours {
 namespace {
 
-constexpr std::uint32_t kNobody = 0xffffffffu;
+/// How long a message is on the air, 13 octets of 10 bits of 269 cycles (kilolib): it keeps its receivers' converters busy, and
+/// its sender's processor with interrupts off.
+constexpr std::uint64_t kPacketCycles = 13 * 10 * 269;
+/// For how long a program may go round in a loop that has no way out and calls nothing: one second.
+constexpr std::int64_t kPatienceCycles = 8'000'000;
+/// So many robots before its turn, a robot's memory is asked for.
+constexpr std::size_t kAhead = 2;
+
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
 
 /// CRC-16/MCRF4XX over data and type.
@@ -48,7 +55,8 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       asked_(share_.size()),
       sent_(share_.size()),
       first_reception_(share_.size() + 1),
-      running_robot_(kNobody) {
+      spins_(share_.size()),
+      divided_(programs_->size()) {
   KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.manifest.program_size()));
   for (const proto::RobotEeprom& brought : plan.manifest.eeprom()) {
     if (!share_.contains(brought.robot())) continue;
@@ -111,18 +119,23 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio, std::span<const 
   senses_.at(from, bodies);
   printed_.clear();
   std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
+  running_->tick.store(from.count(), std::memory_order_relaxed);
+  fail_known_culprits(from);
   const FaultGuard guard;
   for (const Group& group : groups_) {
     const Program& program = programs_->program(group.program);
     Slot& slot = program.slot(group.slot);
     const std::lock_guard lock(slot.mutex);
-    const Executor executor(program, slot);
-    slot.control()->log_length = slot.control()->log_lost = 0;
-    for (const std::uint32_t i : group.robots) {
+    const Executor executor(program, slot, guard.thread());
+    slot.exchange()->log_length = slot.exchange()->log_lost = 0;
+    for (std::size_t n = 0; n < group.robots.size(); ++n) {
+      // Others have used the caches since the last tick.
+      if (n + kAhead < group.robots.size()) memory_[group.robots[n + kAhead]].prefetch();
+      const std::uint32_t i = group.robots[n];
       run_robot(from, i, radio.kilo_ticks[i], program, slot, executor);
-      if (slot.control()->log_length != 0) take_log(i, slot);
+      if (slot.exchange()->log_length != 0) take_log(i, slot);
     }
-    running_robot_.store(kNobody, std::memory_order_relaxed);
+    running_->robot.store(kNobody, std::memory_order_relaxed);
   }
   relay_firmware(radio);
   if (!senses_.has_batteries()) return;
@@ -177,56 +190,91 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   if (presence_[i] == Presence::kFailed || life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kFlat)) return;
   if (presence_[i] == Presence::kNew) reset_robot(from, i, program, slot);
   RobotMemory& memory = memory_[i];
-  KtEvents events{receptions_.data() + first_reception_[i], first_reception_[i + 1] - first_reception_[i],
-                  static_cast<std::uint32_t>(sent_[i] & holds_[i])};
+  std::span<const KtReception> receptions(receptions_.data() + first_reception_[i],
+                                          receptions_.data() + first_reception_[i + 1]);
+  bool sent = (sent_[i] & holds_[i]) != 0;
   if (sent_[i] != 0) holds_[i] = 0;
 
   auto robot = memory.get<KtRobot>(program, program.file.table.robot);
   if (robot.deaf != 0) {
-    events.receptions = events.sent = 0;
+    receptions = {};
+    sent = false;
   } else {
     const auto ticks = memory.get<std::uint32_t>(program, program.file.table.ticks);
     memory.set(program, program.file.table.ticks, ticks + kilo_ticks);
   }
-  const bool eventful = events.receptions > 0 || events.sent != 0;
+  const bool eventful = !receptions.empty() || sent;
   if (!eventful && robot.parked != 0) return;
 
-  running_robot_.store(share_.first + i, std::memory_order_relaxed);
-  entries_.store(entries_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
-  memory.copy_in(slot);
-  surround(i, slot, events.receptions);
+  running_->robot.store(share_.first + i, std::memory_order_relaxed);
+  running_->entry.store(running_->entry.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  RobotThread& thread = executor.thread();
+  thread.divided = 0;
+  memory.copy_in(slot, thread);
+  surround(i, slot, static_cast<std::uint32_t>(receptions.size()));
+  std::int32_t interrupted_cycles = 0;
   if (eventful) {
-    if (const Fault fault = executor.interrupt(events); fault.signal != 0)
-      return fail_robot(i, fault, program, slot);
+    const Fault fault = executor.interrupt(receptions, sent, interrupted_cycles);
+    if (fault.signal != Fault::kNone) return fail_robot(i, fault, program, slot);
     if (executor.robot().reset != 0) {
-      static_cast<void>(memory.copy_out(slot));
+      static_cast<void>(memory.copy_out(slot, thread));
       reset_robot(from, i, program, slot);
-      memory.copy_in(slot);
+      memory.copy_in(slot, thread);
+      sent = false;
+      interrupted_cycles = 0;
     }
   }
   if (executor.robot().parked == 0) {
-    if (const Fault fault = executor.run_main(); fault.signal != 0) return fail_robot(i, fault, program, slot);
+    if (sent) interrupted_cycles += static_cast<std::int32_t>(kPacketCycles);
+    const Fault fault = run_main(i, executor, interrupted_cycles);
+    if (fault.signal != Fault::kNone) return fail_robot(i, fault, program, slot);
   }
   robot = executor.robot();
   if (robot.state != static_cast<std::uint8_t>(LifeCycle::kRunning)) holds_[i] = 0;
   if (asked_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
-    KtMessage message{};
-    bool sends = false;
-    if (const Fault fault = executor.transmit(message, sends); fault.signal != 0)
-      return fail_robot(i, fault, program, slot);
-    if (sends) {
-      std::copy_n(message.data, 9, message_[i].begin());
-      message_[i][9] = message.type;
+    const KtMessage* message = nullptr;
+    std::int32_t cycles = 0;
+    const Fault fault = executor.transmit(message, cycles);
+    if (fault.signal != Fault::kNone) return fail_robot(i, fault, program, slot);
+    if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) executor.robot().debt_cycles += static_cast<std::uint64_t>(cycles);
+    if (message != nullptr) {
+      std::copy_n(message->data, 9, message_[i].begin());
+      message_[i][9] = message->type;
       holds_[i] = offers_[i] = 1;
     }
     robot = executor.robot();
   }
   keep_eeprom(i, slot);
   note_outputs(i, robot, executor.tx_period());
-  if (!memory.copy_out(slot)) return fail_robot(i, Fault{}, program, slot);
-  if (robot.spin_up == 0) return;
-  robot.spin_up = 0;
-  memory.set(program, program.file.table.robot, robot);
+  if (thread.divided != 0) note_division(i, thread.divided, program, slot);
+  executor.robot().spin_up = 0;
+  if (!memory.copy_out(slot, thread)) fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
+}
+
+/// The main program's share of a tick.
+Fault BehavioursEngine::run_main(std::uint32_t i, const Executor& executor, std::int32_t interrupted_cycles) {
+  KtRobot& robot = executor.robot();
+  const auto tick_cycles = static_cast<std::int32_t>(plan_.tick_length.cycles());
+  std::int64_t cycles = tick_cycles;
+  const bool as_on_robot = robot.loop_rate == KT_LOOP_AS_ON_ROBOT;
+  if (as_on_robot) {
+    // Callbacks, transmissions and what the last tick used too much come first.
+    const std::uint64_t owed = robot.debt_cycles + static_cast<std::uint64_t>(interrupted_cycles);
+    const std::uint64_t paid = std::min<std::uint64_t>(owed, static_cast<std::uint64_t>(tick_cycles));
+    robot.debt_cycles = owed - paid;
+    cycles -= static_cast<std::int64_t>(paid);
+    if (cycles <= 0) return {};
+  }
+  Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), spins_[i] != 0);
+  spins_[i] = main.spins ? 1 : 0;
+  if (main.fault.signal != Fault::kNone) return main.fault;
+  if (as_on_robot && main.left < 0) robot.debt_cycles += static_cast<std::uint64_t>(-main.left);
+  if (main.preempted) ++robot.waits;
+  const bool endless = main.preempted && (executor.thread().check & KT_CHECK_ENDLESS) != 0;
+  robot.stuck_ticks = endless ? static_cast<std::uint16_t>(robot.stuck_ticks + 1) : std::uint16_t{0};
+  if (endless && std::int64_t{robot.stuck_ticks} * tick_cycles >= kPatienceCycles)
+    return {Fault::kEndlessLoop, 0, executor.thread().place};
+  return {};
 }
 
 /// What the robot in the slot senses in this tick.
@@ -251,6 +299,8 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
   auto robot = memory_[i].get<KtRobot>(program, program.file.table.robot);
   robot.noise = random_.bits(Stream::kProgram, id, tick, 0);
   robot.tick_cycles = plan_.tick_length.cycles();
+  robot.loop_rate =
+      plan_.group(id).loop_rate() == proto::RobotGroup::AS_ON_ROBOT ? KT_LOOP_AS_ON_ROBOT : KT_LOOP_PER_TICK;
   robot.uid = plan_.uid_of(id);
   robot.turn_left = calibration.turn_left;
   robot.turn_right = calibration.turn_right;
@@ -262,7 +312,21 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
 }
 
 void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Program& program, const Slot& slot) {
-  failures_.push_back({share_.first + i, describe(fault, program, slot)});
+  fail_robot(i, describe(fault, program, slot));
+}
+
+/// Robots that brought down their host in an earlier attempt at this run.
+void BehavioursEngine::fail_known_culprits(Tick from) {
+  for (const proto::ProgramFailure& failure : plan_.manifest.program_failure()) {
+    if (failure.tick() != from.count() || !share_.contains(failure.robot())) continue;
+    const std::uint32_t i = failure.robot() - share_.first;
+    if (presence_[i] == Presence::kNew || presence_[i] == Presence::kAlive)
+      fail_robot(i, "its program brings down its host");
+  }
+}
+
+void BehavioursEngine::fail_robot(std::uint32_t i, std::string text) {
+  failures_.push_back({share_.first + i, std::move(text)});
   presence_[i] = Presence::kFailed;
   life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kFailed);
   motor_left_[i] = motor_right_[i] = spin_up_[i] = 0;
@@ -270,13 +334,22 @@ void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Pro
   memory_[i].release();
 }
 
+void BehavioursEngine::note_division(std::uint32_t i, std::uint64_t code, const Program& program,
+                                     const Slot& slot) {
+  const std::uint32_t index = plan_.program_of(share_.first + i);
+  if (divided_[index] != 0) return;
+  divided_[index] = 1;
+  warnings_.push_back({share_.first + i, describe_division(code, program, slot)});
+}
+
 void BehavioursEngine::take_log(std::uint32_t i, const Slot& slot) {
-  KtControl& control = *slot.control();
+  KtExchange& exchange = *slot.exchange();
   // The robot may have written anything here.
-  const std::uint32_t length = std::min<std::uint32_t>(control.log_length, KT_LOG_OCTETS);
-  printed_.push_back({share_.first + i, std::string(control.log, length)});
-  if (control.log_lost != 0) printed_.back().text += "... (" + std::to_string(control.log_lost) + " more octets)\n";
-  control.log_length = control.log_lost = 0;
+  const std::uint32_t length = std::min<std::uint32_t>(exchange.log_length, KT_LOG_OCTETS);
+  printed_.push_back({share_.first + i, std::string(exchange.log, length)});
+  if (exchange.log_lost != 0)
+    printed_.back().text += "... (" + std::to_string(exchange.log_lost) + " more octets)\n";
+  exchange.log_length = exchange.log_lost = 0;
 }
 
 void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period) {
@@ -324,13 +397,6 @@ std::uint64_t BehavioursEngine::hash_part() const {
     }
   }
   return sum;
-}
-
-std::optional<BehavioursEngine::Running> BehavioursEngine::running() const {
-  const std::uint64_t entry = entries_.load(std::memory_order_acquire);
-  const std::uint32_t robot = running_robot_.load(std::memory_order_relaxed);
-  if (robot == kNobody) return std::nullopt;
-  return Running{robot, entry};
 }
 
 std::uint64_t BehavioursEngine::memory_octets() const {

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -65,13 +64,19 @@ class BehavioursEngine {
   /// What robots printed in the last step, in the order in which they ran. Not part of their state.
   [[nodiscard]] const std::vector<Printed>& printed() const { return printed_; }
 
+  /// What robots' programs do that goes on, but is hardly meant: new ones are appended, one per program and kind.
+  [[nodiscard]] const std::vector<Failure>& warnings() const { return warnings_; }
+
+  /// Whose code runs at this moment. May be read from any thread, or process, while the engine steps.
   struct Running {
-    std::uint32_t robot = 0;
-    std::uint64_t entry = 0;  ///< how many robots have been entered since the start: the same number, the same call
+    std::atomic<std::uint32_t> robot{kNobody};
+    std::atomic<std::uint64_t> entry{0};  ///< robots entered since the start: the same number, the same call
+    std::atomic<std::int64_t> tick{0};    ///< of the step
   };
-  /// Whose code runs at this moment, if any. May be called from any thread while another steps: who gets the same answer
-  /// twice knows that this robot has not returned in between.
-  [[nodiscard]] std::optional<Running> running() const;
+  static constexpr std::uint32_t kNobody = 0xffffffffu;
+  [[nodiscard]] const Running& running() const { return *running_; }
+  /// Notes it there instead, in memory that outlives this process, say.
+  void note_running_in(Running& place) { running_ = &place; }
 
   /// What robot `id`, one of this host's, has in its EEPROM; nullptr where that is what calibration has left.
   [[nodiscard]] const Eeprom* eeprom(std::uint32_t id) const { return eeprom_[id - share_.first].get(); }
@@ -88,8 +93,12 @@ class BehavioursEngine {
   void use_battery(std::uint32_t i);
   void surround(std::uint32_t i, const Slot&, std::uint32_t receptions);
   void keep_eeprom(std::uint32_t i, const Slot&);
+  Fault run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles);
+  void note_division(std::uint32_t i, std::uint64_t code, const Program&, const Slot&);
   void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);
   void fail_robot(std::uint32_t i, const Fault&, const Program&, const Slot&);
+  void fail_robot(std::uint32_t i, std::string text);
+  void fail_known_culprits(Tick from);
   void take_log(std::uint32_t i, const Slot&);
   void note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period);
 
@@ -120,7 +129,7 @@ class BehavioursEngine {
   std::vector<std::uint8_t> offers_;  ///< a message that is new in this tick
   std::vector<IrMessage> message_;    ///< where it offers one
 
-  std::vector<Failure> failures_;
+  std::vector<Failure> failures_, warnings_;
   std::vector<Printed> printed_;
 
   // Of the step at hand; per own robot where not said otherwise.
@@ -129,8 +138,12 @@ class BehavioursEngine {
   std::vector<KtReception> receptions_;         ///< ordered by robot, then by time of arrival
   std::vector<KtMessage> messages_;             ///< with their checksums
 
-  std::atomic<std::uint32_t> running_robot_;
-  std::atomic<std::uint64_t> entries_{0};
+  // Nothing that a result depends on.
+  std::vector<std::uint8_t> spins_;    ///< per own robot: its program waited in a loop when the last tick ended
+  std::vector<std::uint8_t> divided_;  ///< per program: a division by zero was told
+
+  Running own_running_;
+  Running* running_ = &own_running_;
 };
 
 }  // namespace kilotwin::behaviours

@@ -57,13 +57,147 @@ void RobotMemory::restore(const Program& program, const Slot& slot, std::span<co
   std::memcpy(octets_.get() + data_octets_, stack.data(), stack.size());
 }
 
+namespace {
+
+/// What a callback may use, of its robot's time: one second. On a robot, a longer one would have kept every message, every
+/// tick and the program waiting.
+constexpr std::int32_t kCallbackCycles = 8'000'000;
+/// After so many cycles a program is suspected of waiting in a loop, and looked at each time round, this many times.
+constexpr std::int32_t kUnsuspected = 32768;
+constexpr int kLooks = 24;
+
+/// The state of the robot in a slot.
+class Snapshot {
+ public:
+  void take(const Slot& slot, std::size_t data_octets, const RobotThread& thread) {
+    robot_stack_ = thread.robot_stack;
+    const std::uint64_t size = stack_octets(slot);
+    octets_.resize(data_octets + size);
+    std::memcpy(octets_.data(), slot.data(), data_octets);
+    std::memcpy(octets_.data() + data_octets, stack(), size);
+  }
+  [[nodiscard]] bool equals(const Slot& slot, std::size_t data_octets, const RobotThread& thread) const {
+    return robot_stack_ == thread.robot_stack && std::memcmp(octets_.data(), slot.data(), data_octets) == 0 &&
+           std::memcmp(octets_.data() + data_octets, stack(), stack_octets(slot)) == 0;
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t stack_octets(const Slot& slot) const {
+    const std::uint64_t size = slot.stack_top() - robot_stack_;
+    return size <= kStackOctets ? size : 0;
+  }
+  [[nodiscard]] const void* stack() const { return reinterpret_cast<const void*>(robot_stack_); }  // NOLINT
+
+  std::uint64_t robot_stack_ = 0;
+  std::vector<std::uint8_t> octets_;
+};
+
+/// " in f() at FILE:LINE", as far as known.
+std::string place(std::uint64_t code, const Program& program, const Slot& slot) {
+  const std::uint64_t offset = code - slot.image_address();
+  const std::string function = program.file.function_at(offset);
+  const auto line = program.file.lines.find(offset);
+  return (function.empty() ? "" : " in " + function + "()") +
+         (line ? " at " + line->file + ':' + std::to_string(line->line) : " of " + program.name);
+}
+
+}  // namespace
+
+bool Executor::enter(std::int32_t cycles) const {
+  thread_.budget = cycles;
+  begin();
+  const bool preempted = enter_() == KT_PREEMPTED;
+  end();
+  return preempted && thread_.fault.signal == Fault::kNone;
+}
+
+Executor::Main Executor::run_main(std::int32_t cycles, bool spun) const {
+  thread_local Snapshot snapshot;
+  Main main;
+  main.left = cycles;
+  // From here to the next test, or as far as `slice` goes; false when that ended otherwise than by preemption.
+  const auto run = [&](std::int32_t slice) {
+    main.preempted = enter(slice);
+    main.left -= slice - thread_.budget;
+    main.fault = thread_.fault;
+    return main.preempted;
+  };
+  if (!spun && !run(std::min(cycles, kUnsuspected))) return main;
+  // Whoever comes to the same place in the same state goes round in a loop that only an interrupt can end: it need not be
+  // followed any further than for its phase at the end of the tick.
+  int next_snapshot = 0, snapshot_look = 0;
+  std::int32_t snapshot_left = 0;
+  for (int look = 0; look < kLooks && main.left >= 0; ++look) {
+    if (look == next_snapshot) {
+      snapshot.take(slot_, data_octets_, thread_);
+      snapshot_look = look;
+      snapshot_left = main.left;
+      next_snapshot = 2 * look + 1;
+    }
+    if (!run(0)) return main;
+    if (!snapshot.equals(slot_, data_octets_, thread_)) continue;
+    const bool same_test = look == snapshot_look;
+    if (same_test && (thread_.check & KT_CHECK_WAITS) == 0) {
+      main.fault = {Fault::kEndlessLoop, 0, thread_.place};
+      return main;
+    }
+    const std::int32_t period = snapshot_left - main.left;
+    main.spins = true;
+    if (main.left >= 0) main.left %= period;
+    if (same_test && main.left >= 0) main.left -= period;
+    break;
+  }
+  if (main.left >= 0) (void)run(main.left);
+  return main;
+}
+
+Fault Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
+  thread_.budget = kCallbackCycles;
+  thread_.overrun = 0;
+  begin();
+  result = call_(function);
+  end();
+  cycles += kCallbackCycles - thread_.budget;
+  if (thread_.overrun != 0) return {Fault::kCallbackOverrun, robot_->in_interrupt, thread_.place};
+  return thread_.fault;
+}
+
+Fault Executor::interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const {
+  KtExchange& exchange = *slot_.exchange();
+  exchange.sent = sent ? 1 : 0;
+  do {
+    const auto part = receptions.first(std::min<std::size_t>(receptions.size(), KT_MOST_RECEPTIONS));
+    exchange.receptions = static_cast<std::uint32_t>(part.size());
+    std::copy(part.begin(), part.end(), exchange.reception);
+    std::uint64_t result = 0;
+    if (const Fault fault = call(interrupts_, result, cycles); fault.signal != Fault::kNone) return fault;
+    receptions = receptions.subspan(part.size());
+    exchange.sent = 0;
+  } while (!receptions.empty() && robot_->reset == 0);
+  return {};
+}
+
+Fault Executor::transmit(const KtMessage*& message, std::int32_t& cycles) const {
+  std::uint64_t sends = 0;
+  const Fault fault = call(transmit_, sends, cycles);
+  message = fault.signal == Fault::kNone && sends == 1 ? &slot_.exchange()->message : nullptr;
+  return fault;
+}
+
 std::string describe(const Fault& fault, const Program& program, const Slot& slot) {
   std::string text;
   char address[32];
   std::snprintf(address, sizeof address, "0x%llx", static_cast<unsigned long long>(fault.address));
   const std::uint64_t stack_bottom = slot.stack_top() - kStackOctets;
   switch (fault.signal) {
-    case SIGFPE: text = "division by zero"; break;
+    case SIGFPE: text = "arithmetic"; break;
+    case Fault::kEndlessLoop: text = "endless loop"; break;
+    case Fault::kCallbackOverrun:
+      text = std::string("does not return from ") + (fault.address == KT_IN_TX_SUCCESS ? "kilo_message_tx_success"
+                                                     : fault.address == KT_IN_RX       ? "kilo_message_rx"
+                                                                                       : "kilo_message_tx");
+      text += ": it loops";
+      break;
     case SIGILL: text = "illegal instruction (abort, or what the compiler knew to be undefined)"; break;
     case SIGSEGV:
     case SIGBUS:
@@ -73,9 +207,12 @@ std::string describe(const Fault& fault, const Program& program, const Slot& slo
       break;
     default: text = "stack pointer lost";
   }
-  const std::string function = program.file.function_at(fault.code - slot.image_address());
-  if (!function.empty()) text += " in " + function + "()";
-  return text + " of " + program.name;
+  return text + place(fault.code, program, slot);
+}
+
+std::string describe_division(std::uint64_t code, const Program& program, const Slot& slot) {
+  return "division by zero" + place(code, program, slot) +
+         "; the quotient is all ones (of a negative number 1), the remainder the dividend, as on the robot";
 }
 
 }  // namespace kilotwin::behaviours

@@ -1,10 +1,12 @@
 /// Runs one robot's code in a slot: memory in, interrupts, main program, memory out.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <cstring>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "clients/behaviours/faults.hpp"
 #include "clients/behaviours/image.hpp"
@@ -21,20 +23,23 @@ class RobotMemory {
                std::span<const std::uint8_t> stack);
   void release() { *this = RobotMemory(); }
 
-  void copy_in(const Slot& slot) const {
+  void prefetch() const {
+    for (std::uint32_t at = 0; at < data_octets_ + stack_octets_; at += 64) __builtin_prefetch(octets_.get() + at);
+  }
+  void copy_in(const Slot& slot, RobotThread& thread) const {
     std::memcpy(slot.data(), octets_.get(), data_octets_);
     auto* const stack = reinterpret_cast<std::uint8_t*>(slot.stack_top() - stack_octets_);  // NOLINT
     std::memcpy(stack, octets_.get() + data_octets_, stack_octets_);
-    slot.control()->robot_stack = slot.stack_top() - stack_octets_;
+    thread.robot_stack = slot.stack_top() - stack_octets_;
   }
   /// False where the robot's stack pointer has left its stack.
-  [[nodiscard]] bool copy_out(const Slot& slot) {
-    const std::uint64_t size = slot.stack_top() - slot.control()->robot_stack;
+  [[nodiscard]] bool copy_out(const Slot& slot, const RobotThread& thread) {
+    const std::uint64_t size = slot.stack_top() - thread.robot_stack;
     if (size > kStackOctets) return false;
     if (data_octets_ + size > capacity_) resize(data_octets_, static_cast<std::uint32_t>(size));
     stack_octets_ = static_cast<std::uint32_t>(size);
     std::memcpy(octets_.get(), slot.data(), data_octets_);
-    const auto* const stack = reinterpret_cast<const std::uint8_t*>(slot.control()->robot_stack);  // NOLINT
+    const auto* const stack = reinterpret_cast<const std::uint8_t*>(thread.robot_stack);  // NOLINT
     std::memcpy(octets_.get() + data_octets_, stack, size);
     return true;
   }
@@ -62,63 +67,80 @@ class RobotMemory {
   std::uint32_t capacity_ = 0, data_octets_ = 0, stack_octets_ = 0;
 };
 
-/// Code of the robot whose memory is in the slot. Each returns what faulted, if anything. Needs the slot's mutex and a
+/// Code of the robot whose memory is in the slot. Each call returns what faulted, if anything. Needs the slot's mutex and a
 /// FaultGuard on this thread.
 class Executor {
  public:
-  Executor(const Program& program, const Slot& slot)
+  Executor(const Program& program, const Slot& slot, RobotThread& thread)
       : slot_(slot),
+        data_octets_(program.data_size()),
+        thread_(thread),
         leave_(slot.image_address() + program.file.table.leave),
         enter_(slot.at<Enter*>(program.file.table.enter)),
         call_(slot.at<Call*>(program.file.table.call)),
         interrupts_(slot.image_address() + program.file.table.interrupts),
         transmit_(slot.image_address() + program.file.table.transmit),
         robot_(slot.at<KtRobot*>(program.file.table.robot)),
-        tx_period_(slot.at<std::uint16_t*>(program.file.table.tx_period)) {}
+        tx_period_(slot.at<std::uint16_t*>(program.file.table.tx_period)) {
+    thread_.interrupt_stack = slot.interrupt_stack_top();
+  }
 
   /// The simulated hardware of the robot in the slot.
-  [[nodiscard]] KtRobot robot() const {
-    KtRobot robot;
-    std::memcpy(&robot, robot_, sizeof robot);
-    return robot;
-  }
+  [[nodiscard]] KtRobot& robot() const { return *robot_; }
+  [[nodiscard]] RobotThread& thread() const { return thread_; }
   [[nodiscard]] std::uint16_t tx_period() const {
     std::uint16_t value = 0;
     std::memcpy(&value, tx_period_, sizeof value);
     return value;
   }
 
-  [[nodiscard]] Fault run_main() const {
-    FaultGuard::begin(leave_);
-    enter_(slot_.control());
-    return FaultGuard::end();
-  }
-  [[nodiscard]] Fault interrupt(const KtEvents& events) const {
-    FaultGuard::begin(leave_);
-    (void)call_(slot_.control(), interrupts_, &events);
-    return FaultGuard::end();
-  }
-  /// `sends` tells whether the robot has given a message.
-  [[nodiscard]] Fault transmit(KtMessage& message, bool& sends) const {
-    FaultGuard::begin(leave_);
-    sends = call_(slot_.control(), transmit_, &message) == 1;
-    return FaultGuard::end();
-  }
+  struct Main {
+    Fault fault;
+    bool preempted = false;  ///< it was stopped within its code, having used up its cycles
+    bool spins = false;      ///< ... in a loop that only an interrupt can end
+    std::int32_t left = 0;   ///< cycles; negative: it has used more
+  };
+  /// The main program, until it waits or has used up so many cycles. `spun`: how that ended the last time; a hint that
+  /// changes how long this takes and nothing else.
+  [[nodiscard]] Main run_main(std::int32_t cycles, bool spun) const;
+
+  /// Callbacks for what has happened. `cycles` is what they have used.
+  [[nodiscard]] Fault interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const;
+  /// `message` is what the robot gives, or null.
+  [[nodiscard]] Fault transmit(const KtMessage*& message, std::int32_t& cycles) const;
 
  private:
-  using Enter = void(KtControl*);
-  using Call = std::uint64_t(KtControl*, std::uint64_t function, const void* argument);
+  using Enter = std::uint64_t();
+  using Call = std::uint64_t(std::uint64_t function);
+
+  void begin() const {
+    thread_.fault.signal = Fault::kNone;
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+    thread_.leave = leave_;
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+  }
+  void end() const {
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+    thread_.leave = 0;
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+  }
+  [[nodiscard]] bool enter(std::int32_t cycles) const;  ///< whether the robot was preempted
+  [[nodiscard]] Fault call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const;
 
   const Slot& slot_;
+  const std::size_t data_octets_;
+  RobotThread& thread_;
   std::uint64_t leave_;
   Enter* enter_;
   Call* call_;
   std::uint64_t interrupts_, transmit_;
-  const KtRobot* robot_;
+  KtRobot* robot_;
   const std::uint16_t* tx_period_;
 };
 
 /// A fault in words: what, where in the program.
 [[nodiscard]] std::string describe(const Fault&, const Program&, const Slot&);
+/// A division by zero at this address, in words.
+[[nodiscard]] std::string describe_division(std::uint64_t code, const Program&, const Slot&);
 
 }  // namespace kilotwin::behaviours

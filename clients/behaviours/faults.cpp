@@ -1,11 +1,15 @@
 #include "clients/behaviours/faults.hpp"
 
+#include <asm/prctl.h>
+#include <sys/syscall.h>
 #include <ucontext.h>
+#include <unistd.h>
 
 #include <array>
 #include <atomic>
 #include <mutex>
 
+#include "clients/behaviours/division.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
@@ -14,30 +18,45 @@ namespace {
 constexpr std::array<int, 4> kSignals{SIGSEGV, SIGBUS, SIGFPE, SIGILL};
 std::array<struct sigaction, kSignals.size()> previous_actions;
 
-struct Watch {
-  std::uint64_t leave = 0;  // 0: no robot runs
-  Fault fault;
-};
-thread_local Watch watch;
+thread_local RobotThread robot_thread{};
 
 constexpr std::size_t kHandlerStackOctets = 64 * 1024;
 thread_local std::vector<std::uint8_t> handler_stack;
 
 void handle(int signal, siginfo_t* info, void* context) {
-  if (watch.leave == 0) {
+  RobotThread& thread = robot_thread;
+  if (thread.leave == 0) {
     // Not a robot's: as it was before, the instruction faults again and goes to whoever was here first.
     for (std::size_t i = 0; i < kSignals.size(); ++i) {
       if (kSignals[i] == signal) sigaction(signal, &previous_actions[i], nullptr);
     }
     return;
   }
-  auto& registers = static_cast<ucontext_t*>(context)->uc_mcontext.gregs;
-  watch.fault = {signal, reinterpret_cast<std::uint64_t>(info->si_addr),
-                 static_cast<std::uint64_t>(registers[REG_RIP])};
+  ucontext_t& interrupted = *static_cast<ucontext_t*>(context);
+  auto& registers = interrupted.uc_mcontext.gregs;
+  const auto code = static_cast<std::uint64_t>(registers[REG_RIP]);
+  if (signal == SIGFPE && info->si_code == FPE_INTDIV && divide_as_robot(registers)) {
+    thread.divided = code;
+    return;
+  }
+  thread.fault = {signal, reinterpret_cast<std::uint64_t>(info->si_addr), code};
+  // As the host has them: upwards in strings, rounding to nearest, no exceptions of floating-point arithmetic.
   constexpr greg_t kDirectionFlag = 0x400;
   registers[REG_EFL] &= ~kDirectionFlag;
-  registers[REG_RIP] = static_cast<greg_t>(watch.leave);
-  watch.leave = 0;
+  interrupted.uc_mcontext.fpregs->mxcsr = 0x1f80;
+  interrupted.uc_mcontext.fpregs->cwd = 0x37f;
+  interrupted.uc_mcontext.fpregs->ftw = 0;
+  registers[REG_RIP] = static_cast<greg_t>(thread.leave);
+  thread.leave = 0;
+}
+
+/// Lets %gs of this thread point to what it has in common with robots; nothing else uses that register on Linux.
+RobotThread& own_thread() {
+  thread_local const bool set = [] {
+    return syscall(SYS_arch_prctl, ARCH_SET_GS, static_cast<KtThread*>(&robot_thread)) == 0;
+  }();
+  KILOTWIN_DEMAND(set);
+  return robot_thread;
 }
 
 void install_handlers() {
@@ -51,7 +70,7 @@ void install_handlers() {
 
 }  // namespace
 
-FaultGuard::FaultGuard() {
+FaultGuard::FaultGuard() : thread_(own_thread()) {
   static std::once_flag once;
   std::call_once(once, install_handlers);
   handler_stack.resize(kHandlerStackOctets);
@@ -64,18 +83,6 @@ FaultGuard::FaultGuard() {
 FaultGuard::~FaultGuard() {
   if (previous_.ss_flags & SS_DISABLE) previous_.ss_size = kHandlerStackOctets;
   sigaltstack(&previous_, nullptr);
-}
-
-void FaultGuard::begin(std::uint64_t leave) {
-  watch.fault.signal = 0;
-  watch.leave = leave;
-  std::atomic_signal_fence(std::memory_order_seq_cst);
-}
-
-Fault FaultGuard::end() {
-  std::atomic_signal_fence(std::memory_order_seq_cst);
-  watch.leave = 0;
-  return watch.fault;
 }
 
 }  // namespace kilotwin::behaviours

@@ -5,12 +5,23 @@
 #include <cstdint>
 #include <vector>
 
+#include "clients/behaviours/runtime/image_abi.h"
+
 namespace kilotwin::behaviours {
 
 struct Fault {
-  int signal = 0;             ///< SIGSEGV, SIGBUS, SIGFPE or SIGILL; 0: none
+  /// Besides the signals SIGSEGV, SIGBUS, SIGFPE and SIGILL:
+  enum Other : int { kNone = 0, kEndlessLoop = -1, kCallbackOverrun = -2, kStackLost = -3 };
+  int signal = kNone;
   std::uint64_t address = 0;  ///< that could not be accessed
   std::uint64_t code = 0;     ///< address of the instruction
+};
+
+/// What a thread and the robot that it runs have in common. %gs points to it.
+struct RobotThread : KtThread {
+  std::uint64_t leave = 0;    ///< where execution goes on after a fault; 0: no robot runs
+  std::uint64_t divided = 0;  ///< address of the latest division by zero; 0: none
+  Fault fault;
 };
 
 /// While one exists on a thread, that thread may run robots' code. Installs the handlers of the process once (handlers that
@@ -22,12 +33,11 @@ class FaultGuard {
   FaultGuard(const FaultGuard&) = delete;
   FaultGuard& operator=(const FaultGuard&) = delete;
 
-  /// From here on a fault of this thread is a robot's: it is noted, and execution goes on at `leave`.
-  static void begin(std::uint64_t leave);
-  /// Ends that; what happened in between.
-  [[nodiscard]] static Fault end();
+  /// Of the thread that made this guard.
+  [[nodiscard]] RobotThread& thread() const { return thread_; }
 
  private:
+  RobotThread& thread_;
   stack_t previous_{};
 };
 

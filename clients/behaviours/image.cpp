@@ -12,6 +12,7 @@ namespace kilotwin::behaviours {
 namespace {
 
 constexpr std::uint64_t kGuardOctets = 16 * 1024;
+constexpr std::uint64_t kExchangeOctets = page_up(sizeof(KtExchange));
 constexpr const char* kTaken =
     "the addresses of these robots' programs are taken by other programs in this process; run the experiments in "
     "processes "
@@ -43,7 +44,7 @@ Registry& registry() {
 }  // namespace
 
 std::uint64_t Slot::size(const ElfFile& file) {
-  const std::uint64_t used = 2 * kStackOctets + 2 * kPage + file.memory.size() + 4 * kGuardOctets;
+  const std::uint64_t used = 2 * kStackOctets + kExchangeOctets + kPage + file.memory.size() + 4 * kGuardOctets;
   return (used + kAddressStep - 1) / kAddressStep * kAddressStep;
 }
 
@@ -51,8 +52,10 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
     : address_(address),
       size_(size(file)),
       stack_top_(address + kGuardOctets + kStackOctets),
-      control_(stack_top_ + 2 * kGuardOctets + kStackOctets),
-      image_(control_ + 2 * kPage),
+      interrupt_stack_top_(stack_top_ + kGuardOctets + kStackOctets),
+      surroundings_(interrupt_stack_top_ + kGuardOctets),
+      exchange_(surroundings_ + kPage),
+      image_(exchange_ + kExchangeOctets),
       data_offset_(file.data.first) {
   void* mapped = mmap(pointer(address), size_, PROT_NONE,
                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE, -1, 0);
@@ -63,12 +66,10 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
     throw RunError(std::string("memory for robots' programs: ") + std::strerror(error));
   }
   try {
-    const std::uint64_t interrupt_top = stack_top_ + kGuardOctets + kStackOctets;
     protect(stack_top_ - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
-    protect(interrupt_top - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
-    protect(control_, 2 * kPage, PROT_READ | PROT_WRITE);
+    protect(interrupt_stack_top_ - kStackOctets, kStackOctets, PROT_READ | PROT_WRITE);
+    protect(surroundings_, kPage + kExchangeOctets, PROT_READ | PROT_WRITE);
     protect(image_, file.memory.size(), PROT_READ | PROT_WRITE);
-    control()->interrupt_stack = interrupt_top;
     auto* const image = at<std::uint8_t*>(0);
     std::memcpy(image, file.memory.data(), file.memory.size());
     for (const std::uint32_t offset : file.relocations) {
@@ -77,9 +78,8 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
       word += image_;
       std::memcpy(image + offset, &word, sizeof word);
     }
-    std::memcpy(image + file.table.control, &control_, sizeof control_);
-    const KtSurroundings* const around = surroundings();
-    std::memcpy(image + file.table.surroundings, static_cast<const void*>(&around), sizeof around);
+    std::memcpy(image + file.table.exchange, &exchange_, sizeof exchange_);
+    std::memcpy(image + file.table.surroundings, &surroundings_, sizeof surroundings_);
     protect(image_, file.memory.size(), PROT_NONE);
     for (const ElfFile::Segment& segment : file.segments) {
       const int protection = PROT_READ | (segment.writable ? PROT_WRITE : 0) | (segment.executable ? PROT_EXEC : 0);

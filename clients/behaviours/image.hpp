@@ -20,7 +20,7 @@ inline constexpr std::uint64_t kAddressStep = 64 * 1024;  ///< slots begin at mu
 inline constexpr std::uint64_t kStackOctets = 64 * 1024;
 
 /// One copy of an image with its stacks. From low to high addresses, each followed by a guard: main stack, interrupt stack,
-/// control page and surroundings, image. Code and constants are not writable, data and stacks not executable.
+/// surroundings, exchange, image. Code and constants are not writable, data and stacks not executable.
 class Slot {
  public:
   /// Maps the slot. Throws RunError where the addresses are taken or memory is short.
@@ -35,14 +35,15 @@ class Slot {
   /// A function or variable of the image; `offset` is one of ElfFile::table.
   template <class T> [[nodiscard]] T at(std::uint64_t offset) const {
     return reinterpret_cast<T>(image_ + offset);
-  }                                                                                            // NOLINT
-  [[nodiscard]] KtControl* control() const { return reinterpret_cast<KtControl*>(control_); }  // NOLINT
+  }                                                                                                // NOLINT
+  [[nodiscard]] KtExchange* exchange() const { return reinterpret_cast<KtExchange*>(exchange_); }  // NOLINT
   [[nodiscard]] KtSurroundings* surroundings() const {
-    return reinterpret_cast<KtSurroundings*>(control_ + kPage);
-  }  // NOLINT
+    return reinterpret_cast<KtSurroundings*>(surroundings_);  // NOLINT
+  }
   [[nodiscard]] std::uint8_t* data() const { return at<std::uint8_t*>(data_offset_); }
   /// One past the highest octet of the main stack; aligned to 16.
   [[nodiscard]] std::uint64_t stack_top() const { return stack_top_; }
+  [[nodiscard]] std::uint64_t interrupt_stack_top() const { return interrupt_stack_top_; }
   [[nodiscard]] std::uint64_t image_address() const { return image_; }
   /// A robot's data as they are at reset.
   [[nodiscard]] const std::vector<std::uint8_t>& initial_data() const { return initial_data_; }
@@ -50,7 +51,7 @@ class Slot {
   std::mutex mutex;  ///< held while robots run here
 
  private:
-  std::uint64_t address_, size_, stack_top_, control_, image_, data_offset_;
+  std::uint64_t address_, size_, stack_top_, interrupt_stack_top_, surroundings_, exchange_, image_, data_offset_;
   std::vector<std::uint8_t> initial_data_;
 };
 

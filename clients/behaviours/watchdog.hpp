@@ -3,7 +3,6 @@
 
 #include <condition_variable>
 #include <mutex>
-#include <optional>
 #include <thread>
 #include <vector>
 
@@ -12,7 +11,7 @@
 namespace kilotwin::behaviours {
 
 /// Watches engines of this process from a thread of its own. Names a robot whose program has not returned for over 1 s. Where
-/// the process has been interrupted meanwhile, ends it with status 1, since nobody else can.
+/// the process has been interrupted meanwhile, ends it with status 1, since nobody else can; after 30 s, aborts it.
 class Watchdog {
  public:
   explicit Watchdog(std::vector<const BehavioursEngine*> engines);

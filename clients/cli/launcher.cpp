@@ -11,8 +11,10 @@
 #include <chrono>
 #include <csignal>
 #include <mutex>
+#include <optional>
 #include <thread>
 
+#include "clients/behaviours/running_note.hpp"
 #include "clients/cli/progress.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -35,6 +37,7 @@ struct Child {
   int log = -1;  ///< what it says on stderr
   bool running = false;
   int status = 0;
+  std::optional<HostId> host;  ///< of behaviours
 };
 
 /// The last line that a service wrote, without its "kilotwin: " prefix. By descriptor: the file may have been removed.
@@ -50,6 +53,13 @@ std::string last_line(int log) {
   constexpr std::string_view kPrefix = "kilotwin: ";
   if (text.starts_with(kPrefix)) text.remove_prefix(kPrefix.size());
   return std::string(text);
+}
+
+/// Whether a process has ended by what its own code did, not by a signal from outside.
+bool brought_itself_down(int status) {
+  if (!WIFSIGNALED(status)) return false;
+  const int signal = WTERMSIG(status);
+  return signal == SIGSEGV || signal == SIGBUS || signal == SIGILL || signal == SIGFPE || signal == SIGABRT;
 }
 
 class Launcher {
@@ -75,6 +85,7 @@ class Launcher {
     }
     for (std::uint32_t h = 0; h < plan_.hosts; ++h) {
       start(plan_.behaviours(HostId{h}), {"behaviours", "--share", fmt::format("{}/{}", h + 1, plan_.hosts)});
+      children_.back().host = HostId{h};
     }
     // The launcher watches as any observer may.
     const dds::Participant participant({options_.domain, {}});
@@ -88,6 +99,9 @@ class Launcher {
                                           });
     return watch();
   }
+
+  /// Whose program has brought down its host, where that is what ended the run.
+  [[nodiscard]] const std::optional<behaviours::Culprit>& corrupted_by() const { return corrupted_by_; }
 
  private:
   void start(FederateId id, std::vector<std::string> words) {
@@ -164,8 +178,10 @@ class Launcher {
       if (!well && !ending_ && !interrupted_ && culprit_ == nullptr) {
         // The first to end is the culprit: whoever only noticed its loss ends later.
         culprit_ = &child;
-        name_culprit();
-        deadline_ = Clock::now() + kGrace;
+        if (child.host && brought_itself_down(status))
+          corrupted_by_ = behaviours::take_note(directory_.path(), *child.host);
+        if (!corrupted_by_) name_culprit();
+        deadline_ = Clock::now() + (corrupted_by_ ? std::chrono::milliseconds(0) : kGrace);
       }
     }
     return any;
@@ -242,6 +258,7 @@ class Launcher {
   ProgressBar progress_;
   std::vector<Child> children_;
   const Child* culprit_ = nullptr;
+  std::optional<behaviours::Culprit> corrupted_by_;
   int status_ = 0;
   std::optional<Clock::time_point> deadline_;
   bool interrupted_ = false, ending_ = false;
@@ -254,7 +271,34 @@ class Launcher {
 }  // namespace
 
 int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options) {
-  return Launcher(plan, directory, options).run();
+  proto::Manifest manifest = plan.manifest;
+  for (;;) {
+    const RunPlan attempt(manifest);
+    std::optional<behaviours::Culprit> culprit;
+    {
+      Launcher launcher(attempt, directory, options);
+      const int status = launcher.run();
+      culprit = launcher.corrupted_by();
+      if (!culprit) return status;
+    }
+    // The same run once more, in which that robot fails before it does so.
+    for (const proto::ProgramFailure& known : manifest.program_failure()) {
+      if (known.robot() == culprit->robot)
+        throw RunError(
+            fmt::format("a host was lost while robot {}, which had failed, was running", culprit->robot));
+    }
+    say(
+        fmt::format("the program of robot {} has brought down its host at {:.3f} s; the run starts again from {} "
+                    "with that robot "
+                    "failed",
+                    culprit->robot, plan.tick_length.seconds_at(culprit->tick),
+                    manifest.resumed() ? "its checkpoint" : "tick 0"));
+    proto::ProgramFailure& failure = *manifest.add_program_failure();
+    failure.set_robot(culprit->robot);
+    failure.set_tick(culprit->tick.count());
+    manifest.set_run(manifest.run() + 1 == 0 ? 1 : manifest.run() + 1);
+    recorder::write_file(directory.manifest(), manifest.SerializeAsString());
+  }
 }
 
 }  // namespace kilotwin::cli

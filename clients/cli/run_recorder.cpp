@@ -99,6 +99,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.state_hash = totals.state_hash;
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
   summary.robots_failed = totals.robots_failed;
+  summary.recoveries = static_cast<std::uint32_t>(plan_.manifest.program_failure_size());
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
   const double steps =
       static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());

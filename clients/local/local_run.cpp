@@ -1,5 +1,6 @@
 #include "clients/local/local_run.hpp"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <atomic>
@@ -8,12 +9,14 @@
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "clients/behaviours/eeprom_files.hpp"
 #include "clients/behaviours/engine.hpp"
 #include "clients/behaviours/robot_logs.hpp"
 #include "clients/behaviours/watchdog.hpp"
 #include "clients/firmware/firmware_swarm.hpp"
+#include "core/base/say.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_book.hpp"
 #include "core/federation/interrupt.hpp"
@@ -29,6 +32,9 @@ using Clock = std::chrono::steady_clock;
 
 /// How often the observer's idle() is called.
 constexpr auto kIdlePeriod = std::chrono::milliseconds(100);
+
+/// How many failures of a host's robots are told one by one.
+constexpr std::size_t kFailuresTold = 20;
 
 /// All frames of one tick.
 struct Frames {
@@ -68,6 +74,7 @@ class LocalRun {
     for (Frames& frames : frames_) lay_out(frames);
     task_ns_.resize(plan.federates());
     hash_parts_.resize(plan.federates());
+    for (const auto& engine : hosts_) told_.emplace_back(engine->failures().size(), engine->warnings().size());
   }
 
   RunTotals run() {
@@ -101,6 +108,7 @@ class LocalRun {
       }
       if (last) break;
       workers.step(now);
+      tell(now);
       chain = close_tick(now + 1, chain);
     }
     totals.wall_s = static_cast<double>(ns(begun, Clock::now())) * 1e-9;
@@ -243,6 +251,25 @@ class LocalRun {
     }
   }
 
+  /// What programs did wrong in the step from this tick.
+  void tell(Tick from) {
+    for (std::size_t h = 0; h < hosts_.size(); ++h) {
+      const double at_s = plan_.tick_length.seconds_at(from);
+      auto& [failures, warnings] = told_[h];
+      for (; failures < hosts_[h]->failures().size(); ++failures) {
+        const auto& failure = hosts_[h]->failures()[failures];
+        if (failures < kFailuresTold)
+          say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot, at_s, failure.text));
+        else if (failures == kFailuresTold)
+          say("more robots fail; the summary counts them");
+      }
+      for (; warnings < hosts_[h]->warnings().size(); ++warnings) {
+        const auto& warning = hosts_[h]->warnings()[warnings];
+        say(fmt::format("robot {} at {:.3f} s: {}", warning.robot, at_s, warning.text));
+      }
+    }
+  }
+
   std::uint64_t close_tick(Tick tick, std::uint64_t chain) {
     std::uint64_t sum = 0;
     for (const std::uint64_t part : hash_parts_) sum += part;
@@ -324,6 +351,7 @@ class LocalRun {
   RunSchedule schedule_;
   Frames frames_[2];  // of even and of odd ticks: while one is read the other is written
   std::vector<std::uint64_t> task_ns_, hash_parts_;
+  std::vector<std::pair<std::size_t, std::size_t>> told_;  // per host: of its failures and warnings
   std::uint64_t recording_ns_ = 0;
 };
 

@@ -169,11 +169,13 @@ RunPlan::RunPlan(proto::Manifest given)
       hosts(experiment().deployment().hosts()),
       hash(hash_of(manifest)) {
   program_of_.reserve(robots());
+  group_of_.reserve(robots());
   uid_of_.reserve(robots());
   for (int group = 0; group < experiment().robots_size(); ++group) {
     const proto::RobotGroup& robots_of_group = experiment().robots(group);
     program_of_.insert(program_of_.end(), robots_of_group.count(), manifest.group_program(group));
     immobile_.insert(immobile_.end(), robots_of_group.count(), robots_of_group.immobile());
+    group_of_.insert(group_of_.end(), robots_of_group.count(), static_cast<std::uint32_t>(group));
     std::uint32_t uid =
         robots_of_group.has_first_uid() ? robots_of_group.first_uid() : static_cast<std::uint32_t>(uid_of_.size());
     while (uid_of_.size() < program_of_.size()) uid_of_.push_back(static_cast<std::uint16_t>(uid++));

@@ -97,6 +97,10 @@ class RunPlan {
   [[nodiscard]] bool hosts_see_bodies() const {
     return experiment().has_light() || experiment().battery().charger_size() > 0;
   }
+  /// The group of the experiment that the robot belongs to.
+  [[nodiscard]] const proto::RobotGroup& group(std::uint32_t robot) const {
+    return experiment().robots(static_cast<int>(group_of_[robot]));
+  }
   /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;
@@ -119,7 +123,7 @@ class RunPlan {
     return result;
   }
 
-  std::vector<std::uint32_t> program_of_;
+  std::vector<std::uint32_t> program_of_, group_of_;
   std::vector<std::uint8_t> immobile_;
   std::vector<std::uint16_t> uid_of_;
 };

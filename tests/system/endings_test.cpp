@@ -99,20 +99,18 @@ TEST_F(Endings, InterruptsDoNotWaitForASlowPace) {
   EXPECT_TRUE(fs::exists(scratch / "run/summary.json"));
 }
 
-TEST_F(Endings, AProgramThatDoesNotReturnIsNamedAndCanBeInterrupted) {
+TEST_F(Endings, AnEndlessLoopEndsItsRobotAndNobodyElse) {
   write(scratch / "hangs.c",
         "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 3 && kilo_ticks > 30) for "
         "(;;) {} }\n"
         "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
   for (const std::string mode : {"local", "federated"}) {
     fs::remove_all(scratch / "run");
-    Process process(long_run({"--mode", mode, "--behaviour", scratch / "hangs.c"}), scratch.path());
-    const std::string named = "the program of robot 3 has not returned";
-    EXPECT_TRUE(mode == "local" ? process.says(named, 30) : eventually([&] {
-      return read(scratch / "run/logs/behaviours-1-1.log").find(named) != std::string::npos;
-    }));
-    process.signal(SIGINT);
-    EXPECT_EQ(process.wait(20).status, 1);
+    Words words = long_run({"--mode", mode, "--behaviour", scratch / "hangs.c"});
+    words[4] = "3";
+    words[6] = "max";
+    EXPECT_EQ(Process(words, scratch.path()).wait(60).status, 0);
+    EXPECT_EQ(recorder::read_summary(scratch / "run/summary.json").robots_failed, 1u);
     expect_nothing_left();
   }
 }

@@ -13,9 +13,6 @@ enum { SLEEPING, IDLE, BATTERY, SETUP, RUNNING, CHARGING, MOVING };
 enum { STAND, TURN_LEFT, TURN_RIGHT, STRAIGHT };
 enum { CYCLES_PER_MS = 8000 };
 
-/* Readings of the clock after which a tick has certainly passed for a program that does nothing else. */
-enum { CLOCK_READS_PER_TICK = 4096 };
-
 /* How long a call takes (the converter at 1 MHz, 13 clocks; at 62.5 kHz for the temperature; a call in vain). */
 enum {
   READING_CYCLES = 150,
@@ -25,12 +22,12 @@ enum {
 };
 enum { HIGHEST_READING = 1023 };
 
-void kt_enter(struct KtControl*);
+uint64_t kt_enter(void);
 void kt_wait(void);
-uint64_t kt_call(struct KtControl*, uint64_t function, void* argument);
+uint64_t kt_call(uint64_t function);
 void kt_leave(void);
 int main();
-extern struct KtControl* kt_control;
+extern struct KtExchange* kt_exchange;
 
 /* Read-only once the loader has set it. */
 __attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtSurroundings* kt_surroundings = 0;
@@ -65,13 +62,31 @@ uint16_t tx_clock, tx_increment = 255;
 
 static void wait_for_tick(void) {
   ++robot.waits;
-  robot.clock_reads = 0;
   kt_wait();
 }
 
+static int32_t cycles_left(void) {
+  int32_t left;
+  __asm__ volatile("movl %%gs:%c1, %0" : "=r"(left) : "i"(KT_THREAD_BUDGET));
+  return left;
+}
+
+static void set_cycles_left(int32_t left) {
+  __asm__ volatile("movl %0, %%gs:%c1" : : "r"(left), "i"(KT_THREAD_BUDGET) : "memory");
+}
+
 /* Spends time: whole ticks at once, the rest when it has added up to one. A callback cannot wait: what it spends, the main
- * program waits for. */
+ * program waits for. Where code takes its time as well, both come out of the cycles of the tick. */
 static void spend(uint64_t cycles) {
+  if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT && !robot.in_interrupt) {
+    for (int64_t left = cycles_left(); (int64_t)cycles > left; left = cycles_left()) {
+      cycles -= (uint64_t)left;
+      set_cycles_left(0);
+      wait_for_tick();
+    }
+    set_cycles_left(cycles_left() - (int32_t)cycles);
+    return;
+  }
   robot.debt_cycles += cycles;
   if (robot.in_interrupt) return;
   while (robot.debt_cycles >= robot.tick_cycles) {
@@ -85,11 +100,6 @@ void kilotwin_spend(unsigned long long cycles) { spend(cycles); }
 
 void kilotwin_sleep(void) {
   if (!robot.in_interrupt) wait_for_tick();
-}
-
-volatile uint32_t* kilotwin_clock(void) {
-  if (++robot.clock_reads > CLOCK_READS_PER_TICK && !robot.in_interrupt) wait_for_tick();
-  return &kilo_ticks;
 }
 
 void delay(uint16_t ms) { spend((uint64_t)ms * CYCLES_PER_MS); }
@@ -132,7 +142,9 @@ uint8_t* kt_eeprom(void) {
 }
 
 void kt_write_eeprom(uint16_t address, uint8_t value) {
-  kt_eeprom()[address] = value;
+  uint8_t* cell = kt_eeprom() + address;
+  if (*cell != value) ++robot.effects;
+  *cell = value;
   kt_surroundings->eeprom_written = 1;
 }
 
@@ -350,7 +362,7 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
         /* Once per tick. If loop() itself waited, it is due again in the tick in which the wait has ended. */
         const uint64_t waits = robot.waits;
         loop();
-        if (waits == robot.waits) rest_of_tick();
+        if (robot.loop_rate == KT_LOOP_PER_TICK && waits == robot.waits) rest_of_tick();
         break;
       }
       case MOVING:
@@ -478,9 +490,11 @@ static void boot_loader(uint8_t type) {
 }
 
 /* What is received after a RESET in the same tick is lost while the robot starts. */
-static uint64_t interrupts(const struct KtEvents* events) {
-  robot.in_interrupt = 1;
+static uint64_t interrupts(void) {
+  const struct KtExchange* events = kt_exchange;
+  robot.in_interrupt = KT_IN_TX_SUCCESS;
   if (events->sent) kilo_message_tx_success();
+  robot.in_interrupt = KT_IN_RX;
   for (uint32_t i = 0; i < events->receptions && !robot.reset && !robot.deaf; ++i) {
     const struct KtReception* reception = &events->reception[i];
     __builtin_memcpy(&rx_msg, &reception->message, sizeof rx_msg);
@@ -499,20 +513,20 @@ static uint64_t interrupts(const struct KtEvents* events) {
   return 0;
 }
 
-static uint64_t transmit(struct KtMessage* out) {
+static uint64_t transmit(void) {
   if (robot.state != RUNNING) return 0;
-  robot.in_interrupt = 1;
+  robot.in_interrupt = KT_IN_TX;
   const message_t* message = kilo_message_tx();
   robot.in_interrupt = 0;
   if (message == NULL) return 0;
-  __builtin_memcpy(out, message, sizeof *out);
+  __builtin_memcpy(&kt_exchange->message, message, sizeof kt_exchange->message);
   return 1;
 }
 
 __attribute__((visibility("default"), used)) const struct KtImage kilotwin_image = {
     KT_IMAGE_MAGIC,
     KT_IMAGE_VERSION,
-    (uint64_t)&kt_control,
+    (uint64_t)&kt_exchange,
     (uint64_t)&robot,
     (uint64_t)&kilo_ticks,
     (uint64_t)&kilo_tx_period,

@@ -8,7 +8,7 @@
 #include "machine.h"
 #include "weak.h"
 
-extern struct KtControl* kt_control;
+extern struct KtExchange* kt_exchange;
 
 static FILE input, output, errors;
 FILE *stdin = &input, *stdout = &output, *stderr = &errors;
@@ -22,10 +22,10 @@ void kilotwin_serial_line(unsigned long baud) {
 
 /* To the log, and to the function behind the stream if there is one. */
 static void put_into(FILE* stream, char c) {
-  if (kt_control->log_length < KT_LOG_OCTETS)
-    kt_control->log[kt_control->log_length++] = c;
+  if (kt_exchange->log_length < KT_LOG_OCTETS)
+    kt_exchange->log[kt_exchange->log_length++] = c;
   else
-    ++kt_control->log_lost;
+    ++kt_exchange->log_lost;
   if (cycles_per_octet != 0) kilotwin_spend(cycles_per_octet);
   if (stream != NULL && stream->put != NULL) stream->put(c, stream);
 }

@@ -1,6 +1,6 @@
 /* How the host enters a robot and how a robot returns to its host: System V calling convention, x86-64. The host's
  * registers rest on the host's stack, the robot's on the robot's, so that a robot's stack holds addresses of its own image
- * and nothing else. */
+ * and nothing else. %gs points to the thread's KtThread. */
 #ifndef __x86_64__
 #error "robots' programs are simulated on x86-64 only"
 #endif
@@ -8,10 +8,34 @@
 #include "image_abi.h"
 
 /* Read-only once the loader has set it. */
-__attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtControl* kt_control = 0;
+__attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtExchange* kt_exchange = 0;
+
+#define HOST_STACK "%gs:0"
+#define ROBOT_STACK "%gs:8"
+#define INTERRUPT_STACK "%gs:16"
+#define CHECK "%gs:28"
+#define IN_INTERRUPT "%gs:29"
+#define OVERRUN "%gs:30"
+#define PLACE "%gs:32"
+_Static_assert(__builtin_offsetof(struct KtThread, robot_stack) == 8 &&
+                   __builtin_offsetof(struct KtThread, interrupt_stack) == 16 &&
+                   __builtin_offsetof(struct KtThread, check) == 28 &&
+                   __builtin_offsetof(struct KtThread, in_interrupt) == 29 &&
+                   __builtin_offsetof(struct KtThread, overrun) == 30 &&
+                   __builtin_offsetof(struct KtThread, place) == 32,
+               "as above");
 
 #define SAVE "push %rbx\n push %rbp\n push %r12\n push %r13\n push %r14\n push %r15\n"
 #define RESTORE "pop %r15\n pop %r14\n pop %r13\n pop %r12\n pop %rbp\n pop %rbx\n"
+/* What a program finds in registers that nobody gave it does not depend on the host. */
+#define CLEAR                                                                                               \
+  "xor %edx, %edx\n xor %esi, %esi\n xor %edi, %edi\n xor %r8d, %r8d\n xor %r9d, %r9d\n xor %r10d, %r10d\n" \
+  "xor %r11d, %r11d\n"
+#define CLEAR_VECTORS                                                                                        \
+  "xorps %xmm0, %xmm0\n xorps %xmm1, %xmm1\n xorps %xmm2, %xmm2\n xorps %xmm3, %xmm3\n xorps %xmm4, %xmm4\n" \
+  "xorps %xmm5, %xmm5\n xorps %xmm6, %xmm6\n xorps %xmm7, %xmm7\n xorps %xmm8, %xmm8\n xorps %xmm9, %xmm9\n" \
+  "xorps %xmm10, %xmm10\n xorps %xmm11, %xmm11\n xorps %xmm12, %xmm12\n xorps %xmm13, %xmm13\n"              \
+  "xorps %xmm14, %xmm14\n xorps %xmm15, %xmm15\n"
 /* Returns elsewhere than where the call came from: a jump, which processors predict where they would mistake a return. */
 #define CROSS "pop %rcx\n jmp *%rcx\n"
 #define FUNCTION(name) ".globl " #name "\n .hidden " #name "\n .type " #name ", @function\n" #name ":\n"
@@ -19,22 +43,58 @@ __attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtControl* kt_con
 
 __asm__(
     ".text\n"
-    /* void kt_enter(struct KtControl*) */
+    /* uint64_t kt_enter(void) */
     FUNCTION(kt_enter) SAVE
-    "mov %rsp, (%rdi)\n"
-    "mov 8(%rdi), %rsp\n" RESTORE CROSS END(kt_enter)
+    "mov %rsp, " HOST_STACK "\n"
+    "mov " ROBOT_STACK ", %rsp\n" CLEAR CLEAR_VECTORS RESTORE "xor %eax, %eax\n" CROSS END(kt_enter)
     /* void kt_wait(void): called by the robot; returns in the next tick. */
-    FUNCTION(kt_wait) SAVE
-    "mov kt_control(%rip), %rdi\n"
-    "mov %rsp, 8(%rdi)\n"
-    "mov (%rdi), %rsp\n" RESTORE CROSS END(kt_wait)
-    /* uint64_t kt_call(struct KtControl*, function, argument) */
+    FUNCTION(kt_wait)
+    "xor %eax, %eax\n"
+    "kt_switch:\n" SAVE
+    "mov %rsp, " ROBOT_STACK "\n"
+    "mov " HOST_STACK ", %rsp\n" RESTORE CROSS END(kt_wait)
+    /* uint64_t kt_call(function) */
     FUNCTION(kt_call) SAVE
-    "mov %rsp, (%rdi)\n"
-    "mov 16(%rdi), %rsp\n"
-    "mov %rsi, %rax\n"
-    "mov %rdx, %rdi\n"
+    "mov %rsp, " HOST_STACK "\n"
+    "mov " INTERRUPT_STACK ", %rsp\n"
+    "movb $1, " IN_INTERRUPT "\n"
+    "mov %rdi, %rax\n"
+    "xor %ebx, %ebx\n xor %ebp, %ebp\n xor %ecx, %ecx\n xor %r12d, %r12d\n xor %r13d, %r13d\n xor %r14d, %r14d\n"
+    "xor %r15d, %r15d\n" CLEAR CLEAR_VECTORS
     "call *%rax\n" END(kt_call)
     FUNCTION(kt_leave)
-    "mov kt_control(%rip), %rdi\n"
-    "mov (%rdi), %rsp\n" RESTORE "ret\n" END(kt_leave));
+    "movb $0, " IN_INTERRUPT "\n"
+    "mov " HOST_STACK ", %rsp\n" RESTORE "ret\n" END(kt_leave)
+/* void kt_preempt_N(void): called where a counter has run out, with N out of KT_CHECK_*. Keeps all registers but the
+     * flags. */
+#define PREEMPT(kind, to) \
+  FUNCTION(kt_preempt_##kind) "movb $" #kind ", " CHECK "\n jmp " to "\n" END(kt_preempt_##kind)
+    PREEMPT(0, "kt_preempt") PREEMPT(1, "kt_preempt") PREEMPT(2, "kt_preempt") PREEMPT(3, "kt_preempt")
+    PREEMPT(4, "kt_preempt_with_vectors") PREEMPT(5, "kt_preempt_with_vectors")
+    PREEMPT(6, "kt_preempt_with_vectors") PREEMPT(7, "kt_preempt_with_vectors")
+#define SAVE_OTHERS                                                                                           \
+  "push %rbp\n mov %rsp, %rbp\n"                                                                              \
+  "push %rax\n push %rcx\n push %rdx\n push %rsi\n push %rdi\n push %r8\n push %r9\n push %r10\n push %r11\n" \
+  "mov 8(%rbp), %rax\n mov %rax, " PLACE "\n"
+/* What a function may hand on without naming it. */
+#define SAVE_ARGUMENTS                                                                                \
+  "movups %xmm0, (%rsp)\n movups %xmm1, 16(%rsp)\n movups %xmm2, 32(%rsp)\n movups %xmm3, 48(%rsp)\n" \
+  "movups %xmm4, 64(%rsp)\n movups %xmm5, 80(%rsp)\n movups %xmm6, 96(%rsp)\n movups %xmm7, 112(%rsp)\n"
+#define RESTORE_ARGUMENTS                                                                             \
+  "movups (%rsp), %xmm0\n movups 16(%rsp), %xmm1\n movups 32(%rsp), %xmm2\n movups 48(%rsp), %xmm3\n" \
+  "movups 64(%rsp), %xmm4\n movups 80(%rsp), %xmm5\n movups 96(%rsp), %xmm6\n movups 112(%rsp), %xmm7\n"
+#define RESTORE_OTHERS                                                                                          \
+  "pop %r11\n pop %r10\n pop %r9\n pop %r8\n pop %rdi\n pop %rsi\n pop %rdx\n pop %rcx\n pop %rax\n pop %rbp\n" \
+  "ret\n"
+    FUNCTION(kt_preempt)
+    "cmpb $0, " IN_INTERRUPT "\n jne kt_overrun\n" SAVE_OTHERS
+    "sub $128, %rsp\n" SAVE_ARGUMENTS
+    "mov $1, %eax\n call kt_switch\n" RESTORE_ARGUMENTS
+    "add $128, %rsp\n" RESTORE_OTHERS END(kt_preempt)
+    FUNCTION(kt_preempt_with_vectors)
+    "cmpb $0, " IN_INTERRUPT "\n jne kt_overrun\n" SAVE_OTHERS
+    "sub $512, %rsp\n and $-64, %rsp\n fxsave64 (%rsp)\n"
+    "mov $1, %eax\n call kt_switch\n"
+    "fxrstor64 (%rsp)\n lea -72(%rbp), %rsp\n" RESTORE_OTHERS END(kt_preempt_with_vectors)
+    FUNCTION(kt_overrun)
+    "pop %rax\n mov %rax, " PLACE "\n movb $1, " OVERRUN "\n jmp kt_leave\n" END(kt_overrun));

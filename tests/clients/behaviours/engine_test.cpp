@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <thread>
 
 #include "core/base/error.hpp"
@@ -245,26 +244,6 @@ TEST(Engine, HostsOnThreadsEqualOneHost) {
     ASSERT_TRUE(equal(one.frame(), two.frame())) << "tick " << k;
     ASSERT_EQ(one.hash(), two.hash());
   }
-}
-
-TEST(Engine, TheRunningRobotIsKnownToOtherThreads) {
-  Swarm swarm(
-      {program(
-          "static void loop(void) { if (kilo_uid == 2) for (volatile uint32_t i = 0; i < 500000000; ++i) {} }")},
-      3);
-  EXPECT_FALSE(swarm.hosts[0]->running().has_value());
-  swarm.step();
-  Air run = to_all(swarm, message(kRun));
-  std::thread stuck([&] { swarm.step(run); });
-  std::optional<BehavioursEngine::Running> before, now;
-  do {
-    before = swarm.hosts[0]->running();
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    now = swarm.hosts[0]->running();
-  } while (!before || !now || before->entry != now->entry);
-  EXPECT_EQ(now->robot, 2u);
-  stuck.join();
-  EXPECT_FALSE(swarm.hosts[0]->running().has_value());
 }
 
 TEST(ProgramSet, RejectsWhatIsNotWhatItsNameSays) {

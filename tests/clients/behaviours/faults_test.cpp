@@ -35,7 +35,34 @@ TEST(Faults, WildJump) { one_fails("((void (*)(void))(uintptr_t)(n + 16))();", "
 
 TEST(Faults, WriteToCode) { one_fails("*(volatile uint8_t*)&loop = 0;", "access to address 0x"); }
 
-TEST(Faults, DivisionByZero) { one_fails("volatile int zero = 0; n = n / zero;", "division by zero in loop()"); }
+TEST(Faults, EndlessLoop) {
+  one_fails("for (;;) {}", "endless loop in loop() at program0.c:4");
+  one_fails("for (volatile int i = 0; i < 10;) {}", "endless loop in loop() at program0.c:4");
+}
+
+TEST(Faults, EndlessLoopThatIsBusy) {
+  Swarm swarm({program("uint32_t counter; static void loop(void) { for (;;) ++counter; }")}, 2);
+  swarm.start();
+  swarm.steps(20);
+  EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kRunning);
+  swarm.steps(20);
+  EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kFailed);
+  EXPECT_NE(swarm.hosts[0]->failures().at(0).text.find("endless loop in loop()"), std::string::npos);
+}
+
+TEST(Faults, ACallbackThatDoesNotReturn) {
+  for (const std::string body : {"for (;;) {}", "static uint32_t n; while (kilo_uid < 5) ++n;"}) {
+    Swarm swarm({program("static void rx(message_t* m, distance_measurement_t* d) { " + body + " }")}, 3);
+    swarm.start();
+    Air air;
+    air.receptions = {{1, message(0)}};
+    swarm.step(air);
+    EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kFailed);
+    EXPECT_EQ(swarm.life_cycle(2), LifeCycle::kRunning);
+    EXPECT_NE(swarm.hosts[0]->failures().at(0).text.find("does not return from kilo_message_rx"),
+              std::string::npos);
+  }
+}
 
 TEST(Faults, StackOverflow) {
   one_fails(

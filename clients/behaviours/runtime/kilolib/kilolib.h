@@ -59,13 +59,6 @@ void kilo_init();
 /* Runs setup() once and loop() for ever when the overhead controller says RUN. Does not return. */
 void kilo_start(void (*setup)(void), void (*loop)(void));
 
-#if defined(__x86_64__) && !defined(KILOTWIN_RUNTIME)
-/* A program that waits in `while (kilo_ticks < later);` must let time pass; so reading the clock goes through a function
- * that ends the tick for the robot after very many readings within one tick. */
-volatile uint32_t* kilotwin_clock(void);
-#define kilo_ticks (*kilotwin_clock())
-#endif
-
 #ifdef __cplusplus
 }
 #endif

@@ -1,0 +1,19 @@
+/// Makes programs interruptible at places that depend on what they execute and on nothing else: their machine code counts
+/// the cycles that a Kilobot's processor would have needed, about, and hands over to the host when it has used up its share.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace kilotwin::behaviours {
+
+/// The text of a compiler's assembly with counters: one in each basic block, and in at least one block of every cycle, as
+/// well as at the entry of every function that calls another, a test of what is left. The code must be compiled with
+/// -mno-red-zone. Throws RunError if a cycle was left without a test, which would be an error of this function.
+[[nodiscard]] std::string with_cycle_counters(std::string_view assembly);
+
+/// About how many cycles of an ATmega328P an instruction for x86-64 stands for, in code compiled from the same source.
+/// docs/execution.md tells how good that is.
+[[nodiscard]] unsigned avr_cycles(std::string_view instruction, std::string_view operands);
+
+}  // namespace kilotwin::behaviours

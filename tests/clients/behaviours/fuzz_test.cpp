@@ -1,0 +1,190 @@
+// Programs that do everything wrong cost their robots, and nobody else: random C with loops, wild pointers, recursion, division
+// by zero, smashed stacks, stale jumps. KILOTWIN_FUZZ_PROGRAMS=1000 runs a thousand of them, KILOTWIN_FUZZ_SEED others.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <random>
+
+#include "tests/clients/behaviours/swarm.hpp"
+
+namespace kilotwin::behaviours::test {
+namespace {
+
+/// Makes a program of a seed.
+class Generator {
+ public:
+  explicit Generator(std::uint32_t seed) : random_(seed) {}
+
+  std::string text() {
+    std::string functions;
+    for (functions_ = 0; functions_ < 4;) {
+      const std::string head = "static int32_t f" + std::to_string(functions_) + "(int32_t x)";
+      ++functions_;  // it may call itself
+      functions += head + " { int32_t i = x, b[4] = {x}; (void)b; " + statements(3) + " return i + b[x & 3]; }\n";
+    }
+    return program(
+        "#include <setjmp.h>\n#include <stdio.h>\n"
+        "int32_t g[8] = {1, 2, 3}; volatile int32_t v; float r = 1; uint8_t received; char text[16]; jmp_buf "
+        "place;\n"
+        "int32_t (*pointer)(int32_t); void* block; static message_t m;\n"
+        "static int32_t f0(int32_t), f1(int32_t), f2(int32_t), f3(int32_t);\n" +
+        functions +
+        "static void rx(message_t* h, distance_measurement_t* d) { int32_t x = h->data[0], i = x, b[4] = {0}; "
+        "received = 1; " +
+        (chance(3) ? statements(2) : "") +
+        " (void)i, (void)b; }\n"
+        "static message_t* tx(void) { int32_t x = 1, i = v, b[4] = {0}; " +
+        (chance(6) ? statements(2) : "") +
+        " (void)x, (void)i, (void)b; m.data[0] = v; return &m; }\n"
+        "static void setup(void) { rand_seed(kilo_uid); pointer = f0; v = kilo_uid; }\n"
+        "static void loop(void) { int32_t x = kilo_ticks, i = x, b[4] = {0}; (void)b; set_color(i); set_motors(v, "
+        "x); " +
+        statements(3) + " v += i; }\n");
+  }
+
+ private:
+  std::uint32_t draw(std::uint32_t below) { return static_cast<std::uint32_t>(random_() % below); }
+  bool chance(std::uint32_t one_in) { return draw(one_in) == 0; }
+
+  std::string number() {
+    static const char* const kNumbers[] = {"0",   "1",   "-1",   "2",     "7",          "31",
+                                           "255", "-40", "1000", "65536", "0x7fffffff", "(-0x7fffffff - 1)"};
+    return kNumbers[draw(12)];
+  }
+
+  std::string value(int depth = 2) {
+    if (depth == 0 || chance(3)) {
+      static const char* const kValues[] = {
+          "x",           "i",        "v",          "g[1]",    "b[1]", "(int32_t)kilo_ticks",
+          "rand_soft()", "kilo_uid", "(int32_t)r", "received"};
+      return chance(3) ? number() : kValues[draw(10)];
+    }
+    const std::string a = value(depth - 1), b = value(depth - 1);
+    static const char* const kOperators[] = {"+", "-", "*",  "/", "%",      "&",     "|",
+                                             "^", "<", "==", ">", "<< 3 |", ">> 1 ^"};
+    if (chance(12))
+      return "f" + std::to_string(draw(functions_ < 4 ? static_cast<std::uint32_t>(functions_) : 4)) + "(" + a +
+             ")";
+    return "(" + a + " " + kOperators[draw(13)] + " " + b + ")";
+  }
+
+  std::string place() {
+    static const char* const kPlaces[] = {"i", "i", "v", "g[2]", "b[2]"};
+    if (chance(8)) return "g[" + value() + "]";
+    if (chance(10)) return "b[" + value() + "]";
+    return kPlaces[draw(5)];
+  }
+
+  std::string statements(int depth) {
+    std::string result;
+    for (std::uint32_t n = 1 + draw(4); n > 0; --n) result += statement(depth) + " ";
+    return result;
+  }
+
+  std::string statement(int depth) {
+    if (depth > 0) {
+      switch (draw(9)) {
+        case 0: return "if (" + value() + ") { " + statements(depth - 1) + "}";
+        case 1: return "for (int k = 0; k < " + number() + "; ++k) { " + statements(depth - 1) + "}";
+        case 2: return "while (" + value() + ") { " + statements(depth - 1) + "}";
+        case 3: return "do { " + statements(depth - 1) + "} while (" + value() + ");";
+        case 4:
+          return "for (;;) { " + statements(depth - 1) + (chance(4) ? "" : "if (" + value() + ") break; ") + "}";
+        default: break;
+      }
+    }
+    if (chance(5)) return horror();
+    switch (draw(8)) {
+      case 0: return "set_motors(" + value() + ", " + value() + ");";
+      case 1: return "set_color(" + value() + ");";
+      case 2: return "r = r * 1.5f - " + value() + ";";
+      case 3: return "delay(" + value() + " & 127);";
+      case 4: return "if (" + value() + " == 3) return" + std::string(" RETURN;");
+      default: return place() + " = " + value() + ";";
+    }
+  }
+
+  std::string horror() {
+    switch (draw(14)) {
+      case 0: return "*(volatile int32_t*)(uintptr_t)(" + value() + " * 4096L) = " + value() + ";";
+      case 1: return "memset(b, " + value() + ", " + value() + " & 511);";
+      case 2: return "((void (*)(void))(uintptr_t)(" + value() + "))();";
+      case 3: return "if (pointer) i = pointer(" + value() + ");";
+      case 4: return "pointer = (int32_t (*)(int32_t))((uintptr_t)f1 + (" + value() + " & 63));";
+      case 5: return "if (!setjmp(place)) i = 1;";
+      case 6: return "longjmp(place, " + value() + ");";
+      case 7: return "i = f" + std::to_string(draw(4)) + "(x + 1);";
+      case 8: return "i = " + value() + " / " + value() + " + " + value() + " % " + value() + ";";
+      case 9: return "memcpy(text, (void*)((uintptr_t)text + " + value() + "), " + value() + " & 1023);";
+      case 10:
+        return "free(block); block = malloc(" + value() + "); if (block) *(int32_t*)block = " + value() + ";";
+      case 11: return "while (!received); received = 0;";
+      case 12: return "kilo_message_rx = (message_rx_t)(uintptr_t)(" + value() + ");";
+      default: return "((volatile char*)&b)[" + value() + "] = " + value() + ";";
+    }
+  }
+
+  std::mt19937 random_;  // the same numbers everywhere, as the standard says
+  int functions_ = 0;
+};
+
+std::uint32_t wanted(const char* name, std::uint32_t otherwise) {
+  const char* const text = std::getenv(name);
+  return text == nullptr ? otherwise : static_cast<std::uint32_t>(std::atoi(text));
+}
+
+std::string repaired(std::string text) {
+  // `return` has a value in some of the functions above; GNU C takes either in all of them, warnings aside.
+  for (std::size_t at = text.find(" RETURN"); at != std::string::npos; at = text.find(" RETURN")) text.erase(at, 7);
+  return text;
+}
+
+TEST(Fuzz, ProgramsOfEveryKindCostNobodyElse) {
+  const std::string decent = program(
+      "static uint8_t n; static message_t m; static message_t* tx(void) { m.data[0] = n; return &m; }\n"
+      "static void loop(void) { set_motors(++n, kilo_ticks); }");
+  const std::uint32_t programs = wanted("KILOTWIN_FUZZ_PROGRAMS", 12), seed = wanted("KILOTWIN_FUZZ_SEED", 1);
+  constexpr std::uint32_t kRobots = 6;
+  std::uint32_t failed = 0;
+  for (std::uint32_t p = 0; p < programs; ++p) {
+    SCOPED_TRACE("seed " + std::to_string(seed + p));
+    const std::string text = repaired(Generator(seed + p).text());
+    Swarm one({text, decent}, kRobots), other({text, decent}, kRobots, 3);
+    Swarm third({text, decent}, kRobots, 2);
+    one.start();
+    other.start();
+    for (int k = 0; k < 80; ++k) {
+      const Air air = echo(one.frame());
+      one.step(air);
+      if (k < 40) {
+        other.step(air);
+        ASSERT_EQ(one.hash(), other.hash()) << "tick " << k << "\n" << text;
+      } else {
+        // What was interrupted in the midst of its code goes on elsewhere.
+        if (k == 40) {
+          std::vector<proto::BehavioursState> saved(3);
+          std::vector<const proto::BehavioursState*> parts;
+          for (std::size_t h = 0; h < 3; ++h) {
+            other.hosts[h]->save(saved[h]);
+            parts.push_back(&saved[h]);
+          }
+          for (const auto& host : third.hosts) host->load(other.tick, parts);
+          third.tick = other.tick;
+        }
+        third.step(air);
+        ASSERT_EQ(one.hash(), third.hash()) << "tick " << k << " after a restart\n" << text;
+      }
+      for (std::uint32_t robot = kRobots; robot < 2 * kRobots; ++robot) {
+        ASSERT_EQ(one.frame().motor_left[robot], static_cast<std::uint8_t>(k + 2)) << text;
+        ASSERT_EQ(one.life_cycle(robot), LifeCycle::kRunning);
+      }
+    }
+    failed += one.hosts[0]->robots_failed();
+  }
+  EXPECT_GT(failed, programs / 2) << "these programs are too good";
+  if (programs > 100)
+    std::cerr << programs << " programs, " << failed << " of " << programs * kRobots << " robots failed\n";
+}
+
+}  // namespace
+}  // namespace kilotwin::behaviours::test
