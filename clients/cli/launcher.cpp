@@ -16,6 +16,7 @@
 
 #include "clients/behaviours/running_note.hpp"
 #include "clients/cli/progress.hpp"
+#include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/interrupt.hpp"
