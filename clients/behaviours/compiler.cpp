@@ -216,7 +216,9 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& includes, con
     const auto assembly = assembly_of(arguments, kept, errors);
     if (!assembly) throw UserError(first_error(errors, {runtime / name}));
     parts.push_back(std::make_unique<Temporary>(kept));
-    if (!write_file(parts.back()->path(), with_cycle_counters(*assembly)))
+    const bool is_firmware = name == std::string_view("kilolib.c") || name == std::string_view("machine.c");
+    const auto counted = is_firmware ? Counted::kTestsOnly : Counted::kAll;
+    if (!write_file(parts.back()->path(), with_cycle_counters(*assembly, counted)))
       throw RunError(kept.string() + ": cannot be written; is the disk full?");
     link.push_back(parts.back()->path());
   }
@@ -262,7 +264,8 @@ struct Toolchain {
 };
 
 CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialect) const {
-  std::string content = runtime.filename().string() + '\n' + compiler.path + '\n' + compiler.version;
+  std::string content = runtime.filename().string() + '\n' + compiler.path + '\n' + compiler.version +
+                        "\ncounters " + std::to_string(kCountersVersion) + '\n';
   for (const std::string& flag : code) content += flag + '\n';
   for (const std::string& flag : kLinkFlags) content += flag + '\n';
   const std::string runtime_content = content;

@@ -140,8 +140,9 @@ std::vector<bool> blocks_that_need_flags(const FlowGraph& graph, const std::vect
 
 class Instrumenter {
  public:
-  explicit Instrumenter(std::string_view assembly)
+  explicit Instrumenter(std::string_view assembly, Counted counted)
       : assembly_(assembly),
+        counted_(counted),
         statements_(read_assembly(assembly)),
         graph_(flow_graph(statements_)),
         cycles_(graph_, statements_),
@@ -189,7 +190,7 @@ class Instrumenter {
       for (std::uint32_t i = block.first; i < block.last; ++i) {
         const Statement& s = statements_[i];
         if (s.kind != Statement::Kind::kInstruction) continue;
-        counter.cycles += avr_cycles(s.name, s.operands);
+        if (counted_ == Counted::kAll) counter.cycles += avr_cycles(s.name, s.operands);
         calls = calls || flow_of(s) == Flow::kCall;
       }
       counter.tests = cycles_.closes[b] || (block.is_function && function_calls(b));
@@ -277,6 +278,7 @@ class Instrumenter {
   }
 
   std::string_view assembly_;
+  const Counted counted_;
   const std::vector<Statement> statements_;
   const FlowGraph graph_;
   const Cycles cycles_;
@@ -286,6 +288,8 @@ class Instrumenter {
 
 }  // namespace
 
-std::string with_cycle_counters(std::string_view assembly) { return Instrumenter(assembly).instrument(); }
+std::string with_cycle_counters(std::string_view assembly, Counted counted) {
+  return Instrumenter(assembly, counted).instrument();
+}
 
 }  // namespace kilotwin::behaviours

@@ -299,6 +299,8 @@ int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const L
     failure.set_tick(culprit->tick.count());
     manifest.set_run(manifest.run() + 1 == 0 ? 1 : manifest.run() + 1);
     recorder::write_file(directory.manifest(), manifest.SerializeAsString());
+    std::error_code ignored;
+    fs::remove(directory.recording(), ignored);
   }
 }
 

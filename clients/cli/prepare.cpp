@@ -97,7 +97,8 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
     }
     if (group.has_eeprom()) {
       const std::string copy = fmt::format("eeprom-{}", g);
-      fs::copy(loaded.resolve(group.eeprom()), directory.path() / copy, fs::copy_options::overwrite_existing);
+      fs::copy(loaded.resolve(group.eeprom()), directory.path() / copy,
+               fs::copy_options::recursive | fs::copy_options::overwrite_existing);
       group.set_eeprom(copy);
     }
     const std::uint32_t program = manifest.group_program(g);

@@ -80,7 +80,8 @@ TEST_F(Senses, GiveOneHashHoweverARunIsDivided) {
   EXPECT_FALSE(std::filesystem::exists(scratch / "whole/eeprom/1.eeprom"));
   // The run directory holds what it needs to run again.
   Words again{"run", scratch / "whole/experiment.txtpb", "--mode", "local", "--quiet", "--out", scratch / "again"};
-  ASSERT_EQ(kilotwin(again, scratch).status, 0);
+  const Outcome outcome = kilotwin(again, scratch);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(recorder::read_summary(scratch / "again/summary.json").state_hash, whole.state_hash);
   EXPECT_EQ(kilotwin({"replay", scratch / "whole", "--verify"}, scratch).status, 0);
 }
