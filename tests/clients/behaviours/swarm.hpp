@@ -54,7 +54,7 @@ struct Air {
 
 class Swarm {
  public:
-  /// `robots` of each program (C text, or the path of a .c file), on `hosts` hosts.
+  /// `robots` of each program (C text of several lines, or the path of a source), on `hosts` hosts.
   /// `experiment`: more of it, in text format; `edit` has the last word. Robots stand in rows, 40 mm apart, and look to the right.
   Swarm(const std::vector<std::string>& programs, std::uint32_t robots, std::uint32_t hosts = 1,
         const std::string& experiment = "", const std::function<void(proto::Manifest&)>& edit = {});

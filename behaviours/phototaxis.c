@@ -1,0 +1,48 @@
+/* Phototaxis: towards the light with one sensor. The robot pivots about one leg; as soon as its light has fallen clearly below
+ * the best of this pivot it changes to the other leg. Each pivot carries it forward, and so it winds its way to the light.
+ * LED: red on the left pivot, green on the right one. */
+#include <kilolib.h>
+
+#define SAMPLES 8
+#define FALL 6                            /* counts of the converter below the best of this pivot */
+#define LONGEST_TICKS (6 * TICKS_PER_SEC) /* half a turn or so: no pivot lasts longer */
+
+static int16_t best;
+static uint8_t left;
+static uint32_t pivot_began_at;
+
+/* The mean of some readings; the sensor cannot be read while a message arrives and then says -1. */
+static int16_t light(void) {
+  int16_t sum = 0;
+  uint8_t count = 0;
+  while (count < SAMPLES) {
+    const int16_t reading = get_ambientlight();
+    if (reading < 0) continue;
+    sum += reading;
+    ++count;
+  }
+  return sum / SAMPLES;
+}
+
+static void pivot(uint8_t to_the_left, int16_t now) {
+  left = to_the_left;
+  best = now;
+  pivot_began_at = kilo_ticks;
+  set_color(left ? RGB(3, 0, 0) : RGB(0, 3, 0));
+  spinup_motors();
+  set_motors(left ? kilo_turn_left : 0, left ? 0 : kilo_turn_right);
+}
+
+static void setup(void) { pivot(1, light()); }
+
+static void loop(void) {
+  const int16_t now = light();
+  if (now > best) best = now;
+  if (now < best - FALL || kilo_ticks - pivot_began_at > LONGEST_TICKS) pivot(!left, now);
+}
+
+int main(void) {
+  kilo_init();
+  kilo_start(setup, loop);
+  return 0;
+}

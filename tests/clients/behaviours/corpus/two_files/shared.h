@@ -1,0 +1,3 @@
+int common;
+extern const unsigned char table[];
+int sum(int);
