@@ -29,6 +29,11 @@ struct CompiledProgram {
 [[nodiscard]] CompiledProgram compile(const std::vector<std::filesystem::path>& sources,
                                       const CompileOptions& options = {});
 
+/// Compiles and links C sources with avr-gcc and this project's own kilolib for the robot's processor: an .elf file, kept in
+/// the cache, for a robot or its simulated processor. Throws UserError as compile() does.
+[[nodiscard]] CompiledProgram compile_firmware(const std::vector<std::filesystem::path>& sources,
+                                               const CompileOptions& options = {});
+
 /// What a program needs of an ATmega328P (32 KiB of flash, 2 KiB of RAM), with what it uses of the C library and without
 /// kilolib.
 struct AvrSize {

@@ -87,6 +87,13 @@ int build_command(const BuildArguments& arguments) {
   behaviours::CompileOptions options;
   options.defines = arguments.define;
   if (arguments.avr) {
+    if (!arguments.out.empty()) {
+      const behaviours::CompiledProgram linked = behaviours::compile_firmware(arguments.sources, options);
+      std::error_code error;
+      std::filesystem::copy_file(linked.file, arguments.out, std::filesystem::copy_options::overwrite_existing, error);
+      if (error) throw UserError(fmt::format("{}: cannot be written: {}", arguments.out.string(), error.message()));
+      fmt::print("{}\n", arguments.out.string());
+    }
     constexpr double kFlash = 32768, kRam = 2048;
     const behaviours::AvrSize size = behaviours::compile_for_avr(arguments.sources, options);
     fmt::print(
@@ -191,7 +198,7 @@ int main_of(int argc, char** argv) {
   build_app.add_option("program", build.sources, "C sources")->required();
   build_app.add_option("-o", build.out, "shared object to write (default: PROGRAM.so here)");
   build_app.add_option("--define", build.define, "NAME=VALUE")->allow_extra_args(false);
-  build_app.add_flag("--avr", build.avr, "compile for the ATmega328P and print flash and RAM");
+  build_app.add_flag("--avr", build.avr, "compile for the ATmega328P and print flash and RAM; with -o, link with a kilolib that runs on the robot, as .elf");
 
   ExportArguments exported;
   CLI::App& export_app = *app.add_subcommand("export", "CSV files from a recorded run");

@@ -60,13 +60,15 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
     }
     std::vector<fs::path> sources;
     for (const std::string& source : group.behaviour()) sources.push_back(loaded.resolve(source));
-    const bool is_firmware = firmware::is_firmware(sources.front());
-    if (is_firmware && sources.size() > 1)
+    const bool is_linked = firmware::is_firmware(sources.front()), is_firmware = is_linked || group.avr();
+    if (is_linked && sources.size() > 1)
       throw UserError(fmt::format("{}: firmware is one file; link its parts first", sources.front().string()));
     behaviours::CompileOptions options;
     options.defines = arguments.define;
     const behaviours::CompiledProgram compiled =
-        is_firmware ? checked_firmware(sources.front()) : behaviours::compile(sources, options);
+        is_linked     ? checked_firmware(sources.front())
+        : group.avr() ? behaviours::compile_firmware(sources, options)
+                      : behaviours::compile(sources, options);
     for (const std::string& note : compiled.notes) say("note: " + note);
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;

@@ -104,13 +104,29 @@ void FirmwareSwarm::commit() {
     Robot& robot = robots_[i];
     robot.has_run = false;
     const firmware::Outputs out = robot.mcu->outputs();
-    robot.spun_up = robot.spun_up || (out.motor_left == 255 && out.motor_right == 255);
+    robot.full = out.motor_left == 255 && out.motor_right == 255;
+    robot.full_throughout = robot.full_throughout && robot.full;
+    robot.kicked = robot.kicked || robot.full;
     if (!robot.mcu->printed().empty()) write_log(i);
   }
 }
 
 void FirmwareSwarm::begin_tick() {
-  for (Robot& robot : robots_) robot.spun_up = false;
+  for (Robot& robot : robots_) {
+    robot.full_throughout = robot.full;
+    robot.kicked = robot.kick_goes_on;
+  }
+}
+
+void FirmwareSwarm::end_tick() {
+  for (Robot& robot : robots_) {
+    robot.kick_goes_on = robot.full && !robot.full_throughout;
+    robot.spun_up = robot.kicked && !robot.kick_goes_on && !robot.full_throughout;
+    if (robot.kick_goes_on) continue;
+    const firmware::Outputs out = robot.mcu->outputs();
+    robot.shown_left = out.motor_left;
+    robot.shown_right = out.motor_right;
+  }
 }
 
 void FirmwareSwarm::write_log(std::uint32_t i) {
@@ -129,8 +145,8 @@ comm::FirmwareRobots::Outputs FirmwareSwarm::outputs(std::uint32_t i) const {
   const Mcu& mcu = *robots_[i].mcu;
   const firmware::Outputs shown = mcu.outputs();
   Outputs out;
-  out.motor_left = shown.motor_left;
-  out.motor_right = shown.motor_right;
+  out.motor_left = robots_[i].shown_left;
+  out.motor_right = robots_[i].shown_right;
   out.led = shown.led;
   out.spun_up = robots_[i].spun_up;
   out.listening = mcu.listening();
@@ -147,14 +163,22 @@ std::uint64_t FirmwareSwarm::word(std::uint32_t i) const {
 }
 
 std::string FirmwareSwarm::save(std::uint32_t i) const {
-  std::string octets(1, robots_[i].spun_up ? '\1' : '\0');
-  return octets + robots_[i].mcu->save();
+  const Robot& robot = robots_[i];
+  const int flags = (robot.full ? 1 : 0) | (robot.kick_goes_on ? 2 : 0) | (robot.spun_up ? 4 : 0);
+  const std::string board{static_cast<char>(flags), static_cast<char>(robot.shown_left),
+                          static_cast<char>(robot.shown_right)};
+  return board + robot.mcu->save();
 }
 
-void FirmwareSwarm::load(std::uint32_t i, comm::Cycles, const std::string& octets) {
-  if (octets.empty()) throw RunError("a firmware robot is missing in the checkpoint; resume from another one");
-  robots_[i].spun_up = octets[0] != 0;
-  robots_[i].mcu->load(octets.substr(1));
+void FirmwareSwarm::load(std::uint32_t i, const std::string& octets) {
+  if (octets.size() < 3) throw RunError("a firmware robot is missing in the checkpoint; resume from another one");
+  Robot& robot = robots_[i];
+  robot.full = (octets[0] & 1) != 0;
+  robot.kick_goes_on = (octets[0] & 2) != 0;
+  robot.spun_up = (octets[0] & 4) != 0;
+  robot.shown_left = static_cast<std::uint8_t>(octets[1]);
+  robot.shown_right = static_cast<std::uint8_t>(octets[2]);
+  robot.mcu->load(octets.substr(3));
 }
 
 std::unique_ptr<comm::FirmwareRobots> make_firmware_robots(const RunPlan& plan, const fs::path& run_directory,

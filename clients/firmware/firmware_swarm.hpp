@@ -30,10 +30,11 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
            std::vector<std::vector<comm::Cycles>>& flashes) override;
   void commit() override;
   void begin_tick() override;
+  void end_tick() override;
   [[nodiscard]] Outputs outputs(std::uint32_t i) const override;
   [[nodiscard]] std::uint64_t word(std::uint32_t i) const override;
   [[nodiscard]] std::string save(std::uint32_t i) const override;
-  void load(std::uint32_t i, comm::Cycles now, const std::string& octets) override;
+  void load(std::uint32_t i, const std::string& octets) override;
 
   /// The processor of robot i, for tests.
   [[nodiscard]] const Mcu& mcu(std::uint32_t i) const { return *robots_[i].mcu; }
@@ -44,6 +45,10 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
     comm::Cycles switched_on;  ///< at most 0
     comm::Cycles period;       ///< nominal cycles of 2^18 own ones
     bool has_run = false;      ///< since the last commit
+    // Full duty of both motors: now, during all of this tick, at some time in it or in a kick that it continues.
+    bool full = false, full_throughout = false, kicked = false;
+    bool kick_goes_on = false;  ///< at the end of the last tick
+    std::uint8_t shown_left = 0, shown_right = 0;
     bool spun_up = false;
     bool has_printed = false;
     std::vector<Light> light;

@@ -14,7 +14,7 @@
 #include <string_view>
 
 #include "core/base/time.hpp"
-#include "idl/manifest.pb.h"
+#include "core/experiment/plan.hpp"
 
 namespace kilotwin::recorder {
 
@@ -39,9 +39,7 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path experiment() const { return directory_ / "experiment.txtpb"; }
   [[nodiscard]] std::filesystem::path programs() const { return directory_ / "programs"; }
   [[nodiscard]] std::filesystem::path program(const proto::Program& program) const {
-    const std::string ending =
-        program.firmware() ? std::filesystem::path(program.path()).extension().string() : ".so";
-    return programs() / (program.sha256() + ending);
+    return programs() / program_file(program);
   }
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }

@@ -182,6 +182,12 @@ RunPlan::RunPlan(proto::Manifest given)
   }
 }
 
+std::string program_file(const proto::Program& program) {
+  const std::string& path = program.path();
+  const bool hex = path.size() > 4 && (path.ends_with(".hex") || path.ends_with(".HEX"));
+  return program.sha256() + (!program.firmware() ? ".so" : hex ? ".hex" : ".elf");
+}
+
 bool RunPlan::has_firmware() const {
   return std::any_of(manifest.program().begin(), manifest.program().end(),
                      [](const proto::Program& program) { return program.firmware(); });

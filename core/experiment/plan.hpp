@@ -56,6 +56,9 @@ struct Share {
 
 inline constexpr std::uint32_t kNoProgram = 0xffffffffu;
 
+/// The name of a program's file in the run directory's programs/: SHA256 and .so, .elf or .hex.
+[[nodiscard]] std::string program_file(const proto::Program&);
+
 class RunPlan {
  public:
   /// Throws UserError where the manifest is of another format.

@@ -42,7 +42,7 @@ FirmwareAir::FirmwareAir(const RunPlan& plan, FirmwareRobots& robots, const Tick
   flash_starts_.resize(count);
   all_.resize(count);
   std::iota(all_.begin(), all_.end(), 0u);
-  end_tick();
+  show();
 }
 
 void FirmwareAir::begin_tick() {
@@ -58,6 +58,11 @@ void FirmwareAir::begin_tick() {
 }
 
 void FirmwareAir::end_tick() {
+  robots_.end_tick();
+  show();
+}
+
+void FirmwareAir::show() {
   for (std::uint32_t i = 0; i < outputs_.size(); ++i) {
     outputs_[i] = robots_.outputs(i);
     if (outputs_[i].fault != 0) life_cycle_[i] = LifeCycle::kFailed;
@@ -238,7 +243,7 @@ void FirmwareAir::save(proto::RadioState& part) const {
   }
 }
 
-void FirmwareAir::load(Cycles now, const proto::RadioState& part) {
+void FirmwareAir::load(const proto::RadioState& part) {
   if (static_cast<std::size_t>(part.firmware_size()) != all_.size())
     throw RunError("the checkpoint is of other firmware robots; resume from another one");
   for (const std::uint32_t i : all_) {
@@ -247,13 +252,13 @@ void FirmwareAir::load(Cycles now, const proto::RadioState& part) {
     if (state.robot() != robots_.ids()[i] || bits.find_first_not_of("01") != std::string::npos ||
         bits.size() > kPacketBits)
       throw RunError("the checkpoint is of other firmware robots; resume from another one");
-    robots_.load(i, now, state.processor());
+    robots_.load(i, state.processor());
     life_cycle_[i] = static_cast<LifeCycle>(state.life_cycle());
     if (!state.has_packet_start()) continue;
     decoders_[i].restore(
         {state.packet_start(), state.octet_start(), std::min(state.octet(), 12u), true, PacketBits(bits)});
   }
-  end_tick();
+  show();
 }
 
 }  // namespace kilotwin::comm

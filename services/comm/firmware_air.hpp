@@ -62,7 +62,7 @@ class FirmwareAir {
   [[nodiscard]] std::uint64_t hash() const;
   void save(proto::RadioState&) const;
   /// Throws RunError where the part does not fit.
-  void load(Cycles now, const proto::RadioState&);
+  void load(const proto::RadioState&);
 
   static constexpr std::uint32_t kOverhead = 0xffffffffu;
 
@@ -81,6 +81,7 @@ class FirmwareAir {
   void find_starts();
   void shine(Cycles from, Cycles until, std::vector<std::vector<Pulse>>& light);
   void settle(Cycles until);
+  void show();
 
   FirmwareRobots& robots_;
   const Neighbourhood& neighbourhood_;

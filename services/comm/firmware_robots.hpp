@@ -23,7 +23,8 @@ class FirmwareRobots {
  public:
   struct Outputs {
     std::uint8_t motor_left = 0, motor_right = 0, led = 0;  ///< as in ActuationFrame
-    bool spun_up = false;                                   ///< both motors ran at full duty in the last tick
+    /// Both motors were kicked: full duty for less than a tick does not show as a duty.
+    bool spun_up = false;
     bool listening = true;                                  ///< neither halted nor asleep with its clocks off
     std::uint8_t fault = 0;                                 ///< firmware::Halt of one that has faulted, else 0
     std::uint32_t fault_at = 0;                             ///< address in flash, octets
@@ -40,14 +41,15 @@ class FirmwareRobots {
   /// All have run to the same instant, and there is no way back.
   virtual void commit() = 0;
 
-  /// A tick begins.
+  /// A tick begins, and ends.
   virtual void begin_tick() = 0;
+  virtual void end_tick() = 0;
   [[nodiscard]] virtual Outputs outputs(std::uint32_t i) const = 0;
   /// A word of its state, for the state hash.
   [[nodiscard]] virtual std::uint64_t word(std::uint32_t i) const = 0;
   [[nodiscard]] virtual std::string save(std::uint32_t i) const = 0;
-  /// What save() made, at `now`. Throws RunError where it does not fit.
-  virtual void load(std::uint32_t i, Cycles now, const std::string& octets) = 0;
+  /// What save() made. Throws RunError where it does not fit.
+  virtual void load(std::uint32_t i, const std::string& octets) = 0;
 };
 
 }  // namespace kilotwin::comm

@@ -78,7 +78,7 @@ void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> part
                               message_at(part.transmission_messages(), size_of(n)), (flags & kOver) != 0});
   }
   overhead_.load(part.overhead());
-  if (firmware_) firmware_->load(begin_of(tick), part);
+  if (firmware_) firmware_->load(part);
   sent_.assign(part.sent().begin(), part.sent().end());
   receptions_.load(part);
   counters_ = {part.attempted(), part.messages_sent(), part.received(),
