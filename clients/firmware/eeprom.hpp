@@ -4,12 +4,20 @@
 #include <array>
 
 #include "clients/firmware/flash_image.hpp"
+#include "core/base/eeprom_layout.h"
 #include "core/model/robot_parameters.hpp"
 
 namespace kilotwin::firmware {
 
-/// As a calibrated robot has it: kilo_uid = its id, duties of its calibration, the ranging tables of
-/// core/base/ir_calibration.h, all infrared LEDs on PB0; erased (0xff) elsewhere.
-[[nodiscard]] std::array<std::uint8_t, kEepromOctets> make_eeprom(std::uint32_t robot, const Calibration&);
+/// As a calibrated robot has it: core/base/eeprom_layout.h. kilo_uid is the robot's id.
+[[nodiscard]] inline std::array<std::uint8_t, kEepromOctets> make_eeprom(std::uint32_t robot,
+                                                                        const Calibration& calibration) {
+  static_assert(kEepromOctets == KILOTWIN_EEPROM_OCTETS);
+  std::array<std::uint8_t, kEepromOctets> octets{};
+  kilotwin_fill_eeprom(octets.data(),
+                       {static_cast<std::uint16_t>(robot), calibration.turn_left, calibration.turn_right,
+                        calibration.straight_left, calibration.straight_right});
+  return octets;
+}
 
 }  // namespace kilotwin::firmware
