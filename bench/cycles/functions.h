@@ -5,9 +5,9 @@ static volatile uint8_t in8 = 37;
 static volatile uint16_t in16 = 1234;
 static volatile uint32_t in32 = 123456;
 static volatile int16_t out;
-static uint8_t table[16], octets[12];
-static uint16_t distances[12];
-static struct {
+uint8_t table[16], octets[12];
+uint16_t distances[12];
+struct {
   uint8_t id, distance;
   uint32_t seen;
 } neighbours[10];
@@ -126,11 +126,12 @@ FUNCTION(packing) {
   for (uint8_t i = 4; i < 9; i++) octets[i] = table[i];
 }
 
-#define ALL_FUNCTIONS                                                                                              \
-  MEASURE(state_machine)                                                                                           \
-  MEASURE(sum_of_octets)                                                                                           \
-  MEASURE(neighbour_table)                                                                                         \
-  MEASURE(checksum)                                                                                                \
-  MEASURE(mean_of_floats) MEASURE(division) MEASURE(products_of_32_bits) MEASURE(random_walk) MEASURE(bubble_sort) \
-      MEASURE(recursion) MEASURE(waiting_loop) MEASURE(packing)
+#define ALL_FUNCTIONS                                                                                         \
+  MEASURE(state_machine)                                                                                      \
+  MEASURE(sum_of_octets)                                                                                      \
+  MEASURE(neighbour_table)                                                                                    \
+  MEASURE(checksum)                                                                                           \
+  MEASURE(mean_of_floats)                                                                                     \
+  MEASURE(division) MEASURE(products_of_32_bits) MEASURE(random_walk) MEASURE(bubble_sort) MEASURE(recursion) \
+      MEASURE(waiting_loop) MEASURE(packing)
 enum { REPETITIONS = 4 };

@@ -52,6 +52,46 @@ TEST(Preemption, BusyWaitsForTheClock) {
   EXPECT_EQ(swarm.frame().motor_left[0], 100);
 }
 
+TEST(Preemption, AtAnyOptimisation) {
+  for (const std::string level : {"O0", "O1", "O3", "Os"}) {
+    SCOPED_TRACE(level);
+    Swarm swarm({program("#pragma GCC optimize(\"" + level +
+                         "\")\n"
+                         "static uint8_t received, n; static uint32_t counter;\n"
+                         "static void rx(message_t* m, distance_measurement_t* d) { received = 1; }\n"
+                         "static void loop(void) {\n"
+                         "  if (kilo_uid == 0) { while (!received); received = 0; }\n"
+                         "  if (kilo_uid == 1) { uint32_t t = kilo_ticks + 9; while (kilo_ticks < t); }\n"
+                         "  if (kilo_uid == 2) for (;;) {}\n"
+                         "  if (kilo_uid == 3) for (;;) ++counter;\n"
+                         "  set_motors(++n, 0); }")},
+                4);
+    swarm.start();
+    for (int k = 2; k <= 90; ++k) swarm.step(k % 10 == 0 ? to_all(swarm, message(0)) : Air());
+    EXPECT_EQ(swarm.frame().motor_left[0], 9);
+    EXPECT_EQ(swarm.frame().motor_left[1], 9);
+    EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kRunning);
+    EXPECT_EQ(swarm.life_cycle(2), LifeCycle::kFailed);
+    EXPECT_EQ(swarm.life_cycle(3), LifeCycle::kFailed);
+    EXPECT_EQ(swarm.hosts[0]->robots_failed(), 2u);
+  }
+}
+
+TEST(Preemption, LoopAsOnTheRobotRunsAsOftenAsItsCyclesAllow) {
+  // 262144 cycles a tick; each round takes 1000 in a delay, and little more in code.
+  Swarm swarm({program("#include <util/delay.h>\nstatic uint16_t n; static void loop(void) { _delay_us(125); ++n;\n"
+                       "  set_motors(n & 0xff, n >> 8); }")},
+              1, 1, "", [](proto::Manifest& manifest) {
+                manifest.mutable_experiment()->mutable_robots(0)->set_loop_rate(proto::RobotGroup::AS_ON_ROBOT);
+              });
+  swarm.start();
+  swarm.steps(9);
+  const ActuationFrame frame = swarm.frame();
+  const int rounds = frame.motor_left[0] | frame.motor_right[0] << 8;
+  EXPECT_GT(rounds, 10 * 262 * 0.9);
+  EXPECT_LT(rounds, 10 * 262.2);
+}
+
 TEST(Preemption, LongComputationsGoOnInLaterTicks) {
   // About ten million cycles, or forty ticks; messages are heard meanwhile.
   Swarm swarm(
