@@ -306,6 +306,7 @@ void check_bodies(const LoadedExperiment& loaded) {
 /// What an engine does not compute is refused, never left out.
 void check_engine(const LoadedExperiment& loaded) {
   const proto::Experiment& experiment = loaded.experiment;
+  if (experiment.physics().engine() == proto::Physics::ODE) return;
   const auto refuse = [&](const std::string& path, std::string_view what) {
     throw loaded.locations.error(
         path, fmt::format("the {} engine knows no {}; remove it or choose another physics.engine",

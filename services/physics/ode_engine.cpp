@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
 #include "core/math/elementary.h"
 #include "services/physics/contact.hpp"
 
@@ -14,42 +15,23 @@ constexpr std::uint32_t kNone = 0xffffffff;
 constexpr double kGravity_mm_s2 = 9806.65;
 /// Below these a robot that nothing drives is at rest, and is stopped.
 constexpr double kRestSpeed_mm_s = 0.01, kRestSpin_rad_s = 0.001;
-/// A robot that slides faster than this is braked against its way, a slower one against the slope.
-constexpr double kSlidingSpeed_mm_s = 0.1;
-/// Robots at rest may overlap this little, which is rounding and the solver's softness.
-constexpr double kRestDistance_mm = 2 * kRobotRadius_mm - 0.001;
-constexpr double kMilliNewton_g_mm_s2 = 1000;
-
-/// The body's axes in the arena's frame.
-struct Axes {
-  Vector3 x, y, z;
-
-  explicit Axes(const std::array<double, 4>& q) {
-    const double w = q[0], i = q[1], j = q[2], k = q[3];
-    x = {1 - 2 * (j * j + k * k), 2 * (i * j + w * k), 2 * (i * k - w * j)};
-    y = {2 * (i * j - w * k), 1 - 2 * (i * i + k * k), 2 * (j * k + w * i)};
-    z = {2 * (i * k + w * j), 2 * (j * k - w * i), 1 - 2 * (i * i + j * j)};
-  }
-  [[nodiscard]] Vector3 to_arena(const Vector3& v) const {
-    return {x[0] * v[0] + y[0] * v[1] + z[0] * v[2], x[1] * v[0] + y[1] * v[1] + z[1] * v[2],
-            x[2] * v[0] + y[2] * v[1] + z[2] * v[2]};
-  }
-};
-
-/// The unit vector along (x, y), or the fallback where that is 0.
-Vector3 level(double x, double y, const Vector3& fallback) {
-  const double length = __builtin_sqrt(x * x + y * y);
-  if (!(length > 0)) return fallback;
-  return {x / length, y / length, 0};
-}
+/// Bodies at rest may overlap this little, which is rounding and the solver's softness.
+constexpr double kRestOverlap_mm = 0.001;
+constexpr double kNewton_g_mm_s2 = 1e6;
 
 double square_of(const Vector3& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
-void pack(const RigidState& state, double* columns) {
+/// Where the next one goes.
+double* pack(const RigidState& state, double* columns) {
   *columns++ = state.position_mm[2];
   columns = std::copy(state.rotation.begin(), state.rotation.end(), columns);
   columns = std::copy(state.velocity_mm_s.begin(), state.velocity_mm_s.end(), columns);
-  std::copy(state.spin_rad_s.begin(), state.spin_rad_s.end(), columns);
+  return std::copy(state.spin_rad_s.begin(), state.spin_rad_s.end(), columns);
+}
+
+double heading_of(const RigidState& state) {
+  const Axes axes(state.rotation);
+  return wrapped(kt_atan2(axes.x[1], axes.x[0]));
 }
 
 RigidState unpacked(double x_mm, double y_mm, const double* columns) {
@@ -74,7 +56,7 @@ Vector3 gravity_of(const proto::Physics& physics) {
   return {kGravity_mm_s2 * sine * downhill[0], kGravity_mm_s2 * sine * downhill[1], -kGravity_mm_s2 * cosine};
 }
 
-/// Whether a robot at rest stays so.
+/// Whether a body at rest stays so.
 bool holds(const proto::Physics& physics, double grip) {
   double sine, cosine;
   kt_sincos(physics.tilt_deg() * (kPi / 180), &sine, &cosine);
@@ -83,14 +65,10 @@ bool holds(const proto::Physics& physics, double grip) {
 
 }  // namespace
 
-bool OdeLimits::outside(double x_mm, double y_mm) const {
-  return x_mm > x_limit_mm || x_mm < -x_limit_mm || y_mm > y_limit_mm || y_mm < -y_limit_mm;
-}
-
 OdeLimits::OdeLimits(const RunPlan& plan, const DriveModel& drive)
     : sub_steps(std::clamp(plan.experiment().physics().sub_steps(), 1u, 4u)) {
   const double tick_s = plan.tick_length.seconds();
-  const double width_mm = plan.experiment().arena().width_mm(), height_mm = plan.experiment().arena().height_mm();
+  const double width_mm = 2 * plan.world.arena.half_width_mm(), height_mm = 2 * plan.world.arena.half_height_mm();
   sub_step_s = tick_s / sub_steps;
   const Vector3 gravity = gravity_of(plan.experiment().physics());
   const double along_mm_s2 = __builtin_sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1]);
@@ -102,91 +80,144 @@ OdeLimits::OdeLimits(const RunPlan& plan, const DriveModel& drive)
   const double hop_mm = 2 * kRobotRadius_mm + reach_mm;
   rim_mm = (kReachHops - 1) * hop_mm;
   margin_mm = kReachHops * hop_mm + stride_mm;
-  x_limit_mm = width_mm / 2 - kRobotRadius_mm;
-  y_limit_mm = height_mm / 2 - kRobotRadius_mm;
 }
 
 OdeEngine::OdeEngine(const RunPlan& plan, PartitionId partition) : OdeEngine(plan, partition, DriveModel(plan)) {}
 
 OdeEngine::OdeEngine(const RunPlan& plan, PartitionId partition, const DriveModel& drive)
     : PopulationEngine(plan, partition, drive, OdeLimits(plan, drive).margin_mm),
+      grid_(plan.grid),
       rectangle_(plan.grid.rectangle(partition)),
       limits_(plan, drive),
       random_(plan.seed()),
-      inertia_(Inertia::cylinder(10, kRobotRadius_mm, kRobotHeight_mm)),
-      rest_grip_(0.3),
-      thrust_g_mm_s2_(11.77 * kMilliNewton_g_mm_s2),
+      scene_(plan.world),
+      thrust_g_mm_s2_(plan.experiment().physics().thrust_n() * kNewton_g_mm_s2),
       downhill_(downhill_of(plan.experiment().physics())),
-      holds_on_slope_(holds(plan.experiment().physics(), rest_grip_)),
       world_(gravity_of(plan.experiment().physics()), limits_.sub_step_s),
       candidates_(2 * kRobotRadius_mm + limits_.reach_mm),
       states_(plan.robots()) {
+  const proto::Physics& physics = plan.experiment().physics();
   const proto::Motion& motion = plan.experiment().motion();
   const double half_base_mm = motion.wheel_base_mm() / 2;
   legs_mm_ = {{{-motion.axle_offset_mm(), half_base_mm, -kRobotHeight_mm / 2},
                {-motion.axle_offset_mm(), -half_base_mm, -kRobotHeight_mm / 2},
                {kRobotRadius_mm, 0, -kRobotHeight_mm / 2}}};
+  const auto make_kind = [&](const Convex& shape, double mass_g, double height_mm, double friction) {
+    return Kind{shape, Inertia::prism(mass_g, shape, height_mm), height_mm, friction, holds(physics, friction)};
+  };
+  robot_ =
+      make_kind(Convex::disc(kRobotRadius_mm), physics.robot_mass_g(), kRobotHeight_mm, physics.robot_friction());
+  immobile_.resize(plan.robots());
+  for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) immobile_[robot] = plan.immobile(robot);
+  for (const MovableBodyModel& body : scene_.movables) {
+    movable_.push_back(make_kind(body.shape, 1000 * body.mass_kg, body.height_mm, body.friction));
+    movable_states_.push_back(
+        upright(body.pose.position_mm.x(), body.pose.position_mm.y(), body.pose.heading_rad, body.height_mm));
+  }
+  own_movable_.resize(movable_.size());
+  list_movables();
   const Bodies& listed = population_.listed();
   for (std::size_t i = 0; i < listed.size(); ++i)
-    states_[listed.robot[i]] = upright(listed.x_mm[i], listed.y_mm[i], listed.heading_rad[i]);
+    states_[listed.robot[i]] = upright(listed.x_mm[i], listed.y_mm[i], listed.heading_rad[i], kRobotHeight_mm);
 }
 
-RigidState OdeEngine::upright(double x_mm, double y_mm, double heading_rad) const {
+RigidState OdeEngine::upright(double x_mm, double y_mm, double heading_rad, double height_mm) {
   RigidState state;
-  state.position_mm = {x_mm, y_mm, kRobotHeight_mm / 2};
+  state.position_mm = {x_mm, y_mm, height_mm / 2};
   double sine, cosine;
   kt_sincos(heading_rad / 2, &sine, &cosine);
   state.rotation = {cosine, 0, 0, sine};
   return state;
 }
 
-void OdeEngine::move(Tick from, const Inputs& inputs) {
-  Bodies& known = population_.known();
-  const std::vector<std::uint8_t>& own = population_.own();
-  read_ghosts(inputs);
-  now_.resize(known.size());
-  stands_.resize(known.size());
-  for (std::size_t i = 0; i < known.size(); ++i) {
-    const double x = known.x_mm[i], y = known.y_mm[i];
-    now_[i] = known.tracked[i] != 0 ? upright(x, y, known.heading_rad[i]) : states_[known.robot[i]];
-    stands_[i] = known.tracked[i] != 0 || rectangle_.distance_mm(x, y) > limits_.rim_mm;
+void OdeEngine::list_movables() {
+  listed_movable_.resize(movable_.size());
+  for (std::size_t m = 0; m < movable_.size(); ++m)
+    listed_movable_[m] = rectangle_.contains(movable_states_[m].position_mm[0], movable_states_[m].position_mm[1]);
+}
+
+Place OdeEngine::place(std::uint32_t i) const {
+  const Axes axes(now_[i].rotation);
+  const Vector3 ahead = level(axes.x[0], axes.x[1], {1, 0, 0});
+  return {now_[i].position_mm[0], now_[i].position_mm[1], ahead[0], ahead[1]};
+}
+
+bool OdeEngine::is_own(std::uint32_t i) const {
+  if (!is_robot(i)) return own_movable_[movable_of(i)] != 0;
+  return population_.own().empty() || population_.own()[i] != 0;
+}
+
+/// How far a place is from what a partition computes: its rectangle, and the movable bodies that it reaches.
+double OdeEngine::distance_mm(const Rectangle& rectangle, double x_mm, double y_mm) const {
+  double least_mm = rectangle.distance_mm(x_mm, y_mm);
+  for (std::size_t m = 0; m < movable_.size(); ++m) {
+    const double at_x = movable_states_[m].position_mm[0], at_y = movable_states_[m].position_mm[1];
+    const double reach_mm = movable_[m].shape.reach_mm();
+    if (rectangle.distance_mm(at_x, at_y) > reach_mm + limits_.margin_mm) continue;
+    const double dx = x_mm - at_x, dy = y_mm - at_y;
+    least_mm = std::min(least_mm, __builtin_sqrt(dx * dx + dy * dy) - reach_mm);
   }
+  return least_mm;
+}
+
+void OdeEngine::move(Tick from, const Inputs& inputs) {
+  read_ghosts(inputs);
+  place_bodies();
   set_off(from);
-  candidates_.update(known);
-  in_world_.resize(known.size());
-  start_axis_.resize(known.size());
+  candidates_.update(population_.known());
+  find_near();
   make_groups();
   std::uint32_t first = 0;
   for (const std::uint32_t end : group_end_) {
     const std::span<const std::uint32_t> group(order_.data() + first, order_.data() + end);
     first = end;
     if (stands_[group[0]] != 0) continue;  // These are groups of their own.
-    if (!own.empty() && std::none_of(group.begin(), group.end(), [&](std::uint32_t i) { return own[i] != 0; }))
-      continue;
+    if (std::none_of(group.begin(), group.end(), [this](std::uint32_t i) { return is_own(i); })) continue;
     if (rests(group)) {
       for (const std::uint32_t i : group) now_[i].velocity_mm_s = now_[i].spin_rad_s = {};
     } else {
       step_group(from, group);
     }
     for (const std::uint32_t i : group) {
-      if (!own.empty() && own[i] == 0) continue;
-      const RigidState& state = now_[i];
-      states_[known.robot[i]] = state;
-      known.x_mm[i] = state.position_mm[0];
-      known.y_mm[i] = state.position_mm[1];
-      const Axes axes(state.rotation);
-      known.heading_rad[i] = wrapped(kt_atan2(axes.x[1], axes.x[0]));
+      if (is_own(i)) keep(i);
     }
   }
 }
 
 void OdeEngine::read_ghosts(const Inputs& inputs) {
   for (const BodyFrame* frame : inputs.ghosts) {
-    KILOTWIN_DEMAND(frame->spatial.size() == frame->robot.size() * BodyFrame::kSpatialColumns);
-    for (std::size_t g = 0; g < frame->robot.size(); ++g) {
-      states_[frame->robot[g]] =
-          unpacked(frame->x_mm[g], frame->y_mm[g], frame->spatial.data() + g * BodyFrame::kSpatialColumns);
-    }
+    const std::vector<std::uint32_t>& movables = frame->movable.body;
+    KILOTWIN_DEMAND(frame->spatial.size() == (frame->robot.size() + movables.size()) * BodyFrame::kSpatialColumns);
+    const double* columns = frame->spatial.data();
+    for (std::size_t g = 0; g < frame->robot.size(); ++g, columns += BodyFrame::kSpatialColumns)
+      states_[frame->robot[g]] = unpacked(frame->x_mm[g], frame->y_mm[g], columns);
+    for (std::size_t g = 0; g < movables.size(); ++g, columns += BodyFrame::kSpatialColumns)
+      movable_states_[movables[g]] = unpacked(frame->movable.x_mm[g], frame->movable.y_mm[g], columns);
+  }
+  for (std::size_t m = 0; m < movable_.size(); ++m)
+    own_movable_[m] = rectangle_.contains(movable_states_[m].position_mm[0], movable_states_[m].position_mm[1]);
+  listed_movable_ = own_movable_;
+}
+
+void OdeEngine::place_bodies() {
+  const Bodies& known = population_.known();
+  const std::size_t count = known.size() + movable_.size();
+  now_.resize(count);
+  stands_.resize(count);
+  in_world_.resize(count);
+  start_axis_.resize(count);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const double x = known.x_mm[i], y = known.y_mm[i];
+    now_[i] =
+        known.tracked[i] != 0 ? upright(x, y, known.heading_rad[i], kRobotHeight_mm) : states_[known.robot[i]];
+    stands_[i] = known.tracked[i] != 0 || immobile_[known.robot[i]] != 0 ||
+                 (grid_.size() > 1 && distance_mm(rectangle_, x, y) > limits_.rim_mm);
+  }
+  for (std::size_t m = 0; m < movable_.size(); ++m) {
+    const RigidState& state = movable_states_[m];
+    now_[known.size() + m] = state;
+    stands_[known.size() + m] = rectangle_.distance_mm(state.position_mm[0], state.position_mm[1]) >
+                                movable_[m].shape.reach_mm() + limits_.margin_mm;
   }
 }
 
@@ -195,9 +226,9 @@ void OdeEngine::set_off(Tick from) {
   const std::vector<Duties>& duties = population_.duties();
   drives_.reserve(known.size());
   drives_.count = 0;
-  drive_of_.assign(known.size(), kNone);
+  drive_of_.assign(now_.size(), kNone);
   for (std::uint32_t i = 0; i < known.size(); ++i) {
-    if (!duties[i].any()) continue;
+    if (!duties[i].any() || stands_[i] != 0) continue;
     drive_of_[i] = static_cast<std::uint32_t>(drives_.count);
     population_.drive().add(drives_, i, known.robot[i], from, duties[i], known.heading_rad[i],
                             1.0 / limits_.sub_steps);
@@ -205,9 +236,25 @@ void OdeEngine::set_off(Tick from) {
   population_.drive().integrate(drives_);
 }
 
+void OdeEngine::find_near() {
+  near_.clear();
+  const auto robots = static_cast<std::uint32_t>(population_.known().size());
+  for (std::uint32_t m = robots; m < now_.size(); ++m) {
+    const Vector3& at = now_[m].position_mm;
+    for (std::uint32_t i = 0; i < m; ++i) {
+      if (stands_[i] != 0 && stands_[m] != 0) continue;
+      const double dx = now_[i].position_mm[0] - at[0], dy = now_[i].position_mm[1] - at[1];
+      const double near_mm = kind(i).shape.reach_mm() + kind(m).shape.reach_mm() + limits_.reach_mm;
+      if (dx * dx + dy * dy > near_mm * near_mm) continue;
+      if (separation_mm(kind(i).shape, place(i), kind(m).shape, place(m)) <= limits_.reach_mm)
+        near_.emplace_back(i, m);
+    }
+  }
+}
+
 void OdeEngine::make_groups() {
   const Bodies& known = population_.known();
-  const auto count = static_cast<std::uint32_t>(known.size());
+  const auto count = static_cast<std::uint32_t>(now_.size());
   const double reach_mm = 2 * kRobotRadius_mm + limits_.reach_mm, reach_square_mm2 = reach_mm * reach_mm;
   // The leader of a group is its lowest body; found by union with halved paths.
   leader_.resize(count);
@@ -215,16 +262,21 @@ void OdeEngine::make_groups() {
     while (leader_[i] != i) i = leader_[i] = leader_[leader_[i]];
     return i;
   };
+  const auto unite = [&](std::uint32_t i, std::uint32_t j) {
+    const std::uint32_t a = leader(i), b = leader(j);
+    leader_[std::max(a, b)] = std::min(a, b);
+  };
   for (std::uint32_t i = 0; i < count; ++i) {
     leader_[i] = i;
-    if (stands_[i] != 0) continue;
+    if (stands_[i] != 0 || !is_robot(i)) continue;
     for (const std::uint32_t j : candidates_.of(i)) {
       if (j >= i) break;
       const double dx = known.x_mm[i] - known.x_mm[j], dy = known.y_mm[i] - known.y_mm[j];
-      if (stands_[j] != 0 || dx * dx + dy * dy > reach_square_mm2) continue;
-      const std::uint32_t a = leader(i), b = leader(j);
-      leader_[std::max(a, b)] = std::min(a, b);
+      if (stands_[j] == 0 && dx * dx + dy * dy <= reach_square_mm2) unite(i, j);
     }
+  }
+  for (const auto& [i, m] : near_) {
+    if (stands_[i] == 0 && stands_[m] == 0) unite(i, m);
   }
   // Sorted by leaders, ascending within; a counting sort.
   group_end_.assign(count + 1, 0);
@@ -239,12 +291,13 @@ void OdeEngine::make_groups() {
 
 bool OdeEngine::stands_free(std::uint32_t i) const {
   const Bodies& known = population_.known();
-  const double x = known.x_mm[i], y = known.y_mm[i], reach_mm = limits_.reach_mm;
-  if (x > limits_.x_limit_mm - reach_mm || x < reach_mm - limits_.x_limit_mm || y > limits_.y_limit_mm - reach_mm ||
-      y < reach_mm - limits_.y_limit_mm) {
-    return false;
+  const double x = known.x_mm[i], y = known.y_mm[i], near_mm = 2 * kRobotRadius_mm + limits_.reach_mm;
+  if (scene_.arena.clearance_mm({x, y}) < kRobotRadius_mm + limits_.reach_mm) return false;
+  for (const ObstacleBody& obstacle : scene_.obstacles) {
+    if (obstacle.shape.nearest(obstacle.place, {x, y}).distance_mm < kRobotRadius_mm + limits_.reach_mm)
+      return false;
   }
-  const double near_mm = 2 * kRobotRadius_mm + reach_mm;
+  if (std::any_of(near_.begin(), near_.end(), [i](const auto& pair) { return pair.first == i; })) return false;
   for (const std::uint32_t j : candidates_.of(i)) {
     const double dx = known.x_mm[j] - x, dy = known.y_mm[j] - y;
     if (dx * dx + dy * dy <= near_mm * near_mm) return false;
@@ -253,21 +306,29 @@ bool OdeEngine::stands_free(std::uint32_t i) const {
 }
 
 bool OdeEngine::rests(std::span<const std::uint32_t> group) const {
-  if (!holds_on_slope_) return false;
   const Bodies& known = population_.known();
   for (const std::uint32_t i : group) {
     const RigidState& state = now_[i];
-    if (drive_of_[i] != kNone || square_of(state.velocity_mm_s) > kRestSpeed_mm_s * kRestSpeed_mm_s ||
+    if (!kind(i).holds_on_slope || drive_of_[i] != kNone ||
+        square_of(state.velocity_mm_s) > kRestSpeed_mm_s * kRestSpeed_mm_s ||
         square_of(state.spin_rad_s) > kRestSpin_rad_s * kRestSpin_rad_s ||
-        limits_.outside(state.position_mm[0], state.position_mm[1])) {
+        scene_.arena.clearance_mm(kind(i).shape, place(i)) < -kRestOverlap_mm) {
       return false;
     }
+    if (!is_robot(i)) continue;
+    constexpr double kNear_mm = 2 * kRobotRadius_mm - kRestOverlap_mm;
     for (const std::uint32_t j : candidates_.of(i)) {
       const double dx = known.x_mm[i] - known.x_mm[j], dy = known.y_mm[i] - known.y_mm[j];
-      if (dx * dx + dy * dy < kRestDistance_mm * kRestDistance_mm) return false;
+      if (dx * dx + dy * dy < kNear_mm * kNear_mm) return false;
     }
   }
-  return true;
+  // A tracked robot or a ghost at the rim may move against them, or overlap a movable body.
+  return std::none_of(near_.begin(), near_.end(), [&](const auto& pair) {
+    const bool first = std::binary_search(group.begin(), group.end(), pair.first),
+               second = std::binary_search(group.begin(), group.end(), pair.second);
+    return (first || second) && separation_mm(kind(pair.first).shape, place(pair.first), kind(pair.second).shape,
+                                              place(pair.second)) < -kRestOverlap_mm;
+  });
 }
 
 void OdeEngine::step_group(Tick from, std::span<const std::uint32_t> group) {
@@ -282,140 +343,145 @@ void OdeEngine::step_group(Tick from, std::span<const std::uint32_t> group) {
 bool OdeEngine::step_group(Tick from, std::span<const std::uint32_t> group, Solver solver) {
   world_.clear();
   for (const std::uint32_t i : group) {
-    in_world_[i] = world_.add(inertia_, now_[i]);
+    in_world_[i] = world_.add(kind(i).inertia, now_[i]);
     const Axes axes(now_[i].rotation);
     start_axis_[i] = level(axes.x[0], axes.x[1], {1, 0, 0});
   }
+  const std::uint32_t leader = group[0];
+  const std::uint32_t lowest = is_robot(leader) ? population_.known().robot[leader]
+                                                : static_cast<std::uint32_t>(states_.size()) + movable_of(leader);
   for (std::uint32_t s = 0; s < limits_.sub_steps; ++s) {
+    const double since_s = (s + 1) * limits_.sub_step_s;
     for (const std::uint32_t i : group) {
       touch_floor(i);
       touch_walls(i);
-      touch_others(i, (s + 1) * limits_.sub_step_s);
+      touch_obstacles(i);
+      if (is_robot(i)) touch_robots(i, since_s);
     }
-    const std::uint32_t lowest = population_.known().robot[group[0]];
+    for (const auto& [i, m] : near_) {
+      if (leader_[i] != leader && leader_[m] != leader) continue;
+      if (stands_[i] != 0) {
+        touch_pair(m, i, since_s);
+      } else {
+        touch_pair(i, m, since_s);
+      }
+    }
     if (!world_.step(solver, random_.bits(Stream::kSolver, lowest, from, s))) return false;
     for (const std::uint32_t i : group) world_.read(in_world_[i], now_[i]);
   }
   return true;
 }
 
-void OdeEngine::touch_floor(std::uint32_t i) {
+void OdeEngine::keep(std::uint32_t i) {
   const RigidState& state = now_[i];
-  const Axes axes(state.rotation);
-  const Vector3 ahead = level(axes.x[0], axes.x[1], start_axis_[i]);
-  TouchPoint touch;
-  touch.body = in_world_[i];
-  touch.other = TouchPoint::kStanding;
-  touch.normal = {0, 0, 1};
-  double velocity_x = 0, velocity_y = 0, spin = 0;
-  const std::uint32_t d = drive_of_[i];
-  if (d != kNone) {
-    // The drive's displacement within a sub-step was computed for the heading at the tick's start.
-    const Vector3& start = start_axis_[i];
-    const double cosine = start[0] * ahead[0] + start[1] * ahead[1],
-                 sine = start[0] * ahead[1] - start[1] * ahead[0];
-    velocity_x = (cosine * drives_.x_mm[d] - sine * drives_.y_mm[d]) / limits_.sub_step_s;
-    velocity_y = (sine * drives_.x_mm[d] + cosine * drives_.y_mm[d]) / limits_.sub_step_s;
-    spin = drives_.turn_rad[d] / (limits_.sub_step_s * limits_.sub_steps);
-    touch.friction = TouchPoint::Friction::kBounded;
-    touch.axis = ahead;
-  } else {
-    touch.friction = TouchPoint::Friction::kCoulomb;
-    touch.axis = square_of(state.velocity_mm_s) > kSlidingSpeed_mm_s * kSlidingSpeed_mm_s
-                     ? level(state.velocity_mm_s[0], state.velocity_mm_s[1], downhill_)
-                     : downhill_;
+  if (!is_robot(i)) {
+    movable_states_[movable_of(i)] = state;
+    return;
   }
-  for (std::size_t leg = 0; leg < legs_mm_.size(); ++leg) {
-    const Vector3 arm = axes.to_arena(legs_mm_[leg]);
-    for (std::size_t k = 0; k < 3; ++k) touch.at_mm[k] = state.position_mm[k] + arm[k];
-    touch.gap_mm = touch.at_mm[2];
-    if (d != kNone) {
-      // The rear legs push along their ways. They lie on the axle, so that one holds it sideways for both; with the front
-      // leg it keeps the robot from turning.
-      touch.grip[0] = leg < 2 ? thrust_g_mm_s2_ / 2 : 0;
-      touch.grip[1] = leg == 0 ? thrust_g_mm_s2_ * 2 / 3 : leg == 2 ? thrust_g_mm_s2_ / 3 : 0;
-      const double x = velocity_x - spin * arm[1], y = velocity_y + spin * arm[0];
-      touch.motion_mm_s[0] = x * ahead[0] + y * ahead[1];
-      touch.motion_mm_s[1] = y * ahead[0] - x * ahead[1];
-    } else {
-      touch.grip[0] = touch.grip[1] = rest_grip_;
-    }
-    world_.add(touch);
+  Bodies& known = population_.known();
+  states_[known.robot[i]] = state;
+  known.x_mm[i] = state.position_mm[0];
+  known.y_mm[i] = state.position_mm[1];
+  known.heading_rad[i] = heading_of(state);
+}
+
+void OdeEngine::add_movables(BodyFrame& frame) const {
+  frame.movable.clear();
+  for (std::uint32_t m = 0; m < movable_.size(); ++m) {
+    if (listed_movable_[m] == 0) continue;
+    const RigidState& state = movable_states_[m];
+    frame.movable.body.push_back(m);
+    frame.movable.x_mm.push_back(state.position_mm[0]);
+    frame.movable.y_mm.push_back(state.position_mm[1]);
+    frame.movable.heading_rad.push_back(heading_of(state));
+    frame.movable.vx_mm_s.push_back(state.velocity_mm_s[0]);
+    frame.movable.vy_mm_s.push_back(state.velocity_mm_s[1]);
+    frame.movable.turn_rad_s.push_back(state.spin_rad_s[2]);
   }
 }
 
-void OdeEngine::touch_walls(std::uint32_t i) {
-  const Vector3& centre = now_[i].position_mm;
-  TouchPoint touch;
-  touch.body = in_world_[i];
-  touch.other = TouchPoint::kStanding;
-  touch.axis = {0, 0, 1};
-  for (std::size_t k = 0; k < 2; ++k) {
-    const double limit_mm = k == 0 ? limits_.x_limit_mm : limits_.y_limit_mm;
-    for (const double side : {-1.0, 1.0}) {
-      touch.gap_mm = limit_mm - side * centre[k];
-      if (touch.gap_mm > limits_.reach_mm) continue;
-      touch.normal = {0, 0, 0};
-      touch.normal[k] = -side;
-      touch.at_mm = centre;
-      touch.at_mm[k] += side * kRobotRadius_mm;
-      world_.add(touch);
-    }
-  }
-}
-
-void OdeEngine::touch_others(std::uint32_t i, double since_s) {
-  const Vector3& here = now_[i].position_mm;
-  TouchPoint touch;
-  touch.body = in_world_[i];
-  touch.axis = {0, 0, 1};
-  for (const std::uint32_t j : candidates_.of(i)) {
-    const bool stands = stands_[j] != 0;
-    if (!stands && (j < i || leader_[j] != leader_[i])) continue;
-    Vector3 there = now_[j].position_mm;
-    if (stands) {
-      for (std::size_t k = 0; k < 2; ++k) there[k] += now_[j].velocity_mm_s[k] * since_s;
-    }
-    const double dx = here[0] - there[0], dy = here[1] - there[1];
-    const double distance_mm = __builtin_sqrt(dx * dx + dy * dy);
-    touch.gap_mm = distance_mm - 2 * kRobotRadius_mm;
-    if (touch.gap_mm > limits_.reach_mm) continue;
-    touch.other = stands ? TouchPoint::kStanding : in_world_[j];
-    touch.normal = level(dx, dy, {i < j ? -1.0 : 1.0, 0, 0});
-    for (std::size_t k = 0; k < 2; ++k)
-      touch.at_mm[k] = there[k] + touch.normal[k] * (kRobotRadius_mm + touch.gap_mm / 2);
-    touch.at_mm[2] = (here[2] + there[2]) / 2;
-    world_.add(touch);
-  }
+void OdeEngine::emit_bodies(BodyFrame& frame) const {
+  PopulationEngine::emit_bodies(frame);
+  add_movables(frame);
 }
 
 void OdeEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
-  PopulationEngine::emit_ghosts(neighbour, frame);
-  frame.spatial.resize(frame.robot.size() * BodyFrame::kSpatialColumns);
-  for (std::size_t i = 0; i < frame.robot.size(); ++i)
-    pack(states_[frame.robot[i]], frame.spatial.data() + i * BodyFrame::kSpatialColumns);
+  frame.clear();
+  frame.tick = population_.tick();
+  const Rectangle& rectangle = grid_.rectangle(neighbour);
+  const Bodies& listed = population_.listed();
+  // Others' movable bodies are where they were a tick ago.
+  const double margin_mm = limits_.margin_mm + (movable_.empty() ? 0 : limits_.reach_mm);
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    if (listed.tracked[i] == 0 && distance_mm(rectangle, listed.x_mm[i], listed.y_mm[i]) <= margin_mm)
+      frame.add(listed.robot[i], listed.x_mm[i], listed.y_mm[i], listed.heading_rad[i]);
+  }
+  add_movables(frame);
+  frame.spatial.resize((frame.robot.size() + frame.movable.body.size()) * BodyFrame::kSpatialColumns);
+  double* columns = frame.spatial.data();
+  for (const std::uint32_t robot : frame.robot) columns = pack(states_[robot], columns);
+  for (const std::uint32_t m : frame.movable.body) columns = pack(movable_states_[m], columns);
 }
 
-void OdeEngine::save(proto::PhysicsState& state) const {
-  PopulationEngine::save(state);
+std::uint64_t OdeEngine::hash_part() const {
+  std::uint64_t sum = PopulationEngine::hash_part();
+  for (std::uint32_t m = 0; m < movable_.size(); ++m) {
+    if (listed_movable_[m] == 0) continue;
+    const RigidState& state = movable_states_[m];
+    sum += entity_hash(
+        HashDomain::kMovable, m,
+        {hash_bits(state.position_mm[0]), hash_bits(state.position_mm[1]), hash_bits(heading_of(state))});
+  }
+  return sum;
+}
+
+void OdeEngine::save(proto::PhysicsState& saved) const {
+  PopulationEngine::save(saved);
   std::array<double, BodyFrame::kSpatialColumns> packed;
-  for (const std::uint32_t robot : population_.listed().robot) {
-    pack(states_[robot], packed.data());
-    state.mutable_spatial()->Add(packed.begin(), packed.end());
+  const auto add = [&](const RigidState& state) {
+    pack(state, packed.data());
+    saved.mutable_spatial()->Add(packed.begin(), packed.end());
+  };
+  for (const std::uint32_t robot : population_.listed().robot) add(states_[robot]);
+  for (std::uint32_t m = 0; m < movable_.size(); ++m) {
+    if (listed_movable_[m] == 0) continue;
+    const RigidState& state = movable_states_[m];
+    saved.add_movable(m);
+    for (const double value : {state.position_mm[0], state.position_mm[1], heading_of(state),
+                               state.velocity_mm_s[0], state.velocity_mm_s[1], state.spin_rad_s[2]}) {
+      saved.add_movable_state(value);
+    }
+    add(state);
   }
 }
 
 void OdeEngine::load(Tick tick, std::span<const proto::PhysicsState* const> parts) {
   constexpr int kColumns = BodyFrame::kSpatialColumns;
+  std::vector<std::uint8_t> seen(movable_.size(), 0);
+  std::size_t found = 0;
   for (const proto::PhysicsState* part : parts) {
-    if (part->spatial_size() != part->robot_size() * kColumns)
+    if (part->spatial_size() != (part->robot_size() + part->movable_size()) * kColumns ||
+        part->movable_state_size() != 6 * part->movable_size()) {
       throw RunError("checkpoint: physics: columns of unequal length; the file is damaged");
+    }
+    for (const std::uint32_t m : part->movable()) {
+      if (m >= movable_.size() || seen[m]++ != 0)
+        throw RunError("checkpoint: physics: movable body " + std::to_string(m) + " is unknown or occurs twice");
+      ++found;
+    }
   }
+  if (found != movable_.size()) throw RunError("checkpoint: physics: a movable body is missing");
   PopulationEngine::load(tick, parts);
   for (const proto::PhysicsState* part : parts) {
-    for (int i = 0; i < part->robot_size(); ++i)
-      states_[part->robot(i)] = unpacked(part->x_mm(i), part->y_mm(i), part->spatial().data() + i * kColumns);
+    const double* columns = part->spatial().data();
+    for (int i = 0; i < part->robot_size(); ++i, columns += kColumns)
+      states_[part->robot(i)] = unpacked(part->x_mm(i), part->y_mm(i), columns);
+    for (int i = 0; i < part->movable_size(); ++i, columns += kColumns) {
+      const double* const at = part->movable_state().data() + 6 * i;
+      movable_states_[part->movable(i)] = unpacked(at[0], at[1], columns);
+    }
   }
+  list_movables();
 }
 
 }  // namespace kilotwin::physics

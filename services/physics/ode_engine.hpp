@@ -1,24 +1,29 @@
 /// The ODE engine: rigid bodies in space, solved by the Open Dynamics Engine. A robot is an upright cylinder on three legs; it
-/// has mass, stands by its weight, and drives by friction at its rear legs, whose force is bounded. The floor may be tilted.
+/// has mass, stands by its weight, and drives by friction at its rear legs, whose force is bounded. Movable bodies are
+/// upright prisms that stand by their corners. The floor may be tilted.
 ///
-///   move from tick k: groups : known robots that can touch each other within the tick, by chains
-///                     a group without own robots is left out; one in which nobody is driven and all rest, stays
-///                     S sub-steps of each group: touch points, then ODE's solver
-/// Contacts: legs on the floor; between cylinders, at half height, without friction; of cylinders at walls, the same.
+///   move from tick k: groups : known bodies that can touch each other within the tick, by chains
+///                     a group without own bodies is left out; one in which nobody is driven and all rest, stays
+///                     S sub-steps of each group: touch points (ode_touch.cpp), then ODE's solver
+/// Bodies touch each other, obstacles and walls without friction, at half the height of the lower one. Where they touch is
+/// found in the plane, as for bodies that stand upright.
 ///
 /// State is in RigidState alone: ODE's world is filled for each group and emptied after it, always in ascending ids. A
-/// group's next state is a function of its robots, their motors and the seed: the same in any mode, thread, process and
-/// machine with the same libode, and after a checkpoint. Neighbours' robots within the margin are simulated along with the
-/// own ones, so a group comes out the same in any partition that knows all of it. One that reaches farther than
-/// kReachHops - 1 robots beyond the border is cut there, and the ghosts behind the cut go on at their velocities: over
-/// partition grids, and for such groups alone, results are alike, not the same.
+/// group's next state is a function of its bodies, their motors and the seed: the same in any mode, thread, process and
+/// machine with the same libode, and after a checkpoint. All partitions know all movable bodies. Neighbours' robots within the
+/// margin, or beside a movable body that a partition reaches, are simulated along with the own ones, so a group comes out the
+/// same in any partition that knows all of it. One that reaches farther than kReachHops - 1 robots beyond is cut there, and
+/// the ghosts behind the cut go on at their velocities: over partition grids, and for such groups alone, results are
+/// alike, not the same.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "core/experiment/world.hpp"
 #include "core/random/random.hpp"
 #include "services/physics/candidate_list.hpp"
 #include "services/physics/ode_world.hpp"
@@ -39,60 +44,116 @@ struct OdeLimits {
   double sub_step_s;
   double top_speed_mm_s;  ///< nobody is faster: driven, parting, or sliding down the whole arena
   double reach_mm;        ///< two gaps wider than this do not close within a tick
-  double rim_mm;          ///< ghosts farther than this from the rectangle may touch others that are not known
+  double rim_mm;          ///< ghosts farther than this from what is computed may touch others that are not known
   double margin_mm;       ///< of ghosts
-  double x_limit_mm, y_limit_mm;  ///< the centre of a robot stays within +-limit
-
-  [[nodiscard]] bool outside(double x_mm, double y_mm) const;
 };
 
 class OdeEngine final : public PopulationEngine {
  public:
-  /// Throws UserError where the experiment asks for what the engine cannot do.
   OdeEngine(const RunPlan&, PartitionId);
 
+  void emit_bodies(BodyFrame&) const override;
   void emit_ghosts(PartitionId neighbour, BodyFrame&) const override;
+  [[nodiscard]] std::uint64_t hash_part() const override;
   void save(proto::PhysicsState&) const override;
   void load(Tick, std::span<const proto::PhysicsState* const> parts) override;
 
  private:
+  /// What a robot or a movable body is; all robots are alike.
+  struct Kind {
+    Convex shape;
+    Inertia inertia{};
+    double height_mm = 0, friction = 0;
+    bool holds_on_slope = false;  ///< at rest, it stays so
+  };
+
   OdeEngine(const RunPlan&, PartitionId, const DriveModel&);
 
   void move(Tick from, const Inputs&) override;
   void read_ghosts(const Inputs&);
+  void place_bodies();
   void set_off(Tick from);
+  void find_near();
   void make_groups();
   [[nodiscard]] bool rests(std::span<const std::uint32_t> group) const;
+  [[nodiscard]] bool stands_free(std::uint32_t body) const;
   void step_group(Tick from, std::span<const std::uint32_t> group);
   [[nodiscard]] bool step_group(Tick from, std::span<const std::uint32_t> group, Solver);
-  void touch_floor(std::uint32_t body);
-  void touch_walls(std::uint32_t body);
-  void touch_others(std::uint32_t body, double since_s);
-  [[nodiscard]] RigidState upright(double x_mm, double y_mm, double heading_rad) const;
-  /// Neither walls nor others are within reach.
-  [[nodiscard]] bool stands_free(std::uint32_t body) const;
+  void keep(std::uint32_t body);
 
+  void touch_floor(std::uint32_t body);
+  void touch_floor_driven(TouchPoint&, std::uint32_t body, const Vector3& ahead, std::uint32_t drive);
+  void touch_walls(std::uint32_t body);
+  void touch_wall(std::uint32_t body, Point2 at, double radius_mm);
+  void touch_obstacles(std::uint32_t body);
+  void touch_robots(std::uint32_t body, double since_s);
+  void touch_pair(std::uint32_t body, std::uint32_t other, double since_s);
+  void touch_shapes(TouchPoint&, const Convex& body, const Place& here, const Convex& other, const Place& there);
+  void add_touch(TouchPoint&, double x_mm, double y_mm, double normal_x, double normal_y, double gap_mm);
+
+  [[nodiscard]] bool is_robot(std::uint32_t body) const { return body < population_.known().size(); }
+  [[nodiscard]] std::uint32_t movable_of(std::uint32_t body) const {
+    return body - static_cast<std::uint32_t>(population_.known().size());
+  }
+  [[nodiscard]] const Kind& kind(std::uint32_t body) const {
+    return is_robot(body) ? robot_ : movable_[movable_of(body)];
+  }
+  [[nodiscard]] bool is_own(std::uint32_t body) const;
+  [[nodiscard]] Place place(std::uint32_t body) const;
+  [[nodiscard]] double distance_mm(const Rectangle&, double x_mm, double y_mm) const;
+  [[nodiscard]] static RigidState upright(double x_mm, double y_mm, double heading_rad, double height_mm);
+  void add_movables(BodyFrame&) const;
+  void list_movables();
+
+  PartitionGrid grid_;
   Rectangle rectangle_;
   OdeLimits limits_;
   Random random_;
-  Inertia inertia_;
-  double rest_grip_;                ///< coefficient of friction of resting legs
+  const World scene_;
+  Kind robot_;
+  std::vector<Kind> movable_;
   double thrust_g_mm_s2_;           ///< the force of a driven robot at most
   std::array<Vector3, 3> legs_mm_;  ///< tips, in the body's frame: rear left, rear right, front
-  Vector3 downhill_;                ///< unit; 0 on a level floor
-  bool holds_on_slope_;             ///< a robot at rest stays so
+  Vector3 downhill_;                ///< unit
   OdeWorld world_;
   CandidateList candidates_;
-  std::vector<RigidState> states_;  ///< per robot; of those that are listed, current
+  std::vector<std::uint8_t> immobile_;      ///< per robot
+  std::vector<RigidState> states_;          ///< per robot; of those that are listed, current
+  std::vector<RigidState> movable_states_;  ///< per movable body; of those that are not listed, a tick old
+  std::vector<std::uint8_t> listed_movable_, own_movable_;
 
-  // Within a step; per known body.
+  // Within a step; per body: known robots, then all movable bodies.
   Drives drives_;
   std::vector<std::uint32_t> drive_of_, leader_, in_world_;
-  /// 1: it is not simulated: where a tracker says, or a ghost at the rim, which moves on as it does.
+  /// 1: it is not simulated: immobile, where a tracker says, or a ghost at the rim, which moves on as it does.
   std::vector<std::uint8_t> stands_;
   std::vector<RigidState> now_;
-  std::vector<Vector3> start_axis_;               ///< where a body looked at the tick's start, level
-  std::vector<std::uint32_t> order_, group_end_;  ///< bodies sorted by group
+  std::vector<Vector3> start_axis_;                            ///< where a body looked at the tick's start, level
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> near_;  ///< body and movable body, within reach; ascending
+  std::vector<std::uint32_t> order_, group_end_;               ///< bodies sorted by group
+};
+
+/// The unit vector along (x, y), or the fallback where that is 0.
+[[nodiscard]] inline Vector3 level(double x, double y, const Vector3& fallback) {
+  const double length = __builtin_sqrt(x * x + y * y);
+  if (!(length > 0)) return fallback;
+  return {x / length, y / length, 0};
+}
+
+/// A body's axes in the arena's frame.
+struct Axes {
+  Vector3 x, y, z;
+
+  explicit Axes(const std::array<double, 4>& q) {
+    const double w = q[0], i = q[1], j = q[2], k = q[3];
+    x = {1 - 2 * (j * j + k * k), 2 * (i * j + w * k), 2 * (i * k - w * j)};
+    y = {2 * (i * j - w * k), 1 - 2 * (i * i + k * k), 2 * (j * k + w * i)};
+    z = {2 * (i * k + w * j), 2 * (j * k - w * i), 1 - 2 * (i * i + j * j)};
+  }
+  [[nodiscard]] Vector3 to_arena(const Vector3& v) const {
+    return {x[0] * v[0] + y[0] * v[1] + z[0] * v[2], x[1] * v[0] + y[1] * v[1] + z[1] * v[2],
+            x[2] * v[0] + y[2] * v[1] + z[2] * v[2]};
+  }
 };
 
 }  // namespace kilotwin::physics

@@ -43,9 +43,19 @@ void start_ode() {
 
 }  // namespace
 
-Inertia Inertia::cylinder(double mass_g, double radius_mm, double height_mm) {
-  const double across = mass_g * (3 * radius_mm * radius_mm + height_mm * height_mm) / 12;
-  return {mass_g, {across, across, mass_g * radius_mm * radius_mm / 2}};
+Inertia Inertia::prism(double mass_g, const Convex& shape, double height_mm) {
+  // Means of x^2, y^2 and x y over the area; a polygon's from the triangles between its centre and its edges.
+  double xx = shape.radius_mm() * shape.radius_mm() / 4, yy = xx, xy = 0;
+  const std::vector<Point2>& corners = shape.corners();
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Point2 a = corners[i], b = corners[(i + 1) % corners.size()];
+    const double part = (a.x_mm * b.y_mm - b.x_mm * a.y_mm) / (12 * shape.area_mm2());
+    xx += part * (a.x_mm * a.x_mm + a.x_mm * b.x_mm + b.x_mm * b.x_mm);
+    yy += part * (a.y_mm * a.y_mm + a.y_mm * b.y_mm + b.y_mm * b.y_mm);
+    xy += part * (a.x_mm * a.y_mm + (a.x_mm * b.y_mm + b.x_mm * a.y_mm) / 2 + b.x_mm * b.y_mm);
+  }
+  const double across = height_mm * height_mm / 12;
+  return {mass_g, {mass_g * (yy + across), mass_g * (xx + across), mass_g * (xx + yy)}, -mass_g * xy};
 }
 
 struct OdeWorld::Handles {
@@ -91,7 +101,8 @@ std::uint32_t OdeWorld::add(const Inertia& inertia, const RigidState& state) {
   const dBodyID body = dBodyCreate(handles_->world);
   dMass mass;
   const Vector3& moment = inertia.moment_g_mm2;
-  dMassSetParameters(&mass, inertia.mass_g, 0, 0, 0, moment[0], moment[1], moment[2], 0, 0, 0);
+  dMassSetParameters(&mass, inertia.mass_g, 0, 0, 0, moment[0], moment[1], moment[2], inertia.product_xy_g_mm2, 0,
+                     0);
   dBodySetMass(body, &mass);
   dBodySetPosition(body, state.position_mm[0], state.position_mm[1], state.position_mm[2]);
   dBodySetQuaternion(body, state.rotation.data());

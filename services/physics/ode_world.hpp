@@ -10,6 +10,8 @@
 #include <cstdint>
 #include <memory>
 
+#include "core/geometry/convex.hpp"
+
 namespace kilotwin::physics {
 
 using Vector3 = std::array<double, 3>;
@@ -21,13 +23,14 @@ struct RigidState {
   Vector3 velocity_mm_s{}, spin_rad_s{};       ///< in the arena's frame
 };
 
-/// Mass and principal moments about the axes of the body's frame.
+/// Mass and moments about the axes of the body's frame.
 struct Inertia {
   double mass_g;
   Vector3 moment_g_mm2;
+  double product_xy_g_mm2 = 0;
 
-  /// A homogeneous upright cylinder.
-  [[nodiscard]] static Inertia cylinder(double mass_g, double radius_mm, double height_mm);
+  /// A homogeneous upright prism over the shape, about its centre.
+  [[nodiscard]] static Inertia prism(double mass_g, const Convex&, double height_mm);
 };
 
 /// Two bodies, or one body and what stands, touch or may touch within the step: they do not close more than the gap.
