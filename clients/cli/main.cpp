@@ -187,8 +187,10 @@ int main_of(int argc, char** argv) {
   sweep_app.add_option("--seeds", sweep.seeds, "FIRST..LAST");
   sweep_app.add_option("--set", sweep.set, "FIELD=V1,V2,... or FIELD=A..B: all combinations")
       ->allow_extra_args(false);
-  sweep_app.add_option("--plot", sweep.plot, "what plots show: msd, displacement, spread, nearest or polarisation")
-      ->capture_default_str();
+  sweep_app.add_option(
+      "--plot", sweep.plot,
+      "what plots show: msd, displacement, spread, nearest, polarisation or pushed (default: pushed "
+      "where there are movable bodies, else msd)");
   sweep_app.add_option("--jobs", sweep.jobs, "runs at a time (default: one per core)");
   sweep_app.add_option("--out", sweep.out, "directory (default: runs/NAME-sweep)");
 

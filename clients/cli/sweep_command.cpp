@@ -58,7 +58,8 @@ std::vector<std::string> words_of(const SweepArguments& arguments, const SweepPo
 
 int sweep_command(const SweepArguments& arguments) {
   const std::vector<SweepPoint> points = sweep_points(arguments.set);
-  const recorder::Observable plotted = observable_of(arguments.plot);
+  recorder::Observable plotted = recorder::Observable::kMsd;
+  if (!arguments.plot.empty()) plotted = observable_of(arguments.plot);
   std::vector<std::uint64_t> seeds;
   if (!arguments.seeds.empty()) seeds = parse_seeds(arguments.seeds);
   if (points.size() * std::max<std::size_t>(1, seeds.size()) > kMostSweepRuns)
@@ -73,6 +74,7 @@ int sweep_command(const SweepArguments& arguments) {
     const LoadedExperiment loaded = load_with_overrides(one);
     validate(loaded);
     name = loaded.experiment.name();
+    if (arguments.plot.empty() && loaded.experiment.movable_size() > 0) plotted = recorder::Observable::kPushed;
     own_seeds.push_back(loaded.experiment.seed());
   }
   const auto directory =

@@ -9,9 +9,10 @@ struct SweepArguments {
   RunArguments run;              ///< what all runs share
   std::string seeds;             ///< "A..B", or one number; empty: the experiment's own
   std::vector<std::string> set;  ///< FIELD=V1,V2,... or FIELD=A..B: one run per value, all combinations
-  std::string plot = "msd";      ///< the observable that the plots show: clients/recorder/observables.hpp
-  std::uint32_t jobs = 0;        ///< runs at a time; 0: one per core
-  std::filesystem::path out;     ///< default: runs/NAME-sweep
+  /// The observable that plots show: clients/recorder/observables.hpp; empty: pushed where there are movable bodies, else msd.
+  std::string plot;
+  std::uint32_t jobs = 0;     ///< runs at a time; 0: one per core
+  std::filesystem::path out;  ///< default: runs/NAME-sweep
 };
 
 /// Returns the exit status: 1 where some run failed. Throws UserError.

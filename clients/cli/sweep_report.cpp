@@ -116,8 +116,14 @@ std::string SweepReport::name_of(std::size_t point) const {
 
 std::string SweepReport::table() const {
   std::vector<std::string> header{"at the end", "runs"};
-  for (const recorder::ObservableInfo& o : kObservables)
-    header.push_back(o.unit.empty() ? std::string(o.name) : fmt::format("{}, {}", o.name, o.unit));
+  // Quantities that none of the runs has are left out.
+  std::array<bool, kObservables.size()> shown{};
+  for (std::size_t o = 0; o < kObservables.size(); ++o) {
+    for (const Observed& at : observed_) shown[o] = shown[o] || at.at_end[o].count() > 0;
+    const recorder::ObservableInfo& info = kObservables[o];
+    if (shown[o])
+      header.push_back(info.unit.empty() ? std::string(info.name) : fmt::format("{}, {}", info.name, info.unit));
+  }
   const bool messages =
       std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.sent.mean() > 0; });
   const bool failures =
@@ -129,7 +135,9 @@ std::string SweepReport::table() const {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Observed& at = observed_[i];
     std::vector<std::string> row{name_of(i), std::to_string(at.realtime.count())};
-    for (const Sample& sample : at.at_end) row.push_back(with_error(sample));
+    for (std::size_t o = 0; o < kObservables.size(); ++o) {
+      if (shown[o]) row.push_back(with_error(at.at_end[o]));
+    }
     if (messages) row.insert(row.end(), {with_error(at.sent), with_error(at.received)});
     if (failures) row.push_back(with_error(at.failed));
     row.push_back(fmt::format("{:.0f}", at.realtime.mean()));

@@ -63,10 +63,13 @@ double mean_nearest_distance_mm(std::span<const double> x_mm, std::span<const do
 }
 
 void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::span<const double> y_mm,
-                             std::span<const double> heading_rad) {
+                             std::span<const double> heading_rad, std::span<const double> movable_x_mm,
+                             std::span<const double> movable_y_mm) {
   if (curves_.time_s.empty()) {
     start_x_mm_.assign(x_mm.begin(), x_mm.end());
     start_y_mm_.assign(y_mm.begin(), y_mm.end());
+    movable_start_x_mm_.assign(movable_x_mm.begin(), movable_x_mm.end());
+    movable_start_y_mm_.assign(movable_y_mm.begin(), movable_y_mm.end());
   }
   const std::size_t robots = start_x_mm_.size();
   KILOTWIN_DEMAND(x_mm.size() == robots && y_mm.size() == robots && heading_rad.size() == robots);
@@ -87,6 +90,12 @@ void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::s
     const double dx = x_mm[i] - x.mean(), dy = y_mm[i] - y.mean();
     from_centroid.add(dx * dx + dy * dy);
   }
+  Sample pushed;
+  KILOTWIN_DEMAND(movable_x_mm.size() == movable_start_x_mm_.size() && movable_y_mm.size() == movable_x_mm.size());
+  for (std::size_t i = 0; i < movable_x_mm.size(); ++i) {
+    const double dx = movable_x_mm[i] - movable_start_x_mm_[i], dy = movable_y_mm[i] - movable_start_y_mm_[i];
+    pushed.add(std::sqrt(dx * dx + dy * dy));
+  }
   curves_.time_s.push_back(time_s);
   const auto put = [this](Observable o, double value) {
     curves_.value[static_cast<std::size_t>(o)].push_back(value);
@@ -96,13 +105,15 @@ void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::s
   put(Observable::kSpread, std::sqrt(from_centroid.mean()));
   put(Observable::kNearest, mean_nearest_distance_mm(x_mm, y_mm));
   put(Observable::kPolarisation, std::sqrt(cosine.mean() * cosine.mean() + sine.mean() * sine.mean()));
+  put(Observable::kPushed, pushed.count() > 0 ? pushed.mean() : std::numeric_limits<double>::quiet_NaN());
 }
 
 ObservableCurves observe(Reader& recording) {
   ObservableObserver observer;
   while (const proto::StateRecord* state = recording.next_state()) {
     observer.add(recording.tick_length().seconds_at(Tick{state->tick()}), values(state->x_mm()),
-                 values(state->y_mm()), values(state->heading_rad()));
+                 values(state->y_mm()), values(state->heading_rad()), values(state->movable_x_mm()),
+                 values(state->movable_y_mm()));
   }
   return observer.curves();
 }

@@ -4,9 +4,10 @@
 ///   displacement   mean over robots of that distance, mm
 ///   spread         root mean square distance of the robots from their centroid, mm
 ///   nearest        mean over robots of the distance to the nearest other, centre to centre, mm
+///   pushed         mean over movable bodies of the distance from where each was in the first state, mm
 ///   polarisation   length of the mean of all heading vectors, 0 (no common direction) .. 1 (all alike)
 ///
-/// A quantity that a run does not have, such as the nearest other of a single robot, is NaN.
+/// A quantity that a run does not have, such as the nearest other of a single robot, or bodies where there are none, is NaN.
 #pragma once
 
 #include <array>
@@ -20,7 +21,7 @@
 
 namespace kilotwin::recorder {
 
-enum class Observable : std::uint8_t { kMsd, kDisplacement, kSpread, kNearest, kPolarisation };
+enum class Observable : std::uint8_t { kMsd, kDisplacement, kSpread, kNearest, kPolarisation, kPushed };
 
 struct ObservableInfo {
   std::string_view name;   ///< in tables and on the command line
@@ -29,12 +30,13 @@ struct ObservableInfo {
   std::string_view column_suffix;
 };
 
-inline constexpr std::array<ObservableInfo, 5> kObservables = {{
+inline constexpr std::array<ObservableInfo, 6> kObservables = {{
     {"msd", "mean square displacement", "mm\u00b2", "_mm2"},
     {"displacement", "displacement", "mm", "_mm"},
     {"spread", "spread about the centroid", "mm", "_mm"},
     {"nearest", "distance to the nearest robot", "mm", "_mm"},
     {"polarisation", "polarisation", "", ""},
+    {"pushed", "displacement of movable bodies", "mm", "_mm"},
 }};
 
 /// Of one run, per recorded state.
@@ -49,11 +51,12 @@ struct ObservableCurves {
 class ObservableObserver {
  public:
   void add(double time_s, std::span<const double> x_mm, std::span<const double> y_mm,
-           std::span<const double> heading_rad);
+           std::span<const double> heading_rad, std::span<const double> movable_x_mm = {},
+           std::span<const double> movable_y_mm = {});
   [[nodiscard]] const ObservableCurves& curves() const { return curves_; }
 
  private:
-  std::vector<double> start_x_mm_, start_y_mm_;
+  std::vector<double> start_x_mm_, start_y_mm_, movable_start_x_mm_, movable_start_y_mm_;
   ObservableCurves curves_;
 };
 

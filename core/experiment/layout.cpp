@@ -143,7 +143,10 @@ void Placement::place_grid(const Group& group) {
   }
   const std::uint32_t rows = (group.count + columns - 1) / columns;
   for (std::uint32_t i = 0; i < group.count; ++i) {
-    const double right = i % columns - (columns - 1) / 2.0, up = (rows - 1) / 2.0 - i / columns;
+    const std::uint32_t row = i / columns;
+    const std::uint32_t in_row = grid.from_first_row() ? std::min(columns, group.count - row * columns) : columns;
+    const double right = i % columns - (in_row - 1) / 2.0,
+                 up = (grid.from_first_row() ? 0 : (rows - 1) / 2.0) - row;
     set_position(group.first + i, layout.x_mm() + right * grid.pitch_mm(), layout.y_mm() + up * grid.pitch_mm());
     set_heading(group.first + i, layout, grid.heading(), grid.heading_deg());
   }

@@ -91,6 +91,8 @@ std::vector<Recorded> Runs::sweep(const std::string& experiment, const std::vect
       run.x_mm.emplace_back(state->x_mm().begin(), state->x_mm().end());
       run.y_mm.emplace_back(state->y_mm().begin(), state->y_mm().end());
       run.heading_rad.emplace_back(state->heading_rad().begin(), state->heading_rad().end());
+      run.movable_x_mm.emplace_back(state->movable_x_mm().begin(), state->movable_x_mm().end());
+      run.movable_y_mm.emplace_back(state->movable_y_mm().begin(), state->movable_y_mm().end());
     }
   }
   fs::remove_all(out);

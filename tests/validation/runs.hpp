@@ -15,7 +15,8 @@ namespace kilotwin::validation {
 /// What was recorded of one run.
 struct Recorded {
   std::vector<double> time_s;
-  std::vector<std::vector<double>> x_mm, y_mm, heading_rad;  ///< per recorded state: per robot
+  std::vector<std::vector<double>> x_mm, y_mm, heading_rad;     ///< per recorded state: per robot
+  std::vector<std::vector<double>> movable_x_mm, movable_y_mm;  ///< per recorded state: per movable body
 
   [[nodiscard]] std::size_t robots() const { return x_mm.empty() ? 0 : x_mm[0].size(); }
   /// Of robot i, from state `first` on.

@@ -22,6 +22,7 @@ struct Validation {
 constexpr Validation kValidations[] = {{"bias", validate_bias},
                                        {"straight", validate_straight},
                                        {"diffusion", validate_diffusion},
+                                       {"box", validate_box},
                                        {"packing", validate_packing}};
 
 int usage() {

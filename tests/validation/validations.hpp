@@ -17,6 +17,8 @@ void validate_bias(Runs&, Verdicts&, Effort);
 void validate_straight(Runs&, Verdicts&, Effort);
 /// The mean square displacement of a dense crowd that walks at random: peer, with and without contact.
 void validate_diffusion(Runs&, Verdicts&, Effort);
+/// How many robots it takes to push a box.
+void validate_box(Runs&, Verdicts&, Effort);
 /// How far discs overlap where a packed crowd presses inwards.
 void validate_packing(Runs&, Verdicts&, Effort);
 

@@ -46,6 +46,17 @@ TEST(Observables, PolarisationIsOneForACommonDirectionAndZeroForNone) {
   EXPECT_NEAR(observer.curves().of(Observable::kPolarisation)[1], 0, 1e-12);
 }
 
+TEST(Observables, PushedIsTheWayOfMovableBodies) {
+  const std::vector<double> robot{0};
+  ObservableObserver with, without;
+  with.add(0, robot, robot, robot, std::array{1.0, 5.0}, std::array{2.0, 5.0});
+  with.add(1, robot, robot, robot, std::array{4.0, 5.0}, std::array{6.0, 6.0});
+  EXPECT_EQ(with.curves().of(Observable::kPushed)[0], 0);
+  EXPECT_DOUBLE_EQ(with.curves().of(Observable::kPushed)[1], 3);
+  without.add(0, robot, robot, robot);
+  EXPECT_TRUE(std::isnan(without.curves().of(Observable::kPushed)[0]));
+}
+
 TEST(Observables, ALoneRobotHasNoNearest) {
   EXPECT_TRUE(std::isnan(mean_nearest_distance_mm(std::array{1.0}, std::array{2.0})));
 }

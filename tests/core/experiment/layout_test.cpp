@@ -38,6 +38,14 @@ TEST_F(Layouts, GridIsCentredAndFilledFromTheTopLeft) {
   EXPECT_EQ(row.y_mm, (std::vector<double>{0, 0}));
 }
 
+TEST_F(Layouts, AGridFromItsFirstRowHangsBelowTheOriginWithEachRowCentred) {
+  const PlacedRobots grid = placed("x_mm: 100 y_mm: -50 grid { pitch_mm: 40 columns: 3 from_first_row: true }", 5);
+  EXPECT_EQ(grid.x_mm, (std::vector<double>{60, 100, 140, 80, 120}));
+  EXPECT_EQ(grid.y_mm, (std::vector<double>{-50, -50, -50, -90, -90}));
+  const PlacedRobots row = placed("grid { pitch_mm: 50 columns: 9 from_first_row: true }", 2);
+  EXPECT_EQ(row.x_mm, (std::vector<double>{-25, 25}));
+}
+
 TEST_F(Layouts, RandomHeadingsAreUniformAndOfTheSeed) {
   const PlacedRobots one = placed("grid { pitch_mm: 33 }", 2500);
   double sine = 0, cosine = 0;

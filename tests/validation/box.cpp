@@ -1,0 +1,60 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tests/validation/validations.hpp"
+
+namespace kilotwin::validation {
+namespace {
+
+constexpr double kDuration_s = 40;
+/// "By impact only": less than this in all that time.
+constexpr double kStill_mm = 2;
+/// "At nearly their own speed", 10 mm/s.
+constexpr double kDriven_mm = 0.95 * 10 * kDuration_s;
+
+struct Formation {
+  const char* name;
+  std::vector<std::string> words;
+};
+
+void validate_formation(Runs& runs, Verdicts& verdicts, const std::string& engine, const Formation& formation,
+                        int last) {
+  std::vector<std::string> words{"--set", "robots.count=1.." + std::to_string(last), "--set",
+                                 "physics.engine=" + engine};
+  words.insert(words.end(), formation.words.begin(), formation.words.end());
+  const std::vector<Recorded> swept = runs.sweep(runs.source("experiments/box-push.txtpb"), words);
+  for (std::size_t i = 0; i < swept.size(); ++i) {
+    const Recorded& run = swept[i];
+    const std::size_t end = run.time_s.size() - 1, middle = run.state_at(kDuration_s / 2);
+    const auto moved = [&](std::size_t from, std::size_t to) {
+      return std::hypot(run.movable_x_mm[to][0] - run.movable_x_mm[from][0],
+                        run.movable_y_mm[to][0] - run.movable_y_mm[from][0]);
+    };
+    const std::string what = fmt::format("{}, {} {}", engine, i + 1, formation.name);
+    if (i + 1 < 5) {
+      verdicts.at_most(what, "mm", {moved(0, end)}, kStill_mm);
+      verdicts.at_most(what + ": creep in the last 20 s", "mm", {moved(middle, end)}, 0.01);
+    } else {
+      verdicts.at_least(what, "mm", {moved(0, end)}, kDriven_mm);
+    }
+  }
+}
+
+}  // namespace
+
+void validate_box(Runs& runs, Verdicts& verdicts, Effort effort) {
+  verdicts.section("way of a box of 18 g, pushed for 40 s: box-push.txtpb");
+  const Formation abreast{"abreast", {}};
+  const Formation in_file{"behind each other",
+                          {"--set", "robots.layout.grid.columns=1", "--set", "robots.layout.grid.pitch_mm=33.5"}};
+  const Formation three{"in three columns",
+                        {"--set", "robots.layout.grid.columns=3", "--set", "robots.layout.grid.pitch_mm=33.5"}};
+  const int last = effort.quick ? 6 : 8;
+  for (const char* engine : {"PLANAR", "ODE"}) {
+    for (const Formation& formation : {abreast, in_file, three})
+      validate_formation(runs, verdicts, engine, formation, last);
+  }
+}
+
+}  // namespace kilotwin::validation
