@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "clients/recorder/file.hpp"
 #include "clients/recorder/reader.hpp"
@@ -103,13 +102,6 @@ Figure mean_of(const std::vector<double>& values) {
   recorder::Sample sample;
   for (const double value : values) sample.add(value);
   return {sample.mean(), sample.standard_error()};
-}
-
-std::optional<fs::path> data_folder(const fs::path& sources) {
-  const char* const named = std::getenv("KILOTWIN_DATA");
-  const fs::path folder = named != nullptr ? fs::path(named) : sources / "../shared/data";
-  if (!fs::is_directory(folder)) return std::nullopt;
-  return folder;
 }
 
 }  // namespace kilotwin::validation

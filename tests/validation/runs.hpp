@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,9 +47,5 @@ class Runs {
 
 /// Mean over runs with its standard error.
 [[nodiscard]] Figure mean_of(const std::vector<double>& values);
-
-/// The folder of measured and reference data: KILOTWIN_DATA, else ../shared/data beside the sources; none where it is not
-/// there.
-[[nodiscard]] std::optional<std::filesystem::path> data_folder(const std::filesystem::path& sources);
 
 }  // namespace kilotwin::validation

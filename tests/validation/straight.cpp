@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "clients/recorder/plot.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "tests/validation/reference.hpp"
 #include "tests/validation/straight_theory.hpp"
@@ -79,6 +80,34 @@ void validate_straight(Runs& runs, Verdicts& verdicts, Effort effort) {
     const double scale = model.msd_mm2(point.time_s - kStraightLag_s) / model.msd_mm2(exact_s);
     verdicts.near_in_errors(fmt::format("peer (1000 robots), {:.0f} s", point.time_s), "mm^2",
                             {measured.value * scale, measured.error * scale}, {point.value, point.error}, 3);
+  }
+  if (!effort.plots.empty()) {
+    recorder::Plot plot;
+    plot.title = "600 robots drive straight on";
+    plot.subtitle = "their wheel biases bend their ways; bars: standard error of the mean";
+    plot.x_name = "time";
+    plot.x_unit = "s";
+    plot.y_name = "mean square displacement";
+    plot.y_unit = "mm\u00b2";
+    plot.series.resize(3);
+    plot.series[0].name = "closed form";
+    plot.series[0].points = false;
+    plot.series[1].name = "simulated";
+    plot.series[2].name = "peer (ARGoS)";
+    plot.series[1].line = plot.series[2].line = false;
+    const auto put = [&plot](std::size_t series, double time_s, Figure figure) {
+      plot.series[series].x.push_back(time_s);
+      plot.series[series].y.push_back(figure.value);
+      plot.series[series].error.push_back(figure.error);
+    };
+    for (double time_s = 0; time_s <= 60; ++time_s) put(0, time_s, {model.msd_mm2(time_s)});
+    for (double time_s = 5; time_s <= 60; time_s += 5) {
+      double exact_s = 0;
+      const Figure measured = measured_at(time_s, exact_s);
+      put(1, exact_s, measured);
+    }
+    for (const ReferencePoint& point : kStraightNoise) put(2, point.time_s, {point.value, point.error});
+    recorder::write_plot(plot, effort.plots / "validation-straight.svg");
   }
   const std::vector<Recorded> clean =
       runs.sweep(runs.source("experiments/straight.txtpb"),

@@ -1,5 +1,5 @@
 // Prints what was measured beside what was expected, and ends with status 1 where anything misses.
-// Usage: validate [--quick] [NAME]...
+// Usage: validate [--quick] [--plots DIR] [NAME]...
 #include <fmt/format.h>
 
 #include <string>
@@ -28,7 +28,7 @@ constexpr Validation kValidations[] = {{"bias", validate_bias},
 int usage() {
   std::string names;
   for (const Validation& v : kValidations) names += fmt::format(" {}", v.name);
-  say("usage: validate [--quick] [NAME]...; names:" + names);
+  say("usage: validate [--quick] [--plots DIR] [NAME]...; names:" + names);
   return 2;
 }
 
@@ -41,6 +41,10 @@ int main(int argc, char** argv) {
     const std::string word = argv[i];
     if (word == "--quick") {
       effort.quick = true;
+      continue;
+    }
+    if (word == "--plots" && i + 1 < argc) {
+      effort.plots = argv[++i];
       continue;
     }
     bool known = false;

@@ -9,6 +9,7 @@ namespace kilotwin::validation {
 /// How much is run: `quick` in seconds, for every change; else in a minute or two, with small standard errors.
 struct Effort {
   bool quick = false;
+  std::filesystem::path plots;  ///< folder for pictures of the figures; empty: none
 };
 
 /// The seed's estimator gives back the wheel biases that robots were given.
