@@ -56,9 +56,8 @@ Runs::~Runs() {
   fs::remove_all(scratch_, ignored);
 }
 
-std::vector<Recorded> Runs::sweep(const std::string& experiment, const std::vector<std::string>& words) {
-  const fs::path out = scratch_ / fmt::format("sweep-{}", ++sweeps_), log = out.string() + ".log";
-  std::vector<std::string> all{kilotwin_, "sweep", experiment, "--out", out.string()};
+bool Runs::run(const std::vector<std::string>& words, const fs::path& log) {
+  std::vector<std::string> all{kilotwin_};
   all.insert(all.end(), words.begin(), words.end());
   std::vector<char*> argv;
   for (std::string& word : all) argv.push_back(word.data());
@@ -71,9 +70,21 @@ std::vector<Recorded> Runs::sweep(const std::string& experiment, const std::vect
     _exit(127);
   }
   int status = 0;
-  if (process < 0 || waitpid(process, &status, 0) != process || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+  return process >= 0 && waitpid(process, &status, 0) == process && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+bool Runs::accepts(const std::string& experiment, const std::vector<std::string>& words) {
+  std::vector<std::string> all{"check", experiment};
+  all.insert(all.end(), words.begin(), words.end());
+  return run(all, scratch_ / "check.log");
+}
+
+std::vector<Recorded> Runs::sweep(const std::string& experiment, const std::vector<std::string>& words) {
+  const fs::path out = scratch_ / fmt::format("sweep-{}", ++sweeps_), log = out.string() + ".log";
+  std::vector<std::string> all{"sweep", experiment, "--out", out.string()};
+  all.insert(all.end(), words.begin(), words.end());
+  if (!run(all, log))
     throw RunError(fmt::format("kilotwin sweep {} failed; it said: {}", experiment, recorder::read_file(log)));
-  }
   std::vector<std::pair<std::pair<std::string, std::uint64_t>, fs::path>> found;  // by point, then seed
   for (const fs::directory_entry& entry : fs::directory_iterator(out)) {
     if (!fs::exists(entry.path() / "summary.json")) continue;

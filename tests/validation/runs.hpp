@@ -36,10 +36,15 @@ class Runs {
 
   /// `kilotwin sweep EXPERIMENT WORDS...`, quietly; the runs in the order of points and seeds. Throws RunError where it fails.
   [[nodiscard]] std::vector<Recorded> sweep(const std::string& experiment, const std::vector<std::string>& words);
+  /// Whether `kilotwin check` takes the experiment with these words.
+  [[nodiscard]] bool accepts(const std::string& experiment, const std::vector<std::string>& words);
   [[nodiscard]] std::filesystem::path source(const std::string& name) const { return sources_ / name; }
   [[nodiscard]] const std::filesystem::path& scratch() const { return scratch_; }
 
  private:
+  /// Runs the program to its end; its words go to `log`. Returns whether its status was 0.
+  bool run(const std::vector<std::string>& words, const std::filesystem::path& log);
+
   std::string kilotwin_;
   std::filesystem::path sources_, scratch_;
   int sweeps_ = 0;
