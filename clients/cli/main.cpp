@@ -13,6 +13,7 @@
 #include "clients/behaviours/compiler.hpp"
 #include "clients/behaviours/robot_warnings.hpp"
 #include "clients/cli/doctor_command.hpp"
+#include "clients/cli/export_model.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/replay_command.hpp"
 #include "clients/cli/run_command.hpp"
@@ -117,15 +118,22 @@ int build_command(const BuildArguments& arguments) {
 }
 
 struct ExportArguments {
-  std::filesystem::path run, trajectories, bodies, messages;
+  std::filesystem::path run, trajectories, bodies, messages, model;
   double every_s = 1;
+  bool measured = false;
 };
 
 int export_command(const ExportArguments& arguments) {
-  if (arguments.trajectories.empty() && arguments.bodies.empty() && arguments.messages.empty()) {
+  const bool rows_wanted = !arguments.trajectories.empty() || !arguments.bodies.empty() || !arguments.messages.empty();
+  if (!rows_wanted && arguments.model.empty()) {
     throw UserError(
-        "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv or "
-        "several");
+        "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv, "
+        "--model FILE.txtpb or several");
+  }
+  if (!arguments.model.empty()) {
+    const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
+    fmt::print("{}: {} robots\n", arguments.model.string(), export_model(read_manifest(run), arguments.model));
+    if (!rows_wanted) return 0;
   }
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kRecording);
   const auto each = [&](const std::filesystem::path& csv, auto&& write) {
@@ -136,7 +144,8 @@ int export_command(const ExportArguments& arguments) {
     fmt::print("{}: {} rows\n", csv.string(), rows);
   };
   each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) {
-    return recorder::export_trajectories(reader, csv, arguments.every_s);
+    return recorder::export_trajectories(reader, csv, arguments.every_s,
+                                         arguments.measured ? recorder::Poses::kMeasured : recorder::Poses::kTrue);
   });
   each(arguments.bodies, [&](recorder::Reader& reader, const auto& csv) {
     return recorder::export_bodies(reader, csv, arguments.every_s);
@@ -209,6 +218,10 @@ int main_of(int argc, char** argv) {
   export_app.add_option("--bodies", exported.bodies, "movable bodies: time_s,body,x_mm,y_mm,heading_rad");
   export_app.add_option("--messages", exported.messages, "receiver,sender,count");
   export_app.add_option("--every", exported.every_s, "between rows of a robot, s")->capture_default_str();
+  export_app.add_flag("--measured", exported.measured,
+                      "trajectories as the tracker sees them, with the model's effects on it");
+  export_app.add_option("--model", exported.model,
+                        "the model as it ran, with every robot's own parameters; run --model reads it");
 
   std::filesystem::path replayed;
   bool verify = false, replay_quiet = false;

@@ -28,7 +28,8 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       life_cycle_(plan.robots()),
       movable_x_mm_(plan.movables()),
       movable_y_mm_(plan.movables()),
-      movable_heading_rad_(plan.movables()) {}
+      movable_heading_rad_(plan.movables()),
+      measurement_(plan) {}
 
 void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
                         std::span<const ActuationFrame* const> actuation, bool last) {
@@ -54,8 +55,9 @@ void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
     std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
     std::copy(frame->life_cycle.begin(), frame->life_cycle.end(), life_cycle_.begin() + frame->first_robot);
   }
-  writer_.state(
-      {tick, x_mm_, y_mm_, heading_rad_, led_, life_cycle_, movable_x_mm_, movable_y_mm_, movable_heading_rad_});
+  if (measurement_.any()) measurement_.measure(tick, bodies, actuation, measured_);
+  writer_.state({tick, x_mm_, y_mm_, heading_rad_, led_, life_cycle_, movable_x_mm_, movable_y_mm_,
+                 movable_heading_rad_, measured_.x_mm, measured_.y_mm, measured_.heading_rad});
   displacement_.add(x_mm_, y_mm_);
 }
 

@@ -10,6 +10,7 @@
 #include "clients/recorder/statistics.hpp"
 #include "clients/recorder/summary.hpp"
 #include "clients/recorder/writer.hpp"
+#include "core/effects/measurement.hpp"
 #include "core/experiment/plan.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/run_observer.hpp"
@@ -42,6 +43,8 @@ class RunRecorder : public RunObserver {
   std::vector<double> x_mm_, y_mm_, heading_rad_;
   std::vector<std::uint8_t> led_, life_cycle_;
   std::vector<double> movable_x_mm_, movable_y_mm_, movable_heading_rad_;
+  Measurement measurement_;
+  MeasuredPoses measured_;
   Tick next_{0};
   bool any_state_ = false;
   std::chrono::steady_clock::time_point first_tick_at_{};

@@ -69,7 +69,10 @@ void check_interval(const Reader& recording, const RecordingSchedule& wanted, do
   }
 }
 
-std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, const std::string& time) {
+std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, const std::string& time, Poses which) {
+  const bool measured = which == Poses::kMeasured && state.measured_x_mm_size() == state.x_mm_size() &&
+                        state.measured_y_mm_size() == state.x_mm_size() &&
+                        state.measured_heading_rad_size() == state.x_mm_size();
   constexpr std::size_t kLongestNumbers = 80;
   const auto robots = static_cast<std::size_t>(state.x_mm_size());
   const std::size_t start = text.size();
@@ -81,11 +84,11 @@ std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, co
     *to++ = ',';
     to = std::to_chars(to, to + 12, i).ptr;
     *to++ = ',';
-    to = put_fixed<4>(to, state.x_mm(at));
+    to = put_fixed<4>(to, measured ? state.measured_x_mm(at) : state.x_mm(at));
     *to++ = ',';
-    to = put_fixed<4>(to, state.y_mm(at));
+    to = put_fixed<4>(to, measured ? state.measured_y_mm(at) : state.y_mm(at));
     *to++ = ',';
-    to = put_fixed<6>(to, state.heading_rad(at));
+    to = put_fixed<6>(to, measured ? state.measured_heading_rad(at) : state.heading_rad(at));
     *to++ = ',';
     const auto led = static_cast<unsigned char>(state.led()[i]);
     for (int channel = 0; channel < 3; ++channel) *to++ = static_cast<char>('0' + (led >> 2 * channel & 3));
@@ -134,8 +137,11 @@ std::uint64_t export_states(Reader& recording, const std::filesystem::path& csv,
 
 }  // namespace
 
-std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s) {
-  return export_states(recording, csv, every_s, "time_s,robot,x_mm,y_mm,heading_rad,led\n", append_rows);
+std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s, Poses which) {
+  return export_states(recording, csv, every_s, "time_s,robot,x_mm,y_mm,heading_rad,led\n",
+                       [which](std::string& text, const proto::StateRecord& state, const std::string& time) {
+                         return append_rows(text, state, time, which);
+                       });
 }
 
 std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& csv, double every_s) {

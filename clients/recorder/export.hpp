@@ -8,12 +8,17 @@
 
 namespace kilotwin::recorder {
 
+/// Poses as they are, or as a tracker sees them, where the model has effects on what is measured.
+enum class Poses { kTrue, kMeasured };
+
 /// time_s,robot,x_mm,y_mm,heading_rad,led: one row per robot at 0, every_s, 2 every_s..., by time and then by robot.
 /// For each of these times the first recorded state at or after it is taken; time_s is the simulated time of that
 /// state's tick, exactly. Lengths have 4 decimals, angles 6; led is rgb, each digit 0..3.
 /// Returns the number of rows. Throws UserError where the recording has no state within one tick after each such time,
 /// i.e. every_s is no multiple of the recorded interval, and RunError where the file cannot be written.
-std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s = 1);
+/// `which`: where the recording holds no measured poses, they are the true ones.
+std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s = 1,
+                                  Poses which = Poses::kTrue);
 
 /// time_s,body,x_mm,y_mm,heading_rad: the same of movable bodies; x, y is a body's centre. Throws UserError where the
 /// experiment has none.

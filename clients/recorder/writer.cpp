@@ -75,7 +75,10 @@ void Writer::state(const StateView& state) {
   KILOTWIN_DEMAND(state.x_mm.size() == robots_ && state.y_mm.size() == robots_ &&
                   state.heading_rad.size() == robots_ && state.led.size() == robots_ &&
                   state.life_cycle.size() == robots_ && state.movable_x_mm.size() == movables_ &&
-                  state.movable_y_mm.size() == movables_ && state.movable_heading_rad.size() == movables_);
+                  state.movable_y_mm.size() == movables_ && state.movable_heading_rad.size() == movables_ &&
+                  state.measured_y_mm.size() == state.measured_x_mm.size() &&
+                  state.measured_heading_rad.size() == state.measured_x_mm.size() &&
+                  (state.measured_x_mm.empty() || state.measured_x_mm.size() == robots_));
   last_state_ = state.tick.count();
   proto::StateRecord& record = *state_.mutable_state();
   record.set_tick(state.tick.count());
@@ -87,6 +90,9 @@ void Writer::state(const StateView& state) {
   assign(record.mutable_movable_x_mm(), state.movable_x_mm);
   assign(record.mutable_movable_y_mm(), state.movable_y_mm);
   assign(record.mutable_movable_heading_rad(), state.movable_heading_rad);
+  assign(record.mutable_measured_x_mm(), state.measured_x_mm);
+  assign(record.mutable_measured_y_mm(), state.measured_y_mm);
+  assign(record.mutable_measured_heading_rad(), state.measured_heading_rad);
   append(state_);
   flush_if_due();
 }

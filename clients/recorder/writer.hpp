@@ -22,6 +22,8 @@ struct StateView {
   std::span<const std::uint8_t> led;                                              ///< r | g << 2 | b << 4
   std::span<const std::uint8_t> life_cycle;                                       ///< LifeCycle
   std::span<const double> movable_x_mm{}, movable_y_mm{}, movable_heading_rad{};  ///< per movable body, from 0
+  /// As a tracker sees them; empty where that is how they are.
+  std::span<const double> measured_x_mm = {}, measured_y_mm = {}, measured_heading_rad = {};
 };
 
 /// Every function throws RunError where the file cannot be written, e.g. on a full disk: "FILE: cannot be written:

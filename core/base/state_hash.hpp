@@ -14,7 +14,16 @@
 namespace kilotwin {
 
 /// Whose fields: each federate hashes what it owns.
-enum class HashDomain : std::uint64_t { kBody = 1, kProgram = 2, kRadio = 3, kStation = 4, kContact = 5, kMovable = 6 };
+enum class HashDomain : std::uint64_t {
+  kBody = 1,
+  kProgram = 2,
+  kRadio = 3,
+  kStation = 4,
+  kContact = 5,
+  kMovable = 6,
+  kArenaField = 30,
+  kMemory = 31
+};
 
 /// A double as a word. The state never holds a NaN, whose bits would differ between CPUs.
 [[nodiscard]] inline std::uint64_t hash_bits(double value) { return std::bit_cast<std::uint64_t>(value + 0.0); }

@@ -22,10 +22,13 @@ using pb::FieldDescriptor;
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 /// Poses stay within the largest arena, times within the longest run.
 constexpr double kLongest_mm = 1e6, kLongest_s = 1e6;
+/// Of the numbers that make up functions of effects.
+constexpr double kLargestValue = 1e6;
 
 constexpr FieldRule kRules[] = {
     {"Experiment.duration_s", 0, kLongest_s, "s", Lower::kExcluded},
     {"Experiment.seed", -kUnlimited, kUnlimited, ""},
+    {"Experiment.run_number", 0, kMostRobots, ""},
     {"Experiment.tick_cycles", 32768, 1048576, "cycles"},
 
     {"Arena.width_mm", 40, kLongest_mm, "mm"},
@@ -77,6 +80,7 @@ constexpr FieldRule kRules[] = {
     {"Motion.duty_slope", 0, 20, ""},
     {"Motion.top_speed_ratio", 1, 10, ""},
     {"Motion.spin_up_s", 0, 0.1, "s"},
+    {"Motion.effects_limit_mm_s", 0, 200, "mm/s"},
     {"RobotModel.robot", 0, kMostRobots - 1, ""},
     {"RobotModel.bias_left_mm_s", -100, 100, "mm/s"},
     {"RobotModel.bias_right_mm_s", -100, 100, "mm/s"},
@@ -84,6 +88,35 @@ constexpr FieldRule kRules[] = {
     {"RobotModel.turn_right", 1, 255, ""},
     {"RobotModel.straight_left", 1, 255, ""},
     {"RobotModel.straight_right", 1, 255, ""},
+
+    {"Effect.direction_deg", -360, 360, "degrees"},
+    {"Effect.robot", 0, kMostRobots - 1, ""},
+    {"Function.radius_mm", 1, 2000, "mm"},
+    {"Function.forget_s", 0, kLongest_s, "s"},
+    {"Function.constant", -kLargestValue, kLargestValue, ""},
+    {"Linear.at_zero", -kLargestValue, kLargestValue, ""},
+    {"Linear.slope", -kLargestValue, kLargestValue, ""},
+    {"Exponential.at_zero", -kLargestValue, kLargestValue, ""},
+    {"Exponential.at_infinity", -kLargestValue, kLargestValue, ""},
+    {"Exponential.scale", -kLargestValue, kLargestValue, ""},
+    {"Harmonic.mean", -kLargestValue, kLargestValue, ""},
+    {"Harmonic.cosine", -kLargestValue, kLargestValue, ""},
+    {"Harmonic.sine", -kLargestValue, kLargestValue, ""},
+    {"Harmonic.period", 0, kLargestValue, "", Lower::kExcluded},
+    {"Spline.knot", -kLargestValue, kLargestValue, ""},
+    {"Spline.value", -kLargestValue, kLargestValue, ""},
+    {"Spline2d.knot", -kLargestValue, kLargestValue, ""},
+    {"Spline2d.and_knot", -kLargestValue, kLargestValue, ""},
+    {"Spline2d.value", -kLargestValue, kLargestValue, ""},
+    {"Steps.at", -kLargestValue, kLargestValue, ""},
+    {"Steps.value", -kLargestValue, kLargestValue, ""},
+    {"Table.key", 0, kMostRobots, ""},
+    {"Table.value", -kLargestValue, kLargestValue, ""},
+    {"Table.otherwise", -kLargestValue, kLargestValue, ""},
+    {"Noise.sd", 0, kLargestValue, ""},
+    {"Noise.correlation_s", 0, kLongest_s, "s"},
+    {"ArenaField.cell_mm", 10, kLongest_mm, "mm"},
+    {"ArenaField.forget_s", 0, kLongest_s, "s"},
 
     {"Physics.sub_steps", 1, 4, ""},
     {"Physics.tilt_deg", 0, 45, "degrees"},
@@ -165,7 +198,8 @@ using RuleTable = std::map<const FieldDescriptor*, const FieldRule*>;
 
 RuleTable rules_by_field() {
   const pb::FileDescriptor* const files[] = {proto::Experiment::descriptor()->file(),
-                                             proto::Model::descriptor()->file()};
+                                             proto::Model::descriptor()->file(),
+                                             proto::Effect::descriptor()->file()};
   RuleTable table;
   for (const FieldRule& rule : kRules) {
     const std::size_t dot = rule.field.find('.');

@@ -63,6 +63,15 @@ void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file) {
     experiment.mutable_robot_model(known->second)->MergeFrom(model.robot(i));
     merged.locations.adopt(locations, from, fmt::format("robot_model[{}]", known->second));
   }
+  // Effects and fields go by names that they share, so one list replaces the other.
+  if (model.effect_size() > 0 || model.field_size() > 0) {
+    *experiment.mutable_effect() = model.effect();
+    *experiment.mutable_field() = model.field();
+    for (const char* const list : {"effect", "field"}) {
+      merged.locations.set_option(list, name);
+      merged.locations.adopt(locations, list, list);
+    }
+  }
   loaded = std::move(merged);
 }
 

@@ -24,7 +24,8 @@ struct LoadedExperiment {
 /// Throws UserError "FILE:LINE:COLUMN: ...".
 [[nodiscard]] LoadedExperiment load_experiment(const std::filesystem::path& file);
 
-/// `--model FILE`: merges a proto::Model over experiment.motion and experiment.robot_model, robot by robot.
+/// `--model FILE`: merges a proto::Model over experiment.motion and experiment.robot_model, robot by robot. Its effects and
+/// fields, where it has any, replace the experiment's.
 /// Throws UserError that names a place in the model file, and then changes nothing.
 void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file);
 

@@ -167,6 +167,7 @@ RunPlan::RunPlan(proto::Manifest given)
       grid(2 * world.arena.half_width_mm(), 2 * world.arena.half_height_mm(),
            experiment().deployment().partition_columns(), experiment().deployment().partition_rows()),
       hosts(experiment().deployment().hosts()),
+      memory(experiment()),
       hash(hash_of(manifest)) {
   program_of_.reserve(robots());
   group_of_.reserve(robots());

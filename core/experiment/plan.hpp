@@ -10,6 +10,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/time.hpp"
+#include "core/experiment/memory_layout.hpp"
 #include "core/experiment/world.hpp"
 #include "idl/manifest.pb.h"
 
@@ -70,7 +71,8 @@ class RunPlan {
   const World world;     ///< walls, obstacles, movable bodies
   const PartitionGrid grid;
   const std::uint32_t hosts;
-  const std::uint64_t hash;  ///< of what determines results and topology; alike in all federates of a run
+  const MemoryLayout memory;  ///< of each robot, for the model's effects
+  const std::uint64_t hash;   ///< of what determines results and topology; alike in all federates of a run
 
   [[nodiscard]] const proto::Experiment& experiment() const { return manifest.experiment(); }
   [[nodiscard]] std::uint64_t run() const { return manifest.run(); }

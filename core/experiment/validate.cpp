@@ -376,6 +376,7 @@ void validate_fields(const LoadedExperiment& loaded) {
   check_robot_models(loaded);
   check_station(loaded);
   validate_surroundings(loaded);
+  validate_effects(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",

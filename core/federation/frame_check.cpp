@@ -34,6 +34,8 @@ const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, Fede
   if (!all_finite(frame.x_mm) || !all_finite(frame.y_mm) || !all_finite(frame.heading_rad) ||
       !all_finite(frame.spatial))
     return "a pose is not finite";
+  if (frame.memory.size() != frame.robot.size() * plan.memory.size() || !all_finite(frame.memory))
+    return "its robots do not remember what the model's effects ask for";
   const MovableColumns& movable = frame.movable;
   if (!ascending_within(movable.body, {0, plan.movables()}))
     return "its movable bodies are not ascending numbers of the experiment";

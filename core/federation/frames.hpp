@@ -48,11 +48,13 @@ struct BodyFrame {
   Tick tick;
   std::vector<std::uint32_t> robot;
   std::vector<double> x_mm, y_mm, heading_rad;
-  std::vector<double> spatial;  ///< of ghosts of the ODE engine: kSpatialColumns per robot; else empty
+  std::vector<double> spatial;  ///< of ghosts of the ODE engine: kSpatialColumns per robot, then per movable
+                                ///< body; else empty
 
   static constexpr std::size_t kSpatialColumns = 11;
   MovableColumns movable;
   PressedColumns pressed;  ///< in ghosts only
+  std::vector<double> memory;  ///< RunPlan::memory.size() values per robot: what the model's effects remember of it
 
   void clear() {
     robot.clear();
@@ -62,6 +64,7 @@ struct BodyFrame {
     spatial.clear();
     movable.clear();
     pressed.clear();
+    memory.clear();
   }
   void add(std::uint32_t id, double x, double y, double heading) {
     robot.push_back(id);

@@ -70,16 +70,17 @@ WireBodyFrame to_wire(const WireHeader& header, const BodyFrame& frame) {
   wire.contacts = borrow<Octets>(frame.pressed.contacts);
   wire.contact_other = borrow<ULongs>(frame.pressed.other);
   wire.contact_push_mm = borrow<Doubles>(frame.pressed.push_mm);
+  wire.memory = borrow<Doubles>(frame.memory);
   return wire;
 }
 
 bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
   frame.tick = Tick{wire.tick};
   const bool whole = copy(wire.robot, frame.robot) && copy(wire.x_mm, frame.x_mm) && copy(wire.y_mm, frame.y_mm) &&
-                     copy(wire.heading_rad, frame.heading_rad) && copy(wire.spatial, frame.spatial);
+                     copy(wire.heading_rad, frame.heading_rad) && copy(wire.spatial, frame.spatial) &&
+                     copy(wire.memory, frame.memory);
   const std::size_t n = frame.robot.size();
   if (!whole || frame.x_mm.size() != n || frame.y_mm.size() != n || frame.heading_rad.size() != n) return false;
-  if (!frame.spatial.empty() && frame.spatial.size() != BodyFrame::kSpatialColumns * n) return false;
   MovableColumns& movable = frame.movable;
   if (!copy(wire.movable, movable.body) || !copy(wire.movable_x_mm, movable.x_mm) ||
       !copy(wire.movable_y_mm, movable.y_mm) || !copy(wire.movable_heading_rad, movable.heading_rad) ||
@@ -87,6 +88,8 @@ bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
       !copy(wire.movable_turn_rad, movable.turn_rad)) {
     return false;
   }
+  if (!frame.spatial.empty() && frame.spatial.size() != BodyFrame::kSpatialColumns * (n + movable.body.size()))
+    return false;
   for (const auto* column :
        {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm, &movable.vy_mm, &movable.turn_rad}) {
     if (column->size() != movable.body.size()) return false;

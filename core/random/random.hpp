@@ -23,6 +23,9 @@ enum class Stream : std::uint16_t {
   kLightSensor = 25,  ///< draw 0 logarithm of the gain, 1 offset; tick 0
   kBattery = 26,      ///< draw 0 charge at the start
   kTemperature = 27,  ///< draw 0 offset of a robot's sensor
+  kEffectNoise = 30,       ///< independent noise of effects on motion, per tick
+  kCorrelatedNoise = 31,   ///< correlated noise of effects, per tick
+  kMeasurementNoise = 32,  ///< independent noise of effects on what is measured, per tick
   kConverter = 35,   ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 

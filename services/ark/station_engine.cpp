@@ -36,7 +36,8 @@ StationEngine::StationEngine(const RunPlan& plan)
       packet_ticks_(plan.tick_length.at_or_after(plan.experiment().station().packet_interval_s()).count()),
       robot_ticks_(plan.tick_length.at_or_after(robot_interval_s(plan.robots())).count()),
       packets_{run_packet()},
-      next_packet_(start_ends_ + packet_ticks_) {
+      next_packet_(start_ends_ + packet_ticks_),
+      measurement_(plan) {
   for (const proto::VirtualEnvironment& description : plan.experiment().station().environment()) {
     environments_.push_back(make_environment(description));
   }
@@ -54,6 +55,13 @@ void StationEngine::see(const Inputs& inputs) {
       robot.robot = frame->robot[i];
       robot.p_WR.position_mm = {frame->x_mm[i], frame->y_mm[i]};
       robot.p_WR.heading_rad = frame->heading_rad[i];
+    }
+  }
+  if (measurement_.any()) {
+    measurement_.measure(inputs.bodies.front()->tick, inputs.bodies, inputs.actuation, measured_);
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      seen_[i].p_WR.position_mm = {measured_.x_mm[i], measured_.y_mm[i]};
+      seen_[i].p_WR.heading_rad = measured_.heading_rad[i];
     }
   }
   for (const ActuationFrame* frame : inputs.actuation) {

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "core/effects/measurement.hpp"
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
 #include "idl/checkpoint.pb.h"
@@ -57,7 +58,10 @@ class StationEngine {
   std::vector<Tick> served_;          ///< per robot, where there are environments: when it was told a reading last
   std::vector<std::uint32_t> turns_;  ///< per robot: how often; environments answer by turns
 
-  std::vector<TrackedRobot> seen_;  ///< of the step at hand
+  // Of the step at hand: robots as the tracker sees them.
+  std::vector<TrackedRobot> seen_;
+  Measurement measurement_;
+  MeasuredPoses measured_;
 };
 
 }  // namespace kilotwin::ark

@@ -9,6 +9,7 @@ void Bodies::clear() {
   heading_rad.clear();
   tracked.clear();
   awake.clear();
+  memory.clear();
 }
 
 void Bodies::add(std::uint32_t id, double x, double y, double heading, std::uint8_t is_tracked,
@@ -19,10 +20,13 @@ void Bodies::add(std::uint32_t id, double x, double y, double heading, std::uint
   heading_rad.push_back(heading);
   tracked.push_back(is_tracked);
   awake.push_back(is_awake);
+  memory.resize(memory.size() + remembered, 0);
 }
 
 void Bodies::add(const Bodies& other, std::size_t i) {
   add(other.robot[i], other.x_mm[i], other.y_mm[i], other.heading_rad[i], other.tracked[i], other.awake[i]);
+  for (std::size_t m = 0; m < remembered; ++m)
+    memory[memory.size() - remembered + m] = other.memory[i * remembered + m];
 }
 
 void Bodies::resize(std::size_t size) {
@@ -32,6 +36,7 @@ void Bodies::resize(std::size_t size) {
   heading_rad.resize(size);
   tracked.resize(size);
   awake.resize(size);
+  memory.resize(size * remembered);
 }
 
 void Bodies::set(std::size_t to, const Bodies& other, std::size_t i) {
@@ -41,6 +46,7 @@ void Bodies::set(std::size_t to, const Bodies& other, std::size_t i) {
   heading_rad[to] = other.heading_rad[i];
   tracked[to] = other.tracked[i];
   awake[to] = other.awake[i];
+  for (std::size_t m = 0; m < remembered; ++m) memory[to * remembered + m] = other.memory[i * remembered + m];
 }
 
 void Bodies::swap(Bodies& other) noexcept {
@@ -50,6 +56,7 @@ void Bodies::swap(Bodies& other) noexcept {
   heading_rad.swap(other.heading_rad);
   tracked.swap(other.tracked);
   awake.swap(other.awake);
+  memory.swap(other.memory);
 }
 
 }  // namespace kilotwin::physics

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "core/spatial/cell_list.hpp"
 #include "services/physics/bodies.hpp"
-#include "services/physics/cell_list.hpp"
 
 namespace kilotwin::physics {
 

@@ -57,7 +57,7 @@ ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
 }
 
 bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& own,
-                         const std::vector<std::uint8_t>& own_movable, const std::vector<Duties>& duties) {
+                         const std::vector<std::uint8_t>& own_movable, const std::vector<std::uint8_t>& driven) {
   const auto count = static_cast<std::uint32_t>(bodies.size());
   const auto movables = static_cast<std::uint32_t>(movables_.size());
   driven_.resize(count);
@@ -65,7 +65,7 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
   lively_.resize(count);
   int any_active = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    driven_[i] = duties[i].any() && immobile_[bodies.robot[i]] == 0;
+    driven_[i] = driven[i] != 0 && immobile_[bodies.robot[i]] == 0;
     active_[i] = driven_[i] | bodies.awake[i];
     lively_[i] = driven_[i] | presses_[bodies.robot[i]].any();
     any_active |= active_[i];

@@ -69,9 +69,10 @@ class ContactSolver {
   [[nodiscard]] std::vector<MovableState>& movables() { return movables_; }
   [[nodiscard]] const std::vector<MovableState>& movables() const { return movables_; }
 
-  /// Finds who may touch whom. `own_movable`: per movable body, whether its next pose is asked for. `own`: per body, whether its next pose is asked for; empty: of all. False: everything rests.
+  /// Finds who may touch whom. `own`: per body, whether its next pose is asked for; empty: of all. `own_movable`: the same
+  /// per movable body. `driven`: per body, 1: it moves by itself. False: everything rests.
   bool find(const Bodies&, const std::vector<std::uint8_t>& own, const std::vector<std::uint8_t>& own_movable,
-            const std::vector<Duties>&);
+            const std::vector<std::uint8_t>& driven);
   /// Whether the drive of this driven body can matter.
   [[nodiscard]] bool asks_drive(std::uint32_t body) const {
     return hops_[body] != kOutOfReach && driven_[body] != 0;

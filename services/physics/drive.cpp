@@ -9,9 +9,6 @@
 namespace kilotwin::physics {
 namespace {
 
-/// Above what Random::normal can return: its argument has 52 bits, and the normal distribution has less than 2^-54 beyond.
-constexpr double kTopNormal = 8.4;
-
 /// Up to this turn per step the two series below are exact to the last bit or so.
 constexpr double kSeriesTurn_rad = 0.125;
 
@@ -33,6 +30,32 @@ inline Arc arc_from(TurnSeries s, double run_mm, double turn_rad, double axle_of
   const double one_minus_cos = turn_rad * (turn_rad * s.versine);
   return {run_mm * s.sine - axle_offset_mm * one_minus_cos,
           run_mm * (turn_rad * s.versine) + axle_offset_mm * sin_turn, 1 - one_minus_cos, sin_turn};
+}
+
+/// The same with a motion to the left of the heading as well.
+inline Arc arc_from(TurnSeries s, double run_mm, double sideways_mm, double turn_rad, double axle_offset_mm) {
+  Arc arc = arc_from(s, run_mm, turn_rad, axle_offset_mm);
+  arc.forward_mm -= sideways_mm * (turn_rad * s.versine);
+  arc.sideways_mm += sideways_mm * s.sine;
+  return arc;
+}
+
+/// The drift of the first of 1 / part equal sub-steps, in each of which it turns with the body, such that they add up to
+/// (x, y): in between it is turned back by half of the way, and made up for what is lost by turning.
+void unturn(double turn_rad, double part, double& x, double& y) {
+  constexpr double kTooSmall_rad = 1e-9;
+  if (part == 1) return;
+  if (turn_rad < kTooSmall_rad && turn_rad > -kTooSmall_rad) {
+    x *= part;
+    y *= part;
+    return;
+  }
+  double s, c;
+  kt_sincos(-0.5 * (turn_rad - turn_rad * part), &s, &c);
+  const double scale = kt_sin(0.5 * turn_rad * part) / kt_sin(0.5 * turn_rad);
+  const double to_x = scale * (c * x - s * y);
+  y = scale * (s * x + c * y);
+  x = to_x;
 }
 
 /// The same quantities for turns of any size.
@@ -65,8 +88,8 @@ DriveModel::DriveModel(const RunPlan& plan)
       tick_s_(plan.tick_length.seconds()),
       wheel_base_mm_(plan.experiment().motion().wheel_base_mm()),
       axle_offset_mm_(plan.experiment().motion().axle_offset_mm()),
-      dead_band_duty_(static_cast<std::uint8_t>(std::min(plan.experiment().motion().dead_band_duty(), 254u))),
-      kick_part_(std::min(1.0, plan.experiment().motion().spin_up_s() / tick_s_)),
+      motors_(plan),
+      effects_(plan),
       bias_(plan.robots(), {0, 0}) {
   const proto::Motion& motion = plan.experiment().motion();
   const RobotParameters parameters(plan);
@@ -95,6 +118,10 @@ DriveModel::DriveModel(const RunPlan& plan)
   const double top_any = std::max(top_straight, top_turn) + top_bias;
   const double widest = std::max(1.0, 2 * magnitude(lever));
   top_speed_mm_s_ = top_nominal + top_bias * widest + kTopNormal * factor_sd_ * top_any * widest;
+  if (effects_.empty()) return;
+  limits_ = effects_.limits(top_any * (1 + kTopNormal * factor_sd_));
+  // A drift has two axes, and is a little faster in sub-steps that turn.
+  top_speed_mm_s_ += limits_.wheel_mm_s * widest + limits_.sideways_mm_s + 1.5 * limits_.drift_mm_s;
 }
 
 void DriveModel::make_curves(const proto::Motion& motion, const RobotParameters& parameters) {
@@ -103,7 +130,7 @@ void DriveModel::make_curves(const proto::Motion& motion, const RobotParameters&
     const auto [entry, is_new] = known.try_emplace({turn, calibrated}, static_cast<std::uint16_t>(curves_.size()));
     if (is_new) {
       Curve& curve = curves_.emplace_back();
-      for (std::size_t duty = std::size_t{dead_band_duty_} + 1; duty < 256; ++duty) {
+      for (std::size_t duty = std::size_t{motors_.dead_band_duty()} + 1; duty < 256; ++duty) {
         const double slope = motion.duty_slope(), of_calibrated = static_cast<double>(duty) / calibrated;
         const double ratio = slope * of_calibrated + (1 - slope);
         curve[duty] = (turn ? motion.turn_speed_mm_s() : motion.straight_speed_mm_s()) *
@@ -123,7 +150,7 @@ void DriveModel::make_curves(const proto::Motion& motion, const RobotParameters&
 DriveModel::Speeds DriveModel::kicked(std::uint32_t robot, Duties duties) const {
   const Curves& curves = curves_of_[robot];
   const WheelBias& bias = bias_[robot];
-  const double kick = kick_part_, after = (duties.left | duties.right) != 0 ? 1 - kick_part_ : 0;
+  const double kick = motors_.kick_part(), after = (duties.left | duties.right) != 0 ? 1 - kick : 0;
   const Speeds full = nominal(curves, 255, 255), set = nominal(curves, duties.left, duties.right);
   return {kick * (full.left_mm_s + bias.left_mm_s) + after * (set.left_mm_s + bias.left_mm_s),
           kick * (full.right_mm_s + bias.right_mm_s) + after * (set.right_mm_s + bias.right_mm_s)};
@@ -143,6 +170,7 @@ void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Ti
     left *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 0);
     right *= 1 + factor_sd_ * random_.normal(Stream::kWheelFactor, robot, from, 1);
   }
+  if (!duties.any()) left = right = 0;
   const std::size_t n = drives.count++;
   drives.body[n] = body;
   drives.left_mm_s[n] = left;
@@ -151,7 +179,30 @@ void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Ti
   drives.part[n] = part;
 }
 
+void DriveModel::change(Drives& drives, Tick from, const RobotColumns& known, const ArenaFields* fields) {
+  const std::size_t count = drives.count;
+  MotionChanges& changes = drives.changes;
+  effects_.evaluate(from, known, std::span(drives.body).first(count), fields, changes);
+  const auto within = [](double v, double limit) { return std::clamp(v, -limit, limit); };
+  for (std::size_t i = 0; i < count; ++i) {
+    double& left = drives.left_mm_s[i];
+    double& right = drives.right_mm_s[i];
+    left += within(left * (changes.left_gain[i] - 1) + changes.left_mm_s[i], limits_.wheel_mm_s);
+    right += within(right * (changes.right_gain[i] - 1) + changes.right_mm_s[i], limits_.wheel_mm_s);
+  }
+  if (!effects_.drift()) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    changes.sideways_mm_s[i] = within(changes.sideways_mm_s[i], limits_.sideways_mm_s);
+    changes.drift_x_mm_s[i] = within(changes.drift_x_mm_s[i], limits_.drift_mm_s);
+    changes.drift_y_mm_s[i] = within(changes.drift_y_mm_s[i], limits_.drift_mm_s);
+  }
+}
+
 void DriveModel::integrate(Drives& drives) const {
+  effects_.drift() ? integrate<true>(drives) : integrate<false>(drives);
+}
+
+template <bool kDrift> void DriveModel::integrate(Drives& drives) const {
   const std::size_t count = drives.count;
   const double* __restrict__ left = drives.left_mm_s.data();
   const double* __restrict__ right = drives.right_mm_s.data();
@@ -168,22 +219,39 @@ void DriveModel::integrate(Drives& drives) const {
   const auto drive = [&](std::size_t i, const Arc& arc) {
     x[i] = c[i] * arc.forward_mm - s[i] * arc.sideways_mm;
     y[i] = s[i] * arc.forward_mm + c[i] * arc.sideways_mm;
+    if constexpr (kDrift) {
+      double drift_x = drives.changes.drift_x_mm_s[i] * tick_s_, drift_y = drives.changes.drift_y_mm_s[i] * tick_s_;
+      unturn(turn[i], part[i], drift_x, drift_y);
+      x[i] += drift_x;
+      y[i] += drift_y;
+    }
     c[i] = arc.cos_turn;
     s[i] = arc.sin_turn;
   };
   const auto run_mm = [&](std::size_t i) { return (left[i] + right[i]) * half_tick_s * part[i]; };
+  const auto arc_by = [&](TurnSeries series, std::size_t i, double turn_rad) {
+    if constexpr (kDrift) {
+      const double sideways_mm = drives.changes.sideways_mm_s[i] * tick_s_ * part[i];
+      return arc_from(series, run_mm(i), sideways_mm, turn_rad, offset_mm);
+    } else {
+      return arc_from(series, run_mm(i), turn_rad, offset_mm);
+    }
+  };
   int any_large = 0;
   for (std::size_t i = 0; i < count; ++i) {
     turn[i] = (right[i] - left[i]) * turn_per_speed;
     any_large |= !is_small(turn[i]);
   }
   if (any_large != 0) {
-    for (std::size_t i = 0; i < count; ++i) drive(i, arc_of(run_mm(i), turn[i] * part[i], offset_mm));
+    for (std::size_t i = 0; i < count; ++i) {
+      const double t = turn[i] * part[i];
+      drive(i, arc_by(is_small(t) ? series_of(t * t) : large_turn(t), i, t));
+    }
     return;
   }
   for (std::size_t i = 0; i < count; ++i) {
     const double t = turn[i] * part[i];
-    drive(i, arc_from(series_of(t * t), run_mm(i), t, offset_mm));
+    drive(i, arc_by(series_of(t * t), i, t));
   }
 }
 

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "core/base/time.hpp"
+#include "core/effects/motion_effects.hpp"
+#include "core/effects/robots.hpp"
 #include "core/experiment/plan.hpp"
 #include "core/model/robot_parameters.hpp"
 #include "core/random/random.hpp"
@@ -22,14 +24,6 @@ struct Arc {
 /// ahead of it.
 [[nodiscard]] Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm);
 
-/// What turns a robot's motors in a tick; see DriveModel::acting.
-struct Duties {
-  std::uint8_t left = 0, right = 0;
-  std::uint8_t spin_up = 0;  ///< 1: both run at full duty before
-
-  [[nodiscard]] bool any() const { return (left | right | spin_up) != 0; }
-};
-
 /// Driven robots of one tick, structure of arrays, ascending. Kept between ticks for its memory alone.
 struct Drives {
   std::vector<std::uint32_t> body;            ///< index of the body
@@ -39,6 +33,7 @@ struct Drives {
   std::vector<double> x_mm, y_mm;             ///< displacement of the centre, if nothing is in the way
   std::vector<double> cos_turn, sin_turn;
   std::vector<double> turn_rad;  ///< over the whole tick
+  MotionChanges changes;         ///< by effects; where the model has any
   std::size_t count = 0;
 
   void reserve(std::size_t bodies);
@@ -50,15 +45,16 @@ class DriveModel {
  public:
   explicit DriveModel(const RunPlan&);
 
-  /// What of a program's duties turns a motor: none in the dead band, and no kick where the model has none.
-  [[nodiscard]] Duties acting(std::uint8_t left, std::uint8_t right, std::uint8_t spin_up) const {
-    return {left > dead_band_duty_ ? left : std::uint8_t{0}, right > dead_band_duty_ ? right : std::uint8_t{0},
-            kick_part_ > 0 ? spin_up : std::uint8_t{0}};
-  }
+  /// Which of a program's duties turn a motor.
+  [[nodiscard]] const MotorRule& motors() const { return motors_; }
+  [[nodiscard]] const MotionEffects& effects() const { return effects_; }
 
-  /// Adds a robot to the drives; its duties are acting and not all 0. The left motor drives the right-hand wheel.
+  /// Adds a robot to the drives; its duties are acting. The left motor drives the right-hand wheel.
   void add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, Duties, double heading_rad,
            double part) const;
+  /// Applies the model's effects, which must not be empty(); `known` are the bodies that Drives::body counts. See
+  /// Covariates::fill for whom they hold, and for `fields`.
+  void change(Drives&, Tick from, const RobotColumns& known, const ArenaFields* fields);
   /// Fills what follows from the wheels' speeds and the headings.
   void integrate(Drives&) const;
 
@@ -84,11 +80,13 @@ class DriveModel {
     return {curves_[of.turn_right][right], curves_[of.turn_left][left]};
   }
   [[nodiscard]] Speeds kicked(std::uint32_t robot, Duties) const;
+  template <bool kDrift> void integrate(Drives&) const;
 
   Random random_;
   double tick_s_, wheel_base_mm_, axle_offset_mm_;
-  std::uint8_t dead_band_duty_;
-  double kick_part_;      ///< of a tick, for which a kick lasts
+  MotorRule motors_;
+  MotionEffects effects_;
+  MotionEffects::Limits limits_;
   double factor_sd_ = 0;  ///< of f in one tick; 0: f = 1
   std::vector<Curve> curves_;
   std::vector<Curves> curves_of_;  ///< per robot

@@ -20,12 +20,15 @@ std::unique_ptr<Engine> make_engine(const RunPlan& plan, PartitionId partition) 
 
 double ghost_margin_mm(const RunPlan& plan) {
   const DriveModel drive(plan);
-  switch (plan.experiment().physics().engine()) {
-    case proto::Physics::PLANAR: return ContactLimits(plan, drive).margin_mm;
-    case proto::Physics::KINEMATIC: return KinematicEngine::margin_mm(plan, drive);
-    case proto::Physics::ODE: return OdeLimits(plan, drive).margin_mm;
-  }
-  throw UserError("physics.engine: unknown engine; PLANAR, KINEMATIC or ODE would be right");
+  const auto reach_mm = [&] {
+    switch (plan.experiment().physics().engine()) {
+      case proto::Physics::PLANAR: return ContactLimits(plan, drive).margin_mm;
+      case proto::Physics::KINEMATIC: return KinematicEngine::margin_mm(plan, drive);
+      case proto::Physics::ODE: return OdeLimits(plan, drive).margin_mm;
+    }
+    throw UserError("physics.engine: unknown engine; PLANAR, KINEMATIC or ODE would be right");
+  };
+  return Population::margin_mm(plan, drive, reach_mm());
 }
 
 }  // namespace kilotwin::physics

@@ -20,13 +20,14 @@ void KinematicEngine::move(Tick from, const Inputs&) {
   Bodies& known = population_.known();
   const std::vector<std::uint8_t>& own = population_.own();
   const std::vector<Duties>& duties = population_.duties();
+  const std::vector<std::uint8_t>& driven = population_.driven();
   drives_.reserve(known.size());
   drives_.count = 0;
   for (std::uint32_t i = 0; i < known.size(); ++i) {
-    if (!duties[i].any() || (!own.empty() && own[i] == 0)) continue;
+    if (driven[i] == 0 || (!own.empty() && own[i] == 0)) continue;
     population_.drive().add(drives_, i, known.robot[i], from, duties[i], known.heading_rad[i], 1);
   }
-  population_.drive().integrate(drives_);
+  population_.complete(from, drives_);
   for (std::size_t d = 0; d < drives_.count; ++d) {
     const std::uint32_t i = drives_.body[d];
     known.x_mm[i] = std::clamp(known.x_mm[i] + drives_.x_mm[d], -x_limit_mm_, x_limit_mm_);

@@ -224,16 +224,17 @@ void OdeEngine::place_bodies() {
 void OdeEngine::set_off(Tick from) {
   const Bodies& known = population_.known();
   const std::vector<Duties>& duties = population_.duties();
+  const std::vector<std::uint8_t>& driven = population_.driven();
   drives_.reserve(known.size());
   drives_.count = 0;
   drive_of_.assign(now_.size(), kNone);
   for (std::uint32_t i = 0; i < known.size(); ++i) {
-    if (!duties[i].any() || stands_[i] != 0) continue;
+    if (driven[i] == 0 || stands_[i] != 0) continue;
     drive_of_[i] = static_cast<std::uint32_t>(drives_.count);
     population_.drive().add(drives_, i, known.robot[i], from, duties[i], known.heading_rad[i],
                             1.0 / limits_.sub_steps);
   }
-  population_.drive().integrate(drives_);
+  population_.complete(from, drives_);
 }
 
 void OdeEngine::find_near() {
@@ -387,16 +388,17 @@ void OdeEngine::keep(std::uint32_t i) {
 
 void OdeEngine::add_movables(BodyFrame& frame) const {
   frame.movable.clear();
+  auto& [body, x_mm, y_mm, heading_rad, velocity_x, velocity_y, turn] = frame.movable;
   for (std::uint32_t m = 0; m < movable_.size(); ++m) {
     if (listed_movable_[m] == 0) continue;
     const RigidState& state = movable_states_[m];
-    frame.movable.body.push_back(m);
-    frame.movable.x_mm.push_back(state.position_mm[0]);
-    frame.movable.y_mm.push_back(state.position_mm[1]);
-    frame.movable.heading_rad.push_back(heading_of(state));
-    frame.movable.vx_mm_s.push_back(state.velocity_mm_s[0]);
-    frame.movable.vy_mm_s.push_back(state.velocity_mm_s[1]);
-    frame.movable.turn_rad_s.push_back(state.spin_rad_s[2]);
+    body.push_back(m);
+    x_mm.push_back(state.position_mm[0]);
+    y_mm.push_back(state.position_mm[1]);
+    heading_rad.push_back(heading_of(state));
+    velocity_x.push_back(state.velocity_mm_s[0] * limits_.sub_step_s);
+    velocity_y.push_back(state.velocity_mm_s[1] * limits_.sub_step_s);
+    turn.push_back(state.spin_rad_s[2] * limits_.sub_step_s);
   }
 }
 
@@ -411,10 +413,10 @@ void OdeEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   const Rectangle& rectangle = grid_.rectangle(neighbour);
   const Bodies& listed = population_.listed();
   // Others' movable bodies are where they were a tick ago.
-  const double margin_mm = limits_.margin_mm + (movable_.empty() ? 0 : limits_.reach_mm);
+  const double margin_mm = population_.ghost_margin_mm() + (movable_.empty() ? 0 : limits_.reach_mm);
   for (std::size_t i = 0; i < listed.size(); ++i) {
     if (listed.tracked[i] == 0 && distance_mm(rectangle, listed.x_mm[i], listed.y_mm[i]) <= margin_mm)
-      frame.add(listed.robot[i], listed.x_mm[i], listed.y_mm[i], listed.heading_rad[i]);
+      population_.add_ghost(i, frame);
   }
   add_movables(frame);
   frame.spatial.resize((frame.robot.size() + frame.movable.body.size()) * BodyFrame::kSpatialColumns);

@@ -16,7 +16,7 @@ PlanarEngine::PlanarEngine(const RunPlan& plan, PartitionId partition, const Dri
       grid_(plan.grid),
       rectangle_(plan.grid.rectangle(partition)),
       contact_(plan, drive) {
-  margin_mm_ = contact_.limits().margin_mm;
+  margin_mm_ = population_.ghost_margin_mm();
   slack_mm_ = 2 * contact_.limits().sub_steps * contact_.limits().stride_mm;
   for (const MovableBodyModel& body : plan.world.movables) reach_mm_.push_back(body.shape.reach_mm());
   own_movable_.resize(plan.movables());
@@ -62,7 +62,7 @@ void PlanarEngine::move(Tick from, const Inputs& inputs) {
   Bodies& known = population_.known();
   for (std::size_t m = 0; m < own_movable_.size(); ++m) own_movable_[m] = is_own(contact_.movables()[m]);
   listed_movable_ = own_movable_;
-  if (!contact_.find(known, population_.own(), own_movable_, population_.duties())) return;
+  if (!contact_.find(known, population_.own(), own_movable_, population_.driven())) return;
   set_off(from);
   contact_.move(known, drives_);
 }
@@ -70,14 +70,15 @@ void PlanarEngine::move(Tick from, const Inputs& inputs) {
 void PlanarEngine::set_off(Tick from) {
   const Bodies& known = population_.known();
   const std::vector<Duties>& duties = population_.duties();
+  const std::vector<std::uint8_t>& driven = population_.driven();
   const DriveModel& drive = population_.drive();
   drives_.reserve(known.size());
   drives_.count = 0;
   for (std::uint32_t i = 0; i < known.size(); ++i) {
-    if (!duties[i].any() || !contact_.asks_drive(i)) continue;
+    if (driven[i] == 0 || !contact_.asks_drive(i)) continue;
     drive.add(drives_, i, known.robot[i], from, duties[i], known.heading_rad[i], contact_.drive_part(i));
   }
-  drive.integrate(drives_);
+  population_.complete(from, drives_);
 }
 
 void PlanarEngine::add_movables(BodyFrame& frame) const {
@@ -135,8 +136,7 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
     };
     frame.clear();
     for (std::size_t i = 0; i < listed.size(); ++i) {
-      if (listed.tracked[i] == 0 && wanted(listed.x_mm[i], listed.y_mm[i]))
-        frame.add(listed.robot[i], listed.x_mm[i], listed.y_mm[i], listed.heading_rad[i]);
+      if (listed.tracked[i] == 0 && wanted(listed.x_mm[i], listed.y_mm[i])) population_.add_ghost(i, frame);
     }
   }
   add_movables(frame);

@@ -8,15 +8,22 @@
 
 namespace kilotwin::physics {
 
-Population::Population(const RunPlan& plan, PartitionId partition, DriveModel drive, double margin_mm)
+double Population::margin_mm(const RunPlan& plan, const DriveModel& drive, double reach_mm) {
+  return reach_mm + std::max(drive.effects().radius_mm(), ArenaFields::margin_mm(plan));
+}
+
+Population::Population(const RunPlan& plan, PartitionId partition, DriveModel drive, double reach_mm)
     : drive_(std::move(drive)),
+      memory_(plan),
+      fields_(plan, partition, margin_mm(plan, drive_, reach_mm)),
       grid_(plan.grid),
       rectangle_(plan.grid.rectangle(partition)),
-      margin_mm_(margin_mm),
+      margin_mm_(margin_mm(plan, drive_, reach_mm)),
       robots_(plan.robots()),
       // All partitions know all movable bodies.
-      neighbours_(plan.grid.neighbours(partition, plan.movables() > 0 ? 1e300 : margin_mm)),
+      neighbours_(plan.grid.neighbours(partition, plan.movables() > 0 ? 1e300 : margin_mm_)),
       merge_(robots_) {
+  for (Bodies* const bodies : {&listed_, &tracked_, &known_, &previous_}) bodies->remembered = memory_.size();
   for (std::uint32_t robot = 0; robot < robots_; ++robot) {
     const Pose pose = plan.initial_pose(robot);
     const double x = pose.position_mm.x(), y = pose.position_mm.y(), heading = wrapped(pose.heading_rad);
@@ -25,8 +32,11 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
       is_tracked_.resize(robots_, 0);
       is_tracked_[robot] = 1;
       tracked_.add(robot, x, y, heading, 1, 1);
+      memory_.start(robot, tracked_.memory_of(tracked_.size() - 1));
     }
-    if (is_own(x, y)) listed_.add(robot, x, y, heading, tracked, 1);
+    if (!is_own(x, y)) continue;
+    listed_.add(robot, x, y, heading, tracked, 1);
+    memory_.start(robot, listed_.memory_of(listed_.size() - 1));
   }
 }
 
@@ -36,6 +46,33 @@ void Population::begin(Tick from, const Inputs& inputs) {
   for (const BodyFrame* frame : inputs.ghosts) KILOTWIN_DEMAND(frame->tick == from);
   gather(inputs.ghosts);
   read_motors(from, inputs.actuation);
+  driven_.resize(known_.size());
+  const bool act_at_rest = drive_.effects().act_at_rest();
+  for (std::size_t i = 0; i < known_.size(); ++i)
+    driven_[i] = static_cast<std::uint8_t>(duties_[i].any() || (act_at_rest && known_.tracked[i] == 0));
+  if (memory_.size() == 0 && !fields_.any()) return;
+  x_mm_ = known_.x_mm;
+  y_mm_ = known_.y_mm;
+  heading_rad_ = known_.heading_rad;
+}
+
+RobotColumns Population::known_columns() const {
+  return {known_.robot, x_mm_, y_mm_, heading_rad_, known_.memory, duties_, known_.tracked};
+}
+
+void Population::complete(Tick from, Drives& drives) {
+  if (!drive_.effects().empty()) {
+    const RobotColumns known{known_.robot,  known_.x_mm, known_.y_mm,   known_.heading_rad,
+                             known_.memory, duties_,     known_.tracked};
+    drive_.change(drives, from, known, &fields_);
+  }
+  drive_.integrate(drives);
+}
+
+void Population::remember() {
+  const RobotColumns before = known_columns();
+  fields_.count(tick_, before, known_.memory);
+  memory_.advance(tick_, before, known_.x_mm, known_.y_mm, known_.heading_rad, known_.memory);
 }
 
 void Population::take_tracked(std::span<const TrackedPoseInput> inputs) {
@@ -89,6 +126,8 @@ void Population::gather(std::span<const BodyFrame* const> ghosts) {
       known_.heading_rad[n] = frame.heading_rad[from.index];
       known_.tracked[n] = 0;
       known_.awake[n] = !asleep;
+      const std::span<double> memory = known_.memory_of(n);
+      for (std::size_t m = 0; m < memory.size(); ++m) memory[m] = frame.memory[from.index * memory.size() + m];
     }
     ++n;
   });
@@ -111,12 +150,14 @@ void Population::read_motors(Tick from, std::span<const ActuationFrame* const> f
     for (; body < known_.size() && known_.robot[body] - first < size; ++body) {
       const std::uint32_t entry = known_.robot[body] - first;
       if (known_.tracked[body] != 0) continue;
-      duties_[body] = drive_.acting(frame->motor_left[entry], frame->motor_right[entry], frame->spin_up[entry]);
+      duties_[body] =
+          drive_.motors().acting(frame->motor_left[entry], frame->motor_right[entry], frame->spin_up[entry]);
     }
   }
 }
 
 void Population::end() {
+  if (memory_.size() > 0 || fields_.any()) remember();
   ++tick_;
   if (grid_.size() == 1) {
     listed_.swap(known_);
@@ -134,6 +175,7 @@ void Population::emit_bodies(BodyFrame& frame) const {
   frame.x_mm = listed_.x_mm;
   frame.y_mm = listed_.y_mm;
   frame.heading_rad = listed_.heading_rad;
+  frame.memory = listed_.memory;
 }
 
 void Population::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
@@ -147,17 +189,26 @@ void Population::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
         y < rectangle.y_min_mm - margin_mm_ || y > rectangle.y_max_mm + margin_mm_) {
       continue;
     }
-    if (listed_.tracked[i] == 0 && rectangle.distance_mm(x, y) <= margin_mm_) {
-      frame.add(listed_.robot[i], x, y, listed_.heading_rad[i]);
-    }
+    if (listed_.tracked[i] == 0 && rectangle.distance_mm(x, y) <= margin_mm_) add_ghost(i, frame);
   }
 }
 
+void Population::add_ghost(std::size_t listed, BodyFrame& frame) const {
+  frame.add(listed_.robot[listed], listed_.x_mm[listed], listed_.y_mm[listed], listed_.heading_rad[listed]);
+  const auto memory = listed_.memory.begin() + static_cast<std::ptrdiff_t>(listed * listed_.remembered);
+  frame.memory.insert(frame.memory.end(), memory, memory + static_cast<std::ptrdiff_t>(listed_.remembered));
+}
+
 std::uint64_t Population::hash_part() const {
-  std::uint64_t sum = 0;
+  std::uint64_t sum = fields_.hash_part();
   for (std::size_t i = 0; i < listed_.size(); ++i) {
     sum += entity_hash(HashDomain::kBody, listed_.robot[i],
                        {hash_bits(listed_.x_mm[i]), hash_bits(listed_.y_mm[i]), hash_bits(listed_.heading_rad[i])});
+  }
+  for (std::size_t i = 0, size = listed_.remembered; size > 0 && i < listed_.size(); ++i) {
+    HashState state(static_cast<std::uint64_t>(HashDomain::kMemory) << 32 | listed_.robot[i]);
+    for (std::size_t m = 0; m < size; ++m) state.add(hash_bits(listed_.memory[i * size + m]));
+    sum += state.finish();
   }
   return sum;
 }
@@ -169,15 +220,19 @@ void Population::save(proto::PhysicsState& state) const {
   state.mutable_x_mm()->Add(listed_.x_mm.begin(), listed_.x_mm.end());
   state.mutable_y_mm()->Add(listed_.y_mm.begin(), listed_.y_mm.end());
   state.mutable_heading_rad()->Add(listed_.heading_rad.begin(), listed_.heading_rad.end());
+  state.mutable_memory()->Add(listed_.memory.begin(), listed_.memory.end());
   KILOTWIN_DEMAND(state.robot_size() == size && state.heading_rad_size() == size);
+  fields_.save(state);
 }
 
 void Population::load(Tick tick, std::span<const proto::PhysicsState* const> parts) {
   Bodies all;
+  all.remembered = memory_.size();
   std::vector<std::uint8_t> seen(robots_, 0);
   for (const proto::PhysicsState* part : parts) {
     const int size = part->robot_size();
-    if (part->x_mm_size() != size || part->y_mm_size() != size || part->heading_rad_size() != size)
+    if (part->x_mm_size() != size || part->y_mm_size() != size || part->heading_rad_size() != size ||
+        static_cast<std::size_t>(part->memory_size()) != static_cast<std::size_t>(size) * all.remembered)
       throw RunError("checkpoint: physics: columns of unequal length; the file is damaged");
     for (int i = 0; i < size; ++i) {
       const std::uint32_t robot = part->robot(i);
@@ -186,6 +241,9 @@ void Population::load(Tick tick, std::span<const proto::PhysicsState* const> par
         throw RunError("checkpoint: physics: robot " + std::to_string(robot) + " occurs twice");
       const bool tracked = !is_tracked_.empty() && is_tracked_[robot] != 0;
       all.add(robot, part->x_mm(i), part->y_mm(i), part->heading_rad(i), tracked, 1);
+      const std::span<double> memory = all.memory_of(all.size() - 1);
+      for (std::size_t m = 0; m < memory.size(); ++m)
+        memory[m] = part->memory(i * static_cast<int>(memory.size()) + static_cast<int>(m));
     }
   }
   if (all.size() != robots_) {
@@ -200,6 +258,7 @@ void Population::load(Tick tick, std::span<const proto::PhysicsState* const> par
     if (all.tracked[from.index] != 0) tracked_.add(all, from.index);
     if (is_own(all.x_mm[from.index], all.y_mm[from.index])) listed_.add(all, from.index);
   });
+  fields_.load(parts);
   tick_ = tick;
 }
 

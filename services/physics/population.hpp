@@ -4,7 +4,7 @@
 ///   begin(k): known = bodies listed at k + ghosts of k + tracked robots, within the margin of the rectangle
 ///             own   = those of the known whose pose at k lies in the rectangle
 ///   (the engine moves the own bodies among the known from k to k+1)
-///   end():    listed at k+1 = own
+///   end():    listed at k+1 = own; what the model's effects remember
 #pragma once
 
 #include <cstdint>
@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/effects/arena_fields.hpp"
+#include "core/effects/memory.hpp"
 #include "services/physics/bodies.hpp"
 #include "services/physics/drive.hpp"
 #include "services/physics/engine.hpp"
@@ -21,8 +23,11 @@ namespace kilotwin::physics {
 
 class Population {
  public:
-  /// `margin_mm`: as ghost_margin_mm(plan).
-  Population(const RunPlan&, PartitionId, DriveModel, double margin_mm);
+  /// `reach_mm`: how far from the rectangle a robot can be and still matter to own ones within a tick, effects aside.
+  Population(const RunPlan&, PartitionId, DriveModel, double reach_mm);
+
+  /// How far from the rectangle robots must be known, mm: those within reach look at others and at what places remember.
+  [[nodiscard]] static double margin_mm(const RunPlan&, const DriveModel&, double reach_mm);
 
   /// Applies tracked poses, gathers the known bodies and reads their motors. `from` must be the present tick.
   void begin(Tick from, const Inputs&);
@@ -36,7 +41,11 @@ class Population {
   [[nodiscard]] const std::vector<std::uint8_t>& own() const { return own_; }
   /// Per known body; 0 for tracked ones and those that no frame covers.
   [[nodiscard]] const std::vector<Duties>& duties() const { return duties_; }
+  /// Per known body, 1: it moves by itself.
+  [[nodiscard]] const std::vector<std::uint8_t>& driven() const { return driven_; }
   [[nodiscard]] const DriveModel& drive() const { return drive_; }
+  /// Drives, to which known bodies were added, with the model's effects and all that follows; exact for those within reach.
+  void complete(Tick from, Drives&);
 
   // At the present tick.
   [[nodiscard]] Tick tick() const { return tick_; }
@@ -44,6 +53,10 @@ class Population {
   [[nodiscard]] const std::vector<PartitionId>& neighbours() const { return neighbours_; }
   void emit_bodies(BodyFrame&) const;
   void emit_ghosts(PartitionId neighbour, BodyFrame&) const;
+  /// How far from a neighbour's rectangle robots are ghosts there, mm.
+  [[nodiscard]] double ghost_margin_mm() const { return margin_mm_; }
+  /// Adds a listed robot to a frame of ghosts.
+  void add_ghost(std::size_t listed, BodyFrame&) const;
   [[nodiscard]] std::uint64_t hash_part() const;
   void save(proto::PhysicsState&) const;
   void load(Tick, std::span<const proto::PhysicsState* const> parts);
@@ -53,8 +66,13 @@ class Population {
   void gather(std::span<const BodyFrame* const> ghosts);
   void read_motors(Tick from, std::span<const ActuationFrame* const>);
   [[nodiscard]] bool is_own(double x_mm, double y_mm) const { return rectangle_.contains(x_mm, y_mm); }
+  /// The known bodies at the start of the step.
+  [[nodiscard]] RobotColumns known_columns() const;
+  void remember();
 
   DriveModel drive_;
+  EffectMemory memory_;
+  ArenaFields fields_;
   PartitionGrid grid_;
   Rectangle rectangle_;
   double margin_mm_;
@@ -71,7 +89,10 @@ class Population {
   std::vector<std::uint8_t> own_;  ///< per known body, by its pose before the step; empty with one partition
   Merge merge_;
   std::vector<const ActuationFrame*> frames_;
-  std::vector<Duties> duties_;  ///< per known body
+  std::vector<Duties> duties_;        ///< per known body
+  std::vector<std::uint8_t> driven_;  ///< per known body
+  std::vector<double> x_mm_, y_mm_,
+      heading_rad_;  ///< per known body, before the step, where something is remembered
 };
 
 /// An engine over a population; what is left to do is to move it.
@@ -94,8 +115,9 @@ class PopulationEngine : public Engine {
   }
 
  protected:
-  PopulationEngine(const RunPlan& plan, PartitionId partition, DriveModel drive, double margin_mm)
-      : population_(plan, partition, std::move(drive), margin_mm) {}
+  /// `reach_mm`: as Population takes it.
+  PopulationEngine(const RunPlan& plan, PartitionId partition, DriveModel drive, double reach_mm)
+      : population_(plan, partition, std::move(drive), reach_mm) {}
   /// From tick `from` to the next: own bodies get their new poses; those of others may be left as they are.
   virtual void move(Tick from, const Inputs&) = 0;
 

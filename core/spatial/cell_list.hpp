@@ -4,9 +4,10 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
-namespace kilotwin::physics {
+namespace kilotwin {
 
 class CellList {
  public:
@@ -14,7 +15,7 @@ class CellList {
   explicit CellList(double cutoff_mm);
 
   /// Sorts the bodies; |x|, |y| below 10^7 mm are told apart, others share the outermost cells.
-  void build(const std::vector<double>& x_mm, const std::vector<double>& y_mm);
+  void build(std::span<const double> x_mm, std::span<const double> y_mm);
 
   /// Writes the bodies whose centre lies within the cutoff of (x, y), without `self`, in ascending order; returns their
   /// number. `found` grows as needed.
@@ -31,4 +32,4 @@ class CellList {
   std::vector<double> x_mm_, y_mm_;     ///< sorted
 };
 
-}  // namespace kilotwin::physics
+}  // namespace kilotwin

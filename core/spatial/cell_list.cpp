@@ -1,8 +1,8 @@
-#include "services/physics/cell_list.hpp"
+#include "core/spatial/cell_list.hpp"
 
 #include <algorithm>
 
-namespace kilotwin::physics {
+namespace kilotwin {
 namespace {
 
 /// Cells are this much larger than the cutoff, so that rounding of a coordinate cannot put two bodies within the cutoff two
@@ -22,7 +22,7 @@ inline std::uint32_t CellList::coordinate(double mm) const {
   return static_cast<std::uint32_t>(static_cast<std::int32_t>((clamped + kFar_mm) * cells_per_mm_));
 }
 
-void CellList::build(const std::vector<double>& x_mm, const std::vector<double>& y_mm) {
+void CellList::build(std::span<const double> x_mm, std::span<const double> y_mm) {
   const std::size_t count = x_mm.size();
   side_bits_ = 2;
   while ((std::size_t{1} << (2 * side_bits_)) < 2 * count) ++side_bits_;
@@ -84,4 +84,4 @@ std::size_t CellList::find(double x_mm, double y_mm, std::uint32_t self, std::ve
   return count;
 }
 
-}  // namespace kilotwin::physics
+}  // namespace kilotwin

@@ -1,0 +1,15 @@
+/// The model of a run as a file: what `run --model` reads to make the same robots move alike again.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "idl/manifest.pb.h"
+
+namespace kilotwin::cli {
+
+/// Writes the motion parameters, the effects and the parameters of every robot, drawn ones included. Returns the number of
+/// robots. Throws RunError where the file cannot be written.
+std::uint32_t export_model(const proto::Manifest&, const std::filesystem::path& file);
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,68 @@
+/// A function of an effect, compiled: numbers of its covariates in, values out.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <variant>
+
+#include "core/effects/spline.hpp"
+#include "idl/effects.pb.h"
+
+namespace kilotwin {
+
+/// Where a covariate can lie.
+struct Range {
+  double min, max;
+};
+
+class EffectFunction {
+ public:
+  /// The shape of a function that validation has passed. Noise counts as the constant sd.
+  explicit EffectFunction(const proto::Function&);
+
+  /// value[i] *= f(first[i]), or f(first[i], second[i]). Finite for finite covariates.
+  void multiply(std::span<const double> first, std::span<const double> second, std::span<double> value) const;
+  [[nodiscard]] double operator()(double first, double second = 0) const;
+  /// About the largest |f| over the ranges, never below by more than a few per cent.
+  [[nodiscard]] double largest(Range first, Range second) const;
+
+ private:
+  struct Constant {
+    double value;
+    double operator()(double, double) const { return value; }
+  };
+  struct Linear {
+    double at_zero, slope;
+    double operator()(double c, double) const { return at_zero + slope * c; }
+  };
+  struct Exponential {
+    double at_infinity, difference, rate;
+    double operator()(double c, double) const;
+  };
+  struct Harmonic {
+    double mean, cosine, sine, turns_rad;
+    double operator()(double c, double) const;
+  };
+  struct One {
+    Spline spline;
+    double operator()(double c, double) const { return spline(c); }
+  };
+  struct Steps {
+    std::vector<double> at, value;
+    double operator()(double c, double) const;
+  };
+  struct Table {
+    std::vector<double> value;
+    double otherwise;
+    double operator()(double c, double) const {
+      return c >= 0 && c < static_cast<double>(value.size()) ? value[static_cast<std::size_t>(c)] : otherwise;
+    }
+  };
+  using Shape = std::variant<Constant, Linear, Exponential, Harmonic, One, Spline2d, Steps, Table>;
+
+  static Shape shape_of(const proto::Function&);
+
+  Shape shape_;
+};
+
+}  // namespace kilotwin

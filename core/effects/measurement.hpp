@@ -1,0 +1,43 @@
+/// Effects on what is measured: poses as a camera tracker sees them. They never act on physics. A measured position is
+///   (p + body offsets) (1 + s1) (1 + s2)... + offsets,
+/// p being the disc's centre, s the scales; lengths mm, angles rad.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/effects/term.hpp"
+#include "core/federation/frames.hpp"
+
+namespace kilotwin {
+
+/// Of all robots, by id.
+struct MeasuredPoses {
+  std::vector<double> x_mm, y_mm, heading_rad;  ///< heading in [-pi, pi)
+};
+
+class Measurement {
+ public:
+  explicit Measurement(const RunPlan&);
+
+  /// False: what is measured is how things are.
+  [[nodiscard]] bool any() const { return !terms_.empty(); }
+  /// From the frames of all partitions and hosts at a tick. Real robots are seen by their own tracker and stay as they are.
+  void measure(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>, MeasuredPoses&);
+
+ private:
+  void gather(std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>);
+
+  const RunPlan& plan_;
+  MotorRule motors_;
+  TermList terms_;
+  // Of all robots, by id.
+  std::vector<std::uint32_t> robot_, who_;
+  std::vector<double> x_mm_, y_mm_, heading_rad_, memory_;
+  std::vector<Duties> duties_;
+  std::vector<std::uint8_t> tracked_;
+  // Per robot of who_.
+  std::vector<double> ahead_mm_, left_mm_, scale_, offset_x_mm_, offset_y_mm_, turn_rad_;
+};
+
+}  // namespace kilotwin

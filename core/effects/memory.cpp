@@ -1,0 +1,103 @@
+#include "core/effects/memory.hpp"
+
+#include <algorithm>
+
+#include "core/effects/term.hpp"
+#include "core/math/elementary.h"
+
+namespace kilotwin {
+namespace {
+
+std::uint32_t draw_of(const MemorySlot& slot) { return (slot.index * 8 + slot.function) * 2 + slot.wheel; }
+
+}  // namespace
+
+EffectMemory::EffectMemory(const RunPlan& plan)
+    : plan_(plan), random_(plan.seed()), tick_s_(plan.tick_length.seconds()), fades_(plan.memory.size()) {
+  const std::vector<MemorySlot>& slots = plan.memory.slots();
+  for (std::size_t s = 0; s < slots.size(); ++s) {
+    const MemorySlot& slot = slots[s];
+    notes_motion_ = notes_motion_ || (slot.kind >= Kind::kPreviousForward && slot.kind <= Kind::kPreviousTurn);
+    if (slot.kind == Kind::kNoise) {
+      const proto::Effect& effect = plan.experiment().effect(static_cast<int>(slot.index));
+      const double keep =
+          kt_exp(-tick_s_ / effect.function(static_cast<int>(slot.function)).noise().correlation_s());
+      fades_[s] = {keep, __builtin_sqrt(1 - keep * keep)};
+    } else if (slot.forget_s > 0) {
+      fades_[s].keep = kt_exp(-tick_s_ / slot.forget_s);
+    }
+  }
+}
+
+void EffectMemory::start(std::uint32_t robot, std::span<double> memory) const {
+  const std::vector<MemorySlot>& slots = plan_.memory.slots();
+  for (std::size_t s = 0; s < slots.size(); ++s) {
+    memory[s] = slots[s].kind == Kind::kFieldCell ? -1
+                : slots[s].kind == Kind::kNoise
+                    ? random_.normal(Stream::kCorrelatedNoise, robot, Tick{0}, draw_of(slots[s]))
+                    : 0;
+  }
+}
+
+void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<const double> x_mm,
+                           std::span<const double> y_mm, std::span<const double> heading_rad,
+                           std::span<double> memory) const {
+  const std::vector<MemorySlot>& slots = plan_.memory.slots();
+  const std::size_t stride = slots.size(), count = robots.size();
+  const auto each = [&](std::size_t s, auto&& next) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (robots.tracked[i] == 0) memory[i * stride + s] = next(i, memory[i * stride + s]);
+    }
+  };
+  const auto lasts = [&](std::size_t s, auto&& on) {
+    each(s, [&, keep = fades_[s].keep](std::size_t i, double was) {
+      return was * keep + (on(robots.duties[i]) ? tick_s_ : 0);
+    });
+  };
+  for (std::size_t s = 0; s < stride; ++s) {
+    switch (slots[s].kind) {
+      case Kind::kCommand: {
+        // The time that belongs to it has to see the command before.
+        const std::uint32_t time = plan_.memory.index_of({Kind::kTimeSinceCommand});
+        each(s, [&](std::size_t i, double was) {
+          const double command = static_cast<double>(command_of(robots.duties[i]));
+          double& since_s = memory[i * stride + time];
+          since_s = (was == command ? since_s : 0) + tick_s_;
+          return command;
+        });
+        break;
+      }
+      case Kind::kLeftMotorTime: lasts(s, [](Duties d) { return d.left != 0 || d.spin_up != 0; }); break;
+      case Kind::kRightMotorTime: lasts(s, [](Duties d) { return d.right != 0 || d.spin_up != 0; }); break;
+      case Kind::kDrivenTime: lasts(s, [](Duties d) { return d.any(); }); break;
+      case Kind::kNoise:
+        each(s, [&, fade = fades_[s]](std::size_t i, double was) {
+          const double next =
+              fade.keep * was +
+              fade.renew * random_.normal(Stream::kCorrelatedNoise, robots.robot[i], from + 1, draw_of(slots[s]));
+          return std::clamp(next, -kTopNormal, kTopNormal);
+        });
+        break;
+      case Kind::kTimeSinceCommand:  // with the command
+      case Kind::kPreviousForward:
+      case Kind::kPreviousSideways:
+      case Kind::kPreviousTurn:      // below
+      case Kind::kFieldCell: break;  // ArenaFields::count
+    }
+  }
+  if (!notes_motion_) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (robots.tracked[i] != 0) continue;
+    double s, c;
+    kt_sincos(robots.heading_rad[i], &s, &c);
+    const double dx = (x_mm[i] - robots.x_mm[i]) / tick_s_, dy = (y_mm[i] - robots.y_mm[i]) / tick_s_;
+    for (std::size_t m = 0; m < stride; ++m) {
+      double& value = memory[i * stride + m];
+      if (slots[m].kind == Kind::kPreviousForward) value = c * dx + s * dy;
+      if (slots[m].kind == Kind::kPreviousSideways) value = c * dy - s * dx;
+      if (slots[m].kind == Kind::kPreviousTurn) value = wrapped(heading_rad[i] - robots.heading_rad[i]) / tick_s_;
+    }
+  }
+}
+
+}  // namespace kilotwin

@@ -1,0 +1,93 @@
+#include "core/effects/motion_effects.hpp"
+
+#include <algorithm>
+
+namespace kilotwin {
+
+using proto::Effect;
+
+namespace {
+
+double magnitude(double v) { return v < 0 ? -v : v; }
+
+}  // namespace
+
+MotionEffects::MotionEffects(const RunPlan& plan)
+    : terms_(plan, TermList::Of::kMotion),
+      half_base_mm_(plan.experiment().motion().wheel_base_mm() / 2),
+      limit_mm_s_(plan.experiment().motion().effects_limit_mm_s()) {
+  for (const Term& term : terms_.terms()) {
+    act_at_rest_ = act_at_rest_ || (term.commands & 1u << proto::STOP) != 0;
+    drift_ = drift_ || term.target == Effect::WORLD_DRIFT || term.target == Effect::BODY_DRIFT;
+  }
+}
+
+MotionEffects::Limits MotionEffects::limits(double top_wheel_mm_s) const {
+  double gain = 1;
+  Limits limits;
+  for (const Term& term : terms_.terms()) {
+    const double largest = terms_.largest(term);
+    switch (term.target) {
+      case Effect::WHEEL_GAIN: gain *= 1 + largest; break;
+      case Effect::WHEEL_OFFSET: limits.wheel_mm_s += largest; break;
+      case Effect::TURN_RATE: limits.wheel_mm_s += largest * half_base_mm_; break;
+      case Effect::BODY_DRIFT:
+        limits.wheel_mm_s += largest * magnitude(term.along);
+        limits.sideways_mm_s += largest * magnitude(term.across);
+        break;
+      case Effect::WORLD_DRIFT:
+        limits.drift_mm_s += largest * std::max(magnitude(term.along), magnitude(term.across));
+        break;
+      default: break;
+    }
+  }
+  limits.wheel_mm_s += (gain - 1) * top_wheel_mm_s;
+  // What was estimated may be a little too small; what it limits is rarely as large.
+  constexpr double kRoom = 1.05;
+  for (double* const limit : {&limits.wheel_mm_s, &limits.sideways_mm_s, &limits.drift_mm_s})
+    *limit = std::min(*limit * kRoom, limit_mm_s_);
+  return limits;
+}
+
+void MotionEffects::evaluate(Tick from, const RobotColumns& robots, std::span<const std::uint32_t> who,
+                             const ArenaFields* fields, MotionChanges& changes) {
+  const std::size_t count = who.size();
+  for (auto* const ones : {&changes.left_gain, &changes.right_gain}) ones->assign(count, 1);
+  for (auto* const zeros : {&changes.left_mm_s, &changes.right_mm_s, &changes.sideways_mm_s, &changes.drift_x_mm_s,
+                            &changes.drift_y_mm_s}) {
+    zeros->assign(count, 0);
+  }
+  const auto add = [count](std::vector<double>& to, std::span<const double> values, double factor) {
+    for (std::size_t i = 0; i < count; ++i) to[i] += factor * values[i];
+  };
+  terms_.evaluate(from, robots, who, fields, [&](const Term& term, std::span<const double> values) {
+    switch (term.target) {
+      case Effect::WHEEL_GAIN:
+        for (std::size_t i = 0; i < count; ++i) {
+          if (term.left) changes.left_gain[i] *= 1 + values[i];
+          if (term.right) changes.right_gain[i] *= 1 + values[i];
+        }
+        break;
+      case Effect::WHEEL_OFFSET:
+        if (term.left) add(changes.left_mm_s, values, 1);
+        if (term.right) add(changes.right_mm_s, values, 1);
+        break;
+      case Effect::TURN_RATE:
+        add(changes.left_mm_s, values, -half_base_mm_);
+        add(changes.right_mm_s, values, half_base_mm_);
+        break;
+      case Effect::BODY_DRIFT:
+        add(changes.left_mm_s, values, term.along);
+        add(changes.right_mm_s, values, term.along);
+        add(changes.sideways_mm_s, values, term.across);
+        break;
+      case Effect::WORLD_DRIFT:
+        add(changes.drift_x_mm_s, values, term.along);
+        add(changes.drift_y_mm_s, values, term.across);
+        break;
+      default: break;
+    }
+  });
+}
+
+}  // namespace kilotwin

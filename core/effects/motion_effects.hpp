@@ -1,0 +1,47 @@
+/// Effects on motion: what they add to the wheels' speeds and to the motion of the body.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/effects/term.hpp"
+
+namespace kilotwin {
+
+/// Per robot, structure of arrays.
+struct MotionChanges {
+  std::vector<double> left_gain, right_gain;       ///< factor on a wheel's speed
+  std::vector<double> left_mm_s, right_mm_s;       ///< added to a wheel's speed
+  std::vector<double> sideways_mm_s;               ///< to the left of the heading
+  std::vector<double> drift_x_mm_s, drift_y_mm_s;  ///< in the arena
+};
+
+class MotionEffects {
+ public:
+  explicit MotionEffects(const RunPlan&);
+
+  [[nodiscard]] bool empty() const { return terms_.empty(); }
+  /// Whether some move robots whose motors are off.
+  [[nodiscard]] bool act_at_rest() const { return act_at_rest_; }
+  [[nodiscard]] bool drift() const { return drift_; }
+  /// How far away robots count, mm.
+  [[nodiscard]] double radius_mm() const { return terms_.covariates().radius_mm(); }
+
+  /// No larger change is ever made: to a wheel's speed, to the sideways speed, to the drift along an axis, mm/s.
+  struct Limits {
+    double wheel_mm_s = 0, sideways_mm_s = 0, drift_mm_s = 0;
+  };
+  /// Where no wheel is driven faster than this before effects.
+  [[nodiscard]] Limits limits(double top_wheel_mm_s) const;
+
+  /// Changes of the robots robots[who[i]]; see Covariates::fill for `robots` and `fields`.
+  void evaluate(Tick from, const RobotColumns& robots, std::span<const std::uint32_t> who,
+                const ArenaFields* fields, MotionChanges&);
+
+ private:
+  TermList terms_;
+  double half_base_mm_, limit_mm_s_;
+  bool act_at_rest_ = false, drift_ = false;
+};
+
+}  // namespace kilotwin

@@ -1,0 +1,55 @@
+/// What effects look at: robots at one instant.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/experiment/plan.hpp"
+
+namespace kilotwin {
+
+/// What turns a robot's motors in a tick. The left motor drives the right-hand wheel.
+struct Duties {
+  std::uint8_t left = 0, right = 0;
+  std::uint8_t spin_up = 0;  ///< 1: both run at full duty before
+
+  [[nodiscard]] bool any() const { return (left | right | spin_up) != 0; }
+};
+
+/// Which of a program's duties turn a motor: none in the dead band, and no kick where the model has none.
+class MotorRule {
+ public:
+  explicit MotorRule(const RunPlan&);
+
+  [[nodiscard]] Duties acting(std::uint8_t left, std::uint8_t right, std::uint8_t spin_up) const {
+    return {left > dead_band_duty_ ? left : std::uint8_t{0}, right > dead_band_duty_ ? right : std::uint8_t{0},
+            kick_part_ > 0 ? spin_up : std::uint8_t{0}};
+  }
+  [[nodiscard]] std::uint8_t dead_band_duty() const { return dead_band_duty_; }
+  /// Of a tick, for which a kick lasts.
+  [[nodiscard]] double kick_part() const { return kick_part_; }
+
+ private:
+  std::uint8_t dead_band_duty_;
+  double kick_part_;
+};
+
+/// As its motors show; a kick alone counts as STRAIGHT.
+[[nodiscard]] inline proto::Command command_of(Duties duties) {
+  if (duties.left != 0) return duties.right != 0 ? proto::STRAIGHT : proto::LEFT;
+  if (duties.right != 0) return proto::RIGHT;
+  return duties.spin_up != 0 ? proto::STRAIGHT : proto::STOP;
+}
+
+/// Robots at one instant, structure of arrays, ascending ids: a view of somebody's columns, all of one length.
+struct RobotColumns {
+  std::span<const std::uint32_t> robot;
+  std::span<const double> x_mm, y_mm, heading_rad;
+  std::span<const double> memory;         ///< RunPlan::memory.size() per robot
+  std::span<const Duties> duties;         ///< acting in the coming tick; 0 of real robots
+  std::span<const std::uint8_t> tracked;  ///< 1: a real robot, on which no effect acts
+
+  [[nodiscard]] std::size_t size() const { return robot.size(); }
+};
+
+}  // namespace kilotwin
