@@ -4,7 +4,7 @@
 #include <kilolib.h>
 
 /* kilo_ticks last 32.768 ms. */
-#define SECONDS(s) ((uint32_t)((s) * 1000000UL / 32768))
+#define SECONDS(s) ((uint32_t)((s)*1000000UL / 32768))
 #define STRAIGHT_TICKS SECONDS(10)
 #define LONGEST_TURN_TICKS SECONDS(4)
 

@@ -24,8 +24,8 @@ fs::path folder() {
   return fs::temp_directory_path() / fmt::format("kilotwin-firmware-figures-{}", getpid()) / std::to_string(runs++);
 }
 
-std::string experiment(const std::string& program, bool avr, std::uint32_t robots, double duration_s, double pitch_mm,
-                       double oscillator_sd) {
+std::string experiment(const std::string& program, bool avr, std::uint32_t robots, double duration_s,
+                       double pitch_mm, double oscillator_sd) {
   return fmt::format(
       "duration_s: {} seed: 1 arena {{ width_mm: 4000 height_mm: 4000 }} motion {{ noise: false }}\n"
       "radio {{ oscillator_sd: {} range_mm: 400 }} recording {{ messages: true }}\n"
@@ -35,9 +35,10 @@ std::string experiment(const std::string& program, bool avr, std::uint32_t robot
 
 int show_agreement() {
   int status = 0;
-  fmt::print("{:<14}{:>22}{:>22}{:>18}\n", "program", "motors: same/changes", "LED: same/changes", "sent, received");
+  fmt::print("{:<14}{:>22}{:>22}{:>18}\n", "program", "motors: same/changes", "LED: same/changes",
+             "sent, received");
   for (const std::string name : {"behaviours/blink.c", "behaviours/walk.c", "behaviours/delay_walk.c",
-                                  "behaviours/straight.c", "bench/firmware/talker.c", "bench/firmware/ranger.c"}) {
+                                 "behaviours/straight.c", "bench/firmware/talker.c", "bench/firmware/ranger.c"}) {
     const auto run = [&](bool avr) {
       return run_timeline(experiment(kSource + "/" + name, avr, 2, 120, 300, 0), folder(), 2);
     };
@@ -45,7 +46,8 @@ int show_agreement() {
     const std::int64_t end = native.totals.last.count();
     const Agreement motors = agreement(native.motors, firmware.motors, end);
     const Agreement led = agreement(native.led, firmware.led, end);
-    const bool messages = native.totals.sent == firmware.totals.sent && native.totals.received == firmware.totals.received;
+    const bool messages =
+        native.totals.sent == firmware.totals.sent && native.totals.received == firmware.totals.received;
     fmt::print("{:<14}{:>22}{:>22}{:>18}\n", fs::path(name).stem().string(),
                fmt::format("{}/{},{}", motors.same, motors.first, motors.second),
                fmt::format("{}/{},{}", led.same, led.first, led.second),
@@ -77,8 +79,9 @@ int show_contention() {
   std::vector<double> sent[2], received[2];
   for (const int avr : {0, 1}) {
     for (int seed = 1; seed <= 4; ++seed) {
-      const Timeline timeline = run_timeline(experiment(kSource + "/bench/firmware/still.c", avr != 0, kRobots, 60, 40, 0.005),
-                                             folder(), 2, {fmt::format("seed={}", seed)});
+      const Timeline timeline =
+          run_timeline(experiment(kSource + "/bench/firmware/still.c", avr != 0, kRobots, 60, 40, 0.005), folder(),
+                       2, {fmt::format("seed={}", seed)});
       std::vector<double> out(kRobots, 0), in(kRobots, 0);
       for (const PairCount& pair : timeline.totals.pairs)
         (pair.receiver == pair.sender ? out[pair.sender] : in[pair.receiver]) += pair.count;
@@ -94,8 +97,9 @@ int show_contention() {
       return sum / static_cast<double>(x.size());
     };
     const auto [distance, critical] = kolmogorov_smirnov(samples[0], samples[1]);
-    fmt::print("{:<24} native {:.2f}, firmware {:.2f} per robot in 60 s; KS distance {:.3f}, at most {:.3f} at 99 %\n", name,
-               mean(samples[0]), mean(samples[1]), distance, critical);
+    fmt::print(
+        "{:<24} native {:.2f}, firmware {:.2f} per robot in 60 s; KS distance {:.3f}, at most {:.3f} at 99 %\n",
+        name, mean(samples[0]), mean(samples[1]), distance, critical);
     if (distance > critical) status = 1;
   };
   row("messages sent", sent);
@@ -109,8 +113,8 @@ int show_speed() {
     for (const std::uint32_t threads : {1u, 2u}) {
       double best = 0;
       for (int repeat = 0; repeat < 3; ++repeat) {
-        const Timeline timeline =
-            run_timeline(experiment(kSource + "/behaviours/disperse.c", true, robots, 10, 40, 0.005), folder(), threads);
+        const Timeline timeline = run_timeline(
+            experiment(kSource + "/behaviours/disperse.c", true, robots, 10, 40, 0.005), folder(), threads);
         best = std::max(best, 10 / timeline.totals.wall_s);
       }
       fmt::print("{:>8}{:>10}{:>14.2f}\n", robots, threads, best);

@@ -4,9 +4,7 @@
 static message_t hello;
 
 static message_t* send(void) { return &hello; }
-static void setup(void) {
-  hello.crc = message_crc(&hello);
-}
+static void setup(void) { hello.crc = message_crc(&hello); }
 static void loop(void) {}
 
 int main(void) {

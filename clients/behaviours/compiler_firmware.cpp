@@ -40,8 +40,8 @@ CompiledProgram compile_firmware(const std::vector<fs::path>& sources, const Com
                                      (runtime / "kilolib").string()};
   for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
   for (const fs::path& source : sources) arguments.push_back(source.string());
-  arguments.insert(arguments.end(), {(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(), "-lm",
-                                     "-o", whole.string()});
+  arguments.insert(arguments.end(), {(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(),
+                                     "-lm", "-o", whole.string()});
   const ProcessResult result = run_process(arguments);
   const auto octets = read_file(whole);
   fs::remove_all(unfinished, error);

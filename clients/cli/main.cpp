@@ -91,7 +91,8 @@ int build_command(const BuildArguments& arguments) {
     if (!arguments.out.empty()) {
       const behaviours::CompiledProgram linked = behaviours::compile_firmware(arguments.sources, options);
       std::error_code error;
-      std::filesystem::copy_file(linked.file, arguments.out, std::filesystem::copy_options::overwrite_existing, error);
+      std::filesystem::copy_file(linked.file, arguments.out, std::filesystem::copy_options::overwrite_existing,
+                                 error);
       if (error) throw UserError(fmt::format("{}: cannot be written: {}", arguments.out.string(), error.message()));
       fmt::print("{}\n", arguments.out.string());
     }
@@ -124,7 +125,8 @@ struct ExportArguments {
 };
 
 int export_command(const ExportArguments& arguments) {
-  const bool rows_wanted = !arguments.trajectories.empty() || !arguments.bodies.empty() || !arguments.messages.empty();
+  const bool rows_wanted =
+      !arguments.trajectories.empty() || !arguments.bodies.empty() || !arguments.messages.empty();
   if (!rows_wanted && arguments.model.empty()) {
     throw UserError(
         "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv, "
@@ -209,7 +211,9 @@ int main_of(int argc, char** argv) {
   build_app.add_option("program", build.sources, "C sources")->required();
   build_app.add_option("-o", build.out, "shared object to write (default: PROGRAM.so here)");
   build_app.add_option("--define", build.define, "NAME=VALUE")->allow_extra_args(false);
-  build_app.add_flag("--avr", build.avr, "compile for the ATmega328P and print flash and RAM; with -o, link with a kilolib that runs on the robot, as .elf");
+  build_app.add_flag("--avr", build.avr,
+                     "compile for the ATmega328P and print flash and RAM; with -o, link with a kilolib that runs "
+                     "on the robot, as .elf");
 
   ExportArguments exported;
   CLI::App& export_app = *app.add_subcommand("export", "CSV files from a recorded run");

@@ -65,10 +65,9 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
       throw UserError(fmt::format("{}: firmware is one file; link its parts first", sources.front().string()));
     behaviours::CompileOptions options;
     options.defines = arguments.define;
-    const behaviours::CompiledProgram compiled =
-        is_linked     ? checked_firmware(sources.front())
-        : group.avr() ? behaviours::compile_firmware(sources, options)
-                      : behaviours::compile(sources, options);
+    const behaviours::CompiledProgram compiled = is_linked     ? checked_firmware(sources.front())
+                                                 : group.avr() ? behaviours::compile_firmware(sources, options)
+                                                               : behaviours::compile(sources, options);
     for (const std::string& note : compiled.notes) say("note: " + note);
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;

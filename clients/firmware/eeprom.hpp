@@ -11,7 +11,7 @@ namespace kilotwin::firmware {
 
 /// As a calibrated robot has it: core/base/eeprom_layout.h. kilo_uid is the robot's id.
 [[nodiscard]] inline std::array<std::uint8_t, kEepromOctets> make_eeprom(std::uint32_t robot,
-                                                                        const Calibration& calibration) {
+                                                                         const Calibration& calibration) {
   static_assert(kEepromOctets == KILOTWIN_EEPROM_OCTETS);
   std::array<std::uint8_t, kEepromOctets> octets{};
   kilotwin_fill_eeprom(octets.data(),

@@ -21,8 +21,7 @@ namespace fs = std::filesystem;
 constexpr comm::Cycles kPeriod = comm::kTimerCounts * comm::kTimerCount;
 
 FlashImage read_program(const proto::Program& program, const fs::path& run_directory) {
-  const fs::path path =
-      run_directory / "programs" / (program.sha256() + fs::path(program.path()).extension().string());
+  const fs::path path = run_directory / "programs" / program_file(program);
   std::ifstream stream(path, std::ios::binary);
   const std::string octets{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) {

@@ -69,7 +69,8 @@ void check_interval(const Reader& recording, const RecordingSchedule& wanted, do
   }
 }
 
-std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, const std::string& time, Poses which) {
+std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, const std::string& time,
+                          Poses which) {
   const bool measured = which == Poses::kMeasured && state.measured_x_mm_size() == state.x_mm_size() &&
                         state.measured_y_mm_size() == state.x_mm_size() &&
                         state.measured_heading_rad_size() == state.x_mm_size();
@@ -137,7 +138,8 @@ std::uint64_t export_states(Reader& recording, const std::filesystem::path& csv,
 
 }  // namespace
 
-std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s, Poses which) {
+std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s,
+                                  Poses which) {
   return export_states(recording, csv, every_s, "time_s,robot,x_mm,y_mm,heading_rad,led\n",
                        [which](std::string& text, const proto::StateRecord& state, const std::string& time) {
                          return append_rows(text, state, time, which);

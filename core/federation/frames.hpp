@@ -53,7 +53,7 @@ struct BodyFrame {
 
   static constexpr std::size_t kSpatialColumns = 11;
   MovableColumns movable;
-  PressedColumns pressed;  ///< in ghosts only
+  PressedColumns pressed;      ///< in ghosts only
   std::vector<double> memory;  ///< RunPlan::memory.size() values per robot: what the model's effects remember of it
 
   void clear() {

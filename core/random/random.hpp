@@ -20,13 +20,13 @@ enum class Stream : std::uint16_t {
   kReception = 6,    ///< loss at a receiver
   kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
   kSolver = 20,      ///< what ODE's iterative solver starts from; per sub-step, of the lowest robot that takes part
-  kLightSensor = 25,  ///< draw 0 logarithm of the gain, 1 offset; tick 0
-  kBattery = 26,      ///< draw 0 charge at the start
-  kTemperature = 27,  ///< draw 0 offset of a robot's sensor
+  kLightSensor = 25,       ///< draw 0 logarithm of the gain, 1 offset; tick 0
+  kBattery = 26,           ///< draw 0 charge at the start
+  kTemperature = 27,       ///< draw 0 offset of a robot's sensor
   kEffectNoise = 30,       ///< independent noise of effects on motion, per tick
   kCorrelatedNoise = 31,   ///< correlated noise of effects, per tick
   kMeasurementNoise = 32,  ///< independent noise of effects on what is measured, per tick
-  kConverter = 35,   ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
+  kConverter = 35,         ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 
 /// Philox4x32 with 10 rounds. Multipliers and key increments are those of the paper (the increments: the golden ratio and

@@ -25,9 +25,9 @@ class FirmwareRobots {
     std::uint8_t motor_left = 0, motor_right = 0, led = 0;  ///< as in ActuationFrame
     /// Both motors were kicked: full duty for less than a tick does not show as a duty.
     bool spun_up = false;
-    bool listening = true;                                  ///< neither halted nor asleep with its clocks off
-    std::uint8_t fault = 0;                                 ///< firmware::Halt of one that has faulted, else 0
-    std::uint32_t fault_at = 0;                             ///< address in flash, octets
+    bool listening = true;       ///< neither halted nor asleep with its clocks off
+    std::uint8_t fault = 0;      ///< firmware::Halt of one that has faulted, else 0
+    std::uint32_t fault_at = 0;  ///< address in flash, octets
   };
 
   virtual ~FirmwareRobots() = default;

@@ -66,8 +66,9 @@ TEST_F(Model, EffectsGiveOneHashHoweverARunIsDivided) {
             local);
   EXPECT_EQ(hash({"--model", file, "--partitions", "2x2", "--hosts", "2"}, "federated"), local);
   // A checkpoint of 2x1 goes on as 1x2.
-  run(disperse({"--model", file, "--duration", "5", "--partitions", "2x1", "--checkpoint-every", "4"}), scratch,
-      "half");
+  run({source("experiments/disperse.txtpb"), "--duration", "5", "--robots", "60", "--model", file, "--partitions",
+       "2x1", "--checkpoint-every", "4"},
+      scratch, "half");
   EXPECT_EQ(
       hash({"--model", file, "--partitions", "1x2", "--mode", "local", "--resume", scratch / "half"}, "resumed"),
       local);

@@ -65,6 +65,8 @@ static void wait_for_tick(void) {
   kt_wait();
 }
 
+enum { MOST_AT_ONCE = 1 << 30 };
+
 static int32_t cycles_left(void) {
   int32_t left;
   __asm__ volatile("movl %%gs:%c1, %0" : "=r"(left) : "i"(KT_THREAD_BUDGET));
@@ -79,12 +81,13 @@ static void set_cycles_left(int32_t left) {
  * program waits for. Where code takes its time as well, both come out of the cycles of the tick. */
 static void spend(uint64_t cycles) {
   if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT && !robot.in_interrupt) {
-    for (int64_t left = cycles_left(); (int64_t)cycles > left; left = cycles_left()) {
-      cycles -= (uint64_t)left;
-      set_cycles_left(0);
-      wait_for_tick();
+    while (cycles > 0) {
+      const int32_t part = cycles < MOST_AT_ONCE ? (int32_t)cycles : MOST_AT_ONCE;
+      set_cycles_left(cycles_left() - part);
+      /* Below 0 the loop's test hands over to the host, which comes back when what is owed has passed. */
+      while (cycles_left() < 0) {}
+      cycles -= (uint64_t)part;
     }
-    set_cycles_left(cycles_left() - (int32_t)cycles);
     return;
   }
   robot.debt_cycles += cycles;

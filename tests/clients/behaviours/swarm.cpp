@@ -86,7 +86,7 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
   manifest.mutable_experiment()->mutable_deployment()->set_hosts(host_count);
   manifest.mutable_experiment()->mutable_motion()->set_calibrated_turn_duty(60);
   for (std::size_t p = 0; p < texts.size(); ++p) {
-    const bool is_path = texts[p].find('\n') == std::string::npos;
+    const bool is_path = texts[p].find_first_of("\n{") == std::string::npos;
     const fs::path source =
         is_path ? fs::path(texts[p]) : folder.write("program" + std::to_string(p) + ".c", texts[p]);
     const CompiledProgram compiled = compile({source}, cached());

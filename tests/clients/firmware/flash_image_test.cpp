@@ -68,14 +68,16 @@ TEST(FlashImage, RefusesWhatItIsNotWithTheLine) {
 }
 
 TEST(FlashImage, SurvivesDamage) {
-  const std::filesystem::path file = compiled(whole_program("static void setup(void) {} static void loop(void) {}"));
+  const std::filesystem::path file =
+      compiled(whole_program("static void setup(void) {} static void loop(void) {}"));
   const std::string elf = behaviours::read_file(file).value();
   std::mt19937 random(1);
   int read = 0, refused = 0;
   for (int n = 0; n < 4000; ++n) {
     std::string damaged = n % 2 == 0 ? elf.substr(0, 4096) : kHex;
     if (n % 4 == 0) damaged = elf;
-    for (int i = 0; i < 3; ++i) damaged[random() % std::min<std::size_t>(damaged.size(), 400)] = static_cast<char>(random());
+    for (int i = 0; i < 3; ++i)
+      damaged[random() % std::min<std::size_t>(damaged.size(), 400)] = static_cast<char>(random());
     if (n % 3 == 0) damaged.resize(random() % damaged.size());
     try {
       static_cast<void>(parse_firmware(damaged, "a"));

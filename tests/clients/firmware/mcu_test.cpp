@@ -34,9 +34,7 @@ std::vector<Light> light(std::uint8_t type, OwnCycles at, std::int16_t high = 62
   return pulses;
 }
 
-void tell(Mcu& mcu, std::uint8_t type) {
-  mcu.run(mcu.now() + kSecond / 20, light(type, mcu.now() + 1000));
-}
+void tell(Mcu& mcu, std::uint8_t type) { mcu.run(mcu.now() + kSecond / 20, light(type, mcu.now() + 1000)); }
 
 enum : std::uint8_t { kReset = 0x83, kSleep = 0x84, kWakeup = 0x85, kRun = 0x88 };
 
@@ -53,8 +51,9 @@ const FlashImage& talker() {
 }
 
 TEST(Mcu, RunsWhenToldAndDrivesMotorsAndLight) {
-  Mcu mcu = make(firmware(whole_program("static void setup(void) { set_color(RGB(1, 2, 3)); }\n"
-                                        "static void loop(void) { set_motors(kilo_turn_left, kilo_straight_right); }")));
+  Mcu mcu =
+      make(firmware(whole_program("static void setup(void) { set_color(RGB(1, 2, 3)); }\n"
+                                  "static void loop(void) { set_motors(kilo_turn_left, kilo_straight_right); }")));
   mcu.run(kSecond / 2, {});
   EXPECT_EQ(mcu.outputs().motor_left, 0);
   tell(mcu, kRun);
@@ -126,7 +125,8 @@ TEST(Mcu, GivesUpWhereItNoticesAnotherPacket) {
   mcu.run(mcu.now() + kSecond, {});
   const OwnCycles start = mcu.flashes().front();
   EXPECT_GT(mcu.flashes().size(), 20u);
-  for (const auto& [after, gives_up] : {std::pair<OwnCycles, bool>{300, false}, {700, true}, {2300, true}, {3000, false}}) {
+  for (const auto& [after, gives_up] :
+       {std::pair<OwnCycles, bool>{300, false}, {700, true}, {2300, true}, {3000, false}}) {
     mcu.rewind();
     mcu.clear_flashes();
     mcu.run(start + 30000, std::vector<Light>{{start + after, 500, 400}});
@@ -145,7 +145,8 @@ TEST(Mcu, IsTheSameHoweverTimeIsCut) {
     }
     std::size_t next = 0;
     while (mcu.now() < 3 * kSecond) {
-      const OwnCycles until = std::min<OwnCycles>(3 * kSecond, mcu.now() + 1 + random() % (seed == 0 ? 10 * kSecond : 5000));
+      const OwnCycles until =
+          std::min<OwnCycles>(3 * kSecond, mcu.now() + 1 + random() % (seed == 0 ? 10 * kSecond : 5000));
       std::size_t last = next;
       while (last < all.size() && all[last].at < until) ++last;
       mcu.run(until, std::span(all).subspan(next, last - next));
@@ -184,9 +185,10 @@ TEST(Mcu, GoesBackToItsMarkAndGoesOnFromWhatWasSaved) {
 }
 
 TEST(Mcu, StopsAtAFaultAndSaysWhere) {
-  Mcu mcu = make(firmware(whole_program(
-      "static void setup(void) { __asm__ volatile(\".word 0xff0f\\n.word 0x9409\\n.word 0x0001\\n.word 0x95a7\"); }\n"
-      "static void loop(void) { __asm__ volatile(\".word 0x940b\"); }")));
+  Mcu mcu =
+      make(firmware(whole_program("static void setup(void) { __asm__ volatile(\".word 0xff0f\\n.word "
+                                  "0x9409\\n.word 0x0001\\n.word 0x95a7\"); }\n"
+                                  "static void loop(void) { __asm__ volatile(\".word 0x940b\"); }")));
   mcu.run(kSecond / 2, {});
   tell(mcu, kRun);
   // What is no instruction, or a jump to nowhere, must not take anybody else along.
@@ -220,8 +222,9 @@ TEST(Mcu, SleepsWithItsClocksOffAndWakesAfterEightSeconds) {
 }
 
 TEST(Mcu, TossesBitsWithTheNoiseOfItsConverter) {
-  Mcu mcu = make(firmware(whole_program("static void setup(void) {}\n"
-                                        "static void loop(void) { set_motors(rand_hard(), 0); delay(1); }")));
+  Mcu mcu =
+      make(firmware(whole_program("static void setup(void) {}\n"
+                                  "static void loop(void) { set_motors(rand_hard(), 0); delay(1); }")));
   mcu.run(kSecond / 2, {});
   tell(mcu, kRun);
   // Ones among 8 x 1000 bits: 4000 +- 45; 6 of those.

@@ -15,8 +15,8 @@ namespace kilotwin::firmware {
 
 /// A program of which only this part is given.
 inline std::string whole_program(const std::string& functions, const std::string& callbacks = {}) {
-  return "#include <kilolib.h>\n#include <avr/io.h>\n" + functions +
-         "\nint main(void) { kilo_init(); " + callbacks + " kilo_start(setup, loop); return 0; }\n";
+  return "#include <kilolib.h>\n#include <avr/io.h>\n" + functions + "\nint main(void) { kilo_init(); " +
+         callbacks + " kilo_start(setup, loop); return 0; }\n";
 }
 
 inline std::filesystem::path compiled(const std::string& source) {

@@ -51,7 +51,8 @@ TEST_F(Override, MistakesNameTheArgumentAndWhatThereIs) {
       {"=3",
        "--set =3: unknown field  in Experiment; its fields are name, duration_s, seed, tick_cycles, arena, robots, "
        "motion, "
-       "robot_model, physics, radio, station, recording, deployment, movable, obstacle, light, battery, temperature, "
+       "robot_model, physics, radio, station, recording, deployment, movable, obstacle, light, battery, "
+       "temperature, "
        "effect, field, run_number"},
       {"seed", "--set seed: there is no value; write FIELD=VALUE, for instance arena.width_mm=1000"},
       {"seed=x", "--set seed=x: seed cannot be x; it takes a whole number"},

@@ -73,8 +73,7 @@ static void wait_for_edges(void) {
 }
 
 static uint16_t conversion(void) {
-  while (ADCSRA & _BV(ADSC)) {
-  }
+  while (ADCSRA & _BV(ADSC)) {}
   return ADC;
 }
 
@@ -100,10 +99,8 @@ uint8_t rand_hard(void) {
   for (uint8_t bit = 0; bit < 8; ++bit) {
     for (uint8_t tries = 0; tries < 64; ++tries) {
       int16_t first, second;
-      while ((first = get_voltage()) < 0) {
-      }
-      while ((second = get_voltage()) < 0) {
-      }
+      while ((first = get_voltage()) < 0) {}
+      while ((second = get_voltage()) < 0) {}
       if (((first ^ second) & 1) == 0) continue;
       value |= (uint8_t)((first & 1) << bit);
       break;
@@ -321,7 +318,7 @@ static void take_octet(void) {
   in_octet = 0;
   if (octet_count == 0) {
     if (octet != 0) {
-      stop_receiving();  /* two packets at once */
+      stop_receiving(); /* two packets at once */
       return;
     }
     rx_busy = 1;
@@ -385,7 +382,8 @@ ISR(TIMER0_COMPA_vect) {
 /* The state machine. */
 
 static uint16_t table_entry(uint16_t address) {
-  return (uint16_t)(eeprom_read_byte((const uint8_t*)address) << 8) | eeprom_read_byte((const uint8_t*)(address + 1));
+  return (uint16_t)(eeprom_read_byte((const uint8_t*)address) << 8) |
+         eeprom_read_byte((const uint8_t*)(address + 1));
 }
 
 void kilo_init(void) {
@@ -401,8 +399,8 @@ void kilo_init(void) {
   kilo_turn_right = eeprom_read_byte((const uint8_t*)EE_TURN_RIGHT);
   kilo_straight_left = eeprom_read_byte((const uint8_t*)EE_STRAIGHT_LEFT);
   kilo_straight_right = eeprom_read_byte((const uint8_t*)EE_STRAIGHT_RIGHT);
-  kilo_uid = (uint16_t)(eeprom_read_byte((const uint8_t*)EE_UID) |
-                        eeprom_read_byte((const uint8_t*)EE_UID + 1) << 8);
+  kilo_uid =
+      (uint16_t)(eeprom_read_byte((const uint8_t*)EE_UID) | eeprom_read_byte((const uint8_t*)EE_UID + 1) << 8);
   for (uint8_t i = 0; i < IR_ENTRIES; ++i) {
     kilo_irlow[i] = table_entry(EE_IR_LOW + 2u * i);
     kilo_irhigh[i] = table_entry(EE_IR_HIGH + 2u * i);
