@@ -66,7 +66,7 @@ std::size_t closing(const std::vector<Token>& tokens, std::size_t open) {
   return tokens.size();
 }
 
-constexpr std::string_view kBarrier = "({__asm__ volatile(\"\":::\"memory\");1;})";
+constexpr std::string_view kBarrier = "({__asm__ volatile(\"\":::\"memory\");}),";
 
 class Marker {
  public:
@@ -106,8 +106,8 @@ class Marker {
   /// The condition in tokens [first, end).
   void mark(std::size_t first, std::size_t end) {
     if (end >= tokens_.size() || is_declaration(first, end)) return;
-    if (first == end) return insert(tokens_[end].at, kBarrier);
-    insert(tokens_[first].at, std::string(kBarrier) + "&&(");
+    if (first == end) return insert(tokens_[end].at, std::string(kBarrier) + "1");
+    insert(tokens_[first].at, std::string(kBarrier) + "(");
     insert(tokens_[end].at, ")");
   }
 

@@ -72,10 +72,8 @@ TEST(Preemption, AtAnyOptimisation) {
     EXPECT_EQ(swarm.frame().motor_left[1], 9);
     EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kRunning);
     EXPECT_EQ(swarm.life_cycle(2), LifeCycle::kFailed);
-    // Without optimisation the loop is interrupted like any other, but not known to have no way out.
-    const bool known = level != "O0";
-    EXPECT_EQ(swarm.life_cycle(3), known ? LifeCycle::kFailed : LifeCycle::kRunning);
-    EXPECT_EQ(swarm.hosts[0]->robots_failed(), known ? 2u : 1u);
+    EXPECT_EQ(swarm.life_cycle(3), LifeCycle::kFailed);
+    EXPECT_EQ(swarm.hosts[0]->robots_failed(), 2u);
   }
 }
 
