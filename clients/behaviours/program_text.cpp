@@ -1,6 +1,7 @@
 #include "clients/behaviours/program_text.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <optional>
 #include <regex>
@@ -8,6 +9,7 @@
 #include <system_error>
 
 #include "clients/behaviours/files.hpp"
+#include "clients/behaviours/runtime_files.hpp"
 #include "clients/behaviours/sha256.hpp"
 #include "core/base/error.hpp"
 
@@ -225,21 +227,22 @@ class Preparation {
       return normal(copy) == target ? "" : '"' + copy.string() + '"';
     }
     if (!include.quoted) return "";
+    if (is_runtime_header(include.name)) return "";
     const std::optional<fs::path> found = header_around(file, named.lexically_normal().string());
-    if (!found || is_runtime_header(include.name)) return "";
+    if (!found) return "";
     note(found->string() + ": found for #include \"" + include.name + '"');
     result_.included.insert(*found);
     return '"' + fs::absolute(prepared(*found)).string() + '"';
   }
 
-  /// Whether the search for headers finds it anyway.
+  /// Whether the search for headers finds it anyway: in the runtime, or among the compiler's own.
   static bool is_runtime_header(const std::string& name) {
-    static const std::set<std::string> kNames{"kilolib.h", "debug.h",  "message.h",    "message_crc.h",
-                                              "kilombo.h", "math.h",   "stdlib.h",     "stdio.h",
-                                              "string.h",  "stdint.h", "stdbool.h",    "limits.h",
-                                              "float.h",   "time.h",   "ringbuffer.h", "jansson.h",
-                                              "stddef.h",  "assert.h", "ctype.h",      "message_buffered.h"};
-    return kNames.contains(name) || name.starts_with("avr/") || name.starts_with("util/");
+    static const std::set<std::string> kCompilers{"stdbool.h", "stddef.h", "stdarg.h",
+                                                  "float.h",   "iso646.h", "stdalign.h"};
+    const auto files = runtime_files();
+    return kCompilers.contains(name) || std::any_of(files.begin(), files.end(), [&](const RuntimeFile& file) {
+             return file.name == "libc/" + name || file.name == "kilolib/" + name;
+           });
   }
 
   ProgramText& result_;
@@ -276,7 +279,14 @@ std::vector<fs::path> sources_with(const std::set<std::string>& missing, const P
   taken.insert(text.included.begin(), text.included.end());
   static const std::regex kMain(R"(\bmain\s*\()");
   std::vector<fs::path> result;
-  std::set<std::string> open = missing;
+  std::set<std::string> open;
+  for (const std::string& name : missing) {
+    // Of a C++ name the last part, where that is a word.
+    const std::string last = name.substr(name.rfind(':') == std::string::npos ? 0 : name.rfind(':') + 1);
+    if (std::all_of(last.begin(), last.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; }) &&
+        !last.empty())
+      open.insert(last);
+  }
   // First what bears the name of an included header, then whatever lies next to the sources, then farther off.
   std::vector<fs::path> candidates;
   std::set<std::string> stems;
@@ -294,7 +304,9 @@ std::vector<fs::path> sources_with(const std::set<std::string>& missing, const P
   for (const fs::path& candidate : candidates) {
     if (open.empty()) break;
     if (!taken.insert(normal(candidate)).second) continue;
+    constexpr std::size_t kMostOctets = 200'000;  // what regular expressions cope with
     const std::string original = read_file(candidate).value_or("");
+    if (original.size() > kMostOctets) continue;
     const std::string code = code_of(original);
     if (is_kilolib_source(candidate, original) || std::regex_search(code, kMain)) continue;
     bool defines = false;
