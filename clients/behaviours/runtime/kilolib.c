@@ -13,9 +13,13 @@ enum { SLEEPING, IDLE, BATTERY, SETUP, RUNNING, CHARGING, MOVING };
 enum { STAND, TURN_LEFT, TURN_RIGHT, STRAIGHT };
 enum { CYCLES_PER_MS = 8000 };
 
-/* How long a call takes (the converter at 1 MHz, 13 clocks; at 62.5 kHz for the temperature). One in vain is taken to last as
- * long as a short one that is not. */
-enum { READING_CYCLES = 150, TEMPERATURE_CYCLES = 1720, RAND_HARD_CYCLES = 8 * 2 * 2 * READING_CYCLES };
+/* How long a call takes (the converter at 1 MHz, 13 clocks; at 62.5 kHz for the temperature; a call in vain). */
+enum {
+  READING_CYCLES = 150,
+  TEMPERATURE_CYCLES = 1720,
+  BUSY_CYCLES = 20,
+  RAND_HARD_CYCLES = 8 * 2 * 2 * READING_CYCLES
+};
 enum { HIGHEST_READING = 1023 };
 
 uint64_t kt_enter(void);
@@ -161,25 +165,20 @@ static uint8_t is_receiving(void) {
   struct KtSurroundings* around = kt_surroundings;
   if (around->receiving_cycles == 0 || robot.in_interrupt) return 0;
   if (around->receiving_from == 0) around->receiving_from = 1 + (noise() >> 11) % robot.tick_cycles;
-  const int64_t within = robot.loop_rate == KT_LOOP_AS_ON_ROBOT ? (int64_t)robot.tick_cycles - cycles_left()
-                                                                : (int64_t)robot.debt_cycles;
-  const uint64_t now = (uint64_t)within % robot.tick_cycles + robot.tick_cycles + 1;
+  const uint64_t now = robot.debt_cycles % robot.tick_cycles + robot.tick_cycles + 1;
   return (now - around->receiving_from) % robot.tick_cycles < around->receiving_cycles;
 }
 
-/* The converter's count for an expected value and its noise. What it takes to compute is not the robot's time. */
+/* The converter's count for an expected value and its noise. */
 static int16_t convert(double expected, double sd) {
-  const int32_t left = cycles_left();
-  set_cycles_left(INT32_MAX);
   if (sd > 0) expected += sd * kt_inverse_normal(((double)(noise() >> 12) + 0.5) * 0x1p-52);
   expected = kt_floor(expected + 0.5);
-  set_cycles_left(left);
   return (int16_t)(expected < 0 ? 0 : expected > HIGHEST_READING ? HIGHEST_READING : expected);
 }
 
 static int16_t reading(double expected, double sd, uint64_t cycles) {
   if (is_receiving()) {
-    spend(READING_CYCLES);
+    spend(BUSY_CYCLES);
     return -1;
   }
   spend(cycles);
