@@ -9,7 +9,9 @@
 namespace kilotwin::physics {
 
 double Population::margin_mm(const RunPlan& plan, const DriveModel& drive, double reach_mm) {
-  return reach_mm + std::max(drive.effects().radius_mm(), ArenaFields::margin_mm(plan));
+  const double look_mm = std::max(drive.effects().radius_mm(), ArenaFields::margin_mm(plan));
+  // By way of movable bodies it can matter what robots anywhere look at.
+  return look_mm > 0 && plan.movables() > 0 ? 1e300 : reach_mm + look_mm;
 }
 
 Population::Population(const RunPlan& plan, PartitionId partition, DriveModel drive, double reach_mm)

@@ -222,6 +222,26 @@ TEST_P(EffectPartitions, RandomListsGiveTheSameBitsAndStayFinite) {
   }
 }
 
+TEST(EffectContacts, RobotsThatPushBodiesGiveTheSameBits) {
+  // A beam over many partitions: what robots at one end look at matters at the other.
+  std::vector<testing::ScenePose> start;
+  for (int i = 0; i < 40; ++i)
+    start.push_back({-1170 + 60.0 * i, i % 2 == 0 ? 40.0 : -40.0, i % 2 == 0 ? -1.5 : 1.5});
+  const auto text =
+      "arena { width_mm: 2500 height_mm: 640 } duration_s: 30 movable { mass_g: 20 box { width_mm: 2300 "
+      "length_mm: 20 } } " +
+      everything();
+  const RunPlan whole = make_plan(text, start), cut = make_plan(text, start, 10, 1, 2);
+  Swarm a(whole), b(cut);
+  for (std::uint32_t k = 0; k < 120; ++k) {
+    for (Swarm* s : {&a, &b}) {
+      for (std::uint32_t r = 0; r < start.size(); ++r) s->set_motors(r, r % 5 != 0 ? 70 : 0, 70);
+      s->step();
+    }
+    ASSERT_EQ(a.hash(), b.hash()) << k;
+  }
+}
+
 TEST(EffectContacts, RobotsThatAreBlownTogetherDoNotOverlap) {
   const RunPlan plan = make_plan(
       "arena { width_mm: 500 height_mm: 500 } motion { noise: false } "
