@@ -43,6 +43,10 @@ void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file) {
     experiment.mutable_motion()->MergeFrom(model.motion());
     merged.locations.adopt(locations, "motion", "motion");
   }
+  if (model.has_propagation()) {
+    *experiment.mutable_radio()->mutable_propagation() = model.propagation();
+    merged.locations.adopt(locations, "propagation", "radio.propagation");
+  }
   std::map<std::uint32_t, int> index_of;
   for (int i = experiment.robot_model_size(); i-- > 0;) {
     if (experiment.robot_model(i).has_robot()) index_of[experiment.robot_model(i).robot()] = i;

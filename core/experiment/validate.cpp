@@ -4,7 +4,9 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <map>
 #include <numeric>
+#include <utility>
 
 #include "core/base/time.hpp"
 #include "core/experiment/fields.hpp"
@@ -218,6 +220,36 @@ void check_robot_models(const LoadedExperiment& loaded) {
   }
 }
 
+void check_propagation(const LoadedExperiment& loaded) {
+  const proto::Propagation& model = loaded.experiment.radio().propagation();
+  std::map<std::uint32_t, int> entry_of;
+  for (int i = 0; i < model.robot_size(); ++i) {
+    const std::string path = fmt::format("radio.propagation.robot[{}]", i);
+    if (!model.robot(i).has_robot()) {
+      throw loaded.locations.error(path, "robot is missing; state robot: ID, the robot that the entry is about");
+    }
+    if (const auto [earlier, first] = entry_of.emplace(model.robot(i).robot(), i); !first) {
+      throw loaded.locations.error(
+          path, fmt::format("robot {} has an entry already, at {}; keep one of them", earlier->first,
+                            loaded.locations.where(fmt::format("radio.propagation.robot[{}]", earlier->second))));
+    }
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> link_of;
+  for (int i = 0; i < model.link_size(); ++i) {
+    const proto::RadioLink& link = model.link(i);
+    const std::string path = fmt::format("radio.propagation.link[{}]", i);
+    if (!link.has_sender() || !link.has_receiver()) {
+      throw loaded.locations.error(path, "sender or receiver is missing; state both, sender: ID receiver: ID");
+    }
+    if (const auto [earlier, first] = link_of.emplace(std::pair{link.sender(), link.receiver()}, i); !first) {
+      throw loaded.locations.error(
+          path, fmt::format("the link from {} to {} has an entry already, at {}; keep one of them", link.sender(),
+                            link.receiver(),
+                            loaded.locations.where(fmt::format("radio.propagation.link[{}]", earlier->second))));
+    }
+  }
+}
+
 void check_station(const LoadedExperiment& loaded) {
   const proto::Station& station = loaded.experiment.station();
   for (int i = 0; i < station.environment_size(); ++i) {
@@ -265,6 +297,7 @@ void validate_fields(const LoadedExperiment& loaded) {
   check_partition(loaded, "partition_rows", experiment.deployment().partition_rows(), "height",
                   experiment.arena().height_mm());
   check_robot_models(loaded);
+  check_propagation(loaded);
   check_station(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",

@@ -19,6 +19,8 @@ enum class Stream : std::uint16_t {
   kBackOff = 5,      ///< per aborted attempt
   kReception = 6,    ///< loss at a receiver
   kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
+  kLink = 8,         ///< what robots and pairs add to the infrared signal; once per run
+  kPacket = 9,       ///< what a packet adds to it at a receiver
 };
 
 /// Philox4x32 with 10 rounds. Multipliers and key increments are those of the paper (the increments: the golden ratio and

@@ -30,6 +30,7 @@
 #include "core/random/random.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"
+#include "services/comm/link_budget.hpp"
 #include "services/comm/neighbourhood.hpp"
 #include "services/comm/overhead_controller.hpp"
 #include "services/comm/pair_counts.hpp"
@@ -114,6 +115,7 @@ class RadioEngine {
   void finish(std::uint32_t transmission, Cycles end);
   void receive_packet(const Transmission&, Tick now);
   void receive_copy(const OverheadController::Copy&, std::uint32_t ordinal, Tick now);
+  [[nodiscard]] bool drowns(std::uint32_t receiver, double margin_db);
   [[nodiscard]] bool fades(std::uint32_t receiver, Tick now, std::uint32_t draw) const;
 
   const std::vector<Share> shares_;  ///< per host
@@ -129,6 +131,7 @@ class RadioEngine {
   std::vector<std::uint8_t> state_, real_;  ///< per robot
   std::vector<std::uint16_t> tx_period_;    ///< per robot
   std::vector<IrMessage> message_;          ///< per robot: what its slot holds
+  LinkBudget links_;
   Neighbourhood neighbourhood_;
   Channel channel_;
   OverheadController overhead_;
