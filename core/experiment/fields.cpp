@@ -115,6 +115,10 @@ constexpr FieldRule kRules[] = {
     {"Table.otherwise", -kLargestValue, kLargestValue, ""},
     {"Noise.sd", 0, kLargestValue, ""},
     {"Noise.correlation_s", 0, kLongest_s, "s"},
+    {"Episodes.mean_apart_s", 0, kLongest_s, "s", Lower::kExcluded},
+    {"Episodes.scale_s", 0, kLongest_s, "s", Lower::kExcluded},
+    {"Episodes.tail", 0.1, kLargestValue, ""},
+    {"Episodes.longest_s", 0, kLongest_s, "s", Lower::kExcluded},
     {"ArenaField.cell_mm", 10, kLongest_mm, "mm"},
     {"ArenaField.forget_s", 0, kLongest_s, "s"},
 

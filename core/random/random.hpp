@@ -28,6 +28,7 @@ enum class Stream : std::uint16_t {
   kEffectNoise = 30,       ///< independent noise of effects on motion, per tick
   kCorrelatedNoise = 31,   ///< correlated noise of effects, per tick
   kMeasurementNoise = 32,  ///< independent noise of effects on what is measured, per tick
+  kEpisodes = 90,          ///< when episodes of effects begin and end, at the tick before; effect's draw
   kConverter = 35,         ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 
