@@ -15,6 +15,7 @@ struct Press {
   std::uint32_t contacts = 0;
   std::array<std::uint32_t, kMost> other{};  ///< ascending: robot, or robots + movable body, or beyond: walls
   std::array<double, kMost> push_mm{};       ///< above 0
+  std::array<double, kMost> rub_mm{};        ///< friction, on this robot clockwise about it, on the other likewise
 
   [[nodiscard]] bool any() const { return contacts != 0 || slip_x_mm != 0 || slip_y_mm != 0; }
   /// Force of the contact with this other; 0 where there is none.
@@ -24,10 +25,17 @@ struct Press {
     }
     return 0;
   }
+  /// Friction of the contact with this other; 0 where there is none.
+  [[nodiscard]] double rub_of(std::uint32_t id) const {
+    for (std::uint32_t p = 0; p < contacts; ++p) {
+      if (other[p] == id) return rub_mm[p];
+    }
+    return 0;
+  }
   bool operator==(const Press& o) const {
     if (slip_x_mm != o.slip_x_mm || slip_y_mm != o.slip_y_mm || contacts != o.contacts) return false;
     for (std::uint32_t p = 0; p < contacts; ++p) {
-      if (other[p] != o.other[p] || push_mm[p] != o.push_mm[p]) return false;
+      if (other[p] != o.other[p] || push_mm[p] != o.push_mm[p] || rub_mm[p] != o.rub_mm[p]) return false;
     }
     return true;
   }
