@@ -31,7 +31,8 @@ ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
   y_limit_mm = plan.world.arena.half_height_mm() - kRobotRadius_mm;
   touch_mm = 2 * stride_mm;
   const proto::Physics& physics = plan.experiment().physics();
-  const double mm_per_m_s2 = 1000 * sub_step_s * sub_step_s;  // The way in a sub-step that an acceleration adds.
+  // What an acceleration of the true mass adds to a velocity in a sub-step.
+  const double mm_per_m_s2 = 1000 * sub_step_s * sub_step_s / kInertia;
   thrust_mm = physics.thrust_n() / (physics.robot_mass_g() / 1000) * mm_per_m_s2;
   rim_friction = physics.rim_friction();
   hold_mm = physics.robot_friction() * kGravity_m_s2 * mm_per_m_s2;

@@ -3,9 +3,9 @@
 /// Kilobots are quasi-static: thrust is limited and ground friction decides. The ground holds a driven robot to the velocity w
 /// of its drive with a force of at most the thrust F, and a resting one to velocity 0 with friction x mass x g. A contact is a
 /// force along the normal n, kept from tick to tick. In each of S sub-steps, all from the state at its start (Jacobi):
-///   contact  f <- max(0, f + gain (closing - max(0, gap - touch)))     closing: of the velocities, carried on as they change
-///   friction h <- clamp(h + gain sliding, -friction f, friction f)   sliding: of the rims, their turning included; two robots
-///   robot    slip <- shrink(slip - sum of (f n + h t) / m, F / m), v = w + slip  shrink(s, b): s shorter by b, or 0 where it is not longer
+///   contact  f <- max(0, f + gain (closing - kEase max(0, gap - touch)))     closing: of the velocities, carried on
+///   friction h <- clamp(h + gain sliding, -friction f, friction f)       sliding: of two robots' rims, turning included
+///   robot    slip <- shrink(slip - sum of (f n + h t) / m, F / m), v = w + slip   shrink(s, b): s shorter by b, or 0
 ///   position moves by v, limited to half of each gap, so that no overlap arises whatever the forces are on their way to be
 /// In equilibrium each contact carries the force that keeps the two from closing, and each robot's contacts add up to at most
 /// its grip: forces add up along chains, and below the threshold of friction the velocity is 0 and not small. Gains are below

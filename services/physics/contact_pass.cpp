@@ -9,8 +9,8 @@ namespace {
 constexpr double kLimitTolerance_mm = 1e-14;
 /// How many limits of a body are met exactly, the one that is missed most first; what is missed then scales all down.
 constexpr int kLimitRounds = 2;
-/// By which the friction of a contact grows with what the rims slide. It adds to kGain of contact.cpp. The two
-/// exceed what is proven stable where all of a dense packing stick at once; packings come to rest in tests all the same.
+/// By which the friction of a contact grows with what the rims slide. With kGain of contact.cpp: six discs around one, each with
+/// six, have 6 (kGain + kRubGain) = 1.26, below the 4/3 up to which the iteration converges (Banert et al., 2023).
 constexpr double kRubGain = 0.06;
 
 }  // namespace
@@ -78,7 +78,7 @@ inline void ContactPass::move(const ContactLimits& limits, Batch& batch, const d
                                   c.normal_y * (gather(motion + kLanes, c.other) - shift_y));
     const Lanes closing = c.normal_x * (swing_x - gather(motion + 2 * kLanes, c.other)) +
                           c.normal_y * (swing_y - gather(motion + 3 * kLanes, c.other));
-    c.push_mm = larger(c.push_mm + c.gain * (closing - larger(gap - touch_mm, zero)), zero);
+    c.push_mm = larger(c.push_mm + c.gain * (closing - all(kEase) * larger(gap - touch_mm, zero)), zero);
     // Of the rims, along the normal turned left: the same number for both bodies, to the last bit.
     const Lanes sliding = (c.normal_x * (swing_y - gather(motion + 3 * kLanes, c.other)) -
                            c.normal_y * (swing_x - gather(motion + 2 * kLanes, c.other))) +

@@ -1,11 +1,18 @@
 /// What contact keeps from tick to tick besides poses. Units of a sub-step: a velocity is a way per sub-step, and a force is
-/// the change of a free robot's velocity by it, so that robot_mass / sub_step^2 turns it into newtons.
+/// the change of a free robot's velocity by it, so that kInertia x robot_mass / sub_step^2 turns it into newtons.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
 namespace kilotwin::physics {
+
+/// The inertia of all that moves, over its true one. Kilobots are quasi-static: inertia decides nothing, and forces in a jam find
+/// their balance the sooner the less of them it takes to stop a body. docs/physics.md has the evidence.
+inline constexpr double kInertia = 2;
+/// How fast a force ends where a gap opens beyond what a contact bridges, over how fast it ends where bodies part. With 1, a chain
+/// of robots hammers on what it pushes, and so moves what its force does not.
+inline constexpr double kEase = 0.25;
 
 /// A robot that touches others, or that slips against its drive.
 struct Press {

@@ -302,7 +302,7 @@ TEST(Push, TheTightestPackingDrivenToTheCentreForAMinute) {
   std::sort(overlaps.begin(), overlaps.end());
   std::printf("tightest packing inwards: overlap %.3g mm at most, %.3g mm at the 99th percentile of %zu contacts\n",
               overlaps.back(), overlaps[overlaps.size() * 99 / 100], overlaps.size());
-  EXPECT_GT(overlaps.size(), 1000u);
+  EXPECT_GT(overlaps.size(), 800u);  // Biases dissolve the lattice; the crowd stays dense.
   EXPECT_LT(overlaps.back(), 1e-6);
 }
 
