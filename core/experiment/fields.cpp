@@ -128,6 +128,7 @@ constexpr FieldRule kRules[] = {
     {"Physics.thrust_N", 0, 10, "N"},
     {"Physics.robot_mass_g", 1, 1000, "g"},
     {"Physics.robot_friction", 0, 2, ""},
+    {"Physics.rim_friction", 0, 100, ""},
 
     {"Radio.range_mm", 2 * kRobotRadius_mm, kUnlimited, "mm", Lower::kExcluded},
     {"Radio.oscillator_sd", 0, 0.05, ""},
