@@ -26,6 +26,8 @@ EffectMemory::EffectMemory(const RunPlan& plan)
   for (std::size_t s = 0; s < slots.size(); ++s) {
     const MemorySlot& slot = slots[s];
     notes_motion_ = notes_motion_ || (slot.kind >= Kind::kPreviousForward && slot.kind <= Kind::kPreviousTurn);
+    if (slot.kind == Kind::kTimeSinceCommand) time_slot_ = static_cast<std::uint32_t>(s);
+    if (slot.kind == Kind::kPreviousCommand) previous_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kNoise) {
       const proto::Effect& effect = plan.experiment().effect(static_cast<int>(slot.index));
       const double keep =
@@ -75,17 +77,22 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
   };
   for (std::size_t s = 0; s < stride; ++s) {
     switch (slots[s].kind) {
-      case Kind::kCommand: {
-        // The time that belongs to it has to see the command before.
-        const std::uint32_t time = plan_.memory.index_of({Kind::kTimeSinceCommand});
+      case Kind::kCommand:
+        // What belongs to it has to see the command before.
         each(s, [&](std::size_t i, double was) {
           const double command = static_cast<double>(command_of(robots.duties[i]));
-          double& since_s = memory[i * stride + time];
-          since_s = (was == command ? since_s : 0) + tick_s_;
+          double* const own = memory.data() + i * stride;
+          if (time_slot_) own[*time_slot_] = (was == command ? own[*time_slot_] : 0) + tick_s_;
+          if (previous_slot_ && was != command) own[*previous_slot_] = was;
           return command;
         });
         break;
-      }
+      case Kind::kLastTurn:
+        each(s, [&](std::size_t i, double was) {
+          const proto::Command command = command_of(robots.duties[i]);
+          return is_turn(command) ? static_cast<double>(command) : was;
+        });
+        break;
       case Kind::kLeftMotorTime: lasts(s, [](Duties d) { return d.left != 0 || d.spin_up != 0; }); break;
       case Kind::kRightMotorTime: lasts(s, [](Duties d) { return d.right != 0 || d.spin_up != 0; }); break;
       case Kind::kDrivenTime: lasts(s, [](Duties d) { return d.any(); }); break;
@@ -101,6 +108,7 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
         each(s, [&](std::size_t i, double was) { return next_episode(slots[s], robots.robot[i], from + 1, was); });
         break;
       case Kind::kTimeSinceCommand:  // with the command
+      case Kind::kPreviousCommand:
       case Kind::kPreviousForward:
       case Kind::kPreviousSideways:
       case Kind::kPreviousTurn:      // below

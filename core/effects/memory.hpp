@@ -1,6 +1,7 @@
 /// What robots remember for effects, from tick to tick: MemoryLayout says which numbers.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,7 +37,8 @@ class EffectMemory {
   const RunPlan& plan_;
   const Random random_;
   double tick_s_;
-  std::vector<Fade> fades_;  ///< per slot
+  std::vector<Fade> fades_;                                 ///< per slot
+  std::optional<std::uint32_t> time_slot_, previous_slot_;  ///< slots that the command keeps up to date
   bool notes_motion_ = false;
 };
 

@@ -36,6 +36,11 @@ MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
       case Function::PREVIOUS_FORWARD: need({Kind::kPreviousForward}); break;
       case Function::PREVIOUS_SIDEWAYS: need({Kind::kPreviousSideways}); break;
       case Function::PREVIOUS_TURN: need({Kind::kPreviousTurn}); break;
+      case Function::PREVIOUS_COMMAND:
+        need({Kind::kCommand});
+        need({Kind::kPreviousCommand});
+        break;
+      case Function::LAST_TURN: need({Kind::kLastTurn}); break;
       default: break;
     }
   };

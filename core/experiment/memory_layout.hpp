@@ -20,9 +20,11 @@ struct MemorySlot {
     kDrivenTime,
     kPreviousForward,  ///< mm/s
     kPreviousSideways,
-    kPreviousTurn,  ///< rad/s
-    kFieldCell,     ///< cell of field `index` in which the robot was counted last; -1: none
-    kNoise,         ///< of effect `index`, `function`, `wheel`
+    kPreviousTurn,     ///< rad/s
+    kFieldCell,        ///< cell of field `index` in which the robot was counted last; -1: none
+    kNoise,            ///< of effect `index`, `function`, `wheel`
+    kPreviousCommand,  ///< number of the Command before kCommand; STOP at first
+    kLastTurn,         ///< number of the last Command that was LEFT or RIGHT; 0 at first
   };
   Kind kind;
   double forget_s = 0;

@@ -285,6 +285,35 @@ TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
   }
 }
 
+TEST(Effects, CommandsOfThePastAreRemembered) {
+  // What is seen while the robot does the last of these commands, in its first tick and later ones.
+  struct Case {
+    std::vector<std::pair<std::uint8_t, std::uint8_t>> duties;
+    double previous, turn;
+  };
+  const Case cases[] = {{{{70, 70}}, 0, 0},
+                        {{{70, 0}}, 0, 2},
+                        {{{70, 70}, {0, 70}}, 1, 3},
+                        {{{70, 0}, {70, 70}}, 2, 2},
+                        {{{70, 0}, {0, 70}, {0, 0}, {70, 70}}, 0, 3},
+                        {{{70, 0}, {70, 70}, {0, 70}, {70, 70}}, 3, 3}};
+  for (const auto& [covariate, is_turn] : {std::pair{"PREVIOUS_COMMAND", false}, {"LAST_TURN", true}}) {
+    for (const Case& c : cases) {
+      const RunPlan plan =
+          make_plan("motion { noise: false straight_speed_mm_s: 0 turn_speed_mm_s: 0 } " +
+                        effect("acts_on: WORLD_DRIFT during: [STOP, STRAIGHT, LEFT, RIGHT]", thousandth(covariate)),
+                    {{0, 0, 0}});
+      Swarm swarm(plan);
+      for (std::size_t i = 0; i < c.duties.size(); ++i) {
+        swarm.set_motors(0, c.duties[i].first, c.duties[i].second);
+        swarm.run(i + 1 < c.duties.size() ? 4 : 0);
+      }
+      for (int tick = 0; tick < 3; ++tick)
+        EXPECT_NEAR(1000 * seen(swarm, 0), is_turn ? c.turn : c.previous, 1e-8) << covariate << " " << tick;
+    }
+  }
+}
+
 TEST(Effects, PreviousMotionIsInTheBodyOfThen) {
   // Robot 0 drives along y; the effect shows on robot 1, which turns, and is that of its own tick before.
   for (const auto& [covariate, straight, turning] : {std::tuple{"PREVIOUS_FORWARD", 10.0, 10.0},
