@@ -8,12 +8,15 @@
 #include <limits>
 #include <optional>
 
+#include "clients/identify/kilogrid/floor_swarm.hpp"
+
 namespace kilotwin::kilogrid {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kOpen_mm = 150;   ///< from walls: no cell of the rim is heard there
 constexpr double kBeside_mm = 60;  ///< a wall
+constexpr double kAlong_mm = 75;   ///< the rim
 constexpr double kStill_mm = 16;   ///< in a block: less than what cells blur
 constexpr double kMoving_mm = 40;  ///< in a block: the direction is known
 constexpr double kTimeBin_s = 300;
@@ -43,6 +46,7 @@ enum Group : std::size_t {
   kCrowd,
   kDirection,
   kPlace,
+  kRim,
   kDrift,
   kReports,
 };
@@ -78,6 +82,7 @@ std::vector<StatisticGroup> make_groups() {
   add("step-by-neighbours", "neighbours", counted(kNeighbours, "{} within 100 mm"));
   add("step-by-direction", "world_frame", counted(kSectors, "eighth {} of the compass"));
   add("step-by-place", "position", counted(kColumns * kRows, "place {}"));
+  add("occupancy-of-the-rim", "position", counted(kRimParts, "part {}"));
   add("drift", "world_frame", {"x", "y"});
   add("reports", "measurement",
       {"blocks unheard", "heard again after 2 s", "heard twice at once", "cell as before", "next to it",
@@ -145,6 +150,8 @@ class Motions {
       const std::size_t half = k < steps_.size() / 2 ? 0 : 1;
       sums.add(kWall, bin_of(kWalls_mm, wall_mm), step_mm);
       sums.count(kRing, part_of(wall_mm, floor_.width_mm / 2, kRings), kRings);
+      for (std::size_t i = 0; i < kRimParts; ++i)
+        sums.add(kRim, i, wall_mm < kAlong_mm && rim_part(floor_, x_[k], y_[k]) == i ? 1 : 0);
       sums.add(kDrift, 0, steps_[k].real());
       sums.add(kDrift, 1, steps_[k].imag());
       if (wall_mm < kOpen_mm) continue;
@@ -285,6 +292,11 @@ FloorBlocks blocks_of(const FloorRun& run) {
 const std::vector<StatisticGroup>& statistic_groups() {
   static const std::vector<StatisticGroup> groups = make_groups();
   return groups;
+}
+
+const StatisticGroup& statistic_group(std::string_view name) {
+  const auto& groups = statistic_groups();
+  return *std::find_if(groups.begin(), groups.end(), [&](const StatisticGroup& g) { return g.name == name; });
 }
 
 std::size_t statistic_count() { return statistic_groups().back().first + statistic_groups().back().size(); }

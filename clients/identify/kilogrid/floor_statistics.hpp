@@ -6,6 +6,7 @@
 #include <array>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/identify/kilogrid/floor_log.hpp"
@@ -41,6 +42,8 @@ struct StatisticGroup {
 struct RobotSums {
   std::vector<double> sum, weight;
 };
+/// The group of that name; it must be there.
+[[nodiscard]] const StatisticGroup& statistic_group(std::string_view name);
 /// Per robot of the run.
 [[nodiscard]] std::vector<RobotSums> robot_sums(const FloorRun&, const Floor&);
 

@@ -58,12 +58,22 @@ void send_from_rim(const Floor& floor, double range_mm, std::int64_t tick, doubl
       if ((r % 2) * 2 + c % 2 != tick % 4) continue;
       const double dx = x_mm - (c + 0.5) * cell, dy = y_mm - (r + 0.5) * cell;
       const double distance_mm = std::sqrt(dx * dx + dy * dy);
-      if (distance_mm < range_mm) hear(distance_mm);
+      if (distance_mm < range_mm) hear(distance_mm, rim_part(floor, (c + 0.5) * cell, (r + 0.5) * cell));
     }
   }
 }
 
 }  // namespace
+
+std::size_t rim_part(const Floor& floor, double x_mm, double y_mm) {
+  const double w = floor.width_mm, h = floor.height_mm;
+  const double distance[] = {y_mm, w - x_mm, h - y_mm, x_mm};
+  const double along[] = {x_mm, w + y_mm, w + h + (w - x_mm), 2 * w + h + (h - y_mm)};
+  const auto side =
+      static_cast<std::size_t>(std::min_element(std::begin(distance), std::end(distance)) - std::begin(distance));
+  const double part = std::max(along[side], 0.0) / (2 * (w + h)) * static_cast<double>(kRimParts);
+  return std::min(static_cast<std::size_t>(part), kRimParts - 1);
+}
 
 FloorReporter::FloorReporter(const Floor& floor, const FloorRadio& radio, std::uint32_t robots, std::uint64_t seed)
     : floor_(floor), radio_(radio), dice_(seed), tracks_(robots) {
@@ -72,12 +82,28 @@ FloorReporter::FloorReporter(const Floor& floor, const FloorRadio& radio, std::u
     every_s_.push_back(radio.report_every_s * (1 + kClock_sd * dice_.normal()));
     next_s_.push_back(every_s_.back() * dice_.uniform());
     heard_.push_back(std::clamp(radio.heard + radio.heard_sd * dice_.normal(), 0.05, 1.0));
+    talking_.push_back(dice_.uniform() * (radio.silent_s + radio.talking_s) < radio.talking_s);
+    change_s_.push_back(-(talking_.back() ? radio.talking_s : radio.silent_s) * kt_log(dice_.uniform()));
+    phase_.push_back(static_cast<std::uint32_t>(dice_.bits() >> 62));
   }
 }
 
 void FloorReporter::see(std::uint32_t robot, double time_s, double x_mm, double y_mm) {
   if (time_s < next_s_[robot]) return;
   next_s_[robot] += every_s_[robot];
+  while (change_s_[robot] < time_s) {
+    talking_[robot] = !talking_[robot];
+    change_s_[robot] -= (talking_[robot] ? radio_.talking_s : radio_.silent_s) * kt_log(dice_.uniform());
+  }
+  const double chance = heard_[robot] * (talking_[robot] ? radio_.while_talking : 1);
+  const double turn = dice_.uniform() * (radio_.later[0] + radio_.later[1] + radio_.later[2] + radio_.later[3]);
+  double below = 0;
+  for (std::uint32_t later = 0; later < 4; ++later) {
+    below += radio_.later[later];
+    if (turn > below && later < 3) continue;
+    phase_[robot] += later;
+    break;
+  }
   const double module_mm = 2 * floor_.cell_mm;
   const int columns = static_cast<int>(floor_.width_mm / module_mm),
             rows = static_cast<int>(floor_.height_mm / module_mm);
@@ -85,13 +111,14 @@ void FloorReporter::see(std::uint32_t robot, double time_s, double x_mm, double 
   FloorTrack& track = tracks_[robot];
   for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows - 1); ++r) {
     for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c) {
-      // A module listens to one of its cells at a time.
-      const auto cell = static_cast<int>(dice_.bits() >> 62);
+      // Each module began with a cell of its own.
+      const auto cell =
+          static_cast<int>(phase_[robot] + Dice(static_cast<std::uint64_t>(r * columns + c)).bits() % 4) % 4;
       const double cell_x_mm = (2 * c + (cell & 1) + 0.5) * floor_.cell_mm,
                    cell_y_mm = (2 * r + (cell >> 1) + 0.5) * floor_.cell_mm;
       const double dx = x_mm - cell_x_mm, dy = y_mm - cell_y_mm;
       const double over = (std::sqrt(dx * dx + dy * dy) - radio_.range_mm) / radio_.blur_mm;
-      if (over > 30 || dice_.uniform() * (1 + kt_exp(over)) > heard_[robot]) continue;
+      if (over > 30 || dice_.uniform() * (1 + kt_exp(over)) > chance) continue;
       track.time_s.push_back(std::floor(time_s));
       track.x_mm.push_back(cell_x_mm);
       track.y_mm.push_back(cell_y_mm);
@@ -153,8 +180,8 @@ FloorRun simulate(const FloorScene& scene, const Floor& floor, const proto::Mode
     for (std::size_t i = 0; i < bodies.robot.size(); ++i) {
       const std::uint32_t robot = bodies.robot[i];
       const double x_mm = bodies.x_mm[i] + floor.width_mm / 2, y_mm = bodies.y_mm[i] + floor.height_mm / 2;
-      send_from_rim(floor, radio.wall_range_mm, now.count(), x_mm, y_mm, [&](double distance_mm) {
-        if (dice.uniform() > radio.wall_heard) return;
+      send_from_rim(floor, radio.wall_range_mm, now.count(), x_mm, y_mm, [&](double distance_mm, std::size_t part) {
+        if (dice.uniform() > radio.wall_heard * radio.rim[part]) return;
         // The program compares readings; where they begin does not matter as long as they are positive.
         constexpr double kStrongest = 1000;
         programs[robot].hear_wall(kilo_ticks, kStrongest - distance_mm + radio.wall_noise * dice.normal());

@@ -1,7 +1,10 @@
 /// Robots with a known program on the floor, by the planar engine: what the floor would write down of them.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "clients/identify/kilogrid/floor_log.hpp"
@@ -10,6 +13,11 @@
 
 namespace kilotwin::kilogrid {
 
+/// The rim of the floor in equal parts, anticlockwise from the corner at the origin.
+inline constexpr std::size_t kRimParts = 24;
+/// The part of the rim that is nearest to a place.
+[[nodiscard]] std::size_t rim_part(const Floor&, double x_mm, double y_mm);
+
 /// How cells hear robots and robots hear cells.
 struct FloorRadio {
   double report_every_s = 2.064;  ///< 63 kilo_ticks
@@ -17,9 +25,17 @@ struct FloorRadio {
   double blur_mm = 2;             ///< of that range: 1 / (1 + exp((distance - range) / blur))
   double heard = 0.8;             ///< mean chance of a robot to be heard within the range
   double heard_sd = 0.12;         ///< of that chance between robots
-  double wall_range_mm = 46;      ///< at which robots hear cells of the rim
-  double wall_heard = 1;          ///< chance of such a message to arrive
-  double wall_noise = 5;          ///< of one reading, in mm of distance
+  /// Robots talk to each other for a while now and then; their reports are then lost more often, by this factor.
+  double while_talking = 0.6;
+  double silent_s = 300, talking_s = 225;  ///< mean times between and of that
+  /// A module listens to one of its four cells at a time, in turn: chances of the cell to be 0..3 later at the next report.
+  std::array<double, 4> later = {0.25, 0.25, 0.25, 0.25};
+  double wall_range_mm = 46;          ///< at which robots hear cells of the rim
+  double wall_heard = 1;              ///< chance of such a message to arrive
+  std::array<double, kRimParts> rim;  ///< times that, where along the rim
+  double wall_noise = 5;              ///< of one reading, in mm of distance
+
+  FloorRadio() { rim.fill(1); }
 };
 
 /// What is given of a run, not fitted.
@@ -48,7 +64,9 @@ class FloorReporter {
   Floor floor_;
   FloorRadio radio_;
   Dice dice_;
-  std::vector<double> next_s_, every_s_, heard_;
+  std::vector<double> next_s_, every_s_, heard_, change_s_;
+  std::vector<bool> talking_;
+  std::vector<std::uint32_t> phase_;  ///< which cell modules listen to, but for what each began with
   std::vector<FloorTrack> tracks_;
 };
 

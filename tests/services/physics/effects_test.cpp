@@ -233,35 +233,6 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
   EXPECT_EQ(value("NEAREST_BEARING", alone), 0);
 }
 
-TEST(Effects, CommandsOfThePastAreRemembered) {
-  // What is seen while the robot does the last of these commands, in its first tick and later ones.
-  struct Case {
-    std::vector<std::pair<std::uint8_t, std::uint8_t>> duties;
-    double previous, turn;
-  };
-  const Case cases[] = {{{{70, 70}}, 0, 0},
-                        {{{70, 0}}, 0, 2},
-                        {{{70, 70}, {0, 70}}, 1, 3},
-                        {{{70, 0}, {70, 70}}, 2, 2},
-                        {{{70, 0}, {0, 70}, {0, 0}, {70, 70}}, 0, 3},
-                        {{{70, 0}, {70, 70}, {0, 70}, {70, 70}}, 3, 3}};
-  for (const auto& [covariate, is_turn] : {std::pair{"PREVIOUS_COMMAND", false}, {"LAST_TURN", true}}) {
-    for (const Case& c : cases) {
-      const RunPlan plan =
-          make_plan("motion { noise: false straight_speed_mm_s: 0 turn_speed_mm_s: 0 } " +
-                        effect("acts_on: WORLD_DRIFT during: [STOP, STRAIGHT, LEFT, RIGHT]", thousandth(covariate)),
-                    {{0, 0, 0}});
-      Swarm swarm(plan);
-      for (std::size_t i = 0; i < c.duties.size(); ++i) {
-        swarm.set_motors(0, c.duties[i].first, c.duties[i].second);
-        swarm.run(i + 1 < c.duties.size() ? 4 : 0);
-      }
-      for (int tick = 0; tick < 3; ++tick)
-        EXPECT_NEAR(1000 * seen(swarm, 0), is_turn ? c.turn : c.previous, 1e-8) << covariate << " " << tick;
-    }
-  }
-}
-
 TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
   // 200 robots for 1000 s: 40 000 s apart by 8 s on average, of a mean length of 4 / (3 - 1) s, so on for a fifth of the time.
   constexpr std::uint32_t kRobots = 200;
@@ -311,6 +282,35 @@ TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
     EXPECT_NEAR(longer / n, share,
                 3 * std::sqrt(share * (1 - share) / n) + 0.01 * share + kTick_s * tail * share / (scale_s + t))
         << t;
+  }
+}
+
+TEST(Effects, CommandsOfThePastAreRemembered) {
+  // What is seen while the robot does the last of these commands, in its first tick and later ones.
+  struct Case {
+    std::vector<std::pair<std::uint8_t, std::uint8_t>> duties;
+    double previous, turn;
+  };
+  const Case cases[] = {{{{70, 70}}, 0, 0},
+                        {{{70, 0}}, 0, 2},
+                        {{{70, 70}, {0, 70}}, 1, 3},
+                        {{{70, 0}, {70, 70}}, 2, 2},
+                        {{{70, 0}, {0, 70}, {0, 0}, {70, 70}}, 0, 3},
+                        {{{70, 0}, {70, 70}, {0, 70}, {70, 70}}, 3, 3}};
+  for (const auto& [covariate, is_turn] : {std::pair{"PREVIOUS_COMMAND", false}, {"LAST_TURN", true}}) {
+    for (const Case& c : cases) {
+      const RunPlan plan =
+          make_plan("motion { noise: false straight_speed_mm_s: 0 turn_speed_mm_s: 0 } " +
+                        effect("acts_on: WORLD_DRIFT during: [STOP, STRAIGHT, LEFT, RIGHT]", thousandth(covariate)),
+                    {{0, 0, 0}});
+      Swarm swarm(plan);
+      for (std::size_t i = 0; i < c.duties.size(); ++i) {
+        swarm.set_motors(0, c.duties[i].first, c.duties[i].second);
+        swarm.run(i + 1 < c.duties.size() ? 4 : 0);
+      }
+      for (int tick = 0; tick < 3; ++tick)
+        EXPECT_NEAR(1000 * seen(swarm, 0), is_turn ? c.turn : c.previous, 1e-8) << covariate << " " << tick;
+    }
   }
 }
 
