@@ -5,15 +5,11 @@
 namespace kilotwin::physics {
 namespace {
 
-constexpr double kDiameter_mm = 2 * kRobotRadius_mm;
+static_assert(kDiameter_mm == 2 * kRobotRadius_mm);
 constexpr double kOverlapSquare_mm2 = (kDiameter_mm - kOverlapTolerance_mm) * (kDiameter_mm - kOverlapTolerance_mm);
 
 /// Where a lane has no contact: so far away that it never acts.
 constexpr double kNoContact_mm = 1e100;
-
-/// Of contacts of discs. Six discs around one, each with six, are stable below 1/6: the sum of n n^T over six normals has the
-/// eigenvalue 3, a contact has two ends, and the masses are the unit.
-constexpr double kGain = 0.15;
 
 }  // namespace
 
@@ -36,10 +32,6 @@ ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
   thrust_mm = physics.thrust_n() / (physics.robot_mass_g() / 1000) * mm_per_m_s2;
   rim_friction = physics.rim_friction();
   hold_mm = physics.robot_friction() * kGravity_m_s2 * mm_per_m_s2;
-}
-
-bool ContactLimits::outside(double x_mm, double y_mm) const {
-  return x_mm > x_limit_mm || x_mm < -x_limit_mm || y_mm > y_limit_mm || y_mm < -y_limit_mm;
 }
 
 ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
@@ -69,7 +61,7 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
   for (std::uint32_t i = 0; i < count; ++i) {
     driven_[i] = driven[i] != 0 && immobile_[bodies.robot[i]] == 0;
     active_[i] = driven_[i] | bodies.awake[i];
-    lively_[i] = driven_[i] | presses_[bodies.robot[i]].any();
+    lively_[i] = driven_[i] | presses_.any(bodies.robot[i]);
     any_active |= active_[i];
   }
   for (const MovableState& body : movables_) any_active |= body.moves();
@@ -84,6 +76,7 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
     hops_[count + m] = own_movable[m] != 0 ? 0 : kOutOfReach;
   overlaps_.assign(count, 0);
   seat_of_.assign(count, ContactPass::kStill);
+  spin_mm_.assign(count, 0);
   movers_.clear();
   reached_.clear();
   movable_pass_.clear();
@@ -291,127 +284,136 @@ void ContactSolver::seat_movers() {
   pass_.rest();
 }
 
-/// Forces of the contact of this body with another at the tick's start. Both keep it, unless one has come to be pressed only
-/// in the last tick.
-ContactSolver::Forces ContactSolver::forces_of(const Bodies& bodies, std::uint32_t i, std::uint32_t j) const {
-  const Press& press = presses_[bodies.robot[i]];
-  if (press.contacts != 0) return {press.push_of(bodies.robot[j]), press.rub_of(bodies.robot[j])};
-  const Press& theirs = presses_[bodies.robot[j]];
-  if (theirs.contacts == 0) return {};
-  return {theirs.push_of(bodies.robot[i]), theirs.rub_of(bodies.robot[i])};
-}
-
-void ContactSolver::fill_contacts(const Bodies& bodies) {
+void ContactSolver::fill_batches(const Bodies& bodies) {
   const double way_mm = limits_.sub_steps * limits_.stride_mm;
   const double x_free_mm = limits_.x_limit_mm - way_mm, y_free_mm = limits_.y_limit_mm - way_mm;
   for (std::size_t at = 0; at < seated_.size(); at += kLanes) {
-    ContactPass::Batch& batch = pass_.batch_of(seat_of_[seated_[at].body]);
+    ContactBatch& batch = pass_.batch_of(seat_of_[seated_[at].body]);
+    ContactLanes* const contacts = pass_.contacts_of(batch);
     const std::size_t size = std::min(kLanes, seated_.size() - at);
-    Mover movers[kLanes];
+    if (there_.size() < batch.contacts * kLanes) there_.resize(batch.contacts * kLanes);
+    const auto mover = [&](std::size_t lane) {  // The last batch is filled up.
+      return lane < size ? seated_[at + lane] : Mover{seated_[at].body, 0, 0};
+    };
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const bool filled = lane < size;
-      movers[lane] = filled ? seated_[at + lane] : Mover{seated_[at].body, 0, 0};  // The last batch is filled up.
-      const std::uint32_t i = movers[lane].body;
+      const std::uint32_t i = mover(lane).body;
       const double x = bodies.x_mm[i], y = bodies.y_mm[i];
-      const Press& press = presses_[bodies.robot[i]];
       batch.x_mm[lane] = x;
       batch.y_mm[lane] = y;
-      batch.slip_x_mm[lane] = filled ? press.slip_x_mm : 0;
-      batch.slip_y_mm[lane] = filled ? press.slip_y_mm : 0;
+      if (lane < size) {
+        const Press& press = presses_[bodies.robot[i]];
+        batch.slip_x_mm[lane] = press.slip_x_mm;
+        batch.slip_y_mm[lane] = press.slip_y_mm;
+      }
       batch.grip_mm[lane] = driven_[i] != 0 ? limits_.thrust_mm : limits_.hold_mm;
+      batch.special |=
+          mover(lane).contacts > 0 && others_[mover(lane).first + mover(lane).contacts - 1] >= bodies.size();
       batch.near_wall |= x > x_free_mm || x < -x_free_mm || y > y_free_mm || y < -y_free_mm;
+      fill_lane(bodies, lane, mover(lane), batch.contacts, contacts);
     }
-    fill_contacts(bodies, batch, movers);
+    const bool apart = pass_.face(batch, there_.data(), bodies.x_mm.data(), bodies.y_mm.data());
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!apart) part_lane(bodies, lane, mover(lane), contacts);
+      fill_specials(lane, mover(lane), batch, contacts);
+    }
   }
   pass_.set_off();
 }
 
-void ContactSolver::fill_contacts(const Bodies& bodies, const ContactPass::Batch& batch, const Mover* movers) {
+void ContactSolver::fill_lane(const Bodies& bodies, std::size_t lane, const Mover& mover, std::uint32_t most,
+                              ContactLanes* contacts) {
   const auto count = static_cast<std::uint32_t>(bodies.size());
-  std::uint32_t here[kLanes];
-  for (std::size_t lane = 0; lane < kLanes; ++lane) here[lane] = movers[lane].body;
-  const Lanes x = gather(bodies.x_mm.data(), here), y = gather(bodies.y_mm.data(), here);
-  ContactPass::Contact* const contacts = pass_.contacts_of(batch);
-  for (std::uint32_t p = 0; p < batch.contacts; ++p) {
-    std::uint32_t there[kLanes], entry[kLanes];
-    double push[kLanes], rub[kLanes];
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      entry[lane] = p < movers[lane].contacts ? others_[movers[lane].first + p] : here[lane];
-      there[lane] = entry[lane] < count ? entry[lane] : here[lane];
-      const Forces forces = there[lane] != here[lane] ? forces_of(bodies, here[lane], there[lane]) : Forces{};
-      push[lane] = forces.push_mm;
-      rub[lane] = forces.rub_mm;
+  const Press& press = presses_[bodies.robot[mover.body]];
+  const double spin_mm = spin_mm_[mover.body];
+  std::uint32_t known = 0, p = 0;
+  for (; p < mover.contacts; ++p) {
+    const std::uint32_t j = others_[mover.first + p];
+    if (j >= count) break;  // What is no disc comes last.
+    const std::uint32_t id = bodies.robot[j];
+    ContactLanes& contact = contacts[p];
+    double push_mm = 0, rub_mm = 0;
+    if (press.contacts != 0) {
+      while (known < press.contacts && press.touch[known].other < id) ++known;
+      if (known < press.contacts && press.touch[known].other == id) {
+        push_mm = press.touch[known].push_mm;
+        rub_mm = press.touch[known].rub_mm;
+      }
+    } else if (presses_.any(id)) {
+      // Both keep a contact's forces, unless one has come to be pressed only in the last tick.
+      const Press::Touch theirs = presses_[id].touch_of(bodies.robot[mover.body]);
+      push_mm = theirs.push_mm;
+      rub_mm = theirs.rub_mm;
     }
-    const Lanes dx = gather(bodies.x_mm.data(), there) - x, dy = gather(bodies.y_mm.data(), there) - y;
-    const Lanes distance = root(dx * dx + dy * dy), inverse = all(1) / distance;
-    ContactPass::Contact& contact = contacts[p];
-    contact.normal_x = dx * inverse;
-    contact.normal_y = dy * inverse;
-    contact.gap_mm = distance - all(kDiameter_mm);
-    contact.push_mm = load(push);
-    contact.gain = all(kGain);
-    contact.rub_mm = load(rub);
-    contact.friction = all(limits_.rim_friction);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) contact.other[lane] = seat_of_[there[lane]];
-    if (!(smallest(distance) > 0)) fill_special(contact, distance, here, there, entry);
+    contact.push_mm[lane] = push_mm;
+    contact.rub_mm[lane] = rub_mm;
+    contact.spin_mm[lane] = spin_mm + spin_mm_[j];
+    contact.other[lane] = seat_of_[j];
+    there_[p * kLanes + lane] = j;
+  }
+  // Places of any disc but its own do for the rest.
+  const std::uint32_t any = p > 0 ? others_[mover.first] : mover.body == 0 ? count - 1 : 0;
+  for (; p < most; ++p) there_[p * kLanes + lane] = any;
+}
+
+void ContactSolver::fill_specials(std::size_t lane, const Mover& mover, const ContactBatch& batch,
+                                  ContactLanes* contacts) const {
+  const auto count = static_cast<std::uint32_t>(active_.size());
+  std::uint32_t p = mover.contacts;
+  while (p > 0 && others_[mover.first + p - 1] >= count) --p;
+  for (std::uint32_t q = 0; batch.special && q < batch.contacts; ++q) {
+    contacts[q].gain[lane] = kGain;
+    contacts[q].friction[lane] = q < p ? limits_.rim_friction : 0;
+  }
+  for (; p < batch.contacts; ++p) {
+    ContactLanes& contact = contacts[p];
+    contact.rub_mm[lane] = contact.spin_mm[lane] = 0;
+    if (p < mover.contacts) {
+      const Special& special = specials_[others_[mover.first + p] - count];
+      contact.normal_x[lane] = special.normal_x;
+      contact.normal_y[lane] = special.normal_y;
+      contact.gap_mm[lane] = special.gap_mm;
+      contact.gain[lane] = special.gain;
+      contact.push_mm[lane] = special.push_mm;
+      contact.other[lane] = special.seat;
+    } else {
+      contact.normal_x[lane] = 1;
+      contact.normal_y[lane] = 0;
+      contact.gap_mm[lane] = kNoContact_mm;
+      contact.push_mm[lane] = 0;
+      contact.other[lane] = ContactPass::kStill;
+    }
   }
 }
 
-/// Bodies in the same place, contacts with what is no disc, and lanes that have no such contact.
-void ContactSolver::fill_special(ContactPass::Contact& contact, const Lanes& distance_mm, const std::uint32_t* here,
-                                 const std::uint32_t* there, const std::uint32_t* entry) const {
-  double distance[kLanes], gap[kLanes], normal_x[kLanes], normal_y[kLanes], push[kLanes], gain[kLanes],
-      friction[kLanes];
-  store(distance_mm, distance);
-  store(contact.gap_mm, gap);
-  store(contact.normal_x, normal_x);
-  store(contact.normal_y, normal_y);
-  store(contact.push_mm, push);
-  store(contact.gain, gain);
-  store(contact.friction, friction);
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    if (distance[lane] > 0) continue;
-    if (entry[lane] != there[lane]) {
-      const Special& special = specials_[entry[lane] - static_cast<std::uint32_t>(active_.size())];
-      normal_x[lane] = special.normal_x;
-      normal_y[lane] = special.normal_y;
-      gap[lane] = special.gap_mm;
-      gain[lane] = special.gain;
-      friction[lane] = 0;
-      push[lane] = special.push_mm;
-      contact.other[lane] = special.seat;
-      continue;
-    }
-    // Two in the same place part along x, the lower id to the left.
-    normal_x[lane] = there[lane] < here[lane] ? -1 : 1;
-    normal_y[lane] = 0;
-    if (there[lane] != here[lane]) continue;
-    contact.other[lane] = ContactPass::kStill;
-    gap[lane] = kNoContact_mm;
+/// Two in the same place part along x, the lower id to the left.
+void ContactSolver::part_lane(const Bodies& bodies, std::size_t lane, const Mover& mover,
+                              ContactLanes* contacts) const {
+  for (std::uint32_t p = 0; p < mover.contacts; ++p) {
+    const std::uint32_t i = mover.body, j = others_[mover.first + p];
+    if (j >= bodies.size()) return;
+    const double dx = bodies.x_mm[j] - bodies.x_mm[i], dy = bodies.y_mm[j] - bodies.y_mm[i];
+    if (__builtin_sqrt(dx * dx + dy * dy) > 0) continue;
+    contacts[p].normal_x[lane] = j < i ? -1 : 1;
+    contacts[p].normal_y[lane] = 0;
   }
-  contact.gap_mm = load(gap);
-  contact.normal_x = load(normal_x);
-  contact.normal_y = load(normal_y);
-  contact.push_mm = load(push);
-  contact.gain = load(gain);
-  contact.friction = load(friction);
 }
 
 void ContactSolver::move(Bodies& bodies, const Drives& drives) {
-  for (Special& special : specials_) special.push_mm = presses_[bodies.robot[special.body]].push_of(special.key);
+  for (Special& special : specials_)
+    special.push_mm = presses_[bodies.robot[special.body]].touch_of(special.key).push_mm;
   for (std::size_t d = 0; d < drives.count; ++d) {
     const std::uint32_t i = drives.body[d];
-    const ContactPass::Seat seat = seat_of_[i];
+    const Seat seat = seat_of_[i];
     if (seat == ContactPass::kStill) {
       move_alone(bodies, i, drives.x_mm[d], drives.y_mm[d]);
     } else {
-      ContactPass::Batch& batch = pass_.batch_of(seat);
+      ContactBatch& batch = pass_.batch_of(seat);
       const std::size_t lane = ContactPass::lane_of(seat);
       batch.cos_turn[lane] = drives.cos_turn[d];
       batch.sin_turn[lane] = drives.sin_turn[d];
       batch.drive_x_mm[lane] = drives.x_mm[d];
       batch.drive_y_mm[lane] = drives.y_mm[d];
-      batch.spin_mm[lane] = drives.turn_rad[d] * sub_step_part_ * kRobotRadius_mm;
+      spin_mm_[i] = drives.turn_rad[d] * sub_step_part_ * kRobotRadius_mm;
     }
     bodies.heading_rad[i] = wrapped(drives.heading_rad[d] + drives.turn_rad[d]);
   }
@@ -420,18 +422,18 @@ void ContactSolver::move(Bodies& bodies, const Drives& drives) {
       bodies.awake[i] = hops_[i] != kOutOfReach;
     } else if (seat_of_[i] == ContactPass::kStill && active_[i] != 0) {
       if (driven_[i] == 0) move_alone(bodies, i, 0, 0);
-      if (lively_[i] != 0) presses_[bodies.robot[i]] = {};  // It touches nobody.
+      if (lively_[i] != 0) presses_.clear(bodies.robot[i]);  // It touches nobody.
     }
   }
   if (seated_.empty() && movable_pass_.empty()) return;
-  fill_contacts(bodies);
+  fill_batches(bodies);
   for (const Special& s : specials_) {
     if (s.movable == kNone || !movable_pass_.has(s.movable)) continue;
     movable_pass_.add_contact(s.movable, {seat_of_[s.body], s.seat, s.normal_x, s.normal_y, s.gap_mm, s.gain,
                                           s.push_mm, s.lever_x_mm, s.lever_y_mm});
   }
   movable_pass_.set_off(movables_, pass_);
-  pass_.run(limits_, limits_.sub_steps, any_overlap_,
+  pass_.run(limits_.of_pass(), limits_.sub_steps, any_overlap_,
             [&](std::uint32_t step) { movable_pass_.sub_step(step, pass_); });
   movable_pass_.finish(movables_);
   for (const Mover& m : seated_) {
@@ -450,29 +452,30 @@ void ContactSolver::move(Bodies& bodies, const Drives& drives) {
 /// Whether the body goes on next tick even where it has not moved: its forces changed, or it slips, which asks for a drive
 /// that may end.
 bool ContactSolver::keep_press(const Bodies& bodies, const Mover& m) {
-  const ContactPass::Seat seat = seat_of_[m.body];
-  ContactPass::Batch& batch = pass_.batch_of(seat);
+  const Seat seat = seat_of_[m.body];
+  const ContactBatch& batch = pass_.batch_of(seat);
   const std::size_t lane = ContactPass::lane_of(seat);
-  const ContactPass::Contact* const contacts = pass_.contacts_of(batch);
-  Press press;
-  press.slip_x_mm = batch.slip_x_mm[lane];
-  press.slip_y_mm = batch.slip_y_mm[lane];
+  const ContactLanes* const contacts = pass_.contacts_of(batch);
   const auto count = static_cast<std::uint32_t>(bodies.size());
-  for (std::uint32_t p = 0; p < m.contacts && press.contacts < Press::kMost; ++p) {
-    double push, rub;
-    __builtin_memcpy(&push, reinterpret_cast<const char*>(&contacts[p].push_mm) + lane * sizeof push, sizeof push);
-    __builtin_memcpy(&rub, reinterpret_cast<const char*>(&contacts[p].rub_mm) + lane * sizeof rub, sizeof rub);
-    if (!(push > 0)) continue;
-    const std::uint32_t entry = others_[m.first + p];
-    press.other[press.contacts] = entry < count ? bodies.robot[entry] : specials_[entry - count].key;
-    press.rub_mm[press.contacts] = entry < count ? rub : 0;
-    press.push_mm[press.contacts++] = push;
-  }
-  Press& kept = presses_[bodies.robot[m.body]];
-  const bool slips = press.slip_x_mm != 0 || press.slip_y_mm != 0;
-  if (kept == press) return slips;
-  kept = press;
-  return true;
+  return presses_.change(bodies.robot[m.body], [&](Press& kept) {
+    const double slip_x = batch.slip_x_mm[lane], slip_y = batch.slip_y_mm[lane];
+    bool changed = kept.slip_x_mm != slip_x || kept.slip_y_mm != slip_y;
+    kept.slip_x_mm = slip_x;
+    kept.slip_y_mm = slip_y;
+    std::uint32_t n = 0;
+    for (std::uint32_t p = 0; p < m.contacts && n < Press::kMost; ++p) {
+      const double push_mm = contacts[p].push_mm[lane];
+      if (!(push_mm > 0)) continue;
+      const std::uint32_t entry = others_[m.first + p];
+      const Press::Touch touch{push_mm, entry < count ? contacts[p].rub_mm[lane] : 0,
+                               entry < count ? bodies.robot[entry] : specials_[entry - count].key};
+      changed |= !(kept.touch[n] == touch);
+      kept.touch[n++] = touch;
+    }
+    changed |= kept.contacts != n;
+    kept.contacts = n;
+    return changed || slip_x != 0 || slip_y != 0;
+  });
 }
 
 void ContactSolver::move_alone(Bodies& bodies, std::uint32_t i, double way_x_mm, double way_y_mm) const {

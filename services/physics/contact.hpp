@@ -30,6 +30,7 @@
 #include "core/experiment/plan.hpp"
 #include "services/physics/bodies.hpp"
 #include "services/physics/candidate_list.hpp"
+#include "services/physics/contact_constants.hpp"
 #include "services/physics/contact_pass.hpp"
 #include "services/physics/contact_state.hpp"
 #include "services/physics/drive.hpp"
@@ -39,8 +40,6 @@ namespace kilotwin::physics {
 
 /// Overlapping bodies move apart at most at this speed each, mm/s: the speed of a wheel at the calibrated turn.
 inline constexpr double kSeparation_mm_s = 20;
-/// An overlap below this is rounding and is left alone, mm.
-inline constexpr double kOverlapTolerance_mm = 5e-10;
 
 /// What is fixed for a run.
 struct ContactLimits {
@@ -57,7 +56,12 @@ struct ContactLimits {
   double rim_friction;  ///< between two robots
   double thrust_mm, hold_mm;  ///< grip of a driven and of a resting robot, as contact_state.hpp has forces
 
-  [[nodiscard]] bool outside(double x_mm, double y_mm) const;
+  [[nodiscard]] bool outside(double x_mm, double y_mm) const {
+    return x_mm > x_limit_mm || x_mm < -x_limit_mm || y_mm > y_limit_mm || y_mm < -y_limit_mm;
+  }
+  [[nodiscard]] PassLimits of_pass() const {
+    return {separation_mm, stride_mm, touch_mm, x_limit_mm, y_limit_mm, rim_friction};
+  }
 };
 
 /// A tick is find(), then the drives of those that ask for one, then move().
@@ -66,8 +70,8 @@ class ContactSolver {
   ContactSolver(const RunPlan&, const DriveModel&);
 
   /// What contact keeps; per robot of the swarm, and per movable body.
-  [[nodiscard]] std::vector<Press>& presses() { return presses_; }
-  [[nodiscard]] const std::vector<Press>& presses() const { return presses_; }
+  [[nodiscard]] PressTable& presses() { return presses_; }
+  [[nodiscard]] const PressTable& presses() const { return presses_; }
   [[nodiscard]] std::vector<MovableState>& movables() { return movables_; }
   [[nodiscard]] const std::vector<MovableState>& movables() const { return movables_; }
 
@@ -106,7 +110,7 @@ class ContactSolver {
     double normal_x, normal_y;  ///< from the robot
     double gap_mm, gain, push_mm;
     double lever_x_mm, lever_y_mm;  ///< of the touched point from the movable body's centre
-    ContactPass::Seat seat;
+    Seat seat;
   };
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
@@ -116,18 +120,15 @@ class ContactSolver {
   void find_specials(const Bodies&);
   void add_special(std::uint32_t body, std::uint32_t key, std::uint32_t movable, const Nearest& of_shape);
   [[nodiscard]] std::pair<const Special*, const Special*> specials_of(std::uint32_t body) const;
-  struct Forces {
-    double push_mm = 0, rub_mm = 0;
-  };
-  [[nodiscard]] Forces forces_of(const Bodies&, std::uint32_t body, std::uint32_t other) const;
   void reach(std::uint32_t node, std::uint8_t hops);
   [[nodiscard]] bool keep_press(const Bodies&, const Mover&);
   void seat_movers();
-  void fill_contacts(const Bodies&);
-  void fill_contacts(const Bodies&, const ContactPass::Batch&, const Mover* movers);
-  /// Where bodies are in the same place, which for one and the same body means that the lane has no such contact.
-  void fill_special(ContactPass::Contact&, const Lanes& distance_mm, const std::uint32_t* here,
-                    const std::uint32_t* there, const std::uint32_t* entry) const;
+  void fill_batches(const Bodies&);
+  /// Forces of a body's contacts and who the others are, as the last tick left them.
+  void fill_lane(const Bodies&, std::size_t lane, const Mover&, std::uint32_t most, ContactLanes*);
+  /// Normals and gaps that the columns of places do not give.
+  void fill_specials(std::size_t lane, const Mover&, const ContactBatch&, ContactLanes*) const;
+  void part_lane(const Bodies&, std::size_t lane, const Mover&, ContactLanes*) const;
   void move_alone(Bodies&, std::uint32_t body, double way_x_mm, double way_y_mm) const;
   void place(Bodies&, std::uint32_t body, double to_x_mm, double to_y_mm) const;
 
@@ -137,11 +138,12 @@ class ContactSolver {
   ContactPass pass_;
   std::vector<Mover> movers_, seated_;  ///< by hops; by seats
   std::vector<std::uint32_t> others_;   ///< the contacts of the movers
+  std::vector<std::uint32_t> there_;    ///< bodies that a batch's contacts are with, kLanes per contact
   std::size_t other_count_ = 0;
   bool any_overlap_ = false, has_others_ = false;
   const World world_;
   std::vector<std::uint8_t> immobile_;  ///< per robot
-  std::vector<Press> presses_;
+  PressTable presses_;
   std::vector<MovableState> movables_;
   MovablePass movable_pass_;
   std::vector<Special> specials_;                     ///< by body, then by key
@@ -150,7 +152,8 @@ class ContactSolver {
   // Per body.
   std::vector<std::uint8_t> hops_;  ///< by contacts from the own bodies, or kOutOfReach
   std::vector<std::uint8_t> driven_, active_, overlaps_, lively_;  ///< lively: driven or pressed
-  std::vector<ContactPass::Seat> seat_of_;
+  std::vector<Seat> seat_of_;
+  std::vector<double> spin_mm_;         ///< way of its rim about its centre in a sub-step
   std::vector<std::uint32_t> reached_;  ///< others' bodies, by hops
 };
 

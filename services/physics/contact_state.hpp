@@ -4,48 +4,63 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 namespace kilotwin::physics {
-
-/// The inertia of all that moves, over its true one. Kilobots are quasi-static: inertia decides nothing, and forces in a jam find
-/// their balance the sooner the less of them it takes to stop a body. docs/physics.md has the evidence.
-inline constexpr double kInertia = 2;
-/// How fast a force ends where a gap opens beyond what a contact bridges, over how fast it ends where bodies part. With 1, a chain
-/// of robots hammers on what it pushes, and so moves what its force does not.
-inline constexpr double kEase = 0.25;
 
 /// A robot that touches others, or that slips against its drive.
 struct Press {
   static constexpr std::size_t kMost = 12;  ///< six equal discs fit around one; the rest is for walls and bodies
+  struct Touch {
+    double push_mm = 0,
+           rub_mm = 0;  ///< push: above 0; rub: friction, on this robot clockwise about it, on the other likewise
+    std::uint32_t other = 0;  ///< robot, or robots + movable body, or beyond: walls
+
+    bool operator==(const Touch&) const = default;
+  };
 
   double slip_x_mm = 0, slip_y_mm = 0;  ///< velocity less that of the drive
   std::uint32_t contacts = 0;
-  std::array<std::uint32_t, kMost> other{};  ///< ascending: robot, or robots + movable body, or beyond: walls
-  std::array<double, kMost> push_mm{};       ///< above 0
-  std::array<double, kMost> rub_mm{};        ///< friction, on this robot clockwise about it, on the other likewise
+  std::array<Touch, kMost> touch{};  ///< ascending by the other; the first `contacts` count
 
   [[nodiscard]] bool any() const { return contacts != 0 || slip_x_mm != 0 || slip_y_mm != 0; }
-  /// Force of the contact with this other; 0 where there is none.
-  [[nodiscard]] double push_of(std::uint32_t id) const {
+  /// The contact with this other; without forces where there is none.
+  [[nodiscard]] Touch touch_of(std::uint32_t id) const {
     for (std::uint32_t p = 0; p < contacts; ++p) {
-      if (other[p] == id) return push_mm[p];
+      if (touch[p].other == id) return touch[p];
     }
-    return 0;
+    return {};
   }
-  /// Friction of the contact with this other; 0 where there is none.
-  [[nodiscard]] double rub_of(std::uint32_t id) const {
-    for (std::uint32_t p = 0; p < contacts; ++p) {
-      if (other[p] == id) return rub_mm[p];
-    }
-    return 0;
+};
+
+/// All robots' presses, and beside them which of them are any, since most robots touch nobody.
+class PressTable {
+ public:
+  explicit PressTable(std::size_t robots) : presses_(robots), any_(robots, 0) {}
+
+  [[nodiscard]] std::size_t size() const { return presses_.size(); }
+  [[nodiscard]] const Press& operator[](std::size_t robot) const { return presses_[robot]; }
+  [[nodiscard]] bool any(std::size_t robot) const { return any_[robot] != 0; }
+  void set(std::size_t robot, const Press& press) {
+    presses_[robot] = press;
+    any_[robot] = press.any();
   }
-  bool operator==(const Press& o) const {
-    if (slip_x_mm != o.slip_x_mm || slip_y_mm != o.slip_y_mm || contacts != o.contacts) return false;
-    for (std::uint32_t p = 0; p < contacts; ++p) {
-      if (other[p] != o.other[p] || push_mm[p] != o.push_mm[p] || rub_mm[p] != o.rub_mm[p]) return false;
-    }
-    return true;
+  void clear(std::size_t robot) {
+    if (any_[robot] == 0) return;
+    presses_[robot].slip_x_mm = presses_[robot].slip_y_mm = 0;
+    presses_[robot].contacts = 0;
+    any_[robot] = 0;
   }
+  /// Changes it in place: `change(press)`, whose result this returns.
+  template <class Change> bool change(std::size_t robot, Change&& change) {
+    const bool result = change(presses_[robot]);
+    any_[robot] = presses_[robot].any();
+    return result;
+  }
+
+ private:
+  std::vector<Press> presses_;
+  std::vector<std::uint8_t> any_;
 };
 
 /// A movable body: pose of its centre and velocity.

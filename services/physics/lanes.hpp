@@ -1,25 +1,64 @@
-/// Eight doubles worked on at a time, by instructions of two each, which every CPU of the family has: enough independent work
-/// to keep its units busy. Each lane gets the bits that a double alone would get.
+/// Eight doubles worked on at a time, in vectors as wide as the instruction set at hand has them. Each lane gets the bits that a
+/// double alone would get, whatever the width.
+///
+/// For sources that are compiled once per instruction set: everything here has internal linkage, so that no function made for
+/// one of them is linked where another was meant.
 #pragma once
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
 
 #include <cstddef>
 #include <cstdint>
 
-namespace kilotwin::physics {
+#include "services/physics/contact_batch.hpp"
 
-/// Two of something with the operations of one; Two itself is what one instruction works on.
-using Two = double __attribute__((vector_size(16)));
+namespace kilotwin::physics {
+namespace {
+
+/// Two of something with the operations of one.
 template <class T> struct Twice { T a, b; };
-using Four = Twice<Two>;
+using Two = double __attribute__((vector_size(16)));
+#if defined(__AVX512F__)
+using Four = double __attribute__((vector_size(32)));
+using Lanes = double __attribute__((vector_size(64)));
+#elif defined(__AVX2__)
+using Four = double __attribute__((vector_size(32)));
 using Lanes = Twice<Four>;
-inline constexpr std::size_t kLanes = 8;
+#else
+using Lanes = Twice<Twice<Two>>;
+#endif
 
 inline Two larger(Two v, Two w) { return v > w ? v : w; }
 inline Two smaller(Two v, Two w) { return v < w ? v : w; }
-inline Two root(Two v) { return Two{__builtin_sqrt(v[0]), __builtin_sqrt(v[1])}; }
 template <class Mask> inline Two chosen(Mask m, Two v, Two otherwise) { return m ? v : otherwise; }
 inline double largest(Two v) { return v[0] > v[1] ? v[0] : v[1]; }
-inline double smallest(Two v) { return v[0] < v[1] ? v[0] : v[1]; }
+#if defined(__SSE2__)
+inline Two root(Two v) { return _mm_sqrt_pd(v); }
+#else
+inline Two root(Two v) { return Two{__builtin_sqrt(v[0]), __builtin_sqrt(v[1])}; }
+#endif
+
+#if defined(__AVX2__)
+inline Four larger(Four v, Four w) { return v > w ? v : w; }
+inline Four smaller(Four v, Four w) { return v < w ? v : w; }
+template <class Mask> inline Four chosen(Mask m, Four v, Four otherwise) { return m ? v : otherwise; }
+inline Four root(Four v) { return _mm256_sqrt_pd(v); }
+inline double largest(Four v) {
+  return largest(larger(__builtin_shufflevector(v, v, 0, 1), __builtin_shufflevector(v, v, 2, 3)));
+}
+#endif
+
+#if defined(__AVX512F__)
+inline Lanes larger(Lanes v, Lanes w) { return v > w ? v : w; }
+inline Lanes smaller(Lanes v, Lanes w) { return v < w ? v : w; }
+template <class Mask> inline Lanes chosen(Mask m, Lanes v, Lanes otherwise) { return m ? v : otherwise; }
+inline Lanes root(Lanes v) { return _mm512_maskz_sqrt_pd(0xff, v); }
+inline double largest(Lanes v) {
+  return largest(larger(__builtin_shufflevector(v, v, 0, 1, 2, 3), __builtin_shufflevector(v, v, 4, 5, 6, 7)));
+}
+#endif
 
 template <class T> inline Twice<T> operator+(Twice<T> v, Twice<T> w) { return {v.a + w.a, v.b + w.b}; }
 template <class T> inline Twice<T> operator-(Twice<T> v, Twice<T> w) { return {v.a - w.a, v.b - w.b}; }
@@ -39,21 +78,113 @@ template <class T> inline Twice<T> smaller(Twice<T> v, Twice<T> w) {
 }
 template <class T> inline Twice<T> root(Twice<T> v) { return {root(v.a), root(v.b)}; }
 template <class T> inline double largest(Twice<T> v) { return largest(larger(v.a, v.b)); }
-template <class T> inline double smallest(Twice<T> v) { return smallest(smaller(v.a, v.b)); }
 
-inline Lanes all(double v) {
-  const Two two = {v, v};
-  return {{two, two}, {two, two}};
-}
 inline Lanes load(const double* from) {
   Lanes v;
   __builtin_memcpy(&v, from, sizeof v);
   return v;
 }
 inline void store(Lanes v, double* to) { __builtin_memcpy(to, &v, sizeof v); }
+inline Lanes all(double v) {
+  const double eight[kLanes] = {v, v, v, v, v, v, v, v};
+  return load(eight);
+}
 inline Lanes gather(const double* column, const std::uint32_t* at) {
-  const auto two = [&](std::size_t lane) { return Two{column[at[lane]], column[at[lane + 1]]}; };
-  return {{two(0), two(2)}, {two(4), two(6)}};
+  const double eight[kLanes] = {column[at[0]], column[at[1]], column[at[2]], column[at[3]],
+                                column[at[4]], column[at[5]], column[at[6]], column[at[7]]};
+  return load(eight);
 }
 
+/// Four columns of rows of four doubles.
+struct Columns {
+  Lanes a, b, c, d;
+};
+
+template <class V> inline V loaded(const double* from) {
+  V v;
+  __builtin_memcpy(&v, from, sizeof v);
+  return v;
+}
+template <class V> inline void put(V v, double* to) { __builtin_memcpy(to, &v, sizeof v); }
+
+#if defined(__AVX2__)
+
+struct FourColumns {
+  Four a, b, c, d;
+};
+inline FourColumns turned(Four r0, Four r1, Four r2, Four r3) {
+  const Four ac01 = __builtin_shufflevector(r0, r1, 0, 4, 2, 6), bd01 = __builtin_shufflevector(r0, r1, 1, 5, 3, 7);
+  const Four ac23 = __builtin_shufflevector(r2, r3, 0, 4, 2, 6), bd23 = __builtin_shufflevector(r2, r3, 1, 5, 3, 7);
+  return {__builtin_shufflevector(ac01, ac23, 0, 1, 4, 5), __builtin_shufflevector(bd01, bd23, 0, 1, 4, 5),
+          __builtin_shufflevector(ac01, ac23, 2, 3, 6, 7), __builtin_shufflevector(bd01, bd23, 2, 3, 6, 7)};
+}
+inline FourColumns four_rows(const double* table, const std::uint32_t* at) {
+  return turned(loaded<Four>(table + 4 * std::size_t{at[0]}), loaded<Four>(table + 4 * std::size_t{at[1]}),
+                loaded<Four>(table + 4 * std::size_t{at[2]}), loaded<Four>(table + 4 * std::size_t{at[3]}));
+}
+inline void put_four_rows(Four a, Four b, Four c, Four d, double* table) {
+  const FourColumns rows = turned(a, b, c, d);
+  put(rows.a, table);
+  put(rows.b, table + 4);
+  put(rows.c, table + 8);
+  put(rows.d, table + 12);
+}
+
+#if defined(__AVX512F__)
+inline Lanes joined(Four v, Four w) { return __builtin_shufflevector(v, w, 0, 1, 2, 3, 4, 5, 6, 7); }
+inline Four lower(Lanes v) { return __builtin_shufflevector(v, v, 0, 1, 2, 3); }
+inline Four upper(Lanes v) { return __builtin_shufflevector(v, v, 4, 5, 6, 7); }
+#else
+inline Lanes joined(Four v, Four w) { return {v, w}; }
+inline Four lower(const Lanes& v) { return v.a; }
+inline Four upper(const Lanes& v) { return v.b; }
+#endif
+
+/// Rows of four of a table, by their numbers.
+inline Columns rows(const double* table, const std::uint32_t* at) {
+  const FourColumns low = four_rows(table, at), high = four_rows(table, at + 4);
+  return {joined(low.a, high.a), joined(low.b, high.b), joined(low.c, high.c), joined(low.d, high.d)};
+}
+/// Eight rows of four, one after the other.
+inline void put_rows(const Columns& v, double* table) {
+  put_four_rows(lower(v.a), lower(v.b), lower(v.c), lower(v.d), table);
+  put_four_rows(upper(v.a), upper(v.b), upper(v.c), upper(v.d), table + 16);
+}
+
+#else
+
+struct TwoColumns {
+  Two a, b, c, d;
+};
+inline TwoColumns two_rows(const double* table, const std::uint32_t* at) {
+  const double* const r = table + 4 * std::size_t{at[0]};
+  const double* const s = table + 4 * std::size_t{at[1]};
+  const Two r0 = loaded<Two>(r), r1 = loaded<Two>(r + 2), s0 = loaded<Two>(s), s1 = loaded<Two>(s + 2);
+  return {__builtin_shufflevector(r0, s0, 0, 2), __builtin_shufflevector(r0, s0, 1, 3),
+          __builtin_shufflevector(r1, s1, 0, 2), __builtin_shufflevector(r1, s1, 1, 3)};
+}
+inline void put_two_rows(Two a, Two b, Two c, Two d, double* table) {
+  put(Two(__builtin_shufflevector(a, b, 0, 2)), table);
+  put(Two(__builtin_shufflevector(c, d, 0, 2)), table + 2);
+  put(Two(__builtin_shufflevector(a, b, 1, 3)), table + 4);
+  put(Two(__builtin_shufflevector(c, d, 1, 3)), table + 6);
+}
+
+/// Rows of four of a table, by their numbers.
+inline Columns rows(const double* table, const std::uint32_t* at) {
+  const TwoColumns p = two_rows(table, at), q = two_rows(table, at + 2), r = two_rows(table, at + 4),
+                   s = two_rows(table, at + 6);
+  return {{{p.a, q.a}, {r.a, s.a}}, {{p.b, q.b}, {r.b, s.b}}, {{p.c, q.c}, {r.c, s.c}}, {{p.d, q.d}, {r.d, s.d}}};
+}
+/// Eight rows of four, one after the other.
+inline void put_rows(const Columns& v, double* table) {
+  put_two_rows(v.a.a.a, v.b.a.a, v.c.a.a, v.d.a.a, table);
+  put_two_rows(v.a.a.b, v.b.a.b, v.c.a.b, v.d.a.b, table + 8);
+  put_two_rows(v.a.b.a, v.b.b.a, v.c.b.a, v.d.b.a, table + 16);
+  put_two_rows(v.a.b.b, v.b.b.b, v.c.b.b, v.d.b.b, table + 24);
+}
+
+#endif
+
+}  // namespace
 }  // namespace kilotwin::physics

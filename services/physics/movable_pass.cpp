@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "services/physics/contact.hpp"
+#include "services/physics/contact_constants.hpp"
 
 namespace kilotwin::physics {
 namespace {
@@ -120,14 +121,14 @@ void MovablePass::find_stops(Mover& mover, const std::vector<MovableState>& stat
 }
 
 void MovablePass::move_points(const Mover& mover, const Motion& shift, const Motion& swing,
-                              double* (ContactPass::*of)(ContactPass::Seat), ContactPass& pass) const {
+                              double* (ContactPass::*of)(Seat), ContactPass& pass) const {
   const double rho_mm = bodies_[mover.movable].shape.mean_distance_mm();
   for (const Contact& c : mover.contacts) {
     double* const point = (pass.*of)(c.point);
     point[0] = shift.x_mm - c.lever_y_mm * (shift.turn_mm / rho_mm);
-    point[kLanes] = shift.y_mm + c.lever_x_mm * (shift.turn_mm / rho_mm);
-    point[2 * kLanes] = swing.x_mm - c.lever_y_mm * (swing.turn_mm / rho_mm);
-    point[3 * kLanes] = swing.y_mm + c.lever_x_mm * (swing.turn_mm / rho_mm);
+    point[1] = shift.y_mm + c.lever_x_mm * (shift.turn_mm / rho_mm);
+    point[2] = swing.x_mm - c.lever_y_mm * (swing.turn_mm / rho_mm);
+    point[3] = swing.y_mm + c.lever_x_mm * (swing.turn_mm / rho_mm);
   }
 }
 
@@ -156,10 +157,8 @@ void MovablePass::move(Mover& mover, ContactPass& pass) {
     // The same expressions as on the robot's side, and so the same bits.
     const double* const robot = pass.now(c.robot);
     const double* const point = pass.now(c.point);
-    const double gap =
-        c.gap_mm + (c.normal_x * (point[0] - robot[0]) + c.normal_y * (point[kLanes] - robot[kLanes]));
-    const double closing =
-        c.normal_x * (robot[2 * kLanes] - point[2 * kLanes]) + c.normal_y * (robot[3 * kLanes] - point[3 * kLanes]);
+    const double gap = c.gap_mm + (c.normal_x * (point[0] - robot[0]) + c.normal_y * (point[1] - robot[1]));
+    const double closing = c.normal_x * (robot[2] - point[2]) + c.normal_y * (robot[3] - point[3]);
     c.push_mm = std::max(c.push_mm + c.gain * (closing - kEase * std::max(gap - touch_mm_, 0.0)), 0.0);
     force.x_mm += c.push_mm * c.normal_x;
     force.y_mm += c.push_mm * c.normal_y;
@@ -204,8 +203,7 @@ void MovablePass::move(Mover& mover, ContactPass& pass) {
   const auto half_gap = [&](const Contact& c) {
     const double* const robot = pass.now(c.robot);
     const double* const point = pass.now(c.point);
-    const double gap =
-        c.gap_mm + (c.normal_x * (point[0] - robot[0]) + c.normal_y * (point[kLanes] - robot[kLanes]));
+    const double gap = c.gap_mm + (c.normal_x * (point[0] - robot[0]) + c.normal_y * (point[1] - robot[1]));
     return std::max(gap / 2, 0.0);
   };
   for (int round = 0; round < kRounds; ++round) {

@@ -21,7 +21,7 @@ class MovablePass {
  public:
   /// A robot that may touch a body within the tick.
   struct Contact {
-    ContactPass::Seat robot, point;     ///< of the robot, and of the touched point
+    Seat robot, point;                  ///< of the robot, and of the touched point
     double normal_x, normal_y, gap_mm;  ///< from the robot, at the tick's start
     double gain, push_mm;
     double lever_x_mm, lever_y_mm;  ///< of the touched point from the body's centre
@@ -82,8 +82,8 @@ class MovablePass {
   void add_stop(Mover&, const MovableState&, double normal_x, double normal_y, double gap_mm, Point2 at,
                 std::uint32_t other = kNone, const MovableState* other_state = nullptr) const;
   void move(Mover&, ContactPass&);
-  void move_points(const Mover&, const Motion& shift, const Motion& swing,
-                   double* (ContactPass::*of)(ContactPass::Seat), ContactPass&) const;
+  void move_points(const Mover&, const Motion& shift, const Motion& swing, double* (ContactPass::*of)(Seat),
+                   ContactPass&) const;
   /// Way of the point at this lever along a direction.
   [[nodiscard]] static double along(const Motion& m, double nx, double ny, double arm) {
     return nx * m.x_mm + ny * m.y_mm + arm * m.turn_mm;

@@ -367,7 +367,7 @@ bool OdeEngine::step_group(Tick from, std::span<const std::uint32_t> group, Solv
         touch_pair(i, m, since_s);
       }
     }
-    if (!world_.step(solver, random_.bits(Stream::kSolver, lowest, from, s))) return false;
+    if (!world_.step(solver, random_.bits(Stream::kSolver, lowest, from, s), !is_robot(group.back()))) return false;
     for (const std::uint32_t i : group) world_.read(in_world_[i], now_[i]);
   }
   return true;

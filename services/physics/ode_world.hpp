@@ -70,8 +70,8 @@ class OdeWorld {
   std::uint32_t add(const Inertia&, const RigidState&);
   void add(const TouchPoint&);
   /// Advances all bodies and removes all contacts. Results depend on the order of adding, and with the iterative solver on
-  /// `seed`. False: the exact solver met contacts whose forces it cannot tell apart, and the states are to be dropped.
-  [[nodiscard]] bool step(Solver, std::uint64_t seed);
+  /// `seed`. `pushes`: a movable body is among them. False: the exact solver met contacts whose forces it cannot tell apart, and the states are to be dropped.
+  [[nodiscard]] bool step(Solver, std::uint64_t seed, bool pushes);
   void read(std::uint32_t body, RigidState&) const;
 
  private:

@@ -37,20 +37,19 @@ void PlanarEngine::take(const Inputs& inputs) {
       contact_.movables()[movable.body[i]] = {movable.x_mm[i],  movable.y_mm[i],  movable.heading_rad[i],
                                               movable.vx_mm[i], movable.vy_mm[i], movable.turn_rad[i]};
     }
-    for (const std::uint32_t robot : frame->robot) contact_.presses()[robot] = {};
+    for (const std::uint32_t robot : frame->robot) contact_.presses().clear(robot);
     const PressedColumns& pressed = frame->pressed;
     std::size_t at = 0;
     for (std::size_t i = 0; i < pressed.robot.size(); ++i) {
-      Press& press = contact_.presses()[pressed.robot[i]];
+      Press press;
       press.slip_x_mm = pressed.slip_x_mm[i];
       press.slip_y_mm = pressed.slip_y_mm[i];
       for (std::uint32_t p = 0; p < pressed.contacts[i]; ++p, ++at) {
         if (p >= Press::kMost) continue;
-        press.other[p] = pressed.other[at];
-        press.push_mm[p] = pressed.push_mm[at];
-        press.rub_mm[p] = pressed.rub_mm[at];
+        press.touch[p] = {pressed.push_mm[at], pressed.rub_mm[at], pressed.other[at]};
         press.contacts = p + 1;
       }
+      contact_.presses().set(pressed.robot[i], press);
       const auto found = std::lower_bound(known.robot.begin(), known.robot.end(), pressed.robot[i]);
       if (found != known.robot.end() && *found == pressed.robot[i])
         known.awake[static_cast<std::size_t>(found - known.robot.begin())] = 1;
@@ -142,16 +141,16 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   }
   add_movables(frame);
   for (const std::uint32_t robot : frame.robot) {
+    if (!contact_.presses().any(robot)) continue;
     const Press& press = contact_.presses()[robot];
-    if (!press.any()) continue;
     frame.pressed.robot.push_back(robot);
     frame.pressed.slip_x_mm.push_back(press.slip_x_mm);
     frame.pressed.slip_y_mm.push_back(press.slip_y_mm);
     frame.pressed.contacts.push_back(static_cast<std::uint8_t>(press.contacts));
     for (std::uint32_t p = 0; p < press.contacts; ++p) {
-      frame.pressed.other.push_back(press.other[p]);
-      frame.pressed.push_mm.push_back(press.push_mm[p]);
-      frame.pressed.rub_mm.push_back(press.rub_mm[p]);
+      frame.pressed.other.push_back(press.touch[p].other);
+      frame.pressed.push_mm.push_back(press.touch[p].push_mm);
+      frame.pressed.rub_mm.push_back(press.touch[p].rub_mm);
     }
   }
 }
@@ -159,12 +158,14 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
 std::uint64_t PlanarEngine::hash_part() const {
   std::uint64_t sum = population_.hash_part();
   for (const std::uint32_t robot : population_.listed().robot) {
+    if (!contact_.presses().any(robot)) continue;
     const Press& press = contact_.presses()[robot];
-    if (!press.any()) continue;
     sum += entity_hash(HashDomain::kContact, robot, {hash_bits(press.slip_x_mm), hash_bits(press.slip_y_mm)});
-    for (std::uint32_t p = 0; p < press.contacts; ++p)
+    for (std::uint32_t p = 0; p < press.contacts; ++p) {
+      const Press::Touch& touch = press.touch[p];
       sum += entity_hash(HashDomain::kContact, robot,
-                         {press.other[p], hash_bits(press.push_mm[p]), hash_bits(press.rub_mm[p]), 1});
+                         {touch.other, hash_bits(touch.push_mm), hash_bits(touch.rub_mm), 1});
+    }
   }
   for (std::uint32_t m = 0; m < listed_movable_.size(); ++m) {
     if (listed_movable_[m] == 0) continue;
@@ -186,25 +187,25 @@ void PlanarEngine::save(proto::PhysicsState& state) const {
       state.add_movable_state(value);
   }
   for (const std::uint32_t robot : population_.listed().robot) {
+    if (!contact_.presses().any(robot)) continue;
     const Press& press = contact_.presses()[robot];
-    if (!press.any()) continue;
     state.add_pressed(robot);
     state.add_contacts(press.contacts);
     state.add_pressed_state(press.slip_x_mm);
     state.add_pressed_state(press.slip_y_mm);
     for (std::uint32_t p = 0; p < press.contacts; ++p) {
-      state.add_contact_other(press.other[p]);
-      state.add_pressed_state(press.push_mm[p]);
-      state.add_pressed_state(press.rub_mm[p]);
+      state.add_contact_other(press.touch[p].other);
+      state.add_pressed_state(press.touch[p].push_mm);
+      state.add_pressed_state(press.touch[p].rub_mm);
     }
   }
 }
 
 void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> parts) {
   population_.load(tick, parts);
-  std::vector<Press>& presses = contact_.presses();
+  PressTable& presses = contact_.presses();
   std::vector<MovableState>& movables = contact_.movables();
-  std::fill(presses.begin(), presses.end(), Press{});
+  for (std::size_t robot = 0; robot < presses.size(); ++robot) presses.clear(robot);
   std::vector<std::uint8_t> seen(movables.size(), 0);
   std::size_t found = 0;
   for (const proto::PhysicsState* part : parts) {
@@ -226,15 +227,16 @@ void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> p
           other + size > part->contact_other_size()) {
         throw RunError("checkpoint: physics: contacts of robot " + std::to_string(robot) + " are damaged");
       }
-      Press& press = presses[robot];
+      Press press;
       press.slip_x_mm = part->pressed_state(value++);
       press.slip_y_mm = part->pressed_state(value++);
       press.contacts = contacts;
       for (std::uint32_t p = 0; p < contacts; ++p) {
-        press.other[p] = part->contact_other(other++);
-        press.push_mm[p] = part->pressed_state(value++);
-        press.rub_mm[p] = part->pressed_state(value++);
+        press.touch[p].other = part->contact_other(other++);
+        press.touch[p].push_mm = part->pressed_state(value++);
+        press.touch[p].rub_mm = part->pressed_state(value++);
       }
+      presses.set(robot, press);
     }
   }
   if (found != movables.size()) throw RunError("checkpoint: physics: a movable body is missing");

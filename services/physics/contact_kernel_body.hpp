@@ -1,0 +1,188 @@
+/// The inner loops of contact, for a source that says for which instruction set. contact.hpp states the law.
+#pragma once
+
+#include "services/physics/contact_constants.hpp"
+#include "services/physics/lanes.hpp"
+
+namespace kilotwin::physics {
+namespace {
+
+/// By how much a limit may be missed because of rounding, mm. Sliding at a gap of 0 would stop without it.
+constexpr double kLimitTolerance_mm = 1e-14;
+/// How many limits of a body are met exactly, the one that is missed most first; what is missed then scales all down.
+constexpr int kLimitRounds = 2;
+
+bool face(const ContactBatch& batch, const std::uint32_t* there, const double* x_mm, const double* y_mm,
+          ContactLanes* contacts) {
+  const Lanes x = load(batch.x_mm), y = load(batch.y_mm), diameter_mm = all(kDiameter_mm), one = all(1);
+  Lanes least = one;
+  for (std::size_t p = 0; p < batch.contacts; ++p) {
+    ContactLanes& contact = contacts[p];
+    const Lanes dx = gather(x_mm, there + p * kLanes) - x, dy = gather(y_mm, there + p * kLanes) - y;
+    const Lanes distance = root(dx * dx + dy * dy), inverse = one / distance;
+    store(dx * inverse, contact.normal_x);
+    store(dy * inverse, contact.normal_y);
+    store(distance - diameter_mm, contact.gap_mm);
+    least = smaller(least, distance);
+  }
+  return -largest(-least) > 0;
+}
+
+template <bool kWithOverlaps>
+inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* contacts, const double* motion,
+                 double* after, double* room_mm) {
+  const std::size_t count = batch.contacts;
+  const Lanes zero = all(0), a_half = all(0.5), separation_mm = all(limits.separation_mm);
+  const Lanes touch_mm = all(limits.touch_mm), ease = all(kEase), rub_gain = all(kRubGain);
+  const Lanes disc_gain = all(kGain), disc_friction = all(limits.friction);
+  const bool special = batch.special;
+  const Lanes shift_x = load(batch.shift_x_mm), shift_y = load(batch.shift_y_mm);
+  const Lanes swing_x = load(batch.swing_x_mm), swing_y = load(batch.swing_y_mm);
+  const Lanes drive_x = load(batch.drive_x_mm), drive_y = load(batch.drive_y_mm);
+  const Lanes old_slip_x = load(batch.slip_x_mm), old_slip_y = load(batch.slip_y_mm);
+
+  // Forces of the contacts; the sum in ascending order.
+  Lanes slip_x = old_slip_x, slip_y = old_slip_y, apart_x = zero, apart_y = zero, deepest = zero;
+  for (std::size_t p = 0; p < count; ++p) {
+    ContactLanes& c = contacts[p];
+    const Columns other = rows(motion, c.other);
+    const Lanes normal_x = load(c.normal_x), normal_y = load(c.normal_y);
+    const Lanes gap = load(c.gap_mm) + (normal_x * (other.a - shift_x) + normal_y * (other.b - shift_y));
+    const Lanes closing = normal_x * (swing_x - other.c) + normal_y * (swing_y - other.d);
+    const Lanes gain = special ? load(c.gain) : disc_gain, friction = special ? load(c.friction) : disc_friction;
+    const Lanes push = larger(load(c.push_mm) + gain * (closing - ease * larger(gap - touch_mm, zero)), zero);
+    // Of the rims, along the normal turned left: the same number for both bodies, to the last bit.
+    const Lanes sliding = (normal_x * (swing_y - other.d) - normal_y * (swing_x - other.c)) + load(c.spin_mm);
+    const Lanes most = friction * push;
+    const Lanes rub = larger(smaller(load(c.rub_mm) + rub_gain * sliding, most), -most);
+    store(push, c.push_mm);
+    store(rub, c.rub_mm);
+    slip_x = slip_x - push * normal_x + rub * normal_y;
+    slip_y = slip_y - push * normal_y - rub * normal_x;
+    if constexpr (kWithOverlaps) {
+      const Lanes overlap = chosen(all(-kOverlapTolerance_mm) > gap, -gap, zero);
+      deepest = larger(deepest, overlap);
+      const Lanes apart = smaller(a_half * overlap, separation_mm);
+      apart_x = apart_x - apart * normal_x;
+      apart_y = apart_y - apart * normal_y;
+      store(gap, room_mm + p * kLanes);
+    } else {
+      store(larger(a_half * gap, zero), room_mm + p * kLanes);
+    }
+  }
+  // The ground takes off as much of the slip as its grip allows.
+  const Lanes grip = load(batch.grip_mm), square_slip = slip_x * slip_x + slip_y * slip_y;
+  if (largest(square_slip) > 0) {
+    const Lanes slip = root(square_slip), keep = chosen(slip > grip, (slip - grip) / slip, zero);
+    slip_x = slip_x * keep;
+    slip_y = slip_y * keep;
+  }
+  Lanes x = drive_x + slip_x, y = drive_y + slip_y;
+  if constexpr (kWithOverlaps) {
+    for (std::size_t p = 0; p < count; ++p) {
+      const Lanes gap = load(room_mm + p * kLanes);
+      store(larger(a_half * (gap + a_half * deepest), zero), room_mm + p * kLanes);
+    }
+  }
+
+  Lanes low_x = zero, low_y = zero, high_x = zero, high_y = zero;
+  if (batch.near_wall) {
+    const Lanes at_x = load(batch.x_mm) + shift_x, at_y = load(batch.y_mm) + shift_y;
+    high_x = all(limits.x_limit_mm) - at_x;
+    high_y = all(limits.y_limit_mm) - at_y;
+    low_x = all(-limits.x_limit_mm) - at_x;
+    low_y = all(-limits.y_limit_mm) - at_y;
+    const Lanes most_x = larger(high_x, zero), least_x = smaller(low_x, zero);
+    const Lanes most_y = larger(high_y, zero), least_y = smaller(low_y, zero);
+    slip_x = slip_x + (larger(smaller(x, most_x), least_x) - x);
+    slip_y = slip_y + (larger(smaller(y, most_y), least_y) - y);
+    x = larger(smaller(x, most_x), least_x);
+    y = larger(smaller(y, most_y), least_y);
+    // Outside of a wall it moves inwards, as far as its neighbours let it.
+    x = x + (larger(smaller(high_x, zero), -separation_mm) + smaller(larger(low_x, zero), separation_mm));
+    y = y + (larger(smaller(high_y, zero), -separation_mm) + smaller(larger(low_y, zero), separation_mm));
+    high_x = larger(high_x, zero);
+    high_y = larger(high_y, zero);
+    low_x = smaller(low_x, zero);
+    low_y = smaller(low_y, zero);
+  }
+  const Lanes velocity_x = drive_x + slip_x, velocity_y = drive_y + slip_y;
+  if constexpr (kWithOverlaps) {
+    x = x + apart_x;
+    y = y + apart_y;
+  }
+  const Lanes square = x * x + y * y, stride = all(limits.stride_mm), stride_square = stride * stride;
+  if (largest(square) > limits.stride_mm * limits.stride_mm) {
+    const Lanes shortening = chosen(square > stride_square, stride / root(square), all(1));
+    x = x * shortening;
+    y = y * shortening;
+  }
+
+  // Takes off what is most beyond a limit, and again; what is beyond another limit then scales down all.
+  const auto hold_at_walls = [&] {
+    if (!batch.near_wall) return;
+    x = larger(smaller(x, high_x), low_x);
+    y = larger(smaller(y, high_y), low_y);
+  };
+  const auto along = [&](std::size_t p) { return load(contacts[p].normal_x) * x + load(contacts[p].normal_y) * y; };
+  const auto room = [&](std::size_t p) { return load(room_mm + p * kLanes); };
+  hold_at_walls();
+  Lanes excess = zero;
+  for (int round = 0; round < kLimitRounds; ++round) {
+    Lanes normal_x = zero, normal_y = zero;
+    excess = zero;
+    for (std::size_t p = 0; p < count; ++p) {
+      const Lanes beyond = along(p) - room(p);
+      const auto worse = beyond > excess;
+      excess = larger(excess, beyond);
+      normal_x = chosen(worse, load(contacts[p].normal_x), normal_x);
+      normal_y = chosen(worse, load(contacts[p].normal_y), normal_y);
+    }
+    if (!(largest(excess) > kLimitTolerance_mm)) break;
+    excess = chosen(excess > all(kLimitTolerance_mm), excess, zero);
+    x = x - excess * normal_x;
+    y = y - excess * normal_y;
+    hold_at_walls();
+  }
+  if (largest(excess) > kLimitTolerance_mm) {
+    excess = zero;
+    for (std::size_t p = 0; p < count; ++p) excess = larger(excess, along(p) - room(p));
+  }
+  if (largest(excess) > kLimitTolerance_mm) {
+    Lanes scale = all(1);
+    for (std::size_t p = 0; p < count; ++p) {
+      const Lanes way = along(p), limit = room(p);
+      const auto missed = (way > limit + all(kLimitTolerance_mm)) & (scale * way > limit);
+      scale = chosen(missed, limit / way, scale);
+    }
+    x = scale * x;
+    y = scale * y;
+  }
+
+  const Lanes cos_turn = load(batch.cos_turn), sin_turn = load(batch.sin_turn);
+  const Columns next = {shift_x + x, shift_y + y, (velocity_x + velocity_x) - (drive_x + old_slip_x),
+                        (velocity_y + velocity_y) - (drive_y + old_slip_y)};
+  put_rows(next, after);
+  store(next.a, batch.shift_x_mm);
+  store(next.b, batch.shift_y_mm);
+  store(next.c, batch.swing_x_mm);
+  store(next.d, batch.swing_y_mm);
+  store(slip_x, batch.slip_x_mm);
+  store(slip_y, batch.slip_y_mm);
+  store(cos_turn * drive_x - sin_turn * drive_y, batch.drive_x_mm);
+  store(sin_turn * drive_x + cos_turn * drive_y, batch.drive_y_mm);
+}
+
+void pass(const PassLimits& limits, std::uint32_t step, bool overlap, ContactBatch* batches, std::size_t count,
+          ContactLanes* contacts, const double* now, double* after, double* room_mm) {
+  for (std::size_t b = 0; b < count; ++b) {
+    if (step >= batches[b].passes) continue;
+    ContactLanes* const own = contacts + batches[b].first_contact;
+    double* const to = after + b * kLanes * 4;
+    overlap ? move<true>(limits, batches[b], own, now, to, room_mm)
+            : move<false>(limits, batches[b], own, now, to, room_mm);
+  }
+}
+
+}  // namespace
+}  // namespace kilotwin::physics
