@@ -66,6 +66,43 @@ TEST(Checkpoint, ContinuesOnOtherHostsAsIfNothingHadHappened) {
   }
 }
 
+TEST(Checkpoint, WhatAHostHasSeenOfLoopsChangesNothing) {
+  // A host that has seen a robot wait looks for loops at once; one that has just loaded it does so later. The tick in which
+  // an endless loop is found is the same for both, and so is what loops with several tests, or that count, have come to.
+  const std::vector<std::string> texts{
+      program(
+          "static volatile uint8_t go; uint32_t sum;\n"
+          "static void rx(message_t* m, distance_measurement_t* d) { if (m->type == 9) go = 1; }\n"
+          "static void loop(void) { while (!go); for (volatile int i = 0; i < 60; ++i) sum += i; for (;;) {} }"),
+      program("static volatile uint8_t go; static uint16_t n; static uint32_t rounds;\n"
+              "static void rx(message_t* m, distance_measurement_t* d) { if (m->type == 9) ++go; }\n"
+              "static uint8_t odd(uint32_t x) { return rand_soft() != 1 && (x & 1); }\n"
+              "static void loop(void) { uint8_t before = go; while (go == before) { ++n; if (kilo_uid & 1) rounds "
+              "+= 3; }\n"
+              "  while (go == before + 1) { if (odd(kilo_ticks)) ++rounds; }\n"
+              "  set_motors(n, n >> 8); set_color(rounds); }")};
+  for (const int at : {10, 19, 20, 21, 22}) {
+    Swarm seen(texts, 9, 2), loaded(texts, 9, 1);
+    seen.start();
+    const auto air = [](const Swarm& swarm) {
+      Air result;
+      for (std::uint32_t robot = 0; swarm.tick.count() % 7 == 0 && robot < swarm.plan->robots(); ++robot) {
+        result.receptions.push_back({robot, message(swarm.tick.count() < 20 ? 1 : 9)});
+      }
+      return result;
+    };
+    while (seen.tick.count() < at) seen.step(air(seen));
+    load(loaded, seen.tick, saved(seen));
+    for (int k = 0; k < 60; ++k) {
+      seen.step(air(seen));
+      loaded.step(air(loaded));
+      ASSERT_TRUE(equal(seen.frame(), loaded.frame())) << "loaded at " << at << ", " << k << " ticks later";
+    }
+    EXPECT_EQ(loaded.life_cycle(3), LifeCycle::kFailed);
+    EXPECT_EQ(loaded.life_cycle(12), LifeCycle::kRunning);
+  }
+}
+
 TEST(Checkpoint, SavesWhatItHasLoaded) {
   Swarm first({program("static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5),
       second({program("static void loop(void) { delay(rand_hard()); set_color(rand_soft()); }")}, 5);
