@@ -14,10 +14,12 @@
 
 namespace kilotwin::behaviours {
 
+/// Of a stack that clear_below() clears.
+inline constexpr std::uint32_t kClearedOctets = 256;
 /// Clears the end of what frames were below a stack pointer: a robot that looks there by mistake finds the same whoever ran
 /// before it.
 inline void clear_below(std::uint8_t* stack) {
-  for (int line = 1; line <= 16; ++line) {
+  for (int line = 1; line <= static_cast<int>(kClearedOctets / 16); ++line) {
     std::memset(stack - 16 * line, 0, 16);
     // Stays a store each: a loop that becomes a string instruction takes longer to begin than this does.
     std::atomic_signal_fence(std::memory_order_seq_cst);
@@ -42,7 +44,7 @@ class RobotMemory {
     auto* const stack = reinterpret_cast<std::uint8_t*>(slot.stack_top() - stack_octets_);  // NOLINT
     std::memcpy(stack, octets_.get() + data_octets_, stack_octets_);
     // What ends of frames were there is no other robot's.
-    clear_below(stack);
+    if (stack_octets_ + kClearedOctets <= kStackOctets) clear_below(stack);
     thread.robot_stack = slot.stack_top() - stack_octets_;
   }
   /// `data_octets`: Executor::data_octets(). False where the robot's stack pointer has left its stack.
