@@ -175,7 +175,9 @@ bool reads_memory(const Statement& instruction) {
     if (name.starts_with(start) && operands.find("(%rsi)") != std::string_view::npos) return true;
   }
   const std::string_view memory = memory_operand(operands);
-  if (memory.empty()) return operands.find("%fs:") != std::string_view::npos;
+  // %gs: what is left of the cycles, which the next tick changes.
+  if (memory.empty())
+    return operands.find("%fs:") != std::string_view::npos || operands.find("%gs:") != std::string_view::npos;
   if (memory.find("(%rsp") != std::string_view::npos || memory.find("(%rbp") != std::string_view::npos ||
       memory.find("@GOT") != std::string_view::npos) {
     return false;

@@ -168,6 +168,22 @@ std::optional<std::string> assembly_of(Arguments arguments, const fs::path& plac
   return read_file(result.path());
 }
 
+/// Nested functions that use variables of the one around them, and whose address is taken, are called by way of code on the
+/// stack. avr-gcc has none of that either, as a robot cannot execute its RAM.
+void refuse_code_on_stack(const std::string& assembly, Arguments compile, const std::vector<fs::path>& sources,
+                          const fs::path& place) {
+  if (assembly.find(".note.GNU-stack,\"x\"") == std::string::npos) return;
+  std::erase(compile, "-w");
+  append(compile, {"-Wtrampolines", "-Werror=trampolines"});
+  std::string errors;
+  (void)assembly_of(compile, place, errors);
+  const std::string error = first_error(errors, sources);
+  throw UserError(
+      error.substr(0, error.find(" [-W")) +
+      "; a robot cannot run code on its stack: let the nested function use no variable of the one around it, or "
+      "call it there by its name alone");
+}
+
 /// One source to assembly that counts cycles, with loops that see what interrupts change. The text that is compiled for that
 /// differs from the source; what the compiler says of it is said of the source.
 std::string counted_assembly(const Arguments& compiler, const fs::path& source, const std::string& preprocessed,
@@ -191,6 +207,7 @@ std::string counted_assembly(const Arguments& compiler, const fs::path& source, 
     assembly = assembly_of(arguments, place, errors);
   }
   if (!assembly) throw UserError(first_error(errors, sources));
+  refuse_code_on_stack(*assembly, arguments, sources, place);
   return with_cycle_counters(*assembly);
 }
 

@@ -265,15 +265,18 @@ class Instrumenter {
                    std::string& stubs) {
     const std::string count =
         "\tsubl\t$" + std::to_string(std::max(c.cycles, 1u)) + ", %gs:" + std::to_string(KT_THREAD_BUDGET) + "\n";
-    const std::string id = std::to_string(number), call = "\tcall\tkt_preempt_" + std::to_string(c.kind) + "\n";
+    const std::string id = std::to_string(number), preempt = "kt_preempt_" + std::to_string(c.kind) + "\n";
     if (!c.tests) {
       code += count;
     } else if (c.keeps_flags) {
-      code += "\tpushfq\n" + count + "\tjns\t.Lkt_back" + id + "\n" + call + ".Lkt_back" + id + ":\n\tpopfq\n";
+      code += "\tpushfq\n" + count + "\tjns\t.Lkt_back" + id + "\n\tcall\t" + preempt + ".Lkt_back" + id +
+              ":\n\tpopfq\n";
     } else {
       code += count + "\tjs\t.Lkt_out" + id + "\n.Lkt_back" + id + ":\n";
       stubs.append(".Lkt_out" + id + ":\n").append(place).append(place.empty() ? "" : "\n");
-      stubs.append(call).append("\tjmp\t.Lkt_back" + id + "\n");
+      // A call, but for the processor's prediction of returns: see switch.c.
+      stubs.append("\tleaq\t-8(%rsp), %rsp\n\tpushq\t%rax\n\tleaq\t.Lkt_back" + id +
+                   "(%rip), %rax\n\tmovq\t%rax, 8(%rsp)\n\tpopq\t%rax\n\tjmp\t" + preempt);
     }
   }
 

@@ -11,7 +11,7 @@ namespace kilotwin::behaviours {
 /// well as at the entry of every function that calls another, a test of what is left. The code must be compiled with
 /// -mno-red-zone. Throws RunError if a cycle was left without a test, which would be an error of this function.
 /// To be raised whenever this pass, or that of the loops, comes to give other code: compiled programs are kept by it.
-inline constexpr int kCountersVersion = 3;
+inline constexpr int kCountersVersion = 4;
 
 enum class Counted : bool { kAll, kTestsOnly };
 /// Of code that a robot has in another form, as kilolib, only the tests count, one cycle each.

@@ -26,7 +26,7 @@ class Parser {
     find_data();
     read_table();
     read_functions();
-    find_kept();
+    find_sections();
     read_lines();
     return std::move(file_);
   }
@@ -216,8 +216,8 @@ class Parser {
     file_.table = table;
   }
 
-  /// Sections that a reset does not touch. A file without names of sections has none.
-  void find_kept() {
+  /// Sections that a reset does not touch, and the heap. A file without names of sections has none.
+  void find_sections() {
     const auto section_at = [&](std::uint64_t i) {
       return at<Elf64_Shdr>(octets_, header_.e_shoff + i * sizeof(Elf64_Shdr));
     };
@@ -232,6 +232,13 @@ class Parser {
       const std::string_view whole = name.substr(0, name.find('\0'));
       if (whole.starts_with(".noinit") || whole == "kilotwin_eeprom")
         file_.kept.push_back({section->sh_addr, section->sh_addr + section->sh_size});
+      // Elsewhere it would be data like any other.
+      constexpr std::uint64_t kBefore = 64;  // see constructors.ld
+      if (whole == KT_HEAP_SECTION && section->sh_size >= kBefore &&
+          section->sh_addr + section->sh_size == file_.data.last) {
+        file_.heap = {section->sh_addr + kBefore, section->sh_addr + section->sh_size};
+        file_.data.last = file_.heap.first;
+      }
     }
   }
 

@@ -38,6 +38,7 @@ class ElfFile {
   std::vector<Segment> segments;    ///< ascending, no page shared
   Range relro;                      ///< whole pages: read-only once relocated
   Range data;                       ///< what stays writable: a robot's globals and statics
+  Range heap;                       ///< behind them; empty where a program uses none
   std::vector<Range> kept;          ///< parts of data that outlive a reset: .noinit and EEMEM variables
   KtImage table{};                  ///< with offsets for addresses
   std::vector<Function> functions;  ///< for the text of faults; ascending

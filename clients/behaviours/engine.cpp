@@ -217,7 +217,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     const Fault fault = executor.interrupt(receptions, sent, interrupted_cycles);
     if (fault.signal != Fault::kNone) return fail_robot(i, fault, program, slot);
     if (executor.robot().reset != 0) {
-      static_cast<void>(memory.copy_out(slot, thread));
+      static_cast<void>(memory.copy_out(slot, executor.data_octets(), thread));
       reset_robot(from, i, program, slot);
       memory.copy_in(slot, thread);
       sent = false;
@@ -248,7 +248,8 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   note_outputs(i, robot, executor.tx_period());
   if (thread.divided != 0) note_division(i, thread.divided, program, slot);
   executor.robot().spin_up = 0;
-  if (!memory.copy_out(slot, thread)) fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
+  if (!memory.copy_out(slot, executor.data_octets(), thread))
+    fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
 }
 
 /// The main program's share of a tick.
@@ -265,11 +266,12 @@ Fault BehavioursEngine::run_main(std::uint32_t i, const Executor& executor, std:
     cycles -= static_cast<std::int64_t>(paid);
     if (cycles <= 0) return {};
   }
-  Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), spins_[i] != 0);
-  spins_[i] = main.spins ? 1 : 0;
+  Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), spins_[i]);
+  spins_[i] = main.spins;
   if (main.fault.signal != Fault::kNone) return main.fault;
   if (as_on_robot && main.left < 0) robot.debt_cycles += static_cast<std::uint64_t>(-main.left);
   if (main.preempted) ++robot.waits;
+  robot.looped = main.preempted && (executor.thread().check & KT_CHECK_WAITS) == 0 ? 1 : 0;
   const bool endless = main.preempted && (executor.thread().check & KT_CHECK_ENDLESS) != 0;
   robot.stuck_ticks = endless ? static_cast<std::uint16_t>(robot.stuck_ticks + 1) : std::uint16_t{0};
   if (endless && std::int64_t{robot.stuck_ticks} * tick_cycles >= kPatienceCycles)

@@ -139,7 +139,7 @@ class BehavioursEngine {
   std::vector<KtMessage> messages_;             ///< with their checksums
 
   // Nothing that a result depends on.
-  std::vector<std::uint8_t> spins_;    ///< per own robot: its program waited in a loop when the last tick ended
+  std::vector<std::int32_t> spins_;    ///< per own robot: Executor::Main::spins of the last tick
   std::vector<std::uint8_t> divided_;  ///< per program: a division by zero was told
 
   Running own_running_;

@@ -48,8 +48,9 @@ void RobotMemory::reset(const Program& program, const Slot& slot) {
 
 void RobotMemory::restore(const Program& program, const Slot& slot, std::span<const std::uint8_t> data,
                           std::span<const std::uint8_t> stack) {
-  if (data.size() != program.data_size() || stack.size() > kStackOctets || stack.size() < 56 ||
-      slot.initial_data().empty()) {
+  const ElfFile::Range& heap = program.file.heap;
+  if (data.size() < program.data_size() || data.size() > program.data_size() + (heap.last - heap.first) ||
+      stack.size() > kStackOctets || stack.size() < 56 || slot.initial_data().empty()) {
     throw RunError(program.name + ": the checkpoint was made with another program");
   }
   resize(static_cast<std::uint32_t>(data.size()), static_cast<std::uint32_t>(stack.size()));
@@ -65,6 +66,8 @@ constexpr std::int32_t kCallbackCycles = 8'000'000;
 /// After so many cycles a program is suspected of waiting in a loop, and looked at each time round, this many times.
 constexpr std::int32_t kUnsuspected = 32768;
 constexpr int kLooks = 24;
+/// Of Main::spins: the loop has one test; shorter than any loop.
+constexpr std::int32_t kOneTest = 1;
 
 /// The state of the robot in a slot.
 class Snapshot {
@@ -77,7 +80,8 @@ class Snapshot {
     std::memcpy(octets_.data() + data_octets, stack(), size);
   }
   [[nodiscard]] bool equals(const Slot& slot, std::size_t data_octets, const RobotThread& thread) const {
-    return robot_stack_ == thread.robot_stack && std::memcmp(octets_.data(), slot.data(), data_octets) == 0 &&
+    return robot_stack_ == thread.robot_stack && octets_.size() == data_octets + stack_octets(slot) &&
+           std::memcmp(octets_.data(), slot.data(), data_octets) == 0 &&
            std::memcmp(octets_.data() + data_octets, stack(), stack_octets(slot)) == 0;
   }
 
@@ -111,7 +115,7 @@ bool Executor::enter(std::int32_t cycles) const {
   return preempted && thread_.fault.signal == Fault::kNone;
 }
 
-Executor::Main Executor::run_main(std::int32_t cycles, bool spun) const {
+Executor::Main Executor::run_main(std::int32_t cycles, std::int32_t spun) const {
   thread_local Snapshot snapshot;
   Main main;
   main.left = cycles;
@@ -122,29 +126,39 @@ Executor::Main Executor::run_main(std::int32_t cycles, bool spun) const {
     main.fault = thread_.fault;
     return main.preempted;
   };
-  if (!spun && !run(std::min(cycles, kUnsuspected))) return main;
+  if (robot_->looped != 0) {
+    // The last tick ended in a loop that reads nothing which an interrupt could change. If it comes to the same state
+    // again, nothing ever will.
+    snapshot.take(slot_, data_octets(), thread_);
+    if (!run(0)) return main;
+    if (snapshot.equals(slot_, data_octets(), thread_)) {
+      main.fault = {Fault::kEndlessLoop, 0, thread_.place};
+      return main;
+    }
+  }
+  if (spun == 0 && main.left >= 0 && !run(std::min(main.left, kUnsuspected))) return main;
   // Whoever comes to the same place in the same state goes round in a loop that only an interrupt can end: it need not be
   // followed any further than for its phase at the end of the tick.
   int next_snapshot = 0, snapshot_look = 0;
   std::int32_t snapshot_left = 0;
+  // A loop with several tests is likely to be the one of the last tick. The first round may end otherwise than it began, with
+  // what an interrupt has changed in a register.
+  if (spun > kOneTest && main.left >= 0 && !run(std::min(spun, main.left + 1) - 1)) return main;
   for (int look = 0; look < kLooks && main.left >= 0; ++look) {
+    const bool whole_round = look == 0 && spun > kOneTest;
     if (look == next_snapshot) {
-      snapshot.take(slot_, data_octets_, thread_);
+      snapshot.take(slot_, data_octets(), thread_);
       snapshot_look = look;
       snapshot_left = main.left;
       next_snapshot = 2 * look + 1;
     }
-    if (!run(0)) return main;
-    if (!snapshot.equals(slot_, data_octets_, thread_)) continue;
-    const bool same_test = look == snapshot_look;
-    if (same_test && (thread_.check & KT_CHECK_WAITS) == 0) {
-      main.fault = {Fault::kEndlessLoop, 0, thread_.place};
-      return main;
-    }
+    if (!run(whole_round ? std::min(spun, main.left + 1) - 1 : 0)) return main;
+    if (!snapshot.equals(slot_, data_octets(), thread_)) continue;
     const std::int32_t period = snapshot_left - main.left;
-    main.spins = true;
+    const bool one_test = look == snapshot_look && !whole_round;
+    main.spins = one_test ? kOneTest : period;
     if (main.left >= 0) main.left %= period;
-    if (same_test && main.left >= 0) main.left -= period;
+    if (one_test && main.left >= 0) main.left -= period;
     break;
   }
   if (main.left >= 0) (void)run(main.left);
@@ -154,6 +168,7 @@ Executor::Main Executor::run_main(std::int32_t cycles, bool spun) const {
 Fault Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
   thread_.budget = kCallbackCycles;
   thread_.overrun = 0;
+  clear_below(reinterpret_cast<std::uint8_t*>(slot_.interrupt_stack_top()));  // NOLINT
   begin();
   result = call_(function);
   end();

@@ -1,6 +1,7 @@
 /// Runs one robot's code in a slot: memory in, interrupts, main program, memory out.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <cstring>
@@ -13,7 +14,19 @@
 
 namespace kilotwin::behaviours {
 
-/// A robot's memory while it does not run: its data, then its live stack, in one buffer.
+/// Of a stack that clear_below() clears.
+inline constexpr std::uint32_t kClearedOctets = 256;
+/// Clears the end of what frames were below a stack pointer: a robot that looks there by mistake finds the same whoever ran
+/// before it.
+inline void clear_below(std::uint8_t* stack) {
+  for (int line = 1; line <= static_cast<int>(kClearedOctets / 16); ++line) {
+    std::memset(stack - 16 * line, 0, 16);
+    // Stays a store each: a loop that becomes a string instruction takes longer to begin than this does.
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+  }
+}
+
+/// A robot's memory while it does not run: its data with what it uses of its heap, then its live stack, in one buffer.
 class RobotMemory {
  public:
   /// As at reset: initial data, and a stack from which the main program starts.
@@ -31,13 +44,16 @@ class RobotMemory {
     std::memset(slot.data() + data_octets_, 0, kSlackOctets);
     auto* const stack = reinterpret_cast<std::uint8_t*>(slot.stack_top() - stack_octets_);  // NOLINT
     std::memcpy(stack, octets_.get() + data_octets_, stack_octets_);
+    // What ends of frames were there is no other robot's.
+    if (stack_octets_ + kClearedOctets <= kStackOctets) clear_below(stack);
     thread.robot_stack = slot.stack_top() - stack_octets_;
   }
-  /// False where the robot's stack pointer has left its stack.
-  [[nodiscard]] bool copy_out(const Slot& slot, const RobotThread& thread) {
+  /// `data_octets`: Executor::data_octets(). False where the robot's stack pointer has left its stack.
+  [[nodiscard]] bool copy_out(const Slot& slot, std::uint32_t data_octets, const RobotThread& thread) {
     const std::uint64_t size = slot.stack_top() - thread.robot_stack;
     if (size > kStackOctets) return false;
-    if (data_octets_ + size > capacity_) resize(data_octets_, static_cast<std::uint32_t>(size));
+    if (data_octets + size > capacity_) resize(data_octets, static_cast<std::uint32_t>(size));
+    data_octets_ = data_octets;
     stack_octets_ = static_cast<std::uint32_t>(size);
     std::memcpy(octets_.get(), slot.data(), data_octets_);
     const auto* const stack = reinterpret_cast<const std::uint8_t*>(thread.robot_stack);  // NOLINT
@@ -74,7 +90,8 @@ class Executor {
  public:
   Executor(const Program& program, const Slot& slot, RobotThread& thread)
       : slot_(slot),
-        data_octets_(program.data_size()),
+        fixed_octets_(static_cast<std::uint32_t>(program.data_size())),
+        heap_octets_(static_cast<std::uint32_t>(program.file.heap.last - program.file.heap.first)),
         thread_(thread),
         leave_(slot.image_address() + program.file.table.leave),
         enter_(slot.at<Enter*>(program.file.table.enter)),
@@ -89,6 +106,10 @@ class Executor {
   /// The simulated hardware of the robot in the slot.
   [[nodiscard]] KtRobot& robot() const { return *robot_; }
   [[nodiscard]] RobotThread& thread() const { return thread_; }
+  /// Of the memory of the robot in the slot, heap included. The robot may have written anything there.
+  [[nodiscard]] std::uint32_t data_octets() const {
+    return fixed_octets_ + std::min(robot_->heap_octets, heap_octets_);
+  }
   [[nodiscard]] std::uint16_t tx_period() const {
     std::uint16_t value = 0;
     std::memcpy(&value, tx_period_, sizeof value);
@@ -98,12 +119,12 @@ class Executor {
   struct Main {
     Fault fault;
     bool preempted = false;  ///< it was stopped within its code, having used up its cycles
-    bool spins = false;      ///< ... in a loop that only an interrupt can end
+    std::int32_t spins = 0;  ///< not 0: ... in a loop that only an interrupt can end
     std::int32_t left = 0;   ///< cycles; negative: it has used more
   };
-  /// The main program, until it waits or has used up so many cycles. `spun`: how that ended the last time; a hint that
-  /// changes how long this takes and nothing else.
-  [[nodiscard]] Main run_main(std::int32_t cycles, bool spun) const;
+  /// The main program, until it waits or has used up so many cycles. `spun`: what Main::spins was the last time, or 0; a hint
+  /// that changes how long this takes and nothing else.
+  [[nodiscard]] Main run_main(std::int32_t cycles, std::int32_t spun) const;
 
   /// Callbacks for what has happened. `cycles` is what they have used.
   [[nodiscard]] Fault interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const;
@@ -129,7 +150,7 @@ class Executor {
   [[nodiscard]] Fault call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const;
 
   const Slot& slot_;
-  const std::size_t data_octets_;
+  const std::uint32_t fixed_octets_, heap_octets_;  ///< of data; of the heap at most
   RobotThread& thread_;
   std::uint64_t leave_;
   Enter* enter_;

@@ -40,6 +40,7 @@ class Slot {
   [[nodiscard]] KtSurroundings* surroundings() const {
     return reinterpret_cast<KtSurroundings*>(surroundings_);  // NOLINT
   }
+  /// A robot's data; behind them its heap.
   [[nodiscard]] std::uint8_t* data() const { return at<std::uint8_t*>(data_offset_); }
   /// One past the highest octet of the main stack; aligned to 16.
   [[nodiscard]] std::uint64_t stack_top() const { return stack_top_; }

@@ -5,9 +5,11 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 3u
+#define KT_IMAGE_VERSION 4u
 /* Room for what a robot prints in one tick; a serial line of 38400 baud takes 126 octets in a tick. */
 #define KT_LOG_OCTETS 3584
+/* The heap's section; the last of a robot's memory, so that only what is in use need be kept. */
+#define KT_HEAP_SECTION ".kilotwin_heap"
 
 /* What a host thread and the robot that it runs have in common; %gs points to it. Robots' pointers do not reach it. */
 struct KtThread {
@@ -63,7 +65,9 @@ struct KtRobot {
   uint8_t heard;          /* something was received while a sleeping robot listened */
   int16_t adc;            /* the last conversion, which get_voltage() leaves where a message's strength should be */
   uint8_t trigger_lost;   /* it has */
-  uint8_t unused;
+  uint8_t looped;         /* host: the tick ended in a loop that reads nothing which an interrupt may change */
+  uint32_t heap_octets;   /* of the heap's beginning that are in use, or were once */
+  uint32_t unused;
 };
 
 /* The callback that runs. */
@@ -140,7 +144,7 @@ struct KtImage {
 #else
 #define KT_ASSERT _Static_assert
 #endif
-KT_ASSERT(sizeof(struct KtRobot) == 56, "no padding");
+KT_ASSERT(sizeof(struct KtRobot) == 64, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
 KT_ASSERT(sizeof(struct KtThread) == 40 && __builtin_offsetof(struct KtThread, budget) == KT_THREAD_BUDGET,

@@ -104,6 +104,9 @@ static void spend(uint64_t cycles) {
   }
 }
 
+/* For the heap. */
+uint32_t* kt_heap_octets(void) { return &robot.heap_octets; }
+
 /* For what the rest of the runtime lets a program wait for. */
 void kilotwin_spend(unsigned long long cycles) { spend(cycles); }
 

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "image_abi.h"
 #include "weak.h"
 
 /* clang-format off */
@@ -52,30 +53,40 @@ ACCESS(word, uint16_t)
 ACCESS(dword, uint32_t)
 ACCESS(float, float)
 
-/* A heap of four times the robot's whole memory, as pointers are four times as long: blocks in a row, each with its
- * size before it, the lowest bit set while it is in use. First fit; neighbours that are free are joined on the way. */
-enum { HEAP_OCTETS = 8192, HEADER = sizeof(size_t), ALIGNMENT = 8 };
+/* A heap that grows as it is needed: blocks in a row, each with its size before it, the lowest bit set while it is in use. First
+ * fit; neighbours that are free are joined on the way. What it has grown by is zero. Many times a robot's whole memory, for
+ * programs that were written for other simulators. */
+enum { HEAP_OCTETS = 65536, HEADER = sizeof(size_t), ALIGNMENT = 8 };
 
-static uint64_t heap[HEAP_OCTETS / sizeof(uint64_t)];
+__attribute__((section(".bss" KT_HEAP_SECTION))) static uint64_t heap[HEAP_OCTETS / sizeof(uint64_t)];
+
+uint32_t* kt_heap_octets(void);
 
 static size_t* header(size_t at) { return (size_t*)((uint8_t*)heap + at); }
 
 void* malloc(size_t wanted) {
   if (wanted > HEAP_OCTETS) return NULL;
   const size_t needed = (wanted + HEADER + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
-  if (*header(0) == 0) *header(0) = HEAP_OCTETS;
-  for (size_t at = 0; at < HEAP_OCTETS; at += *header(at) & ~(size_t)1) {
+  const size_t end = *kt_heap_octets();
+  size_t at = 0, room = 0;
+  for (; at < end; at += *header(at) & ~(size_t)1) {
     if (*header(at) & 1) continue;
     size_t next = at + *header(at);
-    while (next < HEAP_OCTETS && !(*header(next) & 1)) next += *header(next);
-    const size_t room = next - at;
+    while (next < end && !(*header(next) & 1)) next += *header(next);
+    room = next - at;
     *header(at) = room;
-    if (room < needed) continue;
-    if (room > needed) *header(at + needed) = room - needed;
-    *header(at) = needed | 1;
-    return header(at) + 1;
+    if (room >= needed || next >= end) break;
   }
-  return NULL;
+  if (at >= end) room = 0;
+  if (room < needed) {
+    if (at > HEAP_OCTETS - needed) return NULL;
+    memset((uint8_t*)heap + at + room, 0, needed - room);
+    *kt_heap_octets() = (uint32_t)(at + needed);
+    room = needed;
+  }
+  if (room > needed) *header(at + needed) = room - needed;
+  *header(at) = needed | 1;
+  return header(at) + 1;
 }
 
 void free(void* block) {

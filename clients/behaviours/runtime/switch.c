@@ -38,7 +38,7 @@ _Static_assert(__builtin_offsetof(struct KtThread, robot_stack) == 8 &&
   "xorps %xmm14, %xmm14\n xorps %xmm15, %xmm15\n"
 /* Processors predict returns by the calls that they have seen. So that all calls and returns between a host's call of kt_enter
  * and its end pair up, a robot is continued by a jump and comes to wait by a jump, with the address where it goes on pushed
- * by hand; the host is returned to by the return that its call expects. */
+ * by hand; the host is returned to by the return that its call expects. Counters call kt_preempt in the same way. */
 #define CONTINUE "pop %rcx\n jmp *%rcx\n"
 #define FUNCTION(name) ".globl " #name "\n .hidden " #name "\n .type " #name ", @function\n" #name ":\n"
 #define END(name) ".size " #name ", .-" #name "\n"
@@ -88,7 +88,7 @@ __asm__(
 #define SWITCH "lea 1f(%rip), %rax\n push %rax\n mov $1, %eax\n jmp kt_switch\n 1:\n"
 #define RESTORE_OTHERS                                                                                          \
   "pop %r11\n pop %r10\n pop %r9\n pop %r8\n pop %rdi\n pop %rsi\n pop %rdx\n pop %rcx\n pop %rax\n pop %rbp\n" \
-  "ret\n"
+  "lea 8(%rsp), %rsp\n jmp *-8(%rsp)\n"
     FUNCTION(kt_preempt)
     "cmpb $0, " IN_INTERRUPT "\n jne kt_overrun\n" SAVE_OTHERS
     "sub $128, %rsp\n" SAVE_ARGUMENTS

@@ -69,6 +69,31 @@ TEST(Compiler, ErrorsNameTheUsersLine) {
   }
 }
 
+TEST(Compiler, CodeOnTheStackIsRefusedAsForTheRobot) {
+  const Folder folder;
+  const auto nested = [&](const std::string& captured) {
+    const std::string file = folder.write("nested.c",
+                                          "#include <kilolib.h>\n"
+                                          "static int twice(int (*f)(int), int x) { return f(f(x)); }\n"
+                                          "static void loop(void) {\n"
+                                          "  int base = kilo_ticks;\n"
+                                          "  int add(int x) { return x + " +
+                                              captured +
+                                              "; }\n"
+                                              "  int (*volatile by_address)(int) = add;\n"
+                                              "  set_color(twice(by_address, base));\n"
+                                              "}\n"
+                                              "int main(void) { kilo_init(); kilo_start(loop, loop); }\n");
+    return error_of({file});
+  };
+  const std::string error = nested("base");
+  EXPECT_NE(
+      error.find("nested.c:5:7: error: trampoline generated for nested function 'add'; a robot cannot run code"),
+      std::string::npos)
+      << error;
+  EXPECT_EQ(nested("1"), "no error");
+}
+
 TEST(Compiler, BadArgumentsAreToldPlainly) {
   const Folder folder;
   const fs::path good = folder.write("good.c", "#include <kilolib.h>\nint main(void) { return 0; }\n");

@@ -70,6 +70,23 @@ TEST(Faults, StackOverflow) {
       "static int deep(int n) { volatile char room[300]; room[n & 127] = n; return deep(n + 1) + room[n & 127]; }");
 }
 
+TEST(Faults, AStackThatIsAlmostFull) {
+  // Robots wait with so many octets left, from none to hundreds; whoever has room for that goes on.
+  Swarm swarm({program("static char* top;\n"
+                       "static int deep(void) { volatile char room[8]; room[0] = 0;\n"
+                       "  if (top - (char*)room > 65536 - 256 - 16 * kilo_uid) { delay(100); return room[0]; }\n"
+                       "  return deep() + room[0]; }\n"
+                       "static void loop(void) { char here; top = &here; deep(); set_color(RGB(0, 3, 0)); }")},
+              40);
+  swarm.start();
+  swarm.steps(20);
+  EXPECT_EQ(swarm.led(39), 3 << 2);
+  std::uint32_t lowest = 39;
+  while (lowest > 0 && swarm.life_cycle(lowest - 1) == LifeCycle::kRunning) --lowest;
+  EXPECT_LT(lowest, 20u);
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), lowest) << "the deepest overflow, all others do not";
+}
+
 TEST(Faults, LargeFrame) { one_fails("volatile char room[1000000]; room[n] = 1;", "stack overflow"); }
 
 TEST(Faults, FailedAssertion) { one_fails("assert(n == 200);", "illegal instruction", "#include <assert.h>"); }

@@ -144,7 +144,7 @@ TEST(Fuzz, ProgramsOfEveryKindCostNobodyElse) {
       "static uint8_t n; static message_t m; static message_t* tx(void) { m.data[0] = n; return &m; }\n"
       "static void loop(void) { set_motors(++n, kilo_ticks); }");
   const std::uint32_t programs = wanted("KILOTWIN_FUZZ_PROGRAMS", 8), seed = wanted("KILOTWIN_FUZZ_SEED", 1);
-  constexpr std::uint32_t kRobots = 6;
+  const std::uint32_t kRobots = wanted("KILOTWIN_FUZZ_ROBOTS", 6);
   std::uint32_t failed = 0;
   for (std::uint32_t p = 0; p < programs; ++p) {
     SCOPED_TRACE("seed " + std::to_string(seed + p));
