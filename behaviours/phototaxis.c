@@ -4,16 +4,17 @@
 #include <kilolib.h>
 
 #define SAMPLES 8
-#define FALL 6                            /* counts of the converter below the best of this pivot */
+#define SMOOTHING 8                       /* loops over which readings are averaged */
+#define FALL 24                           /* the light has fallen by this part of the best of this pivot */
 #define LONGEST_TICKS (6 * TICKS_PER_SEC) /* half a turn or so: no pivot lasts longer */
 
-static int16_t best;
+static uint16_t best, smooth; /* sums of readings */
 static uint8_t left;
 static uint32_t pivot_began_at;
 
-/* The mean of some readings; the sensor cannot be read while a message arrives and then says -1. */
-static int16_t light(void) {
-  int16_t sum = 0;
+/* The sum of some readings; the sensor cannot be read while a message arrives and then says -1. */
+static uint16_t light(void) {
+  uint16_t sum = 0;
   uint8_t count = 0;
   while (count < SAMPLES) {
     const int16_t reading = get_ambientlight();
@@ -21,24 +22,31 @@ static int16_t light(void) {
     sum += reading;
     ++count;
   }
-  return sum / SAMPLES;
+  return sum;
 }
 
-static void pivot(uint8_t to_the_left, int16_t now) {
+static void pivot(uint8_t to_the_left) {
   left = to_the_left;
-  best = now;
+  best = smooth;
   pivot_began_at = kilo_ticks;
   set_color(left ? RGB(3, 0, 0) : RGB(0, 3, 0));
   spinup_motors();
   set_motors(left ? kilo_turn_left : 0, left ? 0 : kilo_turn_right);
 }
 
-static void setup(void) { pivot(1, light()); }
+static void setup(void) {
+  smooth = light();
+  pivot(1);
+}
 
 static void loop(void) {
-  const int16_t now = light();
-  if (now > best) best = now;
-  if (now < best - FALL || kilo_ticks - pivot_began_at > LONGEST_TICKS) pivot(!left, now);
+  const uint16_t now = light();
+  if (now > smooth)
+    smooth += (now - smooth) / SMOOTHING;
+  else
+    smooth -= (smooth - now) / SMOOTHING;
+  if (smooth > best) best = smooth;
+  if (smooth < best - best / FALL || kilo_ticks - pivot_began_at > LONGEST_TICKS) pivot(!left);
 }
 
 int main(void) {

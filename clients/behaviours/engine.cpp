@@ -282,7 +282,16 @@ Fault BehavioursEngine::run_main(std::uint32_t i, const Executor& executor, std:
 /// What the robot in the slot senses in this tick.
 void BehavioursEngine::surround(std::uint32_t i, const Slot& slot, std::uint32_t receptions) {
   KtSurroundings& around = *slot.surroundings();
-  senses_.surround(i, receptions, around);
+  const senses::Readings readings = senses_.readings(i);
+  around.light = readings.light;
+  around.light_sd = readings.light_sd;
+  around.voltage = readings.voltage;
+  around.voltage_sd = readings.voltage_sd;
+  around.temperature = readings.temperature;
+  around.temperature_sd = readings.temperature_sd;
+  around.charging = readings.charging ? 1 : 0;
+  around.receiving_cycles = receptions * kPacketCycles;
+  around.receiving_from = 0;
   around.eeprom = eeprom_[i] ? eeprom_[i]->data() : nullptr;
   around.eeprom_filled = around.eeprom_written = 0;
 }

@@ -11,12 +11,12 @@
 
 #include "clients/behaviours/executor.hpp"
 #include "clients/behaviours/program_set.hpp"
-#include "clients/behaviours/robot_senses.hpp"
 #include "core/base/eeprom_layout.h"
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
 #include "core/model/robot_parameters.hpp"
 #include "core/random/random.hpp"
+#include "core/senses/robot_senses.hpp"
 #include "idl/checkpoint.pb.h"
 
 namespace kilotwin::behaviours {
@@ -119,7 +119,7 @@ class BehavioursEngine {
   std::vector<Group> groups_;
 
   // Per own robot; index i is robot share_.first + i.
-  RobotSenses senses_;
+  senses::RobotSenses senses_;
   std::vector<RobotMemory> memory_;
   std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< of those that have written to it
   std::vector<Presence> presence_;

@@ -121,6 +121,7 @@ Executor::Main Executor::run_main(std::int32_t cycles, std::int32_t spun) const 
   main.left = cycles;
   // From here to the next test, or as far as `slice` goes; false when that ended otherwise than by preemption.
   const auto run = [&](std::int32_t slice) {
+    thread_.held = main.left - slice;
     main.preempted = enter(slice);
     main.left -= slice - thread_.budget;
     main.fault = thread_.fault;

@@ -36,6 +36,8 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
                              bool keeps_logs)
     : logs_(keeps_logs ? run_directory / "logs" : fs::path{}),
       appends_logs_(plan.manifest.resumed()),
+      cycles_per_tick_(plan.tick_length.cycles()),
+      senses_(plan, {0, plan.robots()}),
       crew_(std::make_unique<Crew>(threads)) {
   std::map<std::uint32_t, FlashImage> images;
   const comm::TickTimers timers(plan);
@@ -73,6 +75,7 @@ comm::Cycles FirmwareSwarm::nominal(const Robot& robot, OwnCycles cycle) const {
 void FirmwareSwarm::run(comm::Cycles until, std::span<const std::uint32_t> robots,
                         const std::vector<std::vector<comm::Pulse>>& light,
                         std::vector<std::vector<comm::Cycles>>& flashes) {
+  until_ = until;
   crew_->share(static_cast<std::uint32_t>(robots.size()), [&](std::uint32_t n) {
     const std::uint32_t i = robots[n];
     run_robot(robots_[i], until, light[i], flashes[i]);
@@ -92,28 +95,50 @@ void FirmwareSwarm::run_robot(Robot& robot, comm::Cycles until, const std::vecto
   robot.light.clear();
   for (const comm::Pulse& pulse : light)
     robot.light.push_back({own(robot, pulse.time), pulse.gains.high, pulse.gains.low});
-  mcu.run(own(robot, until), robot.light);
+  robot.fulls.clear();
   flashes.clear();
-  for (const OwnCycles flash : mcu.flashes()) flashes.push_back(std::min(nominal(robot, flash), until - 1));
+  auto next = robot.light.cbegin();
+  std::size_t pulse = 0;
+  for (comm::Cycles begin = begin_;;) {
+    const comm::Cycles end = std::min(begin + kSpan, until);
+    const auto first = next;
+    for (; pulse < light.size() && light[pulse].time < end; ++pulse) ++next;
+    mcu.run(own(robot, end), {first, next});
+    // An instruction may end a little later than the span.
+    for (std::size_t n = flashes.size(); n < mcu.flashes().size(); ++n)
+      flashes.push_back(std::min(nominal(robot, mcu.flashes()[n]), end - 1));
+    const firmware::Outputs out = mcu.outputs();
+    robot.fulls.push_back(out.motor_left == 255 && out.motor_right == 255 ? 1 : 0);
+    begin = end;
+    if (begin >= until) break;
+  }
   mcu.clear_flashes();
 }
 
 void FirmwareSwarm::commit() {
+  begin_ = until_;
   for (std::uint32_t i = 0; i < robots_.size(); ++i) {
     Robot& robot = robots_[i];
     robot.has_run = false;
-    const firmware::Outputs out = robot.mcu->outputs();
-    robot.full = out.motor_left == 255 && out.motor_right == 255;
-    robot.full_throughout = robot.full_throughout && robot.full;
-    robot.kicked = robot.kicked || robot.full;
+    for (const std::uint8_t full : robot.fulls) {
+      robot.full = full != 0;
+      robot.full_throughout = robot.full_throughout && robot.full;
+      robot.kicked = robot.kicked || robot.full;
+    }
+    robot.fulls.clear();
     if (!robot.mcu->printed().empty()) write_log(i);
   }
 }
 
-void FirmwareSwarm::begin_tick() {
-  for (Robot& robot : robots_) {
+void FirmwareSwarm::begin_tick(Tick tick, std::span<const BodyFrame* const> bodies) {
+  begin_ = tick.count() * cycles_per_tick_;
+  senses_.at(tick, bodies);
+  for (std::uint32_t i = 0; i < robots_.size(); ++i) {
+    Robot& robot = robots_[i];
     robot.full_throughout = robot.full;
     robot.kicked = robot.kick_goes_on;
+    robot.has_sent = false;
+    robot.mcu->set_readings(senses_.readings(ids_[i]));
   }
 }
 
@@ -126,6 +151,27 @@ void FirmwareSwarm::end_tick() {
     robot.shown_left = out.motor_left;
     robot.shown_right = out.motor_right;
   }
+  if (!senses_.has_batteries()) return;
+  for (std::uint32_t i = 0; i < robots_.size(); ++i) use_battery(i);
+}
+
+void FirmwareSwarm::use_battery(std::uint32_t i) {
+  Robot& robot = robots_[i];
+  const std::uint32_t id = ids_[i];
+  if (robot.flat) {
+    senses_.rest(id);
+    if (!senses_.can_restart(id)) return;
+    robot.flat = false;
+    robot.mcu->power_on();
+    return;
+  }
+  const firmware::Outputs out = robot.mcu->outputs();
+  senses_.spend(id, {robot.shown_left, robot.shown_right, out.led, !robot.mcu->listening(), robot.has_sent});
+  if (!senses_.is_flat(id)) return;
+  robot.mcu->power_off();
+  robot.flat = true;
+  robot.full = robot.kick_goes_on = robot.spun_up = false;
+  robot.shown_left = robot.shown_right = 0;
 }
 
 void FirmwareSwarm::write_log(std::uint32_t i) {
@@ -149,6 +195,7 @@ comm::FirmwareRobots::Outputs FirmwareSwarm::outputs(std::uint32_t i) const {
   out.led = shown.led;
   out.spun_up = robots_[i].spun_up;
   out.listening = mcu.listening();
+  out.flat = robots_[i].flat;
   if (mcu.halt() == Halt::kIllegalInstruction || mcu.halt() == Halt::kBadAddress) {
     out.fault = static_cast<std::uint8_t>(mcu.halt());
     out.fault_at = mcu.program_counter();
@@ -158,26 +205,41 @@ comm::FirmwareRobots::Outputs FirmwareSwarm::outputs(std::uint32_t i) const {
 
 std::uint64_t FirmwareSwarm::word(std::uint32_t i) const {
   const Mcu& mcu = *robots_[i].mcu;
-  return hash_mix(mcu.now(), mcu.program_counter());
+  const std::uint64_t word = hash_mix(mcu.now(), mcu.program_counter());
+  return senses_.has_batteries() ? hash_mix(word, static_cast<std::uint64_t>(senses_.charge(ids_[i]))) : word;
 }
 
 std::string FirmwareSwarm::save(std::uint32_t i) const {
   const Robot& robot = robots_[i];
-  const int flags = (robot.full ? 1 : 0) | (robot.kick_goes_on ? 2 : 0) | (robot.spun_up ? 4 : 0);
-  const std::string board{static_cast<char>(flags), static_cast<char>(robot.shown_left),
-                          static_cast<char>(robot.shown_right)};
+  const int flags =
+      (robot.full ? 1 : 0) | (robot.kick_goes_on ? 2 : 0) | (robot.spun_up ? 4 : 0) | (robot.flat ? 8 : 0);
+  std::string board{static_cast<char>(flags), static_cast<char>(robot.shown_left),
+                    static_cast<char>(robot.shown_right)};
+  std::int64_t battery[2] = {0, 0};
+  if (senses_.has_batteries()) battery[0] = senses_.charge(ids_[i]), battery[1] = senses_.drain(ids_[i]);
+  for (const std::int64_t value : battery) {
+    for (int shift = 0; shift < 64; shift += 8) board.push_back(static_cast<char>(value >> shift));
+  }
   return board + robot.mcu->save();
 }
 
 void FirmwareSwarm::load(std::uint32_t i, const std::string& octets) {
-  if (octets.size() < 3) throw RunError("a firmware robot is missing in the checkpoint; resume from another one");
+  constexpr std::size_t kBoard = 3 + 2 * sizeof(std::int64_t);
+  if (octets.size() < kBoard)
+    throw RunError("a firmware robot is missing in the checkpoint; resume from another one");
   Robot& robot = robots_[i];
   robot.full = (octets[0] & 1) != 0;
   robot.kick_goes_on = (octets[0] & 2) != 0;
   robot.spun_up = (octets[0] & 4) != 0;
   robot.shown_left = static_cast<std::uint8_t>(octets[1]);
   robot.shown_right = static_cast<std::uint8_t>(octets[2]);
-  robot.mcu->load(octets.substr(3));
+  robot.flat = (octets[0] & 8) != 0;
+  std::uint64_t battery[2] = {0, 0};
+  for (std::size_t n = 3; n < kBoard; ++n)
+    battery[(n - 3) / 8] |= std::uint64_t{static_cast<std::uint8_t>(octets[n])} << (n - 3) % 8 * 8;
+  if (senses_.has_batteries())
+    senses_.restore(ids_[i], static_cast<std::int64_t>(battery[0]), static_cast<std::int64_t>(battery[1]));
+  robot.mcu->load(octets.substr(kBoard));
 }
 
 std::unique_ptr<comm::FirmwareRobots> make_firmware_robots(const RunPlan& plan, const fs::path& run_directory,

@@ -29,7 +29,8 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
            const std::vector<std::vector<comm::Pulse>>& light,
            std::vector<std::vector<comm::Cycles>>& flashes) override;
   void commit() override;
-  void begin_tick() override;
+  void note_sent(std::uint32_t i) override { robots_[i].has_sent = true; }
+  void begin_tick(Tick, std::span<const BodyFrame* const>) override;
   void end_tick() override;
   [[nodiscard]] Outputs outputs(std::uint32_t i) const override;
   [[nodiscard]] std::uint64_t word(std::uint32_t i) const override;
@@ -51,7 +52,10 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
     std::uint8_t shown_left = 0, shown_right = 0;
     bool spun_up = false;
     bool has_printed = false;
+    bool has_sent = false;  ///< in this tick
+    bool flat = false;
     std::vector<Light> light;
+    std::vector<std::uint8_t> fulls;  ///< of this run: full duty at the end of each span
   };
 
   [[nodiscard]] OwnCycles own(const Robot&, comm::Cycles) const;
@@ -59,11 +63,15 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
   void run_robot(Robot&, comm::Cycles until, const std::vector<comm::Pulse>& light,
                  std::vector<comm::Cycles>& flashes);
   void write_log(std::uint32_t i);
+  void use_battery(std::uint32_t i);
 
   std::filesystem::path logs_;  ///< empty: none are kept
   bool appends_logs_;           ///< the run continues an earlier one
   std::vector<std::uint32_t> ids_;
   std::vector<Robot> robots_;
+  const comm::Cycles cycles_per_tick_;
+  comm::Cycles begin_ = 0, until_ = 0;  ///< of the run at hand
+  senses::RobotSenses senses_;          ///< of all robots of the run
   std::unique_ptr<Crew> crew_;
 };
 

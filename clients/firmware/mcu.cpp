@@ -28,8 +28,6 @@ constexpr OwnCycles kPulse = 9;
 constexpr std::uint32_t kThreshold_mV = 1000, kLit_mV = 2000;
 /// libsimavr converts mV to counts of Vref / 1023. With this reference a count is 10 mV, whatever AVCC a real robot has.
 constexpr std::uint32_t kReference_mV = 10230, kInternalReference_mV = 1100, kCounts = 1023;
-/// Spread of a conversion, counts: enough to make the lowest bit random, as kilolib's rand_hard needs it to be.
-constexpr double kConverterNoise = 1.5;
 
 // Addresses of registers in data space (data sheet of the ATmega328P, register summary).
 enum Register : std::uint16_t {
@@ -144,12 +142,45 @@ Mcu::~Mcu() {
   std::free(avr_);
 }
 
-/// What the board holds at the pins: nobody charges the robot, it is dark.
+/// What the board holds at the pins: it is dark.
 void Mcu::after_reset() {
-  avr_raise_irq(avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ('D'), 0), 1);
+  hold_charger();
   avr_raise_irq(comparator_[1], kThreshold_mV);
   avr_raise_irq(comparator_[0], 0);
   state_.dark_at = kNever;
+}
+
+/// PD0 is low while the robot is charged.
+void Mcu::hold_charger() {
+  avr_irq_t* const pin = avr_io_getirq(avr_, AVR_IOCTL_IOPORT_GETIRQ('D'), 0);
+  const std::uint32_t level = readings_.charging ? 0 : 1;
+  if (pin->value != level) avr_raise_irq(pin, level);
+}
+
+void Mcu::set_readings(const senses::Readings& readings) {
+  readings_ = readings;
+  hold_charger();
+}
+
+void Mcu::power_off() {
+  avr_->state = cpu_Done;
+  state_.halt = Halt::kFlat;
+  state_.dark_at = kNever;
+}
+
+void Mcu::power_on() {
+  State state;
+  state.powered_down = now();
+  state.conversions = state_.conversions;
+  std::array<std::uint8_t, kEepromOctets> kept = eeprom();
+  marked_ = pristine_;
+  rewind();
+  state_ = state;
+  avr_eeprom_desc_t description{kept.data(), 0, kEepromOctets};
+  avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &description);
+  after_reset();
+  flashes_.clear();
+  mark();
 }
 
 OwnCycles Mcu::now() const { return avr_->cycle + state_.powered_down; }
@@ -304,15 +335,15 @@ void Mcu::on_conversion(avr_irq_t*, std::uint32_t, void* mcu) { static_cast<Mcu*
 void Mcu::start_conversion() {
   const std::uint8_t mux = avr_->data[kAdmux];
   int line = 0;
-  std::int16_t reading = 0;
+  double reading = 0, sd = 0;
   switch (mux & kChannel) {
-    case 6: line = ADC_IRQ_ADC6, reading = readings_.battery; break;
-    case 7: line = ADC_IRQ_ADC7, reading = readings_.light; break;
-    case 8: line = ADC_IRQ_TEMP, reading = readings_.temperature; break;
+    case 6: line = ADC_IRQ_ADC6, reading = readings_.voltage, sd = readings_.voltage_sd; break;
+    case 7: line = ADC_IRQ_ADC7, reading = readings_.light, sd = readings_.light_sd; break;
+    case 8: line = ADC_IRQ_TEMP, reading = readings_.temperature, sd = readings_.temperature_sd; break;
     default: return;
   }
   const std::uint32_t n = state_.conversions++;
-  const double noise = kConverterNoise * random_.normal(Stream::kConverter, robot_, Tick{n >> 16}, n & 0xffff);
+  const double noise = sd > 0 ? sd * random_.normal(Stream::kConverter, robot_, Tick{n >> 16}, n & 0xffff) : 0;
   const auto counts = static_cast<std::int32_t>(std::clamp(reading + noise + 0.5, 0.0, double{kCounts}));
   const bool internal = (mux & kReference) == kReference;
   avr_raise_irq(converter_ + line, millivolts(counts, internal ? kInternalReference_mV : kReference_mV));

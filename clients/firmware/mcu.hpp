@@ -18,6 +18,7 @@
 
 #include "clients/firmware/flash_image.hpp"
 #include "core/random/random.hpp"
+#include "core/senses/robot_senses.hpp"
 
 struct avr_t;
 struct avr_irq_t;
@@ -32,13 +33,6 @@ struct Light {
   std::int16_t high_gain, low_gain;
 };
 
-/// What the sensors read, 10-bit ADC counts, before noise.
-struct Readings {
-  std::int16_t light = 512;
-  std::int16_t battery = 700;
-  std::int16_t temperature = 292;  ///< of the internal sensor against 1.1 V
-};
-
 struct Outputs {
   std::uint8_t motor_left = 0, motor_right = 0;  ///< duty
   std::uint8_t led = 0;                          ///< r | g << 2 | b << 4
@@ -49,7 +43,8 @@ enum class Halt : std::uint8_t {
   kNone = 0,
   kIllegalInstruction = 1,
   kBadAddress = 2,  ///< it read or wrote where there is no memory, or ran out of the flash
-  kEnded = 3        ///< its program has returned from main, or sleeps with interrupts off: no fault
+  kEnded = 3,       ///< its program has returned from main, or sleeps with interrupts off: no fault
+  kFlat = 4         ///< its battery is empty: no fault
 };
 
 class Mcu {
@@ -63,7 +58,11 @@ class Mcu {
   /// Runs to the first instruction boundary at or after `until`. `light`: ascending, not before now().
   void run(OwnCycles until, std::span<const Light> light);
   [[nodiscard]] OwnCycles now() const;
-  void set_readings(const Readings& readings) { readings_ = readings; }
+  /// What its sensors give from now on.
+  void set_readings(const senses::Readings&);
+  /// Its battery is empty; it is charged again. What memory and registers held is lost, the EEPROM stays.
+  void power_off();
+  void power_on();
 
   /// Rising edges of the infrared LED since the last clear, ascending.
   [[nodiscard]] const std::vector<OwnCycles>& flashes() const { return flashes_; }
@@ -113,6 +112,7 @@ class Mcu {
   void doze(OwnCycles until);
   void serve_interrupts();
   void after_reset();
+  void hold_charger();
   void set_receiver(bool lit);
   void start_conversion();
   [[nodiscard]] std::vector<Range> ranges() const;
@@ -126,7 +126,7 @@ class Mcu {
   avr_t* avr_;
   const Random random_;
   const std::uint32_t robot_;
-  Readings readings_;
+  senses::Readings readings_;
   State state_, marked_state_;
   std::vector<OwnCycles> flashes_;
   std::string printed_;

@@ -45,8 +45,8 @@ FirmwareAir::FirmwareAir(const RunPlan& plan, FirmwareRobots& robots, const Tick
   show();
 }
 
-void FirmwareAir::begin_tick() {
-  robots_.begin_tick();
+void FirmwareAir::begin_tick(Tick tick, std::span<const BodyFrame* const> bodies) {
+  robots_.begin_tick(tick, bodies);
   const auto ids = robots_.ids();
   for (std::uint32_t i = 0; i < ids.size(); ++i) {
     neighbours_[i].clear();
@@ -65,7 +65,12 @@ void FirmwareAir::end_tick() {
 void FirmwareAir::show() {
   for (std::uint32_t i = 0; i < outputs_.size(); ++i) {
     outputs_[i] = robots_.outputs(i);
-    if (outputs_[i].fault != 0) life_cycle_[i] = LifeCycle::kFailed;
+    if (outputs_[i].fault != 0)
+      life_cycle_[i] = LifeCycle::kFailed;
+    else if (outputs_[i].flat)
+      life_cycle_[i] = LifeCycle::kFlat;
+    else if (life_cycle_[i] == LifeCycle::kFlat)
+      life_cycle_[i] = LifeCycle::kIdle;  // switched on anew
   }
 }
 
@@ -89,7 +94,7 @@ const std::vector<FirmwareAir::Event>& FirmwareAir::advance(Cycles from, Cycles 
     robots_.run(until, again_, light_, flashes_);
   }
   robots_.commit();
-  settle(until);
+  settle(from, until);
   return events_;
 }
 
@@ -173,29 +178,38 @@ bool FirmwareAir::fades(std::uint32_t receiver, std::uint32_t sender, Cycles sta
   return random_.uniform(Stream::kReception, receiver, Tick{tick}, draw) < loss_;
 }
 
-/// The flashes of the span are final: what they are to others.
-void FirmwareAir::settle(Cycles until) {
+/// The flashes are final: what they are to others, span by span.
+void FirmwareAir::settle(Cycles from, Cycles until) {
   events_.clear();
-  for (const std::uint32_t i : all_) {
-    PulseDecoder& decoder = decoders_[i];
-    const auto note = [&](PulseDecoder::Event kind, Cycles time) {
-      Cycles end = time;
-      switch (kind) {
-        case PulseDecoder::Event::kNone: return;
-        case PulseDecoder::Event::kStarted: end += decoder.bits(kLongestPacket); break;
-        case PulseDecoder::Event::kReceived: end += decoder.bits(1); break;  // its last stop bit
-        case PulseDecoder::Event::kAborted: end = decoder.state().start + kStartPulse; break;
-        case PulseDecoder::Event::kGarbled: break;
+  settled_.assign(all_.size(), 0);
+  for (Cycles begin = from; begin < until; begin += kSpan) {
+    const Cycles end = std::min(begin + kSpan, until);
+    const std::size_t first = events_.size();
+    for (const std::uint32_t i : all_) {
+      PulseDecoder& decoder = decoders_[i];
+      const auto note = [&](PulseDecoder::Event kind, Cycles time) {
+        Cycles ends = time;
+        switch (kind) {
+          case PulseDecoder::Event::kNone: return;
+          case PulseDecoder::Event::kStarted: ends += decoder.bits(kLongestPacket); break;
+          case PulseDecoder::Event::kReceived:
+            robots_.note_sent(i);
+            ends += decoder.bits(1);  // its last stop bit
+            break;
+          case PulseDecoder::Event::kAborted: ends = decoder.state().start + kStartPulse; break;
+          case PulseDecoder::Event::kGarbled: break;
+        }
+        events_.push_back({kind, robots_.ids()[i], time, ends, decoder.message()});
+      };
+      for (std::size_t& n = settled_[i]; n < flashes_[i].size() && flashes_[i][n] < end; ++n) {
+        note(decoder.pass(flashes_[i][n], true), flashes_[i][n]);
+        note(decoder.feed(flashes_[i][n]), flashes_[i][n]);
       }
-      events_.push_back({kind, robots_.ids()[i], time, end, decoder.message()});
-    };
-    for (const Cycles flash : flashes_[i]) {
-      note(decoder.pass(flash, true), flash);
-      note(decoder.feed(flash), flash);
+      note(decoder.pass(end, false), end);
     }
-    note(decoder.pass(until, false), until);
+    std::stable_sort(events_.begin() + static_cast<std::ptrdiff_t>(first), events_.end(),
+                     [](const Event& a, const Event& b) { return a.time < b.time; });
   }
-  std::stable_sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) { return a.time < b.time; });
 }
 
 void FirmwareAir::note_reception(std::uint32_t robot, const IrMessage& message) {

@@ -27,7 +27,10 @@ class FirmwareAir {
  public:
   /// Length of a span, 0.26 ms. A native robot that wants to send hears firmware robots' packets that started in earlier
   /// spans only; the start pulse of one of the same span makes the firmware robot give up.
-  static constexpr Cycles kSpan = 2048;
+  static constexpr Cycles kSpan = FirmwareRobots::kSpan;
+  /// So many spans may go together, with the same result, where only firmware robots send or are about to: threads meet less
+  /// often.
+  static constexpr int kMostSpans = 4;
 
   /// Of a firmware robot's transmissions.
   struct Event {
@@ -49,8 +52,8 @@ class FirmwareAir {
   [[nodiscard]] LifeCycle life_cycle(std::uint32_t i) const { return life_cycle_[i]; }
 
   /// Poses are those of the tick that begins.
-  void begin_tick();
-  /// From `from` to `until`, at most kSpan later. Returns what happened, in the order of time, valid until the next call.
+  void begin_tick(Tick, std::span<const BodyFrame* const>);
+  /// From `from` to `until`, one span or several. Returns what happened, in the order of time, valid until the next call.
   const std::vector<Event>& advance(Cycles from, Cycles until, const Channel&, const OverheadController&);
   /// Reads what the robots show.
   void end_tick();
@@ -80,7 +83,7 @@ class FirmwareAir {
   void collect_packets(Cycles from, Cycles until, const Channel&, const OverheadController&);
   void find_starts();
   void shine(Cycles from, Cycles until, std::vector<std::vector<Pulse>>& light);
-  void settle(Cycles until);
+  void settle(Cycles from, Cycles until);
   void show();
 
   FirmwareRobots& robots_;
@@ -111,6 +114,7 @@ class FirmwareAir {
   std::vector<Packet> packets_;  ///< of robots with native programs, and copies of the overhead controller
   std::vector<Start> starts_;
   std::vector<std::uint32_t> all_, again_;
+  std::vector<std::size_t> settled_;  ///< per robot: flashes that are done with
   std::vector<Event> events_;
 };
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/time.hpp"
+#include "core/federation/frames.hpp"
 #include "services/comm/air.hpp"
 #include "services/comm/ranging.hpp"
 
@@ -21,11 +23,15 @@ struct Pulse {
 
 class FirmwareRobots {
  public:
+  /// Within a run, robots are looked at after each of so many cycles from its beginning on: whether their motors are kicked.
+  static constexpr Cycles kSpan = 2048;
+
   struct Outputs {
     std::uint8_t motor_left = 0, motor_right = 0, led = 0;  ///< as in ActuationFrame
     /// Both motors were kicked: full duty for less than a tick does not show as a duty.
     bool spun_up = false;
     bool listening = true;       ///< neither halted nor asleep with its clocks off
+    bool flat = false;           ///< off, as its battery is empty
     std::uint8_t fault = 0;      ///< firmware::Halt of one that has faulted, else 0
     std::uint32_t fault_at = 0;  ///< address in flash, octets
   };
@@ -38,11 +44,13 @@ class FirmwareRobots {
   /// ascending; flashes[i]: set to the starts of its own pulses, before `until`. Both have an entry per robot; only `robots` are touched.
   virtual void run(Cycles until, std::span<const std::uint32_t> robots,
                    const std::vector<std::vector<Pulse>>& light, std::vector<std::vector<Cycles>>& flashes) = 0;
-  /// All have run to the same instant, and there is no way back.
+  /// All have run to the same instant, and there is no way back. The next run begins there.
   virtual void commit() = 0;
+  /// A robot has sent a whole packet within this tick.
+  virtual void note_sent(std::uint32_t i) = 0;
 
-  /// A tick begins, and ends.
-  virtual void begin_tick() = 0;
+  /// A tick begins, with these poses; and ends.
+  virtual void begin_tick(Tick, std::span<const BodyFrame* const>) = 0;
   virtual void end_tick() = 0;
   [[nodiscard]] virtual Outputs outputs(std::uint32_t i) const = 0;
   /// A word of its state, for the state hash.

@@ -57,7 +57,7 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
   read_actuation(inputs.actuation);
   overhead_.command(inputs.overhead.packets, begin_of(from));
   overhead_.advance(begin_of(from + 1));
-  contend(from);
+  contend(from, inputs.bodies);
   arrive(from);
   ++tick_;
 }
@@ -128,7 +128,7 @@ bool RadioEngine::later(const Attempt& a, const Attempt& b) {
 }
 
 /// A packet that ends at `end` arrives in the tick that begins there, so that nothing in a tick is of a later instant.
-void RadioEngine::contend(Tick now) {
+void RadioEngine::contend(Tick now, std::span<const BodyFrame* const> bodies) {
   const Cycles end = begin_of(now + 1);
   channel_.locate();
   if (links_.casts_shadows()) neighbourhood_.sort();
@@ -146,9 +146,9 @@ void RadioEngine::contend(Tick now) {
   while (next_copy_ < copies.size() && copies[next_copy_].start < begin_of(now)) ++next_copy_;
   simulated_ = begin_of(now);
   if (!firmware_) return contend_until(end, now);
-  firmware_->begin_tick();
+  firmware_->begin_tick(now, bodies);
   while (simulated_ < end) {
-    const Cycles until = std::min(simulated_ + FirmwareAir::kSpan, end);
+    const Cycles until = next_meeting(end);
     contend_until(until, now);
     run_firmware(simulated_, until, now);
     simulated_ = until;
@@ -176,6 +176,21 @@ void RadioEngine::contend_until(Cycles end, Tick now) {
       break;
     }
   }
+}
+
+/// How far firmware robots may run by themselves: a span, or several where no native program sends within them, nor has begun
+/// to and may yet give up.
+Cycles RadioEngine::next_meeting(Cycles end) const {
+  Cycles until = std::min(simulated_ + FirmwareAir::kSpan, end);
+  for (const Transmission& x : channel_.all()) {
+    if (!firmware_->has(x.sender) && !x.aborted && x.start + kListening > simulated_) return until;
+  }
+  for (int n = 1; n < FirmwareAir::kMostSpans; ++n) {
+    const Cycles next = std::min(until + FirmwareAir::kSpan, end);
+    if (!attempts_.empty() && attempts_.front().time < next) break;
+    until = next;
+  }
+  return until;
 }
 
 /// What firmware robots have on the air becomes transmissions; they themselves see to when they give up.

@@ -113,8 +113,9 @@ class RadioEngine {
   void drop_message(std::uint32_t robot);
   void forget(Cycles begin);
 
-  void contend(Tick now);
+  void contend(Tick now, std::span<const BodyFrame* const>);
   void contend_until(Cycles end, Tick now);
+  [[nodiscard]] Cycles next_meeting(Cycles end) const;
   void run_firmware(Cycles from, Cycles until, Tick now);
   void abort_who_notices(std::uint32_t robot, Cycles t, Tick now);
   void schedule(std::uint32_t robot, Cycles end);

@@ -22,8 +22,11 @@ struct KtThread {
   uint8_t overrun; /* the budget of a callback has run out */
   uint8_t reserved;
   uint64_t place; /* where that test is */
+  int32_t held;   /* cycles of this tick that the host has not yet put into the budget */
+  uint32_t unused;
 };
 #define KT_THREAD_BUDGET 24
+#define KT_THREAD_HELD 40
 
 /* What the place of a test tells: the loop reads what an interrupt may change; it has no way out and calls nothing; its
  * function names vector or floating-point registers. */
@@ -147,7 +150,8 @@ struct KtImage {
 KT_ASSERT(sizeof(struct KtRobot) == 64, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
-KT_ASSERT(sizeof(struct KtThread) == 40 && __builtin_offsetof(struct KtThread, budget) == KT_THREAD_BUDGET,
+KT_ASSERT(sizeof(struct KtThread) == 48 && __builtin_offsetof(struct KtThread, budget) == KT_THREAD_BUDGET &&
+              __builtin_offsetof(struct KtThread, held) == KT_THREAD_HELD,
           "no padding");
 KT_ASSERT(sizeof(struct KtSurroundings) == 1104, "no padding");
 KT_ASSERT(sizeof(struct KtImage) == 104, "no padding");

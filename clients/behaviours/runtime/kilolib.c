@@ -79,6 +79,12 @@ static int32_t cycles_left(void) {
   return left;
 }
 
+static int32_t cycles_held(void) {
+  int32_t held;
+  __asm__ volatile("movl %%gs:%c1, %0" : "=r"(held) : "i"(KT_THREAD_HELD));
+  return held;
+}
+
 static void set_cycles_left(int32_t left) {
   __asm__ volatile("movl %0, %%gs:%c1" : : "r"(left), "i"(KT_THREAD_BUDGET) : "memory");
 }
@@ -174,19 +180,26 @@ static uint8_t is_receiving(void) {
   struct KtSurroundings* around = kt_surroundings;
   if (around->receiving_cycles == 0 || robot.in_interrupt) return 0;
   if (around->receiving_from == 0) around->receiving_from = 1 + (noise() >> 11) % robot.tick_cycles;
-  const uint64_t now = robot.debt_cycles % robot.tick_cycles + robot.tick_cycles + 1;
+  const int64_t within = robot.loop_rate == KT_LOOP_AS_ON_ROBOT
+                             ? (int64_t)robot.tick_cycles - cycles_left() - cycles_held()
+                             : (int64_t)robot.debt_cycles;
+  const uint64_t now = (uint64_t)within % robot.tick_cycles + robot.tick_cycles + 1;
   return (now - around->receiving_from) % robot.tick_cycles < around->receiving_cycles;
 }
 
-/* The converter's count for an expected value and its noise. */
+/* The converter's count for an expected value and its noise. What it takes to compute is not the robot's time. */
 static int16_t convert(double expected, double sd) {
+  const int32_t left = cycles_left();
+  set_cycles_left(INT32_MAX);
   if (sd > 0) expected += sd * kt_inverse_normal(((double)(noise() >> 12) + 0.5) * 0x1p-52);
   expected = kt_floor(expected + 0.5);
+  set_cycles_left(left);
   return (int16_t)(expected < 0 ? 0 : expected > HIGHEST_READING ? HIGHEST_READING : expected);
 }
 
 static int16_t reading(double expected, double sd, uint64_t cycles) {
   if (is_receiving()) {
+    ++robot.effects; /* who waits for this to pass does not wait for an interrupt */
     spend(BUSY_CYCLES);
     return -1;
   }

@@ -82,8 +82,27 @@ TEST(Readings, ComeOnceTheMessageIsOver) {
   air.receptions = {{0, message(0)}, {0, message(0)}, {0, message(0)}};
   for (std::uint8_t k = 2; k < 100; ++k) {
     swarm.step(air);
-    EXPECT_GE(swarm.frame().motor_left[0], k / 2);
+    EXPECT_GE(swarm.frame().motor_left[0], k - k / 8 - 3);
   }
+}
+
+TEST(Readings, FailForTheMessagesPartOfATickWhereLoopRunsAsOnTheRobot) {
+  // Three messages take 40 % of each tick; the rest is left for readings.
+  const auto succeeded = [](int messages) {
+    Swarm swarm({program("static uint32_t n; static message_t m;\n"
+                         "static message_t* tx(void) { memcpy(m.data, &n, 4); return &m; }\n"
+                         "static void loop(void) { if (get_ambientlight() >= 0) ++n; }")},
+                1, 1, "", [](proto::Manifest& manifest) {
+                  manifest.mutable_experiment()->mutable_robots(0)->set_loop_rate(proto::RobotGroup::AS_ON_ROBOT);
+                });
+    swarm.start();
+    Air air;
+    for (int i = 0; i < messages; ++i) air.receptions.push_back({0, message(0)});
+    for (int k = 0; k < 50; ++k) swarm.step(air);
+    const IrMessage m = asked(swarm, air);
+    return static_cast<double>(m[0] | m[1] << 8 | m[2] << 16);
+  };
+  EXPECT_NEAR(succeeded(3) / succeeded(0), 1 - 3 * 34970.0 / 262144, 0.02);
 }
 
 TEST(Readings, SucceedInCallbacks) {

@@ -60,7 +60,7 @@ TEST(RobotSenses, ReadingsAreNormalWithTheStatedSpreadAndEndAt1023) {
                          "  if (n == 20000) { n = 20001; value = (value / 200) * 1000 + 500 + mean / 200; } }")},
               1, 1, "light { ambient: 400 sensor { gain_sd: 0 noise_floor: 0 noise_relative: 0.05 } }");
   swarm.start();
-  swarm.steps(1000);
+  swarm.steps(250);
   const std::int32_t told = values(swarm)[0];
   EXPECT_NEAR(told / 1000 / 100.0, 20 * 20 + 1 / 12.0, 4 * 400 * std::sqrt(2.0 / 20000))
       << "variance, rounding included";

@@ -1,6 +1,8 @@
 // Firmware robots among others: they act as robots with native programs do, and the same on any number of threads.
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "tests/clients/firmware/programs.hpp"
 #include "tests/clients/firmware/timeline.hpp"
 
@@ -104,6 +106,61 @@ TEST_F(FirmwareRun, FailsAloneAndSaysSo) {
           talker + " layout { x_mm: 100 grid {} } }\n");
   EXPECT_EQ(timeline.totals.robots_failed, 1u);
   EXPECT_GT(timeline.totals.sent, 15u);
+}
+
+TEST_F(FirmwareRun, ReadsWhatANativeRobotReads) {
+  // The first duties that a robot shows tell what setup() has read where it stood, once no message was arriving.
+  const std::string reader = program(
+      "reader.c",
+      whole_program(
+          "static int16_t wait_for(int16_t read(void)) { int16_t r; do r = read(); while (r < 0); return r; }\n"
+          "static void setup(void) { delay(200); set_motors(wait_for(get_ambientlight) / 4, "
+          "(wait_for(get_voltage) + wait_for(get_temperature)) & 255); }\n"
+          "static void loop(void) {}\n"));
+  const auto first_duties = [&](const std::string& kind) {
+    const Timeline timeline =
+        run("duration_s: 2 seed: 7 radio { range_mm: 300 } motion { noise: false }\n"
+            "light { ambient: 30 source { x_mm: 120 height_mm: 150 intensity: 6 } shadows: true sensor { "
+            "noise_floor: 0 noise_relative: "
+            "0 } } temperature { celsius: 40 reading_sd: 0 } battery { charge: 0.6 charge_sd: 0.2 reading_sd: 0 }\n"
+            "robots { count: 6 " +
+            reader + kind + " layout { grid { pitch_mm: 40 } } }\n");
+    std::vector<std::uint32_t> result;
+    for (const auto& changes : timeline.motors) result.push_back(changes.at(0).value);
+    return result;
+  };
+  const auto native = first_duties(""), firmware = first_duties("avr: true");
+  std::set<std::uint32_t> different;
+  for (std::size_t i = 0; i < native.size(); ++i) {
+    EXPECT_NEAR(native[i] >> 8, firmware[i] >> 8, 1) << "light of robot " << i;
+    EXPECT_NEAR(native[i] & 255, firmware[i] & 255, 2) << "voltage and temperature of robot " << i;
+    different.insert(native[i] >> 8);
+  }
+  EXPECT_GE(different.size(), 4u) << "they stand in different light";
+}
+
+TEST_F(FirmwareRun, AnEmptyBatterySwitchesItOff) {
+  // Some 20 s of white light; then the charger, which gives more than an idle robot takes, brings it back, idle.
+  const std::string lamp = program("lamp.c", whole_program("static void setup(void) { set_color(RGB(3, 3, 3)); }\n"
+                                                           "static void loop(void) {}\n"));
+  const auto dark_at = [&](const std::string& kind) {
+    const Timeline timeline =
+        run("duration_s: 60 seed: 3 battery { capacity_mAh: 0.1 charger { radius_mm: 50 current_mA: 8 } }\n"
+            "robots { count: 1 " +
+            lamp + kind + " }\n");
+    std::int64_t tick = 0;
+    int lit = 0;
+    for (std::size_t n = 0; n + 1 < timeline.led[0].size(); ++n) {
+      if (timeline.led[0][n].value != 63) continue;
+      tick = timeline.led[0][n + 1].tick;
+      ++lit;
+    }
+    EXPECT_EQ(lit, 1) << "it does not run again by itself";
+    return static_cast<double>(tick);
+  };
+  const double native = dark_at(""), firmware = dark_at("avr: true");
+  EXPECT_GT(native, 300);
+  EXPECT_NEAR(native, firmware, 5);
 }
 
 TEST_F(FirmwareRun, IsHeardByNativeRobotsAndHearsThem) {

@@ -1,20 +1,11 @@
-#include "clients/behaviours/robot_senses.hpp"
+#include "core/senses/robot_senses.hpp"
 
 #include <algorithm>
 
 #include "core/random/random.hpp"
 
-namespace kilotwin::behaviours {
+namespace kilotwin::senses {
 namespace {
-
-/// How long the reception of a message takes: 13 octets of 10 bits of 269 cycles (kilolib).
-constexpr std::uint64_t kPacketCycles = 13 * 10 * 269;
-
-/// Readings where the experiment says nothing: light in the middle of the range, and a charged battery, above 682, the
-/// firmware's threshold for full.
-constexpr double kLightReading = 512, kVoltageReading = 700;
-/// Makes rand_hard() random, and readings of an even battery differ by one count now and then.
-constexpr double kVoltageSd = 0.5;
 
 /// The processor's own sensor, counts: 242 mV at -45, 314 mV at 25, 380 mV at 85 degrees Celsius (data sheet of the
 /// ATmega328P), of 1.1 V in 1024 steps.
@@ -59,16 +50,20 @@ void RobotSenses::at(Tick tick, std::span<const BodyFrame* const> bodies) {
   }
 }
 
-void RobotSenses::surround(std::uint32_t i, std::uint32_t receptions, KtSurroundings& around) const {
-  around.light = light_ ? light_->reading(share_.first + i) : kLightReading;
-  around.light_sd = light_ ? light_->sd(around.light) : 0;
-  around.voltage = battery_ ? battery_->reading(charge_[i], drain_[i]) : kVoltageReading;
-  around.voltage_sd = battery_ ? battery_->sd() : kVoltageSd;
-  around.temperature = temperature_[i];
-  around.temperature_sd = temperature_sd_;
-  around.receiving_cycles = receptions * kPacketCycles;
-  around.receiving_from = 0;
-  around.charging = battery_ && supply_[i] > 0 && charge_[i] < battery_->capacity() ? 1 : 0;
+Readings RobotSenses::readings(std::uint32_t i) const {
+  Readings result;
+  if (light_) {
+    result.light = light_->reading(share_.first + i);
+    result.light_sd = light_->sd(result.light);
+  }
+  if (battery_) {
+    result.voltage = battery_->reading(charge_[i], drain_[i]);
+    result.voltage_sd = battery_->sd();
+    result.charging = supply_[i] > 0 && charge_[i] < battery_->capacity();
+  }
+  result.temperature = temperature_[i];
+  result.temperature_sd = temperature_sd_;
+  return result;
 }
 
 void RobotSenses::restore(std::uint32_t i, std::int64_t charge, std::int64_t drain) {
@@ -81,4 +76,4 @@ void RobotSenses::settle(std::uint32_t i, std::int64_t drain) {
   charge_[i] = std::clamp<std::int64_t>(charge_[i] - drain + supply_[i], 0, battery_->capacity());
 }
 
-}  // namespace kilotwin::behaviours
+}  // namespace kilotwin::senses

@@ -1,4 +1,4 @@
-/// What surrounds the robots of one host while their programs run: light, temperature, and their batteries.
+/// What surrounds some of a run's robots while their programs run: light, temperature, and their batteries.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,22 @@
 #include <span>
 #include <vector>
 
-#include "clients/behaviours/runtime/image_abi.h"
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
 #include "core/senses/battery.hpp"
 #include "core/senses/light_field.hpp"
 
-namespace kilotwin::behaviours {
+namespace kilotwin::senses {
+
+/// What a robot's converter gives on average, counts before they are rounded and cut to 0..1023, and the spread of one reading.
+/// Where the experiment says nothing: light in the middle of the range, and a charged battery, above 682, the firmware's
+/// threshold for full, with the noise that makes rand_hard() random.
+struct Readings {
+  double light = 512, light_sd = 0;
+  double voltage = 700, voltage_sd = 0.5;
+  double temperature = 314 * (1024 / 1100.0), temperature_sd = 0;  ///< 25 degrees Celsius
+  bool charging = false;  ///< a charger's voltage is on its contacts
+};
 
 /// Indices are those of robots within the share. Where the experiment says nothing, readings are constant.
 class RobotSenses {
@@ -21,14 +30,13 @@ class RobotSenses {
 
   /// The surroundings of `tick`. `bodies`: the poses of that tick from all partitions, where RunPlan::hosts_see_bodies().
   void at(Tick tick, std::span<const BodyFrame* const> bodies);
-  /// All but the EEPROM.
-  void surround(std::uint32_t i, std::uint32_t receptions, KtSurroundings& around) const;
+  [[nodiscard]] Readings readings(std::uint32_t i) const;
 
   [[nodiscard]] bool has_batteries() const { return battery_.has_value(); }
-  /// uA cycles; see senses::Battery.
+  /// uA cycles; see Battery.
   [[nodiscard]] std::int64_t charge(std::uint32_t i) const { return charge_[i]; }
   /// One tick of use, and of what a charger gives.
-  void spend(std::uint32_t i, const senses::Battery::Use& use) { settle(i, battery_->drain(use)); }
+  void spend(std::uint32_t i, const Battery::Use& use) { settle(i, battery_->drain(use)); }
   /// One tick of a robot that is off.
   void rest(std::uint32_t i) { settle(i, 0); }
   [[nodiscard]] bool is_flat(std::uint32_t i) const { return charge_[i] == 0; }
@@ -42,11 +50,11 @@ class RobotSenses {
   void settle(std::uint32_t i, std::int64_t drain);
 
   const Share share_;
-  std::optional<senses::LightField> light_;
+  std::optional<LightField> light_;
   std::vector<double> temperature_;  ///< average readings
   double temperature_sd_ = 0;
-  std::optional<senses::Battery> battery_;
+  std::optional<Battery> battery_;
   std::vector<std::int64_t> charge_, drain_, supply_;  ///< the latter two of the tick at hand
 };
 
-}  // namespace kilotwin::behaviours
+}  // namespace kilotwin::senses
