@@ -39,7 +39,7 @@ class Follower {
       h.log_weight += innovation.log_likelihood;
       if (innovation.lost && innovation.size == 2) h.log_weight -= 20;
     }
-    if (hypotheses_.size() > 1) prune();
+    prune();
   }
   void start(const Sample& sample) {
     const RobotBias bias = model_.bias_of(view_.track->robot);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 namespace kilotwin::identify {
@@ -236,9 +237,11 @@ void set_target(Effect& effect, Target target) {
 }  // namespace
 
 double rounded(double value) {
-  if (value == 0 || !std::isfinite(value)) return 0;
-  const double unit = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 6);
-  return std::round(value / unit) * unit;
+  if (!std::isfinite(value)) return 0;
+  const std::string digits = fmt::format("{:.7g}", value);
+  double result = 0;
+  std::from_chars(digits.data(), digits.data() + digits.size(), result);
+  return result;
 }
 
 std::vector<Effect> effects_of_term(const Term& term) {
