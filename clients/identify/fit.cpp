@@ -265,6 +265,7 @@ void Fitter::fit(MotionModel& model, int passes) const {
   const std::vector<Block> blocks = blocks_of(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
+    model.room = room_of(set_, model);
     if (pass != 1) fit_noise(model);
     const std::vector<Unit> units = linearise(model, set_.units(), blocks, {100, threads_});
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());

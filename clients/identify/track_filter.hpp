@@ -71,12 +71,14 @@ class TrackFilter {
   [[nodiscard]] Situation situation(double time_s, const CommandState&, const NeighbourView&) const;
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
   void spread(const StepRecord&);
+  [[nodiscard]] bool touches(const Situation&) const;
 
   const MotionModel* model_;
   Belief belief_;
   Situation place_;   ///< robot and run
   int outliers_ = 0;  ///< in a row
   bool measures_;
+  bool looking_ahead_ = false;  ///< what contacts will do is left to whoever knows all robots
 };
 
 }  // namespace kilotwin::identify
