@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace kilotwin::identify {
 namespace {
@@ -14,11 +15,13 @@ struct LogLikelihood {
   double sum = 0;
   std::vector<double> parts;  ///< of so many samples each
   std::size_t count = 0;
+  bool touched = false;
   static constexpr std::size_t kPart = 50;
 
   void start(const TrackFilter&) {}
-  void step(const StepRecord&) {}
+  void step(const StepRecord& record) { touched = touched || record.touching; }
   void update(const Innovation& innovation, const Sample&) {
+    if (std::exchange(touched, false)) return;
     if (count++ % kPart == 0) parts.push_back(0);
     const double value = std::max(innovation.log_likelihood, -1e3);
     parts.back() += value;
@@ -261,6 +264,21 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
   model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
 }
 
+double Fitter::log_likelihood(const MotionModel& model) const {
+  const std::vector<TrackView>& views = set_.views();
+  std::vector<double> sums(views.size());
+  in_parallel(views.size(), threads_, [&](std::size_t i) {
+    if (views[i].track->held_out) return;
+    RobotBias bias = model.bias_of(views[i].track->robot);
+    bias.covariance.setZero();
+    TrackFilter filter(model, bias, views[i].track->robot, views[i].run);
+    LogLikelihood likelihood;
+    walk(filter, views[i], views[i].track->samples.size(), likelihood);
+    sums[i] = likelihood.sum;
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
 void Fitter::fit(MotionModel& model, int passes) const {
   const std::vector<Block> blocks = blocks_of(model);
   for (int pass = 0; pass < passes; ++pass) {
@@ -282,8 +300,16 @@ void Fitter::fit(MotionModel& model, int passes) const {
       score.segment(first, n) -= term.precision.cwiseProduct(term.coefficients);
       first += n;
     }
-    const Eigen::VectorXd step = information.ldlt().solve(score);
-    apply(model, units, step);
+    Eigen::VectorXd step = information.ldlt().solve(score);
+    // A step that makes things worse was too long.
+    const MotionModel start = model;
+    const double before = log_likelihood(start);
+    for (int halve = 0; halve < 5; ++halve, step *= 0.4) {
+      model = start;
+      apply(model, units, step);
+      if (log_likelihood(model) > before - 2) break;
+      if (halve == 4) model = start;
+    }
   }
 }
 

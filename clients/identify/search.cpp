@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 
 namespace kilotwin::identify {
 namespace {
@@ -42,8 +43,15 @@ class Loop {
       note_rejected(outcome);
       const Finding* const best = best_of(outcome);
       if (best != nullptr) {
+        const Search before = out_;
+        const double likelihood = fitter_.log_likelihood(out_.model);
         note_ambiguous(*best, outcome);
         add(*best, outcome.threshold_log10_p);
+        // What promised to explain much must do so.
+        if (fitter_.log_likelihood(out_.model) < likelihood + 3) {
+          out_ = before;
+          failed_.insert(hypothesis(*best).name);
+        }
         continue;
       }
       if (!defend()) break;
@@ -61,7 +69,7 @@ class Loop {
   const Finding* best_of(const Scores::Outcome& outcome) const {
     const Finding* best = nullptr;
     for (const Finding& f : outcome.findings) {
-      if (!good(f, outcome.threshold_log10_p)) continue;
+      if (!good(f, outcome.threshold_log10_p) || failed_.contains(hypothesis(f).name)) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
     return best;
@@ -157,7 +165,8 @@ class Loop {
       if (std::any_of(out_.ambiguous.begin(), out_.ambiguous.end(),
                       [&](const Ambiguity& a) { return a.found == chosen.name && a.instead == other.name; }))
         continue;
-      out_.ambiguous.push_back({chosen.name, other.name, other.covariates, best.evidence - f.evidence});
+      out_.ambiguous.push_back(
+          {chosen.name, other.name, chosen.covariates, other.covariates, best.evidence - f.evidence});
     }
   }
 
@@ -167,6 +176,7 @@ class Loop {
   std::vector<std::vector<const TrackView*>> units_;
   std::optional<Scores> scores_;
   Search out_;
+  std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
   int defences_ = 0;
 };
 

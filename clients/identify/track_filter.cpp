@@ -13,7 +13,7 @@ constexpr double kGate2 = 23, kGate3 = 25.9;
 constexpr int kLostAfter = 4;
 constexpr double kFar = 60;
 /// What a robot that touches something does beyond its own motion, as noise.
-constexpr double kPush_mm2_s = 15, kPush_rad2_s = 0.05;
+constexpr double kPush_mm2_s = 60, kPush_rad2_s = 0.3;
 
 }  // namespace
 
@@ -77,6 +77,7 @@ StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& comm
     record.middle.x_mm = belief_.mean[0] + half.dx_mm + kAxleOffset_mm * std::cos(record.middle.heading_rad);
     record.middle.y_mm = belief_.mean[1] + half.dy_mm + kAxleOffset_mm * std::sin(record.middle.heading_rad);
   }
+  record.touching = commands.driven() && touches(record.middle);
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
   spread(record);
@@ -125,8 +126,7 @@ void TrackFilter::spread(const StepRecord& record) {
                                  h * (noise.factor_s * right * right + noise.wheel_mm2_s));
     p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
   }
-  if (!looking_ahead_ && record.middle.commands.driven() && touches(record.middle))
-    own += h * Eigen::Vector3d(kPush_mm2_s, kPush_mm2_s, kPush_rad2_s);
+  if (!looking_ahead_ && record.touching) own += h * Eigen::Vector3d(kPush_mm2_s, kPush_mm2_s, kPush_rad2_s);
   p.diagonal().head<3>() += own;
 }
 

@@ -31,6 +31,7 @@ struct StepRecord {
   Rates rates;
   Arc arc;
   double h_s = 0;
+  bool touching = false;  ///< a wall or another robot may have pushed it
 };
 
 /// A measurement taken in.

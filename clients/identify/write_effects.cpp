@@ -244,6 +244,23 @@ double rounded(double value) {
   return result;
 }
 
+const char* form_of(const Term& term) {
+  if (term.blocks.empty() || term.blocks.front().basis.factors.empty()) return "constant";
+  if (term.blocks.front().basis.factors.size() > 1) return "product";
+  switch (term.blocks.front().basis.factors.front().shape) {
+    case Shape::kLinear: return "linear";
+    case Shape::kCosines:
+    case Shape::kTaper: return "curve";
+    case Shape::kCosines2: return "map";
+    case Shape::kHarmonics:
+    case Shape::kWave: return "harmonic";
+    case Shape::kTable: return "table";
+    case Shape::kAtLeast: return "steps";
+    case Shape::kExponential: return "exponential";
+  }
+  return "curve";
+}
+
 std::vector<Effect> effects_of_term(const Term& term) {
   std::vector<Effect> effects;
   Eigen::Index first = 0;
