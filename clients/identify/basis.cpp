@@ -100,6 +100,7 @@ std::vector<double> Factor::roughness() const {
 }
 
 std::size_t Basis::size() const {
+  if (!chosen.empty()) return chosen.size();
   std::size_t size = 1;
   for (const Factor& factor : factors) size *= factor.size();
   return size;
@@ -118,6 +119,7 @@ void Basis::evaluate(const Situation& s, std::size_t wheel, double* to) const {
       for (std::size_t j = n; j-- > 0;) to[i * n + j] = to[i] * of_factor[j];
     have *= n;
   }
+  for (std::size_t i = 0; i < chosen.size(); ++i) to[i] = to[chosen[i]];
 }
 
 std::vector<double> Basis::roughness() const {
@@ -128,6 +130,8 @@ std::vector<double> Basis::roughness() const {
       for (const double own : factor.roughness()) next.push_back(r * own);
     rough = std::move(next);
   }
+  for (std::size_t i = 0; i < chosen.size(); ++i) rough[i] = rough[chosen[i]];
+  if (!chosen.empty()) rough.resize(chosen.size());
   return rough;
 }
 

@@ -37,9 +37,11 @@ struct Factor {
 /// The products of columns of all factors; one column of ones where there are none.
 struct Basis {
   std::vector<Factor> factors;
+  /// Not empty: these columns of the products alone, ascending.
+  std::vector<std::uint32_t> chosen = {};
 
   [[nodiscard]] std::size_t size() const;
-  /// `to` has size() entries.
+  /// `to` has room for all products.
   void evaluate(const Situation&, std::size_t wheel, double* to) const;
   [[nodiscard]] std::vector<double> roughness() const;
   [[nodiscard]] bool looks_at(Covariate) const;

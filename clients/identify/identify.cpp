@@ -8,6 +8,7 @@
 
 #include "clients/identify/fit.hpp"
 #include "clients/identify/predict.hpp"
+#include "clients/identify/search.hpp"
 #include "clients/identify/write_model.hpp"
 #include "core/base/error.hpp"
 
@@ -61,6 +62,27 @@ json summary_of(const Errors& errors) {
           {"rows", errors.rows}};
 }
 
+json effects_of(const Search& found) {
+  json effects = json::array();
+  for (std::size_t t = 0; t < found.model.terms.size(); ++t) {
+    const Term& term = found.model.terms[t];
+    const Reason& reason = found.reasons[t];
+    effects.push_back(
+        {{"name", term.name},
+         {"covariates", reason.covariates},
+         {"acts_on", reason.acts_on},
+         {"evidence",
+          {{"log10_p", reason.finding.log10_p},
+           {"threshold_log10_p", reason.threshold_log10_p},
+           {"log_likelihood_gain", reason.finding.evidence},
+           {"held_out_gain", reason.finding.held_out},
+           {"held_out_gain_se", reason.finding.held_out_se},
+           {"degrees", reason.finding.degrees}}},
+         {"in_words", fmt::format("{} depends on {}", reason.acts_on, fmt::join(reason.covariates, ", "))}});
+  }
+  return effects;
+}
+
 }  // namespace
 
 void hold_out_part(MeasuredSet& set) {
@@ -99,7 +121,13 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   MotionModel before;
   fitter.fit(before, 5);
 
-  MotionModel after = before;
+  Search found;
+  found.model = before;
+  if (options.trace) {
+    found = search(fitter, before,
+                   [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); });
+  }
+  const MotionModel& after = found.model;
   json document;
 
   say_progress(0.9, "predictions");
@@ -125,7 +153,20 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
       "motion over "
       "the horizon, and the tracker's noise, all estimated from the innovations one step ahead";
   contract["horizon_s"] = options.horizon_s;
-  contract["effects"] = json::array();
+  contract["effects"] = effects_of(found);
+  contract["rejected"] = json::array();
+  for (const Rejected& r : found.rejected) {
+    contract["rejected"].push_back({{"name", r.name},
+                                    {"covariates", r.covariates},
+                                    {"acts_on", r.acts_on},
+                                    {"log10_p", r.log10_p},
+                                    {"threshold_log10_p", r.threshold_log10_p}});
+  }
+  contract["ambiguous"] = json::array();
+  for (const Ambiguity& a : found.ambiguous) {
+    contract["ambiguous"].push_back(
+        {{"found", a.found}, {"instead", a.instead}, {"log_likelihood_difference", a.evidence_difference}});
+  }
   contract["base"] = {
       {"straight_speed_mm_s", after.base.straight_mm_s}, {"turn_speed_mm_s", after.base.turn_mm_s},
       {"wheel_base_mm", after.base.wheel_base_mm},       {"tracked_point_ahead_mm", after.base.ahead_mm},

@@ -4,15 +4,12 @@
 #include <google/protobuf/text_format.h>
 
 #include <cmath>
+#include <set>
+
+#include "clients/identify/write_effects.hpp"
 
 namespace kilotwin::identify {
 namespace {
-
-double rounded(double value) {
-  if (value == 0 || !std::isfinite(value)) return 0;
-  const double unit = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 6);
-  return std::round(value / unit) * unit;
-}
 
 proto::Effect& add_effect(proto::Model& model, const std::string& name, proto::Effect::Target target) {
   proto::Effect& effect = *model.add_effect();
@@ -59,6 +56,16 @@ proto::Model proto_of(const MotionModel& fitted) {
   add_noise(model, "tracker-x", proto::Effect::MEASURED_OFFSET, 0, std::sqrt(fitted.noise.position_mm2));
   add_noise(model, "tracker-y", proto::Effect::MEASURED_OFFSET, 90, std::sqrt(fitted.noise.position_mm2));
   add_noise(model, "tracker-heading", proto::Effect::MEASURED_HEADING, 0, std::sqrt(fitted.noise.heading_rad2));
+  std::set<std::string> names;
+  for (const Term& term : fitted.terms) {
+    for (const proto::Effect& effect : effects_of_term(term)) {
+      std::string name = effect.name();
+      for (int again = 2; !names.insert(name).second; ++again)
+        name = fmt::format("{}-again{}", effect.name(), again);
+      *model.add_effect() = effect;
+      model.mutable_effect(model.effect_size() - 1)->set_name(name);
+    }
+  }
   return model;
 }
 

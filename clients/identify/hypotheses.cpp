@@ -1,0 +1,385 @@
+#include "clients/identify/hypotheses.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+/// What is natural to a target: an effect of that size would be seen by the naked eye.
+double natural(Target target) {
+  switch (target) {
+    case Target::kGain:
+    case Target::kGainLeft:
+    case Target::kGainRight: return 1;
+    case Target::kTurn: return 0.4;
+    case Target::kOffset:
+    case Target::kAhead:
+    case Target::kSideways:
+    case Target::kWorldX:
+    case Target::kWorldY: return 10;
+    case Target::kMeasuredX:
+    case Target::kMeasuredY: return 30;
+    case Target::kMeasuredAhead:
+    case Target::kMeasuredLeft: return 10;
+    case Target::kMeasuredScale:
+    case Target::kMeasuredHeading: return 0.3;
+  }
+  return 1;
+}
+
+Factor over(Shape shape, Covariate of, double low, double high, std::uint32_t count) {
+  Factor f;
+  f.shape = shape;
+  f.axis.of = of;
+  f.low = low;
+  f.high = high;
+  f.count = count;
+  return f;
+}
+Factor keyed(Shape shape, Covariate of, std::vector<double> points) {
+  Factor f;
+  f.shape = shape;
+  f.axis.of = of;
+  f.points = std::move(points);
+  return f;
+}
+
+class Maker {
+ public:
+  explicit Maker(Dictionary& dictionary) : dictionary_(dictionary) {}
+
+  /// Puts columns into the dictionary; returns the place of the first.
+  Eigen::Index put(Target target, Basis basis, std::uint8_t during = kDriven) {
+    const Eigen::Index first = columns_;
+    const std::vector<double> rough = basis.roughness();
+    for (const double r : rough) scales_.push_back(natural(target) * std::pow(r, -1.5));
+    columns_ += static_cast<Eigen::Index>(rough.size());
+    dictionary_.blocks.push_back({target, std::move(basis), is_measured(target) ? kAlways : during});
+    return first;
+  }
+  std::uint32_t family(const std::string& name) {
+    auto& families = dictionary_.families;
+    const auto known = std::find(families.begin(), families.end(), name);
+    if (known != families.end()) return static_cast<std::uint32_t>(known - families.begin());
+    families.push_back(name);
+    return static_cast<std::uint32_t>(families.size() - 1);
+  }
+  void add(const std::string& name, std::vector<std::string> covariates, const std::string& acts_on,
+           std::vector<Eigen::Index> columns, double choices = 1) {
+    std::sort(columns.begin(), columns.end());
+    dictionary_.hypotheses.push_back(
+        {name, std::move(covariates), acts_on, std::move(columns), family(name), std::log(choices)});
+  }
+  [[nodiscard]] Eigen::Index columns() const { return columns_; }
+  void finish() {
+    dictionary_.scale = Eigen::Map<Eigen::VectorXd>(scales_.data(), static_cast<Eigen::Index>(scales_.size()));
+  }
+
+ private:
+  Dictionary& dictionary_;
+  Eigen::Index columns_ = 0;
+  std::vector<double> scales_;
+};
+
+/// Columns first .. first + count - 1 of each of several bases.
+std::vector<Eigen::Index> some(const std::vector<Eigen::Index>& bases, Eigen::Index first, Eigen::Index count) {
+  std::vector<Eigen::Index> columns;
+  for (const Eigen::Index base : bases)
+    for (Eigen::Index i = 0; i < count; ++i) columns.push_back(base + first + i);
+  return columns;
+}
+
+struct Acting {
+  const char* name;
+  const char* in_words;
+  std::vector<Target> targets;
+  std::vector<std::string> words;  ///< covariates that the target itself brings
+};
+
+const Acting kSpeed{"speed", "speed of the wheels", {Target::kGain}, {}};
+const Acting kTurning{"turning", "turn rate", {Target::kTurn}, {}};
+const Acting kSlip{"slip", "sideways slip", {Target::kSideways}, {}};
+const Acting kWorld{"drift", "drift in the room", {Target::kWorldX, Target::kWorldY}, {"world_frame"}};
+const Acting kCamera{"camera", "measured position", {Target::kMeasuredX, Target::kMeasuredY}, {"measurement"}};
+const Acting kCompass{"compass", "measured heading", {Target::kMeasuredHeading}, {"measurement"}};
+
+class Catalogue {
+ public:
+  Catalogue(const Extent& extent, Dictionary& dictionary) : extent_(extent), make_(dictionary) {}
+
+  void fill() {
+    of_time();
+    of_use();
+    of_place();
+    of_heading();
+    of_commands();
+    of_neighbours();
+    of_history();
+    of_robots();
+    make_.finish();
+  }
+
+ private:
+  std::vector<Eigen::Index> put(const Acting& acting, const Basis& basis, std::uint8_t during = kDriven) {
+    std::vector<Eigen::Index> bases;
+    for (const Target target : acting.targets) bases.push_back(make_.put(target, basis, during));
+    return bases;
+  }
+  void add(const Acting& acting, const std::string& of, std::vector<std::string> words,
+           std::vector<Eigen::Index> columns, double choices = 1) {
+    words.insert(words.begin(), acting.words.begin(), acting.words.end());
+    make_.add(fmt_name(acting.name, of), std::move(words), acting.in_words, std::move(columns), choices);
+  }
+  static std::string fmt_name(const std::string& acting, const std::string& of) { return acting + "-by-" + of; }
+
+  /// The smooth curve with ever more columns, and waves of one kind.
+  void curve(const Acting& acting, const std::string& of, const std::vector<std::string>& words, const Basis& basis,
+             std::vector<Eigen::Index> sizes, bool windows) {
+    const auto bases = put(acting, basis);
+    const auto n = static_cast<Eigen::Index>(basis.size());
+    for (const Eigen::Index size : sizes)
+      if (size <= n) add(acting, of, words, some(bases, 0, size));
+    if (!windows) return;
+    for (Eigen::Index first = 4; first + 4 <= n; first += 2)
+      add(acting, of, words, some(bases, first, 4), static_cast<double>(n) / 2);
+  }
+
+  void of_time() {
+    const auto smooth = [&](std::uint32_t count) {
+      return Basis{{over(Shape::kCosines, Covariate::kTime, 0, extent_.duration_s, count)}};
+    };
+    curve(kSpeed, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
+    curve(kTurning, "time", {"time"}, smooth(12), {1, 3, 12}, true);
+    curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
+    curve(kCamera, "time", {"time"}, smooth(16), {1, 3, 8, 16}, false);
+    if (extent_.headings) curve(kCompass, "time", {"time"}, smooth(6), {1, 3, 6}, false);
+    // Steps, and pulses between two of them.
+    constexpr int kSteps = 40;
+    std::vector<double> at;
+    for (int i = 1; i < kSteps; ++i) at.push_back(extent_.duration_s * i / kSteps);
+    const Basis steps{{keyed(Shape::kAtLeast, Covariate::kTime, at)}};
+    const auto n = static_cast<Eigen::Index>(at.size());
+    for (const Acting* acting : {&kSpeed, &kWorld, &kCamera}) {
+      const auto bases = put(*acting, steps);
+      for (Eigen::Index i = 0; i < n; ++i) add(*acting, "time", {"time"}, some(bases, i, 1), kSteps);
+      for (Eigen::Index width : {1, 2, 4, 8, 16}) {
+        for (Eigen::Index i = 0; i + width < n; ++i) {
+          auto columns = some(bases, i, 1);
+          for (const Eigen::Index c : some(bases, i + width, 1)) columns.push_back(c);
+          add(*acting, "time", {"time"}, columns, kSteps * 5.0);
+        }
+      }
+      add(*acting, "time", {"time"}, some(bases, 0, n));
+    }
+  }
+  void of_use() {
+    const Basis motor{{over(Shape::kCosines, Covariate::kMotorTime, 0, extent_.motor_s, 8)}};
+    curve(kSpeed, "motor-time", {"motor_time"}, motor, {1, 3, 8}, false);
+    const Basis driven{{over(Shape::kCosines, Covariate::kDrivenTime, 0, extent_.driven_s, 6)}};
+    curve(kTurning, "driven-time", {"motor_time"}, driven, {1, 3, 6}, false);
+  }
+  Factor plane(std::uint32_t order) const {
+    Factor f = over(Shape::kCosines2, Covariate::kX, extent_.x_low_mm, extent_.x_high_mm, order);
+    f.and_axis.of = Covariate::kY;
+    f.and_low = extent_.y_low_mm;
+    f.and_high = extent_.y_high_mm;
+    return f;
+  }
+  void of_place() {
+    const auto map = [&](const Acting& acting, std::uint32_t order) {
+      const auto bases = put(acting, Basis{{plane(order)}});
+      for (std::uint32_t o = 1; o <= order; ++o)
+        add(acting, "position", {"position"}, some(bases, 0, (o + 1) * (o + 2) / 2 - 1));
+    };
+    map(kSpeed, 8);
+    map(kTurning, 3);
+    map(kWorld, 5);
+    map(kCamera, 7);
+    if (extent_.headings) map(kCompass, 2);
+  }
+  void of_heading() {
+    const Basis round{{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 4)}};
+    curve(kSpeed, "heading", {"heading"}, round, {2, 4, 8}, false);
+    curve(kTurning, "heading", {"heading"}, round, {2, 4, 8}, false);
+    curve(kSlip, "heading", {"heading"}, round, {2, 4}, false);
+    if (extent_.headings) curve(kCompass, "heading", {"heading"}, round, {2, 4}, false);
+    const auto constant = put(kWorld, Basis{});
+    make_.add("drift", {"world_frame"}, kWorld.in_words, some(constant, 0, 1));
+    if (extent_.has_stop) {
+      const auto at_rest = put(kWorld, Basis{}, 1);
+      make_.add("drift-at-rest", {"world_frame"}, kWorld.in_words, some(at_rest, 0, 1));
+      auto both = some(constant, 0, 1);
+      for (const auto c : some(at_rest, 0, 1)) both.push_back(c);
+      make_.add("drift", {"world_frame"}, kWorld.in_words, both);
+    }
+  }
+  void of_commands() {
+    std::vector<double> moving;
+    if (extent_.has_straight) moving.push_back(1);
+    if (extent_.has_turns) moving.insert(moving.end(), {2, 3});
+    const Basis which{{keyed(Shape::kTable, Covariate::kCommand, moving)}};
+    const auto n = static_cast<Eigen::Index>(moving.size());
+    for (const Acting* acting : {&kSpeed, &kTurning, &kSlip}) {
+      const auto bases = put(*acting, which);
+      for (Eigen::Index i = 0; i < n; ++i)
+        add(*acting, "command", {"command"}, some(bases, i, 1), static_cast<double>(n));
+      add(*acting, "command", {"command"}, some(bases, 0, n));
+    }
+    for (const Target wheel : {Target::kGainLeft, Target::kGainRight}) {
+      const auto base = make_.put(wheel, which);
+      for (Eigen::Index i = 0; i < n; ++i)
+        make_.add("speed-by-command", {"command"}, kSpeed.in_words, {base + i}, static_cast<double>(n) * 2);
+    }
+    // A tracker that lags sees moving robots where they were.
+    if (moving.size() > 1) {
+      const auto ahead = make_.put(Target::kMeasuredAhead, which);
+      make_.add("camera-by-command", {"measurement", "command"}, kCamera.in_words, some({ahead}, 0, n));
+    }
+    Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent_.since_s, 8);
+    since.warp = 1;
+    const Basis start{{since}};
+    curve(kSpeed, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
+    curve(kTurning, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
+    curve(kSlip, "time-since-command", {"time_since_command"}, start, {3}, false);
+  }
+  void of_neighbours() {
+    if (!extent_.neighbours) return;
+    const auto with_radius = [](Factor f, std::uint8_t radius) {
+      f.axis.radius = radius;
+      return f;
+    };
+    for (std::uint8_t r = 1; r < kNeighbourRadii_mm.size(); ++r) {
+      const double reach = kNeighbourRadii_mm[r];
+      const Factor near = with_radius(over(Shape::kTaper, Covariate::kNearest, 0, reach, 3), r);
+      const auto bases = put(kSpeed, Basis{{near}});
+      for (const Eigen::Index n : {1, 3}) add(kSpeed, "neighbours", {"neighbours"}, some(bases, 0, n), 6);
+      const Factor falling = with_radius(over(Shape::kTaper, Covariate::kNearest, 0, reach, 2), r);
+      const Factor bearing = with_radius(over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 1), r);
+      for (const Acting* acting : {&kTurning, &kSlip}) {
+        const auto aside = put(*acting, Basis{{falling, bearing}});
+        add(*acting, "neighbours", {"neighbours"}, {aside[0] + 1}, 6);
+        add(*acting, "neighbours", {"neighbours"}, {aside[0] + 1, aside[0] + 3}, 6);
+      }
+      const auto forward = make_.put(Target::kAhead, Basis{{falling, bearing}});
+      make_.add("speed-by-neighbours", {"neighbours"}, kSpeed.in_words, {forward, forward + 2}, 6);
+    }
+    for (std::uint8_t r = 0; r < kNeighbourRadii_mm.size(); ++r) {
+      const Factor count = with_radius(over(Shape::kCosines, Covariate::kNeighbours, 0, 8, 3), r);
+      const auto bases = put(kSpeed, Basis{{count}});
+      for (const Eigen::Index n : {1, 3}) add(kSpeed, "neighbours", {"neighbours"}, some(bases, 0, n), 8);
+      const Factor density = with_radius(over(Shape::kCosines, Covariate::kDensity, 0, 4, 3), r);
+      const auto dense = put(kSpeed, Basis{{density}});
+      for (const Eigen::Index n : {1, 3}) add(kSpeed, "neighbours", {"neighbours"}, some(dense, 0, n), 8);
+    }
+  }
+  void of_history() {
+    if (!extent_.has_turns || !extent_.has_straight) return;
+    constexpr std::uint8_t kStraightOnly = 1u << 1;
+    const Factor before = keyed(Shape::kTable, Covariate::kPreviousCommand, {2, 3});
+    const Factor last = keyed(Shape::kTable, Covariate::kLastTurn, {2, 3});
+    const Factor fading = keyed(Shape::kExponential, Covariate::kSinceCommand, {0.5, 1.5, 5});
+    for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
+      const auto while_straight = put(*acting, Basis{{before}}, kStraightOnly);
+      add(*acting, "previous-command", {"history"}, some(while_straight, 0, 2));
+      const auto after = put(*acting, Basis{{before, fading}}, kStraightOnly);
+      for (Eigen::Index i = 0; i < 3; ++i)
+        add(*acting, "previous-command", {"history", "time_since_command"}, {after[0] + i, after[0] + 3 + i}, 3);
+      add(*acting, "previous-command", {"history", "time_since_command"}, some(after, 0, 6));
+      const auto turned = put(*acting, Basis{{last}}, kStraightOnly);
+      add(*acting, "last-turn", {"history"}, some(turned, 0, 2));
+    }
+  }
+  void of_robots() {
+    constexpr std::size_t kMost = 120;
+    if (extent_.robots.size() < 2 || extent_.robots.size() > kMost) return;
+    std::vector<double> keys(extent_.robots.begin(), extent_.robots.end());
+    const auto n = static_cast<Eigen::Index>(keys.size());
+    const auto gains = put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys)}});
+    add(kSpeed, "robot", {"robot"}, some(gains, 0, n));
+    if (keys.size() > 40) return;
+    const auto slopes = put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys),
+                                           over(Shape::kLinear, Covariate::kTime, 0, extent_.duration_s, 1)}});
+    add(kSpeed, "robot-and-time", {"robot", "time"}, some(slopes, 0, n));
+  }
+
+  const Extent& extent_;
+  Maker make_;
+};
+
+}  // namespace
+
+Extent extent_of(const PreparedSet& set) {
+  Extent e;
+  std::vector<double> xs, ys;
+  e.duration_s = e.motor_s = e.driven_s = e.since_s = 1;
+  for (const TrackView& view : set.views()) {
+    const std::vector<Sample>& samples = view.track->samples;
+    const std::size_t stride = std::max<std::size_t>(1, samples.size() / 200);
+    for (std::size_t i = 0; i < samples.size(); i += stride) {
+      xs.push_back(samples[i].x_mm);
+      ys.push_back(samples[i].y_mm);
+    }
+    const double end_s = samples.back().time_s;
+    const CommandState last = view.clock.at(end_s);
+    e.duration_s = std::max(e.duration_s, end_s);
+    e.motor_s = std::max({e.motor_s, last.motor_s[0], last.motor_s[1]});
+    e.driven_s = std::max(e.driven_s, last.driven_s);
+    for (const CommandChange& change : view.track->commands) {
+      e.has_stop = e.has_stop || (change.motion == Motion::kStop && change.time_s > 0);
+      e.has_straight = e.has_straight || change.motion == Motion::kStraight;
+      e.has_turns = e.has_turns || change.motion == Motion::kLeft || change.motion == Motion::kRight;
+    }
+  }
+  const auto bounds = [](std::vector<double>& all, double& low, double& high) {
+    std::sort(all.begin(), all.end());
+    low = all[all.size() / 500];
+    high = all[all.size() - 1 - all.size() / 500];
+    const double margin = std::max(10.0, 0.02 * (high - low));
+    low -= margin;
+    high += margin;
+  };
+  bounds(xs, e.x_low_mm, e.x_high_mm);
+  bounds(ys, e.y_low_mm, e.y_high_mm);
+  e.since_s = std::min(20.0, e.duration_s);
+  for (const Run& run : set.set().runs) e.neighbours = e.neighbours || run.tracks.size() > 1;
+  e.headings = set.set().has_headings;
+  e.robots = set.set().robots();
+  return e;
+}
+
+Dictionary dictionary_of(const Extent& extent) {
+  Dictionary dictionary;
+  Catalogue(extent, dictionary).fill();
+  return dictionary;
+}
+
+Term Dictionary::term_of(const Hypothesis& hypothesis, double relative_scale) const {
+  Term term;
+  term.name = hypothesis.name;
+  std::vector<double> precision;
+  Eigen::Index first = 0;
+  std::size_t next = 0;
+  for (const Block& block : blocks) {
+    const auto n = static_cast<Eigen::Index>(block.basis.size());
+    std::vector<std::uint32_t> own;
+    while (next < hypothesis.columns.size() && hypothesis.columns[next] < first + n) {
+      const Eigen::Index column = hypothesis.columns[next++];
+      own.push_back(static_cast<std::uint32_t>(column - first));
+      const double sd = relative_scale * scale[column];
+      precision.push_back(1 / (sd * sd));
+    }
+    first += n;
+    if (own.empty()) continue;
+    Block part = block;
+    if (own.size() < static_cast<std::size_t>(n)) part.basis.chosen = own;
+    term.blocks.push_back(std::move(part));
+  }
+  term.precision = Eigen::Map<Eigen::VectorXd>(precision.data(), static_cast<Eigen::Index>(precision.size()));
+  term.coefficients = Eigen::VectorXd::Zero(term.precision.size());
+  return term;
+}
+
+}  // namespace kilotwin::identify

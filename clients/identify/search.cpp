@@ -1,0 +1,180 @@
+#include "clients/identify/search.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr int kMostRounds = 8;
+constexpr std::uint64_t kSeed = 20180729;
+/// Look-alikes whose evidence lies closer than this (a Bayes factor of 20) are not told apart.
+constexpr double kClose = 3;
+/// As many samples as hypotheses are tested on; there are no more surprises in more.
+constexpr std::size_t kEnoughSamples = 130000;
+
+class Loop {
+ public:
+  Loop(const Fitter& fitter, const MotionModel& base,
+       const std::function<void(double, const std::string&)>& progress)
+      : fitter_(fitter), progress_(progress), dictionary_(dictionary_of(extent_of(fitter.set()))) {
+    out_.model = base;
+    units_ = fitter.set().units();
+    std::size_t samples = 0;
+    for (const auto& unit : units_)
+      for (const TrackView* view : unit) samples += view->track->samples.size();
+    // Of a large set a part of every robot's tracks, or of the robots.
+    const std::size_t every = samples / kEnoughSamples + 1;
+    if (every > 1) {
+      std::vector<std::vector<const TrackView*>> part;
+      for (std::size_t u = 0; u < units_.size(); u += every) part.push_back(units_[u]);
+      if (part.size() >= 6) units_ = std::move(part);
+    }
+  }
+
+  Search run() {
+    for (int round = 0; round < kMostRounds; ++round) {
+      progress_(0.9 * round / kMostRounds, fmt::format("looking for causes, {} found", out_.model.terms.size()));
+      measure();
+      const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
+      note_rejected(outcome);
+      const Finding* const best = best_of(outcome);
+      if (best != nullptr) {
+        note_ambiguous(*best, outcome);
+        add(*best, outcome.threshold_log10_p);
+        continue;
+      }
+      if (!defend()) break;
+    }
+    return std::move(out_);
+  }
+
+ private:
+  void measure() {
+    std::vector<Block> blocks = blocks_of(out_.model);
+    blocks.insert(blocks.end(), dictionary_.blocks.begin(), dictionary_.blocks.end());
+    const std::vector<Unit> units = linearise(out_.model, units_, blocks, {100, fitter_.threads()});
+    scores_.emplace(fitter_, out_.model, units, dictionary_);
+  }
+  const Finding* best_of(const Scores::Outcome& outcome) const {
+    const Finding* best = nullptr;
+    for (const Finding& f : outcome.findings) {
+      if (!good(f, outcome.threshold_log10_p)) continue;
+      if (best == nullptr || f.evidence > best->evidence) best = &f;
+    }
+    return best;
+  }
+  static bool good(const Finding& f, double threshold) {
+    return f.log10_p < threshold && f.evidence > 3 && f.held_out > 2;
+  }
+  const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
+
+  void add(const Finding& found, double threshold) {
+    const Hypothesis& h = hypothesis(found);
+    Term term = dictionary_.term_of(h, found.relative_scale);
+    const Reason reason{h.covariates, h.acts_on, found, threshold};
+    // More of what is there already may be one thing in a richer form.
+    for (std::size_t t = 0; t < out_.model.terms.size(); ++t) {
+      if (out_.model.terms[t].name != h.name) continue;
+      const Finding instead = scores_->weigh(h, static_cast<int>(t));
+      const Finding own = scores_->weigh_term(static_cast<int>(t));
+      if (instead.evidence < own.evidence + found.evidence - 2) continue;
+      out_.model.terms[t] = dictionary_.term_of(h, instead.relative_scale);
+      out_.reasons[t].finding = instead;
+      out_.reasons[t].finding.log10_p = std::min(reason.finding.log10_p, out_.reasons[t].finding.log10_p);
+      fitter_.fit(out_.model, 2);
+      out_.steps.push_back({h.name, found.held_out});
+      return;
+    }
+    out_.model.terms.push_back(std::move(term));
+    out_.reasons.push_back(reason);
+    fitter_.fit(out_.model, 2);
+    out_.steps.push_back({h.name, found.held_out});
+  }
+
+  /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.
+  bool defend() {
+    if (defences_++ >= 3) return false;
+    for (int t = 0; t < static_cast<int>(out_.model.terms.size()); ++t) {
+      const auto place = static_cast<std::size_t>(t);
+      const Finding own = scores_->weigh_term(t);
+      out_.reasons[place].finding.held_out = own.held_out;
+      out_.reasons[place].finding.held_out_se = own.held_out_se;
+      if (own.held_out < 2) {
+        drop(place);
+        return true;
+      }
+      const Hypothesis* best = nullptr;
+      Finding best_finding;
+      for (const Hypothesis& h : dictionary_.hypotheses) {
+        const Finding other = scores_->weigh(h, t);
+        if (best == nullptr || other.evidence > best_finding.evidence) {
+          best = &h;
+          best_finding = other;
+        }
+      }
+      if (best != nullptr && best->name != out_.model.terms[place].name &&
+          best_finding.evidence > own.evidence + kClose) {
+        const double log10_p = out_.reasons[place].finding.log10_p;
+        out_.model.terms[place] = dictionary_.term_of(*best, best_finding.relative_scale);
+        best_finding.log10_p = log10_p;
+        out_.reasons[place] = {best->covariates, best->acts_on, best_finding,
+                               out_.reasons[place].threshold_log10_p};
+        fitter_.fit(out_.model, 2);
+        return true;
+      }
+    }
+    return false;
+  }
+  void drop(std::size_t t) {
+    out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
+    fitter_.fit(out_.model, 1);
+  }
+  void note_rejected(const Scores::Outcome& outcome) {
+    out_.rejected.clear();
+    std::vector<const Finding*> order;
+    for (const Finding& f : outcome.findings) order.push_back(&f);
+    std::sort(order.begin(), order.end(),
+              [](const Finding* a, const Finding* b) { return a->log10_p < b->log10_p; });
+    for (const Finding* f : order) {
+      const Hypothesis& h = hypothesis(*f);
+      if (std::any_of(out_.rejected.begin(), out_.rejected.end(),
+                      [&](const Rejected& r) { return r.name == h.name; }))
+        continue;
+      out_.rejected.push_back({h.name, h.covariates, h.acts_on, f->log10_p, outcome.threshold_log10_p});
+      if (out_.rejected.size() == 12) break;
+    }
+  }
+  void note_ambiguous(const Finding& best, const Scores::Outcome& outcome) {
+    const Hypothesis& chosen = hypothesis(best);
+    for (const Finding& f : outcome.findings) {
+      const Hypothesis& other = hypothesis(f);
+      if (!good(f, outcome.threshold_log10_p) || other.name == chosen.name || f.evidence < best.evidence - kClose)
+        continue;
+      if (std::any_of(out_.ambiguous.begin(), out_.ambiguous.end(),
+                      [&](const Ambiguity& a) { return a.found == chosen.name && a.instead == other.name; }))
+        continue;
+      out_.ambiguous.push_back({chosen.name, other.name, other.covariates, best.evidence - f.evidence});
+    }
+  }
+
+  const Fitter& fitter_;
+  const std::function<void(double, const std::string&)>& progress_;
+  const Dictionary dictionary_;
+  std::vector<std::vector<const TrackView*>> units_;
+  std::optional<Scores> scores_;
+  Search out_;
+  int defences_ = 0;
+};
+
+}  // namespace
+
+Search search(const Fitter& fitter, const MotionModel& base,
+              const std::function<void(double, const std::string&)>& progress) {
+  return Loop(fitter, base, progress).run();
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,18 @@
+/// Terms as records of effects, which the simulator runs.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "clients/identify/motion_model.hpp"
+#include "idl/effects.pb.h"
+
+namespace kilotwin::identify {
+
+/// One record where the term is a function of one covariate or two; several, of which the effects add up, where it is more.
+[[nodiscard]] std::vector<proto::Effect> effects_of_term(const Term&);
+
+/// A number with seven digits.
+[[nodiscard]] double rounded(double value);
+
+}  // namespace kilotwin::identify
