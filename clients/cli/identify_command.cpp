@@ -7,6 +7,7 @@
 
 #include "clients/identify/data_faults.hpp"
 #include "clients/identify/identify.hpp"
+#include "clients/identify/import.hpp"
 #include "clients/identify/report.hpp"
 #include "clients/identify/write_model.hpp"
 #include "clients/recorder/file.hpp"
@@ -37,12 +38,12 @@ void make_directory(const fs::path& directory) {
 
 int identify_command(const IdentifyArguments& arguments) {
   if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
-  identify::MeasuredSet train = identify::load_measured_set(arguments.train);
+  identify::MeasuredSet train = identify::load_or_import(arguments.train, arguments.out / "imported-train");
   // Whatever robots do, they do not do this: it is excluded before anything is fitted, and never modelled.
   const std::vector<identify::DataFault> faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!arguments.test.empty()) {
-    test = identify::load_measured_set(arguments.test);
+    test = identify::load_or_import(arguments.test, arguments.out / "imported-test");
   } else {
     identify::hold_out_part(train);
   }

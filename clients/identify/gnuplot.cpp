@@ -37,7 +37,7 @@ constexpr const char* kStyle = R"(set encoding utf8
 set border 3 lc rgb '#8896a4' lw 1
 set tics nomirror out scale 0.6 textcolor rgb '#3b4754'
 set grid lc rgb '#e3e8ed' lw 1 lt 1
-set key top right samplen 1.6 spacing 1.15 textcolor rgb '#3b4754'
+set key above left Left reverse horizontal samplen 1.6 width 1 textcolor rgb '#3b4754'
 set xlabel textcolor rgb '#3b4754' offset 0,0.3
 set ylabel textcolor rgb '#3b4754' offset 1,0
 set title textcolor rgb '#1f2933'
@@ -45,7 +45,6 @@ set linetype 1 lc rgb '#d95f0e' lw 2 pt 7 ps 0.5
 set linetype 2 lc rgb '#2563a8' lw 2 pt 7 ps 0.5
 set linetype 3 lc rgb '#66727f' lw 1.5 dt (5,4) pt 7 ps 0.4
 set linetype 4 lc rgb '#1f2933' lw 1.6
-set style fill solid 0.25 noborder
 set bars small
 )";
 
@@ -56,31 +55,39 @@ std::size_t Gnuplot::add(int width_px, int height_px, std::string commands) {
   return plots_.size() - 1;
 }
 
-std::vector<std::string> Gnuplot::draw() const {
+std::string Gnuplot::script(std::size_t plot, const std::string& file) const {
+  return fmt::format(
+      "reset session\nset terminal svg size {},{} enhanced font 'Helvetica,12' rounded\nset output "
+      "'{}'\n{}{}\nunset output\n",
+      plots_[plot].width_px, plots_[plot].height_px, file, kStyle, plots_[plot].commands);
+}
+
+std::vector<Gnuplot::Drawn> Gnuplot::draw() const {
   if (plots_.empty()) return {};
   const fs::path program = behaviours::find_executable("gnuplot");
   if (program.empty())
     throw RunError("the report's plots need gnuplot, which is not on the PATH; install gnuplot-nox");
   const Scratch scratch;
-  std::string script;
+  const auto file = [&](std::size_t k) { return (scratch.path() / fmt::format("{}.svg", k)).string(); };
+  const auto run = [&](const std::string& commands) {
+    recorder::write_file(scratch.path() / "plots", commands);
+    return behaviours::run_process({program.string(), (scratch.path() / "plots").string()});
+  };
+  std::string all;
+  for (std::size_t k = 0; k < plots_.size(); ++k) all += script(k, file(k));
+  std::vector<Drawn> drawn(plots_.size());
+  const bool good = run(all).status == 0;
   for (std::size_t k = 0; k < plots_.size(); ++k) {
-    script += fmt::format(
-        "reset session\nset terminal svg size {},{} enhanced font 'Helvetica,12' fontscale 1 rounded\nset output "
-        "'{}/{}.svg'\n",
-        plots_[k].width_px, plots_[k].height_px, scratch.path().string(), k);
-    script += kStyle;
-    script += plots_[k].commands;
-    script += "\nunset output\n";
+    if (!good) {
+      // gnuplot stops at the first plot that it cannot draw; one by one, the others are saved.
+      const behaviours::ProcessResult result = run(script(k, file(k)));
+      if (result.status != 0) {
+        drawn[k].error = result.errors;
+        continue;
+      }
+    }
+    drawn[k].svg = recorder::read_file(file(k));
   }
-  recorder::write_file(scratch.path() / "plots", script);
-  const behaviours::ProcessResult result =
-      behaviours::run_process({program.string(), (scratch.path() / "plots").string()});
-  if (result.status != 0) {
-    throw RunError(fmt::format("gnuplot failed with status {}: {}", result.status, result.errors.substr(0, 300)));
-  }
-  std::vector<std::string> drawn;
-  for (std::size_t k = 0; k < plots_.size(); ++k)
-    drawn.push_back(recorder::read_file(scratch.path() / fmt::format("{}.svg", k)));
   return drawn;
 }
 

@@ -12,8 +12,12 @@ class Gnuplot {
  public:
   /// Adds a plot of `commands`, width x height px; returns its number. Data go into the commands as data blocks.
   std::size_t add(int width_px, int height_px, std::string commands);
-  /// One SVG document per plot, by number. Throws RunError where gnuplot is missing or fails.
-  [[nodiscard]] std::vector<std::string> draw() const;
+  struct Drawn {
+    std::string svg;    ///< empty where it could not be drawn
+    std::string error;  ///< why
+  };
+  /// By number. Throws RunError where gnuplot is missing.
+  [[nodiscard]] std::vector<Drawn> draw() const;
   [[nodiscard]] std::size_t size() const { return plots_.size(); }
 
  private:
@@ -21,6 +25,8 @@ class Gnuplot {
     int width_px, height_px;
     std::string commands;
   };
+  [[nodiscard]] std::string script(std::size_t plot, const std::string& file) const;
+
   std::vector<Plot> plots_;
 };
 

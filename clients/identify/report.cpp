@@ -57,13 +57,35 @@ std::string chance(std::optional<double> log10_p) {
   return fmt::format("10<sup>−{:.0f}</sup>", -*log10_p);
 }
 
+/// A cause as what "it depends on ..." goes on with.
+std::string phrase_of(const std::string& covariate) {
+  static const std::map<std::string, std::string> kPhrases = {{"time", "how late it is in the run"},
+                                                              {"position", "where they are"},
+                                                              {"heading", "where they point to"},
+                                                              {"command", "what they are told"},
+                                                              {"time_since_command", "how long ago they were told"},
+                                                              {"motor_time", "how long each motor has run"},
+                                                              {"neighbours", "who is near by"},
+                                                              {"world_frame", "a direction in the room"},
+                                                              {"measurement", "the tracker"},
+                                                              {"robot", "which robot it is"},
+                                                              {"history", "what was before"}};
+  const auto at = kPhrases.find(covariate);
+  return at == kPhrases.end() ? words_of(covariate) : at->second;
+}
+
 std::string covariates_of(const json& effect) {
   std::string out;
   for (const json& covariate : part(effect, "covariates")) {
-    if (!covariate.is_string()) continue;
-    out += (out.empty() ? "" : " and ") + words_of(covariate.get<std::string>());
+    if (covariate.is_string()) out += (out.empty() ? "" : " and ") + phrase_of(covariate.get<std::string>());
   }
   return out.empty() ? "nothing: it is the same everywhere" : out;
+}
+
+bool is_measurement(const json& effect) {
+  if (text(effect, "acts_on").starts_with("MEASURED")) return true;
+  const json& covariates = part(effect, "covariates");
+  return std::any_of(covariates.begin(), covariates.end(), [](const json& c) { return c == "measurement"; });
 }
 
 std::string acts_on_of(const json& effect) {
@@ -104,10 +126,12 @@ class Figures {
   }
   /// The page with all plots in it.
   std::string filled(std::string page) const {
-    const std::vector<std::string> drawn = plots_.draw();
+    const std::vector<Gnuplot::Drawn> drawn = plots_.draw();
     for (const auto& [number, alt] : alts_) {
       const std::string here = html::mark_of(number);
-      page.replace(page.find(here), here.size(), html::image(drawn[number], alt));
+      const std::string shown = drawn[number].error.empty() ? html::image(drawn[number].svg, alt)
+                                                            : "<p>This plot could not be drawn.</p>";
+      page.replace(page.find(here), here.size(), shown);
     }
     return page;
   }
@@ -146,24 +170,29 @@ std::optional<double> share_explained(const Errors& e) {
 }
 
 std::string headline(const json& contract) {
-  const json& effects = part(contract, "effects");
-  const std::size_t count = effects.is_array() ? effects.size() : 0;
-  if (count == 0) return "The base model explains these robots";
   std::vector<std::string> causes;
-  for (const json& effect : effects) {
-    const std::string cause = covariates_of(effect);
+  bool tracker = false;
+  for (const json& effect : part(contract, "effects")) {
+    if (is_measurement(effect)) {
+      tracker = true;
+      continue;
+    }
+    const std::string cause = "<em>" + escaped(covariates_of(effect)) + "</em>";
     if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
   }
-  const auto named = [&](std::size_t k) { return "<em>" + escaped(causes[k]) + "</em>"; };
-  const std::string because = causes.size() == 1   ? named(0)
-                              : causes.size() == 2 ? named(0) + ", and on " + named(1)
-                                                   : named(0) + ", on " + named(1) + " and more";
-  return "These robots differ from the base model: what they do depends on " + because;
+  const char* const kSeen = "<em>the tracker</em> does not see them where they are";
+  if (causes.empty() && !tracker) return "The base model explains these robots";
+  if (causes.empty()) return fmt::format("These robots do what the base model says, but {}", kSeen);
+  std::string because = causes[0];
+  if (causes.size() == 2) because += ", and on " + causes[1];
+  if (causes.size() > 2) because += ", on " + causes[1] + " and more";
+  return fmt::format("These robots differ from the base model: what they do depends on {}{}", because,
+                     tracker ? fmt::format("; and {}", kSeen) : "");
 }
 
 std::string verdict(const json& contract) {
   const Errors e = errors_of(contract);
-  const std::string ahead = figure(number(contract, "horizon_s"));
+  const std::string ahead = fmt::format("{:g}", number(contract, "horizon_s").value_or(10));
   std::string out = fmt::format(
       "Predicted {} s ahead, on data that nothing was fitted to, robots were <b>{} mm</b> away from where the base "
       "model had them",
@@ -178,8 +207,14 @@ std::string verdict(const json& contract) {
   if (e.floor)
     out += fmt::format(" The best that any model can do with these robots and this tracker is about <b>{} mm</b>.",
                        figure(e.floor));
+  const json& faults = part(contract, "faults");
   if (const auto share = share_explained(e); share && count > 0)
     out += fmt::format(" {} of what could be explained is explained.", percent(share));
+  if (faults.is_array() && !faults.empty()) {
+    out += fmt::format(" The data have <a href=\"#faults\">{}</a>, which {} excluded.",
+                       faults.size() == 1 ? "a fault" : fmt::format("{} faults", faults.size()),
+                       faults.size() == 1 ? "was" : "were");
+  }
   return out;
 }
 
@@ -193,7 +228,7 @@ std::string bars(const json& contract) {
   const auto bar = [&](const char* kind, const char* name, double value, const json& from) {
     const auto low = number(from, "rmse_low_mm"), high = number(from, "rmse_high_mm");
     const std::string interval =
-        low && high ? fmt::format("<small>{} to {} with 95 % confidence</small>", figure(low), figure(high)) : "";
+        low && high ? fmt::format("<small>{} to {} (95 %)</small>", figure(low), figure(high)) : "";
     return fmt::format(
         "<div class=\"bar\"><span class=\"what\">{}</span><span class=\"track\"><span class=\"fill {}\" "
         "style=\"width:{:.1f}%\"></span></span>"
@@ -255,8 +290,8 @@ std::string cards(const json& contract, const json& covariate_plots, Figures& fi
       out += fmt::format("<dt>{}</dt><dd>{}</dd>", name, value);
     };
     fact("acts on", acts_on_of(effect));
-    fact("removes", percent(number(effect, "share_removed")) + " of the error's square");
-    fact("without it", figure(number(effect, "rmse_without_mm")) + " mm");
+    fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
+    fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
     fact("by chance",
          chance(number(evidence, "p_family") ? std::log10(std::max(*number(evidence, "p_family"), 1e-300))
                                              : number(evidence, "log10_p")));
@@ -376,25 +411,26 @@ std::string report_html(const json& document) {
       "<header><p class=\"kicker\">Kilotwin · identified from measured data</p><h1>{}</h1>\n<p "
       "class=\"verdict\">{}</p>\n{}</header>\n",
       headline(contract), verdict(contract), bars(contract));
-  page +=
-      section("faults", "Faults of the data",
-              "Excluded before anything was fitted. They are slips of the measurement, and no property of robots.",
-              fault_list(contract));
   page += section("why", "Why", "", cards(contract, plots, figures));
   const std::size_t effects = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
+  const Errors errors = errors_of(contract);
   std::string better = figures.place(plot_horizon(gnuplot, part(document, "horizon")),
                                      "Error over how far ahead robots are predicted");
-  if (effects > 0)
-    better += figures.place(
-        plot_steps(gnuplot, part(document, "steps"), errors_of(contract).floor.value_or(std::nan(""))),
-        "Error as the model grew, one effect at a time; dashed: the floor", "wide");
-  better +=
-      figures.place(plot_robots(gnuplot, part(document, "robots")), "Each robot's error, largest first", "wide");
+  if (effects > 0) {
+    better += figures.place(plot_steps(gnuplot, part(document, "steps"), errors.floor.value_or(std::nan(""))),
+                            "Error as the model grew, one effect at a time; dashed: the floor");
+  }
+  if (!better.empty()) better = "<div class=\"grid\">" + better + "</div>\n";
+  better += figures.place(plot_robots(gnuplot, part(document, "robots")), "Each robot's error, largest first");
   page += section(
       "better", "By how much it is better",
       escaped(text(contract, "noise_floor_how").empty() ? ""
                                                         : "The floor: " + text(contract, "noise_floor_how") + "."),
       better);
+  page +=
+      section("faults", "Faults of the data",
+              "Excluded before anything was fitted. They are slips of the measurement, and no property of robots.",
+              fault_list(contract));
   page +=
       section("maps", "Where",
               "Residuals over the arena, before and after, in the same colours. A good model leaves no pattern.",

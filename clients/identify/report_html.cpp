@@ -33,6 +33,7 @@ h1 { font-size: 1.9rem; line-height: 1.25; margin: 0.2rem 0 0.8rem; font-weight:
 h1 em { font-style: normal; color: var(--after); }
 h2 { font-size: 1.25rem; margin: 2.6rem 0 0.4rem; padding-top: 0.9rem; border-top: 1px solid var(--line); }
 h3 { font-size: 1.05rem; margin: 0 0 0.3rem; }
+a { color: inherit; }
 h3::first-letter, .what::first-letter { text-transform: uppercase; }
 .kicker { margin: 0; color: var(--faint); font-size: 0.85rem; letter-spacing: 0.03em; }
 .verdict { font-size: 1.1rem; max-width: 50rem; margin: 0 0 1.2rem; }

@@ -14,13 +14,18 @@ namespace {
 using nlohmann::json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// No figure of a robot in a room is as large; axes have no room for it.
+constexpr double kAbsurd = 1e12;
 constexpr int kHalf_px = 460, kLow_px = 280;
 
 std::vector<double> numbers(const json& from, const char* key) {
   std::vector<double> out;
   const auto list = from.find(key);
   if (list == from.end() || !list->is_array()) return out;
-  for (const json& value : *list) out.push_back(value.is_number() ? value.get<double>() : kNaN);
+  for (const json& value : *list) {
+    const double v = value.is_number() ? value.get<double>() : kNaN;
+    out.push_back(std::abs(v) < kAbsurd ? v : kNaN);
+  }
   return out;
 }
 
@@ -90,12 +95,19 @@ double reach(const json& map) {
   return *at;
 }
 
+/// A round distance between ticks, about four over a length.
+double tick_step(double length) {
+  const double rough = length / 4, power = std::pow(10, std::floor(std::log10(rough))), lead = rough / power;
+  return power * (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10);
+}
+
 std::string map_frame(const Grid& grid) {
   const double half_x = 0.5 * (grid.x[1] - grid.x[0]), half_y = 0.5 * (grid.y[1] - grid.y[0]);
+  const double step = tick_step(std::max(grid.x.back() - grid.x.front(), grid.y.back() - grid.y.front()));
   return fmt::format(
       "set size ratio -1\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'x, mm'\nset ylabel 'y, mm'\nunset "
-      "grid\nunset key\n",
-      grid.x.front() - half_x, grid.x.back() + half_x, grid.y.front() - half_y, grid.y.back() + half_y);
+      "grid\nunset key\nset tics front\nset xtics {}\nset ytics {}\n",
+      grid.x.front() - half_x, grid.x.back() + half_x, grid.y.front() - half_y, grid.y.back() + half_y, step, step);
 }
 
 constexpr int kMap_px = 380, kMapHigh_px = 340;
@@ -140,7 +152,7 @@ PlotNumber plot_horizon(Gnuplot& plots, const json& horizon) {
       "key top left\n";
   commands +=
       "plot $d using 1:2 with linespoints lt 1 title 'before', $d using 1:3 with linespoints lt 2 title 'after'";
-  if (any_finite(floor)) commands += ", $d using 1:4 with lines lt 3 title 'floor: the best that any model can do'";
+  if (any_finite(floor)) commands += ", $d using 1:4 with lines lt 3 title 'floor'";
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
@@ -160,7 +172,7 @@ PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
   commands +=
       "set xzeroaxis lc rgb '#8896a4'\nset key bottom left horizontal opaque\nset offsets graph 0.02, graph 0.02, "
       "graph 0.12, graph 0.14\n";
-  commands += "plot $d using 1:2:3:4 with yerrorbars lc rgb '#d95f0e' lw 1.2 pt 7 ps 0.45 title 'before'";
+  commands += "plot $d using 1:2:3:4 with yerrorbars lt 1 lw 1.2 dt solid ps 0.45 title 'before'";
   if (any_finite(after)) commands += ", $d using 1:5 with points lt 2 title 'after'";
   if (any_finite(fitted)) commands += ", $d using 1:6 with lines lt 4 title 'as added'";
   return plots.add(kHalf_px, kLow_px, commands);
@@ -253,7 +265,7 @@ PlotNumber plot_msd(Gnuplot& plots, const json& msd) {
   std::string commands = block("d", {lag, measured, simulated});
   commands +=
       "set logscale xy\nset format y '10^{%L}'\nset xlabel 'lag, s'\nset ylabel 'mean square displacement, "
-      "mm²'\nset key top left\n";
+      "mm²'\n";
   commands +=
       "plot $d using 1:2 with points pt 7 ps 0.7 lc rgb '#66727f' title 'measured', $d using 1:3 with lines lt 2 "
       "title 'simulated'";
@@ -284,7 +296,7 @@ PlotNumber plot_steps(Gnuplot& plots, const json& steps, double floor_mm) {
       "plot $d using 1:2 with boxes fc rgb '#9fb6cc' fs solid 1 noborder, $d using 1:2:3 with labels offset 0,0.6 "
       "tc rgb '#1f2933'";
   if (std::isfinite(floor_mm)) commands += fmt::format(", {} with lines lt 3", floor_mm);
-  return plots.add(2 * kHalf_px, kLow_px, commands);
+  return plots.add(count > 5 ? 2 * kHalf_px : kHalf_px, kLow_px, commands);
 }
 
 PlotNumber plot_robots(Gnuplot& plots, const json& robots) {

@@ -1,0 +1,165 @@
+// ARK logs and our own recordings as data directories.
+#include "clients/identify/import.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <random>
+#include <string>
+
+#include "clients/identify/measured_set.hpp"
+#include "clients/recorder/file.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ImportTest : public testing::Test {
+ protected:
+  ImportTest()
+      : folder_(fs::path(testing::TempDir()) /
+                ("import-" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "from");
+    fs::create_directories(folder_ / "to");
+  }
+  ~ImportTest() override { fs::remove_all(folder_); }
+
+  void give(const std::string& name, const std::string& content) {
+    recorder::write_file(folder_ / "from" / name, content);
+  }
+  MeasuredSet imported() {
+    import_set(folder_ / "from", folder_ / "to");
+    return load_measured_set(folder_ / "to");
+  }
+  /// What the import complains of.
+  std::string complaint() {
+    try {
+      import_set(folder_ / "from", folder_ / "to");
+    } catch (const UserError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(ImportTest, ArkLogsInTheMiddleAndUpright) {
+  give("day1.txt", "0.1\t3\t0\t1000\t1000\t90\n0.1\t12\t2\t1250\t900\t-45.5\t1\n0.6\t3\t0\t1001.5\t998\t91\n");
+  give("day2.txt", "0\t3\t1\t0\t0\t0\n");
+  const MeasuredSet set = imported();
+  ASSERT_EQ(set.runs.size(), 2U);
+  EXPECT_EQ(set.runs[0].name, "day1");
+  EXPECT_EQ(set.runs[1].name, "day2");
+  EXPECT_FALSE(set.has_headings);
+  ASSERT_EQ(set.runs[0].tracks.size(), 2U);
+  EXPECT_EQ(set.runs[0].tracks[0].robot, 3U);
+  ASSERT_EQ(set.runs[0].tracks[0].samples.size(), 2U);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].time_s, 0.6);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].x_mm, 1.5);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].y_mm, 2);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[1].samples[0].x_mm, 250);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[1].samples[0].y_mm, 100);
+  EXPECT_DOUBLE_EQ(set.runs[1].tracks[0].samples[0].x_mm, -1000);
+  EXPECT_DOUBLE_EQ(set.runs[1].tracks[0].samples[0].y_mm, 1000);
+}
+
+TEST_F(ImportTest, NamesOfColumnsAndACutLastLine) {
+  give("a.log", "t\tid\tcolour\tx\ty\torientation\r\n1\t0\t0\t10\t20\t0\r\n\r\n2\t0\t0\t11\t20\t0\r\n3\t0\t0\t1");
+  EXPECT_EQ(imported().samples(), 2U);
+}
+
+TEST_F(ImportTest, RecordingsWithHeadingsAndCommands) {
+  give("seed-1.csv",
+       "time_s,robot,x_mm,y_mm,heading_rad,led\n0.0000,0,1.5,-2.25,0.5,003\n1.0000,0,2.5,-2.25,0.5,000\n");
+  give("commands.csv", "run,robot,time_s,motion\nseed-1,0,0,left\n");
+  const MeasuredSet set = imported();
+  ASSERT_EQ(set.runs.size(), 1U);
+  EXPECT_TRUE(set.has_headings);
+  EXPECT_TRUE(set.has_commands);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[0].heading_rad, 0.5);
+  EXPECT_DOUBLE_EQ(set.runs[0].tracks[0].samples[1].x_mm, 2.5);
+  EXPECT_EQ(set.runs[0].tracks[0].commands.back().motion, Motion::kLeft);
+}
+
+TEST_F(ImportTest, ADataDirectoryIsLeftAsItIs) {
+  give("trajectories.csv", "run,robot,time_s,x_mm,y_mm\n");
+  give("notes.txt", "0\t0\t0\t0\t0\t0\n");
+  EXPECT_TRUE(importable(folder_ / "from").empty());
+}
+
+TEST_F(ImportTest, SaysWhereALineIsWrong) {
+  const std::string file = (folder_ / "from" / "x.tsv").string();
+  give("x.tsv", "0\t1\t0\t5\t5\t0\n1\t1\t0\tleft\t5\t0\n");
+  EXPECT_EQ(complaint(), file + ":2:7: x is \"left\"; give pixels");
+  give("x.tsv", "0\t-1\t0\t5\t5\t0\n");
+  EXPECT_EQ(complaint(), file + ":1:3: id is \"-1\"; give a whole number");
+  give("x.tsv", "0\t1\t0\t5\t5\t0\n1\t1\t0\n");
+  EXPECT_EQ(complaint().substr(0, file.size() + 9), file + ":2:1: 3 c");
+  give("x.tsv", "0\t1\t0\tnan\t5\t0\n");
+  EXPECT_NE(complaint().find(":1:7: x is \"nan\""), std::string::npos);
+  give("x.tsv", "t\tid\tcolour\tx\ty\torientation\n");
+  EXPECT_NE(complaint().find("has no rows"), std::string::npos);
+}
+
+TEST_F(ImportTest, RefusesWhatIsAmbiguousOrNothing) {
+  EXPECT_NE(complaint().find("holds neither"), std::string::npos);
+  give("README.txt", "Robots on a table.\nt\tid\n");
+  give("other.csv", "a,b\n1,2\n");
+  give("empty.log", "");
+  EXPECT_NE(complaint().find("holds neither"), std::string::npos);
+  give("a.txt", "0\t1\t0\t5\t5\t0\n");
+  give("a.tsv", "0\t1\t0\t5\t5\t0\n");
+  EXPECT_NE(complaint().find("the same run"), std::string::npos);
+  fs::remove(folder_ / "from" / "a.tsv");
+  give("b.csv", "time_s,robot,x_mm,y_mm,heading_rad,led\n0,0,1,2,3,000\n");
+  EXPECT_NE(complaint().find("not both"), std::string::npos);
+}
+
+TEST_F(ImportTest, WhateverIsInAFileItIsReadOrComplainedOf) {
+  std::mt19937 dice(11);
+  const std::string ark =
+      "t\tid\tcolour\tx\ty\torientation\n0.1\t3\t0\t1000\t1000\t90\n0.1\t12\t2\t1250\t900\t-45.5\n0.6\t3\t0\t1001."
+      "5\t998\t91\n";
+  const std::string recording =
+      "time_s,robot,x_mm,y_mm,heading_rad,led\n0.0000,0,1.5,-2.25,0.5,003\n1.0000,0,2.5,-2.25,0.5,000\n";
+  const std::string alphabet = "0123456789.-+e\t\n\r ,\"nainfx\0\xff";
+  for (int i = 0; i < 1000; ++i) {
+    const bool is_ark = i % 2 == 0;
+    std::string content = is_ark ? ark : recording;
+    for (int k = 0; k < 1 + i % 9; ++k) {
+      const std::size_t at = dice() % content.size();
+      const char other = alphabet[dice() % alphabet.size()];
+      switch (dice() % 3) {
+        case 0: content[at] = other; break;
+        case 1: content.erase(at, 1 + dice() % 4); break;
+        default: content.insert(at, 1, other); break;
+      }
+      if (content.empty()) content = " ";
+    }
+    const std::string name = is_ark ? "f.txt" : "f.csv";
+    give(name, content);
+    try {
+      const std::string rows =
+          is_ark ? rows_of_ark_log(folder_ / "from" / name) : rows_of_recording(folder_ / "from" / name);
+      // Whatever passes is a data directory's rows.
+      recorder::write_file(
+          folder_ / "to" / "trajectories.csv",
+          (is_ark ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + rows);
+      const MeasuredSet set = load_measured_set(folder_ / "to");
+      for (const Track& track : set.runs.at(0).tracks) {
+        for (const Sample& s : track.samples)
+          EXPECT_TRUE(std::isfinite(s.time_s) && std::isfinite(s.x_mm) && std::isfinite(s.y_mm));
+      }
+    } catch (const UserError& error) {
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kilotwin::identify
