@@ -5,7 +5,9 @@
 
 #include <optional>
 
+#include "clients/identify/data_faults.hpp"
 #include "clients/identify/identify.hpp"
+#include "clients/identify/report.hpp"
 #include "clients/identify/write_model.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
@@ -36,6 +38,8 @@ void make_directory(const fs::path& directory) {
 int identify_command(const IdentifyArguments& arguments) {
   if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
   identify::MeasuredSet train = identify::load_measured_set(arguments.train);
+  // Whatever robots do, they do not do this: it is excluded before anything is fitted, and never modelled.
+  const std::vector<identify::DataFault> faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!arguments.test.empty()) {
     test = identify::load_measured_set(arguments.test);
@@ -56,18 +60,21 @@ int identify_command(const IdentifyArguments& arguments) {
       fmt::print(stderr, "{:3.0f} %  {}\n", 100 * part, what);
     }
   };
-  const identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
+  identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
+  found.document["contract"]["faults"] = identify::document_of(faults);
 
   recorder::write_file(
       arguments.out / "model.txtpb",
       identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   recorder::write_file(arguments.out / "result.json", found.document.at("contract").dump(2) + "\n");
   recorder::write_file(arguments.out / "predictions.csv", csv_of(found.predictions));
+  identify::write_report(found.document, arguments.out / "report.html");
   if (!arguments.quiet) {
     const auto& result = found.document.at("contract");
     const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
     fmt::print("error {:.2f} mm before, {:.2f} mm after, {:.2f} mm at best, {:g} s ahead\n", number("before"),
                number("after"), result.at("noise_floor_mm").get<double>(), arguments.horizon_s);
+    for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
     for (const auto& effect : result.at("effects"))
       fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());
     if (result.at("effects").empty()) fmt::print("no effect found: the base model explains this data\n");

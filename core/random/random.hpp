@@ -19,6 +19,8 @@ enum class Stream : std::uint16_t {
   kBackOff = 5,      ///< per aborted attempt
   kReception = 6,    ///< loss at a receiver
   kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
+  kLink = 8,         ///< what robots and pairs add to the infrared signal; once per run
+  kPacket = 9,       ///< what a packet adds to it at a receiver
   kSolver = 20,      ///< what ODE's iterative solver starts from; per sub-step, of the lowest robot that takes part
   kLightSensor = 25,       ///< draw 0 logarithm of the gain, 1 offset; tick 0
   kBattery = 26,           ///< draw 0 charge at the start
