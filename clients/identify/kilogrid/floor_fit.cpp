@@ -55,15 +55,15 @@ struct Surrogate {
   Eigen::MatrixXd slopes;  ///< per statistic and parameter
 };
 
-/// Statistics at one point of the design: of some of the runs, in turn, since their differences are small beside those of the
+/// Statistics at one point of the design: of one of the runs, in turn, since their differences are small beside those of the
 /// points.
 FloorStatistics statistics_at(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
                               std::size_t point) {
-  constexpr std::size_t kRunsPerPoint = 2;
+  constexpr std::size_t kRunsPerPoint = 1;
   std::vector<RobotSums> all;
   const std::size_t scenes = target.scenes().size();
   for (std::size_t i = 0; i < std::min(kRunsPerPoint, scenes); ++i) {
-    const std::size_t scene = (2 * point + i) % scenes;
+    const std::size_t scene = (point + i) % scenes;
     const FloorRun run = simulate(target.scenes()[scene], target.floor(), settings.model, settings.times,
                                   settings.radio, seed * 100 + i);
     std::vector<RobotSums> sums = robot_sums(run, target.floor());
