@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "clients/cli/other_data.hpp"
 #include "clients/identify/data_faults.hpp"
 #include "clients/identify/identify.hpp"
 #include "clients/identify/import.hpp"
@@ -34,21 +35,28 @@ void make_directory(const fs::path& directory) {
     throw UserError(fmt::format("--out {}: is no directory and cannot be made one", directory.string()));
 }
 
-}  // namespace
-
-int identify_command(const IdentifyArguments& arguments) {
-  if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
+/// Of trajectories. `faults` gets what was excluded.
+identify::Identified identify_trajectories(const IdentifyArguments& arguments, const identify::Options& options,
+                                           std::vector<identify::DataFault>& faults) {
   identify::MeasuredSet train = identify::load_or_import(arguments.train, arguments.out / "imported-train");
   // Whatever robots do, they do not do this: it is excluded before anything is fitted, and never modelled.
-  const std::vector<identify::DataFault> faults = identify::exclude_faults(train);
+  faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!arguments.test.empty()) {
     test = identify::load_or_import(arguments.test, arguments.out / "imported-test");
   } else {
     identify::hold_out_part(train);
   }
-  make_directory(arguments.out);
+  identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
+  found.document["contract"]["faults"] = identify::document_of(faults);
+  return found;
+}
 
+}  // namespace
+
+int identify_command(const IdentifyArguments& arguments) {
+  if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
+  make_directory(arguments.out);
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
@@ -61,8 +69,13 @@ int identify_command(const IdentifyArguments& arguments) {
       fmt::print(stderr, "{:3.0f} %  {}\n", 100 * part, what);
     }
   };
-  identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
-  found.document["contract"]["faults"] = identify::document_of(faults);
+  std::vector<identify::DataFault> faults;
+  identify::Identified found;
+  if (std::optional<identify::Identified> other = identify_other_data(arguments.train, arguments.test, options)) {
+    found = std::move(*other);
+  } else {
+    found = identify_trajectories(arguments, options, faults);
+  }
 
   recorder::write_file(
       arguments.out / "model.txtpb",

@@ -55,15 +55,15 @@ struct Surrogate {
   Eigen::MatrixXd slopes;  ///< per statistic and parameter
 };
 
-/// Statistics at one point of the design: of some of the runs, in turn, since their differences are small beside those of the
+/// Statistics at one point of the design: of one of the runs, in turn, since their differences are small beside those of the
 /// points.
 FloorStatistics statistics_at(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
                               std::size_t point) {
-  constexpr std::size_t kRunsPerPoint = 2;
+  constexpr std::size_t kRunsPerPoint = 1;
   std::vector<RobotSums> all;
   const std::size_t scenes = target.scenes().size();
   for (std::size_t i = 0; i < std::min(kRunsPerPoint, scenes); ++i) {
-    const std::size_t scene = (2 * point + i) % scenes;
+    const std::size_t scene = (point + i) % scenes;
     const FloorRun run = simulate(target.scenes()[scene], target.floor(), settings.model, settings.times,
                                   settings.radio, seed * 100 + i);
     std::vector<RobotSums> sums = robot_sums(run, target.floor());
@@ -155,17 +155,6 @@ double expected(const Surrogate& surrogate, const Eigen::VectorXd& steps) {
   const Eigen::VectorXd weights = weights_of(surrogate.off);
   const Eigen::VectorXd residual = surrogate.off + surrogate.slopes * steps;
   return (weights.array() * residual.array().square()).sum();
-}
-
-/// The chance of a message along the rim, brought nearer to where robots stay as long as they were measured to.
-void update_rim(FloorModel& model, const FloorTarget& target, const FloorStatistics& simulated) {
-  const StatisticGroup& group = statistic_group("occupancy-of-the-rim");
-  constexpr double kSome = 5e-4, kPower = 0.8, kLeast = 0.02, kMost = 2;
-  for (std::size_t i = 0; i < kRimParts; ++i) {
-    const double ratio =
-        (simulated.value[group.first + i] + kSome) / (target.statistics().value[group.first + i] + kSome);
-    model.rim[i] = std::clamp(model.rim[i] * std::pow(ratio, kPower), kLeast, kMost);
-  }
 }
 
 /// The order in which modules listen to their cells, from successive reports to two cells of one module: where nothing
@@ -267,8 +256,8 @@ FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSetti
   return statistics_of(all);
 }
 
-double fit(FloorModel& model, const FloorTarget& target, int rounds, double width, bool with_rim,
-           std::uint64_t seed, const FloorProgress& progress) {
+double fit(FloorModel& model, const FloorTarget& target, int rounds, double width, std::uint64_t seed,
+           const FloorProgress& progress) {
   const std::vector<FloorParameter> parameters = model.parameters();
   const std::vector<bool> all(parameters.size(), true);
   model.later = target.later();
@@ -279,7 +268,6 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
     const Eigen::VectorXd steps = best_steps(surrogate, all, 1.5);
     const FloorModel before = model;
     model.values = moved(parameters, before.values, {steps.data(), steps.data() + steps.size()}, width);
-    if (with_rim) update_rim(model, target, at);
     const FloorStatistics there =
         simulated_statistics(target, model.settings(), seed * 7 + 2 + static_cast<std::uint64_t>(round));
     const double now = target.misfit(there);
@@ -294,6 +282,33 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
     at = there;
     width *= 0.75;
   }
+  return misfit;
+}
+
+double fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed,
+                 const FloorProgress& progress) {
+  const StatisticGroup& group = statistic_group("occupancy-of-the-rim");
+  // Robots stay the longer, the slower they are; a few blocks more or less say nothing.
+  constexpr double kSome = 1e-3, kPower = 0.8, kSlowest = 0.02, kFastest = 1.2;
+  FloorStatistics at = simulated_statistics(target, model.settings(), seed);
+  double misfit = target.misfit(at);
+  FloorModel best = model;
+  if (!model.wall) model.wall.emplace().fill(1);
+  for (int round = 0; round < rounds; ++round) {
+    for (std::size_t i = 0; i < kRimParts; ++i) {
+      const double ratio =
+          (at.value[group.first + i] + kSome) / (target.statistics().value[group.first + i] + kSome);
+      (*model.wall)[i] = std::clamp((*model.wall)[i] * std::pow(ratio, kPower), kSlowest, kFastest);
+    }
+    at = simulated_statistics(target, model.settings(), seed + 1 + static_cast<std::uint64_t>(round));
+    const double now = target.misfit(at);
+    progress(fmt::format("beside walls: misfit {:.0f} -> {:.0f}", misfit, now));
+    if (now < misfit) {
+      misfit = now;
+      best = model;
+    }
+  }
+  model = best;
   return misfit;
 }
 

@@ -52,9 +52,12 @@ struct CandidateScore {
 using FloorProgress = std::function<void(const std::string&)>;
 
 /// Regresses the statistics on all parameters over a design of simulated runs, and goes to where they fit best; `rounds` times
-/// with ever smaller steps; `with_rim`: the messages of each part of the rim as well. Returns the misfit at the end, by new simulations.
-double fit(FloorModel&, const FloorTarget&, int rounds, double width, bool with_rim, std::uint64_t seed,
-           const FloorProgress&);
+/// with ever smaller steps. Returns the misfit at the end, by new simulations.
+double fit(FloorModel&, const FloorTarget&, int rounds, double width, std::uint64_t seed, const FloorProgress&);
+
+/// The effect of walls, part by part of the rim: slower where robots were measured to stay longer than they do in the model. It
+/// is kept where the misfit falls. Returns the misfit.
+double fit_walls(FloorModel&, const FloorTarget&, int rounds, std::uint64_t seed, const FloorProgress&);
 
 /// Candidates that the model lacks, one after the other by what each removes of the misfit beside those before it and with the
 /// model refitted; ends where the next would remove less than `least_gain`.

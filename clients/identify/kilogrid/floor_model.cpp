@@ -28,13 +28,34 @@ void add_noise(FloorSettings& settings, const char* name, Effect::Target target,
   noise.set_correlation_s(correlation_s);
 }
 
-/// Slower by `drag` within `zone_mm` of either end of an axis.
-void add_drag(FloorSettings& settings, const char* name, Function::Covariate axis, double half_mm, double drag,
-              double zone_mm) {
-  proto::Steps& steps = *add_function(add_effect(settings, name, Effect::WHEEL_GAIN), axis).mutable_steps();
-  steps.add_at(zone_mm - half_mm);
-  steps.add_at(half_mm - zone_mm);
-  for (const double value : {-drag, 0.0, -drag}) steps.add_value(value);
+/// Gains beside one wall: `across` is the axis that leads to it, `at_mm` where it begins; `values` along the other axis, ascending.
+void add_wall(FloorSettings& settings, const char* name, Function::Covariate across, bool above, double at_mm,
+              double half_along_mm, std::span<const double> values) {
+  Effect& effect = add_effect(settings, name, Effect::WHEEL_GAIN);
+  proto::Steps& beside = *add_function(effect, across).mutable_steps();
+  beside.add_at(at_mm);
+  beside.add_value(above ? 0 : 1);
+  beside.add_value(above ? 1 : 0);
+  proto::Steps& along = *add_function(effect, across == Function::X ? Function::Y : Function::X).mutable_steps();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i > 0) along.add_at(half_along_mm * (2 * static_cast<double>(i) / static_cast<double>(values.size()) - 1));
+    along.add_value(values[i]);
+  }
+}
+
+/// The rim's parts run anticlockwise from the corner at the origin: 4 along x, 8 along y.
+void add_walls(FloorSettings& settings, const Floor& floor, const std::array<double, kRimParts>& wall) {
+  std::array<double, kRimParts> gain;
+  for (std::size_t i = 0; i < kRimParts; ++i) gain[i] = wall[i] - 1;
+  const std::span<const double> all(gain);
+  const double x_mm = floor.width_mm / 2, y_mm = floor.height_mm / 2, beside_mm = FloorModel::kBeside_mm;
+  std::vector<double> top(all.begin() + 12, all.begin() + 16), left(all.begin() + 16, all.end());
+  std::reverse(top.begin(), top.end());
+  std::reverse(left.begin(), left.end());
+  add_wall(settings, "wall-bottom", Function::Y, false, beside_mm - y_mm, x_mm, all.first(4));
+  add_wall(settings, "wall-right", Function::X, true, x_mm - beside_mm, y_mm, all.subspan(4, 8));
+  add_wall(settings, "wall-top", Function::Y, true, y_mm - beside_mm, x_mm, top);
+  add_wall(settings, "wall-left", Function::X, false, beside_mm - x_mm, y_mm, left);
 }
 
 void add_harmonic(Function& function, double cosine, double sine, double period) {
@@ -47,18 +68,12 @@ void add_harmonic(Function& function, double cosine, double sine, double period)
 
 FloorTerm base_term() {
   FloorTerm term{"base", {}, "", "", {}, 0, {}};
-  term.parameters = {{"straight_speed_mm_s", 11, 3, 20, 1},
-                     {"turn_speed_mm_s", 24, 5, 40, 3},
-                     {"bias_sd_mm_s", 1, 0.05, 4, 0.3},
-                     {"factor_variance_s", 0.15, 0, 2, 0.1},
-                     {"range_mm", 50, 35, 70, 3},
-                     {"heard", 0.7, 0.1, 1, 0.1},
-                     {"heard_sd", 0.25, 0, 0.5, 0.06},
-                     {"wall_range_mm", 32, 20, 75, 4},
-                     {"wall_heard", 0.6, 0.1, 1, 0.15},
-                     {"wall_noise", 18, 1, 60, 6},
-                     {"while_talking", 0.6, 0.05, 1, 0.15},
-                     {"same_cell", 0.15, 0.02, 0.5, 0.05}};
+  term.parameters = {{"straight_speed_mm_s", 11, 3, 20, 1}, {"turn_speed_mm_s", 24, 5, 40, 3},
+                     {"bias_sd_mm_s", 1, 0.05, 4, 0.3},     {"factor_variance_s", 0.15, 0, 2, 0.1},
+                     {"range_mm", 50, 35, 70, 3},           {"heard", 0.7, 0.1, 1, 0.1},
+                     {"heard_sd", 0.25, 0, 0.5, 0.06},      {"wall_range_mm", 32, 20, 75, 4},
+                     {"wall_heard", 0.6, 0.1, 1, 0.15},     {"wall_noise", 18, 1, 60, 6},
+                     {"while_talking", 0.6, 0.05, 1, 0.15}, {"same_cell", 0.15, 0.02, 0.5, 0.05}};
   term.apply = [](std::span<const double> v, FloorSettings& s) {
     proto::Motion& motion = *s.model.mutable_motion();
     motion.set_straight_speed_mm_s(v[0]);
@@ -80,7 +95,6 @@ FloorTerm base_term() {
 }
 
 std::vector<FloorTerm> candidate_terms(const Floor& floor) {
-  const double half_x_mm = floor.width_mm / 2, half_y_mm = floor.height_mm / 2;
   std::vector<FloorTerm> terms;
   terms.push_back({"speed-of-robots",
                    {"robot"},
@@ -139,17 +153,6 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
          decay.set_at_infinity(-1);
          decay.set_scale(3600 / rate);
        }});
-  terms.push_back({"wall-drag",
-                   {"position"},
-                   "WHEEL_GAIN",
-                   "drag at the wall and what the walls' messages make robots do act in the same place: let robots "
-                   "drive along a wall without them",
-                   {{"drag", 0, 0, 0.98, 0.6}, {"zone_mm", 26, 18, 80, 6}},
-                   1,
-                   [half_x_mm, half_y_mm](std::span<const double> v, FloorSettings& s) {
-                     add_drag(s, "wall-drag-x", Function::X, half_x_mm, v[0], v[1]);
-                     add_drag(s, "wall-drag-y", Function::Y, half_y_mm, v[0], v[1]);
-                   }});
   terms.push_back({"crowd",
                    {"neighbours"},
                    "WHEEL_GAIN",
@@ -257,19 +260,19 @@ std::vector<FloorParameter> FloorModel::parameters() const {
 
 FloorSettings FloorModel::settings(std::span<const double> values_of_all) const {
   FloorSettings settings;
-  settings.radio.rim = rim;
   settings.radio.later = later;
   std::size_t first = 0;
   for (const FloorTerm& term : terms) {
     term.apply(values_of_all.subspan(first, term.parameters.size()), settings);
     first += term.parameters.size();
   }
+  if (wall) add_walls(settings, Floor{}, *wall);
   return settings;
 }
 
 FloorModel FloorModel::without(std::size_t term) const {
   FloorModel less;
-  less.rim = rim;
+  less.wall = wall;
   less.later = later;
   for (std::size_t t = 0; t < terms.size(); ++t) {
     if (t == term) continue;

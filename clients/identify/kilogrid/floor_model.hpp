@@ -4,6 +4,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,9 +48,10 @@ struct FloorTerm {
 struct FloorModel {
   std::vector<FloorTerm> terms;  ///< the first is the base
   std::vector<double> values;
-  /// What along the rim its messages' chance is multiplied with, and in which order modules listen to their cells: found each
-  /// by a rule of its own.
-  std::array<double, kRimParts> rim = FloorRadio().rim;
+  /// Speed beside the wall, within kBeside_mm of it, times what it is in the open: by part of the rim. Effect "wall", in as
+  /// many records as there are walls. Found by a rule of its own, as is the order in which modules listen to their cells.
+  static constexpr double kBeside_mm = 50;
+  std::optional<std::array<double, kRimParts>> wall;
   std::array<double, 4> later = FloorRadio().later;
 
   void add(const FloorTerm& term);

@@ -43,6 +43,8 @@ class FloorProgram {
   /// One call of the loop. Returns what the motors do then.
   Motion loop(std::int64_t kilo_ticks);
   [[nodiscard]] bool avoiding() const { return avoiding_; }
+  /// From here on with other random numbers.
+  void reseed(std::uint64_t seed) { dice_ = Dice(seed); }
 
  private:
   enum class Walk : std::uint8_t { kBegin, kStraight, kTurn };

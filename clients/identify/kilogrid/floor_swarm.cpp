@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/base/pose.hpp"
 #include "core/math/elementary.h"
@@ -43,26 +44,6 @@ RunPlan plan_of(const FloorScene& scene, const Floor& floor, const proto::Model&
   return RunPlan(std::move(manifest));
 }
 
-/// Cells of the rim. Each module, 2 x 2 cells, sends from its cells one after the other, one in a tick.
-template <class Hear>
-void send_from_rim(const Floor& floor, double range_mm, std::int64_t tick, double x_mm, double y_mm, Hear&& hear) {
-  const double cell = floor.cell_mm;
-  const double nearest = std::min(std::min(x_mm, floor.width_mm - x_mm), std::min(y_mm, floor.height_mm - y_mm));
-  if (nearest > cell / 2 + range_mm) return;
-  const int columns = static_cast<int>(floor.width_mm / cell), rows = static_cast<int>(floor.height_mm / cell);
-  const int reach = static_cast<int>(std::ceil(range_mm / cell));
-  const int column = static_cast<int>(x_mm / cell), row = static_cast<int>(y_mm / cell);
-  for (int r = std::max(row - reach, 0); r <= std::min(row + reach, rows - 1); ++r) {
-    for (int c = std::max(column - reach, 0); c <= std::min(column + reach, columns - 1); ++c) {
-      if (r != 0 && r != rows - 1 && c != 0 && c != columns - 1) continue;
-      if ((r % 2) * 2 + c % 2 != tick % 4) continue;
-      const double dx = x_mm - (c + 0.5) * cell, dy = y_mm - (r + 0.5) * cell;
-      const double distance_mm = std::sqrt(dx * dx + dy * dy);
-      if (distance_mm < range_mm) hear(distance_mm, rim_part(floor, (c + 0.5) * cell, (r + 0.5) * cell));
-    }
-  }
-}
-
 }  // namespace
 
 std::size_t rim_part(const Floor& floor, double x_mm, double y_mm) {
@@ -73,6 +54,19 @@ std::size_t rim_part(const Floor& floor, double x_mm, double y_mm) {
       static_cast<std::size_t>(std::min_element(std::begin(distance), std::end(distance)) - std::begin(distance));
   const double part = std::max(along[side], 0.0) / (2 * (w + h)) * static_cast<double>(kRimParts);
   return std::min(static_cast<std::size_t>(part), kRimParts - 1);
+}
+
+double rim_cell_distance_mm(const Floor& floor, double x_mm, double y_mm) {
+  const double half = floor.cell_mm / 2, w = floor.width_mm, h = floor.height_mm;
+  const auto middle = [&](double v, double end) {
+    return (std::floor(std::clamp(v, half, end - half) / floor.cell_mm) + 0.5) * floor.cell_mm;
+  };
+  const double x = middle(x_mm, w), y = middle(y_mm, h);
+  double nearest = std::numeric_limits<double>::infinity();
+  const double cells[][2] = {{x, half}, {x, h - half}, {half, y}, {w - half, y}};
+  for (const auto& [cell_x, cell_y] : cells)
+    nearest = std::min(nearest, (x_mm - cell_x) * (x_mm - cell_x) + (y_mm - cell_y) * (y_mm - cell_y));
+  return std::sqrt(nearest);
 }
 
 FloorReporter::FloorReporter(const Floor& floor, const FloorRadio& radio, std::uint32_t robots, std::uint64_t seed)
@@ -180,12 +174,14 @@ FloorRun simulate(const FloorScene& scene, const Floor& floor, const proto::Mode
     for (std::size_t i = 0; i < bodies.robot.size(); ++i) {
       const std::uint32_t robot = bodies.robot[i];
       const double x_mm = bodies.x_mm[i] + floor.width_mm / 2, y_mm = bodies.y_mm[i] + floor.height_mm / 2;
-      send_from_rim(floor, radio.wall_range_mm, now.count(), x_mm, y_mm, [&](double distance_mm, std::size_t part) {
-        if (dice.uniform() > radio.wall_heard * radio.rim[part]) return;
+      // Robots listen every 16 kilo_ticks, each at its own.
+      if ((now.count() + robot) % 4 == 0) {
+        const double reading_mm = rim_cell_distance_mm(floor, x_mm, y_mm) + radio.wall_noise * dice.normal();
         // The program compares readings; where they begin does not matter as long as they are positive.
         constexpr double kStrongest = 1000;
-        programs[robot].hear_wall(kilo_ticks, kStrongest - distance_mm + radio.wall_noise * dice.normal());
-      });
+        if (reading_mm < radio.wall_range_mm && dice.uniform() < radio.wall_heard)
+          programs[robot].hear_wall(kilo_ticks, kStrongest - reading_mm);
+      }
       const Motion next = programs[robot].loop(kilo_ticks);
       actuation.spin_up[robot] = next != motion[robot] ? 1 : 0;
       motion[robot] = next;

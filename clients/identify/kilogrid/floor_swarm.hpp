@@ -18,6 +18,9 @@ inline constexpr std::size_t kRimParts = 24;
 /// The part of the rim that is nearest to a place.
 [[nodiscard]] std::size_t rim_part(const Floor&, double x_mm, double y_mm);
 
+/// From a place to the middle of the nearest cell of the rim, mm.
+[[nodiscard]] double rim_cell_distance_mm(const Floor&, double x_mm, double y_mm);
+
 /// How cells hear robots and robots hear cells.
 struct FloorRadio {
   double report_every_s = 2.064;  ///< 63 kilo_ticks
@@ -30,12 +33,9 @@ struct FloorRadio {
   double silent_s = 300, talking_s = 225;  ///< mean times between and of that
   /// A module listens to one of its four cells at a time, in turn: chances of the cell to be 0..3 later at the next report.
   std::array<double, 4> later = {0.25, 0.25, 0.25, 0.25};
-  double wall_range_mm = 46;          ///< at which robots hear cells of the rim
-  double wall_heard = 1;              ///< chance of such a message to arrive
-  std::array<double, kRimParts> rim;  ///< times that, where along the rim
-  double wall_noise = 5;              ///< of one reading, in mm of distance
-
-  FloorRadio() { rim.fill(1); }
+  double wall_range_mm = 46;  ///< at which robots hear cells of the rim
+  double wall_heard = 1;      ///< chance of such a message to arrive
+  double wall_noise = 5;      ///< of one reading, in mm of distance
 };
 
 /// What is given of a run, not fitted.

@@ -1,0 +1,213 @@
+// The robots' program, the floor that hears them, and the swarm: laws that each follows.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "clients/identify/kilogrid/cell_filter.hpp"
+#include "clients/identify/kilogrid/floor_statistics.hpp"
+#include "clients/identify/kilogrid/floor_swarm.hpp"
+
+namespace kilotwin::kilogrid {
+namespace {
+
+TEST(FloorProgram, GoesStraightAndTurnsForWholeSeconds) {
+  FloorProgram program({}, 3);
+  std::map<std::int64_t, int> turns;
+  double straight = 0, straights = 0, left = 0, all = 0;
+  Motion last = Motion::kStop;
+  std::int64_t since = 0;
+  for (std::int64_t k = 0; k < 3'000'000; ++k) {
+    const Motion now = program.loop(k);
+    if (now == last) continue;
+    if (last == Motion::kStraight) {
+      straight += static_cast<double>(k - since);
+      ++straights;
+    } else if (last != Motion::kStop) {
+      ++turns[(k - since) / FloorProgram::kWalkTicks];
+      left += last == Motion::kLeft ? 1 : 0;
+      ++all;
+    }
+    last = now;
+    since = k;
+  }
+  ASSERT_GT(straights, 4000);
+  // Cutting to whole seconds takes half a second of 15; three standard errors.
+  EXPECT_NEAR(straight / straights / FloorProgram::kWalkTicks, 14.5, 3 * 1.53 / std::sqrt(straights) + 0.1);
+  EXPECT_NEAR(left / all, 0.5, 3 * 0.5 / std::sqrt(all));
+  // |N(0.5, 3)| below a whole number of seconds: differences of the normal distribution.
+  const auto below = [](double s) {
+    return 0.5 * (std::erf((s - 0.5) / 3 / std::sqrt(2)) - std::erf((-s - 0.5) / 3 / std::sqrt(2)));
+  };
+  for (int s = 0; s < 6; ++s) {
+    const double share = below(s + 1) - below(s);
+    EXPECT_NEAR(turns[s] / all, share, 3 * std::sqrt(share * (1 - share) / all) + 0.002) << s;
+  }
+}
+
+TEST(FloorProgram, TurnsAtAWallAndLeavesItASecondAfterTheLastMessage) {
+  FloorProgram program({}, 4);
+  std::int64_t k = 0;
+  for (; k < 20; ++k) EXPECT_EQ(program.loop(k), Motion::kStraight);
+  program.hear_wall(k, 100);
+  const Motion turning = program.loop(k);
+  EXPECT_TRUE(turning == Motion::kLeft || turning == Motion::kRight);
+  const std::int64_t heard = k;
+  while (program.avoiding()) (void)program.loop(++k);
+  EXPECT_EQ(k - heard, FloorProgram::kWallTicks + 1);
+  EXPECT_EQ(program.loop(++k), turning);  // until the walk's next step
+}
+
+TEST(FloorProgram, GoesAwayOnceReadingsGetWeaker) {
+  FloorProgram program({}, 5);
+  (void)program.loop(0);
+  program.hear_wall(1, 100);
+  (void)program.loop(1);
+  std::int64_t k = 1;
+  const auto hear = [&](double strength) {
+    for (int i = 0; i < 4; ++i) program.hear_wall(k += 8, strength);
+    return program.loop(k);
+  };
+  EXPECT_NE(hear(100), Motion::kStraight);
+  EXPECT_NE(hear(110), Motion::kStraight);
+  EXPECT_EQ(hear(90), Motion::kStraight);
+  EXPECT_EQ(hear(80), Motion::kStraight);
+  (void)hear(95);  // nearer again
+  EXPECT_NE(program.loop(k + 1), Motion::kStraight);
+}
+
+TEST(FloorReporter, HearsAsOftenAsItsRangeSays) {
+  // A robot at random places: a cell in range is listened to a quarter of the time.
+  const Floor floor;
+  FloorRadio radio;
+  radio.heard = 0.6;
+  radio.heard_sd = 0;
+  radio.while_talking = 1;
+  radio.range_mm = 44;
+  radio.blur_mm = 0.5;
+  FloorReporter reporter(floor, radio, 1, 9);
+  Dice dice(2);
+  constexpr int kReports = 60000;
+  for (int i = 0; i < kReports; ++i)
+    reporter.see(0, 2.2 * i, 100 + 800 * dice.uniform(), 100 + 1800 * dice.uniform());
+  const FloorRun run = reporter.take("r", 2.2 * kReports);
+  const double expected = 0.6 * 3.14159265 * 44 * 44 / 2500 / 4 * kReports;
+  EXPECT_NEAR(static_cast<double>(run.tracks[0].size()), expected, 0.03 * expected);
+}
+
+TEST(FloorReporter, CellsThatHearAreNear) {
+  const Floor floor;
+  FloorRadio radio;
+  radio.blur_mm = 0.1;
+  FloorReporter reporter(floor, radio, 1, 1);
+  for (int i = 0; i < 3000; ++i) reporter.see(0, 2.2 * i, 510, 1010);
+  const FloorRun run = reporter.take("r", 6600);
+  ASSERT_GT(run.tracks[0].size(), 300u);
+  for (std::size_t i = 0; i < run.tracks[0].size(); ++i)
+    EXPECT_LT(std::hypot(run.tracks[0].x_mm[i] - 510, run.tracks[0].y_mm[i] - 1010), radio.range_mm + 3);
+}
+
+TEST(FloorSwarm, TheRimIsFoundFromAnyPlace) {
+  const Floor floor;
+  EXPECT_NEAR(rim_cell_distance_mm(floor, 25, 1025), 0, 1e-12);
+  EXPECT_NEAR(rim_cell_distance_mm(floor, 65, 1025), 40, 1e-12);
+  EXPECT_NEAR(rim_cell_distance_mm(floor, 500, 1990), std::hypot(25, 15), 1e-12);
+  EXPECT_EQ(rim_part(floor, 10, 5), 0u);
+  EXPECT_EQ(rim_part(floor, 990, 15), 4u);
+  EXPECT_EQ(rim_part(floor, 990, 1985), 11u);
+  EXPECT_EQ(rim_part(floor, 15, 1990), 15u);
+  EXPECT_EQ(rim_part(floor, 5, 15), 23u);
+}
+
+FloorScene scene_of_grid(std::uint32_t robots, double duration_s) {
+  FloorScene scene{"grid", duration_s, {}, {}};
+  for (std::uint32_t i = 0; i < robots; ++i) {
+    scene.x_mm.push_back(150 + 100 * (i % 8));
+    scene.y_mm.push_back(150 + 150.0 * (i / 8));
+  }
+  return scene;
+}
+
+TEST(FloorSwarm, TheSameArgumentsGiveTheSameRun) {
+  proto::Model model;
+  const FloorScene scene = scene_of_grid(20, 200);
+  const FloorRun a = simulate(scene, {}, model, {}, {}, 5), b = simulate(scene, {}, model, {}, {}, 5),
+                 c = simulate(scene, {}, model, {}, {}, 6);
+  ASSERT_EQ(a.tracks.size(), b.tracks.size());
+  bool differs = false;
+  for (std::size_t i = 0; i < a.tracks.size(); ++i) {
+    EXPECT_EQ(a.tracks[i].x_mm, b.tracks[i].x_mm);
+    EXPECT_EQ(a.tracks[i].time_s, b.tracks[i].time_s);
+    differs = differs || a.tracks[i].x_mm != c.tracks[i].x_mm;
+  }
+  EXPECT_TRUE(differs);
+}
+
+TEST(FloorStatistics, AStraightWayIsAsLongAsItIs) {
+  // 6 mm/s along y, seen without blur: 60 mm in 10 s, 120 in 20.
+  FloorRun run{"r", 250, {}, {}};
+  FloorTrack track;
+  for (int t = 0; t < 250; ++t) {
+    track.time_s.push_back(t);
+    track.x_mm.push_back(500);
+    track.y_mm.push_back(200 + 6.0 * t);
+  }
+  run.tracks.push_back(track);
+  const FloorStatistics s = statistics_of(robot_sums(run, {}));
+  const StatisticGroup& ways = statistic_group("msd");
+  EXPECT_NEAR(std::sqrt(s.value[ways.first]), 60, 1e-9);
+  EXPECT_NEAR(std::sqrt(s.value[ways.first + 1]), 120, 1e-9);
+  EXPECT_NEAR(s.value[statistic_group("drift").first + 1], 60, 1e-9);
+  const StatisticGroup& turns = statistic_group("turn");
+  EXPECT_NEAR(s.value[turns.first], 1, 1e-12);
+  EXPECT_NEAR(s.value[statistic_group("step").first + 7], 1, 1e-12);  // from 60 mm
+}
+
+TEST(CellFilter, TheLikelihoodFindsTheSpeedThatMadeTheCells) {
+  const Floor floor;
+  FloorSettings settings;
+  settings.model.mutable_motion()->set_straight_speed_mm_s(9);
+  settings.model.mutable_motion()->set_bias_sd_mm_s(0.5);
+  settings.model.mutable_motion()->set_bias_mean_mm_s(0);
+  settings.radio.heard = 0.9;
+  settings.radio.wall_range_mm = 40;
+  const FloorRun run = simulate(scene_of_grid(12, 600), floor, settings.model, settings.times, settings.radio, 3);
+  std::map<double, double> likelihood;
+  for (const double speed : {5.0, 7.0, 9.0, 11.0, 14.0}) {
+    FloorSettings tried = settings;
+    tried.model.mutable_motion()->set_straight_speed_mm_s(speed);
+    for (std::size_t i = 0; i < run.tracks.size(); ++i)
+      likelihood[speed] += filter_cells(run.tracks[i], floor, tried, 10, 100, i + 1).log_likelihood;
+  }
+  for (const auto& [speed, value] : likelihood) {
+    if (speed != 9) EXPECT_LT(value, likelihood[9]) << speed;
+  }
+  EXPECT_LT(likelihood[5], likelihood[7]);
+  EXPECT_LT(likelihood[14], likelihood[11]);
+}
+
+TEST(CellFilter, PredictsBetterThanThatNothingMoves) {
+  const Floor floor;
+  FloorSettings settings;
+  settings.radio.heard = 0.9;
+  const FloorRun run = simulate(scene_of_grid(8, 500), floor, settings.model, settings.times, settings.radio, 4);
+  double predicted = 0, still = 0, rows = 0;
+  for (const FloorTrack& track : run.tracks) {
+    const CellFilterResult result = filter_cells(track, floor, settings, 10, 100, 1);
+    for (const CellPrediction& p : result.predictions) {
+      const auto i =
+          static_cast<std::size_t>(std::upper_bound(track.time_s.begin(), track.time_s.end(), p.time_s - 10) -
+                                   track.time_s.begin()) -
+          1;
+      predicted += std::pow(p.x_mm - p.measured_x_mm, 2) + std::pow(p.y_mm - p.measured_y_mm, 2);
+      still += std::pow(track.x_mm[i] - p.measured_x_mm, 2) + std::pow(track.y_mm[i] - p.measured_y_mm, 2);
+      ++rows;
+    }
+  }
+  ASSERT_GT(rows, 200);
+  EXPECT_LT(std::sqrt(predicted / rows), 0.8 * std::sqrt(still / rows));
+  EXPECT_GT(std::sqrt(predicted / rows), cell_noise_mm(floor, settings.radio));
+}
+
+}  // namespace
+}  // namespace kilotwin::kilogrid
