@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <map>
 
 namespace kilotwin::bristle {
 namespace {
@@ -141,9 +142,14 @@ RideModel::RideModel(const std::vector<RideInstant>& train) {
   // Drift: medians over instants of what is left of the way, in speeds.
   RideEffects on{};
   on[static_cast<std::size_t>(RideEffect::kSense)] = on[static_cast<std::size_t>(RideEffect::kAxis)] = true;
+  std::map<std::size_t, std::vector<double>> speeds_of;
+  for (const RideInstant& i : train) speeds_of[i.run].push_back(speed_of(i));
+  std::map<std::size_t, double> speed_of_run;
+  for (const auto& [run, own] : speeds_of) speed_of_run[run] = median(own);
   std::vector<double> left_x, left_y;
   for (const RideInstant& i : train) {
-    const double speed = speed_of(i);
+    // The run's speed and not that of the instant, which goes with where it is carried.
+    const double speed = speed_of_run[i.run];
     if (!(speed > 0)) continue;
     const std::complex<double> forward = OwnPast{}.direction(i, *this, on);
     left_x.push_back(i.vx_mm_s / speed - forward.real());

@@ -17,6 +17,8 @@ constexpr double kStep_s = kStepTicks * 0.032768;
 constexpr double kEvery_s = 5, kFirst_s = 10;
 /// Of a report to come from anywhere: what the kernel does not know.
 constexpr double kAstray = 2e-4;
+/// How far copies of a particle part, and how many of them get a new heading.
+constexpr double kPart_mm = 4, kPart_rad = 0.15, kTurned = 0.1;
 
 /// One term of the model for a robot alone.
 struct LoneTerm {
@@ -67,6 +69,18 @@ class LoneRobot {
         term.factors.push_back(std::move(factor));
       }
       terms_.push_back(std::move(term));
+    }
+  }
+
+  /// What lasts for a robot is drawn again a little, so that no single draw is all that is left of it after a while.
+  void renew(Particle& p, Dice& dice) const {
+    const double keep = 0.97, fresh = std::sqrt(1 - keep * keep), sd = settings_.model.motion().bias_sd_mm_s();
+    p.bias_left_mm_s = keep * p.bias_left_mm_s + fresh * sd * dice.normal();
+    p.bias_right_mm_s = keep * p.bias_right_mm_s + fresh * sd * dice.normal();
+    for (const LoneTerm& term : terms_) {
+      for (const LoneTerm::Factor& factor : term.factors) {
+        if (factor.is_noise) p.memory[*factor.slot] = keep * p.memory[*factor.slot] + fresh * dice.normal();
+      }
     }
   }
 
@@ -246,7 +260,7 @@ class LoneRobot {
 };
 
 /// Draws as many particles as there are, each as often as its weight says.
-void resample(std::vector<Particle>& particles, std::vector<double>& weights, Dice& dice) {
+void resample(const LoneRobot& robot, std::vector<Particle>& particles, std::vector<double>& weights, Dice& dice) {
   const std::size_t n = particles.size();
   std::vector<Particle> kept;
   kept.reserve(n);
@@ -254,7 +268,14 @@ void resample(std::vector<Particle>& particles, std::vector<double>& weights, Di
   for (std::size_t i = 0, j = 0; i < n; ++i, at += 1 / static_cast<double>(n)) {
     while (at > below && j + 1 < n) below += weights[++j];
     kept.push_back(particles[j]);
-    kept.back().program.reseed(dice.bits());
+    Particle& p = kept.back();
+    p.program.reseed(dice.bits());
+    robot.renew(p, dice);
+    // Copies part, and some turn as the robot may just have: what the program does is not known.
+    p.x_mm += kPart_mm * dice.normal();
+    p.y_mm += kPart_mm * dice.normal();
+    p.heading_rad = wrapped(dice.uniform() < kTurned ? (2 * dice.uniform() - 1) * kPi
+                                                     : p.heading_rad + kPart_rad * dice.normal());
   }
   particles = std::move(kept);
   std::fill(weights.begin(), weights.end(), 1 / static_cast<double>(n));
@@ -300,11 +321,17 @@ CellFilterResult filter_cells(const FloorTrack& track, const Floor& floor, const
         all += weights[i] *= robot.chance_of(particles[i], track.x_mm[next], track.y_mm[next]);
       result.log_likelihood += kt_log(all);
       ++result.reports;
+      if (all < 3 * kAstray) {
+        // Nobody is where the robot was heard: begin again there.
+        for (Particle& p : particles) p = robot.start(track.x_mm[next], track.y_mm[next], dice);
+        std::fill(weights.begin(), weights.end(), 1 / static_cast<double>(count));
+        continue;
+      }
       for (double& w : weights) {
         w /= all;
         squares += w * w;
       }
-      if (1 / squares < 0.5 * static_cast<double>(count)) resample(particles, weights, dice);
+      if (1 / squares < 0.5 * static_cast<double>(count)) resample(robot, particles, weights, dice);
     }
   }
   return result;

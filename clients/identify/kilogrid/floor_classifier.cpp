@@ -50,7 +50,7 @@ class Logistic {
     const Eigen::MatrixXd x = terms(s.x);
     const Eigen::VectorXd importance = class_weights(s.y);
     weights_ = Eigen::VectorXd::Zero(x.cols());
-    const double ridge = 3;
+    const double ridge = 25;
     for (int iteration = 0; iteration < 12; ++iteration) {
       const Eigen::VectorXd p = (1 + (-(x * weights_).array()).exp()).inverse();
       const Eigen::VectorXd w = importance.array() * (p.array() * (1 - p.array())).max(1e-4);

@@ -13,13 +13,12 @@ namespace {
 
 /// No statistic is taken for more exact than that share of it: the program, the cells and the walls are idealised.
 constexpr double kExact = 0.02;
-constexpr unsigned kThreads = 2;
 
 /// Calls work(0), work(1)... work(n - 1), on several threads.
-void in_parallel(std::size_t n, const std::function<void(std::size_t)>& work) {
+void in_parallel(std::uint32_t threads_to_use, std::size_t n, const std::function<void(std::size_t)>& work) {
   std::atomic<std::size_t> next{0};
   std::vector<std::jthread> threads;
-  for (unsigned t = 0; t < kThreads; ++t) {
+  for (std::uint32_t t = 0; t < threads_to_use; ++t) {
     threads.emplace_back([&] {
       for (std::size_t i = next++; i < n; i = next++) work(i);
     });
@@ -86,7 +85,7 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const std:
   std::vector<FloorStatistics> results(points);
   std::vector<std::vector<double>> at(points);
   for (std::size_t i = 0; i < points; ++i) at[i] = moved(parameters, model.values, design[i], width);
-  in_parallel(points, [&](std::size_t i) {
+  in_parallel(target.threads(), points, [&](std::size_t i) {
     results[i] = statistics_at(target, model.settings(at[i]), seed * 1000 + i, i);
   });
 
@@ -185,8 +184,8 @@ std::array<double, 4> order_of_listening(const std::vector<FloorRun>& runs, cons
 
 }  // namespace
 
-FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor)
-    : floor_(floor), later_(order_of_listening(runs, floor)) {
+FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor, std::uint32_t threads)
+    : floor_(floor), threads_(threads), later_(order_of_listening(runs, floor)) {
   std::vector<RobotSums> all;
   std::vector<FloorStatistics> each;
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -234,7 +233,7 @@ std::vector<FloorRun> simulate_scenes(const FloorTarget& target, const FloorSett
                                       int repeats) {
   const std::size_t scenes = target.scenes().size();
   std::vector<FloorRun> runs(scenes * static_cast<std::size_t>(repeats));
-  in_parallel(runs.size(), [&](std::size_t i) {
+  in_parallel(target.threads(), runs.size(), [&](std::size_t i) {
     runs[i] = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times, settings.radio,
                        seed * 100 + i);
   });
@@ -246,7 +245,7 @@ FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSetti
   std::vector<RobotSums> all;
   const std::size_t scenes = target.scenes().size();
   std::vector<std::vector<RobotSums>> sums(scenes * static_cast<std::size_t>(repeats));
-  in_parallel(sums.size(), [&](std::size_t i) {
+  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
     const FloorRun run = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times,
                                   settings.radio, seed * 100 + i);
     sums[i] = robot_sums(run, target.floor());

@@ -13,7 +13,9 @@ namespace kilotwin::kilogrid {
 /// Measured runs, as what is fitted to.
 class FloorTarget {
  public:
-  FloorTarget(const std::vector<FloorRun>&, const Floor&);
+  /// `threads`: for simulated runs, without effect on them.
+  FloorTarget(const std::vector<FloorRun>&, const Floor&, std::uint32_t threads = 2);
+  [[nodiscard]] std::uint32_t threads() const { return threads_; }
 
   [[nodiscard]] const std::vector<FloorScene>& scenes() const { return scenes_; }
   [[nodiscard]] const FloorStatistics& statistics() const { return statistics_; }
@@ -30,6 +32,7 @@ class FloorTarget {
 
  private:
   Floor floor_;
+  std::uint32_t threads_;
   std::vector<FloorScene> scenes_;
   FloorStatistics statistics_;
   std::vector<double> tolerance_;

@@ -68,12 +68,18 @@ void add_harmonic(Function& function, double cosine, double sine, double period)
 
 FloorTerm base_term() {
   FloorTerm term{"base", {}, "", "", {}, 0, {}};
-  term.parameters = {{"straight_speed_mm_s", 11, 3, 20, 1}, {"turn_speed_mm_s", 24, 5, 40, 3},
-                     {"bias_sd_mm_s", 1, 0.05, 4, 0.3},     {"factor_variance_s", 0.15, 0, 2, 0.1},
-                     {"range_mm", 50, 35, 70, 3},           {"heard", 0.7, 0.1, 1, 0.1},
-                     {"heard_sd", 0.25, 0, 0.5, 0.06},      {"wall_range_mm", 32, 20, 75, 4},
-                     {"wall_heard", 0.6, 0.1, 1, 0.15},     {"wall_noise", 18, 1, 60, 6},
-                     {"while_talking", 0.6, 0.05, 1, 0.15}, {"same_cell", 0.15, 0.02, 0.5, 0.05}};
+  term.parameters = {{"straight_speed_mm_s", 11.3, 3, 20, 1},
+                     {"turn_speed_mm_s", 27, 5, 40, 3},
+                     {"bias_sd_mm_s", 1.2, 0.05, 4, 0.3},
+                     {"factor_variance_s", 0.13, 0, 2, 0.1},
+                     {"range_mm", 49, 35, 70, 3},
+                     {"heard", 0.75, 0.1, 1, 0.1},
+                     {"heard_sd", 0.3, 0, 0.5, 0.06},
+                     {"wall_range_mm", 38, 20, 75, 4},
+                     {"wall_heard", 0.5, 0.1, 1, 0.15},
+                     {"wall_noise", 15, 1, 60, 6},
+                     {"while_talking", 0.45, 0.05, 1, 0.15},
+                     {"same_cell", 0.12, 0.02, 0.5, 0.05}};
   term.apply = [](std::span<const double> v, FloorSettings& s) {
     proto::Motion& motion = *s.model.mutable_motion();
     motion.set_straight_speed_mm_s(v[0]);

@@ -241,7 +241,7 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
     if (options.progress) options.progress(part, what);
   };
   const Floor floor;
-  const FloorTarget learned(train, floor), held_out(test, floor);
+  const FloorTarget learned(train, floor, options.threads), held_out(test, floor, options.threads);
   json steps = json::array();
   const auto note = [&](const std::string& added, const FloorModel& model) {
     const double misfit = held_out.misfit(simulated_statistics(held_out, model.settings(), 4711, 2));

@@ -103,7 +103,7 @@ TEST(Bristle, AnInclineCarriesRobotsDownhill) {
   EXPECT_TRUE(found(identified).contains("downhill"));
   for (const auto& effect : identified.document.at("contract").at("effects")) {
     if (effect.at("name") != "downhill") continue;
-    EXPECT_LT(effect.at("parameters").at("x").get<double>(), -0.15);
+    EXPECT_LT(effect.at("parameters").at("x").get<double>(), -0.08);
   }
 }
 
