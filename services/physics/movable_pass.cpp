@@ -208,7 +208,11 @@ void MovablePass::balance(std::uint32_t step) {
     v.turn_mm += way * lever;
   };
   for (Link& link : links_) link.push = 0;
-  for (int round = 0; round < kBalanceRounds; ++round) {
+  for (Mover& mover : movers_) mover.changed = true;
+  // Where nothing changes any more, further rounds would not change anything, whatever goes on elsewhere.
+  bool any = true;
+  for (int round = 0; round < kBalanceRounds && any; ++round) {
+    any = false;
     for (Link& link : links_) {
       Mover &a = movers_[link.first], &b = movers_[link.second];
       if (step >= a.passes || step >= b.passes) continue;
@@ -217,6 +221,7 @@ void MovablePass::balance(std::uint32_t step) {
       const double excess = along(a.velocity, link.normal_x, link.normal_y, link.first_arm) -
                             along(b.velocity, link.normal_x, link.normal_y, link.second_arm) -
                             std::max(gap - touch_mm_, 0.0);
+      if (excess < kTolerance_mm && (excess > -kTolerance_mm || link.push == 0)) continue;
       const double of_a = 1 / bodies_[a.movable].mass_kg, of_b = 1 / bodies_[b.movable].mass_kg;
       const double yields =
           of_a * (1 + link.first_arm * link.first_arm) + of_b * (1 + link.second_arm * link.second_arm);
@@ -224,10 +229,13 @@ void MovablePass::balance(std::uint32_t step) {
       link.push = push;
       add(a.velocity, link, link.first_arm, -of_a * more);
       add(b.velocity, link, link.second_arm, of_b * more);
+      any = a.changed = b.changed = true;
     }
     for (Mover& mover : movers_) {
-      if (step < mover.passes && mover.linked) brake(mover);
+      if (step < mover.passes && mover.linked && mover.changed) brake(mover);
+      mover.changed = false;
     }
+    any |= round == 0;
   }
 }
 

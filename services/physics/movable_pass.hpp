@@ -77,7 +77,8 @@ class MovablePass {
   };
   struct Mover {
     std::uint32_t movable = 0, passes = 0;
-    bool linked = false;  ///< it may touch other movers
+    bool linked = false;   ///< it may touch other movers
+    bool changed = false;  ///< it is to be braked again
     Motion shift, next_shift, velocity, before;
     Motion braked;  ///< what friction has taken off in this sub-step
     std::vector<Contact> contacts;
