@@ -14,6 +14,7 @@
 #include "clients/behaviours/robot_warnings.hpp"
 #include "clients/cli/doctor_command.hpp"
 #include "clients/cli/export_model.hpp"
+#include "clients/cli/identify_command.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/replay_command.hpp"
 #include "clients/cli/run_command.hpp"
@@ -234,6 +235,19 @@ int main_of(int argc, char** argv) {
   replay_app.add_flag("--verify", verify, "compare every tick's state hash")->required();
   replay_app.add_flag("--quiet", replay_quiet, "nothing on the screen");
 
+  IdentifyArguments identified;
+  CLI::App& identify_app =
+      *app.add_subcommand("identify", "why measured robots differ from the model, put into the model");
+  identify_app.add_option("--train", identified.train, "directory of measured data to fit to")->required();
+  identify_app.add_option("--test", identified.test,
+                          "directory to predict, never fitted to (default: a part of --train that is held out)");
+  identify_app.add_option("--out", identified.out, "directory to write to")->capture_default_str();
+  identify_app.add_option("--horizon", identified.horizon_s, "how far ahead to predict, s")->capture_default_str();
+  identify_app.add_option("--threads", identified.threads, "threads to work on")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  identify_app.add_flag("--quiet", identified.quiet, "no progress and no summary on the screen");
+
   std::optional<std::uint32_t> doctor_domain;
   CLI::App& doctor_app =
       *app.add_subcommand("doctor", "what on this machine would keep an experiment from running");
@@ -267,6 +281,7 @@ int main_of(int argc, char** argv) {
   if (build_app.parsed()) return build_command(build);
   if (export_app.parsed()) return export_command(exported);
   if (replay_app.parsed()) return replay_command(replayed, replay_quiet);
+  if (identify_app.parsed()) return identify_command(identified);
   return doctor_command(doctor_domain);
 }
 

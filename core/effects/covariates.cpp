@@ -22,6 +22,8 @@ std::optional<MemorySlot> slot_of(Function::Covariate covariate, double forget_s
     case Function::PREVIOUS_FORWARD: return MemorySlot{Kind::kPreviousForward};
     case Function::PREVIOUS_SIDEWAYS: return MemorySlot{Kind::kPreviousSideways};
     case Function::PREVIOUS_TURN: return MemorySlot{Kind::kPreviousTurn};
+    case Function::PREVIOUS_COMMAND: return MemorySlot{Kind::kPreviousCommand};
+    case Function::LAST_TURN: return MemorySlot{Kind::kLastTurn};
     default: return std::nullopt;
   }
 }
@@ -84,7 +86,9 @@ Range Covariates::range(std::uint32_t index) const {
     case Function::RADIUS: return {0, __builtin_sqrt(x_mm * x_mm + y_mm * y_mm)};
     case Function::HEADING:
     case Function::NEAREST_BEARING: return {-kPi, kPi};
-    case Function::COMMAND: return {0, 3};
+    case Function::COMMAND:
+    case Function::PREVIOUS_COMMAND:
+    case Function::LAST_TURN: return {0, 3};
     case Function::LEFT_DUTY:
     case Function::RIGHT_DUTY: return {0, 255};
     case Function::NEIGHBOURS:
@@ -143,6 +147,19 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
         return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot] : 0.0;
       });
     }
+    case Function::PREVIOUS_COMMAND: {
+      const std::uint32_t command = plan_.memory.index_of({Kind::kCommand});
+      return each([&](std::size_t r) {
+        const double* const memory = robots.memory.data() + r * stride;
+        return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot]
+                                                                                    : memory[command];
+      });
+    }
+    case Function::LAST_TURN:
+      return each([&](std::size_t r) {
+        const proto::Command command = command_of(robots.duties[r]);
+        return is_turn(command) ? static_cast<double>(command) : robots.memory[r * stride + column.slot];
+      });
     case Function::LEFT_MOTOR_TIME:
     case Function::RIGHT_MOTOR_TIME:
     case Function::DRIVEN_TIME:

@@ -10,6 +10,14 @@ namespace {
 
 std::uint32_t draw_of(const MemorySlot& slot) { return (slot.index * 8 + slot.function) * 2 + slot.wheel; }
 
+/// At least a tick, so that no phase is lost.
+double wait_s(const proto::Episodes& e, double uniform, double tick_s) {
+  return std::max(-e.mean_apart_s() * kt_log(uniform), tick_s);
+}
+double length_s(const proto::Episodes& e, double uniform, double tick_s) {
+  return std::clamp(e.scale_s() * (kt_pow(uniform, -1 / e.tail()) - 1), tick_s, std::max(e.longest_s(), tick_s));
+}
+
 }  // namespace
 
 EffectMemory::EffectMemory(const RunPlan& plan)
@@ -18,6 +26,8 @@ EffectMemory::EffectMemory(const RunPlan& plan)
   for (std::size_t s = 0; s < slots.size(); ++s) {
     const MemorySlot& slot = slots[s];
     notes_motion_ = notes_motion_ || (slot.kind >= Kind::kPreviousForward && slot.kind <= Kind::kPreviousTurn);
+    if (slot.kind == Kind::kTimeSinceCommand) time_slot_ = static_cast<std::uint32_t>(s);
+    if (slot.kind == Kind::kPreviousCommand) previous_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kNoise) {
       const proto::Effect& effect = plan.experiment().effect(static_cast<int>(slot.index));
       const double keep =
@@ -33,10 +43,21 @@ void EffectMemory::start(std::uint32_t robot, std::span<double> memory) const {
   const std::vector<MemorySlot>& slots = plan_.memory.slots();
   for (std::size_t s = 0; s < slots.size(); ++s) {
     memory[s] = slots[s].kind == Kind::kFieldCell ? -1
+                : slots[s].kind == Kind::kEpisode ? next_episode(slots[s], robot, Tick{0}, -tick_s_)
                 : slots[s].kind == Kind::kNoise
                     ? random_.normal(Stream::kCorrelatedNoise, robot, Tick{0}, draw_of(slots[s]))
                     : 0;
   }
+}
+
+double EffectMemory::next_episode(const MemorySlot& slot, std::uint32_t robot, Tick now, double left_s) const {
+  // Half a tick at most is neither counted twice nor lost.
+  if (left_s > tick_s_ * 1.5) return left_s - tick_s_;
+  if (left_s < -tick_s_ * 1.5) return left_s + tick_s_;
+  const proto::Episodes& episodes =
+      plan_.experiment().effect(static_cast<int>(slot.index)).function(static_cast<int>(slot.function)).episodes();
+  const double uniform = random_.uniform(Stream::kEpisodes, robot, now, draw_of(slot));
+  return left_s > 0 ? -length_s(episodes, uniform, tick_s_) : wait_s(episodes, uniform, tick_s_);
 }
 
 void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<const double> x_mm,
@@ -56,17 +77,22 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
   };
   for (std::size_t s = 0; s < stride; ++s) {
     switch (slots[s].kind) {
-      case Kind::kCommand: {
-        // The time that belongs to it has to see the command before.
-        const std::uint32_t time = plan_.memory.index_of({Kind::kTimeSinceCommand});
+      case Kind::kCommand:
+        // What belongs to it has to see the command before.
         each(s, [&](std::size_t i, double was) {
           const double command = static_cast<double>(command_of(robots.duties[i]));
-          double& since_s = memory[i * stride + time];
-          since_s = (was == command ? since_s : 0) + tick_s_;
+          double* const own = memory.data() + i * stride;
+          if (time_slot_) own[*time_slot_] = (was == command ? own[*time_slot_] : 0) + tick_s_;
+          if (previous_slot_ && was != command) own[*previous_slot_] = was;
           return command;
         });
         break;
-      }
+      case Kind::kLastTurn:
+        each(s, [&](std::size_t i, double was) {
+          const proto::Command command = command_of(robots.duties[i]);
+          return is_turn(command) ? static_cast<double>(command) : was;
+        });
+        break;
       case Kind::kLeftMotorTime: lasts(s, [](Duties d) { return d.left != 0 || d.spin_up != 0; }); break;
       case Kind::kRightMotorTime: lasts(s, [](Duties d) { return d.right != 0 || d.spin_up != 0; }); break;
       case Kind::kDrivenTime: lasts(s, [](Duties d) { return d.any(); }); break;
@@ -78,7 +104,11 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
           return std::clamp(next, -kTopNormal, kTopNormal);
         });
         break;
+      case Kind::kEpisode:
+        each(s, [&](std::size_t i, double was) { return next_episode(slots[s], robots.robot[i], from + 1, was); });
+        break;
       case Kind::kTimeSinceCommand:  // with the command
+      case Kind::kPreviousCommand:
       case Kind::kPreviousForward:
       case Kind::kPreviousSideways:
       case Kind::kPreviousTurn:      // below

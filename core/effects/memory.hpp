@@ -1,6 +1,7 @@
 /// What robots remember for effects, from tick to tick: MemoryLayout says which numbers.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,10 +31,14 @@ class EffectMemory {
     double renew = 0;  ///< of noise: the weight of the new number
   };
 
+  /// What a slot of episodes holds after `left_s`, as long as a phase lasts and when the next one is drawn at `now`.
+  [[nodiscard]] double next_episode(const MemorySlot&, std::uint32_t robot, Tick now, double left_s) const;
+
   const RunPlan& plan_;
   const Random random_;
   double tick_s_;
-  std::vector<Fade> fades_;  ///< per slot
+  std::vector<Fade> fades_;                                 ///< per slot
+  std::optional<std::uint32_t> time_slot_, previous_slot_;  ///< slots that the command keeps up to date
   bool notes_motion_ = false;
 };
 

@@ -41,6 +41,10 @@ class MotorRule {
   return duties.spin_up != 0 ? proto::STRAIGHT : proto::STOP;
 }
 
+[[nodiscard]] constexpr bool is_turn(proto::Command command) {
+  return command == proto::LEFT || command == proto::RIGHT;
+}
+
 /// Robots at one instant, structure of arrays, ascending ids: a view of somebody's columns, all of one length.
 struct RobotColumns {
   std::span<const std::uint32_t> robot;

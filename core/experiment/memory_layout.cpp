@@ -36,6 +36,11 @@ MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
       case Function::PREVIOUS_FORWARD: need({Kind::kPreviousForward}); break;
       case Function::PREVIOUS_SIDEWAYS: need({Kind::kPreviousSideways}); break;
       case Function::PREVIOUS_TURN: need({Kind::kPreviousTurn}); break;
+      case Function::PREVIOUS_COMMAND:
+        need({Kind::kCommand});
+        need({Kind::kPreviousCommand});
+        break;
+      case Function::LAST_TURN: need({Kind::kLastTurn}); break;
       default: break;
     }
   };
@@ -45,6 +50,8 @@ MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
       const Function& function = effect.function(f);
       need_for(function.of(), function.forget_s());
       need_for(function.and_of(), function.forget_s());
+      if (function.has_episodes())
+        need({Kind::kEpisode, 0, static_cast<std::uint32_t>(e), static_cast<std::uint32_t>(f)});
       if (!function.has_noise() || !(function.noise().correlation_s() > 0)) continue;
       const auto index = static_cast<std::uint32_t>(e), number = static_cast<std::uint32_t>(f);
       need({Kind::kNoise, 0, index, number, 0});

@@ -14,14 +14,17 @@ struct MemorySlot {
   enum class Kind : std::uint8_t {
     kCommand,           ///< number of the Command of the tick before; STOP at first
     kTimeSinceCommand,  ///< s for which that has lasted
+    kEpisode,           ///< of effect `index`, `function`: s until the next begins, or less than 0: until it ends
     kLeftMotorTime,     ///< s, forgetting within `forget_s`
     kRightMotorTime,
     kDrivenTime,
     kPreviousForward,  ///< mm/s
     kPreviousSideways,
-    kPreviousTurn,  ///< rad/s
-    kFieldCell,     ///< cell of field `index` in which the robot was counted last; -1: none
-    kNoise,         ///< of effect `index`, `function`, `wheel`
+    kPreviousTurn,     ///< rad/s
+    kFieldCell,        ///< cell of field `index` in which the robot was counted last; -1: none
+    kNoise,            ///< of effect `index`, `function`, `wheel`
+    kPreviousCommand,  ///< number of the Command before kCommand; STOP at first
+    kLastTurn,         ///< number of the last Command that was LEFT or RIGHT; 0 at first
   };
   Kind kind;
   double forget_s = 0;

@@ -1,0 +1,140 @@
+#include "clients/identify/basis.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+double unit_of(double c, double low, double high, double warp) {
+  const double inside = std::clamp(c, low, high) - low;
+  if (warp > 0) return std::log1p(inside / warp) / std::log1p((high - low) / warp);
+  return inside / (high - low);
+}
+
+/// cos(k a), k = 0..last, by the recurrence of Chebyshev.
+void cosines(double angle, std::uint32_t last, double* to) {
+  const double c = std::cos(angle);
+  to[0] = 1;
+  if (last > 0) to[1] = c;
+  for (std::uint32_t k = 2; k <= last; ++k) to[k] = 2 * c * to[k - 1] - to[k - 2];
+}
+
+}  // namespace
+
+std::size_t Factor::size() const {
+  switch (shape) {
+    case Shape::kLinear: return 1;
+    case Shape::kCosines:
+    case Shape::kTaper: return count;
+    case Shape::kCosines2: return (count + 1) * (count + 2) / 2 - 1;
+    case Shape::kHarmonics: return 2 * std::size_t{count};
+    case Shape::kTable:
+    case Shape::kAtLeast:
+    case Shape::kExponential: return points.size();
+    case Shape::kWave: return 2 * points.size();
+  }
+  return 0;
+}
+
+void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
+  std::array<double, 64> a, b;
+  const double c = value_of(axis, s, wheel);
+  switch (shape) {
+    case Shape::kLinear: to[0] = (std::clamp(c, low, high) - low) / (high - low); return;
+    case Shape::kCosines:
+      cosines(M_PI * unit_of(c, low, high, warp), first + count - 1, a.data());
+      for (std::uint32_t k = 0; k < count; ++k) to[k] = a[first + k];
+      return;
+    case Shape::kCosines2:
+      cosines(M_PI * unit_of(c, low, high, warp), count, a.data());
+      cosines(M_PI * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0), count, b.data());
+      for (std::uint32_t sum = 1; sum <= count; ++sum)
+        for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
+      return;
+    case Shape::kHarmonics:
+      for (std::uint32_t k = 0; k < count; ++k) {
+        to[2 * k] = std::cos((first + k) * c);
+        to[2 * k + 1] = std::sin((first + k) * c);
+      }
+      return;
+    case Shape::kTable:
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
+      return;
+    case Shape::kAtLeast:
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = c >= points[i] ? 1 : 0;
+      return;
+    case Shape::kExponential:
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = std::exp(-c / points[i]);
+      return;
+    case Shape::kTaper: {
+      const double rest = std::max(0.0, 1 - c / high);
+      double power = 1;
+      for (std::uint32_t k = 0; k < count; ++k) to[k] = power *= rest;
+      return;
+    }
+    case Shape::kWave:
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        to[2 * i] = std::cos(2 * M_PI * c / points[i]);
+        to[2 * i + 1] = std::sin(2 * M_PI * c / points[i]);
+      }
+      return;
+  }
+}
+
+std::vector<double> Factor::roughness() const {
+  std::vector<double> rough(size(), 1.0);
+  if (shape == Shape::kCosines) {
+    for (std::uint32_t k = 0; k < count; ++k) rough[k] = first + k;
+  } else if (shape == Shape::kHarmonics) {
+    for (std::uint32_t k = 0; k < count; ++k) rough[2 * k] = rough[2 * k + 1] = first + k;
+  } else if (shape == Shape::kCosines2) {
+    std::size_t i = 0;
+    for (std::uint32_t sum = 1; sum <= count; ++sum)
+      for (std::uint32_t k = 0; k <= sum; ++k) rough[i++] = std::sqrt((sum - k) * (sum - k) + k * k + 0.0);
+  }
+  return rough;
+}
+
+std::size_t Basis::size() const {
+  std::size_t size = 1;
+  for (const Factor& factor : factors) size *= factor.size();
+  return size;
+}
+
+void Basis::evaluate(const Situation& s, std::size_t wheel, double* to) const {
+  to[0] = 1;
+  std::size_t have = 1;
+  std::array<double, kMostColumns> of_factor;
+  for (const Factor& factor : factors) {
+    const std::size_t n = factor.size();
+    KILOTWIN_DEMAND(have * n <= kMostColumns);
+    factor.evaluate(s, wheel, of_factor.data());
+    // From the last, so that nothing is overwritten before it is read.
+    for (std::size_t i = have; i-- > 0;)
+      for (std::size_t j = n; j-- > 0;) to[i * n + j] = to[i] * of_factor[j];
+    have *= n;
+  }
+}
+
+std::vector<double> Basis::roughness() const {
+  std::vector<double> rough{1.0};
+  for (const Factor& factor : factors) {
+    std::vector<double> next;
+    for (const double r : rough)
+      for (const double own : factor.roughness()) next.push_back(r * own);
+    rough = std::move(next);
+  }
+  return rough;
+}
+
+bool Basis::looks_at(Covariate covariate) const {
+  return std::any_of(factors.begin(), factors.end(), [&](const Factor& f) {
+    return f.axis.of == covariate || (f.shape == Factor::Shape::kCosines2 && f.and_axis.of == covariate);
+  });
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,279 @@
+#include "clients/identify/fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace kilotwin::identify {
+namespace {
+
+struct LogLikelihood {
+  double sum = 0;
+  std::vector<double> parts;  ///< of so many samples each
+  std::size_t count = 0;
+  static constexpr std::size_t kPart = 50;
+
+  void start(const TrackFilter&) {}
+  void step(const StepRecord&) {}
+  void update(const Innovation& innovation, const Sample&) {
+    if (count++ % kPart == 0) parts.push_back(0);
+    const double value = std::max(innovation.log_likelihood, -1e3);
+    parts.back() += value;
+    sum += value;
+  }
+};
+
+constexpr int kNoises = 6;
+using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
+
+NoiseVector to_vector(const Noise& n) {
+  NoiseVector v;
+  v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
+  return v.array().log();
+}
+Noise to_noise(const NoiseVector& logs) {
+  // Below the lower bounds a noise is as good as none, above the upper ones nothing would be told from noise.
+  const std::array<double, kNoises> low = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6}, high = {1, 100, 1, 100, 1e4, 10};
+  std::array<double, kNoises> v;
+  for (std::size_t i = 0; i < kNoises; ++i)
+    v[i] = std::clamp(std::exp(logs[static_cast<Eigen::Index>(i)]), low[i], high[i]);
+  return {v[0], v[1], v[2], v[3], v[4], v[5]};
+}
+
+}  // namespace
+
+PreparedSet::PreparedSet(const MeasuredSet& set) : set_(&set) {
+  for (std::size_t r = 0; r < set.runs.size(); ++r) {
+    neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
+    for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
+      const Track& track = set.runs[r].tracks[t];
+      if (track.samples.size() < 2) continue;
+      views_.push_back({&track, static_cast<std::uint32_t>(r), t, neighbours_.back().get(), CommandClock(track)});
+    }
+  }
+}
+
+std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
+  const std::vector<std::uint32_t> robots = set_->robots();
+  constexpr std::size_t kFewRobots = 6;
+  std::vector<std::vector<const TrackView*>> units(robots.size() < kFewRobots ? views_.size() : robots.size());
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    if (views_[v].track->held_out) continue;
+    const auto robot = std::lower_bound(robots.begin(), robots.end(), views_[v].track->robot) - robots.begin();
+    units[robots.size() < kFewRobots ? v : static_cast<std::size_t>(robot)].push_back(&views_[v]);
+  }
+  std::erase_if(units, [](const auto& unit) { return unit.empty(); });
+  return units;
+}
+
+void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads) {
+  in_parallel(views_.size(), threads, [&](std::size_t v) {
+    TrackView& view = views_[v];
+    const Sample& first = view.track->samples.front();
+    if (TrackFilter::has_heading(first)) {
+      view.start_heading_rad = first.heading_rad;
+      view.start_heading_sd_rad = std::sqrt(model.noise.heading_rad2);
+      return;
+    }
+    // As many samples as it takes to move a good way, and no more than these.
+    constexpr std::size_t kMost = 200;
+    constexpr double kWay_mm = 60;
+    std::size_t samples = 2;
+    for (; samples < std::min(kMost, view.track->samples.size()); ++samples) {
+      const Sample& s = view.track->samples[samples];
+      if (std::hypot(s.x_mm - first.x_mm, s.y_mm - first.y_mm) > kWay_mm || TrackFilter::has_heading(s)) break;
+    }
+    const auto value = [&](double heading, double sd) {
+      view.start_heading_rad = heading;
+      view.start_heading_sd_rad = sd;
+      TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.run);
+      LogLikelihood likelihood;
+      walk(filter, view, samples + 1, likelihood);
+      return likelihood.sum;
+    };
+    double best = 0, best_value = -1e300;
+    const auto search = [&](double around, double spacing, int count, double sd) {
+      for (int i = -count; i <= count; ++i) {
+        const double heading = around + spacing * i, found = value(heading, sd);
+        if (found > best_value) {
+          best_value = found;
+          best = heading;
+        }
+      }
+    };
+    search(0, M_PI / 8, 8, 0.25);
+    best_value = -1e300;
+    search(best, M_PI / 40, 3, 0.08);
+    view.start_heading_rad = wrapped_angle(best);
+    view.start_heading_sd_rad = 0.3;
+  });
+}
+
+std::vector<Block> blocks_of(const MotionModel& model) {
+  std::vector<Block> blocks;
+  for (const Term& term : model.terms) blocks.insert(blocks.end(), term.blocks.begin(), term.blocks.end());
+  return blocks;
+}
+
+void Fitter::fit_noise(MotionModel& model) const {
+  // Tracks spread over the whole set, until there are enough samples.
+  constexpr std::size_t kEnough = 12000;
+  std::vector<const TrackView*> chosen;
+  std::vector<const TrackView*> all;
+  for (const TrackView& view : set_.views())
+    if (!view.track->held_out) all.push_back(&view);
+  std::size_t samples = 0;
+  for (std::size_t i = 0; i < all.size() && samples < kEnough; ++i) {
+    chosen.push_back(all[(i * 7919) % all.size()]);
+    samples += chosen.back()->track->samples.size();
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  const bool headings = set_.set().has_headings;
+  const auto parts_at = [&](const NoiseVector& at) {
+    MotionModel trial = model;
+    trial.noise = to_noise(at);
+    std::vector<std::vector<double>> parts(chosen.size());
+    in_parallel(chosen.size(), threads_, [&](std::size_t i) {
+      const TrackView& view = *chosen[i];
+      RobotBias bias = trial.bias_of(view.track->robot);
+      bias.covariance.setZero();
+      TrackFilter filter(trial, bias, view.track->robot, view.run);
+      LogLikelihood likelihood;
+      walk(filter, view, view.track->samples.size(), likelihood);
+      parts[i] = std::move(likelihood.parts);
+    });
+    std::vector<double> flat;
+    for (const auto& p : parts) flat.insert(flat.end(), p.begin(), p.end());
+    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(flat.data(), static_cast<Eigen::Index>(flat.size())));
+  };
+  // Noises beyond the data's reach are held near these by a weak prior, so that the search has an end.
+  const NoiseVector middle = to_vector(Noise{});
+  const double weak = 1.0 / (6 * 6);
+  const auto prior = [&](const NoiseVector& at) { return -0.5 * weak * (at - middle).squaredNorm(); };
+
+  NoiseVector at = to_vector(model.noise);
+  Eigen::VectorXd here = parts_at(at);
+  double value = here.sum() + prior(at);
+  constexpr double kStep = 0.05;
+  for (int pass = 0; pass < 12; ++pass) {
+    Eigen::MatrixXd slopes(here.size(), kNoises);
+    for (int i = 0; i < kNoises; ++i) {
+      if (i == 5 && !headings) {
+        slopes.col(i).setZero();
+        continue;
+      }
+      NoiseVector up = at;
+      up[i] += kStep;
+      slopes.col(i) = (parts_at(up) - here) / kStep;
+    }
+    const NoiseVector gradient = slopes.colwise().sum().transpose() - weak * (at - middle);
+    const Eigen::RowVectorXd mean = slopes.colwise().mean();
+    const Eigen::MatrixXd centred = slopes.rowwise() - mean;
+    Eigen::MatrixXd fisher = centred.transpose() * centred;
+    fisher.diagonal().array() += weak + 1e-3;
+    NoiseVector move = fisher.ldlt().solve(gradient);
+    const double longest = move.cwiseAbs().maxCoeff();
+    if (longest > 2) move *= 2 / longest;
+    bool better = false;
+    for (int halve = 0; halve < 5 && !better; ++halve, move *= 0.4) {
+      const NoiseVector trial = at + move;
+      const Eigen::VectorXd there = parts_at(trial);
+      const double found = there.sum() + prior(trial);
+      if (found <= value) continue;
+      const double gained = found - value;
+      at = trial;
+      here = there;
+      value = found;
+      better = true;
+      if (gained < 0.5) pass = 100;
+    }
+    if (!better) break;
+  }
+  model.noise = to_noise(at);
+}
+
+void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {
+  const BaseParameters seed;
+  const auto add = [&](Eigen::Index i, double from, double sd) {
+    information(i, i) += 1 / (sd * sd);
+    score[i] += from / (sd * sd);
+  };
+  add(kStraightSpeed, seed.straight_mm_s - model.base.straight_mm_s, prior_.straight_mm_s);
+  add(kTurnSpeed, seed.turn_mm_s - model.base.turn_mm_s, prior_.turn_mm_s);
+  add(kWheelBase, seed.wheel_base_mm - model.base.wheel_base_mm, prior_.wheel_base_mm);
+  add(kAheadPoint, seed.ahead_mm - model.base.ahead_mm, prior_.point_mm);
+  add(kLeftPoint, seed.left_mm - model.base.left_mm, prior_.point_mm / 4);
+}
+
+void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eigen::VectorXd& step) {
+  const auto limited = [](double value, double most) { return std::clamp(value, -most, most); };
+  model.base.straight_mm_s += limited(step[kStraightSpeed], 20);
+  model.base.turn_mm_s += limited(step[kTurnSpeed], 20);
+  model.base.wheel_base_mm = std::clamp(model.base.wheel_base_mm + limited(step[kWheelBase], 3), 10.0, 60.0);
+  model.base.ahead_mm += limited(step[kAheadPoint], 8);
+  model.base.left_mm += limited(step[kLeftPoint], 8);
+  Eigen::Index first = kBaseColumns;
+  for (Term& term : model.terms) {
+    term.coefficients += step.segment(first, term.coefficients.size());
+    first += term.coefficients.size();
+  }
+  // A robot may be several units (tracks): its bias is their mean by precision.
+  std::map<std::uint32_t, std::pair<Eigen::Matrix2d, Eigen::Vector2d>> sums;
+  for (const Unit& unit : units) {
+    const RobotBias was = model.bias_of(unit.robot);
+    const Eigen::Vector2d bias = was.mean_mm_s + unit.bias_step - unit.bias_by_column * step;
+    const Eigen::Matrix2d precision = unit.bias_covariance.inverse();
+    auto [sum, made] = sums.try_emplace(unit.robot, Eigen::Matrix2d::Zero(), Eigen::Vector2d::Zero());
+    sum->second.first += precision;
+    sum->second.second += precision * bias;
+  }
+  double sum = 0, square = 0, count = 0;
+  for (const auto& [robot, s] : sums) {
+    RobotBias& bias = model.robots[robot];
+    bias.covariance = s.first.inverse();
+    bias.mean_mm_s = (bias.covariance * s.second).cwiseMax(-15).cwiseMin(15);
+    sum += bias.mean_mm_s.sum();
+    square += bias.mean_mm_s.squaredNorm() + bias.covariance.trace();
+    count += 2;
+  }
+  // The distribution of biases, held near the seed's where robots are few.
+  const BaseParameters seed;
+  constexpr double kSeedRobots = 4;
+  const double mean = sum / (count + kSeedRobots);
+  const double variance =
+      (square - 2 * mean * sum + count * mean * mean + kSeedRobots * seed.bias_sd_mm_s * seed.bias_sd_mm_s) /
+      (count + kSeedRobots);
+  model.base.bias_mean_mm_s = mean;
+  model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
+}
+
+void Fitter::fit(MotionModel& model, int passes) const {
+  const std::vector<Block> blocks = blocks_of(model);
+  for (int pass = 0; pass < passes; ++pass) {
+    set_.find_headings(model, threads_);
+    if (pass != 1) fit_noise(model);
+    const std::vector<Unit> units = linearise(model, set_.units(), blocks, {100, threads_});
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());
+    Eigen::VectorXd score = Eigen::VectorXd::Zero(information.rows());
+    for (const Unit& unit : units) {
+      information += unit.information;
+      score += unit.score;
+    }
+    add_base_prior(model, information, score);
+    Eigen::Index first = kBaseColumns;
+    for (const Term& term : model.terms) {
+      const Eigen::Index n = term.coefficients.size();
+      information.diagonal().segment(first, n) += term.precision;
+      score.segment(first, n) -= term.precision.cwiseProduct(term.coefficients);
+      first += n;
+    }
+    const Eigen::VectorXd step = information.ldlt().solve(score);
+    apply(model, units, step);
+  }
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,67 @@
+/// Fits the model to the tracks of a set: noise by maximum likelihood, everything else by Gauss-Newton steps on the
+/// likelihood of the filter's innovations, biases of robots with the distribution of all as their prior.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "clients/identify/linearise.hpp"
+
+namespace kilotwin::identify {
+
+/// The tracks of a set, ready to be walked along.
+class PreparedSet {
+ public:
+  explicit PreparedSet(const MeasuredSet&);
+
+  [[nodiscard]] const MeasuredSet& set() const { return *set_; }
+  [[nodiscard]] std::vector<TrackView>& views() { return views_; }
+  [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
+  [[nodiscard]] const RunNeighbours& neighbours(std::size_t run) const { return *neighbours_[run]; }
+  /// The tracks that may be fitted to, by unit: by robot, or each for itself where there are fewer than six robots.
+  [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
+  /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
+  void find_headings(const MotionModel&, std::uint32_t threads);
+
+ private:
+  const MeasuredSet* set_;
+  std::vector<std::unique_ptr<RunNeighbours>> neighbours_;
+  std::vector<TrackView> views_;
+};
+
+/// Prior standard deviations of the base parameters about the seed's values.
+struct BasePrior {
+  double straight_mm_s = 1, turn_mm_s = 2, wheel_base_mm = 2, point_mm = 10;
+  /// Where nobody knows what the robots were told: anything goes.
+  [[nodiscard]] static BasePrior unknown_commands() { return {50, 50, 0.5, 0.1}; }
+};
+
+class Fitter {
+ public:
+  Fitter(PreparedSet& set, std::uint32_t threads) : set_(set), threads_(threads) {
+    if (!set.set().has_commands) prior_ = BasePrior::unknown_commands();
+  }
+
+  /// Fits base, biases, noise and the coefficients of the model's terms. Few passes suffice from a fitted model.
+  void fit(MotionModel&, int passes) const;
+  /// The noise alone: a quasi-Newton search on the likelihood of some of the tracks.
+  void fit_noise(MotionModel&) const;
+  /// Information and score of the base's prior, added to those of the data.
+  void add_base_prior(const MotionModel&, Eigen::MatrixXd& information, Eigen::VectorXd& score) const;
+  /// Moves base parameters, terms and biases by a step in all columns.
+  static void apply(MotionModel&, const std::vector<Unit>&, const Eigen::VectorXd& step);
+
+  [[nodiscard]] std::uint32_t threads() const { return threads_; }
+  [[nodiscard]] PreparedSet& set() const { return set_; }
+
+ private:
+  PreparedSet& set_;
+  std::uint32_t threads_;
+  BasePrior prior_;
+};
+
+/// The blocks of all terms of a model, in order.
+[[nodiscard]] std::vector<Block> blocks_of(const MotionModel&);
+
+}  // namespace kilotwin::identify

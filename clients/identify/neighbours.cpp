@@ -1,0 +1,77 @@
+#include "clients/identify/neighbours.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilotwin::identify {
+
+NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm) {
+  NeighbourView view;
+  double nearest2 = view.nearest_mm * view.nearest_mm;
+  std::size_t nearest = robot;
+  const double reach2 = kNeighbourRadii_mm.back() * kNeighbourRadii_mm.back();
+  for (std::size_t other = 0; other < x_mm.size(); ++other) {
+    const double dx = x_mm[other] - x_mm[robot], dy = y_mm[other] - y_mm[robot], d2 = dx * dx + dy * dy;
+    if (other == robot || !(d2 <= std::max(reach2, nearest2))) continue;
+    if (d2 < nearest2) {
+      nearest2 = d2;
+      nearest = other;
+    }
+    for (std::size_t r = 0; r < kNeighbourRadii_mm.size(); ++r) {
+      const double part = 1 - d2 / (kNeighbourRadii_mm[r] * kNeighbourRadii_mm[r]);
+      if (part < 0) continue;
+      view.count[r] += 1;
+      view.density[r] += part * part;
+    }
+  }
+  if (nearest != robot) {
+    view.nearest_mm = std::sqrt(nearest2);
+    view.direction_rad = std::atan2(y_mm[nearest] - y_mm[robot], x_mm[nearest] - x_mm[robot]);
+  }
+  return view;
+}
+
+RunNeighbours::RunNeighbours(const Run& run) {
+  double end_s = -1e300;
+  start_s_ = 1e300;
+  for (const Track& track : run.tracks) {
+    if (track.samples.empty()) continue;
+    start_s_ = std::min(start_s_, track.samples.front().time_s);
+    end_s = std::max(end_s, track.samples.back().time_s);
+  }
+  const std::size_t robots = run.tracks.size();
+  if (robots < 2 || end_s < start_s_) return;
+  instants_ = static_cast<std::size_t>((end_s - start_s_) / kRaster_s) + 2;
+  views_.resize(robots * instants_);
+  std::vector<std::size_t> next(robots, 0);
+  std::vector<double> x(robots), y(robots);
+  for (std::size_t i = 0; i < instants_; ++i) {
+    const double t = start_s_ + static_cast<double>(i) * kRaster_s;
+    for (std::size_t r = 0; r < robots; ++r) {
+      const std::vector<Sample>& samples = run.tracks[r].samples;
+      while (next[r] < samples.size() && samples[next[r]].time_s <= t) ++next[r];
+      x[r] = y[r] = std::nan("");
+      if (next[r] == 0) continue;
+      const Sample& a = samples[next[r] - 1];
+      if (next[r] == samples.size()) {
+        if (t - a.time_s < kGap_s) x[r] = a.x_mm, y[r] = a.y_mm;
+        continue;
+      }
+      const Sample& b = samples[next[r]];
+      if (b.time_s - a.time_s > kGap_s) continue;
+      const double part = (t - a.time_s) / (b.time_s - a.time_s);
+      x[r] = a.x_mm + part * (b.x_mm - a.x_mm);
+      y[r] = a.y_mm + part * (b.y_mm - a.y_mm);
+    }
+    for (std::size_t r = 0; r < robots; ++r)
+      if (!std::isnan(x[r])) views_[r * instants_ + i] = view_of(r, x, y);
+  }
+}
+
+const NeighbourView& RunNeighbours::view(std::size_t track, double time_s) const {
+  if (instants_ == 0) return nobody_;
+  const double at = std::clamp((time_s - start_s_) / kRaster_s + 0.5, 0.0, static_cast<double>(instants_ - 1));
+  return views_[track * instants_ + static_cast<std::size_t>(at)];
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,31 @@
+/// The other robots as they were measured, between samples too.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "clients/identify/situation.hpp"
+
+namespace kilotwin::identify {
+
+/// One robot among others, all at one instant. Robots whose x is NaN are not there.
+[[nodiscard]] NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm);
+
+/// What each track of a run sees of the others, on a raster of time.
+class RunNeighbours {
+ public:
+  static constexpr double kRaster_s = 0.25;
+  /// A robot that was not measured for longer than this is not there, s.
+  static constexpr double kGap_s = 4;
+
+  explicit RunNeighbours(const Run&);
+  [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
+
+ private:
+  double start_s_ = 0;
+  std::size_t instants_ = 0;
+  std::vector<NeighbourView> views_;  ///< by track, then by instant
+  NeighbourView nobody_;
+};
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,82 @@
+#include "clients/identify/situation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kilotwin::identify {
+
+double wrapped_angle(double rad) { return std::remainder(rad, 2 * M_PI); }
+
+void CommandState::advance(double by_s) {
+  since_s += by_s;
+  if (left_on()) motor_s[0] += by_s;
+  if (right_on()) motor_s[1] += by_s;
+  if (driven()) driven_s += by_s;
+}
+
+double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
+  switch (axis.of) {
+    case Covariate::kNothing: return 0;
+    case Covariate::kTime: return s.time_s;
+    case Covariate::kX: return s.x_mm;
+    case Covariate::kY: return s.y_mm;
+    case Covariate::kRadius: return std::sqrt(s.x_mm * s.x_mm + s.y_mm * s.y_mm);
+    case Covariate::kHeading: return s.heading_rad;
+    case Covariate::kCommand: return static_cast<double>(s.commands.command);
+    case Covariate::kSinceCommand: return s.commands.since_s;
+    case Covariate::kMotorTime: return s.commands.motor_s[wheel];
+    case Covariate::kDrivenTime: return s.commands.driven_s;
+    case Covariate::kNeighbours: return s.near.count[axis.radius];
+    case Covariate::kNearest: return std::min(s.near.nearest_mm, kNeighbourRadii_mm[axis.radius]);
+    case Covariate::kDensity: return s.near.density[axis.radius];
+    case Covariate::kBearing:
+      return s.near.nearest_mm > kNeighbourRadii_mm[axis.radius]
+                 ? 0
+                 : wrapped_angle(s.near.direction_rad - s.heading_rad);
+    case Covariate::kPreviousCommand: return static_cast<double>(s.commands.previous);
+    case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
+    case Covariate::kRobot: return s.robot;
+    case Covariate::kRun: return s.run;
+  }
+  return 0;
+}
+
+CommandClock::CommandClock(const Track& track) {
+  CommandState state;
+  double now_s = 0;
+  for (const CommandChange& change : track.commands) {
+    const double at_s = std::max(change.time_s, 0.0);
+    if (!starts_s_.empty()) state.advance(at_s - now_s);
+    now_s = at_s;
+    state.previous = state.command;
+    state.command = change.motion;
+    state.since_s = 0;
+    if (change.motion == Motion::kLeft || change.motion == Motion::kRight) state.last_turn = change.motion;
+    if (!starts_s_.empty() && starts_s_.back() == at_s) {
+      states_.back() = state;  // nothing lasted
+      continue;
+    }
+    starts_s_.push_back(at_s);
+    states_.push_back(state);
+  }
+}
+
+std::size_t CommandClock::piece(double time_s) const {
+  const auto next = std::upper_bound(starts_s_.begin(), starts_s_.end(), time_s);
+  return next == starts_s_.begin() ? 0 : static_cast<std::size_t>(next - starts_s_.begin()) - 1;
+}
+
+CommandState CommandClock::at(double time_s) const {
+  const std::size_t p = piece(time_s);
+  CommandState state = states_[p];
+  state.advance(std::max(0.0, time_s - starts_s_[p]));
+  return state;
+}
+
+double CommandClock::next_change_s(double after_s) const {
+  const auto next = std::upper_bound(starts_s_.begin(), starts_s_.end(), after_s);
+  return next == starts_s_.end() ? std::numeric_limits<double>::infinity() : *next;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,93 @@
+/// What effects look at: one robot at one instant, and numbers of it by the names that model files know.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "clients/identify/measured_set.hpp"
+
+namespace kilotwin::identify {
+
+/// Radii within which robots count as neighbours, mm, centre to centre: touching, one robot between, within reach of a loud message.
+inline constexpr std::array<double, 4> kNeighbourRadii_mm = {40, 70, 100, 150};
+
+/// The other robots, seen from one.
+struct NeighbourView {
+  double nearest_mm = 1e9;             ///< centre to centre
+  double direction_rad = 0;            ///< to the nearest, from the x axis
+  std::array<double, 4> count = {};    ///< within kNeighbourRadii_mm
+  std::array<double, 4> density = {};  ///< sum of (1 - (distance / radius)^2)^2
+};
+
+/// What the commands of a robot say of an instant.
+struct CommandState {
+  Motion command = Motion::kStop, previous = Motion::kStop, last_turn = Motion::kStop;
+  double since_s = 0;                      ///< since the command changed
+  std::array<double, 2> motor_s = {0, 0};  ///< for which the motor of the left, of the right wheel has turned
+  double driven_s = 0;                     ///< for which either has
+
+  [[nodiscard]] bool driven() const { return command != Motion::kStop; }
+  [[nodiscard]] bool left_on() const { return command == Motion::kStraight || command == Motion::kRight; }
+  [[nodiscard]] bool right_on() const { return command == Motion::kStraight || command == Motion::kLeft; }
+  /// `by_s` later, under the same command.
+  void advance(double by_s);
+};
+
+struct Situation {
+  double time_s = 0;
+  double x_mm = 0, y_mm = 0;  ///< of the disc's centre
+  double heading_rad = 0;
+  CommandState commands;
+  NeighbourView near;
+  std::uint32_t robot = 0;  ///< its number
+  std::uint32_t run = 0;    ///< place in the set
+};
+
+enum class Covariate : std::uint8_t {
+  kNothing,
+  kTime,
+  kX,
+  kY,
+  kRadius,
+  kHeading,
+  kCommand,
+  kSinceCommand,
+  kMotorTime,  ///< of the wheel's own motor
+  kDrivenTime,
+  kNeighbours,  ///< within radius
+  kNearest,     ///< at most radius
+  kDensity,
+  kBearing,  ///< to the nearest, from the heading
+  kPreviousCommand,
+  kLastTurn,
+  kRobot,
+  kRun,
+};
+
+struct Axis {
+  Covariate of = Covariate::kNothing;
+  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm
+
+  bool operator==(const Axis&) const = default;
+};
+
+/// `wheel`: 0 left, 1 right; matters to kMotorTime alone.
+[[nodiscard]] double value_of(const Axis&, const Situation&, std::size_t wheel);
+[[nodiscard]] double wrapped_angle(double rad);
+
+/// The commands of a track, piece by piece.
+class CommandClock {
+ public:
+  explicit CommandClock(const Track&);
+  /// At a time: of the command that then starts or lasts.
+  [[nodiscard]] CommandState at(double time_s) const;
+  /// The first change after that time; infinite where there is none.
+  [[nodiscard]] double next_change_s(double after_s) const;
+
+ private:
+  [[nodiscard]] std::size_t piece(double time_s) const;
+  std::vector<double> starts_s_;
+  std::vector<CommandState> states_;  ///< at the start of each piece
+};
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,221 @@
+#include "clients/identify/track_filter.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+
+namespace kilotwin::identify {
+namespace {
+
+/// Squared distances beyond which a measurement is an outlier: what normal noise exceeds once in about 1e5 times, of 2 and 3 numbers.
+constexpr double kGate2 = 23, kGate3 = 25.9;
+/// So many far outliers in a row mean that the robot is elsewhere.
+constexpr int kLostAfter = 4;
+constexpr double kFar = 60;
+
+}  // namespace
+
+TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run)
+    : model_(&model), measures_(model.measures()) {
+  belief_.mean.tail<2>() = bias.mean_mm_s;
+  belief_.covariance.bottomRightCorner<2, 2>() = bias.covariance;
+  place_.robot = robot;
+  place_.run = run;
+}
+
+void TrackFilter::start(const Sample& sample, const Situation&, double heading_rad, double heading_sd_rad) {
+  const BaseParameters& base = model_->base;
+  const double c = std::cos(heading_rad), s = std::sin(heading_rad);
+  const double variance = heading_sd_rad * heading_sd_rad;
+  // The point is where it was seen; the reference point lies behind it, wherever that is.
+  Eigen::Vector3d by_heading(base.ahead_mm * s + base.left_mm * c, -base.ahead_mm * c + base.left_mm * s, 1);
+  belief_.mean.head<3>() << sample.x_mm - base.ahead_mm * c + base.left_mm * s,
+      sample.y_mm - base.ahead_mm * s - base.left_mm * c, heading_rad;
+  belief_.covariance.topRows<3>().setZero();
+  belief_.covariance.leftCols<3>().setZero();
+  belief_.covariance.topLeftCorner<3, 3>() = variance * by_heading * by_heading.transpose();
+  belief_.covariance(0, 0) += model_->noise.position_mm2;
+  belief_.covariance(1, 1) += model_->noise.position_mm2;
+  if (measures_) {
+    // What the tracker adds is taken off.
+    Situation at = situation(sample.time_s, CommandState{}, {});
+    for (int pass = 0; pass < 3; ++pass) {
+      const Eigen::Vector3d seen = model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], at);
+      belief_.mean[0] += sample.x_mm - seen[0];
+      belief_.mean[1] += sample.y_mm - seen[1];
+    }
+  }
+  outliers_ = 0;
+}
+
+Situation TrackFilter::situation(double time_s, const CommandState& commands, const NeighbourView& near) const {
+  Situation s = place_;
+  s.time_s = time_s;
+  s.heading_rad = belief_.mean[2];
+  s.x_mm = belief_.centre_x_mm();
+  s.y_mm = belief_.centre_y_mm();
+  s.commands = commands;
+  s.near = near;
+  return s;
+}
+
+StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
+  StepRecord record;
+  record.h_s = h_s;
+  record.middle = situation(time_s + h_s / 2, commands, near);
+  record.middle.commands.advance(h_s / 2);
+  if (!model_->terms.empty() && commands.driven()) {
+    // Half a step ahead by the base model, for what depends on the pose.
+    Rates plain;
+    const Eigen::Vector2d v = nominal_speeds(model_->base, commands.command) + belief_.mean.tail<2>();
+    plain.left_mm_s = v[0];
+    plain.right_mm_s = v[1];
+    const Arc half = arc_of(plain, model_->base.wheel_base_mm, belief_.mean[2], h_s / 2);
+    record.middle.heading_rad += half.dheading_rad;
+    record.middle.x_mm = belief_.mean[0] + half.dx_mm + kAxleOffset_mm * std::cos(record.middle.heading_rad);
+    record.middle.y_mm = belief_.mean[1] + half.dy_mm + kAxleOffset_mm * std::sin(record.middle.heading_rad);
+  }
+  record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
+  record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
+  spread(record);
+  belief_.mean[0] += record.arc.dx_mm;
+  belief_.mean[1] += record.arc.dy_mm;
+  belief_.mean[2] += record.arc.dheading_rad;
+  return record;
+}
+
+/// The covariance at the end of the step: what was uncertain moves along, and the noise of the step comes in.
+void TrackFilter::spread(const StepRecord& record) {
+  const double h = record.h_s, base = model_->base.wheel_base_mm;
+  const Arc& arc = record.arc;
+  const double world_x = record.rates.world_x_mm_s * h, world_y = record.rates.world_y_mm_s * h;
+  Eigen::Matrix<double, 3, 2> by_wheel;  // pose by the wheels' ways
+  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 * h;
+  // A turn within the step also bends the rest of it.
+  const double bend_x = -arc.along_y * forward / 2, bend_y = arc.along_x * forward / 2;
+  by_wheel << arc.along_x / 2 - bend_x / base, arc.along_x / 2 + bend_x / base,  //
+      arc.along_y / 2 - bend_y / base, arc.along_y / 2 + bend_y / base,          //
+      -1 / base, 1 / base;
+  StateCovariance& p = belief_.covariance;
+  Eigen::Matrix<double, 5, 5> f = Eigen::Matrix<double, 5, 5>::Identity();
+  f(0, 2) = -(arc.dy_mm - world_y);
+  f(1, 2) = arc.dx_mm - world_x;
+  const Noise& noise = model_->noise;
+  Eigen::Vector3d own = Eigen::Vector3d::Constant(noise.drift_mm2_s * h);
+  own[2] = 1e-9 * h;
+  if (record.middle.commands.driven()) {
+    f.col(3).head<3>() = h * record.rates.left_gain * by_wheel.col(0);
+    f.col(4).head<3>() = h * record.rates.right_gain * by_wheel.col(1);
+    own[2] += noise.heading_rad2_s * h;
+  }
+  p = (f * p * f.transpose()).eval();
+  if (record.middle.commands.driven()) {
+    const double left = record.rates.left_mm_s, right = record.rates.right_mm_s;
+    const Eigen::Vector2d wheels(h * (noise.factor_s * left * left + noise.wheel_mm2_s),
+                                 h * (noise.factor_s * right * right + noise.wheel_mm2_s));
+    p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
+  }
+  p.diagonal().head<3>() += own;
+}
+
+void TrackFilter::step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
+  const State before = belief_.mean;
+  const StateCovariance p = belief_.covariance;
+  const StepRecord record = step(time_s, h_s, commands, near);
+  // With a normal heading of variance P, E[cos] = cos exp(-P / 2), and speeds that go with the heading shift it.
+  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 + record.rates.ahead_mm_s;
+  const double shrink = std::exp(-p(2, 2) / 2);
+  const double together = (record.rates.left_gain * p(2, 3) + record.rates.right_gain * p(2, 4)) / 2;
+  const double cx = record.arc.along_x * shrink, cy = record.arc.along_y * shrink;
+  const Rates& r = record.rates;
+  belief_.mean[0] = before[0] + h_s * (forward * cx - together * cy - r.sideways_mm_s * cy + r.world_x_mm_s);
+  belief_.mean[1] = before[1] + h_s * (forward * cy + together * cx + r.sideways_mm_s * cx + r.world_y_mm_s);
+}
+
+Eigen::Matrix3d TrackFilter::jacobian(const Situation& at) const {
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+  const State& m = belief_.mean;
+  if (!measures_) {
+    const BaseParameters& base = model_->base;
+    const double c = std::cos(m[2]), s = std::sin(m[2]);
+    h(0, 2) = -base.ahead_mm * s - base.left_mm * c;
+    h(1, 2) = base.ahead_mm * c - base.left_mm * s;
+    return h;
+  }
+  const double steps[] = {0.5, 0.5, 1e-3};
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Vector3d d = Eigen::Vector3d::Zero();
+    d[i] = steps[i];
+    h.col(i) = (model_->measured(m[0] + d[0], m[1] + d[1], m[2] + d[2], at) -
+                model_->measured(m[0] - d[0], m[1] - d[1], m[2] - d[2], at)) /
+               (2 * steps[i]);
+  }
+  return h;
+}
+
+Eigen::Vector3d TrackFilter::expected(double time_s, const CommandState& commands) const {
+  return model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], situation(time_s, commands, {}));
+}
+
+double TrackFilter::expected_spread_mm2(double time_s, const CommandState& commands) const {
+  const Eigen::Matrix3d h = jacobian(situation(time_s, commands, {}));
+  const Eigen::Matrix3d s = h * belief_.covariance.topLeftCorner<3, 3>() * h.transpose();
+  return s(0, 0) + s(1, 1);
+}
+
+Innovation TrackFilter::update(const Sample& sample, const CommandState& commands) {
+  Innovation out;
+  out.size = has_heading(sample) ? 3 : 2;
+  out.pose = belief_.mean.head<3>();
+  const Situation at = situation(sample.time_s, commands, {});
+  const Eigen::Vector3d seen = model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], at);
+  out.jacobian = jacobian(at);
+  out.difference << sample.x_mm - seen[0], sample.y_mm - seen[1],
+      out.size == 3 ? wrapped_angle(sample.heading_rad - seen[2]) : 0.0;
+  if (out.size == 2) out.jacobian.row(2).setZero();
+  const Noise& noise = model_->noise;
+  const Eigen::Matrix<double, 5, 3> ph = belief_.covariance.leftCols<3>() * out.jacobian.transpose();
+  Eigen::Matrix3d s = out.jacobian * ph.topRows<3>();
+  s(0, 0) += noise.position_mm2;
+  s(1, 1) += noise.position_mm2;
+  s(2, 2) = out.size == 3 ? s(2, 2) + noise.heading_rad2 : 1;
+  Eigen::Matrix3d inverse = s.inverse();
+  out.distance2 = out.difference.dot(inverse * out.difference);
+  double factor = 1;
+  const double gate = out.size == 3 ? kGate3 : kGate2;
+  if (out.distance2 > gate) {
+    factor = out.distance2 / gate;
+    out.weight = 1 / factor;
+    outliers_ = out.distance2 > kFar ? outliers_ + 1 : 0;
+  } else {
+    outliers_ = 0;
+  }
+  out.log_likelihood = -0.5 * (std::log(s.determinant()) + out.size * std::log(factor) + out.distance2 / factor);
+  if (outliers_ >= kLostAfter) {
+    // Wherever it was, it is here now; which way it points is unknown unless it is measured.
+    out.lost = true;
+    start(sample, at, out.size == 3 ? sample.heading_rad : belief_.mean[2],
+          out.size == 3 ? std::sqrt(noise.heading_rad2) : 1.8);
+    return out;
+  }
+  s *= factor;
+  inverse /= factor;
+  out.covariance = s;
+  out.gain = ph * inverse;
+  belief_.mean += out.gain * out.difference;
+  // Joseph's form keeps the covariance positive.
+  Eigen::Matrix<double, 5, 5> keep = Eigen::Matrix<double, 5, 5>::Identity();
+  keep.leftCols<3>() -= out.gain * out.jacobian;
+  // The factor enlarged the whole innovation; its share of the prior is put to the tracker.
+  Eigen::Matrix3d tracker = s - out.jacobian * ph.topRows<3>();
+  if (out.size == 2) {
+    tracker.row(2).setZero();
+    tracker.col(2).setZero();
+  }
+  belief_.covariance =
+      (keep * belief_.covariance * keep.transpose() + out.gain * tracker * out.gain.transpose()).eval();
+  belief_.covariance = (0.5 * (belief_.covariance + belief_.covariance.transpose())).eval();
+  return out;
+}
+
+}  // namespace kilotwin::identify

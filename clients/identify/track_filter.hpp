@@ -1,0 +1,82 @@
+/// Where a robot is, by all that was measured of it so far: an extended Kalman filter over its pose and its two biases. The
+/// tracker's noise and the motion's are apart; outliers count less; a robot that was carried away is found again.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "clients/identify/motion_model.hpp"
+
+namespace kilotwin::identify {
+
+using State = Eigen::Matrix<double, 5, 1>;  ///< x, y of the drive's reference point, heading, bias left, bias right
+using StateCovariance = Eigen::Matrix<double, 5, 5>;
+
+struct Belief {
+  State mean = State::Zero();
+  StateCovariance covariance = StateCovariance::Zero();
+
+  /// Of the disc's centre.
+  [[nodiscard]] double centre_x_mm() const { return mean[0] + kAxleOffset_mm * std::cos(mean[2]); }
+  [[nodiscard]] double centre_y_mm() const { return mean[1] + kAxleOffset_mm * std::sin(mean[2]); }
+};
+
+/// Sub-steps are no longer than this, s.
+inline constexpr double kSubStep_s = 0.125;
+
+/// One sub-step, linearised: how the pose at its end depends on things at its start.
+struct StepRecord {
+  Situation middle;  ///< where covariates were looked at
+  Rates rates;
+  Arc arc;
+  double h_s = 0;
+};
+
+/// A measurement taken in.
+struct Innovation {
+  int size = 0;  ///< 2 or 3: with the heading
+  Eigen::Vector3d difference = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d jacobian = Eigen::Matrix3d::Identity();  ///< of what is measured by the pose
+  Eigen::Matrix<double, 5, 3> gain = Eigen::Matrix<double, 5, 3>::Zero();
+  Eigen::Vector3d pose = Eigen::Vector3d::Zero();  ///< as expected, before the measurement was taken in
+  double distance2 = 0;                            ///< squared Mahalanobis distance
+  double log_likelihood = 0;
+  double weight = 1;  ///< below 1: an outlier
+  bool lost = false;  ///< the filter had lost the robot and starts anew here
+};
+
+class TrackFilter {
+ public:
+  TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run);
+
+  /// At the first sample; `heading_rad` replaces a measured heading, with that standard deviation.
+  void start(const Sample&, const Situation& at, double heading_rad, double heading_sd_rad);
+  [[nodiscard]] static bool has_heading(const Sample& sample) { return !std::isnan(sample.heading_rad); }
+
+  /// A sub-step of `h_s` under one command, `commands` being the state at its start.
+  StepRecord step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
+  /// The same with the mean as the mean of all headings that are possible, not the way of the mean heading: for predictions.
+  void step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
+  Innovation update(const Sample&, const CommandState& commands);
+
+  [[nodiscard]] const Belief& belief() const { return belief_; }
+  [[nodiscard]] Belief& belief() { return belief_; }
+  /// What the tracker would see, and its covariance without the tracker's noise, mm^2.
+  [[nodiscard]] Eigen::Vector3d expected(double time_s, const CommandState& commands) const;
+  [[nodiscard]] double expected_spread_mm2(double time_s, const CommandState& commands) const;
+
+ private:
+  [[nodiscard]] Situation situation(double time_s, const CommandState&, const NeighbourView&) const;
+  [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
+  void spread(const StepRecord&);
+
+  const MotionModel* model_;
+  Belief belief_;
+  Situation place_;   ///< robot and run
+  int outliers_ = 0;  ///< in a row
+  bool measures_;
+};
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,235 @@
+// Judges `kilotwin identify`: plays the scenes of tests/identify/truth, has each identified, and prints the errors before and
+// after beside those of an oracle, whether causes were named, and what was found where nothing is. Ends with status 1 where
+// anything misses.
+// Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] [SCENE]...
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/identify/truth/files.hpp"
+#include "tests/identify/truth/oracle.hpp"
+#include "tests/identify/truth/play.hpp"
+#include "tests/identify/truth/scenarios.hpp"
+#include "tests/identify/verdict.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace kilotwin::truth;
+
+constexpr double kHorizon_s = 10;
+// The share of data sets without an effect in which something may be found.
+constexpr double kFalseAlarms = 0.01;
+
+struct Arguments {
+  std::string program = KILOTWIN_PROGRAM;
+  std::uint64_t seed = 1;
+  fs::path keep;
+  bool small = false;
+  int nothing = 0;
+  int jobs = 1;
+  std::vector<std::string> scenes;
+};
+
+int usage() {
+  fmt::print(
+      stderr,
+      "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] [SCENE]...\n"
+      "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
+      fmt::join(scenario_names(), " "));
+  return 2;
+}
+
+/// A directory that goes with the object, unless it is to be kept.
+class Folder {
+ public:
+  explicit Folder(const fs::path& keep) : path_(keep), kept_(!keep.empty()) {
+    if (kept_) return;
+    std::string pattern = (fs::temp_directory_path() / "kilotwin-judge-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no scratch directory can be made");
+    path_ = pattern;
+  }
+  ~Folder() {
+    std::error_code ignored;
+    if (!kept_) fs::remove_all(path_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+  bool kept_;
+};
+
+/// Half the robots and two thirds of the time: for a quick look.
+Scene smaller(Scene scene) {
+  scene.robots = std::max(8, scene.robots / 2);
+  scene.width_mm *= 0.75;
+  scene.height_mm *= 0.75;
+  scene.train_s *= 0.75;
+  scene.test_runs = 1;
+  return scene;
+}
+
+std::string in_quotes(const fs::path& path) { return "'" + path.string() + "'"; }
+
+Verdict try_scene(const Arguments& arguments, const Scene& scene, std::uint64_t seed, int samples,
+                  const fs::path& folder) {
+  const Play played = play(scene, seed);
+  write_data(scene, played.train, folder / "train");
+  write_data(scene, played.test, folder / "test");
+  std::vector<Prediction> oracle;
+  for (const auto& run : played.test) {
+    const std::vector<Prediction> of_run = predict(scene, played.individuals, run, kHorizon_s, samples, seed + 1);
+    oracle.insert(oracle.end(), of_run.begin(), of_run.end());
+  }
+  const fs::path out = folder / "out";
+  fs::remove_all(out);
+  const std::string command = fmt::format("{} identify --train {} --test {} --out {} > {} 2>&1",
+                                          in_quotes(arguments.program), in_quotes(folder / "train"),
+                                          in_quotes(folder / "test"), in_quotes(out), in_quotes(folder / "log"));
+  const auto start = std::chrono::steady_clock::now();
+  const int status = std::system(command.c_str());
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  Verdict verdict;
+  if (status == 0) {
+    verdict = judge(scene, oracle, out);
+  } else {
+    std::ifstream log(folder / "log");
+    std::string line, last;
+    while (std::getline(log, line)) last = line;
+    verdict.scene = scene.name;
+    verdict.failure = fmt::format("status {}: {}", status, last);
+  }
+  verdict.seconds = seconds;
+  return verdict;
+}
+
+void print_header() {
+  fmt::print("{:20} {:>8} {:>8} {:>8} {:>6} | {:>8} {:>8} {:>8} {:>6} | {:>6} {:>5} {:>5}  {}\n", "scene", "before",
+             "after", "oracle", "ratio", "from20s", "after", "oracle", "ratio", "named", "false", "s", "found");
+}
+
+void print_row(const Verdict& v) {
+  if (!v.failure.empty()) {
+    fmt::print("{:20} {}\n", v.scene, v.failure);
+    return;
+  }
+  fmt::print(
+      "{:20} {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:8.2f} {:8.2f} {:8.2f} {:6.3f} | {:>6} {:5} {:5.0f}  {}{}{}{}\n",
+      v.scene, v.before_mm, v.after_mm, v.oracle_mm, v.after_mm / v.oracle_mm, v.later_before_mm, v.later_after_mm,
+      v.later_oracle_mm, v.later_after_mm / v.later_oracle_mm, fmt::format("{}/{}", v.named, v.causes),
+      v.false_findings.size(), v.seconds, fmt::join(v.found, ", "),
+      v.unnamed.empty() ? "" : fmt::format("; not named: {}", fmt::join(v.unnamed, ", ")),
+      v.missing_rows == 0 ? "" : fmt::format("; {} rows missing", v.missing_rows), v.good() ? "" : "  <-");
+  std::fflush(stdout);
+}
+
+/// Runs `job(i)` for 0..count-1 on so many threads.
+template <class Job> void share_out(int count, int threads, Job job) {
+  std::atomic<int> next = 0;
+  std::vector<std::jthread> crew;
+  for (int t = 0; t < threads; ++t) {
+    crew.emplace_back([&] {
+      for (int i = next++; i < count; i = next++) job(i);
+    });
+  }
+}
+
+/// Returns how many scenes miss.
+int judge_scenes(const Arguments& arguments, const fs::path& folder) {
+  int misses = 0;
+  std::mutex printing;
+  print_header();
+  share_out(static_cast<int>(arguments.scenes.size()), arguments.jobs, [&](int i) {
+    Scene scene = scenario(arguments.scenes[static_cast<std::size_t>(i)]);
+    if (arguments.small) scene = smaller(std::move(scene));
+    const Verdict verdict =
+        try_scene(arguments, scene, arguments.seed, arguments.small ? 30 : 100, folder / scene.name);
+    const std::lock_guard lock(printing);
+    print_row(verdict);
+    if (!verdict.good()) ++misses;
+  });
+  fmt::print(
+      "{} of {} scenes as good as they must be: error at or below {:.2f} of the oracle's, every cause named, "
+      "nothing else\n",
+      static_cast<int>(arguments.scenes.size()) - misses, arguments.scenes.size(), Verdict::kRatio);
+  return misses;
+}
+
+/// Returns in how many sets without an effect something was found, or nothing could be judged.
+int judge_nothing(const Arguments& arguments, const fs::path& folder) {
+  int alarms = 0;
+  std::mutex printing;
+  std::vector<double> ratios;
+  share_out(arguments.nothing, arguments.jobs, [&](int i) {
+    const std::uint64_t seed = arguments.seed * 1000 + static_cast<std::uint64_t>(i);
+    const Scene scene = nothing_to_find(seed);
+    const Verdict verdict = try_scene(arguments, scene, seed, 20, folder / scene.name);
+    const std::lock_guard lock(printing);
+    if (verdict.failure.empty()) ratios.push_back(verdict.later_after_mm / verdict.later_oracle_mm);
+    if (verdict.failure.empty() && verdict.false_findings.empty()) return;
+    ++alarms;
+    print_row(verdict);
+  });
+  std::sort(ratios.begin(), ratios.end());
+  fmt::print("{} of {} sets without an effect with something found; error over the oracle's, median {:.3f}\n",
+             alarms, arguments.nothing, ratios.empty() ? 0 : ratios[ratios.size() / 2]);
+  return alarms;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  try {
+    for (int i = 1; i < argc; ++i) {
+      const std::string word = argv[i];
+      if (word == "--small") {
+        arguments.small = true;
+      } else if (word.rfind("--", 0) != 0) {
+        scenario(word);
+        arguments.scenes.push_back(word);
+      } else if (i + 1 == argc) {
+        return usage();
+      } else if (word == "--program") {
+        arguments.program = argv[++i];
+      } else if (word == "--seed") {
+        arguments.seed = std::stoull(argv[++i]);
+      } else if (word == "--keep") {
+        arguments.keep = argv[++i];
+      } else if (word == "--nothing") {
+        arguments.nothing = std::stoi(argv[++i]);
+      } else if (word == "--jobs") {
+        arguments.jobs = std::stoi(argv[++i]);
+      } else {
+        return usage();
+      }
+    }
+    if (arguments.scenes.empty() && arguments.nothing == 0) {
+      arguments.scenes = scenario_names();
+      arguments.nothing = 300;
+    }
+    const Folder folder(arguments.keep);
+    bool good = true;
+    if (!arguments.scenes.empty()) good = judge_scenes(arguments, folder.path()) == 0;
+    // With so few sets that the bound is below one, none may sound.
+    if (arguments.nothing > 0)
+      good = judge_nothing(arguments, folder.path()) <= kFalseAlarms * arguments.nothing && good;
+    return good ? 0 : 1;
+  } catch (const std::invalid_argument&) {
+    return usage();
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "judge: {}\n", error.what());
+    return 1;
+  }
+}

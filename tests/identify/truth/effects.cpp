@@ -1,0 +1,283 @@
+#include "tests/identify/truth/effects.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilotwin::truth {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+void slow_both(Push& push, double factor) {
+  push.gain.left *= factor;
+  push.gain.right *= factor;
+}
+
+double square(double x) { return x * x; }
+
+}  // namespace
+
+Effect battery_by_the_clock(double strength) {
+  return {"battery-by-the-clock",
+          "both wheels run at 1 - 0.40 q / (1 + q) of their speed, q = (t / 85 s)^3",
+          {{"time"}},
+          {"motor_time", "robot"},
+          [=](const Situation& at, Push& push) {
+            const double q = std::pow(at.time_s / 85, 3);
+            slow_both(push, 1 - 0.40 * strength * q / (1 + q));
+          },
+          {}};
+}
+
+Effect fatigue_of_motors(double strength) {
+  return {"fatigue-of-motors",
+          "a wheel runs at 1 / (1 + 0.5 (u / 80 s)^1.6) of its speed, u = time that its own motor has run",
+          {{"motor_time"}},
+          {"time"},
+          [=](const Situation& at, Push& push) {
+            push.gain.left /= 1 + 0.5 * strength * std::pow(at.driven_s.left / 80, 1.6);
+            push.gain.right /= 1 + 0.5 * strength * std::pow(at.driven_s.right / 80, 1.6);
+          },
+          {}};
+}
+
+Effect slow_start(double strength) {
+  return {
+      "slow-start",
+      "speed is 1 - 0.75 / (1 + (s / 0.9 s)^4) + 0.25 exp(-((s - 2.6 s) / 0.8 s)^2), s = time since the command",
+      {{"time_since_command"}},
+      {"time"},
+      [=](const Situation& at, Push& push) {
+        const double s = at.since_change_s;
+        slow_both(push,
+                  1 - strength * (0.75 / (1 + std::pow(s / 0.9, 4)) - 0.25 * std::exp(-square((s - 2.6) / 0.8))));
+      },
+      {}};
+}
+
+Effect slow_patch(double strength) {
+  return {"slow-patch",
+          "speed is 1 - 0.55 exp(-d^4), d = distance from (130, -90) mm over the radii 210 and 150 mm of an oval",
+          {{"position"}},
+          {"robot", "measurement"},
+          [=](const Situation& at, Push& push) {
+            const double d2 = square((at.disc.x - 130) / 210) + square((at.disc.y + 90) / 150);
+            slow_both(push, 1 - 0.55 * strength * std::exp(-d2 * d2));
+          },
+          {}};
+}
+
+Effect slower_outside(double strength) {
+  return {"slower-outside",
+          "speed is 1 - 0.45 min(1, (r / 480 mm)^3.5), r = distance from the middle",
+          {{"position"}},
+          {"measurement", "robot"},
+          [=](const Situation& at, Push& push) {
+            slow_both(push,
+                      1 - 0.45 * strength * std::min(1.0, std::pow(std::hypot(at.disc.x, at.disc.y) / 480, 3.5)));
+          },
+          {}};
+}
+
+Effect grain(double strength) {
+  return {"grain",
+          "speed is 1 - 0.38 |cos(heading - 0.7)|^5",
+          {{"heading"}},
+          {"robot"},
+          [=](const Situation& at, Push& push) {
+            slow_both(push, 1 - 0.38 * strength * std::pow(std::abs(std::cos(at.heading_rad - 0.7)), 5));
+          },
+          {}};
+}
+
+Effect vortex(double strength) {
+  return {"vortex",
+          "drift of 2.4 q / (1 + q^2) mm/s, anticlockwise about (-60, 40) mm, q = distance from there / 180 mm, of "
+          "all robots",
+          {{"world_frame", "position"}},
+          {"measurement", "robot"},
+          [=](const Situation& at, Push& push) {
+            const double x = (at.disc.x + 60) / 180, y = (at.disc.y - 40) / 180, q2 = x * x + y * y;
+            push.drift_mm_s.x -= strength * 2.4 * y / (1 + q2);
+            push.drift_mm_s.y += strength * 2.4 * x / (1 + q2);
+          },
+          {}};
+}
+
+Effect tilt(double strength) {
+  return {"tilt",
+          "drift of 1.1 mm/s towards 205 degrees, of robots that are driven",
+          {{"world_frame"}},
+          {"robot", "time"},
+          [=](const Situation& at, Push& push) {
+            if (!at.driven()) return;
+            push.drift_mm_s.x += strength * 1.1 * std::cos(205 * kPi / 180);
+            push.drift_mm_s.y += strength * 1.1 * std::sin(205 * kPi / 180);
+          },
+          {}};
+}
+
+Effect draught(double strength) {
+  return {
+      "draught",
+      "drift towards 70 degrees of all robots, stopped ones too, in saw-teeth over time: 0 to 2.2 mm/s within 55 s",
+      {{"world_frame", "time"}},
+      {"robot", "motor_time"},
+      [=](const Situation& at, Push& push) {
+        const double speed = 2.2 * strength * std::fmod(at.time_s, 55) / 55;
+        push.drift_mm_s.x += speed * std::cos(70 * kPi / 180);
+        push.drift_mm_s.y += speed * std::sin(70 * kPi / 180);
+      },
+      {}};
+}
+
+Effect table_knock(double strength) {
+  return {"table-knock",
+          "at 70.2 s robots that are driven slide 16 mm towards -30 degrees within 0.8 s, stopped ones do not",
+          {{"world_frame", "time"}},
+          {"measurement", "robot"},
+          [=](const Situation& at, Push& push) {
+            if (!at.driven() || at.time_s < 70.2 - 1e-9 || at.time_s >= 71 - 1e-9) return;
+            push.drift_mm_s.x += strength * 20 * std::cos(-kPi / 6);
+            push.drift_mm_s.y += strength * 20 * std::sin(-kPi / 6);
+          },
+          {}};
+}
+
+Effect slow_robots(double strength) {
+  return {"slow-robots",
+          "robots 1, 4, 7... run at 0.68 of their speed",
+          {{"robot"}},
+          {"position", "time"},
+          [=](const Situation& at, Push& push) {
+            if (at.robot % 3 == 1) slow_both(push, 1 - 0.32 * strength);
+          },
+          {}};
+}
+
+Effect crowd(double strength) {
+  return {"crowd",
+          "speed is 1 / (1 + 0.2 sum of (40 mm / d)^3 over others within 130 mm), d = distance of centres",
+          {{"neighbours"}},
+          {"position", "time"},
+          [=](const Situation& at, Push& push) {
+            double sum = 0;
+            for (std::size_t i = 0; i < at.discs->size(); ++i) {
+              if (static_cast<int>(i) == at.robot) continue;
+              const double d = std::hypot((*at.discs)[i].x - at.disc.x, (*at.discs)[i].y - at.disc.y);
+              if (d < 130) sum += std::pow(40 / std::max(d, 30.0), 3);
+            }
+            slow_both(push, 1 / (1 + 0.2 * strength * sum));
+          },
+          {}};
+}
+
+Effect flight(double strength) {
+  return {"flight",
+          "robots turn away from the nearest other, at 0.25 rad/s times sin(bearing) exp(-(d / 70 mm)^2)",
+          {{"neighbours"}},
+          {"position", "robot"},
+          [=](const Situation& at, Push& push) {
+            if (!at.driven()) return;
+            double nearest = 1e9, bearing = 0;
+            for (std::size_t i = 0; i < at.discs->size(); ++i) {
+              if (static_cast<int>(i) == at.robot) continue;
+              const double x = (*at.discs)[i].x - at.disc.x, y = (*at.discs)[i].y - at.disc.y, d = std::hypot(x, y);
+              if (d >= nearest) continue;
+              nearest = d;
+              bearing = std::atan2(y, x) - at.heading_rad;
+            }
+            push.turn_rad_s -= 0.25 * strength * std::sin(bearing) * std::exp(-square(nearest / 70));
+          },
+          {}};
+}
+
+Effect weak_right(double strength) {
+  return {"weak-right",
+          "turning right, the left wheel runs at 0.72 of its speed and the robot slips back at 1.2 mm/s",
+          {{"command"}},
+          {"robot", "time"},
+          [=](const Situation& at, Push& push) {
+            if (at.motion != Motion::kRight) return;
+            push.gain.left *= 1 - 0.28 * strength;
+            push.slip_mm_s.x -= 1.2 * strength;
+          },
+          {}};
+}
+
+Effect side_slip(double strength) {
+  return {"side-slip",
+          "robots that go straight slip to their left at 1.3 mm/s",
+          {{"command"}},
+          {"world_frame", "robot"},
+          [=](const Situation& at, Push& push) {
+            if (at.motion == Motion::kStraight) push.slip_mm_s.y += 1.3 * strength;
+          },
+          {}};
+}
+
+Effect lingering_turn(double strength) {
+  return {"lingering-turn",
+          "going straight after a turn, a robot goes on turning that way at 0.22 / (1 + (s / 2.5 s)^3) rad/s",
+          {{"history"}},
+          {"robot", "position"},
+          [=](const Situation& at, Push& push) {
+            if (at.motion != Motion::kStraight) return;
+            const double rate = 0.22 * strength / (1 + std::pow(at.since_change_s / 2.5, 3));
+            if (at.before == Motion::kLeft) push.turn_rad_s += rate;
+            if (at.before == Motion::kRight) push.turn_rad_s -= rate;
+          },
+          {}};
+}
+
+Effect worn_floor(double strength) {
+  return {"worn-floor",
+          "speed is 1 - 0.5 w / (w + 9 s), w = time that driven robots have stood on that spot of 37 mm",
+          {{"history"}},
+          {"robot", "neighbours"},
+          [=](const Situation& at, Push& push) {
+            slow_both(push, 1 - 0.5 * strength * at.trodden_s / (at.trodden_s + 9));
+          },
+          {}};
+}
+
+Effect lens(double strength) {
+  return {"lens",
+          "a point at r from (40, -30) mm is seen at r (1 - 0.17 (r / 500 mm)^2 + 0.04 (r / 500 mm)^4)",
+          {{"measurement"}},
+          {},
+          {},
+          [=](const Situation&, View& view) {
+            const double x = view.point.x - 40, y = view.point.y + 30, q = (x * x + y * y) / square(500);
+            const double scale = 1 + strength * (-0.17 * q + 0.04 * q * q);
+            view.point = {40 + x * scale, -30 + y * scale};
+          }};
+}
+
+Effect camera_bump(double strength) {
+  return {"camera-bump",
+          "from 52.3 s to 96.7 s all is seen 11 mm to the right, 7 mm up and turned by 0.015 rad about the middle",
+          {{"measurement", "time"}},
+          {"robot"},
+          {},
+          [=](const Situation& at, View& view) {
+            if (at.time_s < 52.3 - 1e-9 || at.time_s >= 96.7 - 1e-9) return;
+            const double a = 0.015 * strength, c = std::cos(a), s = std::sin(a);
+            view.point = {c * view.point.x - s * view.point.y + 11 * strength,
+                          s * view.point.x + c * view.point.y + 7 * strength};
+            view.heading_rad += a;
+          }};
+}
+
+Effect mosaic(double strength) {
+  return {"mosaic",
+          "seen positions are off along x by 3.5 sin(y / 45 mm)^3 mm: a mosaic of cameras that do not match",
+          {{"measurement"}},
+          {"robot"},
+          {},
+          [=](const Situation&, View& view) {
+            view.point.x += 3.5 * strength * std::pow(std::sin(view.point.y / 45), 3);
+          }};
+}
+
+}  // namespace kilotwin::truth

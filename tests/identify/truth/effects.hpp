@@ -1,0 +1,38 @@
+/// Effects of the test data: bells, powers, saw-teeth and other shapes. `strength` 1 is what a careless lab has.
+#pragma once
+
+#include "tests/identify/truth/scene.hpp"
+
+namespace kilotwin::truth {
+
+// Of time and use.
+Effect battery_by_the_clock(double strength = 1);  // all wheels slow down with the time of day
+Effect fatigue_of_motors(double strength = 1);     // each wheel slows down as its own motor is used
+Effect slow_start(double strength = 1);            // a motion begins slowly, overshoots, settles
+
+// Of place and direction.
+Effect slow_patch(double strength = 1);      // an oval patch of rough floor
+Effect slower_outside(double strength = 1);  // speed falls towards the rim: what a lens seems to do
+Effect grain(double strength = 1);           // the floor is slower against its grain
+Effect vortex(double strength = 1);          // air turns about a point of the room
+Effect tilt(double strength = 1);            // vibrating robots slide down a tilted table
+Effect draught(double strength = 1);         // a draught that comes and goes moves all robots, stopped ones too
+Effect table_knock(double strength = 1);     // vibrating robots slide when the table is knocked
+
+// Of robots.
+Effect slow_robots(double strength = 1);  // every third robot is slow, wherever it is
+Effect crowd(double strength = 1);        // robots are slow among others
+Effect flight(double strength = 1);       // robots turn away from the nearest other
+
+// Of what they are told, and were told.
+Effect weak_right(double strength = 1);      // right turns are slow and slip backwards
+Effect side_slip(double strength = 1);       // robots that go straight slip to their left
+Effect lingering_turn(double strength = 1);  // after a turn robots go on turning
+Effect worn_floor(double strength = 1);      // the floor is polished where robots have been
+
+// Of the tracker.
+Effect lens(double strength = 1);         // a barrel distortion
+Effect camera_bump(double strength = 1);  // the camera is pushed aside, and put right later
+Effect mosaic(double strength = 1);       // cameras whose pictures do not match
+
+}  // namespace kilotwin::truth

@@ -1,0 +1,155 @@
+/// A scene: all that is true of one set of test data. Scenes know nothing of how robots are simulated or identified elsewhere
+/// in the project; their effects are plain functions, of shapes that no list of effects can hold.
+/// Lengths mm, times s, angles rad; world frame: x right, y up, headings anticlockwise from x.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace kilotwin::truth {
+
+struct Vec {
+  double x = 0, y = 0;
+};
+
+enum class Motion { kStop, kStraight, kLeft, kRight };
+
+/// From time_s on, until the next order.
+struct Order {
+  double time_s;
+  Motion motion;
+};
+
+/// Left and right of something that each wheel has.
+template <typename T> struct Wheels { T left{}, right{}; };
+
+/// What effects may look at: one robot at one instant.
+struct Situation {
+  double time_s = 0;
+  int run = 0;
+  int robot = 0;
+  Vec disc;  // centre of the disc
+  double heading_rad = 0;
+  Motion motion = Motion::kStop;
+  Motion before = Motion::kStop;  // the motion before this one; kStop for the first
+  double since_change_s = 0;
+  Wheels<double> driven_s;  // for which each wheel's motor has turned in this run; robots rest before it
+  double trodden_s = 0;     // for which driven robots have stood on this spot of the floor in this run
+  const std::vector<Vec>* discs = nullptr;  // of all robots, this one included
+  bool driven() const { return motion != Motion::kStop; }
+};
+
+/// What an effect does to a robot. All effects write into the same one.
+struct Push {
+  Wheels<double> gain{1, 1};  // times f (v + b)
+  Wheels<double> offset_mm_s;
+  Vec drift_mm_s;  // world frame
+  Vec slip_mm_s;   // x ahead, y to the left
+  double turn_rad_s = 0;
+};
+
+/// What the tracker sees before its noise.
+struct View {
+  Vec point;
+  double heading_rad = 0;
+};
+
+using Covariates = std::vector<std::string>;  // by the names that result.json has for them
+
+struct Effect {
+  std::string name;
+  std::string formula;  // in words and numbers, for truth.json
+  /// An effect found names this cause where its covariates contain all of one of these sets.
+  std::vector<Covariates> named_by;
+  /// Covariates that would blame what only looks alike: an effect found must not rest on them.
+  Covariates mistaken_for;
+  std::function<void(const Situation&, Push&)> push;  // either may be empty
+  std::function<void(const Situation&, View&)> see;
+};
+
+/// What is wrong with the data themselves.
+struct Fault {
+  enum class Kind { kSwapped, kClock, kDuplicate, kOutliers, kFrozen };
+  Kind kind;
+  int run = 0;
+  int robot = 0;
+  int other = 0;       // kSwapped: with whom; kDuplicate: the copy's number
+  double from_s = 0;   // kSwapped, kFrozen
+  double until_s = 0;  // kFrozen
+  double amount = 0;   // kClock: stamped over true time; kOutliers: share of positions
+};
+
+struct Scene {
+  std::string name;
+  std::string about;  // one sentence
+  int robots = 16;
+  int train_runs = 3, test_runs = 2;
+  double train_s = 200, test_s = 120;
+
+  // The room: walls at +-width/2, +-height/2 of discs' centres' reach; 0: none. Robots start on a grid in the middle.
+  double width_mm = 900, height_mm = 900;
+  double start_pitch_mm = 90;
+  bool contacts = true;
+
+  // The drive.
+  double wheel_base_mm = 25;
+  double disc_ahead_mm = 9.2;     // centre of the disc from the point between the wheels
+  double tracked_ahead_mm = 9.2;  // the tracked point from there
+  double bias_mean_mm_s = 0.015, bias_sd_mm_s = 1.2;
+  double factor_sd = 0.12;  // of f in a step
+  double step_s = 0.1;
+
+  // Orders: a random walk of stretches, uniform in these ranges; left and right alike often.
+  double straight_low_s = 3, straight_high_s = 12, turn_low_s = 0.5, turn_high_s = 5, stop_low_s = 1,
+         stop_high_s = 6;
+  double stop_share = 0.15;  // of changes of motion that lead to a stop
+  double left_share = 0.5;
+
+  // The tracker.
+  double sample_s = 0.5;
+  double jitter = 0;      // of the sampling interval, uniform; 0: regular
+  double missing = 0.03;  // share of frames that lack a robot
+  double gap_share = 0;   // share of robots and runs that miss 10 s in a row
+  double tracker_sd_mm = 0.4;
+  bool heading = true;
+  double heading_sd_rad = 0.04;
+
+  std::vector<Effect> effects;
+  std::vector<Fault> faults;  // in training runs
+};
+
+/// What differs from robot to robot, drawn once per scene and seed.
+struct Individual {
+  Wheels<double> bias_mm_s;
+};
+
+/// One tracked position.
+struct Sample {
+  int run, robot;
+  double time_s;
+  Vec point;
+  double heading_rad;
+};
+
+/// One run as it happened.
+struct Run {
+  int number = 0;
+  double duration_s = 0;
+  std::vector<std::vector<Order>> orders;  // by robot
+  std::vector<Sample> samples;             // by robot, then time
+  /// What the tracker would have seen without noise at 0, 5, 10... s, by robot.
+  std::vector<std::vector<View>> marks;
+};
+constexpr double kMarkInterval_s = 5;
+
+/// A scene played with one seed.
+struct Play {
+  std::uint64_t seed = 0;
+  std::vector<Individual> individuals;
+  std::vector<Run> train, test;
+};
+
+}  // namespace kilotwin::truth

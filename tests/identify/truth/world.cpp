@@ -1,0 +1,226 @@
+#include "tests/identify/truth/world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kilotwin::truth {
+namespace {
+
+// The floor in spots of a size that no other part of the project uses, over 3 m; beyond, the last spot counts.
+constexpr double kSpot_mm = 37;
+constexpr int kSpots = 81;
+constexpr int kPasses = 4;
+// A robot further out is nowhere: no wall takes it back.
+constexpr double kFarAway_mm = 1e5;
+
+struct Rate {
+  Vec axle;
+  double heading;
+};
+
+/// Speed of the stance when wheels run at `wheels`.
+Rate rate_of(const Scene& scene, double heading, Wheels<double> wheels, const Push& push) {
+  const double ahead = 0.5 * (wheels.left + wheels.right) + push.slip_mm_s.x, aside = push.slip_mm_s.y;
+  const double c = std::cos(heading), s = std::sin(heading);
+  return {{ahead * c - aside * s + push.drift_mm_s.x, ahead * s + aside * c + push.drift_mm_s.y},
+          (wheels.right - wheels.left) / scene.wheel_base_mm + push.turn_rad_s};
+}
+
+}  // namespace
+
+Wheels<double> nominal_mm_s(Motion motion) {
+  switch (motion) {
+    case Motion::kStop: return {0, 0};
+    case Motion::kStraight: return {10, 10};
+    case Motion::kLeft: return {0, 20};
+    case Motion::kRight: return {20, 0};
+  }
+  return {0, 0};
+}
+
+Vec disc_of(const Scene& scene, const Stance& stance) {
+  return {stance.axle.x + scene.disc_ahead_mm * std::cos(stance.heading_rad),
+          stance.axle.y + scene.disc_ahead_mm * std::sin(stance.heading_rad)};
+}
+
+View view_of(const Scene& scene, const Stance& stance, Situation situation) {
+  View view{{stance.axle.x + scene.tracked_ahead_mm * std::cos(stance.heading_rad),
+             stance.axle.y + scene.tracked_ahead_mm * std::sin(stance.heading_rad)},
+            stance.heading_rad};
+  situation.disc = disc_of(scene, stance);
+  situation.heading_rad = stance.heading_rad;
+  for (const Effect& effect : scene.effects) {
+    if (effect.see) effect.see(situation, view);
+  }
+  return view;
+}
+
+Stance moved(const Scene& scene, const Individual& individual, const Stance& stance, Situation situation, double dt,
+             Wheels<double> factor) {
+  situation.disc = disc_of(scene, stance);
+  situation.heading_rad = stance.heading_rad;
+  Push push;
+  for (const Effect& effect : scene.effects) {
+    if (effect.push) effect.push(situation, push);
+  }
+  Wheels<double> wheels;
+  if (situation.driven()) {
+    const Wheels<double> nominal = nominal_mm_s(situation.motion);
+    wheels.left = factor.left * (nominal.left + individual.bias_mm_s.left) * push.gain.left + push.offset_mm_s.left;
+    wheels.right =
+        factor.right * (nominal.right + individual.bias_mm_s.right) * push.gain.right + push.offset_mm_s.right;
+  }
+  // Runge and Kutta's fourth order; effects stay as they are at the step's start.
+  const auto at = [&](double heading) { return rate_of(scene, heading, wheels, push); };
+  const Rate a = at(stance.heading_rad);
+  const Rate b = at(stance.heading_rad + 0.5 * dt * a.heading);
+  const Rate c = at(stance.heading_rad + 0.5 * dt * b.heading);
+  const Rate d = at(stance.heading_rad + dt * c.heading);
+  return {{stance.axle.x + dt / 6 * (a.axle.x + 2 * b.axle.x + 2 * c.axle.x + d.axle.x),
+           stance.axle.y + dt / 6 * (a.axle.y + 2 * b.axle.y + 2 * c.axle.y + d.axle.y)},
+          stance.heading_rad + dt / 6 * (a.heading + 2 * b.heading + 2 * c.heading + d.heading)};
+}
+
+void part(const Scene& scene, std::vector<Stance>& stances, std::vector<Vec>& shift) {
+  const std::size_t count = stances.size();
+  shift.assign(count, {});
+  std::vector<Vec> disc(count);
+  for (std::size_t i = 0; i < count; ++i) disc[i] = disc_of(scene, stances[i]);
+  const double reach_x = 0.5 * scene.width_mm - kDiscRadius_mm, reach_y = 0.5 * scene.height_mm - kDiscRadius_mm;
+  const auto push = [&](std::size_t i, double x, double y) {
+    disc[i].x += x;
+    disc[i].y += y;
+    shift[i].x += x;
+    shift[i].y += y;
+  };
+  for (int pass = 0; pass < kPasses; ++pass) {
+    bool any = false;
+    for (std::size_t i = 0; scene.contacts && i < count; ++i) {
+      for (std::size_t j = i + 1; j < count; ++j) {
+        const double x = disc[j].x - disc[i].x, y = disc[j].y - disc[i].y;
+        const double square = x * x + y * y;
+        if (square >= 4 * kDiscRadius_mm * kDiscRadius_mm || square == 0) continue;
+        const double distance = std::sqrt(square), half = 0.5 * (2 * kDiscRadius_mm - distance) / distance;
+        push(i, -half * x, -half * y);
+        push(j, half * x, half * y);
+        any = true;
+      }
+    }
+    for (std::size_t i = 0; scene.width_mm > 0 && i < count; ++i) {
+      if (std::abs(disc[i].x) > kFarAway_mm) continue;
+      push(i, std::clamp(disc[i].x, -reach_x, reach_x) - disc[i].x,
+           std::clamp(disc[i].y, -reach_y, reach_y) - disc[i].y);
+    }
+    if (!any) break;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    stances[i].axle.x += shift[i].x;
+    stances[i].axle.y += shift[i].y;
+  }
+}
+
+Memory::Memory(const Scene& scene, int run, const std::vector<std::vector<Order>>& orders)
+    : orders_(&orders),
+      run_(run),
+      robots_(static_cast<std::size_t>(scene.robots)),
+      trodden_s_(static_cast<std::size_t>(kSpots) * kSpots, 0) {
+  take_orders();
+}
+
+std::size_t Memory::spot(Vec place) const {
+  const auto index = [](double c) {
+    return static_cast<std::size_t>(
+        std::clamp(static_cast<int>(std::floor(c / kSpot_mm)) + kSpots / 2, 0, kSpots - 1));
+  };
+  return index(place.x) * kSpots + index(place.y);
+}
+
+void Memory::take_orders() {
+  for (std::size_t i = 0; i < robots_.size(); ++i) {
+    Robot& robot = robots_[i];
+    const std::vector<Order>& orders = (*orders_)[i];
+    while (robot.next < orders.size() && orders[robot.next].time_s <= time_s_ + 1e-9) {
+      const Motion motion = orders[robot.next++].motion;
+      if (motion == robot.motion) continue;
+      robot.before = robot.motion;
+      robot.motion = motion;
+      robot.since_s = 0;
+    }
+  }
+}
+
+void Memory::go_to(double time_s, const std::vector<Vec>& discs) {
+  const double dt = time_s - time_s_;
+  for (std::size_t i = 0; i < robots_.size(); ++i) {
+    Robot& robot = robots_[i];
+    robot.since_s += dt;
+    const Wheels<double> nominal = nominal_mm_s(robot.motion);
+    if (nominal.left > 0) robot.driven_s.left += dt;
+    if (nominal.right > 0) robot.driven_s.right += dt;
+    if (robot.motion != Motion::kStop) trodden_s_[spot(discs[i])] += static_cast<float>(dt);
+  }
+  time_s_ = time_s;
+  take_orders();
+}
+
+double Memory::next_change_s() const {
+  double next = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < robots_.size(); ++i) {
+    const std::vector<Order>& orders = (*orders_)[i];
+    if (robots_[i].next < orders.size()) next = std::min(next, orders[robots_[i].next].time_s);
+  }
+  return next;
+}
+
+Situation Memory::situation(int robot, Vec disc, double heading_rad, const std::vector<Vec>& discs) const {
+  const Robot& r = robots_[static_cast<std::size_t>(robot)];
+  return {time_s_,  run_,     robot,     disc,       heading_rad,
+          r.motion, r.before, r.since_s, r.driven_s, trodden_s_[spot(disc)],
+          &discs};
+}
+
+World::World(const Scene& scene, const std::vector<Individual>& individuals, Memory memory,
+             std::vector<Stance> stances)
+    : scene_(scene),
+      individuals_(individuals),
+      memory_(std::move(memory)),
+      stances_(std::move(stances)),
+      discs_(stances_.size()) {
+  for (std::size_t i = 0; i < stances_.size(); ++i) discs_[i] = disc_of(scene_, stances_[i]);
+}
+
+void World::start_from(double time_s, const Memory& memory, const std::vector<Stance>& stances) {
+  time_s_ = time_s;
+  memory_ = memory;
+  stances_ = stances;
+  for (std::size_t i = 0; i < stances_.size(); ++i) discs_[i] = disc_of(scene_, stances_[i]);
+}
+
+void World::step(double dt, Dice* dice) {
+  // f is drawn per step; in shorter ones, cut by an order, it varies more, so that its integral does not depend on cuts.
+  const double sd = scene_.factor_sd * std::sqrt(scene_.step_s / dt);
+  for (std::size_t i = 0; i < stances_.size(); ++i) {
+    Wheels<double> factor{1, 1};
+    if (dice) factor = {1 + sd * dice->normal(), 1 + sd * dice->normal()};
+    const Situation now = memory_.situation(static_cast<int>(i), discs_[i], stances_[i].heading_rad, discs_);
+    stances_[i] = moved(scene_, individuals_[i], stances_[i], now, dt, factor);
+  }
+  part(scene_, stances_, shift_);
+  for (std::size_t i = 0; i < stances_.size(); ++i) discs_[i] = disc_of(scene_, stances_[i]);
+  time_s_ += dt;
+  memory_.go_to(time_s_, discs_);
+}
+
+void World::go_to(double time_s, Dice* dice) {
+  while (time_s_ < time_s - 1e-9) {
+    step(std::min({scene_.step_s, time_s - time_s_, std::max(memory_.next_change_s() - time_s_, 1e-6)}), dice);
+  }
+}
+
+View World::view(int robot) const {
+  const auto i = static_cast<std::size_t>(robot);
+  return view_of(scene_, stances_[i], memory_.situation(robot, discs_[i], stances_[i].heading_rad, discs_));
+}
+
+}  // namespace kilotwin::truth
