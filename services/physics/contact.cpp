@@ -82,11 +82,14 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
   movable_pass_.clear();
   other_count_ = 0;
   any_overlap_ = false;
+  for (std::uint32_t m = 0; m < movables && has_others_; ++m) {
+    if (own_movable[m] != 0) reach_beside(m, 0);
+  }
   for (std::uint32_t i = 0; i < count; ++i) {
     if (hops_[i] == 0 && may_be_touched(i)) search(bodies, i);
   }
   for (std::uint32_t m = 0; m < movables; ++m) {
-    if (hops_[count + m] == 0) search_movable(m);
+    if (!has_others_ || own_movable[m] != 0) search_movable(m);
   }
   for (std::size_t k = 0; k < reached_.size(); ++k) {
     const std::uint32_t i = reached_[k];
@@ -174,6 +177,21 @@ void ContactSolver::find_specials(const Bodies& bodies) {
       lively_movable_[m] |= lively_[specials_[k].body];
     }
   }
+  // What one of them does, all feel that it may touch one by the other.
+  std::vector<std::uint32_t>& next = reached_;
+  next.clear();
+  for (std::uint32_t m = 0; m < movables; ++m) {
+    if (lively_movable_[m] != 0) next.push_back(m);
+  }
+  while (!next.empty()) {
+    const std::uint32_t m = next.back();
+    next.pop_back();
+    movable_pass_.for_each_near(m, movables_, [&](std::uint32_t other) {
+      if (lively_movable_[other] != 0) return;
+      lively_movable_[other] = 1;
+      next.push_back(other);
+    });
+  }
 }
 
 std::pair<const ContactSolver::Special*, const ContactSolver::Special*> ContactSolver::specials_of(
@@ -201,6 +219,14 @@ void ContactSolver::reach(std::uint32_t node, std::uint8_t hops) {
   if (hops_[node] != kOutOfReach) return;
   hops_[node] = hops;
   reached_.push_back(node);
+  const auto count = static_cast<std::uint32_t>(active_.size());
+  if (node >= count) reach_beside(node - count, hops);
+}
+
+/// Movable bodies that may touch each other are one hop together.
+void ContactSolver::reach_beside(std::uint32_t m, std::uint8_t hops) {
+  const auto count = static_cast<std::uint32_t>(active_.size());
+  movable_pass_.for_each_near(m, movables_, [&](std::uint32_t other) { reach(count + other, hops); });
 }
 
 void ContactSolver::search_movable(std::uint32_t m) {
@@ -210,7 +236,6 @@ void ContactSolver::search_movable(std::uint32_t m) {
   if (!has_others_) return;
   const auto next = static_cast<std::uint8_t>(hops_[count + m] + 1);
   for (const std::uint32_t k : touching_[m]) reach(specials_[k].body, next);
-  movable_pass_.for_each_near(m, movables_, [&](std::uint32_t other) { reach(count + other, next); });
 }
 
 void ContactSolver::search(const Bodies& bodies, std::uint32_t i) {

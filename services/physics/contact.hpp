@@ -121,6 +121,7 @@ class ContactSolver {
   void add_special(std::uint32_t body, std::uint32_t key, std::uint32_t movable, const Nearest& of_shape);
   [[nodiscard]] std::pair<const Special*, const Special*> specials_of(std::uint32_t body) const;
   void reach(std::uint32_t node, std::uint8_t hops);
+  void reach_beside(std::uint32_t movable, std::uint8_t hops);
   [[nodiscard]] bool keep_press(const Bodies&, const Mover&);
   void seat_movers();
   void fill_batches(const Bodies&);

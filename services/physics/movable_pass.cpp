@@ -10,6 +10,10 @@ namespace {
 
 /// How often limits are met one after the other; what is missed then scales all down.
 constexpr int kRounds = 8;
+/// Rounds in which bodies that touch each other, and friction, find their forces, and their over-relaxation: with it, bodies
+/// that friction holds come to rest exactly; a light one between heavy ones needs the most rounds.
+constexpr int kBalanceRounds = 128;
+constexpr double kRelaxation = 1.5;
 constexpr double kTolerance_mm = 1e-14;
 
 }  // namespace
@@ -38,6 +42,7 @@ double MovablePass::gain(std::uint32_t movable, std::size_t robots) const {
 void MovablePass::clear() {
   for (const Mover& mover : movers_) mover_of_[mover.movable] = kNone;
   movers_.clear();
+  links_.clear();
 }
 
 void MovablePass::add(std::uint32_t movable, std::uint32_t passes) {
@@ -139,19 +144,40 @@ void MovablePass::set_off(const std::vector<MovableState>& states, ContactPass& 
     find_stops(mover, states);
     move_points(mover, {}, mover.velocity, &ContactPass::start, pass);
   }
+  find_links();
+}
+
+/// By the bodies' numbers, in which all partitions have them.
+void MovablePass::find_links() {
+  for (std::uint32_t m = 0; m < mover_of_.size(); ++m) {
+    if (mover_of_[m] == kNone) continue;
+    Mover& first = movers_[mover_of_[m]];
+    for (const Stop& s : first.stops) {
+      if (s.other == kNone || mover_of_[s.other] == kNone) continue;
+      first.linked = true;
+      if (s.other < m) continue;  // Of the two that have it as a stop, the lower one makes it a link.
+      const Mover& second = movers_[mover_of_[s.other]];
+      links_.push_back({mover_of_[m], mover_of_[s.other], s.normal_x, s.normal_y,
+                        arm(first, s.lever_x_mm, s.lever_y_mm, s.normal_x, s.normal_y),
+                        arm(second, s.other_lever_x_mm, s.other_lever_y_mm, s.normal_x, s.normal_y), s.gap_mm});
+    }
+  }
 }
 
 void MovablePass::sub_step(std::uint32_t step, ContactPass& pass) {
   for (Mover& mover : movers_) {
-    if (step < mover.passes) move(mover, pass);
+    if (step < mover.passes) push(mover, pass);
+  }
+  balance(step);
+  for (Mover& mover : movers_) {
+    if (step < mover.passes) place(mover, pass);
   }
   for (Mover& mover : movers_) mover.shift = mover.next_shift;
 }
 
-void MovablePass::move(Mover& mover, ContactPass& pass) {
-  const MovableBodyModel& body = bodies_[mover.movable];
-  const double rho_mm = body.shape.mean_distance_mm(), share = robot_kg_ / body.mass_kg;
-  const auto arm = [&](const auto& c) { return (c.lever_x_mm * c.normal_y - c.lever_y_mm * c.normal_x) / rho_mm; };
+/// Forces of robots.
+void MovablePass::push(Mover& mover, const ContactPass& pass) const {
+  const double share = robot_kg_ / bodies_[mover.movable].mass_kg;
   Motion force;
   for (Contact& c : mover.contacts) {
     // The same expressions as on the robot's side, and so the same bits.
@@ -162,43 +188,107 @@ void MovablePass::move(Mover& mover, ContactPass& pass) {
     c.push_mm = std::max(c.push_mm + c.gain * (closing - kEase * std::max(gap - touch_mm_, 0.0)), 0.0);
     force.x_mm += c.push_mm * c.normal_x;
     force.y_mm += c.push_mm * c.normal_y;
-    force.turn_mm += c.push_mm * arm(c);
+    force.turn_mm += c.push_mm * arm(mover, c.lever_x_mm, c.lever_y_mm, c.normal_x, c.normal_y);
   }
-  const Motion before = mover.velocity;
-  Motion v{before.x_mm + share * force.x_mm, before.y_mm + share * force.y_mm,
-           before.turn_mm + share * force.turn_mm};
+  mover.before = mover.velocity;
+  mover.velocity = {mover.before.x_mm + share * force.x_mm, mover.before.y_mm + share * force.y_mm,
+                    mover.before.turn_mm + share * force.turn_mm};
+  mover.braked = {};
+}
+
+/// Friction, walls, and what bodies pass on to each other.
+void MovablePass::balance(std::uint32_t step) {
+  for (Mover& mover : movers_) {
+    if (step < mover.passes && !mover.linked) brake(mover);
+  }
+  if (links_.empty()) return;
+  const auto add = [](Motion& v, const Link& link, double lever, double way) {
+    v.x_mm += way * link.normal_x;
+    v.y_mm += way * link.normal_y;
+    v.turn_mm += way * lever;
+  };
+  for (Link& link : links_) link.push = 0;
+  for (Mover& mover : movers_) mover.changed = true;
+  // Where nothing changes any more, further rounds would not change anything, whatever goes on elsewhere.
+  bool any = true;
+  for (int round = 0; round < kBalanceRounds && any; ++round) {
+    any = false;
+    for (Link& link : links_) {
+      Mover &a = movers_[link.first], &b = movers_[link.second];
+      if (step >= a.passes || step >= b.passes) continue;
+      const double gap = link.gap_mm - along(a.shift, link.normal_x, link.normal_y, link.first_arm) +
+                         along(b.shift, link.normal_x, link.normal_y, link.second_arm);
+      const double excess = along(a.velocity, link.normal_x, link.normal_y, link.first_arm) -
+                            along(b.velocity, link.normal_x, link.normal_y, link.second_arm) -
+                            std::max(gap - touch_mm_, 0.0);
+      if (excess < kTolerance_mm && (excess > -kTolerance_mm || link.push == 0)) continue;
+      const double of_a = 1 / bodies_[a.movable].mass_kg, of_b = 1 / bodies_[b.movable].mass_kg;
+      const double yields =
+          of_a * (1 + link.first_arm * link.first_arm) + of_b * (1 + link.second_arm * link.second_arm);
+      const double push = std::max(link.push + kRelaxation * excess / yields, 0.0), more = push - link.push;
+      link.push = push;
+      add(a.velocity, link, link.first_arm, -of_a * more);
+      add(b.velocity, link, link.second_arm, of_b * more);
+      any = a.changed = b.changed = true;
+    }
+    for (Mover& mover : movers_) {
+      if (step < mover.passes && mover.linked && mover.changed) brake(mover);
+      mover.changed = false;
+    }
+    any |= round == 0;
+  }
+}
+
+void MovablePass::take(Motion& m, double nx, double ny, double lever, double excess) {
+  const double part = excess / (1 + lever * lever);
+  m.x_mm -= part * nx;
+  m.y_mm -= part * ny;
+  m.turn_mm -= part * lever;
+}
+
+double MovablePass::gap_mm(const Mover& mover, const Stop& s) const {
+  double gap = s.gap_mm - along(mover.shift, s.normal_x, s.normal_y,
+                                arm(mover, s.lever_x_mm, s.lever_y_mm, s.normal_x, s.normal_y));
+  if (s.other == kNone || mover_of_[s.other] == kNone) return gap;
+  const Mover& other = movers_[mover_of_[s.other]];
+  return gap + along(other.shift, s.normal_x, s.normal_y,
+                     arm(other, s.other_lever_x_mm, s.other_lever_y_mm, s.normal_x, s.normal_y));
+}
+
+/// Half of the gap towards what moves as well, all of it towards what does not.
+double MovablePass::room_mm(const Mover& mover, const Stop& s) const {
+  const double gap = gap_mm(mover, s);
+  return std::max(s.other == kNone ? gap : gap / 2, 0.0);
+}
+
+/// The ground takes off as much of the velocity as friction allows; walls hold the rest.
+void MovablePass::brake(Mover& mover) const {
+  Motion v{mover.velocity.x_mm + mover.braked.x_mm, mover.velocity.y_mm + mover.braked.y_mm,
+           mover.velocity.turn_mm + mover.braked.turn_mm};
+  const Motion unbraked = v;
   const double length = __builtin_sqrt(v.x_mm * v.x_mm + v.y_mm * v.y_mm + v.turn_mm * v.turn_mm);
   const double grip = grip_mm_[mover.movable], keep = length > grip ? (length - grip) / length : 0;
   v = {v.x_mm * keep, v.y_mm * keep, v.turn_mm * keep};
-
-  const auto take = [](Motion& m, double nx, double ny, double lever, double excess) {
-    const double part = excess / (1 + lever * lever);
-    m.x_mm -= part * nx;
-    m.y_mm -= part * ny;
-    m.turn_mm -= part * lever;
-  };
-  const auto room = [&](const Stop& s) {
-    double gap = s.gap_mm - along(mover.shift, s.normal_x, s.normal_y, arm(s));
-    if (s.other == kNone) return std::max(gap, 0.0);
-    if (mover_of_[s.other] != kNone) {
-      const Mover& other = movers_[mover_of_[s.other]];
-      const double other_rho_mm = bodies_[s.other].shape.mean_distance_mm();
-      gap += along(other.shift, s.normal_x, s.normal_y,
-                   (s.other_lever_x_mm * s.normal_y - s.other_lever_y_mm * s.normal_x) / other_rho_mm);
-    }
-    return std::max(gap / 2, 0.0);
-  };
+  mover.braked = {unbraked.x_mm - v.x_mm, unbraked.y_mm - v.y_mm, unbraked.turn_mm - v.turn_mm};
   for (int round = 0; round < kRounds; ++round) {
     for (const Stop& s : mover.stops) {
-      const double excess = along(v, s.normal_x, s.normal_y, arm(s)) - room(s);
-      if (excess > kTolerance_mm) take(v, s.normal_x, s.normal_y, arm(s), excess);
+      if (s.other != kNone && mover_of_[s.other] != kNone) continue;  // a link
+      const double lever = arm(mover, s.lever_x_mm, s.lever_y_mm, s.normal_x, s.normal_y);
+      const double excess = along(v, s.normal_x, s.normal_y, lever) - room_mm(mover, s);
+      if (excess > kTolerance_mm) take(v, s.normal_x, s.normal_y, lever, excess);
     }
   }
   mover.velocity = v;
+}
+
+/// The way: at most half of each gap towards robots and other bodies.
+void MovablePass::place(Mover& mover, ContactPass& pass) const {
+  const MovableBodyModel& body = bodies_[mover.movable];
+  const double rho_mm = body.shape.mean_distance_mm();
+  const auto lever = [&](const auto& c) { return arm(mover, c.lever_x_mm, c.lever_y_mm, c.normal_x, c.normal_y); };
+  const Motion &v = mover.velocity, &before = mover.before;
   const Motion swing{(v.x_mm + v.x_mm) - before.x_mm, (v.y_mm + v.y_mm) - before.y_mm,
                      (v.turn_mm + v.turn_mm) - before.turn_mm};
-
-  // The way: at most half of each gap towards robots and other bodies.
   Motion way = v;
   const auto half_gap = [&](const Contact& c) {
     const double* const robot = pass.now(c.robot);
@@ -208,20 +298,20 @@ void MovablePass::move(Mover& mover, ContactPass& pass) {
   };
   for (int round = 0; round < kRounds; ++round) {
     for (const Contact& c : mover.contacts) {
-      const double excess = -along(way, c.normal_x, c.normal_y, arm(c)) - half_gap(c);
-      if (excess > kTolerance_mm) take(way, -c.normal_x, -c.normal_y, -arm(c), excess);
+      const double excess = -along(way, c.normal_x, c.normal_y, lever(c)) - half_gap(c);
+      if (excess > kTolerance_mm) take(way, -c.normal_x, -c.normal_y, -lever(c), excess);
     }
     for (const Stop& s : mover.stops) {
-      const double excess = along(way, s.normal_x, s.normal_y, arm(s)) - room(s);
-      if (excess > kTolerance_mm) take(way, s.normal_x, s.normal_y, arm(s), excess);
+      const double excess = along(way, s.normal_x, s.normal_y, lever(s)) - room_mm(mover, s);
+      if (excess > kTolerance_mm) take(way, s.normal_x, s.normal_y, lever(s), excess);
     }
   }
   double scale = 1;
   const auto hold = [&](double closing, double limit) {
     if (closing > limit + kTolerance_mm && scale * closing > limit) scale = limit / closing;
   };
-  for (const Contact& c : mover.contacts) hold(-along(way, c.normal_x, c.normal_y, arm(c)), half_gap(c));
-  for (const Stop& s : mover.stops) hold(along(way, s.normal_x, s.normal_y, arm(s)), room(s));
+  for (const Contact& c : mover.contacts) hold(-along(way, c.normal_x, c.normal_y, lever(c)), half_gap(c));
+  for (const Stop& s : mover.stops) hold(along(way, s.normal_x, s.normal_y, lever(s)), room_mm(mover, s));
   const double turn = way.turn_mm < 0 ? -way.turn_mm : way.turn_mm;
   const double farthest =
       __builtin_sqrt(way.x_mm * way.x_mm + way.y_mm * way.y_mm) + turn * (body.shape.reach_mm() / rho_mm);

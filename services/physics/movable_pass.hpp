@@ -4,6 +4,10 @@
 /// moments within the ellipsoid |f|^2 + (M / rho)^2 <= (friction m g)^2 (the limit surface of Howe and Cutkosky 1996, whose two
 /// axes are exact where the weight rests evenly). Inertia about the centre is taken as m rho^2, so that friction takes off the
 /// length of the velocity in these coordinates; it matters in the moment of impact alone.
+///
+/// Forces between movable bodies are found anew in each sub-step, together with friction and for all bodies that can touch
+/// each other at once (over-relaxed projection, Gauss-Seidel in ascending order): so they pass through any chain of bodies
+/// within the sub-step, and such bodies are one hop together.
 #pragma once
 
 #include <cstdint>
@@ -73,15 +77,35 @@ class MovablePass {
   };
   struct Mover {
     std::uint32_t movable = 0, passes = 0;
-    Motion shift, next_shift, velocity;
+    bool linked = false;   ///< it may touch other movers
+    bool changed = false;  ///< it is to be braked again
+    Motion shift, next_shift, velocity, before;
+    Motion braked;  ///< what friction has taken off in this sub-step
     std::vector<Contact> contacts;
     std::vector<Stop> stops;
+  };
+  /// A point where two movers may touch; normal out of the first. Arms: as of along().
+  struct Link {
+    std::uint32_t first, second;
+    double normal_x, normal_y, first_arm, second_arm, gap_mm;
+    double push = 0;  ///< force times the sub-step: kg mm per sub-step
   };
 
   void find_stops(Mover&, const std::vector<MovableState>&) const;
   void add_stop(Mover&, const MovableState&, double normal_x, double normal_y, double gap_mm, Point2 at,
                 std::uint32_t other = kNone, const MovableState* other_state = nullptr) const;
-  void move(Mover&, ContactPass&);
+  void find_links();
+  void push(Mover&, const ContactPass&) const;
+  void balance(std::uint32_t step);
+  void brake(Mover&) const;
+  [[nodiscard]] double gap_mm(const Mover&, const Stop&) const;
+  [[nodiscard]] double room_mm(const Mover&, const Stop&) const;
+  /// Takes off what a motion is beyond a limit along a direction.
+  static void take(Motion&, double nx, double ny, double arm, double excess);
+  void place(Mover&, ContactPass&) const;
+  [[nodiscard]] double arm(const Mover& mover, double lever_x_mm, double lever_y_mm, double nx, double ny) const {
+    return (lever_x_mm * ny - lever_y_mm * nx) / bodies_[mover.movable].shape.mean_distance_mm();
+  }
   void move_points(const Mover&, const Motion& shift, const Motion& swing, double* (ContactPass::*of)(Seat),
                    ContactPass&) const;
   /// Way of the point at this lever along a direction.
@@ -95,6 +119,7 @@ class MovablePass {
   std::vector<double> grip_mm_;  ///< per body: what friction takes off a velocity in a sub-step
   std::vector<std::uint32_t> mover_of_;
   std::vector<Mover> movers_;
+  std::vector<Link> links_;
 };
 
 }  // namespace kilotwin::physics

@@ -1,6 +1,7 @@
 // The crown jewel: one state hash, however a run is divided, whichever way it is run.
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <memory>
 
 #include "core/dds/dds.hpp"
@@ -77,6 +78,36 @@ TEST(Hashes, AreThoseOfServicesStartedByHand) {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
   }
   EXPECT_EQ(recorder::read_summary(directory + "/summary.json").state_hash, kGolden);
+}
+
+/// Nine robots push a box, and the box a cylinder, over borders of all grids below.
+std::string moving_bodies(const Scratch& scratch, const std::string& mass_g) {
+  const std::string file = scratch / ("bodies-" + mass_g + ".txtpb");
+  std::ofstream(file) << "duration_s: 12 seed: 3 arena { width_mm: 900 height_mm: 700 } "
+                         "robots { count: 9 behaviour: \""
+                      << source("behaviours/straight.c")
+                      << "\" layout { y_mm: -150 grid { pitch_mm: 36 columns: 9 from_first_row: true "
+                         "heading: HEADING_FIXED heading_deg: 90 } } } "
+                         "movable { box { width_mm: 330 length_mm: 60 } y_mm: -100 mass_g: "
+                      << mass_g << " } movable { cylinder { radius_mm: 40 } mass_g: 6 y_mm: -20 x_mm: 10 }";
+  return file;
+}
+
+TEST(Hashes, AreOneWithBodiesThatMoveOverBorders) {
+  const Scratch scratch;
+  const std::string experiment = moving_bodies(scratch, "18");
+  int runs = 0;
+  const auto hash = [&](const std::string& file, Words words) {
+    words.insert(words.begin(), file);
+    return run(words, scratch, "run-" + std::to_string(++runs)).state_hash;
+  };
+  const std::uint64_t whole = hash(experiment, {"--mode", "local", "--partitions", "1x1"});
+  EXPECT_NE(whole, hash(moving_bodies(scratch, "500"), {"--mode", "local"})) << "the box does not move";
+  for (const Words& words : {Words{"--mode", "local", "--partitions", "2x2", "--threads", "2"},
+                             Words{"--mode", "local", "--partitions", "5x6", "--hosts", "3", "--threads", "4"},
+                             Words{"--partitions", "1x2"}, Words{"--partitions", "2x3", "--hosts", "2"}}) {
+    EXPECT_EQ(hash(experiment, words), whole) << words.back();
+  }
 }
 
 // ODE's results are a function of the experiment and the partition grid; which threads and processes compute them is not

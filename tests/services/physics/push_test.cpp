@@ -164,6 +164,44 @@ TEST(Push, MirroredPushesMirror) {
   EXPECT_NEAR(p.heading_rad, -q.heading_rad, 1e-8);
 }
 
+TEST(Push, ForcesPassThroughARowOfBoxes) {
+  // Two boxes of 4.5 thrusts each, 5 mm apart: eight robots push the first against the second, which holds; ten drive both.
+  // Then one box between them that is lighter, and a cylinder at the end.
+  const std::string two =
+      "movable { box { width_mm: 60 length_mm: 400 } mass_g: 18 x_mm: 30 } "
+      "movable { box { width_mm: 60 length_mm: 400 } mass_g: 18 x_mm: 95 } ";
+  const std::string three =
+      "movable { box { width_mm: 40 length_mm: 400 } mass_g: 18 x_mm: 20 } "
+      "movable { box { width_mm: 40 length_mm: 400 } mass_g: 2 x_mm: 65 } "
+      "movable { cylinder { radius_mm: 50 } mass_g: 16 x_mm: 140 } ";
+  for (const std::string& row : {two, three}) {
+    for (const int k : {8, 10}) {
+      const RunPlan plan = make_plan(kQuiet + row, abreast(k));
+      Swarm swarm(plan);
+      const auto start = swarm.movables();
+      swarm.set_all_motors(70, 70);
+      swarm.run(k40_s / 2);
+      const auto middle = swarm.movables();
+      swarm.run(k40_s - k40_s / 2);
+      const auto end = swarm.movables();
+      std::printf("%d robots against %zu bodies in a row: %.3f mm, the last %.3f mm\n", k, end.size(),
+                  end[0].x_mm - start[0].x_mm, end.back().x_mm - start.back().x_mm);
+      for (std::size_t m = 0; m < end.size(); ++m) {
+        if (k == 8) {
+          // What is left where a light body lies between heavy ones is what the rounds leave.
+          EXPECT_NEAR(end[m].x_mm, middle[m].x_mm, row == two ? 0 : 1e-3) << "it creeps";
+          EXPECT_LT(end[m].x_mm - start[m].x_mm, 15);
+        } else {
+          EXPECT_GT(end[m].x_mm - start[m].x_mm, 380);
+        }
+        if (m > 0 && row == two) {
+          EXPECT_GE(end[m].x_mm - end[m - 1].x_mm, 60 - 1e-6);
+        }
+      }
+    }
+  }
+}
+
 /// Robots all about with movable bodies of each shape, obstacles and beacons among them.
 std::string mixed_world(const std::string& arena) {
   return "arena { " + arena +
