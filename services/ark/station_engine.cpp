@@ -39,7 +39,7 @@ StationEngine::StationEngine(const RunPlan& plan)
       next_packet_(start_ends_ + packet_ticks_),
       measurement_(plan) {
   for (const proto::VirtualEnvironment& description : plan.experiment().station().environment()) {
-    environments_.push_back(make_environment(description));
+    environments_.push_back(make_environment(description, plan.robots()));
   }
   if (!environments_.empty()) {
     served_.resize(plan.robots(), Tick{-robot_ticks_});
@@ -80,7 +80,8 @@ void StationEngine::send_own(const Inputs& inputs) {
   std::size_t count = 0;
   see(inputs);
   while (count < kArkSlots && now_ - served_[next_robot_] >= robot_ticks_) {
-    messages[count++] = environments_[turns_[next_robot_] % environments_.size()]->sense(seen_[next_robot_]);
+    VirtualEnvironment& environment = *environments_[turns_[next_robot_] % environments_.size()];
+    if (const auto message = environment.sense(seen_[next_robot_])) messages[count++] = *message;
     served_[next_robot_] = now_;
     ++turns_[next_robot_];
     next_robot_ = (next_robot_ + 1) % plan_.robots();
@@ -120,6 +121,12 @@ std::uint64_t StationEngine::hash_part() const {
         HashDomain::kStation, 1 + i,
         {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0), word_of(packets_[i], 8)});
   }
+  for (std::uint32_t i = 0; i < environments_.size(); ++i) {
+    // Apart from the packets, of which there are few.
+    constexpr std::uint32_t kEnvironments = 1u << 31;
+    if (const std::uint64_t word = environments_[i]->word(); word != 0)
+      sum += entity_hash(HashDomain::kStation, kEnvironments + i, {word});
+  }
   return sum;
 }
 
@@ -132,12 +139,14 @@ void StationEngine::save(proto::StationState& state) const {
   }
   for (const Tick served : served_) state.add_served_tick(served.count());
   for (const std::uint32_t turns : turns_) state.add_turns(turns);
+  for (const auto& environment : environments_) environment->save(*state.add_environment());
 }
 
 void StationEngine::load(Tick tick, std::span<const proto::StationState* const> parts) {
   constexpr std::size_t kPacketOctets = 11;
   if (parts.size() != 1 || static_cast<std::size_t>(parts[0]->served_tick_size()) != served_.size() ||
       static_cast<std::size_t>(parts[0]->turns_size()) != turns_.size() ||
+      static_cast<std::size_t>(parts[0]->environment_size()) != environments_.size() ||
       parts[0]->packets().size() % kPacketOctets != 0) {
     throw RunError("the checkpoint holds no station's state of this experiment");
   }
@@ -157,6 +166,8 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
     served_[i] = Tick{state.served_tick(static_cast<int>(i))};
     turns_[i] = state.turns(static_cast<int>(i));
   }
+  for (std::size_t i = 0; i < environments_.size(); ++i)
+    environments_[i]->load(state.environment(static_cast<int>(i)));
   // Robots are served in a circle: those before the next one have had one turn more.
   next_robot_ = 0;
   while (next_robot_ < turns_.size() && turns_[next_robot_] > turns_.back()) ++next_robot_;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "core/base/pose.hpp"
+#include "idl/checkpoint.pb.h"
 #include "idl/experiment.pb.h"
 #include "services/ark/ark_message.hpp"
 
@@ -19,10 +21,22 @@ struct TrackedRobot {
 class VirtualEnvironment {
  public:
   virtual ~VirtualEnvironment() = default;
-  /// The reading of this robot's virtual sensor.
-  [[nodiscard]] virtual ArkMessage sense(const TrackedRobot& robot) const = 0;
+  /// The reading of this robot's virtual sensor; nothing where there is nothing to tell it. What the robot shows may change
+  /// the environment.
+  [[nodiscard]] virtual std::optional<ArkMessage> sense(const TrackedRobot& robot) = 0;
+
+  /// What of it changes: a word for the state hash, and its part of checkpoints.
+  [[nodiscard]] virtual std::uint64_t word() const { return 0; }
+  virtual void save(proto::EnvironmentState&) const {}
+  /// Throws RunError where it does not fit.
+  virtual void load(const proto::EnvironmentState&) {}
 };
 
-[[nodiscard]] std::unique_ptr<VirtualEnvironment> make_environment(const proto::VirtualEnvironment& description);
+/// The bearing of a place from a robot, whole degrees 0..359, anticlockwise from its heading.
+[[nodiscard]] std::uint16_t bearing_deg(const Pose& p_WR, const Eigen::Vector2d& place_mm);
+
+/// For `robots` robots.
+[[nodiscard]] std::unique_ptr<VirtualEnvironment> make_environment(const proto::VirtualEnvironment& description,
+                                                                   std::uint32_t robots);
 
 }  // namespace kilotwin::ark

@@ -132,9 +132,11 @@ TEST(Hashes, OfTheOdeEngineAreTheSameInThreadsAndProcesses) {
   EXPECT_EQ(with({"--hosts", "2"}, "federated"), local);
 }
 
-TEST(Hashes, AreTheSameWithTheStationsVirtualEnvironment) {
+class VirtualEnvironments : public testing::TestWithParam<const char*> {};
+
+TEST_P(VirtualEnvironments, HaveOneHashHoweverARunIsDivided) {
   const Scratch scratch;
-  const Words words{source("experiments/ark-hub.txtpb"), "--duration", "20"};
+  const Words words{source(GetParam()), "--duration", "20"};
   const auto with = [&](const Words& more, const std::string& name) {
     Words all = words;
     all.insert(all.end(), more.begin(), more.end());
@@ -145,6 +147,12 @@ TEST(Hashes, AreTheSameWithTheStationsVirtualEnvironment) {
   EXPECT_EQ(local.state_hash, federated.state_hash);
   EXPECT_EQ(local.messages.received, federated.messages.received);
 }
+
+INSTANTIATE_TEST_SUITE_P(Hashes, VirtualEnvironments,
+                         testing::Values("experiments/ark-hub.txtpb", "experiments/ark-foraging.txtpb"),
+                         [](const auto& tested) {
+                           return std::string(tested.param).find("hub") != std::string::npos ? "Hub" : "Foraging";
+                         });
 
 }  // namespace
 }  // namespace kilotwin::test

@@ -135,13 +135,13 @@ TEST(StationEngine, TellsWhatTheTrackerSaw) {
   const RunPlan plan = plan_of(9, "station { environment { hub { x_mm: 40 y_mm: 0 radius_mm: 30 } } }");
   Scene scene(plan);
   std::size_t inside = 0;
-  const auto hub = make_environment(plan.experiment().station().environment(0));
+  const auto hub = make_environment(plan.experiment().station().environment(0), 9);
   for (int k = 0; k < 40; ++k) {
     scene.step();
     if (scene.frame.packets.empty() || scene.frame.packets[0].command != OverheadCommand::kRepeat) continue;
     for (const ArkMessage& message : unpack(scene.frame.packets[0].message)) {
       if (message.id == kArkNobody) continue;
-      EXPECT_EQ(message, hub->sense({message.id, plan.initial_pose(message.id), 0}));
+      EXPECT_EQ(message, hub->sense({message.id, plan.initial_pose(message.id), 0}).value());
       inside += message.type;
     }
   }
@@ -211,7 +211,9 @@ TEST(StationEngine, DivisionOfTheFramesChangesNothing) {
 
 TEST(StationEngine, LoadedEngineGoesOnAsTheSavedOne) {
   for (const std::uint32_t robots : {1u, 2u, 3u, 4u, 50u, 100u, 1022u}) {
-    const RunPlan plan = plan_of(robots, "station { environment { hub { } } environment { hub { x_mm: 500 } } } ");
+    const RunPlan plan = plan_of(robots,
+                                 "station { environment { hub { } } environment { hub { x_mm: 500 } } "
+                                 "environment { foraging { food_x_mm: 0 food_y_mm: 0 } } } ");
     std::mt19937 random(robots);
     Scene scene(plan);
     std::unique_ptr<Scene> loaded;
