@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/model/ranging.hpp"
 #include "services/comm/air.hpp"
-#include "services/comm/ranging.hpp"
 
 namespace kilotwin::comm {
 
