@@ -41,6 +41,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       programs_(std::move(programs)),
       senses_(plan, share_),
       memory_(share_.size()),
+      calibrated_(share_.size(), 0),
       eeprom_(share_.size()),
       presence_(share_.size(), Presence::kNone),
       motor_left_(share_.size()),
@@ -63,6 +64,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
     auto& eeprom = eeprom_[brought.robot() - share_.first] = std::make_unique<Eeprom>();
     std::copy_n(brought.content().begin(), eeprom->size(), eeprom->begin());
   }
+  if (const RadioParameters radios(plan); radios.own_tables()) calibrate_ranging(radios);
   // Hosts of one process start at different slots, so that they seldom wait for each other.
   const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
   for (std::uint32_t s = 0; s < kSlots; ++s) {
@@ -298,9 +300,26 @@ void BehavioursEngine::surround(std::uint32_t i, const Slot& slot, std::uint32_t
 
 void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
   const KtSurroundings& around = *slot.surroundings();
-  if (around.eeprom_written == 0 || eeprom_[i]) return;
+  if (around.eeprom_written == 0) return;
+  calibrated_[i] = 0;
+  if (eeprom_[i]) return;
   eeprom_[i] = std::make_unique<Eeprom>();
   std::copy_n(around.eeprom_copy, eeprom_[i]->size(), eeprom_[i]->begin());
+}
+
+/// Robots that have brought no EEPROM find their own ranging tables in it.
+void BehavioursEngine::calibrate_ranging(const RadioParameters& radios) {
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    const std::uint32_t id = share_.first + i;
+    if (eeprom_[i] || plan_.tracked(id) || plan_.firmware(id)) continue;
+    const Calibration& calibration = parameters_.calibration(id);
+    const RangingTable table = radios.table(id);
+    eeprom_[i] = std::make_unique<Eeprom>();
+    kilotwin_fill_eeprom(eeprom_[i]->data(), {plan_.uid_of(id), calibration.turn_left, calibration.turn_right,
+                                              calibration.straight_left, calibration.straight_right});
+    calibrated_[i] = 1;
+    kilotwin_fill_ranging(eeprom_[i]->data(), table.high.data(), table.low.data());
+  }
 }
 
 void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& program, const Slot& slot) {

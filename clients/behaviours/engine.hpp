@@ -14,6 +14,7 @@
 #include "core/base/eeprom_layout.h"
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
+#include "core/model/radio_parameters.hpp"
 #include "core/model/robot_parameters.hpp"
 #include "core/random/random.hpp"
 #include "core/senses/robot_senses.hpp"
@@ -79,7 +80,10 @@ class BehavioursEngine {
   void note_running_in(Running& place) { running_ = &place; }
 
   /// What robot `id`, one of this host's, has in its EEPROM; nullptr where that is what calibration has left.
-  [[nodiscard]] const Eeprom* eeprom(std::uint32_t id) const { return eeprom_[id - share_.first].get(); }
+  [[nodiscard]] const Eeprom* eeprom(std::uint32_t id) const {
+    const std::uint32_t i = id - share_.first;
+    return calibrated_[i] != 0 ? nullptr : eeprom_[i].get();
+  }
 
   /// Octets of memory that robots' programs take at present.
   [[nodiscard]] std::uint64_t memory_octets() const;
@@ -92,6 +96,7 @@ class BehavioursEngine {
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
   void use_battery(std::uint32_t i);
   void surround(std::uint32_t i, const Slot&, std::uint32_t receptions);
+  void calibrate_ranging(const RadioParameters&);
   void keep_eeprom(std::uint32_t i, const Slot&);
   Fault run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles);
   void note_division(std::uint32_t i, std::uint64_t code, const Program&, const Slot&);
@@ -121,7 +126,8 @@ class BehavioursEngine {
   // Per own robot; index i is robot share_.first + i.
   senses::RobotSenses senses_;
   std::vector<RobotMemory> memory_;
-  std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< of those that have written to it
+  std::vector<std::uint8_t> calibrated_;         ///< 1: its EEPROM is what calibration has left
+  std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< of those that have written to it, or have one of their own
   std::vector<Presence> presence_;
   std::vector<std::uint8_t> motor_left_, motor_right_, spin_up_, led_, life_cycle_;
   std::vector<std::uint16_t> tx_period_;

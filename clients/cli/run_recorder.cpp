@@ -134,6 +134,17 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
     }
     writer_.messages(messages);
   }
+  if (totals.radios.size() == plan_.robots()) {
+    proto::RadioRecord radios;
+    for (const RadioCount& radio : totals.radios) {
+      radios.add_attempted(radio.attempted);
+      radios.add_sent(radio.sent);
+      radios.add_received(radio.received);
+      radios.add_collided(radio.collided);
+      radios.add_backed_off(radio.backed_off);
+    }
+    writer_.radio(radios);
+  }
   // A run that broke before any state hash was known ended where it began.
   writer_.end(std::max(totals.last, totals.first), totals.state_hash, totals.failure);
 
@@ -155,6 +166,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.peak_memory_mib = totals.peak_memory_mib;
   summary.state_hash = totals.state_hash;
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
+  for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
   summary.robots_failed = totals.robots_failed;
   summary.recoveries = static_cast<std::uint32_t>(plan_.manifest.program_failure_size());
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};

@@ -43,6 +43,7 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   const comm::TickTimers timers(plan);
   const Random random(plan.seed());
   const RobotParameters parameters(plan);
+  const RadioParameters radios(plan);
   for (std::uint32_t id = 0; id < plan.robots(); ++id) {
     if (!plan.firmware(id)) continue;
     const std::uint32_t program = plan.program_of(id);
@@ -52,7 +53,8 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
     Robot& robot = robots_.emplace_back();
     robot.period = timers.period(id);
     robot.switched_on = timers.next(id) - robot.period;
-    robot.mcu = std::make_unique<Mcu>(images.at(program), make_eeprom(id, parameters.calibration(id)), random, id);
+    robot.mcu = std::make_unique<Mcu>(images.at(program),
+                                      make_eeprom(id, parameters.calibration(id), radios.table(id)), random, id);
   }
   // Up to tick 0, before which nobody sends.
   std::vector<std::vector<comm::Cycles>> flashes(robots_.size());

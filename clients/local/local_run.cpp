@@ -341,6 +341,7 @@ class LocalRun {
     totals.received = counters.received;
     totals.collided = counters.collided;
     totals.pairs = radio_.pair_counts();
+    totals.radios = radio_.radio_counts();
     for (const auto& engine : hosts_) totals.robots_failed += engine->robots_failed();
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);

@@ -189,4 +189,28 @@ std::uint64_t export_messages(Reader& recording, const std::filesystem::path& cs
   return written;
 }
 
+std::uint64_t export_radio(Reader& recording, const std::filesystem::path& csv) {
+  proto::RadioRecord radio;
+  bool found = false;
+  while (const proto::Record* record = recording.next()) {
+    if (!record->has_radio()) continue;
+    found = true;
+    radio = record->radio();
+  }
+  if (!found) {
+    throw UserError(
+        fmt::format("{}: no counts of the robots' radios; the run did not come to the end where it writes them",
+                    recording.path().string()));
+  }
+  OutputFile output(csv, OutputFile::Existing::kReplace);
+  output.buffer() = "robot,attempted,sent,received,collided,backed_off\n";
+  for (int i = 0; i < radio.attempted_size(); ++i) {
+    fmt::format_to(std::back_inserter(output.buffer()), "{},{},{},{},{},{}\n", i, radio.attempted(i), radio.sent(i),
+                   radio.received(i), radio.collided(i), radio.backed_off(i));
+    output.flush_if_above(kWriteAbove_bytes);
+  }
+  output.close();
+  return static_cast<std::uint64_t>(radio.attempted_size());
+}
+
 }  // namespace kilotwin::recorder

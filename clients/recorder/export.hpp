@@ -29,4 +29,8 @@ std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& csv,
 /// recorded.
 std::uint64_t export_messages(Reader& recording, const std::filesystem::path& csv);
 
+/// robot,attempted,sent,received,collided,backed_off: what each robot's radio did. Returns the number of rows. Throws
+/// UserError where the run did not come to its end.
+std::uint64_t export_radio(Reader& recording, const std::filesystem::path& csv);
+
 }  // namespace kilotwin::recorder

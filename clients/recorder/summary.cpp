@@ -55,7 +55,27 @@ std::string percentage(std::uint64_t part, std::uint64_t whole) {
   return fmt::format("{:.3g} %", whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole));
 }
 
+Json spread_json(const Summary::PerRobot::Spread& spread, std::uint32_t robots) {
+  return Json{{"least", spread.least},
+              {"mean", robots == 0 ? 0.0 : static_cast<double>(spread.sum) / robots},
+              {"most", spread.most}};
+}
+
 }  // namespace
+
+void Summary::PerRobot::add(const RadioCount& radio) {
+  const auto widen = [this](Spread& spread, std::uint32_t count) {
+    spread.least = robots == 0 ? count : std::min(spread.least, count);
+    spread.most = std::max(spread.most, count);
+    spread.sum += count;
+  };
+  widen(attempted, radio.attempted);
+  widen(sent, radio.sent);
+  widen(received, radio.received);
+  widen(collided, radio.collided);
+  widen(backed_off, radio.backed_off);
+  ++robots;
+}
 
 double Summary::realtime_factor() const {
   const std::int64_t from = std::max(resumed_from_tick, recovered_from_tick);
@@ -85,6 +105,11 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
                         {"sent", s.messages.sent},
                         {"received", s.messages.received},
                         {"collided", s.messages.collided}}},
+      {"messages_per_robot", Json{{"attempted", spread_json(s.per_robot.attempted, s.per_robot.robots)},
+                                  {"sent", spread_json(s.per_robot.sent, s.per_robot.robots)},
+                                  {"received", spread_json(s.per_robot.received, s.per_robot.robots)},
+                                  {"collided", spread_json(s.per_robot.collided, s.per_robot.robots)},
+                                  {"backed_off", spread_json(s.per_robot.backed_off, s.per_robot.robots)}}},
       {"robots_failed", s.robots_failed},
       {"recoveries", s.recoveries},
       {"moved_mm", Json{{"mean", s.moved_mm.mean}, {"max", s.moved_mm.max}}},

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string>
 
+#include "core/federation/run_observer.hpp"
+
 namespace kilotwin::recorder {
 
 /// The fields carry the names that they have in the file.
@@ -27,6 +29,16 @@ struct Summary {
   struct Messages {
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   } messages;
+  /// Least, mean and most over the robots of what their radios did; messages_per_robot in the file.
+  struct PerRobot {
+    struct Spread {
+      std::uint32_t least = 0, most = 0;
+      std::uint64_t sum = 0;
+    };
+    std::uint32_t robots = 0;
+    Spread attempted, sent, received, collided, backed_off;
+    void add(const RadioCount& radio);
+  } per_robot;
   std::uint32_t robots_failed = 0;
   std::uint32_t recoveries = 0;
   /// Distance between a robot's first and last recorded place.

@@ -123,6 +123,17 @@ void Writer::messages(const proto::MessagesRecord& messages) {
   flush_if_due();
 }
 
+void Writer::radio(const proto::RadioRecord& radio) {
+  const auto robots = static_cast<int>(robots_);
+  KILOTWIN_DEMAND(radio.attempted_size() == robots && radio.sent_size() == robots &&
+                  radio.received_size() == robots && radio.collided_size() == robots &&
+                  radio.backed_off_size() == robots);
+  *other_.mutable_radio() = radio;
+  append(other_);
+  other_.clear_radio();
+  flush_if_due();
+}
+
 void Writer::end(Tick tick, std::uint64_t state_hash, const std::string& failure) {
   append_hashes();
   proto::EndRecord& record = *other_.mutable_end();

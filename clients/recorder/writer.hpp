@@ -40,6 +40,8 @@ class Writer {
   void input(const proto::InputRecord& input);
   /// Counts since the start; they take the place of what was recorded for the same pairs before.
   void messages(const proto::MessagesRecord& messages);
+  /// One entry per robot in every field.
+  void radio(const proto::RadioRecord& radio);
   /// The last record of all, where the run came to its end. `failure`: one line, empty where it ended well. Closes
   /// the file.
   void end(Tick tick, std::uint64_t state_hash, const std::string& failure = {});

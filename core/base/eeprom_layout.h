@@ -35,7 +35,17 @@ struct KilotwinCalibration {
   uint8_t turn_left, turn_right, straight_left, straight_right; /* duties */
 };
 
-/* The EEPROM of a robot that has been calibrated: 1024 octets. */
+/* The two ranging tables. */
+static inline void kilotwin_fill_ranging(uint8_t* eeprom, const uint16_t* high, const uint16_t* low) {
+  for (int i = 0; i < KILOTWIN_IR_ENTRIES; ++i) {
+    eeprom[KILOTWIN_EEPROM_IR_LOW + 2 * i] = (uint8_t)(low[i] >> 8);
+    eeprom[KILOTWIN_EEPROM_IR_LOW + 2 * i + 1] = (uint8_t)(low[i] & 0xff);
+    eeprom[KILOTWIN_EEPROM_IR_HIGH + 2 * i] = (uint8_t)(high[i] >> 8);
+    eeprom[KILOTWIN_EEPROM_IR_HIGH + 2 * i + 1] = (uint8_t)(high[i] & 0xff);
+  }
+}
+
+/* The EEPROM of a robot that has been calibrated, with the nominal ranging tables: 1024 octets. */
 static inline void kilotwin_fill_eeprom(uint8_t* eeprom, struct KilotwinCalibration robot) {
   const uint16_t low[] = KILOTWIN_IR_LOW, high[] = KILOTWIN_IR_HIGH;
   for (int i = 0; i < KILOTWIN_EEPROM_OCTETS; ++i) eeprom[i] = 0xff;
@@ -43,12 +53,7 @@ static inline void kilotwin_fill_eeprom(uint8_t* eeprom, struct KilotwinCalibrat
   eeprom[KILOTWIN_EEPROM_TURN_RIGHT] = robot.turn_right;
   eeprom[KILOTWIN_EEPROM_STRAIGHT_LEFT] = robot.straight_left;
   eeprom[KILOTWIN_EEPROM_STRAIGHT_RIGHT] = robot.straight_right;
-  for (int i = 0; i < KILOTWIN_IR_ENTRIES; ++i) {
-    eeprom[KILOTWIN_EEPROM_IR_LOW + 2 * i] = (uint8_t)(low[i] >> 8);
-    eeprom[KILOTWIN_EEPROM_IR_LOW + 2 * i + 1] = (uint8_t)(low[i] & 0xff);
-    eeprom[KILOTWIN_EEPROM_IR_HIGH + 2 * i] = (uint8_t)(high[i] >> 8);
-    eeprom[KILOTWIN_EEPROM_IR_HIGH + 2 * i + 1] = (uint8_t)(high[i] & 0xff);
-  }
+  kilotwin_fill_ranging(eeprom, high, low);
   eeprom[KILOTWIN_EEPROM_TX_MASK] = 1;
   eeprom[KILOTWIN_EEPROM_UID] = (uint8_t)(robot.uid & 0xff);
   eeprom[KILOTWIN_EEPROM_UID + 1] = (uint8_t)(robot.uid >> 8);

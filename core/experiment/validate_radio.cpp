@@ -18,10 +18,9 @@ void check_use(const LoadedExperiment& loaded) {
   const Radio& radio = loaded.experiment.radio();
   const auto refuse = [&](const char* field, bool given, Radio::Model needed) {
     if (!given || radio.model() == needed) return;
-    throw loaded.locations.error(
-        std::string{"radio."} + field,
-        fmt::format("{} has no effect with model: {}; set model: {}, or remove it", field,
-                    Radio::Model_Name(radio.model()), Radio::Model_Name(needed)));
+    throw loaded.locations.error(std::string{"radio."} + field,
+                                 fmt::format("{} has no effect with model: {}; set model: {}, or remove it", field,
+                                             Radio::Model_Name(radio.model()), Radio::Model_Name(needed)));
   };
   refuse("propagation", radio.has_propagation(), Radio::PROPAGATION);
   refuse("simple", radio.has_simple(), Radio::SIMPLE);
@@ -37,8 +36,8 @@ void check_pattern(const LoadedExperiment& loaded, const char* field, int entrie
   if (entries <= kMostPatternEntries && entries % 2 == 0) return;
   throw loaded.locations.error(
       std::string{"radio.propagation."} + field,
-      fmt::format("{} has {} entries; it takes pairs, the cosine's and the sine's, at most {} entries", field, entries,
-                  kMostPatternEntries));
+      fmt::format("{} has {} entries; it takes pairs, the cosine's and the sine's, at most {} entries", field,
+                  entries, kMostPatternEntries));
 }
 
 void check_tables(const LoadedExperiment& loaded, const proto::RobotRadio& robot, const std::string& path) {
@@ -51,9 +50,10 @@ void check_tables(const LoadedExperiment& loaded, const proto::RobotRadio& robot
   const bool both = robot.ir_high().empty() == robot.ir_low().empty();
   if (both && fits(robot.ir_high()) && fits(robot.ir_low())) return;
   throw loaded.locations.error(
-      path, fmt::format("ir_high and ir_low are wrong; each takes {} readings, none above the one before, or neither "
-                        "has any",
-                        KILOTWIN_IR_ENTRIES));
+      path,
+      fmt::format("ir_high and ir_low are wrong; each takes {} readings, none above the one before, or neither "
+                  "has any",
+                  KILOTWIN_IR_ENTRIES));
 }
 
 void check_robots(const LoadedExperiment& loaded) {

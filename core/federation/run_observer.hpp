@@ -19,6 +19,16 @@ struct PairCount {
   std::uint32_t receiver, sender, count;
 };
 
+/// What one robot's radio did since the start. attempted = sent + backed_off + one that is on the air.
+struct RadioCount {
+  std::uint32_t attempted = 0;   ///< start pulses
+  std::uint32_t sent = 0;        ///< whole packets
+  std::uint32_t received = 0;    ///< packets of other robots
+  std::uint32_t collided = 0;    ///< receptions lost because something overlapped
+  std::uint32_t backed_off = 0;  ///< attempts given up in the leading byte
+  bool operator==(const RadioCount&) const = default;
+};
+
 /// How far a run is.
 struct RunProgress {
   Tick now;
@@ -59,9 +69,10 @@ struct RunTotals {
   std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   std::uint32_t robots_failed = 0;
   std::array<std::uint64_t, static_cast<std::size_t>(Work::kCount)> work_ns{};
-  std::vector<PairCount> pairs;  ///< where the recording wants messages
-  bool stopped_early = false;    ///< by a directive
-  std::string failure;           ///< one line, where the run broke
+  std::vector<PairCount> pairs;    ///< where the recording wants messages
+  std::vector<RadioCount> radios;  ///< per robot; empty where the run broke before the radio told
+  bool stopped_early = false;      ///< by a directive
+  std::string failure;             ///< one line, where the run broke
 };
 
 }  // namespace kilotwin

@@ -23,7 +23,10 @@ bool RunBooks::fits(const WireLedger& ledger, const Account& account) const {
     return std::all_of(sequence._buffer, sequence._buffer + sequence._length,
                        [this](std::uint32_t robot) { return robot < plan_.robots(); });
   };
-  return !account.last && ledger.first_tick == account.next.count() &&
+  const std::uint32_t radios = ledger.robot_attempted._length;
+  return (radios == 0 || radios == plan_.robots()) && ledger.robot_sent._length == radios &&
+         ledger.robot_received._length == radios && ledger.robot_collided._length == radios &&
+         ledger.robot_backed_off._length == radios && !account.last && ledger.first_tick == account.next.count() &&
          ledger.hash_parts._length <= plan_.last_tick + 1 - account.next && ledger.pair_sender._length == pairs &&
          ledger.pair_count._length == pairs && all_robots(ledger.pair_receiver) && all_robots(ledger.pair_sender);
 }
@@ -50,6 +53,11 @@ void RunBooks::on_ledger(const WireLedger& ledger) {
   for (std::uint32_t i = 0; i < ledger.pair_count._length; ++i) {
     account.pairs.push_back(
         {ledger.pair_receiver._buffer[i], ledger.pair_sender._buffer[i], ledger.pair_count._buffer[i]});
+  }
+  for (std::uint32_t i = 0; i < ledger.robot_attempted._length; ++i) {
+    account.radios.push_back({ledger.robot_attempted._buffer[i], ledger.robot_sent._buffer[i],
+                              ledger.robot_received._buffer[i], ledger.robot_collided._buffer[i],
+                              ledger.robot_backed_off._buffer[i]});
   }
   if (ledger.hash_parts._length != 0) {
     parts_.emplace_back(Tick{ledger.first_tick},
@@ -87,6 +95,7 @@ void RunBooks::fill(RunTotals& totals) {
   totals.robots_failed = 0;
   totals.work_ns = {};
   totals.pairs.clear();
+  totals.radios.clear();
   for (std::uint32_t i = 0; i < accounts_.size(); ++i) {
     const Account& account = accounts_[i];
     totals.cpu_s += static_cast<double>(account.cpu_ns) * 1e-9;
@@ -99,6 +108,7 @@ void RunBooks::fill(RunTotals& totals) {
     totals.work_ns[static_cast<std::size_t>(work_of(i))] += account.step_ns;
     totals.work_ns[static_cast<std::size_t>(Work::kExchange)] += account.exchange_ns;
     totals.pairs.insert(totals.pairs.end(), account.pairs.begin(), account.pairs.end());
+    totals.radios.insert(totals.radios.end(), account.radios.begin(), account.radios.end());
   }
 }
 

@@ -36,6 +36,7 @@ class RunBooks {
     std::uint32_t peak_memory_kib = 0, robots_failed = 0;
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
     std::vector<PairCount> pairs{};
+    std::vector<RadioCount> radios{};
   };
   void on_ledger(const WireLedger&);
   [[nodiscard]] bool fits(const WireLedger&, const Account&) const;

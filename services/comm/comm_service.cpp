@@ -51,6 +51,13 @@ class CommFederate : public Federate {
       sender_.push_back(pair.sender);
       count_.push_back(pair.count);
     }
+    for (const RadioCount& radio : engine_.radio_counts()) {
+      attempted_.push_back(radio.attempted);
+      robot_sent_.push_back(radio.sent);
+      received_.push_back(radio.received);
+      collided_.push_back(radio.collided);
+      backed_off_.push_back(radio.backed_off);
+    }
     const auto lend = [](auto& sequence, std::vector<std::uint32_t>& values) {
       sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
       sequence._buffer = values.data();
@@ -58,6 +65,11 @@ class CommFederate : public Federate {
     lend(ledger.pair_receiver, receiver_);
     lend(ledger.pair_sender, sender_);
     lend(ledger.pair_count, count_);
+    lend(ledger.robot_attempted, attempted_);
+    lend(ledger.robot_sent, robot_sent_);
+    lend(ledger.robot_received, received_);
+    lend(ledger.robot_collided, collided_);
+    lend(ledger.robot_backed_off, backed_off_);
   }
 
  private:
@@ -68,7 +80,9 @@ class CommFederate : public Federate {
   Input<ActuationFrame> actuation_;
   Input<OverheadFrame> overhead_;
   std::vector<std::unique_ptr<Output<RadioFrame>>> radio_out_;
+  // What the last ledger lends.
   std::vector<std::uint32_t> receiver_, sender_, count_;
+  std::vector<std::uint32_t> attempted_, robot_sent_, received_, collided_, backed_off_;
 };
 
 }  // namespace

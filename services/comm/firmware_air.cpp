@@ -18,9 +18,11 @@ constexpr Cycles kLongestPacket = 13 * (kBitsPerOctet + 2);
 }  // namespace
 
 FirmwareAir::FirmwareAir(const RunPlan& plan, FirmwareRobots& robots, const TickTimers& timers,
-                         const Neighbourhood& neighbourhood, const Ranging& ranging, Gains overhead_gains)
+                         const Neighbourhood& neighbourhood, LinkBudget& links, const Ranging& ranging,
+                         Gains overhead_gains)
     : robots_(robots),
       neighbourhood_(neighbourhood),
+      links_(links),
       ranging_(ranging),
       overhead_gains_(overhead_gains),
       cycles_per_tick_(plan.tick_length.cycles()),
@@ -51,10 +53,17 @@ void FirmwareAir::begin_tick(Tick tick, std::span<const BodyFrame* const> bodies
   for (std::uint32_t i = 0; i < ids.size(); ++i) {
     neighbours_[i].clear();
     for (std::uint32_t j = 0; j < ids.size(); ++j) {
-      if (i == j || !neighbourhood_.in_range(ids[i], ids[j])) continue;
-      neighbours_[i].push_back({j, ranging_.gains(__builtin_sqrt(neighbourhood_.square(ids[i], ids[j])))});
+      if (i == j || !links_.hears(neighbourhood_, ids[i], ids[j])) continue;
+      neighbours_[i].push_back({j, gains(ids[j], ids[i])});
     }
   }
+}
+
+/// What a firmware robot reads of a sender that it hears. The noise of single packets and readings is left out: a processor
+/// takes pulses for what they are.
+Gains FirmwareAir::gains(std::uint32_t sender, std::uint32_t receiver) {
+  if (links_.is_disc()) return ranging_.gains(__builtin_sqrt(neighbourhood_.square(receiver, sender)));
+  return links_.gains(links_.margin_db(neighbourhood_, sender, receiver));
 }
 
 void FirmwareAir::end_tick() {
@@ -138,20 +147,20 @@ void FirmwareAir::shine(Cycles from, Cycles until, std::vector<std::vector<Pulse
     Cycles ends = until;
     for (const Start& start : starts_) {
       if (!packet.fragile || start.time - packet.start < kDeaf || start.time - packet.start >= kListening) continue;
-      if (neighbourhood_.in_range(packet.sender, start.robot)) ends = std::min(ends, start.time);
+      if (links_.hears(neighbourhood_, packet.sender, start.robot)) ends = std::min(ends, start.time);
     }
     const Cycles first = std::max<Cycles>(0, (from - packet.start + kBit - 1) / kBit);
     const Cycles last = std::min<Cycles>(kPacketBits, (ends - packet.start + kBit - 1) / kBit);
     for (const std::uint32_t i : all_) {
       const std::uint32_t id = robots_.ids()[i];
-      Gains gains = overhead_gains_;
+      Gains received = overhead_gains_;
       if (packet.sender != kOverhead) {
-        if (!neighbourhood_.in_range(id, packet.sender)) continue;
-        gains = ranging_.gains(__builtin_sqrt(neighbourhood_.square(id, packet.sender)));
+        if (!links_.hears(neighbourhood_, id, packet.sender)) continue;
+        received = gains(packet.sender, id);
       }
       if (fades(id, packet.sender, packet.start)) continue;
       for (Cycles bit = first; bit < last; ++bit) {
-        if (packet.bits[static_cast<std::size_t>(bit)]) light[i].push_back({packet.start + bit * kBit, gains});
+        if (packet.bits[static_cast<std::size_t>(bit)]) light[i].push_back({packet.start + bit * kBit, received});
       }
     }
   }

@@ -16,6 +16,7 @@
 #include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"
 #include "services/comm/firmware_robots.hpp"
+#include "services/comm/link_budget.hpp"
 #include "services/comm/neighbourhood.hpp"
 #include "services/comm/overhead_controller.hpp"
 #include "services/comm/packet_bits.hpp"
@@ -41,7 +42,7 @@ class FirmwareAir {
     IrMessage message;  ///< kReceived
   };
 
-  FirmwareAir(const RunPlan&, FirmwareRobots&, const TickTimers&, const Neighbourhood&, const Ranging&,
+  FirmwareAir(const RunPlan&, FirmwareRobots&, const TickTimers&, const Neighbourhood&, LinkBudget&, const Ranging&,
               Gains overhead_gains);
 
   [[nodiscard]] bool has(std::uint32_t robot) const { return index_[robot] != kNobody; }
@@ -72,7 +73,7 @@ class FirmwareAir {
  private:
   static constexpr std::uint32_t kNobody = 0xffffffffu;
   struct Neighbour {
-    std::uint32_t index;
+    std::uint32_t index;  ///< of one that is heard
     Gains gains;
   };
   struct Start {
@@ -80,6 +81,7 @@ class FirmwareAir {
     std::uint32_t robot;  ///< id
   };
 
+  [[nodiscard]] Gains gains(std::uint32_t sender, std::uint32_t receiver);
   void collect_packets(Cycles from, Cycles until, const Channel&, const OverheadController&);
   void find_starts();
   void shine(Cycles from, Cycles until, std::vector<std::vector<Pulse>>& light);
@@ -88,6 +90,7 @@ class FirmwareAir {
 
   FirmwareRobots& robots_;
   const Neighbourhood& neighbourhood_;
+  LinkBudget& links_;
   const Ranging& ranging_;
   const Gains overhead_gains_;
   const Cycles cycles_per_tick_;
@@ -99,7 +102,7 @@ class FirmwareAir {
   std::vector<PulseDecoder> decoders_;
   std::vector<FirmwareRobots::Outputs> outputs_;
   std::vector<LifeCycle> life_cycle_;
-  std::vector<std::vector<Neighbour>> neighbours_;  ///< firmware robots in range, ascending
+  std::vector<std::vector<Neighbour>> neighbours_;  ///< firmware robots that it hears, ascending
   std::vector<std::vector<Pulse>> light_, next_light_;
   std::vector<std::vector<Cycles>> flashes_;
   std::vector<std::vector<Cycles>> flash_starts_;  ///< of each flash: when its packet started

@@ -9,8 +9,8 @@
 
 #include "core/base/time.hpp"
 #include "core/federation/frames.hpp"
+#include "core/model/ranging.hpp"
 #include "services/comm/air.hpp"
-#include "services/comm/ranging.hpp"
 
 namespace kilotwin::comm {
 

@@ -1,6 +1,7 @@
 #include "services/comm/link_budget.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 
 #include "core/math/elementary.h"
@@ -8,88 +9,94 @@
 namespace kilotwin::comm {
 namespace {
 
-/// 1 / sqrt(8 / 12), over the 2^16 steps of a uniform number.
-constexpr double kNoiseStep = 1.224744871391589 / 65536;
+/// Standard deviation of the sum of four octets: sqrt(4 (256^2 - 1) / 12).
+constexpr double kOctetSum_sd = 147.801, kOctetSum_mean = 510;
+/// What is remembered of pairs, octets in all: it stays in a cache of the processor's.
+constexpr std::size_t kRemembered = 8u << 20;
+constexpr std::uint32_t kNobody = 0xffffffffu;
+/// ln 10 / 10: from dB to a factor.
+constexpr double kPerDecibel = 0.2302585092994046;
 
 }  // namespace
 
 LinkBudget::LinkBudget(const RunPlan& plan)
-    : random_(plan.seed()),
+    : robots_(plan),
+      random_(plan.seed()),
       is_disc_(plan.experiment().radio().model() != proto::Radio::PROPAGATION),
       range_mm_(plan.experiment().radio().range_mm()),
       range_square_(range_mm_ * range_mm_),
       decay_db_per_mm_(plan.experiment().radio().propagation().decay_db_per_mm()),
+      mm_per_db_(1 / decay_db_per_mm_),
       reach_mm_(range_mm_),
       surely_square_(range_square_) {
   if (is_disc_) return;
   const proto::Propagation& model = plan.experiment().radio().propagation();
   body_loss_db_ = model.body_loss_db();
   link_sd_db_ = model.link_sd_db();
+  pair_sd_db_ = model.pair_sd_db();
+  run_sd_db_ = model.run_sd_db();
   packet_sd_db_ = model.packet_sd_db();
   capture_db_ = model.capture_db();
-  draw_robots(model, plan.robots());
-  note_known(model, plan.robots());
+  reading_sd_db_ = model.reading_sd_db();
+  const auto take = [](const auto& entries, Pattern& pattern) {
+    for (int i = 0; i + 1 < entries.size(); i += 2)
+      pattern.harmonics.push_back({entries.Get(i), entries.Get(i + 1)});
+  };
+  take(model.power_pattern_db(), power_pattern_);
+  take(model.sensitivity_pattern_db(), sensitivity_pattern_);
+  for (const proto::RadioLink& link : model.link())
+    links_.push_back({key(link.sender(), link.receiver()), link.offset_db()});
+  std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) { return a.key < b.key; });
+
+  const auto points = [](const RadioParameters::Bearing& b) { return b.ahead_db != 0 || b.left_db != 0; };
+  sender_matters_ = !power_pattern_.harmonics.empty();
+  receiver_matters_ = !sensitivity_pattern_.harmonics.empty();
   for (std::uint32_t i = 0; i < plan.robots(); ++i) {
-    for (const Vector& v : {power_bearing_[i], sensitivity_bearing_[i]})
-      directional_ = directional_ || v.x != 0 || v.y != 0;
+    sender_matters_ = sender_matters_ || points(robots_.power_bearing(i));
+    receiver_matters_ = receiver_matters_ || points(robots_.sensitivity_bearing(i));
+    heading_rad_.push_back(plan.initial_pose(i).heading_rad);
   }
-  if (directional_) {
-    for (std::uint32_t i = 0; i < plan.robots(); ++i) heading_rad_.push_back(plan.initial_pose(i).heading_rad);
-    oriented_rad_.assign(plan.robots(), std::numeric_limits<double>::quiet_NaN());
-    power_in_arena_.resize(plan.robots());
-    sensitivity_in_arena_.resize(plan.robots());
+  directional_ = sender_matters_ || receiver_matters_;
+  if (sender_matters_ && power_pattern_.harmonics.empty()) power_pattern_.harmonics.push_back({0, 0});
+  if (receiver_matters_ && sensitivity_pattern_.harmonics.empty()) sensitivity_pattern_.harmonics.push_back({0, 0});
+  faced_rad_.assign(plan.robots(), std::numeric_limits<double>::quiet_NaN());
+  facing_.assign(plan.robots(), {1, 0});
+  if (link_sd_db_ > 0 || pair_sd_db_ > 0 || run_sd_db_ > 0 || !links_.empty()) {
+    row_ = static_cast<std::uint32_t>(
+        std::clamp<std::size_t>(std::bit_floor(kRemembered / sizeof(Known) / plan.robots()), 16, 256));
+    known_.assign(std::size_t{row_} * plan.robots(), {kNobody, 0});
   }
   find_reach();
 }
 
-void LinkBudget::draw_robots(const proto::Propagation& model, std::uint32_t robots) {
-  const auto draw = [&](std::uint32_t robot, std::uint32_t number, double sd) {
-    return sd > 0 ? sd * random_.normal(Stream::kLink, robot, Tick{-1}, number) : 0.0;
-  };
-  for (std::uint32_t i = 0; i < robots; ++i) {
-    power_db_.push_back(draw(i, 0, model.power_sd_db()));
-    sensitivity_db_.push_back(draw(i, 1, model.sensitivity_sd_db()));
-    power_bearing_.push_back({draw(i, 2, model.power_bearing_sd_db()), draw(i, 3, model.power_bearing_sd_db())});
-    sensitivity_bearing_.push_back(
-        {draw(i, 4, model.sensitivity_bearing_sd_db()), draw(i, 5, model.sensitivity_bearing_sd_db())});
-  }
-}
-
-void LinkBudget::note_known(const proto::Propagation& model, std::uint32_t robots) {
-  for (const proto::RobotRadio& known : model.robot()) {
-    const std::uint32_t i = known.robot();
-    if (i >= robots) continue;
-    if (known.has_power_db()) power_db_[i] = known.power_db();
-    if (known.has_sensitivity_db()) sensitivity_db_[i] = known.sensitivity_db();
-    if (known.has_power_ahead_db()) power_bearing_[i].x = known.power_ahead_db();
-    if (known.has_power_left_db()) power_bearing_[i].y = known.power_left_db();
-    if (known.has_sensitivity_ahead_db()) sensitivity_bearing_[i].x = known.sensitivity_ahead_db();
-    if (known.has_sensitivity_left_db()) sensitivity_bearing_[i].y = known.sensitivity_left_db();
-  }
-  for (const proto::RadioLink& link : model.link())
-    links_.push_back({key(link.sender(), link.receiver()), link.offset_db()});
-  std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) { return a.key < b.key; });
+double LinkBudget::Pattern::swing_db() const {
+  double sum = 0;
+  for (const Vector& v : harmonics) sum += __builtin_sqrt(v.x * v.x + v.y * v.y);
+  return sum;
 }
 
 /// The greatest gain over the nominal robot that any pair can have bounds the reach; the greatest loss, the distance within
 /// which everybody is heard.
 void LinkBudget::find_reach() {
   double power_most = 0, power_least = 0, sensitivity_most = 0, sensitivity_least = 0;
-  for (std::size_t i = 0; i < power_db_.size(); ++i) {
-    const auto widen = [](double level, const Vector& v, double& most, double& least) {
-      const double swing = __builtin_sqrt(v.x * v.x + v.y * v.y);
+  for (std::uint32_t i = 0; i < heading_rad_.size(); ++i) {
+    const auto widen = [](double level, const RadioParameters::Bearing& own, const Pattern& pattern, double& most,
+                          double& least) {
+      const double swing =
+          __builtin_sqrt(own.ahead_db * own.ahead_db + own.left_db * own.left_db) + pattern.swing_db();
       most = std::max(most, level + swing);
       least = std::min(least, level - swing);
     };
-    widen(power_db_[i], power_bearing_[i], power_most, power_least);
-    widen(sensitivity_db_[i], sensitivity_bearing_[i], sensitivity_most, sensitivity_least);
+    widen(robots_.power_db(i), robots_.power_bearing(i), power_pattern_, power_most, power_least);
+    widen(robots_.sensitivity_db(i), robots_.sensitivity_bearing(i), sensitivity_pattern_, sensitivity_most,
+          sensitivity_least);
   }
-  double link_most = 0, link_least = 0;
+  double link_most = kMostNoise * (link_sd_db_ + pair_sd_db_), link_least = -link_most;
   for (const Link& link : links_) {
     link_most = std::max(link_most, link.offset_db);
     link_least = std::min(link_least, link.offset_db);
   }
-  const double noise = kMostNoise * (link_sd_db_ + packet_sd_db_);
+  const double noise = kMostNoise * (run_sd_db_ + packet_sd_db_);
   reach_mm_ = range_mm_ + (power_most + sensitivity_most + link_most + noise) / decay_db_per_mm_;
   // Between discs that touch there is no room for another: a shadow needs a distance of two diameters.
   const double surely_mm = range_mm_ + (power_least + sensitivity_least + link_least - noise) / decay_db_per_mm_;
@@ -97,50 +104,91 @@ void LinkBudget::find_reach() {
   surely_square_ = clear_mm > 0 ? clear_mm * clear_mm : 0;
 }
 
-void LinkBudget::orient(std::uint32_t robot) {
+void LinkBudget::face(std::uint32_t robot) {
   const double heading = heading_rad_[robot];
-  if (oriented_rad_[robot] == heading) return;
-  oriented_rad_[robot] = heading;
-  const double c = kt_cos(heading), s = kt_sin(heading);
-  const auto turned = [c, s](const Vector& v) { return Vector{c * v.x - s * v.y, s * v.x + c * v.y}; };
-  power_in_arena_[robot] = turned(power_bearing_[robot]);
-  sensitivity_in_arena_[robot] = turned(sensitivity_bearing_[robot]);
+  if (faced_rad_[robot] == heading) return;
+  faced_rad_[robot] = heading;
+  facing_[robot] = {kt_cos(heading), kt_sin(heading)};
+}
+
+/// Level of a robot in the direction of the unit vector (x, y) of the arena: its own vector and the pattern of all.
+double LinkBudget::bearing_db(const Pattern& pattern, const RadioParameters::Bearing& own, std::uint32_t robot,
+                              double x, double y) {
+  face(robot);
+  const Vector f = facing_[robot];
+  const double cosine = f.x * x + f.y * y, sine = f.x * y - f.y * x;
+  double sum = own.ahead_db * cosine + own.left_db * sine;
+  double c = 1, s = 0;
+  for (const Vector& harmonic : pattern.harmonics) {
+    const double next = c * cosine - s * sine;
+    s = s * cosine + c * sine;
+    c = next;
+    sum += harmonic.x * c + harmonic.y * s;
+  }
+  return sum;
 }
 
 double LinkBudget::margin_db(const Neighbourhood& robots, std::uint32_t sender, std::uint32_t receiver) {
   const double distance_mm = __builtin_sqrt(robots.square(sender, receiver));
   double margin = decay_db_per_mm_ * (range_mm_ - distance_mm);
-  margin += power_db_[sender] + sensitivity_db_[receiver];
+  margin += robots_.power_db(sender) + robots_.sensitivity_db(receiver);
   if (directional_ && distance_mm > 0) {
-    orient(sender);
-    orient(receiver);
-    const double x = robots.x_mm(receiver) - robots.x_mm(sender), y = robots.y_mm(receiver) - robots.y_mm(sender);
-    const Vector &power = power_in_arena_[sender], &sensitivity = sensitivity_in_arena_[receiver];
-    margin += (x * (power.x + sensitivity.x) + y * (power.y + sensitivity.y)) / distance_mm;
+    const double x = (robots.x_mm(receiver) - robots.x_mm(sender)) / distance_mm;
+    const double y = (robots.y_mm(receiver) - robots.y_mm(sender)) / distance_mm;
+    if (sender_matters_) margin += bearing_db(power_pattern_, robots_.power_bearing(sender), sender, x, y);
+    if (receiver_matters_)
+      margin += bearing_db(sensitivity_pattern_, robots_.sensitivity_bearing(receiver), receiver, -x, -y);
   }
-  if (link_sd_db_ > 0) margin += link_sd_db_ * noise(Stream::kLink, receiver, Tick{sender}, 3);
-  if (!links_.empty()) {
-    const std::uint64_t wanted = key(sender, receiver);
-    const auto link = std::lower_bound(links_.begin(), links_.end(), wanted,
-                                       [](const Link& a, std::uint64_t k) { return a.key < k; });
-    if (link != links_.end() && link->key == wanted) margin += link->offset_db;
-  }
+  if (row_ > 0) margin += static_cast<double>(spread_db(sender, receiver));
   if (body_loss_db_ > 0) margin -= body_loss_db_ * robots.bodies_between(sender, receiver, kRobotRadius_mm);
   return margin;
 }
 
-double LinkBudget::packet_noise_db(std::uint32_t sender, std::uint32_t receiver, Tick now) const {
-  if (!(packet_sd_db_ > 0)) return 0;
-  // The sender goes into the draw, where the numbers of a robot and tick have room for 2^16 blocks.
-  return packet_sd_db_ * noise(Stream::kPacket, receiver, now, sender & 0xffffu);
+/// What a pair has of its own in this run.
+float LinkBudget::spread_db(std::uint32_t sender, std::uint32_t receiver) {
+  Known& known = known_[std::size_t{receiver} * row_ + (sender & (row_ - 1))];
+  if (known.other != sender) known = {sender, drawn_spread_db(sender, receiver)};
+  return known.db;
 }
 
-double LinkBudget::noise(Stream stream, std::uint32_t entity, Tick tick, std::uint32_t block) const {
-  std::int32_t sum = 0;
-  for (const std::uint32_t word : random_.block(stream, entity, tick, block))
-    sum += static_cast<std::int32_t>(word & 0xffffu) + static_cast<std::int32_t>(word >> 16);
-  // Eight numbers of mean 2^15 - 1/2 each.
-  return kNoiseStep * (static_cast<double>(sum) - 8 * 32767.5);
+float LinkBudget::drawn_spread_db(std::uint32_t sender, std::uint32_t receiver) const {
+  const std::uint32_t low = std::min(sender, receiver), high = std::max(sender, receiver);
+  const std::uint32_t direction = sender < receiver ? 1 : 2;
+  double sum = 0;
+  const std::uint64_t wanted = key(sender, receiver);
+  const auto link = std::lower_bound(links_.begin(), links_.end(), wanted,
+                                     [](const Link& a, std::uint64_t k) { return a.key < k; });
+  if (link != links_.end() && link->key == wanted) {
+    sum += link->offset_db;
+  } else if (link_sd_db_ > 0 || pair_sd_db_ > 0) {
+    const auto word = random_.block(Stream::kLink, low, Tick{high}, 0);
+    sum += pair_sd_db_ * noise(word[0]) + link_sd_db_ * noise(word[direction]);
+  }
+  if (run_sd_db_ > 0) sum += run_sd_db_ * noise(random_.block(Stream::kLink, low, Tick{high}, 1)[direction]);
+  return static_cast<float>(sum);
+}
+
+double LinkBudget::packet_noise_db(std::uint32_t sender, std::uint32_t receiver, std::int64_t instant) const {
+  if (!(packet_sd_db_ > 0)) return 0;
+  // The sender goes into the draw, where the numbers of a robot and an instant have room for 2^16 blocks.
+  return packet_sd_db_ * noise(random_.block(Stream::kPacket, receiver, Tick{instant}, sender & 0xffffu)[0]);
+}
+
+Gains LinkBudget::readings(std::uint32_t sender, std::uint32_t receiver, std::int64_t instant,
+                           double margin_db) const {
+  const Gains exact = gains(margin_db);
+  if (!(reading_sd_db_ > 0)) return exact;
+  const auto word = random_.block(Stream::kPacket, receiver, Tick{instant}, sender & 0xffffu);
+  const auto noisy = [this](std::int16_t reading, std::uint32_t bits) {
+    const double counts = reading * kt_exp(kPerDecibel * reading_sd_db_ * noise(bits));
+    return static_cast<std::int16_t>(std::min(counts + 0.5, 1023.0));
+  };
+  return {noisy(exact.high, word[1]), noisy(exact.low, word[2])};
+}
+
+double LinkBudget::noise(std::uint32_t bits) {
+  const std::uint32_t sum = (bits & 0xff) + (bits >> 8 & 0xff) + (bits >> 16 & 0xff) + (bits >> 24);
+  return (static_cast<double>(sum) - kOctetSum_mean) * (1 / kOctetSum_sd);
 }
 
 }  // namespace kilotwin::comm

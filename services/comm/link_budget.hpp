@@ -2,16 +2,19 @@
 /// receiver just hears.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "core/experiment/plan.hpp"
+#include "core/model/radio_parameters.hpp"
+#include "core/model/ranging.hpp"
 #include "core/random/random.hpp"
 #include "services/comm/neighbourhood.hpp"
 
 namespace kilotwin::comm {
 
-/// Where the experiment has no propagation model, everybody within radio.range_mm is heard, and margins mean nothing.
+/// With a model other than PROPAGATION everybody within radio.range_mm is heard, and margins mean nothing.
 class LinkBudget {
  public:
   explicit LinkBudget(const RunPlan&);
@@ -35,44 +38,64 @@ class LinkBudget {
     if (square <= surely_square_) return true;
     return square <= robots.range_square() && margin_db(robots, sender, receiver) > 0;
   }
-  /// What the noise of a packet adds, dB.
-  [[nodiscard]] double packet_noise_db(std::uint32_t sender, std::uint32_t receiver, Tick now) const;
+  /// What the noise of a packet adds, dB; `instant` tells the packets of a pair apart. Is asked for where it matters.
+  [[nodiscard]] double packet_noise_db(std::uint32_t sender, std::uint32_t receiver, std::int64_t instant) const;
+  /// The greatest noise of a packet, dB.
+  [[nodiscard]] double most_packet_noise_db() const { return kMostNoise * packet_sd_db_; }
   [[nodiscard]] double capture_db() const { return capture_db_; }
-  /// The distance at which the nominal robot is heard with this margin, mm.
-  [[nodiscard]] double distance_of_mm(double margin_db) const { return range_mm_ - margin_db / decay_db_per_mm_; }
+  /// Readings at this margin, without noise.
+  [[nodiscard]] Gains gains(double margin_db) const { return ranging_.gains(range_mm_ - margin_db * mm_per_db_); }
+  /// What a receiver reads of a packet that arrives with this margin.
+  [[nodiscard]] Gains readings(std::uint32_t sender, std::uint32_t receiver, std::int64_t instant,
+                               double margin_db) const;
 
  private:
-  /// A component ahead and one to the left, of one robot, or along x and y.
+  /// Along the heading and to the left of it, or along x and y.
   struct Vector {
-    double x = 0, y = 0;
+    double x, y;
+  };
+  /// A level over the bearing: c cos + s sin for each harmonic 1, 2...
+  struct Pattern {
+    std::vector<Vector> harmonics;
+    [[nodiscard]] double swing_db() const;
   };
   struct Link {
     std::uint64_t key;
     double offset_db;
   };
+  struct Known {
+    std::uint32_t other;
+    float db;
+  };
   static std::uint64_t key(std::uint32_t sender, std::uint32_t receiver) {
     return std::uint64_t{sender} << 32 | receiver;
   }
 
-  void draw_robots(const proto::Propagation&, std::uint32_t robots);
-  void note_known(const proto::Propagation&, std::uint32_t robots);
   void find_reach();
-  /// Turns what depends on the bearing into the arena's frame.
-  void orient(std::uint32_t robot);
-  /// Sum of eight uniform numbers, with mean 0 and standard deviation 1: near enough to normal, and bounded.
-  [[nodiscard]] double noise(Stream, std::uint32_t entity, Tick, std::uint32_t block) const;
-  static constexpr double kMostNoise = 4.898979485566356;  ///< 4 / sqrt(8 / 12)
+  void face(std::uint32_t robot);
+  [[nodiscard]] double bearing_db(const Pattern&, const RadioParameters::Bearing&, std::uint32_t robot, double x,
+                                  double y);
+  [[nodiscard]] float spread_db(std::uint32_t sender, std::uint32_t receiver);
+  [[nodiscard]] float drawn_spread_db(std::uint32_t sender, std::uint32_t receiver) const;
+  /// Sum of the four octets, with mean 0 and standard deviation 1: near enough to normal, and bounded.
+  static double noise(std::uint32_t bits);
+  static constexpr double kMostNoise = 3.4506;  ///< 510 / 147.8
 
-  Random random_;
-  bool is_disc_, directional_ = false;
-  double range_mm_, range_square_, decay_db_per_mm_, body_loss_db_ = 0, link_sd_db_ = 0, packet_sd_db_ = 0,
-                                                     capture_db_ = 0;
-  double reach_mm_ = 0, surely_square_ = 0;
-  std::vector<double> power_db_, sensitivity_db_;              ///< per robot
-  std::vector<Vector> power_bearing_, sensitivity_bearing_;    ///< per robot, in its own frame, dB
-  std::vector<Link> links_;                                    ///< ascending keys
-  std::vector<double> heading_rad_, oriented_rad_;             ///< per robot: now, and for which the next two hold
-  std::vector<Vector> power_in_arena_, sensitivity_in_arena_;  ///< per robot
+  const RadioParameters robots_;
+  const Ranging ranging_;
+  const Random random_;
+  const bool is_disc_;
+  const double range_mm_, range_square_, decay_db_per_mm_, mm_per_db_;
+  double body_loss_db_ = 0, link_sd_db_ = 0, pair_sd_db_ = 0, run_sd_db_ = 0, packet_sd_db_ = 0, capture_db_ = 0,
+         reading_sd_db_ = 0;
+  bool directional_ = false, sender_matters_ = false, receiver_matters_ = false;
+  double reach_mm_, surely_square_;
+  Pattern power_pattern_, sensitivity_pattern_;
+  std::vector<Link> links_;                      ///< ascending keys
+  std::vector<double> heading_rad_, faced_rad_;  ///< per robot: now, and for which facing_ holds
+  std::vector<Vector> facing_;                   ///< per robot: unit vector of its heading
+  std::uint32_t row_ = 0;                        ///< entries per receiver in known_
+  std::vector<Known> known_;  ///< per receiver: what spread_db has found, by the low bits of the sender
 };
 
 }  // namespace kilotwin::comm

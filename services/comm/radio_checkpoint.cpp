@@ -24,6 +24,11 @@ void RadioEngine::save(proto::RadioState& part) const {
     part.add_timer_counts(timers_.count_word(i));
     part.add_tx_period(tx_period_[i]);
     if (is(i, kHolding)) append(*part.mutable_held_messages(), message_[i]);
+    part.add_robot_attempted(radio_counts_[i].attempted);
+    part.add_robot_sent(radio_counts_[i].sent);
+    part.add_robot_received(radio_counts_[i].received);
+    part.add_robot_collided(radio_counts_[i].collided);
+    part.add_robot_backed_off(radio_counts_[i].backed_off);
   }
   part.set_state(std::string(state_.begin(), state_.end()));
   for (const Transmission& x : channel_.all()) {
@@ -34,6 +39,7 @@ void RadioEngine::save(proto::RadioState& part) const {
         static_cast<char>((x.aborted ? kAborted : 0) | (x.orphaned ? kOrphaned : 0) | (x.over ? kOver : 0)));
     append(*part.mutable_transmission_messages(), x.message);
   }
+  part.mutable_next_send()->Add(next_send_.begin(), next_send_.end());
   overhead_.save(*part.mutable_overhead());
   if (firmware_) firmware_->save(part);
   part.mutable_sent()->Add(sent_.begin(), sent_.end());
@@ -57,6 +63,10 @@ void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> part
   const std::size_t robots = state_.size();
   require(size_of(part.next_interrupt_size()) == robots && size_of(part.timer_counts_size()) == robots &&
           part.state().size() == robots && size_of(part.tx_period_size()) == robots);
+  require(size_of(part.next_send_size()) == next_send_.size() && size_of(part.robot_attempted_size()) == robots &&
+          size_of(part.robot_sent_size()) == robots && size_of(part.robot_received_size()) == robots &&
+          size_of(part.robot_collided_size()) == robots && size_of(part.robot_backed_off_size()) == robots);
+  next_send_.assign(part.next_send().begin(), part.next_send().end());
   tick_ = tick;
   std::size_t held = 0;
   for (std::uint32_t i = 0; i < robots; ++i) {
@@ -64,6 +74,8 @@ void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> part
     timers_.restore(i, part.next_interrupt(n), part.timer_counts(n));
     state_[i] = static_cast<std::uint8_t>(part.state()[i]);
     tx_period_[i] = static_cast<std::uint16_t>(part.tx_period(n));
+    radio_counts_[i] = {part.robot_attempted(n), part.robot_sent(n), part.robot_received(n), part.robot_collided(n),
+                        part.robot_backed_off(n)};
     if (is(i, kHolding)) message_[i] = message_at(part.held_messages(), held++);
   }
   const int transmissions = part.transmission_start_size();

@@ -28,15 +28,19 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
       loss_(plan.experiment().radio().loss()),
       counts_pairs_(plan.experiment().recording().messages()),
       random_(plan.seed()),
+      simple_(plan.experiment().radio().model() == proto::Radio::SIMPLE),
+      simple_model_(plan.experiment().radio().simple()),
       overhead_gains_(ranging_.gains(kOverheadDistance_mm)),
       timers_(plan),
       state_(plan.robots(), 0),
       tx_period_(plan.robots(), 0),
       message_(plan.robots()),
+      next_send_(simple_ ? plan.robots() : 0, 0),
       links_(plan),
       neighbourhood_(links_.reach_mm(), plan.robots()),
       channel_(neighbourhood_, links_),
       receptions_(plan.robots()),
+      radio_counts_(plan.robots()),
       pairs_(counts_pairs_ ? plan.robots() : 0),
       firmware_robots_(std::move(firmware)),
       jammed_(plan.robots(), 0) {
@@ -47,7 +51,7 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
   }
   KILOTWIN_DEMAND(!plan.has_firmware() || firmware_robots_ != nullptr);
   if (plan.has_firmware())
-    firmware_.emplace(plan, *firmware_robots_, timers_, neighbourhood_, ranging_, overhead_gains_);
+    firmware_.emplace(plan, *firmware_robots_, timers_, neighbourhood_, links_, ranging_, overhead_gains_);
 }
 
 void RadioEngine::step(Tick from, const Inputs& inputs) {
@@ -57,8 +61,12 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
   read_actuation(inputs.actuation);
   overhead_.command(inputs.overhead.packets, begin_of(from));
   overhead_.advance(begin_of(from + 1));
-  contend(from, inputs.bodies);
-  arrive(from);
+  if (simple_) {
+    exchange_simply(from);
+  } else {
+    contend(from, inputs.bodies);
+    arrive(from);
+  }
   ++tick_;
 }
 
@@ -199,6 +207,7 @@ void RadioEngine::run_firmware(Cycles from, Cycles until, Tick now) {
   for (const FirmwareAir::Event& event : firmware_->advance(from, until, channel_, overhead_)) {
     if (event.kind == Kind::kStarted) {
       ++counters_.attempted;
+      ++radio_counts_[event.robot].attempted;
       abort_who_notices(event.robot, event.time, now);
       channel_.add({event.time, event.end, event.robot, false, false, {}});
       continue;
@@ -210,6 +219,7 @@ void RadioEngine::run_firmware(Cycles from, Cycles until, Tick now) {
       x.message = event.message;
       if (event.kind == Kind::kReceived) continue;
       ++counters_.aborted;
+      ++radio_counts_[event.robot].backed_off;
       x.aborted = true;
     }
   }
@@ -231,6 +241,7 @@ void RadioEngine::attempt(std::uint32_t robot, Tick now) {
   timers_.interrupt(robot);
   if (senses(robot, t)) return schedule(robot, begin_of(now + 1));
   ++counters_.attempted;
+  ++radio_counts_[robot].attempted;
   state_[robot] |= kFlying;
   abort_who_notices(robot, t, now);
   channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
@@ -256,6 +267,7 @@ void RadioEngine::abort(Transmission& transmission, Cycles t, Tick now) {
   const std::uint32_t robot = transmission.sender;
   if (firmware_ && firmware_->has(robot)) return;  // it notices by itself
   ++counters_.aborted;
+  ++radio_counts_[robot].backed_off;
   transmission.aborted = true;
   transmission.end = transmission.start + kStartPulse;
   state_[robot] &= static_cast<std::uint8_t>(~kFlying);
@@ -306,6 +318,7 @@ void RadioEngine::finish(std::uint32_t index, Cycles end) {
   const Transmission& transmission = channel_.all()[index];
   const std::uint32_t robot = transmission.sender;
   ++counters_.sent;
+  ++radio_counts_[robot].sent;
   if (counts_pairs_) pairs_.add(robot, robot);
   if (firmware_ && firmware_->has(robot)) return;
   state_[robot] &= static_cast<std::uint8_t>(~kFlying);
@@ -327,23 +340,28 @@ void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
     if ((state_[receiver] & (kReceptive | kFirmware)) == 0) return;
     double margin_db = 0;
     if (!links_.is_disc()) {
-      margin_db = links_.margin_db(neighbourhood_, packet.sender, receiver) +
-                  links_.packet_noise_db(packet.sender, receiver, now);
+      margin_db = links_.margin_db(neighbourhood_, packet.sender, receiver);
+      if (margin_db <= -links_.most_packet_noise_db()) return;
+      if (margin_db < links_.most_packet_noise_db())
+        margin_db += links_.packet_noise_db(packet.sender, receiver, now.count());
       if (!(margin_db > 0)) return;
     }
     const bool firmware = is(receiver, kFirmware);
     if (drowned || drowns(receiver, margin_db)) {
       ++counters_.collided;
+      ++radio_counts_[receiver].collided;
     } else if (firmware ? firmware_->fades(receiver, packet.sender, packet.start)
                         : fades(receiver, now, packet.sender)) {
       ++counters_.faded;
     } else {
       ++counters_.received;
+      ++radio_counts_[receiver].received;
       if (firmware)
         firmware_->note_reception(receiver, packet.message);
       else
-        receptions_.add(receiver, ranging_.gains(links_.is_disc() ? __builtin_sqrt(square_mm2)
-                                                                  : links_.distance_of_mm(margin_db)));
+        receptions_.add(receiver, links_.is_disc()
+                                      ? ranging_.gains(__builtin_sqrt(square_mm2))
+                                      : links_.readings(packet.sender, receiver, now.count(), margin_db));
       if (counts_pairs_) pairs_.add(receiver, packet.sender);
     }
   });
@@ -394,7 +412,7 @@ void RadioEngine::emit(HostId host, RadioFrame& frame) const {
   const Cycles from = begin_of(tick_ + 1), until = begin_of(tick_ + 2);
   for (std::uint32_t i = share.first; i < share.last; ++i) {
     if ((state_[i] & (kRunning | kHolding | kFlying)) != kRunning) continue;
-    if (timers_.exceeds(i, tx_period_[i], from, until)) frame.ask.push_back(i);
+    if (simple_ ? next_send_[i] < until : timers_.exceeds(i, tx_period_[i], from, until)) frame.ask.push_back(i);
   }
   frame.sent.clear();
   for (const std::uint32_t robot : sent_) {
@@ -437,7 +455,8 @@ std::uint64_t RadioEngine::hash_part() const {
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     const std::uint64_t counts =
         timers_.count_word(i) | std::uint64_t{state_[i]} << 32 | std::uint64_t{receptions_.count(i)} << 40;
-    sum += entity_hash(HashDomain::kRadio, i, {timers_.time_word(i), counts});
+    const std::uint64_t next_send = simple_ ? static_cast<std::uint64_t>(next_send_[i]) : 0;
+    sum += entity_hash(HashDomain::kRadio, i, {timers_.time_word(i) + next_send, counts});
   }
   for (const Transmission& x : channel_.all()) {
     const auto [first, second] = words(x.message);

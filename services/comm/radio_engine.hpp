@@ -19,6 +19,8 @@
 /// The slot. A robot's message lies in its host's slot and here from its offer until success. Both sides empty it when the
 /// robot is not RUNNING; what is on the air then goes to its end unreported.
 ///
+/// With `model: SIMPLE` there is none of this (simple_radio.cpp): it is the seed's model, for comparison.
+///
 /// Robots that run real firmware do all this themselves, bit by bit: firmware_air.hpp. What they send takes part in the
 /// above as transmissions do.
 #pragma once
@@ -32,6 +34,7 @@
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
 #include "core/federation/run_observer.hpp"
+#include "core/model/ranging.hpp"
 #include "core/random/random.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"
@@ -40,7 +43,6 @@
 #include "services/comm/neighbourhood.hpp"
 #include "services/comm/overhead_controller.hpp"
 #include "services/comm/pair_counts.hpp"
-#include "services/comm/ranging.hpp"
 #include "services/comm/reception_log.hpp"
 #include "services/comm/tick_timers.hpp"
 
@@ -78,6 +80,8 @@ class RadioEngine {
   void emit(HostId, RadioFrame&) const;
   [[nodiscard]] std::uint64_t hash_part() const;
   [[nodiscard]] const Counters& counters() const { return counters_; }
+  /// Per robot.
+  [[nodiscard]] const std::vector<RadioCount>& radio_counts() const { return radio_counts_; }
   /// By receiver, then sender; receiver == sender: its own successes. Empty unless recording.messages.
   [[nodiscard]] std::vector<PairCount> pair_counts() const { return pairs_.all(); }
 
@@ -123,6 +127,8 @@ class RadioEngine {
   [[nodiscard]] bool senses(std::uint32_t robot, Cycles t);
   void abort(Transmission&, Cycles t, Tick now);
 
+  void exchange_simply(Tick now);
+  void receive_simply(std::uint32_t sender, Tick now);
   void arrive(Tick now);
   void finish(std::uint32_t transmission, Cycles end);
   void receive_packet(const Transmission&, Tick now);
@@ -136,6 +142,8 @@ class RadioEngine {
   const double loss_;
   const bool counts_pairs_;
   const Random random_;
+  const bool simple_;  ///< no packets in time: exchange_simply()
+  const proto::SimpleRadio simple_model_;
   const Ranging ranging_;
   const Gains overhead_gains_;
 
@@ -144,6 +152,7 @@ class RadioEngine {
   std::vector<std::uint8_t> state_, apart_;  ///< per robot; apart: it runs firmware, or its body is real
   std::vector<std::uint16_t> tx_period_;     ///< per robot
   std::vector<IrMessage> message_;           ///< per robot: what its slot holds
+  std::vector<Cycles> next_send_;            ///< per robot of a simple radio: when it may send again
   LinkBudget links_;
   Neighbourhood neighbourhood_;
   Channel channel_;
@@ -151,6 +160,7 @@ class RadioEngine {
   std::vector<std::uint32_t> sent_;  ///< in the last tick, ascending
   ReceptionLog receptions_;          ///< of the last tick
   Counters counters_;
+  std::vector<RadioCount> radio_counts_;  ///< per robot
   PairCounts pairs_;
 
   const std::unique_ptr<FirmwareRobots> firmware_robots_;

@@ -6,8 +6,8 @@
 
 #include "core/experiment/plan.hpp"
 #include "core/federation/frames.hpp"
+#include "core/model/ranging.hpp"
 #include "idl/checkpoint.pb.h"
-#include "services/comm/ranging.hpp"
 
 namespace kilotwin::comm {
 

@@ -15,8 +15,13 @@ TickTimers::TickTimers(const RunPlan& plan) {
   count_.assign(robots, 0);
   const Random random(plan.seed());
   const double spread = plan.experiment().radio().oscillator_sd();
+  std::vector<double> error(robots);
+  for (std::uint32_t i = 0; i < robots; ++i) error[i] = spread * random.normal(Stream::kOscillator, i, Tick{0}, 0);
+  for (const proto::RobotRadio& known : plan.experiment().radio().propagation().robot()) {
+    if (known.robot() < robots && known.has_oscillator()) error[known.robot()] = known.oscillator();
+  }
   for (std::uint32_t i = 0; i < robots; ++i) {
-    const double rate = 1 + spread * random.normal(Stream::kOscillator, i, Tick{0}, 0);
+    const double rate = 1 + error[i];
     const double period = static_cast<double>(kTimerCounts * kTimerCount) / rate;
     period_.push_back(static_cast<std::uint32_t>(period + 0.5));
     next_.push_back(static_cast<Cycles>(period * random.uniform(Stream::kOscillator, i, Tick{0}, 1)));

@@ -136,7 +136,9 @@ TEST(Ranging, FollowsTheCalibration) {
     EXPECT_EQ(gains.high, high[i]);
   }
   EXPECT_EQ(ranging.gains(35.5).low, 815);
-  EXPECT_EQ(ranging.gains(20).low, 880);
+  EXPECT_EQ(ranging.gains(30.5).low, 945);
+  EXPECT_EQ(ranging.gains(20).low, 1023);
+  EXPECT_EQ(ranging.gains(20).high, 1000);
   for (double d = 98; d < 400; d += 0.7) {
     EXPECT_NEAR(ranging.gains(d).low, 110 * std::exp(-(d - 98) / 31.2), 0.9) << d;
     EXPECT_LE(ranging.gains(d + 0.7).high, ranging.gains(d).high);

@@ -1,9 +1,9 @@
-#include "services/comm/ranging.hpp"
+#include "core/model/ranging.hpp"
 
 #include "core/base/ir_calibration.h"
 #include "core/math/elementary.h"
 
-namespace kilotwin::comm {
+namespace kilotwin {
 namespace {
 
 constexpr std::size_t kMeasured = KILOTWIN_IR_ENTRIES;
@@ -27,4 +27,4 @@ Ranging::Ranging() {
   }
 }
 
-}  // namespace kilotwin::comm
+}  // namespace kilotwin

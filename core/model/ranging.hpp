@@ -1,10 +1,11 @@
 /// Readings of the two distance amplifiers for a sender at a distance.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
-namespace kilotwin::comm {
+namespace kilotwin {
 
 struct Gains {
   std::int16_t high, low;  ///< 10-bit ADC counts
@@ -12,14 +13,15 @@ struct Gains {
 };
 
 /// The nominal calibration of core/base/ir_calibration.h, linear between its entries; beyond the last it decays
-/// exponentially with the length constant of the table's own curve.
+/// exponentially with the length constant of the table's own curve. Nearer than contact is a signal stronger than the nominal
+/// robot's: the low gain rises on to its greatest reading, the high gain is saturated.
 class Ranging {
  public:
   Ranging();
-  /// `distance_mm`: of disc centres, >= 0.
+  /// `distance_mm`: of disc centres.
   [[nodiscard]] Gains gains(double distance_mm) const {
     const double step = (distance_mm - kContact_mm) * (1.0 / kStep_mm);
-    if (!(step > 0)) return rounded(high_[0], low_[0]);
+    if (!(step > 0)) return rounded(high_[0], std::min(low_[0] + step * (low_[1] - low_[0]), kMost));
     if (step >= kEntries - 1) return {0, 0};
     const auto i = static_cast<std::size_t>(step);
     const double part = step - static_cast<double>(i);
@@ -27,7 +29,7 @@ class Ranging {
   }
 
  private:
-  static constexpr double kContact_mm = 33, kStep_mm = 5;
+  static constexpr double kContact_mm = 33, kStep_mm = 5, kMost = 1023;
   /// Beyond entry 60, at 333 mm, readings are below half a count.
   static constexpr int kEntries = 61;
 
@@ -37,4 +39,4 @@ class Ranging {
   std::array<double, kEntries> high_, low_;
 };
 
-}  // namespace kilotwin::comm
+}  // namespace kilotwin

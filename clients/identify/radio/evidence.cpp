@@ -1,0 +1,163 @@
+#include "clients/identify/radio/evidence.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace kilotwin::radio_fit {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kShuffles = 100;
+
+struct Residuals {
+  VectorXd value;
+  MatrixXd bearing, bodies, robots, robot_bearings;  ///< regressors
+  std::vector<std::pair<int, int>> of;               ///< sender, receiver; robots of all sets counted through
+};
+
+Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
+  std::vector<double> value;
+  Residuals result;
+  std::vector<double> angles, bodies;
+  int first = 0;
+  for (std::size_t q = 0; q < sets.size(); ++q) {
+    const MatrixXd on = on_share(sets[q]);
+    const LinkModel::Swarm& swarm = model.swarms[q];
+    for (int j = 0; j < sets[q].robots(); ++j) {
+      for (int i = 0; i < sets[q].robots(); ++i) {
+        if (i == j || on(i, j) < 0 || std::isnan(swarm.margin_db(i, j))) continue;
+        const double expected = 0.5 * std::erfc(-swarm.margin_db(i, j) / swarm.run_sd_db / std::numbers::sqrt2);
+        value.push_back(on(i, j) - expected);
+        result.of.push_back({first + j, first + i});
+        const Eigen::Vector2d way = sets[q].place_mm(i) - sets[q].place_mm(j);
+        bodies.push_back(bodies_between(sets[q], i, j));
+        angles.push_back(std::atan2(way.y(), way.x()));
+      }
+    }
+    first += sets[q].robots();
+  }
+  const auto count = static_cast<Eigen::Index>(value.size());
+  result.value = Eigen::Map<VectorXd>(value.data(), count);
+  result.bearing = MatrixXd::Zero(count, 8);
+  result.bodies = Eigen::Map<VectorXd>(bodies.data(), count);
+  result.bodies.array() -= result.bodies.mean();
+  result.robots = MatrixXd::Zero(count, 2 * first);
+  result.robot_bearings = MatrixXd::Zero(count, 4 * first);
+  for (Eigen::Index r = 0; r < count; ++r) {
+    const double angle = angles[static_cast<std::size_t>(r)];
+    const auto [sender, receiver] = result.of[static_cast<std::size_t>(r)];
+    for (int n = 1; n <= 4; ++n) {
+      result.bearing(r, 2 * n - 2) = std::cos(n * angle);
+      result.bearing(r, 2 * n - 1) = std::sin(n * angle);
+    }
+    result.robots(r, sender) = result.robots(r, first + receiver) = 1;
+    result.robot_bearings(r, 2 * sender) = result.robot_bearings(r, 2 * (first + receiver)) = std::cos(angle);
+    result.robot_bearings(r, 2 * sender + 1) = result.robot_bearings(r, 2 * (first + receiver) + 1) =
+        std::sin(angle);
+  }
+  return result;
+}
+
+/// Share of the variance that a least-squares fit explains, and that of shuffled values.
+Evidence explained(std::string what, const MatrixXd& regressors, const VectorXd& value) {
+  const VectorXd centred = value.array() - value.mean();
+  // A little ridge, as regressors may depend on each other.
+  const MatrixXd normal =
+      regressors.transpose() * regressors + 1e-6 * MatrixXd::Identity(regressors.cols(), regressors.cols());
+  const Eigen::LDLT<MatrixXd> solver(normal);
+  const auto share = [&](const VectorXd& v) {
+    const VectorXd fitted = regressors * solver.solve(regressors.transpose() * v);
+    return 1 - (v - fitted).squaredNorm() / v.squaredNorm();
+  };
+  Evidence evidence{std::move(what), share(centred), 0, 0};
+  std::mt19937_64 random(1);
+  double squares = 0;
+  VectorXd shuffled = centred;
+  for (int k = 0; k < kShuffles; ++k) {
+    for (Eigen::Index n = shuffled.size(); n-- > 1;)
+      std::swap(shuffled(n), shuffled(static_cast<Eigen::Index>(random() % static_cast<std::uint64_t>(n + 1))));
+    const double s = share(shuffled);
+    evidence.by_chance += s / kShuffles;
+    squares += s * s / kShuffles;
+  }
+  evidence.by_chance_sd = std::sqrt(std::max(0.0, squares - evidence.by_chance * evidence.by_chance));
+  return evidence;
+}
+
+double correlation(const VectorXd& a, const VectorXd& b) {
+  const VectorXd x = a.array() - a.mean(), y = b.array() - b.mean();
+  const double norm = x.norm() * y.norm();
+  return norm > 0 ? x.dot(y) / norm : 0;
+}
+
+}  // namespace
+
+Evidence bearing_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
+  const Residuals r = residuals(sets, model);
+  return explained("residuals follow the bearing from sender to receiver, alike in all sets (4 harmonics)",
+                   r.bearing, r.value);
+}
+
+Evidence body_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
+  const Residuals r = residuals(sets, model);
+  return explained("residuals follow how much of the line lies within other robots", r.bodies, r.value);
+}
+
+Evidence robot_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
+  const Residuals r = residuals(sets, model);
+  return explained("residuals share a part by sender and one by receiver", r.robots, r.value);
+}
+
+Evidence robot_bearing_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
+  const Residuals r = residuals(sets, model);
+  return explained("residuals of a robot follow the bearing, each robot's in its own way", r.robot_bearings,
+                   r.value);
+}
+
+Evidence pair_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
+  const Residuals a = residuals(half_of(sets, false), model), b = residuals(half_of(sets, true), model);
+  Evidence evidence{"residuals of a link recur from run to run (correlation of two halves of the runs)",
+                    correlation(a.value, b.value), 0, 1 / std::sqrt(static_cast<double>(a.value.size()))};
+  return evidence;
+}
+
+Evidence hidden_terminal_evidence(const std::vector<GridSet>& sets) {
+  std::vector<double> loss, hidden;
+  for (const GridSet& set : sets) {
+    const MatrixXd on = on_share(set);
+    for (int j = 0; j < set.robots(); ++j) {
+      for (int i = 0; i < set.robots(); ++i) {
+        if (i == j || set.distance_mm(i, j) > kSurelyHeard_mm) continue;
+        double lost = 0, runs = 0, count = 0;
+        for (const GridRun& run : set.runs) {
+          if (run.share(i, j) < 0) continue;
+          lost += 1 - run.share(i, j);
+          runs += 1;
+        }
+        if (!(runs > 0)) continue;
+        for (int k = 0; k < set.robots(); ++k) {
+          if (k != i && k != j) count += std::max(0.0, on(i, k)) * (1 - std::max(0.0, on(j, k)));
+        }
+        loss.push_back(lost / runs);
+        hidden.push_back(count);
+      }
+    }
+  }
+  const auto count = static_cast<Eigen::Index>(loss.size());
+  const VectorXd a = Eigen::Map<VectorXd>(loss.data(), count), b = Eigen::Map<VectorXd>(hidden.data(), count);
+  return {
+      "what is lost up to 105 mm follows how many robots the receiver hears and the sender does not (correlation)",
+      correlation(a, b), 0, 1 / std::sqrt(static_cast<double>(count))};
+}
+
+double same_robots(const LinkModel& model, bool senders) {
+  if (model.swarms.size() < 2) return 0;
+  const LinkModel::Swarm &a = model.swarms[0], &b = model.swarms[1];
+  if (a.power_db.size() != b.power_db.size()) return 0;
+  return senders ? correlation(a.power_db, b.power_db) : correlation(a.sensitivity_db, b.sensitivity_db);
+}
+
+}  // namespace kilotwin::radio_fit

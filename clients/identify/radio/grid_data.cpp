@@ -1,0 +1,123 @@
+#include "clients/identify/radio/grid_data.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::radio_fit {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The sets were laid with robots touching where nobody pauses, and 50 mm apart else: with both, reception ends at the same
+/// distance, 130..150 mm.
+constexpr double kTouchingPitch_mm = 33, kPitch_mm = 50;
+constexpr int kMostRobots = 1000;
+
+GridRun read_run(const fs::path& file) {
+  std::ifstream in(file);
+  if (!in)
+    throw UserError(fmt::format("{}: cannot be read; give a directory with comm_tau*_run*.dat", file.string()));
+  GridRun run;
+  run.name = file.stem().string();
+  std::vector<std::vector<double>> rows;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    std::istringstream words(line);
+    std::vector<double> row;
+    for (std::string word; words >> word;) {
+      double value = 0;
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+      if (error != std::errc{} || end != word.data() + word.size() || value < 0 || value > 1e9)
+        throw UserError(fmt::format("{}:{}: \"{}\" is no count; expected whitespace-separated counts",
+                                    file.string(), number, word));
+      row.push_back(value);
+    }
+    if (!row.empty()) rows.push_back(std::move(row));
+  }
+  std::size_t width = 0;
+  for (const auto& row : rows) width = std::max(width, row.size());
+  // The receiver's own id stands first, where rows are one longer than the swarm, a square number.
+  const auto square = [](std::size_t n) {
+    const auto side = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(n))));
+    return side * side == n;
+  };
+  const bool ids = !square(width) && width > 1 && square(width - 1);
+  const std::size_t robots = ids ? width - 1 : width;
+  if (robots < 4 || robots > kMostRobots || !square(robots))
+    throw UserError(
+        fmt::format("{}: rows of {} columns; expected those of a square grid of robots", file.string(), width));
+  const auto n = static_cast<Eigen::Index>(robots);
+  run.counts = Eigen::MatrixXd::Constant(n, n, -1);
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    if (rows[r].size() != width) continue;  // a cut line
+    const auto receiver = ids ? static_cast<Eigen::Index>(rows[r][0]) : static_cast<Eigen::Index>(r);
+    if (receiver >= n) continue;
+    for (Eigen::Index j = 0; j < n; ++j)
+      run.counts(receiver, j) = rows[r][static_cast<std::size_t>(j) + (ids ? 1 : 0)];
+  }
+  return run;
+}
+
+}  // namespace
+
+double GridRun::share(Eigen::Index i, Eigen::Index j) const {
+  if (counts(i, j) < 0 || !(counts(j, j) > 0)) return -1;
+  return std::min(1.0, counts(i, j) / counts(j, j));
+}
+
+int GridSet::side() const { return static_cast<int>(std::lround(std::sqrt(robots()))); }
+
+Eigen::Vector2d GridSet::place_mm(int robot) const {
+  return {pitch_mm * (robot % side()), -pitch_mm * (robot / side())};
+}
+
+std::vector<GridSet> read_grids(const fs::path& directory) {
+  std::error_code error;
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(directory, error)) files.push_back(entry.path());
+  if (error)
+    throw UserError(fmt::format("{}: cannot be read ({}); give a directory with comm_tau*_run*.dat",
+                                directory.string(), error.message()));
+  std::sort(files.begin(), files.end());
+  std::map<double, GridSet> sets;
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string();
+    const std::size_t end = name.find("_run");
+    if (!name.starts_with("comm_tau") || end == std::string::npos || !name.ends_with(".dat")) continue;
+    const std::string tau = name.substr(8, end - 8);
+    double tau_s = 0;
+    if (std::from_chars(tau.data(), tau.data() + tau.size(), tau_s).ec != std::errc{}) continue;
+    GridSet& set = sets[tau_s];
+    set.name = "tau" + tau;
+    set.tau_s = tau_s;
+    set.pitch_mm = tau_s == 0 ? kTouchingPitch_mm : kPitch_mm;
+    set.runs.push_back(read_run(file));
+    if (set.runs.back().counts.rows() != set.runs.front().counts.rows())
+      throw UserError(fmt::format("{}: another number of robots than in {}", file.string(), set.runs.front().name));
+  }
+  if (sets.empty())
+    throw UserError(fmt::format("{}: no runs; expected files comm_tau*_run*.dat", directory.string()));
+  std::vector<GridSet> result;
+  for (auto& [tau_s, set] : sets) result.push_back(std::move(set));
+  return result;
+}
+
+std::vector<GridSet> half_of(const std::vector<GridSet>& sets, bool odd) {
+  std::vector<GridSet> result = sets;
+  for (GridSet& set : result) {
+    std::vector<GridRun> runs;
+    for (std::size_t i = odd ? 1 : 0; i < set.runs.size(); i += 2) runs.push_back(std::move(set.runs[i]));
+    set.runs = std::move(runs);
+  }
+  return result;
+}
+
+}  // namespace kilotwin::radio_fit

@@ -1,0 +1,468 @@
+#include "clients/identify/radio/radio_fit.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "clients/identify/radio/evidence.hpp"
+#include "clients/identify/radio/grid_run.hpp"
+#include "clients/identify/radio/link_fit.hpp"
+#include "clients/identify/radio/scores.hpp"
+#include "clients/recorder/plot.hpp"
+#include "core/base/error.hpp"
+#include "core/base/say.hpp"
+#include "idl/model.pb.h"
+
+namespace kilotwin::radio_fit {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Radios = std::vector<proto::Radio>;  ///< one per set
+
+constexpr double kPacket_sd_db = 0.15, kOscillator_sd = 0.005;
+/// 16 kilo_ticks of the nominal clock.
+constexpr double kSixteenTicks_s = 16 * 0.032768;
+constexpr std::uint64_t kFirstSeed = 1000, kFirstSwarm = 5000;
+constexpr double kFar_mm = 125;
+
+/// One effect, added to those before it.
+struct Step {
+  std::string name, added;
+  std::vector<std::string> covariates;
+  std::string evidence;
+  Json figures;
+  std::vector<Errors> errors;  ///< per set
+};
+
+class Loop {
+ public:
+  explicit Loop(const FitOptions& options) : options_(options) {
+    const std::vector<GridSet> all = read_grids(options.train);
+    train_ = options.test.empty() ? half_of(all, false) : all;
+    test_ = options.test.empty() ? half_of(all, true) : read_grids(options.test);
+    if (train_.size() != test_.size())
+      throw UserError(fmt::format("{}: other sets than in {}; give runs of the same tau in both",
+                                  options.test.string(), options.train.string()));
+    for (const auto& sets : {train_, test_}) {
+      for (const GridSet& set : sets) {
+        if (set.runs.empty() || set.robots() != train_.front().robots())
+          throw UserError(
+              fmt::format("{}: {} has no run to spare, or another number of robots; give two runs of each "
+                          "set at least",
+                          options.train.string(), set.name));
+      }
+    }
+  }
+  void go();
+
+ private:
+  void add(Step step, const Radios& radios);
+  void add_simple();
+  void add_links();
+  void add_oscillators();
+  void draw_population();
+  void write_models() const;
+  void write_result() const;
+  void write_figures() const;
+  [[nodiscard]] Radios alike(const proto::Radio& radio) const { return Radios(train_.size(), radio); }
+  [[nodiscard]] Radios fitted(const LinkModel& model) const;
+
+  const FitOptions options_;
+  std::vector<GridSet> train_, test_;
+  std::vector<Step> steps_;
+  LinkModel model_;
+  double oscillator_sd_ = kOscillator_sd;
+  Json population_ = Json::array();
+};
+
+std::string text_of(const Evidence& e) {
+  return fmt::format("{}: {:.2f}, by chance {:.2f} +- {:.2f}", e.what, e.explained, e.by_chance, e.by_chance_sd);
+}
+
+Json json_of(const Evidence& e) {
+  return {{"what", e.what}, {"value", e.explained}, {"by_chance", e.by_chance}, {"by_chance_sd", e.by_chance_sd}};
+}
+
+void Loop::add(Step step, const Radios& radios) {
+  for (std::size_t q = 0; q < train_.size(); ++q) {
+    const GridSet simulated = simulate(train_[q], radios[q], options_.runs, kFirstSeed);
+    step.errors.push_back(compare(test_[q], simulated, train_[q]));
+  }
+  say(fmt::format("{}: {}", step.name, step.evidence));
+  steps_.push_back(std::move(step));
+}
+
+Radios Loop::fitted(const LinkModel& model) const {
+  Radios radios;
+  for (const LinkModel::Swarm& swarm : model.swarms)
+    radios.push_back(model.radio(swarm, kPacket_sd_db, oscillator_sd_));
+  return radios;
+}
+
+/// Mean difference of reception up to 105 mm, over the sets.
+double near_error(const std::vector<GridSet>& sets, const proto::Radio& radio) {
+  double sum = 0;
+  for (const GridSet& set : sets)
+    sum += std::abs(statistics(simulate(set, radio, 4, kFirstSeed)).near - statistics(set).near);
+  return sum;
+}
+
+void Loop::add_simple() {
+  const LinkModel distance = fit_links(train_, Terms::kDistance);
+  proto::Radio radio;
+  radio.set_model(proto::Radio::SIMPLE);
+  radio.set_range_mm(distance.range_mm);
+  const auto tune = [&] {
+    double best = 1e9, contention = 1;
+    for (const double tried : {0.0, 0.05, 0.1, 0.2, 0.4, 1.0}) {
+      radio.mutable_simple()->set_contention(tried);
+      const double error = near_error(train_, radio);
+      if (error < best) {
+        best = error;
+        contention = tried;
+      }
+    }
+    radio.mutable_simple()->set_contention(contention);
+  };
+  tune();
+  add({"the seed's model",
+       fmt::format("2 Hz, sending error 0.008, range {:.0f} mm, contention {:.2f}: tuned to the mean "
+                   "reception",
+                   distance.range_mm, radio.simple().contention()),
+       {},
+       "-",
+       Json::object(),
+       {}},
+      alike(radio));
+  double sent = 0;
+  for (const GridSet& set : train_) sent += statistics(set).sent / static_cast<double>(train_.size());
+  radio.mutable_simple()->set_interval_s(kSixteenTicks_s);
+  tune();
+  add({"own clock",
+       fmt::format("a message every 16 kilo_ticks (contention {:.2f})", radio.simple().contention()),
+       {"time"},
+       fmt::format("robots send {:.1f} in 4800 of their kilo_ticks, at most 301: one in {:.2f}", sent, 4800 / sent),
+       Json{{"kilo_ticks_per_message", 4800 / sent}},
+       {}},
+      alike(radio));
+  proto::Radio disc;
+  disc.set_model(proto::Radio::DISC);
+  disc.set_range_mm(distance.range_mm);
+  const Evidence hidden = hidden_terminal_evidence(train_);
+  add({"packets in time",
+       "packets of 4.371 ms, carrier sense from the start pulse, collisions where two overlap; nothing is tuned",
+       {"neighbours"},
+       text_of(hidden),
+       json_of(hidden),
+       {}},
+      alike(disc));
+}
+
+void Loop::add_links() {
+  const auto heard_in_some_run = [&] {
+    double partly = 0, far = 0;
+    for (const GridSet& set : train_) {
+      const Eigen::MatrixXd on = on_share(set);
+      for (int i = 0; i < set.robots(); ++i) {
+        for (int j = 0; j < set.robots(); ++j) {
+          const double d = set.distance_mm(i, j);
+          if (d < kFar_mm || d > kNeverHeard_mm || on(i, j) < 0) continue;
+          far += 1;
+          partly += on(i, j) > 0.02;
+        }
+      }
+    }
+    return partly / far;
+  };
+  model_ = fit_links(train_, Terms::kDistance);
+  add({"signal strength",
+       fmt::format("0.139 dB/mm, heard up to {:.1f} mm, and noise from run to run", model_.range_mm),
+       {"neighbours"},
+       fmt::format("no distance divides the links: of those at 125..200 mm {:.0f} % are heard in some run",
+                   100 * heard_in_some_run()),
+       Json{{"heard_in_some_run", heard_in_some_run()}},
+       {}},
+      fitted(model_));
+
+  const Evidence bearing = bearing_evidence(train_, model_);
+  model_ = fit_links(train_, Terms::kPattern);
+  add({"bearing",
+       "power of all robots over the bearing, 4 harmonics",
+       {"heading"},
+       text_of(bearing),
+       json_of(bearing),
+       {}},
+      fitted(model_));
+  const Evidence bodies = body_evidence(train_, model_);
+  model_ = fit_links(train_, Terms::kBodies);
+  add({"bodies in between",
+       fmt::format("{:.2f} dB for each", model_.body_loss_db),
+       {"neighbours"},
+       text_of(bodies),
+       json_of(bodies),
+       {}},
+      fitted(model_));
+  const Evidence robots = robot_evidence(train_, model_);
+  model_ = fit_links(train_, Terms::kRobots);
+  add({"robots",
+       fmt::format("power and sensitivity of each robot, sd {:.2f} and {:.2f} dB", model_.power_sd_db,
+                   model_.sensitivity_sd_db),
+       {"robot"},
+       text_of(robots),
+       json_of(robots),
+       {}},
+      fitted(model_));
+  const Evidence own = robot_bearing_evidence(train_, model_);
+  model_ = fit_links(train_, Terms::kBearings);
+  add({"robots' bearings",
+       fmt::format("each robot's own dependence on the bearing, sd {:.2f} and {:.2f} dB",
+                   model_.power_bearing_sd_db, model_.sensitivity_bearing_sd_db),
+       {"robot", "heading"},
+       text_of(own),
+       json_of(own),
+       {}},
+      fitted(model_));
+  const Evidence pairs = pair_evidence(train_, model_);
+  model_ = fit_links(train_, Terms::kPairs);
+  add({"pairs",
+       fmt::format("what a pair has, sd {:.2f} dB, and each direction of it, {:.2f} dB", model_.pair_sd_db,
+                   model_.link_sd_db),
+       {"robot", "neighbours"},
+       text_of(pairs),
+       json_of(pairs),
+       {}},
+      fitted(model_));
+}
+
+/// As their phases pass each other, robots come into each other's way: what they send tells how fast.
+void Loop::add_oscillators() {
+  const auto far_from = [&](double sd) {
+    oscillator_sd_ = sd;
+    const Radios radios = fitted(model_);
+    double error = 0;
+    for (std::size_t q = 0; q < train_.size(); ++q) {
+      const GridSet simulated = simulate(train_[q], radios[q], options_.runs / 2, kFirstSeed);
+      error += (statistics(simulated).sent - statistics(train_[q]).sent) / static_cast<double>(train_.size());
+    }
+    return error;
+  };
+  const double before = far_from(kOscillator_sd);
+  double best = before, chosen = kOscillator_sd;
+  for (const double sd : {0.002, 0.0025, 0.003, 0.0035, 0.004, 0.007}) {
+    const double error = far_from(sd);
+    if (std::abs(error) >= std::abs(best)) continue;
+    best = error;
+    chosen = sd;
+  }
+  oscillator_sd_ = chosen;
+  add({"oscillators",
+       fmt::format("rates spread by {:.2f} %", 100 * chosen),
+       {"time"},
+       fmt::format("what a robot sends is off by {:+.2f} with 0.5 %, by {:+.2f} with this", before, best),
+       Json{{"error_before", before}, {"error_after", best}},
+       {}},
+      fitted(model_));
+}
+
+/// Swarms of other robots than those measured: does what was measured look like one of them?
+void Loop::draw_population() {
+  for (std::size_t q = 0; q < train_.size(); ++q) {
+    const proto::Radio radio = model_.population(model_.swarms[q], kPacket_sd_db, oscillator_sd_);
+    const Statistics real = statistics(test_[q]);
+    std::vector<std::vector<double>> drawn(real.classes.size());
+    for (int k = 0; k < options_.swarms; ++k) {
+      GridSet one = train_[q];
+      one.runs = {simulate(train_[q], radio, kFirstSwarm + static_cast<std::uint64_t>(k))};
+      const Statistics s = statistics(one);
+      for (std::size_t c = 0; c < drawn.size(); ++c) drawn[c].push_back(s.classes[c].reception);
+    }
+    for (std::size_t c = 0; c < drawn.size(); ++c) {
+      std::sort(drawn[c].begin(), drawn[c].end());
+      const auto at = [&](double share) {
+        return drawn[c][static_cast<std::size_t>(share * static_cast<double>(drawn[c].size() - 1) + 0.5)];
+      };
+      const DisplacementClass& is = real.classes[c];
+      population_.push_back(Json{{"set", train_[q].name},
+                                 {"rows", is.rows},
+                                 {"columns", is.columns},
+                                 {"distance_mm", is.distance_mm},
+                                 {"measured", is.reception},
+                                 {"low", at(0.025)},
+                                 {"median", at(0.5)},
+                                 {"high", at(0.975)},
+                                 {"inside", is.reception >= at(0.025) - 1e-9 && is.reception <= at(0.975) + 1e-9}});
+    }
+  }
+}
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  if (!out.flush()) throw RunError(file.string() + ": cannot be written");
+}
+
+void Loop::write_models() const {
+  const auto write = [&](const proto::Radio& radio, const std::string& name, const std::string& about) {
+    proto::Model model;
+    proto::Propagation& propagation = *model.mutable_propagation() = radio.propagation();
+    propagation.set_range_mm(radio.range_mm());
+    propagation.set_oscillator_sd(radio.oscillator_sd());
+    std::string text;
+    google::protobuf::TextFormat::PrintToString(model, &text);
+    write_text(options_.out / name, "# " + about + "\n" + text);
+  };
+  // Laid once and left alone, robots differ less from run to run: the least of the sets.
+  const auto steadiest = std::min_element(model_.swarms.begin(), model_.swarms.end(),
+                                          [](const auto& a, const auto& b) { return a.run_sd_db < b.run_sd_db; });
+  write(model_.population(*steadiest, kPacket_sd_db, oscillator_sd_), "model.txtpb",
+        "Range, pattern and spreads, fitted to all sets; robots and pairs are drawn.");
+  for (std::size_t q = 0; q < train_.size(); ++q) {
+    write(model_.radio(model_.swarms[q], kPacket_sd_db, oscillator_sd_), "model-" + train_[q].name + ".txtpb",
+          "The same with the robots and pairs of " + train_[q].name + ".");
+  }
+}
+
+Json json_of(const Errors& e) {
+  return {{"sent", e.simulated.sent},
+          {"sent_error", e.sent},
+          {"near_worst", e.near_worst},
+          {"far_worst", e.far_worst},
+          {"silent_error", e.silent},
+          {"sender_spread_error", e.sender_spread},
+          {"run_spread_error", e.run_spread},
+          {"log_likelihood", e.log_likelihood},
+          {"deficit", e.deficit}};
+}
+
+void Loop::write_result() const {
+  Json result;
+  result["effects"] = Json::array();
+  std::string table =
+      "| effect | in the data | added | set | sent | near | far | silent | senders | runs | likelihood | deficit "
+      "|\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const Step& step : steps_) {
+    Json errors;
+    for (std::size_t q = 0; q < step.errors.size(); ++q) {
+      const Errors& e = step.errors[q];
+      errors[train_[q].name] = json_of(e);
+      table += fmt::format(
+          "| {} | {} | {} | {} | {:+.1f} | {:.3f} | {:.3f} | {:+.3f} | {:+.3f} | {:+.3f} | {:.2f} | {:.2f} |\n",
+          q == 0 ? step.name : "", q == 0 ? step.evidence : "", q == 0 ? step.added : "", train_[q].name, e.sent,
+          e.near_worst, e.far_worst, e.silent, e.sender_spread, e.run_spread, e.log_likelihood, e.deficit);
+    }
+    result["effects"].push_back(Json{{"name", step.name},
+                                     {"covariates", step.covariates},
+                                     {"acts_on", "radio"},
+                                     {"evidence", step.figures},
+                                     {"parameters", Json{{"added", step.added}}},
+                                     {"errors", errors}});
+  }
+  Json shared{{"range_mm", model_.range_mm},
+              {"pattern_db", model_.pattern_db},
+              {"body_loss_db", model_.body_loss_db},
+              {"power_sd_db", model_.power_sd_db},
+              {"sensitivity_sd_db", model_.sensitivity_sd_db},
+              {"power_bearing_sd_db", model_.power_bearing_sd_db},
+              {"sensitivity_bearing_sd_db", model_.sensitivity_bearing_sd_db},
+              {"pair_sd_db", model_.pair_sd_db},
+              {"link_sd_db", model_.link_sd_db},
+              {"oscillator_sd", oscillator_sd_}};
+  Json apart{{"correlation_of_power", same_robots(model_, true)},
+             {"correlation_of_sensitivity", same_robots(model_, false)}};
+  for (const LinkModel::Swarm& swarm : model_.swarms) apart["run_sd_db"][swarm.set] = swarm.run_sd_db;
+  result["shared"] = shared;
+  result["of_each_set"] = apart;
+  Json measured;
+  for (const GridSet& set : test_) measured[set.name] = statistics(set).sent;
+  result["measured_sent"] = measured;
+  result["population"] = population_;
+  write_text(options_.out / "result.json", result.dump(2) + "\n");
+
+  std::string bands =
+      "\n| set | rows, columns | mm | measured | fitted | population, 95 % of swarms "
+      "|\n|---|---|---|---|---|---|\n";
+  for (const Json& row : population_) {
+    if (row.at("distance_mm").get<double>() > kNeverHeard_mm) continue;
+    double fitted = 0;
+    for (std::size_t q = 0; q < train_.size(); ++q) {
+      if (train_[q].name != row.at("set")) continue;
+      for (const DisplacementClass& c : steps_.back().errors[q].simulated.classes) {
+        if (c.rows == row.at("rows") && c.columns == row.at("columns")) fitted = c.reception;
+      }
+    }
+    bands += fmt::format("| {} | {}, {} | {:.0f} | {:.3f} | {:.3f} | {:.2f}..{:.2f}{} |\n",
+                         row.at("set").get<std::string>(), row.at("rows").get<int>(), row.at("columns").get<int>(),
+                         row.at("distance_mm").get<double>(), row.at("measured").get<double>(), fitted,
+                         row.at("low").get<double>(), row.at("high").get<double>(),
+                         row.at("inside").get<bool>() ? "" : ", outside");
+  }
+  write_text(options_.out / "effects.md", table + bands);
+}
+
+void Loop::write_figures() const {
+  for (std::size_t q = 0; q < train_.size(); ++q) {
+    recorder::Plot plot;
+    plot.title = fmt::format("Reception over distance, {}", train_[q].name);
+    plot.subtitle =
+        fmt::format("{} runs that were not fitted to; {} simulated ones", test_[q].runs.size(), options_.runs);
+    plot.x_name = "distance";
+    plot.x_unit = "mm";
+    plot.y_name = "share of messages received";
+    const auto series = [&](const std::string& name, const Statistics& s) {
+      recorder::PlotSeries& line = plot.series.emplace_back();
+      line.name = name;
+      line.line = false;
+      for (const DisplacementClass& c : s.classes) {
+        if (c.distance_mm > kNeverHeard_mm) continue;
+        line.x.push_back(c.distance_mm);
+        line.y.push_back(c.reception);
+      }
+    };
+    series("measured", statistics(test_[q]));
+    series(steps_.front().name, steps_.front().errors[q].simulated);
+    series("all effects", steps_.back().errors[q].simulated);
+    recorder::write_plot(plot, options_.out / ("reception-" + train_[q].name + ".svg"));
+  }
+  recorder::Plot plot;
+  plot.title = "What each effect brings";
+  plot.subtitle = "log-likelihood of runs that were not fitted to, below what the fitted runs' own means reach";
+  plot.x_name = "effect";
+  plot.y_name = "deficit per pair and run";
+  plot.y_unit = "nat";
+  plot.y_logarithmic = true;
+  for (const Step& step : steps_) plot.x_categories.push_back(step.name);
+  for (std::size_t q = 0; q < train_.size(); ++q) {
+    recorder::PlotSeries& line = plot.series.emplace_back();
+    line.name = train_[q].name;
+    for (std::size_t n = 0; n < steps_.size(); ++n) {
+      line.x.push_back(static_cast<double>(n));
+      line.y.push_back(std::max(steps_[n].errors[q].deficit, 1e-3));
+    }
+  }
+  recorder::write_plot(plot, options_.out / "effects.svg");
+}
+
+void Loop::go() {
+  std::error_code error;
+  std::filesystem::create_directories(options_.out, error);
+  if (error) throw UserError(fmt::format("{}: cannot be made: {}", options_.out.string(), error.message()));
+  add_simple();
+  add_links();
+  add_oscillators();
+  draw_population();
+  write_models();
+  write_result();
+  write_figures();
+}
+
+}  // namespace
+
+void fit_radio(const FitOptions& options) { Loop(options).go(); }
+
+}  // namespace kilotwin::radio_fit
