@@ -258,8 +258,10 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   }
   contract["ambiguous"] = json::array();
   for (const Ambiguity& a : found.ambiguous) {
-    contract["ambiguous"].push_back(
-        {{"found", a.found}, {"instead", a.instead}, {"log_likelihood_difference", a.evidence_difference}});
+    contract["ambiguous"].push_back({{"found", a.found},
+                                     {"instead", a.instead},
+                                     {"experiment", experiment_for(a.found_covariates, a.covariates)},
+                                     {"log_likelihood_difference", a.evidence_difference}});
   }
   contract["base"] = {
       {"straight_speed_mm_s", after.base.straight_mm_s}, {"turn_speed_mm_s", after.base.turn_mm_s},
