@@ -10,6 +10,7 @@
 #include "clients/identify/identify.hpp"
 #include "clients/identify/import.hpp"
 #include "clients/identify/report.hpp"
+#include "clients/identify/prediction_residuals.hpp"
 #include "clients/identify/write_model.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
@@ -49,6 +50,11 @@ identify::Identified identify_trajectories(const IdentifyArguments& arguments, c
   }
   identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
   found.document["contract"]["faults"] = identify::document_of(faults);
+  const nlohmann::json residuals =
+      identify::residual_parts(test ? *test : train, found.predictions, arguments.horizon_s);
+  for (const auto& [part, content] : residuals.items()) {
+    if (!found.document.contains(part)) found.document[part] = content;
+  }
   return found;
 }
 

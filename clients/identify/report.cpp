@@ -204,9 +204,15 @@ std::string verdict(const json& contract) {
     out += fmt::format("; with {} in the model, <b>{} mm</b>.",
                        count == 1 ? "one effect" : fmt::format("{} effects", count), figure(e.after));
   }
-  if (e.floor)
+  if (e.floor && e.after && *e.after <= *e.floor) {
+    out += fmt::format(
+        " That is as good as any model can be expected to be with these robots and this tracker (about <b>{} "
+        "mm</b>).",
+        figure(e.floor));
+  } else if (e.floor) {
     out += fmt::format(" The best that any model can do with these robots and this tracker is about <b>{} mm</b>.",
                        figure(e.floor));
+  }
   const json& faults = part(contract, "faults");
   if (const auto share = share_explained(e); share && count > 0)
     out += fmt::format(" {} of what could be explained is explained.", percent(share));
@@ -357,11 +363,17 @@ std::string effects_table(const json& contract) {
 std::string rejected_table(const json& contract) {
   const json& rejected = part(contract, "rejected");
   if (!rejected.is_array() || rejected.empty()) return "";
-  html::Table table({"tried", "depends on", "acts on", "chance of as much", "needed", "why not"});
+  const bool reasons =
+      std::any_of(rejected.begin(), rejected.end(), [](const json& tried) { return !text(tried, "why").empty(); });
+  std::vector<std::string> heads = {"tried", "depends on", "acts on", "chance of as much", "needed"};
+  if (reasons) heads.emplace_back("why not");
+  html::Table table(std::move(heads));
   for (const json& tried : rejected) {
-    table.row({escaped(text(tried, "name")), escaped(covariates_of(tried)), acts_on_of(tried),
-               chance(number(tried, "log10_p")), chance(number(tried, "threshold_log10_p")),
-               escaped(text(tried, "why"))});
+    std::vector<std::string> cells = {escaped(text(tried, "name")), escaped(covariates_of(tried)),
+                                      acts_on_of(tried), chance(number(tried, "log10_p")),
+                                      chance(number(tried, "threshold_log10_p"))};
+    if (reasons) cells.push_back(escaped(text(tried, "why")));
+    table.row(cells);
   }
   return table.text();
 }

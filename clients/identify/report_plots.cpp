@@ -115,7 +115,14 @@ constexpr int kMap_px = 380, kMapHigh_px = 340;
 }  // namespace
 
 std::string words_of(const std::string& name) {
-  static const std::map<std::string, std::string> kWords = {{"forward", "speed ahead"},
+  static const std::map<std::string, std::string> kWords = {{"ahead", "residual ahead"},
+                                                            {"left", "residual to the left"},
+                                                            {"residual", "predicted position"},
+                                                            {"residual_x", "residual along x"},
+                                                            {"residual_y", "residual along y"},
+                                                            {"driven_time", "time for which it was driven"},
+                                                            {"radius", "distance from the middle"},
+                                                            {"forward", "speed ahead"},
                                                             {"sideways", "slip sideways"},
                                                             {"turn", "turning"},
                                                             {"world_x", "drift along x"},
