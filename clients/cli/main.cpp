@@ -20,6 +20,7 @@
 #include "clients/cli/run_command.hpp"
 #include "clients/cli/service_command.hpp"
 #include "clients/cli/sweep_command.hpp"
+#include "clients/identify/kilogrid/export_cells.hpp"
 #include "clients/recorder/export.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -120,18 +121,18 @@ int build_command(const BuildArguments& arguments) {
 }
 
 struct ExportArguments {
-  std::filesystem::path run, trajectories, bodies, messages, model;
+  std::filesystem::path run, trajectories, bodies, messages, cells, model;
   double every_s = 1;
   bool measured = false;
 };
 
 int export_command(const ExportArguments& arguments) {
-  const bool rows_wanted =
-      !arguments.trajectories.empty() || !arguments.bodies.empty() || !arguments.messages.empty();
+  const bool rows_wanted = !arguments.trajectories.empty() || !arguments.bodies.empty() ||
+                           !arguments.messages.empty() || !arguments.cells.empty();
   if (!rows_wanted && arguments.model.empty()) {
     throw UserError(
         "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv, "
-        "--model FILE.txtpb or several");
+        "--cells FILE.csv, --model FILE.txtpb or several");
   }
   if (!arguments.model.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
@@ -155,6 +156,8 @@ int export_command(const ExportArguments& arguments) {
   });
   each(arguments.messages,
        [&](recorder::Reader& reader, const auto& csv) { return recorder::export_messages(reader, csv); });
+  each(arguments.cells,
+       [&](recorder::Reader& reader, const auto& csv) { return kilogrid::export_cells(reader, csv); });
   return 0;
 }
 
@@ -222,6 +225,8 @@ int main_of(int argc, char** argv) {
   export_app.add_option("--trajectories", exported.trajectories, "time_s,robot,x_mm,y_mm,heading_rad,led");
   export_app.add_option("--bodies", exported.bodies, "movable bodies: time_s,body,x_mm,y_mm,heading_rad");
   export_app.add_option("--messages", exported.messages, "receiver,sender,count");
+  export_app.add_option("--cells", exported.cells,
+                        "as a floor of 50 mm cells hears robots: time_s,robot,x_mm,y_mm");
   export_app.add_option("--every", exported.every_s, "between rows of a robot, s")->capture_default_str();
   export_app.add_flag("--measured", exported.measured,
                       "trajectories as the tracker sees them, with the model's effects on it");
