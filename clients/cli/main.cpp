@@ -20,6 +20,7 @@
 #include "clients/cli/run_command.hpp"
 #include "clients/cli/service_command.hpp"
 #include "clients/cli/sweep_command.hpp"
+#include "clients/identify/kilogrid/export_cells.hpp"
 #include "clients/recorder/export.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -120,18 +121,18 @@ int build_command(const BuildArguments& arguments) {
 }
 
 struct ExportArguments {
-  std::filesystem::path run, trajectories, bodies, messages, radio, model;
+  std::filesystem::path run, trajectories, bodies, messages, radio, cells, model;
   double every_s = 1;
   bool measured = false;
 };
 
 int export_command(const ExportArguments& arguments) {
   const bool rows_wanted = !arguments.trajectories.empty() || !arguments.bodies.empty() ||
-                           !arguments.messages.empty() || !arguments.radio.empty();
+                           !arguments.messages.empty() || !arguments.radio.empty() || !arguments.cells.empty();
   if (!rows_wanted && arguments.model.empty()) {
     throw UserError(
         "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv, "
-        "--radio FILE.csv, --model FILE.txtpb or several");
+        "--radio FILE.csv, --cells FILE.csv, --model FILE.txtpb or several");
   }
   if (!arguments.model.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
@@ -157,6 +158,8 @@ int export_command(const ExportArguments& arguments) {
        [&](recorder::Reader& reader, const auto& csv) { return recorder::export_messages(reader, csv); });
   each(arguments.radio,
        [&](recorder::Reader& reader, const auto& csv) { return recorder::export_radio(reader, csv); });
+  each(arguments.cells,
+       [&](recorder::Reader& reader, const auto& csv) { return kilogrid::export_cells(reader, csv); });
   return 0;
 }
 
@@ -225,6 +228,8 @@ int main_of(int argc, char** argv) {
   export_app.add_option("--bodies", exported.bodies, "movable bodies: time_s,body,x_mm,y_mm,heading_rad");
   export_app.add_option("--messages", exported.messages, "receiver,sender,count");
   export_app.add_option("--radio", exported.radio, "robot,attempted,sent,received,collided,backed_off");
+  export_app.add_option("--cells", exported.cells,
+                        "as a floor of 50 mm cells hears robots: time_s,robot,x_mm,y_mm");
   export_app.add_option("--every", exported.every_s, "between rows of a robot, s")->capture_default_str();
   export_app.add_flag("--measured", exported.measured,
                       "trajectories as the tracker sees them, with the model's effects on it");
