@@ -169,7 +169,7 @@ Executor::Main Executor::run_main(std::int32_t cycles, std::int32_t spun) const 
 Fault Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
   thread_.budget = kCallbackCycles;
   thread_.overrun = 0;
-  clear_below(reinterpret_cast<std::uint8_t*>(slot_.interrupt_stack_top()));  // NOLINT
+  clear(reinterpret_cast<std::uint8_t*>(slot_.interrupt_stack_top()) - kClearedOctets, kClearedOctets);  // NOLINT
   begin();
   result = call_(function);
   end();

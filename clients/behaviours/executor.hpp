@@ -14,13 +14,13 @@
 
 namespace kilotwin::behaviours {
 
-/// Of a stack that clear_below() clears.
+/// Octets below a stack pointer, the end of what frames were there, that are zero whenever a robot begins to run: one that looks
+/// there by mistake finds the same whoever ran before it.
 inline constexpr std::uint32_t kClearedOctets = 256;
-/// Clears the end of what frames were below a stack pointer: a robot that looks there by mistake finds the same whoever ran
-/// before it.
-inline void clear_below(std::uint8_t* stack) {
-  for (int line = 1; line <= static_cast<int>(kClearedOctets / 16); ++line) {
-    std::memset(stack - 16 * line, 0, 16);
+/// Sets few octets, a multiple of 16, to zero.
+inline void clear(std::uint8_t* first, std::size_t octets) {
+  for (std::size_t at = 0; at < octets; at += 16) {
+    std::memset(first + at, 0, 16);
     // Stays a store each: a loop that becomes a string instruction takes longer to begin than this does.
     std::atomic_signal_fence(std::memory_order_seq_cst);
   }
@@ -41,11 +41,10 @@ class RobotMemory {
   }
   void copy_in(const Slot& slot, RobotThread& thread) const {
     std::memcpy(slot.data(), octets_.get(), data_octets_);
-    std::memset(slot.data() + data_octets_, 0, kSlackOctets);
+    clear(slot.data() + data_octets_, kSlackOctets);
     auto* const stack = reinterpret_cast<std::uint8_t*>(slot.stack_top() - stack_octets_);  // NOLINT
     std::memcpy(stack, octets_.get() + data_octets_, stack_octets_);
-    // What ends of frames were there is no other robot's.
-    if (stack_octets_ + kClearedOctets <= kStackOctets) clear_below(stack);
+    if (stack_octets_ + kClearedOctets <= kStackOctets) clear(stack - kClearedOctets, kClearedOctets);
     thread.robot_stack = slot.stack_top() - stack_octets_;
   }
   /// `data_octets`: Executor::data_octets(). False where the robot's stack pointer has left its stack.

@@ -1,5 +1,6 @@
 // Programs that do everything wrong cost their robots, and nobody else: random C with loops, wild pointers, recursion, division
-// by zero, smashed stacks, stale jumps. KILOTWIN_FUZZ_PROGRAMS=1000 runs a thousand of them, KILOTWIN_FUZZ_SEED others.
+// by zero, smashed stacks, stale jumps. KILOTWIN_FUZZ_PROGRAMS=1000 runs a thousand of them, KILOTWIN_FUZZ_SEED others,
+// KILOTWIN_FUZZ_ROBOTS more robots of each.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
