@@ -49,6 +49,10 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
     neighbourhood_.place(i, pose.position_mm.x(), pose.position_mm.y());
     apart_.push_back(plan.tracked(i) || plan.firmware(i));
   }
+  // Nobody has sent just now: the first times are spread over the interval.
+  for (std::uint32_t i = 0; i < next_send_.size(); ++i)
+    next_send_[i] = static_cast<Cycles>(simple_model_.interval_s() * kNominalClockHz *
+                                        random_.uniform(Stream::kBackOff, i, Tick{-1}, 0));
   KILOTWIN_DEMAND(!plan.has_firmware() || firmware_robots_ != nullptr);
   if (plan.has_firmware())
     firmware_.emplace(plan, *firmware_robots_, timers_, neighbourhood_, links_, ranging_, overhead_gains_);

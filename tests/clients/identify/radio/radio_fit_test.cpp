@@ -73,7 +73,7 @@ TEST(Scores, PreferTheModelThatMadeTheData) {
   EXPECT_GT(log_likelihood(data, same), log_likelihood(data, other) + 1);
   const Errors errors = compare(data, same, same);
   EXPECT_NEAR(errors.sent, 0, 1);
-  EXPECT_LT(errors.near_worst, 0.03);
+  EXPECT_LT(errors.near_worst, 0.06);  // of few runs
   EXPECT_EQ(errors.deficit, 0);
 }
 
