@@ -284,7 +284,8 @@ void Fitter::fit(MotionModel& model, int passes) const {
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
     model.room = room_of(set_, model);
-    if (pass != 1) fit_noise(model);
+    // What was noise to a model without its new terms is not, once they have their size.
+    if (pass != 0 || passes == 1) fit_noise(model);
     const std::vector<Unit> units = linearise(model, set_.units(), blocks, {100, threads_});
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());
     Eigen::VectorXd score = Eigen::VectorXd::Zero(information.rows());

@@ -9,7 +9,9 @@
 namespace kilotwin::identify {
 namespace {
 
-constexpr int kMostRounds = 8;
+constexpr int kMostRounds = 7;
+/// Hypotheses of which so many (as a logarithm) are tried, single steps and pulses, do not challenge others.
+constexpr double kManyChoices = 2.5;
 constexpr std::uint64_t kSeed = 20180729;
 /// Look-alikes whose evidence lies closer than this (a Bayes factor of 20) are not told apart.
 constexpr double kClose = 3;
@@ -117,6 +119,7 @@ class Loop {
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
+        if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
         const Finding other = scores_->weigh(h, t);
         if (best == nullptr || other.evidence > best_finding.evidence) {
           best = &h;
