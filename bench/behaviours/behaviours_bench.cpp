@@ -1,7 +1,7 @@
 // What robots' programs cost their host: ns per robot and tick on one core, switch included, for programs that return from
 // loop(), that are blocked in delay(), that wait busily, that compute for longer than a tick; and their memory. Each figure is
 // the fastest of several rounds of one second of simulated time.
-// Usage: behaviours_bench [ROBOTS [CASE]]     default: 1000, all whose name holds CASE
+// Usage: behaviours_bench [ROBOTS [CASE [ROUNDS]]]     default: 1000, all whose name holds CASE, 30
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -54,7 +54,7 @@ RadioFrame air(Tick tick, std::uint32_t robots, bool run) {
   return frame;
 }
 
-void measure(const Case& one, std::uint32_t robots, const fs::path& folder) {
+void measure(const Case& one, std::uint32_t robots, int rounds, const fs::path& folder) {
   const bool is_file = one.source.ends_with(".c");
   const fs::path source = is_file ? fs::path(one.source) : folder / "program.c";
   if (!is_file && !write_file(source, with_main(one.source))) std::exit(1);
@@ -80,9 +80,9 @@ void measure(const Case& one, std::uint32_t robots, const fs::path& folder) {
   BehavioursEngine engine(plan, HostId{0}, ProgramSet::load(plan.manifest, folder));
   Tick tick;
   for (; tick.count() < 3; ++tick) engine.step(tick, air(tick, robots, true));
-  constexpr int kRounds = 30, kTicks = 30;
+  constexpr int kTicks = 30;
   double best_ns = 1e30;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     double ns = 0;
     for (int k = 0; k < kTicks; ++k, ++tick) {
       const RadioFrame frame = air(tick, robots, false);
@@ -100,6 +100,7 @@ void measure(const Case& one, std::uint32_t robots, const fs::path& folder) {
 
 int main(int count, char** words) {
   const std::uint32_t robots = count > 1 ? static_cast<std::uint32_t>(std::atoi(words[1])) : 1000;
+  const int rounds = count > 3 ? std::atoi(words[3]) : 30;
   std::string folder = (fs::temp_directory_path() / "kilotwin-bench-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) return 1;
   const std::string own = std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c";
@@ -117,7 +118,7 @@ int main(int count, char** words) {
             one.name == std::string("computes without end") || one.name == std::string("while (!received) ++n;")
                 ? std::min(robots, 100u)
                 : robots,
-            folder);
+            rounds, folder);
   }
   fs::remove_all(folder);
   return 0;

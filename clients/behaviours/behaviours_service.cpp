@@ -24,6 +24,7 @@ class BehavioursFederate : public Federate {
         engine_(engine),
         radio_(session, topics::radio(host.value()), {session.plan().comm()}),
         actuation_(session, topics::actuation()),
+        told_(engine.failures().size()),
         logs_(context.run_directory, session.plan().tick_length, context.first(), session.plan().share(host)) {
     if (session.plan().hosts_see_bodies()) bodies_.emplace(session, topics::bodies(), session.plan().all_physics());
   }
@@ -69,8 +70,9 @@ class BehavioursFederate : public Federate {
   Input<RadioFrame> radio_;
   std::optional<Input<BodyFrame>> bodies_;  // only where the experiment has something to sense by place
   Output<ActuationFrame> actuation_;
+  std::size_t told_;  // of the engine's failures; those of a checkpoint were told when they happened
   RobotLogs logs_;
-  std::size_t told_ = 0, warned_ = 0;  // of the engine's failures and warnings
+  std::size_t warned_ = 0;
 };
 
 }  // namespace
@@ -78,7 +80,7 @@ class BehavioursFederate : public Federate {
 void run_service(const RunPlan& plan, HostId host, const ServiceContext& context) {
   BehavioursEngine engine(plan, host, ProgramSet::load(plan.manifest, context.run_directory));
   if (context.resumed) engine.load(context.first(), context.resumed->behaviours());
-  Session session(plan, plan.behaviours(host), context.transport, context.first());
+  Session session(plan, plan.behaviours(host), context.transport, context.first(), context.inputs);
   RunningNote note(context.run_directory, host);
   engine.note_running_in(note.place());
   const Watchdog watchdog({&engine});

@@ -253,6 +253,9 @@ struct Toolchain {
   /// all other errors.
   [[nodiscard]] CompiledProgram make(const ProgramText& text, const Arguments& dialect) const;
 
+  /// A source alone after the preprocessor, or nothing where that fails.
+  [[nodiscard]] std::string preprocessed(const fs::path& source, const Arguments& dialect) const;
+
  private:
   [[nodiscard]] Arguments flags_for(const ProgramText& text, const fs::path& file, const Arguments& dialect) const {
     const bool as_cpp = std::find(dialect.begin(), dialect.end(), "c++") != dialect.end();
@@ -263,6 +266,15 @@ struct Toolchain {
   }
 };
 
+std::string Toolchain::preprocessed(const fs::path& source, const Arguments& dialect) const {
+  const ProgramText text = program_text({source}, cache);
+  Arguments preprocess{compiler.path, "-E", "-P"};
+  append(preprocess, flags_for(text, text.files[0], dialect));
+  preprocess.push_back(text.files[0].string());
+  const ProcessResult process = run_process(preprocess);
+  return process.status == 0 ? process.output : "";
+}
+
 CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialect) const {
   std::string content = runtime.filename().string() + '\n' + compiler.path + '\n' + compiler.version +
                         "\ncounters " + std::to_string(kCountersVersion) + '\n';
@@ -271,15 +283,20 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
   const std::string runtime_content = content;
   for (const std::string& flag : defines) content += flag + '\n';
   for (const std::string& flag : dialect) content += flag + '\n';
-  std::vector<std::string> preprocessed;
-  for (const fs::path& file : text.files) {
+  std::vector<fs::path> files = text.files;
+  std::vector<std::string> texts;
+  bool for_kilombo = std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const fs::path file = files[i];
     Arguments preprocess{compiler.path, "-E"};
     append(preprocess, flags_for(text, file, dialect));
     preprocess.push_back(file.string());
     ProcessResult process = run_process(preprocess);
     if (process.status != 0) throw UserError(first_error(process.errors, text.sources));
     content += sha256_hex(process.output);
-    preprocessed.push_back(std::move(process.output));
+    for_kilombo = for_kilombo || process.output.find("UserdataSize") != std::string::npos;
+    texts.push_back(std::move(process.output));
+    if (i + 1 == text.files.size() && for_kilombo) files.push_back(runtime / "simulator.c");
   }
   const fs::path kept = cache / "programs" / (sha256_hex(content) + ".so");
   if (const auto octets = read_file(kept)) {
@@ -291,20 +308,20 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
   }
   Arguments link{compiler.path};
   append(link, kLinkFlags);
+  // The runtime's variables come first: what is written past the end of an array meets the program's own, as on the robot.
+  link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
   append(link, {"-x", "assembler"});
   std::vector<std::unique_ptr<Temporary>> parts;
-  for (std::size_t i = 0; i < text.files.size(); ++i) {
+  for (std::size_t i = 0; i < files.size(); ++i) {
     Arguments compile{compiler.path};
-    append(compile, flags_for(text, text.files[i], dialect));
+    append(compile, flags_for(text, files[i], dialect));
     parts.push_back(std::make_unique<Temporary>(kept));
-    const std::string assembly = counted_assembly(compile, text.files[i], preprocessed[i], text.sources, kept);
+    const std::string assembly = counted_assembly(compile, files[i], texts[i], text.sources, kept);
     if (!write_file(parts.back()->path(), assembly))
       throw RunError(kept.string() + ": cannot be written; is the disk full?");
     link.push_back(parts.back()->path());
   }
-  append(link, {"-x", "none"});
-  link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
-  append(link, {"-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
+  append(link, {"-x", "none", "-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
   const Temporary result(kept);
   append(link, {"-o", result.path()});
   const ProcessResult linked = run_process(link);
@@ -329,16 +346,15 @@ bool mentions(const std::vector<fs::path>& sources, std::string_view word) {
 CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sources, const Arguments& dialect) {
   std::vector<std::string> notes;
   for (;;) {
-    ProgramText text = program_text(sources, toolchain.cache);
-    if (std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end())
-      text.files.push_back(toolchain.runtime / "simulator.c");
+    const ProgramText text = program_text(sources, toolchain.cache);
     try {
       CompiledProgram program = toolchain.make(text, dialect);
       notes.insert(notes.begin(), text.notes.begin(), text.notes.end());
       program.notes = std::move(notes);
       return program;
     } catch (const Incomplete& incomplete) {
-      const std::vector<fs::path> more = sources_with(undefined_names(incomplete.errors), text);
+      auto preprocessed = [&](const fs::path& source) { return toolchain.preprocessed(source, dialect); };
+      const std::vector<fs::path> more = sources_with(undefined_names(incomplete.errors), text, preprocessed);
       if (more.empty()) throw UserError(first_error(incomplete.errors, text.sources));
       for (const fs::path& source : more) {
         notes.push_back(source.string() + ": compiled too; it has what the program lacks");
@@ -375,8 +391,15 @@ std::vector<Dialect> dialects_for(const std::string& error, const std::vector<fs
     result.push_back({{"-DSIMULATOR"}, for_kilombo});
     result.push_back({{"-DSIMULATOR", headers[0], headers[1]}, for_kilombo + "; " + with_headers});
   }
-  if (!says("undefined reference") && !says("No such file"))
-    result.push_back({{"-x", "c++", headers[0], headers[1]}, "compiled as C++, " + with_headers.substr(9)});
+  if (!says("undefined reference") && !says("No such file")) {
+    const Arguments as_cpp{"-x", "c++", headers[0], headers[1]};
+    const std::string note = "compiled as C++, " + with_headers.substr(9);
+    result.push_back({as_cpp, note});
+    if (mentions(sources, "log_message")) {
+      result.push_back({as_cpp, note + ", and with log_message()"});
+      append(result.back().flags, {"-include", (runtime / "log_message.h").string()});
+    }
+  }
   return result;
 }
 

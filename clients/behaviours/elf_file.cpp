@@ -79,7 +79,7 @@ class Parser {
           {h.p_vaddr, h.p_vaddr + h.p_memsz}, (h.p_flags & PF_W) != 0, (h.p_flags & PF_X) != 0};
       require(page_down(h.p_vaddr) >= end, "segments overlap");
       require(!(segment.writable && segment.executable), "a segment is both writable and executable");
-      end = page_up(segment.range.last);
+      end = page_up(segment.range.last + (segment.writable ? kSlackOctets : 0));
       require(end <= kMostOctets, "too large");
       file_.memory.resize(end);
       if (h.p_filesz > 0) std::memcpy(file_.memory.data() + h.p_vaddr, octets_.data() + h.p_offset, h.p_filesz);

@@ -48,6 +48,9 @@ class ElfFile {
   [[nodiscard]] std::string function_at(std::uint64_t offset) const;
 };
 
+/// Memory beyond a robot's variables, for programs that write past the end of an array, as many do unnoticed on the robot. It
+/// is zero whenever a robot begins to run.
+inline constexpr std::uint64_t kSlackOctets = 256;
 inline constexpr std::uint64_t kPage = 4096;
 [[nodiscard]] constexpr std::uint64_t page_down(std::uint64_t at) { return at & ~(kPage - 1); }
 [[nodiscard]] constexpr std::uint64_t page_up(std::uint64_t at) { return page_down(at + kPage - 1); }

@@ -28,6 +28,7 @@ class RobotMemory {
   }
   void copy_in(const Slot& slot, RobotThread& thread) const {
     std::memcpy(slot.data(), octets_.get(), data_octets_);
+    std::memset(slot.data() + data_octets_, 0, kSlackOctets);
     auto* const stack = reinterpret_cast<std::uint8_t*>(slot.stack_top() - stack_octets_);  // NOLINT
     std::memcpy(stack, octets_.get() + data_octets_, stack_octets_);
     thread.robot_stack = slot.stack_top() - stack_octets_;

@@ -84,7 +84,8 @@ Slot::Slot(const ElfFile& file, std::uint64_t address)
     for (const ElfFile::Segment& segment : file.segments) {
       const int protection = PROT_READ | (segment.writable ? PROT_WRITE : 0) | (segment.executable ? PROT_EXEC : 0);
       const std::uint64_t first = page_down(segment.range.first);
-      protect(image_ + first, page_up(segment.range.last) - first, protection);
+      const std::uint64_t last = page_up(segment.range.last + (segment.writable ? kSlackOctets : 0));
+      protect(image_ + first, last - first, protection);
     }
     protect(image_ + file.relro.first, file.relro.last - file.relro.first, PROT_READ);
     initial_data_.assign(data(), data() + (file.data.last - file.data.first));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
 #include <map>
 #include <optional>
 #include <regex>
@@ -126,17 +127,36 @@ std::vector<fs::path> files_below(const fs::path& folder) {
   return result;
 }
 
-/// A project's folders around a file: its own, and up to two above, but nothing as wide as a home.
-std::vector<fs::path> folders_around(const fs::path& file) {
-  std::vector<fs::path> result;
-  fs::path folder = normal(file).parent_path();
-  for (int up = 0; up < 3 && folder.has_relative_path(); ++up) {
-    result.push_back(folder);
-    if (fs::exists(folder / ".git")) break;
-    folder = folder.parent_path();
-    const auto depth = std::distance(folder.begin(), folder.end());
-    if (depth < 4) break;
+/// Whether a project could begin here: it has what lies at the top of a repository.
+bool is_top(const fs::path& folder) {
+  std::error_code error;
+  for (const char* name :
+       {".git", "README.md", "README", "README.txt", "Readme.md", "readme.md", "LICENSE", "LICENSE.md"}) {
+    if (fs::exists(folder / name, error)) return true;
   }
+  return false;
+}
+
+/// Whether a folder is as wide as a home, or wider.
+bool is_wide(const fs::path& folder) {
+  const char* const home = std::getenv("HOME");
+  return std::distance(folder.begin(), folder.end()) < 3 || folder.parent_path() == "/home" ||
+         (home != nullptr && folder == fs::path(home));
+}
+
+/// A project's folders around a file: its own, up to two above, and farther up to its top where that is found.
+std::vector<fs::path> folders_around(const fs::path& file) {
+  constexpr std::size_t kSurely = 3, kMost = 8;
+  std::vector<fs::path> result;
+  std::size_t used = 0;
+  for (fs::path folder = normal(file).parent_path(); result.size() < kMost && !is_wide(folder);
+       folder = folder.parent_path()) {
+    result.push_back(folder);
+    if (result.size() <= kSurely || is_top(folder)) used = result.size();
+    if (fs::exists(folder / ".git")) break;
+  }
+  result.resize(used);
+  if (result.empty()) result.push_back(normal(file).parent_path());
   return result;
 }
 
@@ -226,11 +246,11 @@ class Preparation {
       const fs::path copy = prepared((file.parent_path() / named).lexically_normal());
       return normal(copy) == target ? "" : '"' + copy.string() + '"';
     }
-    if (!include.quoted) return "";
     if (is_runtime_header(include.name)) return "";
     const std::optional<fs::path> found = header_around(file, named.lexically_normal().string());
     if (!found) return "";
-    note(found->string() + ": found for #include \"" + include.name + '"');
+    note(found->string() + ": found for #include " +
+         (include.quoted ? '"' + include.name + '"' : '<' + include.name + '>'));
     result_.included.insert(*found);
     return '"' + fs::absolute(prepared(*found)).string() + '"';
   }
@@ -273,12 +293,46 @@ ProgramText program_text(const std::vector<fs::path>& sources, const fs::path& c
   return result;
 }
 
-std::vector<fs::path> sources_with(const std::set<std::string>& missing, const ProgramText& text) {
-  std::set<fs::path> taken;
+namespace {
+
+/// What a text defines of these names, and does not merely declare: functions with a body, variables at the beginning of a line.
+std::set<std::string> defined_names(const std::string& code, const std::set<std::string>& names) {
+  std::set<std::string> result;
+  for (const std::string& name : names) {
+    if (code.find(name) == std::string::npos) continue;
+    const std::regex definition("(^|\\n)[A-Za-z_][^;{}()#]*\\b" + name + "\\s*(\\([^;{}]*\\)\\s*\\{|=|\\[|;)");
+    const std::regex elsewhere("(^|\\n)\\s*(extern|static)\\b[^;{}()]*\\b" + name + "\\b");
+    if (std::regex_search(code, definition) && !std::regex_search(code, elsewhere)) result.insert(name);
+  }
+  return result;
+}
+
+/// Sources around these: first what bears the name of an included header, then whatever lies next to the sources, then farther
+/// off.
+std::vector<fs::path> sources_around(const ProgramText& text) {
+  std::set<std::string> stems;
+  for (const fs::path& header : text.included) stems.insert(header.stem().string());
+  std::set<fs::path> taken(text.included.begin(), text.included.end());
   for (const fs::path& source : text.sources) taken.insert(normal(source));
-  taken.insert(text.included.begin(), text.included.end());
+  std::vector<fs::path> result, others;
+  for (const fs::path& source : text.sources) {
+    for (const fs::path& folder : folders_around(source)) {
+      for (const fs::path& file : files_below(folder)) {
+        if ((file.extension() != ".c" && !is_cpp(file)) || !taken.insert(normal(file)).second) continue;
+        (stems.contains(file.stem().string()) ? result : others).push_back(file);
+      }
+    }
+  }
+  result.insert(result.end(), others.begin(), others.end());
+  return result;
+}
+
+}  // namespace
+
+std::vector<fs::path> sources_with(const std::set<std::string>& missing, const ProgramText& text,
+                                   const std::function<std::string(const fs::path&)>& preprocessed) {
   static const std::regex kMain(R"(\bmain\s*\()");
-  std::vector<fs::path> result;
+  constexpr std::size_t kMostOctets = 200'000;  // what regular expressions cope with
   std::set<std::string> open;
   for (const std::string& name : missing) {
     // Of a C++ name the last part, where that is a word.
@@ -287,39 +341,28 @@ std::vector<fs::path> sources_with(const std::set<std::string>& missing, const P
         !last.empty())
       open.insert(last);
   }
-  // First what bears the name of an included header, then whatever lies next to the sources, then farther off.
-  std::vector<fs::path> candidates;
-  std::set<std::string> stems;
-  for (const fs::path& header : text.included) stems.insert(header.stem().string());
-  std::vector<fs::path> others;
-  for (const fs::path& source : text.sources) {
-    for (const fs::path& folder : folders_around(source)) {
-      for (const fs::path& file : files_below(folder)) {
-        if (file.extension() == ".c" || is_cpp(file))
-          (stems.contains(file.stem().string()) ? candidates : others).push_back(file);
-      }
-    }
-  }
-  candidates.insert(candidates.end(), others.begin(), others.end());
-  for (const fs::path& candidate : candidates) {
+  std::vector<fs::path> result, without;
+  auto take = [&](const fs::path& candidate, const std::string& code) {
+    const std::set<std::string> found = defined_names(code, open);
+    for (const std::string& name : found) open.erase(name);
+    if (!found.empty()) result.push_back(fs::relative(candidate));
+    return !found.empty();
+  };
+  for (const fs::path& candidate : sources_around(text)) {
     if (open.empty()) break;
-    if (!taken.insert(normal(candidate)).second) continue;
-    constexpr std::size_t kMostOctets = 200'000;  // what regular expressions cope with
     const std::string original = read_file(candidate).value_or("");
-    if (original.size() > kMostOctets) continue;
+    if (original.size() > kMostOctets || is_kilolib_source(candidate, original)) continue;
     const std::string code = code_of(original);
-    if (is_kilolib_source(candidate, original) || std::regex_search(code, kMain)) continue;
-    bool defines = false;
-    for (auto name = open.begin(); name != open.end();) {
-      // A function with a body, or a variable at the beginning of a line.
-      const std::regex definition("(^|\\n)[A-Za-z_][^;{}()#]*\\b" + *name + "\\s*(\\([^;{}]*\\)\\s*\\{|=|\\[|;)");
-      const bool found =
-          code.find(*name) != std::string::npos && std::regex_search(code, definition) &&
-          !std::regex_search(code, std::regex("(^|\\n)\\s*(extern|static)\\b[^;{}()]*\\b" + *name + "\\b"));
-      defines = defines || found;
-      name = found ? open.erase(name) : std::next(name);
-    }
-    if (defines) result.push_back(fs::relative(candidate));
+    if (!std::regex_search(code, kMain) && !take(candidate, code)) without.push_back(candidate);
+  }
+  if (!result.empty()) return result;
+  // Names that macros put together are to be seen in preprocessed text alone.
+  constexpr std::size_t kMostFiles = 100;
+  if (without.size() > kMostFiles) without.resize(kMostFiles);
+  for (const fs::path& candidate : without) {
+    if (open.empty()) break;
+    const std::string code = code_of(preprocessed(candidate));
+    if (code.size() <= kMostOctets) take(candidate, code);
   }
   return result;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <set>
 #include <string>
 #include <vector>
@@ -26,8 +27,10 @@ struct ProgramText {
                                        const std::filesystem::path& cache);
 
 /// Further sources near these that define one of the missing functions or variables and no main(); empty where there are none.
-[[nodiscard]] std::vector<std::filesystem::path> sources_with(const std::set<std::string>& missing,
-                                                              const ProgramText& text);
+/// `preprocessed` gives a source after its preprocessor, or nothing.
+[[nodiscard]] std::vector<std::filesystem::path> sources_with(
+    const std::set<std::string>& missing, const ProgramText& text,
+    const std::function<std::string(const std::filesystem::path&)>& preprocessed);
 
 /// Whether a source is C++ by its name.
 [[nodiscard]] bool is_cpp(const std::filesystem::path& source);

@@ -9,7 +9,7 @@
 #include "clients/identify/identify.hpp"
 #include "clients/identify/import.hpp"
 #include "clients/identify/report.hpp"
-#include "clients/identify/residuals.hpp"
+#include "clients/identify/prediction_residuals.hpp"
 #include "clients/identify/write_model.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"

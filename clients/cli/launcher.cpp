@@ -16,7 +16,7 @@
 
 #include "clients/behaviours/running_note.hpp"
 #include "clients/cli/progress.hpp"
-#include "clients/recorder/file.hpp"
+#include "clients/cli/recovery.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/interrupt.hpp"
@@ -54,13 +54,6 @@ std::string last_line(int log) {
   constexpr std::string_view kPrefix = "kilotwin: ";
   if (text.starts_with(kPrefix)) text.remove_prefix(kPrefix.size());
   return std::string(text);
-}
-
-/// Whether a process has ended by what its own code did, not by a signal from outside.
-bool brought_itself_down(int status) {
-  if (!WIFSIGNALED(status)) return false;
-  const int signal = WTERMSIG(status);
-  return signal == SIGSEGV || signal == SIGBUS || signal == SIGILL || signal == SIGFPE || signal == SIGABRT;
 }
 
 class Launcher {
@@ -280,27 +273,12 @@ int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const L
       Launcher launcher(attempt, directory, options);
       const int status = launcher.run();
       culprit = launcher.corrupted_by();
-      if (!culprit) return status;
+      if (!culprit) {
+        if (status == 0) forget_attempts(directory);
+        return status;
+      }
     }
-    // The same run once more, in which that robot fails before it does so.
-    for (const proto::ProgramFailure& known : manifest.program_failure()) {
-      if (known.robot() == culprit->robot)
-        throw RunError(
-            fmt::format("a host was lost while robot {}, which had failed, was running", culprit->robot));
-    }
-    say(
-        fmt::format("the program of robot {} has brought down its host at {:.3f} s; the run starts again from {} "
-                    "with that robot "
-                    "failed",
-                    culprit->robot, plan.tick_length.seconds_at(culprit->tick),
-                    manifest.resumed() ? "its checkpoint" : "tick 0"));
-    proto::ProgramFailure& failure = *manifest.add_program_failure();
-    failure.set_robot(culprit->robot);
-    failure.set_tick(culprit->tick.count());
-    manifest.set_run(manifest.run() + 1 == 0 ? 1 : manifest.run() + 1);
-    recorder::write_file(directory.manifest(), manifest.SerializeAsString());
-    std::error_code ignored;
-    fs::remove(directory.recording(), ignored);
+    recover(directory, manifest, {&*culprit, 1});
   }
 }
 

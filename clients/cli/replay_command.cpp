@@ -81,10 +81,8 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
 
   local::LocalOptions options;
   if (plan.manifest.resumed()) options.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);
-  // Pauses took no simulated time, and checkpoints change nothing; the run ends where the recording does.
-  std::erase_if(recorded.inputs, [](const Directive& input) {
-    return input.kind != DirectiveKind::kOverheadInput && input.kind != DirectiveKind::kTrackedPose;
-  });
+  // The run ends where the recording does.
+  std::erase_if(recorded.inputs, [](const Directive& input) { return !changes_results(input); });
   Directive stop;
   stop.kind = DirectiveKind::kStop;
   stop.tick = recorded.first_hash + static_cast<std::int64_t>(recorded.chain.size()) - 1;

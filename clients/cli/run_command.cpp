@@ -1,12 +1,15 @@
 #include "clients/cli/run_command.hpp"
 
 #include <fmt/format.h>
+#include <sys/wait.h>
 
 #include "clients/behaviours/program_set.hpp"
 #include "clients/cli/launcher.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/progress.hpp"
+#include "clients/cli/recovery.hpp"
 #include "clients/cli/run_recorder.hpp"
+#include "clients/cli/worker.hpp"
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
 #include "core/dds/dds.hpp"
@@ -41,14 +44,16 @@ std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& dir
   return text;
 }
 
-void run_locally(const RunPlan& plan, const recorder::RunDirectory& directory, const RunArguments& arguments,
-                 double started_s) {
+void run_in_this_process(const RunPlan& plan, const recorder::RunDirectory& directory, std::uint32_t threads,
+                         bool quiet, double started_s) {
   local::LocalOptions options;
-  options.threads = std::max(1u, arguments.threads);
+  options.threads = threads;
   options.run_directory = directory.path();
-  if (plan.manifest.resumed()) options.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);
+  Beginning beginning = beginning_of(plan, directory);
+  options.resumed = std::move(beginning.resumed);
+  options.inputs = std::move(beginning.inputs);
   const auto programs = behaviours::ProgramSet::load(plan.manifest, directory.path());
-  ProgressBar progress(plan, !arguments.quiet);
+  ProgressBar progress(plan, !quiet);
   RunRecorder run_recorder(plan, directory, options.resumed, [&](const RunProgress& now) { progress.show(now); });
   const RunTotals totals = local::run(plan, programs, options, run_recorder);
   progress.clear();
@@ -57,6 +62,33 @@ void run_locally(const RunPlan& plan, const recorder::RunDirectory& directory, c
   run_recorder.finish(totals, first_tick_s - started_s);
   if (!totals.failure.empty()) {
     throw RunError(fmt::format("{}; what was recorded so far is in {}", totals.failure, directory.path().string()));
+  }
+}
+
+/// Returns in the process where the run came to its end, with nothing, and in the one that waited for that, with the exit
+/// status.
+std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDirectory& directory,
+                               const RunArguments& arguments, double started_s) {
+  std::uint32_t threads = std::max(1u, arguments.threads);
+  for (;;) {
+    const RunPlan plan(manifest);
+    const std::optional<int> status = status_of_worker();
+    if (!status) {
+      run_in_this_process(plan, directory, threads, arguments.quiet, started_s);
+      forget_attempts(directory);
+      return std::nullopt;
+    }
+    if (WIFEXITED(*status)) return WEXITSTATUS(*status);  // it has said what there was to say
+    std::vector<behaviours::Culprit> running;
+    for (std::uint32_t h = 0; h < plan.hosts; ++h) {
+      if (const auto culprit = behaviours::take_note(directory.path(), HostId{h})) running.push_back(*culprit);
+    }
+    if (!brought_itself_down(*status) || running.empty()) {
+      throw RunError(fmt::format("the run was ended by signal {}; what was recorded so far is in {}",
+                                 WTERMSIG(*status), directory.path().string()));
+    }
+    recover(directory, manifest, running);
+    if (running.size() > 1) threads = 1;
   }
 }
 
@@ -76,7 +108,8 @@ int run_command(const RunArguments& arguments, double start_monotonic_s) {
   }
   catch_interrupts();
   if (arguments.mode == "local") {
-    run_locally(plan, prepared.directory, arguments, start_monotonic_s);
+    if (const auto status = run_locally(prepared.manifest, prepared.directory, arguments, start_monotonic_s))
+      return *status;
   } else {
     const int status = launch(plan, prepared.directory, {claim->domain(), start_monotonic_s, !arguments.quiet});
     if (status != 0) return status;

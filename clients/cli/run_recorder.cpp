@@ -1,13 +1,22 @@
 #include "clients/cli/run_recorder.hpp"
 
 #include <algorithm>
+#include <utility>
 
+#include "clients/cli/recovery.hpp"
 #include "clients/recorder/picture.hpp"
+#include "clients/recorder/reader.hpp"
 
 namespace kilotwin::cli {
 namespace {
 
-proto::RecordingHeader header_of(const RunPlan& plan, const std::optional<Checkpoint>& resumed) {
+proto::RecordingHeader header_of(const RunPlan& plan, const recorder::RunDirectory& directory,
+                                 const std::optional<Checkpoint>& resumed) {
+  if (const auto earlier = earlier_recording(directory); !earlier.empty()) {
+    const recorder::Reader reader(earlier);
+    return recorder::recording_header(plan.manifest, Tick{reader.header().first_tick()},
+                                      reader.header().first_hash());
+  }
   return recorder::recording_header(plan.manifest, resumed ? resumed->tick : Tick{0},
                                     resumed ? resumed->hash_chain() : 0);
 }
@@ -18,7 +27,8 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
                          const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle)
     : plan_(plan),
       directory_(directory),
-      writer_(directory.recording(), header_of(plan, resumed)),
+      header_(header_of(plan, directory, resumed)),
+      writer_(directory.recording(), header_),
       when_(plan.tick_length, plan.experiment().recording().every_s()),
       on_idle_(std::move(on_idle)),
       x_mm_(plan.robots()),
@@ -29,12 +39,47 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       movable_x_mm_(plan.movables()),
       movable_y_mm_(plan.movables()),
       movable_heading_rad_(plan.movables()),
-      measurement_(plan) {}
+      measurement_(plan) {
+  if (const auto earlier = earlier_recording(directory); !earlier.empty())
+    take_over(earlier, resumed ? resumed->tick : Tick{0});
+}
+
+void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
+  recovered_from_ = until;
+  recorder::Reader reader(earlier);
+  using recorder::values;
+  const auto octets = [](const std::string& text) {
+    return std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());  // NOLINT
+  };
+  while (const proto::Record* record = reader.next()) {
+    if (record->has_state() && Tick{record->state().tick()} <= until) {
+      const proto::StateRecord& state = record->state();
+      const Tick tick{state.tick()};
+      writer_.state({tick, values(state.x_mm()), values(state.y_mm()), values(state.heading_rad()),
+                     octets(state.led()), octets(state.life_cycle()), values(state.movable_x_mm()),
+                     values(state.movable_y_mm()), values(state.movable_heading_rad()),
+                     values(state.measured_x_mm()), values(state.measured_y_mm()),
+                     values(state.measured_heading_rad())});
+      displacement_.add(values(state.x_mm()), values(state.y_mm()));
+      any_state_ = true;
+      next_ = when_.at_or_after(tick + 1);
+    } else if (record->has_hash()) {
+      Tick tick{record->hash().first_tick()};
+      for (const std::uint64_t chain : record->hash().chain()) {
+        if (tick <= until) writer_.hash(tick, chain);
+        ++tick;
+      }
+    } else if (record->has_input()) {
+      const Directive input = from_record(record->input());
+      if (input.tick < until || changes_results(input)) writer_.input(record->input());
+    }
+  }
+}
 
 void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
                         std::span<const ActuationFrame* const> actuation, bool last) {
+  if (first_tick_at_ == std::chrono::steady_clock::time_point{}) first_tick_at_ = std::chrono::steady_clock::now();
   if (any_state_ && tick < next_ && !last) return;
-  if (!any_state_) first_tick_at_ = std::chrono::steady_clock::now();
   any_state_ = true;
   next_ = when_.at_or_after(tick + 1);
   for (const BodyFrame* frame : bodies) {
@@ -63,10 +108,19 @@ void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
 
 void RunRecorder::hash(Tick tick, std::uint64_t chain) { writer_.hash(tick, chain); }
 
-void RunRecorder::input(const Directive& directive) { writer_.input(to_record(directive)); }
+void RunRecorder::input(const Directive& directive) {
+  writer_.input(to_record(directive));
+  inputs_wait_ = true;
+}
+
+void RunRecorder::saved() { writer_.flush(); }
 
 void RunRecorder::idle(const RunProgress& progress) {
-  writer_.flush_if_due();
+  // Nobody says twice what came from outside.
+  if (std::exchange(inputs_wait_, false))
+    writer_.flush();
+  else
+    writer_.flush_if_due();
   if (on_idle_) on_idle_(progress);
 }
 
@@ -92,7 +146,8 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.hosts = plan_.hosts;
   summary.robots = plan_.robots();
   summary.ticks = std::max<std::int64_t>(0, totals.last.count());
-  summary.resumed_from_tick = totals.first.count();
+  summary.resumed_from_tick = header_.first_tick();
+  summary.recovered_from_tick = recovered_from_.count();
   summary.simulated_s = plan_.tick_length.seconds() * static_cast<double>(summary.ticks);
   summary.start_s = start_s;
   summary.wall_s = totals.wall_s;

@@ -19,13 +19,15 @@ namespace kilotwin::cli {
 
 class RunRecorder : public RunObserver {
  public:
-  /// `resumed`: where the run starts from a checkpoint. `on_idle`: told how far the run is; may be empty.
+  /// `resumed`: where the run starts from a checkpoint. `on_idle`: told how far the run is; may be empty. Takes over what an
+  /// earlier attempt at this run has recorded, see recovery.hpp.
   RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory,
               const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle);
 
   void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>, bool last) override;
   void hash(Tick, std::uint64_t chain) override;
   void input(const Directive&) override;
+  void saved() override;
   void idle(const RunProgress&) override;
 
   /// Ends the recording, and writes summary and picture. `start_s`: wall time from the command to the first tick.
@@ -34,8 +36,11 @@ class RunRecorder : public RunObserver {
   [[nodiscard]] std::chrono::steady_clock::time_point first_tick_at() const { return first_tick_at_; }
 
  private:
+  void take_over(const std::filesystem::path& earlier, Tick until);
+
   const RunPlan& plan_;
   const recorder::RunDirectory directory_;
+  const proto::RecordingHeader header_;
   recorder::Writer writer_;
   recorder::RecordingSchedule when_;
   recorder::DisplacementObserver displacement_;
@@ -46,11 +51,17 @@ class RunRecorder : public RunObserver {
   Measurement measurement_;
   MeasuredPoses measured_;
   Tick next_{0};
+  Tick recovered_from_{0};
   bool any_state_ = false;
+  bool inputs_wait_ = false;  ///< to be flushed
   std::chrono::steady_clock::time_point first_tick_at_{};
 };
 
 [[nodiscard]] proto::InputRecord to_record(const Directive& directive);
+/// What replays repeat. Pauses took no simulated time, checkpoints change nothing, and where a run stopped, its recording ends.
+[[nodiscard]] inline bool changes_results(const Directive& directive) {
+  return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kTrackedPose;
+}
 [[nodiscard]] Directive from_record(const proto::InputRecord& record);
 
 }  // namespace kilotwin::cli

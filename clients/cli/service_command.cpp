@@ -8,6 +8,7 @@
 
 #include "clients/behaviours/behaviours_service.hpp"
 #include "clients/cli/prepare.hpp"
+#include "clients/cli/recovery.hpp"
 #include "clients/cli/run_recorder.hpp"
 #include "clients/firmware/firmware_swarm.hpp"
 #include "core/base/error.hpp"
@@ -73,7 +74,9 @@ int service_command(const ServiceArguments& arguments) {
   ServiceContext context;
   context.transport = {arguments.domain, arguments.peers};
   context.run_directory = directory.path();
-  if (plan.manifest.resumed()) context.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);
+  Beginning beginning = beginning_of(plan, directory);
+  context.resumed = std::move(beginning.resumed);
+  context.inputs = std::move(beginning.inputs);
 
   if (arguments.service == "physics") {
     physics::run_service(plan, parse_partition(arguments.partition, plan.grid), context);

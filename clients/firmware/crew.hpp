@@ -20,53 +20,58 @@ class Crew {
   Crew& operator=(const Crew&) = delete;
   ~Crew() {
     ended_ = true;
-    round_.fetch_add(1);
-    round_.notify_all();
+    unclaimed_.store(1, std::memory_order_release);
+    unclaimed_.notify_all();
     for (std::thread& hand : hands_) hand.join();
   }
 
   /// Calls task(i) once for each i below `count`, in any order on any thread; returns when all are done. Tasks do not throw.
+  /// A hand that the system does not let run costs nothing: whoever is awake takes what is left.
   void share(std::uint32_t count, const std::function<void(std::uint32_t)>& task) {
     if (hands_.empty() || count < 2) {
       for (std::uint32_t i = 0; i < count; ++i) task(i);
       return;
     }
     task_ = &task;
-    count_ = count;
-    next_.store(0, std::memory_order_relaxed);
-    working_.store(static_cast<std::uint32_t>(hands_.size()), std::memory_order_relaxed);
-    round_.fetch_add(1, std::memory_order_release);
-    round_.notify_all();
+    unfinished_.store(count, std::memory_order_relaxed);
+    unclaimed_.store(count, std::memory_order_release);
+    unclaimed_.notify_all();
     work();
-    wait(working_, [](std::uint32_t working) { return working == 0; });
+    wait(unfinished_, [](std::uint32_t unfinished) { return unfinished == 0; });
   }
 
  private:
   /// Looks so often before it sleeps: some 10 us.
   static constexpr int kLooks = 2000;
 
-  template <class Done> static std::uint32_t wait(std::atomic<std::uint32_t>& value, Done done) {
+  template <class Done> static void wait(std::atomic<std::uint32_t>& value, Done done) {
     for (int look = 0;; ++look) {
       const std::uint32_t now = value.load(std::memory_order_acquire);
-      if (done(now)) return now;
+      if (done(now)) return;
       if (look >= kLooks) value.wait(now, std::memory_order_acquire);
     }
   }
+  /// Whoever brings `unclaimed_` from n to n - 1 has task n - 1 of the round of that moment, which cannot end before it is
+  /// done: so a hand that slept through rounds still claims right.
   void work() {
-    for (std::uint32_t i = next_++; i < count_; i = next_++) (*task_)(i);
+    for (std::uint32_t n = unclaimed_.load(std::memory_order_acquire); n != 0;) {
+      if (!unclaimed_.compare_exchange_weak(n, n - 1, std::memory_order_acq_rel, std::memory_order_acquire))
+        continue;
+      (*task_)(n - 1);
+      if (unfinished_.fetch_sub(1, std::memory_order_acq_rel) == 1) unfinished_.notify_one();
+      n = unclaimed_.load(std::memory_order_acquire);
+    }
   }
   void serve() {
-    for (std::uint32_t seen = 0;;) {
-      seen = wait(round_, [seen](std::uint32_t round) { return round != seen; });
+    for (;;) {
+      wait(unclaimed_, [](std::uint32_t unclaimed) { return unclaimed != 0; });
       if (ended_) return;
       work();
-      if (working_.fetch_sub(1, std::memory_order_acq_rel) == 1) working_.notify_one();
     }
   }
 
   const std::function<void(std::uint32_t)>* task_ = nullptr;
-  std::uint32_t count_ = 0;
-  std::atomic<std::uint32_t> next_{0}, working_{0}, round_{0};
+  std::atomic<std::uint32_t> unclaimed_{0}, unfinished_{0};
   std::atomic<bool> ended_{false};
   std::vector<std::thread> hands_;
 };

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace kilotwin::identify {
 namespace {
@@ -14,11 +15,13 @@ struct LogLikelihood {
   double sum = 0;
   std::vector<double> parts;  ///< of so many samples each
   std::size_t count = 0;
+  bool touched = false;
   static constexpr std::size_t kPart = 50;
 
   void start(const TrackFilter&) {}
-  void step(const StepRecord&) {}
+  void step(const StepRecord& record) { touched = touched || record.touching; }
   void update(const Innovation& innovation, const Sample&) {
+    if (std::exchange(touched, false)) return;
     if (count++ % kPart == 0) parts.push_back(0);
     const double value = std::max(innovation.log_likelihood, -1e3);
     parts.back() += value;
@@ -120,7 +123,7 @@ std::vector<Block> blocks_of(const MotionModel& model) {
 
 void Fitter::fit_noise(MotionModel& model) const {
   // Tracks spread over the whole set, until there are enough samples.
-  constexpr std::size_t kEnough = 12000;
+  constexpr std::size_t kEnough = 8000;
   std::vector<const TrackView*> chosen;
   std::vector<const TrackView*> all;
   for (const TrackView& view : set_.views())
@@ -155,43 +158,53 @@ void Fitter::fit_noise(MotionModel& model) const {
   const double weak = 1.0 / (6 * 6);
   const auto prior = [&](const NoiseVector& at) { return -0.5 * weak * (at - middle).squaredNorm(); };
 
-  NoiseVector at = to_vector(model.noise);
-  Eigen::VectorXd here = parts_at(at);
-  double value = here.sum() + prior(at);
-  constexpr double kStep = 0.05;
-  for (int pass = 0; pass < 12; ++pass) {
-    Eigen::MatrixXd slopes(here.size(), kNoises);
+  const auto value_at = [&](const NoiseVector& at) { return parts_at(at).sum() + prior(at); };
+  const auto gradient_at = [&](const NoiseVector& at) {
+    constexpr double kStep = 0.02;
+    NoiseVector gradient = NoiseVector::Zero();
     for (int i = 0; i < kNoises; ++i) {
-      if (i == 5 && !headings) {
-        slopes.col(i).setZero();
-        continue;
-      }
-      NoiseVector up = at;
+      if (i == 5 && !headings) continue;
+      NoiseVector up = at, down = at;
       up[i] += kStep;
-      slopes.col(i) = (parts_at(up) - here) / kStep;
+      down[i] -= kStep;
+      gradient[i] = (value_at(up) - value_at(down)) / (2 * kStep);
     }
-    const NoiseVector gradient = slopes.colwise().sum().transpose() - weak * (at - middle);
-    const Eigen::RowVectorXd mean = slopes.colwise().mean();
-    const Eigen::MatrixXd centred = slopes.rowwise() - mean;
-    Eigen::MatrixXd fisher = centred.transpose() * centred;
-    fisher.diagonal().array() += weak + 1e-3;
-    NoiseVector move = fisher.ldlt().solve(gradient);
+    return gradient;
+  };
+  // Broyden, Fletcher, Goldfarb and Shanno, on logarithms of variances.
+  NoiseVector at = to_vector(model.noise);
+  double value = value_at(at);
+  NoiseVector gradient = gradient_at(at);
+  // A log variance is known to about sqrt(2 / n).
+  const double curvature =
+      std::max<double>(10, 0.1 * static_cast<double>(parts_at(at).size()) * LogLikelihood::kPart);
+  Eigen::Matrix<double, kNoises, kNoises> inverse = Eigen::Matrix<double, kNoises, kNoises>::Identity() / curvature;
+  for (int pass = 0; pass < 20; ++pass) {
+    NoiseVector move = inverse * gradient;
     const double longest = move.cwiseAbs().maxCoeff();
-    if (longest > 2) move *= 2 / longest;
+    if (longest > 1.5) move *= 1.5 / longest;
     bool better = false;
-    for (int halve = 0; halve < 5 && !better; ++halve, move *= 0.4) {
-      const NoiseVector trial = at + move;
-      const Eigen::VectorXd there = parts_at(trial);
-      const double found = there.sum() + prior(trial);
-      if (found <= value) continue;
-      const double gained = found - value;
-      at = trial;
-      here = there;
+    double gained = 0;
+    for (int halve = 0; halve < 6; ++halve, move *= 0.3) {
+      const double found = value_at(at + move);
+      if (!(found > value)) continue;
+      gained = found - value;
       value = found;
       better = true;
-      if (gained < 0.5) pass = 100;
+      break;
     }
     if (!better) break;
+    at += move;
+    if (gained < 0.3) break;
+    const NoiseVector next = gradient_at(at);
+    const NoiseVector change = gradient - next;  // of the negative
+    const double along = change.dot(move);
+    if (along > 1e-9) {
+      const Eigen::Matrix<double, kNoises, kNoises> side =
+          Eigen::Matrix<double, kNoises, kNoises>::Identity() - move * change.transpose() / along;
+      inverse = (side * inverse * side.transpose() + move * move.transpose() / along).eval();
+    }
+    gradient = next;
   }
   model.noise = to_noise(at);
 }
@@ -251,10 +264,26 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
   model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
 }
 
+double Fitter::log_likelihood(const MotionModel& model) const {
+  const std::vector<TrackView>& views = set_.views();
+  std::vector<double> sums(views.size());
+  in_parallel(views.size(), threads_, [&](std::size_t i) {
+    if (views[i].track->held_out) return;
+    RobotBias bias = model.bias_of(views[i].track->robot);
+    bias.covariance.setZero();
+    TrackFilter filter(model, bias, views[i].track->robot, views[i].run);
+    LogLikelihood likelihood;
+    walk(filter, views[i], views[i].track->samples.size(), likelihood);
+    sums[i] = likelihood.sum;
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
 void Fitter::fit(MotionModel& model, int passes) const {
   const std::vector<Block> blocks = blocks_of(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
+    model.room = room_of(set_, model);
     if (pass != 1) fit_noise(model);
     const std::vector<Unit> units = linearise(model, set_.units(), blocks, {100, threads_});
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());
@@ -271,8 +300,16 @@ void Fitter::fit(MotionModel& model, int passes) const {
       score.segment(first, n) -= term.precision.cwiseProduct(term.coefficients);
       first += n;
     }
-    const Eigen::VectorXd step = information.ldlt().solve(score);
-    apply(model, units, step);
+    Eigen::VectorXd step = information.ldlt().solve(score);
+    // A step that makes things worse was too long.
+    const MotionModel start = model;
+    const double before = log_likelihood(start);
+    for (int halve = 0; halve < 5; ++halve, step *= 0.4) {
+      model = start;
+      apply(model, units, step);
+      if (log_likelihood(model) > before - 2) break;
+      if (halve == 4) model = start;
+    }
   }
 }
 

@@ -47,6 +47,8 @@ class Fitter {
   void fit(MotionModel&, int passes) const;
   /// The noise alone: a quasi-Newton search on the likelihood of some of the tracks.
   void fit_noise(MotionModel&) const;
+  /// Of all that was measured on tracks that may be fitted to.
+  [[nodiscard]] double log_likelihood(const MotionModel&) const;
   /// Information and score of the base's prior, added to those of the data.
   void add_base_prior(const MotionModel&, Eigen::MatrixXd& information, Eigen::VectorXd& score) const;
   /// Moves base parameters, terms and biases by a step in all columns.

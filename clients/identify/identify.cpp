@@ -8,7 +8,9 @@
 
 #include "clients/identify/fit.hpp"
 #include "clients/identify/predict.hpp"
+#include "clients/identify/residuals.hpp"
 #include "clients/identify/search.hpp"
+#include "clients/identify/write_effects.hpp"
 #include "clients/identify/write_model.hpp"
 #include "core/base/error.hpp"
 
@@ -62,11 +64,45 @@ json summary_of(const Errors& errors) {
           {"rows", errors.rows}};
 }
 
-json effects_of(const Search& found) {
+/// An experiment that would tell two causes apart, by what the one depends on and the other does not.
+std::string experiment_for(const std::vector<std::string>& found, const std::vector<std::string>& instead) {
+  const auto only_one = [&](const char* word) {
+    return (std::find(found.begin(), found.end(), word) != found.end()) !=
+           (std::find(instead.begin(), instead.end(), word) != instead.end());
+  };
+  if (only_one("motor_time"))
+    return "let some robots rest for the first half of a run, then drive: use and clock differ";
+  if (only_one("time_since_command")) return "give motions of very different lengths in random order";
+  if (only_one("measurement"))
+    return "turn the camera by 90 degrees, or shift it, between two runs: what is the camera's moves along";
+  if (only_one("robot")) return "exchange the places of fast and slow robots between runs";
+  if (only_one("neighbours")) return "repeat a run with every robot alone";
+  if (only_one("position"))
+    return "start the same robots from other places, and turn the arrangement by 90 degrees";
+  if (only_one("world_frame") || only_one("heading"))
+    return "repeat the commands with all robots turned by 90 degrees";
+  if (only_one("time")) return "start the same commands later after switching on";
+  if (only_one("history") || only_one("command"))
+    return "give left and right turns in random order before equal stretches straight on";
+  return "repeat the runs with more robots, or for longer";
+}
+
+/// Of terms by the same cause, one entry. `without_mm` are errors without each term.
+json effects_of(const Search& found, const std::vector<double>& without_mm, double before_mm, double after_mm) {
   json effects = json::array();
   for (std::size_t t = 0; t < found.model.terms.size(); ++t) {
     const Term& term = found.model.terms[t];
     const Reason& reason = found.reasons[t];
+    const auto known =
+        std::find_if(effects.begin(), effects.end(), [&](const json& e) { return e["name"] == term.name; });
+    if (known != effects.end()) {
+      (*known)["rmse_without_mm"] = std::max((*known)["rmse_without_mm"].get<double>(), without_mm[t]);
+      continue;
+    }
+    const double gap = before_mm * before_mm - after_mm * after_mm;
+    const double share = gap > 0 ? (without_mm[t] * without_mm[t] - after_mm * after_mm) / gap : 0;
+    json records = json::array();
+    for (const proto::Effect& effect : effects_of_term(term)) records.push_back(effect.ShortDebugString());
     effects.push_back(
         {{"name", term.name},
          {"covariates", reason.covariates},
@@ -74,13 +110,45 @@ json effects_of(const Search& found) {
          {"evidence",
           {{"log10_p", reason.finding.log10_p},
            {"threshold_log10_p", reason.threshold_log10_p},
+           {"p_family",
+            std::min(1.0, Scores::kFamilyAlarm *
+                              std::pow(10.0, std::max(-300.0, reason.finding.log10_p - reason.threshold_log10_p)))},
            {"log_likelihood_gain", reason.finding.evidence},
            {"held_out_gain", reason.finding.held_out},
            {"held_out_gain_se", reason.finding.held_out_se},
            {"degrees", reason.finding.degrees}}},
+         {"parameters", {{"form", form_of(term)}, {"columns", term.coefficients.size()}, {"records", records}}},
+         {"rmse_without_mm", without_mm[t]},
+         {"share_removed", std::clamp(share, 0.0, 1.0)},
          {"in_words", fmt::format("{} depends on {}", reason.acts_on, fmt::join(reason.covariates, ", "))}});
   }
+  std::stable_sort(effects.begin(), effects.end(), [](const json& a, const json& b) {
+    return a["evidence"]["log_likelihood_gain"].get<double>() > b["evidence"]["log_likelihood_gain"].get<double>();
+  });
   return effects;
+}
+
+json describe_set(const MeasuredSet& train, const MeasuredSet* test, bool held_out) {
+  double duration_s = 0;
+  std::vector<double> steps;
+  for (const Run& run : train.runs) {
+    for (const Track& track : run.tracks) {
+      if (!track.samples.empty()) duration_s = std::max(duration_s, track.samples.back().time_s);
+      for (std::size_t i = 1; i < track.samples.size(); i += 10)
+        steps.push_back(track.samples[i].time_s - track.samples[i - 1].time_s);
+    }
+  }
+  std::sort(steps.begin(), steps.end());
+  return {{"runs", train.runs.size()},
+          {"robots", train.robots().size()},
+          {"tracks", train.tracks()},
+          {"samples", train.samples()},
+          {"test_samples", test != nullptr ? test->samples() : 0},
+          {"has_headings", train.has_headings},
+          {"has_commands", train.has_commands},
+          {"duration_s", duration_s},
+          {"sample_s", steps.empty() ? 0 : steps[steps.size() / 2]},
+          {"held_out", held_out}};
 }
 
 }  // namespace
@@ -127,11 +195,29 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     found = search(fitter, before,
                    [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); });
   }
+  const Asked asked{10, 5, options.horizon_s};
+  // An effect that does not help to look ahead is no part of the model, however sure it is one step ahead.
+  const auto fitted_mm = [&](const MotionModel& model) {
+    return errors_of(train, predict(model, prepared, asked, false, options.threads)).rmse_mm();
+  };
+  if (!found.model.terms.empty()) {
+    say_progress(0.86, "what each effect is worth");
+    double with_mm = fitted_mm(found.model);
+    for (std::size_t t = found.model.terms.size(); t-- > 0;) {
+      MotionModel without = found.model;
+      without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(t));
+      fitter.fit(without, 1);
+      const double without_mm = fitted_mm(without);
+      if (without_mm > with_mm * 1.0005) continue;
+      found.model = without;
+      found.reasons.erase(found.reasons.begin() + static_cast<std::ptrdiff_t>(t));
+      with_mm = without_mm;
+    }
+  }
   const MotionModel& after = found.model;
   json document;
 
   say_progress(0.9, "predictions");
-  const Asked asked{10, 5, options.horizon_s};
   const std::vector<Predicted> predicted_before = predict(before, judged, asked, held_out_only, options.threads);
   const std::vector<Predicted> predicted_after = predict(after, judged, asked, held_out_only, options.threads);
 
@@ -153,7 +239,15 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
       "motion over "
       "the horizon, and the tracker's noise, all estimated from the innovations one step ahead";
   contract["horizon_s"] = options.horizon_s;
-  contract["effects"] = effects_of(found);
+  std::vector<double> without_mm;
+  for (std::size_t t = 0; t < after.terms.size(); ++t) {
+    MotionModel without = after;
+    without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    fitter.fit(without, 1);
+    without_mm.push_back(
+        errors_of(judged.set(), predict(without, judged, asked, held_out_only, options.threads)).rmse_mm());
+  }
+  contract["effects"] = effects_of(found, without_mm, errors_before.rmse_mm(), errors_after.rmse_mm());
   contract["rejected"] = json::array();
   for (const Rejected& r : found.rejected) {
     contract["rejected"].push_back({{"name", r.name},
@@ -164,8 +258,10 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   }
   contract["ambiguous"] = json::array();
   for (const Ambiguity& a : found.ambiguous) {
-    contract["ambiguous"].push_back(
-        {{"found", a.found}, {"instead", a.instead}, {"log_likelihood_difference", a.evidence_difference}});
+    contract["ambiguous"].push_back({{"found", a.found},
+                                     {"instead", a.instead},
+                                     {"experiment", experiment_for(a.found_covariates, a.covariates)},
+                                     {"log_likelihood_difference", a.evidence_difference}});
   }
   contract["base"] = {
       {"straight_speed_mm_s", after.base.straight_mm_s}, {"turn_speed_mm_s", after.base.turn_mm_s},
@@ -178,6 +274,46 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
                        {"drift_sd_mm", std::sqrt(after.noise.drift_mm2_s)},
                        {"tracker_position_sd_mm", std::sqrt(after.noise.position_mm2)},
                        {"tracker_heading_sd_rad", std::sqrt(after.noise.heading_rad2)}};
+  document["set"] = describe_set(train, test, held_out_only);
+  document["steps"] = json::array();
+  for (const Step& step : found.steps)
+    document["steps"].push_back({{"added", step.added}, {"held_out_gain", step.held_out}});
+  document["robots"] = json::array();
+  std::map<std::uint32_t, std::array<double, 3>> by_robot;
+  for (const auto* errors : {&errors_before, &errors_after}) {
+    for (const auto& [track, part] : errors->by_track) {
+      auto& sums = by_robot[judged.set().runs[track.first].tracks[track.second].robot];
+      sums[errors == &errors_before ? 0 : 1] += part.first;
+      if (errors == &errors_before) sums[2] += static_cast<double>(part.second);
+    }
+  }
+  for (const auto& [robot, bias] : after.robots) {
+    json entry = {{"robot", robot},
+                  {"bias_left_mm_s", bias.mean_mm_s[0]},
+                  {"bias_right_mm_s", bias.mean_mm_s[1]},
+                  {"sd_left_mm_s", std::sqrt(bias.covariance(0, 0))},
+                  {"sd_right_mm_s", std::sqrt(bias.covariance(1, 1))}};
+    if (const auto sums = by_robot.find(robot); sums != by_robot.end() && sums->second[2] > 0) {
+      entry["before_mm"] = std::sqrt(sums->second[0] / sums->second[2]);
+      entry["after_mm"] = std::sqrt(sums->second[1] / sums->second[2]);
+    }
+    document["robots"].push_back(entry);
+  }
+  say_progress(0.94, "plots");
+  json& curve = document["horizon"];
+  for (const double ahead_s : {1.0, 2.0, 5.0, 10.0, 15.0, 20.0}) {
+    const Asked at{20, 10, ahead_s};
+    const Errors was = errors_of(judged.set(), predict(before, judged, at, held_out_only, options.threads));
+    const Errors is = errors_of(judged.set(), predict(after, judged, at, held_out_only, options.threads));
+    curve["at_s"].push_back(ahead_s);
+    curve["before_mm"].push_back(was.rmse_mm());
+    curve["after_mm"].push_back(is.rmse_mm());
+    curve["floor_mm"].push_back(is.expected_mm());
+  }
+  const std::vector<Disturbance> left_before = disturbances_of(before, prepared, options.threads),
+                                 left_after = disturbances_of(after, prepared, options.threads);
+  document["covariate_plots"] = covariate_plots(left_before, left_after);
+  document["maps"] = maps(left_before, left_after);
   out.model = proto_of(after);
   document["seconds"]["all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   out.document = std::move(document);

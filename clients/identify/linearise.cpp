@@ -50,6 +50,7 @@ class Sensitivities {
     pose_.row(0) += by_heading_x * pose_.row(2);
     pose_.row(1) += by_heading_y * pose_.row(2);
     last_ = record.middle;
+    touched_ = touched_ || record.touching;
     const double forward = (r.left_mm_s + r.right_mm_s) / 2 * h;
     const Eigen::Vector3d turn = h * Eigen::Vector3d(-arc.along_y * forward / 2, arc.along_x * forward / 2, 1);
     const Eigen::Vector3d ahead = h * Eigen::Vector3d(arc.along_x, arc.along_y, 0);
@@ -105,11 +106,13 @@ class Sensitivities {
     }
   }
   void update(const Innovation& innovation, const Sample& sample) {
-    log_likelihood += innovation.log_likelihood;
+    if (!touched_) log_likelihood += innovation.log_likelihood;
     ++samples;
     if (innovation.weight < 1) ++outliers;
-    if (innovation.lost) {
-      ++lost;
+    // What happened to a robot while it touched something tells nothing of the model; it starts anew from here.
+    if (innovation.lost || touched_) {
+      lost += innovation.lost ? 1 : 0;
+      touched_ = false;
       start(*filter_);
       return;
     }
@@ -224,7 +227,7 @@ class Sensitivities {
   double cluster_start_s_ = -1e300;
   const TrackFilter* filter_ = nullptr;
   Situation last_;
-  bool measures_ = false;
+  bool measures_ = false, touched_ = false;
   double of_left_[kMostColumns], of_right_[kMostColumns];
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/identify/basis.hpp"
+#include "clients/identify/room.hpp"
 
 namespace kilotwin::identify {
 
@@ -87,6 +88,8 @@ struct Rates {
 struct MotionModel {
   BaseParameters base;
   Noise noise;
+  Room room;
+  bool contacts = true;  ///< robots push each other
   std::vector<Term> terms;
   std::map<std::uint32_t, RobotBias> robots;
 

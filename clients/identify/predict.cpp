@@ -39,7 +39,7 @@ class Follower {
       h.log_weight += innovation.log_likelihood;
       if (innovation.lost && innovation.size == 2) h.log_weight -= 20;
     }
-    if (hypotheses_.size() > 1) prune();
+    prune();
   }
   void start(const Sample& sample) {
     const RobotBias bias = model_.bias_of(view_.track->robot);
@@ -138,6 +138,11 @@ class Outlook {
   };
   void see() {
     if (!neighbours_) return;
+    locate();
+    for (std::size_t r = 0; r < robots_.size(); ++r)
+      if (!std::isnan(x_[r])) robots_[r].near = view_of(r, x_, y_);
+  }
+  void locate() {
     x_.assign(robots_.size(), std::nan(""));
     y_ = x_;
     for (std::size_t r = 0; r < robots_.size(); ++r) {
@@ -148,8 +153,6 @@ class Outlook {
         y_[r] += robots_[r].weights[i] * robots_[r].filters[i].belief().centre_y_mm();
       }
     }
-    for (std::size_t r = 0; r < robots_.size(); ++r)
-      if (!std::isnan(x_[r])) robots_[r].near = view_of(r, x_, y_);
   }
   void advance(double to_s) {
     for (Robot& robot : robots_) {
@@ -158,6 +161,21 @@ class Outlook {
           filter.step_mean(t, h, commands, robot.near);
         });
       if (!robot.filters.empty()) robot.now_s = std::max(robot.now_s, to_s);
+    }
+    if (model_.contacts) push();
+  }
+
+  /// Robots that have come to overlap push each other away.
+  void push() {
+    locate();
+    const std::vector<double> x = x_, y = y_;
+    push_apart(x_, y_);
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      if (std::isnan(x[r]) || (x_[r] == x[r] && y_[r] == y[r])) continue;
+      for (TrackFilter& filter : robots_[r].filters) {
+        filter.belief().mean[0] += model_.room.inside_x(x_[r]) - x[r];
+        filter.belief().mean[1] += model_.room.inside_y(y_[r]) - y[r];
+      }
     }
   }
 
@@ -169,6 +187,7 @@ class Outlook {
 };
 
 bool looks_at_neighbours(const MotionModel& model) {
+  if (model.contacts) return true;
   for (const Term& term : model.terms)
     for (const Block& block : term.blocks)
       for (const Covariate c :
@@ -214,7 +233,7 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
       outlook.go_to(time_s);
       for (std::size_t i = 0; i < followers.size(); ++i) {
         const Track& track = *followers[i].view().track;
-        if ((held_out_only && !track.held_out) || track.samples.back().time_s < time_s - 1e-6) continue;
+        if (held_out_only && !track.held_out) continue;
         Predicted p{static_cast<std::uint32_t>(run),
                     static_cast<std::uint32_t>(followers[i].view().place),
                     time_s,

@@ -1,21 +1,28 @@
-/// Residuals of predictions, measured minus predicted: by robot, over the arena, and over what they may depend on.
+/// What the filter had to correct, sample by sample: disturbances of the motion, for plots.
 #pragma once
 
 #include <nlohmann/json.hpp>
-#include <vector>
 
-#include "clients/identify/identify.hpp"
-#include "clients/identify/measured_set.hpp"
+#include "clients/identify/fit.hpp"
 
 namespace kilotwin::identify {
 
-/// The parts `robots`, `maps` and `covariate_plots` of the document (identify.hpp), of predictions `horizon_s` ahead:
-///   robots           rms residual before and after, by robot
-///   maps             mean residual along x and y, by where the robot was halfway
-///   covariate_plots  for each covariate the residual that depends on it most: ahead and to the left, seen along the way
-///                    that the base model predicts, or along x and y of the room
-/// Measured positions are interpolated between samples at most 2.5 s apart; predictions without any are left out. Standard
-/// errors allow for windows that overlap.
-[[nodiscard]] nlohmann::json residual_parts(const MeasuredSet&, const std::vector<Prediction>&, double horizon_s);
+/// One correction of the pose, as speeds over the time since the sample before.
+struct Disturbance {
+  double time_s, x_mm, y_mm, heading_rad;
+  double since_command_s, motor_s, nearest_mm;
+  double forward_mm_s, sideways_mm_s, turn_rad_s, world_x_mm_s, world_y_mm_s;
+  std::uint32_t track;
+};
+
+/// Of all tracks, while robots are driven and touch nothing.
+[[nodiscard]] std::vector<Disturbance> disturbances_of(const MotionModel&, const PreparedSet&,
+                                                       std::uint32_t threads);
+
+/// The report's covariate_plots (identify.hpp).
+[[nodiscard]] nlohmann::json covariate_plots(const std::vector<Disturbance>& before,
+                                             const std::vector<Disturbance>& after);
+/// The report's maps.
+[[nodiscard]] nlohmann::json maps(const std::vector<Disturbance>& before, const std::vector<Disturbance>& after);
 
 }  // namespace kilotwin::identify

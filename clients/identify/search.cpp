@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 
 namespace kilotwin::identify {
 namespace {
 
-constexpr int kMostRounds = 8;
+constexpr int kMostRounds = 7;
+/// Hypotheses of which so many (as a logarithm) are tried, single steps and pulses, do not challenge others.
+constexpr double kManyChoices = 2.5;
 constexpr std::uint64_t kSeed = 20180729;
 /// Look-alikes whose evidence lies closer than this (a Bayes factor of 20) are not told apart.
 constexpr double kClose = 3;
@@ -42,8 +45,15 @@ class Loop {
       note_rejected(outcome);
       const Finding* const best = best_of(outcome);
       if (best != nullptr) {
+        const Search before = out_;
+        const double likelihood = fitter_.log_likelihood(out_.model);
         note_ambiguous(*best, outcome);
         add(*best, outcome.threshold_log10_p);
+        // What promised to explain much must do so.
+        if (fitter_.log_likelihood(out_.model) < likelihood + 3) {
+          out_ = before;
+          failed_.insert(hypothesis(*best).name);
+        }
         continue;
       }
       if (!defend()) break;
@@ -61,7 +71,7 @@ class Loop {
   const Finding* best_of(const Scores::Outcome& outcome) const {
     const Finding* best = nullptr;
     for (const Finding& f : outcome.findings) {
-      if (!good(f, outcome.threshold_log10_p)) continue;
+      if (!good(f, outcome.threshold_log10_p) || failed_.contains(hypothesis(f).name)) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
     return best;
@@ -109,6 +119,7 @@ class Loop {
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
+        if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
         const Finding other = scores_->weigh(h, t);
         if (best == nullptr || other.evidence > best_finding.evidence) {
           best = &h;
@@ -157,7 +168,8 @@ class Loop {
       if (std::any_of(out_.ambiguous.begin(), out_.ambiguous.end(),
                       [&](const Ambiguity& a) { return a.found == chosen.name && a.instead == other.name; }))
         continue;
-      out_.ambiguous.push_back({chosen.name, other.name, other.covariates, best.evidence - f.evidence});
+      out_.ambiguous.push_back(
+          {chosen.name, other.name, chosen.covariates, other.covariates, best.evidence - f.evidence});
     }
   }
 
@@ -167,6 +179,7 @@ class Loop {
   std::vector<std::vector<const TrackView*>> units_;
   std::optional<Scores> scores_;
   Search out_;
+  std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
   int defences_ = 0;
 };
 

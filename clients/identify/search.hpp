@@ -21,7 +21,7 @@ struct Reason {
 /// A cause that this data cannot tell from another.
 struct Ambiguity {
   std::string found, instead;
-  std::vector<std::string> covariates;  ///< of the other
+  std::vector<std::string> found_covariates, covariates;  ///< of the one and of the other
   double evidence_difference = 0;
 };
 

@@ -12,6 +12,8 @@ constexpr double kGate2 = 23, kGate3 = 25.9;
 /// So many far outliers in a row mean that the robot is elsewhere.
 constexpr int kLostAfter = 4;
 constexpr double kFar = 60;
+/// What a robot that touches something does beyond its own motion, as noise.
+constexpr double kPush_mm2_s = 60, kPush_rad2_s = 0.3;
 
 }  // namespace
 
@@ -75,13 +77,22 @@ StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& comm
     record.middle.x_mm = belief_.mean[0] + half.dx_mm + kAxleOffset_mm * std::cos(record.middle.heading_rad);
     record.middle.y_mm = belief_.mean[1] + half.dy_mm + kAxleOffset_mm * std::sin(record.middle.heading_rad);
   }
+  record.touching = commands.driven() && touches(record.middle);
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
   spread(record);
   belief_.mean[0] += record.arc.dx_mm;
   belief_.mean[1] += record.arc.dy_mm;
   belief_.mean[2] += record.arc.dheading_rad;
+  const double x = belief_.centre_x_mm(), y = belief_.centre_y_mm();
+  belief_.mean[0] += model_->room.inside_x(x) - x;
+  belief_.mean[1] += model_->room.inside_y(y) - y;
   return record;
+}
+
+bool TrackFilter::touches(const Situation& s) const {
+  return (model_->contacts && s.near.nearest_mm < kTouch_mm) ||
+         model_->room.at_wall(s.x_mm, s.y_mm, kWallMargin_mm);
 }
 
 /// The covariance at the end of the step: what was uncertain moves along, and the noise of the step comes in.
@@ -115,12 +126,14 @@ void TrackFilter::spread(const StepRecord& record) {
                                  h * (noise.factor_s * right * right + noise.wheel_mm2_s));
     p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
   }
+  if (!looking_ahead_ && record.touching) own += h * Eigen::Vector3d(kPush_mm2_s, kPush_mm2_s, kPush_rad2_s);
   p.diagonal().head<3>() += own;
 }
 
 void TrackFilter::step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
   const State before = belief_.mean;
   const StateCovariance p = belief_.covariance;
+  looking_ahead_ = true;
   const StepRecord record = step(time_s, h_s, commands, near);
   // With a normal heading of variance P, E[cos] = cos exp(-P / 2), and speeds that go with the heading shift it.
   const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 + record.rates.ahead_mm_s;
@@ -130,6 +143,9 @@ void TrackFilter::step_mean(double time_s, double h_s, const CommandState& comma
   const Rates& r = record.rates;
   belief_.mean[0] = before[0] + h_s * (forward * cx - together * cy - r.sideways_mm_s * cy + r.world_x_mm_s);
   belief_.mean[1] = before[1] + h_s * (forward * cy + together * cx + r.sideways_mm_s * cx + r.world_y_mm_s);
+  const double x = belief_.centre_x_mm(), y = belief_.centre_y_mm();
+  belief_.mean[0] += model_->room.inside_x(x) - x;
+  belief_.mean[1] += model_->room.inside_y(y) - y;
 }
 
 Eigen::Matrix3d TrackFilter::jacobian(const Situation& at) const {

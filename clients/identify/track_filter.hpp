@@ -31,6 +31,7 @@ struct StepRecord {
   Rates rates;
   Arc arc;
   double h_s = 0;
+  bool touching = false;  ///< a wall or another robot may have pushed it
 };
 
 /// A measurement taken in.
@@ -71,12 +72,14 @@ class TrackFilter {
   [[nodiscard]] Situation situation(double time_s, const CommandState&, const NeighbourView&) const;
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
   void spread(const StepRecord&);
+  [[nodiscard]] bool touches(const Situation&) const;
 
   const MotionModel* model_;
   Belief belief_;
   Situation place_;   ///< robot and run
   int outliers_ = 0;  ///< in a row
   bool measures_;
+  bool looking_ahead_ = false;  ///< what contacts will do is left to whoever knows all robots
 };
 
 }  // namespace kilotwin::identify

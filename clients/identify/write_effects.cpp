@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 namespace kilotwin::identify {
@@ -236,9 +237,28 @@ void set_target(Effect& effect, Target target) {
 }  // namespace
 
 double rounded(double value) {
-  if (value == 0 || !std::isfinite(value)) return 0;
-  const double unit = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 6);
-  return std::round(value / unit) * unit;
+  if (!std::isfinite(value)) return 0;
+  const std::string digits = fmt::format("{:.7g}", value);
+  double result = 0;
+  std::from_chars(digits.data(), digits.data() + digits.size(), result);
+  return result;
+}
+
+const char* form_of(const Term& term) {
+  if (term.blocks.empty() || term.blocks.front().basis.factors.empty()) return "constant";
+  if (term.blocks.front().basis.factors.size() > 1) return "product";
+  switch (term.blocks.front().basis.factors.front().shape) {
+    case Shape::kLinear: return "linear";
+    case Shape::kCosines:
+    case Shape::kTaper: return "curve";
+    case Shape::kCosines2: return "map";
+    case Shape::kHarmonics:
+    case Shape::kWave: return "harmonic";
+    case Shape::kTable: return "table";
+    case Shape::kAtLeast: return "steps";
+    case Shape::kExponential: return "exponential";
+  }
+  return "curve";
 }
 
 std::vector<Effect> effects_of_term(const Term& term) {

@@ -12,6 +12,9 @@ namespace kilotwin::identify {
 /// One record where the term is a function of one covariate or two; several, of which the effects add up, where it is more.
 [[nodiscard]] std::vector<proto::Effect> effects_of_term(const Term&);
 
+/// "constant", "steps", "curve", "map", "table"... of its first block.
+[[nodiscard]] const char* form_of(const Term&);
+
 /// A number with seven digits.
 [[nodiscard]] double rounded(double value);
 

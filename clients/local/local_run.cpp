@@ -14,6 +14,7 @@
 #include "clients/behaviours/eeprom_files.hpp"
 #include "clients/behaviours/engine.hpp"
 #include "clients/behaviours/robot_logs.hpp"
+#include "clients/behaviours/running_note.hpp"
 #include "clients/behaviours/watchdog.hpp"
 #include "clients/firmware/firmware_swarm.hpp"
 #include "core/base/say.hpp"
@@ -21,6 +22,7 @@
 #include "core/federation/hash_book.hpp"
 #include "core/federation/interrupt.hpp"
 #include "core/federation/pace.hpp"
+#include "core/federation/spare_checkpoints.hpp"
 #include "services/ark/station_engine.hpp"
 #include "services/comm/radio_engine.hpp"
 #include "services/physics/engine.hpp"
@@ -60,14 +62,18 @@ class LocalRun {
                                                     options.save_checkpoints)),
         station_(plan),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
-        schedule_(first_, plan.last_tick, plan.checkpoint_every()) {
+        schedule_(first_, plan.last_tick, plan.checkpoint_every()),
+        spare_(options.run_directory,
+               options.save_checkpoints && !options.run_directory.empty() && plan.checkpoint_every() == 0) {
     for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
       physics_.push_back(physics::make_engine(plan, PartitionId{p}));
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
-      if (!options.run_directory.empty() && options.save_checkpoints)
-        logs_.push_back(std::make_unique<behaviours::RobotLogs>(options.run_directory, plan.tick_length, first_,
-                                                                plan.share(HostId{h})));
+      if (options.run_directory.empty() || !options.save_checkpoints) continue;
+      logs_.push_back(std::make_unique<behaviours::RobotLogs>(options.run_directory, plan.tick_length, first_,
+                                                              plan.share(HostId{h})));
+      notes_.push_back(std::make_unique<behaviours::RunningNote>(options.run_directory, HostId{h}));
+      hosts_.back()->note_running_in(notes_.back()->place());
     }
     if (options.resumed) load(*options.resumed);
     for (const Directive& directive : options.inputs) schedule_.add(directive);
@@ -102,6 +108,10 @@ class LocalRun {
       observer_.state(now, frames_of(now).all_bodies, frames_of(now).all_actuation, last);
       const auto recorded_to = Clock::now();
       recording_ns_ += ns(recorded_from, recorded_to);
+      if (!last && spare_.due(recorded_to)) {
+        save(now, chain);
+        spare_.taken(now);
+      }
       if (recorded_to >= next_idle) {
         next_idle = recorded_to + kIdlePeriod;
         observer_.idle(progress(now, static_cast<double>(ns(begun, recorded_to)) * 1e-9));
@@ -116,6 +126,7 @@ class LocalRun {
     totals.last = now;
     totals.state_hash = chain;
     totals.stopped_early = schedule_.stopped_early();
+    if (totals.failure.empty()) spare_.remove_all();
     if (!options_.run_directory.empty()) {
       for (std::uint32_t h = 0; h < plan_.hosts; ++h)
         behaviours::write_eeproms(*hosts_[h], plan_.share(HostId{h}), options_.run_directory);
@@ -279,6 +290,7 @@ class LocalRun {
   }
 
   void save(Tick now, std::uint64_t chain) {
+    observer_.saved();
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
       proto::CheckpointPart part;
       if (task < physics_.size())
@@ -346,9 +358,12 @@ class LocalRun {
   comm::RadioEngine radio_;
   ark::StationEngine station_;
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
-  std::vector<std::unique_ptr<behaviours::RobotLogs>> logs_;  // per host, where there is a run directory
+  // Per host, where there is a run directory.
+  std::vector<std::unique_ptr<behaviours::RobotLogs>> logs_;
+  std::vector<std::unique_ptr<behaviours::RunningNote>> notes_;
   const Tick first_;
   RunSchedule schedule_;
+  SpareCheckpoints spare_;
   Frames frames_[2];  // of even and of odd ticks: while one is read the other is written
   std::vector<std::uint64_t> task_ns_, hash_parts_;
   std::vector<std::pair<std::size_t, std::size_t>> told_;  // per host: of its failures and warnings

@@ -200,6 +200,13 @@ const char* Reader::defect_of_record() const {
                          std::all_of(messages.sender().begin(), messages.sender().end(), known);
       return right ? nullptr : "messages of robots that are none";
     }
+    case proto::Record::kRadio: {
+      const proto::RadioRecord& radio = record_.radio();
+      const bool right = radio.attempted_size() == robots && radio.sent_size() == robots &&
+                         radio.received_size() == robots && radio.collided_size() == robots &&
+                         radio.backed_off_size() == robots;
+      return right ? nullptr : "counts of another number of robots";
+    }
     case proto::Record::kEnd: return valid_tick(record_.end().tick()) ? nullptr : "an end at a tick that is none";
     case proto::Record::KIND_NOT_SET: return nullptr;
   }

@@ -58,8 +58,9 @@ std::string percentage(std::uint64_t part, std::uint64_t whole) {
 }  // namespace
 
 double Summary::realtime_factor() const {
-  if (!(wall_s > 0) || ticks <= resumed_from_tick) return 0;
-  return simulated_s * static_cast<double>(ticks - resumed_from_tick) / static_cast<double>(ticks) / wall_s;
+  const std::int64_t from = std::max(resumed_from_tick, recovered_from_tick);
+  if (!(wall_s > 0) || ticks <= from) return 0;
+  return simulated_s * static_cast<double>(ticks - from) / static_cast<double>(ticks) / wall_s;
 }
 
 void write_summary(const Summary& s, const std::filesystem::path& file) {
@@ -72,6 +73,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"robots", s.robots},
       {"ticks", s.ticks},
       {"resumed_from_tick", s.resumed_from_tick},
+      {"recovered_from_tick", s.recovered_from_tick},
       {"simulated_s", s.simulated_s},
       {"start_s", s.start_s},
       {"wall_s", s.wall_s},
@@ -121,6 +123,7 @@ Summary read_summary(const std::filesystem::path& file) {
     // The rest is not part of the contract and may be missing.
     s.hosts = json.value("hosts", 1u);
     s.resumed_from_tick = json.value("resumed_from_tick", std::int64_t{0});
+    s.recovered_from_tick = json.value("recovered_from_tick", std::int64_t{0});
     s.cpu_s = json.value("cpu_s", 0.0);
     s.peak_memory_mib = json.value("peak_memory_mib", 0.0);
     const Json none = Json::object();

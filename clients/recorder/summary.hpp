@@ -15,14 +15,15 @@ struct Summary {
   std::uint32_t partition_columns = 1, partition_rows = 1;  ///< partitions: "2x1", as for --partitions
   std::uint32_t hosts = 1;
   std::uint32_t robots = 0;
-  std::int64_t ticks = 0;              ///< the run's last tick
-  std::int64_t resumed_from_tick = 0;  ///< 0 where it began at the beginning
-  double simulated_s = 0;              ///< at the last tick
-  double start_s = 0;                  ///< wall time from the command to the first tick
-  double wall_s = 0;                   ///< wall time from the first tick to the last
-  double cpu_s = 0;                    ///< of all processes of the run
-  double peak_memory_mib = 0;          ///< of all processes of the run, resident
-  std::uint64_t state_hash = 0;        ///< 16 hex digits in the file
+  std::int64_t ticks = 0;                ///< the run's last tick
+  std::int64_t resumed_from_tick = 0;    ///< 0 where it began at the beginning
+  std::int64_t recovered_from_tick = 0;  ///< where it went on after its last recovery
+  double simulated_s = 0;                ///< at the last tick
+  double start_s = 0;                    ///< wall time from the command to the first tick, or to where it went on
+  double wall_s = 0;                     ///< wall time from there to the last tick
+  double cpu_s = 0;                      ///< of all processes of the run
+  double peak_memory_mib = 0;            ///< of all processes of the run, resident
+  std::uint64_t state_hash = 0;          ///< 16 hex digits in the file
   struct Messages {
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   } messages;

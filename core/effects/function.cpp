@@ -51,6 +51,7 @@ EffectFunction::Shape EffectFunction::shape_of(const proto::Function& f) {
   switch (f.shape_case()) {
     case proto::Function::kConstant: return Constant{f.constant()};
     case proto::Function::kNoise: return Constant{f.noise().sd()};
+    case proto::Function::kEpisodes: return Constant{1};
     case proto::Function::kLinear: return Linear{f.linear().at_zero(), f.linear().slope()};
     case proto::Function::kExponential: {
       const proto::Exponential& e = f.exponential();

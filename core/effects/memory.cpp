@@ -10,6 +10,14 @@ namespace {
 
 std::uint32_t draw_of(const MemorySlot& slot) { return (slot.index * 8 + slot.function) * 2 + slot.wheel; }
 
+/// At least a tick, so that no phase is lost.
+double wait_s(const proto::Episodes& e, double uniform, double tick_s) {
+  return std::max(-e.mean_apart_s() * kt_log(uniform), tick_s);
+}
+double length_s(const proto::Episodes& e, double uniform, double tick_s) {
+  return std::clamp(e.scale_s() * (kt_pow(uniform, -1 / e.tail()) - 1), tick_s, std::max(e.longest_s(), tick_s));
+}
+
 }  // namespace
 
 EffectMemory::EffectMemory(const RunPlan& plan)
@@ -35,10 +43,21 @@ void EffectMemory::start(std::uint32_t robot, std::span<double> memory) const {
   const std::vector<MemorySlot>& slots = plan_.memory.slots();
   for (std::size_t s = 0; s < slots.size(); ++s) {
     memory[s] = slots[s].kind == Kind::kFieldCell ? -1
+                : slots[s].kind == Kind::kEpisode ? next_episode(slots[s], robot, Tick{0}, -tick_s_)
                 : slots[s].kind == Kind::kNoise
                     ? random_.normal(Stream::kCorrelatedNoise, robot, Tick{0}, draw_of(slots[s]))
                     : 0;
   }
+}
+
+double EffectMemory::next_episode(const MemorySlot& slot, std::uint32_t robot, Tick now, double left_s) const {
+  // Half a tick at most is neither counted twice nor lost.
+  if (left_s > tick_s_ * 1.5) return left_s - tick_s_;
+  if (left_s < -tick_s_ * 1.5) return left_s + tick_s_;
+  const proto::Episodes& episodes =
+      plan_.experiment().effect(static_cast<int>(slot.index)).function(static_cast<int>(slot.function)).episodes();
+  const double uniform = random_.uniform(Stream::kEpisodes, robot, now, draw_of(slot));
+  return left_s > 0 ? -length_s(episodes, uniform, tick_s_) : wait_s(episodes, uniform, tick_s_);
 }
 
 void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<const double> x_mm,
@@ -84,6 +103,9 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
               fade.renew * random_.normal(Stream::kCorrelatedNoise, robots.robot[i], from + 1, draw_of(slots[s]));
           return std::clamp(next, -kTopNormal, kTopNormal);
         });
+        break;
+      case Kind::kEpisode:
+        each(s, [&](std::size_t i, double was) { return next_episode(slots[s], robots.robot[i], from + 1, was); });
         break;
       case Kind::kTimeSinceCommand:  // with the command
       case Kind::kPreviousCommand:

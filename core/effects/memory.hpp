@@ -31,6 +31,9 @@ class EffectMemory {
     double renew = 0;  ///< of noise: the weight of the new number
   };
 
+  /// What a slot of episodes holds after `left_s`, as long as a phase lasts and when the next one is drawn at `now`.
+  [[nodiscard]] double next_episode(const MemorySlot&, std::uint32_t robot, Tick now, double left_s) const;
+
   const RunPlan& plan_;
   const Random random_;
   double tick_s_;

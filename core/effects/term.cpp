@@ -56,7 +56,8 @@ void TermList::add(const Effect& effect, std::uint32_t number, bool left, bool r
   }
   for (int f = 0; f < effect.function_size(); ++f) {
     const Function& given = effect.function(f);
-    Term::Factor factor{EffectFunction(given), 0, 0, false, false, given.has_noise(), std::nullopt, 0};
+    Term::Factor factor{EffectFunction(given), 0, 0, false, false, given.has_noise(), given.has_episodes(),
+                        std::nullopt,          0};
     const auto column = [&](Function::Covariate of, std::uint32_t& index) {
       if (of == Function::NOTHING) return false;
       index = covariates_.need(of_wheel(of, wheel), given);
@@ -70,6 +71,7 @@ void TermList::add(const Effect& effect, std::uint32_t number, bool left, bool r
       const std::uint32_t slot_wheel = effect.wheel() == Effect::BOTH_WHEELS ? wheel : 0;
       factor.slot = plan_.memory.index_of({MemorySlot::Kind::kNoise, 0, number, at, slot_wheel});
     }
+    if (factor.is_episodes) factor.slot = plan_.memory.index_of({MemorySlot::Kind::kEpisode, 0, number, at});
     term.factors.push_back(std::move(factor));
   }
   terms_.push_back(std::move(term));
@@ -92,6 +94,11 @@ void TermList::compute(const Term& term, Tick now, const RobotColumns& robots, s
     factor.function.multiply(factor.has_first ? covariates_.values(factor.first) : std::span<const double>{},
                              factor.has_second ? covariates_.values(factor.second) : std::span<const double>{},
                              values_);
+    if (factor.is_episodes) {
+      const std::size_t stride = plan_.memory.size();
+      for (std::size_t i = 0; i < who.size(); ++i)
+        values_[i] = robots.memory[who[i] * stride + *factor.slot] < 0 ? values_[i] : 0.0;
+    }
     if (!factor.is_noise) continue;
     if (factor.slot) {
       const std::size_t stride = plan_.memory.size();

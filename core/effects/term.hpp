@@ -18,8 +18,8 @@ struct Term {
     EffectFunction function;
     std::uint32_t first = 0, second = 0;  ///< columns of Covariates
     bool has_first = false, has_second = false;
-    bool is_noise = false;
-    std::optional<std::uint32_t> slot;  ///< of memory, of correlated noise
+    bool is_noise = false, is_episodes = false;
+    std::optional<std::uint32_t> slot;  ///< of memory, of correlated noise and episodes
     std::uint32_t draw = 0;             ///< of independent noise
   };
 

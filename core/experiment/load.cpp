@@ -43,6 +43,16 @@ void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file) {
     experiment.mutable_motion()->MergeFrom(model.motion());
     merged.locations.adopt(locations, "motion", "motion");
   }
+  if (model.has_propagation()) {
+    proto::Radio& radio = *experiment.mutable_radio();
+    proto::Propagation& propagation = *radio.mutable_propagation();
+    propagation = model.propagation();
+    if (propagation.has_range_mm()) radio.set_range_mm(propagation.range_mm());
+    if (propagation.has_oscillator_sd()) radio.set_oscillator_sd(propagation.oscillator_sd());
+    propagation.clear_range_mm();
+    propagation.clear_oscillator_sd();
+    merged.locations.adopt(locations, "propagation", "radio.propagation");
+  }
   std::map<std::uint32_t, int> index_of;
   for (int i = experiment.robot_model_size(); i-- > 0;) {
     if (experiment.robot_model(i).has_robot()) index_of[experiment.robot_model(i).robot()] = i;

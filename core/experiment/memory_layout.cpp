@@ -50,6 +50,8 @@ MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
       const Function& function = effect.function(f);
       need_for(function.of(), function.forget_s());
       need_for(function.and_of(), function.forget_s());
+      if (function.has_episodes())
+        need({Kind::kEpisode, 0, static_cast<std::uint32_t>(e), static_cast<std::uint32_t>(f)});
       if (!function.has_noise() || !(function.noise().correlation_s() > 0)) continue;
       const auto index = static_cast<std::uint32_t>(e), number = static_cast<std::uint32_t>(f);
       need({Kind::kNoise, 0, index, number, 0});

@@ -14,6 +14,7 @@ struct MemorySlot {
   enum class Kind : std::uint8_t {
     kCommand,           ///< number of the Command of the tick before; STOP at first
     kTimeSinceCommand,  ///< s for which that has lasted
+    kEpisode,           ///< of effect `index`, `function`: s until the next begins, or less than 0: until it ends
     kLeftMotorTime,     ///< s, forgetting within `forget_s`
     kRightMotorTime,
     kDrivenTime,

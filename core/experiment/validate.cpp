@@ -4,6 +4,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <map>
 #include <numeric>
 #include <stdexcept>
 
@@ -377,6 +378,7 @@ void validate_fields(const LoadedExperiment& loaded) {
   check_station(loaded);
   validate_surroundings(loaded);
   validate_effects(loaded);
+  validate_radio(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",

@@ -15,6 +15,8 @@ void validate(const LoadedExperiment& loaded);
 void validate_fields(const LoadedExperiment& loaded);
 /// The part of it that is about `effect` and `field`, whose numbers are in their ranges.
 void validate_effects(const LoadedExperiment& loaded);
+/// The infrared channel: what the table of ranges cannot say.
+void validate_radio(const LoadedExperiment& loaded);
 
 /// How many robots the group has, by its count or, where that is absent, by its rings. 0: only its CSV file knows.
 [[nodiscard]] std::uint64_t stated_count(const proto::RobotGroup& group);

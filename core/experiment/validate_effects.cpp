@@ -118,10 +118,11 @@ class EffectCheck {
     const Shape shape = function.shape_case();
     demand(shape != Function::SHAPE_NOT_SET, path,
            "function has no shape; it takes constant, linear, exponential, harmonic, spline, spline_2d, steps, "
-           "table or noise");
+           "table, noise or episodes");
     const bool has_variable = function.of() != Function::NOTHING;
-    if (shape == Function::kConstant || shape == Function::kNoise) {
-      demand(!has_variable, path + ".of", "of has no effect here; a constant and noise look at nothing, remove it");
+    if (shape == Function::kConstant || shape == Function::kNoise || shape == Function::kEpisodes) {
+      demand(!has_variable, path + ".of",
+             "of has no effect here; a constant, noise and episodes look at nothing, remove it");
     } else {
       demand(has_variable, path, "of is missing; state what the function looks at, e.g. of: TIME");
     }
@@ -151,6 +152,9 @@ class EffectCheck {
     demand(!of_place || fields_.contains(function.field()), path + ".field",
            fmt::format("there is no arena field \"{}\"; add field {{ name: \"{}\" }}, or name one that is there",
                        one_line(function.field(), 60), one_line(function.field(), 60)));
+    demand(
+        !(measured && shape == Function::kEpisodes), path + ".episodes",
+        "episodes are known to what moves robots alone; take them with a gain, an offset, a turn rate or a drift");
     check_shape(function, path);
   }
 
@@ -208,6 +212,13 @@ class EffectCheck {
       }
       case Function::kNoise:
         return demand(function.noise().has_sd(), path + ".noise", "sd is missing; state the standard deviation");
+      case Function::kEpisodes: {
+        const proto::Episodes& episodes = function.episodes();
+        demand(episodes.has_mean_apart_s(), path + ".episodes",
+               "mean_apart_s is missing; state the mean time from the end of an episode to the next");
+        return demand(episodes.has_scale_s(), path + ".episodes",
+                      "scale_s is missing; state the scale of the episodes' lengths");
+      }
       default: return;
     }
   }

@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
+#include <system_error>
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
@@ -79,6 +81,10 @@ std::vector<const proto::BehavioursState*> Checkpoint::behaviours() const {
   return pick(*this, &proto::CheckpointPart::has_behaviours, &proto::CheckpointPart::behaviours);
 }
 
+fs::path checkpoint_directory(const fs::path& run_directory, Tick tick) {
+  return run_directory / "checkpoints" / fmt::format("{:010}", tick.count());
+}
+
 std::uint64_t resumable_hash(const proto::Manifest& manifest) {
   proto::Manifest core;
   *core.mutable_experiment() = manifest.experiment();
@@ -103,7 +109,7 @@ void write_checkpoint_part(const fs::path& run_directory, const RunPlan& plan, T
   header.set_parts(plan.federates());
   header.set_experiment_hash(resumable_hash(plan.manifest));
 
-  const fs::path directory = run_directory / "checkpoints" / fmt::format("{:010}", tick.count());
+  const fs::path directory = checkpoint_directory(run_directory, tick);
   const fs::path file = directory / fmt::format("{:04}.part", id.value());
   const fs::path unfinished = directory / fmt::format("{:04}.{}", id.value(), getpid());
   std::error_code ignored;
@@ -121,16 +127,32 @@ void write_checkpoint_part(const fs::path& run_directory, const RunPlan& plan, T
     throw RunError(fmt::format("{}: the checkpoint cannot be written: {}", file.string(), error.message()));
 }
 
-fs::path newest_checkpoint(const fs::path& run_directory) {
-  std::vector<fs::path> directories;
+std::vector<CheckpointDirectory> checkpoint_directories(const fs::path& run_directory) {
+  std::vector<CheckpointDirectory> found;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(run_directory / "checkpoints", ignored)) {
-    if (entry.is_directory()) directories.push_back(entry.path());
+    const std::string name = entry.path().filename().string();
+    std::int64_t tick = 0;
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), tick);
+    if (entry.is_directory() && error == std::errc() && end == name.data() + name.size())
+      found.push_back({Tick{tick}, entry.path()});
   }
-  std::sort(directories.rbegin(), directories.rend());
-  for (const fs::path& directory : directories) {
-    const std::vector<fs::path> files = part_files(directory);
-    if (!files.empty() && read_part(files.front()).header().parts() == files.size()) return directory;
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.tick > b.tick; });
+  return found;
+}
+
+bool is_complete(const fs::path& checkpoint) {
+  const std::vector<fs::path> files = part_files(checkpoint);
+  if (files.empty()) return false;
+  const proto::CheckpointHeader first = read_part(files.front()).header();
+  return first.parts() == files.size() && std::all_of(files.begin() + 1, files.end(), [&](const fs::path& file) {
+           return read_part(file).header().run() == first.run();
+         });
+}
+
+fs::path newest_checkpoint(const fs::path& run_directory) {
+  for (const auto& [tick, directory] : checkpoint_directories(run_directory)) {
+    if (is_complete(directory)) return directory;
   }
   throw UserError(
       fmt::format("{}: no complete checkpoint; run with --checkpoint-every S to get some", run_directory.string()));

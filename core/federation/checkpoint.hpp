@@ -23,6 +23,9 @@ struct Checkpoint {
   [[nodiscard]] std::vector<const proto::BehavioursState*> behaviours() const;
 };
 
+/// Where the checkpoint of a tick lies.
+[[nodiscard]] std::filesystem::path checkpoint_directory(const std::filesystem::path& run_directory, Tick tick);
+
 /// Names what a checkpoint can be resumed by: the experiment without what may differ (length, division, recording).
 [[nodiscard]] std::uint64_t resumable_hash(const proto::Manifest& manifest);
 
@@ -33,6 +36,16 @@ void write_checkpoint_part(const std::filesystem::path& run_directory, const Run
 
 /// Directory of the newest complete checkpoint of a run. Throws UserError where there is none.
 [[nodiscard]] std::filesystem::path newest_checkpoint(const std::filesystem::path& run_directory);
+
+/// A checkpoint's directory and the tick in its name; complete or not.
+struct CheckpointDirectory {
+  Tick tick;
+  std::filesystem::path path;
+};
+/// Those of a run, the newest first.
+[[nodiscard]] std::vector<CheckpointDirectory> checkpoint_directories(const std::filesystem::path& run_directory);
+/// Whether all parts are there, of one and the same run.
+[[nodiscard]] bool is_complete(const std::filesystem::path& checkpoint);
 
 /// Throws UserError where it is incomplete, damaged, or of another experiment than the manifest's.
 [[nodiscard]] Checkpoint read_checkpoint(const std::filesystem::path& directory, const proto::Manifest& manifest);

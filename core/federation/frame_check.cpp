@@ -47,7 +47,8 @@ const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, Fede
   if (!std::includes(frame.robot.begin(), frame.robot.end(), pressed.robot.begin(), pressed.robot.end()) ||
       !ascending_within(pressed.robot, {0, plan.robots()}))
     return "its pressed robots are not ascending robots of the frame";
-  if (!all_finite(pressed.slip_x_mm) || !all_finite(pressed.slip_y_mm) || !all_finite(pressed.push_mm))
+  if (!all_finite(pressed.slip_x_mm) || !all_finite(pressed.slip_y_mm) || !all_finite(pressed.push_mm) ||
+      !all_finite(pressed.rub_mm))
     return "a contact's state is not finite";
   constexpr std::uint32_t kMostWalls = 32;
   const auto obstacles = static_cast<std::uint32_t>(plan.world.obstacles.size());

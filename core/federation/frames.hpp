@@ -29,9 +29,10 @@ struct MovableColumns {
 struct PressedColumns {
   std::vector<std::uint32_t> robot;
   std::vector<double> slip_x_mm, slip_y_mm;  ///< per robot: velocity less that of its drive
-  std::vector<std::uint8_t> contacts;        ///< per robot: how many entries of the next two are its own
+  std::vector<std::uint8_t> contacts;        ///< per robot: how many entries of the next three are its own
   std::vector<std::uint32_t> other;          ///< ascending within a robot: another robot, or robots + movable body
   std::vector<double> push_mm;               ///< above 0
+  std::vector<double> rub_mm;
 
   void clear() {
     robot.clear();
@@ -40,6 +41,7 @@ struct PressedColumns {
     contacts.clear();
     other.clear();
     push_mm.clear();
+    rub_mm.clear();
   }
 };
 

@@ -40,6 +40,8 @@ class RunObserver {
   virtual void hash(Tick, std::uint64_t chain) = 0;
   /// A stamped input was announced.
   virtual void input(const Directive&) = 0;
+  /// A checkpoint comes to be complete: what was told up to its tick must not be lost with this process.
+  virtual void saved() {}
   /// Called a few times a second, also while the run pauses or waits.
   virtual void idle(const RunProgress& progress) { static_cast<void>(progress); }
 };

@@ -7,9 +7,11 @@
 /// hosts -> physics), so the ingress announces kAnnounceAhead ticks ahead.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <span>
 #include <vector>
 
 #include "core/base/time.hpp"
@@ -89,6 +91,11 @@ class RunSchedule {
 /// Stamps what comes from outside: the one place where a tick is chosen for it.
 class Ingress {
  public:
+  Ingress() = default;
+  /// Goes on after what has been stamped already, numbered from 0.
+  explicit Ingress(std::span<const Directive> stamped) : next_sequence_number_(stamped.size()) {
+    for (const Directive& directive : stamped) latest_ = std::max(latest_, directive.tick);
+  }
   /// Gives `directive` its sequence number and tick; `now` is the tick at which the ingress' own federate stands.
   Directive stamp(Tick now, Directive directive);
 

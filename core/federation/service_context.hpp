@@ -3,9 +3,11 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "core/dds/dds.hpp"
 #include "core/federation/checkpoint.hpp"
+#include "core/federation/schedule.hpp"
 
 namespace kilotwin {
 
@@ -13,6 +15,7 @@ struct ServiceContext {
   dds::Transport transport;
   std::filesystem::path run_directory;
   std::optional<Checkpoint> resumed;  ///< where the run starts from a checkpoint
+  std::vector<Directive> inputs;  ///< that were stamped for ticks to come, before the run went back to a checkpoint
 
   [[nodiscard]] Tick first() const { return resumed ? resumed->tick : Tick{0}; }
 };

@@ -41,7 +41,8 @@ std::string host_name() {
 
 }  // namespace
 
-Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first)
+Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first,
+                 std::span<const Directive> inputs)
     : plan_(plan),
       self_(self),
       first_(first),
@@ -50,6 +51,8 @@ Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& tra
       peers_(plan.federates()),
       hash_first_(first_hashed(first)),
       participant_(transport) {
+  for (const Directive& directive : inputs) schedule_.add(directive);
+  known_ = schedule_.known();
   member_writer_ = std::make_unique<dds::Writer<WireMember>>(participant_, topics::members());
   ledger_writer_ = std::make_unique<dds::Writer<WireLedger>>(participant_, topics::ledgers());
   if (self_ == plan_.station()) {

@@ -16,6 +16,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,8 +54,10 @@ class Federate {
 
 class Session {
  public:
-  /// `first`: the tick at which the run starts (0, or that of a checkpoint).
-  Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first);
+  /// `first`: the tick at which the run starts (0, or that of a checkpoint). `inputs`: what all federates know from the start
+  /// of what will be stamped, numbered from 0.
+  Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first,
+          std::span<const Directive> inputs = {});
   ~Session();
 
   /// Runs `federate` to the end of the run. Throws RunError where another federate is lost or failed, or the run was

@@ -71,6 +71,7 @@ WireBodyFrame to_wire(const WireHeader& header, const BodyFrame& frame) {
   wire.contact_other = borrow<ULongs>(frame.pressed.other);
   wire.contact_push_mm = borrow<Doubles>(frame.pressed.push_mm);
   wire.memory = borrow<Doubles>(frame.memory);
+  wire.contact_rub_mm = borrow<Doubles>(frame.pressed.rub_mm);
   return wire;
 }
 
@@ -97,12 +98,13 @@ bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
   PressedColumns& pressed = frame.pressed;
   if (!copy(wire.pressed, pressed.robot) || !copy(wire.slip_x_mm, pressed.slip_x_mm) ||
       !copy(wire.slip_y_mm, pressed.slip_y_mm) || !copy(wire.contacts, pressed.contacts) ||
-      !copy(wire.contact_other, pressed.other) || !copy(wire.contact_push_mm, pressed.push_mm)) {
+      !copy(wire.contact_other, pressed.other) || !copy(wire.contact_push_mm, pressed.push_mm) ||
+      !copy(wire.contact_rub_mm, pressed.rub_mm)) {
     return false;
   }
   const std::size_t p = pressed.robot.size();
   return pressed.slip_x_mm.size() == p && pressed.slip_y_mm.size() == p && pressed.contacts.size() == p &&
-         pressed.other.size() == pressed.push_mm.size() &&
+         pressed.other.size() == pressed.push_mm.size() && pressed.other.size() == pressed.rub_mm.size() &&
          std::accumulate(pressed.contacts.begin(), pressed.contacts.end(), std::size_t{0}) == pressed.other.size();
 }
 

@@ -19,6 +19,8 @@ enum class Stream : std::uint16_t {
   kBackOff = 5,      ///< per aborted attempt
   kReception = 6,    ///< loss at a receiver
   kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
+  kLink = 8,         ///< what robots and pairs add to the infrared signal; once per run
+  kPacket = 9,       ///< what a packet adds to it at a receiver
   kSolver = 20,      ///< what ODE's iterative solver starts from; per sub-step, of the lowest robot that takes part
   kLightSensor = 25,       ///< draw 0 logarithm of the gain, 1 offset; tick 0
   kBattery = 26,           ///< draw 0 charge at the start
@@ -26,6 +28,7 @@ enum class Stream : std::uint16_t {
   kEffectNoise = 30,       ///< independent noise of effects on motion, per tick
   kCorrelatedNoise = 31,   ///< correlated noise of effects, per tick
   kMeasurementNoise = 32,  ///< independent noise of effects on what is measured, per tick
+  kEpisodes = 90,          ///< when episodes of effects begin and end, at the tick before; effect's draw
   kConverter = 35,         ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 

@@ -10,6 +10,7 @@
 #include "core/federation/frame_io.hpp"
 #include "core/federation/interrupt.hpp"
 #include "core/federation/pace.hpp"
+#include "core/federation/spare_checkpoints.hpp"
 #include "services/ark/outside.hpp"
 #include "services/ark/run_books.hpp"
 #include "services/ark/station_engine.hpp"
@@ -33,6 +34,8 @@ class StationFederate : public Federate {
         engine_(engine),
         books_(books),
         observer_(observer),
+        ingress_(context.inputs),
+        spare_(context.run_directory, session.plan().checkpoint_every() == 0),
         outside_(session.plan(), session.participant()),
         bodies_(session, topics::bodies(), session.plan().all_physics()),
         actuation_(session, topics::actuation(), session.plan().all_behaviours()),
@@ -113,6 +116,8 @@ class StationFederate : public Federate {
     progress.waiting_for.copy(status.note, sizeof status.note - 1);
     status_.write(status);
   }
+  /// The run has come to its end in order.
+  void finish() { spare_.remove_all(); }
   void flush_status() const { status_.flush(1.0); }
 
   [[nodiscard]] std::uint64_t recording_ns() const { return recording_ns_; }
@@ -125,6 +130,7 @@ class StationFederate : public Federate {
     if (unfinished_.empty() || unfinished_.front().first != books_.hash_tick()) return;
     auto& [tick, part] = unfinished_.front();
     part.mutable_station()->set_hash_chain(books_.chain());
+    observer_.saved();
     write_checkpoint_part(context_.run_directory, session_.plan(), tick, session_.plan().station(), part);
     unfinished_.pop_front();
   }
@@ -137,12 +143,19 @@ class StationFederate : public Federate {
       stop.kind = DirectiveKind::kStop;
       announce(now, stop);
     }
+    if (session_.started() && !session_.paused() && spare_.due(Clock::now())) {
+      Directive save;
+      save.kind = DirectiveKind::kCheckpoint;
+      spare_.taken(announce(now, save));
+    }
   }
 
-  void announce(Tick now, const Directive& unstamped) {
+  /// Returns from which tick it counts.
+  Tick announce(Tick now, const Directive& unstamped) {
     const Directive directive = ingress_.stamp(now, unstamped);
     session_.announce(directive);
     observer_.input(directive);
+    return directive.tick;
   }
 
   void publish_robots(Tick now) {
@@ -171,6 +184,7 @@ class StationFederate : public Federate {
   RunBooks& books_;
   RunObserver& observer_;
   Ingress ingress_;
+  SpareCheckpoints spare_;
   Outside outside_;
   Input<BodyFrame> bodies_;
   Input<ActuationFrame> actuation_;
@@ -190,7 +204,7 @@ class StationFederate : public Federate {
 RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObserver& observer) {
   StationEngine engine(plan);
   if (context.resumed) engine.load(context.first(), context.resumed->station());
-  Session session(plan, plan.station(), context.transport, context.first());
+  Session session(plan, plan.station(), context.transport, context.first(), context.inputs);
   // The chain of a resumed run goes on from H at the checkpoint: its first own sum is that of the tick after.
   RunBooks books(plan, session.participant(), first_hashed(context.first()),
                  context.resumed ? context.resumed->hash_chain() : 0);
@@ -208,6 +222,7 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   }
   try {
     federate.settle();
+    if (totals.failure.empty()) federate.finish();
   } catch (const std::exception& error) {
     if (totals.failure.empty()) totals.failure = error.what();
   }

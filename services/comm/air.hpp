@@ -15,6 +15,8 @@ using Cycles = std::int64_t;
 inline constexpr Cycles kBit = 269;
 /// A packet: a leading byte of zeros and 12 bytes, each with a start and a stop bit. 4.371 ms.
 inline constexpr Cycles kPacket = 13 * 10 * kBit;
+/// From a start pulse to where the receivers that hear it know that the air is taken: their comparator's interrupt.
+inline constexpr Cycles kNoticed = 16;
 /// A sender hears nothing for two bits from its start on, then it polls its receiver 235 times, every 8 cycles, until the
 /// leading byte is over.
 inline constexpr Cycles kDeaf = 2 * kBit;
@@ -40,7 +42,7 @@ struct Transmission {
 
   [[nodiscard]] bool overlaps(Cycles from, Cycles until) const { return start < until && from < end; }
   /// Whether another robot's receiver is busy with it at an instant.
-  [[nodiscard]] bool sensed_at(Cycles t) const { return t - start >= kListening && t < end; }
+  [[nodiscard]] bool sensed_at(Cycles t) const { return t - start >= kNoticed && t < end; }
   /// Whether its sender notices a start pulse at an instant.
   [[nodiscard]] bool notices(Cycles t) const { return t - start >= kDeaf && t - start < kListening && t < end; }
 };

@@ -5,14 +5,15 @@
 #include <vector>
 
 #include "services/comm/air.hpp"
+#include "services/comm/link_budget.hpp"
 #include "services/comm/neighbourhood.hpp"
 
 namespace kilotwin::comm {
 
 class Channel {
  public:
-  explicit Channel(const Neighbourhood& neighbourhood)
-      : neighbourhood_(neighbourhood), newest_(neighbourhood.cells(), kNone) {}
+  Channel(const Neighbourhood& neighbourhood, LinkBudget& links)
+      : neighbourhood_(neighbourhood), links_(links), newest_(neighbourhood.cells(), kNone) {}
 
   /// Files all transmissions by where their senders are now.
   void locate();
@@ -26,10 +27,16 @@ class Channel {
   [[nodiscard]] std::vector<Transmission>& all() { return all_; }
   [[nodiscard]] const std::vector<Transmission>& all() const { return all_; }
 
-  /// Calls f(transmission) for the transmissions of other robots in range of `robot`, in no particular order.
+  /// Calls f(transmission) for the transmissions of other robots that `robot` hears, in no particular order.
   template <class F> void visit_heard(std::uint32_t robot, F f) {
     visit_near(robot, 1, [&](Transmission& x) {
-      if (x.sender != robot && neighbourhood_.in_range(robot, x.sender)) f(x);
+      if (x.sender != robot && links_.hears(neighbourhood_, robot, x.sender)) f(x);
+    });
+  }
+  /// Calls f(transmission) for the transmissions of other robots that hear `robot`, in no particular order.
+  template <class F> void visit_hearers(std::uint32_t robot, F f) {
+    visit_near(robot, 1, [&](Transmission& x) {
+      if (x.sender != robot && links_.hears(neighbourhood_, x.sender, robot)) f(x);
     });
   }
   /// The senders that transmit in [from, until) so close to `robot` that a third robot may hear both; `robot` itself is
@@ -47,6 +54,7 @@ class Channel {
   void file(std::uint32_t index);
 
   const Neighbourhood& neighbourhood_;
+  LinkBudget& links_;
   std::vector<Transmission> all_;
   std::vector<std::uint32_t> older_;   ///< per transmission: the next one in its cell
   std::vector<std::uint32_t> newest_;  ///< per cell: its first transmission

@@ -76,7 +76,7 @@ class CommFederate : public Federate {
 void run_service(const RunPlan& plan, const ServiceContext& context, std::unique_ptr<FirmwareRobots> firmware) {
   RadioEngine engine(plan, std::move(firmware));
   if (context.resumed) engine.load(context.first(), context.resumed->radio());
-  Session session(plan, plan.comm(), context.transport, context.first());
+  Session session(plan, plan.comm(), context.transport, context.first(), context.inputs);
   CommFederate federate(session, engine, context);
   session.run(federate);
 }

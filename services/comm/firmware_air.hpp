@@ -25,8 +25,8 @@ namespace kilotwin::comm {
 
 class FirmwareAir {
  public:
-  /// Length of a span. Shorter than kListening: whether a robot that wants to send hears a packet depends on what started
-  /// in earlier spans only.
+  /// Length of a span, 0.26 ms. A native robot that wants to send hears firmware robots' packets that started in earlier
+  /// spans only; the start pulse of one of the same span makes the firmware robot give up.
   static constexpr Cycles kSpan = 2048;
 
   /// Of a firmware robot's transmissions.

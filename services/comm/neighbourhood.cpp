@@ -48,4 +48,27 @@ void Neighbourhood::sort() {
   }
 }
 
+double Neighbourhood::bodies_between(std::uint32_t a, std::uint32_t b, double radius_mm) const {
+  const double x = x_mm_[a], y = y_mm_[a];
+  const double length = __builtin_sqrt(square(a, b));
+  if (!(length > 0)) return 0;
+  const double ahead_x = (x_mm_[b] - x) / length, ahead_y = (y_mm_[b] - y) / length;
+  const auto first = [&](double from, double to) { return coordinate(std::min(from, to) - radius_mm); };
+  const auto last = [&](double from, double to) { return coordinate(std::max(from, to) + radius_mm); };
+  double sum = 0;
+  for (std::uint32_t r = first(y, y_mm_[b]); r != last(y, y_mm_[b]) + 1; ++r) {
+    for (std::uint32_t c = first(x, x_mm_[b]); c != last(x, x_mm_[b]) + 1; ++c) {
+      const std::uint32_t cell = (r & mask_) << side_bits_ | (c & mask_);
+      for (std::uint32_t m = first_[cell]; m < first_[cell + 1]; ++m) {
+        const double dx = sorted_x_mm_[m] - x, dy = sorted_y_mm_[m] - y;
+        const double along = dx * ahead_x + dy * ahead_y, aside = dx * ahead_y - dy * ahead_x;
+        const double half_square = radius_mm * radius_mm - aside * aside;
+        if (!(half_square > 0) || along <= 0 || along >= length || sorted_[m] == a || sorted_[m] == b) continue;
+        sum += __builtin_sqrt(half_square) / radius_mm;
+      }
+    }
+  }
+  return sum;
+}
+
 }  // namespace kilotwin::comm

@@ -20,6 +20,8 @@ class Neighbourhood {
   /// Sorts the robots by cell, for visit(). Call it when all are placed.
   void sort();
 
+  [[nodiscard]] double x_mm(std::uint32_t robot) const { return x_mm_[robot]; }
+  [[nodiscard]] double y_mm(std::uint32_t robot) const { return y_mm_[robot]; }
   /// Squared distance of two robots' centres, mm^2; the same bits for either order.
   [[nodiscard]] double square(std::uint32_t a, std::uint32_t b) const {
     const double dx = x_mm_[a] - x_mm_[b], dy = y_mm_[a] - y_mm_[b];
@@ -50,6 +52,9 @@ class Neighbourhood {
       }
     }
   }
+
+  /// How much of the line between two robots' centres lies within the discs of others, in diameters. Call sort() first.
+  [[nodiscard]] double bodies_between(std::uint32_t a, std::uint32_t b, double radius_mm) const;
 
   /// Number of cells.
   [[nodiscard]] std::uint32_t cells() const { return 1u << (2 * side_bits_); }

@@ -18,7 +18,7 @@ class OverheadController {
     IrMessage message;
     [[nodiscard]] Cycles end() const { return start + kPacket; }
     [[nodiscard]] bool overlaps(Cycles from, Cycles until) const { return start < until && from < end(); }
-    [[nodiscard]] bool sensed_at(Cycles t) const { return t - start >= kListening && t < end(); }
+    [[nodiscard]] bool sensed_at(Cycles t) const { return t - start >= kNoticed && t < end(); }
   };
 
   /// Takes the packets that arrive at `now`. Each message goes out at least once, in order; what an earlier call left

@@ -33,8 +33,9 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
       state_(plan.robots(), 0),
       tx_period_(plan.robots(), 0),
       message_(plan.robots()),
-      neighbourhood_(plan.experiment().radio().range_mm(), plan.robots()),
-      channel_(neighbourhood_),
+      links_(plan),
+      neighbourhood_(links_.reach_mm(), plan.robots()),
+      channel_(neighbourhood_, links_),
       receptions_(plan.robots()),
       pairs_(counts_pairs_ ? plan.robots() : 0),
       firmware_robots_(std::move(firmware)),
@@ -67,6 +68,7 @@ void RadioEngine::read_poses(std::span<const BodyFrame* const> frames) {
     for (std::size_t n = 0; n < frame->robot.size(); ++n) {
       KILOTWIN_DEMAND(frame->robot[n] < state_.size());
       neighbourhood_.place(frame->robot[n], frame->x_mm[n], frame->y_mm[n]);
+      links_.turn(frame->robot[n], frame->heading_rad[n]);
     }
     listed += frame->robot.size();
   }
@@ -129,6 +131,7 @@ bool RadioEngine::later(const Attempt& a, const Attempt& b) {
 void RadioEngine::contend(Tick now) {
   const Cycles end = begin_of(now + 1);
   channel_.locate();
+  if (links_.casts_shadows()) neighbourhood_.sort();
   timers_.begin_tick();
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     switch (state_[i] & (kRunning | kHolding | kFlying)) {
@@ -218,9 +221,9 @@ void RadioEngine::attempt(std::uint32_t robot, Tick now) {
   channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
 }
 
-/// A start pulse of `robot`: robots in range that are about to begin a packet give up.
+/// A start pulse of `robot`: robots that hear it and are about to begin a packet give up.
 void RadioEngine::abort_who_notices(std::uint32_t robot, Cycles t, Tick now) {
-  channel_.visit_heard(robot, [&](Transmission& other) {
+  channel_.visit_hearers(robot, [&](Transmission& other) {
     if (other.notices(t)) abort(other, t, now);
   });
 }
@@ -307,10 +310,14 @@ void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
   receptions_.begin_message(packet.message);
   neighbourhood_.visit(packet.sender, [&](std::uint32_t receiver, double square_mm2) {
     if ((state_[receiver] & (kReceptive | kFirmware)) == 0) return;
-    bool lost = drowned;
-    for (const std::uint32_t rival : rivals_) lost = lost || neighbourhood_.in_range(receiver, rival);
+    double margin_db = 0;
+    if (!links_.is_disc()) {
+      margin_db = links_.margin_db(neighbourhood_, packet.sender, receiver) +
+                  links_.packet_noise_db(packet.sender, receiver, now);
+      if (!(margin_db > 0)) return;
+    }
     const bool firmware = is(receiver, kFirmware);
-    if (lost) {
+    if (drowned || drowns(receiver, margin_db)) {
       ++counters_.collided;
     } else if (firmware ? firmware_->fades(receiver, packet.sender, packet.start)
                         : fades(receiver, now, packet.sender)) {
@@ -320,10 +327,22 @@ void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
       if (firmware)
         firmware_->note_reception(receiver, packet.message);
       else
-        receptions_.add(receiver, ranging_.gains(__builtin_sqrt(square_mm2)));
+        receptions_.add(receiver, ranging_.gains(links_.is_disc() ? __builtin_sqrt(square_mm2)
+                                                                  : links_.distance_of_mm(margin_db)));
       if (counts_pairs_) pairs_.add(receiver, packet.sender);
     }
   });
+}
+
+/// Whether one of the rivals spoils a packet that arrives with this margin.
+bool RadioEngine::drowns(std::uint32_t receiver, double margin_db) {
+  for (const std::uint32_t rival : rivals_) {
+    if (rival == receiver) return true;
+    if (!links_.hears(neighbourhood_, receiver, rival)) continue;
+    if (links_.is_disc() || margin_db < links_.margin_db(neighbourhood_, rival, receiver) + links_.capture_db())
+      return true;
+  }
+  return false;
 }
 
 void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32_t ordinal, Tick now) {
@@ -331,7 +350,9 @@ void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32
   for (const Transmission& transmission : channel_.all()) {
     if (!transmission.overlaps(copy.start, copy.end())) continue;
     jammed_[transmission.sender] = 1;
-    neighbourhood_.visit(transmission.sender, [&](std::uint32_t receiver, double) { jammed_[receiver] = 1; });
+    neighbourhood_.visit(transmission.sender, [&](std::uint32_t receiver, double) {
+      if (links_.hears(neighbourhood_, receiver, transmission.sender)) jammed_[receiver] = 1;
+    });
   }
   receptions_.begin_message(copy.message);
   for (std::uint32_t receiver = 0; receiver < state_.size(); ++receiver) {

@@ -6,14 +6,14 @@
 ///   arrive  : packets that end in the interval are received by the robots in range of their sender
 ///
 /// Sending. At an interrupt of its timer a robot that is RUNNING, holds a message and whose tx_clock exceeds its tx_period
-/// tries to send. If it hears a packet whose leading byte is over, it waits for its next interrupt. Else its start pulse
-/// goes out. For two bits it hears nothing; another start pulse that it hears in the rest of the leading byte makes it give
-/// up, and its timer interrupts it once more after a random time (back-off). A packet that goes on to its end is a
-/// success: tx_clock starts again and the host is told.
+/// tries to send. If it hears a packet, from its start pulse on, it waits for its next interrupt. Else its own start pulse
+/// goes out. For two bits it hears nothing; another start pulse that it hears in the rest of the leading byte (of somebody
+/// who does not hear it) makes it give up, and its timer interrupts it once more after a random time (back-off). A packet
+/// that goes on to its end is a success: tx_clock starts again and the host is told.
 ///
-/// Receiving. A packet is received at every robot within radio.range_mm of its sender unless anything else that is in
-/// range there overlaps it in time: another packet, an aborted packet's start pulse, a copy of the overhead controller,
-/// the receiver's own sending. Then all of them are lost there. Robots that are SLEEPING or FAILED, or whose bodies are
+/// Receiving. A packet is received at every robot that hears its sender (link_budget.hpp) unless anything else that is heard
+/// there overlaps it in time: another packet, an aborted packet's start pulse, a copy of the overhead controller, the
+/// receiver's own sending. Then all of them are lost there, but for one that is stronger than the others by capture_db. Robots that are SLEEPING or FAILED, or whose bodies are
 /// real, receive nothing.
 ///
 /// The slot. A robot's message lies in its host's slot and here from its offer until success. Both sides empty it when the
@@ -36,6 +36,7 @@
 #include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"
 #include "services/comm/firmware_air.hpp"
+#include "services/comm/link_budget.hpp"
 #include "services/comm/neighbourhood.hpp"
 #include "services/comm/overhead_controller.hpp"
 #include "services/comm/pair_counts.hpp"
@@ -126,6 +127,7 @@ class RadioEngine {
   void receive_packet(const Transmission&, Tick now);
   void receive_copy(const OverheadController::Copy&, std::uint32_t ordinal, Tick now);
   void emit_firmware(Share, RadioFrame&) const;
+  [[nodiscard]] bool drowns(std::uint32_t receiver, double margin_db);
   [[nodiscard]] bool fades(std::uint32_t receiver, Tick now, std::uint32_t draw) const;
 
   const std::vector<Share> shares_;  ///< per host
@@ -141,6 +143,7 @@ class RadioEngine {
   std::vector<std::uint8_t> state_, apart_;  ///< per robot; apart: it runs firmware, or its body is real
   std::vector<std::uint16_t> tx_period_;     ///< per robot
   std::vector<IrMessage> message_;           ///< per robot: what its slot holds
+  LinkBudget links_;
   Neighbourhood neighbourhood_;
   Channel channel_;
   OverheadController overhead_;

@@ -31,8 +31,10 @@ ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
   y_limit_mm = plan.world.arena.half_height_mm() - kRobotRadius_mm;
   touch_mm = 2 * stride_mm;
   const proto::Physics& physics = plan.experiment().physics();
-  const double mm_per_m_s2 = 1000 * sub_step_s * sub_step_s;  // The way in a sub-step that an acceleration adds.
+  // What an acceleration of the true mass adds to a velocity in a sub-step.
+  const double mm_per_m_s2 = 1000 * sub_step_s * sub_step_s / kInertia;
   thrust_mm = physics.thrust_n() / (physics.robot_mass_g() / 1000) * mm_per_m_s2;
+  rim_friction = physics.rim_friction();
   hold_mm = physics.robot_friction() * kGravity_m_s2 * mm_per_m_s2;
 }
 
@@ -289,13 +291,14 @@ void ContactSolver::seat_movers() {
   pass_.rest();
 }
 
-/// Force of the contact of this body with another at the tick's start. Both keep it, unless one has come to be pressed only
+/// Forces of the contact of this body with another at the tick's start. Both keep it, unless one has come to be pressed only
 /// in the last tick.
-double ContactSolver::push_of(const Bodies& bodies, std::uint32_t i, std::uint32_t j) const {
+ContactSolver::Forces ContactSolver::forces_of(const Bodies& bodies, std::uint32_t i, std::uint32_t j) const {
   const Press& press = presses_[bodies.robot[i]];
-  if (press.contacts != 0) return press.push_of(bodies.robot[j]);
+  if (press.contacts != 0) return {press.push_of(bodies.robot[j]), press.rub_of(bodies.robot[j])};
   const Press& theirs = presses_[bodies.robot[j]];
-  return theirs.contacts != 0 ? theirs.push_of(bodies.robot[i]) : 0;
+  if (theirs.contacts == 0) return {};
+  return {theirs.push_of(bodies.robot[i]), theirs.rub_of(bodies.robot[i])};
 }
 
 void ContactSolver::fill_contacts(const Bodies& bodies) {
@@ -331,11 +334,13 @@ void ContactSolver::fill_contacts(const Bodies& bodies, const ContactPass::Batch
   ContactPass::Contact* const contacts = pass_.contacts_of(batch);
   for (std::uint32_t p = 0; p < batch.contacts; ++p) {
     std::uint32_t there[kLanes], entry[kLanes];
-    double push[kLanes];
+    double push[kLanes], rub[kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       entry[lane] = p < movers[lane].contacts ? others_[movers[lane].first + p] : here[lane];
       there[lane] = entry[lane] < count ? entry[lane] : here[lane];
-      push[lane] = there[lane] != here[lane] ? push_of(bodies, here[lane], there[lane]) : 0;
+      const Forces forces = there[lane] != here[lane] ? forces_of(bodies, here[lane], there[lane]) : Forces{};
+      push[lane] = forces.push_mm;
+      rub[lane] = forces.rub_mm;
     }
     const Lanes dx = gather(bodies.x_mm.data(), there) - x, dy = gather(bodies.y_mm.data(), there) - y;
     const Lanes distance = root(dx * dx + dy * dy), inverse = all(1) / distance;
@@ -345,6 +350,8 @@ void ContactSolver::fill_contacts(const Bodies& bodies, const ContactPass::Batch
     contact.gap_mm = distance - all(kDiameter_mm);
     contact.push_mm = load(push);
     contact.gain = all(kGain);
+    contact.rub_mm = load(rub);
+    contact.friction = all(limits_.rim_friction);
     for (std::size_t lane = 0; lane < kLanes; ++lane) contact.other[lane] = seat_of_[there[lane]];
     if (!(smallest(distance) > 0)) fill_special(contact, distance, here, there, entry);
   }
@@ -353,13 +360,15 @@ void ContactSolver::fill_contacts(const Bodies& bodies, const ContactPass::Batch
 /// Bodies in the same place, contacts with what is no disc, and lanes that have no such contact.
 void ContactSolver::fill_special(ContactPass::Contact& contact, const Lanes& distance_mm, const std::uint32_t* here,
                                  const std::uint32_t* there, const std::uint32_t* entry) const {
-  double distance[kLanes], gap[kLanes], normal_x[kLanes], normal_y[kLanes], push[kLanes], gain[kLanes];
+  double distance[kLanes], gap[kLanes], normal_x[kLanes], normal_y[kLanes], push[kLanes], gain[kLanes],
+      friction[kLanes];
   store(distance_mm, distance);
   store(contact.gap_mm, gap);
   store(contact.normal_x, normal_x);
   store(contact.normal_y, normal_y);
   store(contact.push_mm, push);
   store(contact.gain, gain);
+  store(contact.friction, friction);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (distance[lane] > 0) continue;
     if (entry[lane] != there[lane]) {
@@ -368,6 +377,7 @@ void ContactSolver::fill_special(ContactPass::Contact& contact, const Lanes& dis
       normal_y[lane] = special.normal_y;
       gap[lane] = special.gap_mm;
       gain[lane] = special.gain;
+      friction[lane] = 0;
       push[lane] = special.push_mm;
       contact.other[lane] = special.seat;
       continue;
@@ -384,6 +394,7 @@ void ContactSolver::fill_special(ContactPass::Contact& contact, const Lanes& dis
   contact.normal_y = load(normal_y);
   contact.push_mm = load(push);
   contact.gain = load(gain);
+  contact.friction = load(friction);
 }
 
 void ContactSolver::move(Bodies& bodies, const Drives& drives) {
@@ -400,6 +411,7 @@ void ContactSolver::move(Bodies& bodies, const Drives& drives) {
       batch.sin_turn[lane] = drives.sin_turn[d];
       batch.drive_x_mm[lane] = drives.x_mm[d];
       batch.drive_y_mm[lane] = drives.y_mm[d];
+      batch.spin_mm[lane] = drives.turn_rad[d] * sub_step_part_ * kRobotRadius_mm;
     }
     bodies.heading_rad[i] = wrapped(drives.heading_rad[d] + drives.turn_rad[d]);
   }
@@ -447,11 +459,13 @@ bool ContactSolver::keep_press(const Bodies& bodies, const Mover& m) {
   press.slip_y_mm = batch.slip_y_mm[lane];
   const auto count = static_cast<std::uint32_t>(bodies.size());
   for (std::uint32_t p = 0; p < m.contacts && press.contacts < Press::kMost; ++p) {
-    double push;
+    double push, rub;
     __builtin_memcpy(&push, reinterpret_cast<const char*>(&contacts[p].push_mm) + lane * sizeof push, sizeof push);
+    __builtin_memcpy(&rub, reinterpret_cast<const char*>(&contacts[p].rub_mm) + lane * sizeof rub, sizeof rub);
     if (!(push > 0)) continue;
     const std::uint32_t entry = others_[m.first + p];
     press.other[press.contacts] = entry < count ? bodies.robot[entry] : specials_[entry - count].key;
+    press.rub_mm[press.contacts] = entry < count ? rub : 0;
     press.push_mm[press.contacts++] = push;
   }
   Press& kept = presses_[bodies.robot[m.body]];

@@ -3,8 +3,9 @@
 /// Kilobots are quasi-static: thrust is limited and ground friction decides. The ground holds a driven robot to the velocity w
 /// of its drive with a force of at most the thrust F, and a resting one to velocity 0 with friction x mass x g. A contact is a
 /// force along the normal n, kept from tick to tick. In each of S sub-steps, all from the state at its start (Jacobi):
-///   contact  f <- max(0, f + gain (closing - max(0, gap - touch)))     closing: of the velocities, carried on as they change
-///   robot    slip <- shrink(slip - sum of f n / m, F / m), v = w + slip  shrink(s, b): s shorter by b, or 0 where it is not longer
+///   contact  f <- max(0, f + gain (closing - kEase max(0, gap - touch)))     closing: of the velocities, carried on
+///   friction h <- clamp(h + gain sliding, -friction f, friction f)       sliding: of two robots' rims, turning included
+///   robot    slip <- shrink(slip - sum of (f n + h t) / m, F / m), v = w + slip   shrink(s, b): s shorter by b, or 0
 ///   position moves by v, limited to half of each gap, so that no overlap arises whatever the forces are on their way to be
 /// In equilibrium each contact carries the force that keeps the two from closing, and each robot's contacts add up to at most
 /// its grip: forces add up along chains, and below the threshold of friction the velocity is 0 and not small. Gains are below
@@ -52,7 +53,8 @@ struct ContactLimits {
   double
       margin_mm;  ///< from a partition's rectangle: all that can matter within a tick, and where bodies can get to
   double x_limit_mm, y_limit_mm;  ///< the centre of a disc stays within +-limit
-  double touch_mm;  ///< a contact carries force up to this gap: who follows another at full speed keeps it
+  double touch_mm;      ///< a contact carries force up to this gap: who follows another at full speed keeps it
+  double rim_friction;  ///< between two robots
   double thrust_mm, hold_mm;  ///< grip of a driven and of a resting robot, as contact_state.hpp has forces
 
   [[nodiscard]] bool outside(double x_mm, double y_mm) const;
@@ -114,7 +116,10 @@ class ContactSolver {
   void find_specials(const Bodies&);
   void add_special(std::uint32_t body, std::uint32_t key, std::uint32_t movable, const Nearest& of_shape);
   [[nodiscard]] std::pair<const Special*, const Special*> specials_of(std::uint32_t body) const;
-  [[nodiscard]] double push_of(const Bodies&, std::uint32_t body, std::uint32_t other) const;
+  struct Forces {
+    double push_mm = 0, rub_mm = 0;
+  };
+  [[nodiscard]] Forces forces_of(const Bodies&, std::uint32_t body, std::uint32_t other) const;
   void reach(std::uint32_t node, std::uint8_t hops);
   [[nodiscard]] bool keep_press(const Bodies&, const Mover&);
   void seat_movers();

@@ -24,6 +24,7 @@ class ContactPass {
     Lanes gap_mm;              ///< at the tick's start; huge where a lane has no such contact
     Lanes push_mm;             ///< force of the contact
     Lanes gain;                ///< by which the force grows with what the two close
+    Lanes rub_mm, friction;    ///< tangential force, and its bound over the force of the contact
     Seat other[kLanes];
   };
   struct Batch {
@@ -32,6 +33,7 @@ class ContactPass {
            drive_y_mm[kLanes] = {};                         ///< velocity by the drive alone in the coming sub-step
     double slip_x_mm[kLanes] = {}, slip_y_mm[kLanes] = {};  ///< velocity less that of the drive
     double grip_mm[kLanes] = {};                          ///< the force with which the ground holds it to its drive
+    double spin_mm[kLanes] = {};                          ///< way of its rim about its centre in a sub-step
     double cos_turn[kLanes] = {}, sin_turn[kLanes] = {};  ///< of a sub-step; read where the body is driven
     std::uint32_t first_contact = 0, contacts = 0;
     std::uint32_t passes = 0;  ///< it is moved in the first so many sub-steps
@@ -64,7 +66,8 @@ class ContactPass {
       now_.swap(after_);
     }
   }
-  /// Of a seat, kLanes apart: displacement since the tick's start, x, y; velocity, carried on as it changes, x, y.
+  /// Of a seat, kLanes apart: displacement since the tick's start, x, y; velocity, carried on as it changes, x, y;
+  /// way of the rim about the centre.
   [[nodiscard]] const double* now(Seat seat) const { return now_.data() + seat; }
   [[nodiscard]] double* after(Seat seat) { return after_.data() + seat; }
   [[nodiscard]] double* start(Seat seat) { return now_.data() + seat; }
@@ -75,7 +78,7 @@ class ContactPass {
 
  private:
   /// As now() says.
-  static constexpr std::size_t kColumns = 4;
+  static constexpr std::size_t kColumns = 5;
 
   template <bool kWithOverlaps> void sub_step(const ContactLimits&, std::uint32_t step);
   template <bool kWithOverlaps> void move(const ContactLimits&, Batch&, const double* now, double* after);

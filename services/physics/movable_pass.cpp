@@ -23,7 +23,7 @@ MovablePass::MovablePass(const RunPlan& plan, const ContactLimits& limits)
       mover_of_(plan.movables(), kNone) {
   const double sub_step_s = plan.tick_length.seconds() / limits.sub_steps;
   for (const MovableBodyModel& body : bodies_)
-    grip_mm_.push_back(body.friction * kGravity_m_s2 * 1000 * sub_step_s * sub_step_s);
+    grip_mm_.push_back(body.friction * kGravity_m_s2 * 1000 * sub_step_s * sub_step_s / kInertia);
 }
 
 /// Stable whatever touches whatever: below one over the sum, over a contact's two ends, of what a force there moves all the
@@ -160,7 +160,7 @@ void MovablePass::move(Mover& mover, ContactPass& pass) {
         c.gap_mm + (c.normal_x * (point[0] - robot[0]) + c.normal_y * (point[kLanes] - robot[kLanes]));
     const double closing =
         c.normal_x * (robot[2 * kLanes] - point[2 * kLanes]) + c.normal_y * (robot[3 * kLanes] - point[3 * kLanes]);
-    c.push_mm = std::max(c.push_mm + c.gain * (closing - std::max(gap - touch_mm_, 0.0)), 0.0);
+    c.push_mm = std::max(c.push_mm + c.gain * (closing - kEase * std::max(gap - touch_mm_, 0.0)), 0.0);
     force.x_mm += c.push_mm * c.normal_x;
     force.y_mm += c.push_mm * c.normal_y;
     force.turn_mm += c.push_mm * arm(c);

@@ -48,6 +48,7 @@ void PlanarEngine::take(const Inputs& inputs) {
         if (p >= Press::kMost) continue;
         press.other[p] = pressed.other[at];
         press.push_mm[p] = pressed.push_mm[at];
+        press.rub_mm[p] = pressed.rub_mm[at];
         press.contacts = p + 1;
       }
       const auto found = std::lower_bound(known.robot.begin(), known.robot.end(), pressed.robot[i]);
@@ -150,6 +151,7 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
     for (std::uint32_t p = 0; p < press.contacts; ++p) {
       frame.pressed.other.push_back(press.other[p]);
       frame.pressed.push_mm.push_back(press.push_mm[p]);
+      frame.pressed.rub_mm.push_back(press.rub_mm[p]);
     }
   }
 }
@@ -161,7 +163,8 @@ std::uint64_t PlanarEngine::hash_part() const {
     if (!press.any()) continue;
     sum += entity_hash(HashDomain::kContact, robot, {hash_bits(press.slip_x_mm), hash_bits(press.slip_y_mm)});
     for (std::uint32_t p = 0; p < press.contacts; ++p)
-      sum += entity_hash(HashDomain::kContact, robot, {press.other[p], hash_bits(press.push_mm[p]), 1});
+      sum += entity_hash(HashDomain::kContact, robot,
+                         {press.other[p], hash_bits(press.push_mm[p]), hash_bits(press.rub_mm[p]), 1});
   }
   for (std::uint32_t m = 0; m < listed_movable_.size(); ++m) {
     if (listed_movable_[m] == 0) continue;
@@ -192,6 +195,7 @@ void PlanarEngine::save(proto::PhysicsState& state) const {
     for (std::uint32_t p = 0; p < press.contacts; ++p) {
       state.add_contact_other(press.other[p]);
       state.add_pressed_state(press.push_mm[p]);
+      state.add_pressed_state(press.rub_mm[p]);
     }
   }
 }
@@ -218,7 +222,7 @@ void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> p
     for (int i = 0; i < part->pressed_size(); ++i) {
       const std::uint32_t robot = part->pressed(i), contacts = part->contacts(i);
       const int size = static_cast<int>(std::min<std::uint32_t>(contacts, Press::kMost + 1));
-      if (robot >= presses.size() || contacts > Press::kMost || value + 2 + size > part->pressed_state_size() ||
+      if (robot >= presses.size() || contacts > Press::kMost || value + 2 + 2 * size > part->pressed_state_size() ||
           other + size > part->contact_other_size()) {
         throw RunError("checkpoint: physics: contacts of robot " + std::to_string(robot) + " are damaged");
       }
@@ -229,6 +233,7 @@ void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> p
       for (std::uint32_t p = 0; p < contacts; ++p) {
         press.other[p] = part->contact_other(other++);
         press.push_mm[p] = part->pressed_state(value++);
+        press.rub_mm[p] = part->pressed_state(value++);
       }
     }
   }

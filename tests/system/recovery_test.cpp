@@ -1,8 +1,12 @@
-// A program that brings down its host costs its own robot: the run starts again without it, and comes to the same end.
+// A program that brings down its host costs its own robot: the run goes on from its last checkpoint
+// without it, and comes to the same end, in either mode.
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <fstream>
 
+#include "clients/recorder/reader.hpp"
+#include "core/federation/topics.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -10,8 +14,9 @@ namespace {
 
 class Recoveries : public testing::Test {
  protected:
-  /// A program of which robot 3 does `deed` when its clock shows 60; all wait in delays and in loops.
-  std::string behaviour(const std::string& name, const std::string& deed) const {
+  /// A program of which those robots do `deed` when their clocks show 60; all wait in delays and in loops.
+  std::string behaviour(const std::string& name, const std::string& deed,
+                        const std::string& who = "kilo_uid == 3") const {
     std::ofstream(scratch / (name + ".c"))
         << "#include <kilolib.h>\n"
            "static uint8_t heard; static message_t m;\n"
@@ -23,7 +28,9 @@ class Recoveries : public testing::Test {
            "static void deed(void) { "
         << deed
         << " }\n"
-           "static void wait(void) { if (kilo_uid == 3 && kilo_ticks >= 60) deed(); if (kilo_uid != 3) loop(); }\n"
+           "static void wait(void) { if ("
+        << who
+        << ") { if (kilo_ticks >= 60) deed(); } else loop(); }\n"
            "int main(void) { kilo_init(); kilo_message_rx = rx; kilo_message_tx = tx; kilo_start(setup, wait); }\n";
     return scratch / (name + ".c");
   }
@@ -32,25 +39,164 @@ class Recoveries : public testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     return run(words, scratch, name);
   }
+  std::string trajectories(const std::string& name) const {
+    const Outcome exported =
+        kilotwin({"export", scratch / name, "--trajectories", scratch / "t.csv", "--every", "1"}, scratch);
+    EXPECT_EQ(exported.status, 0) << exported.err;
+    return read(scratch / "t.csv");
+  }
   Scratch scratch;
 };
 
+/// By system calls, gettid and tkill, as no wild pointer finds its host for certain.
+constexpr const char* kKillHost =
+    "long p; __asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(186) : \"rcx\", \"r11\", \"memory\");\n"
+    "__asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(200), \"D\"(p), \"S\"(6) : \"rcx\", \"r11\", \"memory\");";
+
 TEST_F(Recoveries, AHostBroughtDownCostsTheCulpritAlone) {
-  // By system calls, getpid and kill, as no wild pointer finds its host for certain.
-  const std::string kills =
-      behaviour("kills",
-                "long p; __asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(39) : \"rcx\", \"r11\", \"memory\");\n"
-                "__asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(62), \"D\"(p), \"S\"(6) : \"rcx\", \"r11\", "
-                "\"memory\"); for (;;) {}");
-  const std::string faults = behaviour("faults", "*(volatile int*)8 = 1;");
+  const std::string kills = behaviour("kills", kKillHost), faults = behaviour("faults", "*(volatile int*)8 = 1;");
   const auto failed = outcome("failed", faults, {"--mode", "local"});
   EXPECT_EQ(failed.robots_failed, 1u);
   EXPECT_EQ(failed.recoveries, 0u);
-  const auto recovered = outcome("recovered", kills, {"--partitions", "2x1", "--hosts", "2"});
-  EXPECT_EQ(recovered.robots_failed, 1u);
-  EXPECT_EQ(recovered.recoveries, 1u);
-  EXPECT_EQ(recovered.state_hash, failed.state_hash);
-  EXPECT_EQ(recovered.ticks, failed.ticks);
+  const struct {
+    const char* name;
+    Words words;
+    bool from_checkpoint;
+  } cases[] = {
+      {"federated", {"--partitions", "2x1", "--hosts", "2"}, false},
+      {"federated-saving", {"--partitions", "2x1", "--hosts", "2", "--checkpoint-every", "0.5"}, true},
+      {"local", {"--mode", "local"}, false},
+      {"local-saving",
+       {"--mode", "local", "--checkpoint-every", "0.5", "--partitions", "2x2", "--hosts", "2"},
+       true},
+  };
+  for (const auto& [name, words, from_checkpoint] : cases) {
+    SCOPED_TRACE(name);
+    const auto recovered = outcome(name, kills, words);
+    EXPECT_EQ(recovered.robots_failed, 1u);
+    EXPECT_EQ(recovered.recoveries, 1u);
+    EXPECT_EQ(recovered.state_hash, failed.state_hash);
+    EXPECT_EQ(recovered.ticks, failed.ticks);
+    EXPECT_EQ(recovered.messages.sent, failed.messages.sent);
+    EXPECT_EQ(recovered.moved_mm.mean, failed.moved_mm.mean);
+    // Its clock shows 60 at about 2 s.
+    EXPECT_EQ(recovered.recovered_from_tick, from_checkpoint ? 48 : 0);
+    EXPECT_FALSE(std::filesystem::exists(scratch / name + std::string("/recovered")));
+    // One recording, from beginning to end.
+    const Outcome replayed = kilotwin({"replay", scratch / name, "--verify"}, scratch);
+    EXPECT_EQ(replayed.status, 0) << replayed.err;
+    EXPECT_NE(replayed.out.find(std::to_string(failed.ticks + 1) + " ticks"), std::string::npos) << replayed.out;
+    EXPECT_EQ(trajectories(name), trajectories("failed"));
+  }
+}
+
+TEST_F(Recoveries, SeveralCulpritsFallOneAfterAnother) {
+  const std::string when = "static uint8_t n; if (++n < kilo_uid * 8) return; ";
+  const auto failed =
+      outcome("failed", behaviour("faults", when + "*(volatile int*)8 = 1;", "kilo_uid < 4"), {"--mode", "local"});
+  EXPECT_EQ(failed.robots_failed, 4u);
+  const std::string kills = behaviour("kills", when + kKillHost, "kilo_uid < 4");
+  for (const Words& words : {Words{"--mode", "local", "--checkpoint-every", "0.5"},
+                             Words{"--mode", "local", "--hosts", "8", "--threads", "2"},
+                             Words{"--hosts", "2", "--partitions", "1x1", "--checkpoint-every", "0.25"}}) {
+    const std::string name = "recovered" + words[1] + words[3];
+    SCOPED_TRACE(name);
+    const auto recovered = outcome(name, kills, words);
+    EXPECT_EQ(recovered.recoveries, 4u);
+    EXPECT_EQ(recovered.robots_failed, 4u);
+    EXPECT_EQ(recovered.state_hash, failed.state_hash);
+    EXPECT_EQ(kilotwin({"replay", scratch / name, "--verify"}, scratch).status, 0);
+  }
+}
+
+TEST_F(Recoveries, ARunThatWasResumedGoesOnFromThereOrFromLater) {
+  const auto failed = outcome("failed", behaviour("faults", "*(volatile int*)8 = 1;"), {"--mode", "local"});
+  const std::string kills = behaviour("kills", kKillHost);
+  Words words{"run",
+              source("experiments/disperse.txtpb"),
+              "--duration",
+              "1",
+              "--robots",
+              "16",
+              "--behaviour",
+              kills,
+              "--mode",
+              "local",
+              "--checkpoint-every",
+              "0.5",
+              "--out",
+              scratch / "saved",
+              "--quiet"};
+  ASSERT_EQ(kilotwin(words, scratch).status, 0);
+  const auto again = outcome("again", kills, {"--mode", "local", "--resume", scratch / "saved"});
+  EXPECT_EQ(again.state_hash, failed.state_hash);
+  EXPECT_EQ(again.resumed_from_tick, 16);
+  EXPECT_EQ(again.recovered_from_tick, 16);
+  const auto later = outcome("later", kills, {"--resume", scratch / "saved", "--checkpoint-every", "0.5"});
+  EXPECT_EQ(later.state_hash, failed.state_hash);
+  EXPECT_EQ(later.resumed_from_tick, 16);
+  EXPECT_EQ(later.recovered_from_tick, 48);
+  EXPECT_EQ(kilotwin({"replay", scratch / "later", "--verify"}, scratch).status, 0);
+}
+
+TEST_F(Recoveries, WhatCameFromOutsideComesAgain) {
+  // The packet makes the culprit act; it is stamped for a tick before that, and nobody sends it twice.
+  std::ofstream(scratch / "told.c")
+      << "#include <kilolib.h>\nstatic uint32_t told; static uint8_t heard;\n"
+         "static void rx(message_t* r, distance_measurement_t* d) { ++heard; if (r->type == 7) told = kilo_ticks; "
+         "}\n"
+         "static void setup(void) {}\n"
+         "static void loop(void) { set_color(heard); set_motors(heard, told);\n"
+         "  if (kilo_uid == 3 && told && kilo_ticks > told + 20) { "
+      << kKillHost << " } }\n"
+      << "int main(void) { kilo_init(); kilo_message_rx = rx; kilo_start(setup, loop); }\n";
+  for (const char* every : {"1000", "0.1"}) {
+    const std::string domain = std::to_string(dds::DomainClaim::any().domain()),
+                      name = "told-" + std::string(every);
+    const dds::Participant participant({static_cast<std::uint32_t>(std::stoul(domain)), {}});
+    dds::Writer<PublicOverheadPacket> overhead(participant, topics::overhead_packets());
+    Process process({program(), "run", source("experiments/disperse.txtpb"), "--robots", "8", "--duration", "8",
+                     "--pace", "6", "--partitions", "1x1", "--domain", domain, "--behaviour", scratch / "told.c",
+                     "--checkpoint-every", every, "--out", scratch / name},
+                    scratch.path());
+    ASSERT_TRUE(eventually([&] { return overhead.readers() > 0; }));
+    PublicOverheadPacket packet{};
+    std::string("test").copy(packet.client, sizeof packet.client - 1);
+    packet.request = 1;
+    packet.command = 6;
+    packet.message[9] = 7;
+    overhead.write(packet);
+    const Outcome outcome = process.wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const auto summary = recorder::read_summary(scratch / name + std::string("/summary.json"));
+    EXPECT_EQ(summary.recoveries, 1u) << outcome.err;
+    EXPECT_EQ(summary.robots_failed, 1u);
+    recorder::Reader reader(scratch / name + std::string("/recording.ktrec"));
+    int inputs = 0;
+    while (const proto::Record* record = reader.next()) {
+      if (record->has_input() && record->input().kind() == proto::InputRecord::OVERHEAD_INPUT) ++inputs;
+    }
+    EXPECT_EQ(inputs, 1);
+    const Outcome replayed = kilotwin({"replay", scratch / name, "--verify"}, scratch);
+    EXPECT_EQ(replayed.status, 0) << replayed.err;
+  }
+}
+
+TEST_F(Recoveries, AWorkerThatIsKilledIsNobodysFault) {
+  Process process({program(), "run", source("experiments/disperse.txtpb"), "--mode", "local", "--duration", "600",
+                   "--pace", "1", "--out", scratch / "run"},
+                  scratch.path());
+  const auto worker = [&]() -> pid_t {
+    for (const pid_t id : processes_with(scratch / "run")) {
+      if (id != process.id()) return id;
+    }
+    return -1;
+  };
+  ASSERT_TRUE(eventually([&] { return worker() > 0 && std::filesystem::exists(scratch / "run/recording.ktrec"); }));
+  kill(worker(), SIGKILL);
+  const Outcome outcome = process.wait(30);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("signal 9"), std::string::npos) << outcome.err;
 }
 
 }  // namespace

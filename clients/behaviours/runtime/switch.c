@@ -36,8 +36,10 @@ _Static_assert(__builtin_offsetof(struct KtThread, robot_stack) == 8 &&
   "xorps %xmm5, %xmm5\n xorps %xmm6, %xmm6\n xorps %xmm7, %xmm7\n xorps %xmm8, %xmm8\n xorps %xmm9, %xmm9\n" \
   "xorps %xmm10, %xmm10\n xorps %xmm11, %xmm11\n xorps %xmm12, %xmm12\n xorps %xmm13, %xmm13\n"              \
   "xorps %xmm14, %xmm14\n xorps %xmm15, %xmm15\n"
-/* Returns elsewhere than where the call came from: a jump, which processors predict where they would mistake a return. */
-#define CROSS "pop %rcx\n jmp *%rcx\n"
+/* Processors predict returns by the calls that they have seen. So that all calls and returns between a host's call of kt_enter
+ * and its end pair up, a robot is continued by a jump and comes to wait by a jump, with the address where it goes on pushed
+ * by hand; the host is returned to by the return that its call expects. */
+#define CONTINUE "pop %rcx\n jmp *%rcx\n"
 #define FUNCTION(name) ".globl " #name "\n .hidden " #name "\n .type " #name ", @function\n" #name ":\n"
 #define END(name) ".size " #name ", .-" #name "\n"
 
@@ -46,13 +48,13 @@ __asm__(
     /* uint64_t kt_enter(void) */
     FUNCTION(kt_enter) SAVE
     "mov %rsp, " HOST_STACK "\n"
-    "mov " ROBOT_STACK ", %rsp\n" CLEAR CLEAR_VECTORS RESTORE "xor %eax, %eax\n" CROSS END(kt_enter)
-    /* void kt_wait(void): called by the robot; returns in the next tick. */
+    "mov " ROBOT_STACK ", %rsp\n" CLEAR CLEAR_VECTORS RESTORE "xor %eax, %eax\n" CONTINUE END(kt_enter)
+    /* Where a robot that waits jumps to, see kilolib.c; goes on there in the next tick. */
     FUNCTION(kt_wait)
     "xor %eax, %eax\n"
     "kt_switch:\n" SAVE
     "mov %rsp, " ROBOT_STACK "\n"
-    "mov " HOST_STACK ", %rsp\n" RESTORE CROSS END(kt_wait)
+    "mov " HOST_STACK ", %rsp\n" RESTORE "ret\n" END(kt_wait)
     /* uint64_t kt_call(function) */
     FUNCTION(kt_call) SAVE
     "mov %rsp, " HOST_STACK "\n"
@@ -83,18 +85,19 @@ __asm__(
 #define RESTORE_ARGUMENTS                                                                             \
   "movups (%rsp), %xmm0\n movups 16(%rsp), %xmm1\n movups 32(%rsp), %xmm2\n movups 48(%rsp), %xmm3\n" \
   "movups 64(%rsp), %xmm4\n movups 80(%rsp), %xmm5\n movups 96(%rsp), %xmm6\n movups 112(%rsp), %xmm7\n"
+#define SWITCH "lea 1f(%rip), %rax\n push %rax\n mov $1, %eax\n jmp kt_switch\n 1:\n"
 #define RESTORE_OTHERS                                                                                          \
   "pop %r11\n pop %r10\n pop %r9\n pop %r8\n pop %rdi\n pop %rsi\n pop %rdx\n pop %rcx\n pop %rax\n pop %rbp\n" \
   "ret\n"
     FUNCTION(kt_preempt)
     "cmpb $0, " IN_INTERRUPT "\n jne kt_overrun\n" SAVE_OTHERS
     "sub $128, %rsp\n" SAVE_ARGUMENTS
-    "mov $1, %eax\n call kt_switch\n" RESTORE_ARGUMENTS
+    SWITCH RESTORE_ARGUMENTS
     "add $128, %rsp\n" RESTORE_OTHERS END(kt_preempt)
     FUNCTION(kt_preempt_with_vectors)
     "cmpb $0, " IN_INTERRUPT "\n jne kt_overrun\n" SAVE_OTHERS
     "sub $512, %rsp\n and $-64, %rsp\n fxsave64 (%rsp)\n"
-    "mov $1, %eax\n call kt_switch\n"
+    SWITCH
     "fxrstor64 (%rsp)\n lea -72(%rbp), %rsp\n" RESTORE_OTHERS END(kt_preempt_with_vectors)
     FUNCTION(kt_overrun)
     "pop %rax\n mov %rax, " PLACE "\n movb $1, " OVERRUN "\n jmp kt_leave\n" END(kt_overrun));

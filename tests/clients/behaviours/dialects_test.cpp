@@ -87,6 +87,35 @@ TEST(Dialects, SourcesAndHeadersThatAMakefileWouldNameAreFound) {
   EXPECT_EQ(led_of(source), 4);
 }
 
+TEST(Dialects, AProjectIsSearchedFromItsTop) {
+  const Folder folder;
+  folder.write("project/README.md", "A project.\n");
+  folder.write("project/lib/robot/light.h", "#define COLOUR 6\n");
+  folder.write("light.h", "#define COLOUR 1\n");
+  const std::string text =
+      "#include <kilolib.h>\n#include <light.h>\nvoid setup() {} void loop() { set_color(COLOUR); }\n" + kMain;
+  const fs::path deep = folder.write("project/src/programs/first/robot/a.c", text);
+  EXPECT_TRUE(mentions(compile({deep}, cached()).notes, "light.h: found for #include <light.h>"));
+  EXPECT_EQ(led_of(deep), 6);
+  // Without a top, no farther than two folders above.
+  EXPECT_THROW((void)compile({folder.write("other/src/programs/first/a.c", text)}, cached()), UserError);
+}
+
+TEST(Dialects, FunctionsWhoseNamesMacrosMakeAreFound) {
+  const Folder folder;
+  folder.write("state.h", "#define NAME(state) on_##state\nint NAME(idle)(void);\n");
+  folder.write("states/idle.c", "#include \"state.h\"\nint NAME(idle)(void) { return 3; }\n");
+  folder.write("states/template.c", "#include \"state.h\"\nint NAME(other)(void) { return 4; }\n");
+  const fs::path source = folder.write(
+      "a.c",
+      "#include <kilolib.h>\n#include \"state.h\"\nvoid setup() {} void loop() { set_color(NAME(idle)()); }\n" +
+          kMain);
+  const CompiledProgram program = compile({source}, cached());
+  EXPECT_TRUE(mentions(program.notes, "idle.c: compiled too"));
+  EXPECT_FALSE(mentions(program.notes, "template.c"));
+  EXPECT_EQ(led_of(source), 3);
+}
+
 TEST(Dialects, WhatIsNowhereIsStillAnError) {
   const Folder folder;
   folder.write("huge.c", "int operator_plus;\nint others[] = {" + std::string(300'000, '1') + "};\n");
@@ -160,6 +189,43 @@ TEST(Dialects, KilombosOwnWayWithDataIsTheSecondTry) {
       "void setup() { mydata->colour = 7; callback_botinfo = info; } void loop() { set_color(mydata->colour); }\n" +
           kMain);
   EXPECT_TRUE(mentions(compile({source}, cached()).notes, "SIMULATOR"));
+  EXPECT_EQ(led_of(source), 7);
+}
+
+TEST(Dialects, KilombosRoomForDataIsThereWithoutItsHeader) {
+  const Folder folder;
+  const std::string text =
+      "typedef struct { uint8_t colour; } USERDATA;\nREGISTER_USERDATA(USERDATA)\n"
+      "void setup() { mydata->colour += 4; } void loop() { set_color(mydata->colour); }\n" +
+      kMain;
+  EXPECT_EQ(
+      led_of(folder.write("own.c",
+                          "#include <kilolib.h>\n#define REGISTER_USERDATA(type) int UserdataSize = sizeof(type); "
+                          "type* mydata;\n" +
+                              text)),
+      4);
+  // Data of the program's own remain.
+  EXPECT_EQ(led_of(folder.write(
+                "both.c",
+                "#define SIMULATOR\n#include <kilombo.h>\nstruct { uint8_t colour; } first = {3};\nvoid* mine = "
+                "&first;\ntypedef struct { uint8_t colour; } USERDATA;\nUSERDATA own = {2};\nUSERDATA* mydata = "
+                "&own;\nREGISTER_USERDATA(USERDATA)\n"
+                "void setup() { mydata->colour += 4; } void loop() { set_color(mydata->colour); }\n" +
+                    kMain)),
+            6);
+}
+
+TEST(Dialects, StructuresOfGlobalsInCppThatPrintByLogMessage) {
+  const Folder folder;
+  const fs::path source =
+      folder.write("a.c",
+                   "//#include \"kilolib.h\"\nstruct GLOBALS { uint16_t colour = 5; message_t message; }* g;\n"
+                   "void setup() { g->colour = 7; log_message(\"colour %d\", g->colour); } void loop() { "
+                   "set_color(g->colour); }\n"
+                   "int main() { GLOBALS* g_safe = (GLOBALS*)malloc(sizeof(GLOBALS)); kilo_init(); g = g_safe; "
+                   "kilo_start(setup, loop); "
+                   "free(g_safe); return 0; }\n");
+  EXPECT_TRUE(mentions(compile({source}, cached()).notes, "log_message"));
   EXPECT_EQ(led_of(source), 7);
 }
 

@@ -229,6 +229,29 @@ TEST(SwarmPrograms, ForagerFetchesAndBringsHome) {
   EXPECT_EQ(swarm.led(1), kGreen);
 }
 
+TEST(SwarmPrograms, RelayHandsTheBatonRoundWhileItWaitsInEveryWay) {
+  const std::vector<Place> places = line_of(3, 40);
+  Swarm swarm({ready_made("relay.c")}, 3);
+  swarm.start();
+  std::vector<std::uint32_t> order;
+  std::vector<int> held(3, 0);
+  for (int k = 0; k < 500; ++k) {
+    run(swarm, places, 100, 1);
+    int with_baton = 0;
+    for (std::uint32_t robot = 0; robot < 3; ++robot) {
+      if (swarm.led(robot) != kRed) continue;
+      ++with_baton;
+      ++held[robot];
+      if (order.empty() || order.back() != robot) order.push_back(robot);
+    }
+    EXPECT_LE(with_baton, 1) << k;
+  }
+  ASSERT_GE(order.size(), 6u);
+  for (std::size_t n = 0; n < order.size(); ++n) EXPECT_EQ(order[n], n % 3);
+  // Half a second by delay, then 31 ticks of the clock.
+  EXPECT_NEAR(held[1], 46.0 * static_cast<double>((order.size() + 1) / 3), 46);
+}
+
 TEST(SwarmPrograms, PhototaxisChangesLegsWhenTheLightFalls) {
   // Light that rises for 40 ticks and falls for 40.
   Swarm swarm({"#define get_ambientlight own_light\n#include \"" + ready_made("phototaxis.c") +

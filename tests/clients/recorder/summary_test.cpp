@@ -22,6 +22,7 @@ Summary example() {
   s.robots = 1000;
   s.ticks = 2000;
   s.resumed_from_tick = 500;
+  s.recovered_from_tick = 400;
   s.simulated_s = 65.536;
   s.start_s = 0.25;
   s.wall_s = 4.9152;
@@ -66,7 +67,8 @@ TEST(Summary, HasTheFieldsOfTheContract) {
   EXPECT_EQ(json["hosts"], 4);
   EXPECT_EQ(json["resumed_from_tick"], 500);
   EXPECT_EQ(json["moved_mm"], (nlohmann::json{{"mean", 12.5}, {"max", 99.0}}));
-  EXPECT_EQ(json.size(), 20u);
+  EXPECT_EQ(json["recovered_from_tick"], 400);
+  EXPECT_EQ(json.size(), 21u);
 }
 
 TEST(Summary, ComesBackAsItWasWritten) {

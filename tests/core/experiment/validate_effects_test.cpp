@@ -24,6 +24,22 @@ TEST_F(ValidateEffects, WhatIsRightPasses) {
       "");
 }
 
+TEST_F(ValidateEffects, EpisodesSayHowOftenAndHowLong) {
+  const std::string head =
+      kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN function { constant: -1 }\n function { ";
+  EXPECT_EQ(check_error(head + "episodes { mean_apart_s: 100 scale_s: 5 tail: 1.5 } } }"), "");
+  EXPECT_EQ(check_error(head + "episodes { scale_s: 5 } } }"),
+            "e.txtpb:3:13: mean_apart_s is missing; state the mean time from the end of an episode to the next");
+  EXPECT_EQ(check_error(head + "episodes { mean_apart_s: 5 } } }"),
+            "e.txtpb:3:13: scale_s is missing; state the scale of the episodes' lengths");
+  EXPECT_EQ(
+      check_error(
+          kRobots +
+          "effect { name: 'a' acts_on: MEASURED_SCALE function {\n episodes { mean_apart_s: 5 scale_s: 1 } } }"),
+      "e.txtpb:3:2: episodes are known to what moves robots alone; take them with a gain, an offset, a turn rate "
+      "or a drift");
+}
+
 struct Bad {
   const char* text;
   const char* error;
@@ -48,11 +64,11 @@ TEST_F(ValidateEffects, WhatIsWrongIsNamedWithItsPlace) {
        "e.txtpb:2:39: direction_deg has no effect here; it goes with drifts and measured offsets"},
       {"effect { name: 'a' acts_on: TURN_RATE function { } }",
        "e.txtpb:2:39: function has no shape; it takes constant, linear, exponential, harmonic, spline, spline_2d, "
-       "steps, table or noise"},
+       "steps, table, noise or episodes"},
       {"effect { name: 'a' acts_on: TURN_RATE function { linear { } } }",
        "e.txtpb:2:39: of is missing; state what the function looks at, e.g. of: TIME"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: TIME constant: 3 } }",
-       "e.txtpb:2:50: of has no effect here; a constant and noise look at nothing, remove it"},
+       "e.txtpb:2:50: of has no effect here; a constant, noise and episodes look at nothing, remove it"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: NEAREST linear { } } }",
        "e.txtpb:2:39: radius_mm is missing; state how far away robots count, mm"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: TIME radius_mm: 5 linear { } } }",
@@ -112,7 +128,7 @@ TEST_F(ValidateEffects, AModelsListTakesThePlaceOfTheExperiments) {
   EXPECT_EQ(loaded.experiment.effect(0).name(), "c");
   EXPECT_EQ(error_of([&] { validate(loaded); }),
             "m.txtpb:3:2: function has no shape; it takes constant, linear, exponential, harmonic, spline, "
-            "spline_2d, steps, table or noise");
+            "spline_2d, steps, table, noise or episodes");
 }
 
 TEST_F(ValidateEffects, EveryExampleOfTheDocumentRuns) {

@@ -242,6 +242,23 @@ class Federation {
   std::vector<Member> federates_;
 };
 
+TEST(Ingress, GoesOnAfterWhatWasStampedBefore) {
+  const std::vector<Directive> stamped{directive(0, 7, DirectiveKind::kOverheadInput),
+                                       directive(1, 90, DirectiveKind::kOverheadInput)};
+  Ingress ingress(stamped);
+  const Directive next = ingress.stamp(Tick{12}, directive(0, 0, DirectiveKind::kOverheadInput));
+  EXPECT_EQ(next.sequence_number, 2u);
+  EXPECT_EQ(next.tick, Tick{90}) << "no later input takes effect before an earlier one";
+  // A schedule that starts between them applies what lies ahead.
+  RunSchedule schedule(Tick{5}, Tick{200}, 0);
+  for (const Directive& one : stamped) schedule.add(one);
+  EXPECT_EQ(schedule.known(), 2u);
+  for (int t = 5; t < 100; ++t) {
+    ASSERT_EQ(schedule.verdict(Tick{t}), Verdict::kStep);
+    EXPECT_EQ(schedule.overhead_inputs().size(), t == 7 || t == 90 ? 1u : 0u) << t;
+  }
+}
+
 TEST(RunSchedule, AllFederatesActAlikeWhateverTheDelays) {
   std::size_t inputs_seen = 0;
   for (unsigned seed = 1; seed <= 200; ++seed) {

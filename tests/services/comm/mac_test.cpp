@@ -69,8 +69,8 @@ TEST(Mac, PacketTakesItsAirTime) {
   EXPECT_GT(straddling, 10);
 }
 
-TEST(Mac, StartsWithinTwoBitsAreNotNoticed) {
-  const Duel duel = make_duel(0, kDeaf - 1);
+TEST(Mac, StartsOfOneInstantAreNotNoticed) {
+  const Duel duel = make_duel(0, kNoticed - 1);
   Swarm swarm(duel.plan);
   while (swarm.now.count() < 20) swarm.step();
   const auto& counters = swarm.radio.counters();
@@ -81,9 +81,21 @@ TEST(Mac, StartsWithinTwoBitsAreNotNoticed) {
   EXPECT_EQ(counters.collided, 2u);
 }
 
+/// Robot 1 does not hear robot 0, so that it starts while robot 0 polls its receiver.
 TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
-  const Duel duel = make_duel(kDeaf, kListening - 1);
-  Swarm swarm(duel.plan);
+  const std::string one_way =
+      "radio { model: PROPAGATION oscillator_sd: 0 propagation { packet_sd_db: 0 link { sender: 0 receiver: 1 "
+      "offset_db: "
+      "-100 } } }";
+  const std::vector<testing::ScenePose> poses{{0, 0, 0}, {40, 0, 0}};
+  const auto apart = [&](std::uint64_t seed) {
+    const TickTimers timers(seeded(one_way, seed, poses));
+    return timers.next(1) - timers.next(0);
+  };
+  std::uint64_t seed = 1;
+  while (apart(seed) < kDeaf || apart(seed) >= kListening) ++seed;
+  const RunPlan plan = seeded(one_way, seed, poses);
+  Swarm swarm(plan);
   std::vector<std::uint32_t> sent;
   std::vector<int> kilo_ticks(2, 0);
   while (swarm.now.count() < 30) {
@@ -91,19 +103,17 @@ TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
     sent.insert(sent.end(), swarm.frames[0].sent.begin(), swarm.frames[0].sent.end());
     for (std::size_t i = 0; i < 2; ++i) kilo_ticks[i] += swarm.frames[0].kilo_ticks[i];
   }
-  ASSERT_EQ(sent.size(), 2u);
-  EXPECT_EQ(sent[0], 1 - duel.earlier);
-  EXPECT_EQ(sent[1], duel.earlier);
+  EXPECT_EQ(sent, (std::vector<std::uint32_t>{1, 0}));
   EXPECT_EQ(swarm.radio.counters().attempted, 3u);
   EXPECT_EQ(swarm.radio.counters().aborted, 1u);
-  EXPECT_EQ(swarm.radio.counters().received, 2u);
+  EXPECT_EQ(swarm.radio.counters().received, 1u);
   // Same rate, almost the same phase: one more tick is the back-off's.
-  EXPECT_EQ(kilo_ticks[duel.earlier], kilo_ticks[1 - duel.earlier] + 1);
+  EXPECT_EQ(kilo_ticks[0], kilo_ticks[1] + 1);
 }
 
 TEST(Mac, LaterOneWaitsForItsNextTick) {
-  for (const auto& [least, most] :
-       {std::pair{kListening, kListening + 500}, std::pair{kPacket - 3000, kPacket - 1}}) {
+  for (const auto& [least, most] : {std::pair{kNoticed, kNoticed + 100}, std::pair{kListening, kListening + 500},
+                                    std::pair{kPacket - 3000, kPacket - 1}}) {
     const Duel duel = make_duel(least, most);
     const TickTimers timers(duel.plan);
     const std::uint32_t later = 1 - duel.earlier;
@@ -137,9 +147,9 @@ TEST(Mac, TouchingRobotsThatAlwaysSendLoseNothingSilently) {
   EXPECT_GT(c.sent, 40000u);
   EXPECT_LE(c.attempted - c.sent - c.aborted, poses.size());
   EXPECT_EQ(c.received + c.collided, c.sent);
-  EXPECT_GT(c.received, c.sent / 100 * 98);
-  EXPECT_GT(c.aborted, 0u);
-  EXPECT_GT(c.collided, 0u);
+  // Both must start within 16 of the 262144 cycles of a tick to collide, and a start pulse is never overheard.
+  EXPECT_LT(static_cast<double>(c.collided), 0.002 * static_cast<double>(c.sent));
+  EXPECT_EQ(c.aborted, 0u);
 }
 
 /// With a program that never sends, tx_clock runs through its 16 bits; the robot is asked exactly when it exceeds.

@@ -116,9 +116,9 @@ TEST(Overhead, JamsRobotsAsThePhasesSay) {
   for (std::uint32_t i = 0; i < kPairs; ++i) {
     const Cycles start = timers.next(2 * i) + 15 * timers.period(2 * i), into = start % kPeriod,
                  until_next = kPeriod - into;
-    if (into >= 2418 && into < 34970)
+    if (into >= 16 && into < 34970)
       fate.push_back(kSensed);
-    else if (into < 2418)
+    else if (into < 16)
       fate.push_back(kDrowned);
     else if (until_next >= 34970)
       fate.push_back(kClean);

@@ -53,6 +53,7 @@ std::string everything() {
   add("WORLD_DRIFT direction_deg: 45 during: [STOP, LEFT]",
       "of: X and_of: Y spline_2d { knot: [-300, 0, 300] and_knot: [-300, 300] value: [1, -1, 2, 0, 1, -2] }");
   add("TURN_RATE during: [STOP, STRAIGHT]", "noise { sd: 0.1 correlation_s: 2 }");
+  add("WHEEL_GAIN", "constant: -0.6 } function { episodes { mean_apart_s: 1 scale_s: 0.4 tail: 1.5 }");
   add("WHEEL_OFFSET wheel: RIGHT_WHEEL", "noise { sd: 0.2 correlation_s: 0.5 } } function { noise { sd: 0.5 }");
   add("WHEEL_GAIN",
       "of: HEADING harmonic { cosine: 0.1 } } function { of: DRIVEN_TIME forget_s: 4 exponential { at_zero: 1 "

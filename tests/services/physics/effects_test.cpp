@@ -1,7 +1,9 @@
 // Effects through the engines: targets, functions and covariates against closed forms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/base/error.hpp"
 #include "services/physics/drive.hpp"
@@ -229,6 +231,58 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
   EXPECT_EQ(value("NEIGHBOURS", alone), 0);
   EXPECT_NEAR(value("NEAREST", alone), 100, 1e-8);
   EXPECT_EQ(value("NEAREST_BEARING", alone), 0);
+}
+
+TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
+  // 200 robots for 1000 s: 40 000 s apart by 8 s on average, of a mean length of 4 / (3 - 1) s, so on for a fifth of the time.
+  constexpr std::uint32_t kRobots = 200;
+  constexpr int kTicks = 30518;
+  const double mean_apart_s = 8, scale_s = 4, tail = 3;
+  std::vector<ScenePose> poses;
+  for (std::uint32_t r = 0; r < kRobots; ++r) poses.push_back({0, 40.0 * r - 4000, 0});
+  const RunPlan plan = make_plan(
+      shown("episodes { mean_apart_s: 8 scale_s: 4 tail: 3 }", "duration_s: 1000 physics { engine: KINEMATIC } "),
+      poses);
+  Swarm swarm(plan);
+  std::vector<double> last_x(kRobots, 0), began(kRobots, -1), lengths, waits, ended(kRobots, -1);
+  double on = 0;
+  for (int k = 0; k < kTicks; ++k) {
+    swarm.step();
+    const std::vector<ScenePose> now_at = swarm.poses();
+    for (std::uint32_t r = 0; r < kRobots; ++r) {
+      const double x = now_at[r].x_mm, moved = (x - last_x[r]) / kTick_s;
+      last_x[r] = x;
+      ASSERT_TRUE(std::abs(moved) < 1e-6 || std::abs(moved - 1) < 1e-6);
+      const bool is_on = moved > 0.5;
+      on += is_on;
+      const double now = k * kTick_s;
+      if (is_on && began[r] < 0) {
+        began[r] = now;
+        if (ended[r] >= 0) waits.push_back(now - ended[r]);
+      }
+      if (!is_on && began[r] >= 0) {
+        if (ended[r] >= 0) lengths.push_back(now - began[r]);
+        began[r] = -1;
+        ended[r] = now;
+      }
+    }
+  }
+  const auto mean = [](const std::vector<double>& v) {
+    return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
+  };
+  ASSERT_GT(lengths.size(), 15000u);
+  // Three standard errors, and a tick for phases that are rounded up to one; the ends of the run cut long ones.
+  EXPECT_NEAR(mean(waits), mean_apart_s, 3 * mean_apart_s / std::sqrt(waits.size()) + kTick_s + 0.1);
+  EXPECT_NEAR(mean(lengths), scale_s / (tail - 1), 3 * 3.5 / std::sqrt(lengths.size()) + kTick_s);
+  EXPECT_NEAR(on / kTicks / kRobots, 0.2, 0.01);
+  for (const double t : {2.0, 8.0, 20.0}) {
+    const double share = std::pow(1 + t / scale_s, -tail), n = static_cast<double>(lengths.size());
+    const double longer =
+        static_cast<double>(std::count_if(lengths.begin(), lengths.end(), [t](double l) { return l > t; }));
+    EXPECT_NEAR(longer / n, share,
+                3 * std::sqrt(share * (1 - share) / n) + 0.01 * share + kTick_s * tail * share / (scale_s + t))
+        << t;
+  }
 }
 
 TEST(Effects, CommandsOfThePastAreRemembered) {

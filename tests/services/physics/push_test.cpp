@@ -109,8 +109,9 @@ TEST(Push, AColumnOfTenAddsUpItsThrusts) {
 TEST(Push, ARestingRobotYieldsToMoreThanItsFriction) {
   // Friction of 0.8 and of 1.2 thrusts: thrust / (mass g) is 0.12.
   for (const double thrusts : {0.8, 1.2}) {
-    const RunPlan plan = make_plan(kQuiet + "physics { robot_friction: " + std::to_string(thrusts * 0.12002) + " }",
-                                   {{0, 0, 0}, {40, 0, 1}});
+    const RunPlan plan =
+        make_plan(kQuiet + "physics { rim_friction: 0 robot_friction: " + std::to_string(thrusts * 0.12002) + " }",
+                  {{0, 0, 0}, {40, 0, 1}});
     Swarm swarm(plan);
     swarm.set_motors(0, 70, 70);
     swarm.run(300);
@@ -301,7 +302,7 @@ TEST(Push, TheTightestPackingDrivenToTheCentreForAMinute) {
   std::sort(overlaps.begin(), overlaps.end());
   std::printf("tightest packing inwards: overlap %.3g mm at most, %.3g mm at the 99th percentile of %zu contacts\n",
               overlaps.back(), overlaps[overlaps.size() * 99 / 100], overlaps.size());
-  EXPECT_GT(overlaps.size(), 1000u);
+  EXPECT_GT(overlaps.size(), 800u);  // Biases dissolve the lattice; the crowd stays dense.
   EXPECT_LT(overlaps.back(), 1e-6);
 }
 

@@ -321,7 +321,6 @@ static void take_octet(void) {
       stop_receiving(); /* two packets at once */
       return;
     }
-    rx_busy = 1;
     rx_dist.low_gain = (int16_t)conversion();
     listen_to(0);
   } else {
@@ -338,6 +337,7 @@ static void take_octet(void) {
 
 ISR(ANALOG_COMP_vect) {
   const uint16_t time = TCNT1;
+  rx_busy = 1;
   if (!in_octet) {
     TCNT1 = 0;
     TCCR1B = _BV(CS10);

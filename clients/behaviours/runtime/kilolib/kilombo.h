@@ -5,9 +5,15 @@
 
 #include <kilolib.h>
 
+#ifdef SIMULATOR
+#define REGISTER_USERDATA(type)    \
+  int UserdataSize = sizeof(type); \
+  type* mydata;
+#else
 #define REGISTER_USERDATA(type) \
   type myuserdata;              \
   type* mydata = &myuserdata;
+#endif
 
 #define SET_CALLBACK(event, function)
 

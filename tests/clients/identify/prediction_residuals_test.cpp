@@ -1,5 +1,5 @@
 // Residuals of known predictions.
-#include "clients/identify/residuals.hpp"
+#include "clients/identify/prediction_residuals.hpp"
 
 #include <gtest/gtest.h>
 

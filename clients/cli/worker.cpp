@@ -1,0 +1,55 @@
+#include "clients/cli/worker.hpp"
+
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+/// Signals that wait to be taken, while the object exists.
+class Held {
+ public:
+  Held() {
+    sigemptyset(&signals_);
+    for (const int signal : {SIGINT, SIGTERM, SIGCHLD}) sigaddset(&signals_, signal);
+    sigprocmask(SIG_BLOCK, &signals_, &before_);
+  }
+  ~Held() { sigprocmask(SIG_SETMASK, &before_, nullptr); }
+  Held(const Held&) = delete;
+  [[nodiscard]] int next() const { return sigwaitinfo(&signals_, nullptr); }
+
+ private:
+  sigset_t signals_{}, before_{};
+};
+
+}  // namespace
+
+std::optional<int> status_of_worker() {
+  std::fflush(nullptr);
+  const Held held;
+  const pid_t parent = getpid();
+  const pid_t worker = fork();
+  if (worker < 0) throw RunError("the run cannot be started: the system has no room for another process");
+  if (worker == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(1);
+    return std::nullopt;
+  }
+  bool told = false;
+  for (int status = 0;;) {
+    if (waitpid(worker, &status, WNOHANG) == worker) return status;
+    const int signal = held.next();
+    if (signal != SIGINT && signal != SIGTERM) continue;
+    // A terminal sends SIGINT to both, and a second one to a process ends it whatever it does.
+    kill(worker, told && signal == SIGINT ? SIGKILL : SIGTERM);
+    told = true;
+  }
+}
+
+}  // namespace kilotwin::cli

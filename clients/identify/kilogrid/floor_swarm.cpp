@@ -1,0 +1,203 @@
+#include "clients/identify/kilogrid/floor_swarm.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/pose.hpp"
+#include "core/math/elementary.h"
+#include "services/physics/engine.hpp"
+
+namespace kilotwin::kilogrid {
+namespace {
+
+/// Kilo_ticks per tick of the engine: the longest tick there is.
+constexpr std::int64_t kKiloTicks = 4;
+constexpr std::uint32_t kTickCycles = kKiloTicks << 18;
+/// Spread of robots' clocks.
+constexpr double kClock_sd = 0.005;
+constexpr std::uint8_t kDuty = 70;
+constexpr double kRadius_mm = kRobotRadius_mm;
+
+RunPlan plan_of(const FloorScene& scene, const Floor& floor, const proto::Model& model, std::uint64_t seed,
+                Dice& dice) {
+  proto::Manifest manifest;
+  manifest.set_run(1);
+  proto::Experiment& e = *manifest.mutable_experiment();
+  e.set_seed(seed);
+  e.set_duration_s(scene.duration_s);
+  e.set_tick_cycles(kTickCycles);
+  e.mutable_arena()->set_width_mm(floor.width_mm);
+  e.mutable_arena()->set_height_mm(floor.height_mm);
+  *e.mutable_motion() = model.motion();
+  *e.mutable_robot_model() = model.robot();
+  *e.mutable_effect() = model.effect();
+  *e.mutable_field() = model.field();
+  e.add_robots()->set_count(static_cast<std::uint32_t>(scene.x_mm.size()));
+  manifest.add_program()->set_path("floor");
+  manifest.add_group_program(0);
+  for (std::size_t i = 0; i < scene.x_mm.size(); ++i) {
+    manifest.add_x_mm(scene.x_mm[i] - floor.width_mm / 2);
+    manifest.add_y_mm(scene.y_mm[i] - floor.height_mm / 2);
+    manifest.add_heading_rad((2 * dice.uniform() - 1) * kPi);
+  }
+  return RunPlan(std::move(manifest));
+}
+
+/// Cells of the rim. Each module, 2 x 2 cells, sends from its cells one after the other, one in a tick.
+template <class Hear>
+void send_from_rim(const Floor& floor, double range_mm, std::int64_t tick, double x_mm, double y_mm, Hear&& hear) {
+  const double cell = floor.cell_mm;
+  const double nearest = std::min(std::min(x_mm, floor.width_mm - x_mm), std::min(y_mm, floor.height_mm - y_mm));
+  if (nearest > cell / 2 + range_mm) return;
+  const int columns = static_cast<int>(floor.width_mm / cell), rows = static_cast<int>(floor.height_mm / cell);
+  const int reach = static_cast<int>(std::ceil(range_mm / cell));
+  const int column = static_cast<int>(x_mm / cell), row = static_cast<int>(y_mm / cell);
+  for (int r = std::max(row - reach, 0); r <= std::min(row + reach, rows - 1); ++r) {
+    for (int c = std::max(column - reach, 0); c <= std::min(column + reach, columns - 1); ++c) {
+      if (r != 0 && r != rows - 1 && c != 0 && c != columns - 1) continue;
+      if ((r % 2) * 2 + c % 2 != tick % 4) continue;
+      const double dx = x_mm - (c + 0.5) * cell, dy = y_mm - (r + 0.5) * cell;
+      const double distance_mm = std::sqrt(dx * dx + dy * dy);
+      if (distance_mm < range_mm) hear(distance_mm, rim_part(floor, (c + 0.5) * cell, (r + 0.5) * cell));
+    }
+  }
+}
+
+}  // namespace
+
+std::size_t rim_part(const Floor& floor, double x_mm, double y_mm) {
+  const double w = floor.width_mm, h = floor.height_mm;
+  const double distance[] = {y_mm, w - x_mm, h - y_mm, x_mm};
+  const double along[] = {x_mm, w + y_mm, w + h + (w - x_mm), 2 * w + h + (h - y_mm)};
+  const auto side =
+      static_cast<std::size_t>(std::min_element(std::begin(distance), std::end(distance)) - std::begin(distance));
+  const double part = std::max(along[side], 0.0) / (2 * (w + h)) * static_cast<double>(kRimParts);
+  return std::min(static_cast<std::size_t>(part), kRimParts - 1);
+}
+
+FloorReporter::FloorReporter(const Floor& floor, const FloorRadio& radio, std::uint32_t robots, std::uint64_t seed)
+    : floor_(floor), radio_(radio), dice_(seed), tracks_(robots) {
+  for (std::uint32_t robot = 0; robot < robots; ++robot) {
+    tracks_[robot].robot = robot;
+    every_s_.push_back(radio.report_every_s * (1 + kClock_sd * dice_.normal()));
+    next_s_.push_back(every_s_.back() * dice_.uniform());
+    heard_.push_back(std::clamp(radio.heard + radio.heard_sd * dice_.normal(), 0.05, 1.0));
+    talking_.push_back(dice_.uniform() * (radio.silent_s + radio.talking_s) < radio.talking_s);
+    change_s_.push_back(-(talking_.back() ? radio.talking_s : radio.silent_s) * kt_log(dice_.uniform()));
+    phase_.push_back(static_cast<std::uint32_t>(dice_.bits() >> 62));
+  }
+}
+
+void FloorReporter::see(std::uint32_t robot, double time_s, double x_mm, double y_mm) {
+  if (time_s < next_s_[robot]) return;
+  next_s_[robot] += every_s_[robot];
+  while (change_s_[robot] < time_s) {
+    talking_[robot] = !talking_[robot];
+    change_s_[robot] -= (talking_[robot] ? radio_.talking_s : radio_.silent_s) * kt_log(dice_.uniform());
+  }
+  const double chance = heard_[robot] * (talking_[robot] ? radio_.while_talking : 1);
+  const double turn = dice_.uniform() * (radio_.later[0] + radio_.later[1] + radio_.later[2] + radio_.later[3]);
+  double below = 0;
+  for (std::uint32_t later = 0; later < 4; ++later) {
+    below += radio_.later[later];
+    if (turn > below && later < 3) continue;
+    phase_[robot] += later;
+    break;
+  }
+  const double module_mm = 2 * floor_.cell_mm;
+  const int columns = static_cast<int>(floor_.width_mm / module_mm),
+            rows = static_cast<int>(floor_.height_mm / module_mm);
+  const int column = static_cast<int>(x_mm / module_mm), row = static_cast<int>(y_mm / module_mm);
+  FloorTrack& track = tracks_[robot];
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows - 1); ++r) {
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c) {
+      // Each module began with a cell of its own.
+      const auto cell =
+          static_cast<int>(phase_[robot] + Dice(static_cast<std::uint64_t>(r * columns + c)).bits() % 4) % 4;
+      const double cell_x_mm = (2 * c + (cell & 1) + 0.5) * floor_.cell_mm,
+                   cell_y_mm = (2 * r + (cell >> 1) + 0.5) * floor_.cell_mm;
+      const double dx = x_mm - cell_x_mm, dy = y_mm - cell_y_mm;
+      const double over = (std::sqrt(dx * dx + dy * dy) - radio_.range_mm) / radio_.blur_mm;
+      if (over > 30 || dice_.uniform() * (1 + kt_exp(over)) > chance) continue;
+      track.time_s.push_back(std::floor(time_s));
+      track.x_mm.push_back(cell_x_mm);
+      track.y_mm.push_back(cell_y_mm);
+    }
+  }
+}
+
+FloorRun FloorReporter::take(std::string name, double duration_s) {
+  FloorRun run{std::move(name), duration_s, {}, {}};
+  for (FloorTrack& track : tracks_) {
+    if (track.size() > 1) run.tracks.push_back(std::move(track));
+  }
+  return run;
+}
+
+FloorScene scene_of(const FloorRun& run, const Floor& floor, std::uint64_t seed) {
+  Dice dice(seed);
+  FloorScene scene{run.name, run.duration_s, {}, {}};
+  const auto within = [](double v, double end) { return std::clamp(v, kRadius_mm, end - kRadius_mm); };
+  for (const FloorTrack& track : run.tracks) {
+    double x_mm = 0, y_mm = 0;
+    // Places farther and farther from the cell, until one is free.
+    for (int attempt = 0; attempt < 10000; ++attempt) {
+      const double spread_mm = floor.cell_mm * (1 + 0.02 * attempt);
+      x_mm = within(track.x_mm.front() + spread_mm * (dice.uniform() - 0.5), floor.width_mm);
+      y_mm = within(track.y_mm.front() + spread_mm * (dice.uniform() - 0.5), floor.height_mm);
+      bool free = true;
+      for (std::size_t j = 0; j < scene.x_mm.size() && free; ++j)
+        free = std::hypot(scene.x_mm[j] - x_mm, scene.y_mm[j] - y_mm) >= 2 * kRadius_mm + 0.5;
+      if (free) break;
+    }
+    scene.x_mm.push_back(x_mm);
+    scene.y_mm.push_back(y_mm);
+  }
+  return scene;
+}
+
+FloorRun simulate(const FloorScene& scene, const Floor& floor, const proto::Model& model, const WalkTimes& times,
+                  const FloorRadio& radio, std::uint64_t seed) {
+  Dice dice(seed * 2 + 1);
+  const RunPlan plan = plan_of(scene, floor, model, seed, dice);
+  const std::unique_ptr<physics::Engine> engine = physics::make_engine(plan, PartitionId{0});
+  const std::uint32_t robots = plan.robots();
+  std::vector<FloorProgram> programs;
+  for (std::uint32_t robot = 0; robot < robots; ++robot) programs.emplace_back(times, dice.bits());
+  FloorReporter reporter(floor, radio, robots, dice.bits());
+
+  ActuationFrame actuation;
+  actuation.motor_left.assign(robots, 0);
+  actuation.motor_right.assign(robots, 0);
+  actuation.spin_up.assign(robots, 0);
+  std::vector<Motion> motion(robots, Motion::kStop);
+  BodyFrame bodies;
+  const double tick_s = plan.tick_length.seconds();
+  for (Tick now{0}; now < plan.last_tick; ++now) {
+    bodies.clear();
+    engine->emit_bodies(bodies);
+    const std::int64_t kilo_ticks = now.count() * kKiloTicks;
+    for (std::size_t i = 0; i < bodies.robot.size(); ++i) {
+      const std::uint32_t robot = bodies.robot[i];
+      const double x_mm = bodies.x_mm[i] + floor.width_mm / 2, y_mm = bodies.y_mm[i] + floor.height_mm / 2;
+      send_from_rim(floor, radio.wall_range_mm, now.count(), x_mm, y_mm, [&](double distance_mm, std::size_t part) {
+        if (dice.uniform() > radio.wall_heard * radio.rim[part]) return;
+        // The program compares readings; where they begin does not matter as long as they are positive.
+        constexpr double kStrongest = 1000;
+        programs[robot].hear_wall(kilo_ticks, kStrongest - distance_mm + radio.wall_noise * dice.normal());
+      });
+      const Motion next = programs[robot].loop(kilo_ticks);
+      actuation.spin_up[robot] = next != motion[robot] ? 1 : 0;
+      motion[robot] = next;
+      actuation.motor_left[robot] = next == Motion::kStraight || next == Motion::kLeft ? kDuty : 0;
+      actuation.motor_right[robot] = next == Motion::kStraight || next == Motion::kRight ? kDuty : 0;
+      reporter.see(robot, static_cast<double>(now.count()) * tick_s, x_mm, y_mm);
+    }
+    actuation.tick = now;
+    const ActuationFrame* const frames[] = {&actuation};
+    engine->step(now, {{}, frames, {}});
+  }
+  return reporter.take(scene.name, scene.duration_s);
+}
+
+}  // namespace kilotwin::kilogrid

@@ -1,0 +1,89 @@
+#include "clients/identify/room.hpp"
+
+#include <cmath>
+#include <set>
+
+#include "clients/identify/fit.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// One coordinate of a disc, by track, while its robot goes straight.
+struct Place {
+  double at_mm;
+  std::size_t track;
+};
+
+/// The line at the upper end of a coordinate where robots stay; infinite where there is none.
+double upper_wall(std::vector<Place> places, double noise_mm) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  constexpr std::size_t kFewest = 25, kFewestTracks = 2;
+  if (places.size() < 500) return kNone;
+  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.at_mm > b.at_mm; });
+  // Outliers lie beyond walls too.
+  const double edge = places[std::max<std::size_t>(3, places.size() / 2000)].at_mm;
+  const double width = 2 + 3 * noise_mm;
+  std::size_t at_edge = 0, before = 0;
+  double sum = 0;
+  std::set<std::size_t> tracks;
+  for (const Place& p : places) {
+    if (p.at_mm > edge + width) continue;
+    if (p.at_mm > edge - width) {
+      ++at_edge;
+      sum += p.at_mm;
+      tracks.insert(p.track);
+    } else if (p.at_mm > edge - 5 * width) {
+      ++before;
+    } else {
+      break;
+    }
+  }
+  // Of a free robot's places no strip holds many times what the strips beside it hold.
+  const bool crowded = static_cast<double>(at_edge) > 2 * (static_cast<double>(before) / 2 + 3);
+  if (at_edge < kFewest || tracks.size() < kFewestTracks || !crowded) return kNone;
+  return sum / static_cast<double>(at_edge);
+}
+
+}  // namespace
+
+Room room_of(const PreparedSet& set, const MotionModel& model) {
+  std::vector<Place> x, y;
+  const double ahead = kAxleOffset_mm - model.base.ahead_mm;
+  for (std::size_t v = 0; v < set.views().size(); ++v) {
+    const TrackView& view = set.views()[v];
+    for (const Sample& s : view.track->samples) {
+      if (view.clock.at(s.time_s).command != Motion::kStraight) continue;
+      const double heading = std::isnan(s.heading_rad) ? 0 : s.heading_rad;
+      const double by = std::isnan(s.heading_rad) ? 0 : ahead;
+      x.push_back({s.x_mm + by * std::cos(heading), v});
+      y.push_back({s.y_mm + by * std::sin(heading), v});
+    }
+  }
+  const double noise = std::sqrt(model.noise.position_mm2);
+  const auto turned = [](std::vector<Place> places) {
+    for (Place& p : places) p.at_mm = -p.at_mm;
+    return places;
+  };
+  Room room;
+  room.x_high_mm = upper_wall(x, noise);
+  room.y_high_mm = upper_wall(y, noise);
+  room.x_low_mm = -upper_wall(turned(std::move(x)), noise);
+  room.y_low_mm = -upper_wall(turned(std::move(y)), noise);
+  return room;
+}
+
+void push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm) {
+  for (std::size_t i = 0; i < x_mm.size(); ++i) {
+    for (std::size_t j = i + 1; j < x_mm.size(); ++j) {
+      const double dx = x_mm[j] - x_mm[i], dy = y_mm[j] - y_mm[i], square = dx * dx + dy * dy;
+      if (!(square < kDiscs_mm * kDiscs_mm) || square < 1e-6) continue;
+      const double distance = std::sqrt(square), half = (kDiscs_mm - distance) / 2 / distance;
+      x_mm[i] -= half * dx;
+      y_mm[i] -= half * dy;
+      x_mm[j] += half * dx;
+      y_mm[j] += half * dy;
+    }
+  }
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,40 @@
+/// Where robots touch: walls, seen by where robots come to a stop, and each other. What happens to a robot there is nobody's
+/// model of a free robot: its way is uncertain while it touches, and nothing is concluded from it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <vector>
+
+namespace kilotwin::identify {
+
+class PreparedSet;
+struct MotionModel;
+
+/// Centres of discs stay within.
+struct Room {
+  double x_low_mm = -std::numeric_limits<double>::infinity(), x_high_mm = std::numeric_limits<double>::infinity();
+  double y_low_mm = -std::numeric_limits<double>::infinity(), y_high_mm = std::numeric_limits<double>::infinity();
+
+  /// Within so much of a wall, mm.
+  [[nodiscard]] bool at_wall(double x_mm, double y_mm, double margin_mm) const {
+    return x_mm < x_low_mm + margin_mm || x_mm > x_high_mm - margin_mm || y_mm < y_low_mm + margin_mm ||
+           y_mm > y_high_mm - margin_mm;
+  }
+  [[nodiscard]] double inside_x(double x_mm) const { return std::clamp(x_mm, x_low_mm, x_high_mm); }
+  [[nodiscard]] double inside_y(double y_mm) const { return std::clamp(y_mm, y_low_mm, y_high_mm); }
+};
+
+/// Two robots whose centres are this near may touch, mm: two radii of 16.5 mm, the tracker's noise, and their ways between looks.
+inline constexpr double kTouch_mm = 40;
+inline constexpr double kDiscs_mm = 33;
+inline constexpr double kWallMargin_mm = 4;
+
+/// A side is a wall where robots that are driven stay at one line, some of them for seconds, and nobody is beyond.
+[[nodiscard]] Room room_of(const PreparedSet&, const MotionModel&);
+
+/// Pushes overlapping discs apart, half the overlap each. NaN: not there.
+void push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm);
+
+}  // namespace kilotwin::identify
