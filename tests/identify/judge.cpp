@@ -1,7 +1,7 @@
 // Judges `kilotwin identify`: plays the scenes of tests/identify/truth, has each identified, and prints the errors before and
 // after beside those of an oracle, whether causes were named, and what was found where nothing is. Ends with status 1 where
 // anything misses.
-// Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] [SCENE]...
+// Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] [SCENE|nothing:SEED]...
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -41,11 +41,11 @@ struct Arguments {
 };
 
 int usage() {
-  fmt::print(
-      stderr,
-      "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] [SCENE]...\n"
-      "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
-      fmt::join(scenario_names(), " "));
+  fmt::print(stderr,
+             "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] "
+             "[SCENE|nothing:SEED]...\n"
+             "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
+             fmt::join(scenario_names(), " "));
   return 2;
 }
 
@@ -78,6 +78,11 @@ Scene smaller(Scene scene) {
   scene.train_s *= 0.75;
   scene.test_runs = 1;
   return scene;
+}
+
+/// A scene by its name; "nothing:N" is the small one without an effect of that seed.
+Scene scene_of(const std::string& name) {
+  return name.rfind("nothing:", 0) == 0 ? nothing_to_find(std::stoull(name.substr(8))) : scenario(name);
 }
 
 std::string in_quotes(const fs::path& path) { return "'" + path.string() + "'"; }
@@ -151,7 +156,7 @@ int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   std::mutex printing;
   print_header();
   share_out(static_cast<int>(arguments.scenes.size()), arguments.jobs, [&](int i) {
-    Scene scene = scenario(arguments.scenes[static_cast<std::size_t>(i)]);
+    Scene scene = scene_of(arguments.scenes[static_cast<std::size_t>(i)]);
     if (arguments.small) scene = smaller(std::move(scene));
     const Verdict verdict =
         try_scene(arguments, scene, arguments.seed, arguments.small ? 30 : 100, folder / scene.name);
@@ -197,7 +202,7 @@ int main(int argc, char** argv) {
       if (word == "--small") {
         arguments.small = true;
       } else if (word.rfind("--", 0) != 0) {
-        scenario(word);
+        scene_of(word);
         arguments.scenes.push_back(word);
       } else if (i + 1 == argc) {
         return usage();
