@@ -17,7 +17,7 @@ static uint32_t started_at;
 
 static uint8_t is_over(void) { return kilo_ticks - started_at >= DURATION_TICKS; }
 
-static message_t *offer(void) {
+static message_t* offer(void) {
   if (is_over()) return 0;
   if (has_sent && kilo_ticks - sent_at < PAUSE_TICKS) return 0;
   return &own_id;

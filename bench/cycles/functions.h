@@ -126,13 +126,13 @@ FUNCTION(packing) {
   for (uint8_t i = 4; i < 9; i++) octets[i] = table[i];
 }
 
-#define ALL_FUNCTIONS                                                                                             \
-  MEASURE(state_machine)                                                                                          \
-  MEASURE(sum_of_octets)                                                                                          \
-  MEASURE(neighbour_table)                                                                                        \
-  MEASURE(checksum)                                                                                               \
-  MEASURE(mean_of_floats)                                                                                         \
-  MEASURE(division)                                                                                               \
-  MEASURE(products_of_32_bits) MEASURE(random_walk) MEASURE(bubble_sort) MEASURE(recursion) MEASURE(waiting_loop) \
-      MEASURE(packing)
+#define ALL_FUNCTIONS          \
+  MEASURE(state_machine)       \
+  MEASURE(sum_of_octets)       \
+  MEASURE(neighbour_table)     \
+  MEASURE(checksum)            \
+  MEASURE(mean_of_floats)      \
+  MEASURE(division)            \
+  MEASURE(products_of_32_bits) \
+  MEASURE(random_walk) MEASURE(bubble_sort) MEASURE(recursion) MEASURE(waiting_loop) MEASURE(packing)
 enum { REPETITIONS = 4 };

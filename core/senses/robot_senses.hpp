@@ -20,7 +20,7 @@ struct Readings {
   double light = 512, light_sd = 0;
   double voltage = 700, voltage_sd = 0.5;
   double temperature = 314 * (1024 / 1100.0), temperature_sd = 0;  ///< 25 degrees Celsius
-  bool charging = false;  ///< a charger's voltage is on its contacts
+  bool charging = false;                                           ///< a charger's voltage is on its contacts
 };
 
 /// Indices are those of robots within the share. Where the experiment says nothing, readings are constant.

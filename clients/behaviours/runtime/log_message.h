@@ -2,5 +2,6 @@
 #ifdef __cplusplus
 extern "C"
 #endif
-int kilotwin_print(const char* format, ...);
+    int
+    kilotwin_print(const char* format, ...);
 #define log_message(...) ((void)kilotwin_print(__VA_ARGS__), (void)kilotwin_print("\n"))

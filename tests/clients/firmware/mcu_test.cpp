@@ -15,9 +15,10 @@ namespace {
 
 constexpr OwnCycles kSecond = 8'000'000;
 constexpr Calibration kDuties{60, 61, 70, 71};
+const RangingTable kNominal{KILOTWIN_IR_HIGH, KILOTWIN_IR_LOW};
 
 Mcu make(const FlashImage& image, std::uint32_t robot = 5) {
-  return Mcu(image, make_eeprom(robot, kDuties), Random(1), robot);
+  return Mcu(image, make_eeprom(robot, kDuties, kNominal), Random(1), robot);
 }
 
 /// The light of a message that starts at a cycle.

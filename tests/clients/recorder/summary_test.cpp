@@ -68,7 +68,7 @@ TEST(Summary, HasTheFieldsOfTheContract) {
   EXPECT_EQ(json["resumed_from_tick"], 500);
   EXPECT_EQ(json["moved_mm"], (nlohmann::json{{"mean", 12.5}, {"max", 99.0}}));
   EXPECT_EQ(json["recovered_from_tick"], 400);
-  EXPECT_EQ(json.size(), 21u);
+  EXPECT_EQ(json.size(), 22u);
 }
 
 TEST(Summary, ComesBackAsItWasWritten) {

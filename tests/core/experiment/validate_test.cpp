@@ -87,7 +87,8 @@ TEST_F(Validate, OneLineForEveryMistake) {
       {"robots { count: 1023 behaviour: 'a.c' }\nstation { environment { hub { } } }",
        "e.txtpb:2:11: environment is given with 1023 robots, but ARK's messages address 10-bit ids; it takes at "
        "most 1022 robots"},
-      {kGroup + "station { environment { } }", "e.txtpb:2:11: environment has no kind; it takes hub { ... }"},
+      {kGroup + "station { environment { } }",
+       "e.txtpb:2:11: environment has no kind; it takes hub, foraging { ... }"},
       {kGroup + "robot_model { bias_left_mm_s: 1 }",
        "e.txtpb:2:1: robot is missing; state robot: ID, the robot that the entry is about"},
       {kGroup + "robot_model { robot: 2 }\nrobot_model { robot: 2 }",

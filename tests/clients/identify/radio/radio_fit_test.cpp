@@ -69,7 +69,8 @@ TEST(Scores, PreferTheModelThatMadeTheData) {
   near.set_range_mm(60);
   far.set_range_mm(110);
   const GridSet set = grid(16, 0, 40);
-  const GridSet data = simulate(set, near, 3, 1), same = simulate(set, near, 6, 50), other = simulate(set, far, 6, 50);
+  const GridSet data = simulate(set, near, 3, 1), same = simulate(set, near, 6, 50),
+                other = simulate(set, far, 6, 50);
   EXPECT_GT(log_likelihood(data, same), log_likelihood(data, other) + 1);
   const Errors errors = compare(data, same, same);
   EXPECT_NEAR(errors.sent, 0, 1);
