@@ -29,8 +29,8 @@ std::string experiment(const std::string& program, bool avr, std::uint32_t robot
   return fmt::format(
       "duration_s: {} seed: 1 arena {{ width_mm: 4000 height_mm: 4000 }} motion {{ noise: false }}\n"
       "radio {{ oscillator_sd: {} range_mm: 400 }} recording {{ messages: true }}\n"
-      "robots {{ count: {} behaviour: \"{}\" avr: {} layout {{ grid {{ pitch_mm: {} }} }} }}\n",
-      duration_s, oscillator_sd, robots, program, avr, pitch_mm);
+      "robots {{ count: {} behaviour: \"{}\" {} layout {{ grid {{ pitch_mm: {} }} }} }}\n",
+      duration_s, oscillator_sd, robots, program, avr ? "avr: true" : "loop_rate: AS_ON_ROBOT", pitch_mm);
 }
 
 int show_agreement() {

@@ -35,7 +35,11 @@ class TimelineObserver : public RunObserver {
     for (const ActuationFrame* frame : frames) {
       for (std::size_t i = 0; i < frame->led.size(); ++i) {
         const std::size_t robot = frame->first_robot + i;
-        note(timeline.motors[robot], tick, std::uint32_t{frame->motor_left[i]} << 8 | frame->motor_right[i]);
+        // A kick is shorter than a tick: whether its duties are those at a tick's end is by chance.
+        const bool kick = frame->motor_left[i] == 255 && frame->motor_right[i] == 255;
+        if (!kick) {
+          note(timeline.motors[robot], tick, std::uint32_t{frame->motor_left[i]} << 8 | frame->motor_right[i]);
+        }
         note(timeline.led[robot], tick, frame->led[i]);
       }
     }
