@@ -403,10 +403,19 @@ void Fitter::fit_base(MotionModel& model) const {
   set_.find_headings(model, threads_);
   if (!headings) find_walls(model);
   fit(model, 3);
-  if (!headings) find_walls(model);
-  fit_touching(model);
-  set_.find_centres(model, threads_);
-  fit(model, 2);
+  // Where headings are not measured, walls, centres and what touching does lean on each other.
+  constexpr int kMostRounds = 4;
+  constexpr double kSettled = 20;
+  double likelihood = -1e300;
+  for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
+    if (!headings) find_walls(model);
+    fit_touching(model);
+    set_.find_centres(model, threads_);
+    fit(model, 2);
+    const double found = log_likelihood(model);
+    if (found < likelihood + kSettled) break;
+    likelihood = found;
+  }
 }
 
 void Fitter::fit(MotionModel& model, int passes) const {
