@@ -187,7 +187,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   say_progress(0.02, "base model");
   Fitter fitter(prepared, options.threads);
   MotionModel before;
-  fitter.fit(before, 5);
+  fitter.fit_base(before);
+  if (other) other->find_centres(before, options.threads);
 
   Search found;
   found.model = before;
@@ -273,7 +274,11 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
                        {"heading_sd_rad", std::sqrt(after.noise.heading_rad2_s)},
                        {"drift_sd_mm", std::sqrt(after.noise.drift_mm2_s)},
                        {"tracker_position_sd_mm", std::sqrt(after.noise.position_mm2)},
-                       {"tracker_heading_sd_rad", std::sqrt(after.noise.heading_rad2)}};
+                       {"tracker_heading_sd_rad", std::sqrt(after.noise.heading_rad2)},
+                       {"at_walls_sd_mm", std::sqrt(after.noise.wall_mm2_s)},
+                       {"at_walls_sd_rad", std::sqrt(after.noise.wall_rad2_s)},
+                       {"at_robots_sd_mm", std::sqrt(after.noise.contact_mm2_s)},
+                       {"at_robots_sd_rad", std::sqrt(after.noise.contact_rad2_s)}};
   document["set"] = describe_set(train, test, held_out_only);
   document["steps"] = json::array();
   for (const Step& step : found.steps)

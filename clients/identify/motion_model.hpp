@@ -30,6 +30,8 @@ struct Noise {
   double drift_mm2_s = 1e-3;     ///< of the position along each axis, always
   double position_mm2 = 1;       ///< of a measured position along each axis
   double heading_rad2 = 2.5e-3;  ///< of a measured heading
+  /// What touching adds to the motion: at walls, and at other robots.
+  double wall_mm2_s = 5, wall_rad2_s = 0.01, contact_mm2_s = 60, contact_rad2_s = 0.03;
 };
 
 /// A robot's own: bias of the left and the right wheel.
