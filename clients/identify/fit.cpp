@@ -101,6 +101,19 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
   }
 }
 
+Meetings PreparedSet::meetings() const {
+  Meetings sum;
+  constexpr double kEvery_s = 1;
+  for (const TrackView& view : views_) {
+    for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s) {
+      const double nearest = view.neighbours->view(view.place, t).nearest_mm;
+      if (nearest < kDiscs_mm - 2) ++sum.within;
+      if (nearest > kTouch_mm && nearest < Meetings::kRing_mm) ++sum.near;
+    }
+  }
+  return sum;
+}
+
 void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads) {
   in_parallel(views_.size(), threads, [&](std::size_t v) {
     TrackView& view = views_[v];
@@ -202,9 +215,48 @@ void Fitter::fit_touching(MotionModel& model) const {
   }
 }
 
+void Fitter::find_shape(MotionModel& model) const {
+  const bool headings = set_.set().has_headings;
+  const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+  struct Candidate {
+    MotionModel model;
+    double log_likelihood = 0;
+    Meetings meetings;
+  };
+  std::vector<Candidate> candidates;
+  const auto add = [&](double centre_mm) {
+    Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
+    c.model.base.centre_mm = centre_mm;
+    set_.find_centres(c.model, threads_);
+    if (headings) {
+      c.model.room = room_of(set_, c.model);
+    } else {
+      find_walls(c.model);
+    }
+    c.log_likelihood = with_touching(c.model, tracks);
+    c.meetings = set_.meetings();
+  };
+  add(kAxleOffset_mm);
+  // Or the tracked point is the centre.
+  constexpr double kApart_mm = 3;
+  if (std::abs(model.base.ahead_mm - kAxleOffset_mm) > kApart_mm) add(model.base.ahead_mm);
+  const Candidate* best = &candidates.front();
+  for (const Candidate& c : candidates) {
+    // Walls tell more than robots that met, where there are walls.
+    constexpr double kSure = 50;
+    const double better = c.log_likelihood - best->log_likelihood;
+    if (better > kSure || (better > -kSure && c.meetings.share_within() < 0.5 * best->meetings.share_within()))
+      best = &c;
+  }
+  model = best->model;
+  constexpr double kUnhindered = 0.6;
+  model.contacts = best->meetings.share_within() < kUnhindered;
+  if (best != &candidates.back()) set_.find_centres(model, threads_);
+}
+
 void Fitter::find_walls(MotionModel& model) const {
   // How far the tracked point may lie beyond the disc's centre, or before it.
-  const double reach = std::abs(kAxleOffset_mm - model.base.ahead_mm);
+  const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
   struct Side {
     double Room::*wall;
     double Sample::*along;
@@ -403,6 +455,7 @@ void Fitter::fit_base(MotionModel& model) const {
   set_.find_headings(model, threads_);
   if (!headings) find_walls(model);
   fit(model, 3);
+  find_shape(model);
   // Where headings are not measured, walls, centres and what touching does lean on each other.
   constexpr int kMostRounds = 4;
   constexpr double kSettled = 20;
@@ -443,11 +496,18 @@ void Fitter::fit(MotionModel& model, int passes) const {
     Eigen::VectorXd step = information.ldlt().solve(score);
     // A step that makes things worse was too long.
     const MotionModel start = model;
-    const double before = log_likelihood(start);
+    // Of the coefficients beforehand as well.
+    const auto worth = [&](const MotionModel& trial) {
+      double value = log_likelihood(trial);
+      for (const Term& term : trial.terms)
+        value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+      return value;
+    };
+    const double before = worth(start);
     for (int halve = 0; halve < 5; ++halve, step *= 0.4) {
       model = start;
       apply(model, units, step);
-      if (log_likelihood(model) > before - 2) break;
+      if (worth(model) > before - 2) break;
       if (halve == 4) model = start;
     }
   }

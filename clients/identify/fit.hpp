@@ -10,6 +10,19 @@
 
 namespace kilotwin::identify {
 
+/// How often the nearest robot was so near that discs would overlap, and a little farther away.
+struct Meetings {
+  static constexpr double kRing_mm = 55;
+  std::size_t within = 0, near = 0;
+  /// Of what there would be within if robots did not feel each other, by areas; 0.2 where few have met.
+  [[nodiscard]] double share_within() const {
+    constexpr double kInner = (kDiscs_mm - 2) * (kDiscs_mm - 2),
+                     kOuter = kRing_mm * kRing_mm - kTouch_mm * kTouch_mm;
+    constexpr double kFew = 10;
+    return (static_cast<double>(within) + 0.2 * kFew) / (static_cast<double>(near) * kInner / kOuter + kFew);
+  }
+};
+
 /// The tracks of a set, ready to be walked along.
 class PreparedSet {
  public:
@@ -23,6 +36,7 @@ class PreparedSet {
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
   /// Looks again at where discs are, which is not where they are measured, for what robots see of each other.
   void find_centres(const MotionModel&, std::uint32_t threads);
+  [[nodiscard]] Meetings meetings() const;
   /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
   void find_headings(const MotionModel&, std::uint32_t threads);
 
@@ -53,6 +67,8 @@ class Fitter {
   void fit_noise(MotionModel&) const;
   /// What touching adds to the motion, likewise.
   void fit_touching(MotionModel&) const;
+  /// Where the centre of the disc is, which is what touches, and whether robots touch each other at all; the room.
+  void find_shape(MotionModel&) const;
   /// The room, where its walls are not seen because headings are not: walls that make the tracks most likely.
   void find_walls(MotionModel&) const;
   /// Of all that was measured on tracks that may be fitted to.

@@ -267,8 +267,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   contract["base"] = {
       {"straight_speed_mm_s", after.base.straight_mm_s}, {"turn_speed_mm_s", after.base.turn_mm_s},
       {"wheel_base_mm", after.base.wheel_base_mm},       {"tracked_point_ahead_mm", after.base.ahead_mm},
-      {"tracked_point_left_mm", after.base.left_mm},     {"bias_mean_mm_s", after.base.bias_mean_mm_s},
-      {"bias_sd_mm_s", after.base.bias_sd_mm_s}};
+      {"tracked_point_left_mm", after.base.left_mm},     {"disc_centre_ahead_mm", after.base.centre_mm},
+      {"bias_mean_mm_s", after.base.bias_mean_mm_s},     {"bias_sd_mm_s", after.base.bias_sd_mm_s}};
   contract["noise"] = {{"factor_variance_s", after.noise.factor_s},
                        {"wheel_sd_mm", std::sqrt(after.noise.wheel_mm2_s)},
                        {"heading_sd_rad", std::sqrt(after.noise.heading_rad2_s)},

@@ -187,8 +187,8 @@ class Sensitivities {
     if (!measures_) return;
     Situation at = last_;
     at.time_s = sample.time_s;
-    at.x_mm = pose[0] + kAxleOffset_mm * c;
-    at.y_mm = pose[1] + kAxleOffset_mm * s;
+    at.x_mm = pose[0] + model_.base.centre_mm * c;
+    at.y_mm = pose[1] + model_.base.centre_mm * s;
     at.heading_rad = heading;
     Eigen::Index first = kBaseColumns;
     for (const Block& block : blocks_) {

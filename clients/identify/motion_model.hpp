@@ -19,6 +19,8 @@ struct BaseParameters {
   double straight_mm_s = 10, turn_mm_s = 20, wheel_base_mm = 25;
   /// The tracked point in the body, from the reference point of the drive.
   double ahead_mm = kAxleOffset_mm, left_mm = 0;
+  /// The disc's centre, ahead of that point: where robots touch, and where effects look.
+  double centre_mm = kAxleOffset_mm;
   double bias_mean_mm_s = 0.015, bias_sd_mm_s = 1.86;
 };
 

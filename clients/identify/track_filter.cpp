@@ -17,6 +17,7 @@ constexpr double kFar = 60;
 
 TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run)
     : model_(&model), measures_(model.measures()) {
+  belief_.centre_mm = model.base.centre_mm;
   belief_.mean.tail<2>() = bias.mean_mm_s;
   belief_.covariance.bottomRightCorner<2, 2>() = bias.covariance;
   place_.robot = robot;
@@ -79,8 +80,10 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
     plain.right_mm_s = v[1];
     const Arc half = arc_of(plain, model_->base.wheel_base_mm, belief_.mean[2], h_s / 2);
     record.middle.heading_rad += half.dheading_rad;
-    record.middle.x_mm = belief_.mean[0] + half.dx_mm + kAxleOffset_mm * std::cos(record.middle.heading_rad);
-    record.middle.y_mm = belief_.mean[1] + half.dy_mm + kAxleOffset_mm * std::sin(record.middle.heading_rad);
+    record.middle.x_mm =
+        belief_.mean[0] + half.dx_mm + model_->base.centre_mm * std::cos(record.middle.heading_rad);
+    record.middle.y_mm =
+        belief_.mean[1] + half.dy_mm + model_->base.centre_mm * std::sin(record.middle.heading_rad);
   }
   // A robot at rest is pushed by others as well.
   record.at_robot = model_->contacts && near.nearest_mm < kTouch_mm;
@@ -108,9 +111,9 @@ void TrackFilter::hold_inside() {
 void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards) {
   if (std::isinf(wall_mm)) return;
   const double c = std::cos(belief_.mean[2]), s = std::sin(belief_.mean[2]);
-  const double by_heading = axis == 0 ? -kAxleOffset_mm * s : kAxleOffset_mm * c;
+  const double by_heading = axis == 0 ? -model_->base.centre_mm * s : model_->base.centre_mm * c;
   StateCovariance& p = belief_.covariance;
-  const double beyond = outwards * (belief_.mean[axis] + kAxleOffset_mm * (axis == 0 ? c : s) - wall_mm);
+  const double beyond = outwards * (belief_.mean[axis] + model_->base.centre_mm * (axis == 0 ? c : s) - wall_mm);
   const double variance = p(axis, axis) + 2 * by_heading * p(axis, 2) + by_heading * by_heading * p(2, 2);
   const double sd = std::sqrt(std::max(variance, 1e-6));
   constexpr double kNever = 4;  // standard deviations

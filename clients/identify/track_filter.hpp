@@ -16,10 +16,11 @@ using StateCovariance = Eigen::Matrix<double, 5, 5>;
 struct Belief {
   State mean = State::Zero();
   StateCovariance covariance = StateCovariance::Zero();
+  double centre_mm = kAxleOffset_mm;  ///< as in BaseParameters
 
   /// Of the disc's centre.
-  [[nodiscard]] double centre_x_mm() const { return mean[0] + kAxleOffset_mm * std::cos(mean[2]); }
-  [[nodiscard]] double centre_y_mm() const { return mean[1] + kAxleOffset_mm * std::sin(mean[2]); }
+  [[nodiscard]] double centre_x_mm() const { return mean[0] + centre_mm * std::cos(mean[2]); }
+  [[nodiscard]] double centre_y_mm() const { return mean[1] + centre_mm * std::sin(mean[2]); }
 };
 
 /// Sub-steps are no longer than this, s.
