@@ -456,8 +456,21 @@ void Fitter::fit_base(MotionModel& model) const {
   if (!headings) find_walls(model);
   fit(model, 3);
   find_shape(model);
-  fit_touching(model);
-  fit(model, 2);
+  // Where headings are not measured, walls, centres and what touching does lean on each other.
+  constexpr int kMostRounds = 4;
+  constexpr double kSettled = 20;
+  double likelihood = -1e300;
+  for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
+    if (round > 0) {
+      find_walls(model);
+      set_.find_centres(model, threads_);
+    }
+    fit_touching(model);
+    fit(model, 2);
+    const double found = log_likelihood(model);
+    if (found < likelihood + kSettled) break;
+    likelihood = found;
+  }
 }
 
 void Fitter::fit(MotionModel& model, int passes) const {

@@ -85,10 +85,10 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
     record.middle.y_mm =
         belief_.mean[1] + half.dy_mm + model_->base.centre_mm * std::sin(record.middle.heading_rad);
   }
-  if (commands.driven()) {
-    record.at_robot = model_->contacts && near.nearest_mm < kTouch_mm;
-    record.at_wall = model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm);
-  }
+  // A robot at rest is pushed by others as well.
+  record.at_robot = model_->contacts && near.nearest_mm < kTouch_mm;
+  record.at_wall =
+      commands.driven() && model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm);
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
   spread(record);
@@ -245,10 +245,12 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   }
   out.log_likelihood = -0.5 * (std::log(s.determinant()) + out.size * std::log(factor) + out.distance2 / factor);
   if (outliers_ >= kLostAfter) {
-    // Wherever it was, it is here now; which way it points is unknown unless it is measured.
+    // Wherever it was, it is here now; which way it points is less known than before, unless it is measured.
     out.lost = true;
+    constexpr double kLeast_rad = 0.4, kMost_rad = 1.8;
+    const double known = std::clamp(3 * std::sqrt(belief_.covariance(2, 2)), kLeast_rad, kMost_rad);
     start(sample, at, out.size == 3 ? sample.heading_rad : belief_.mean[2],
-          out.size == 3 ? std::sqrt(noise.heading_rad2) : 1.8);
+          out.size == 3 ? std::sqrt(noise.heading_rad2) : known);
     return out;
   }
   s *= factor;
