@@ -28,25 +28,57 @@ bool face(const ContactBatch& batch, const std::uint32_t* there, const double* x
   return -largest(-least) > 0;
 }
 
-template <bool kWithOverlaps>
+/// How many contacts batches have for which the loop below is unrolled, so that its values stay in registers.
+constexpr std::size_t kUnrolled = 4;
+
+/// What a pass keeps of each contact of a batch: in registers, or in memory where there are many.
+template <std::size_t kCount> struct ContactValues {
+  ContactValues(const ContactLanes*, double*) {}
+  Lanes normal_x[kCount], normal_y[kCount], room_mm[kCount];
+
+  void set_normal(std::size_t p, Lanes x, Lanes y) {
+    normal_x[p] = x;
+    normal_y[p] = y;
+  }
+  void set_room(std::size_t p, Lanes v) { room_mm[p] = v; }
+  [[nodiscard]] Lanes x(std::size_t p) const { return normal_x[p]; }
+  [[nodiscard]] Lanes y(std::size_t p) const { return normal_y[p]; }
+  [[nodiscard]] Lanes room(std::size_t p) const { return room_mm[p]; }
+};
+template <> struct ContactValues<0> {
+  const ContactLanes* contacts;
+  double* room_mm;
+
+  void set_normal(std::size_t, Lanes, Lanes) {}
+  void set_room(std::size_t p, Lanes v) { store(v, room_mm + p * kLanes); }
+  [[nodiscard]] Lanes x(std::size_t p) const { return load(contacts[p].normal_x); }
+  [[nodiscard]] Lanes y(std::size_t p) const { return load(contacts[p].normal_y); }
+  [[nodiscard]] Lanes room(std::size_t p) const { return load(room_mm + p * kLanes); }
+};
+
+/// `kCount`: how many contacts the batch has, if it is not special; 0: as many as it says.
+template <bool kWithOverlaps, std::size_t kCount>
 inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* contacts, const double* motion,
                  double* after, double* room_mm) {
-  const std::size_t count = batch.contacts;
+  const std::size_t count = kCount > 0 ? kCount : batch.contacts;
   const Lanes zero = all(0), a_half = all(0.5), separation_mm = all(limits.separation_mm);
   const Lanes touch_mm = all(limits.touch_mm), ease = all(kEase), rub_gain = all(kRubGain);
-  const Lanes disc_gain = all(kGain), disc_friction = all(limits.friction);
-  const bool special = batch.special;
+  const Lanes disc_gain = all(kGain), disc_friction = all(limits.friction), tolerance_mm = all(kLimitTolerance_mm);
+  const bool special = kCount == 0 && batch.special;
   const Lanes shift_x = load(batch.shift_x_mm), shift_y = load(batch.shift_y_mm);
   const Lanes swing_x = load(batch.swing_x_mm), swing_y = load(batch.swing_y_mm);
   const Lanes drive_x = load(batch.drive_x_mm), drive_y = load(batch.drive_y_mm);
   const Lanes old_slip_x = load(batch.slip_x_mm), old_slip_y = load(batch.slip_y_mm);
 
   // Forces of the contacts; the sum in ascending order.
+  ContactValues<kCount> of{contacts, room_mm};
   Lanes slip_x = old_slip_x, slip_y = old_slip_y, apart_x = zero, apart_y = zero, deepest = zero;
+#pragma GCC unroll 4
   for (std::size_t p = 0; p < count; ++p) {
     ContactLanes& c = contacts[p];
     const Columns other = rows(motion, c.other);
     const Lanes normal_x = load(c.normal_x), normal_y = load(c.normal_y);
+    of.set_normal(p, normal_x, normal_y);
     const Lanes gap = load(c.gap_mm) + (normal_x * (other.a - shift_x) + normal_y * (other.b - shift_y));
     const Lanes closing = normal_x * (swing_x - other.c) + normal_y * (swing_y - other.d);
     const Lanes gain = special ? load(c.gain) : disc_gain, friction = special ? load(c.friction) : disc_friction;
@@ -65,24 +97,20 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
       const Lanes apart = smaller(a_half * overlap, separation_mm);
       apart_x = apart_x - apart * normal_x;
       apart_y = apart_y - apart * normal_y;
-      store(gap, room_mm + p * kLanes);
+      of.set_room(p, gap);
     } else {
-      store(larger(a_half * gap, zero), room_mm + p * kLanes);
+      of.set_room(p, larger(a_half * gap, zero));
     }
   }
   // The ground takes off as much of the slip as its grip allows.
-  const Lanes grip = load(batch.grip_mm), square_slip = slip_x * slip_x + slip_y * slip_y;
-  if (largest(square_slip) > 0) {
-    const Lanes slip = root(square_slip), keep = chosen(slip > grip, (slip - grip) / slip, zero);
-    slip_x = slip_x * keep;
-    slip_y = slip_y * keep;
-  }
+  const Lanes grip = load(batch.grip_mm), slip = root(slip_x * slip_x + slip_y * slip_y);
+  const Lanes keep = chosen(slip > grip, (slip - grip) / slip, zero);
+  slip_x = slip_x * keep;
+  slip_y = slip_y * keep;
   Lanes x = drive_x + slip_x, y = drive_y + slip_y;
   if constexpr (kWithOverlaps) {
-    for (std::size_t p = 0; p < count; ++p) {
-      const Lanes gap = load(room_mm + p * kLanes);
-      store(larger(a_half * (gap + a_half * deepest), zero), room_mm + p * kLanes);
-    }
+#pragma GCC unroll 4
+    for (std::size_t p = 0; p < count; ++p) of.set_room(p, larger(a_half * (of.room(p) + a_half * deepest), zero));
   }
 
   Lanes low_x = zero, low_y = zero, high_x = zero, high_y = zero;
@@ -112,52 +140,45 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
     y = y + apart_y;
   }
   const Lanes square = x * x + y * y, stride = all(limits.stride_mm), stride_square = stride * stride;
-  if (largest(square) > limits.stride_mm * limits.stride_mm) {
+  if (any_above(square, stride_square)) {
     const Lanes shortening = chosen(square > stride_square, stride / root(square), all(1));
     x = x * shortening;
     y = y * shortening;
   }
 
-  // Takes off what is most beyond a limit, and again; what is beyond another limit then scales down all.
+  // Takes off what is most beyond a limit, and again; what is beyond another limit then scales down all. Without branches, so
+  // that the processor works on several batches at a time.
   const auto hold_at_walls = [&] {
     if (!batch.near_wall) return;
     x = larger(smaller(x, high_x), low_x);
     y = larger(smaller(y, high_y), low_y);
   };
-  const auto along = [&](std::size_t p) { return load(contacts[p].normal_x) * x + load(contacts[p].normal_y) * y; };
-  const auto room = [&](std::size_t p) { return load(room_mm + p * kLanes); };
+  const auto along = [&](std::size_t p) { return of.x(p) * x + of.y(p) * y; };
   hold_at_walls();
-  Lanes excess = zero;
   for (int round = 0; round < kLimitRounds; ++round) {
-    Lanes normal_x = zero, normal_y = zero;
-    excess = zero;
+    Lanes normal_x = zero, normal_y = zero, excess = zero;
+#pragma GCC unroll 4
     for (std::size_t p = 0; p < count; ++p) {
-      const Lanes beyond = along(p) - room(p);
+      const Lanes beyond = along(p) - of.room(p);
       const auto worse = beyond > excess;
       excess = larger(excess, beyond);
-      normal_x = chosen(worse, load(contacts[p].normal_x), normal_x);
-      normal_y = chosen(worse, load(contacts[p].normal_y), normal_y);
+      normal_x = chosen(worse, of.x(p), normal_x);
+      normal_y = chosen(worse, of.y(p), normal_y);
     }
-    if (!(largest(excess) > kLimitTolerance_mm)) break;
-    excess = chosen(excess > all(kLimitTolerance_mm), excess, zero);
+    excess = chosen(excess > tolerance_mm, excess, zero);
     x = x - excess * normal_x;
     y = y - excess * normal_y;
     hold_at_walls();
   }
-  if (largest(excess) > kLimitTolerance_mm) {
-    excess = zero;
-    for (std::size_t p = 0; p < count; ++p) excess = larger(excess, along(p) - room(p));
+  Lanes scale = all(1);
+#pragma GCC unroll 4
+  for (std::size_t p = 0; p < count; ++p) {
+    const Lanes way = along(p), limit = of.room(p);
+    const auto missed = (way > limit + tolerance_mm) & (scale * way > limit);
+    scale = chosen(missed, limit / way, scale);
   }
-  if (largest(excess) > kLimitTolerance_mm) {
-    Lanes scale = all(1);
-    for (std::size_t p = 0; p < count; ++p) {
-      const Lanes way = along(p), limit = room(p);
-      const auto missed = (way > limit + all(kLimitTolerance_mm)) & (scale * way > limit);
-      scale = chosen(missed, limit / way, scale);
-    }
-    x = scale * x;
-    y = scale * y;
-  }
+  x = scale * x;
+  y = scale * y;
 
   const Lanes cos_turn = load(batch.cos_turn), sin_turn = load(batch.sin_turn);
   const Columns next = {shift_x + x, shift_y + y, (velocity_x + velocity_x) - (drive_x + old_slip_x),
@@ -173,15 +194,27 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
   store(sin_turn * drive_x + cos_turn * drive_y, batch.drive_y_mm);
 }
 
+template <bool kWithOverlaps>
+void pass_over(const PassLimits& limits, std::uint32_t step, ContactBatch* batches, std::size_t count,
+               ContactLanes* contacts, const double* now, double* after, double* room_mm) {
+  for (std::size_t b = 0; b < count; ++b) {
+    ContactBatch& batch = batches[b];
+    if (step >= batch.passes) continue;
+    ContactLanes* const own = contacts + batch.first_contact;
+    double* const to = after + b * kLanes * 4;
+    switch (batch.special ? 0 : batch.contacts) {
+      case 1: move<kWithOverlaps, 1>(limits, batch, own, now, to, room_mm); break;
+      case 2: move<kWithOverlaps, 2>(limits, batch, own, now, to, room_mm); break;
+      case 3: move<kWithOverlaps, 3>(limits, batch, own, now, to, room_mm); break;
+      case kUnrolled: move<kWithOverlaps, kUnrolled>(limits, batch, own, now, to, room_mm); break;
+      default: move<kWithOverlaps, 0>(limits, batch, own, now, to, room_mm);
+    }
+  }
+}
+
 void pass(const PassLimits& limits, std::uint32_t step, bool overlap, ContactBatch* batches, std::size_t count,
           ContactLanes* contacts, const double* now, double* after, double* room_mm) {
-  for (std::size_t b = 0; b < count; ++b) {
-    if (step >= batches[b].passes) continue;
-    ContactLanes* const own = contacts + batches[b].first_contact;
-    double* const to = after + b * kLanes * 4;
-    overlap ? move<true>(limits, batches[b], own, now, to, room_mm)
-            : move<false>(limits, batches[b], own, now, to, room_mm);
-  }
+  (overlap ? pass_over<true> : pass_over<false>)(limits, step, batches, count, contacts, now, after, room_mm);
 }
 
 }  // namespace

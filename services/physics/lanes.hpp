@@ -40,7 +40,15 @@ inline Two root(Two v) { return _mm_sqrt_pd(v); }
 inline Two root(Two v) { return Two{__builtin_sqrt(v[0]), __builtin_sqrt(v[1])}; }
 #endif
 
+#if defined(__SSE2__)
+/// Whether v > w in any lane.
+inline bool any_above(Two v, Two w) { return _mm_movemask_pd(_mm_cmpgt_pd(v, w)) != 0; }
+#else
+inline bool any_above(Two v, Two w) { return v[0] > w[0] || v[1] > w[1]; }
+#endif
+
 #if defined(__AVX2__)
+inline bool any_above(Four v, Four w) { return _mm256_movemask_pd(_mm256_cmp_pd(v, w, _CMP_GT_OQ)) != 0; }
 inline Four larger(Four v, Four w) { return v > w ? v : w; }
 inline Four smaller(Four v, Four w) { return v < w ? v : w; }
 template <class Mask> inline Four chosen(Mask m, Four v, Four otherwise) { return m ? v : otherwise; }
@@ -51,6 +59,7 @@ inline double largest(Four v) {
 #endif
 
 #if defined(__AVX512F__)
+inline bool any_above(Lanes v, Lanes w) { return _mm512_cmp_pd_mask(v, w, _CMP_GT_OQ) != 0; }
 inline Lanes larger(Lanes v, Lanes w) { return v > w ? v : w; }
 inline Lanes smaller(Lanes v, Lanes w) { return v < w ? v : w; }
 template <class Mask> inline Lanes chosen(Mask m, Lanes v, Lanes otherwise) { return m ? v : otherwise; }
@@ -75,6 +84,9 @@ template <class Mask, class T> inline Twice<T> chosen(Twice<Mask> m, Twice<T> v,
 template <class T> inline Twice<T> larger(Twice<T> v, Twice<T> w) { return {larger(v.a, w.a), larger(v.b, w.b)}; }
 template <class T> inline Twice<T> smaller(Twice<T> v, Twice<T> w) {
   return {smaller(v.a, w.a), smaller(v.b, w.b)};
+}
+template <class T> inline bool any_above(Twice<T> v, Twice<T> w) {
+  return any_above(v.a, w.a) || any_above(v.b, w.b);
 }
 template <class T> inline Twice<T> root(Twice<T> v) { return {root(v.a), root(v.b)}; }
 template <class T> inline double largest(Twice<T> v) { return largest(larger(v.a, v.b)); }
@@ -131,25 +143,49 @@ inline void put_four_rows(Four a, Four b, Four c, Four d, double* table) {
 }
 
 #if defined(__AVX512F__)
-inline Lanes joined(Four v, Four w) { return __builtin_shufflevector(v, w, 0, 1, 2, 3, 4, 5, 6, 7); }
-inline Four lower(Lanes v) { return __builtin_shufflevector(v, v, 0, 1, 2, 3); }
-inline Four upper(Lanes v) { return __builtin_shufflevector(v, v, 4, 5, 6, 7); }
-#else
-inline Lanes joined(Four v, Four w) { return {v, w}; }
-inline Four lower(const Lanes& v) { return v.a; }
-inline Four upper(const Lanes& v) { return v.b; }
-#endif
-
 /// Rows of four of a table, by their numbers.
 inline Columns rows(const double* table, const std::uint32_t* at) {
-  const FourColumns low = four_rows(table, at), high = four_rows(table, at + 4);
-  return {joined(low.a, high.a), joined(low.b, high.b), joined(low.c, high.c), joined(low.d, high.d)};
+  const auto pair = [&](std::size_t r, std::size_t s) {
+    return Lanes(__builtin_shufflevector(loaded<Four>(table + 4 * std::size_t{at[r]}),
+                                         loaded<Four>(table + 4 * std::size_t{at[s]}), 0, 1, 2, 3, 4, 5, 6, 7));
+  };
+  const Lanes r02 = pair(0, 2), r13 = pair(1, 3), r46 = pair(4, 6), r57 = pair(5, 7);
+  const Lanes ac03 = __builtin_shufflevector(r02, r13, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Lanes bd03 = __builtin_shufflevector(r02, r13, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Lanes ac47 = __builtin_shufflevector(r46, r57, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Lanes bd47 = __builtin_shufflevector(r46, r57, 1, 9, 3, 11, 5, 13, 7, 15);
+  return {__builtin_shufflevector(ac03, ac47, 0, 1, 4, 5, 8, 9, 12, 13),
+          __builtin_shufflevector(bd03, bd47, 0, 1, 4, 5, 8, 9, 12, 13),
+          __builtin_shufflevector(ac03, ac47, 2, 3, 6, 7, 10, 11, 14, 15),
+          __builtin_shufflevector(bd03, bd47, 2, 3, 6, 7, 10, 11, 14, 15)};
 }
 /// Eight rows of four, one after the other.
 inline void put_rows(const Columns& v, double* table) {
-  put_four_rows(lower(v.a), lower(v.b), lower(v.c), lower(v.d), table);
-  put_four_rows(upper(v.a), upper(v.b), upper(v.c), upper(v.d), table + 16);
+  const Lanes ab_even = __builtin_shufflevector(v.a, v.b, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Lanes ab_odd = __builtin_shufflevector(v.a, v.b, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Lanes cd_even = __builtin_shufflevector(v.c, v.d, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Lanes cd_odd = __builtin_shufflevector(v.c, v.d, 1, 9, 3, 11, 5, 13, 7, 15);
+  const auto put_two = [table](Lanes two, std::size_t r, std::size_t s) {
+    put(Four(__builtin_shufflevector(two, two, 0, 1, 2, 3)), table + 4 * r);
+    put(Four(__builtin_shufflevector(two, two, 4, 5, 6, 7)), table + 4 * s);
+  };
+  put_two(__builtin_shufflevector(ab_even, cd_even, 0, 1, 8, 9, 2, 3, 10, 11), 0, 2);
+  put_two(__builtin_shufflevector(ab_even, cd_even, 4, 5, 12, 13, 6, 7, 14, 15), 4, 6);
+  put_two(__builtin_shufflevector(ab_odd, cd_odd, 0, 1, 8, 9, 2, 3, 10, 11), 1, 3);
+  put_two(__builtin_shufflevector(ab_odd, cd_odd, 4, 5, 12, 13, 6, 7, 14, 15), 5, 7);
 }
+#else
+/// Rows of four of a table, by their numbers.
+inline Columns rows(const double* table, const std::uint32_t* at) {
+  const FourColumns low = four_rows(table, at), high = four_rows(table, at + 4);
+  return {{low.a, high.a}, {low.b, high.b}, {low.c, high.c}, {low.d, high.d}};
+}
+/// Eight rows of four, one after the other.
+inline void put_rows(const Columns& v, double* table) {
+  put_four_rows(v.a.a, v.b.a, v.c.a, v.d.a, table);
+  put_four_rows(v.a.b, v.b.b, v.c.b, v.d.b, table + 16);
+}
+#endif
 
 #else
 
