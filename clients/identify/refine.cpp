@@ -137,7 +137,8 @@ Beside beside(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, 
   own.diagonal() += prior(nuisance);
   const Eigen::MatrixXd cross = information(nuisance, columns);
   const Eigen::MatrixXd by = own.ldlt().solve(cross);
-  return {information(columns, columns) - cross.transpose() * by, at_zero(columns) - by.transpose() * at_zero(nuisance)};
+  return {information(columns, columns) - cross.transpose() * by,
+          at_zero(columns) - by.transpose() * at_zero(nuisance)};
 }
 
 /// Linearises with all that a model has and with more blocks, and looks at the term's own columns, or at the new ones with
@@ -206,7 +207,8 @@ void prune(Term& term, const Eigen::VectorXd& information) {
   }
   if (blocks.empty()) return;
   term.blocks = std::move(blocks);
-  term.coefficients = Eigen::Map<Eigen::VectorXd>(coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
+  term.coefficients =
+      Eigen::Map<Eigen::VectorXd>(coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
   term.precision = Eigen::Map<Eigen::VectorXd>(precision.data(), static_cast<Eigen::Index>(precision.size()));
 }
 
@@ -228,7 +230,8 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
                          const std::vector<ColumnGroup>& groups, std::vector<Smoothness>& smoothness,
                          Eigen::VectorXd& sd) {
   const auto fill = [&](std::size_t g, const Smoothness& by, Eigen::VectorXd& to) {
-    for (std::size_t i = 0; i < groups[g].columns.size(); ++i) to[groups[g].columns[i]] = by.sd(groups[g].roughness[i]);
+    for (std::size_t i = 0; i < groups[g].columns.size(); ++i)
+      to[groups[g].columns[i]] = by.sd(groups[g].roughness[i]);
   };
   const bool anew = smoothness.size() != groups.size();
   sd = Eigen::VectorXd::Zero(score.size());
