@@ -463,9 +463,9 @@ void Fitter::fit_base(MotionModel& model) const {
   constexpr double kSettled = 20;
   double likelihood = -1e300;
   for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
-    find_walls(model);
+    if (headings || round > 0) find_walls(model);
+    if (round > 0) set_.find_centres(model, threads_);
     fit_touching(model);
-    set_.find_centres(model, threads_);
     fit(model, 2);
     const double found = log_likelihood(model);
     if (found < likelihood + kSettled) break;
