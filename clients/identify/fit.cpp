@@ -266,6 +266,8 @@ void Fitter::find_walls(MotionModel& model) const {
       Side{&Room::x_high_mm, &Sample::x_mm, 1}, Side{&Room::x_low_mm, &Sample::x_mm, -1},
       Side{&Room::y_high_mm, &Sample::y_mm, 1}, Side{&Room::y_low_mm, &Sample::y_mm, -1}};
   for (const Side& side : sides) {
+    // Where headings are measured, discs that stay at one line have shown most walls already.
+    if (set_.set().has_headings && std::isfinite(model.room.*side.wall)) continue;
     std::vector<double> places;
     for (const TrackView& view : set_.views())
       for (const Sample& s : view.track->samples) places.push_back(side.sign * s.*side.along);
@@ -461,10 +463,8 @@ void Fitter::fit_base(MotionModel& model) const {
   constexpr double kSettled = 20;
   double likelihood = -1e300;
   for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
-    if (round > 0) {
-      find_walls(model);
-      set_.find_centres(model, threads_);
-    }
+    if (headings || round > 0) find_walls(model);
+    if (round > 0) set_.find_centres(model, threads_);
     fit_touching(model);
     fit(model, 2);
     const double found = log_likelihood(model);
@@ -477,7 +477,12 @@ void Fitter::fit(MotionModel& model, int passes) const {
   const std::vector<Block> blocks = blocks_of(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
-    if (set_.set().has_headings) model.room = room_of(set_, model);
+    if (set_.set().has_headings) {
+      const Room known = model.room;
+      model.room = room_of(set_, model);
+      for (double Room::*const side : {&Room::x_low_mm, &Room::x_high_mm, &Room::y_low_mm, &Room::y_high_mm})
+        if (std::isinf(model.room.*side)) model.room.*side = known.*side;
+    }
     // What was noise to a model without its new terms is not, once they have their size.
     if (pass != 0 || passes == 1) fit_noise(model);
     const std::vector<Unit> units = linearise(model, set_.units(), blocks, {100, threads_});
@@ -501,8 +506,7 @@ void Fitter::fit(MotionModel& model, int passes) const {
     // Of the coefficients beforehand as well.
     const auto worth = [&](const MotionModel& trial) {
       double value = log_likelihood(trial);
-      for (const Term& term : trial.terms)
-        value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+      for (const Term& term : trial.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
       return value;
     };
     const double before = worth(start);

@@ -122,66 +122,95 @@ std::vector<ColumnGroup> groups_of(const std::vector<Block>& blocks) {
   return groups;
 }
 
-/// Information and score of some columns beside all others, the score as it would be if their coefficients were 0.
+/// All that a model has, and more blocks after it, linearised about the model.
+struct Linear {
+  std::vector<Unit> units;
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;              ///< with the prior of what the model has
+  Eigen::VectorXd prior;              ///< precision of the columns of the model
+  Eigen::Index first = 0, count = 0;  ///< the columns of the term that is looked at
+  Eigen::Index own = 0;               ///< columns of the model; those of the other blocks come after them
+};
+
+Linear linear(const Fitter& fitter, const MotionModel& model, std::size_t term, const std::vector<Block>& more) {
+  std::vector<Block> blocks = blocks_of(model);
+  blocks.insert(blocks.end(), more.begin(), more.end());
+  Linear out;
+  out.units = linearise(model, fitter.set().units(), blocks, {100, fitter.threads(), static_cast<int>(term)});
+  const Eigen::Index all = out.units.front().information.rows();
+  out.information = Eigen::MatrixXd::Zero(all, all);
+  out.score = Eigen::VectorXd::Zero(all);
+  for (const Unit& unit : out.units) {
+    out.information += unit.information;
+    out.score += unit.score;
+  }
+  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
+  fitter.add_base_prior(model, base, out.score);
+  out.prior = base.diagonal();
+  out.own = kBaseColumns;
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const Term& own = model.terms[t];
+    const Eigen::Index n = own.coefficients.size();
+    if (t == term) {
+      out.first = out.own;
+      out.count = n;
+    } else {
+      out.prior.segment(out.own, n) = own.precision;
+      out.score.segment(out.own, n) -= own.precision.cwiseProduct(own.coefficients);
+    }
+    out.own += n;
+  }
+  return out;
+}
+
+/// Information and score of some columns beside all others, the score as it would be if the term's coefficients were 0.
 struct Beside {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
 };
 
-/// `first..first + count` are looked at; `taken_out` are coefficients that the model has now and that are put to 0.
-Beside beside(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, const Eigen::VectorXd& prior,
-              const std::vector<Eigen::Index>& columns, const std::vector<Eigen::Index>& nuisance,
-              const Eigen::VectorXd& taken_out) {
-  const Eigen::VectorXd at_zero = score + information * taken_out;
-  Eigen::MatrixXd own = information(nuisance, nuisance);
-  own.diagonal() += prior(nuisance);
-  const Eigen::MatrixXd cross = information(nuisance, columns);
+/// Columns of the model but for the term's.
+std::vector<Eigen::Index> others_of(const Linear& l) {
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index i = 0; i < l.own; ++i)
+    if (i < l.first || i >= l.first + l.count) others.push_back(i);
+  return others;
+}
+
+/// The score where the term's coefficients were 0.
+Eigen::VectorXd score_without(const Linear& l, const Eigen::VectorXd& coefficients) {
+  return l.score + l.information.middleCols(l.first, l.count) * coefficients;
+}
+
+Beside beside(const Linear& l, const Eigen::VectorXd& at_zero, const std::vector<Eigen::Index>& columns) {
+  const std::vector<Eigen::Index> others = others_of(l);
+  Eigen::MatrixXd own = l.information(others, others);
+  own.diagonal() += l.prior(others);
+  const Eigen::MatrixXd cross = l.information(others, columns);
   const Eigen::MatrixXd by = own.ldlt().solve(cross);
-  return {information(columns, columns) - cross.transpose() * by, at_zero(columns) - by.transpose() * at_zero(nuisance)};
+  return {l.information(columns, columns) - cross.transpose() * by,
+          at_zero(columns) - by.transpose() * at_zero(others)};
 }
 
-/// Linearises with all that a model has and with more blocks, and looks at the term's own columns, or at the new ones with
-/// the term's taken out.
-Beside look(const Fitter& fitter, const MotionModel& model, std::size_t term, const std::vector<Block>& instead) {
-  std::vector<Block> blocks = blocks_of(model);
-  blocks.insert(blocks.end(), instead.begin(), instead.end());
-  const std::vector<Unit> units = linearise(model, fitter.set().units(), blocks, {100, fitter.threads()});
-  const Eigen::Index all = units.front().information.rows();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
-  Eigen::VectorXd score = Eigen::VectorXd::Zero(all);
-  for (const Unit& unit : units) {
-    information += unit.information;
-    score += unit.score;
-  }
-  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
-  fitter.add_base_prior(model, base, score);
-  Eigen::VectorXd prior = base.diagonal(), taken_out = Eigen::VectorXd::Zero(all);
-  std::vector<Eigen::Index> columns, nuisance;
-  for (Eigen::Index i = 0; i < kBaseColumns; ++i) nuisance.push_back(i);
-  Eigen::Index first = kBaseColumns;
-  for (std::size_t t = 0; t < model.terms.size(); ++t) {
-    const Term& own = model.terms[t];
-    const Eigen::Index n = own.coefficients.size();
-    if (t == term) {
-      taken_out.segment(first, n) = own.coefficients;
-      if (instead.empty())
-        for (Eigen::Index i = 0; i < n; ++i) columns.push_back(first + i);
-    } else {
-      prior.segment(first, n) = own.precision;
-      score.segment(first, n) -= own.precision.cwiseProduct(own.coefficients);
-      for (Eigen::Index i = 0; i < n; ++i) nuisance.push_back(first + i);
-    }
-    first += n;
-  }
-  if (!instead.empty())
-    for (Eigen::Index i = first; i < all; ++i) columns.push_back(i);
-  return beside(information, score, prior, columns, nuisance, taken_out);
-}
-
-Eigen::VectorXd solved(const Beside& data, const Eigen::VectorXd& sd) {
-  const Eigen::MatrixXd scaled = sd.asDiagonal() * data.information * sd.asDiagonal();
-  const Eigen::MatrixXd own = scaled + Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
-  return sd.asDiagonal() * own.llt().solve(sd.cwiseProduct(data.score));
+/// Puts the new blocks in place of the term's: all moves with them as the linearised data have it.
+void exchange(MotionModel& model, std::size_t place, const Linear& l, const std::vector<Block>& blocks,
+              const Eigen::VectorXd& at_zero, const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd) {
+  Term& term = model.terms[place];
+  std::vector<Eigen::Index> moved = others_of(l);
+  moved.insert(moved.end(), columns.begin(), columns.end());
+  Eigen::MatrixXd own = l.information(moved, moved);
+  Eigen::VectorXd precision = Eigen::VectorXd::Zero(l.information.rows());
+  precision.head(l.own) = l.prior.head(l.own);
+  precision(columns) = sd.array().square().inverse();
+  own.diagonal() += precision(moved);
+  const Eigen::VectorXd part = own.ldlt().solve(Eigen::VectorXd(at_zero(moved)));
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(l.information.rows());
+  for (std::size_t i = 0; i < moved.size(); ++i) step[moved[i]] = part[static_cast<Eigen::Index>(i)];
+  step.segment(l.first, l.count) = -term.coefficients;
+  Fitter::apply(model, l.units, step);
+  term.blocks = blocks;
+  term.coefficients = step(columns);
+  term.precision = precision(columns);
 }
 
 /// Leaves out the columns that cannot matter.
@@ -206,7 +235,8 @@ void prune(Term& term, const Eigen::VectorXd& information) {
   }
   if (blocks.empty()) return;
   term.blocks = std::move(blocks);
-  term.coefficients = Eigen::Map<Eigen::VectorXd>(coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
+  term.coefficients =
+      Eigen::Map<Eigen::VectorXd>(coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
   term.precision = Eigen::Map<Eigen::VectorXd>(precision.data(), static_cast<Eigen::Index>(precision.size()));
 }
 
@@ -228,7 +258,8 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
                          const std::vector<ColumnGroup>& groups, std::vector<Smoothness>& smoothness,
                          Eigen::VectorXd& sd) {
   const auto fill = [&](std::size_t g, const Smoothness& by, Eigen::VectorXd& to) {
-    for (std::size_t i = 0; i < groups[g].columns.size(); ++i) to[groups[g].columns[i]] = by.sd(groups[g].roughness[i]);
+    for (std::size_t i = 0; i < groups[g].columns.size(); ++i)
+      to[groups[g].columns[i]] = by.sd(groups[g].roughness[i]);
   };
   const bool anew = smoothness.size() != groups.size();
   sd = Eigen::VectorXd::Zero(score.size());
@@ -295,19 +326,24 @@ void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const std::vector<ColumnGroup> groups = groups_of(rich);
   std::vector<Smoothness> smoothness;
   Eigen::VectorXd sd;
-  double likelihood = fitter.log_likelihood(model);
+  double likelihood = -1e300;
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    const Beside data = look(fitter, model, place, pass == 0 ? rich : std::vector<Block>{});
-    choose_smoothness(data.information, data.score, groups, smoothness, sd);
+    const Linear l = linear(fitter, model, place, pass == 0 ? rich : std::vector<Block>{});
     Term& term = model.terms[place];
+    const Eigen::VectorXd at_zero = score_without(l, term.coefficients);
+    std::vector<Eigen::Index> columns;
+    for (Eigen::Index i = pass == 0 ? l.own : l.first; i < (pass == 0 ? l.information.rows() : l.first + l.count);
+         ++i)
+      columns.push_back(i);
+    const Beside data = beside(l, at_zero, columns);
+    choose_smoothness(data.information, data.score, groups, smoothness, sd);
     // What has no size beforehand is as good as held at 0.
-    const double least = 1e-6 * std::max(sd.maxCoeff(), 1e-6);
-    const Eigen::VectorXd held = sd.cwiseMax(least);
+    const Eigen::VectorXd held = sd.cwiseMax(1e-6 * std::max(sd.maxCoeff(), 1e-6));
     if (pass == 0) {
-      term.blocks = rich;
-      term.coefficients = solved(data, held);
+      exchange(model, place, l, rich, at_zero, columns, held);
+    } else {
+      term.precision = held.array().square().inverse();
     }
-    term.precision = held.array().square().inverse();
     fitter.fit(model, 1);
     const double now = fitter.log_likelihood(model);
     const bool last = pass + 1 == kMostPasses || now < likelihood + kSettled;
