@@ -219,8 +219,10 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   json document;
 
   say_progress(0.9, "predictions");
-  const std::vector<Predicted> predicted_before = predict(before, judged, asked, held_out_only, options.threads);
-  const std::vector<Predicted> predicted_after = predict(after, judged, asked, held_out_only, options.threads);
+  Asked final = asked;
+  final.futures = 64;
+  const std::vector<Predicted> predicted_before = predict(before, judged, final, held_out_only, options.threads);
+  const std::vector<Predicted> predicted_after = predict(after, judged, final, held_out_only, options.threads);
 
   Identified out;
   for (std::size_t i = 0; i < predicted_before.size(); ++i) {
