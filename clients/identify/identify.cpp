@@ -8,8 +8,10 @@
 
 #include "clients/identify/fit.hpp"
 #include "clients/identify/predict.hpp"
+#include "clients/identify/prediction_errors.hpp"
 #include "clients/identify/residuals.hpp"
 #include "clients/identify/search.hpp"
+#include "clients/identify/simulated_check.hpp"
 #include "clients/identify/write_effects.hpp"
 #include "clients/identify/write_model.hpp"
 #include "core/base/error.hpp"
@@ -19,49 +21,30 @@ namespace {
 
 using nlohmann::json;
 
-/// Squared distances between predictions and measurements, by (run, robot).
-struct Errors {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::pair<double, std::size_t>> by_track;
-  double sum = 0, expected = 0;
-  std::size_t rows = 0;
-
-  [[nodiscard]] double rmse_mm() const { return rows > 0 ? std::sqrt(sum / static_cast<double>(rows)) : 0; }
-  [[nodiscard]] double expected_mm() const {
-    return rows > 0 ? std::sqrt(expected / static_cast<double>(rows)) : 0;
+/// Root mean square, with bounds of 95 % where there are some.
+json summary_of(const PredictionErrors& errors, const std::optional<ErrorBounds>& bounds,
+                Interval ErrorBounds::*which) {
+  json out = {{"rmse_mm", errors.rmse_mm()}, {"rows", errors.rows}};
+  if (bounds) {
+    out["rmse_low_mm"] = ((*bounds).*which).low_mm;
+    out["rmse_high_mm"] = ((*bounds).*which).high_mm;
   }
-};
-
-Errors errors_of(const MeasuredSet& set, const std::vector<Predicted>& predictions) {
-  Errors errors;
-  for (const Predicted& p : predictions) {
-    Sample seen;
-    if (!measured_at(set.runs[p.run].tracks[p.place], p.time_s, seen)) continue;
-    const double dx = seen.x_mm - p.x_mm, dy = seen.y_mm - p.y_mm, square = dx * dx + dy * dy;
-    auto& track = errors.by_track[{p.run, p.place}];
-    track.first += square;
-    track.second += 1;
-    errors.sum += square;
-    errors.expected += p.spread_mm * p.spread_mm;
-    ++errors.rows;
-  }
-  return errors;
+  return out;
 }
 
-/// Bounds of the rms error with 95 % confidence: by the spread over tracks, which are taken to be independent.
-json summary_of(const Errors& errors) {
-  double variance = 0;
-  const double mean = errors.rows > 0 ? errors.sum / static_cast<double>(errors.rows) : 0;
-  for (const auto& [track, part] : errors.by_track) {
-    const double excess = part.first - mean * static_cast<double>(part.second);
-    variance += excess * excess;
+/// How much the error has fallen.
+json improvement_of(const PredictionErrors& before, const PredictionErrors& after,
+                    const std::optional<ErrorBounds>& bounds) {
+  json out = {{"less_by_mm", before.rmse_mm() - after.rmse_mm()}};
+  if (bounds) {
+    out["low_mm"] = bounds->less_by.low_mm;
+    out["high_mm"] = bounds->less_by.high_mm;
+    out["bounds_how"] =
+        fmt::format("95 %, by drawing {}anew{}", bounds->runs > 1 ? "robots and runs " : "robots ",
+                    bounds->runs > 1 ? fmt::format(", {} robots and {} runs", bounds->robots, bounds->runs)
+                                     : fmt::format(": {} robots in one run", bounds->robots));
   }
-  const double tracks = static_cast<double>(errors.by_track.size());
-  if (tracks > 1) variance *= tracks / (tracks - 1);
-  const double half = errors.rows > 0 ? 1.96 * std::sqrt(variance) / static_cast<double>(errors.rows) : 0;
-  return {{"rmse_mm", errors.rmse_mm()},
-          {"rmse_low_mm", std::sqrt(std::max(0.0, mean - half))},
-          {"rmse_high_mm", std::sqrt(mean + half)},
-          {"rows", errors.rows}};
+  return out;
 }
 
 /// An experiment that would tell two causes apart, by what the one depends on and the other does not.
@@ -231,16 +214,28 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     const Run& run = judged.set().runs[b.run];
     out.predictions.push_back({run.name, run.tracks[b.place].robot, b.time_s, b.x_mm, b.y_mm, a.x_mm, a.y_mm});
   }
-  const Errors errors_before = errors_of(judged.set(), predicted_before),
-               errors_after = errors_of(judged.set(), predicted_after);
+  const PredictionErrors errors_before = errors_of(judged.set(), predicted_before),
+                         errors_after = errors_of(judged.set(), predicted_after);
+  const std::optional<ErrorBounds> bounds = bounds_of(judged.set(), errors_before, errors_after);
   json& contract = document["contract"];
-  contract["before"] = summary_of(errors_before);
-  contract["after"] = summary_of(errors_after);
+  contract["before"] = summary_of(errors_before, bounds, &ErrorBounds::before);
+  contract["after"] = summary_of(errors_after, bounds, &ErrorBounds::after);
+  contract["improvement"] = improvement_of(errors_before, errors_after, bounds);
   contract["noise_floor_mm"] = errors_after.expected_mm();
   contract["noise_floor_how"] =
       "what the model with its effects expects of itself: the spread of the filter at the start, the noise of the "
-      "motion over "
-      "the horizon, and the tracker's noise, all estimated from the innovations one step ahead";
+      "motion over the horizon, and the tracker's noise, all estimated from the innovations one step ahead";
+  {
+    const std::vector<Predicted> fitted = predict(after, prepared, asked, false, options.threads);
+    std::vector<std::pair<const MeasuredSet*, const std::vector<Predicted>*>> all{{&train, &fitted}};
+    if (other) all.emplace_back(test, &predicted_after);
+    if (const std::optional<Replicates> again = replicates_of(all, options.horizon_s)) {
+      contract["replicates"] = {{"floor_mm", again->floor_mm},
+                                {"repeatable_mm", again->repeatable_mm},
+                                {"groups", again->groups},
+                                {"windows", again->windows}};
+    }
+  }
   contract["horizon_s"] = options.horizon_s;
   std::vector<double> without_mm;
   for (std::size_t t = 0; t < after.terms.size(); ++t) {
@@ -290,8 +285,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   for (const auto* errors : {&errors_before, &errors_after}) {
     for (const auto& [track, part] : errors->by_track) {
       auto& sums = by_robot[judged.set().runs[track.first].tracks[track.second].robot];
-      sums[errors == &errors_before ? 0 : 1] += part.first;
-      if (errors == &errors_before) sums[2] += static_cast<double>(part.second);
+      sums[errors == &errors_before ? 0 : 1] += part.sum_mm2;
+      if (errors == &errors_before) sums[2] += static_cast<double>(part.rows);
     }
   }
   for (const auto& [robot, bias] : after.robots) {
@@ -306,12 +301,13 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     }
     document["robots"].push_back(entry);
   }
-  say_progress(0.94, "plots");
+  say_progress(0.92, "errors over the horizon");
   json& curve = document["horizon"];
   for (const double ahead_s : {1.0, 2.0, 5.0, 10.0, 15.0, 20.0}) {
     const Asked at{20, 10, ahead_s};
-    const Errors was = errors_of(judged.set(), predict(before, judged, at, held_out_only, options.threads));
-    const Errors is = errors_of(judged.set(), predict(after, judged, at, held_out_only, options.threads));
+    const PredictionErrors was =
+        errors_of(judged.set(), predict(before, judged, at, held_out_only, options.threads));
+    const PredictionErrors is = errors_of(judged.set(), predict(after, judged, at, held_out_only, options.threads));
     curve["at_s"].push_back(ahead_s);
     curve["before_mm"].push_back(was.rmse_mm());
     curve["after_mm"].push_back(is.rmse_mm());
@@ -322,6 +318,11 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   document["covariate_plots"] = covariate_plots(left_before, left_after);
   document["maps"] = maps(left_before, left_after);
   out.model = proto_of(after);
+  say_progress(0.95, "the written model in the simulator");
+  const proto::Model written_before = proto_of(before);
+  const json simulated = simulated_check({before, written_before}, {after, out.model}, other ? *other : prepared,
+                                         held_out_only, options.threads);
+  for (const auto& [part, content] : simulated.items()) (part == "simulated" ? contract : document)[part] = content;
   document["seconds"]["all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   out.document = std::move(document);
   say_progress(1, "done");
