@@ -1,6 +1,6 @@
 /* The random walk of robots on an instrumented floor (experiments/kilogrid.txtpb): straight on for |N(15, 1.5)| s, a turn of
  * |N(0.5, 3)| s to either side, both in whole seconds; and turning away from walls. Cells on the floor's rim say that they are
- * a wall every half second; here they say it by light, which grows towards their middle. A robot that notices one turns to
+ * a wall, some arriving every second; here they say it by light, which grows towards their middle. A robot that notices one turns to
  * either side, the other way every 7.5 s, until four readings in a row are weaker than the four before; then it goes straight. One
  * second without a reading ends that, and the walk goes on with its next step.
  * LED: green straight on, blue to the left, red to the right; brighter beside a wall. */
@@ -10,7 +10,7 @@
 #define WALL_RANGE_MM 42 /* how far from its middle a cell of the rim is noticed */
 #endif
 #ifndef WALL_HEARD
-#define WALL_HEARD 160 /* chance of a reading to be taken, in 256ths */
+#define WALL_HEARD 20 /* of its messages arrive in 10 s */
 #endif
 /* The floor's light: 1000 counts in the middle of a cell of the rim, 10 less for each mm from it. */
 #define NOTICED (1000 - 10 * WALL_RANGE_MM)
@@ -18,7 +18,9 @@
 /* As the walk and the avoidance count seconds, in kilo_ticks. */
 #define WALK_TICKS 31
 #define WALL_TICKS 32
-#define LISTEN_TICKS 16
+#define LISTEN_TICKS 4
+/* Chance of a message to arrive in that time, in 256ths: 0.131 s is 859 / 65536 of 10 s. */
+#define HEARD (WALL_HEARD * 859L / 256)
 #define LONGEST_TURN_TICKS (7500 / 32)
 #define READINGS 4
 
@@ -73,7 +75,7 @@ static void listen(void) {
   if (kilo_ticks < listen_at) return;
   listen_at = kilo_ticks + LISTEN_TICKS;
   light = get_ambientlight();
-  if (light < NOTICED || rand_soft() >= WALL_HEARD) return;
+  if (light < NOTICED || rand_soft() >= HEARD) return;
   avoiding = 1;
   wall_until = kilo_ticks + WALL_TICKS;
   sum += (uint16_t)light;

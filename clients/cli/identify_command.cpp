@@ -77,7 +77,7 @@ int identify_command(const IdentifyArguments& arguments) {
   };
   std::vector<identify::DataFault> faults;
   identify::Identified found;
-  if (std::optional<identify::Identified> other = identify_other_data(arguments.train, arguments.test, options)) {
+  if (std::optional<identify::Identified> other = identify_other_data(arguments.train, arguments.test, arguments.out, options)) {
     found = std::move(*other);
   } else {
     found = identify_trajectories(arguments, options, faults);
@@ -91,9 +91,13 @@ int identify_command(const IdentifyArguments& arguments) {
   identify::write_report(found.document, arguments.out / "report.html");
   if (!arguments.quiet) {
     const auto& result = found.document.at("contract");
-    const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
-    fmt::print("error {:.2f} mm before, {:.2f} mm after, {:.2f} mm at best, {:g} s ahead\n", number("before"),
-               number("after"), result.at("noise_floor_mm").get<double>(), arguments.horizon_s);
+    if (found.document.contains("summary")) {
+      for (const auto& line : found.document.at("summary")) fmt::print("{}\n", line.get<std::string>());
+    } else {
+      const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
+      fmt::print("error {:.2f} mm before, {:.2f} mm after, {:.2f} mm at best, {:g} s ahead\n", number("before"),
+                 number("after"), result.at("noise_floor_mm").get<double>(), arguments.horizon_s);
+    }
     for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
     for (const auto& effect : result.at("effects"))
       fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());

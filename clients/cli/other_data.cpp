@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "clients/cli/radio_data.hpp"
 #include "clients/identify/bristle/identify_ridden.hpp"
 #include "clients/identify/kilogrid/identify_floor.hpp"
 #include "core/base/error.hpp"
@@ -10,7 +11,7 @@ namespace kilotwin::cli {
 namespace fs = std::filesystem;
 
 std::optional<identify::Identified> identify_other_data(const fs::path& train, const fs::path& test,
-                                                        const identify::Options& options) {
+                                                        const fs::path& out, const identify::Options& options) {
   if (identify::has_trajectories(train)) return std::nullopt;
   const auto same_kind = [&](bool is, const char* kind) {
     if (!test.empty() && !is)
@@ -27,6 +28,10 @@ std::optional<identify::Identified> identify_other_data(const fs::path& train, c
     return bristle::identify_ridden(
         bristle::read_ridden_runs(train),
         test.empty() ? std::vector<bristle::RiddenRun>{} : bristle::read_ridden_runs(test), options);
+  }
+  if (has_radio_runs(train)) {
+    same_kind(test.empty() || has_radio_runs(test), "runs of radio messages");
+    return identify_radio_runs(train, test, out, options);
   }
   return std::nullopt;
 }

@@ -12,6 +12,7 @@ namespace kilotwin::cli {
 /// known. `test` may be empty. Throws UserError where the two directories hold different kinds.
 [[nodiscard]] std::optional<identify::Identified> identify_other_data(const std::filesystem::path& train,
                                                                       const std::filesystem::path& test,
+                                                                      const std::filesystem::path& out,
                                                                       const identify::Options&);
 
 }  // namespace kilotwin::cli

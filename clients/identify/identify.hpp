@@ -18,6 +18,9 @@
 ///   distributions [{name, unit, edges [..], measured [..], simulated [..]}]: counts; present once the check in the engines ran
 ///   msd           {lag_s [..], measured_mm2 [..], simulated_mm2 [..]}
 ///   steps         [{added, rmse_mm, held_out_gain}]: the loop, in order
+///   headline, verdict, summary [..]  words in place of the page's own and of what the command says at its end; absent: those
+///   bars          [{kind, name, value, low, high, unit, from}] in place of the errors' bars
+///   tables        [{id, title, lead, head [..], rows [[..]..]}], each a section; an effect's `facts` [[name, value]..] likewise
 ///   seconds       wall time of each part, for the screen only
 #pragma once
 

@@ -247,6 +247,28 @@ std::string bars(const json& contract) {
   return out + "</div>\n";
 }
 
+/// Bars of any measure, as the document gives them: as long as they are above `from`.
+std::string given_bars(const json& bars) {
+  double most = 0;
+  for (const json& bar : bars) {
+    const double from = number(bar, "from").value_or(0);
+    most = std::max({most, number(bar, "value").value_or(0) - from, number(bar, "high").value_or(0) - from});
+  }
+  if (most <= 0) return "";
+  std::string out;
+  for (const json& bar : bars) {
+    const auto low = number(bar, "low"), high = number(bar, "high");
+    const double above = number(bar, "value").value_or(0) - number(bar, "from").value_or(0);
+    out += fmt::format(
+        "<div class=\"bar\"><span class=\"what\">{}</span><span class=\"track\"><span class=\"fill {}\" "
+        "style=\"width:{:.1f}%\"></span></span><span class=\"value\"><b>{} {}</b> {}</span></div>\n",
+        escaped(text(bar, "name")), escaped(text(bar, "kind")), std::max(100 * above / most, 0.0),
+        figure(number(bar, "value")), escaped(text(bar, "unit")),
+        low && high ? fmt::format("<small>{} to {} (95 %)</small>", figure(low), figure(high)) : "");
+  }
+  return "<div class=\"bars\">\n" + out + "</div>\n";
+}
+
 bool shares_covariate(const json& effect, const std::string& covariate) {
   static const std::map<std::string, std::set<std::string>> kOf = {
       {"position", {"x", "y", "radius", "position"}},
@@ -296,11 +318,17 @@ std::string cards(const json& contract, const json& covariate_plots, Figures& fi
       out += fmt::format("<dt>{}</dt><dd>{}</dd>", name, value);
     };
     fact("acts on", acts_on_of(effect));
-    fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
-    fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
-    fact("by chance",
-         chance(number(evidence, "p_family") ? std::log10(std::max(*number(evidence, "p_family"), 1e-300))
-                                             : number(evidence, "log10_p")));
+    if (const json& facts = part(effect, "facts"); facts.is_array()) {
+      for (const json& given : facts)
+        out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(given.at(0).get<std::string>()),
+                           escaped(given.at(1).get<std::string>()));
+    } else {
+      fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
+      fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
+      fact("by chance",
+           chance(number(evidence, "p_family") ? std::log10(std::max(*number(evidence, "p_family"), 1e-300))
+                                               : number(evidence, "log10_p")));
+    }
     out += "</dl></div>";
     const json* plot = covariate_plots.is_array() ? plot_for(effect, covariate_plots) : nullptr;
     if (plot != nullptr && shown.insert(plot).second)
@@ -378,6 +406,24 @@ std::string rejected_table(const json& contract) {
   return table.text();
 }
 
+/// Tables that the document brings along, each a section of its own.
+std::string given_tables(const json& tables) {
+  std::string out;
+  for (const json& given : tables) {
+    std::vector<std::string> heads;
+    for (const json& head : part(given, "head")) heads.push_back(escaped(head.get<std::string>()));
+    html::Table table(std::move(heads));
+    for (const json& row : part(given, "rows")) {
+      std::vector<std::string> cells;
+      for (const json& cell : row) cells.push_back(escaped(cell.get<std::string>()));
+      table.row(cells);
+    }
+    out += section(text(given, "id").c_str(), escaped(text(given, "title")).c_str(), escaped(text(given, "lead")),
+                   table.text());
+  }
+  return out;
+}
+
 std::string ambiguous_list(const json& contract) {
   std::string out;
   for (const json& pair : part(contract, "ambiguous")) {
@@ -422,7 +468,9 @@ std::string report_html(const json& document) {
   std::string page = fmt::format(
       "<header><p class=\"kicker\">Kilotwin · identified from measured data</p><h1>{}</h1>\n<p "
       "class=\"verdict\">{}</p>\n{}</header>\n",
-      headline(contract), verdict(contract), bars(contract));
+      text(document, "headline").empty() ? headline(contract) : escaped(text(document, "headline")),
+      text(document, "verdict").empty() ? verdict(contract) : escaped(text(document, "verdict")),
+      part(document, "bars").is_array() ? given_bars(part(document, "bars")) : bars(contract));
   page += section("why", "Why", "", cards(contract, plots, figures));
   const std::size_t effects = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
   const Errors errors = errors_of(contract);
@@ -439,6 +487,7 @@ std::string report_html(const json& document) {
       escaped(text(contract, "noise_floor_how").empty() ? ""
                                                         : "The floor: " + text(contract, "noise_floor_how") + "."),
       better);
+  page += given_tables(part(document, "tables"));
   page +=
       section("faults", "Faults of the data",
               "Excluded before anything was fitted. They are slips of the measurement, and no property of robots.",

@@ -37,7 +37,11 @@ struct LoneTerm {
   std::vector<Factor> factors;
 };
 
+/// Numbers that a robot may have in the model, where it knows them apart.
+constexpr std::uint64_t kNumbers = 100;
+
 struct Particle {
+  std::uint32_t number;  ///< which one it may be
   double x_mm, y_mm, heading_rad;  ///< of the disc's centre
   double bias_left_mm_s, bias_right_mm_s;
   double since_command_s;
@@ -82,11 +86,13 @@ class LoneRobot {
         if (factor.is_noise) p.memory[*factor.slot] = keep * p.memory[*factor.slot] + fresh * dice.normal();
       }
     }
+    if (dice.uniform() > keep) p.number = static_cast<std::uint32_t>(dice.bits() % kNumbers);
   }
 
   [[nodiscard]] Particle start(double x_mm, double y_mm, Dice& dice) const {
     const double sd = settings_.model.motion().bias_sd_mm_s();
-    Particle p{x_mm + 2 * floor_.cell_mm * (dice.uniform() - 0.5),
+    Particle p{static_cast<std::uint32_t>(dice.bits() % kNumbers),
+               x_mm + 2 * floor_.cell_mm * (dice.uniform() - 0.5),
                y_mm + 2 * floor_.cell_mm * (dice.uniform() - 0.5),
                (2 * dice.uniform() - 1) * kPi,
                sd * dice.normal(),
@@ -199,9 +205,12 @@ class LoneRobot {
     const FloorRadio& radio = settings_.radio;
     const double reading_mm = rim_cell_distance_mm(floor_, p.x_mm, p.y_mm);
     if (reading_mm > radio.wall_range_mm + 4 * radio.wall_noise) return;
-    const double noisy_mm = reading_mm + radio.wall_noise * dice.normal();
-    if (noisy_mm < radio.wall_range_mm && dice.uniform() < radio.wall_heard)
-      p.program.hear_wall(kilo_ticks, 1000 - noisy_mm);
+    constexpr std::int64_t kHeardEvery = 4;  // kilo_ticks, as in the simulation
+    for (std::int64_t t = 0; t < kStepTicks; t += kHeardEvery) {
+      if (dice.uniform() > radio.wall_heard * kStep_s * kHeardEvery / kStepTicks) continue;
+      const double noisy_mm = reading_mm + radio.wall_noise * dice.normal();
+      if (noisy_mm < radio.wall_range_mm) p.program.hear_wall(kilo_ticks + t, 1000 - noisy_mm);
+    }
   }
 
   [[nodiscard]] double covariate(Function::Covariate of, const Particle& p, double time_s) const {
@@ -214,6 +223,7 @@ class LoneRobot {
       case Function::Y: return y;
       case Function::RADIUS: return std::sqrt(x * x + y * y);
       case Function::HEADING: return p.heading_rad;
+      case Function::ROBOT: return p.number;
       case Function::COMMAND: return static_cast<double>(p.motion);
       case Function::TIME_SINCE_COMMAND: return p.since_command_s;
       default: return 0;  // of neighbours: it has none

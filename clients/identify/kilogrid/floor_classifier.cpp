@@ -3,19 +3,20 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <complex>
-#include <numeric>
+#include <map>
+#include <tuple>
+
+#include "clients/identify/kilogrid/floor_program.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
 
-constexpr std::size_t kWindow = 20;  // blocks
-constexpr double kStill_mm = 16, kMoving_mm = 40, kBeside_mm = 60;
-
 /// Samples as rows, standardised by those that are learned from.
 struct Samples {
   Eigen::MatrixXd x;
-  Eigen::VectorXd y;  ///< 0 or 1
+  Eigen::VectorXd y;               ///< 0 or 1
+  std::vector<std::size_t> robot;  ///< of each row, those of both classes counted on
+  std::size_t robots = 0;
 };
 
 Samples samples_of(const std::vector<TrackWindow>& a, const std::vector<TrackWindow>& b, std::size_t half) {
@@ -27,7 +28,13 @@ Samples samples_of(const std::vector<TrackWindow>& a, const std::vector<TrackWin
   }
   const auto features = static_cast<Eigen::Index>(feature_names().size());
   Samples samples{Eigen::MatrixXd(static_cast<Eigen::Index>(rows.size()), features),
-                  Eigen::VectorXd(static_cast<Eigen::Index>(rows.size()))};
+                  Eigen::VectorXd(static_cast<Eigen::Index>(rows.size())),
+                  {},
+                  0};
+  std::map<std::pair<bool, std::size_t>, std::size_t> numbers;
+  for (const auto& [window, label] : rows)
+    samples.robot.push_back(numbers.emplace(std::pair{label > 0.5, window->robot}, numbers.size()).first->second);
+  samples.robots = numbers.size();
   for (Eigen::Index i = 0; i < samples.x.rows(); ++i) {
     const auto& [window, label] = rows[static_cast<std::size_t>(i)];
     for (Eigen::Index f = 0; f < features; ++f) samples.x(i, f) = window->feature[static_cast<std::size_t>(f)];
@@ -152,78 +159,63 @@ class Boosted {
   std::vector<Stump> stumps_;
 };
 
-double area(const Eigen::VectorXd& scores, const Eigen::VectorXd& y) {
-  std::vector<double> negatives, positives;
-  for (Eigen::Index i = 0; i < y.size(); ++i) (y(i) > 0.5 ? positives : negatives).push_back(scores(i));
-  return area_under_curve(negatives, positives);
+/// Scores of windows, in order, with what their robots' weights make of the area.
+class Judgement {
+ public:
+  Judgement(const Eigen::VectorXd& scores, const Samples& s) : robots_(s.robots) {
+    for (Eigen::Index i = 0; i < scores.size(); ++i)
+      rows_.push_back({scores(i), s.robot[static_cast<std::size_t>(i)], s.y(i) > 0.5});
+    std::sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) { return a.score < b.score; });
+  }
+  [[nodiscard]] double area() const { return area(std::vector<double>(robots_, 1)); }
+  /// Each robot drawn as often as chance has it.
+  [[nodiscard]] double area(Dice& dice) const {
+    std::vector<double> weight(robots_, 0);
+    for (std::size_t i = 0; i < robots_; ++i) ++weight[dice.bits() % robots_];
+    return area(weight);
+  }
+
+ private:
+  struct Row {
+    double score;
+    std::size_t robot;
+    bool positive;
+  };
+  /// The share of pairs in order, ties half.
+  [[nodiscard]] double area(const std::vector<double>& weight) const {
+    double below = 0, positives = 0, right = 0;
+    for (std::size_t i = 0; i < rows_.size();) {
+      double negative = 0, positive = 0;
+      const double score = rows_[i].score;
+      for (; i < rows_.size() && rows_[i].score == score; ++i)
+        (rows_[i].positive ? positive : negative) += weight[rows_[i].robot];
+      right += positive * (below + negative / 2);
+      below += negative;
+      positives += positive;
+    }
+    return below > 0 && positives > 0 ? right / (below * positives) : 0.5;
+  }
+
+  std::vector<Row> rows_;
+  std::size_t robots_;
+};
+
+/// The mean area of both halves, and its standard error.
+std::pair<double, double> area_of(const std::vector<Judgement>& halves) {
+  constexpr int kResamples = 200;
+  Dice dice(1);
+  double mean = 0, sum = 0, squares = 0;
+  for (const Judgement& half : halves) mean += half.area() / static_cast<double>(halves.size());
+  for (int i = 0; i < kResamples; ++i) {
+    double area = 0;
+    for (const Judgement& half : halves) area += half.area(dice) / static_cast<double>(halves.size());
+    sum += area;
+    squares += area * area;
+  }
+  return {mean, std::sqrt(std::max(squares - sum * sum / kResamples, 0.0) / (kResamples - 1))};
 }
 
 }  // namespace
-
-const std::vector<std::string>& feature_names() {
-  static const std::vector<std::string> names = {"mean step", "spread of steps", "still",         "still in a row",
-                                                 "mean turn", "sharp turns",     "side of turns", "way in the end",
-                                                 "extent",    "beside a wall",   "wall distance", "unheard"};
-  return names;
-}
-
-std::vector<TrackWindow> windows_of(const FloorRun& run, const Floor& floor) {
-  const FloorBlocks blocks = blocks_of(run);
-  std::vector<TrackWindow> windows;
-  for (std::size_t robot = 0; robot < blocks.robots(); ++robot) {
-    const std::vector<double>&x = blocks.x_mm[robot], &y = blocks.y_mm[robot];
-    for (std::size_t begin = 0; begin + kWindow <= blocks.blocks; begin += kWindow) {
-      std::vector<std::size_t> heard;
-      for (std::size_t k = begin; k < begin + kWindow; ++k) {
-        if (!std::isnan(x[k])) heard.push_back(k);
-      }
-      if (heard.size() < kWindow / 2) continue;
-      double step = 0, square = 0, steps = 0, still = 0, row = 0, longest = 0, turn = 0, sharp = 0, side = 0,
-             turns = 0;
-      double wall = 0, beside = 0;
-      std::complex<double> last = 0;
-      std::size_t last_at = 0;
-      for (std::size_t i = 0; i < heard.size(); ++i) {
-        const std::size_t k = heard[i];
-        const double wall_mm = wall_distance_mm(floor, x[k], y[k]);
-        wall += wall_mm;
-        beside += wall_mm < kBeside_mm ? 1 : 0;
-        if (i == 0 || heard[i - 1] + 1 != k) continue;
-        const std::complex<double> way(x[k] - x[k - 1], y[k] - y[k - 1]);
-        const double way_mm = std::abs(way);
-        step += way_mm;
-        square += way_mm * way_mm;
-        ++steps;
-        row = way_mm < kStill_mm ? row + 1 : 0;
-        longest = std::max(longest, row);
-        still += way_mm < kStill_mm ? 1 : 0;
-        if (way_mm > kMoving_mm && std::abs(last) > kMoving_mm && last_at + 1 == k) {
-          const double angle = std::arg(way * std::conj(last));
-          turn += std::abs(angle);
-          side += angle;
-          sharp += std::abs(angle) > 1.2 ? 1 : 0;
-          ++turns;
-        }
-        last = way;
-        last_at = k;
-      }
-      if (steps < 3) continue;
-      const auto [low_x, high_x] =
-          std::minmax_element(heard.begin(), heard.end(), [&](auto a, auto b) { return x[a] < x[b]; });
-      const auto [low_y, high_y] =
-          std::minmax_element(heard.begin(), heard.end(), [&](auto a, auto b) { return y[a] < y[b]; });
-      const auto count = static_cast<double>(heard.size());
-      const double mean = step / steps, some = std::max(turns, 1.0);
-      windows.push_back({robot,
-                         {mean, std::sqrt(std::max(square / steps - mean * mean, 0.0)), still / steps, longest,
-                          turn / some, sharp / some, side / some,
-                          std::hypot(x[heard.back()] - x[heard.front()], y[heard.back()] - y[heard.front()]),
-                          std::hypot(x[*high_x] - x[*low_x], y[*high_y] - y[*low_y]), beside / count, wall / count,
-                          static_cast<double>(kWindow) - count}});
-    }
-  }
-  return windows;
-}
 
 double area_under_curve(const std::vector<double>& negatives, const std::vector<double>& positives) {
   if (negatives.empty() || positives.empty()) return 0.5;
@@ -238,17 +230,20 @@ double area_under_curve(const std::vector<double>& negatives, const std::vector<
 }
 
 TellApart tell_apart(const std::vector<TrackWindow>& a, const std::vector<TrackWindow>& b) {
-  TellApart sum{0, 0};
+  std::vector<Judgement> logistic, boosted;
   for (const std::size_t half : {std::size_t{0}, std::size_t{1}}) {
     const Samples learned = samples_of(a, b, half), judged = samples_of(a, b, 1 - half);
     const double ones = learned.y.sum(), others = judged.y.sum();
     if (ones < 1 || ones >= static_cast<double>(learned.y.size()) || others < 1 ||
         others >= static_cast<double>(judged.y.size()))
       return {};
-    sum.logistic += area(Logistic(learned).judge(judged.x), judged.y) / 2;
-    sum.boosted += area(Boosted(learned).judge(judged.x), judged.y) / 2;
+    logistic.emplace_back(Logistic(learned).judge(judged.x), judged);
+    boosted.emplace_back(Boosted(learned).judge(judged.x), judged);
   }
-  return sum;
+  TellApart t;
+  std::tie(t.logistic, t.logistic_sd) = area_of(logistic);
+  std::tie(t.boosted, t.boosted_sd) = area_of(boosted);
+  return t;
 }
 
 }  // namespace kilotwin::kilogrid

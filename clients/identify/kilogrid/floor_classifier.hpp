@@ -6,18 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "clients/identify/kilogrid/floor_statistics.hpp"
+#include "clients/identify/kilogrid/track_windows.hpp"
 
 namespace kilotwin::kilogrid {
-
-/// Features of one robot within one window of time.
-struct TrackWindow {
-  std::size_t robot;  ///< index in the run
-  std::vector<double> feature;
-};
-[[nodiscard]] const std::vector<std::string>& feature_names();
-/// Windows of 200 s, one after the other, in which the robot was heard in at least half of the blocks.
-[[nodiscard]] std::vector<TrackWindow> windows_of(const FloorRun&, const Floor&);
 
 /// The area under the curve of a score: the share of pairs of one of each class that it orders rightly, ties half.
 [[nodiscard]] double area_under_curve(const std::vector<double>& of_negatives,
@@ -25,7 +16,9 @@ struct TrackWindow {
 
 struct TellApart {
   double logistic = 0.5, boosted = 0.5;
+  double logistic_sd = 0, boosted_sd = 0;  ///< standard errors over robots, by resampling them
   [[nodiscard]] double best() const { return logistic > boosted ? logistic : boosted; }
+  [[nodiscard]] double best_sd() const { return logistic > boosted ? logistic_sd : boosted_sd; }
 };
 /// Cross-validated over robots: in turn each half of the robots of both runs is learned from, the other half judged.
 [[nodiscard]] TellApart tell_apart(const std::vector<TrackWindow>& a, const std::vector<TrackWindow>& b);

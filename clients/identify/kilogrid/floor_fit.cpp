@@ -4,26 +4,13 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <thread>
 
 namespace kilotwin::kilogrid {
 namespace {
 
-/// No statistic is taken for more exact than that share of it: the program, the cells and the walls are idealised.
-constexpr double kExact = 0.02;
-
-/// Calls work(0), work(1)... work(n - 1), on several threads.
-void in_parallel(std::uint32_t threads_to_use, std::size_t n, const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next{0};
-  std::vector<std::jthread> threads;
-  for (std::uint32_t t = 0; t < threads_to_use; ++t) {
-    threads.emplace_back([&] {
-      for (std::size_t i = next++; i < n; i = next++) work(i);
-    });
-  }
-}
+/// Runs of the design are cut to that: what parameters change shows in half an hour.
+constexpr double kExplored_s = 1800;
 
 /// Where a model of `m` parameters stands on a design of runs, in steps: each parameter balanced between up and down.
 std::vector<std::vector<double>> design_of(std::size_t parameters, std::size_t points, Dice& dice) {
@@ -54,26 +41,18 @@ struct Surrogate {
   Eigen::MatrixXd slopes;  ///< per statistic and parameter
 };
 
-/// Statistics at one point of the design: of one of the runs, in turn, since their differences are small beside those of the
-/// points.
+/// Statistics at one point of the design: of one of the runs, in turn, and not of all of it.
 FloorStatistics statistics_at(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
                               std::size_t point) {
-  constexpr std::size_t kRunsPerPoint = 1;
-  std::vector<RobotSums> all;
-  const std::size_t scenes = target.scenes().size();
-  for (std::size_t i = 0; i < std::min(kRunsPerPoint, scenes); ++i) {
-    const std::size_t scene = (point + i) % scenes;
-    const FloorRun run = simulate(target.scenes()[scene], target.floor(), settings.model, settings.times,
-                                  settings.radio, seed * 100 + i);
-    std::vector<RobotSums> sums = robot_sums(run, target.floor());
-    all.insert(all.end(), std::make_move_iterator(sums.begin()), std::make_move_iterator(sums.end()));
-  }
-  return statistics_of(all);
+  FloorScene scene = target.scenes()[point % target.scenes().size()];
+  scene.duration_s = std::min(scene.duration_s, kExplored_s);
+  return statistics_of(robot_sums(
+      simulate(scene, target.floor(), settings.model, settings.times, settings.radio, seed), target.floor()));
 }
 
-/// `moves`: which parameters are varied; the others have slopes of 0.
-Surrogate explore(const FloorModel& model, const FloorTarget& target, const std::vector<bool>& moves, double width,
-                  std::uint64_t seed) {
+/// `here`: the model's statistics. `moves`: which parameters are varied; the others have slopes of 0.
+Surrogate explore(const FloorModel& model, const FloorTarget& target, const FloorStatistics& here,
+                  const std::vector<bool>& moves, double width, std::uint64_t seed) {
   const std::vector<FloorParameter> parameters = model.parameters();
   const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
   const std::size_t points = 3 * moving / 2 + 10;
@@ -89,14 +68,16 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const std:
     results[i] = statistics_at(target, model.settings(at[i]), seed * 1000 + i, i);
   });
 
+  // Each run has a column of its own, for what it has begun with.
   const auto rows = static_cast<Eigen::Index>(points), columns = static_cast<Eigen::Index>(parameters.size());
-  Eigen::MatrixXd x(rows, columns + 1);
+  const auto scenes = static_cast<Eigen::Index>(target.scenes().size());
+  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(rows, scenes + columns);
   for (Eigen::Index i = 0; i < rows; ++i) {
-    x(i, 0) = 1;
+    x(i, i % scenes) = 1;
     for (Eigen::Index p = 0; p < columns; ++p) {
       const auto q = static_cast<std::size_t>(p);
       // What was really done, within the parameter's range.
-      x(i, p + 1) = (at[static_cast<std::size_t>(i)][q] - model.values[q]) / (width * parameters[q].width);
+      x(i, scenes + p) = (at[static_cast<std::size_t>(i)][q] - model.values[q]) / (width * parameters[q].width);
     }
   }
   // A little ridge: a parameter at the end of its range moves to one side only.
@@ -107,18 +88,18 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const std:
   Surrogate surrogate{Eigen::VectorXd::Zero(statistics), Eigen::MatrixXd::Zero(statistics, columns)};
   for (Eigen::Index s = 0; s < statistics; ++s) {
     const auto q = static_cast<std::size_t>(s);
-    if (!(target.tolerance()[q] > 0)) continue;
+    const double off = here.value[q] - target.statistics().value[q];
+    if (!(target.tolerance()[q] > 0) || !std::isfinite(off)) continue;
+    const double sd = std::sqrt(target.tolerance()[q] + here.variance[q]);
+    surrogate.off(s) = off / sd;
     Eigen::VectorXd y(rows);
     bool known = true;
     for (Eigen::Index i = 0; i < rows; ++i) {
-      y(i) = (results[static_cast<std::size_t>(i)].value[q] - target.statistics().value[q]) /
-             std::sqrt(target.tolerance()[q]);
+      y(i) = results[static_cast<std::size_t>(i)].value[q] / sd;
       known = known && std::isfinite(y(i));
     }
     if (!known) continue;  // not in all of these runs
-    const Eigen::VectorXd line = solver.solve(x.transpose() * y);
-    surrogate.off(s) = line(0);
-    surrogate.slopes.row(s) = line.tail(columns).transpose();
+    surrogate.slopes.row(s) = solver.solve(x.transpose() * y).tail(columns).transpose();
   }
   return surrogate;
 }
@@ -156,104 +137,7 @@ double expected(const Surrogate& surrogate, const Eigen::VectorXd& steps) {
   return (weights.array() * residual.array().square()).sum();
 }
 
-/// The order in which modules listen to their cells, from successive reports to two cells of one module: where nothing
-/// favours an order, as many go from one to the other as back.
-std::array<double, 4> order_of_listening(const std::vector<FloorRun>& runs, const Floor& floor) {
-  std::array<std::array<double, 4>, 4> count{};
-  for (const FloorRun& run : runs) {
-    for (const FloorTrack& track : run.tracks) {
-      for (std::size_t i = 1; i < track.size(); ++i) {
-        if (track.time_s[i] - track.time_s[i - 1] != 2) continue;
-        const auto cell = [&](std::size_t k) {
-          return std::pair{static_cast<std::size_t>(track.x_mm[k] / floor.cell_mm),
-                           static_cast<std::size_t>(track.y_mm[k] / floor.cell_mm)};
-        };
-        const auto [x0, y0] = cell(i - 1);
-        const auto [x1, y1] = cell(i);
-        if (x0 / 2 == x1 / 2 && y0 / 2 == y1 / 2) ++count[x0 % 2 + 2 * (y0 % 2)][x1 % 2 + 2 * (y1 % 2)];
-      }
-    }
-  }
-  // Neighbouring pairs are 01, 23 along x and 02, 13 along y; the diagonal ones are 12 and 03.
-  const double by_1 = count[0][1] + count[2][3], by_3 = count[1][0] + count[3][2];
-  const double by_2 = (count[0][2] + count[2][0] + count[1][3] + count[3][1]) / 2;
-  const double all = by_1 + by_2 + by_3;
-  if (!(all > 0)) return {0.25, 0.25, 0.25, 0.25};
-  return {0.25, 0.75 * by_1 / all, 0.75 * by_2 / all, 0.75 * by_3 / all};
-}
-
 }  // namespace
-
-FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor, std::uint32_t threads)
-    : floor_(floor), threads_(threads), later_(order_of_listening(runs, floor)) {
-  std::vector<RobotSums> all;
-  std::vector<FloorStatistics> each;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    scenes_.push_back(scene_of(runs[i], floor, i + 1));
-    const std::vector<RobotSums> sums = robot_sums(runs[i], floor);
-    each.push_back(statistics_of(sums));
-    all.insert(all.end(), sums.begin(), sums.end());
-  }
-  statistics_ = statistics_of(all);
-  for (std::size_t s = 0; s < statistic_count(); ++s) {
-    const double mean = statistics_.value[s];
-    double spread = 0, count = 0;
-    for (const FloorStatistics& run : each) {
-      if (!std::isfinite(run.value[s])) continue;
-      spread += (run.value[s] - mean) * (run.value[s] - mean);
-      ++count;
-    }
-    const double between = count > 1 ? spread / (count - 1) / count : 0;
-    tolerance_.push_back(std::max(statistics_.variance[s], between) + kExact * kExact * mean * mean);
-  }
-}
-
-std::size_t FloorTarget::size() const {
-  return static_cast<std::size_t>(
-      std::count_if(tolerance_.begin(), tolerance_.end(), [](double t) { return t > 0; }));
-}
-
-double FloorTarget::misfit(const FloorStatistics& simulated, const StatisticGroup& group) const {
-  double sum = 0;
-  for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
-    const double off = simulated.value[s] - statistics_.value[s];
-    const double tolerance = tolerance_[s] + simulated.variance[s];
-    if (std::isfinite(off) && tolerance > 0) sum += off * off / tolerance;
-  }
-  return sum;
-}
-
-double FloorTarget::misfit(const FloorStatistics& simulated) const {
-  double sum = 0;
-  for (const StatisticGroup& group : statistic_groups()) sum += misfit(simulated, group);
-  return sum;
-}
-
-std::vector<FloorRun> simulate_scenes(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
-                                      int repeats) {
-  const std::size_t scenes = target.scenes().size();
-  std::vector<FloorRun> runs(scenes * static_cast<std::size_t>(repeats));
-  in_parallel(target.threads(), runs.size(), [&](std::size_t i) {
-    runs[i] = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times, settings.radio,
-                       seed * 100 + i);
-  });
-  return runs;
-}
-
-FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
-                                     int repeats) {
-  std::vector<RobotSums> all;
-  const std::size_t scenes = target.scenes().size();
-  std::vector<std::vector<RobotSums>> sums(scenes * static_cast<std::size_t>(repeats));
-  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
-    const FloorRun run = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times,
-                                  settings.radio, seed * 100 + i);
-    sums[i] = robot_sums(run, target.floor());
-  });
-  for (std::vector<RobotSums>& run : sums)
-    all.insert(all.end(), std::make_move_iterator(run.begin()), std::make_move_iterator(run.end()));
-  return statistics_of(all);
-}
 
 double fit(FloorModel& model, const FloorTarget& target, int rounds, double width, std::uint64_t seed,
            const FloorProgress& progress) {
@@ -263,7 +147,8 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   FloorStatistics at = simulated_statistics(target, model.settings(), seed * 7 + 1);
   double misfit = target.misfit(at);
   for (int round = 0; round < rounds; ++round) {
-    const Surrogate surrogate = explore(model, target, all, width, seed * 10 + static_cast<std::uint64_t>(round));
+    const Surrogate surrogate =
+        explore(model, target, at, all, width, seed * 10 + static_cast<std::uint64_t>(round));
     const Eigen::VectorXd steps = best_steps(surrogate, all, 1.5);
     const FloorModel before = model;
     model.values = moved(parameters, before.values, {steps.data(), steps.data() + steps.size()}, width);
@@ -284,13 +169,14 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   return misfit;
 }
 
-double fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed,
+double fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed, double least_gain,
                  const FloorProgress& progress) {
   const StatisticGroup& group = statistic_group("occupancy-of-the-rim");
   // Robots stay the longer, the slower they are; a few blocks more or less say nothing.
   constexpr double kSome = 1e-3, kPower = 0.8, kSlowest = 0.02, kFastest = 1.2;
   FloorStatistics at = simulated_statistics(target, model.settings(), seed);
   double misfit = target.misfit(at);
+  double to_beat = misfit - least_gain;
   FloorModel best = model;
   if (!model.wall) model.wall.emplace().fill(1);
   for (int round = 0; round < rounds; ++round) {
@@ -302,8 +188,8 @@ double fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std::
     at = simulated_statistics(target, model.settings(), seed + 1 + static_cast<std::uint64_t>(round));
     const double now = target.misfit(at);
     progress(fmt::format("beside walls: misfit {:.0f} -> {:.0f}", misfit, now));
-    if (now < misfit) {
-      misfit = now;
+    if (now < to_beat) {
+      misfit = to_beat = now;
       best = model;
     }
   }
@@ -313,7 +199,7 @@ double fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std::
 
 std::vector<CandidateScore> choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
                                    const FloorTarget& target, double least_gain, std::uint64_t seed,
-                                   const FloorProgress& progress) {
+                                   const FloorProgress& progress, std::vector<double>* gains) {
   FloorModel all = model;
   for (const FloorTerm& candidate : candidates) all.add(candidate);
   const std::vector<FloorParameter> parameters = all.parameters();
@@ -324,9 +210,11 @@ std::vector<CandidateScore> choose(const FloorModel& model, const std::vector<Fl
     const std::size_t first = all.first_of(model.terms.size() + c);
     for (std::size_t p = candidates[c].switches; p < candidates[c].parameters.size(); ++p) moves[first + p] = false;
   }
-  const Surrogate surrogate = explore(all, target, moves, 1, seed);
+  const Surrogate surrogate =
+      explore(all, target, simulated_statistics(target, model.settings(), seed * 7 + 3), moves, 1, seed);
   std::vector<CandidateScore> chosen;
   std::vector<bool> taken(candidates.size(), false);
+  if (gains != nullptr) gains->assign(candidates.size(), 0);
   double without = expected(surrogate, best_steps(surrogate, in_use, 1));
   while (chosen.size() < candidates.size()) {
     CandidateScore best{candidates.size(), 0, {}};
@@ -338,6 +226,7 @@ std::vector<CandidateScore> choose(const FloorModel& model, const std::vector<Fl
       std::fill_n(with.begin() + static_cast<std::ptrdiff_t>(first), count, true);
       const Eigen::VectorXd steps = best_steps(surrogate, with, 1);
       const double gain = without - expected(surrogate, steps);
+      if (gains != nullptr) (*gains)[c] = gain;
       tried += fmt::format(" {} {:.0f}", candidates[c].name, gain);
       if (gain <= best.gain) continue;
       const std::vector<double> values =

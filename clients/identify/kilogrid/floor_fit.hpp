@@ -5,45 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "clients/identify/kilogrid/floor_model.hpp"
-#include "clients/identify/kilogrid/floor_statistics.hpp"
+#include "clients/identify/kilogrid/floor_target.hpp"
 
 namespace kilotwin::kilogrid {
-
-/// Measured runs, as what is fitted to.
-class FloorTarget {
- public:
-  /// `threads`: for simulated runs, without effect on them.
-  FloorTarget(const std::vector<FloorRun>&, const Floor&, std::uint32_t threads = 2);
-  [[nodiscard]] std::uint32_t threads() const { return threads_; }
-
-  [[nodiscard]] const std::vector<FloorScene>& scenes() const { return scenes_; }
-  [[nodiscard]] const FloorStatistics& statistics() const { return statistics_; }
-  /// What a perfect model's statistics would differ by, squared: chance among robots, and differences among runs.
-  [[nodiscard]] const std::vector<double>& tolerance() const { return tolerance_; }
-  [[nodiscard]] const Floor& floor() const { return floor_; }
-  /// By which of its cells a module hears a robot next, counted from the last: chances of 0..3; that of 0 is not known yet.
-  [[nodiscard]] const std::array<double, 4>& later() const { return later_; }
-  /// How many times the tolerance the statistics lie off, squared and summed; of one group, or of all.
-  [[nodiscard]] double misfit(const FloorStatistics&) const;
-  [[nodiscard]] double misfit(const FloorStatistics&, const StatisticGroup&) const;
-  /// How many statistics there are.
-  [[nodiscard]] std::size_t size() const;
-
- private:
-  Floor floor_;
-  std::uint32_t threads_;
-  std::vector<FloorScene> scenes_;
-  FloorStatistics statistics_;
-  std::vector<double> tolerance_;
-  std::array<double, 4> later_;
-};
-
-/// One simulated run per scene, `repeats` times.
-[[nodiscard]] std::vector<FloorRun> simulate_scenes(const FloorTarget&, const FloorSettings&, std::uint64_t seed,
-                                                    int repeats = 1);
-[[nodiscard]] FloorStatistics simulated_statistics(const FloorTarget&, const FloorSettings&, std::uint64_t seed,
-                                                   int repeats = 1);
 
 /// What the neighbourhood of a model says about a candidate.
 struct CandidateScore {
@@ -59,13 +23,15 @@ using FloorProgress = std::function<void(const std::string&)>;
 double fit(FloorModel&, const FloorTarget&, int rounds, double width, std::uint64_t seed, const FloorProgress&);
 
 /// The effect of walls, part by part of the rim: slower where robots were measured to stay longer than they do in the model. It
-/// is kept where the misfit falls. Returns the misfit.
-double fit_walls(FloorModel&, const FloorTarget&, int rounds, std::uint64_t seed, const FloorProgress&);
+/// is kept where the misfit falls by `least_gain` at least. Returns the misfit.
+double fit_walls(FloorModel&, const FloorTarget&, int rounds, std::uint64_t seed, double least_gain,
+                 const FloorProgress&);
 
 /// Candidates that the model lacks, one after the other by what each removes of the misfit beside those before it and with the
-/// model refitted; ends where the next would remove less than `least_gain`.
+/// model refitted; ends where the next would remove less than `least_gain`. `gains`: what each candidate would remove beside
+/// those chosen; of those, what it removed when chosen.
 [[nodiscard]] std::vector<CandidateScore> choose(const FloorModel&, const std::vector<FloorTerm>& candidates,
                                                  const FloorTarget&, double least_gain, std::uint64_t seed,
-                                                 const FloorProgress&);
+                                                 const FloorProgress&, std::vector<double>* gains = nullptr);
 
 }  // namespace kilotwin::kilogrid

@@ -1,13 +1,14 @@
 #include "clients/identify/kilogrid/floor_model.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "core/math/elementary.h"
 
 namespace kilotwin::kilogrid {
 namespace {
 
 using proto::Effect, proto::Function;
-
-constexpr double kForever_s = 1e6;
 
 Effect& add_effect(FloorSettings& settings, const char* name, Effect::Target target) {
   Effect& effect = *settings.model.add_effect();
@@ -28,17 +29,61 @@ void add_noise(FloorSettings& settings, const char* name, Effect::Target target,
   noise.set_correlation_s(correlation_s);
 }
 
-/// Gains beside one wall: `across` is the axis that leads to it, `at_mm` where it begins; `values` along the other axis, ascending.
-void add_wall(FloorSettings& settings, const char* name, Function::Covariate across, bool above, double at_mm,
-              double half_along_mm, std::span<const double> values) {
-  Effect& effect = add_effect(settings, name, Effect::WHEEL_GAIN);
-  proto::Steps& beside = *add_function(effect, across).mutable_steps();
-  beside.add_at(at_mm);
-  beside.add_value(above ? 0 : 1);
-  beside.add_value(above ? 1 : 0);
-  proto::Steps& along = *add_function(effect, across == Function::X ? Function::Y : Function::X).mutable_steps();
+/// v: episodes per hour, their scale in s, their tail.
+void set_episodes(Function& function, std::span<const double> v) {
+  proto::Episodes& episodes = *function.mutable_episodes();
+  episodes.set_mean_apart_s(3600 / std::max(v[0], 0.0036));
+  episodes.set_scale_s(v[1]);
+  episodes.set_tail(v[2]);
+}
+
+/// Every robot's own gain, as a table: its quantile in the distribution z + skew (z^2 - 1) of the normal z. Successive numbers
+/// are spread evenly over it, so that any swarm has nearly the whole distribution.
+void add_speeds(FloorSettings& settings, double sd, double skew) {
+  constexpr std::uint32_t kRobots = 256;
+  constexpr double kGolden = 0.6180339887498949, kSlowest = -0.95;
+  proto::Table& table =
+      *add_function(add_effect(settings, "speed-of-robots", Effect::WHEEL_GAIN), Function::ROBOT).mutable_table();
+  for (std::uint32_t robot = 0; robot < kRobots; ++robot) {
+    const double share = (robot + 0.5) * kGolden, z = kt_inverse_normal(share - std::floor(share));
+    table.add_key(robot);
+    table.add_value(std::max(sd * (z + skew * (z * z - 1)) / std::sqrt(1 + 2 * skew * skew), kSlowest));
+  }
+}
+
+/// Beside one wall: `across` is the axis that leads to it, `at_mm` where it begins.
+struct Side {
+  const char* name;
+  Function::Covariate across;
+  bool above;
+  double at_mm, half_along_mm;
+};
+
+std::array<Side, 4> sides_of(const Floor& floor) {
+  const double x_mm = floor.width_mm / 2, y_mm = floor.height_mm / 2, beside_mm = FloorModel::kBeside_mm;
+  return {Side{"bottom", Function::Y, false, beside_mm - y_mm, x_mm},
+          {"right", Function::X, true, x_mm - beside_mm, y_mm},
+          {"top", Function::Y, true, y_mm - beside_mm, x_mm},
+          {"left", Function::X, false, beside_mm - x_mm, y_mm}};
+}
+
+/// A factor of `value` there, of 0 elsewhere.
+void add_beside(Effect& effect, const Side& side, double value) {
+  proto::Steps& beside = *add_function(effect, side.across).mutable_steps();
+  beside.add_at(side.at_mm);
+  beside.add_value(side.above ? 0 : value);
+  beside.add_value(side.above ? value : 0);
+}
+
+/// Gains beside one wall, `values` along it, ascending.
+void add_wall(FloorSettings& settings, const Side& side, std::span<const double> values) {
+  Effect& effect = add_effect(settings, (std::string("wall-") + side.name).c_str(), Effect::WHEEL_GAIN);
+  add_beside(effect, side, 1);
+  proto::Steps& along =
+      *add_function(effect, side.across == Function::X ? Function::Y : Function::X).mutable_steps();
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (i > 0) along.add_at(half_along_mm * (2 * static_cast<double>(i) / static_cast<double>(values.size()) - 1));
+    if (i > 0)
+      along.add_at(side.half_along_mm * (2 * static_cast<double>(i) / static_cast<double>(values.size()) - 1));
     along.add_value(values[i]);
   }
 }
@@ -48,14 +93,14 @@ void add_walls(FloorSettings& settings, const Floor& floor, const std::array<dou
   std::array<double, kRimParts> gain;
   for (std::size_t i = 0; i < kRimParts; ++i) gain[i] = wall[i] - 1;
   const std::span<const double> all(gain);
-  const double x_mm = floor.width_mm / 2, y_mm = floor.height_mm / 2, beside_mm = FloorModel::kBeside_mm;
   std::vector<double> top(all.begin() + 12, all.begin() + 16), left(all.begin() + 16, all.end());
   std::reverse(top.begin(), top.end());
   std::reverse(left.begin(), left.end());
-  add_wall(settings, "wall-bottom", Function::Y, false, beside_mm - y_mm, x_mm, all.first(4));
-  add_wall(settings, "wall-right", Function::X, true, x_mm - beside_mm, y_mm, all.subspan(4, 8));
-  add_wall(settings, "wall-top", Function::Y, true, y_mm - beside_mm, x_mm, top);
-  add_wall(settings, "wall-left", Function::X, false, beside_mm - x_mm, y_mm, left);
+  const std::array<Side, 4> sides = sides_of(floor);
+  add_wall(settings, sides[0], all.first(4));
+  add_wall(settings, sides[1], all.subspan(4, 8));
+  add_wall(settings, sides[2], top);
+  add_wall(settings, sides[3], left);
 }
 
 void add_harmonic(Function& function, double cosine, double sine, double period) {
@@ -67,7 +112,7 @@ void add_harmonic(Function& function, double cosine, double sine, double period)
 }  // namespace
 
 FloorTerm base_term() {
-  FloorTerm term{"base", {}, "", "", {}, 0, {}};
+  FloorTerm term{"base", {}, "", "", "", {}, 0, {}};
   term.parameters = {{"straight_speed_mm_s", 11.3, 3, 20, 1},
                      {"turn_speed_mm_s", 27, 5, 40, 3},
                      {"bias_sd_mm_s", 1.2, 0.05, 4, 0.3},
@@ -76,7 +121,7 @@ FloorTerm base_term() {
                      {"heard", 0.75, 0.1, 1, 0.1},
                      {"heard_sd", 0.3, 0, 0.5, 0.06},
                      {"wall_range_mm", 38, 20, 75, 4},
-                     {"wall_heard", 0.5, 0.1, 1, 0.15},
+                     {"wall_heard", 1.5, 0.3, 7, 0.6},
                      {"wall_noise", 15, 1, 60, 6},
                      {"while_talking", 0.45, 0.05, 1, 0.15},
                      {"same_cell", 0.12, 0.02, 0.5, 0.05}};
@@ -104,16 +149,16 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   std::vector<FloorTerm> terms;
   terms.push_back({"speed-of-robots",
                    {"robot"},
-                   "BODY_DRIFT",
+                   "WHEEL_GAIN",
+                   "every robot has a speed of its own: they spread by {0:.2f} of the mean, skewed by {1:+.2f}",
                    "",
-                   {{"sd_mm_s", 0, 0, 5, 0.8}},
+                   {{"sd", 0, 0, 0.5, 0.08}, {"skew", 0, -0.6, 0.6, 0.15}},
                    1,
-                   [](std::span<const double> v, FloorSettings& s) {
-                     add_noise(s, "speed-of-robots", Effect::BODY_DRIFT, v[0], kForever_s);
-                   }});
+                   [](std::span<const double> v, FloorSettings& s) { add_speeds(s, v[0], v[1]); }});
   terms.push_back({"wandering-turn",
                    {"history"},
                    "TURN_RATE",
+                   "robots turn by themselves, by {0:.3f} rad/s (standard deviation), which lasts {1:.0f} s",
                    "",
                    {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"correlation_s", 60, 5, 600, 30}},
                    1,
@@ -123,6 +168,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"wandering-speed",
                    {"history"},
                    "BODY_DRIFT",
+                   "a robot's speed wanders by {0:.2f} mm/s (standard deviation), which lasts {1:.0f} s",
                    "",
                    {{"sd_mm_s", 0, 0, 5, 0.8}, {"correlation_s", 120, 5, 900, 60}},
                    1,
@@ -132,21 +178,34 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"stalls",
                    {"history"},
                    "WHEEL_GAIN",
+                   "robots stall {0:.1f} times an hour, longer than t with the chance (1 + t / {1:.1f} s)^-{2:.2f}",
                    "",
                    {{"per_hour", 0, 0, 240, 12}, {"scale_s", 8, 1, 120, 4}, {"tail", 1.8, 1.1, 6, 0.3}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      Effect& effect = add_effect(s, "stalls", Effect::WHEEL_GAIN);
                      add_function(effect, Function::NOTHING).set_constant(-1);
-                     proto::Episodes& episodes = *add_function(effect, Function::NOTHING).mutable_episodes();
-                     episodes.set_mean_apart_s(3600 / std::max(v[0], 0.0036));
-                     episodes.set_scale_s(v[1]);
-                     episodes.set_tail(v[2]);
+                     set_episodes(add_function(effect, Function::NOTHING), v);
+                   }});
+  terms.push_back({"stuck-beside-walls",
+                   {"position", "history"},
+                   "WHEEL_GAIN",
+                   "within 50 mm of a wall robots get stuck, {0:.1f} times an hour and wall, longer than t with the chance (1 + t / {1:.0f} s)^-{2:.2f}",
+                   "film robots that stand beside a wall: their motors push in vain, or rest",
+                   {{"per_hour", 0, 0, 120, 8}, {"scale_s", 40, 2, 300, 15}, {"tail", 1.8, 1.1, 5, 0.3}},
+                   1,
+                   [floor](std::span<const double> v, FloorSettings& s) {
+                     for (const Side& side : sides_of(floor)) {
+                       Effect& effect = add_effect(s, (std::string("stuck-") + side.name).c_str(), Effect::WHEEL_GAIN);
+                       add_beside(effect, side, -1);
+                       set_episodes(add_function(effect, Function::NOTHING), v);
+                     }
                    }});
   terms.push_back(
       {"slowing",
        {"time"},
        "WHEEL_GAIN",
+                   "speeds fall with time, by {0:.2f} of themselves in an hour",
        "the clock and the motors' own time are one here, since motors never rest: let some robots rest for half of "
        "a run",
        {{"per_hour", 0, -1, 2, 0.12}},
@@ -162,6 +221,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"crowd",
                    {"neighbours"},
                    "WHEEL_GAIN",
+                   "in a crowd wheels change their speed, at most by {0:+.2f}, with others within {1:.0f} mm",
                    "",
                    {{"gain", 0, -0.95, 1, 0.15}, {"radius_mm", 50, 34, 120, 10}},
                    1,
@@ -176,6 +236,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"middle",
                    {"position"},
                    "WHEEL_GAIN",
+                   "in the middle of the floor wheels change their speed by {0:+.2f}, falling to nothing at the walls",
                    "",
                    {{"gain", 0, -0.9, 0.9, 0.12}},
                    1,
@@ -187,6 +248,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"slope-of-speed",
                    {"position"},
                    "WHEEL_GAIN",
+                   "speed changes over the floor: by {0:+.2f} at the right end and {1:+.2f} at the upper end, the other way at the others",
                    "",
                    {{"x", 0, -0.6, 0.6, 0.12}, {"y", 0, -0.6, 0.6, 0.12}},
                    2,
@@ -199,6 +261,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"grain",
                    {"heading", "world_frame"},
                    "WHEEL_GAIN",
+                   "speed depends on the direction as a grain makes it, by {0:+.3f} and {1:+.3f}",
                    "",
                    {{"cosine", 0, -0.5, 0.5, 0.1}, {"sine", 0, -0.5, 0.5, 0.1}},
                    2,
@@ -210,6 +273,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
       {"drift",
        {"world_frame"},
        "WORLD_DRIFT",
+                   "robots drift in the room, by {0:+.2f} and {1:+.2f} mm/s along x and y",
        "",
        {{"x_mm_s", 0, -3, 3, 0.4}, {"y_mm_s", 0, -3, 3, 0.4}},
        2,
@@ -222,6 +286,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"slow-start",
                    {"time_since_command"},
                    "WHEEL_GAIN",
+                   "after a command wheels begin with a change of {0:+.2f}, which fades in {1:.1f} s",
                    "",
                    {{"gain", 0, -0.95, 0.95, 0.2}, {"scale_s", 2, 0.2, 15, 1}},
                    1,
@@ -236,6 +301,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"pull",
                    {},
                    "TURN_RATE",
+                   "robots that go straight turn by {0:+.3f} rad/s on average",
                    "",
                    {{"rad_s", 0, -0.2, 0.2, 0.02}},
                    1,

@@ -32,6 +32,7 @@ struct FloorTerm {
   std::string name;
   std::vector<std::string> covariates;  ///< of the contract
   std::string acts_on;                  ///< as in the model file
+  std::string about;                    ///< in words, with places {0} {1} {2} for its parameters, as of fmt
   std::string experiment;               ///< that would tell it from what looks alike; empty: nothing does
   std::vector<FloorParameter> parameters;
   /// The parameters that switch it: at 0 the term does nothing. The others are shapes.

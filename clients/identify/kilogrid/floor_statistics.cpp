@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "clients/identify/kilogrid/floor_swarm.hpp"
+#include "clients/identify/kilogrid/track_windows.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -20,7 +21,10 @@ constexpr double kAlong_mm = 75;   ///< the rim
 constexpr double kStill_mm = 16;   ///< in a block: less than what cells blur
 constexpr double kMoving_mm = 40;  ///< in a block: the direction is known
 constexpr double kTimeBin_s = 300;
-constexpr std::size_t kTimeBins = 16;
+constexpr std::size_t kTimeBins = 16, kMiddleBins = 8;
+constexpr std::size_t kExtentFeature = 8;  ///< of a track window, taken in 100 mm
+constexpr double kExtentScale_mm = 100;
+constexpr double kMiddle_mm = 300;  ///< from walls
 constexpr double kNear_mm = 100;
 constexpr double kGentle_rad = 1.2;  ///< turns of a straight robot with a bias, not of the walk
 
@@ -30,7 +34,28 @@ constexpr std::array kWalls_mm = {0., 40., 50., 60., 75., 100., 150., 200., 300.
 constexpr std::size_t kRings = 10, kTurns = 8, kSectors = 8, kNeighbours = 5;
 constexpr std::array kOpenRuns = {1, 2, 3, 4};
 constexpr std::array kWallRuns = {1, 2, 3, 4, 6, 9, 12};
+constexpr std::array kStays = {1, 2, 3, 5, 10, 20, 40, 80};
 constexpr std::size_t kColumns = 4, kRows = 8;
+
+/// Of a feature of track windows: lower edges of the bins of its distribution, the first open to below; and what makes it
+/// about 0 and 1 wide where features are multiplied.
+struct FeatureScale {
+  std::vector<double> edges;
+  double middle, width;
+};
+/// In the order of feature_names().
+const std::array kFeatures = {FeatureScale{{0, 20, 35, 50, 60, 70, 80, 90, 100}, 65, 25},
+                              FeatureScale{{0, 15, 20, 25, 30, 35, 40}, 28, 10},
+                              FeatureScale{{0, 0.01, 0.1, 0.2, 0.4, 0.7}, 0.1, 0.17},
+                              FeatureScale{{0, 0.5, 1.5, 2.5, 4.5, 8.5}, 0.7, 1.3},
+                              FeatureScale{{0, 0.4, 0.8, 1.2, 1.6}, 1, 0.65},
+                              FeatureScale{{0, 0.15, 0.3, 0.45, 0.6}, 0.35, 0.3},
+                              FeatureScale{{-4, -1, -0.4, 0, 0.4, 1}, 0, 0.85},
+                              FeatureScale{{0, 100, 200, 300, 400, 600}, 305, 225},
+                              FeatureScale{{0, 150, 300, 400, 500, 650}, 465, 245},
+                              FeatureScale{{0, 0.01, 0.15, 0.35, 0.65, 0.95}, 0.17, 0.3},
+                              FeatureScale{{0, 70, 120, 180, 250, 320, 400}, 230, 125},
+                              FeatureScale{{0, 1.5, 3.5, 5.5, 7.5}, 4.4, 2.9}};
 
 enum Group : std::size_t {
   kStep,
@@ -49,6 +74,11 @@ enum Group : std::size_t {
   kRim,
   kDrift,
   kReports,
+  kStay,
+  kMiddle,
+  kExtent,
+  kWindows,  ///< the first of one group per feature
+  kPairs = kWindows + 12,
 };
 
 std::vector<StatisticGroup> make_groups() {
@@ -87,6 +117,17 @@ std::vector<StatisticGroup> make_groups() {
   add("reports", "measurement",
       {"blocks unheard", "heard again after 2 s", "heard twice at once", "cell as before", "next to it",
        "blocks unheard, between robots"});
+  add("stays-beside-walls", "position", each(kStays, "stays of {} blocks or more, in 1000"));
+  add("middle-by-time", "time", counted(kMiddleBins, "share in the middle in 10 minutes {}"));
+  add("extent", "robot", {"mean", "between robots", "in halves"});
+  const std::vector<std::string>& features = feature_names();
+  for (std::size_t f = 0; f < kFeatures.size(); ++f)
+    add("windows: " + features[f], "history", each(kFeatures[f].edges, "from {}"));
+  std::vector<std::string> pairs;
+  for (std::size_t f = 0; f < features.size(); ++f) {
+    for (std::size_t g = 0; g < f; ++g) pairs.push_back(features[f] + " with " + features[g]);
+  }
+  add("windows: pairs", "history", std::move(pairs));
   return groups;
 }
 
@@ -127,9 +168,8 @@ struct Mean {
 };
 
 /// Two halves of a run tell what lasts from what is chance: their product has the variance of what lasts.
-void add_halves(Sums& sums, Group group, const std::array<Mean, 2>& halves, double about) {
-  constexpr double kEnough = 10;
-  if (halves[0].count < kEnough || halves[1].count < kEnough) return;
+void add_halves(Sums& sums, Group group, const std::array<Mean, 2>& halves, double about, double enough = 10) {
+  if (halves[0].count < enough || halves[1].count < enough) return;
   const double a = halves[0].value() - about, b = halves[1].value() - about;
   sums.add(group, 0, (halves[0].value() + halves[1].value()) / 2);
   sums.add(group, 1, (a * a + b * b) / 2);
@@ -149,6 +189,8 @@ class Motions {
       const double step_mm = std::abs(steps_[k]), wall_mm = wall_distance_mm(floor_, x_[k], y_[k]);
       const std::size_t half = k < steps_.size() / 2 ? 0 : 1;
       sums.add(kWall, bin_of(kWalls_mm, wall_mm), step_mm);
+      if (const std::size_t t = part_of(static_cast<double>(k) * FloorBlocks::kBlock_s, 2 * kTimeBin_s * kMiddleBins, kMiddleBins + 1); t < kMiddleBins)
+        sums.add(kMiddle, t, wall_mm > kMiddle_mm ? 1 : 0);
       sums.count(kRing, part_of(wall_mm, floor_.width_mm / 2, kRings), kRings);
       for (std::size_t i = 0; i < kRimParts; ++i)
         sums.add(kRim, i, wall_mm < kAlong_mm && rim_part(floor_, x_[k], y_[k]) == i ? 1 : 0);
@@ -176,6 +218,7 @@ class Motions {
     add_ways(sums);
     add_still(sums, kStillOpen, kOpenRuns, [&](double wall_mm) { return wall_mm > kOpen_mm; });
     add_still(sums, kStillWall, kWallRuns, [&](double wall_mm) { return wall_mm < kBeside_mm; });
+    add_stays(sums);
   }
 
  private:
@@ -214,6 +257,30 @@ class Motions {
     }
   }
 
+  /// Stays beside a wall, per 1000 blocks; unheard blocks are passed over.
+  void add_stays(Sums& sums) {
+    int stay = 0;
+    double blocks = 0;
+    std::vector<double> stays(kStays.size(), 0);
+    const auto end = [&] {
+      for (std::size_t i = 0; i < kStays.size(); ++i) stays[i] += stay >= kStays[i] ? 1 : 0;
+      stay = 0;
+    };
+    for (std::size_t k = 0; k < x_.size(); ++k) {
+      if (std::isnan(x_[k])) continue;
+      ++blocks;
+      if (wall_distance_mm(floor_, x_[k], y_[k]) < kBeside_mm) {
+        ++stay;
+      } else {
+        end();
+      }
+    }
+    end();
+    for (std::size_t i = 0; i < kStays.size(); ++i) {
+      if (blocks > 0) sums.add(kStay, i, 1000 * stays[i] / blocks, blocks);
+    }
+  }
+
   const std::vector<double>&x_, &y_;
   const Floor& floor_;
   std::vector<std::complex<double>> steps_;
@@ -246,6 +313,21 @@ void add_reports(Sums& sums, const FloorTrack& track, const std::vector<double>&
   }
 }
 
+/// What a classifier sees, and how its numbers go together.
+void add_window(Sums& sums, const std::vector<double>& feature) {
+  std::array<double, kFeatures.size()> scaled;
+  for (std::size_t f = 0; f < kFeatures.size(); ++f) {
+    const FeatureScale& scale = kFeatures[f];
+    const auto above = std::upper_bound(scale.edges.begin() + 1, scale.edges.end(), feature[f]) - scale.edges.begin();
+    sums.count(static_cast<Group>(kWindows + f), static_cast<std::size_t>(above) - 1, scale.edges.size());
+    scaled[f] = std::clamp((feature[f] - scale.middle) / scale.width, -4.0, 4.0);
+  }
+  std::size_t pair = 0;
+  for (std::size_t f = 0; f < kFeatures.size(); ++f) {
+    for (std::size_t g = 0; g < f; ++g) sums.add(kPairs, pair++, scaled[f] * scaled[g]);
+  }
+}
+
 /// How many others were within reach in each block.
 std::vector<std::vector<std::size_t>> count_neighbours(const FloorBlocks& blocks) {
   std::vector<std::vector<std::size_t>> all(blocks.robots(), std::vector<std::size_t>(blocks.blocks, 0));
@@ -264,31 +346,6 @@ std::vector<std::vector<std::size_t>> count_neighbours(const FloorBlocks& blocks
 
 }  // namespace
 
-double wall_distance_mm(const Floor& floor, double x_mm, double y_mm) {
-  return std::max(std::min(std::min(x_mm, floor.width_mm - x_mm), std::min(y_mm, floor.height_mm - y_mm)), 0.0);
-}
-
-FloorBlocks blocks_of(const FloorRun& run) {
-  FloorBlocks blocks;
-  blocks.blocks = std::max<std::size_t>(static_cast<std::size_t>(run.duration_s / FloorBlocks::kBlock_s), 2);
-  for (const FloorTrack& track : run.tracks) {
-    std::vector<double> x(blocks.blocks, 0), y(blocks.blocks, 0), count(blocks.blocks, 0);
-    for (std::size_t i = 0; i < track.size(); ++i) {
-      const auto k = std::min(static_cast<std::size_t>(track.time_s[i] / FloorBlocks::kBlock_s), blocks.blocks - 1);
-      x[k] += track.x_mm[i];
-      y[k] += track.y_mm[i];
-      ++count[k];
-    }
-    for (std::size_t k = 0; k < blocks.blocks; ++k) {
-      x[k] = count[k] < 2 ? kNan : x[k] / count[k];
-      y[k] = count[k] < 2 ? kNan : y[k] / count[k];
-    }
-    blocks.x_mm.push_back(std::move(x));
-    blocks.y_mm.push_back(std::move(y));
-  }
-  return blocks;
-}
-
 const std::vector<StatisticGroup>& statistic_groups() {
   static const std::vector<StatisticGroup> groups = make_groups();
   return groups;
@@ -304,10 +361,22 @@ std::size_t statistic_count() { return statistic_groups().back().first + statist
 std::vector<RobotSums> robot_sums(const FloorRun& run, const Floor& floor) {
   const FloorBlocks blocks = blocks_of(run);
   const auto neighbours = count_neighbours(blocks);
+  const std::vector<TrackWindow> windows = windows_of(blocks, floor);
+  auto window = windows.begin();
   std::vector<RobotSums> all;
   for (std::size_t robot = 0; robot < blocks.robots(); ++robot) {
     Sums sums;
     Motions(blocks, floor, robot).add_to(sums, neighbours[robot]);
+    std::array<Mean, 2> extents;
+    const auto last =
+        std::find_if(window, windows.end(), [&](const TrackWindow& w) { return w.robot != robot; });
+    for (auto w = window; w != last; ++w) {
+      add_window(sums, w->feature);
+      extents[w - window < (last - window) / 2 ? 0 : 1].add(w->feature[kExtentFeature] / kExtentScale_mm);
+    }
+    window = last;
+    constexpr double kFewestWindows = 3, kAboutExtent = 4.7;
+    add_halves(sums, kExtent, extents, kAboutExtent, kFewestWindows);
     add_reports(sums, run.tracks[robot], blocks.x_mm[robot], floor.cell_mm);
     all.push_back(sums.take());
   }

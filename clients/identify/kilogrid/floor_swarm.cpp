@@ -174,13 +174,12 @@ FloorRun simulate(const FloorScene& scene, const Floor& floor, const proto::Mode
     for (std::size_t i = 0; i < bodies.robot.size(); ++i) {
       const std::uint32_t robot = bodies.robot[i];
       const double x_mm = bodies.x_mm[i] + floor.width_mm / 2, y_mm = bodies.y_mm[i] + floor.height_mm / 2;
-      // Robots listen every 16 kilo_ticks, each at its own.
-      if ((now.count() + robot) % 4 == 0) {
-        const double reading_mm = rim_cell_distance_mm(floor, x_mm, y_mm) + radio.wall_noise * dice.normal();
+      if (const double rim_mm = rim_cell_distance_mm(floor, x_mm, y_mm);
+          rim_mm < radio.wall_range_mm + 4 * radio.wall_noise && dice.uniform() < radio.wall_heard * tick_s) {
+        const double reading_mm = rim_mm + radio.wall_noise * dice.normal();
         // The program compares readings; where they begin does not matter as long as they are positive.
         constexpr double kStrongest = 1000;
-        if (reading_mm < radio.wall_range_mm && dice.uniform() < radio.wall_heard)
-          programs[robot].hear_wall(kilo_ticks, kStrongest - reading_mm);
+        if (reading_mm < radio.wall_range_mm) programs[robot].hear_wall(kilo_ticks, kStrongest - reading_mm);
       }
       const Motion next = programs[robot].loop(kilo_ticks);
       actuation.spin_up[robot] = next != motion[robot] ? 1 : 0;

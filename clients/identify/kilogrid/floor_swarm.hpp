@@ -34,7 +34,7 @@ struct FloorRadio {
   /// A module listens to one of its four cells at a time, in turn: chances of the cell to be 0..3 later at the next report.
   std::array<double, 4> later = {0.25, 0.25, 0.25, 0.25};
   double wall_range_mm = 46;  ///< at which robots hear cells of the rim
-  double wall_heard = 1;      ///< chance of such a message to arrive
+  double wall_heard = 2;      ///< such messages a second; at most one in 4 kilo_ticks
   double wall_noise = 5;      ///< of one reading, in mm of distance
 };
 

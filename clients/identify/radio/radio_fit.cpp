@@ -93,7 +93,13 @@ void Loop::add(Step step, const Radios& radios) {
     const GridSet simulated = simulate(train_[q], radios[q], options_.runs, kFirstSeed);
     step.errors.push_back(compare(test_[q], simulated, train_[q]));
   }
-  say(fmt::format("{}: {}", step.name, step.evidence));
+  const std::string shown = fmt::format("{}: {}", step.name, step.evidence);
+  constexpr double kSteps = 11;
+  if (options_.progress) {
+    options_.progress(std::min((1 + static_cast<double>(steps_.size())) / kSteps, 1.0), shown);
+  } else {
+    say(shown);
+  }
   steps_.push_back(std::move(step));
 }
 

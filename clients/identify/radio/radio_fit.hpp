@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <string>
 
 namespace kilotwin::radio_fit {
 
@@ -12,6 +14,8 @@ struct FitOptions {
   std::filesystem::path out;
   int runs = 40;     ///< simulated for each effect and set
   int swarms = 200;  ///< drawn from the fitted population
+  /// Gets how far the work is, 0..1, and what each effect showed; none: that is said on the screen.
+  std::function<void(double, const std::string&)> progress = {};
 };
 
 /// Writes model.txtpb (range, pattern and spreads), model-SET.txtpb (with that set's 25 robots), result.json, effects.md (the

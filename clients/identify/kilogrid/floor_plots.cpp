@@ -1,0 +1,116 @@
+#include "clients/identify/kilogrid/floor_plots.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace kilotwin::kilogrid {
+namespace {
+
+using nlohmann::json;
+
+/// What simulated runs leave of the measured speed over one covariate, in mm/s, as the report shows it.
+json plot_of(const char* name, const char* covariate, const char* unit, const std::vector<double>& at,
+             const FloorTarget& target, const FloorStatistics& before, const FloorStatistics& after) {
+  const StatisticGroup& group = statistic_group(name);
+  json plot = {{"target", "forward"},
+               {"covariate", covariate},
+               {"unit", unit},
+               {"acts_on_unit", "mm/s"},
+               {"fitted", nullptr}};
+  for (const char* list : {"at", "before", "before_se", "after"}) plot[list] = json::array();
+  for (std::size_t i = 0; i < std::min(at.size(), group.size()); ++i) {
+    const std::size_t s = group.first + i;
+    const double measured = target.statistics().value[s];
+    if (!std::isfinite(measured + before.value[s] + after.value[s])) continue;
+    plot["at"].push_back(at[i]);
+    plot["before"].push_back((measured - before.value[s]) / FloorBlocks::kBlock_s);
+    plot["before_se"].push_back(std::sqrt(target.statistics().variance[s]) / FloorBlocks::kBlock_s);
+    plot["after"].push_back((measured - after.value[s]) / FloorBlocks::kBlock_s);
+  }
+  return plot;
+}
+
+std::vector<double> middles(double first, double step, std::size_t count) {
+  std::vector<double> at;
+  for (std::size_t i = 0; i < count; ++i) at.push_back(first + step * static_cast<double>(i));
+  return at;
+}
+
+json map_of(const FloorTarget& target, const FloorStatistics& before, const FloorStatistics& after) {
+  const StatisticGroup& group = statistic_group("step-by-place");
+  constexpr std::size_t kColumns = 4;
+  const std::size_t rows = group.size() / kColumns;
+  const double width = target.floor().width_mm / kColumns,
+               height = target.floor().height_mm / static_cast<double>(rows);
+  json map = {{"target", "forward"},
+              {"unit", "mm/s"},
+              {"x_mm", middles(0.5 * width - target.floor().width_mm / 2, width, kColumns)},
+              {"y_mm", middles(0.5 * height - target.floor().height_mm / 2, height, rows)}};
+  for (std::size_t r = 0; r < rows; ++r) {
+    json b = json::array(), a = json::array(), n = json::array();
+    for (std::size_t c = 0; c < kColumns; ++c) {
+      const std::size_t s = group.first + r * kColumns + c;
+      const double measured = target.statistics().value[s];
+      b.push_back((measured - before.value[s]) / FloorBlocks::kBlock_s);
+      a.push_back((measured - after.value[s]) / FloorBlocks::kBlock_s);
+      n.push_back(1);
+    }
+    map["before"].push_back(b);
+    map["after"].push_back(a);
+    map["count"].push_back(n);
+  }
+  return map;
+}
+
+/// A row of shares as a distribution of 10 000.
+json distribution_of(const char* name, const char* title, const char* unit, const std::vector<double>& edges,
+                     const FloorTarget& target, const FloorStatistics& simulated) {
+  const StatisticGroup& group = statistic_group(name);
+  json d = {
+      {"name", title}, {"unit", unit}, {"edges", edges}, {"measured", json::array()}, {"simulated", json::array()}};
+  for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
+    d["measured"].push_back(std::round(10000 * target.statistics().value[s]));
+    d["simulated"].push_back(std::round(10000 * simulated.value[s]));
+  }
+  return d;
+}
+
+}  // namespace
+
+json numbers(const std::vector<double>& values, const StatisticGroup& group, bool root) {
+  json list = json::array();
+  for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
+    const double v = root ? std::sqrt(values[s]) : values[s];
+    list.push_back(std::isfinite(v) ? json(v) : json());
+  }
+  return list;
+}
+
+void add_plots(json& document, const FloorTarget& held_out, const FloorStatistics& before,
+               const FloorStatistics& after) {
+  const StatisticGroup& ways = statistic_group("msd");
+  json measured = json::array(), simulated = json::array(), lags = json::array();
+  for (std::size_t s = 0; s < ways.size(); ++s) {
+    measured.push_back(held_out.statistics().value[ways.first + s]);
+    simulated.push_back(after.value[ways.first + s]);
+    lags.push_back(std::array{10, 20, 50, 100, 200, 300, 600}[s]);
+  }
+  document["msd"] = {{"lag_s", lags}, {"measured_mm2", measured}, {"simulated_mm2", simulated}};
+  const double pi = 3.14159265358979;
+  document["covariate_plots"] = {
+      plot_of("step-by-time", "time", "s", middles(150, 300, 16), held_out, before, after),
+      plot_of("step-by-wall", "position", "mm from the wall", {20, 45, 55, 67, 87, 125, 175, 250, 400}, held_out,
+              before, after),
+      plot_of("step-by-neighbours", "neighbours", "within 100 mm", middles(0, 1, 5), held_out, before,
+              after),
+      plot_of("step-by-direction", "heading", "rad", middles(-7 * pi / 8, pi / 4, 8), held_out, before,
+              after)};
+  document["maps"] = {map_of(held_out, before, after)};
+  document["distributions"] = {
+      distribution_of("step", "way in 10 s", "mm",
+                      {0, 8, 16, 24, 32, 40, 50, 60, 70, 80, 90, 100, 110, 120, 150, 200}, held_out, after),
+      distribution_of("turn", "turn between two ways of 10 s", "rad", middles(0, pi / 8, 9), held_out, after)};
+}
+
+}  // namespace kilotwin::kilogrid

@@ -1,0 +1,178 @@
+#include "clients/identify/kilogrid/floor_target.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <thread>
+
+namespace kilotwin::kilogrid {
+namespace {
+
+/// No statistic is taken for more exact than that share of it: the program, the cells and the walls are idealised.
+constexpr double kExact = 0.02;
+/// Mean square of how far a run is from the others, beyond which it is unlike them: of eight measured days seven have 0.3 to
+/// 2, one has 3.5; runs of one model have less than 1.
+constexpr double kUnlike = 3;
+constexpr std::size_t kFewestToCompare = 4;
+
+/// The order in which modules listen to their cells, from successive reports to two cells of one module: where nothing
+/// favours an order, as many go from one to the other as back.
+std::array<double, 4> order_of_listening(const std::vector<FloorRun>& runs, const Floor& floor) {
+  std::array<std::array<double, 4>, 4> count{};
+  for (const FloorRun& run : runs) {
+    for (const FloorTrack& track : run.tracks) {
+      for (std::size_t i = 1; i < track.size(); ++i) {
+        if (track.time_s[i] - track.time_s[i - 1] != 2) continue;
+        const auto cell = [&](std::size_t k) {
+          return std::pair{static_cast<std::size_t>(track.x_mm[k] / floor.cell_mm),
+                           static_cast<std::size_t>(track.y_mm[k] / floor.cell_mm)};
+        };
+        const auto [x0, y0] = cell(i - 1);
+        const auto [x1, y1] = cell(i);
+        if (x0 / 2 == x1 / 2 && y0 / 2 == y1 / 2) ++count[x0 % 2 + 2 * (y0 % 2)][x1 % 2 + 2 * (y1 % 2)];
+      }
+    }
+  }
+  // Neighbouring pairs are 01, 23 along x and 02, 13 along y; the diagonal ones are 12 and 03.
+  const double by_1 = count[0][1] + count[2][3], by_3 = count[1][0] + count[3][2];
+  const double by_2 = (count[0][2] + count[2][0] + count[1][3] + count[3][1]) / 2;
+  const double all = by_1 + by_2 + by_3;
+  if (!(all > 0)) return {0.25, 0.25, 0.25, 0.25};
+  return {0.25, 0.75 * by_1 / all, 0.75 * by_2 / all, 0.75 * by_3 / all};
+}
+
+struct Unlike {
+  double square, others;
+};
+
+/// How far a run's statistic is from the mean of the others', squared, by what the others and its own robots differ among each other.
+Unlike unlike_of(const std::vector<FloorStatistics>& runs, std::size_t run, std::size_t s) {
+  double sum = 0, squares = 0, count = 0;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    if (r == run || !std::isfinite(runs[r].value[s])) continue;
+    sum += runs[r].value[s];
+    squares += runs[r].value[s] * runs[r].value[s];
+    ++count;
+  }
+  if (count < 3) return {std::numeric_limits<double>::quiet_NaN(), 0};
+  const double mean = sum / count, variance = std::max(squares - sum * mean, 0.0) / (count - 1);
+  const double off = runs[run].value[s] - mean;
+  return {off * off / (variance * (1 + 1 / count) + runs[run].variance[s] + kExact * kExact * mean * mean), mean};
+}
+
+}  // namespace
+
+void in_parallel(std::uint32_t threads_to_use, std::size_t n, const std::function<void(std::size_t)>& work) {
+  std::atomic<std::size_t> next{0};
+  std::vector<std::jthread> threads;
+  for (std::uint32_t t = 0; t < threads_to_use; ++t) {
+    threads.emplace_back([&] {
+      for (std::size_t i = next++; i < n; i = next++) work(i);
+    });
+  }
+}
+
+std::vector<UnlikeRun> unlike_runs(const std::vector<FloorRun>& runs, const Floor& floor) {
+  std::vector<FloorStatistics> each;
+  for (const FloorRun& run : runs) each.push_back(statistics_of(robot_sums(run, floor)));
+  std::vector<UnlikeRun> unlike;
+  if (runs.size() < kFewestToCompare) return unlike;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    double all = 0, count = 0, worst = 0;
+    UnlikeRun run{r, 0, "", 0, 0};
+    for (const StatisticGroup& group : statistic_groups()) {
+      double sum = 0, own = 0;
+      for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
+        const Unlike of = unlike_of(each, r, s);
+        if (!std::isfinite(of.square)) continue;
+        sum += of.square;
+        ++own;
+        if (of.square <= worst) continue;
+        worst = of.square;
+        run.worst = group.name + ", " + group.labels[s - group.first];
+        run.value = each[r].value[s];
+        run.others = of.others;
+      }
+      all += sum;
+      count += own;
+    }
+    run.distance = all / std::max(count, 1.0);
+    if (run.distance > kUnlike) unlike.push_back(std::move(run));
+  }
+  return unlike;
+}
+
+FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor, std::uint32_t threads)
+    : floor_(floor), threads_(threads), later_(order_of_listening(runs, floor)) {
+  std::vector<RobotSums> all;
+  std::vector<FloorStatistics> each;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    scenes_.push_back(scene_of(runs[i], floor, i + 1));
+    const std::vector<RobotSums> sums = robot_sums(runs[i], floor);
+    each.push_back(statistics_of(sums));
+    all.insert(all.end(), sums.begin(), sums.end());
+  }
+  statistics_ = statistics_of(all);
+  for (std::size_t s = 0; s < statistic_count(); ++s) {
+    const double mean = statistics_.value[s];
+    double spread = 0, count = 0;
+    for (const FloorStatistics& run : each) {
+      if (!std::isfinite(run.value[s])) continue;
+      spread += (run.value[s] - mean) * (run.value[s] - mean);
+      ++count;
+    }
+    const double between = count > 1 ? spread / (count - 1) / count : 0;
+    tolerance_.push_back(std::max(statistics_.variance[s], between) + kExact * kExact * mean * mean);
+  }
+}
+
+std::size_t FloorTarget::size() const {
+  return static_cast<std::size_t>(
+      std::count_if(tolerance_.begin(), tolerance_.end(), [](double t) { return t > 0; }));
+}
+
+double FloorTarget::misfit(const FloorStatistics& simulated, const StatisticGroup& group) const {
+  double sum = 0;
+  for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
+    const double off = simulated.value[s] - statistics_.value[s];
+    const double tolerance = tolerance_[s] + simulated.variance[s];
+    if (std::isfinite(off) && tolerance > 0) sum += off * off / tolerance;
+  }
+  return sum;
+}
+
+double FloorTarget::misfit(const FloorStatistics& simulated) const {
+  double sum = 0;
+  for (const StatisticGroup& group : statistic_groups()) sum += misfit(simulated, group);
+  return sum;
+}
+
+std::vector<FloorRun> simulate_scenes(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
+                                      int repeats) {
+  const std::size_t scenes = target.scenes().size();
+  std::vector<FloorRun> runs(scenes * static_cast<std::size_t>(repeats));
+  in_parallel(target.threads(), runs.size(), [&](std::size_t i) {
+    runs[i] = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times, settings.radio,
+                       seed * 100 + i);
+  });
+  return runs;
+}
+
+FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
+                                     int repeats) {
+  std::vector<RobotSums> all;
+  const std::size_t scenes = target.scenes().size();
+  std::vector<std::vector<RobotSums>> sums(scenes * static_cast<std::size_t>(repeats));
+  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
+    const FloorRun run = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times,
+                                  settings.radio, seed * 100 + i);
+    sums[i] = robot_sums(run, target.floor());
+  });
+  for (std::vector<RobotSums>& run : sums)
+    all.insert(all.end(), std::make_move_iterator(run.begin()), std::make_move_iterator(run.end()));
+  return statistics_of(all);
+}
+
+}  // namespace kilotwin::kilogrid
