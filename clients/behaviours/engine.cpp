@@ -197,27 +197,30 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   bool sent = (sent_[i] & holds_[i]) != 0;
   if (sent_[i] != 0) holds_[i] = 0;
 
-  auto robot = memory.get<KtRobot>(program, program.file.table.robot);
-  if (robot.deaf != 0) {
+  const bool deaf = memory.get<std::uint8_t>(program, program.file.table.robot + offsetof(KtRobot, deaf)) != 0;
+  if (deaf) {
     receptions = {};
     sent = false;
-  } else {
-    const auto ticks = memory.get<std::uint32_t>(program, program.file.table.ticks);
-    memory.set(program, program.file.table.ticks, ticks + kilo_ticks);
+    kilo_ticks = 0;
   }
   const bool eventful = !receptions.empty() || sent;
-  if (!eventful && robot.parked != 0) return;
+  if (!eventful && memory.get<std::uint8_t>(program, program.file.table.robot + offsetof(KtRobot, parked)) != 0) {
+    const auto ticks = memory.get<std::uint32_t>(program, program.file.table.ticks);
+    memory.set(program, program.file.table.ticks, ticks + kilo_ticks);
+    return;
+  }
 
   running_->robot.store(share_.first + i, std::memory_order_relaxed);
   running_->entry.store(running_->entry.load(std::memory_order_relaxed) + 1, std::memory_order_release);
   RobotThread& thread = executor.thread();
   thread.divided = 0;
   memory.copy_in(slot, thread);
+  executor.advance_clock(kilo_ticks);
   surround(i, slot, static_cast<std::uint32_t>(receptions.size()));
   std::int32_t interrupted_cycles = 0;
   if (eventful) {
-    const Fault fault = executor.interrupt(receptions, sent, interrupted_cycles);
-    if (fault.signal != Fault::kNone) return fail_robot(i, fault, program, slot);
+    const Fault* const fault = executor.interrupt(receptions, sent, interrupted_cycles);
+    if (fault != nullptr) return fail_robot(i, *fault, program, slot);
     if (executor.robot().reset != 0) {
       static_cast<void>(memory.copy_out(slot, executor.data_octets(), thread));
       reset_robot(from, i, program, slot);
@@ -228,34 +231,35 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   }
   if (executor.robot().parked == 0) {
     if (sent) interrupted_cycles += static_cast<std::int32_t>(kPacketCycles);
-    const Fault fault = run_main(i, executor, interrupted_cycles);
-    if (fault.signal != Fault::kNone) return fail_robot(i, fault, program, slot);
+    const Fault* const fault = run_main(i, executor, interrupted_cycles);
+    if (fault != nullptr) return fail_robot(i, *fault, program, slot);
   }
-  robot = executor.robot();
+  // Field by field: what the robot has just written a part of, a processor cannot read as a whole at once.
+  KtRobot& robot = executor.robot();
   if (robot.state != static_cast<std::uint8_t>(LifeCycle::kRunning)) holds_[i] = 0;
   if (asked_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
     const KtMessage* message = nullptr;
     std::int32_t cycles = 0;
-    const Fault fault = executor.transmit(message, cycles);
-    if (fault.signal != Fault::kNone) return fail_robot(i, fault, program, slot);
-    if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) executor.robot().debt_cycles += static_cast<std::uint64_t>(cycles);
+    const Fault* const fault = executor.transmit(message, cycles);
+    if (fault != nullptr) return fail_robot(i, *fault, program, slot);
+    if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) robot.debt_cycles += static_cast<std::uint64_t>(cycles);
     if (message != nullptr) {
       std::copy_n(message->data, 9, message_[i].begin());
       message_[i][9] = message->type;
       holds_[i] = offers_[i] = 1;
     }
-    robot = executor.robot();
   }
   keep_eeprom(i, slot);
   note_outputs(i, robot, executor.tx_period());
   if (thread.divided != 0) note_division(i, thread.divided, program, slot);
-  executor.robot().spin_up = 0;
+  robot.spin_up = 0;
   if (!memory.copy_out(slot, executor.data_octets(), thread))
     fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
 }
 
 /// The main program's share of a tick.
-Fault BehavioursEngine::run_main(std::uint32_t i, const Executor& executor, std::int32_t interrupted_cycles) {
+const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executor,
+                                        std::int32_t interrupted_cycles) {
   KtRobot& robot = executor.robot();
   const auto tick_cycles = static_cast<std::int32_t>(plan_.tick_length.cycles());
   std::int64_t cycles = tick_cycles;
@@ -266,19 +270,19 @@ Fault BehavioursEngine::run_main(std::uint32_t i, const Executor& executor, std:
     const std::uint64_t paid = std::min<std::uint64_t>(owed, static_cast<std::uint64_t>(tick_cycles));
     robot.debt_cycles = owed - paid;
     cycles -= static_cast<std::int64_t>(paid);
-    if (cycles <= 0) return {};
+    if (cycles <= 0) return nullptr;
   }
   Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), spins_[i]);
   spins_[i] = main.spins;
-  if (main.fault.signal != Fault::kNone) return main.fault;
+  if (main.fault != nullptr) return main.fault;
   if (as_on_robot && main.left < 0) robot.debt_cycles += static_cast<std::uint64_t>(-main.left);
   if (main.preempted) ++robot.waits;
   robot.looped = main.preempted && (executor.thread().check & KT_CHECK_WAITS) == 0 ? 1 : 0;
   const bool endless = main.preempted && (executor.thread().check & KT_CHECK_ENDLESS) != 0;
   robot.stuck_ticks = endless ? static_cast<std::uint16_t>(robot.stuck_ticks + 1) : std::uint16_t{0};
   if (endless && std::int64_t{robot.stuck_ticks} * tick_cycles >= kPatienceCycles)
-    return {Fault::kEndlessLoop, 0, executor.thread().place};
-  return {};
+    return executor.fail({Fault::kEndlessLoop, 0, executor.thread().place});
+  return nullptr;
 }
 
 /// What the robot in the slot senses in this tick.

@@ -98,7 +98,7 @@ class BehavioursEngine {
   void surround(std::uint32_t i, const Slot&, std::uint32_t receptions);
   void calibrate_ranging(const RadioParameters&);
   void keep_eeprom(std::uint32_t i, const Slot&);
-  Fault run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles);
+  const Fault* run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles);
   void note_division(std::uint32_t i, std::uint64_t code, const Program&, const Slot&);
   void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);
   void fail_robot(std::uint32_t i, const Fault&, const Program&, const Slot&);

@@ -63,8 +63,7 @@ namespace {
 /// What a callback may use, of its robot's time: one second. On a robot, a longer one would have kept every message, every
 /// tick and the program waiting.
 constexpr std::int32_t kCallbackCycles = 8'000'000;
-/// After so many cycles a program is suspected of waiting in a loop, and looked at each time round, this many times.
-constexpr std::int32_t kUnsuspected = 32768;
+/// A program that is suspected of waiting in a loop is looked at each time round, this many times.
 constexpr int kLooks = 24;
 /// Of Main::spins: the loop has one test; shorter than any loop.
 constexpr std::int32_t kOneTest = 1;
@@ -107,44 +106,28 @@ std::string place(std::uint64_t code, const Program& program, const Slot& slot) 
 
 }  // namespace
 
-bool Executor::enter(std::int32_t cycles) const {
-  thread_.budget = cycles;
-  begin();
-  const bool preempted = enter_() == KT_PREEMPTED;
-  end();
-  return preempted && thread_.fault.signal == Fault::kNone;
-}
-
-Executor::Main Executor::run_main(std::int32_t cycles, std::int32_t spun) const {
+/// The main program until it waits or has used up the tick: one that waits in a loop, or did in the tick before, or has run
+/// for long enough to be suspected of it.
+void Executor::follow(Main& main, std::int32_t spun) const {
   thread_local Snapshot snapshot;
-  Main main;
-  main.left = cycles;
-  // From here to the next test, or as far as `slice` goes; false when that ended otherwise than by preemption.
-  const auto run = [&](std::int32_t slice) {
-    thread_.held = main.left - slice;
-    main.preempted = enter(slice);
-    main.left -= slice - thread_.budget;
-    main.fault = thread_.fault;
-    return main.preempted;
-  };
   if (robot_->looped != 0) {
     // The last tick ended in a loop that reads nothing which an interrupt could change. If it comes to the same state
     // again, nothing ever will.
     snapshot.take(slot_, data_octets(), thread_);
-    if (!run(0)) return main;
+    if (!run(main, 0)) return;
     if (snapshot.equals(slot_, data_octets(), thread_)) {
-      main.fault = {Fault::kEndlessLoop, 0, thread_.place};
-      return main;
+      main.fault = fail({Fault::kEndlessLoop, 0, thread_.place});
+      return;
     }
+    if (spun == 0 && main.left >= 0 && !run(main, std::min(main.left, kUnsuspected))) return;
   }
-  if (spun == 0 && main.left >= 0 && !run(std::min(main.left, kUnsuspected))) return main;
   // Whoever comes to the same place in the same state goes round in a loop that only an interrupt can end: it need not be
   // followed any further than for its phase at the end of the tick.
   int next_snapshot = 0, snapshot_look = 0;
   std::int32_t snapshot_left = 0;
   // A loop with several tests is likely to be the one of the last tick. The first round may end otherwise than it began, with
   // what an interrupt has changed in a register.
-  if (spun > kOneTest && main.left >= 0 && !run(std::min(spun, main.left + 1) - 1)) return main;
+  if (spun > kOneTest && main.left >= 0 && !run(main, std::min(spun, main.left + 1) - 1)) return;
   for (int look = 0; look < kLooks && main.left >= 0; ++look) {
     const bool whole_round = look == 0 && spun > kOneTest;
     if (look == next_snapshot) {
@@ -153,7 +136,7 @@ Executor::Main Executor::run_main(std::int32_t cycles, std::int32_t spun) const 
       snapshot_left = main.left;
       next_snapshot = 2 * look + 1;
     }
-    if (!run(whole_round ? std::min(spun, main.left + 1) - 1 : 0)) return main;
+    if (!run(main, whole_round ? std::min(spun, main.left + 1) - 1 : 0)) return;
     if (!snapshot.equals(slot_, data_octets(), thread_)) continue;
     const std::int32_t period = snapshot_left - main.left;
     const bool one_test = look == snapshot_look && !whole_round;
@@ -162,11 +145,10 @@ Executor::Main Executor::run_main(std::int32_t cycles, std::int32_t spun) const 
     if (one_test && main.left >= 0) main.left -= period;
     break;
   }
-  if (main.left >= 0) (void)run(main.left);
-  return main;
+  if (main.left >= 0) run(main, main.left);
 }
 
-Fault Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
+const Fault* Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
   thread_.budget = kCallbackCycles;
   thread_.overrun = 0;
   clear(reinterpret_cast<std::uint8_t*>(slot_.interrupt_stack_top()) - kClearedOctets, kClearedOctets);  // NOLINT
@@ -174,11 +156,11 @@ Fault Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t
   result = call_(function);
   end();
   cycles += kCallbackCycles - thread_.budget;
-  if (thread_.overrun != 0) return {Fault::kCallbackOverrun, robot_->in_interrupt, thread_.place};
-  return thread_.fault;
+  if (thread_.overrun != 0) return fail({Fault::kCallbackOverrun, robot_->in_interrupt, thread_.place});
+  return fault();
 }
 
-Fault Executor::interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const {
+const Fault* Executor::interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const {
   KtExchange& exchange = *slot_.exchange();
   exchange.sent = sent ? 1 : 0;
   do {
@@ -186,17 +168,17 @@ Fault Executor::interrupt(std::span<const KtReception> receptions, bool sent, st
     exchange.receptions = static_cast<std::uint32_t>(part.size());
     std::copy(part.begin(), part.end(), exchange.reception);
     std::uint64_t result = 0;
-    if (const Fault fault = call(interrupts_, result, cycles); fault.signal != Fault::kNone) return fault;
+    if (const Fault* const fault = call(interrupts_, result, cycles)) return fault;
     receptions = receptions.subspan(part.size());
     exchange.sent = 0;
   } while (!receptions.empty() && robot_->reset == 0);
-  return {};
+  return nullptr;
 }
 
-Fault Executor::transmit(const KtMessage*& message, std::int32_t& cycles) const {
+const Fault* Executor::transmit(const KtMessage*& message, std::int32_t& cycles) const {
   std::uint64_t sends = 0;
-  const Fault fault = call(transmit_, sends, cycles);
-  message = fault.signal == Fault::kNone && sends == 1 ? &slot_.exchange()->message : nullptr;
+  const Fault* const fault = call(transmit_, sends, cycles);
+  message = fault == nullptr && sends == 1 ? &slot_.exchange()->message : nullptr;
   return fault;
 }
 

@@ -17,13 +17,11 @@ namespace kilotwin::behaviours {
 /// Octets below a stack pointer, the end of what frames were there, that are zero whenever a robot begins to run: one that looks
 /// there by mistake finds the same whoever ran before it.
 inline constexpr std::uint32_t kClearedOctets = 256;
-/// Sets few octets, a multiple of 16, to zero.
+/// Sets octets to zero, by the library's function: where compilers see how many octets there are, they choose an instruction
+/// that takes longer to begin than this does.
 inline void clear(std::uint8_t* first, std::size_t octets) {
-  for (std::size_t at = 0; at < octets; at += 16) {
-    std::memset(first + at, 0, 16);
-    // Stays a store each: a loop that becomes a string instruction takes longer to begin than this does.
-    std::atomic_signal_fence(std::memory_order_seq_cst);
-  }
+  __asm__("" : "+r"(octets));
+  std::memset(first, 0, octets);
 }
 
 /// A robot's memory while it does not run: its data with what it uses of its heap, then its live stack, in one buffer.
@@ -83,8 +81,8 @@ class RobotMemory {
   std::uint32_t capacity_ = 0, data_octets_ = 0, stack_octets_ = 0;
 };
 
-/// Code of the robot whose memory is in the slot. Each call returns what faulted, if anything. Needs the slot's mutex and a
-/// FaultGuard on this thread.
+/// Code of the robot whose memory is in the slot. Each call returns what faulted, until the next call, or null. Needs the
+/// slot's mutex and a FaultGuard on this thread.
 class Executor {
  public:
   Executor(const Program& program, const Slot& slot, RobotThread& thread)
@@ -98,6 +96,7 @@ class Executor {
         interrupts_(slot.image_address() + program.file.table.interrupts),
         transmit_(slot.image_address() + program.file.table.transmit),
         robot_(slot.at<KtRobot*>(program.file.table.robot)),
+        ticks_(slot.at<std::uint32_t*>(program.file.table.ticks)),
         tx_period_(slot.at<std::uint16_t*>(program.file.table.tx_period)) {
     thread_.interrupt_stack = slot.interrupt_stack_top();
   }
@@ -109,26 +108,46 @@ class Executor {
   [[nodiscard]] std::uint32_t data_octets() const {
     return fixed_octets_ + std::min(robot_->heap_octets, heap_octets_);
   }
+  /// Of its own clock, by so many ticks.
+  void advance_clock(std::uint32_t ticks) const {
+    std::uint32_t value = 0;
+    std::memcpy(&value, ticks_, sizeof value);
+    value += ticks;
+    std::memcpy(ticks_, &value, sizeof value);
+  }
   [[nodiscard]] std::uint16_t tx_period() const {
     std::uint16_t value = 0;
     std::memcpy(&value, tx_period_, sizeof value);
     return value;
   }
 
+  /// Notes what the host has found to be a fault.
+  [[nodiscard]] const Fault* fail(const Fault& fault) const {
+    thread_.fault = fault;
+    return &thread_.fault;
+  }
+
   struct Main {
-    Fault fault;
+    const Fault* fault = nullptr;
     bool preempted = false;  ///< it was stopped within its code, having used up its cycles
     std::int32_t spins = 0;  ///< not 0: ... in a loop that only an interrupt can end
     std::int32_t left = 0;   ///< cycles; negative: it has used more
   };
   /// The main program, until it waits or has used up so many cycles. `spun`: what Main::spins was the last time, or 0; a hint
   /// that changes how long this takes and nothing else.
-  [[nodiscard]] Main run_main(std::int32_t cycles, std::int32_t spun) const;
+  [[nodiscard]] Main run_main(std::int32_t cycles, std::int32_t spun) const {
+    Main main;
+    main.left = cycles;
+    if (robot_->looped == 0 && spun == 0 && !run(main, std::min(cycles, kUnsuspected))) return main;
+    follow(main, spun);
+    return main;
+  }
 
   /// Callbacks for what has happened. `cycles` is what they have used.
-  [[nodiscard]] Fault interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const;
+  [[nodiscard]] const Fault* interrupt(std::span<const KtReception> receptions, bool sent,
+                                       std::int32_t& cycles) const;
   /// `message` is what the robot gives, or null.
-  [[nodiscard]] Fault transmit(const KtMessage*& message, std::int32_t& cycles) const;
+  [[nodiscard]] const Fault* transmit(const KtMessage*& message, std::int32_t& cycles) const;
 
  private:
   using Enter = std::uint64_t();
@@ -145,8 +164,27 @@ class Executor {
     thread_.leave = 0;
     std::atomic_signal_fence(std::memory_order_seq_cst);
   }
-  [[nodiscard]] bool enter(std::int32_t cycles) const;  ///< whether the robot was preempted
-  [[nodiscard]] Fault call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const;
+  /// After so many cycles a program is suspected of waiting in a loop.
+  static constexpr std::int32_t kUnsuspected = 32768;
+
+  /// The main program to the next test of its cycles, or as far as `slice` of them goes; false when that ended otherwise than
+  /// by preemption.
+  bool run(Main& main, std::int32_t slice) const {
+    thread_.held = main.left - slice;
+    thread_.budget = slice;
+    begin();
+    main.preempted = enter_() == KT_PREEMPTED;
+    end();
+    main.left -= slice - thread_.budget;
+    main.fault = fault();
+    main.preempted = main.preempted && main.fault == nullptr;
+    return main.preempted;
+  }
+  void follow(Main& main, std::int32_t spun) const;
+  [[nodiscard]] const Fault* call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const;
+  [[nodiscard]] const Fault* fault() const {
+    return thread_.fault.signal == Fault::kNone ? nullptr : &thread_.fault;
+  }
 
   const Slot& slot_;
   const std::uint32_t fixed_octets_, heap_octets_;  ///< of data; of the heap at most
@@ -156,6 +194,7 @@ class Executor {
   Call* call_;
   std::uint64_t interrupts_, transmit_;
   KtRobot* robot_;
+  std::uint32_t* ticks_;
   const std::uint16_t* tx_period_;
 };
 

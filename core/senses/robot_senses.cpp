@@ -50,22 +50,6 @@ void RobotSenses::at(Tick tick, std::span<const BodyFrame* const> bodies) {
   }
 }
 
-Readings RobotSenses::readings(std::uint32_t i) const {
-  Readings result;
-  if (light_) {
-    result.light = light_->reading(share_.first + i);
-    result.light_sd = light_->sd(result.light);
-  }
-  if (battery_) {
-    result.voltage = battery_->reading(charge_[i], drain_[i]);
-    result.voltage_sd = battery_->sd();
-    result.charging = supply_[i] > 0 && charge_[i] < battery_->capacity();
-  }
-  result.temperature = temperature_[i];
-  result.temperature_sd = temperature_sd_;
-  return result;
-}
-
 void RobotSenses::restore(std::uint32_t i, std::int64_t charge, std::int64_t drain) {
   charge_[i] = charge;
   drain_[i] = drain;

@@ -30,7 +30,21 @@ class RobotSenses {
 
   /// The surroundings of `tick`. `bodies`: the poses of that tick from all partitions, where RunPlan::hosts_see_bodies().
   void at(Tick tick, std::span<const BodyFrame* const> bodies);
-  [[nodiscard]] Readings readings(std::uint32_t i) const;
+  [[nodiscard]] Readings readings(std::uint32_t i) const {
+    Readings result;
+    if (light_) {
+      result.light = light_->reading(share_.first + i);
+      result.light_sd = light_->sd(result.light);
+    }
+    if (battery_) {
+      result.voltage = battery_->reading(charge_[i], drain_[i]);
+      result.voltage_sd = battery_->sd();
+      result.charging = supply_[i] > 0 && charge_[i] < battery_->capacity();
+    }
+    result.temperature = temperature_[i];
+    result.temperature_sd = temperature_sd_;
+    return result;
+  }
 
   [[nodiscard]] bool has_batteries() const { return battery_.has_value(); }
   /// uA cycles; see Battery.
