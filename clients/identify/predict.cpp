@@ -1,9 +1,12 @@
 #include "clients/identify/predict.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "clients/identify/follower.hpp"
+#include "clients/identify/futures.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -24,6 +27,11 @@ class Outlook {
         robot.weights.push_back(std::exp(h.log_weight) / sum);
       }
       robot.now_s = follower.last_s();
+      Starting& start = robot.start;
+      start.view = robot.view;
+      start.weights = robot.weights;
+      for (const auto& h : follower.hypotheses()) start.filters.push_back(&h.filter);
+      start.now_s = robot.now_s;
     }
   }
   /// Goes on to a time; all robots see each other on a raster.
@@ -37,9 +45,32 @@ class Outlook {
     }
     advance(to_s);
   }
+  /// Draws futures of the robots that came near each other, or were uncertain enough to.
+  void draw_futures(double from_s, std::uint32_t count, bool all, std::array<std::uint32_t, 2> key) {
+    std::vector<Starting> together;
+    std::vector<std::size_t> who;
+    bool any = false;
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      if (robots_[r].filters.empty()) continue;
+      any = any || robots_[r].may_touch;
+      if (!all && !robots_[r].may_touch) continue;
+      together.push_back(robots_[r].start);
+      who.push_back(r);
+    }
+    if (!any) return;
+    const std::vector<Foreseen> seen = futures(model_, together, from_s, now_s_, count, all, key);
+    for (std::size_t i = 0; i < who.size(); ++i)
+      if (robots_[who[i]].may_touch) robots_[who[i]].foreseen = seen[i];
+  }
   bool expected(std::size_t place, Predicted& out) const {
     const Robot& robot = robots_[place];
     if (robot.filters.empty()) return false;
+    if (robot.foreseen) {
+      out.x_mm = robot.foreseen->x_mm;
+      out.y_mm = robot.foreseen->y_mm;
+      out.spread_mm = std::sqrt(robot.foreseen->square_mm2 + 2 * model_.noise.position_mm2);
+      return true;
+    }
     const CommandState commands = robot.view->clock.at(now_s_ - 1e-9);
     double x = 0, y = 0, square = 0, spread = 0;
     for (std::size_t i = 0; i < robot.filters.size(); ++i) {
@@ -62,12 +93,21 @@ class Outlook {
     std::vector<double> weights;
     double now_s = 0;
     NeighbourView near;
+    Starting start;
+    bool may_touch = false;
+    std::optional<Foreseen> foreseen;
   };
   void see() {
     if (!neighbours_) return;
     locate();
-    for (std::size_t r = 0; r < robots_.size(); ++r)
-      if (!std::isnan(x_[r])) robots_[r].near = view_of(r, x_, y_);
+    for (std::size_t r = 0; r < robots_.size(); ++r) {
+      if (std::isnan(x_[r])) continue;
+      robots_[r].near = view_of(r, x_, y_);
+      const StateCovariance& p = robots_[r].filters.front().belief().covariance;
+      const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
+      if (model_.contacts && robots_[r].near.nearest_mm < kTouch_mm + std::min(uncertain, 20.0))
+        robots_[r].may_touch = true;
+    }
   }
   void locate() {
     x_.assign(robots_.size(), std::nan(""));
@@ -122,7 +162,6 @@ double end_of(const std::vector<Sample>& samples) {
 }
 
 bool looks_at_neighbours(const MotionModel& model) {
-  if (model.contacts) return true;
   for (const Term& term : model.terms)
     for (const Block& block : term.blocks)
       for (const Covariate c :
@@ -145,7 +184,8 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
                                bool held_out_only, std::uint32_t threads) {
   const std::vector<Run>& runs = set.set().runs;
   std::vector<std::vector<Predicted>> by_run(runs.size());
-  const bool neighbours = looks_at_neighbours(model);
+  const bool effects_of_neighbours = looks_at_neighbours(model),
+             neighbours = effects_of_neighbours || model.contacts;
   in_parallel(runs.size(), threads, [&](std::size_t run) {
     std::vector<Follower> followers;
     double last_s = 0;
@@ -166,6 +206,9 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
       for (Follower& follower : followers) follower.follow(from_s);
       Outlook outlook(model, followers, from_s, neighbours);
       outlook.go_to(time_s);
+      if (asked.futures > 0 && model.contacts)
+        outlook.draw_futures(from_s, asked.futures, effects_of_neighbours,
+                             {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(k)});
       for (std::size_t i = 0; i < followers.size(); ++i) {
         const Track& track = *followers[i].view().track;
         if (held_out_only && !track.held_out) continue;

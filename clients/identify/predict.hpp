@@ -17,6 +17,8 @@ struct Predicted {
 
 struct Asked {
   double first_s = 10, every_s = 5, horizon_s = 10;
+  /// So many joint futures of robots that may touch; 0: that of their means alone, for a quick look.
+  std::uint32_t futures = 0;
 };
 
 /// Predictions of all robots of the tracks (of those held out, with `held_out_only`) at first_s, first_s + every_s ... up to

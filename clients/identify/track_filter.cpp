@@ -172,7 +172,7 @@ void TrackFilter::spread(const StepRecord& record) {
 void TrackFilter::step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
   const State before = belief_.mean;
   const StateCovariance p = belief_.covariance;
-  looking_ahead_ = true;
+  look_ahead();
   const StepRecord record = step_freely(time_s, h_s, commands, near);
   // With a normal heading of variance P, E[cos] = cos exp(-P / 2), and speeds that go with the heading shift it.
   const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 + record.rates.ahead_mm_s;

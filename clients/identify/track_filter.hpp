@@ -62,6 +62,8 @@ class TrackFilter {
   StepRecord step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
   /// The same with the mean as the mean of all headings that are possible, not the way of the mean heading: for predictions.
   void step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
+  /// Nothing is measured any more, and what contacts will do is left to whoever knows all robots.
+  void look_ahead() { looking_ahead_ = true; }
   Innovation update(const Sample&, const CommandState& commands);
 
   [[nodiscard]] const Belief& belief() const { return belief_; }
@@ -85,7 +87,7 @@ class TrackFilter {
   Situation place_;   ///< robot and run
   int outliers_ = 0;  ///< in a row
   bool measures_;
-  bool looking_ahead_ = false;  ///< what contacts will do is left to whoever knows all robots
+  bool looking_ahead_ = false;
 };
 
 }  // namespace kilotwin::identify
