@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/identify/linear.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -26,6 +28,8 @@ Factor richer(Factor f) {
     case Shape::kCosines:
       switch (f.axis.of) {
         case Covariate::kTime: f.count = 64; break;
+        case Covariate::kX:
+        case Covariate::kY: f.count = 40; break;
         case Covariate::kNeighbours: f.count = 8; break;
         case Covariate::kSinceCommand:
           f.count = 40;
@@ -120,97 +124,6 @@ std::vector<ColumnGroup> groups_of(const std::vector<Block>& blocks) {
     }
   }
   return groups;
-}
-
-/// All that a model has, and more blocks after it, linearised about the model.
-struct Linear {
-  std::vector<Unit> units;
-  Eigen::MatrixXd information;
-  Eigen::VectorXd score;              ///< with the prior of what the model has
-  Eigen::VectorXd prior;              ///< precision of the columns of the model
-  Eigen::Index first = 0, count = 0;  ///< the columns of the term that is looked at
-  Eigen::Index own = 0;               ///< columns of the model; those of the other blocks come after them
-};
-
-Linear linear(const Fitter& fitter, const MotionModel& model, std::size_t term, const std::vector<Block>& more) {
-  std::vector<Block> blocks = blocks_of(model);
-  blocks.insert(blocks.end(), more.begin(), more.end());
-  Linear out;
-  out.units = linearise(model, fitter.set().units(), blocks, {100, fitter.threads(), static_cast<int>(term)});
-  const Eigen::Index all = out.units.front().information.rows();
-  out.information = Eigen::MatrixXd::Zero(all, all);
-  out.score = Eigen::VectorXd::Zero(all);
-  for (const Unit& unit : out.units) {
-    out.information += unit.information;
-    out.score += unit.score;
-  }
-  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
-  fitter.add_base_prior(model, base, out.score);
-  out.prior = base.diagonal();
-  out.own = kBaseColumns;
-  for (std::size_t t = 0; t < model.terms.size(); ++t) {
-    const Term& own = model.terms[t];
-    const Eigen::Index n = own.coefficients.size();
-    if (t == term) {
-      out.first = out.own;
-      out.count = n;
-    } else {
-      out.prior.segment(out.own, n) = own.precision;
-      out.score.segment(out.own, n) -= own.precision.cwiseProduct(own.coefficients);
-    }
-    out.own += n;
-  }
-  return out;
-}
-
-/// Information and score of some columns beside all others, the score as it would be if the term's coefficients were 0.
-struct Beside {
-  Eigen::MatrixXd information;
-  Eigen::VectorXd score;
-};
-
-/// Columns of the model but for the term's.
-std::vector<Eigen::Index> others_of(const Linear& l) {
-  std::vector<Eigen::Index> others;
-  for (Eigen::Index i = 0; i < l.own; ++i)
-    if (i < l.first || i >= l.first + l.count) others.push_back(i);
-  return others;
-}
-
-/// The score where the term's coefficients were 0.
-Eigen::VectorXd score_without(const Linear& l, const Eigen::VectorXd& coefficients) {
-  return l.score + l.information.middleCols(l.first, l.count) * coefficients;
-}
-
-Beside beside(const Linear& l, const Eigen::VectorXd& at_zero, const std::vector<Eigen::Index>& columns) {
-  const std::vector<Eigen::Index> others = others_of(l);
-  Eigen::MatrixXd own = l.information(others, others);
-  own.diagonal() += l.prior(others);
-  const Eigen::MatrixXd cross = l.information(others, columns);
-  const Eigen::MatrixXd by = own.ldlt().solve(cross);
-  return {l.information(columns, columns) - cross.transpose() * by,
-          at_zero(columns) - by.transpose() * at_zero(others)};
-}
-
-/// Puts the new blocks in place of the term's: all moves with them as the linearised data have it.
-void exchange(MotionModel& model, std::size_t place, const Linear& l, const std::vector<Block>& blocks,
-              const Eigen::VectorXd& at_zero, const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd) {
-  Term& term = model.terms[place];
-  std::vector<Eigen::Index> moved = others_of(l);
-  moved.insert(moved.end(), columns.begin(), columns.end());
-  Eigen::MatrixXd own = l.information(moved, moved);
-  Eigen::VectorXd precision = Eigen::VectorXd::Zero(l.information.rows());
-  precision.head(l.own) = l.prior.head(l.own);
-  precision(columns) = sd.array().square().inverse();
-  own.diagonal() += precision(moved);
-  const Eigen::VectorXd part = own.ldlt().solve(Eigen::VectorXd(at_zero(moved)));
-  Eigen::VectorXd step = Eigen::VectorXd::Zero(l.information.rows());
-  for (std::size_t i = 0; i < moved.size(); ++i) step[moved[i]] = part[static_cast<Eigen::Index>(i)];
-  step.segment(l.first, l.count) = -term.coefficients;
-  Fitter::apply(model, l.units, step);
-  term.blocks = blocks;
-  term.coefficients = step(columns);
-  term.precision = precision(columns);
 }
 
 /// Leaves out the columns that cannot matter.
@@ -330,11 +243,8 @@ void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const Linear l = linear(fitter, model, place, pass == 0 ? rich : std::vector<Block>{});
     Term& term = model.terms[place];
-    const Eigen::VectorXd at_zero = score_without(l, term.coefficients);
-    std::vector<Eigen::Index> columns;
-    for (Eigen::Index i = pass == 0 ? l.own : l.first; i < (pass == 0 ? l.information.rows() : l.first + l.count);
-         ++i)
-      columns.push_back(i);
+    const Eigen::VectorXd at_zero = l.score_without(term.coefficients);
+    const std::vector<Eigen::Index> columns = pass == 0 ? l.more() : l.of_term();
     const Beside data = beside(l, at_zero, columns);
     choose_smoothness(data.information, data.score, groups, smoothness, sd);
     // What has no size beforehand is as good as held at 0.
