@@ -15,8 +15,15 @@ constexpr Eigen::Index kBuffer = 96;  ///< rows of innovations that are summed a
 /// Derivatives of one track's filter by all columns, and the sums that come of them.
 class Sensitivities {
  public:
-  Sensitivities(const MotionModel& model, const std::vector<Block>& blocks, double cluster_s)
-      : model_(model), blocks_(blocks), cluster_s_(cluster_s) {
+  Sensitivities(const MotionModel& model, const std::vector<Block>& blocks, const LineariseOptions& options)
+      : model_(model), blocks_(blocks), cluster_s_(options.cluster_s) {
+    for (std::size_t t = 0; t < model.terms.size(); ++t) {
+      Eigen::Index first = 0;
+      for (const Block& block : model.terms[t].blocks) {
+        own_.push_back({model.terms[t].coefficients.data() + first, static_cast<int>(t) == options.instead_of});
+        first += static_cast<Eigen::Index>(block.basis.size());
+      }
+    }
     columns_ = kBaseColumns;
     for (const Block& block : blocks) columns_ += static_cast<Eigen::Index>(block.basis.size());
     all_ = columns_ + 2;
@@ -67,13 +74,14 @@ class Sensitivities {
       pose_.col(columns_ + 1) += by_right;
     }
     Eigen::Index c = kBaseColumns;
-    for (const Block& block : blocks_) {
+    Wheels replaced;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block& block = blocks_[b];
       const auto n = static_cast<Eigen::Index>(block.basis.size());
       const Eigen::Index first = c;
       c += n;
       if (is_measured(block.target) || (block.during >> static_cast<int>(commands.command) & 1) == 0) continue;
       block.basis.evaluate(record.middle, 0, of_left_);
-      const double gained_left = r.left_base_mm_s * r.left_gain, gained_right = r.right_base_mm_s * r.right_gain;
       const auto add = [&](const Eigen::Vector3d& force, const double* values) {
         const Eigen::Map<const Eigen::RowVectorXd> row(values, n);
         for (int i = 0; i < 3; ++i)
@@ -84,6 +92,26 @@ class Sensitivities {
         block.basis.evaluate(record.middle, 1, of_right_);
         right_values = of_right_;
       }
+      // Gains are factors: a term's own is not part of what its columns act on.
+      Wheels without = replaced;
+      if (b < own_.size()) {
+        const Eigen::Map<const Eigen::VectorXd> own(own_[b].coefficients, n);
+        const auto factor = [&](const double* values) {
+          const double gain = 1 + own.dot(Eigen::Map<const Eigen::VectorXd>(values, n));
+          constexpr double kLeast = 0.05;
+          return std::abs(gain) < kLeast ? kLeast : gain;
+        };
+        without = {};
+        if (block.target == Target::kGain || block.target == Target::kGainLeft) without.left = factor(of_left_);
+        if (block.target == Target::kGain || block.target == Target::kGainRight)
+          without.right = factor(right_values);
+        if (own_[b].replaced) {
+          replaced.left *= without.left;
+          replaced.right *= without.right;
+        }
+      }
+      const double gained_left = r.left_base_mm_s * r.left_gain / without.left,
+                   gained_right = r.right_base_mm_s * r.right_gain / without.right;
       switch (block.target) {
         case Target::kGain:
           if (right_values == of_left_) {
@@ -177,6 +205,15 @@ class Sensitivities {
   std::vector<std::uint32_t> cluster_run;
 
  private:
+  /// What belongs to a block of the model.
+  struct Own {
+    const double* coefficients;
+    bool replaced;
+  };
+  struct Wheels {
+    double left = 1, right = 1;
+  };
+
   void add_measured(const Sample& sample, const Eigen::Vector3d& pose) {
     const double heading = pose[2];
     const double c = std::cos(heading), s = std::sin(heading);
@@ -216,6 +253,7 @@ class Sensitivities {
 
   const MotionModel& model_;
   const std::vector<Block>& blocks_;
+  std::vector<Own> own_;  ///< of the first blocks
   const double cluster_s_;
   Eigen::Index columns_ = 0, all_ = 0, filled_ = 0;
   Rows pose_, seen_;
@@ -248,7 +286,7 @@ std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vec
                             const std::vector<Block>& blocks, const LineariseOptions& options) {
   std::vector<Unit> out(units.size());
   in_parallel(units.size(), options.threads, [&](std::size_t u) {
-    Sensitivities sums(model, blocks, options.cluster_s);
+    Sensitivities sums(model, blocks, options);
     RobotBias bias;
     for (const TrackView* view : units[u]) {
       out[u].robot = view->track->robot;

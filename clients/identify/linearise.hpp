@@ -33,6 +33,8 @@ struct Unit {
 struct LineariseOptions {
   double cluster_s = 100;  ///< a track is cut into clusters of about this length
   std::uint32_t threads = 2;
+  /// Blocks after those of the model stand for this term of it, not beside it; below 0: beside all.
+  int instead_of = -1;
 };
 
 /// The tracks of each unit are units[i]. Columns: BaseColumn, then those of the blocks in order.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/identify/linear.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -122,69 +124,6 @@ std::vector<ColumnGroup> groups_of(const std::vector<Block>& blocks) {
   return groups;
 }
 
-/// Information and score of some columns beside all others, the score as it would be if their coefficients were 0.
-struct Beside {
-  Eigen::MatrixXd information;
-  Eigen::VectorXd score;
-};
-
-/// `first..first + count` are looked at; `taken_out` are coefficients that the model has now and that are put to 0.
-Beside beside(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, const Eigen::VectorXd& prior,
-              const std::vector<Eigen::Index>& columns, const std::vector<Eigen::Index>& nuisance,
-              const Eigen::VectorXd& taken_out) {
-  const Eigen::VectorXd at_zero = score + information * taken_out;
-  Eigen::MatrixXd own = information(nuisance, nuisance);
-  own.diagonal() += prior(nuisance);
-  const Eigen::MatrixXd cross = information(nuisance, columns);
-  const Eigen::MatrixXd by = own.ldlt().solve(cross);
-  return {information(columns, columns) - cross.transpose() * by,
-          at_zero(columns) - by.transpose() * at_zero(nuisance)};
-}
-
-/// Linearises with all that a model has and with more blocks, and looks at the term's own columns, or at the new ones with
-/// the term's taken out.
-Beside look(const Fitter& fitter, const MotionModel& model, std::size_t term, const std::vector<Block>& instead) {
-  std::vector<Block> blocks = blocks_of(model);
-  blocks.insert(blocks.end(), instead.begin(), instead.end());
-  const std::vector<Unit> units = linearise(model, fitter.set().units(), blocks, {100, fitter.threads()});
-  const Eigen::Index all = units.front().information.rows();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
-  Eigen::VectorXd score = Eigen::VectorXd::Zero(all);
-  for (const Unit& unit : units) {
-    information += unit.information;
-    score += unit.score;
-  }
-  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
-  fitter.add_base_prior(model, base, score);
-  Eigen::VectorXd prior = base.diagonal(), taken_out = Eigen::VectorXd::Zero(all);
-  std::vector<Eigen::Index> columns, nuisance;
-  for (Eigen::Index i = 0; i < kBaseColumns; ++i) nuisance.push_back(i);
-  Eigen::Index first = kBaseColumns;
-  for (std::size_t t = 0; t < model.terms.size(); ++t) {
-    const Term& own = model.terms[t];
-    const Eigen::Index n = own.coefficients.size();
-    if (t == term) {
-      taken_out.segment(first, n) = own.coefficients;
-      if (instead.empty())
-        for (Eigen::Index i = 0; i < n; ++i) columns.push_back(first + i);
-    } else {
-      prior.segment(first, n) = own.precision;
-      score.segment(first, n) -= own.precision.cwiseProduct(own.coefficients);
-      for (Eigen::Index i = 0; i < n; ++i) nuisance.push_back(first + i);
-    }
-    first += n;
-  }
-  if (!instead.empty())
-    for (Eigen::Index i = first; i < all; ++i) columns.push_back(i);
-  return beside(information, score, prior, columns, nuisance, taken_out);
-}
-
-Eigen::VectorXd solved(const Beside& data, const Eigen::VectorXd& sd) {
-  const Eigen::MatrixXd scaled = sd.asDiagonal() * data.information * sd.asDiagonal();
-  const Eigen::MatrixXd own = scaled + Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
-  return sd.asDiagonal() * own.llt().solve(sd.cwiseProduct(data.score));
-}
-
 /// Leaves out the columns that cannot matter.
 void prune(Term& term, const Eigen::VectorXd& information) {
   std::vector<Block> blocks;
@@ -298,19 +237,21 @@ void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const std::vector<ColumnGroup> groups = groups_of(rich);
   std::vector<Smoothness> smoothness;
   Eigen::VectorXd sd;
-  double likelihood = fitter.log_likelihood(model);
+  double likelihood = -1e300;
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    const Beside data = look(fitter, model, place, pass == 0 ? rich : std::vector<Block>{});
-    choose_smoothness(data.information, data.score, groups, smoothness, sd);
+    const Linear l = linear(fitter, model, place, pass == 0 ? rich : std::vector<Block>{});
     Term& term = model.terms[place];
+    const Eigen::VectorXd at_zero = l.score_without(term.coefficients);
+    const std::vector<Eigen::Index> columns = pass == 0 ? l.more() : l.of_term();
+    const Beside data = beside(l, at_zero, columns);
+    choose_smoothness(data.information, data.score, groups, smoothness, sd);
     // What has no size beforehand is as good as held at 0.
-    const double least = 1e-6 * std::max(sd.maxCoeff(), 1e-6);
-    const Eigen::VectorXd held = sd.cwiseMax(least);
+    const Eigen::VectorXd held = sd.cwiseMax(1e-6 * std::max(sd.maxCoeff(), 1e-6));
     if (pass == 0) {
-      term.blocks = rich;
-      term.coefficients = solved(data, held);
+      exchange(model, place, l, rich, at_zero, columns, held);
+    } else {
+      term.precision = held.array().square().inverse();
     }
-    term.precision = held.array().square().inverse();
     fitter.fit(model, 1);
     const double now = fitter.log_likelihood(model);
     const bool last = pass + 1 == kMostPasses || now < likelihood + kSettled;

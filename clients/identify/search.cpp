@@ -7,6 +7,7 @@
 #include <set>
 
 #include "clients/identify/refine.hpp"
+#include "clients/identify/widen.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -103,7 +104,10 @@ class Loop {
     out_.model.terms.push_back(std::move(term));
     out_.reasons.push_back(reason);
     fitter_.fit(out_.model, 2);
-    refine(fitter_, out_.model, out_.model.terms.size() - 1);
+    const std::size_t place = out_.model.terms.size() - 1;
+    refine(fitter_, out_.model, place);
+    find_steps(fitter_, out_.model, place);
+    widen(fitter_, out_.model, place);
     out_.steps.push_back({h.name, found.held_out});
   }
 

@@ -1,0 +1,15 @@
+/// What a cause does besides what it was found by, and where it does so from one instant to the next.
+#pragma once
+
+#include "clients/identify/fit.hpp"
+
+namespace kilotwin::identify {
+
+/// Lets a term act on more of what its kind of effect acts on (the wheels, the turn rate, slip, robots at rest, the measured
+/// heading), as long as the data become more probable by it.
+void widen(const Fitter&, MotionModel&, std::size_t term);
+
+/// Puts steps at times of their own in place of a curve over time, where they are more probable.
+void find_steps(const Fitter&, MotionModel&, std::size_t term);
+
+}  // namespace kilotwin::identify
