@@ -199,6 +199,16 @@ class Catalogue {
     map(kWorld, 5);
     map(kCamera, 7);
     if (extent_.headings) map(kCompass, 2);
+    // Stripes are finer than what a map of the plane resolves: pictures put together, boards of a floor.
+    const auto stripes = [&](const Acting& acting, Covariate of, double low, double high, std::uint32_t count) {
+      const auto bases = put(acting, Basis{{over(Shape::kCosines, of, low, high, count)}});
+      for (Eigen::Index size = count / 2; size <= count; size += count / 2)
+        add(acting, "position", {"position"}, some(bases, 0, size));
+    };
+    for (const auto& [acting, count] : {std::pair{&kCamera, 24u}, {&kSpeed, 16u}}) {
+      stripes(*acting, Covariate::kX, extent_.x_low_mm, extent_.x_high_mm, count);
+      stripes(*acting, Covariate::kY, extent_.y_low_mm, extent_.y_high_mm, count);
+    }
   }
   void of_heading() {
     const Basis round{{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 4)}};

@@ -281,6 +281,13 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
                        {"at_walls_sd_rad", std::sqrt(after.noise.wall_rad2_s)},
                        {"at_robots_sd_mm", std::sqrt(after.noise.contact_mm2_s)},
                        {"at_robots_sd_rad", std::sqrt(after.noise.contact_rad2_s)}};
+  // Lines that the centres of discs do not cross; a side without one has no wall.
+  contract["walls"] = json::object();
+  for (const auto& [side, at_mm] :
+       {std::pair{"x_low_mm", after.room.x_low_mm}, std::pair{"x_high_mm", after.room.x_high_mm},
+        std::pair{"y_low_mm", after.room.y_low_mm}, std::pair{"y_high_mm", after.room.y_high_mm}}) {
+    if (std::isfinite(at_mm)) contract["walls"][side] = at_mm;
+  }
   document["set"] = describe_set(train, test, held_out_only);
   document["steps"] = json::array();
   for (const Step& step : found.steps)

@@ -28,6 +28,8 @@ Factor richer(Factor f) {
     case Shape::kCosines:
       switch (f.axis.of) {
         case Covariate::kTime: f.count = 64; break;
+        case Covariate::kX:
+        case Covariate::kY: f.count = 40; break;
         case Covariate::kNeighbours: f.count = 8; break;
         case Covariate::kSinceCommand:
           f.count = 40;
