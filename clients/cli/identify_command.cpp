@@ -77,7 +77,8 @@ int identify_command(const IdentifyArguments& arguments) {
   };
   std::vector<identify::DataFault> faults;
   identify::Identified found;
-  if (std::optional<identify::Identified> other = identify_other_data(arguments.train, arguments.test, arguments.out, options)) {
+  if (std::optional<identify::Identified> other =
+          identify_other_data(arguments.train, arguments.test, arguments.out, options)) {
     found = std::move(*other);
   } else {
     found = identify_trajectories(arguments, options, faults);

@@ -59,8 +59,10 @@ json table_of_errors(const json& steps) {
   return {{"id", "errors"},
           {"title", "Errors on runs held out, as the model grew"},
           {"lead",
-           "Sent: messages of a robot, simulated less measured. Near, far: largest error of the share received, up to 105 "
-           "mm and beyond 125 mm. Silent: of the share of pairs that hear nothing. Runs: of the spread from run to run. "
+           "Sent: messages of a robot, simulated less measured. Near, far: largest error of the share received, up "
+           "to 105 "
+           "mm and beyond 125 mm. Silent: of the share of pairs that hear nothing. Runs: of the spread from run to "
+           "run. "
            "Deficit: log-likelihood of the counts below what the other runs' own means reach, per pair and run."},
           {"head", {"with", "set", "sent", "near", "far", "silent", "runs", "deficit, nat"}},
           {"rows", rows}};
@@ -76,8 +78,10 @@ json table_of_population(const json& population) {
                                 c.at("inside").get<bool>() ? "" : ", outside")});
   return {{"id", "population"},
           {"title", "Swarms of other robots"},
-          {"lead", "The share of messages received over distance, measured on runs held out, and of swarms drawn from the fitted "
-                   "population."},
+          {"lead",
+           "The share of messages received over distance, measured on runs held out, and of swarms drawn from the "
+           "fitted "
+           "population."},
           {"head", {"set", "distance, mm", "measured", "median swarm", "95 % of swarms"}},
           {"rows", rows}};
 }
@@ -88,7 +92,8 @@ bool has_radio_runs(const fs::path& directory) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with("comm_tau") && name.find("_run") != std::string::npos && name.ends_with(".dat")) return true;
+    if (name.starts_with("comm_tau") && name.find("_run") != std::string::npos && name.ends_with(".dat"))
+      return true;
   }
   return false;
 }
@@ -115,31 +120,33 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   for (std::size_t s = 1; s < steps.size(); ++s) {
     const json& step = steps[s];
     const double before = mean_of(steps[s - 1], "deficit"), after = mean_of(step, "deficit");
-    effects.push_back(
-        {{"name", step.at("name")},
-         {"covariates", step.at("covariates")},
-         {"acts_on", "radio"},
-         {"evidence", step.at("evidence")},
-         {"parameters", step.at("parameters")},
-         {"deficit_before", before},
-         {"deficit_after", after},
-         {"facts",
-          {{"deficit", fmt::format("{:.3f} nat before, {:.3f} nat with it", before, after)},
-           {"added", step.at("parameters").at("added").get<std::string>()}}},
-         {"in_words", fmt::format("{}: {}", step.at("name").get<std::string>(),
-                                  step.at("parameters").at("added").get<std::string>())}});
+    effects.push_back({{"name", step.at("name")},
+                       {"covariates", step.at("covariates")},
+                       {"acts_on", "radio"},
+                       {"evidence", step.at("evidence")},
+                       {"parameters", step.at("parameters")},
+                       {"deficit_before", before},
+                       {"deficit_after", after},
+                       {"facts",
+                        {{"deficit", fmt::format("{:.3f} nat before, {:.3f} nat with it", before, after)},
+                         {"added", step.at("parameters").at("added").get<std::string>()}}},
+                       {"in_words", fmt::format("{}: {}", step.at("name").get<std::string>(),
+                                                step.at("parameters").at("added").get<std::string>())}});
   }
   const json before = summary_of(steps.front()), after = summary_of(steps.back());
   json& contract = result.document["contract"];
-  contract = {{"before", before}, {"after", after},         {"effects", effects},
-              {"rejected", json::array()}, {"ambiguous", json::array()}, {"faults", json::array()}};
+  contract = {{"before", before},           {"after", after},
+              {"effects", effects},         {"rejected", json::array()},
+              {"ambiguous", json::array()}, {"faults", json::array()}};
   for (const auto& [key, value] : fitted.items()) {
     if (key != "effects") contract[key] = value;
   }
   const auto of = [](const json& summary, const char* error) { return summary.at(error).get<double>(); };
   const std::string verdict = fmt::format(
-      "Messages counted on runs that nothing was fitted to are {:.2f} nat per pair and run less likely in the seed's model "
-      "than by the means of the other runs, and {:.2f} with all effects. The largest error of the share received is {:.3f} "
+      "Messages counted on runs that nothing was fitted to are {:.2f} nat per pair and run less likely in the "
+      "seed's model "
+      "than by the means of the other runs, and {:.2f} with all effects. The largest error of the share received "
+      "is {:.3f} "
       "up to 105 mm ({:.3f} before) and {:.3f} beyond 125 mm ({:.3f} before).",
       of(before, "deficit"), of(after, "deficit"), of(after, "near_worst"), of(before, "near_worst"),
       of(after, "far_worst"), of(before, "far_worst"));

@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <complex>
+#include <map>
 
 #include "clients/identify/bristle/ride_model.hpp"
+#include "clients/identify/bristle/velocity_circle.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::bristle {
@@ -14,6 +18,8 @@ namespace {
 
 using identify::Identified, identify::Options;
 using nlohmann::json;
+/// Of a set without an effect to show one.
+constexpr double kChance = 0.01;
 using Places = std::vector<RideModel::Place>;
 
 constexpr const char* kNames[] = {"heading-sense", "heading-mount", "front-for-back",
@@ -102,8 +108,10 @@ std::string words_of(RideEffect effect, const RideModel& m) {
       const double size = std::hypot(m.drift_x, m.drift_y),
                    direction = std::atan2(m.drift_y, m.drift_x) * 180 / 3.14159265358979;
       return fmt::format(
-          "the table carries robots towards {:.0f} degrees by {:.2f} of their own speed, in the median over runs",
-          direction, size);
+          "the table carries robots towards {:.0f} degrees by {:.2f} +- {:.2f} of their own speed in the median of "
+          "{} "
+          "runs, which differ by {:.2f}: velocities lie on circles off zero",
+          direction, size, 1.96 * m.drift_se, m.drift_runs, m.drift_sd);
     }
     case RideEffect::kTurn: return "each run turns at a rate of its own";
   }
@@ -115,10 +123,72 @@ json parameters_of(RideEffect effect, const RideModel& m) {
     case RideEffect::kSense:
       return {{"form", "linear in the heading"}, {"slope", -2}, {"at_zero_rad", m.sense_rad}};
     case RideEffect::kAxis: return {{"form", "half a turn at times"}};
-    case RideEffect::kDrift: return {{"form", "constant times the speed"}, {"x", m.drift_x}, {"y", m.drift_y}};
+    case RideEffect::kDrift:
+      return {{"form", "constant times the speed"},
+              {"x", m.drift_x},
+              {"y", m.drift_y},
+              {"se", m.drift_se},
+              {"sd_between_runs", m.drift_sd}};
     case RideEffect::kSpeed: return {{"form", "table by run"}, {"median_mm_s", m.speed_mm_s}};
     default: return {{"form", "table by run"}};
   }
+}
+
+/// Speeds over the direction of the way, less the run's own: what carries robots makes them faster one way.
+json speed_by_direction(const std::vector<RideInstant>& instants, const RideModel& m, bool carried) {
+  constexpr std::size_t kSectors = 8;
+  constexpr double kPi = 3.14159265358979;
+  std::map<std::size_t, std::vector<std::complex<double>>> ways;
+  for (const RideInstant& i : instants) ways[i.run].emplace_back(i.vx_mm_s, i.vy_mm_s);
+  std::array<double, kSectors> before{}, squares{}, after{}, count{};
+  for (const auto& [run, of_run] : ways) {
+    const VelocityCircle circle = circle_through(of_run, {m.drift_x, m.drift_y}, 6);
+    for (const std::complex<double>& way : of_run) {
+      const double part = (std::arg(way) + kPi) / (2 * kPi) * kSectors;
+      const std::size_t s = std::min(static_cast<std::size_t>(part), kSectors - 1);
+      const double faster = std::abs(way) - circle.speed_mm_s;
+      const std::complex<double> own = carried ? way - circle.drift * circle.speed_mm_s : way;
+      before[s] += faster;
+      squares[s] += faster * faster;
+      after[s] += std::abs(own) - circle.speed_mm_s;
+      ++count[s];
+    }
+  }
+  json plot = {{"target", "forward"},
+               {"covariate", "direction of the way"},
+               {"unit", "rad"},
+               {"acts_on_unit", "mm/s"},
+               {"fitted", nullptr}};
+  for (const char* list : {"at", "before", "before_se", "after"}) plot[list] = json::array();
+  for (std::size_t s = 0; s < kSectors; ++s) {
+    if (count[s] < 5) continue;
+    const double mean = before[s] / count[s];
+    plot["at"].push_back((static_cast<double>(s) + 0.5) * 2 * kPi / kSectors - kPi);
+    plot["before"].push_back(mean);
+    plot["before_se"].push_back(std::sqrt(std::max(squares[s] / count[s] - mean * mean, 0.0) / count[s]));
+    plot["after"].push_back(after[s] / count[s]);
+  }
+  return plot;
+}
+
+json table_of_runs(const json& runs) {
+  json rows = json::array();
+  for (const json& run : runs) {
+    const double x = run.at("drift_x_mm_s"), y = run.at("drift_y_mm_s"), speed = run.at("speed_mm_s");
+    rows.push_back({run.at("run"), run.at("held_out").get<bool>() ? "held out" : "learned from",
+                    fmt::format("{:.0f}", speed), fmt::format("{:+.2f}", speed > 0 ? x / speed : 0),
+                    fmt::format("{:+.2f}", speed > 0 ? y / speed : 0),
+                    fmt::format("{:+.2f}", run.at("turn_rad_s").get<double>())});
+  }
+  return {
+      {"id", "runs"},
+      {"title", "Run by run"},
+      {"lead",
+       "A robot's own speed is the radius of the circle on which its velocities lie; the circle's centre is what "
+       "carries it, in parts of that speed along x and y. Runs that went one way only have the median of the "
+       "others."},
+      {"head", {"run", "", "speed, mm/s", "carried along x", "along y", "turns, rad/s"}},
+      {"rows", rows}};
 }
 
 /// What the model file can say: the median robot on this table.
@@ -187,7 +257,10 @@ Identified identify_ridden(std::vector<RiddenRun> train, std::vector<RiddenRun> 
       RideEffects with = on;
       with[e] = true;
       const Errors errors = errors_on(learned, train.size(), with);
-      if (now.mean() - errors.mean() < 3 * now.error(&errors)) continue;
+      // What carries robots shows in their velocities, whether or not it helps to predict them.
+      const bool carried = e == static_cast<std::size_t>(RideEffect::kDrift) &&
+                           model.drift_p < kChance / kRideEffects && errors.mean() < now.mean();
+      if (!carried && now.mean() - errors.mean() < 3 * now.error(&errors)) continue;
       if (best == kRideEffects || errors.mean() < best_errors.mean()) {
         best = e;
         best_errors = errors;
@@ -229,13 +302,14 @@ Identified identify_ridden(std::vector<RiddenRun> train, std::vector<RiddenRun> 
                  less_in = errors_on(learned, train.size(), without);
     const double gain_in = less_in.mean() - errors_on(learned, train.size(), on).mean();
     const Errors with_in = errors_on(learned, train.size(), on);
+    json evidence = {{"standard_errors", gain_in / std::max(less_in.error(&with_in), 1e-12)},
+                     {"held_out_gain", less.mean() - now_out.mean()},
+                     {"held_out_gain_se", less.error(&now_out)}};
+    if (effect == RideEffect::kDrift) evidence["log10_p"] = std::log10(std::max(model.drift_p, 1e-300));
     effects.push_back({{"name", kNames[e]},
                        {"covariates", kCovariates[e]},
                        {"acts_on", kActsOn[e]},
-                       {"evidence",
-                        {{"standard_errors", gain_in / std::max(less_in.error(&with_in), 1e-12)},
-                         {"held_out_gain", less.mean() - now_out.mean()},
-                         {"held_out_gain_se", less.error(&now_out)}}},
+                       {"evidence", evidence},
                        {"parameters", parameters_of(effect, model)},
                        {"rmse_without_mm", std::sqrt(less.mean())},
                        {"share_removed", total > 0 ? (less.mean() - now_out.mean()) / total : 0},
@@ -298,6 +372,24 @@ Identified identify_ridden(std::vector<RiddenRun> train, std::vector<RiddenRun> 
                      {"experiment", "turn the table by half a turn, or ride with the motors at rest"}}})},
       {"faults", faults}};
   if (!on[static_cast<std::size_t>(RideEffect::kDrift)]) document["contract"]["ambiguous"] = json::array();
+  // How errors grow with how far ahead: for the same runs, with what was learned for one horizon.
+  json& horizon = document["horizon"];
+  for (const char* list : {"at_s", "before_mm", "after_mm", "floor_mm"}) horizon[list] = json::array();
+  for (const double ahead_s : {0.25, 0.5, 1.0, 2.0, 3.0, 5.0}) {
+    const std::vector<RideInstant> instants = instants_of(test, ahead_s);
+    if (instants.empty()) continue;
+    const auto rmse = [&](const RideEffects& with) {
+      return std::sqrt(errors_of(instants, model.predict(instants, ahead_s, with), test.size()).mean());
+    };
+    const double with = rmse(on);
+    horizon["at_s"].push_back(ahead_s);
+    horizon["before_mm"].push_back(rmse(RideEffects{}));
+    horizon["after_mm"].push_back(with);
+    horizon["floor_mm"].push_back(std::min(going_on_mm(instants, ahead_s), with));
+  }
+  document["covariate_plots"] = {
+      speed_by_direction(judged, model, on[static_cast<std::size_t>(RideEffect::kDrift)])};
+  document["tables"] = {table_of_runs(runs)};
   document["set"] = {{"runs", train.size() + test.size()}, {"has_headings", true}, {"has_commands", false}};
   document["steps"] = steps;
   document["seconds"]["all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();

@@ -1,10 +1,15 @@
 #include "clients/identify/bristle/ride_model.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <limits>
 #include <map>
+#include <numeric>
+#include <set>
+
+#include "clients/identify/bristle/velocity_circle.hpp"
 
 namespace kilotwin::bristle {
 namespace {
@@ -13,6 +18,10 @@ constexpr double kLine_s = 0.5, kEvery_s = 1, kFirst_s = 3, kNear_s = 0.1;
 constexpr std::size_t kFewest = 4;
 /// Instants that a run's own values are blended with: those of all runs.
 constexpr double kPrior = 6;
+/// A run tells what carries it if it has that many velocities, and their directions have no mean beyond that.
+constexpr std::size_t kFewestOnCircle = 12;
+constexpr double kOneWay = 0.7;
+constexpr std::size_t kFewestRuns = 4;
 constexpr std::complex<double> kI(0, 1);
 
 std::complex<double> unit(double angle_rad) { return std::exp(kI * angle_rad); }
@@ -43,11 +52,70 @@ std::pair<double, double> line(const std::vector<double>& t, const std::vector<d
 
 double speed_of(const RideInstant& i) { return std::hypot(i.vx_mm_s, i.vy_mm_s); }
 
+struct RobotWay {
+  std::size_t run;
+  std::complex<double> way, forward;  ///< front and back not told apart
+  double speed;
+};
+
+/// The drift, in speeds, that leaves least of ways across headings: once with each run left out, as what runs say (jackknife
+/// pseudo-values).
+void carried_across(const std::vector<RobotWay>& all, std::vector<double>& xs, std::vector<double>& ys) {
+  const auto fit = [&](std::size_t without) {
+    // The third: by how much the axis of headings is off, which goes with the side to which the robot drives.
+    Eigen::Vector3d left = Eigen::Vector3d::Zero();
+    constexpr double kLimit = 0.3;  // of the speed: beyond it the heading is wrong
+    for (int iteration = 0; iteration < 10; ++iteration) {
+      Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
+      Eigen::Vector3d right = Eigen::Vector3d::Zero();
+      for (const RobotWay& w : all) {
+        if (w.run == without || !(w.speed > 0)) continue;
+        const std::complex<double> own = w.way * std::conj(w.forward) / w.speed;
+        const Eigen::Vector3d across(-w.forward.imag(), w.forward.real(), own.real() < 0 ? -1 : 1);
+        const double weight = std::min(1.0, kLimit / std::max(std::abs(own.imag() - across.dot(left)), 1e-9));
+        normal += weight * across * across.transpose();
+        right += weight * own.imag() * across;
+      }
+      left = normal.ldlt().solve(right);
+    }
+    return Eigen::Vector2d(left.head<2>());
+  };
+  std::set<std::size_t> runs;
+  for (const RobotWay& w : all) runs.insert(w.run);
+  const Eigen::Vector2d whole = fit(SIZE_MAX);
+  xs.clear();
+  ys.clear();
+  const auto n = static_cast<double>(runs.size());
+  for (const std::size_t run : runs) {
+    const Eigen::Vector2d pseudo = runs.size() > 1 ? Eigen::Vector2d(n * whole - (n - 1) * fit(run)) : whole;
+    xs.push_back(pseudo.x());
+    ys.push_back(pseudo.y());
+  }
+}
+
+/// The chance that the mean of pairs is as far from 0 as it is, were the truth 0 (Hotelling; F with 2 and n - 2 degrees).
+double chance_of_mean(const std::vector<double>& xs, const std::vector<double>& ys) {
+  const auto n = static_cast<Eigen::Index>(xs.size());
+  if (n < 5) return 1;
+  Eigen::MatrixX2d v(n, 2);
+  v.col(0) = Eigen::Map<const Eigen::VectorXd>(xs.data(), n);
+  v.col(1) = Eigen::Map<const Eigen::VectorXd>(ys.data(), n);
+  const Eigen::RowVector2d mean = v.colwise().mean();
+  const Eigen::MatrixX2d off = v.rowwise() - mean;
+  const auto count = static_cast<double>(n);
+  const Eigen::Matrix2d covariance = off.transpose() * off / (count - 1);
+  const double square = count * mean * covariance.ldlt().solve(mean.transpose());
+  const double f = square * (count - 2) / (2 * (count - 1));
+  return std::pow(1 + 2 * f / (count - 2), -(count - 2) / 2);
+}
+
 /// Values of one run so far, blended with those of all runs.
 struct OwnPast {
   std::vector<double> speeds;
-  std::complex<double> mount = 0, drift = 0;
-  double turn = 0, turns = 0, instants = 0;
+  std::vector<std::complex<double>> ways;
+  VelocityCircle circle;
+  std::complex<double> mount = 0;
+  double turn = 0, turns = 0;
   std::complex<double> last_way = 0;
   double last_time_s = -std::numeric_limits<double>::infinity();
 
@@ -55,8 +123,11 @@ struct OwnPast {
     const std::complex<double> way(now.vx_mm_s, now.vy_mm_s);
     speeds.push_back(std::abs(way));
     if (speeds.size() > 20) speeds.erase(speeds.begin());
+    ways.push_back(way);
+    circle = circle_through(ways, {all.drift_x, all.drift_y}, kPrior);
+    const bool carried = effects[static_cast<std::size_t>(RideEffect::kDrift)];
     // Twice the angle: front and back are one.
-    mount += unit(2 * (std::arg(way) + now.axis_rad - all.sense_rad));
+    mount += unit(2 * (std::arg(own_way(way, carried)) + now.axis_rad - all.sense_rad));
     if (now.time_s - last_time_s < 1.5 * kEvery_s) {
       const double turned = std::arg(way * std::conj(last_way));
       if (std::abs(turned) < 1.2) {
@@ -66,16 +137,14 @@ struct OwnPast {
     }
     last_way = way;
     last_time_s = now.time_s;
-    ++instants;
-    const std::complex<double> forward = direction(now, all, effects);
-    const double speed = median(speeds);
-    if (speed > 0) drift += (way - speed * forward) / speed;
   }
+  /// Of a way, what is not the table's.
+  [[nodiscard]] std::complex<double> own_way(std::complex<double> way, bool carried) const {
+    return carried ? way - circle.drift * circle.speed_mm_s : way;
+  }
+  [[nodiscard]] double own_speed(bool carried) const { return carried ? circle.speed_mm_s : median(speeds); }
   [[nodiscard]] double own_mount() const { return std::arg(mount + kPrior) / 2; }
   [[nodiscard]] double own_turn() const { return turn / (turns + kPrior); }
-  [[nodiscard]] std::complex<double> own_drift(const RideModel& all) const {
-    return (drift + kPrior * std::complex<double>(all.drift_x, all.drift_y)) / (instants + kPrior);
-  }
   /// Where it goes, if nothing carries it.
   [[nodiscard]] std::complex<double> direction(const RideInstant& now, const RideModel& all,
                                                const RideEffects& on) const {
@@ -84,7 +153,7 @@ struct OwnPast {
     double heading = has(RideEffect::kSense) ? all.sense_rad - measured : measured;
     if (has(RideEffect::kMount)) heading += own_mount();
     std::complex<double> forward = unit(heading);
-    const std::complex<double> way(now.vx_mm_s, now.vy_mm_s);
+    const std::complex<double> way = own_way({now.vx_mm_s, now.vy_mm_s}, has(RideEffect::kDrift));
     if (has(RideEffect::kAxis) && (way * std::conj(forward)).real() < 0) forward = -forward;
     return forward;
   }
@@ -139,24 +208,42 @@ RideModel::RideModel(const std::vector<RideInstant>& train) {
   aligned_turned = std::abs(turned) / n;
   aligned_axis = std::abs(turned_axis) / n;
   sense_rad = std::arg(turned);
-  // Drift: medians over instants of what is left of the way, in speeds.
-  RideEffects on{};
-  on[static_cast<std::size_t>(RideEffect::kSense)] = on[static_cast<std::size_t>(RideEffect::kAxis)] = true;
-  std::map<std::size_t, std::vector<double>> speeds_of;
-  for (const RideInstant& i : train) speeds_of[i.run].push_back(speed_of(i));
-  std::map<std::size_t, double> speed_of_run;
-  for (const auto& [run, own] : speeds_of) speed_of_run[run] = median(own);
-  std::vector<double> left_x, left_y;
-  for (const RideInstant& i : train) {
-    // The run's speed and not that of the instant, which goes with where it is carried.
-    const double speed = speed_of_run[i.run];
-    if (!(speed > 0)) continue;
-    const std::complex<double> forward = OwnPast{}.direction(i, *this, on);
-    left_x.push_back(i.vx_mm_s / speed - forward.real());
-    left_y.push_back(i.vy_mm_s / speed - forward.imag());
+  // What carries robots: the median over runs that went in many directions. Each run is one measurement.
+  std::map<std::size_t, std::vector<std::complex<double>>> ways_of;
+  for (const RideInstant& i : train) ways_of[i.run].emplace_back(i.vx_mm_s, i.vy_mm_s);
+  std::vector<double> xs, ys;
+  for (const auto& [run, ways] : ways_of) {
+    const VelocityCircle circle = circle_through(ways, 0, 0.5);
+    if (ways.size() < kFewestOnCircle || circle.one_way > kOneWay || std::abs(circle.drift) > 1) continue;
+    xs.push_back(circle.drift.real());
+    ys.push_back(circle.drift.imag());
   }
-  drift_x = median(left_x);
-  drift_y = median(left_y);
+  const bool across = xs.size() < kFewestRuns;
+  if (across) {
+    // Runs that went one way each: what carries them shows across their headings.
+    std::vector<RobotWay> all;
+    for (const RideInstant& i : train) {
+      std::vector<double> own;
+      for (const std::complex<double>& way : ways_of[i.run]) own.push_back(std::abs(way));
+      all.push_back({i.run, {i.vx_mm_s, i.vy_mm_s}, unit(sense_rad - i.axis_rad), median(own)});
+    }
+    carried_across(all, xs, ys);
+  }
+  drift_runs = xs.size();
+  if (xs.empty()) return;
+  const auto middle = [&](const std::vector<double>& v) {
+    return across ? std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size()) : median(v);
+  };
+  drift_x = middle(xs);
+  drift_y = middle(ys);
+  double spread = 0;
+  for (std::size_t r = 0; r < xs.size(); ++r)
+    spread += (xs[r] - drift_x) * (xs[r] - drift_x) + (ys[r] - drift_y) * (ys[r] - drift_y);
+  const auto runs = static_cast<double>(xs.size());
+  drift_sd = xs.size() > 1 ? std::sqrt(spread / 2 / (runs - 1)) : 0;
+  drift_p = chance_of_mean(xs, ys);
+  // Per axis; the standard error of a median is 1.25 that of a mean.
+  drift_se = xs.size() > 1 ? (across ? 1 : 1.25) * std::sqrt(spread / 2 / (runs - 1) / runs) : 1;
 }
 
 std::vector<RideModel::Place> RideModel::predict(const std::vector<RideInstant>& instants, double horizon_s,
@@ -169,14 +256,14 @@ std::vector<RideModel::Place> RideModel::predict(const std::vector<RideInstant>&
     if (now.run != run) past = {};
     run = now.run;
     past.add(now, *this, on);
-    const double speed = has(RideEffect::kSpeed) ? median(past.speeds) : speed_mm_s;
+    const double speed = has(RideEffect::kSpeed) ? past.own_speed(has(RideEffect::kDrift)) : speed_mm_s;
     std::complex<double> way = speed * horizon_s * past.direction(now, *this, on);
     if (has(RideEffect::kTurn)) {
       // Along an arc.
       const double turn = past.own_turn() * horizon_s;
       if (std::abs(turn) > 1e-6) way *= (unit(turn) - 1.0) / (kI * turn);
     }
-    if (has(RideEffect::kDrift)) way += speed * horizon_s * past.own_drift(*this);
+    if (has(RideEffect::kDrift)) way += speed * horizon_s * past.circle.drift;
     places.push_back({now.x_mm + way.real(), now.y_mm + way.imag()});
   }
   return places;
@@ -195,10 +282,10 @@ std::vector<RideSummary> summaries_of(const RideModel& model, const std::vector<
   std::vector<RideSummary> summaries;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     if (speeds[r].empty()) continue;
-    const double speed = median(speeds[r]);
-    const std::complex<double> drift = pasts[r].own_drift(model) * speed;
+    const VelocityCircle& circle = pasts[r].circle;
+    const std::complex<double> drift = circle.drift * circle.speed_mm_s;
     summaries.push_back(
-        {runs[r].name, speed, drift.real(), drift.imag(), pasts[r].own_turn(), pasts[r].own_mount()});
+        {runs[r].name, circle.speed_mm_s, drift.real(), drift.imag(), pasts[r].own_turn(), pasts[r].own_mount()});
   }
   return summaries;
 }

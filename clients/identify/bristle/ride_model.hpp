@@ -45,7 +45,11 @@ class RideModel {
 
   double speed_mm_s = 0;            ///< median
   double sense_rad = 0;             ///< heading = sense_rad - measured heading
-  double drift_x = 0, drift_y = 0;  ///< of the speed
+  double drift_x = 0, drift_y = 0;  ///< of the speed, in the median over runs that went in many directions
+  double drift_se = 1;              ///< of either, by the spread of these runs
+  std::size_t drift_runs = 0;
+  double drift_sd = 0;  ///< between runs, of either
+  double drift_p = 1;   ///< chance of a mean as far from 0 over these runs, were it 0 (Hotelling)
   double aligned = 0,
          aligned_turned = 0;  ///< 0..1: how well the way goes with the heading as measured, and the other way round
   double aligned_axis = 0;    ///< the same where front and back are not told apart

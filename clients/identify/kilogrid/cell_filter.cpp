@@ -41,7 +41,7 @@ struct LoneTerm {
 constexpr std::uint64_t kNumbers = 100;
 
 struct Particle {
-  std::uint32_t number;  ///< which one it may be
+  std::uint32_t number;            ///< which one it may be
   double x_mm, y_mm, heading_rad;  ///< of the disc's centre
   double bias_left_mm_s, bias_right_mm_s;
   double since_command_s;

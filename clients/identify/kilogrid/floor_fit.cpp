@@ -9,8 +9,8 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Runs of the design are cut to that: what parameters change shows in half an hour.
-constexpr double kExplored_s = 1800;
+/// Runs of the design are cut to that: what parameters change shows soon.
+constexpr double kExplored_s = 1500;
 
 /// Where a model of `m` parameters stands on a design of runs, in steps: each parameter balanced between up and down.
 std::vector<std::vector<double>> design_of(std::size_t parameters, std::size_t points, Dice& dice) {
@@ -83,7 +83,8 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const Floo
   // A little ridge: a parameter at the end of its range moves to one side only.
   Eigen::MatrixXd normal = x.transpose() * x;
   normal.diagonal().tail(columns).array() += 0.02 * static_cast<double>(points);
-  const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
+  const Eigen::MatrixXd inverse = normal.inverse();
+  const double spare = std::max(static_cast<double>(rows - scenes - columns), 1.0);
   const auto statistics = static_cast<Eigen::Index>(statistic_count());
   Surrogate surrogate{Eigen::VectorXd::Zero(statistics), Eigen::MatrixXd::Zero(statistics, columns)};
   for (Eigen::Index s = 0; s < statistics; ++s) {
@@ -99,7 +100,14 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const Floo
       known = known && std::isfinite(y(i));
     }
     if (!known) continue;  // not in all of these runs
-    surrogate.slopes.row(s) = solver.solve(x.transpose() * y).tail(columns).transpose();
+    // A slope that chance explains would only dampen the steps: many statistics do not depend on a parameter.
+    const Eigen::VectorXd line = inverse * (x.transpose() * y);
+    const double variance = (y - x * line).squaredNorm() / spare;
+    for (Eigen::Index p = 0; p < columns; ++p) {
+      const double slope = line(scenes + p), chance = variance * inverse(scenes + p, scenes + p);
+      constexpr double kBeyond = 3;
+      surrogate.slopes(s, p) = slope * std::max(0.0, 1 - kBeyond * chance / std::max(slope * slope, 1e-30));
+    }
   }
   return surrogate;
 }

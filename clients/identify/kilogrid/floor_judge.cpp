@@ -11,8 +11,8 @@ namespace {
 using nlohmann::json;
 
 /// Robots and time that predictions are made for: some of each run held out.
-constexpr std::size_t kPredictedRobots = 8, kParticles = 80;
-constexpr double kPredicted_s = 1200;
+constexpr std::size_t kPredictedRobots = 6, kParticles = 80;
+constexpr double kPredicted_s = 900;
 
 /// A mean of areas, with its standard error.
 struct MeanArea {

@@ -113,18 +113,18 @@ void add_harmonic(Function& function, double cosine, double sine, double period)
 
 FloorTerm base_term() {
   FloorTerm term{"base", {}, "", "", "", {}, 0, {}};
-  term.parameters = {{"straight_speed_mm_s", 11.3, 3, 20, 1},
-                     {"turn_speed_mm_s", 27, 5, 40, 3},
-                     {"bias_sd_mm_s", 1.2, 0.05, 4, 0.3},
-                     {"factor_variance_s", 0.13, 0, 2, 0.1},
-                     {"range_mm", 49, 35, 70, 3},
-                     {"heard", 0.75, 0.1, 1, 0.1},
-                     {"heard_sd", 0.3, 0, 0.5, 0.06},
-                     {"wall_range_mm", 38, 20, 75, 4},
-                     {"wall_heard", 1.5, 0.3, 7, 0.6},
-                     {"wall_noise", 15, 1, 60, 6},
-                     {"while_talking", 0.45, 0.05, 1, 0.15},
-                     {"same_cell", 0.12, 0.02, 0.5, 0.05}};
+  term.parameters = {{"straight_speed_mm_s", 11.5, 3, 20, 1.2},
+                     {"turn_speed_mm_s", 20, 5, 40, 3},
+                     {"bias_sd_mm_s", 1.2, 0.05, 4, 0.4},
+                     {"factor_variance_s", 0.06, 0, 2, 0.06},
+                     {"range_mm", 47, 35, 70, 2},
+                     {"heard", 0.95, 0.1, 1, 0.08},
+                     {"heard_sd", 0.26, 0, 0.5, 0.06},
+                     {"wall_range_mm", 47, 20, 75, 3},
+                     {"wall_heard", 2.9, 0.3, 7, 1},
+                     {"wall_noise", 4, 0.5, 60, 4},
+                     {"while_talking", 0.3, 0.05, 1, 0.15},
+                     {"same_cell", 0.15, 0.02, 0.5, 0.04}};
   term.apply = [](std::span<const double> v, FloorSettings& s) {
     proto::Motion& motion = *s.model.mutable_motion();
     motion.set_straight_speed_mm_s(v[0]);
@@ -152,7 +152,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "WHEEL_GAIN",
                    "every robot has a speed of its own: they spread by {0:.2f} of the mean, skewed by {1:+.2f}",
                    "",
-                   {{"sd", 0, 0, 0.5, 0.08}, {"skew", 0, -0.6, 0.6, 0.15}},
+                   {{"sd", 0, 0, 0.5, 0.25}, {"skew", 0, -0.6, 0.6, 0.2}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) { add_speeds(s, v[0], v[1]); }});
   terms.push_back({"wandering-turn",
@@ -160,7 +160,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "TURN_RATE",
                    "robots turn by themselves, by {0:.3f} rad/s (standard deviation), which lasts {1:.0f} s",
                    "",
-                   {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"correlation_s", 60, 5, 600, 30}},
+                   {{"sd_rad_s", 0, 0, 0.4, 0.1}, {"correlation_s", 30, 5, 600, 20}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      add_noise(s, "wandering-turn", Effect::TURN_RATE, v[0], v[1]);
@@ -170,7 +170,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "BODY_DRIFT",
                    "a robot's speed wanders by {0:.2f} mm/s (standard deviation), which lasts {1:.0f} s",
                    "",
-                   {{"sd_mm_s", 0, 0, 5, 0.8}, {"correlation_s", 120, 5, 900, 60}},
+                   {{"sd_mm_s", 0, 0, 5, 2.5}, {"correlation_s", 30, 5, 600, 20}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      add_noise(s, "wandering-speed", Effect::BODY_DRIFT, v[0], v[1]);
@@ -180,7 +180,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "WHEEL_GAIN",
                    "robots stall {0:.1f} times an hour, longer than t with the chance (1 + t / {1:.1f} s)^-{2:.2f}",
                    "",
-                   {{"per_hour", 0, 0, 240, 12}, {"scale_s", 8, 1, 120, 4}, {"tail", 1.8, 1.1, 6, 0.3}},
+                   {{"per_hour", 0, 0, 240, 25}, {"scale_s", 8, 1, 120, 4}, {"tail", 1.8, 1.1, 6, 0.3}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      Effect& effect = add_effect(s, "stalls", Effect::WHEEL_GAIN);
@@ -190,13 +190,15 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"stuck-beside-walls",
                    {"position", "history"},
                    "WHEEL_GAIN",
-                   "within 50 mm of a wall robots get stuck, {0:.1f} times an hour and wall, longer than t with the chance (1 + t / {1:.0f} s)^-{2:.2f}",
+                   "within 50 mm of a wall robots get stuck, {0:.1f} times an hour and wall, longer than t with "
+                   "the chance (1 + t / {1:.0f} s)^-{2:.2f}",
                    "film robots that stand beside a wall: their motors push in vain, or rest",
-                   {{"per_hour", 0, 0, 120, 8}, {"scale_s", 40, 2, 300, 15}, {"tail", 1.8, 1.1, 5, 0.3}},
+                   {{"per_hour", 0, 0, 120, 12}, {"scale_s", 40, 2, 300, 15}, {"tail", 1.8, 1.1, 5, 0.3}},
                    1,
                    [floor](std::span<const double> v, FloorSettings& s) {
                      for (const Side& side : sides_of(floor)) {
-                       Effect& effect = add_effect(s, (std::string("stuck-") + side.name).c_str(), Effect::WHEEL_GAIN);
+                       Effect& effect =
+                           add_effect(s, (std::string("stuck-") + side.name).c_str(), Effect::WHEEL_GAIN);
                        add_beside(effect, side, -1);
                        set_episodes(add_function(effect, Function::NOTHING), v);
                      }
@@ -205,10 +207,10 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
       {"slowing",
        {"time"},
        "WHEEL_GAIN",
-                   "speeds fall with time, by {0:.2f} of themselves in an hour",
+       "speeds fall with time, by {0:.2f} of themselves in an hour",
        "the clock and the motors' own time are one here, since motors never rest: let some robots rest for half of "
        "a run",
-       {{"per_hour", 0, -1, 2, 0.12}},
+       {{"per_hour", 0, -1, 2, 0.3}},
        1,
        [](std::span<const double> v, FloorSettings& s) {
          const double rate = std::abs(v[0]) < 1e-4 ? 1e-4 : v[0];
@@ -223,7 +225,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "WHEEL_GAIN",
                    "in a crowd wheels change their speed, at most by {0:+.2f}, with others within {1:.0f} mm",
                    "",
-                   {{"gain", 0, -0.95, 1, 0.15}, {"radius_mm", 50, 34, 120, 10}},
+                   {{"gain", 0, -0.95, 1, 0.3}, {"radius_mm", 50, 34, 120, 10}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      Function& function =
@@ -233,24 +235,26 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                      function.mutable_exponential()->set_at_infinity(v[0]);
                      function.mutable_exponential()->set_scale(1);
                    }});
-  terms.push_back({"middle",
-                   {"position"},
-                   "WHEEL_GAIN",
-                   "in the middle of the floor wheels change their speed by {0:+.2f}, falling to nothing at the walls",
-                   "",
-                   {{"gain", 0, -0.9, 0.9, 0.12}},
-                   1,
-                   [floor](std::span<const double> v, FloorSettings& s) {
-                     Effect& effect = add_effect(s, "middle", Effect::WHEEL_GAIN);
-                     add_harmonic(add_function(effect, Function::X), v[0], 0, 2 * floor.width_mm);
-                     add_harmonic(add_function(effect, Function::Y), 1, 0, 2 * floor.height_mm);
-                   }});
+  terms.push_back(
+      {"middle",
+       {"position"},
+       "WHEEL_GAIN",
+       "in the middle of the floor wheels change their speed by {0:+.2f}, falling to nothing at the walls",
+       "",
+       {{"gain", 0, -0.9, 0.9, 0.25}},
+       1,
+       [floor](std::span<const double> v, FloorSettings& s) {
+         Effect& effect = add_effect(s, "middle", Effect::WHEEL_GAIN);
+         add_harmonic(add_function(effect, Function::X), v[0], 0, 2 * floor.width_mm);
+         add_harmonic(add_function(effect, Function::Y), 1, 0, 2 * floor.height_mm);
+       }});
   terms.push_back({"slope-of-speed",
                    {"position"},
                    "WHEEL_GAIN",
-                   "speed changes over the floor: by {0:+.2f} at the right end and {1:+.2f} at the upper end, the other way at the others",
+                   "speed changes over the floor: by {0:+.2f} at the right end and {1:+.2f} at the upper end, the "
+                   "other way at the others",
                    "",
-                   {{"x", 0, -0.6, 0.6, 0.12}, {"y", 0, -0.6, 0.6, 0.12}},
+                   {{"x", 0, -0.6, 0.6, 0.2}, {"y", 0, -0.6, 0.6, 0.2}},
                    2,
                    [floor](std::span<const double> v, FloorSettings& s) {
                      add_harmonic(add_function(add_effect(s, "slope-x", Effect::WHEEL_GAIN), Function::X), 0, v[0],
@@ -273,9 +277,9 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
       {"drift",
        {"world_frame"},
        "WORLD_DRIFT",
-                   "robots drift in the room, by {0:+.2f} and {1:+.2f} mm/s along x and y",
+       "robots drift in the room, by {0:+.2f} and {1:+.2f} mm/s along x and y",
        "",
-       {{"x_mm_s", 0, -3, 3, 0.4}, {"y_mm_s", 0, -3, 3, 0.4}},
+       {{"x_mm_s", 0, -3, 3, 0.8}, {"y_mm_s", 0, -3, 3, 0.8}},
        2,
        [](std::span<const double> v, FloorSettings& s) {
          add_function(add_effect(s, "drift-x", Effect::WORLD_DRIFT), Function::NOTHING).set_constant(v[0]);
@@ -288,7 +292,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "WHEEL_GAIN",
                    "after a command wheels begin with a change of {0:+.2f}, which fades in {1:.1f} s",
                    "",
-                   {{"gain", 0, -0.95, 0.95, 0.2}, {"scale_s", 2, 0.2, 15, 1}},
+                   {{"gain", 0, -0.95, 0.95, 0.4}, {"scale_s", 2, 0.2, 15, 1}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      proto::Exponential& e = *add_function(add_effect(s, "slow-start", Effect::WHEEL_GAIN),
@@ -303,7 +307,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "TURN_RATE",
                    "robots that go straight turn by {0:+.3f} rad/s on average",
                    "",
-                   {{"rad_s", 0, -0.2, 0.2, 0.02}},
+                   {{"rad_s", 0, -0.2, 0.2, 0.04}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      Effect& effect = add_effect(s, "pull", Effect::TURN_RATE);

@@ -102,10 +102,8 @@ void add_plots(json& document, const FloorTarget& held_out, const FloorStatistic
       plot_of("step-by-time", "time", "s", middles(150, 300, 16), held_out, before, after),
       plot_of("step-by-wall", "position", "mm from the wall", {20, 45, 55, 67, 87, 125, 175, 250, 400}, held_out,
               before, after),
-      plot_of("step-by-neighbours", "neighbours", "within 100 mm", middles(0, 1, 5), held_out, before,
-              after),
-      plot_of("step-by-direction", "heading", "rad", middles(-7 * pi / 8, pi / 4, 8), held_out, before,
-              after)};
+      plot_of("step-by-neighbours", "neighbours", "within 100 mm", middles(0, 1, 5), held_out, before, after),
+      plot_of("step-by-direction", "heading", "rad", middles(-7 * pi / 8, pi / 4, 8), held_out, before, after)};
   document["maps"] = {map_of(held_out, before, after)};
   document["distributions"] = {
       distribution_of("step", "way in 10 s", "mm",

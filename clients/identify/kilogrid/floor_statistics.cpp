@@ -189,7 +189,9 @@ class Motions {
       const double step_mm = std::abs(steps_[k]), wall_mm = wall_distance_mm(floor_, x_[k], y_[k]);
       const std::size_t half = k < steps_.size() / 2 ? 0 : 1;
       sums.add(kWall, bin_of(kWalls_mm, wall_mm), step_mm);
-      if (const std::size_t t = part_of(static_cast<double>(k) * FloorBlocks::kBlock_s, 2 * kTimeBin_s * kMiddleBins, kMiddleBins + 1); t < kMiddleBins)
+      if (const std::size_t t = part_of(static_cast<double>(k) * FloorBlocks::kBlock_s,
+                                        2 * kTimeBin_s * kMiddleBins, kMiddleBins + 1);
+          t < kMiddleBins)
         sums.add(kMiddle, t, wall_mm > kMiddle_mm ? 1 : 0);
       sums.count(kRing, part_of(wall_mm, floor_.width_mm / 2, kRings), kRings);
       for (std::size_t i = 0; i < kRimParts; ++i)
@@ -318,7 +320,8 @@ void add_window(Sums& sums, const std::vector<double>& feature) {
   std::array<double, kFeatures.size()> scaled;
   for (std::size_t f = 0; f < kFeatures.size(); ++f) {
     const FeatureScale& scale = kFeatures[f];
-    const auto above = std::upper_bound(scale.edges.begin() + 1, scale.edges.end(), feature[f]) - scale.edges.begin();
+    const auto above =
+        std::upper_bound(scale.edges.begin() + 1, scale.edges.end(), feature[f]) - scale.edges.begin();
     sums.count(static_cast<Group>(kWindows + f), static_cast<std::size_t>(above) - 1, scale.edges.size());
     scaled[f] = std::clamp((feature[f] - scale.middle) / scale.width, -4.0, 4.0);
   }
@@ -368,8 +371,7 @@ std::vector<RobotSums> robot_sums(const FloorRun& run, const Floor& floor) {
     Sums sums;
     Motions(blocks, floor, robot).add_to(sums, neighbours[robot]);
     std::array<Mean, 2> extents;
-    const auto last =
-        std::find_if(window, windows.end(), [&](const TrackWindow& w) { return w.robot != robot; });
+    const auto last = std::find_if(window, windows.end(), [&](const TrackWindow& w) { return w.robot != robot; });
     for (auto w = window; w != last; ++w) {
       add_window(sums, w->feature);
       extents[w - window < (last - window) / 2 ? 0 : 1].add(w->feature[kExtentFeature] / kExtentScale_mm);

@@ -52,7 +52,8 @@ std::string name_of(const FloorModel& model, std::size_t effect) {
 }
 
 std::vector<std::string> covariates_of(const FloorModel& model, std::size_t effect) {
-  return effect + 1 < model.terms.size() ? model.terms[effect + 1].covariates : std::vector<std::string>{"position"};
+  return effect + 1 < model.terms.size() ? model.terms[effect + 1].covariates
+                                         : std::vector<std::string>{"position"};
 }
 
 json faults_of(const std::vector<FloorRun>& train, const std::vector<FloorRun>& test) {
@@ -74,14 +75,21 @@ json faults_of(const std::vector<FloorRun>& train, const std::vector<FloorRun>& 
 void add_words(json& document, const json& classifier) {
   const auto area = [&](const char* of, const char* what) { return classifier.at(of).at(what).get<double>(); };
   const auto bar = [&](const char* kind, const char* name, const char* of) {
-    return json{{"kind", kind},          {"name", name}, {"value", area(of, "area")}, {"low", area(of, "low")},
-                {"high", area(of, "high")}, {"unit", ""}, {"from", 0.5}};
+    return json{{"kind", kind},
+                {"name", name},
+                {"value", area(of, "area")},
+                {"low", area(of, "low")},
+                {"high", area(of, "high")},
+                {"unit", ""},
+                {"from", 0.5}};
   };
   document["bars"] = {bar("before", "base model", "before"), bar("after", "with effects", "after"),
                       bar("floor", "measured days", "measured_days")};
   document["verdict"] = fmt::format(
-      "A classifier is shown windows of 200 s of robots, measured on days held out and simulated. Where it can only guess, "
-      "the area under its curve is 0.5. The base model's robots it tells with {:.3f}, those of the model with effects "
+      "A classifier is shown windows of 200 s of robots, measured on days held out and simulated. Where it can "
+      "only guess, "
+      "the area under its curve is 0.5. The base model's robots it tells with {:.3f}, those of the model with "
+      "effects "
       "with {:.3f} ({:.3f} to {:.3f}). Measured days are told from each other with {:.3f}.",
       area("before", "area"), area("after", "area"), area("after", "low"), area("after", "high"),
       area("measured_days", "area"));
@@ -97,8 +105,9 @@ void add_words(json& document, const json& classifier) {
   document["tables"].push_back(
       {{"id", "features"},
        {"title", "What still tells simulated robots from measured ones"},
-       {"lead", "Areas under the curve of each feature of a window alone, on runs held out: 0.5 tells nothing, above it "
-                "the feature is larger in simulated runs, below it smaller."},
+       {"lead",
+        "Areas under the curve of each feature of a window alone, on runs held out: 0.5 tells nothing, above it "
+        "the feature is larger in simulated runs, below it smaller."},
        {"head", {"feature of 200 s", "base model", "with effects"}},
        {"rows", rows}});
 }
@@ -146,7 +155,7 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   FloorModel model;
   model.add(base_term());
   part = 0.02;
-  fit(model, learned, 2, 1, 1, progress);
+  fit(model, learned, 1, 0.8, 1, progress);
   const FloorModel base = model;
   note("base", model);
 
@@ -176,13 +185,13 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
                             {"acts_on", candidates[c].acts_on},
                             {"misfit_gain", gains[c]},
                             {"misfit_gain_needed", kLeastGain},
-                            {"why", fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance", gains[c],
-                                                kLeastGain)}});
+                            {"why", fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance",
+                                                gains[c], kLeastGain)}});
       }
       if (chosen.empty()) break;
       std::sort(taken.rbegin(), taken.rend());
       for (const std::size_t c : taken) candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(c));
-      fit(model, learned, round == 0 ? 3 : 2, round == 0 ? 1 : 0.8, 100 + round, progress);
+      fit(model, learned, round == 0 ? 3 : 2, round == 0 ? 0.8 : 0.5, 100 + round, progress);
       note(names, model);
     }
     part = 0.65;
@@ -244,7 +253,8 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
          {"share_removed", (misfit - misfit_after) / std::max(misfit_before - misfit_after, 1e-9)},
          {"facts",
           {{"misfit on runs held out", fmt::format("{:.0f} without it, {:.0f} with it", misfit, misfit_after)},
-           {"cells 10 s ahead", fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after.rmse_mm())},
+           {"cells 10 s ahead",
+            fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after.rmse_mm())},
            {"likelihood of cells", fmt::format("{:+.0f} nat", after.log_likelihood - lesser.log_likelihood)}}},
          {"in_words", is_wall ? words_of_wall(model) : words_of(model, e + 1)}});
     progress(fmt::format("{}: misfit {:.0f} without it, {:.0f} with it", name_of(model, e), misfit, misfit_after));

