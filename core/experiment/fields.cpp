@@ -142,6 +142,7 @@ constexpr FieldRule kRules[] = {
     {"Propagation.link_sd_db", 0, 20, "dB"},
     {"Propagation.packet_sd_db", 0, 20, "dB"},
     {"Propagation.capture_db", 0, 100, "dB"},
+    {"Propagation.notice_db", 0, 20, "dB"},
     {"Propagation.pair_sd_db", 0, 20, "dB"},
     {"Propagation.run_sd_db", 0, 20, "dB"},
     {"Propagation.power_pattern_db", -100, 100, "dB"},

@@ -12,7 +12,7 @@ namespace {
 
 using proto::Radio;
 
-constexpr int kMostPatternEntries = 12;
+constexpr int kMostPatternEntries = 24;
 
 void check_use(const LoadedExperiment& loaded) {
   const Radio& radio = loaded.experiment.radio();

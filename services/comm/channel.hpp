@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "services/comm/air.hpp"
-#include "services/comm/link_budget.hpp"
+#include "services/comm/link_table.hpp"
 #include "services/comm/neighbourhood.hpp"
 
 namespace kilotwin::comm {
 
 class Channel {
  public:
-  Channel(const Neighbourhood& neighbourhood, LinkBudget& links)
+  Channel(const Neighbourhood& neighbourhood, LinkTable& links)
       : neighbourhood_(neighbourhood), links_(links), newest_(neighbourhood.cells(), kNone) {}
 
   /// Files all transmissions by where their senders are now.
@@ -27,16 +27,18 @@ class Channel {
   [[nodiscard]] std::vector<Transmission>& all() { return all_; }
   [[nodiscard]] const std::vector<Transmission>& all() const { return all_; }
 
-  /// Calls f(transmission) for the transmissions of other robots that `robot` hears, in no particular order.
-  template <class F> void visit_heard(std::uint32_t robot, F f) {
-    visit_near(robot, 1, [&](Transmission& x) {
-      if (x.sender != robot && links_.hears(neighbourhood_, robot, x.sender)) f(x);
+  /// Whether `robot` notices at `t` that another one sends.
+  [[nodiscard]] bool busy(std::uint32_t robot, Cycles t) {
+    bool found = false;
+    visit_near(robot, 1, [&](const Transmission& x) {
+      found = found || (x.sensed_at(t) && x.sender != robot && links_.notices(robot, x.sender));
     });
+    return found;
   }
-  /// Calls f(transmission) for the transmissions of other robots that hear `robot`, in no particular order.
-  template <class F> void visit_hearers(std::uint32_t robot, F f) {
+  /// Calls f(transmission) for the transmissions whose senders notice a start pulse of `robot` at `t`, in no particular order.
+  template <class F> void visit_interrupted(std::uint32_t robot, Cycles t, F f) {
     visit_near(robot, 1, [&](Transmission& x) {
-      if (x.sender != robot && links_.hears(neighbourhood_, x.sender, robot)) f(x);
+      if (x.notices(t) && x.sender != robot && links_.notices(x.sender, robot)) f(x);
     });
   }
   /// The senders that transmit in [from, until) so close to `robot` that a third robot may hear both; `robot` itself is
@@ -54,7 +56,7 @@ class Channel {
   void file(std::uint32_t index);
 
   const Neighbourhood& neighbourhood_;
-  LinkBudget& links_;
+  LinkTable& links_;
   std::vector<Transmission> all_;
   std::vector<std::uint32_t> older_;   ///< per transmission: the next one in its cell
   std::vector<std::uint32_t> newest_;  ///< per cell: its first transmission

@@ -38,6 +38,7 @@ LinkBudget::LinkBudget(const RunPlan& plan)
   packet_sd_db_ = model.packet_sd_db();
   capture_db_ = model.capture_db();
   reading_sd_db_ = model.reading_sd_db();
+  notice_db_ = model.notice_db();
   const auto take = [](const auto& entries, Pattern& pattern) {
     for (int i = 0; i + 1 < entries.size(); i += 2)
       pattern.harmonics.push_back({entries.Get(i), entries.Get(i + 1)});
@@ -91,17 +92,25 @@ void LinkBudget::find_reach() {
     widen(robots_.sensitivity_db(i), robots_.sensitivity_bearing(i), sensitivity_pattern_, sensitivity_most,
           sensitivity_least);
   }
-  double link_most = kMostNoise * (link_sd_db_ + pair_sd_db_), link_least = -link_most;
+  double link_most = most_spread_db(), link_least = -link_most;
   for (const Link& link : links_) {
-    link_most = std::max(link_most, link.offset_db);
-    link_least = std::min(link_least, link.offset_db);
+    link_most = std::max(link_most, link.offset_db + kMostNoise * run_sd_db_);
+    link_least = std::min(link_least, link.offset_db - kMostNoise * run_sd_db_);
   }
-  const double noise = kMostNoise * (run_sd_db_ + packet_sd_db_);
-  reach_mm_ = range_mm_ + (power_most + sensitivity_most + link_most + noise) / decay_db_per_mm_;
+  reach_mm_ = range_mm_ + (power_most + sensitivity_most + link_most - floor_db()) / decay_db_per_mm_;
   // Between discs that touch there is no room for another: a shadow needs a distance of two diameters.
-  const double surely_mm = range_mm_ + (power_least + sensitivity_least + link_least - noise) / decay_db_per_mm_;
+  const double surely_mm = range_mm_ + (power_least + sensitivity_least + link_least) / decay_db_per_mm_;
   const double clear_mm = body_loss_db_ > 0 ? std::min(surely_mm, 3 * kRobotRadius_mm) : surely_mm;
   surely_square_ = clear_mm > 0 ? clear_mm * clear_mm : 0;
+}
+
+double LinkBudget::most_spread_db() const {
+  return kMostNoise *
+         __builtin_sqrt(pair_sd_db_ * pair_sd_db_ + link_sd_db_ * link_sd_db_ + run_sd_db_ * run_sd_db_);
+}
+
+double LinkBudget::span_mm() const {
+  return casts_shadows() ? __builtin_sqrt(reach_mm_ * reach_mm_ + kRobotRadius_mm * kRobotRadius_mm) : reach_mm_;
 }
 
 void LinkBudget::face(std::uint32_t robot) {
@@ -158,13 +167,15 @@ float LinkBudget::drawn_spread_db(std::uint32_t sender, std::uint32_t receiver) 
   const std::uint64_t wanted = key(sender, receiver);
   const auto link = std::lower_bound(links_.begin(), links_.end(), wanted,
                                      [](const Link& a, std::uint64_t k) { return a.key < k; });
-  if (link != links_.end() && link->key == wanted) {
+  const bool known = link != links_.end() && link->key == wanted;
+  if (known) {
     sum += link->offset_db;
   } else if (link_sd_db_ > 0 || pair_sd_db_ > 0) {
     const auto word = random_.block(Stream::kLink, low, Tick{high}, 0);
     sum += pair_sd_db_ * noise(word[0]) + link_sd_db_ * noise(word[direction]);
   }
   if (run_sd_db_ > 0) sum += run_sd_db_ * noise(random_.block(Stream::kLink, low, Tick{high}, 1)[direction]);
+  if (!known) sum = std::clamp(sum, -most_spread_db(), most_spread_db());
   return static_cast<float>(sum);
 }
 

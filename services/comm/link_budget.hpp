@@ -21,12 +21,17 @@ class LinkBudget {
 
   /// Whether the distance alone decides who hears whom.
   [[nodiscard]] bool is_disc() const { return is_disc_; }
-  /// Nobody is heard from farther away, mm.
+  /// Nobody is noticed from farther away, mm.
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
+  /// A robot whose pose matters to a link is within this distance of its sender, mm: receivers, and bodies in between.
+  [[nodiscard]] double span_mm() const;
   /// Whether bodies cast shadows: then robots must be sorted in the neighbourhood before a margin is asked for.
   [[nodiscard]] bool casts_shadows() const { return body_loss_db_ > 0; }
-  void turn(std::uint32_t robot, double heading_rad) {
-    if (directional_) heading_rad_[robot] = heading_rad;
+  /// Whether that matters.
+  bool turn(std::uint32_t robot, double heading_rad) {
+    if (!directional_ || heading_rad_[robot] == heading_rad) return false;
+    heading_rad_[robot] = heading_rad;
+    return true;
   }
 
   /// Margin of a sender at a receiver, dB, that stays for a run while nobody moves: without the noise of a packet.
@@ -43,6 +48,12 @@ class LinkBudget {
   /// The greatest noise of a packet, dB.
   [[nodiscard]] double most_packet_noise_db() const { return kMostNoise * packet_sd_db_; }
   [[nodiscard]] double capture_db() const { return capture_db_; }
+  /// How far below 0 a margin may be for the sender to be noticed, dB.
+  [[nodiscard]] double notice_db() const { return notice_db_; }
+  /// A robot with a margin up to this is nothing to its receiver, dB.
+  [[nodiscard]] double floor_db() const {
+    return -(notice_db_ > most_packet_noise_db() ? notice_db_ : most_packet_noise_db());
+  }
   /// Readings at this margin, without noise.
   [[nodiscard]] Gains gains(double margin_db) const { return ranging_.gains(range_mm_ - margin_db * mm_per_db_); }
   /// What a receiver reads of a packet that arrives with this margin.
@@ -72,6 +83,8 @@ class LinkBudget {
   }
 
   void find_reach();
+  /// Bound of what is drawn for a pair, all parts together.
+  [[nodiscard]] double most_spread_db() const;
   void face(std::uint32_t robot);
   [[nodiscard]] double bearing_db(const Pattern&, const RadioParameters::Bearing&, std::uint32_t robot, double x,
                                   double y);
@@ -87,7 +100,7 @@ class LinkBudget {
   const bool is_disc_;
   const double range_mm_, range_square_, decay_db_per_mm_, mm_per_db_;
   double body_loss_db_ = 0, link_sd_db_ = 0, pair_sd_db_ = 0, run_sd_db_ = 0, packet_sd_db_ = 0, capture_db_ = 0,
-         reading_sd_db_ = 0;
+         reading_sd_db_ = 0, notice_db_ = 0;
   bool directional_ = false, sender_matters_ = false, receiver_matters_ = false;
   double reach_mm_, surely_square_;
   Pattern power_pattern_, sensitivity_pattern_;

@@ -13,9 +13,9 @@ constexpr std::uint32_t kRobotsPerCell = 4;
 
 }  // namespace
 
-Neighbourhood::Neighbourhood(double range_mm, std::uint32_t robots)
+Neighbourhood::Neighbourhood(double range_mm, double cell_mm, std::uint32_t robots)
     : range_square_(range_mm * range_mm),
-      cells_per_mm_(1 / (range_mm * kCellSlack)),
+      cells_per_mm_(1 / (cell_mm * kCellSlack)),
       side_bits_(kLeastSideBits),
       x_mm_(robots),
       y_mm_(robots),
@@ -28,6 +28,8 @@ Neighbourhood::Neighbourhood(double range_mm, std::uint32_t robots)
 }
 
 void Neighbourhood::sort() {
+  if (sorted_now_) return;
+  sorted_now_ = true;
   const auto robots = static_cast<std::uint32_t>(x_mm_.size());
   first_.assign(cells() + 1, 0);
   for (std::uint32_t i = 0; i < robots; ++i) {

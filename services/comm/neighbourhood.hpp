@@ -1,4 +1,4 @@
-/// Who is near whom: robots in the cells of a square grid whose pitch is the range. The grid covers the plane and is folded
+/// Who is near whom: robots in the cells of a square grid whose pitch is the range or a little more. The grid covers the plane and is folded
 /// onto a table of 2^k x 2^k cells, so that its memory depends on the number of robots alone; robots far apart may share a
 /// cell and are told apart by their distance.
 #pragma once
@@ -11,15 +11,21 @@ namespace kilotwin::comm {
 
 class Neighbourhood {
  public:
-  Neighbourhood(double range_mm, std::uint32_t robots);
+  /// `cell_mm`: pitch of the cells, at least the range.
+  Neighbourhood(double range_mm, double cell_mm, std::uint32_t robots);
 
-  void place(std::uint32_t robot, double x_mm, double y_mm) {
+  /// Whether the place is another than before.
+  bool place(std::uint32_t robot, double x_mm, double y_mm) {
+    const bool moved = x_mm_[robot] != x_mm || y_mm_[robot] != y_mm;
     x_mm_[robot] = x_mm;
     y_mm_[robot] = y_mm;
+    sorted_now_ = sorted_now_ && !moved;
+    return moved;
   }
   /// Sorts the robots by cell, for visit(). Call it when all are placed.
   void sort();
 
+  [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(x_mm_.size()); }
   [[nodiscard]] double x_mm(std::uint32_t robot) const { return x_mm_[robot]; }
   [[nodiscard]] double y_mm(std::uint32_t robot) const { return y_mm_[robot]; }
   /// Squared distance of two robots' centres, mm^2; the same bits for either order.
@@ -83,6 +89,7 @@ class Neighbourhood {
   }
 
   double range_square_, cells_per_mm_;
+  bool sorted_now_ = false;
   std::uint32_t side_bits_, mask_;
   std::vector<double> x_mm_, y_mm_;                ///< per robot
   std::vector<std::uint32_t> cell_of_;             ///< per robot

@@ -18,6 +18,7 @@ std::size_t size_of(int size) { return static_cast<std::size_t>(size); }
 }  // namespace
 
 void RadioEngine::save(proto::RadioState& part) const {
+  KILOTWIN_DEMAND(!divided_);
   part.Clear();
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     part.add_next_interrupt(timers_.time_word(i));
@@ -58,6 +59,7 @@ void RadioEngine::save(proto::RadioState& part) const {
 }
 
 void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> parts) {
+  KILOTWIN_DEMAND(!divided_);
   require(parts.size() == 1);
   const proto::RadioState& part = *parts[0];
   const std::size_t robots = state_.size();

@@ -22,8 +22,10 @@ std::vector<Share> all_shares(const RunPlan& plan) {
 
 }  // namespace
 
-RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> firmware)
-    : shares_(all_shares(plan)),
+RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> firmware, Region region)
+    : region_(region),
+      divided_(!region.is_everywhere()),
+      shares_(all_shares(plan)),
       cycles_per_tick_(plan.tick_length.cycles()),
       loss_(plan.experiment().radio().loss()),
       counts_pairs_(plan.experiment().recording().messages()),
@@ -37,17 +39,25 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
       message_(plan.robots()),
       next_send_(simple_ ? plan.robots() : 0, 0),
       links_(plan),
-      neighbourhood_(links_.reach_mm(), plan.robots()),
-      channel_(neighbourhood_, links_),
+      neighbourhood_(links_.reach_mm(), links_.span_mm(), plan.robots()),
+      table_(neighbourhood_, links_),
+      channel_(neighbourhood_, table_),
       receptions_(plan.robots()),
       radio_counts_(plan.robots()),
       pairs_(counts_pairs_ ? plan.robots() : 0),
       firmware_robots_(std::move(firmware)),
+      strongest_rival_(table_.used() ? plan.robots() : 0),
       jammed_(plan.robots(), 0) {
   for (std::uint32_t i = 0; i < plan.robots(); ++i) {
     const Pose pose = plan.initial_pose(i);
     neighbourhood_.place(i, pose.position_mm.x(), pose.position_mm.y());
     apart_.push_back(plan.tracked(i) || plan.firmware(i));
+  }
+  KILOTWIN_DEMAND(!divided_ || !plan.has_firmware());
+  if (divided_) {
+    owned_.assign(plan.robots(), 0);
+    known_.assign(plan.robots(), 1);
+    divide();
   }
   // Nobody has sent just now: the first times are spread over the interval.
   for (std::uint32_t i = 0; i < next_send_.size(); ++i)
@@ -60,8 +70,10 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
 
 void RadioEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == tick_);
+  if (divided_) take_ghosts(inputs.ghosts);
   forget(begin_of(from));
   read_poses(inputs.bodies);
+  if (divided_) divide();
   read_actuation(inputs.actuation);
   overhead_.command(inputs.overhead.packets, begin_of(from));
   overhead_.advance(begin_of(from + 1));
@@ -76,11 +88,16 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
 
 void RadioEngine::read_poses(std::span<const BodyFrame* const> frames) {
   std::size_t listed = 0;
+  table_.begin_tick();
   for (const BodyFrame* frame : frames) {
     for (std::size_t n = 0; n < frame->robot.size(); ++n) {
-      KILOTWIN_DEMAND(frame->robot[n] < state_.size());
-      neighbourhood_.place(frame->robot[n], frame->x_mm[n], frame->y_mm[n]);
-      links_.turn(frame->robot[n], frame->heading_rad[n]);
+      const std::uint32_t robot = frame->robot[n];
+      KILOTWIN_DEMAND(robot < state_.size());
+      if (table_.used()) {
+        table_.move(robot, frame->x_mm[n], frame->y_mm[n], frame->heading_rad[n]);
+      } else {
+        neighbourhood_.place(robot, frame->x_mm[n], frame->y_mm[n]);
+      }
     }
     listed += frame->robot.size();
   }
@@ -95,6 +112,7 @@ void RadioEngine::read_actuation(std::span<const ActuationFrame* const> frames) 
     std::copy(frame->tx_period.begin(), frame->tx_period.end(), tx_period_.begin() + frame->first_robot);
     for (std::size_t n = 0; n < robots; ++n) {
       const auto robot = static_cast<std::uint32_t>(frame->first_robot + n);
+      if (divided_ && known_[robot] == 0) continue;
       const auto life_cycle = static_cast<LifeCycle>(frame->life_cycle[n]);
       const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed ||
                         life_cycle == LifeCycle::kFlat || apart_[robot] != 0;
@@ -143,7 +161,7 @@ bool RadioEngine::later(const Attempt& a, const Attempt& b) {
 void RadioEngine::contend(Tick now, std::span<const BodyFrame* const> bodies) {
   const Cycles end = begin_of(now + 1);
   channel_.locate();
-  if (links_.casts_shadows()) neighbourhood_.sort();
+  if (table_.used()) neighbourhood_.sort();
   timers_.begin_tick();
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     switch (state_[i] & (kRunning | kHolding | kFlying)) {
@@ -244,8 +262,10 @@ void RadioEngine::attempt(std::uint32_t robot, Tick now) {
   const Cycles t = std::max(timers_.next(robot), simulated_);
   timers_.interrupt(robot);
   if (senses(robot, t)) return schedule(robot, begin_of(now + 1));
-  ++counters_.attempted;
-  ++radio_counts_[robot].attempted;
+  if (owns(robot)) {
+    ++counters_.attempted;
+    ++radio_counts_[robot].attempted;
+  }
   state_[robot] |= kFlying;
   abort_who_notices(robot, t, now);
   channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
@@ -253,25 +273,23 @@ void RadioEngine::attempt(std::uint32_t robot, Tick now) {
 
 /// A start pulse of `robot`: robots that hear it and are about to begin a packet give up.
 void RadioEngine::abort_who_notices(std::uint32_t robot, Cycles t, Tick now) {
-  channel_.visit_hearers(robot, [&](Transmission& other) {
-    if (other.notices(t)) abort(other, t, now);
-  });
+  channel_.visit_interrupted(robot, t, [&](Transmission& other) { abort(other, t, now); });
 }
 
 bool RadioEngine::senses(std::uint32_t robot, Cycles t) {
   for (const OverheadController::Copy& copy : overhead_.copies()) {
     if (copy.sensed_at(t)) return true;
   }
-  bool busy = false;
-  channel_.visit_heard(robot, [&](const Transmission& other) { busy = busy || other.sensed_at(t); });
-  return busy;
+  return channel_.busy(robot, t);
 }
 
 void RadioEngine::abort(Transmission& transmission, Cycles t, Tick now) {
   const std::uint32_t robot = transmission.sender;
   if (firmware_ && firmware_->has(robot)) return;  // it notices by itself
-  ++counters_.aborted;
-  ++radio_counts_[robot].backed_off;
+  if (owns(robot)) {
+    ++counters_.aborted;
+    ++radio_counts_[robot].backed_off;
+  }
   transmission.aborted = true;
   transmission.end = transmission.start + kStartPulse;
   state_[robot] &= static_cast<std::uint8_t>(~kFlying);
@@ -321,16 +339,18 @@ void RadioEngine::arrive(Tick now) {
 void RadioEngine::finish(std::uint32_t index, Cycles end) {
   const Transmission& transmission = channel_.all()[index];
   const std::uint32_t robot = transmission.sender;
-  ++counters_.sent;
-  ++radio_counts_[robot].sent;
-  if (counts_pairs_) pairs_.add(robot, robot);
+  if (owns(robot)) {
+    ++counters_.sent;
+    ++radio_counts_[robot].sent;
+    if (counts_pairs_) pairs_.add(robot, robot);
+  }
   if (firmware_ && firmware_->has(robot)) return;
   state_[robot] &= static_cast<std::uint8_t>(~kFlying);
   timers_.restart_clock(robot);
   timers_.pass(robot, end);
   if (transmission.orphaned) return;
   state_[robot] &= static_cast<std::uint8_t>(~kHolding);
-  sent_.push_back(robot);
+  if (owns(robot)) sent_.push_back(robot);
 }
 
 void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
@@ -340,46 +360,73 @@ void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
   }
   channel_.find_rivals(packet.sender, packet.start, packet.end, rivals_);
   receptions_.begin_message(packet.message);
+  if (table_.used())
+    receive_by_strength(packet, drowned, now);
+  else
+    receive_in_range(packet, drowned, now);
+}
+
+void RadioEngine::receive_in_range(const Transmission& packet, bool drowned, Tick now) {
   neighbourhood_.visit(packet.sender, [&](std::uint32_t receiver, double square_mm2) {
     if ((state_[receiver] & (kReceptive | kFirmware)) == 0) return;
-    double margin_db = 0;
-    if (!links_.is_disc()) {
-      margin_db = links_.margin_db(neighbourhood_, packet.sender, receiver);
-      if (margin_db <= -links_.most_packet_noise_db()) return;
-      if (margin_db < links_.most_packet_noise_db())
-        margin_db += links_.packet_noise_db(packet.sender, receiver, now.count());
-      if (!(margin_db > 0)) return;
-    }
-    const bool firmware = is(receiver, kFirmware);
-    if (drowned || drowns(receiver, margin_db)) {
-      ++counters_.collided;
-      ++radio_counts_[receiver].collided;
-    } else if (firmware ? firmware_->fades(receiver, packet.sender, packet.start)
-                        : fades(receiver, now, packet.sender)) {
-      ++counters_.faded;
-    } else {
-      ++counters_.received;
-      ++radio_counts_[receiver].received;
-      if (firmware)
-        firmware_->note_reception(receiver, packet.message);
-      else
-        receptions_.add(receiver, links_.is_disc()
-                                      ? ranging_.gains(__builtin_sqrt(square_mm2))
-                                      : links_.readings(packet.sender, receiver, now.count(), margin_db));
-      if (counts_pairs_) pairs_.add(receiver, packet.sender);
-    }
+    const bool spoilt = drowned || std::any_of(rivals_.begin(), rivals_.end(), [&](std::uint32_t rival) {
+                          return rival == receiver || neighbourhood_.in_range(receiver, rival);
+                        });
+    take(packet, receiver, spoilt, now, [&] { return ranging_.gains(__builtin_sqrt(square_mm2)); });
   });
 }
 
-/// Whether one of the rivals spoils a packet that arrives with this margin.
-bool RadioEngine::drowns(std::uint32_t receiver, double margin_db) {
-  for (const std::uint32_t rival : rivals_) {
-    if (rival == receiver) return true;
-    if (!links_.hears(neighbourhood_, receiver, rival)) continue;
-    if (links_.is_disc() || margin_db < links_.margin_db(neighbourhood_, rival, receiver) + links_.capture_db())
-      return true;
+void RadioEngine::receive_by_strength(const Transmission& packet, bool drowned, Tick now) {
+  constexpr float kOwn_db = 1e6F;  // while it sends, a robot receives nothing
+  ++packets_;
+  const auto disturb = [&](std::uint32_t receiver, float margin_db) {
+    Rival& rival = strongest_rival_[receiver];
+    if (rival.packet != packets_ || rival.margin_db < margin_db) rival = {packets_, margin_db};
+  };
+  const auto noticed_db = static_cast<float>(-links_.notice_db());
+  for (const std::uint32_t sender : rivals_) {
+    disturb(sender, kOwn_db);
+    for (const LinkTable::Link& link : table_.of(sender)) {
+      if (link.margin_db > noticed_db) disturb(link.receiver, link.margin_db);
+    }
   }
-  return false;
+  const double noise_db = links_.most_packet_noise_db();
+  for (const LinkTable::Link& link : table_.of(packet.sender)) {
+    const std::uint32_t receiver = link.receiver;
+    if ((state_[receiver] & (kReceptive | kFirmware)) == 0) continue;
+    double margin_db = static_cast<double>(link.margin_db);
+    if (margin_db <= -noise_db) continue;
+    if (margin_db < noise_db) margin_db += links_.packet_noise_db(packet.sender, receiver, now.count());
+    if (!(margin_db > 0)) continue;
+    const Rival& rival = strongest_rival_[receiver];
+    const bool overlapped =
+        rival.packet == packets_ && margin_db < static_cast<double>(rival.margin_db) + links_.capture_db();
+    take(packet, receiver, drowned || overlapped, now,
+         [&] { return links_.readings(packet.sender, receiver, now.count(), margin_db); });
+  }
+}
+
+/// A packet that is heard arrives.
+template <class Readings>
+void RadioEngine::take(const Transmission& packet, std::uint32_t receiver, bool spoilt, Tick now,
+                       Readings readings) {
+  if (!owns(receiver)) return;
+  const bool firmware = is(receiver, kFirmware);
+  if (spoilt) {
+    ++counters_.collided;
+    ++radio_counts_[receiver].collided;
+  } else if (firmware ? firmware_->fades(receiver, packet.sender, packet.start)
+                      : fades(receiver, now, packet.sender)) {
+    ++counters_.faded;
+  } else {
+    ++counters_.received;
+    ++radio_counts_[receiver].received;
+    if (firmware)
+      firmware_->note_reception(receiver, packet.message);
+    else
+      receptions_.add(receiver, readings());
+    if (counts_pairs_) pairs_.add(receiver, packet.sender);
+  }
 }
 
 void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32_t ordinal, Tick now) {
@@ -387,13 +434,16 @@ void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32
   for (const Transmission& transmission : channel_.all()) {
     if (!transmission.overlaps(copy.start, copy.end())) continue;
     jammed_[transmission.sender] = 1;
-    neighbourhood_.visit(transmission.sender, [&](std::uint32_t receiver, double) {
-      if (links_.hears(neighbourhood_, receiver, transmission.sender)) jammed_[receiver] = 1;
-    });
+    if (table_.used()) {
+      for (const LinkTable::Link& link : table_.of(transmission.sender))
+        jammed_[link.receiver] |= link.margin_db > static_cast<float>(-links_.notice_db());
+    } else {
+      neighbourhood_.visit(transmission.sender, [&](std::uint32_t receiver, double) { jammed_[receiver] = 1; });
+    }
   }
   receptions_.begin_message(copy.message);
   for (std::uint32_t receiver = 0; receiver < state_.size(); ++receiver) {
-    if ((state_[receiver] & (kReceptive | kFirmware)) == 0 || jammed_[receiver] != 0) continue;
+    if ((state_[receiver] & (kReceptive | kFirmware)) == 0 || jammed_[receiver] != 0 || !owns(receiver)) continue;
     if (is(receiver, kFirmware)) {
       if (!firmware_->fades(receiver, FirmwareAir::kOverhead, copy.start))
         firmware_->note_reception(receiver, copy.message);
@@ -412,10 +462,13 @@ void RadioEngine::emit(HostId host, RadioFrame& frame) const {
   frame.tick = tick_;
   frame.first_robot = share.first;
   frame.kilo_ticks.assign(timers_.counts().begin() + share.first, timers_.counts().begin() + share.last);
+  for (std::uint32_t i = share.first; divided_ && i < share.last; ++i) {
+    if (!owns(i)) frame.kilo_ticks[i - share.first] = 0;
+  }
   frame.ask.clear();
   const Cycles from = begin_of(tick_ + 1), until = begin_of(tick_ + 2);
   for (std::uint32_t i = share.first; i < share.last; ++i) {
-    if ((state_[i] & (kRunning | kHolding | kFlying)) != kRunning) continue;
+    if ((state_[i] & (kRunning | kHolding | kFlying)) != kRunning || !owns(i)) continue;
     if (simple_ ? next_send_[i] < until : timers_.exceeds(i, tx_period_[i], from, until)) frame.ask.push_back(i);
   }
   frame.sent.clear();
@@ -455,14 +508,17 @@ void RadioEngine::emit_firmware(Share share, RadioFrame& frame) const {
 }
 
 std::uint64_t RadioEngine::hash_part() const {
-  std::uint64_t sum = overhead_.hash() + (firmware_ ? firmware_->hash() : 0);
+  // The overhead controller, which all regions have alike, counts in the one of the origin.
+  std::uint64_t sum = (region_.contains(0, 0) ? overhead_.hash() : 0) + (firmware_ ? firmware_->hash() : 0);
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
+    if (!owns(i)) continue;
     const std::uint64_t counts =
         timers_.count_word(i) | std::uint64_t{state_[i]} << 32 | std::uint64_t{receptions_.count(i)} << 40;
     const std::uint64_t next_send = simple_ ? static_cast<std::uint64_t>(next_send_[i]) : 0;
     sum += entity_hash(HashDomain::kRadio, i, {timers_.time_word(i) + next_send, counts});
   }
   for (const Transmission& x : channel_.all()) {
+    if (!owns(x.sender)) continue;
     const auto [first, second] = words(x.message);
     sum += entity_hash(HashDomain::kRadio, x.sender,
                        {static_cast<std::uint64_t>(x.start), static_cast<std::uint64_t>(x.end), first, second});

@@ -40,10 +40,12 @@
 #include "services/comm/channel.hpp"
 #include "services/comm/firmware_air.hpp"
 #include "services/comm/link_budget.hpp"
+#include "services/comm/link_table.hpp"
 #include "services/comm/neighbourhood.hpp"
 #include "services/comm/overhead_controller.hpp"
 #include "services/comm/pair_counts.hpp"
 #include "services/comm/reception_log.hpp"
+#include "services/comm/region.hpp"
 #include "services/comm/tick_timers.hpp"
 
 namespace kilotwin::comm {
@@ -56,6 +58,8 @@ class RadioEngine {
     std::span<const BodyFrame* const> bodies;
     std::span<const ActuationFrame* const> actuation;
     const OverheadFrame& overhead;
+    /// Of every other region, what it emits for this one; none where the region is everywhere.
+    std::span<const RadioGhosts* const> ghosts = {};
   };
 
   /// Messages of robots since the start. attempted = sent + aborted + those on the air. Over all packets sent and all
@@ -70,7 +74,9 @@ class RadioEngine {
   };
 
   /// `firmware`: the robots of the plan that run firmware, at tick 0; needed where there are any.
-  explicit RadioEngine(const RunPlan&, std::unique_ptr<FirmwareRobots> firmware = nullptr);
+  /// `region`: whose robots are this engine's own; frames and counts are of them alone, so that those of all regions add up to
+  /// those of one engine. Where it is not everywhere: without firmware robots, save and load.
+  explicit RadioEngine(const RunPlan&, std::unique_ptr<FirmwareRobots> firmware = nullptr, Region region = {});
   RadioEngine(const RadioEngine&) = delete;
   RadioEngine& operator=(const RadioEngine&) = delete;
 
@@ -78,6 +84,10 @@ class RadioEngine {
   void step(Tick from, const Inputs&);
   /// The frame of the present tick for one host.
   void emit(HostId, RadioFrame&) const;
+  /// What the engine of another region needs of this one at the present tick.
+  void emit_ghosts(const Region& to, RadioGhosts&) const;
+  /// Robots this far from a region matter to it.
+  [[nodiscard]] double ghost_margin_mm() const;
   [[nodiscard]] std::uint64_t hash_part() const;
   [[nodiscard]] const Counters& counters() const { return counters_; }
   /// Per robot.
@@ -112,6 +122,10 @@ class RadioEngine {
   [[nodiscard]] bool is(std::uint32_t robot, std::uint8_t bits) const { return (state_[robot] & bits) == bits; }
   [[nodiscard]] Cycles begin_of(Tick tick) const { return tick.count() * cycles_per_tick_; }
 
+  [[nodiscard]] bool owns(std::uint32_t robot) const { return !divided_ || owned_[robot] != 0; }
+
+  void take_ghosts(std::span<const RadioGhosts* const>);
+  void divide();
   void read_poses(std::span<const BodyFrame* const>);
   void read_actuation(std::span<const ActuationFrame* const>);
   void drop_message(std::uint32_t robot);
@@ -134,9 +148,14 @@ class RadioEngine {
   void receive_packet(const Transmission&, Tick now);
   void receive_copy(const OverheadController::Copy&, std::uint32_t ordinal, Tick now);
   void emit_firmware(Share, RadioFrame&) const;
-  [[nodiscard]] bool drowns(std::uint32_t receiver, double margin_db);
+  void receive_in_range(const Transmission&, bool drowned, Tick now);
+  void receive_by_strength(const Transmission&, bool drowned, Tick now);
+  template <class Readings>
+  void take(const Transmission&, std::uint32_t receiver, bool spoilt, Tick now, Readings readings);
   [[nodiscard]] bool fades(std::uint32_t receiver, Tick now, std::uint32_t draw) const;
 
+  const Region region_;
+  const bool divided_;               ///< the region is not everywhere
   const std::vector<Share> shares_;  ///< per host
   const Cycles cycles_per_tick_;
   const double loss_;
@@ -150,11 +169,14 @@ class RadioEngine {
   Tick tick_;
   TickTimers timers_;
   std::vector<std::uint8_t> state_, apart_;  ///< per robot; apart: it runs firmware, or its body is real
-  std::vector<std::uint16_t> tx_period_;     ///< per robot
-  std::vector<IrMessage> message_;           ///< per robot: what its slot holds
-  std::vector<Cycles> next_send_;            ///< per robot of a simple radio: when it may send again
+  std::vector<std::uint8_t> owned_,
+      known_;                             ///< per robot, of a divided channel: this engine's own; that, or a ghost
+  std::vector<std::uint16_t> tx_period_;  ///< per robot
+  std::vector<IrMessage> message_;        ///< per robot: what its slot holds
+  std::vector<Cycles> next_send_;         ///< per robot of a simple radio: when it may send again
   LinkBudget links_;
   Neighbourhood neighbourhood_;
+  LinkTable table_;
   Channel channel_;
   OverheadController overhead_;
   std::vector<std::uint32_t> sent_;  ///< in the last tick, ascending
@@ -172,6 +194,13 @@ class RadioEngine {
   std::vector<Attempt> attempts_;  ///< a heap, earliest first
   std::vector<Arrival> arrivals_;
   std::vector<std::uint32_t> rivals_;
+  /// Per robot, in the packet at hand: the strongest of the rivals that it notices, dB.
+  struct Rival {
+    std::uint32_t packet = 0;  ///< by packets_
+    float margin_db = 0;
+  };
+  std::vector<Rival> strongest_rival_;
+  std::uint32_t packets_ = 0;  ///< received so far
   std::vector<std::uint8_t> jammed_;
 };
 

@@ -25,11 +25,12 @@ void RadioEngine::exchange_simply(Tick now) {
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     timers_.pass(i, end);
     if (!is(i, kRunning | kHolding) || next_send_[i] >= end) continue;
-    ++counters_.attempted;
-    ++radio_counts_[i].attempted;
+    const bool own = owns(i);
+    counters_.attempted += own;
+    radio_counts_[i].attempted += own;
     if (random_.uniform(Stream::kBackOff, i, now, 0) < model.sending_error()) {
-      ++counters_.aborted;
-      ++radio_counts_[i].backed_off;
+      counters_.aborted += own;
+      radio_counts_[i].backed_off += own;
       continue;
     }
     next_send_[i] = std::max(next_send_[i], begin) + interval;
@@ -42,16 +43,19 @@ void RadioEngine::exchange_simply(Tick now) {
     if (copy.end() >= begin && copy.end() < end) receive_copy(copy, ordinal++, now);
   }
   receptions_.close();
+  if (divided_) std::erase_if(sent_, [this](std::uint32_t i) { return !owns(i); });
 }
 
 void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
   const proto::SimpleRadio& model = simple_model_;
-  ++counters_.sent;
-  ++radio_counts_[sender].sent;
-  if (counts_pairs_) pairs_.add(sender, sender);
+  if (owns(sender)) {
+    ++counters_.sent;
+    ++radio_counts_[sender].sent;
+    if (counts_pairs_) pairs_.add(sender, sender);
+  }
   receptions_.begin_message(message_[sender]);
   neighbourhood_.visit(sender, [&](std::uint32_t receiver, double square_mm2) {
-    if (!is(receiver, kReceptive)) return;
+    if (!is(receiver, kReceptive) || !owns(receiver)) return;
     const auto happens = [&](double probability, std::uint32_t draw) {
       return probability > 0 && random_.uniform(Stream::kReception, receiver, now, draw % kDraws) < probability;
     };

@@ -24,6 +24,8 @@ TickTimers::TickTimers(const RunPlan& plan) {
     const double rate = 1 + error[i];
     const double period = static_cast<double>(kTimerCounts * kTimerCount) / rate;
     period_.push_back(static_cast<std::uint32_t>(period + 0.5));
+    if (plan.experiment().radio().model() == proto::Radio::PROPAGATION)
+      clock_[i] = static_cast<std::uint16_t>(65536 * random.uniform(Stream::kOscillator, i, Tick{0}, 2));
     next_.push_back(static_cast<Cycles>(period * random.uniform(Stream::kOscillator, i, Tick{0}, 1)));
   }
   shortest_period_ = robots == 0 ? 0 : *std::min_element(period_.begin(), period_.end());

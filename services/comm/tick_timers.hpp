@@ -3,7 +3,9 @@
 /// Timer 0 counts 0..255 for ever, 1024 cycles of the robot's own clock per count, and interrupts where it equals the
 /// compare register. That register holds 255, so that an interrupt comes every 256 counts; after an aborted attempt it
 /// holds a random value for once, which puts one more interrupt between two regular ones. Each interrupt is one kilo_tick,
-/// and adds the value that matched to tx_clock, a 16-bit number.
+/// and adds the value that matched to tx_clock, a 16-bit number. tx_clock runs from the reset on, whatever the robot does, and
+/// only a message sent sets it back: robots that have been on for a while find it anywhere, and so send at once, all of them,
+/// when they are told to RUN. With `model: PROPAGATION` they have been; else they are reset at tick 0.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,8 @@
 #include "clients/identify/radio/evidence.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -11,17 +14,20 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kShuffles = 100;
+/// From this share on a link is on.
+constexpr double kHeard = 0.3;
 
 struct Residuals {
   VectorXd value;
-  MatrixXd bearing, bodies, robots, robot_bearings;  ///< regressors
-  std::vector<std::pair<int, int>> of;               ///< sender, receiver; robots of all sets counted through
+  MatrixXd bearing, laying, bodies, robots, robot_bearings;  ///< regressors
+  std::vector<std::pair<int, int>> of;  ///< sender, receiver; robots of all sets counted through
 };
 
 Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
   std::vector<double> value;
   Residuals result;
   std::vector<double> angles, bodies;
+  std::vector<std::size_t> set_of;
   int first = 0;
   for (std::size_t q = 0; q < sets.size(); ++q) {
     const MatrixXd on = on_share(sets[q]);
@@ -31,6 +37,7 @@ Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
         if (i == j || on(i, j) < 0 || std::isnan(swarm.margin_db(i, j))) continue;
         const double expected = 0.5 * std::erfc(-swarm.margin_db(i, j) / swarm.run_sd_db / std::numbers::sqrt2);
         value.push_back(on(i, j) - expected);
+        set_of.push_back(q);
         result.of.push_back({first + j, first + i});
         const Eigen::Vector2d way = sets[q].place_mm(i) - sets[q].place_mm(j);
         bodies.push_back(bodies_between(sets[q], i, j));
@@ -41,7 +48,8 @@ Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
   }
   const auto count = static_cast<Eigen::Index>(value.size());
   result.value = Eigen::Map<VectorXd>(value.data(), count);
-  result.bearing = MatrixXd::Zero(count, 8);
+  result.bearing = MatrixXd::Zero(count, 2 * kHarmonics);
+  result.laying = MatrixXd::Zero(count, 2 * kHarmonics * static_cast<Eigen::Index>(sets.size()));
   result.bodies = Eigen::Map<VectorXd>(bodies.data(), count);
   result.bodies.array() -= result.bodies.mean();
   result.robots = MatrixXd::Zero(count, 2 * first);
@@ -49,9 +57,10 @@ Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
   for (Eigen::Index r = 0; r < count; ++r) {
     const double angle = angles[static_cast<std::size_t>(r)];
     const auto [sender, receiver] = result.of[static_cast<std::size_t>(r)];
-    for (int n = 1; n <= 4; ++n) {
-      result.bearing(r, 2 * n - 2) = std::cos(n * angle);
-      result.bearing(r, 2 * n - 1) = std::sin(n * angle);
+    const auto first_of_set = 2 * kHarmonics * static_cast<Eigen::Index>(set_of[static_cast<std::size_t>(r)]);
+    for (int n = 1; n <= kHarmonics; ++n) {
+      result.bearing(r, 2 * n - 2) = result.laying(r, first_of_set + 2 * n - 2) = std::cos(n * angle);
+      result.bearing(r, 2 * n - 1) = result.laying(r, first_of_set + 2 * n - 1) = std::sin(n * angle);
     }
     result.robots(r, sender) = result.robots(r, first + receiver) = 1;
     result.robot_bearings(r, 2 * sender) = result.robot_bearings(r, 2 * (first + receiver)) = std::cos(angle);
@@ -97,8 +106,14 @@ double correlation(const VectorXd& a, const VectorXd& b) {
 
 Evidence bearing_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
   const Residuals r = residuals(sets, model);
-  return explained("residuals follow the bearing from sender to receiver, alike in all sets (4 harmonics)",
+  return explained("residuals follow the bearing from sender to receiver, alike in all sets (8 harmonics)",
                    r.bearing, r.value);
+}
+
+Evidence laying_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
+  const Residuals r = residuals(sets, model);
+  return explained("residuals follow the bearing from sender to receiver, each set in its own way", r.laying,
+                   r.value);
 }
 
 Evidence body_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
@@ -151,6 +166,58 @@ Evidence hidden_terminal_evidence(const std::vector<GridSet>& sets) {
   return {
       "what is lost up to 105 mm follows how many robots the receiver hears and the sender does not (correlation)",
       correlation(a, b), 0, 1 / std::sqrt(static_cast<double>(count))};
+}
+
+Evidence notice_evidence(const std::vector<GridSet>& sets) {
+  std::vector<std::array<double, 5>> rows;
+  std::vector<double> loss;
+  for (const GridSet& set : sets) {
+    const int robots = set.robots();
+    const MatrixXd on = on_share(set);
+    for (const GridRun& run : set.runs) {
+      const auto hears = [&](int i, int j) { return run.share(i, j) > kHeard; };
+      for (int j = 0; j < robots; ++j) {
+        for (int i = 0; i < robots; ++i) {
+          if (i == j || set.distance_mm(i, j) > kSurelyHeard_mm || run.share(i, j) < 0) continue;
+          std::array<double, 5> row{1, 0, 0, 0, 0};
+          for (int k = 0; k < robots; ++k) {
+            if (k == i || k == j || !hears(i, k)) continue;
+            if (hears(j, k) || hears(k, j)) {
+              row[1] += hears(j, k) && !hears(k, j);
+              row[2] += hears(k, j) && !hears(j, k);
+            } else {
+              row[on(j, k) > 0 || on(k, j) > 0 ? 4 : 3] += 1;
+            }
+          }
+          rows.push_back(row);
+          loss.push_back(1 - run.share(i, j));
+        }
+      }
+    }
+  }
+  MatrixXd x(static_cast<Eigen::Index>(rows.size()), 5);
+  for (Eigen::Index r = 0; r < x.rows(); ++r) {
+    for (Eigen::Index c = 0; c < 5; ++c) x(r, c) = rows[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+  }
+  const VectorXd y = Eigen::Map<VectorXd>(loss.data(), x.rows());
+  const MatrixXd inverse = (x.transpose() * x + 1e-6 * MatrixXd::Identity(5, 5)).inverse();
+  const VectorXd cost = inverse * x.transpose() * y;
+  const double variance = (y - x * cost).squaredNorm() / static_cast<double>(x.rows());
+  return {
+      fmt::format(
+          "a hidden sender that is heard in other runs costs {:.4f} of the packets, one that never is {:.4f}; the "
+          "difference",
+          cost(4), cost(3)),
+      cost(3) - cost(4), 0, std::sqrt(variance * (inverse(3, 3) + inverse(4, 4) - 2 * inverse(3, 4)))};
+}
+
+Evidence oscillator_evidence(const std::vector<GridSet>& sets) {
+  const bool several = sets.size() > 1 && sets[0].robots() == sets[1].robots();
+  const VectorXd a = mean_sent(several ? sets[0] : half_of(sets, false)[0]);
+  const VectorXd b = mean_sent(several ? sets[1] : half_of(sets, true)[0]);
+  return {std::string("robots that send less than others do so in both ") +
+              (several ? "sets" : "halves of the runs") + " (correlation)",
+          correlation(a, b), 0, 1 / std::sqrt(static_cast<double>(a.size()))};
 }
 
 double same_robots(const LinkModel& model, bool senders) {

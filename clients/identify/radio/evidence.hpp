@@ -24,6 +24,13 @@ struct Evidence {
 /// Of what is lost up to 105 mm: does a sender's loss at a receiver follow the number of robots that the receiver hears and
 /// the sender does not?
 [[nodiscard]] Evidence hidden_terminal_evidence(const std::vector<GridSet>& sets);
+/// Of what is lost up to 105 mm: what a robot costs that the receiver hears and the sender does not, in this run; those that
+/// neither hears the other of in any run, less those that do in another one.
+[[nodiscard]] Evidence notice_evidence(const std::vector<GridSet>& sets);
+/// Do robots that send less than others do so in every set? Correlation of their means, of two sets or of two halves.
+[[nodiscard]] Evidence oscillator_evidence(const std::vector<GridSet>& sets);
+/// Does each set have its own dependence on the bearing?
+[[nodiscard]] Evidence laying_evidence(const std::vector<GridSet>& sets, const LinkModel&);
 /// Correlation over the robots of what was fitted to one set with what was fitted to the other.
 [[nodiscard]] double same_robots(const LinkModel&, bool senders);
 

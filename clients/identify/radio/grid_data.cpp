@@ -79,6 +79,18 @@ Eigen::Vector2d GridSet::place_mm(int robot) const {
   return {pitch_mm * (robot % side()), -pitch_mm * (robot / side())};
 }
 
+Eigen::VectorXd mean_sent(const GridSet& set) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(set.robots()), runs = sum;
+  for (const GridRun& run : set.runs) {
+    for (Eigen::Index i = 0; i < sum.size(); ++i) {
+      if (run.sent(i) < 0) continue;
+      sum(i) += run.sent(i);
+      runs(i) += 1;
+    }
+  }
+  return sum.cwiseQuotient(runs.cwiseMax(1));
+}
+
 std::vector<GridSet> read_grids(const fs::path& directory) {
   std::error_code error;
   std::vector<fs::path> files;

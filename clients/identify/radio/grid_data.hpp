@@ -33,6 +33,9 @@ struct GridSet {
   [[nodiscard]] double distance_mm(int a, int b) const { return (place_mm(a) - place_mm(b)).norm(); }
 };
 
+/// What each robot sent, mean over the runs.
+[[nodiscard]] Eigen::VectorXd mean_sent(const GridSet& set);
+
 /// Reads comm_tauT_runN.dat of a directory, the sets by ascending tau. Throws UserError: "FILE:LINE: what is wrong".
 [[nodiscard]] std::vector<GridSet> read_grids(const std::filesystem::path& directory);
 

@@ -9,6 +9,8 @@ namespace {
 constexpr std::uint16_t kTxPeriod = 3906;
 /// TAU_S is in units of 32 kilo_ticks.
 constexpr double kTicksPerTau = 32;
+/// The overhead controller calls RUN for 0.25 s, as in experiments: for so long it talks over the robots.
+constexpr std::int64_t kCall_ticks = 8;
 
 RunPlan plan_of(const GridSet& set, const proto::Radio& radio, std::uint64_t seed) {
   proto::Manifest manifest;
@@ -48,7 +50,7 @@ GridRun simulate(const GridSet& set, const proto::Radio& radio, std::uint64_t se
   actuation.led.assign(robots, 0);
   actuation.life_cycle.assign(robots, static_cast<std::uint8_t>(LifeCycle::kRunning));
   actuation.tx_period.assign(robots, kTxPeriod);
-  const OverheadFrame overhead;
+  OverheadFrame overhead;
   const BodyFrame* const body_frames[] = {&bodies};
   const ActuationFrame* const actuation_frames[] = {&actuation};
   std::vector<std::uint32_t> kilo_ticks(robots, 0), sent_at(robots, 0);
@@ -57,6 +59,9 @@ GridRun simulate(const GridSet& set, const proto::Radio& radio, std::uint64_t se
   std::uint32_t running = robots;
   for (Tick now; running > 0; ++now) {
     engine.emit(HostId{0}, frame);
+    overhead.packets.clear();
+    if (now.count() == 0) overhead.packets.push_back({OverheadCommand::kRepeat, {}});
+    if (now.count() == kCall_ticks) overhead.packets.push_back({OverheadCommand::kStop, {}});
     engine.step(now, {body_frames, actuation_frames, overhead});
     actuation.offer_robot.clear();
     actuation.offer_message.clear();

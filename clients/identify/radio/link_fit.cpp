@@ -15,13 +15,15 @@ using Eigen::VectorXd;
 /// kilolib's calibration of the low-gain amplifier: exp(-d / 31.2 mm).
 constexpr double kDecay_db_per_mm = 0.139;
 constexpr double kReference_mm = 132;
-constexpr int kHarmonics = 4, kRounds = 7, kMostSteps = 12;
+constexpr int kRounds = 7, kMostSteps = 12;
 /// Hardly any link is on beyond.
-constexpr double kFittedTo_mm = 178;
+constexpr double kFittedTo_mm = 190;
 /// From this share on, what is missing was lost to collisions.
 constexpr double kOn = 0.6;
 /// Prior of what is common to all robots, dB: wide.
 constexpr double kCommon_sd_db = 6;
+/// Prior of the first harmonic of the pattern, dB; of the n-th, 1/n of it.
+constexpr double kPattern_sd_db = 6;
 
 /// A link of a set that may be on or off.
 struct Row {
@@ -57,6 +59,7 @@ class Fit {
     groups_.push_back({std::move(design), std::move(covariance), sd_db, fixed});
   }
   double settle(bool spreads);
+  [[nodiscard]] VectorXd variances() const;
   [[nodiscard]] VectorXd offsets() const;
 
   const std::vector<GridSet>& sets_;
@@ -65,6 +68,7 @@ class Fit {
   std::vector<Group> groups_;
   std::vector<double> run_sd_;
   VectorXd dual_, margin_;  ///< margin_ = offsets + covariance * dual_
+  VectorXd weight_;         ///< curvature of the likelihood at the mode
 };
 
 void Fit::collect() {
@@ -95,11 +99,22 @@ void Fit::build() {
     add(each(2 * kHarmonics,
              [](const Row& x, auto row) {
                for (int n = 1; n <= kHarmonics; ++n) {
-                 row(2 * n - 2) = std::cos(n * x.bearing_rad);
-                 row(2 * n - 1) = std::sin(n * x.bearing_rad);
+                 row(2 * n - 2) = std::cos(n * x.bearing_rad) / n;
+                 row(2 * n - 1) = std::sin(n * x.bearing_rad) / n;
                }
              }),
-        kCommon_sd_db, true);
+        kPattern_sd_db, true);
+  }
+  if (terms_ >= Terms::kLaying) {
+    add(each(2 * kHarmonics * static_cast<Eigen::Index>(sets_.size()),
+             [](const Row& x, auto row) {
+               const auto first = 2 * kHarmonics * static_cast<Eigen::Index>(x.set);
+               for (int n = 1; n <= kHarmonics; ++n) {
+                 row(first + 2 * n - 2) = std::cos(n * x.bearing_rad) / n;
+                 row(first + 2 * n - 1) = std::sin(n * x.bearing_rad) / n;
+               }
+             }),
+        1.0);
   }
   if (terms_ >= Terms::kBodies)
     add(each(1, [](const Row& x, auto row) { row(0) = -x.bodies; }), kCommon_sd_db, true);
@@ -149,7 +164,9 @@ double Fit::settle(bool spreads) {
   MatrixXd covariance = MatrixXd::Zero(count, count);
   for (const Group& group : groups_) covariance += group.sd_db * group.sd_db * group.covariance;
   const VectorXd offset = offsets();
-  VectorXd weight(count), slope(count);
+  VectorXd slope(count);
+  VectorXd& weight = weight_;
+  weight.resize(count);
   Eigen::LLT<MatrixXd> root;
   double likelihood = 0;
   const auto evaluate = [&](const VectorXd& margin) {
@@ -201,6 +218,18 @@ double Fit::settle(bool spreads) {
   return marginal;
 }
 
+/// Of the margins, dB^2, given the data.
+VectorXd Fit::variances() const {
+  const auto count = static_cast<Eigen::Index>(rows_.size());
+  MatrixXd covariance = MatrixXd::Zero(count, count);
+  for (const Group& group : groups_) covariance += group.sd_db * group.sd_db * group.covariance;
+  const VectorXd half = weight_.cwiseSqrt();
+  const Eigen::LLT<MatrixXd> root(MatrixXd::Identity(count, count) +
+                                  half.asDiagonal() * covariance * half.asDiagonal());
+  const MatrixXd known = root.matrixL().solve(MatrixXd(half.asDiagonal() * covariance));
+  return covariance.diagonal() - known.colwise().squaredNorm().transpose();
+}
+
 LinkModel Fit::run() {
   // Without terms that are drawn there is nothing to iterate but the noise of runs.
   const int rounds = terms_ >= Terms::kRobots ? kRounds : 3;
@@ -234,14 +263,21 @@ LinkModel Fit::run() {
   std::size_t next = 1;
   if (terms_ >= Terms::kPattern) {
     model.pattern_db.assign(effects[next].data(), effects[next].data() + effects[next].size());
+    for (std::size_t n = 0; n < model.pattern_db.size(); ++n) model.pattern_db[n] /= static_cast<double>(n / 2 + 1);
     ++next;
   }
+  const std::size_t laying = next;
+  if (terms_ >= Terms::kLaying) model.laying_sd_db = groups_[next++].sd_db;
   if (terms_ >= Terms::kBodies) model.body_loss_db = effects[next++](0);
   const Eigen::Index robots = sets_.front().robots();
   for (std::size_t q = 0; q < sets_.size(); ++q) {
     LinkModel::Swarm& swarm = model.swarms.emplace_back();
     swarm.set = sets_[q].name;
     swarm.run_sd_db = run_sd_[q];
+    swarm.pattern_db = model.pattern_db;
+    for (std::size_t n = 0; n < swarm.pattern_db.size() && terms_ >= Terms::kLaying; ++n)
+      swarm.pattern_db[n] += effects[laying](static_cast<Eigen::Index>(q * swarm.pattern_db.size() + n)) /
+                             static_cast<double>(n / 2 + 1);
     const Eigen::Index first = static_cast<Eigen::Index>(q) * robots;
     swarm.power_db = swarm.sensitivity_db = VectorXd::Zero(robots);
     swarm.power_bearing_db = swarm.sensitivity_bearing_db = MatrixXd::Zero(robots, 2);
@@ -258,15 +294,18 @@ LinkModel Fit::run() {
       }
     }
   }
+  const VectorXd variance = variances();
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const Row& row = rows_[r];
     LinkModel::Swarm& swarm = model.swarms[row.set];
     const auto at = static_cast<Eigen::Index>(r);
     swarm.margin_db(row.receiver, row.sender) = margin_(at);
+    // A margin that is not known well means chances nearer to even: the one that gives them, with the noise of runs alone.
+    const double even = margin_(at) * (1 / std::sqrt(1 + variance(at) / (swarm.run_sd_db * swarm.run_sd_db)) - 1);
     if (terms_ >= Terms::kPairs) {
       const Group &pair = groups_[next + 4], &link = groups_[next + 5];
-      swarm.link_db(row.receiver, row.sender) =
-          (pair.sd_db * pair.sd_db * pair.covariance.row(at).dot(dual_)) + link.sd_db * link.sd_db * dual_(at);
+      swarm.link_db(row.receiver, row.sender) = (pair.sd_db * pair.sd_db * pair.covariance.row(at).dot(dual_)) +
+                                                link.sd_db * link.sd_db * dual_(at) + even;
     }
   }
   if (terms_ >= Terms::kRobots) {
@@ -330,11 +369,11 @@ double bodies_between(const GridSet& set, int a, int b) {
   return sum;
 }
 
-proto::Radio LinkModel::population(const Swarm& swarm, double packet_sd_db, double oscillator_sd) const {
+proto::Radio LinkModel::population(const Swarm& swarm, const Timing& timing) const {
   proto::Radio radio;
   radio.set_model(proto::Radio::PROPAGATION);
   radio.set_range_mm(range_mm);
-  radio.set_oscillator_sd(oscillator_sd);
+  radio.set_oscillator_sd(timing.oscillator_sd);
   proto::Propagation& model = *radio.mutable_propagation();
   model.set_decay_db_per_mm(kDecay_db_per_mm);
   model.set_body_loss_db(std::max(0.0, body_loss_db));
@@ -345,13 +384,14 @@ proto::Radio LinkModel::population(const Swarm& swarm, double packet_sd_db, doub
   model.set_pair_sd_db(pair_sd_db);
   model.set_link_sd_db(link_sd_db);
   model.set_run_sd_db(swarm.run_sd_db);
-  model.set_packet_sd_db(packet_sd_db);
-  for (const double entry : pattern_db) model.add_power_pattern_db(entry);
+  model.set_packet_sd_db(timing.packet_sd_db);
+  model.set_notice_db(timing.notice_db);
+  for (const double entry : swarm.pattern_db) model.add_power_pattern_db(entry);
   return radio;
 }
 
-proto::Radio LinkModel::radio(const Swarm& swarm, double packet_sd_db, double oscillator_sd) const {
-  proto::Radio radio = population(swarm, packet_sd_db, oscillator_sd);
+proto::Radio LinkModel::radio(const Swarm& swarm, const Timing& timing) const {
+  proto::Radio radio = population(swarm, timing);
   proto::Propagation& model = *radio.mutable_propagation();
   for (Eigen::Index i = 0; i < swarm.power_db.size(); ++i) {
     proto::RobotRadio& robot = *model.add_robot();
@@ -362,6 +402,7 @@ proto::Radio LinkModel::radio(const Swarm& swarm, double packet_sd_db, double os
     robot.set_power_left_db(swarm.power_bearing_db(i, 1));
     robot.set_sensitivity_ahead_db(swarm.sensitivity_bearing_db(i, 0));
     robot.set_sensitivity_left_db(swarm.sensitivity_bearing_db(i, 1));
+    if (timing.oscillator.size() > 0) robot.set_oscillator(timing.oscillator(i));
   }
   for (Eigen::Index i = 0; i < swarm.link_db.rows(); ++i) {
     for (Eigen::Index j = 0; j < swarm.link_db.cols(); ++j) {

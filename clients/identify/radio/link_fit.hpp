@@ -13,19 +13,20 @@
 namespace kilotwin::radio_fit {
 
 /// Which terms the model has; each includes the ones above it.
-enum class Terms { kDistance, kPattern, kBodies, kRobots, kBearings, kPairs };
+enum class Terms { kDistance, kPattern, kLaying, kBodies, kRobots, kBearings, kPairs };
 
 struct LinkModel {
   Terms terms = Terms::kDistance;
   double range_mm = 130;
   std::vector<double> pattern_db;  ///< a1 b1 a2 b2..
-  double body_loss_db = 0;
+  double body_loss_db = 0, laying_sd_db = 0;
   double power_sd_db = 0, sensitivity_sd_db = 0, power_bearing_sd_db = 0, sensitivity_bearing_sd_db = 0;
   double pair_sd_db = 0, link_sd_db = 0;
   /// Of one set: its robots and links, and what changes from run to run.
   struct Swarm {
     std::string set;
     double run_sd_db = 1;
+    std::vector<double> pattern_db;  ///< the common one and what is this set's own
     Eigen::VectorXd power_db, sensitivity_db;
     Eigen::MatrixXd power_bearing_db, sensitivity_bearing_db;  ///< robots x 2: ahead, left
     Eigen::MatrixXd link_db;                                   ///< receiver, sender
@@ -33,12 +34,20 @@ struct LinkModel {
   };
   std::vector<Swarm> swarms;
 
+  /// What is not of links.
+  struct Timing {
+    double packet_sd_db = 0.15, notice_db = 0, oscillator_sd = 0.005;
+    Eigen::VectorXd oscillator;  ///< per robot, where known; else empty
+  };
+
   /// For the runs of one set, with its robots.
-  [[nodiscard]] proto::Radio radio(const Swarm& swarm, double packet_sd_db, double oscillator_sd) const;
+  [[nodiscard]] proto::Radio radio(const Swarm& swarm, const Timing& timing) const;
   /// Robots and links drawn; what changes from run to run is as in `swarm`.
-  [[nodiscard]] proto::Radio population(const Swarm& swarm, double packet_sd_db, double oscillator_sd) const;
+  [[nodiscard]] proto::Radio population(const Swarm& swarm, const Timing& timing) const;
 };
 
+/// Harmonics of the pattern.
+inline constexpr int kHarmonics = 8;
 /// Distances between which links are neither all heard nor all silent, and from which on links are fitted to, mm.
 inline constexpr double kSurelyHeard_mm = 105, kNeverHeard_mm = 200, kFitted_mm = 95;
 

@@ -10,7 +10,7 @@
 namespace kilotwin::radio_fit {
 namespace {
 
-constexpr double kSilent = 0.02, kFar_mm = 125;
+constexpr double kSilent = 0.02, kWhole = 0.6, kFar_mm = 125;
 /// A pair's mean and dispersion come from a few runs: so many runs' worth of its displacement class are added.
 constexpr double kPriorRuns = 0.5;
 
@@ -45,7 +45,8 @@ std::pair<int, int> class_of(const GridSet& set, int i, int j) {
 Statistics statistics(const GridSet& set) {
   Statistics s;
   const int robots = set.robots();
-  double sent = 0, known_sent = 0, silent = 0, entries = 0, spread = 0, pairs = 0, near = 0, near_entries = 0;
+  double sent = 0, known_sent = 0, silent = 0, entries = 0, spread = 0, pairs = 0, near = 0, near_entries = 0,
+         partial = 0, far_entries = 0;
   std::map<std::pair<int, int>, Moments> classes;
   std::vector<Moments> senders(static_cast<std::size_t>(robots));
   for (int i = 0; i < robots; ++i) {
@@ -65,6 +66,10 @@ Statistics statistics(const GridSet& set) {
         senders[static_cast<std::size_t>(j)].add(share, 1);
         silent += share < kSilent;
         entries += 1;
+        if (set.distance_mm(i, j) > kFar_mm && set.distance_mm(i, j) < kNeverHeard_mm) {
+          partial += share > kSilent && share < kWhole;
+          far_entries += 1;
+        }
         if (set.distance_mm(i, j) > kSurelyHeard_mm) continue;
         near += share;
         near_entries += 1;
@@ -79,6 +84,7 @@ Statistics statistics(const GridSet& set) {
   s.silent = silent / entries;
   s.run_spread = pairs > 0 ? spread / pairs : 0;
   s.near = near / near_entries;
+  s.partial = far_entries > 0 ? partial / far_entries : 0;
   Moments over;
   for (const Moments& sender : senders) {
     if (sender.runs > 0) over.add(sender.sum / sender.runs, 1);

@@ -22,6 +22,7 @@ struct Statistics {
   double silent = 0;         ///< share of (pair, run) that received less than 2 %
   double run_spread = 0;     ///< mean over pairs of the sd over runs
   double near = 0;           ///< mean reception up to 105 mm
+  double partial = 0;        ///< share of (pair, run) of 125..200 mm that received some, 2..60 %
   std::vector<DisplacementClass> classes;
 };
 [[nodiscard]] Statistics statistics(const GridSet& set);

@@ -126,7 +126,7 @@ TEST(SimpleRadio, ContendsAsStated) {
 }
 
 struct Air {
-  explicit Air(const RunPlan& plan) : links(plan), robots(links.reach_mm(), plan.robots()) {
+  explicit Air(const RunPlan& plan) : links(plan), robots(links.reach_mm(), links.span_mm(), plan.robots()) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
       robots.place(i, pose.position_mm.x(), pose.position_mm.y());

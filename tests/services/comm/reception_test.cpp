@@ -150,7 +150,7 @@ TEST(Neighbourhood, FindsAllInRangeAnywhere) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const double width = seed % 3 == 0 ? 300 : seed % 3 == 1 ? 3000 : 300000;
     const auto poses = testing::random_crowd(200, width, width, 0, seed);
-    Neighbourhood neighbourhood(130, 200);
+    Neighbourhood neighbourhood(130, 130, 200);
     for (std::uint32_t i = 0; i < 200; ++i) neighbourhood.place(i, poses[i].x_mm, poses[i].y_mm);
     neighbourhood.sort();
     for (std::uint32_t i = 0; i < 200; ++i) {

@@ -1,0 +1,47 @@
+/// The channel split by space: each engine owns the robots in its region and simulates, besides them, those of the neighbouring
+/// regions that are near enough to matter within a tick. What it makes of those is forgotten: their owners say anew, in every
+/// tick, how they are.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/federation/frames.hpp"
+#include "services/comm/air.hpp"
+
+namespace kilotwin::comm {
+
+/// A rectangle of the arena, mm; its left and lower edges belong to it. As it stands: everywhere.
+struct Region {
+  double left_mm = -std::numeric_limits<double>::infinity(), bottom_mm = left_mm;
+  double right_mm = std::numeric_limits<double>::infinity(), top_mm = right_mm;
+
+  [[nodiscard]] bool contains(double x_mm, double y_mm) const {
+    return x_mm >= left_mm && x_mm < right_mm && y_mm >= bottom_mm && y_mm < top_mm;
+  }
+  /// Whether a place is within `margin_mm` of it, along either axis.
+  [[nodiscard]] bool is_near(double x_mm, double y_mm, double margin_mm) const {
+    return x_mm >= left_mm - margin_mm && x_mm < right_mm + margin_mm && y_mm >= bottom_mm - margin_mm &&
+           y_mm < top_mm + margin_mm;
+  }
+  [[nodiscard]] bool is_everywhere() const {
+    const double most = std::numeric_limits<double>::max();
+    return left_mm < -most && bottom_mm < -most && right_mm > most && top_mm > most;
+  }
+};
+
+/// Robots of one region that matter to another, as they are at a tick. One entry per robot, and per transmission.
+struct RadioGhosts {
+  std::vector<std::uint32_t> robot, count_word;  ///< of its timer
+  std::vector<std::uint64_t> time_word;          ///< likewise
+  std::vector<std::uint8_t> state;
+  std::vector<std::uint16_t> tx_period;
+  std::vector<IrMessage> message;
+  std::vector<Cycles> next_send;  ///< of a simple radio
+  std::vector<Transmission> transmissions;
+
+  void clear() { *this = {}; }
+};
+
+}  // namespace kilotwin::comm
