@@ -8,6 +8,8 @@
 #include <numeric>
 #include <utility>
 
+#include "clients/identify/follower.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -16,12 +18,13 @@ struct LogLikelihood {
   std::vector<double> parts;  ///< of so many samples each
   std::size_t count = 0;
   bool touched = false;
+  bool with_touching = false;  ///< what was measured after touching counts as well
   static constexpr std::size_t kPart = 50;
 
   void start(const TrackFilter&) {}
-  void step(const StepRecord& record) { touched = touched || record.touching; }
+  void step(const StepRecord& record) { touched = touched || record.touching(); }
   void update(const Innovation& innovation, const Sample&) {
-    if (std::exchange(touched, false)) return;
+    if (std::exchange(touched, false) && !with_touching) return;
     if (count++ % kPart == 0) parts.push_back(0);
     const double value = std::max(innovation.log_likelihood, -1e3);
     parts.back() += value;
@@ -29,6 +32,7 @@ struct LogLikelihood {
   }
 };
 
+constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
 constexpr int kNoises = 6;
 using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
 
@@ -37,13 +41,19 @@ NoiseVector to_vector(const Noise& n) {
   v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
   return v.array().log();
 }
-Noise to_noise(const NoiseVector& logs) {
+Noise to_noise(const NoiseVector& logs, Noise noise) {
   // Below the lower bounds a noise is as good as none, above the upper ones nothing would be told from noise.
   const std::array<double, kNoises> low = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6}, high = {1, 100, 1, 100, 1e4, 10};
   std::array<double, kNoises> v;
   for (std::size_t i = 0; i < kNoises; ++i)
     v[i] = std::clamp(std::exp(logs[static_cast<Eigen::Index>(i)]), low[i], high[i]);
-  return {v[0], v[1], v[2], v[3], v[4], v[5]};
+  noise.factor_s = v[0];
+  noise.wheel_mm2_s = v[1];
+  noise.heading_rad2_s = v[2];
+  noise.drift_mm2_s = v[3];
+  noise.position_mm2 = v[4];
+  noise.heading_rad2 = v[5];
+  return noise;
 }
 
 }  // namespace
@@ -70,6 +80,38 @@ std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
   }
   std::erase_if(units, [](const auto& unit) { return unit.empty(); });
   return units;
+}
+
+void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) {
+  std::vector<Centres> centres(views_.size());
+  in_parallel(views_.size(), threads, [&](std::size_t v) { centres[v] = centres_of(model, views_[v]); });
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) {
+    // Tracks that are too short to be followed are where they were seen.
+    std::vector<Centres> of_run;
+    for (const Track& track : set_->runs[r].tracks) {
+      Centres& own = of_run.emplace_back();
+      for (const Sample& s : track.samples) {
+        own.x_mm.push_back(s.x_mm);
+        own.y_mm.push_back(s.y_mm);
+      }
+    }
+    for (std::size_t v = 0; v < views_.size(); ++v)
+      if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
+    *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
+  }
+}
+
+Meetings PreparedSet::meetings() const {
+  Meetings sum;
+  constexpr double kEvery_s = 1;
+  for (const TrackView& view : views_) {
+    for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s) {
+      const double nearest = view.neighbours->view(view.place, t).nearest_mm;
+      if (nearest < kDiscs_mm - 2) ++sum.within;
+      if (nearest > kTouch_mm && nearest < Meetings::kRing_mm) ++sum.near;
+    }
+  }
+  return sum;
 }
 
 void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads) {
@@ -121,24 +163,153 @@ std::vector<Block> blocks_of(const MotionModel& model) {
   return blocks;
 }
 
-void Fitter::fit_noise(MotionModel& model) const {
-  // Tracks spread over the whole set, until there are enough samples.
-  constexpr std::size_t kEnough = 8000;
-  std::vector<const TrackView*> chosen;
-  std::vector<const TrackView*> all;
+std::vector<const TrackView*> Fitter::some_tracks(std::size_t samples) const {
+  std::vector<const TrackView*> chosen, all;
   for (const TrackView& view : set_.views())
     if (!view.track->held_out) all.push_back(&view);
-  std::size_t samples = 0;
-  for (std::size_t i = 0; i < all.size() && samples < kEnough; ++i) {
+  std::size_t sum = 0;
+  for (std::size_t i = 0; i < all.size() && sum < samples; ++i) {
     chosen.push_back(all[(i * 7919) % all.size()]);
-    samples += chosen.back()->track->samples.size();
+    sum += chosen.back()->track->samples.size();
   }
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+double Fitter::with_touching(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
+  std::vector<double> sums(tracks.size());
+  in_parallel(tracks.size(), threads_, [&](std::size_t i) {
+    const TrackView& view = *tracks[i];
+    RobotBias bias = model.bias_of(view.track->robot);
+    bias.covariance.setZero();
+    TrackFilter filter(model, bias, view.track->robot, view.run);
+    LogLikelihood likelihood;
+    likelihood.with_touching = true;
+    walk(filter, view, view.track->samples.size(), likelihood);
+    sums[i] = likelihood.sum;
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+void Fitter::fit_touching(MotionModel& model) const {
+  const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+  double best = with_touching(model, tracks);
+  for (double Noise::*const part :
+       {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s}) {
+    const double start = model.noise.*part;
+    for (const double factor : {4.0, 0.25}) {
+      bool better = true;
+      while (better) {
+        MotionModel trial = model;
+        trial.noise.*part *= factor;
+        if (trial.noise.*part < 1e-6 || trial.noise.*part > 1e3) break;
+        const double value = with_touching(trial, tracks);
+        better = value > best + 0.5;
+        if (!better) break;
+        best = value;
+        model = trial;
+      }
+      if (model.noise.*part != start) break;
+    }
+  }
+}
+
+void Fitter::find_shape(MotionModel& model) const {
+  const bool headings = set_.set().has_headings;
+  const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+  struct Candidate {
+    MotionModel model;
+    double log_likelihood = 0;
+    Meetings meetings;
+  };
+  std::vector<Candidate> candidates;
+  const auto add = [&](double centre_mm) {
+    Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
+    c.model.base.centre_mm = centre_mm;
+    set_.find_centres(c.model, threads_);
+    if (headings) {
+      c.model.room = room_of(set_, c.model);
+    } else {
+      find_walls(c.model);
+    }
+    c.log_likelihood = with_touching(c.model, tracks);
+    c.meetings = set_.meetings();
+  };
+  add(kAxleOffset_mm);
+  // Or the tracked point is the centre.
+  constexpr double kApart_mm = 3;
+  if (std::abs(model.base.ahead_mm - kAxleOffset_mm) > kApart_mm) add(model.base.ahead_mm);
+  const Candidate* best = &candidates.front();
+  for (const Candidate& c : candidates) {
+    // Walls tell more than robots that met, where there are walls.
+    constexpr double kSure = 50;
+    const double better = c.log_likelihood - best->log_likelihood;
+    if (better > kSure || (better > -kSure && c.meetings.share_within() < 0.5 * best->meetings.share_within()))
+      best = &c;
+  }
+  model = best->model;
+  constexpr double kUnhindered = 0.6;
+  model.contacts = best->meetings.share_within() < kUnhindered;
+  if (best != &candidates.back()) set_.find_centres(model, threads_);
+}
+
+void Fitter::find_walls(MotionModel& model) const {
+  // How far the tracked point may lie beyond the disc's centre, or before it.
+  const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
+  struct Side {
+    double Room::*wall;
+    double Sample::*along;
+    double sign;
+  };
+  const std::array<Side, 4> sides = {
+      Side{&Room::x_high_mm, &Sample::x_mm, 1}, Side{&Room::x_low_mm, &Sample::x_mm, -1},
+      Side{&Room::y_high_mm, &Sample::y_mm, 1}, Side{&Room::y_low_mm, &Sample::y_mm, -1}};
+  for (const Side& side : sides) {
+    std::vector<double> places;
+    for (const TrackView& view : set_.views())
+      for (const Sample& s : view.track->samples) places.push_back(side.sign * s.*side.along);
+    const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
+    if (places.size() < 100) return;
+    std::nth_element(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(rank), places.end());
+    const double edge = places[rank];
+    // Those that came near; of many, some.
+    constexpr std::size_t kMost = 16;
+    std::vector<const TrackView*> near;
+    for (const TrackView& view : set_.views()) {
+      if (view.track->held_out || near.size() == kMost) continue;
+      const auto there =
+          std::count_if(view.track->samples.begin(), view.track->samples.end(),
+                        [&](const Sample& s) { return std::abs(side.sign * s.*side.along - edge) < reach + 5; });
+      if (there > 5) near.push_back(&view);
+    }
+    model.room.*side.wall = side.sign * std::numeric_limits<double>::infinity();
+    if (near.empty()) continue;
+    MotionModel best = model;
+    // A wall has to be worth more than chance and bad luck with a few outliers.
+    double best_value = with_touching(model, near) + 30;
+    const auto try_at = [&](double wall) {
+      MotionModel trial = model;
+      trial.room.*side.wall = side.sign * wall;
+      const double value = with_touching(trial, near);
+      if (value <= best_value) return;
+      best_value = value;
+      best = trial;
+    };
+    for (double wall = edge - 2; wall <= edge + reach + 2; wall += 2) try_at(wall);
+    const double found = side.sign * best.room.*side.wall;
+    if (std::isinf(found)) continue;
+    for (const double by : {-1.0, 1.0, -0.5, 0.5}) try_at(found + by);
+    model = best;
+  }
+}
+
+void Fitter::fit_noise(MotionModel& model) const {
+  const std::vector<const TrackView*> chosen = some_tracks(kEnoughSamples);
   const bool headings = set_.set().has_headings;
   const auto parts_at = [&](const NoiseVector& at) {
     MotionModel trial = model;
-    trial.noise = to_noise(at);
+    trial.noise = to_noise(at, model.noise);
     std::vector<std::vector<double>> parts(chosen.size());
     in_parallel(chosen.size(), threads_, [&](std::size_t i) {
       const TrackView& view = *chosen[i];
@@ -206,7 +377,7 @@ void Fitter::fit_noise(MotionModel& model) const {
     }
     gradient = next;
   }
-  model.noise = to_noise(at);
+  model.noise = to_noise(at, model.noise);
 }
 
 void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {
@@ -279,11 +450,34 @@ double Fitter::log_likelihood(const MotionModel& model) const {
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
+void Fitter::fit_base(MotionModel& model) const {
+  const bool headings = set_.set().has_headings;
+  set_.find_headings(model, threads_);
+  if (!headings) find_walls(model);
+  fit(model, 3);
+  find_shape(model);
+  // Where headings are not measured, walls, centres and what touching does lean on each other.
+  constexpr int kMostRounds = 4;
+  constexpr double kSettled = 20;
+  double likelihood = -1e300;
+  for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
+    if (round > 0) {
+      find_walls(model);
+      set_.find_centres(model, threads_);
+    }
+    fit_touching(model);
+    fit(model, 2);
+    const double found = log_likelihood(model);
+    if (found < likelihood + kSettled) break;
+    likelihood = found;
+  }
+}
+
 void Fitter::fit(MotionModel& model, int passes) const {
   const std::vector<Block> blocks = blocks_of(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
-    model.room = room_of(set_, model);
+    if (set_.set().has_headings) model.room = room_of(set_, model);
     // What was noise to a model without its new terms is not, once they have their size.
     if (pass != 0 || passes == 1) fit_noise(model);
     const std::vector<Unit> units = linearise(model, set_.units(), blocks, {100, threads_});
@@ -304,11 +498,17 @@ void Fitter::fit(MotionModel& model, int passes) const {
     Eigen::VectorXd step = information.ldlt().solve(score);
     // A step that makes things worse was too long.
     const MotionModel start = model;
-    const double before = log_likelihood(start);
+    // Of the coefficients beforehand as well.
+    const auto worth = [&](const MotionModel& trial) {
+      double value = log_likelihood(trial);
+      for (const Term& term : trial.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+      return value;
+    };
+    const double before = worth(start);
     for (int halve = 0; halve < 5; ++halve, step *= 0.4) {
       model = start;
       apply(model, units, step);
-      if (log_likelihood(model) > before - 2) break;
+      if (worth(model) > before - 2) break;
       if (halve == 4) model = start;
     }
   }

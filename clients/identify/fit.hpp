@@ -10,6 +10,19 @@
 
 namespace kilotwin::identify {
 
+/// How often the nearest robot was so near that discs would overlap, and a little farther away.
+struct Meetings {
+  static constexpr double kRing_mm = 55;
+  std::size_t within = 0, near = 0;
+  /// Of what there would be within if robots did not feel each other, by areas; 0.2 where few have met.
+  [[nodiscard]] double share_within() const {
+    constexpr double kInner = (kDiscs_mm - 2) * (kDiscs_mm - 2),
+                     kOuter = kRing_mm * kRing_mm - kTouch_mm * kTouch_mm;
+    constexpr double kFew = 10;
+    return (static_cast<double>(within) + 0.2 * kFew) / (static_cast<double>(near) * kInner / kOuter + kFew);
+  }
+};
+
 /// The tracks of a set, ready to be walked along.
 class PreparedSet {
  public:
@@ -21,6 +34,9 @@ class PreparedSet {
   [[nodiscard]] const RunNeighbours& neighbours(std::size_t run) const { return *neighbours_[run]; }
   /// The tracks that may be fitted to, by unit: by robot, or each for itself where there are fewer than six robots.
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
+  /// Looks again at where discs are, which is not where they are measured, for what robots see of each other.
+  void find_centres(const MotionModel&, std::uint32_t threads);
+  [[nodiscard]] Meetings meetings() const;
   /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
   void find_headings(const MotionModel&, std::uint32_t threads);
 
@@ -43,10 +59,18 @@ class Fitter {
     if (!set.set().has_commands) prior_ = BasePrior::unknown_commands();
   }
 
+  /// All of a model of which nothing is known: walls and what touching does as well.
+  void fit_base(MotionModel&) const;
   /// Fits base, biases, noise and the coefficients of the model's terms. Few passes suffice from a fitted model.
   void fit(MotionModel&, int passes) const;
   /// The noise alone: a quasi-Newton search on the likelihood of some of the tracks.
   void fit_noise(MotionModel&) const;
+  /// What touching adds to the motion, likewise.
+  void fit_touching(MotionModel&) const;
+  /// Where the centre of the disc is, which is what touches, and whether robots touch each other at all; the room.
+  void find_shape(MotionModel&) const;
+  /// The room, where its walls are not seen because headings are not: walls that make the tracks most likely.
+  void find_walls(MotionModel&) const;
   /// Of all that was measured on tracks that may be fitted to.
   [[nodiscard]] double log_likelihood(const MotionModel&) const;
   /// Information and score of the base's prior, added to those of the data.
@@ -58,6 +82,10 @@ class Fitter {
   [[nodiscard]] PreparedSet& set() const { return set_; }
 
  private:
+  /// Tracks spread over the whole set, until there are so many samples.
+  [[nodiscard]] std::vector<const TrackView*> some_tracks(std::size_t samples) const;
+  [[nodiscard]] double with_touching(const MotionModel&, const std::vector<const TrackView*>&) const;
+
   PreparedSet& set_;
   std::uint32_t threads_;
   BasePrior prior_;

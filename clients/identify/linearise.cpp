@@ -50,7 +50,7 @@ class Sensitivities {
     pose_.row(0) += by_heading_x * pose_.row(2);
     pose_.row(1) += by_heading_y * pose_.row(2);
     last_ = record.middle;
-    touched_ = touched_ || record.touching;
+    touched_ = touched_ || record.touching();
     const double forward = (r.left_mm_s + r.right_mm_s) / 2 * h;
     const Eigen::Vector3d turn = h * Eigen::Vector3d(-arc.along_y * forward / 2, arc.along_x * forward / 2, 1);
     const Eigen::Vector3d ahead = h * Eigen::Vector3d(arc.along_x, arc.along_y, 0);
@@ -187,8 +187,8 @@ class Sensitivities {
     if (!measures_) return;
     Situation at = last_;
     at.time_s = sample.time_s;
-    at.x_mm = pose[0] + kAxleOffset_mm * c;
-    at.y_mm = pose[1] + kAxleOffset_mm * s;
+    at.x_mm = pose[0] + model_.base.centre_mm * c;
+    at.y_mm = pose[1] + model_.base.centre_mm * s;
     at.heading_rad = heading;
     Eigen::Index first = kBaseColumns;
     for (const Block& block : blocks_) {

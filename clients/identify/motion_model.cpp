@@ -100,8 +100,8 @@ Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_r
   double ahead = base.ahead_mm, left = base.left_mm, scale = 1, x = 0, y = 0, turn = 0;
   if (measures()) {
     Situation there = at;
-    there.x_mm = x_mm + kAxleOffset_mm * c;
-    there.y_mm = y_mm + kAxleOffset_mm * s;
+    there.x_mm = x_mm + base.centre_mm * c;
+    there.y_mm = y_mm + base.centre_mm * s;
     there.heading_rad = heading_rad;
     std::array<double, kMostColumns> values;
     for (const Term& term : terms) {

@@ -19,6 +19,8 @@ struct BaseParameters {
   double straight_mm_s = 10, turn_mm_s = 20, wheel_base_mm = 25;
   /// The tracked point in the body, from the reference point of the drive.
   double ahead_mm = kAxleOffset_mm, left_mm = 0;
+  /// The disc's centre, ahead of that point: where robots touch, and where effects look.
+  double centre_mm = kAxleOffset_mm;
   double bias_mean_mm_s = 0.015, bias_sd_mm_s = 1.86;
 };
 
@@ -30,6 +32,8 @@ struct Noise {
   double drift_mm2_s = 1e-3;     ///< of the position along each axis, always
   double position_mm2 = 1;       ///< of a measured position along each axis
   double heading_rad2 = 2.5e-3;  ///< of a measured heading
+  /// What touching adds to the motion: at walls, and at other robots.
+  double wall_mm2_s = 5, wall_rad2_s = 0.01, contact_mm2_s = 60, contact_rad2_s = 0.03;
 };
 
 /// A robot's own: bias of the left and the right wheel.

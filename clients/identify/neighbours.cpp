@@ -31,7 +31,7 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
   return view;
 }
 
-RunNeighbours::RunNeighbours(const Run& run) {
+RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres) {
   double end_s = -1e300;
   start_s_ = 1e300;
   for (const Track& track : run.tracks) {
@@ -52,16 +52,23 @@ RunNeighbours::RunNeighbours(const Run& run) {
       while (next[r] < samples.size() && samples[next[r]].time_s <= t) ++next[r];
       x[r] = y[r] = std::nan("");
       if (next[r] == 0) continue;
-      const Sample& a = samples[next[r] - 1];
+      const std::size_t last = next[r] - 1;
+      const Sample& a = samples[last];
+      const auto place = [&](std::size_t at) -> std::pair<double, double> {
+        if (centres == nullptr) return {samples[at].x_mm, samples[at].y_mm};
+        return {(*centres)[r].x_mm[at], (*centres)[r].y_mm[at]};
+      };
+      const auto [ax, ay] = place(last);
       if (next[r] == samples.size()) {
-        if (t - a.time_s < kGap_s) x[r] = a.x_mm, y[r] = a.y_mm;
+        if (t - a.time_s < kGap_s) x[r] = ax, y[r] = ay;
         continue;
       }
       const Sample& b = samples[next[r]];
       if (b.time_s - a.time_s > kGap_s) continue;
       const double part = (t - a.time_s) / (b.time_s - a.time_s);
-      x[r] = a.x_mm + part * (b.x_mm - a.x_mm);
-      y[r] = a.y_mm + part * (b.y_mm - a.y_mm);
+      const auto [bx, by] = place(next[r]);
+      x[r] = ax + part * (bx - ax);
+      y[r] = ay + part * (by - ay);
     }
     for (std::size_t r = 0; r < robots; ++r)
       if (!std::isnan(x[r])) views_[r * instants_ + i] = view_of(r, x, y);

@@ -11,6 +11,11 @@ namespace kilotwin::identify {
 /// One robot among others, all at one instant. Robots whose x is NaN are not there.
 [[nodiscard]] NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm);
 
+/// Where the disc's centre of a track was when it was sampled.
+struct Centres {
+  std::vector<double> x_mm, y_mm;
+};
+
 /// What each track of a run sees of the others, on a raster of time.
 class RunNeighbours {
  public:
@@ -18,7 +23,8 @@ class RunNeighbours {
   /// A robot that was not measured for longer than this is not there, s.
   static constexpr double kGap_s = 4;
 
-  explicit RunNeighbours(const Run&);
+  /// Where robots were measured; with `centres`, by track, where their discs were instead.
+  explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr);
   [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
 
  private:

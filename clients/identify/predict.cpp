@@ -3,83 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/identify/follower.hpp"
+
 namespace kilotwin::identify {
 namespace {
-
-/// A robot's filter while it is led along its track; several while nobody knows which way it points.
-class Follower {
- public:
-  Follower(const MotionModel& model, const TrackView& view) : model_(model), view_(view) {}
-
-  /// Takes in all samples up to this time.
-  void follow(double to_s) {
-    const std::vector<Sample>& samples = view_.track->samples;
-    for (; next_ < samples.size() && samples[next_].time_s <= to_s + 1e-6; ++next_) take(samples[next_]);
-  }
-  [[nodiscard]] bool started() const { return next_ > 0; }
-  /// Between the last sample and `to_s`.
-  [[nodiscard]] double last_s() const { return view_.track->samples[next_ - 1].time_s; }
-
-  struct Hypothesis {
-    TrackFilter filter;
-    double log_weight = 0;
-  };
-  [[nodiscard]] const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
-  [[nodiscard]] const TrackView& view() const { return view_; }
-
- private:
-  void take(const Sample& sample) {
-    if (next_ == 0) return start(sample);
-    const double from_s = last_s();
-    for (Hypothesis& h : hypotheses_) {
-      sub_steps(view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
-        h.filter.step(t, length, commands, view_.neighbours->view(view_.place, std::min(t, from_s)));
-      });
-      const Innovation innovation = h.filter.update(sample, view_.clock.at(sample.time_s - 1e-9));
-      h.log_weight += innovation.log_likelihood;
-      if (innovation.lost && innovation.size == 2) h.log_weight -= 20;
-    }
-    prune();
-  }
-  void start(const Sample& sample) {
-    const RobotBias bias = model_.bias_of(view_.track->robot);
-    const auto add = [&](double heading, double sd) {
-      TrackFilter filter(model_, bias, view_.track->robot, view_.run);
-      filter.start(sample, {}, heading, sd);
-      hypotheses_.push_back({std::move(filter), 0});
-    };
-    if (TrackFilter::has_heading(sample)) return add(sample.heading_rad, std::sqrt(model_.noise.heading_rad2));
-    constexpr int kHeadings = 16;
-    for (int i = 0; i < kHeadings; ++i) add(2 * M_PI * i / kHeadings, M_PI / kHeadings / 1.7);
-  }
-  void prune() {
-    double best = -1e300;
-    for (const Hypothesis& h : hypotheses_) best = std::max(best, h.log_weight);
-    for (Hypothesis& h : hypotheses_) h.log_weight -= best;
-    std::erase_if(hypotheses_, [](const Hypothesis& h) { return h.log_weight < -9; });
-    // Two that have become the same are one.
-    for (std::size_t i = 0; i + 1 < hypotheses_.size(); ++i) {
-      for (std::size_t j = i + 1; j < hypotheses_.size();) {
-        const Belief& a = hypotheses_[i].filter.belief();
-        const Belief& b = hypotheses_[j].filter.belief();
-        const double apart = wrapped_angle(a.mean[2] - b.mean[2]);
-        if (apart * apart < 0.25 * std::min(a.covariance(2, 2), b.covariance(2, 2))) {
-          const double wa = std::exp(hypotheses_[i].log_weight), wb = std::exp(hypotheses_[j].log_weight);
-          if (wb > wa) hypotheses_[i].filter = hypotheses_[j].filter;
-          hypotheses_[i].log_weight = std::log(wa + wb);
-          hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(j));
-        } else {
-          ++j;
-        }
-      }
-    }
-  }
-
-  const MotionModel& model_;
-  const TrackView& view_;
-  std::vector<Hypothesis> hypotheses_;
-  std::size_t next_ = 0;
-};
 
 /// Robots of a run that go on from an instant by their commands alone.
 class Outlook {
@@ -89,7 +16,7 @@ class Outlook {
     for (Follower& follower : followers) {
       Robot& robot = robots_.emplace_back();
       robot.view = &follower.view();
-      if (!follower.started() || from_s - follower.last_s() > 30) continue;
+      if (!follower.started()) continue;
       double sum = 0;
       for (const auto& h : follower.hypotheses()) sum += std::exp(h.log_weight);
       for (const auto& h : follower.hypotheses()) {
@@ -186,6 +113,14 @@ class Outlook {
   std::vector<double> x_, y_;
 };
 
+/// The end of a run is not told; it may last to the next frame, which need not have come.
+double end_of(const std::vector<Sample>& samples) {
+  constexpr double kFrames = 2;
+  const double span_s = samples.back().time_s - samples.front().time_s;
+  return samples.back().time_s +
+         kFrames * span_s / static_cast<double>(std::max<std::size_t>(samples.size() - 1, 1));
+}
+
 bool looks_at_neighbours(const MotionModel& model) {
   if (model.contacts) return true;
   for (const Term& term : model.terms)
@@ -220,7 +155,7 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
       if (held_out_only && !view.track->held_out && !neighbours) continue;
       wanted = wanted || !held_out_only || view.track->held_out;
       followers.emplace_back(model, view);
-      last_s = std::max(last_s, view.track->samples.back().time_s);
+      last_s = std::max(last_s, end_of(view.track->samples));
     }
     if (!wanted) return;
     const double first_s = std::max(asked.first_s, std::ceil(asked.horizon_s / asked.every_s) * asked.every_s);

@@ -17,7 +17,7 @@ class Corrections {
   void step(const StepRecord& record) {
     last_ = record.middle;
     all_driven_ = all_driven_ && record.middle.commands.driven();
-    touched_ = touched_ || record.touching;
+    touched_ = touched_ || record.touching();
     length_s_ += record.h_s;
   }
   void update(const Innovation& innovation, const Sample& sample) {

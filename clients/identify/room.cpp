@@ -48,7 +48,7 @@ double upper_wall(std::vector<Place> places, double noise_mm) {
 
 Room room_of(const PreparedSet& set, const MotionModel& model) {
   std::vector<Place> x, y;
-  const double ahead = kAxleOffset_mm - model.base.ahead_mm;
+  const double ahead = model.base.centre_mm - model.base.ahead_mm;
   for (std::size_t v = 0; v < set.views().size(); ++v) {
     const TrackView& view = set.views()[v];
     for (const Sample& s : view.track->samples) {

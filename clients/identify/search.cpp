@@ -6,6 +6,8 @@
 #include <optional>
 #include <set>
 
+#include "clients/identify/refine.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -101,6 +103,7 @@ class Loop {
     out_.model.terms.push_back(std::move(term));
     out_.reasons.push_back(reason);
     fitter_.fit(out_.model, 2);
+    refine(fitter_, out_.model, out_.model.terms.size() - 1);
     out_.steps.push_back({h.name, found.held_out});
   }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/random/random.hpp"
@@ -60,6 +61,9 @@ struct Scores::Reduced {
   std::vector<Eigen::VectorXd> fold_score;
 };
 
+Scores::Folds::Folds(std::size_t count, Eigen::Index columns)
+    : information(count, Eigen::MatrixXd::Zero(columns, columns)), score(count, Eigen::VectorXd::Zero(columns)) {}
+
 Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector<Unit>& units,
                const Dictionary& dictionary)
     : model_(model), dictionary_(dictionary) {
@@ -67,16 +71,26 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
   own_ = all - dictionary.columns();
   information_ = Eigen::MatrixXd::Zero(all, all);
   score_ = Eigen::VectorXd::Zero(all);
-  fold_information_.assign(std::min(kFolds, units.size()), Eigen::MatrixXd::Zero(all, all));
-  fold_score_.assign(fold_information_.size(), Eigen::VectorXd::Zero(all));
+  by_unit_ = Folds(std::min(kFolds, units.size()), all);
+  by_stretch_ = Folds(kFolds, all);
   Eigen::Index clusters = 0;
   for (const Unit& unit : units) clusters += unit.cluster_scores.cols();
   clusters_.resize(all, clusters);
   Eigen::Index next = 0;
   for (std::size_t u = 0; u < units.size(); ++u) {
-    const std::size_t fold = u % fold_information_.size();
-    fold_information_[fold] += units[u].information;
-    fold_score_[fold] += units[u].score;
+    const std::size_t fold = u % by_unit_.score.size();
+    by_unit_.information[fold] += units[u].information;
+    by_unit_.score[fold] += units[u].score;
+    // Stretches are about as long as each other, and tell about as much.
+    const Eigen::Index stretches = units[u].cluster_scores.cols();
+    std::array<double, kFolds> share{};
+    for (Eigen::Index k = 0; k < stretches; ++k) {
+      const std::size_t of = (static_cast<std::size_t>(k) + u) % kFolds;
+      by_stretch_.score[of] += units[u].cluster_scores.col(k);
+      share[of] += 1 / static_cast<double>(stretches);
+    }
+    for (std::size_t f = 0; f < kFolds; ++f)
+      if (share[f] > 0) by_stretch_.information[f] += share[f] * units[u].information;
     information_ += units[u].information;
     score_ += units[u].score;
     clusters_.middleCols(next, units[u].cluster_scores.cols()) = units[u].cluster_scores;
@@ -99,7 +113,8 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
 }
 
 /// Columns beside the model's own (but for one term, which is taken out): what is left of them, in all folds.
-Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int without_term) const {
+Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_stretch) const {
+  const Folds& folds = by_stretch ? by_stretch_ : by_unit_;
   std::vector<Eigen::Index> nuisance;
   for (Eigen::Index i = 0; i < kBaseColumns; ++i) nuisance.push_back(i);
   Eigen::VectorXd taken_out = Eigen::VectorXd::Zero(information_.rows());
@@ -137,9 +152,9 @@ Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int wit
   out.information =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(columns.size()));
   out.score = Eigen::VectorXd::Zero(out.information.rows());
-  for (std::size_t f = 0; f < fold_information_.size(); ++f) {
-    out.fold_information.push_back(reduced(fold_information_[f]) / dispersion_);
-    out.fold_score.push_back(reduced_score(score_of(fold_information_[f], fold_score_[f])) / dispersion_);
+  for (std::size_t f = 0; f < folds.score.size(); ++f) {
+    out.fold_information.push_back(reduced(folds.information[f]) / dispersion_);
+    out.fold_score.push_back(reduced_score(score_of(folds.information[f], folds.score[f])) / dispersion_);
     out.information += out.fold_information.back();
     out.score += out.fold_score.back();
   }
@@ -190,7 +205,10 @@ Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, doub
 Finding Scores::weigh(const Hypothesis& hypothesis, int without_term) const {
   std::vector<Eigen::Index> columns;
   for (const Eigen::Index c : hypothesis.columns) columns.push_back(own_ + c);
-  return weigh(reduce(columns, without_term), pick(dictionary_.scale, hypothesis.columns), hypothesis.log_choices);
+  const bool own =
+      std::find(hypothesis.covariates.begin(), hypothesis.covariates.end(), "robot") != hypothesis.covariates.end();
+  return weigh(reduce(columns, without_term, own), pick(dictionary_.scale, hypothesis.columns),
+               hypothesis.log_choices);
 }
 
 Finding Scores::weigh_term(int term) const {
@@ -199,7 +217,9 @@ Finding Scores::weigh_term(int term) const {
   const Term& own = model_.terms[static_cast<std::size_t>(term)];
   std::vector<Eigen::Index> columns;
   for (Eigen::Index i = 0; i < own.coefficients.size(); ++i) columns.push_back(first + i);
-  return weigh(reduce(columns, term), own.precision.cwiseInverse().cwiseSqrt(), 0);
+  const bool of_robots = std::any_of(own.blocks.begin(), own.blocks.end(),
+                                     [](const Block& block) { return block.basis.looks_at(Covariate::kRobot); });
+  return weigh(reduce(columns, term, of_robots), own.precision.cwiseInverse().cwiseSqrt(), 0);
 }
 
 Scores::Outcome Scores::test(std::uint64_t seed) const {

@@ -49,7 +49,7 @@ class Scores {
  private:
   struct Beside;  // information and scores of columns beside all others
   struct Reduced;
-  [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term) const;
+  [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_stretch) const;
   [[nodiscard]] Finding weigh(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 
   const MotionModel& model_;
@@ -58,8 +58,15 @@ class Scores {
   Eigen::MatrixXd information_;
   Eigen::VectorXd score_;
   Eigen::VectorXd prior_;  ///< diagonal of the model's own prior information, on own columns
-  std::vector<Eigen::MatrixXd> fold_information_;
-  std::vector<Eigen::VectorXd> fold_score_;
+  /// Parts of the data that are left out in turn.
+  struct Folds {
+    std::vector<Eigen::MatrixXd> information;
+    std::vector<Eigen::VectorXd> score;
+    Folds(std::size_t count, Eigen::Index columns);
+  };
+  Folds by_unit_{0, 0};
+  /// Stretches of every robot's tracks: for what is each robot's own, of which robots left out tell nothing.
+  Folds by_stretch_{0, 0};
   Eigen::MatrixXd clusters_;  ///< scores of all columns, a column per cluster
   double dispersion_ = 1;
 };

@@ -12,13 +12,12 @@ constexpr double kGate2 = 23, kGate3 = 25.9;
 /// So many far outliers in a row mean that the robot is elsewhere.
 constexpr int kLostAfter = 4;
 constexpr double kFar = 60;
-/// What a robot that touches something does beyond its own motion, as noise.
-constexpr double kPush_mm2_s = 60, kPush_rad2_s = 0.3;
 
 }  // namespace
 
 TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run)
     : model_(&model), measures_(model.measures()) {
+  belief_.centre_mm = model.base.centre_mm;
   belief_.mean.tail<2>() = bias.mean_mm_s;
   belief_.covariance.bottomRightCorner<2, 2>() = bias.covariance;
   place_.robot = robot;
@@ -62,6 +61,13 @@ Situation TrackFilter::situation(double time_s, const CommandState& commands, co
 }
 
 StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
+  const StepRecord record = step_freely(time_s, h_s, commands, near);
+  hold_inside();
+  return record;
+}
+
+StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandState& commands,
+                                    const NeighbourView& near) {
   StepRecord record;
   record.h_s = h_s;
   record.middle = situation(time_s + h_s / 2, commands, near);
@@ -74,25 +80,55 @@ StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& comm
     plain.right_mm_s = v[1];
     const Arc half = arc_of(plain, model_->base.wheel_base_mm, belief_.mean[2], h_s / 2);
     record.middle.heading_rad += half.dheading_rad;
-    record.middle.x_mm = belief_.mean[0] + half.dx_mm + kAxleOffset_mm * std::cos(record.middle.heading_rad);
-    record.middle.y_mm = belief_.mean[1] + half.dy_mm + kAxleOffset_mm * std::sin(record.middle.heading_rad);
+    record.middle.x_mm =
+        belief_.mean[0] + half.dx_mm + model_->base.centre_mm * std::cos(record.middle.heading_rad);
+    record.middle.y_mm =
+        belief_.mean[1] + half.dy_mm + model_->base.centre_mm * std::sin(record.middle.heading_rad);
   }
-  record.touching = commands.driven() && touches(record.middle);
+  // A robot at rest is pushed by others as well.
+  record.at_robot = model_->contacts && near.nearest_mm < kTouch_mm;
+  record.at_wall =
+      commands.driven() && model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm);
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
   spread(record);
   belief_.mean[0] += record.arc.dx_mm;
   belief_.mean[1] += record.arc.dy_mm;
   belief_.mean[2] += record.arc.dheading_rad;
-  const double x = belief_.centre_x_mm(), y = belief_.centre_y_mm();
-  belief_.mean[0] += model_->room.inside_x(x) - x;
-  belief_.mean[1] += model_->room.inside_y(y) - y;
   return record;
 }
 
-bool TrackFilter::touches(const Situation& s) const {
-  return (model_->contacts && s.near.nearest_mm < kTouch_mm) ||
-         model_->room.at_wall(s.x_mm, s.y_mm, kWallMargin_mm);
+void TrackFilter::hold_inside() {
+  const Room& room = model_->room;
+  hold_behind(0, room.x_high_mm, 1);
+  hold_behind(0, room.x_low_mm, -1);
+  hold_behind(1, room.y_high_mm, 1);
+  hold_behind(1, room.y_low_mm, -1);
+}
+
+/// A normal variable X of the centre becomes min(X, wall), whose first two moments are known; its covariance with any other
+/// normal variable is that of X times the chance of X < wall (Stein's lemma).
+void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards) {
+  if (std::isinf(wall_mm)) return;
+  const double c = std::cos(belief_.mean[2]), s = std::sin(belief_.mean[2]);
+  const double by_heading = axis == 0 ? -model_->base.centre_mm * s : model_->base.centre_mm * c;
+  StateCovariance& p = belief_.covariance;
+  const double beyond = outwards * (belief_.mean[axis] + model_->base.centre_mm * (axis == 0 ? c : s) - wall_mm);
+  const double variance = p(axis, axis) + 2 * by_heading * p(axis, 2) + by_heading * by_heading * p(2, 2);
+  const double sd = std::sqrt(std::max(variance, 1e-6));
+  constexpr double kNever = 4;  // standard deviations
+  if (beyond < -kNever * sd) return;
+  const double inside = 0.5 * std::erfc(beyond / sd * M_SQRT1_2);
+  const double density = std::exp(-0.5 * beyond * beyond / (sd * sd)) / std::sqrt(2 * M_PI);
+  const double mean = beyond * inside - sd * density;
+  const double square = (beyond * beyond + sd * sd) * inside - beyond * sd * density;
+  const State with_all = p.col(axis) + by_heading * p.col(2);
+  State own = inside * with_all - by_heading * p.col(2);
+  own[axis] = std::max(0.0, square - mean * mean) - 2 * by_heading * inside * with_all[2] +
+              by_heading * by_heading * p(2, 2);
+  p.col(axis) = own;
+  p.row(axis) = own.transpose();
+  belief_.mean[axis] += outwards * (mean - beyond);
 }
 
 /// The covariance at the end of the step: what was uncertain moves along, and the noise of the step comes in.
@@ -126,7 +162,10 @@ void TrackFilter::spread(const StepRecord& record) {
                                  h * (noise.factor_s * right * right + noise.wheel_mm2_s));
     p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
   }
-  if (!looking_ahead_ && record.touching) own += h * Eigen::Vector3d(kPush_mm2_s, kPush_mm2_s, kPush_rad2_s);
+  if (!looking_ahead_) {
+    if (record.at_wall) own += h * Eigen::Vector3d(noise.wall_mm2_s, noise.wall_mm2_s, noise.wall_rad2_s);
+    if (record.at_robot) own += h * Eigen::Vector3d(noise.contact_mm2_s, noise.contact_mm2_s, noise.contact_rad2_s);
+  }
   p.diagonal().head<3>() += own;
 }
 
@@ -134,7 +173,7 @@ void TrackFilter::step_mean(double time_s, double h_s, const CommandState& comma
   const State before = belief_.mean;
   const StateCovariance p = belief_.covariance;
   looking_ahead_ = true;
-  const StepRecord record = step(time_s, h_s, commands, near);
+  const StepRecord record = step_freely(time_s, h_s, commands, near);
   // With a normal heading of variance P, E[cos] = cos exp(-P / 2), and speeds that go with the heading shift it.
   const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 + record.rates.ahead_mm_s;
   const double shrink = std::exp(-p(2, 2) / 2);
@@ -143,9 +182,7 @@ void TrackFilter::step_mean(double time_s, double h_s, const CommandState& comma
   const Rates& r = record.rates;
   belief_.mean[0] = before[0] + h_s * (forward * cx - together * cy - r.sideways_mm_s * cy + r.world_x_mm_s);
   belief_.mean[1] = before[1] + h_s * (forward * cy + together * cx + r.sideways_mm_s * cx + r.world_y_mm_s);
-  const double x = belief_.centre_x_mm(), y = belief_.centre_y_mm();
-  belief_.mean[0] += model_->room.inside_x(x) - x;
-  belief_.mean[1] += model_->room.inside_y(y) - y;
+  hold_inside();
 }
 
 Eigen::Matrix3d TrackFilter::jacobian(const Situation& at) const {
@@ -208,10 +245,12 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   }
   out.log_likelihood = -0.5 * (std::log(s.determinant()) + out.size * std::log(factor) + out.distance2 / factor);
   if (outliers_ >= kLostAfter) {
-    // Wherever it was, it is here now; which way it points is unknown unless it is measured.
+    // Wherever it was, it is here now; which way it points is less known than before, unless it is measured.
     out.lost = true;
+    constexpr double kLeast_rad = 0.4, kMost_rad = 1.8;
+    const double known = std::clamp(3 * std::sqrt(belief_.covariance(2, 2)), kLeast_rad, kMost_rad);
     start(sample, at, out.size == 3 ? sample.heading_rad : belief_.mean[2],
-          out.size == 3 ? std::sqrt(noise.heading_rad2) : 1.8);
+          out.size == 3 ? std::sqrt(noise.heading_rad2) : known);
     return out;
   }
   s *= factor;

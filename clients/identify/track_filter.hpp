@@ -16,10 +16,11 @@ using StateCovariance = Eigen::Matrix<double, 5, 5>;
 struct Belief {
   State mean = State::Zero();
   StateCovariance covariance = StateCovariance::Zero();
+  double centre_mm = kAxleOffset_mm;  ///< as in BaseParameters
 
   /// Of the disc's centre.
-  [[nodiscard]] double centre_x_mm() const { return mean[0] + kAxleOffset_mm * std::cos(mean[2]); }
-  [[nodiscard]] double centre_y_mm() const { return mean[1] + kAxleOffset_mm * std::sin(mean[2]); }
+  [[nodiscard]] double centre_x_mm() const { return mean[0] + centre_mm * std::cos(mean[2]); }
+  [[nodiscard]] double centre_y_mm() const { return mean[1] + centre_mm * std::sin(mean[2]); }
 };
 
 /// Sub-steps are no longer than this, s.
@@ -31,7 +32,8 @@ struct StepRecord {
   Rates rates;
   Arc arc;
   double h_s = 0;
-  bool touching = false;  ///< a wall or another robot may have pushed it
+  bool at_wall = false, at_robot = false;  ///< which may have pushed it
+  [[nodiscard]] bool touching() const { return at_wall || at_robot; }
 };
 
 /// A measurement taken in.
@@ -69,10 +71,14 @@ class TrackFilter {
   [[nodiscard]] double expected_spread_mm2(double time_s, const CommandState& commands) const;
 
  private:
+  /// A sub-step as if there were no walls.
+  StepRecord step_freely(double time_s, double h_s, const CommandState&, const NeighbourView&);
+  /// Takes the disc's centre back behind walls that some of what is believed lies beyond.
+  void hold_inside();
+  void hold_behind(Eigen::Index axis, double wall_mm, double outwards);
   [[nodiscard]] Situation situation(double time_s, const CommandState&, const NeighbourView&) const;
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
   void spread(const StepRecord&);
-  [[nodiscard]] bool touches(const Situation&) const;
 
   const MotionModel* model_;
   Belief belief_;

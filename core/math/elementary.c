@@ -5,6 +5,8 @@
 
 #include <stdint.h>
 
+#include "sine_series.h"
+
 __extension__ typedef unsigned __int128 Wide;
 
 typedef struct {
@@ -38,8 +40,8 @@ static double with_sign(double x, int negative) { return double_of(bits_of(x) ^ 
 /* 2^n for -1022 <= n <= 1023. */
 static double power_of_two(int n) { return double_of((uint64_t)(n + 1023) << 52); }
 
-/* The nearest integer to x, |x| < 2^51: ulp is 1 in [2^52, 2^53). */
-static double nearest(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
+/* The nearest integer to x, |x| < 2^51. */
+static double nearest(double x) { return (x + kWholeNumbers) - kWholeNumbers; }
 
 /* x with the lower 27 bits of its significand cleared; products of two such are exact. */
 static double upper(double x) { return double_of(bits_of(x) & ~(uint64_t)0x7ffffff); }
@@ -73,13 +75,6 @@ static double polynomial8(const double c[8], double x) {
 }
 
 /* ---- sin, cos, tan */
-
-/* (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 in powers of r^2, |r| <= pi/4. */
-static const double kSine[7] = {-0x1.5555555555555p-3, 0x1.111111111111p-7,    -0x1.a01a01a019926p-13,
-                                0x1.71de3a545e7p-19,   -0x1.ae64540f0ba18p-26, 0x1.61217c1864fa1p-33,
-                                -0x1.ab161757f0c63p-41};
-static const double kCosine[6] = {0x1.5555555555555p-5,   -0x1.6c16c16c1696p-10, 0x1.a01a019f4d0edp-16,
-                                  -0x1.27e4fa15bd814p-22, 0x1.1eeb66b683028p-29, -0x1.907c0e63adbb6p-37};
 
 /* 2/pi after one word of zeros, 64 bits a word. */
 static const uint64_t kTwoOverPi[21] = {0,
@@ -156,13 +151,10 @@ static Reduced reduced_exactly(double x) {
   return result;
 }
 
-/* pi/2 in parts of 33, 33 and 53 bits: the first two times a whole number below 2^20 are exact. */
-static const double kHalfPi1 = 0x1.921fb544p+0, kHalfPi2 = 0x1.0b4611a6p-34, kHalfPi3 = 0x1.3198a2e037073p-69;
-
 /* For any finite x. */
 static Reduced reduced(double x) {
   if (magnitude(x) <= 0x1p20) {
-    const double turns = nearest(x * 0x1.45f306dc9c883p-1);
+    const double turns = nearest(x * kTwoOverPiRounded);
     const double first = x - turns * kHalfPi1, second = turns * kHalfPi2;
     const double value = first - second;
     const double rest = ((first - value) - second) - turns * kHalfPi3;

@@ -2,21 +2,6 @@
 
 namespace kilotwin::physics {
 
-extern const ContactKernel kBaselineKernel;
-#if defined(__x86_64__)
-extern const ContactKernel kAvx2Kernel, kAvx512Kernel;
-#endif
-
-std::size_t contact_kernels(const ContactKernel* (&kernels)[3]) {
-  std::size_t count = 0;
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f")) kernels[count++] = &kAvx512Kernel;
-  if (__builtin_cpu_supports("avx2")) kernels[count++] = &kAvx2Kernel;
-#endif
-  kernels[count++] = &kBaselineKernel;
-  return count;
-}
-
 ContactPass::ContactPass() {
   const ContactKernel* kernels[3];
   contact_kernels(kernels);

@@ -9,9 +9,6 @@
 namespace kilotwin::physics {
 namespace {
 
-/// Up to this turn per step the two series below are exact to the last bit or so.
-constexpr double kSeriesTurn_rad = 0.125;
-
 /// sin(t) / t and (1 - cos(t)) / t^2 from the square of t.
 struct TurnSeries {
   double sine, versine;
@@ -78,6 +75,7 @@ Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm) {
 
 void Drives::reserve(std::size_t bodies) {
   if (body.size() >= bodies) return;
+  bodies = (bodies + 7) / 8 * 8;
   body.resize(bodies);
   for (auto* column : {&left_mm_s, &right_mm_s, &heading_rad, &part, &x_mm, &y_mm, &cos_turn, &sin_turn, &turn_rad})
     column->resize(bodies);
@@ -91,6 +89,9 @@ DriveModel::DriveModel(const RunPlan& plan)
       motors_(plan),
       effects_(plan),
       bias_(plan.robots(), {0, 0}) {
+  const DriveKernel* kernels[3];
+  drive_kernels(kernels);
+  kernel_ = kernels[0];
   const proto::Motion& motion = plan.experiment().motion();
   const RobotParameters parameters(plan);
   make_curves(motion, parameters);
@@ -199,60 +200,45 @@ void DriveModel::change(Drives& drives, Tick from, const RobotColumns& known, co
 }
 
 void DriveModel::integrate(Drives& drives) const {
-  effects_.drift() ? integrate<true>(drives) : integrate<false>(drives);
-}
-
-template <bool kDrift> void DriveModel::integrate(Drives& drives) const {
-  const std::size_t count = drives.count;
-  const double* __restrict__ left = drives.left_mm_s.data();
-  const double* __restrict__ right = drives.right_mm_s.data();
-  const double* __restrict__ part = drives.part.data();
-  double* __restrict__ turn = drives.turn_rad.data();
-  double* __restrict__ x = drives.x_mm.data();
-  double* __restrict__ y = drives.y_mm.data();
-  double* __restrict__ c = drives.cos_turn.data();
-  double* __restrict__ s = drives.sin_turn.data();
-
-  const double half_tick_s = 0.5 * tick_s_, turn_per_speed = tick_s_ / wheel_base_mm_, offset_mm = axle_offset_mm_;
-  // The cosine and sine of the heading first, then of the turn, in the same columns.
-  for (std::size_t i = 0; i < count; ++i) kt_sincos(drives.heading_rad[i], &s[i], &c[i]);
-  const auto drive = [&](std::size_t i, const Arc& arc) {
-    x[i] = c[i] * arc.forward_mm - s[i] * arc.sideways_mm;
-    y[i] = s[i] * arc.forward_mm + c[i] * arc.sideways_mm;
-    if constexpr (kDrift) {
-      double drift_x = drives.changes.drift_x_mm_s[i] * tick_s_, drift_y = drives.changes.drift_y_mm_s[i] * tick_s_;
-      unturn(turn[i], part[i], drift_x, drift_y);
-      x[i] += drift_x;
-      y[i] += drift_y;
-    }
-    c[i] = arc.cos_turn;
-    s[i] = arc.sin_turn;
-  };
-  const auto run_mm = [&](std::size_t i) { return (left[i] + right[i]) * half_tick_s * part[i]; };
-  const auto arc_by = [&](TurnSeries series, std::size_t i, double turn_rad) {
-    if constexpr (kDrift) {
-      const double sideways_mm = drives.changes.sideways_mm_s[i] * tick_s_ * part[i];
-      return arc_from(series, run_mm(i), sideways_mm, turn_rad, offset_mm);
-    } else {
-      return arc_from(series, run_mm(i), turn_rad, offset_mm);
-    }
-  };
-  int any_large = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    turn[i] = (right[i] - left[i]) * turn_per_speed;
-    any_large |= !is_small(turn[i]);
-  }
-  if (any_large != 0) {
-    for (std::size_t i = 0; i < count; ++i) {
-      const double t = turn[i] * part[i];
-      drive(i, arc_by(is_small(t) ? series_of(t * t) : large_turn(t), i, t));
-    }
+  if (effects_.drift()) {
+    for (std::size_t i = 0; i < drives.count; ++i) integrate_one<true>(drives, i);
     return;
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    const double t = turn[i] * part[i];
-    drive(i, arc_by(series_of(t * t), i, t));
+  const DriveColumns columns{drives.left_mm_s.data(), drives.right_mm_s.data(), drives.heading_rad.data(),
+                             drives.part.data(),      drives.turn_rad.data(),   drives.x_mm.data(),
+                             drives.y_mm.data(),      drives.cos_turn.data(),   drives.sin_turn.data()};
+  const DriveGeometry geometry{0.5 * tick_s_, tick_s_ / wheel_base_mm_, axle_offset_mm_};
+  if (kernel_->integrate(geometry, columns, (drives.count + 7) / 8)) return;
+  for (std::size_t i = 0; i < drives.count; ++i) {
+    if (!is_small(drives.turn_rad[i] * drives.part[i])) integrate_one<false>(drives, i);
   }
+}
+
+/// The same as the kernel does, for drifts and for turns of any size.
+template <bool kDrift> void DriveModel::integrate_one(Drives& drives, std::size_t i) const {
+  const double left = drives.left_mm_s[i], right = drives.right_mm_s[i], part = drives.part[i];
+  const double whole_turn = (right - left) * (tick_s_ / wheel_base_mm_), turn = whole_turn * part;
+  const double run_mm = (left + right) * (0.5 * tick_s_) * part;
+  const TurnSeries series = is_small(turn) ? series_of(turn * turn) : large_turn(turn);
+  Arc arc = arc_from(series, run_mm, turn, axle_offset_mm_);
+  if constexpr (kDrift) {
+    const double sideways_mm = drives.changes.sideways_mm_s[i] * tick_s_ * part;
+    arc = arc_from(series, run_mm, sideways_mm, turn, axle_offset_mm_);
+  }
+  double s, c;
+  kt_sincos(drives.heading_rad[i], &s, &c);
+  double x = c * arc.forward_mm - s * arc.sideways_mm, y = s * arc.forward_mm + c * arc.sideways_mm;
+  if constexpr (kDrift) {
+    double drift_x = drives.changes.drift_x_mm_s[i] * tick_s_, drift_y = drives.changes.drift_y_mm_s[i] * tick_s_;
+    unturn(whole_turn, part, drift_x, drift_y);
+    x += drift_x;
+    y += drift_y;
+  }
+  drives.turn_rad[i] = whole_turn;
+  drives.x_mm[i] = x;
+  drives.y_mm[i] = y;
+  drives.cos_turn[i] = arc.cos_turn;
+  drives.sin_turn[i] = arc.sin_turn;
 }
 
 }  // namespace kilotwin::physics

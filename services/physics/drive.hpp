@@ -11,6 +11,7 @@
 #include "core/experiment/plan.hpp"
 #include "core/model/robot_parameters.hpp"
 #include "core/random/random.hpp"
+#include "services/physics/drive_kernel.hpp"
 
 namespace kilotwin::physics {
 
@@ -24,7 +25,7 @@ struct Arc {
 /// ahead of it.
 [[nodiscard]] Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm);
 
-/// Driven robots of one tick, structure of arrays, ascending. Kept between ticks for its memory alone.
+/// Driven robots of one tick, structure of arrays, ascending; room for whole eights. Kept between ticks for its memory alone.
 struct Drives {
   std::vector<std::uint32_t> body;            ///< index of the body
   std::vector<double> left_mm_s, right_mm_s;  ///< actual speeds of the wheels
@@ -80,9 +81,10 @@ class DriveModel {
     return {curves_[of.turn_right][right], curves_[of.turn_left][left]};
   }
   [[nodiscard]] Speeds kicked(std::uint32_t robot, Duties) const;
-  template <bool kDrift> void integrate(Drives&) const;
+  template <bool kDrift> void integrate_one(Drives&, std::size_t i) const;
 
   Random random_;
+  const DriveKernel* kernel_;
   double tick_s_, wheel_base_mm_, axle_offset_mm_;
   MotorRule motors_;
   MotionEffects effects_;

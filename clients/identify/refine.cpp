@@ -1,0 +1,324 @@
+#include "clients/identify/refine.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+constexpr int kMostPasses = 5;
+/// A gain in log likelihood for which no further pass is made.
+constexpr double kSettled = 1;
+/// A column that prior and data together leave this little of is not kept: its sd times the root of its information.
+constexpr double kFaint = 0.03;
+
+Factor richer(Factor f) {
+  switch (f.shape) {
+    case Shape::kLinear: {
+      f.shape = Shape::kCosines;
+      f.first = 1;
+      f.count = 16;
+      break;
+    }
+    case Shape::kCosines:
+      switch (f.axis.of) {
+        case Covariate::kTime: f.count = 64; break;
+        case Covariate::kNeighbours: f.count = 8; break;
+        case Covariate::kSinceCommand:
+          f.count = 40;
+          f.warp = 0.5;
+          break;
+        default: f.count = 24; break;
+      }
+      break;
+    case Shape::kCosines2: f.count = 11; break;
+    case Shape::kHarmonics: f.count = f.axis.of == Covariate::kBearing ? 3 : 10; break;
+    case Shape::kTaper: f.count = 6; break;
+    case Shape::kExponential: f.points = {0.25, 0.5, 1, 2, 4, 8}; break;
+    case Shape::kTable:
+    case Shape::kAtLeast:
+    case Shape::kWave: break;
+  }
+  return f;
+}
+
+/// What lies beyond a map's order, along one axis.
+Basis along(const Factor& map, bool second) {
+  Factor f = map;
+  f.shape = Shape::kCosines;
+  f.first = map.count + 1;
+  f.count = 20;
+  if (second) {
+    f.axis = map.and_axis;
+    f.low = map.and_low;
+    f.high = map.and_high;
+  }
+  return Basis{{f}};
+}
+
+std::vector<Block> richer(const Term& term) {
+  std::vector<Block> blocks;
+  for (const Block& block : term.blocks) {
+    Block rich = block;
+    rich.basis.chosen.clear();
+    for (Factor& factor : rich.basis.factors) factor = richer(factor);
+    // Too many columns: as they were.
+    if (rich.basis.size() > kMostColumns) rich.basis = block.basis;
+    blocks.push_back(rich);
+    if (rich.basis.factors.size() == 1 && rich.basis.factors.front().shape == Shape::kCosines2) {
+      const Factor map = rich.basis.factors.front();
+      for (const bool second : {false, true}) {
+        rich.basis = along(map, second);
+        blocks.push_back(rich);
+      }
+    }
+  }
+  return blocks;
+}
+
+bool same_axes(const Basis& a, const Basis& b) {
+  if (a.factors.size() != b.factors.size()) return false;
+  for (std::size_t i = 0; i < a.factors.size(); ++i) {
+    const Factor &f = a.factors[i], &g = b.factors[i];
+    if (f.shape != g.shape || !(f.axis == g.axis) || f.first != g.first) return false;
+  }
+  return true;
+}
+bool paired(Target a, Target b) {
+  const auto pair = [](Target t) {
+    switch (t) {
+      case Target::kWorldY: return Target::kWorldX;
+      case Target::kMeasuredY: return Target::kMeasuredX;
+      case Target::kGainRight: return Target::kGainLeft;
+      default: return t;
+    }
+  };
+  return pair(a) == pair(b);
+}
+
+/// The columns of a term's blocks, those of a kind together.
+std::vector<ColumnGroup> groups_of(const std::vector<Block>& blocks) {
+  std::vector<ColumnGroup> groups;
+  std::vector<std::size_t> first_block;
+  Eigen::Index next = 0;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    std::size_t g = 0;
+    while (g < groups.size() && !(paired(blocks[first_block[g]].target, blocks[b].target) &&
+                                  blocks[first_block[g]].during == blocks[b].during &&
+                                  same_axes(blocks[first_block[g]].basis, blocks[b].basis)))
+      ++g;
+    if (g == groups.size()) {
+      groups.emplace_back();
+      first_block.push_back(b);
+    }
+    for (const double rough : blocks[b].basis.roughness()) {
+      groups[g].columns.push_back(next++);
+      groups[g].roughness.push_back(rough);
+    }
+  }
+  return groups;
+}
+
+/// Information and score of some columns beside all others, the score as it would be if their coefficients were 0.
+struct Beside {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+};
+
+/// `first..first + count` are looked at; `taken_out` are coefficients that the model has now and that are put to 0.
+Beside beside(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, const Eigen::VectorXd& prior,
+              const std::vector<Eigen::Index>& columns, const std::vector<Eigen::Index>& nuisance,
+              const Eigen::VectorXd& taken_out) {
+  const Eigen::VectorXd at_zero = score + information * taken_out;
+  Eigen::MatrixXd own = information(nuisance, nuisance);
+  own.diagonal() += prior(nuisance);
+  const Eigen::MatrixXd cross = information(nuisance, columns);
+  const Eigen::MatrixXd by = own.ldlt().solve(cross);
+  return {information(columns, columns) - cross.transpose() * by,
+          at_zero(columns) - by.transpose() * at_zero(nuisance)};
+}
+
+/// Linearises with all that a model has and with more blocks, and looks at the term's own columns, or at the new ones with
+/// the term's taken out.
+Beside look(const Fitter& fitter, const MotionModel& model, std::size_t term, const std::vector<Block>& instead) {
+  std::vector<Block> blocks = blocks_of(model);
+  blocks.insert(blocks.end(), instead.begin(), instead.end());
+  const std::vector<Unit> units = linearise(model, fitter.set().units(), blocks, {100, fitter.threads()});
+  const Eigen::Index all = units.front().information.rows();
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all);
+  Eigen::VectorXd score = Eigen::VectorXd::Zero(all);
+  for (const Unit& unit : units) {
+    information += unit.information;
+    score += unit.score;
+  }
+  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
+  fitter.add_base_prior(model, base, score);
+  Eigen::VectorXd prior = base.diagonal(), taken_out = Eigen::VectorXd::Zero(all);
+  std::vector<Eigen::Index> columns, nuisance;
+  for (Eigen::Index i = 0; i < kBaseColumns; ++i) nuisance.push_back(i);
+  Eigen::Index first = kBaseColumns;
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const Term& own = model.terms[t];
+    const Eigen::Index n = own.coefficients.size();
+    if (t == term) {
+      taken_out.segment(first, n) = own.coefficients;
+      if (instead.empty())
+        for (Eigen::Index i = 0; i < n; ++i) columns.push_back(first + i);
+    } else {
+      prior.segment(first, n) = own.precision;
+      score.segment(first, n) -= own.precision.cwiseProduct(own.coefficients);
+      for (Eigen::Index i = 0; i < n; ++i) nuisance.push_back(first + i);
+    }
+    first += n;
+  }
+  if (!instead.empty())
+    for (Eigen::Index i = first; i < all; ++i) columns.push_back(i);
+  return beside(information, score, prior, columns, nuisance, taken_out);
+}
+
+Eigen::VectorXd solved(const Beside& data, const Eigen::VectorXd& sd) {
+  const Eigen::MatrixXd scaled = sd.asDiagonal() * data.information * sd.asDiagonal();
+  const Eigen::MatrixXd own = scaled + Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
+  return sd.asDiagonal() * own.llt().solve(sd.cwiseProduct(data.score));
+}
+
+/// Leaves out the columns that cannot matter.
+void prune(Term& term, const Eigen::VectorXd& information) {
+  std::vector<Block> blocks;
+  std::vector<double> coefficients, precision;
+  Eigen::Index first = 0;
+  for (Block& block : term.blocks) {
+    const auto n = static_cast<Eigen::Index>(block.basis.size());
+    std::vector<std::uint32_t> kept;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (std::sqrt(information[first + i] / term.precision[first + i]) < kFaint) continue;
+      kept.push_back(block.basis.chosen.empty() ? static_cast<std::uint32_t>(i)
+                                                : block.basis.chosen[static_cast<std::size_t>(i)]);
+      coefficients.push_back(term.coefficients[first + i]);
+      precision.push_back(term.precision[first + i]);
+    }
+    first += n;
+    if (kept.empty()) continue;
+    if (kept.size() < static_cast<std::size_t>(n)) block.basis.chosen = kept;
+    blocks.push_back(std::move(block));
+  }
+  if (blocks.empty()) return;
+  term.blocks = std::move(blocks);
+  term.coefficients =
+      Eigen::Map<Eigen::VectorXd>(coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
+  term.precision = Eigen::Map<Eigen::VectorXd>(precision.data(), static_cast<Eigen::Index>(precision.size()));
+}
+
+}  // namespace
+
+double Smoothness::sd(double roughness) const {
+  return size * std::pow(1 + (roughness / knee) * (roughness / knee), -decay / 2);
+}
+
+double log_evidence(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, const Eigen::VectorXd& sd) {
+  Eigen::MatrixXd own = sd.asDiagonal() * information * sd.asDiagonal();
+  own.diagonal().array() += 1;
+  const Eigen::LLT<Eigen::MatrixXd> root(own);
+  const Eigen::VectorXd part = root.matrixL().solve(sd.cwiseProduct(score));
+  return 0.5 * part.squaredNorm() - root.matrixLLT().diagonal().array().log().sum();
+}
+
+double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
+                         const std::vector<ColumnGroup>& groups, std::vector<Smoothness>& smoothness,
+                         Eigen::VectorXd& sd) {
+  const auto fill = [&](std::size_t g, const Smoothness& by, Eigen::VectorXd& to) {
+    for (std::size_t i = 0; i < groups[g].columns.size(); ++i)
+      to[groups[g].columns[i]] = by.sd(groups[g].roughness[i]);
+  };
+  const bool anew = smoothness.size() != groups.size();
+  sd = Eigen::VectorXd::Zero(score.size());
+  if (anew) smoothness.assign(groups.size(), {0, 4, 2});
+  for (std::size_t g = 0; g < groups.size(); ++g) fill(g, smoothness[g], sd);
+  double best = log_evidence(information, score, sd);
+  const auto try_it = [&](std::size_t g, const Smoothness& trial) {
+    Eigen::VectorXd changed = sd;
+    fill(g, trial, changed);
+    const double value = log_evidence(information, score, changed);
+    if (!(value > best + 1e-9)) return false;
+    best = value;
+    sd = changed;
+    smoothness[g] = trial;
+    return true;
+  };
+  for (int sweep = 0; sweep < 3; ++sweep) {
+    const double before = best;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (smoothness[g].size == 0) {
+        // From what one column could tell of its size, up.
+        double smallest = 1e300;
+        for (const Eigen::Index c : groups[g].columns)
+          if (information(c, c) > 0) smallest = std::min(smallest, 1 / std::sqrt(information(c, c)));
+        if (smallest == 1e300) continue;
+        for (double size = smallest; size < 3000 * smallest; size *= 4)
+          for (const double knee : {1.0, 4.0, 16.0}) try_it(g, {size, knee, 3});
+      }
+      if (smoothness[g].size == 0) continue;
+      for (double factor = 3; factor > 1.2; factor = std::sqrt(factor)) {
+        bool better = true;
+        while (better) {
+          const Smoothness was = smoothness[g];
+          better = false;
+          for (const double by : {factor, 1 / factor}) {
+            Smoothness trial = was;
+            trial.size *= by;
+            better = try_it(g, trial) || better;
+            trial = was;
+            trial.knee = std::clamp(trial.knee * by, 0.3, 60.0);
+            better = try_it(g, trial) || better;
+            trial = was;
+            trial.decay = std::clamp(trial.decay * by, 0.6, 12.0);
+            better = try_it(g, trial) || better;
+            // A smaller knee at the same height of the tail.
+            trial = was;
+            trial.knee = std::clamp(trial.knee * by, 0.3, 60.0);
+            trial.size *= std::pow(by, -trial.decay);
+            better = try_it(g, trial) || better;
+          }
+        }
+      }
+      Smoothness none = smoothness[g];
+      none.size = 0;
+      try_it(g, none);
+    }
+    if (best < before + 0.1) break;
+  }
+  return best;
+}
+
+void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  const std::vector<Block> rich = richer(model.terms[place]);
+  const std::vector<ColumnGroup> groups = groups_of(rich);
+  std::vector<Smoothness> smoothness;
+  Eigen::VectorXd sd;
+  double likelihood = fitter.log_likelihood(model);
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    const Beside data = look(fitter, model, place, pass == 0 ? rich : std::vector<Block>{});
+    choose_smoothness(data.information, data.score, groups, smoothness, sd);
+    Term& term = model.terms[place];
+    // What has no size beforehand is as good as held at 0.
+    const double least = 1e-6 * std::max(sd.maxCoeff(), 1e-6);
+    const Eigen::VectorXd held = sd.cwiseMax(least);
+    if (pass == 0) {
+      term.blocks = rich;
+      term.coefficients = solved(data, held);
+    }
+    term.precision = held.array().square().inverse();
+    fitter.fit(model, 1);
+    const double now = fitter.log_likelihood(model);
+    const bool last = pass + 1 == kMostPasses || now < likelihood + kSettled;
+    likelihood = now;
+    if (!last) continue;
+    prune(term, data.information.diagonal());
+    break;
+  }
+}
+
+}  // namespace kilotwin::identify

@@ -1,9 +1,0 @@
-// The inner loops of contact, for processors with AVX-512. CMakeLists.txt says so to the compiler.
-#include "services/physics/contact_kernel_body.hpp"
-
-namespace kilotwin::physics {
-
-extern const ContactKernel kAvx512Kernel;
-const ContactKernel kAvx512Kernel = {"AVX-512", face, pass};
-
-}  // namespace kilotwin::physics

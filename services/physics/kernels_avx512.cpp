@@ -1,0 +1,13 @@
+// The inner loops, for processors with AVX-512. CMakeLists.txt says so to the compiler.
+#include "services/physics/contact_kernel_body.hpp"
+#include "services/physics/drive_kernel_body.hpp"
+
+namespace kilotwin::physics {
+
+extern const ContactKernel kAvx512Kernel;
+const ContactKernel kAvx512Kernel = {"AVX-512", face, pass};
+
+extern const DriveKernel kAvx512DriveKernel;
+const DriveKernel kAvx512DriveKernel = {"AVX-512", integrate};
+
+}  // namespace kilotwin::physics
