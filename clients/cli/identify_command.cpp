@@ -1,14 +1,16 @@
 #include "clients/cli/identify_command.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "clients/cli/other_data.hpp"
+#include "clients/cli/work_progress.hpp"
 #include "clients/identify/data_faults.hpp"
 #include "clients/identify/identify.hpp"
 #include "clients/identify/import.hpp"
+#include "clients/identify/plausible.hpp"
 #include "clients/identify/prediction_residuals.hpp"
 #include "clients/identify/report.hpp"
 #include "clients/identify/write_model.hpp"
@@ -40,13 +42,21 @@ void make_directory(const fs::path& directory) {
 identify::Identified identify_trajectories(const IdentifyArguments& arguments, const identify::Options& options,
                                            std::vector<identify::DataFault>& faults) {
   identify::MeasuredSet train = identify::load_or_import(arguments.train, arguments.out / "imported-train");
+  identify::demand_plausible(train, arguments.train.string());
+  options.progress(0, "faults of the data");
   // Whatever robots do, they do not do this: it is excluded before anything is fitted, and never modelled.
   faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!arguments.test.empty()) {
     test = identify::load_or_import(arguments.test, arguments.out / "imported-test");
+    identify::demand_plausible(*test, arguments.test.string());
+    identify::demand_longer_than(*test, arguments.horizon_s, false, arguments.test.string());
   } else {
     identify::hold_out_part(train);
+    const bool held_out = std::any_of(train.runs.begin(), train.runs.end(), [](const identify::Run& run) {
+      return std::any_of(run.tracks.begin(), run.tracks.end(), [](const identify::Track& t) { return t.held_out; });
+    });
+    identify::demand_longer_than(train, arguments.horizon_s, held_out, arguments.train.string());
   }
   identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
   found.document["contract"]["faults"] = identify::document_of(faults);
@@ -66,15 +76,10 @@ int identify_command(const IdentifyArguments& arguments) {
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
-  const bool terminal = isatty(STDERR_FILENO) != 0;
-  options.progress = [&](double part, const std::string& what) {
-    if (arguments.quiet) return;
-    if (terminal) {
-      fmt::print(stderr, "\r{:3.0f} %  {:<70}{}", 100 * part, what.substr(0, 70), part >= 1 ? "\n" : "");
-    } else {
-      fmt::print(stderr, "{:3.0f} %  {}\n", 100 * part, what);
-    }
-  };
+  std::optional<WorkProgress> progress(std::in_place, !arguments.quiet);
+  // Reading comes first and drawing last; all else lies between.
+  options.progress = [&](double share, const std::string& what) { progress->show(0.02 + 0.95 * share, what); };
+  progress->show(0, "reading " + arguments.train.string());
   std::vector<identify::DataFault> faults;
   identify::Identified found;
   if (std::optional<identify::Identified> other =
@@ -84,12 +89,15 @@ int identify_command(const IdentifyArguments& arguments) {
     found = identify_trajectories(arguments, options, faults);
   }
 
+  progress->show(0.97, "drawing the report");
   recorder::write_file(
       arguments.out / "model.txtpb",
       identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   recorder::write_file(arguments.out / "result.json", found.document.at("contract").dump(2) + "\n");
   recorder::write_file(arguments.out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.document, arguments.out / "report.html");
+  progress->show(1, "done");
+  progress.reset();
   if (!arguments.quiet) {
     const auto& result = found.document.at("contract");
     if (found.document.contains("summary")) {

@@ -45,6 +45,7 @@ set linetype 1 lc rgb '#d95f0e' lw 2 pt 7 ps 0.5
 set linetype 2 lc rgb '#2563a8' lw 2 pt 7 ps 0.5
 set linetype 3 lc rgb '#66727f' lw 1.5 dt (5,4) pt 7 ps 0.4
 set linetype 4 lc rgb '#1f2933' lw 1.6
+set linetype 5 lc rgb '#d95f0e' lw 1.3 dt (4,3)
 set bars small
 )";
 

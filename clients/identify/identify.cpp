@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "clients/identify/effect_words.hpp"
 #include "clients/identify/fit.hpp"
 #include "clients/identify/predict.hpp"
 #include "clients/identify/prediction_errors.hpp"
@@ -84,8 +85,10 @@ json effects_of(const Search& found, const std::vector<double>& without_mm, doub
     }
     const double gap = before_mm * before_mm - after_mm * after_mm;
     const double share = gap > 0 ? (without_mm[t] * without_mm[t] - after_mm * after_mm) / gap : 0;
+    const std::vector<proto::Effect> written = effects_of_term(term);
     json records = json::array();
-    for (const proto::Effect& effect : effects_of_term(term)) records.push_back(effect.ShortDebugString());
+    for (const proto::Effect& effect : written) records.push_back(effect.ShortDebugString());
+    const std::string size = size_in_words(written);
     effects.push_back(
         {{"name", term.name},
          {"covariates", reason.covariates},
@@ -103,7 +106,8 @@ json effects_of(const Search& found, const std::vector<double>& without_mm, doub
          {"parameters", {{"form", form_of(term)}, {"columns", term.coefficients.size()}, {"records", records}}},
          {"rmse_without_mm", without_mm[t]},
          {"share_removed", std::clamp(share, 0.0, 1.0)},
-         {"in_words", fmt::format("{} depends on {}", reason.acts_on, fmt::join(reason.covariates, ", "))}});
+         {"in_words", fmt::format("{} depends on {}{}{}", reason.acts_on, fmt::join(reason.covariates, ", "),
+                                  size.empty() ? "" : ": ", size)}});
   }
   std::stable_sort(effects.begin(), effects.end(), [](const json& a, const json& b) {
     return a["evidence"]["log_likelihood_gain"].get<double>() > b["evidence"]["log_likelihood_gain"].get<double>();
@@ -246,6 +250,10 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
         errors_of(judged.set(), predict(without, judged, asked, held_out_only, options.threads)).rmse_mm());
   }
   contract["effects"] = effects_of(found, without_mm, errors_before.rmse_mm(), errors_after.rmse_mm());
+  document["effect_curves"] = json::array();
+  for (const Term& term : after.terms)
+    for (json& curve : curves_of(term.name, effects_of_term(term)))
+      document["effect_curves"].push_back(std::move(curve));
   contract["rejected"] = json::array();
   for (const Rejected& r : found.rejected) {
     contract["rejected"].push_back({{"name", r.name},

@@ -1,8 +1,9 @@
 /// The measured-data loop: why robots differ from the model, put into the model. Pure: sets in, one document out.
 ///
 /// The document holds everything that the report shows. Its keys (lengths mm, times s, angles rad; any list may be empty):
-///   contract      result.json: before, after {rmse_mm, rmse_low_mm, rmse_high_mm, rows}, noise_floor_mm, noise_floor_how,
-///                 horizon_s, effects, base, noise, rejected, ambiguous, faults
+///   contract      result.json: before, after {rmse_mm, rmse_low_mm, rmse_high_mm, rows}, improvement {less_by_mm, low_mm, high_mm,
+///                 bounds_how}, noise_floor_mm, noise_floor_how, replicates {floor_mm, repeatable_mm, groups, windows},
+///                 horizon_s, effects, base, noise, rejected, ambiguous, faults, simulated (simulated_check.hpp)
 ///     effects     [{name, covariates [..], acts_on, evidence {log10_p, p_family, log_likelihood_gain, held_out_gain,
 ///                 held_out_gain_se, degrees}, parameters {form, ...}, rmse_without_mm, share_removed, in_words}], strongest first
 ///     rejected    [{name, covariates, acts_on, log10_p, threshold_log10_p}]: the strongest of what was tried and not added
@@ -15,8 +16,10 @@
 ///                 means of the disturbances (target: forward, turn, world_x, world_y, measured_x, measured_y) over bins
 ///                 of one covariate; `fitted` (null where nothing was) is the effect as added
 ///   maps          [{target, unit, x_mm [..], y_mm [..], before [[..]..], after [[..]..], count [[..]..]}]: rows are y
-///   distributions [{name, unit, edges [..], measured [..], simulated [..]}]: counts; present once the check in the engines ran
-///   msd           {lag_s [..], measured_mm2 [..], simulated_mm2 [..]}
+///   effect_curves [{name, which, covariate, unit, acts_on, acts_on_unit, at [..], value [..]}]: effects as they were written
+///   distributions [{name, unit, edges [..], measured [..], base [..], simulated [..]}]: counts; `base` by the base model
+///   msd           {lag_s [..], measured_mm2 [..], base_mm2 [..], simulated_mm2 [..]}
+///   speed_over_time {time_s [..], measured_mm_s [..], base_mm_s [..], simulated_mm_s [..]}: means
 ///   steps         [{added, rmse_mm, held_out_gain}]: the loop, in order
 ///   headline, verdict, summary [..]  words in place of the page's own and of what the command says at its end; absent: those
 ///   bars          [{kind, name, value, low, high, unit, from}] in place of the errors' bars

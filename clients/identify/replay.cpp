@@ -72,7 +72,7 @@ RunPlan plan_of(const Scene& scene, const proto::Model& numbered_otherwise, std:
   *e.mutable_robot_model() = model.robot();
   *e.mutable_effect() = model.effect();
   *e.mutable_field() = model.field();
-  e.mutable_physics()->set_engine(proto::Physics::PLANAR);
+  e.mutable_physics()->set_engine(scene.contacts ? proto::Physics::PLANAR : proto::Physics::KINEMATIC);
   e.add_robots()->set_count(static_cast<std::uint32_t>(scene.robots.size()));
   manifest.add_program()->set_path("replay");
   manifest.add_group_program(0);
@@ -91,6 +91,15 @@ RunPlan plan_of(const Scene& scene, const proto::Model& numbered_otherwise, std:
   const double half_mm = reach_mm + 5000, length_mm = 2 * half_mm;
   e.mutable_arena()->set_width_mm(2 * half_mm);
   e.mutable_arena()->set_height_mm(2 * half_mm);
+  if (!scene.contacts) {
+    // The kinematic engine knows the arena's own walls alone, as far from the origin on either side.
+    const auto both = [](double low, double high) { return 2 * (std::max(-low, high) + kRadius_mm); };
+    if (std::isfinite(room.x_low_mm + room.x_high_mm))
+      e.mutable_arena()->set_width_mm(both(room.x_low_mm, room.x_high_mm));
+    if (std::isfinite(room.y_low_mm + room.y_high_mm))
+      e.mutable_arena()->set_height_mm(both(room.y_low_mm, room.y_high_mm));
+    return RunPlan(std::move(manifest));
+  }
   add_wall(e, true, room.x_low_mm, -1, length_mm);
   add_wall(e, true, room.x_high_mm, 1, length_mm);
   add_wall(e, false, room.y_low_mm, -1, length_mm);
@@ -198,6 +207,7 @@ double robot_ticks(const Scene& scene) {
 Scene scene_of(const MotionModel& model, const PreparedSet& set, std::size_t run) {
   Scene scene;
   scene.room = model.room;
+  scene.contacts = model.contacts;
   scene.run = static_cast<std::uint32_t>(run);
   for (const TrackView& view : set.views()) {
     if (view.run != run) continue;
@@ -215,8 +225,8 @@ Scene scene_of(const MotionModel& model, const PreparedSet& set, std::size_t run
       y_mm += first.y_mm - seen[1];
       if (TrackFilter::has_heading(first)) heading_rad += wrapped_angle(first.heading_rad - seen[2]);
     }
-    scene.robots.push_back({view.track, x_mm + kAxleOffset_mm * std::cos(heading_rad),
-                            y_mm + kAxleOffset_mm * std::sin(heading_rad), wrapped_angle(heading_rad)});
+    scene.robots.push_back({view.track, x_mm + model.base.centre_mm * std::cos(heading_rad),
+                            y_mm + model.base.centre_mm * std::sin(heading_rad), wrapped_angle(heading_rad)});
   }
   return scene;
 }

@@ -1,6 +1,5 @@
 /// Measured runs once more, in the simulator: robots of a written model start where measured ones were seen first, are told the
-/// same, and are looked at by the simulator's tracker at the same times. The planar engine moves them; the walls are those that
-/// the measured robots showed.
+/// same, and are looked at by the simulator's tracker at the same times. The walls are those that the measured robots showed.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +17,7 @@ struct Scene {
     double x_mm = 0, y_mm = 0, heading_rad = 0;  ///< of the disc's centre, at the first sample
   };
   Room room;
+  bool contacts = true;   ///< robots push each other: the planar engine; else the kinematic one
   std::uint32_t run = 0;  ///< the covariate RUN
   std::vector<Robot> robots;
 

@@ -34,7 +34,7 @@ h1 em { font-style: normal; color: var(--after); }
 h2 { font-size: 1.25rem; margin: 2.6rem 0 0.4rem; padding-top: 0.9rem; border-top: 1px solid var(--line); }
 h3 { font-size: 1.05rem; margin: 0 0 0.3rem; }
 a { color: inherit; }
-h3::first-letter, .what::first-letter { text-transform: uppercase; }
+h3::first-letter, .what::first-letter, .cause p::first-letter { text-transform: uppercase; }
 .kicker { margin: 0; color: var(--faint); font-size: 0.85rem; letter-spacing: 0.03em; }
 .verdict { font-size: 1.1rem; max-width: 50rem; margin: 0 0 1.2rem; }
 .lead { color: var(--faint); max-width: 50rem; margin: 0 0 0.8rem; }
@@ -61,6 +61,7 @@ table { border-collapse: collapse; width: 100%; font-size: 0.88rem; font-variant
 th { text-align: left; font-weight: 600; color: var(--faint); border-bottom: 1px solid var(--line); padding: 0.3rem 0.8rem 0.3rem 0; vertical-align: bottom; }
 td { border-bottom: 1px solid #eef1f4; padding: 0.3rem 0.8rem 0.3rem 0; vertical-align: top; }
 table.facts thead { display: none; } table.facts td:last-child { text-align: right; padding-right: 0; }
+details summary { cursor: pointer; color: var(--faint); margin: 0.4rem 0; }
 .faults b { text-transform: capitalize; margin-right: 0.3em; }
 @media (max-width: 56rem) { .cause, .grid, .thirds, figure.pair { grid-template-columns: 1fr; } .bar { grid-template-columns: 4rem 1fr; } .bar .value { grid-column: 2; } }
 @page { size: A4; margin: 14mm 13mm; }

@@ -16,7 +16,13 @@ using nlohmann::json;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // No figure of a robot in a room is as large; axes have no room for it.
 constexpr double kAbsurd = 1e12;
-constexpr int kHalf_px = 460, kLow_px = 280;
+constexpr int kHalf_px = 460, kLow_px = 280, kFlat_px = 210;
+
+constexpr const char* kMeasuredAndModels =
+    "plot $d using 1:2 with points pt 7 ps 0.7 lc rgb '#66727f' title 'measured', $d using 1:3 with lines lt 2 "
+    "title "
+    "'this model'";
+constexpr const char* kBaseModel = ", $d using 1:4 with lines lt 5 title 'base model'";
 
 std::vector<double> numbers(const json& from, const char* key) {
   std::vector<double> out;
@@ -116,6 +122,17 @@ constexpr int kMap_px = 380, kMapHigh_px = 340;
 
 std::string words_of(const std::string& name) {
   static const std::map<std::string, std::string> kWords = {{"ahead", "residual ahead"},
+                                                            {"WHEEL_GAIN", "change of speed"},
+                                                            {"WHEEL_OFFSET", "change of speed"},
+                                                            {"TURN_RATE", "turning"},
+                                                            {"BODY_DRIFT", "drift"},
+                                                            {"WORLD_DRIFT", "drift"},
+                                                            {"MEASURED_OFFSET", "the tracker's error"},
+                                                            {"MEASURED_BODY_OFFSET", "tracked point"},
+                                                            {"MEASURED_SCALE", "the tracker's scale"},
+                                                            {"MEASURED_HEADING", "the tracker's error"},
+                                                            {"nearest", "distance to the nearest robot"},
+                                                            {"bearing", "direction to the nearest robot"},
                                                             {"left", "residual to the left"},
                                                             {"residual", "predicted position"},
                                                             {"residual_x", "residual along x"},
@@ -255,13 +272,14 @@ PlotNumber plot_distribution(Gnuplot& plots, const json& distribution) {
     middle.push_back(0.5 * (edges[k] + edges[k + 1]));
     width.push_back(edges[k + 1] - edges[k]);
   }
-  std::string commands = block("d", {middle, share(measured), share(simulated), width});
+  const std::vector<double> base = numbers(distribution, "base");
+  std::string commands = block("d", {middle, share(measured), share(simulated), width, share(base)});
   commands += axis("x", text(distribution, "name"), text(distribution, "unit"));
   commands += fmt::format("set ylabel 'share, %'\nset xrange [{}:{}]\nset yrange [0:*]\nset grid noxtics\n",
                           edges.front(), edges.back());
-  commands +=
-      "plot $d using 1:2:4 with boxes fc rgb '#c3ccd5' fs solid 1 noborder title 'measured', "
-      "$d using 1:3 with histeps lc rgb '#2563a8' lw 2 title 'simulated'";
+  commands += "plot $d using 1:2:4 with boxes fc rgb '#c3ccd5' fs solid 1 noborder title 'measured', ";
+  if (base.size() == measured.size()) commands += "$d using 1:5 with histeps lt 5 title 'base model', ";
+  commands += "$d using 1:3 with histeps lc rgb '#2563a8' lw 2 title 'this model'";
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
@@ -269,14 +287,39 @@ PlotNumber plot_msd(Gnuplot& plots, const json& msd) {
   const std::vector<double> lag = numbers(msd, "lag_s"), measured = numbers(msd, "measured_mm2"),
                             simulated = numbers(msd, "simulated_mm2");
   if (lag.size() < 2 || !any_finite(measured) || !any_finite(simulated)) return std::nullopt;
-  std::string commands = block("d", {lag, measured, simulated});
+  const std::vector<double> base = numbers(msd, "base_mm2");
+  std::string commands = block("d", {lag, measured, simulated, base});
   commands +=
       "set logscale xy\nset format y '10^{%L}'\nset xlabel 'lag, s'\nset ylabel 'mean square displacement, "
       "mm²'\n";
-  commands +=
-      "plot $d using 1:2 with points pt 7 ps 0.7 lc rgb '#66727f' title 'measured', $d using 1:3 with lines lt 2 "
-      "title 'simulated'";
+  commands += kMeasuredAndModels;
+  if (any_finite(base)) commands += kBaseModel;
   return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_speed_over_time(Gnuplot& plots, const json& speeds) {
+  const std::vector<double> at = numbers(speeds, "time_s"), measured = numbers(speeds, "measured_mm_s"),
+                            simulated = numbers(speeds, "simulated_mm_s"), base = numbers(speeds, "base_mm_s");
+  if (at.size() < 2 || !any_finite(measured) || !any_finite(simulated)) return std::nullopt;
+  std::string commands = block("d", {at, measured, simulated, base});
+  commands +=
+      "set xlabel 'time in the run, s'\nset ylabel 'mean speed, mm/s'\nset offsets 0, 0, graph 0.1, graph 0.1\n";
+  commands += kMeasuredAndModels;
+  if (any_finite(base)) commands += kBaseModel;
+  return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_effect(Gnuplot& plots, const json& curve) {
+  const std::vector<double> at = numbers(curve, "at"), value = numbers(curve, "value");
+  if (at.size() < 2 || value.size() != at.size() || !any_finite(value)) return std::nullopt;
+  std::string commands = block("d", {at, value});
+  const std::string acts_on = text(curve, "acts_on"), unit = text(curve, "acts_on_unit"),
+                    which = text(curve, "which");
+  commands += axis("x", text(curve, "covariate"), text(curve, "unit")) +
+              fmt::format("set ylabel {}\n", gnuplot_text(which + words_of(acts_on) + ", " + unit));
+  commands += "set xzeroaxis lc rgb '#8896a4'\nunset key\nset offsets 0, 0, graph 0.1, graph 0.1\n";
+  commands += "plot $d using 1:2 with lines lt 2";
+  return plots.add(kHalf_px, kFlat_px, commands);
 }
 
 PlotNumber plot_steps(Gnuplot& plots, const json& steps, double floor_mm) {

@@ -21,6 +21,10 @@ PlotNumber plot_arrows(Gnuplot&, const nlohmann::json& map_x, const nlohmann::js
 PlotNumber plot_map(Gnuplot&, const nlohmann::json& map, const char* when);
 /// One distribution, simulated over measured.
 PlotNumber plot_distribution(Gnuplot&, const nlohmann::json& distribution);
+/// Mean speed over the run, simulated over measured.
+PlotNumber plot_speed_over_time(Gnuplot&, const nlohmann::json& speeds);
+/// An effect as it is in the model, over its covariate.
+PlotNumber plot_effect(Gnuplot&, const nlohmann::json& curve);
 PlotNumber plot_msd(Gnuplot&, const nlohmann::json& msd);
 /// The error as effects were added, one after the other.
 PlotNumber plot_steps(Gnuplot&, const nlohmann::json& steps, double floor_mm);

@@ -164,7 +164,7 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
     played.push_back(std::move(p));
   }
   const BaseParameters& b = full.fitted.base;
-  const TrackStatistics statistics(tracks, full.fitted.room, std::hypot(b.ahead_mm - kAxleOffset_mm, b.left_mm));
+  const TrackStatistics statistics(tracks, full.fitted.room, std::hypot(b.ahead_mm - b.centre_mm, b.left_mm));
   if (statistics.list().empty() || cost * kFewestSeeds > kMostRobotTicks) return json::object();
   const auto seeds =
       static_cast<std::size_t>(std::clamp(kMostRobotTicks / cost, double{kFewestSeeds}, double{kMostSeeds}));
@@ -223,7 +223,7 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
     add_plot(out, statistic, sum_of(statistic, measured[s]), sum(0), sum(first_full));
   }
   const char* const unit = units.by_robot ? "robot" : "track";
-  out["simulated"] = {{"engine", "planar"},
+  out["simulated"] = {{"engine", full.fitted.contacts ? "planar" : "kinematic"},
                       {"seeds", seeds},
                       {"runs", played.size()},
                       {"units", units.count},

@@ -90,12 +90,8 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
   Function function;
   set_axis(function, factor);
   switch (factor.shape) {
-    case Shape::kLinear: {
-      const double slope = coefficients[0] / (factor.high - factor.low);
-      function.mutable_linear()->set_at_zero(rounded(-factor.low * slope));
-      function.mutable_linear()->set_slope(rounded(slope));
-      break;
-    }
+    // Through two points: beyond them, where there were no data, it stays as it is at the last.
+    case Shape::kLinear: set_spline(function, factor, coefficients, factor.low, factor.high, 0, 2); break;
     case Shape::kCosines: {
       // Eight knots a half-wave of the finest column that counts.
       Eigen::Index last = 0;
@@ -158,8 +154,8 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
         grid.add_knot(rounded(at(factor.low, factor.high, i)));
         grid.add_and_knot(rounded(at(factor.and_low, factor.and_high, i)));
       }
-      for (int i = 0; i < knots; ++i) {
-        for (int j = 0; j < knots; ++j) {
+      for (int j = 0; j < knots; ++j) {
+        for (int i = 0; i < knots; ++i) {
           const Situation s = with(factor.and_axis, at(factor.and_low, factor.and_high, j),
                                    with(factor.axis, at(factor.low, factor.high, i)));
           grid.add_value(rounded(sum_at(factor, coefficients, s)));

@@ -34,6 +34,7 @@ proto::Model proto_of(const MotionModel& fitted) {
   motion.set_straight_speed_mm_s(rounded(fitted.base.straight_mm_s));
   motion.set_turn_speed_mm_s(rounded(fitted.base.turn_mm_s));
   motion.set_wheel_base_mm(rounded(fitted.base.wheel_base_mm));
+  motion.set_axle_offset_mm(rounded(fitted.base.centre_mm));
   motion.set_bias_mean_mm_s(rounded(fitted.base.bias_mean_mm_s));
   motion.set_bias_sd_mm_s(rounded(fitted.base.bias_sd_mm_s));
   motion.set_factor_variance_s(rounded(fitted.noise.factor_s));
@@ -44,7 +45,7 @@ proto::Model proto_of(const MotionModel& fitted) {
     own.set_bias_left_mm_s(rounded(bias.mean_mm_s[0]));
     own.set_bias_right_mm_s(rounded(bias.mean_mm_s[1]));
   }
-  const double ahead = fitted.base.ahead_mm - kAxleOffset_mm;
+  const double ahead = fitted.base.ahead_mm - fitted.base.centre_mm;
   const double off = std::hypot(ahead, fitted.base.left_mm);
   if (off > 1e-3) {
     proto::Effect& point = add_effect(model, "tracked-point", proto::Effect::MEASURED_BODY_OFFSET);

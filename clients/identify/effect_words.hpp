@@ -1,0 +1,18 @@
+/// Effects as written, for people: how large each is, and where.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "idl/effects.pb.h"
+
+namespace kilotwin::identify {
+
+/// "+26 % at 0 s, -20 % at 200 s": the sizes of all records of one cause. Empty where they are products of functions.
+[[nodiscard]] std::string size_in_words(const std::vector<proto::Effect>&);
+
+/// Those records that are a curve over one covariate: [{name, covariate, unit, acts_on, acts_on_unit, at [..], value [..]}].
+[[nodiscard]] nlohmann::json curves_of(const std::string& name, const std::vector<proto::Effect>&);
+
+}  // namespace kilotwin::identify
