@@ -52,6 +52,29 @@ Eigen::VectorXd pick(const Eigen::VectorXd& from, const std::vector<Eigen::Index
   return out;
 }
 
+bool of_robots(const Hypothesis& h) {
+  return std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
+}
+
+/// The sum of squares of the scores of all stretches, what those of one robot have in common taken off: what is each
+/// robot's own makes its stretches alike, not noisy. 0 where robots have too few stretches to tell.
+double within_units(const Eigen::MatrixXd& scores, const std::vector<std::size_t>& unit) {
+  constexpr double kFewest = 30;
+  double sum = 0, freedom = 0;
+  for (std::size_t first = 0; first < unit.size();) {
+    std::size_t end = first;
+    while (end < unit.size() && unit[end] == unit[first]) ++end;
+    const auto n = static_cast<Eigen::Index>(end - first);
+    const auto own = scores.middleCols(static_cast<Eigen::Index>(first), n);
+    if (n == 1) return 0;
+    const Eigen::VectorXd mean = own.rowwise().mean();
+    sum += (own.colwise() - mean).squaredNorm() * static_cast<double>(n) / static_cast<double>(n - 1);
+    freedom += static_cast<double>(n - 1);
+    first = end;
+  }
+  return freedom < kFewest ? 0 : sum;
+}
+
 }  // namespace
 
 struct Scores::Reduced {
@@ -93,6 +116,7 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
       if (share[f] > 0) by_stretch_.information[f] += share[f] * units[u].information;
     information_ += units[u].information;
     score_ += units[u].score;
+    cluster_unit_.insert(cluster_unit_.end(), static_cast<std::size_t>(units[u].cluster_scores.cols()), u);
     clusters_.middleCols(next, units[u].cluster_scores.cols()) = units[u].cluster_scores;
     next += units[u].cluster_scores.cols();
   }
@@ -205,9 +229,7 @@ Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, doub
 Finding Scores::weigh(const Hypothesis& hypothesis, int without_term) const {
   std::vector<Eigen::Index> columns;
   for (const Eigen::Index c : hypothesis.columns) columns.push_back(own_ + c);
-  const bool own =
-      std::find(hypothesis.covariates.begin(), hypothesis.covariates.end(), "robot") != hypothesis.covariates.end();
-  return weigh(reduce(columns, without_term, own), pick(dictionary_.scale, hypothesis.columns),
+  return weigh(reduce(columns, without_term, of_robots(hypothesis)), pick(dictionary_.scale, hypothesis.columns),
                hypothesis.log_choices);
 }
 
@@ -217,9 +239,9 @@ Finding Scores::weigh_term(int term) const {
   const Term& own = model_.terms[static_cast<std::size_t>(term)];
   std::vector<Eigen::Index> columns;
   for (Eigen::Index i = 0; i < own.coefficients.size(); ++i) columns.push_back(first + i);
-  const bool of_robots = std::any_of(own.blocks.begin(), own.blocks.end(),
-                                     [](const Block& block) { return block.basis.looks_at(Covariate::kRobot); });
-  return weigh(reduce(columns, term, of_robots), own.precision.cwiseInverse().cwiseSqrt(), 0);
+  const bool of_each = std::any_of(own.blocks.begin(), own.blocks.end(),
+                                   [](const Block& block) { return block.basis.looks_at(Covariate::kRobot); });
+  return weigh(reduce(columns, term, of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
 }
 
 Scores::Outcome Scores::test(std::uint64_t seed) const {
@@ -275,7 +297,15 @@ Scores::Outcome Scores::test(std::uint64_t seed) const {
       flips.row(i) = flipped.row(own_columns[static_cast<std::size_t>(i)]);
     const Eigen::VectorXd statistics = (whiten * flips).colwise().squaredNorm();
     const double dispersion = std::max(1.0, statistics.mean() / degrees);
-    finding.log10_p = log10_tail(finding.statistic / dispersion, degrees);
+    double own_dispersion = dispersion;
+    if (of_robots(dictionary_.hypotheses[h])) {
+      Eigen::MatrixXd scores(scale.size(), cluster.cols());
+      for (Eigen::Index i = 0; i < scale.size(); ++i)
+        scores.row(i) = cluster.row(own_columns[static_cast<std::size_t>(i)]);
+      const double within = within_units(whiten * scores, cluster_unit_);
+      if (within > 0) own_dispersion = std::clamp(within / degrees, 1.0, dispersion);
+    }
+    finding.log10_p = log10_tail(finding.statistic / own_dispersion, degrees);
     for (Eigen::Index f = 0; f < kFlips; ++f)
       worst(f) = std::min(worst(f), log10_tail(statistics[f] / dispersion, degrees));
   }

@@ -100,6 +100,14 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
 
 void TrackFilter::hold_inside() {
   const Room& room = model_->room;
+  const double ahead = model_->base.centre_mm;
+  const Eigen::Vector2d by_heading(-ahead * std::sin(belief_.mean[2]), ahead * std::cos(belief_.mean[2]));
+  const Eigen::Vector2d centre(belief_.mean[0] + by_heading[1], belief_.mean[1] - by_heading[0]);
+  // Few are near a wall.
+  const StateCovariance& p = belief_.covariance;
+  constexpr double kNear = 6;  // standard deviations
+  const double reach = kNear * (std::sqrt(p(0, 0) + p(1, 1)) + std::abs(ahead) * std::sqrt(p(2, 2)));
+  if (!room.at_wall(centre[0], centre[1], reach)) return;
   hold_behind(0, room.x_high_mm, 1);
   hold_behind(0, room.x_low_mm, -1);
   hold_behind(1, room.y_high_mm, 1);
@@ -144,18 +152,24 @@ void TrackFilter::spread(const StepRecord& record) {
       arc.along_y / 2 - bend_y / base, arc.along_y / 2 + bend_y / base,          //
       -1 / base, 1 / base;
   StateCovariance& p = belief_.covariance;
-  Eigen::Matrix<double, 5, 5> f = Eigen::Matrix<double, 5, 5>::Identity();
-  f(0, 2) = -(arc.dy_mm - world_y);
-  f(1, 2) = arc.dx_mm - world_x;
+  const Eigen::Vector2d by_heading(-(arc.dy_mm - world_y), arc.dx_mm - world_x);
   const Noise& noise = model_->noise;
   Eigen::Vector3d own = Eigen::Vector3d::Constant(noise.drift_mm2_s * h);
   own[2] = 1e-9 * h;
+  Eigen::Matrix<double, 3, 2> by_bias = Eigen::Matrix<double, 3, 2>::Zero();
   if (record.middle.commands.driven()) {
-    f.col(3).head<3>() = h * record.rates.left_gain * by_wheel.col(0);
-    f.col(4).head<3>() = h * record.rates.right_gain * by_wheel.col(1);
+    by_bias.col(0) = h * record.rates.left_gain * by_wheel.col(0);
+    by_bias.col(1) = h * record.rates.right_gain * by_wheel.col(1);
     own[2] += noise.heading_rad2_s * h;
   }
-  p = (f * p * f.transpose()).eval();
+  // F P F^T, F being 1 but for these columns: rows first, then columns. Biases may be known, with zeros in P.
+  const bool biased = p(3, 3) > 0 || p(4, 4) > 0;
+  p.row(0) += by_heading[0] * p.row(2);
+  p.row(1) += by_heading[1] * p.row(2);
+  if (biased) p.topRows<3>() += by_bias * p.bottomRows<2>();
+  p.col(0) += by_heading[0] * p.col(2);
+  p.col(1) += by_heading[1] * p.col(2);
+  if (biased) p.leftCols<3>() += p.rightCols<2>() * by_bias.transpose();
   if (record.middle.commands.driven()) {
     const double left = record.rates.left_mm_s, right = record.rates.right_mm_s;
     const Eigen::Vector2d wheels(h * (noise.factor_s * left * left + noise.wheel_mm2_s),
@@ -258,17 +272,7 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   out.covariance = s;
   out.gain = ph * inverse;
   belief_.mean += out.gain * out.difference;
-  // Joseph's form keeps the covariance positive.
-  Eigen::Matrix<double, 5, 5> keep = Eigen::Matrix<double, 5, 5>::Identity();
-  keep.leftCols<3>() -= out.gain * out.jacobian;
-  // The factor enlarged the whole innovation; its share of the prior is put to the tracker.
-  Eigen::Matrix3d tracker = s - out.jacobian * ph.topRows<3>();
-  if (out.size == 2) {
-    tracker.row(2).setZero();
-    tracker.col(2).setZero();
-  }
-  belief_.covariance =
-      (keep * belief_.covariance * keep.transpose() + out.gain * tracker * out.gain.transpose()).eval();
+  belief_.covariance -= out.gain * (s * out.gain.transpose());
   belief_.covariance = (0.5 * (belief_.covariance + belief_.covariance.transpose())).eval();
   return out;
 }
