@@ -473,6 +473,17 @@ void Fitter::fit_base(MotionModel& model) const {
   }
 }
 
+void Fitter::fit_surroundings(MotionModel& model) const {
+  find_walls(model);
+  set_.find_centres(model, threads_);
+  const Noise anew;
+  for (double Noise::*const part :
+       {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
+    model.noise.*part = anew.*part;
+  fit_touching(model);
+  fit(model, 2);
+}
+
 void Fitter::fit(MotionModel& model, int passes) const {
   const std::vector<Block> blocks = blocks_of(model);
   for (int pass = 0; pass < passes; ++pass) {
