@@ -42,8 +42,17 @@ Factor richer(Factor f) {
     case Shape::kHarmonics: f.count = f.axis.of == Covariate::kBearing ? 3 : 10; break;
     case Shape::kTaper: f.count = 6; break;
     case Shape::kExponential: f.points = {0.25, 0.5, 1, 2, 4, 8}; break;
-    case Shape::kTable:
     case Shape::kAtLeast:
+      if (f.axis.of != Covariate::kTime) break;
+      // Where the steps really are is found afterwards.
+      f.shape = Shape::kCosines;
+      f.low = 0;
+      f.high = f.points.back() + f.points.front();
+      f.first = 1;
+      f.count = 64;
+      f.points.clear();
+      break;
+    case Shape::kTable:
     case Shape::kWave: break;
   }
   return f;
@@ -234,22 +243,25 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
   return best;
 }
 
-void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  const std::vector<Block> rich = richer(model.terms[place]);
-  const std::vector<ColumnGroup> groups = groups_of(rich);
+namespace {
+
+/// With `rich` blocks in place of the term's, or, where there are none, those that it has.
+void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, const std::vector<Block>& rich) {
+  const std::vector<ColumnGroup> groups = groups_of(rich.empty() ? model.terms[place].blocks : rich);
   std::vector<Smoothness> smoothness;
   Eigen::VectorXd sd;
   double likelihood = -1e300;
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    const Linear l = linear(fitter, model, place, pass == 0 ? rich : std::vector<Block>{});
+    const bool anew = pass == 0 && !rich.empty();
+    const Linear l = linear(fitter, model, place, anew ? rich : std::vector<Block>{});
     Term& term = model.terms[place];
     const Eigen::VectorXd at_zero = l.score_without(term.coefficients);
-    const std::vector<Eigen::Index> columns = pass == 0 ? l.more() : l.of_term();
+    const std::vector<Eigen::Index> columns = anew ? l.more() : l.of_term();
     const Beside data = beside(l, at_zero, columns);
     choose_smoothness(data.information, data.score, groups, smoothness, sd);
     // What has no size beforehand is as good as held at 0.
     const Eigen::VectorXd held = sd.cwiseMax(1e-6 * std::max(sd.maxCoeff(), 1e-6));
-    if (pass == 0) {
+    if (anew) {
       exchange(model, place, l, rich, at_zero, columns, held);
     } else {
       term.precision = held.array().square().inverse();
@@ -263,5 +275,13 @@ void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
     break;
   }
 }
+
+}  // namespace
+
+void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  fit_smoothly(fitter, model, place, richer(model.terms[place]));
+}
+
+void settle(const Fitter& fitter, MotionModel& model, std::size_t place) { fit_smoothly(fitter, model, place, {}); }
 
 }  // namespace kilotwin::identify

@@ -32,5 +32,7 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
 
 /// Puts rich bases in place of those of a term, and fits all of the model until it stays as it is.
 void refine(const Fitter&, MotionModel&, std::size_t term);
+/// The same with the bases that it has.
+void settle(const Fitter&, MotionModel&, std::size_t term);
 
 }  // namespace kilotwin::identify

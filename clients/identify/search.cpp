@@ -100,19 +100,30 @@ class Loop {
       out_.reasons[t].finding = instead;
       out_.reasons[t].finding.log10_p = std::min(reason.finding.log10_p, out_.reasons[t].finding.log10_p);
       fitter_.fit(out_.model, 2);
+      shape(t);
       out_.steps.push_back({h.name, found.held_out});
       return;
     }
     out_.model.terms.push_back(std::move(term));
     out_.reasons.push_back(reason);
     fitter_.fit(out_.model, 2);
-    const std::size_t place = out_.model.terms.size() - 1;
-    refine(fitter_, out_.model, place);
-    find_steps(fitter_, out_.model, place);
-    widen(fitter_, out_.model, place);
+    shape(out_.model.terms.size() - 1);
     out_.steps.push_back({h.name, found.held_out});
   }
 
+  /// Gives a term the form that the data support.
+  void shape(std::size_t place) {
+    refine(fitter_, out_.model, place);
+    const std::string before = out_.model.terms[place].name, name = find_steps(fitter_, out_.model, place);
+    if (name != before) {
+      for (const Hypothesis& h : dictionary_.hypotheses) {
+        if (h.name != name) continue;
+        out_.reasons[place].covariates = h.covariates;
+        out_.reasons[place].acts_on = h.acts_on;
+      }
+    }
+    widen(fitter_, out_.model, place);
+  }
   /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.
   bool defend() {
     if (defences_++ >= 3) return false;
@@ -143,6 +154,7 @@ class Loop {
         out_.reasons[place] = {best->covariates, best->acts_on, best_finding,
                                out_.reasons[place].threshold_log10_p};
         fitter_.fit(out_.model, 2);
+        shape(place);
         return true;
       }
     }

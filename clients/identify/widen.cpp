@@ -1,5 +1,6 @@
 #include "clients/identify/widen.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -134,6 +135,46 @@ class StepChoice {
     }
     return out;
   }
+  /// The points that are best added to some that are chosen, a step or two that make a pulse, and what they gain less their price.
+  std::pair<std::vector<std::size_t>, double> best_addition(const Picked& picked, double price) const {
+    std::pair<std::vector<std::size_t>, double> best{{}, 0};
+    std::vector<double> sizes;
+    if (picked.points.empty()) {
+      for (double size = size_; size < 4000 * size_; size *= 3) sizes.push_back(size);
+    } else {
+      sizes = {picked.sd[0]};
+    }
+    for (const double size : sizes) {
+      // What is left of all beside those that are chosen.
+      Eigen::MatrixXd left = data_.information;
+      Eigen::VectorXd score = data_.score;
+      if (!picked.columns.empty()) {
+        Eigen::MatrixXd own = data_.information(picked.columns, picked.columns);
+        own.diagonal().array() += 1 / (size * size);
+        const Eigen::MatrixXd cross = data_.information(picked.columns, Eigen::all);
+        const Eigen::MatrixXd by = own.llt().solve(cross);
+        left.noalias() -= cross.transpose() * by;
+        score -= by.transpose() * Eigen::VectorXd(data_.score(picked.columns));
+      }
+      for (const std::size_t width : {0u, 1u, 2u, 4u, 8u}) {
+        for (std::size_t p = 0; p + width < points_; ++p) {
+          std::vector<Eigen::Index> columns;
+          for (std::size_t t = 0; t < targets_; ++t) {
+            columns.push_back(static_cast<Eigen::Index>(t * points_ + p));
+            if (width > 0) columns.push_back(static_cast<Eigen::Index>(t * points_ + p + width));
+          }
+          const double worth =
+              log_evidence(left(columns, columns), score(columns),
+                           Eigen::VectorXd::Constant(static_cast<Eigen::Index>(columns.size()), size)) -
+              price * (width > 0 ? 2 : 1);
+          if (worth <= best.second) continue;
+          best = {{p}, worth};
+          if (width > 0) best.first.push_back(p + width);
+        }
+      }
+    }
+    return best;
+  }
   void set_smallest_size() {
     double most = 0;
     for (Eigen::Index i = 0; i < data_.information.rows(); ++i) most = std::max(most, data_.information(i, i));
@@ -195,98 +236,151 @@ void widen(const Fitter& fitter, MotionModel& model, std::size_t place) {
   }
 }
 
-void find_steps(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  double duration_s = 0;
+namespace {
+
+constexpr std::size_t kMostPoints = 150, kMostSteps = 12;
+constexpr double kLeastGain = 2;
+
+std::vector<Block> stepping(const std::vector<Block>& kinds, const std::vector<double>& at) {
+  std::vector<Block> blocks;
+  for (const Block& kind : kinds) blocks.push_back(stepping(kind, at));
+  return blocks;
+}
+
+/// Steps of one kind of effect, in place of a term or beside it.
+struct Steps {
   std::vector<Block> kinds;
-  for (const Block& block : model.terms[place].blocks) {
-    if (block.basis.factors.size() != 1) return;
-    const Factor& f = block.basis.factors.front();
-    if (f.axis.of != Covariate::kTime || (f.shape != Shape::kCosines && f.shape != Shape::kAtLeast)) return;
-    duration_s = std::max(duration_s, f.shape == Shape::kCosines ? f.high : f.points.back());
-    if (std::none_of(kinds.begin(), kinds.end(),
-                     [&](const Block& b) { return b.target == block.target && b.during == block.during; }))
-      kinds.push_back(block);
+  bool beside = false;
+  std::vector<double> at_s;
+  double gain = 0;  ///< log evidence over the term as it is, less the price of choosing
+};
+
+/// The steps at points of a raster that are worth their price.
+void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t place,
+                  const std::vector<double>& points, Steps& steps) {
+  const Term& term = model.terms[place];
+  const Linear l =
+      linear(fitter, model, steps.beside ? model.terms.size() : place, stepping(steps.kinds, points), steps.beside);
+  double had = 0;
+  Eigen::VectorXd score = l.score;
+  if (!steps.beside) {
+    score = l.score_without(term.coefficients);
+    const Beside now = beside(l, score, l.of_term());
+    had = log_evidence(now.information, now.score, term.precision.cwiseInverse().cwiseSqrt());
   }
-  constexpr std::size_t kMostPoints = 150, kMostSteps = 16;
-  std::vector<double> points;
-  const double apart_s = std::max(1.0, duration_s / kMostPoints);
-  for (double at = apart_s; at < duration_s - apart_s / 2 && points.size() < kMostPoints; at += apart_s)
-    points.push_back(at);
-  const auto stepped = [&](const std::vector<double>& at) {
-    std::vector<Block> blocks;
-    for (const Block& kind : kinds) blocks.push_back(stepping(kind, at));
-    return blocks;
-  };
-  MotionModel trial = model;
-  const Linear l = linear(fitter, trial, place, stepped(points));
-  const Eigen::VectorXd at_zero = l.score_without(trial.terms[place].coefficients);
-  const Beside now = beside(l, at_zero, l.of_term()), data = beside(l, at_zero, l.more());
-  const double had =
-      log_evidence(now.information, now.score, trial.terms[place].precision.cwiseInverse().cwiseSqrt());
-  StepChoice choice(data, points.size(), kinds.size());
+  const Beside data = beside(l, score, l.more());
+  StepChoice choice(data, points.size(), steps.kinds.size());
   choice.set_smallest_size();
-  Picked picked;
   const double price = std::log(static_cast<double>(points.size()));
+  Picked picked;
   while (picked.points.size() < kMostSteps) {
-    Picked best;
-    double gain = 2;
-    // A step, or two that make a pulse.
-    for (const std::size_t width : {0u, 1u, 2u, 4u, 8u}) {
-      for (std::size_t p = 0; p + width < points.size(); ++p) {
-        std::vector<std::size_t> with = picked.points;
-        with.push_back(p);
-        if (width > 0) with.push_back(p + width);
-        Picked found = choice.weigh(with);
-        const double worth =
-            found.evidence - picked.evidence - price * static_cast<double>(with.size() - picked.points.size());
-        if (worth <= gain) continue;
-        gain = worth;
-        best = std::move(found);
-      }
-    }
-    if (best.points.empty()) break;
-    picked = std::move(best);
+    const auto [added, worth] = choice.best_addition(picked, price);
+    if (added.empty() || worth < kLeastGain) break;
+    std::vector<std::size_t> with = picked.points;
+    with.insert(with.end(), added.begin(), added.end());
+    picked = choice.weigh(with);
   }
-  if (picked.points.empty()) return;
-  constexpr double kBetter = 2;
-  if (picked.evidence - price * static_cast<double>(picked.points.size()) < had + kBetter) return;
-  std::vector<double> at;
-  for (const std::size_t p : picked.points) at.push_back(points[p]);
-  std::sort(at.begin(), at.end());
-  const double likelihood = fitter.log_likelihood(model);
-  // Twice about each step a finer raster.
+  for (const std::size_t p : picked.points) steps.at_s.push_back(points[p]);
+  std::sort(steps.at_s.begin(), steps.at_s.end());
+  steps.gain = picked.evidence - price * static_cast<double>(picked.points.size()) - had;
+}
+
+/// Puts the steps into the model, at times found on ever finer rasters. False: they came to be in disorder.
+bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, const Steps& steps, double apart_s) {
+  constexpr int kSide = 6, kRaster = 2 * kSide + 1;
+  const std::size_t home = place;
+  std::vector<double> at = steps.at_s;
+  if (steps.beside) {
+    // A term of their own, which is joined to the other afterwards.
+    model.terms.push_back({model.terms[place].name, {}, {}, {}});
+    place = model.terms.size() - 1;
+  }
   for (double fine_s = apart_s / 5; fine_s > 0.04; fine_s /= 5) {
     std::vector<double> raster;
     for (const double t : at)
-      for (int i = -6; i <= 6; ++i) raster.push_back(t + i * fine_s);
-    if (raster.size() > kMostColumns) break;
-    const Linear fine = linear(fitter, trial, place, stepped(raster));
-    const Eigen::VectorXd zero = fine.score_without(trial.terms[place].coefficients);
-    const Beside fine_data = beside(fine, zero, fine.more());
-    StepChoice fine_choice(fine_data, raster.size(), kinds.size());
-    fine_choice.set_smallest_size();
+      for (int i = -kSide; i <= kSide; ++i) raster.push_back(t + i * fine_s);
+    if (raster.size() > kMostColumns) return false;
+    const Linear l = linear(fitter, model, place, stepping(steps.kinds, raster));
+    const Eigen::VectorXd score = l.score_without(model.terms[place].coefficients);
+    const Beside data = beside(l, score, l.more());
+    StepChoice choice(data, raster.size(), steps.kinds.size());
+    choice.set_smallest_size();
     std::vector<std::size_t> chosen;
-    for (std::size_t k = 0; k < at.size(); ++k) chosen.push_back(13 * k + 6);
-    Picked best = fine_choice.weigh(chosen);
+    for (std::size_t k = 0; k < at.size(); ++k) chosen.push_back(kRaster * k + kSide);
+    Picked best = choice.weigh(chosen);
     for (int sweep = 0; sweep < 3; ++sweep) {
       for (std::size_t k = 0; k < at.size(); ++k) {
-        for (std::size_t i = 0; i < 13; ++i) {
+        for (std::size_t i = 0; i < kRaster; ++i) {
           std::vector<std::size_t> other = best.points;
-          other[k] = 13 * k + i;
-          Picked found = fine_choice.weigh(other);
+          other[k] = kRaster * k + i;
+          Picked found = choice.weigh(other);
           if (found.evidence > best.evidence) best = std::move(found);
         }
       }
     }
     for (std::size_t k = 0; k < at.size(); ++k) at[k] = raster[best.points[k]];
-    if (!std::is_sorted(at.begin(), at.end())) return;
+    if (!std::is_sorted(at.begin(), at.end())) return false;
     std::vector<Eigen::Index> columns;
-    for (const Eigen::Index c : best.columns) columns.push_back(fine.own + c);
-    exchange(trial, place, fine, stepped(at), zero, columns, best.sd);
+    for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
+    exchange(model, place, l, stepping(steps.kinds, at), score, columns, best.sd);
   }
-  if (trial.terms[place].blocks.front().basis.factors.front().shape != Shape::kAtLeast) return;
+  if (!steps.beside) return true;
+  const Term own = model.terms.back();
+  model.terms.pop_back();
+  Term& term = model.terms[home];
+  term.blocks.insert(term.blocks.end(), own.blocks.begin(), own.blocks.end());
+  Eigen::VectorXd all(term.coefficients.size() + own.coefficients.size()), precision(all.size());
+  all << term.coefficients, own.coefficients;
+  precision << term.precision, own.precision;
+  term.coefficients = all;
+  term.precision = precision;
+  return true;
+}
+
+}  // namespace
+
+std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  const std::string name = model.terms[place].name;
+  double duration_s = 0;
+  std::vector<Block> kinds;
+  for (const Block& block : model.terms[place].blocks) {
+    if (block.basis.factors.size() != 1) return name;
+    const Factor& f = block.basis.factors.front();
+    if (f.axis.of != Covariate::kTime || f.shape != Shape::kCosines) return name;
+    duration_s = std::max(duration_s, f.high);
+    if (std::none_of(kinds.begin(), kinds.end(),
+                     [&](const Block& b) { return b.target == block.target && b.during == block.during; }))
+      kinds.push_back(block);
+  }
+  std::vector<double> points;
+  const double apart_s = std::max(1.0, duration_s / kMostPoints);
+  for (double at = apart_s; at < duration_s - apart_s / 2 && points.size() < kMostPoints; at += apart_s)
+    points.push_back(at);
+  std::vector<Steps> forms = {{kinds, false, {}, 0}, {kinds, true, {}, 0}};
+  // What jumps in the room and what jumps in the picture look alike until the instant is known.
+  const Basis basis = kinds.front().basis;
+  const std::vector<Block> room = {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}},
+                           picture = {{Target::kMeasuredX, basis, kAlways}, {Target::kMeasuredY, basis, kAlways}};
+  const bool in_room = is_world(kinds.front().target), in_picture = kinds.front().target == Target::kMeasuredX;
+  if (in_room || in_picture) forms.push_back({in_room ? picture : room, false, {}, 0});
+  const Steps* best = nullptr;
+  for (Steps& form : forms) {
+    choose_steps(fitter, model, place, points, form);
+    constexpr double kBetter = 2;
+    if (!form.at_s.empty() && form.gain > kBetter && (best == nullptr || form.gain > best->gain)) best = &form;
+  }
+  if (best == nullptr) return name;
+  MotionModel trial = model;
+  if (!put_steps(fitter, trial, place, *best, apart_s)) return name;
+  const bool other = best == &forms.back() && forms.size() == 3;
+  if (other) trial.terms[place].name = in_room ? "camera-by-time" : "drift-by-time";
   fitter.fit(trial, 2);
-  if (fitter.log_likelihood(trial) > likelihood - 0.5 * static_cast<double>(now.score.size())) model = trial;
+  if (best->beside) settle(fitter, trial, place);
+  // Fewer columns may explain a little less.
+  const double allowed = 0.5 * static_cast<double>(model.terms[place].coefficients.size());
+  if (fitter.log_likelihood(trial) < fitter.log_likelihood(model) - allowed) return name;
+  model = trial;
+  return model.terms[place].name;
 }
 
 }  // namespace kilotwin::identify

@@ -1,6 +1,8 @@
 /// What a cause does besides what it was found by, and where it does so from one instant to the next.
 #pragma once
 
+#include <string>
+
 #include "clients/identify/fit.hpp"
 
 namespace kilotwin::identify {
@@ -9,7 +11,8 @@ namespace kilotwin::identify {
 /// heading), as long as the data become more probable by it.
 void widen(const Fitter&, MotionModel&, std::size_t term);
 
-/// Puts steps at times of their own in place of a curve over time, where they are more probable.
-void find_steps(const Fitter&, MotionModel&, std::size_t term);
+/// Puts steps at times of their own in place of a curve over time, or beside it, where that is more probable. A drift in the
+/// room may turn out to be a shift of the picture, or the other way round. Returns the name of the term as it then is.
+std::string find_steps(const Fitter&, MotionModel&, std::size_t term);
 
 }  // namespace kilotwin::identify
