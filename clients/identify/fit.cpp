@@ -474,14 +474,17 @@ void Fitter::fit_base(MotionModel& model) const {
 }
 
 void Fitter::fit_surroundings(MotionModel& model) const {
-  find_walls(model);
-  set_.find_centres(model, threads_);
+  // With much noise at walls it would not matter where they are.
   const Noise anew;
   for (double Noise::*const part :
        {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
     model.noise.*part = anew.*part;
-  fit_touching(model);
-  fit(model, 2);
+  for (int round = 0; round < (set_.set().has_headings ? 1 : 2); ++round) {
+    find_walls(model);
+    set_.find_centres(model, threads_);
+    fit_touching(model);
+    fit(model, 1);
+  }
 }
 
 void Fitter::fit(MotionModel& model, int passes) const {
