@@ -30,7 +30,7 @@
 #include "core/experiment/plan.hpp"
 #include "services/physics/bodies.hpp"
 #include "services/physics/candidate_list.hpp"
-#include "services/physics/contact_constants.hpp"
+#include "services/physics/contact_limits.hpp"
 #include "services/physics/contact_pass.hpp"
 #include "services/physics/contact_state.hpp"
 #include "services/physics/drive.hpp"
@@ -38,40 +38,26 @@
 
 namespace kilotwin::physics {
 
-/// Overlapping bodies move apart at most at this speed each, mm/s: the speed of a wheel at the calibrated turn.
-inline constexpr double kSeparation_mm_s = 20;
-
-/// What is fixed for a run.
-struct ContactLimits {
-  ContactLimits(const RunPlan&, const DriveModel&);
-
-  std::uint32_t sub_steps;
-  double separation_mm;  ///< of an overlapping body per sub-step
-  double stride_mm;      ///< no body moves further in a sub-step
-  double cutoff_mm;      ///< bodies whose centres are farther apart at the tick's start cannot meet within the tick
-  double
-      margin_mm;  ///< from a partition's rectangle: all that can matter within a tick, and where bodies can get to
-  double x_limit_mm, y_limit_mm;  ///< the centre of a disc stays within +-limit
-  double touch_mm;      ///< a contact carries force up to this gap: who follows another at full speed keeps it
-  double rim_friction;  ///< between two robots
-  double thrust_mm, hold_mm;  ///< grip of a driven and of a resting robot, as contact_state.hpp has forces
-
-  [[nodiscard]] bool outside(double x_mm, double y_mm) const {
-    return x_mm > x_limit_mm || x_mm < -x_limit_mm || y_mm > y_limit_mm || y_mm < -y_limit_mm;
-  }
-  [[nodiscard]] PassLimits of_pass() const {
-    return {separation_mm, stride_mm, touch_mm, x_limit_mm, y_limit_mm, rim_friction};
-  }
-};
-
 /// A tick is find(), then the drives of those that ask for one, then move().
+///
+/// Seats of bodies, and their forces there, are kept from tick to tick where one partition holds all and only discs and straight
+/// walls are there: until somebody has moved by half of a skin. Contacts that the skin adds are beyond the cutoff and do
+/// nothing, so that no result depends on when seats were given. Else they are given anew in each tick.
 class ContactSolver {
  public:
   ContactSolver(const RunPlan&, const DriveModel&);
 
   /// What contact keeps; per robot of the swarm, and per movable body.
-  [[nodiscard]] PressTable& presses() { return presses_; }
-  [[nodiscard]] const PressTable& presses() const { return presses_; }
+  [[nodiscard]] PressTable& presses() {
+    leave_seats();
+    return presses_;
+  }
+  [[nodiscard]] const PressTable& presses() const {
+    keep_presses();
+    return presses_;
+  }
+  /// Sum of the hashes of what contact keeps of these robots.
+  [[nodiscard]] std::uint64_t hash_presses(const std::vector<std::uint32_t>& robots) const;
   [[nodiscard]] std::vector<MovableState>& movables() { return movables_; }
   [[nodiscard]] const std::vector<MovableState>& movables() const { return movables_; }
 
@@ -79,17 +65,13 @@ class ContactSolver {
   /// per movable body. `driven`: per body, 1: it moves by itself. False: everything rests.
   bool find(const Bodies&, const std::vector<std::uint8_t>& own, const std::vector<std::uint8_t>& own_movable,
             const std::vector<std::uint8_t>& driven);
-  /// Whether the drive of this driven body can matter.
-  [[nodiscard]] bool asks_drive(std::uint32_t body) const {
-    return hops_[body] != kOutOfReach && driven_[body] != 0;
-  }
-  /// The part of a tick over which its drive is to be integrated: a sub-step where it may meet others, else all of it.
-  [[nodiscard]] double drive_part(std::uint32_t body) const {
-    return seat_of_[body] != ContactPass::kStill ? sub_step_part_ : 1;
-  }
-  /// Moves the own bodies by one tick and advances their headings; others keep their poses. Own bodies that moved, overlap
-  /// or are outside the arena are awake afterwards.
-  void move(Bodies&, const Drives&);
+  /// Per body, 1: it is driven, and its drive can matter.
+  [[nodiscard]] const std::vector<std::uint8_t>& asks_drive() const { return has_others_ ? asked_ : driven_; }
+  /// The part of a tick over which drives are to be integrated: a sub-step.
+  [[nodiscard]] double drive_part() const { return sub_step_part_; }
+  /// Moves the own bodies by one tick and advances their headings; poses of others are of no use afterwards. Own bodies that
+  /// moved, overlap or are outside the arena are awake afterwards. Spreads the drives.
+  void move(Bodies&, Drives&);
 
   [[nodiscard]] const ContactLimits& limits() const { return limits_; }
 
@@ -97,10 +79,12 @@ class ContactSolver {
   static constexpr std::uint8_t kOutOfReach = 255;
   /// Bodies with more contacts than this are not told apart.
   static constexpr std::uint32_t kMostContacts = 7;
+  static_assert(kMostContacts < Press::kMost);
 
-  /// A body that may be moved by contacts, or whose drive moves one.
+  /// A body that may be moved by contacts or walls, or whose drive moves one.
   struct Mover {
     std::uint32_t body, first, contacts;  ///< into others_
+    std::uint32_t near;                   ///< how many are within the cutoff; they come first
   };
 
   /// A contact of a robot with what is no disc.
@@ -114,37 +98,60 @@ class ContactSolver {
   };
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  [[nodiscard]] bool may_be_touched(std::uint32_t body) const;
+  // contact.cpp: the tick.
+  void begin(const Bodies&, const BodyColumns&);
+  void end(Bodies&);
+  [[nodiscard]] bool stays(const ContactBatch&, std::size_t lane) const;
+  void remember_forces(ContactBatch&);
+  void keep_most(const ContactBatch&);
+
+  // contact_search.cpp: who may touch whom.
+  void search_all(const Bodies&, const std::vector<std::uint8_t>& own,
+                  const std::vector<std::uint8_t>& own_movable);
   void search(const Bodies&, std::uint32_t body);
   void search_movable(std::uint32_t movable);
+  void reach(std::uint32_t node, std::uint8_t hops);
+  void reach_beside(std::uint32_t movable, std::uint8_t hops);
+  [[nodiscard]] bool may_be_touched(std::uint32_t body) const;
+
+  // contact_specials.cpp: contacts with what is no disc.
   void find_specials(const Bodies&);
   void add_special(std::uint32_t body, std::uint32_t key, std::uint32_t movable, const Nearest& of_shape);
   [[nodiscard]] std::pair<const Special*, const Special*> specials_of(std::uint32_t body) const;
-  void reach(std::uint32_t node, std::uint8_t hops);
-  void reach_beside(std::uint32_t movable, std::uint8_t hops);
-  [[nodiscard]] bool keep_press(const Bodies&, const Mover&);
+  void fill_specials(std::size_t lane, const Mover&, ContactBatch&);
+
+  // contact_seats.cpp: who works in which lane.
+  void keep_seats(const Bodies&);
+  void list_near(const Bodies&, std::uint32_t body);
   void seat_movers();
-  void fill_batches(const Bodies&);
-  /// Forces of a body's contacts and who the others are, as the last tick left them.
-  void fill_lane(const Bodies&, std::size_t lane, const Mover&, std::uint32_t most, ContactLanes*);
-  /// Normals and gaps that the columns of places do not give.
-  void fill_specials(std::size_t lane, const Mover&, const ContactBatch&, ContactLanes*) const;
-  void part_lane(const Bodies&, std::size_t lane, const Mover&, ContactLanes*) const;
-  void move_alone(Bodies&, std::uint32_t body, double way_x_mm, double way_y_mm) const;
-  void place(Bodies&, std::uint32_t body, double to_x_mm, double to_y_mm) const;
+  void seat_points();
+  void fill_batches(const Bodies&, double more_mm, bool from_stash);
+  void fill_lane(const Bodies&, std::size_t lane, const Mover&, ContactBatch&);
+  void fill_lane_from_stash(std::size_t lane, const Mover&, ContactBatch&);
+  void order_contacts(const ContactBatch&);
+  void fill_rest(std::size_t lane, const Mover&, ContactBatch&);
+  void part_lane(const Bodies&, std::size_t lane, const ContactBatch&, ContactLanes*) const;
+  bool keep_press(std::uint32_t robot, const Mover&) const;
+  void keep_presses() const;
+  void leave_seats();
+  void rest_who_can();
 
   ContactLimits limits_;
+  PassLimits pass_limits_;
   double sub_step_part_;
   CandidateList candidates_;
   ContactPass pass_;
   std::vector<Mover> movers_, seated_;  ///< by hops; by seats
   std::vector<std::uint32_t> others_;   ///< the contacts of the movers
-  std::vector<std::uint32_t> there_;    ///< bodies that a batch's contacts are with, kLanes per contact
   std::size_t other_count_ = 0;
   bool any_overlap_ = false, has_others_ = false;
+  std::size_t active_count_ = 0;
   const World world_;
+  bool has_immobile_ = false;
+  bool has_shapes_;                     ///< anything but robots and straight walls
   std::vector<std::uint8_t> immobile_;  ///< per robot
-  PressTable presses_;
+  mutable PressTable presses_;          ///< out of date while seats are kept, until somebody asks
+  mutable bool presses_are_kept_ = true;
   std::vector<MovableState> movables_;
   MovablePass movable_pass_;
   std::vector<Special> specials_;                     ///< by body, then by key
@@ -154,8 +161,15 @@ class ContactSolver {
   std::vector<std::uint8_t> hops_;  ///< by contacts from the own bodies, or kOutOfReach
   std::vector<std::uint8_t> driven_, active_, overlaps_, lively_;  ///< lively: driven or pressed
   std::vector<Seat> seat_of_;
-  std::vector<double> spin_mm_;         ///< way of its rim about its centre in a sub-step
+  std::vector<std::uint8_t> asked_;     ///< driven, and within reach; where there are others
   std::vector<std::uint32_t> reached_;  ///< others' bodies, by hops
+  std::vector<std::uint32_t> far_;      ///< scratch
+  // While seats are kept.
+  std::vector<Seat> stashed_seat_of_;  ///< as seat_of_ was before seats were given
+  bool seats_are_kept_ = false;
+  std::vector<std::uint32_t> seated_robot_;        ///< per body, when seats were given
+  std::vector<double> seated_x_mm_, seated_y_mm_;  ///< per body, when seats were given
+  std::vector<double> remembered_;                 ///< forces at the tick's start, of batches that may come to rest
 };
 
 }  // namespace kilotwin::physics

@@ -21,4 +21,10 @@ inline constexpr double kEase = 0.25;
 /// their balance the sooner the less of them it takes to stop a body.
 inline constexpr double kInertia = 2;
 
+/// The gap where there is no contact: so wide that it never acts, mm.
+inline constexpr double kNoContact_mm = 1e100;
+/// Contacts are listed up to so much beyond where they matter, so that a list stays good until somebody has moved by half of it.
+/// A wider one adds contacts that do nothing.
+inline constexpr double kSeatSkin_mm = 4;
+
 }  // namespace kilotwin::physics

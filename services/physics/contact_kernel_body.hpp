@@ -12,20 +12,58 @@ constexpr double kLimitTolerance_mm = 1e-14;
 /// How many limits of a body are met exactly, the one that is missed most first; what is missed then scales all down.
 constexpr int kLimitRounds = 2;
 
-bool face(const ContactBatch& batch, const std::uint32_t* there, const double* x_mm, const double* y_mm,
-          ContactLanes* contacts) {
-  const Lanes x = load(batch.x_mm), y = load(batch.y_mm), diameter_mm = all(kDiameter_mm), one = all(1);
-  Lanes least = one;
+Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, ContactBatch& batch,
+            ContactLanes* contacts, double* rows) {
+  const Lanes zero = all(0), one = all(1), diameter_mm = all(kDiameter_mm), cutoff = all(limits.cutoff_square_mm2);
+  const Lanes no_contact = all(kNoContact_mm), rim_mm_per_turn = all(limits.rim_mm_per_turn_rad);
+  const Lanes x = gather(bodies.x_mm, batch.body), y = gather(bodies.y_mm, batch.body);
+  const Lanes turn = gather(bodies.turn_rad, batch.body), discs = load(batch.discs);
+  Lanes nearest = no_contact, newest = zero;
+  std::uint32_t used = 0;
   for (std::size_t p = 0; p < batch.contacts; ++p) {
     ContactLanes& contact = contacts[p];
-    const Lanes dx = gather(x_mm, there + p * kLanes) - x, dy = gather(y_mm, there + p * kLanes) - y;
-    const Lanes distance = root(dx * dx + dy * dy), inverse = one / distance;
-    store(dx * inverse, contact.normal_x);
-    store(dy * inverse, contact.normal_y);
-    store(distance - diameter_mm, contact.gap_mm);
-    least = smaller(least, distance);
+    const Lanes dx = gather(bodies.x_mm, contact.there) - x, dy = gather(bodies.y_mm, contact.there) - y;
+    const Lanes square = dx * dx + dy * dy, distance = root(square), inverse = one / distance;
+    const auto is_contact = discs > all(static_cast<double>(p)), is_far = square > cutoff;
+    const auto within = [&](Lanes v, Lanes otherwise) {
+      return chosen(is_contact, chosen(is_far, otherwise, v), otherwise);
+    };
+    store(chosen(is_contact, dx * inverse, one), contact.normal_x);
+    store(chosen(is_contact, dy * inverse, zero), contact.normal_y);
+    const Lanes gap = within(distance - diameter_mm, no_contact);
+    newest = larger(newest, load(contact.gap_mm) - gap);
+    if (any_above(no_contact, gap)) used = static_cast<std::uint32_t>(p) + 1;
+    store(gap, contact.gap_mm);
+    store(within(load(contact.push_mm), zero), contact.push_mm);
+    store(within(load(contact.rub_mm), zero), contact.rub_mm);
+    // The same number for both, to the last bit.
+    store((turn + gather(bodies.turn_rad, contact.there)) * rim_mm_per_turn, contact.spin_mm);
+    nearest = smaller(nearest, within(distance, no_contact));
   }
-  return -largest(-least) > 0;
+  Lanes slip_x = load(batch.slip_x_mm), slip_y = load(batch.slip_y_mm);
+  if (kept) {
+    slip_x = chosen(no_contact > nearest, slip_x, zero);
+    slip_y = chosen(no_contact > nearest, slip_y, zero);
+    store(slip_x, batch.slip_x_mm);
+    store(slip_y, batch.slip_y_mm);
+  }
+  const Lanes drive_x = gather(bodies.drive_x_mm, batch.body), drive_y = gather(bodies.drive_y_mm, batch.body);
+  const Columns start = {zero, zero, drive_x + slip_x, drive_y + slip_y};
+  put_rows(start, rows);
+  store(x, batch.x_mm);
+  store(y, batch.y_mm);
+  store(drive_x, batch.drive_x_mm);
+  store(drive_y, batch.drive_y_mm);
+  store(zero, batch.shift_x_mm);
+  store(zero, batch.shift_y_mm);
+  store(start.c, batch.swing_x_mm);
+  store(start.d, batch.swing_y_mm);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    batch.grip_mm[lane] = limits.grip_mm[bodies.driven[batch.body[lane]]];
+  store(gather(bodies.cos_turn, batch.body), batch.cos_turn);
+  store(gather(bodies.sin_turn, batch.body), batch.sin_turn);
+  batch.used = batch.special ? batch.contacts : used;
+  return {-largest(-nearest), any_above(newest, all(kNoContact_mm / 2))};
 }
 
 /// How many contacts batches have for which the loop below is unrolled, so that its values stay in registers.
@@ -58,9 +96,9 @@ template <> struct ContactValues<0> {
 
 /// `kCount`: how many contacts the batch has, if it is not special; 0: as many as it says.
 template <bool kWithOverlaps, std::size_t kCount>
-inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* contacts, const double* motion,
-                 double* after, double* room_mm) {
-  const std::size_t count = kCount > 0 ? kCount : batch.contacts;
+inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* contacts,
+                 const SpecialLanes* specials, const double* motion, double* after, double* room_mm) {
+  const std::size_t count = kCount > 0 ? kCount : batch.used;
   const Lanes zero = all(0), a_half = all(0.5), separation_mm = all(limits.separation_mm);
   const Lanes touch_mm = all(limits.touch_mm), ease = all(kEase), rub_gain = all(kRubGain);
   const Lanes disc_gain = all(kGain), disc_friction = all(limits.friction), tolerance_mm = all(kLimitTolerance_mm);
@@ -81,7 +119,8 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
     of.set_normal(p, normal_x, normal_y);
     const Lanes gap = load(c.gap_mm) + (normal_x * (other.a - shift_x) + normal_y * (other.b - shift_y));
     const Lanes closing = normal_x * (swing_x - other.c) + normal_y * (swing_y - other.d);
-    const Lanes gain = special ? load(c.gain) : disc_gain, friction = special ? load(c.friction) : disc_friction;
+    const Lanes gain = special ? load(specials[p].gain) : disc_gain;
+    const Lanes friction = special ? load(specials[p].friction) : disc_friction;
     const Lanes push = larger(load(c.push_mm) + gain * (closing - ease * larger(gap - touch_mm, zero)), zero);
     // Of the rims, along the normal turned left: the same number for both bodies, to the last bit.
     const Lanes sliding = (normal_x * (swing_y - other.d) - normal_y * (swing_x - other.c)) + load(c.spin_mm);
@@ -196,25 +235,87 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
 
 template <bool kWithOverlaps>
 void pass_over(const PassLimits& limits, std::uint32_t step, ContactBatch* batches, std::size_t count,
-               ContactLanes* contacts, const double* now, double* after, double* room_mm) {
+               ContactLanes* contacts, const SpecialLanes* specials, const double* now, double* after,
+               double* room_mm) {
   for (std::size_t b = 0; b < count; ++b) {
     ContactBatch& batch = batches[b];
     if (step >= batch.passes) continue;
     ContactLanes* const own = contacts + batch.first_contact;
+    const SpecialLanes* const special = specials + batch.first_special;
     double* const to = after + b * kLanes * 4;
-    switch (batch.special ? 0 : batch.contacts) {
-      case 1: move<kWithOverlaps, 1>(limits, batch, own, now, to, room_mm); break;
-      case 2: move<kWithOverlaps, 2>(limits, batch, own, now, to, room_mm); break;
-      case 3: move<kWithOverlaps, 3>(limits, batch, own, now, to, room_mm); break;
-      case kUnrolled: move<kWithOverlaps, kUnrolled>(limits, batch, own, now, to, room_mm); break;
-      default: move<kWithOverlaps, 0>(limits, batch, own, now, to, room_mm);
+    switch (batch.special ? 0 : batch.used) {
+      case 1: move<kWithOverlaps, 1>(limits, batch, own, special, now, to, room_mm); break;
+      case 2: move<kWithOverlaps, 2>(limits, batch, own, special, now, to, room_mm); break;
+      case 3: move<kWithOverlaps, 3>(limits, batch, own, special, now, to, room_mm); break;
+      case kUnrolled: move<kWithOverlaps, kUnrolled>(limits, batch, own, special, now, to, room_mm); break;
+      default: move<kWithOverlaps, 0>(limits, batch, own, special, now, to, room_mm);
     }
   }
 }
 
 void pass(const PassLimits& limits, std::uint32_t step, bool overlap, ContactBatch* batches, std::size_t count,
-          ContactLanes* contacts, const double* now, double* after, double* room_mm) {
-  (overlap ? pass_over<true> : pass_over<false>)(limits, step, batches, count, contacts, now, after, room_mm);
+          ContactLanes* contacts, const SpecialLanes* specials, const double* now, double* after, double* room_mm) {
+  (overlap ? pass_over<true> : pass_over<false>)(limits, step, batches, count, contacts, specials, now, after,
+                                                 room_mm);
+}
+
+/// The first eight of these columns.
+inline void roll_eight(const PassLimits& limits, const double* drive_x_mm, const double* drive_y_mm,
+                       const double* cos_turn, const double* sin_turn, const double* turn_rad, double* x_mm,
+                       double* y_mm, double* heading_rad) {
+  constexpr double kBelowPi = 0x1.921fb54442d17p+1;  // the double below the one nearest to pi
+  const Lanes cosine = load(cos_turn), sine = load(sin_turn), pi = all(0x1.921fb54442d18p+1), whole_turn = pi + pi;
+  Lanes x = load(drive_x_mm), y = load(drive_y_mm), shift_x = x, shift_y = y;
+  for (std::uint32_t step = 1; step < limits.sub_steps; ++step) {
+    const Lanes next_x = cosine * x - sine * y;
+    y = sine * x + cosine * y;
+    x = next_x;
+    shift_x = shift_x + x;
+    shift_y = shift_y + y;
+  }
+  store(load(x_mm) + shift_x, x_mm);
+  store(load(y_mm) + shift_y, y_mm);
+  Lanes heading = load(heading_rad) + load(turn_rad);
+  while (any_above(heading, all(kBelowPi)))
+    heading = chosen(heading > all(kBelowPi), heading - whole_turn, heading);
+  while (any_above(-pi, heading)) heading = chosen(-pi > heading, heading + whole_turn, heading);
+  store(heading, heading_rad);
+}
+
+void roll(const PassLimits& limits, const BodyColumns& bodies, double* x_mm, double* y_mm, double* heading_rad,
+          std::size_t count) {
+  const auto eight = [&](std::size_t i, double* x, double* y, double* heading) {
+    roll_eight(limits, bodies.drive_x_mm + i, bodies.drive_y_mm + i, bodies.cos_turn + i, bodies.sin_turn + i,
+               bodies.turn_rad + i, x, y, heading);
+  };
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) eight(i, x_mm + i, y_mm + i, heading_rad + i);
+  if (i == count) return;
+  double last[3][kLanes] = {};
+  const std::size_t octets = (count - i) * sizeof(double);
+  __builtin_memcpy(last[0], x_mm + i, octets);
+  __builtin_memcpy(last[1], y_mm + i, octets);
+  __builtin_memcpy(last[2], heading_rad + i, octets);
+  eight(i, last[0], last[1], last[2]);
+  __builtin_memcpy(x_mm + i, last[0], octets);
+  __builtin_memcpy(y_mm + i, last[1], octets);
+  __builtin_memcpy(heading_rad + i, last[2], octets);
+}
+
+bool any_moved(const double* x_mm, const double* y_mm, const double* from_x_mm, const double* from_y_mm,
+               std::size_t count, double square_mm2) {
+  Lanes farthest = all(0);
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    const Lanes dx = load(x_mm + i) - load(from_x_mm + i), dy = load(y_mm + i) - load(from_y_mm + i);
+    farthest = larger(dx * dx + dy * dy, farthest);
+  }
+  bool moved = largest(farthest) > square_mm2;
+  for (; i < count; ++i) {
+    const double dx = x_mm[i] - from_x_mm[i], dy = y_mm[i] - from_y_mm[i];
+    moved |= dx * dx + dy * dy > square_mm2;
+  }
+  return moved;
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "services/physics/contact_pass.hpp"
 
+#include <algorithm>
+
 namespace kilotwin::physics {
 
 ContactPass::ContactPass() {
@@ -10,8 +12,14 @@ ContactPass::ContactPass() {
 
 void ContactPass::clear() {
   batches_.clear();
+  specials_.clear();
   contact_count_ = 0;
   add_batch(0, 0);
+}
+
+void ContactPass::stash() {
+  batches_.swap(stashed_batches_);
+  contacts_.swap(stashed_contacts_);
 }
 
 void ContactPass::add_batch(std::uint32_t contacts, std::uint32_t passes) {
@@ -24,20 +32,22 @@ void ContactPass::add_batch(std::uint32_t contacts, std::uint32_t passes) {
   if (room_mm_.size() < contacts * kLanes) room_mm_.resize(contacts * kLanes);
 }
 
+void ContactPass::make_special(ContactBatch& batch) {
+  batch.special = true;
+  batch.first_special = static_cast<std::uint32_t>(specials_.size());
+  specials_.resize(specials_.size() + batch.contacts);
+}
+
 void ContactPass::rest() {
   now_.assign(batches_.size() * kLanes * kRow, 0);
   after_.assign(now_.size(), 0);
 }
 
-void ContactPass::set_off() {
-  for (std::size_t b = 1; b < batches_.size(); ++b) {
-    ContactBatch& batch = batches_[b];
-    double* row = now_.data() + b * kLanes * kRow;
-    for (std::size_t lane = 0; lane < kLanes; ++lane, row += kRow) {
-      row[2] = batch.swing_x_mm[lane] = batch.drive_x_mm[lane] + batch.slip_x_mm[lane];
-      row[3] = batch.swing_y_mm[lane] = batch.drive_y_mm[lane] + batch.slip_y_mm[lane];
-    }
-  }
+void ContactPass::rest(std::size_t number) {
+  batches_[number].passes = 0;
+  const auto first = static_cast<std::ptrdiff_t>(number * kLanes * kRow);
+  std::fill_n(now_.begin() + first, kLanes * kRow, 0);
+  std::fill_n(after_.begin() + first, kLanes * kRow, 0);
 }
 
 }  // namespace kilotwin::physics

@@ -14,35 +14,53 @@ class ContactPass {
 
   ContactPass();
 
-  /// Starts a tick with batch 0 alone, in which nothing moves.
+  /// Starts anew with batch 0 alone, in which nothing moves.
   void clear();
-  /// Appends a batch; its places and contacts are to be filled in.
+  /// Puts all batches aside, to be read while new ones are made.
+  void stash();
+  [[nodiscard]] const ContactBatch& stashed_batch_of(Seat seat) const { return stashed_batches_[seat / kLanes]; }
+  [[nodiscard]] const ContactLanes* stashed_contacts_of(const ContactBatch& batch) const {
+    return stashed_contacts_.data() + batch.first_contact;
+  }
+  /// Appends a batch; its bodies and contacts are to be filled in.
   void add_batch(std::uint32_t contacts, std::uint32_t passes);
+  [[nodiscard]] std::size_t batches() const { return batches_.size(); }
+  [[nodiscard]] ContactBatch& batch(std::size_t number) { return batches_[number]; }
+  [[nodiscard]] const ContactBatch& batch(std::size_t number) const { return batches_[number]; }
   [[nodiscard]] ContactLanes* contacts_of(const ContactBatch& batch) {
     return contacts_.data() + batch.first_contact;
   }
-  [[nodiscard]] ContactBatch& batch_of(Seat seat) { return batches_[seat / kLanes]; }
+  [[nodiscard]] const ContactLanes* contacts_of(const ContactBatch& batch) const {
+    return contacts_.data() + batch.first_contact;
+  }
+  /// Says that a batch has others than discs.
+  void make_special(ContactBatch&);
+  [[nodiscard]] SpecialLanes* specials_of(const ContactBatch& batch) {
+    return specials_.data() + batch.first_special;
+  }
   [[nodiscard]] static std::size_t lane_of(Seat seat) { return seat % kLanes; }
+  [[nodiscard]] const ContactBatch& batch_of(Seat seat) const { return batches_[seat / kLanes]; }
   /// Of the batch appended last.
   [[nodiscard]] Seat seat(std::size_t lane) const {
     return static_cast<Seat>((batches_.size() - 1) * kLanes + lane);
   }
   /// Once all batches are there: nobody moves.
   void rest();
-  /// Normals and gaps of a batch's contacts; see ContactKernel::face.
-  bool face(const ContactBatch& batch, const std::uint32_t* there, const double* x_mm, const double* y_mm) {
-    return kernel_->face(batch, there, x_mm, y_mm, contacts_of(batch));
+  /// Nobody of a batch moves in this tick.
+  void rest(std::size_t number);
+  /// See ContactKernel::begin.
+  Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, std::size_t number) {
+    ContactBatch& batch = batches_[number];
+    return kernel_->begin(limits, kept, bodies, batch, contacts_of(batch), now_.data() + number * kLanes * kRow);
   }
-  /// Once drives and slips are filled in: velocities at the tick's start.
-  void set_off();
+  [[nodiscard]] const ContactKernel& kernel() const { return *kernel_; }
 
   /// All sub-steps. `with_overlaps`: whether any bodies overlap at the tick's start; none do later where none did then.
   /// `others(step)` moves what is not a disc: it reads now() and writes after().
-  template <class Others>
-  void run(const PassLimits& limits, std::uint32_t sub_steps, bool with_overlaps, Others&& others) {
-    for (std::uint32_t step = 0; step < sub_steps; ++step) {
-      kernel_->pass(limits, step, with_overlaps, batches_.data(), batches_.size(), contacts_.data(), now_.data(),
-                    after_.data(), room_mm_.data());
+  template <class Others> void run(const PassLimits& limits, bool with_overlaps, Others&& others) {
+    for (std::uint32_t step = 0; step < limits.sub_steps; ++step) {
+      kernel_->pass(limits, step, with_overlaps, batches_.data(), batches_.size(), contacts_.data(),
+                    specials_.data(), now_.data(), after_.data(), room_mm_.data());
       others(step);
       now_.swap(after_);
     }
@@ -52,16 +70,15 @@ class ContactPass {
   [[nodiscard]] double* after(Seat seat) { return after_.data() + kRow * seat; }
   [[nodiscard]] double* start(Seat seat) { return now_.data() + kRow * seat; }
 
-  /// Displacement over the tick.
-  [[nodiscard]] double shift_x_mm(Seat seat) const { return now(seat)[0]; }
-  [[nodiscard]] double shift_y_mm(Seat seat) const { return now(seat)[1]; }
-
  private:
   static constexpr std::size_t kRow = 4;
 
   const ContactKernel* kernel_;
   std::vector<ContactBatch> batches_;
   std::vector<ContactLanes> contacts_;
+  std::vector<ContactBatch> stashed_batches_;
+  std::vector<ContactLanes> stashed_contacts_;
+  std::vector<SpecialLanes> specials_;
   std::size_t contact_count_ = 0;
   std::vector<double> now_, after_;
   std::vector<double> room_mm_;  ///< of the contacts of the batch at hand

@@ -81,6 +81,21 @@ void Drives::reserve(std::size_t bodies) {
     column->resize(bodies);
 }
 
+void Drives::spread(std::size_t bodies) {
+  if (count == bodies) return;
+  std::size_t end = bodies;
+  for (std::size_t d = count; d-- > 0; end = body[d]) {
+    const std::size_t i = body[d];
+    for (auto* column : {&x_mm, &y_mm, &cos_turn, &sin_turn, &turn_rad}) {
+      double* const values = column->data();
+      values[i] = values[d];
+      for (std::size_t k = i + 1; k < end; ++k) values[k] = 0;
+    }
+  }
+  for (auto* column : {&x_mm, &y_mm, &cos_turn, &sin_turn, &turn_rad})
+    std::fill_n(column->begin(), static_cast<std::ptrdiff_t>(end), 0);
+}
+
 DriveModel::DriveModel(const RunPlan& plan)
     : random_(plan.seed()),
       tick_s_(plan.tick_length.seconds()),
@@ -178,6 +193,33 @@ void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Ti
   drives.right_mm_s[n] = right;
   drives.heading_rad[n] = heading_rad;
   drives.part[n] = part;
+}
+
+void DriveModel::add(Drives& drives, const std::vector<std::uint8_t>& asked,
+                     const std::vector<std::uint32_t>& robot, Tick from, const std::vector<Duties>& duties,
+                     const std::vector<double>& heading_rad, double part) const {
+  drives.reserve(robot.size());
+  const bool plain = !(factor_sd_ > 0);
+  const Curve* const curves = curves_.data();
+  double* const left_mm_s = drives.left_mm_s.data();
+  double* const right_mm_s = drives.right_mm_s.data();
+  for (std::uint32_t i = 0; i < robot.size(); ++i) {
+    if (asked[i] == 0) continue;
+    const Duties own = duties[i];
+    if (!plain || own.spin_up != 0 || own.left == 0 || own.right == 0) {
+      add(drives, i, robot[i], from, own, heading_rad[i], part);
+      continue;
+    }
+    // Most robots, in most ticks.
+    const std::size_t n = drives.count++;
+    const Curves& of = curves_of_[robot[i]];
+    const WheelBias& bias = bias_[robot[i]];
+    left_mm_s[n] = curves[of.straight_right][own.right] + bias.left_mm_s;
+    right_mm_s[n] = curves[of.straight_left][own.left] + bias.right_mm_s;
+    drives.body[n] = i;
+    drives.heading_rad[n] = heading_rad[i];
+    drives.part[n] = part;
+  }
 }
 
 void DriveModel::change(Drives& drives, Tick from, const RobotColumns& known, const ArenaFields* fields) {

@@ -38,6 +38,8 @@ struct Drives {
   std::size_t count = 0;
 
   void reserve(std::size_t bodies);
+  /// Puts what was integrated where the bodies' numbers say, for bodies [0, bodies); zeros for those that are not driven.
+  void spread(std::size_t bodies);
 };
 
 /// Actual speed of a wheel = f (v + b) while either motor turns, 0 when both rest (seed, section 2.2). v follows from the
@@ -53,6 +55,9 @@ class DriveModel {
   /// Adds a robot to the drives; its duties are acting. The left motor drives the right-hand wheel.
   void add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, Duties, double heading_rad,
            double part) const;
+  /// Adds those robots that are `asked` for.
+  void add(Drives&, const std::vector<std::uint8_t>& asked, const std::vector<std::uint32_t>& robot, Tick from,
+           const std::vector<Duties>&, const std::vector<double>& heading_rad, double part) const;
   /// Applies the model's effects, which must not be empty(); `known` are the bodies that Drives::body counts. See
   /// Covariates::fill for whom they hold, and for `fields`.
   void change(Drives&, Tick from, const RobotColumns& known, const ArenaFields* fields);

@@ -5,7 +5,7 @@
 namespace kilotwin::physics {
 
 extern const ContactKernel kAvx2Kernel;
-const ContactKernel kAvx2Kernel = {"AVX2", face, pass};
+const ContactKernel kAvx2Kernel = {"AVX2", begin, pass, roll, any_moved};
 
 extern const DriveKernel kAvx2DriveKernel;
 const DriveKernel kAvx2DriveKernel = {"AVX2", integrate};

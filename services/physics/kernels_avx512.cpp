@@ -5,7 +5,7 @@
 namespace kilotwin::physics {
 
 extern const ContactKernel kAvx512Kernel;
-const ContactKernel kAvx512Kernel = {"AVX-512", face, pass};
+const ContactKernel kAvx512Kernel = {"AVX-512", begin, pass, roll, any_moved};
 
 extern const DriveKernel kAvx512DriveKernel;
 const DriveKernel kAvx512DriveKernel = {"AVX-512", integrate};

@@ -5,7 +5,7 @@
 namespace kilotwin::physics {
 
 extern const ContactKernel kBaselineKernel;
-const ContactKernel kBaselineKernel = {"baseline", face, pass};
+const ContactKernel kBaselineKernel = {"baseline", begin, pass, roll, any_moved};
 
 extern const DriveKernel kBaselineDriveKernel;
 const DriveKernel kBaselineDriveKernel = {"baseline", integrate};

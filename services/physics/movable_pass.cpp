@@ -2,9 +2,6 @@
 
 #include <algorithm>
 
-#include "services/physics/contact.hpp"
-#include "services/physics/contact_constants.hpp"
-
 namespace kilotwin::physics {
 namespace {
 

@@ -14,12 +14,11 @@
 #include <vector>
 
 #include "core/experiment/plan.hpp"
+#include "services/physics/contact_limits.hpp"
 #include "services/physics/contact_pass.hpp"
 #include "services/physics/contact_state.hpp"
 
 namespace kilotwin::physics {
-
-struct ContactLimits;
 
 class MovablePass {
  public:

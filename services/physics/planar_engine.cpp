@@ -69,15 +69,9 @@ void PlanarEngine::move(Tick from, const Inputs& inputs) {
 
 void PlanarEngine::set_off(Tick from) {
   const Bodies& known = population_.known();
-  const std::vector<Duties>& duties = population_.duties();
-  const std::vector<std::uint8_t>& driven = population_.driven();
-  const DriveModel& drive = population_.drive();
-  drives_.reserve(known.size());
   drives_.count = 0;
-  for (std::uint32_t i = 0; i < known.size(); ++i) {
-    if (driven[i] == 0 || !contact_.asks_drive(i)) continue;
-    drive.add(drives_, i, known.robot[i], from, duties[i], known.heading_rad[i], contact_.drive_part(i));
-  }
+  population_.drive().add(drives_, contact_.asks_drive(), known.robot, from, population_.duties(),
+                          known.heading_rad, contact_.drive_part());
   population_.complete(from, drives_);
 }
 
@@ -156,17 +150,7 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
 }
 
 std::uint64_t PlanarEngine::hash_part() const {
-  std::uint64_t sum = population_.hash_part();
-  for (const std::uint32_t robot : population_.listed().robot) {
-    if (!contact_.presses().any(robot)) continue;
-    const Press& press = contact_.presses()[robot];
-    sum += entity_hash(HashDomain::kContact, robot, {hash_bits(press.slip_x_mm), hash_bits(press.slip_y_mm)});
-    for (std::uint32_t p = 0; p < press.contacts; ++p) {
-      const Press::Touch& touch = press.touch[p];
-      sum += entity_hash(HashDomain::kContact, robot,
-                         {touch.other, hash_bits(touch.push_mm), hash_bits(touch.rub_mm), 1});
-    }
-  }
+  std::uint64_t sum = population_.hash_part() + contact_.hash_presses(population_.listed().robot);
   for (std::uint32_t m = 0; m < listed_movable_.size(); ++m) {
     if (listed_movable_[m] == 0) continue;
     const MovableState& b = contact_.movables()[m];

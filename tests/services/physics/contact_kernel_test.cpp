@@ -6,88 +6,105 @@
 #include <random>
 #include <vector>
 
+#include "core/base/pose.hpp"
 #include "services/physics/contact_batch.hpp"
 
 namespace kilotwin::physics {
 namespace {
 
+constexpr std::uint32_t kBatches = 6, kMostContacts = 7, kSeats = kBatches * kLanes, kSubSteps = 4;
+constexpr PassLimits kLimits{{0.3, 0.04}, 0.16, 0.17, 0.33, 20, 20, 6.25, 40.0 * 40, 16.5 / kSubSteps, kSubSteps};
+
 struct Scene {
   std::vector<ContactBatch> batches;
   std::vector<ContactLanes> contacts;
-  std::vector<double> now, after, x_mm, y_mm;
-  std::vector<std::uint32_t> there;
+  std::vector<SpecialLanes> specials;
+  std::vector<double> now, after;
+  // Per body.
+  std::vector<double> x_mm, y_mm, heading_rad, drive_x_mm, drive_y_mm, cos_turn, sin_turn, turn_rad;
+  std::vector<std::uint8_t> driven;
+
+  [[nodiscard]] BodyColumns bodies() const {
+    return {x_mm.data(),     y_mm.data(),     drive_x_mm.data(), drive_y_mm.data(),
+            cos_turn.data(), sin_turn.data(), turn_rad.data(),   driven.data()};
+  }
 };
 
 Scene make_scene(std::uint32_t seed) {
   std::mt19937 generator(seed);
   const auto value = [&](double size) { return (static_cast<double>(generator() % 20001) - 10000) / 10000 * size; };
-  constexpr std::uint32_t kBatches = 6, kContacts = 7, kSeats = kBatches * kLanes;
   Scene scene;
   scene.batches.resize(kBatches);
-  scene.contacts.resize(kBatches * kContacts);
+  scene.contacts.resize(kBatches * kMostContacts);
+  scene.specials.resize(kMostContacts);
   scene.now.resize(4 * kSeats);
   for (double& v : scene.now) v = value(0.3);
   scene.after = scene.now;
   for (std::uint32_t i = 0; i < kSeats; ++i) {
     scene.x_mm.push_back(value(50));
     scene.y_mm.push_back(value(50));
+    scene.heading_rad.push_back(value(3.14159));
+    for (std::vector<double>* const column : {&scene.drive_x_mm, &scene.drive_y_mm})
+      column->push_back(generator() % 5 == 0 ? 0 : value(0.1));
+    scene.turn_rad.push_back(value(0.1));
+    scene.cos_turn.push_back(std::cos(scene.turn_rad.back() / kSubSteps));
+    scene.sin_turn.push_back(std::sin(scene.turn_rad.back() / kSubSteps));
+    scene.driven.push_back(generator() % 4 != 0);
+  }
+  for (SpecialLanes& special : scene.specials) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      special.gain[lane] = 0.1;
+      special.friction[lane] = lane % 2 == 0 ? 0.1 : 2;
+    }
   }
   for (std::uint32_t b = 0; b < kBatches; ++b) {
     ContactBatch& batch = scene.batches[b];
-    batch.first_contact = b * kContacts;
-    batch.contacts = b == 0 ? 0 : kContacts - b % 3;
-    batch.passes = b == 0 ? 0 : 4;
+    batch.first_contact = b * kMostContacts;
+    batch.contacts = b == 0 ? 0 : kMostContacts - b;
+    batch.passes = b == 0 ? 0 : kSubSteps;
     batch.near_wall = b % 2 == 1;
     batch.special = b % 3 == 1;
+    batch.size = kLanes;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      batch.x_mm[lane] = scene.x_mm[b * kLanes + lane];
-      batch.y_mm[lane] = scene.y_mm[b * kLanes + lane];
-      for (double* const column : {batch.drive_x_mm, batch.drive_y_mm, batch.slip_x_mm, batch.slip_y_mm})
+      batch.body[lane] = static_cast<std::uint32_t>(b * kLanes + lane);
+      batch.discs[lane] = lane == 3 ? batch.contacts / 2 : batch.contacts;
+      for (double* const column : {batch.slip_x_mm, batch.slip_y_mm})
         column[lane] = generator() % 5 == 0 ? 0 : value(0.2);
-      const double* const row = scene.now.data() + 4 * (b * kLanes + lane);
-      batch.shift_x_mm[lane] = row[0];
-      batch.shift_y_mm[lane] = row[1];
-      batch.swing_x_mm[lane] = row[2];
-      batch.swing_y_mm[lane] = row[3];
-      batch.grip_mm[lane] = 0.04;
-      batch.cos_turn[lane] = 0.999;
-      batch.sin_turn[lane] = 0.01;
-      for (std::uint32_t p = 0; p < kContacts; ++p) {
+      for (std::uint32_t p = 0; p < kMostContacts; ++p) {
         ContactLanes& contact = scene.contacts[batch.first_contact + p];
         contact.push_mm[lane] = generator() % 3 == 0 ? 0 : std::abs(value(0.1));
         contact.rub_mm[lane] = value(0.1);
-        contact.spin_mm[lane] = value(0.1);
-        contact.gain[lane] = 0.1;
-        contact.friction[lane] = lane % 2 == 0 ? 0.1 : 2;
-        contact.other[lane] = static_cast<Seat>(generator() % kSeats);
+        contact.there[lane] = static_cast<std::uint32_t>(generator() % kSeats);
+        contact.other[lane] = contact.there[lane];
       }
     }
   }
-  for (std::size_t k = 0; k < kContacts * kLanes; ++k)
-    scene.there.push_back(static_cast<std::uint32_t>(generator() % kSeats));
   return scene;
 }
 
 /// All that the loops write.
 std::vector<double> results(const ContactKernel& kernel, std::uint32_t seed) {
   Scene scene = make_scene(seed);
-  std::vector<double> room_mm(7 * kLanes), all;
-  for (const ContactBatch& batch : scene.batches) {
-    all.push_back(kernel.face(batch, scene.there.data(), scene.x_mm.data(), scene.y_mm.data(),
-                              scene.contacts.data() + batch.first_contact));
+  std::vector<double> room_mm(kMostContacts * kLanes), all;
+  for (std::uint32_t b = 1; b < kBatches; ++b) {
+    const ContactBatch& batch = scene.batches[b];
+    const Start start =
+        kernel.begin(kLimits, seed % 3 == 0, scene.bodies(), scene.batches[b],
+                     scene.contacts.data() + batch.first_contact, scene.now.data() + 4 * kLanes * b);
+    all.push_back(start.nearest_mm);
+    all.push_back(start.is_new);
     for (std::uint32_t p = 0; p < batch.contacts; ++p) {
       ContactLanes& contact = scene.contacts[batch.first_contact + p];
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        contact.gap_mm[lane] =
-            std::fmod(contact.gap_mm[lane], 0.5);  // near enough to act, on both sides of a touch
+        // Near enough to act, on both sides of a touch.
+        if (contact.gap_mm[lane] < 100) contact.gap_mm[lane] = std::fmod(contact.gap_mm[lane], 0.5);
         if (!std::isfinite(contact.normal_x[lane])) contact.normal_x[lane] = 1, contact.normal_y[lane] = 0;
       }
     }
   }
-  const PassLimits limits{0.16, 0.17, 0.33, 20, 20, 6.25};
-  for (std::uint32_t step = 0; step < 4; ++step) {
-    kernel.pass(limits, step, seed % 2 == 0, scene.batches.data(), scene.batches.size(), scene.contacts.data(),
-                scene.now.data(), scene.after.data(), room_mm.data());
+  for (std::uint32_t step = 0; step < kSubSteps; ++step) {
+    kernel.pass(kLimits, step, seed % 2 == 0, scene.batches.data(), scene.batches.size(), scene.contacts.data(),
+                scene.specials.data(), scene.now.data(), scene.after.data(), room_mm.data());
     scene.now.swap(scene.after);
   }
   all.insert(all.end(), scene.now.begin(), scene.now.end());
@@ -100,6 +117,10 @@ std::vector<double> results(const ContactKernel& kernel, std::uint32_t seed) {
         all.insert(all.end(), column, column + kLanes);
     }
   }
+  const BodyColumns bodies = scene.bodies();
+  kernel.roll(kLimits, bodies, scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(), kSeats - 3);
+  for (const auto* column : {&scene.x_mm, &scene.y_mm, &scene.heading_rad})
+    all.insert(all.end(), column->begin(), column->end());
   return all;
 }
 
@@ -118,6 +139,58 @@ TEST(ContactKernel, EveryInstructionSetGivesTheSameBits) {
             << kernels[k]->name << ", scene " << seed << ", value " << i << ": " << measured[i] << " and "
             << expected[i];
       }
+    }
+  }
+}
+
+/// A body without contacts comes out of a batch as it does without one, and headings stay in their range.
+TEST(ContactKernel, RollsAsABatchDoes) {
+  const ContactKernel* kernels[3];
+  const std::size_t count = contact_kernels(kernels);
+  for (std::size_t k = 0; k < count; ++k) {
+    Scene scene = make_scene(5);
+    double room_mm[kLanes];
+    for (std::uint32_t b = 1; b < kBatches; ++b) {
+      ContactBatch& batch = scene.batches[b];
+      batch.contacts = 0;
+      batch.near_wall = batch.special = false;
+      kernels[k]->begin(kLimits, true, scene.bodies(), batch, scene.contacts.data(),
+                        scene.now.data() + 4 * kLanes * b);
+    }
+    for (std::uint32_t step = 0; step < kSubSteps; ++step) {
+      kernels[k]->pass(kLimits, step, false, scene.batches.data(), kBatches, scene.contacts.data(),
+                       scene.specials.data(), scene.now.data(), scene.after.data(), room_mm);
+      scene.now.swap(scene.after);
+    }
+    const Scene before = scene;
+    constexpr std::uint32_t kRolled = kSeats - 3;
+    kernels[k]->roll(kLimits, before.bodies(), scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(),
+                     kRolled);
+    for (std::uint32_t i = kLanes; i < kSeats; ++i) {
+      const bool rolled = i < kRolled;
+      EXPECT_EQ(scene.x_mm[i], before.x_mm[i] + (rolled ? scene.now[4 * i] : 0)) << kernels[k]->name << ' ' << i;
+      EXPECT_EQ(scene.y_mm[i], before.y_mm[i] + (rolled ? scene.now[4 * i + 1] : 0))
+          << kernels[k]->name << ' ' << i;
+      EXPECT_EQ(scene.heading_rad[i],
+                rolled ? wrapped(before.heading_rad[i] + before.turn_rad[i]) : before.heading_rad[i]);
+    }
+  }
+}
+
+TEST(ContactKernel, SeesWhoMoved) {
+  const ContactKernel* kernels[3];
+  const std::size_t count = contact_kernels(kernels);
+  for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t who = 0; who < 19; ++who) {
+      std::vector<double> x(19, 3), y(19, -4);
+      const std::vector<double> from_x = x, from_y = y;
+      x[who] += 0.6;
+      y[who] -= 0.8;
+      const auto moved = [&](double square_mm2) {
+        return kernels[k]->any_moved(x.data(), y.data(), from_x.data(), from_y.data(), 19, square_mm2);
+      };
+      EXPECT_TRUE(moved(0.999));
+      EXPECT_FALSE(moved(1.001));
     }
   }
 }

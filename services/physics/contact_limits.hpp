@@ -1,0 +1,55 @@
+/// What of planar contact is fixed for a run. contact.hpp states the law.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/pose.hpp"
+#include "core/experiment/plan.hpp"
+#include "services/physics/contact_batch.hpp"
+#include "services/physics/contact_constants.hpp"
+#include "services/physics/drive.hpp"
+
+namespace kilotwin::physics {
+
+/// Overlapping bodies move apart at most at this speed each, mm/s: the speed of a wheel at the calibrated turn.
+inline constexpr double kSeparation_mm_s = 20;
+
+/// What is fixed for a run.
+struct ContactLimits {
+  ContactLimits(const RunPlan&, const DriveModel&);
+
+  std::uint32_t sub_steps;
+  double separation_mm;  ///< of an overlapping body per sub-step
+  double stride_mm;      ///< no body moves further in a sub-step
+  double cutoff_mm;      ///< bodies whose centres are farther apart at the tick's start cannot meet within the tick
+  double
+      margin_mm;  ///< from a partition's rectangle: all that can matter within a tick, and where bodies can get to
+  double x_limit_mm, y_limit_mm;  ///< the centre of a disc stays within +-limit
+  double touch_mm;      ///< a contact carries force up to this gap: who follows another at full speed keeps it
+  double rim_friction;  ///< between two robots
+  double thrust_mm, hold_mm;  ///< grip of a driven and of a resting robot, as contact_state.hpp has forces
+
+  [[nodiscard]] bool outside(double x_mm, double y_mm) const {
+    return x_mm > x_limit_mm || x_mm < -x_limit_mm || y_mm > y_limit_mm || y_mm < -y_limit_mm;
+  }
+  /// Whether it could get to a wall within the tick, or within another `more_mm`.
+  [[nodiscard]] bool near_wall(double x_mm, double y_mm, double more_mm) const {
+    const double way_mm = sub_steps * stride_mm + more_mm;
+    return x_mm > x_limit_mm - way_mm || x_mm < way_mm - x_limit_mm || y_mm > y_limit_mm - way_mm ||
+           y_mm < way_mm - y_limit_mm;
+  }
+  [[nodiscard]] PassLimits of_pass() const {
+    return {{hold_mm, thrust_mm},
+            separation_mm,
+            stride_mm,
+            touch_mm,
+            x_limit_mm,
+            y_limit_mm,
+            rim_friction,
+            cutoff_mm * cutoff_mm,
+            kRobotRadius_mm / sub_steps,
+            sub_steps};
+  }
+};
+
+}  // namespace kilotwin::physics
