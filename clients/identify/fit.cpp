@@ -345,39 +345,53 @@ void Fitter::fit_noise(MotionModel& model) const {
     return gradient;
   };
   // Broyden, Fletcher, Goldfarb and Shanno, on logarithms of variances.
+  const auto climb = [&](NoiseVector& at) {
+    double value = value_at(at);
+    NoiseVector gradient = gradient_at(at);
+    // A log variance is known to about sqrt(2 / n).
+    const double curvature =
+        std::max<double>(10, 0.1 * static_cast<double>(parts_at(at).size()) * LogLikelihood::kPart);
+    Eigen::Matrix<double, kNoises, kNoises> inverse =
+        Eigen::Matrix<double, kNoises, kNoises>::Identity() / curvature;
+    for (int pass = 0; pass < 20; ++pass) {
+      NoiseVector move = inverse * gradient;
+      const double longest = move.cwiseAbs().maxCoeff();
+      if (longest > 1.5) move *= 1.5 / longest;
+      bool better = false;
+      double gained = 0;
+      for (int halve = 0; halve < 6; ++halve, move *= 0.3) {
+        const double found = value_at(at + move);
+        if (!(found > value)) continue;
+        gained = found - value;
+        value = found;
+        better = true;
+        break;
+      }
+      if (!better) break;
+      at += move;
+      if (gained < 0.3) break;
+      const NoiseVector next = gradient_at(at);
+      const NoiseVector change = gradient - next;  // of the negative
+      const double along = change.dot(move);
+      if (along > 1e-9) {
+        const Eigen::Matrix<double, kNoises, kNoises> side =
+            Eigen::Matrix<double, kNoises, kNoises>::Identity() - move * change.transpose() / along;
+        inverse = (side * inverse * side.transpose() + move * move.transpose() / along).eval();
+      }
+      gradient = next;
+    }
+    return value;
+  };
   NoiseVector at = to_vector(model.noise);
-  double value = value_at(at);
-  NoiseVector gradient = gradient_at(at);
-  // A log variance is known to about sqrt(2 / n).
-  const double curvature =
-      std::max<double>(10, 0.1 * static_cast<double>(parts_at(at).size()) * LogLikelihood::kPart);
-  Eigen::Matrix<double, kNoises, kNoises> inverse = Eigen::Matrix<double, kNoises, kNoises>::Identity() / curvature;
-  for (int pass = 0; pass < 20; ++pass) {
-    NoiseVector move = inverse * gradient;
-    const double longest = move.cwiseAbs().maxCoeff();
-    if (longest > 1.5) move *= 1.5 / longest;
-    bool better = false;
-    double gained = 0;
-    for (int halve = 0; halve < 6; ++halve, move *= 0.3) {
-      const double found = value_at(at + move);
-      if (!(found > value)) continue;
-      gained = found - value;
-      value = found;
-      better = true;
-      break;
-    }
-    if (!better) break;
-    at += move;
-    if (gained < 0.3) break;
-    const NoiseVector next = gradient_at(at);
-    const NoiseVector change = gradient - next;  // of the negative
-    const double along = change.dot(move);
-    if (along > 1e-9) {
-      const Eigen::Matrix<double, kNoises, kNoises> side =
-          Eigen::Matrix<double, kNoises, kNoises>::Identity() - move * change.transpose() / along;
-      inverse = (side * inverse * side.transpose() + move * move.transpose() / along).eval();
-    }
-    gradient = next;
+  const double value = climb(at);
+  // What once seemed to be no noise has no slope any more that would lead back; a new start shows whether it is some.
+  constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
+  if (std::exp(at[4]) < kNone_mm2 || std::exp(at[0]) < kNone_s) {
+    NoiseVector anew = at;
+    anew[0] = std::max(at[0], middle[0]);
+    anew[3] = std::min(at[3], std::log(1e-2));
+    anew[4] = std::max(at[4], std::log(0.1));
+    if (climb(anew) > value) at = anew;
   }
   model.noise = to_noise(at, model.noise);
 }

@@ -1,0 +1,165 @@
+// Laws of the refinement: evidence in closed form, smoothness that fits the data, shapes and instants recovered.
+#include "clients/identify/refine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "clients/identify/widen.hpp"
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// What acts on the robots of a set.
+struct Acting {
+  std::function<double(double since_s)> gain = [](double) { return 1.0; };
+  std::function<double(double time_s)> drift_x_mm_s = [](double) { return 0.0; };
+};
+
+/// Robots far from each other that go straight and turn by turns, by arcs of 20 ms, with noise of wheels and tracker.
+MeasuredSet played(const Acting& acting, std::uint64_t seed, std::uint32_t robots, double duration_s) {
+  const Random random(seed);
+  const double dt = 0.02, factor_s = 0.001, tracker_mm = 0.5, tracker_rad = 0.03;
+  MeasuredSet set;
+  set.has_commands = set.has_headings = true;
+  Run& run = set.runs.emplace_back();
+  run.name = "r";
+  for (std::uint32_t robot = 0; robot < robots; ++robot) {
+    Track& track = run.tracks.emplace_back();
+    track.robot = robot;
+    double x = 3000.0 * robot, y = 0, heading = robot, since_s = 0, next_s = 0;
+    track.commands.push_back({-1e300, Motion::kStop});
+    for (int k = 0; k * dt <= duration_s; ++k) {
+      const double t = k * dt;
+      const auto noise = [&](Stream stream, std::uint32_t draw) {
+        return random.normal(stream, robot, Tick{k}, draw);
+      };
+      if (k % 25 == 0)
+        track.samples.push_back({t, x + 9.2 * std::cos(heading) + tracker_mm * noise(Stream::kMeasurementNoise, 0),
+                                 y + 9.2 * std::sin(heading) + tracker_mm * noise(Stream::kMeasurementNoise, 1),
+                                 wrapped_angle(heading + tracker_rad * noise(Stream::kMeasurementNoise, 2))});
+      if (t >= next_s - 1e-9) {
+        const bool straight = track.commands.back().motion != Motion::kStraight;
+        const double draw = random.uniform(Stream::kLayout, robot, Tick{k}, 0);
+        track.commands.push_back({t, straight ? Motion::kStraight : draw < 0.5 ? Motion::kLeft : Motion::kRight});
+        next_s = t + (straight ? 3 + 6 * draw : 1 + 2 * draw);
+        since_s = 0;
+      }
+      const Eigen::Vector2d v =
+          acting.gain(since_s) * nominal_speeds(BaseParameters{}, track.commands.back().motion);
+      const double sd = std::sqrt(factor_s / dt);
+      Rates rates;
+      rates.left_mm_s = v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
+      rates.right_mm_s = v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
+      rates.world_x_mm_s = acting.drift_x_mm_s(t);
+      const Arc arc = arc_of(rates, 25, heading, dt);
+      x += arc.dx_mm;
+      y += arc.dy_mm;
+      heading += arc.dheading_rad;
+      since_s += dt;
+    }
+  }
+  return set;
+}
+
+Factor cosines(Covariate of, double high, std::uint32_t count, double warp) {
+  Factor f;
+  f.shape = Factor::Shape::kCosines;
+  f.axis.of = of;
+  f.high = high;
+  f.count = count;
+  f.warp = warp;
+  return f;
+}
+
+Term unfitted(const std::string& name, std::vector<Block> blocks) {
+  Eigen::Index columns = 0;
+  for (const Block& block : blocks) columns += static_cast<Eigen::Index>(block.basis.size());
+  return {name, std::move(blocks), Eigen::VectorXd::Zero(columns), Eigen::VectorXd::Constant(columns, 0.01)};
+}
+
+TEST(Refine, EvidenceOfOneColumnIsInClosedForm) {
+  const double information = 7, score = 3, sd = 0.8;
+  const Eigen::MatrixXd i = Eigen::MatrixXd::Constant(1, 1, information);
+  const double expected =
+      0.5 * score * score / (information + 1 / (sd * sd)) - 0.5 * std::log(1 + sd * sd * information);
+  EXPECT_NEAR(log_evidence(i, Eigen::VectorXd::Constant(1, score), Eigen::VectorXd::Constant(1, sd)), expected,
+              1e-12);
+}
+
+TEST(Refine, SmoothnessFollowsTheData) {
+  // Twenty columns told apart by the data, the first four of which are there.
+  const Eigen::MatrixXd information = 400 * Eigen::MatrixXd::Identity(20, 20);
+  ColumnGroup group;
+  Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(20);
+  for (Eigen::Index k = 0; k < 20; ++k) {
+    group.columns.push_back(k);
+    group.roughness.push_back(static_cast<double>(k + 1));
+    if (k < 4) coefficients[k] = 1;
+  }
+  std::vector<Smoothness> smoothness;
+  Eigen::VectorXd sd;
+  EXPECT_GT(choose_smoothness(information, information * coefficients, {group}, smoothness, sd), 500);
+  EXPECT_GT(sd[0], 0.4);
+  EXPECT_LT(sd[19], 0.05 * sd[0]);
+  // Nothing there, nothing chosen.
+  smoothness.clear();
+  EXPECT_EQ(choose_smoothness(information, Eigen::VectorXd::Zero(20), {group}, smoothness, sd), 0);
+  EXPECT_EQ(sd.maxCoeff(), 0);
+}
+
+TEST(Refine, ASharpShapeIsRecovered) {
+  Acting acting;
+  acting.gain = [](double s) { return s < 0.8 ? 0.4 : std::min(1.0, 0.4 + 0.5 * (s - 0.8)); };
+  const MeasuredSet set = played(acting, 5, 8, 120);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  const double before = fitter.log_likelihood(model);
+  model.terms.push_back(
+      unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
+  fitter.fit(model, 2);
+  const double coarse = fitter.log_likelihood(model);
+  refine(fitter, model, 0);
+  EXPECT_GT(coarse, before + 100);
+  EXPECT_GT(fitter.log_likelihood(model), coarse + 100);
+  // Its size shows against that of later times.
+  const auto gain_at = [&](double since_s) {
+    Situation s;
+    s.commands.command = Motion::kStraight;
+    s.commands.since_s = since_s;
+    return model.rates(s, Eigen::Vector2d::Zero()).left_gain;
+  };
+  const double late = gain_at(5);
+  for (const double s : {0.4, 1.4, 2.5}) EXPECT_NEAR(gain_at(s) / late, acting.gain(s), 0.06) << s;
+}
+
+TEST(Refine, TheInstantOfAPulseIsFound) {
+  Acting acting;
+  acting.drift_x_mm_s = [](double t) { return t >= 40.2 && t < 41 ? 15.0 : 0.0; };
+  const MeasuredSet set = played(acting, 6, 8, 80);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
+  model.terms.push_back(
+      unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+  EXPECT_EQ(find_steps(fitter, model, 0), "drift-by-time");
+  const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
+  ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
+  ASSERT_EQ(steps.points.size(), 2u);
+  // Samples lie half a second apart.
+  EXPECT_NEAR(steps.points[0], 40.2, 0.3);
+  EXPECT_NEAR(steps.points[1], 41, 0.3);
+  // How far it moved the robots is surer than how fast.
+  EXPECT_NEAR(model.terms[0].coefficients[0] * (steps.points[1] - steps.points[0]), 12, 1);
+}
+
+}  // namespace
+}  // namespace kilotwin::identify
