@@ -487,6 +487,20 @@ void Fitter::fit_base(MotionModel& model) const {
   }
 }
 
+void Fitter::fit_surroundings(MotionModel& model) const {
+  // With much noise at walls it would not matter where they are.
+  const Noise anew;
+  for (double Noise::*const part :
+       {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
+    model.noise.*part = anew.*part;
+  for (int round = 0; round < (set_.set().has_headings ? 1 : 2); ++round) {
+    find_walls(model);
+    set_.find_centres(model, threads_);
+    fit_touching(model);
+    fit(model, 1);
+  }
+}
+
 void Fitter::fit(MotionModel& model, int passes) const {
   const std::vector<Block> blocks = blocks_of(model);
   for (int pass = 0; pass < passes; ++pass) {

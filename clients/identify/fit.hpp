@@ -61,6 +61,8 @@ class Fitter {
 
   /// All of a model of which nothing is known: walls and what touching does as well.
   void fit_base(MotionModel&) const;
+  /// Looks again at walls, discs and what touching does, with effects in the model that had passed for part of it.
+  void fit_surroundings(MotionModel&) const;
   /// Fits base, biases, noise and the coefficients of the model's terms. Few passes suffice from a fitted model.
   void fit(MotionModel&, int passes) const;
   /// The noise alone: a quasi-Newton search on the likelihood of some of the tracks.

@@ -56,6 +56,8 @@ class Loop {
         if (fitter_.log_likelihood(out_.model) < likelihood + 3) {
           out_ = before;
           failed_.insert(hypothesis(*best).name);
+        } else {
+          fitter_.fit_surroundings(out_.model);
         }
         continue;
       }

@@ -209,13 +209,13 @@ Eigen::Matrix3d TrackFilter::jacobian(const Situation& at) const {
     h(1, 2) = base.ahead_mm * c - base.left_mm * s;
     return h;
   }
-  const double steps[] = {0.5, 0.5, 1e-3};
+  // Differences on one side: what trackers add bends far less within these steps.
+  const Eigen::Vector3d here = model_->measured(m[0], m[1], m[2], at);
+  const double steps[] = {0.1, 0.1, 1e-4};
   for (int i = 0; i < 3; ++i) {
     Eigen::Vector3d d = Eigen::Vector3d::Zero();
     d[i] = steps[i];
-    h.col(i) = (model_->measured(m[0] + d[0], m[1] + d[1], m[2] + d[2], at) -
-                model_->measured(m[0] - d[0], m[1] - d[1], m[2] - d[2], at)) /
-               (2 * steps[i]);
+    h.col(i) = (model_->measured(m[0] + d[0], m[1] + d[1], m[2] + d[2], at) - here) / steps[i];
   }
   return h;
 }
