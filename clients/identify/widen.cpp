@@ -285,6 +285,14 @@ void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t pl
   steps.gain = picked.evidence - price * static_cast<double>(picked.points.size()) - had;
 }
 
+/// What a curve over time has gained by many columns beside what it explains: half the log determinant of its posterior.
+double bends(const Fitter& fitter, const MotionModel& model, std::size_t place) {
+  const Linear l = linear(fitter, model, place, {});
+  const Beside now = beside(l, l.score_without(model.terms[place].coefficients), l.of_term());
+  const Eigen::VectorXd sd = model.terms[place].precision.cwiseInverse().cwiseSqrt();
+  return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
+}
+
 /// Puts the steps into the model, at times found on ever finer rasters. False: they came to be in disorder.
 bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, const Steps& steps, double apart_s) {
   constexpr int kSide = 6, kRaster = 2 * kSide + 1;
@@ -363,23 +371,30 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
                            picture = {{Target::kMeasuredX, basis, kAlways}, {Target::kMeasuredY, basis, kAlways}};
   const bool in_room = is_world(kinds.front().target), in_picture = kinds.front().target == Target::kMeasuredX;
   if (in_room || in_picture) forms.push_back({in_room ? picture : room, false, {}, 0});
-  const Steps* best = nullptr;
-  for (Steps& form : forms) {
-    choose_steps(fitter, model, place, points, form);
+  // On the raster an instant is only roughly known: what it is worth shows once it is found.
+  MotionModel best = model;
+  double best_worth = 0;
+  for (std::size_t f = 0; f < forms.size(); ++f) {
+    Steps& form = forms[f];
     constexpr double kBetter = 2;
-    if (!form.at_s.empty() && form.gain > kBetter && (best == nullptr || form.gain > best->gain)) best = &form;
+    const bool other = f == 2;
+    choose_steps(fitter, model, place, points, form);
+    if (form.at_s.empty() || (form.gain < kBetter && !other)) continue;
+    MotionModel trial = model;
+    if (!put_steps(fitter, trial, place, form, apart_s)) continue;
+    if (other) trial.terms[place].name = in_room ? "camera-by-time" : "drift-by-time";
+    fitter.fit(trial, 2);
+    if (form.beside) settle(fitter, trial, place);
+    // A step costs the choice of its instant, and its sizes; a curve goes for what it bends.
+    const double price = std::log(static_cast<double>(points.size())) + 3 * static_cast<double>(form.kinds.size());
+    const double curve = form.beside ? 0 : bends(fitter, model, place);
+    const double worth = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
+                         price * static_cast<double>(form.at_s.size());
+    if (worth <= best_worth) continue;
+    best_worth = worth;
+    best = trial;
   }
-  if (best == nullptr) return name;
-  MotionModel trial = model;
-  if (!put_steps(fitter, trial, place, *best, apart_s)) return name;
-  const bool other = best == &forms.back() && forms.size() == 3;
-  if (other) trial.terms[place].name = in_room ? "camera-by-time" : "drift-by-time";
-  fitter.fit(trial, 2);
-  if (best->beside) settle(fitter, trial, place);
-  // Fewer columns may explain a little less.
-  const double allowed = 0.5 * static_cast<double>(model.terms[place].coefficients.size());
-  if (fitter.log_likelihood(trial) < fitter.log_likelihood(model) - allowed) return name;
-  model = trial;
+  model = best;
   return model.terms[place].name;
 }
 

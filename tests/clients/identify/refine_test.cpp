@@ -161,5 +161,30 @@ TEST(Refine, TheInstantOfAPulseIsFound) {
   EXPECT_NEAR(model.terms[0].coefficients[0] * (steps.points[1] - steps.points[0]), 12, 1);
 }
 
+// A shift that stays is as good as a push; one that is put right takes half as many steps as two pushes.
+TEST(Refine, AShiftOfThePictureIsNotADrift) {
+  Acting acting;
+  MeasuredSet set = played(acting, 7, 8, 80);
+  for (Track& track : set.runs[0].tracks)
+    for (Sample& s : track.samples)
+      if (s.time_s >= 33.3 && s.time_s < 55.3) s.x_mm += 6;
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
+  model.terms.push_back(
+      unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+  EXPECT_EQ(find_steps(fitter, model, 0), "camera-by-time");
+  EXPECT_EQ(model.terms[0].blocks[0].target, Target::kMeasuredX);
+  const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
+  double shift_mm = 0;
+  for (std::size_t i = 0; i < steps.points.size(); ++i)
+    if (steps.points[i] < 45) shift_mm += model.terms[0].coefficients[static_cast<Eigen::Index>(i)];
+  EXPECT_NEAR(shift_mm, 6, 0.5);
+}
+
 }  // namespace
 }  // namespace kilotwin::identify
