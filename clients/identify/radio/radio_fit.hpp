@@ -10,8 +10,9 @@ struct FitOptions {
   std::filesystem::path train,
       test;  ///< directories of comm_tau*_run*.dat; test empty: every other run of each set is held out
   std::filesystem::path out;
-  int runs = 40;     ///< simulated for each effect and set
-  int swarms = 200;  ///< drawn from the fitted population
+  bool swap = false;  ///< fit to the half that is else held out, and test on the other
+  int runs = 40;      ///< simulated for each effect and set
+  int swarms = 200;   ///< drawn from the fitted population
 };
 
 /// Writes model.txtpb (range, pattern and spreads), model-SET.txtpb (with that set's 25 robots), result.json, effects.md (the
