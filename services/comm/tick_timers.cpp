@@ -18,7 +18,7 @@ TickTimers::TickTimers(const RunPlan& plan) {
   std::vector<double> error(robots);
   for (std::uint32_t i = 0; i < robots; ++i) error[i] = spread * random.normal(Stream::kOscillator, i, Tick{0}, 0);
   for (const proto::RobotRadio& known : plan.experiment().radio().propagation().robot()) {
-    if (known.robot() < robots && known.has_oscillator()) error[known.robot()] = known.oscillator();
+    if (known.robot() < robots && known.has_oscillator()) error[known.robot()] += known.oscillator();
   }
   for (std::uint32_t i = 0; i < robots; ++i) {
     const double rate = 1 + error[i];

@@ -20,7 +20,7 @@ class TickTimers {
  public:
   static constexpr std::uint8_t kRegular = 255;
 
-  /// Rates and phases are drawn from the plan's seed. The first interrupt of a robot comes within its first period.
+  /// Rates and phases are drawn from the plan's seed; what is known of a robot's rate is added. The first interrupt of a robot comes within its first period.
   explicit TickTimers(const RunPlan&);
 
   /// When robot `i` is interrupted next.

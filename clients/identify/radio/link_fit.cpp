@@ -301,7 +301,9 @@ LinkModel Fit::run() {
     const auto at = static_cast<Eigen::Index>(r);
     swarm.margin_db(row.receiver, row.sender) = margin_(at);
     // A margin that is not known well means chances nearer to even: the one that gives them, with the noise of runs alone.
-    const double even = margin_(at) * (1 / std::sqrt(1 + variance(at) / (swarm.run_sd_db * swarm.run_sd_db)) - 1);
+    // Where everybody is heard, the model's distances know better.
+    const double wider = std::sqrt(1 + variance(at) / (swarm.run_sd_db * swarm.run_sd_db));
+    const double even = row.distance_mm > kSurelyHeard_mm ? margin_(at) * (1 / wider - 1) : 0;
     if (terms_ >= Terms::kPairs) {
       const Group &pair = groups_[next + 4], &link = groups_[next + 5];
       swarm.link_db(row.receiver, row.sender) = (pair.sd_db * pair.sd_db * pair.covariance.row(at).dot(dual_)) +

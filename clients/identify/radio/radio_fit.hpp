@@ -12,8 +12,9 @@ struct FitOptions {
   std::filesystem::path train,
       test;  ///< directories of comm_tau*_run*.dat; test empty: every other run of each set is held out
   std::filesystem::path out;
-  int runs = 40;     ///< simulated for each effect and set
-  int swarms = 200;  ///< drawn from the fitted population
+  bool swap = false;  ///< fit to the half that is else held out, and test on the other
+  int runs = 40;      ///< simulated for each effect and set
+  int swarms = 200;   ///< drawn from the fitted population
   /// Gets how far the work is, 0..1, and what each effect showed; none: that is said on the screen.
   std::function<void(double, const std::string&)> progress = {};
 };

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   app.add_option("--test", options.test, "directory of runs to test on; none: every other run of --train");
   app.add_option("--out", options.out, "directory for model.txtpb, result.json, effects.md and figures")
       ->required();
+  app.add_flag("--swap", options.swap, "fit to the half of the runs that is else held out");
   app.add_option("--runs", options.runs, "simulated for each effect and set")->check(CLI::Range(4, 10000));
   app.add_option("--swarms", options.swarms, "drawn from the fitted population")->check(CLI::Range(1, 10000));
   try {
