@@ -134,8 +134,14 @@ std::string report_html(const json& document) {
     better += figures.place(plot_steps(gnuplot, part(document, "steps"), errors.floor.value_or(std::nan(""))),
                             "Error as the model grew, one effect at a time; dashed: the floor");
   }
+  const std::string robots =
+      figures.place(plot_robots(gnuplot, part(document, "robots")), "Each robot's error, largest first");
+  // A row of its own where there are many.
+  const json& all_robots = part(document, "robots");
+  const bool many = all_robots.is_array() && all_robots.size() > 24;
+  if (!many) better += robots;
   if (!better.empty()) better = "<div class=\"grid\">" + better + "</div>\n";
-  better += figures.place(plot_robots(gnuplot, part(document, "robots")), "Each robot's error, largest first");
+  if (many) better += robots;
   page += section("better", "By how much it is better", better_lead(contract), better);
   page += given_tables(part(document, "tables"));
   page +=

@@ -88,13 +88,15 @@ std::string cards(const json& contract, const json& document, Figures& figures) 
     }
     out += "</dl></div>";
     out += "<div>";
+    std::string plots;
     for (const json& curve : part(document, "effect_curves")) {
       if (text(curve, "name") == text(effect, "name") && !text(effect, "name").empty())
-        out += figures.place(plot_effect(figures.plots(), curve), "The effect, as it is in the model");
+        plots += figures.place(plot_effect(figures.plots(), curve), "The effect, as it is in the model");
     }
-    const json* plot = covariate_plots.is_array() ? plot_for(effect, covariate_plots) : nullptr;
+    const json* plot = covariate_plots.is_array() && plots.empty() ? plot_for(effect, covariate_plots) : nullptr;
     if (plot != nullptr && shown.insert(plot).second)
-      out += figures.place(plot_covariate(figures.plots(), *plot), "What it left in the residuals");
+      plots += figures.place(plot_covariate(figures.plots(), *plot), "What it left in the residuals");
+    out += plots;
     out += "</div></article>\n";
   }
   return out;

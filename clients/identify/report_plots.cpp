@@ -279,7 +279,7 @@ PlotNumber plot_distribution(Gnuplot& plots, const json& distribution) {
                           edges.front(), edges.back());
   commands += "plot $d using 1:2:4 with boxes fc rgb '#c3ccd5' fs solid 1 noborder title 'measured', ";
   if (base.size() == measured.size()) commands += "$d using 1:5 with histeps lt 5 title 'base model', ";
-  commands += "$d using 1:3 with histeps lc rgb '#2563a8' lw 2 title 'this model'";
+  commands += "$d using 1:3 with histeps lc rgb '#2563a8' lw 2 dt solid title 'this model'";
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
@@ -384,7 +384,8 @@ PlotNumber plot_robots(Gnuplot& plots, const json& robots) {
   commands +=
       "plot $d using 1:2:(0):($3-$2) with vectors nohead lw 1.2 lc rgb '#c8d0d9' notitle, "
       "$d using 1:2 with points lt 1 ps 0.7 title 'before', $d using 1:3 with points lt 2 ps 0.7 title 'after'";
-  return plots.add(2 * kHalf_px, kLow_px, commands);
+  constexpr std::size_t kFew = 24;
+  return plots.add(rows.size() <= kFew ? kHalf_px : 2 * kHalf_px, kLow_px, commands);
 }
 
 }  // namespace kilotwin::identify

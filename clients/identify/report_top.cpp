@@ -79,9 +79,17 @@ std::string verdict(const json& contract) {
   }
   const json& simulated = part(contract, "simulated");
   if (part(simulated, "agrees").is_boolean()) {
-    out += part(simulated, "agrees").get<bool>()
-               ? " <a href=\"#simulated\">Simulated</a>, its robots are not told from the measured ones."
-               : " <a href=\"#simulated\">Simulated</a>, its robots still differ from the measured ones.";
+    std::size_t differ = 0, all = 0;
+    for (const json& s : part(simulated, "statistics")) {
+      ++all;
+      if (part(s, "agrees") == json(false)) ++differ;
+    }
+    out += differ == 0 ? " <a href=\"#simulated\">Simulated</a> by the written model, robots are not told from the "
+                         "measured ones."
+                       : fmt::format(
+                             " <a href=\"#simulated\">Simulated</a> by the written model, robots differ from the "
+                             "measured ones in {} of {} respects.",
+                             differ, all);
   }
   const json& faults = part(contract, "faults");
   if (const auto share = share_explained(e); share && count > 0)

@@ -202,13 +202,14 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
       return compare(statistic, measured[s], all);
     };
     const Comparison is = of(first_full), was = first_full == 0 ? is : of(0);
+    const double scale = statistic.kind == Statistic::Kind::kSquares ? 100 : 1;  // of the logarithm: per cent
     entries[s] = {{"name", statistic.name},
                   {"unit", statistic.distance_unit},
-                  {"distance", is.distance},
-                  {"by_chance_95", is.by_chance_95},
+                  {"distance", scale * is.distance},
+                  {"by_chance_95", scale * is.by_chance_95},
                   {"p", is.p},
                   {"agrees", told ? json(is.p >= kSurprise) : json()},
-                  {"base_distance", was.distance},
+                  {"base_distance", scale * was.distance},
                   {"base_p", was.p}};
   });
   for (std::size_t s = 0; s < entries.size(); ++s) {

@@ -11,7 +11,7 @@ namespace kilotwin::identify {
 namespace {
 
 constexpr std::size_t kBins = 36, kTimeBins = 12;
-constexpr double kWallBins_mm = 10, kFarthest_mm = 200;
+constexpr double kWallBins_mm = 20;
 /// Nearer to where walls stop it than this a robot is at the wall, mm.
 constexpr double kAtWall_mm = 8;
 /// Without headings the turn between two ways is seen where both are longer than this, mm.
@@ -154,11 +154,14 @@ TrackStatistics::TrackStatistics(const std::vector<const Track*>& tracks, const 
   std::vector<double> lags;
   for (const double lag_s : {1., 2., 5., 10., 20., 50., 100., 200., 500., 1000.})
     if (lag_s >= quantile(steps, 0.5) * 0.99 && lag_s <= 0.5 * (last_s_ - first_s_)) lags.push_back(lag_s);
-  if (lags.size() >= 2)
-    list_.push_back({Statistic::Kind::kSquares, "mean square displacement", "s", lags, "in the logarithm"});
+  if (lags.size() >= 2) list_.push_back({Statistic::Kind::kSquares, "mean square displacement", "s", lags, "%"});
   if (!has_walls_) return;
+  std::vector<double> from_walls;
+  for (const Track* track : tracks)
+    for (const Sample& s : track->samples) from_walls.push_back(wall_distance_mm(s));
+  const double farthest_mm = std::max(kWallBins_mm, quantile(from_walls, 0.995));
   list_.push_back({Statistic::Kind::kHistogram, "distance from the walls", "mm",
-                   edges(0, kFarthest_mm, static_cast<std::size_t>(kFarthest_mm / kWallBins_mm)), "mm"});
+                   edges(0, farthest_mm, static_cast<std::size_t>(farthest_mm / kWallBins_mm) + 1), "mm"});
   list_.push_back({Statistic::Kind::kMeans, "share of time at walls", "", {0}, ""});
 }
 
