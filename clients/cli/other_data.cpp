@@ -4,22 +4,17 @@
 
 #include "clients/cli/radio_data.hpp"
 #include "clients/identify/bristle/identify_ridden.hpp"
-#include "clients/identify/kilogrid/identify_floor.hpp"
 #include "clients/identify/import.hpp"
+#include "clients/identify/kilogrid/identify_floor.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::cli {
 namespace fs = std::filesystem;
 
 std::optional<identify::Identified> identify_other_data(const fs::path& train, const fs::path& test,
-<<<<<<< HEAD
                                                         const fs::path& out, const identify::Options& options) {
-  if (identify::has_trajectories(train)) return std::nullopt;
-=======
-                                                        const identify::Options& options) {
   // A recording's columns begin like a floor's.
   if (identify::has_trajectories(train) || !identify::importable(train).empty()) return std::nullopt;
->>>>>>> report4
   const auto same_kind = [&](bool is, const char* kind) {
     if (!test.empty() && !is)
       throw UserError(fmt::format("--test {}: it does not hold {}, as --train does", test.string(), kind));

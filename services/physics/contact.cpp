@@ -45,7 +45,7 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
   for (const MovableState& body : movables_) any_moves |= body.moves();
   if (active_count_ == 0 && !any_moves) return false;
 
-  if (own.empty() && !has_shapes_) {
+  if (own.empty() && !has_shapes_ && !any_overlap_) {
     keep_seats(bodies);
     rest_who_can();
     return true;

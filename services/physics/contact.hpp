@@ -42,7 +42,8 @@ namespace kilotwin::physics {
 ///
 /// Seats of bodies, and their forces there, are kept from tick to tick where one partition holds all and only discs and straight
 /// walls are there: until somebody has moved by half of a skin. Contacts that the skin adds are beyond the cutoff and do
-/// nothing, so that no result depends on when seats were given. Else they are given anew in each tick.
+/// nothing, so that no result depends on when seats were given. Else, and while discs overlap, which may then have more contacts
+/// than a press keeps, they are given anew in each tick.
 class ContactSolver {
  public:
   ContactSolver(const RunPlan&, const DriveModel&);
@@ -144,7 +145,7 @@ class ContactSolver {
   std::vector<Mover> movers_, seated_;  ///< by hops; by seats
   std::vector<std::uint32_t> others_;   ///< the contacts of the movers
   std::size_t other_count_ = 0;
-  bool any_overlap_ = false, has_others_ = false;
+  bool any_overlap_ = true, has_others_ = false;
   std::size_t active_count_ = 0;
   const World world_;
   bool has_immobile_ = false;
