@@ -41,6 +41,13 @@ struct Surrogate {
   Eigen::MatrixXd slopes;  ///< per statistic and parameter
 };
 
+/// A slope with this variance, less what chance makes of it. Many statistics do not depend on a parameter; what chance makes of
+/// those would only dampen steps.
+double beyond_chance(double slope, double variance) {
+  constexpr double kBeyond = 1;
+  return slope * std::max(0.0, 1 - kBeyond * variance / std::max(slope * slope, 1e-30));
+}
+
 /// Statistics at one point of the design: of one of the runs, in turn, and not of all of it.
 FloorStatistics statistics_at(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
                               std::size_t point) {
@@ -100,16 +107,52 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const Floo
       known = known && std::isfinite(y(i));
     }
     if (!known) continue;  // not in all of these runs
-    // A slope that chance explains would only dampen the steps: many statistics do not depend on a parameter.
     const Eigen::VectorXd line = inverse * (x.transpose() * y);
     const double variance = (y - x * line).squaredNorm() / spare;
     for (Eigen::Index p = 0; p < columns; ++p) {
-      const double slope = line(scenes + p), chance = variance * inverse(scenes + p, scenes + p);
-      constexpr double kBeyond = 3;
-      surrogate.slopes(s, p) = slope * std::max(0.0, 1 - kBeyond * chance / std::max(slope * slope, 1e-30));
+      surrogate.slopes(s, p) = beyond_chance(line(scenes + p), variance * inverse(scenes + p, scenes + p));
     }
   }
   return surrogate;
+}
+
+/// Slopes of parameters that are 0 in the model, each by itself: a width of it against none, in the same runs. What else is
+/// in the model stays as it is, so that small runs show it.
+void switch_on(Surrogate& surrogate, const FloorModel& model, const FloorTarget& target, const FloorStatistics& here,
+               const std::vector<std::size_t>& switches, std::uint64_t seed) {
+  const std::vector<FloorParameter> parameters = model.parameters();
+  const std::size_t scenes = std::min<std::size_t>(target.scenes().size(), 2), repeats = 2;
+  // First without any, more often since all are compared with it.
+  const std::size_t without = scenes * repeats * 2, count = without + switches.size() * scenes;
+  std::vector<FloorStatistics> results(count);
+  in_parallel(target.threads(), count, [&](std::size_t i) {
+    std::vector<double> values = model.values;
+    if (i >= without) {
+      const std::size_t p = switches[(i - without) / scenes];
+      values[p] = std::min(values[p] + parameters[p].width, parameters[p].most);
+    }
+    results[i] = statistics_at(target, model.settings(values), seed * 1000 + 500 + i, i % scenes);
+  });
+  const auto mean = [&](std::size_t first, std::size_t n, std::size_t s) {
+    std::pair<double, double> m{0, 0};  // and its variance
+    for (std::size_t i = first; i < first + n; ++i) {
+      m.first += results[i].value[s] / static_cast<double>(n);
+      m.second += results[i].variance[s] / static_cast<double>(n * n);
+    }
+    return m;
+  };
+  for (std::size_t s = 0; s < statistic_count(); ++s) {
+    const double scale = target.tolerance()[s] + here.variance[s];
+    if (!(scale > 0) || !std::isfinite(here.value[s] - target.statistics().value[s])) continue;
+    const auto [none, none_variance] = mean(0, without, s);
+    for (std::size_t k = 0; k < switches.size(); ++k) {
+      const auto [on, variance] = mean(without + k * scenes, scenes, s);
+      const double slope = on - none, chance = variance + none_variance;
+      if (!std::isfinite(slope + chance)) continue;
+      surrogate.slopes(static_cast<Eigen::Index>(s), static_cast<Eigen::Index>(switches[k])) =
+          beyond_chance(slope, chance) / std::sqrt(scale);
+    }
+  }
 }
 
 /// Single statistics that no parameter can reach must not pull at all of them: weights fall beyond three tolerances.
@@ -218,8 +261,15 @@ std::vector<CandidateScore> choose(const FloorModel& model, const std::vector<Fl
     const std::size_t first = all.first_of(model.terms.size() + c);
     for (std::size_t p = candidates[c].switches; p < candidates[c].parameters.size(); ++p) moves[first + p] = false;
   }
-  const Surrogate surrogate =
-      explore(all, target, simulated_statistics(target, model.settings(), seed * 7 + 3), moves, 1, seed);
+  std::vector<bool> base(parameters.size(), false);
+  std::fill(base.begin(), base.begin() + static_cast<std::ptrdiff_t>(model.values.size()), true);
+  const FloorStatistics here = simulated_statistics(target, model.settings(), seed * 7 + 3);
+  Surrogate surrogate = explore(all, target, here, base, 1, seed);
+  std::vector<std::size_t> switches;
+  for (std::size_t p = model.values.size(); p < moves.size(); ++p) {
+    if (moves[p]) switches.push_back(p);
+  }
+  switch_on(surrogate, all, target, here, switches, seed);
   std::vector<CandidateScore> chosen;
   std::vector<bool> taken(candidates.size(), false);
   if (gains != nullptr) gains->assign(candidates.size(), 0);

@@ -21,6 +21,7 @@ constexpr double kAlong_mm = 75;   ///< the rim
 constexpr double kStill_mm = 16;   ///< in a block: less than what cells blur
 constexpr double kMoving_mm = 40;  ///< in a block: the direction is known
 constexpr double kTimeBin_s = 300;
+constexpr double kFewestRobots = 4;  ///< that a mean is taken of, counted by their weights
 constexpr std::size_t kTimeBins = 16, kMiddleBins = 8;
 constexpr std::size_t kExtentFeature = 8;  ///< of a track window, taken in 100 mm
 constexpr double kExtentScale_mm = 100;
@@ -388,18 +389,21 @@ std::vector<RobotSums> robot_sums(const FloorRun& run, const Floor& floor) {
 FloorStatistics statistics_of(std::span<const RobotSums> robots) {
   FloorStatistics statistics;
   for (std::size_t s = 0; s < statistic_count(); ++s) {
-    double sum = 0, weight = 0, spread = 0;
+    double sum = 0, weight = 0, squares = 0, spread = 0;
     for (const RobotSums& robot : robots) {
       sum += robot.sum[s];
       weight += robot.weight[s];
+      squares += robot.weight[s] * robot.weight[s];
     }
-    const double mean = weight > 0 ? sum / weight : kNan;
+    // A mean of a few robots says nothing of its own uncertainty.
+    const bool known = squares > 0 && weight * weight >= kFewestRobots * squares;
+    const double mean = known ? sum / weight : kNan;
     for (const RobotSums& robot : robots) {
       const double off = robot.sum[s] - mean * robot.weight[s];
       spread += off * off;
     }
     statistics.value.push_back(mean);
-    statistics.variance.push_back(weight > 0 ? spread / (weight * weight) : kNan);
+    statistics.variance.push_back(known ? spread / (weight * weight) : kNan);
   }
   return statistics;
 }

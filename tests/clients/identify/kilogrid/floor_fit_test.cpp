@@ -23,7 +23,7 @@ std::vector<FloorRun> runs_of(const FloorModel& model, std::uint64_t seed) {
   for (int i = 0; i < 3; ++i) {
     const FloorSettings s = model.settings();
     runs.push_back(
-        simulate(scene(24, 700, i), {}, s.model, s.times, s.radio, seed + static_cast<std::uint64_t>(i)));
+        simulate(scene(40, 1000, i), {}, s.model, s.times, s.radio, seed + static_cast<std::uint64_t>(i)));
   }
   return runs;
 }
