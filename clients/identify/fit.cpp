@@ -242,9 +242,10 @@ void Fitter::find_shape(MotionModel& model) const {
   if (std::abs(model.base.ahead_mm - kAxleOffset_mm) > kApart_mm) add(model.base.ahead_mm);
   const Candidate* best = &candidates.front();
   for (const Candidate& c : candidates) {
-    // Walls tell more than robots that met, where there are walls.
+    // Walls tell more than robots that met. Without walls the likelihood tells nothing: it would only count who is thought to touch.
     constexpr double kSure = 50;
-    const double better = c.log_likelihood - best->log_likelihood;
+    const bool walls = c.model.room.any() || best->model.room.any();
+    const double better = walls ? c.log_likelihood - best->log_likelihood : 0;
     if (better > kSure || (better > -kSure && c.meetings.share_within() < 0.5 * best->meetings.share_within()))
       best = &c;
   }

@@ -6,6 +6,8 @@
 #include <functional>
 #include <thread>
 
+#include "clients/identify/products.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -164,7 +166,7 @@ class Sensitivities {
   void flush() {
     if (filled_ == 0) return;
     const auto rows = buffer_.topRows(filled_);
-    information_.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
+    add_products(buffer_, filled_, information_);
     clusters_.back().noalias() += rows.transpose() * values_.head(filled_);
     filled_ = 0;
   }
@@ -258,7 +260,7 @@ class Sensitivities {
   Eigen::Index columns_ = 0, all_ = 0, filled_ = 0;
   Rows pose_, seen_;
   Eigen::MatrixXd information_;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> buffer_;
+  RowMajorMatrix buffer_;
   Eigen::VectorXd values_;
   std::vector<Eigen::VectorXd> clusters_;
   std::uint32_t run_ = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -21,6 +22,10 @@ struct Room {
   [[nodiscard]] bool at_wall(double x_mm, double y_mm, double margin_mm) const {
     return x_mm < x_low_mm + margin_mm || x_mm > x_high_mm - margin_mm || y_mm < y_low_mm + margin_mm ||
            y_mm > y_high_mm - margin_mm;
+  }
+  [[nodiscard]] bool any() const {
+    return std::isfinite(x_low_mm) || std::isfinite(x_high_mm) || std::isfinite(y_low_mm) ||
+           std::isfinite(y_high_mm);
   }
   [[nodiscard]] double inside_x(double x_mm) const { return std::clamp(x_mm, x_low_mm, x_high_mm); }
   [[nodiscard]] double inside_y(double y_mm) const { return std::clamp(y_mm, y_low_mm, y_high_mm); }
