@@ -129,7 +129,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
                        {"deficit_after", after},
                        {"facts",
                         {{"deficit", fmt::format("{:.3f} nat before, {:.3f} nat with it", before, after)},
-                         {"added", step.at("parameters").at("added").get<std::string>()}}},
+                         {"in the data", step.at("evidence").at("what")}}},
                        {"in_words", fmt::format("{}: {}", step.at("name").get<std::string>(),
                                                 step.at("parameters").at("added").get<std::string>())}});
   }

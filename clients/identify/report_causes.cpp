@@ -75,13 +75,14 @@ std::string cards(const json& contract, const json& document, Figures& figures) 
       out += fmt::format("<dt>{}</dt><dd>{}</dd>", name, value);
     };
     fact("acts on", acts_on_of(effect));
-    if (const json& facts = part(effect, "facts"); facts.is_array()) {
-      for (const json& given : facts)
-        out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(given.at(0).get<std::string>()),
-                           escaped(given.at(1).get<std::string>()));
+    if (const json& facts = part(effect, "facts"); facts.is_object()) {
+      for (const auto& [name, value] : facts.items())
+        out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(name), escaped(value.get<std::string>()));
     } else {
-      fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
-      fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
+      if (number(effect, "share_removed"))
+        fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
+      if (number(effect, "rmse_without_mm"))
+        fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
       fact("by chance",
            chance(number(evidence, "p_family") ? std::log10(std::max(*number(evidence, "p_family"), 1e-300))
                                                : number(evidence, "log10_p")));
