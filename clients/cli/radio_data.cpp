@@ -120,6 +120,8 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   for (std::size_t s = 1; s < steps.size(); ++s) {
     const json& step = steps[s];
     const double before = mean_of(steps[s - 1], "deficit"), after = mean_of(step, "deficit");
+    json facts = {{"deficit", fmt::format("{:.3f} nat before, {:.3f} nat with it", before, after)}};
+    if (const std::string what = step.at("evidence").value("what", ""); !what.empty()) facts["in the data"] = what;
     effects.push_back({{"name", step.at("name")},
                        {"covariates", step.at("covariates")},
                        {"acts_on", "radio"},
@@ -127,9 +129,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
                        {"parameters", step.at("parameters")},
                        {"deficit_before", before},
                        {"deficit_after", after},
-                       {"facts",
-                        {{"deficit", fmt::format("{:.3f} nat before, {:.3f} nat with it", before, after)},
-                         {"in the data", step.at("evidence").at("what")}}},
+                       {"facts", facts},
                        {"in_words", fmt::format("{}: {}", step.at("name").get<std::string>(),
                                                 step.at("parameters").at("added").get<std::string>())}});
   }
