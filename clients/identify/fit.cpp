@@ -32,6 +32,17 @@ struct LogLikelihood {
   }
 };
 
+/// Of one track, its robot's bias being known.
+LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, bool with_touching = false) {
+  RobotBias bias = model.bias_of(view.track->robot);
+  bias.covariance.setZero();
+  TrackFilter filter(model, bias, view.track->robot, view.run);
+  LogLikelihood likelihood;
+  likelihood.with_touching = with_touching;
+  walk(filter, view, view.track->samples.size(), likelihood);
+  return likelihood;
+}
+
 constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
 constexpr int kNoises = 6;
 using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
@@ -179,16 +190,8 @@ std::vector<const TrackView*> Fitter::some_tracks(std::size_t samples) const {
 
 double Fitter::with_touching(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
   std::vector<double> sums(tracks.size());
-  in_parallel(tracks.size(), threads_, [&](std::size_t i) {
-    const TrackView& view = *tracks[i];
-    RobotBias bias = model.bias_of(view.track->robot);
-    bias.covariance.setZero();
-    TrackFilter filter(model, bias, view.track->robot, view.run);
-    LogLikelihood likelihood;
-    likelihood.with_touching = true;
-    walk(filter, view, view.track->samples.size(), likelihood);
-    sums[i] = likelihood.sum;
-  });
+  in_parallel(tracks.size(), threads_,
+              [&](std::size_t i) { sums[i] = likelihood_of(model, *tracks[i], true).sum; });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
@@ -314,15 +317,7 @@ void Fitter::fit_noise(MotionModel& model) const {
     MotionModel trial = model;
     trial.noise = to_noise(at, model.noise);
     std::vector<std::vector<double>> parts(chosen.size());
-    in_parallel(chosen.size(), threads_, [&](std::size_t i) {
-      const TrackView& view = *chosen[i];
-      RobotBias bias = trial.bias_of(view.track->robot);
-      bias.covariance.setZero();
-      TrackFilter filter(trial, bias, view.track->robot, view.run);
-      LogLikelihood likelihood;
-      walk(filter, view, view.track->samples.size(), likelihood);
-      parts[i] = std::move(likelihood.parts);
-    });
+    in_parallel(chosen.size(), threads_, [&](std::size_t i) { parts[i] = likelihood_of(trial, *chosen[i]).parts; });
     std::vector<double> flat;
     for (const auto& p : parts) flat.insert(flat.end(), p.begin(), p.end());
     return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(flat.data(), static_cast<Eigen::Index>(flat.size())));
@@ -457,12 +452,7 @@ double Fitter::log_likelihood(const MotionModel& model) const {
   std::vector<double> sums(views.size());
   in_parallel(views.size(), threads_, [&](std::size_t i) {
     if (views[i].track->held_out) return;
-    RobotBias bias = model.bias_of(views[i].track->robot);
-    bias.covariance.setZero();
-    TrackFilter filter(model, bias, views[i].track->robot, views[i].run);
-    LogLikelihood likelihood;
-    walk(filter, views[i], views[i].track->samples.size(), likelihood);
-    sums[i] = likelihood.sum;
+    sums[i] = likelihood_of(model, views[i]).sum;
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }

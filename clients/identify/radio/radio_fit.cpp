@@ -198,63 +198,41 @@ void Loop::add_links() {
        {}},
       fitted(model_));
 
-  const Evidence bearing = bearing_evidence(train_, model_);
-  model_ = fit_links(train_, Terms::kPattern);
-  add({"bearing",
-       "power of all robots over the bearing, 8 harmonics",
-       {"heading"},
-       text_of(bearing),
-       json_of(bearing),
-       {}},
-      fitted(model_));
-  const Evidence laying = laying_evidence(train_, model_);
-  model_ = fit_links(train_, Terms::kLaying);
-  add({"laying",
-       fmt::format("a pattern of each set's own, as robots lie and face, sd {:.2f} dB", model_.laying_sd_db),
-       {"heading"},
-       text_of(laying),
-       json_of(laying),
-       {}},
-      fitted(model_));
-  const Evidence bodies = body_evidence(train_, model_);
-  model_ = fit_links(train_, Terms::kBodies);
-  add({"bodies in between",
-       fmt::format("{:.2f} dB for each", model_.body_loss_db),
-       {"neighbours"},
-       text_of(bodies),
-       json_of(bodies),
-       {}},
-      fitted(model_));
-  const Evidence robots = robot_evidence(train_, model_);
-  model_ = fit_links(train_, Terms::kRobots);
-  add({"robots",
-       fmt::format("power and sensitivity of each robot, sd {:.2f} and {:.2f} dB", model_.power_sd_db,
-                   model_.sensitivity_sd_db),
-       {"robot"},
-       text_of(robots),
-       json_of(robots),
-       {}},
-      fitted(model_));
-  const Evidence own = robot_bearing_evidence(train_, model_);
-  model_ = fit_links(train_, Terms::kBearings);
-  add({"robots' bearings",
-       fmt::format("each robot's own dependence on the bearing, sd {:.2f} and {:.2f} dB",
-                   model_.power_bearing_sd_db, model_.sensitivity_bearing_sd_db),
-       {"robot", "heading"},
-       text_of(own),
-       json_of(own),
-       {}},
-      fitted(model_));
-  const Evidence pairs = pair_evidence(train_, model_);
-  model_ = fit_links(train_, Terms::kPairs);
-  add({"pairs",
-       fmt::format("what a pair has, sd {:.2f} dB, and each direction of it, {:.2f} dB", model_.pair_sd_db,
-                   model_.link_sd_db),
-       {"robot", "neighbours"},
-       text_of(pairs),
-       json_of(pairs),
-       {}},
-      fitted(model_));
+  // What the data show beside the model so far, then the model with it.
+  const auto step = [&](const char* name, auto evidence_of, Terms terms, auto words,
+                        std::vector<std::string> covariates) {
+    const Evidence evidence = evidence_of(train_, model_);
+    model_ = fit_links(train_, terms);
+    add({name, words(), std::move(covariates), text_of(evidence), json_of(evidence), {}}, fitted(model_));
+  };
+  step("bearing", bearing_evidence, Terms::kPattern,
+       [&] { return std::string("power of all robots over the bearing, 8 harmonics"); }, {"heading"});
+  step("laying", laying_evidence, Terms::kLaying,
+       [&] {
+         return fmt::format("a pattern of each set's own, as robots lie and face, sd {:.2f} dB",
+                            model_.laying_sd_db);
+       },
+       {"heading"});
+  step("bodies in between", body_evidence, Terms::kBodies,
+       [&] { return fmt::format("{:.2f} dB for each", model_.body_loss_db); }, {"neighbours"});
+  step("robots", robot_evidence, Terms::kRobots,
+       [&] {
+         return fmt::format("power and sensitivity of each robot, sd {:.2f} and {:.2f} dB", model_.power_sd_db,
+                            model_.sensitivity_sd_db);
+       },
+       {"robot"});
+  step("robots' bearings", robot_bearing_evidence, Terms::kBearings,
+       [&] {
+         return fmt::format("each robot's own dependence on the bearing, sd {:.2f} and {:.2f} dB",
+                            model_.power_bearing_sd_db, model_.sensitivity_bearing_sd_db);
+       },
+       {"robot", "heading"});
+  step("pairs", pair_evidence, Terms::kPairs,
+       [&] {
+         return fmt::format("what a pair has, sd {:.2f} dB, and each direction of it, {:.2f} dB", model_.pair_sd_db,
+                            model_.link_sd_db);
+       },
+       {"robot", "neighbours"});
 }
 
 /// Packets of one run differ: how many links are heard in part says by how much.

@@ -137,6 +137,15 @@ TEST(Refine, ASharpShapeIsRecovered) {
   for (const double s : {0.4, 1.4, 2.5}) EXPECT_NEAR(gain_at(s) / late, acting.gain(s), 0.06) << s;
 }
 
+/// A smooth curve in 80 s of time, fitted and refined.
+void add_drift_by_time(const Fitter& fitter, MotionModel& model) {
+  const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
+  model.terms.push_back(
+      unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+}
+
 TEST(Refine, TheInstantOfAPulseIsFound) {
   Acting acting;
   acting.drift_x_mm_s = [](double t) { return t >= 40.2 && t < 41 ? 15.0 : 0.0; };
@@ -145,11 +154,7 @@ TEST(Refine, TheInstantOfAPulseIsFound) {
   const Fitter fitter(prepared, 2);
   MotionModel model;
   fitter.fit_base(model);
-  const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
-  model.terms.push_back(
-      unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
-  fitter.fit(model, 2);
-  refine(fitter, model, 0);
+  add_drift_by_time(fitter, model);
   EXPECT_EQ(find_steps(fitter, model, 0), "drift-by-time");
   const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
   ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
@@ -172,11 +177,7 @@ TEST(Refine, AShiftOfThePictureIsNotADrift) {
   const Fitter fitter(prepared, 2);
   MotionModel model;
   fitter.fit_base(model);
-  const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
-  model.terms.push_back(
-      unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
-  fitter.fit(model, 2);
-  refine(fitter, model, 0);
+  add_drift_by_time(fitter, model);
   EXPECT_EQ(find_steps(fitter, model, 0), "camera-by-time");
   EXPECT_EQ(model.terms[0].blocks[0].target, Target::kMeasuredX);
   const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
