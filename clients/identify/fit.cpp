@@ -9,26 +9,21 @@
 #include <utility>
 
 #include "clients/identify/follower.hpp"
+#include "clients/identify/noise_fit.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
 struct LogLikelihood {
   double sum = 0;
-  std::vector<double> parts;  ///< of so many samples each
-  std::size_t count = 0;
   bool touched = false;
   bool with_touching = false;  ///< what was measured after touching counts as well
-  static constexpr std::size_t kPart = 50;
 
   void start(const TrackFilter&) {}
   void step(const StepRecord& record) { touched = touched || record.touching(); }
   void update(const Innovation& innovation, const Sample&) {
     if (std::exchange(touched, false) && !with_touching) return;
-    if (count++ % kPart == 0) parts.push_back(0);
-    const double value = std::max(innovation.log_likelihood, -1e3);
-    parts.back() += value;
-    sum += value;
+    sum += std::max(innovation.log_likelihood, -1e3);
   }
 };
 
@@ -44,28 +39,6 @@ LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, boo
 }
 
 constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
-constexpr int kNoises = 6;
-using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
-
-NoiseVector to_vector(const Noise& n) {
-  NoiseVector v;
-  v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
-  return v.array().log();
-}
-Noise to_noise(const NoiseVector& logs, Noise noise) {
-  // Below the lower bounds a noise is as good as none, above the upper ones nothing would be told from noise.
-  const std::array<double, kNoises> low = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6}, high = {1, 100, 1, 100, 1e4, 10};
-  std::array<double, kNoises> v;
-  for (std::size_t i = 0; i < kNoises; ++i)
-    v[i] = std::clamp(std::exp(logs[static_cast<Eigen::Index>(i)]), low[i], high[i]);
-  noise.factor_s = v[0];
-  noise.wheel_mm2_s = v[1];
-  noise.heading_rad2_s = v[2];
-  noise.drift_mm2_s = v[3];
-  noise.position_mm2 = v[4];
-  noise.heading_rad2 = v[5];
-  return noise;
-}
 
 }  // namespace
 
@@ -311,85 +284,7 @@ void Fitter::find_walls(MotionModel& model) const {
 }
 
 void Fitter::fit_noise(MotionModel& model) const {
-  const std::vector<const TrackView*> chosen = some_tracks(kEnoughSamples);
-  const bool headings = set_.set().has_headings;
-  const auto parts_at = [&](const NoiseVector& at) {
-    MotionModel trial = model;
-    trial.noise = to_noise(at, model.noise);
-    std::vector<std::vector<double>> parts(chosen.size());
-    in_parallel(chosen.size(), threads_, [&](std::size_t i) { parts[i] = likelihood_of(trial, *chosen[i]).parts; });
-    std::vector<double> flat;
-    for (const auto& p : parts) flat.insert(flat.end(), p.begin(), p.end());
-    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(flat.data(), static_cast<Eigen::Index>(flat.size())));
-  };
-  // Noises beyond the data's reach are held near these by a weak prior, so that the search has an end.
-  const NoiseVector middle = to_vector(Noise{});
-  const double weak = 1.0 / (6 * 6);
-  const auto prior = [&](const NoiseVector& at) { return -0.5 * weak * (at - middle).squaredNorm(); };
-
-  const auto value_at = [&](const NoiseVector& at) { return parts_at(at).sum() + prior(at); };
-  const auto gradient_at = [&](const NoiseVector& at) {
-    constexpr double kStep = 0.02;
-    NoiseVector gradient = NoiseVector::Zero();
-    for (int i = 0; i < kNoises; ++i) {
-      if (i == 5 && !headings) continue;
-      NoiseVector up = at, down = at;
-      up[i] += kStep;
-      down[i] -= kStep;
-      gradient[i] = (value_at(up) - value_at(down)) / (2 * kStep);
-    }
-    return gradient;
-  };
-  // Broyden, Fletcher, Goldfarb and Shanno, on logarithms of variances.
-  const auto climb = [&](NoiseVector& at) {
-    double value = value_at(at);
-    NoiseVector gradient = gradient_at(at);
-    // A log variance is known to about sqrt(2 / n).
-    const double curvature =
-        std::max<double>(10, 0.1 * static_cast<double>(parts_at(at).size()) * LogLikelihood::kPart);
-    Eigen::Matrix<double, kNoises, kNoises> inverse =
-        Eigen::Matrix<double, kNoises, kNoises>::Identity() / curvature;
-    for (int pass = 0; pass < 20; ++pass) {
-      NoiseVector move = inverse * gradient;
-      const double longest = move.cwiseAbs().maxCoeff();
-      if (longest > 1.5) move *= 1.5 / longest;
-      bool better = false;
-      double gained = 0;
-      for (int halve = 0; halve < 6; ++halve, move *= 0.3) {
-        const double found = value_at(at + move);
-        if (!(found > value)) continue;
-        gained = found - value;
-        value = found;
-        better = true;
-        break;
-      }
-      if (!better) break;
-      at += move;
-      if (gained < 0.3) break;
-      const NoiseVector next = gradient_at(at);
-      const NoiseVector change = gradient - next;  // of the negative
-      const double along = change.dot(move);
-      if (along > 1e-9) {
-        const Eigen::Matrix<double, kNoises, kNoises> side =
-            Eigen::Matrix<double, kNoises, kNoises>::Identity() - move * change.transpose() / along;
-        inverse = (side * inverse * side.transpose() + move * move.transpose() / along).eval();
-      }
-      gradient = next;
-    }
-    return value;
-  };
-  NoiseVector at = to_vector(model.noise);
-  const double value = climb(at);
-  // What once seemed to be no noise has no slope any more that would lead back; a new start shows whether it is some.
-  constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
-  if (std::exp(at[4]) < kNone_mm2 || std::exp(at[0]) < kNone_s) {
-    NoiseVector anew = at;
-    anew[0] = std::max(at[0], middle[0]);
-    anew[3] = std::min(at[3], std::log(1e-2));
-    anew[4] = std::max(at[4], std::log(0.1));
-    if (climb(anew) > value) at = anew;
-  }
-  model.noise = to_noise(at, model.noise);
+  model.noise = most_likely_noise(model, some_tracks(kEnoughSamples), set_.set().has_headings, threads_);
 }
 
 void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {

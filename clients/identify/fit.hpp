@@ -65,7 +65,7 @@ class Fitter {
   void fit_surroundings(MotionModel&) const;
   /// Fits base, biases, noise and the coefficients of the model's terms. Few passes suffice from a fitted model.
   void fit(MotionModel&, int passes) const;
-  /// The noise alone: a quasi-Newton search on the likelihood of some of the tracks.
+  /// The noise alone, on some of the tracks.
   void fit_noise(MotionModel&) const;
   /// What touching adds to the motion, likewise.
   void fit_touching(MotionModel&) const;
