@@ -90,6 +90,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   StepRecord record;
   record.h_s = h_s;
   record.middle = situation(time_s + h_s / 2, commands, near);
+  record.middle.span_s = h_s;
   record.middle.commands.advance(h_s / 2);
   if (!model_->terms.empty() && commands.driven()) {
     // Half a step ahead by the base model, for what depends on the pose.
