@@ -352,6 +352,31 @@ double Fitter::log_likelihood(const MotionModel& model) const {
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
+double Fitter::log_evidence(const MotionModel& model) const {
+  double value = log_likelihood(model);
+  if (model.terms.empty()) return value;
+  const std::vector<Unit> units = linearise(model, set_.units(), blocks_of(model), {100, threads_});
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());
+  for (const Unit& unit : units) information += unit.information;
+  Eigen::VectorXd unused = Eigen::VectorXd::Zero(information.rows());
+  add_base_prior(model, information, unused);
+  const Eigen::Index n = information.rows() - kBaseColumns;
+  Eigen::VectorXd sd(n);
+  Eigen::Index first = 0;
+  for (const Term& term : model.terms) {
+    sd.segment(first, term.precision.size()) = term.precision.cwiseInverse().cwiseSqrt();
+    value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+    first += term.precision.size();
+  }
+  // Of the terms' coefficients, whatever the base parameters are.
+  const Eigen::MatrixXd cross = information.topRightCorner(kBaseColumns, n);
+  const Eigen::MatrixXd by = information.topLeftCorner<kBaseColumns, kBaseColumns>().ldlt().solve(cross);
+  Eigen::MatrixXd posterior = information.bottomRightCorner(n, n) - cross.transpose() * by;
+  posterior = (sd.asDiagonal() * posterior * sd.asDiagonal()).eval();
+  posterior.diagonal().array() += 1;
+  return value - Eigen::LLT<Eigen::MatrixXd>(posterior).matrixLLT().diagonal().array().log().sum();
+}
+
 void Fitter::fit_base(MotionModel& model) const {
   const bool headings = set_.set().has_headings;
   set_.find_headings(model, threads_);
@@ -407,15 +432,16 @@ void Fitter::fit(MotionModel& model, int passes) const {
       score += unit.score;
     }
     add_base_prior(model, information, score);
+    Eigen::VectorXd beforehand = Eigen::VectorXd::Zero(information.rows());
     Eigen::Index first = kBaseColumns;
     for (const Term& term : model.terms) {
       const Eigen::Index n = term.coefficients.size();
+      beforehand.segment(first, n) = term.precision;
       information.diagonal().segment(first, n) += term.precision;
       score.segment(first, n) -= term.precision.cwiseProduct(term.coefficients);
       first += n;
     }
-    Eigen::VectorXd step = information.ldlt().solve(score);
-    // A step that makes things worse was too long.
+    // A step that makes things worse is held back first where the data say little, then everywhere.
     const MotionModel start = model;
     // Of the coefficients beforehand as well.
     const auto worth = [&](const MotionModel& trial) {
@@ -424,12 +450,20 @@ void Fitter::fit(MotionModel& model, int passes) const {
       return value;
     };
     const double before = worth(start);
-    for (int halve = 0; halve < 5; ++halve, step *= 0.4) {
+    struct Trial {
+      double firmness, length;
+    };
+    constexpr std::array<Trial, 6> kTrials = {{{0, 1}, {10, 1}, {100, 1}, {100, 0.4}, {100, 0.16}, {100, 0.06}}};
+    bool better = false;
+    for (const Trial& trial : kTrials) {
+      Eigen::MatrixXd held = information;
+      held.diagonal() += trial.firmness * beforehand;
       model = start;
-      apply(model, units, step);
-      if (worth(model) > before - 2) break;
-      if (halve == 4) model = start;
+      apply(model, units, trial.length * held.ldlt().solve(score));
+      better = worth(model) > before - 2;
+      if (better) break;
     }
+    if (!better) model = start;
   }
 }
 
