@@ -203,6 +203,9 @@ void Fitter::find_shape(MotionModel& model) const {
   const auto add = [&](double centre_mm) {
     Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
     c.model.base.centre_mm = centre_mm;
+    // Without headings nobody sees which way the centre lies from the point that is tracked.
+    constexpr double kMostly = 0.75;
+    c.model.touch_mm = kTouch_mm + (headings ? 0 : kMostly * std::abs(centre_mm - model.base.ahead_mm));
     set_.find_centres(c.model, threads_);
     if (headings) {
       c.model.room = room_of(set_, c.model);

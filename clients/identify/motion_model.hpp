@@ -94,6 +94,8 @@ struct MotionModel {
   Noise noise;
   Room room;
   bool contacts = true;  ///< robots push each other
+  /// Robots whose centres are this near, by what is known of where they are, may touch, mm.
+  double touch_mm = kTouch_mm;
   std::vector<Term> terms;
   std::map<std::uint32_t, RobotBias> robots;
 

@@ -106,7 +106,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
         belief_.mean[1] + half.dy_mm + model_->base.centre_mm * std::sin(record.middle.heading_rad);
   }
   // A robot at rest is pushed by others as well.
-  record.at_robot = model_->contacts && near.nearest_mm < kTouch_mm;
+  record.at_robot = model_->contacts && near.nearest_mm < model_->touch_mm;
   record.at_wall =
       commands.driven() && model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm);
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
