@@ -66,7 +66,11 @@ void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
       return;
     case Shape::kAtLeast:
-      for (std::size_t i = 0; i < points.size(); ++i) to[i] = c >= points[i] ? 1 : 0;
+      // Within a sub-step, for as much of it as lies after the point.
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        to[i] = axis.of == Covariate::kTime && s.span_s > 0 ? std::clamp((c - points[i]) / s.span_s + 0.5, 0.0, 1.0)
+                                                            : (c >= points[i] ? 1 : 0);
+      }
       return;
     case Shape::kExponential:
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = std::exp(-c / points[i]);

@@ -67,7 +67,7 @@ class Fitter {
   void fit_surroundings(MotionModel&) const;
   /// Fits base, biases, noise and the coefficients of the model's terms. Few passes suffice from a fitted model.
   void fit(MotionModel&, int passes) const;
-  /// The noise alone: a quasi-Newton search on the likelihood of some of the tracks.
+  /// The noise alone, on some of the tracks.
   void fit_noise(MotionModel&) const;
   /// What touching adds to the motion, likewise.
   void fit_touching(MotionModel&) const;
@@ -77,6 +77,8 @@ class Fitter {
   void find_walls(MotionModel&) const;
   /// Of all that was measured on tracks that may be fitted to.
   [[nodiscard]] double log_likelihood(const MotionModel&) const;
+  /// Log marginal likelihood over the coefficients of the terms (Laplace's approximation), up to what all models have in common.
+  [[nodiscard]] double log_evidence(const MotionModel&) const;
   /// Information and score of the base's prior, added to those of the data.
   void add_base_prior(const MotionModel&, Eigen::MatrixXd& information, Eigen::VectorXd& score) const;
   /// Moves base parameters, terms and biases by a step in all columns.

@@ -95,6 +95,8 @@ struct MotionModel {
   Noise noise;
   Room room;
   bool contacts = true;  ///< robots push each other
+  /// Robots whose centres are this near, by what is known of where they are, may touch, mm.
+  double touch_mm = kTouch_mm;
   /// Sides of the square cells in which the floor may remember, the first cell from 0 on.
   std::array<double, kFloorCells> cells_mm = {20, 28, 39, 55, 78, 110};
   std::vector<Term> terms;

@@ -144,7 +144,7 @@ class Outlook {
       robots_[r].near = view_of(r, x_, y_);
       const StateCovariance& p = robots_[r].filters.front().belief().covariance;
       const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
-      if (model_.contacts && robots_[r].near.nearest_mm < kTouch_mm + std::min(uncertain, 20.0))
+      if (model_.contacts && robots_[r].near.nearest_mm < model_.touch_mm + std::min(uncertain, 20.0))
         robots_[r].branches = true;
       if (!robots_[r].branches) robots_[r].branches = edges_.near(x_[r], y_[r], std::clamp(uncertain, 6.0, 30.0));
       floors_.see(x_[r], y_[r], robots_[r].near);

@@ -137,10 +137,7 @@ class Loop {
       const Finding own = scores_->weigh_term(t);
       out_.reasons[place].finding.held_out = own.held_out;
       out_.reasons[place].finding.held_out_se = own.held_out_se;
-      if (own.held_out < 2) {
-        drop(place);
-        return true;
-      }
+      if (own.held_out < 2 && dropped(place)) return true;
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
@@ -165,10 +162,17 @@ class Loop {
     }
     return false;
   }
-  void drop(std::size_t t) {
+  /// Takes a term out, but for one without which the data are less probable after all.
+  bool dropped(std::size_t t) {
+    const Search before = out_;
+    const double evidence = fitter_.log_evidence(out_.model);
     out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
     fitter_.fit(out_.model, 1);
+    if (fitter_.log_evidence(out_.model) > evidence - kClose) return true;
+    out_ = before;
+    fitter_.set().find_headings(out_.model, fitter_.threads());
+    return false;
   }
   void note_rejected(const Scores::Outcome& outcome) {
     out_.rejected.clear();

@@ -46,6 +46,7 @@ struct Situation {
   NeighbourView near;
   std::uint32_t robot = 0;  ///< its number
   std::uint32_t run = 0;    ///< place in the set
+  double span_s = 0;        ///< of the sub-step of which this is the middle; 0: an instant
 };
 
 enum class Covariate : std::uint8_t {

@@ -395,7 +395,9 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
     const double curve = form.beside ? 0 : bends(fitter, model, place);
     const double worth = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
                          price * static_cast<double>(form.at_s.size());
-    if (worth <= best_worth) continue;
+    // What is as likely to be the one as the other stays what it was found as.
+    constexpr double kSurelyOther = 3;
+    if (worth <= best_worth + (other ? kSurelyOther : 0)) continue;
     best_worth = worth;
     best = trial;
   }
