@@ -45,6 +45,7 @@ constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
 PreparedSet::PreparedSet(const MeasuredSet& set) : set_(&set) {
   for (std::size_t r = 0; r < set.runs.size(); ++r) {
     neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
+    neighbours_.back()->remember(set.runs[r], MotionModel{}.cells_mm);
     for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
       const Track& track = set.runs[r].tracks[t];
       if (track.samples.size() < 2) continue;
@@ -82,7 +83,12 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
     for (std::size_t v = 0; v < views_.size(); ++v)
       if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
     *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
+    neighbours_[r]->remember(set_->runs[r], model.cells_mm);
   }
+}
+
+void PreparedSet::remember(const MotionModel& model) {
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells_mm);
 }
 
 Meetings PreparedSet::meetings() const {

@@ -36,6 +36,8 @@ class PreparedSet {
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
   /// Looks again at where discs are, which is not where they are measured, for what robots see of each other.
   void find_centres(const MotionModel&, std::uint32_t threads);
+  /// Looks again at what floors remember, in cells of the model's sizes.
+  void remember(const MotionModel&);
   [[nodiscard]] Meetings meetings() const;
   /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
   void find_headings(const MotionModel&, std::uint32_t threads);

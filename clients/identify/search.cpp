@@ -6,6 +6,9 @@
 #include <optional>
 #include <set>
 
+#include "clients/identify/fine_map.hpp"
+#include "clients/identify/memory_shape.hpp"
+#include "clients/identify/neighbour_shape.hpp"
 #include "clients/identify/refine.hpp"
 #include "clients/identify/widen.hpp"
 
@@ -113,7 +116,8 @@ class Loop {
 
   /// Gives a term the form that the data support.
   void shape(std::size_t place) {
-    refine(fitter_, out_.model, place);
+    if (!shape_neighbours(fitter_, out_.model, place) && !shape_memory(fitter_, out_.model, place))
+      refine(fitter_, out_.model, place);
     const std::string before = out_.model.terms[place].name, name = find_steps(fitter_, out_.model, place);
     if (name != before) {
       for (const Hypothesis& h : dictionary_.hypotheses) {
@@ -122,6 +126,7 @@ class Loop {
         out_.reasons[place].acts_on = h.acts_on;
       }
     }
+    sharpen(fitter_, out_.model, place);
     widen(fitter_, out_.model, place);
   }
   /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.

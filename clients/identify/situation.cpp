@@ -36,6 +36,7 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
                  : wrapped_angle(s.near.direction_rad - s.heading_rad);
     case Covariate::kPreviousCommand: return static_cast<double>(s.commands.previous);
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
+    case Covariate::kTrodden: return s.near.trodden_s[axis.radius];
     case Covariate::kRobot: return s.robot;
     case Covariate::kRun: return s.run;
   }

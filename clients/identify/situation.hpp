@@ -8,15 +8,20 @@
 
 namespace kilotwin::identify {
 
-/// Radii within which robots count as neighbours, mm, centre to centre: touching, one robot between, within reach of a loud message.
-inline constexpr std::array<double, 4> kNeighbourRadii_mm = {40, 70, 100, 150};
+/// Radii within which robots count as neighbours, mm, centre to centre: from touching to well within reach of a message.
+inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,  80,  90,  100,
+                                                              110, 120, 130, 140, 150, 175, 200};
 
-/// The other robots, seen from one.
+/// So many sizes of cells in which a floor may remember where robots went (MotionModel::cells_mm).
+inline constexpr std::size_t kFloorCells = 6;
+
+/// The other robots, seen from one, and what they left on the floor.
 struct NeighbourView {
-  double nearest_mm = 1e9;             ///< centre to centre
-  double direction_rad = 0;            ///< to the nearest, from the x axis
-  std::array<double, 4> count = {};    ///< within kNeighbourRadii_mm
-  std::array<double, 4> density = {};  ///< sum of (1 - (distance / radius)^2)^2
+  double nearest_mm = 1e9;                                    ///< centre to centre
+  double direction_rad = 0;                                   ///< to the nearest, from the x axis
+  std::array<float, kNeighbourRadii_mm.size()> count = {};    ///< within kNeighbourRadii_mm
+  std::array<float, kNeighbourRadii_mm.size()> density = {};  ///< sum of (1 - (distance / radius)^2)^2
+  std::array<float, kFloorCells> trodden_s = {};  ///< for which driven robots stood in its cell, itself included
 };
 
 /// What the commands of a robot say of an instant.
@@ -61,13 +66,14 @@ enum class Covariate : std::uint8_t {
   kBearing,  ///< to the nearest, from the heading
   kPreviousCommand,
   kLastTurn,
+  kTrodden,  ///< time that driven robots stood in its cell of the floor
   kRobot,
   kRun,
 };
 
 struct Axis {
   Covariate of = Covariate::kNothing;
-  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm
+  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; of kTrodden, into MotionModel::cells_mm
 
   bool operator==(const Axis&) const = default;
 };

@@ -22,6 +22,11 @@ Basis modest(Basis basis) {
   for (Factor& f : basis.factors) {
     if (f.shape == Shape::kAtLeast || f.shape == Shape::kTable) continue;
     basis.chosen.clear();
+    if (f.shape == Shape::kGrid) {
+      f.shape = Shape::kCosines2;
+      f.count = 6;
+      f.points.clear();
+    }
     if (f.shape == Shape::kCosines)
       f.count = std::min<std::uint32_t>(f.count, f.axis.of == Covariate::kTime ? 24 : 12);
     if (f.shape == Shape::kCosines2) f.count = std::min<std::uint32_t>(f.count, 6);
