@@ -44,6 +44,15 @@ std::vector<Form> forms() {
   map.and_high = 250;
   Factor bearing = over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 1);
   const Factor previous = over(Shape::kTable, Covariate::kPreviousCommand, 0, 1, 1, {2, 3});
+  Factor since = late;
+  since.first = 0;
+  const auto of_late = [](Covariate of, std::uint8_t forget) {
+    Factor f = over(Shape::kLinear, of, 0, 5, 1);
+    f.axis.forget = forget;
+    return f;
+  };
+  Factor known = over(Shape::kCosines, Covariate::kTime, 0, 18, 3);
+  known.known = {0.7, 0, -0.4};
   return {{"constant", {}},
           {"linear in time", {{over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}},
           {"curve over time", {{over(Shape::kCosines, Covariate::kTime, 0, 18, 5)}}},
@@ -69,6 +78,12 @@ std::vector<Form> forms() {
           {"density", {{over(Shape::kCosines, Covariate::kDensity, 0, 4, 2)}}},
           {"bearing", {{over(Shape::kTaper, Covariate::kNearest, 0, 150, 1), bearing}}},
           {"history", {{previous, over(Shape::kExponential, Covariate::kSinceCommand, 0, 1, 1, {0.5, 1.5})}}},
+          {"curves after turns", {{previous, since}}},
+          {"own motor of late", {{of_late(Covariate::kMotorTime, 2)}}},
+          {"left motor of late", {{of_late(Covariate::kLeftMotorTime, 2)}}},
+          {"right motor", {{of_late(Covariate::kRightMotorTime, 0)}}},
+          {"driven of late", {{of_late(Covariate::kDrivenTime, 3)}}},
+          {"amounts of a curve", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2}), known}}},
           {"robots in time",
            {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
              over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}}};
