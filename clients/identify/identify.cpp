@@ -251,10 +251,12 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
         errors_of(judged.set(), predict(without, judged, asked, held_out_only, options.threads)).rmse_mm());
   }
   contract["effects"] = effects_of(found, without_mm, errors_before.rmse_mm(), errors_after.rmse_mm());
-  document["effect_curves"] = json::array();
-  for (const Term& term : after.terms)
-    for (json& curve : curves_of(term.name, effects_of_term(term)))
-      document["effect_curves"].push_back(std::move(curve));
+  document["effect_curves"] = document["effect_maps"] = json::array();
+  for (const Term& term : after.terms) {
+    const std::vector<proto::Effect> written = effects_of_term(term);
+    for (json& curve : curves_of(term.name, written)) document["effect_curves"].push_back(std::move(curve));
+    for (json& map : maps_of(term.name, written)) document["effect_maps"].push_back(std::move(map));
+  }
   contract["rejected"] = json::array();
   for (const Rejected& r : found.rejected) {
     contract["rejected"].push_back({{"name", r.name},
