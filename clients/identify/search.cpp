@@ -23,6 +23,8 @@ constexpr std::uint64_t kSeed = 20180729;
 constexpr double kClose = 3;
 /// What another cause in a term's place must reach in log likelihood: with few columns, and with the shape that the data support.
 constexpr double kMostByShape = 200, kAsGood = 10;
+/// No form fits a cause exactly. What is left of all that was found, by this share of what that explains, is no other cause.
+constexpr double kRemnant = 0.003;
 /// As many samples as hypotheses are tested on; there are no more surprises in more.
 constexpr std::size_t kEnoughSamples = 130000;
 
@@ -32,6 +34,7 @@ class Loop {
        const std::function<void(double, const std::string&)>& progress)
       : fitter_(fitter), progress_(progress), extent_(extent_of(fitter.set())) {
     out_.model = base;
+    base_likelihood_ = fitter.log_likelihood(base);
     units_ = fitter.set().units();
     std::size_t samples = 0;
     for (const auto& unit : units_)
@@ -51,7 +54,8 @@ class Loop {
       measure();
       const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
       note_rejected(outcome);
-      const Finding* const best = best_of(outcome);
+      const double explained = fitter_.log_likelihood(out_.model) - base_likelihood_;
+      const Finding* const best = best_of(outcome, kRemnant * explained);
       if (best != nullptr) {
         const Search before = out_;
         const double likelihood = fitter_.log_likelihood(out_.model);
@@ -79,10 +83,12 @@ class Loop {
     const std::vector<Unit> units = linearise(out_.model, units_, blocks, {100, fitter_.threads()});
     scores_.emplace(fitter_, out_.model, units, dictionary_);
   }
-  const Finding* best_of(const Scores::Outcome& outcome) const {
+  const Finding* best_of(const Scores::Outcome& outcome, double least_evidence) const {
     const Finding* best = nullptr;
     for (const Finding& f : outcome.findings) {
-      if (!good(f, outcome.threshold_log10_p) || failed_.contains(hypothesis(f).name)) continue;
+      if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
+          failed_.contains(hypothesis(f).name))
+        continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
     return best;
@@ -226,6 +232,7 @@ class Loop {
   std::vector<std::vector<const TrackView*>> units_;
   std::optional<Scores> scores_;
   Search out_;
+  double base_likelihood_ = 0;
   std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
   int defences_ = 0;
 };
