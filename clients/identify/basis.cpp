@@ -25,7 +25,7 @@ void cosines(double angle, std::uint32_t last, double* to) {
 
 }  // namespace
 
-std::size_t Factor::size() const {
+std::size_t Factor::columns() const {
   switch (shape) {
     case Shape::kLinear:
     case Shape::kGrid: return 1;
@@ -42,6 +42,15 @@ std::size_t Factor::size() const {
 }
 
 void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
+  if (known.empty()) return evaluate_columns(s, wheel, to);
+  std::array<double, kMostColumns> values;
+  evaluate_columns(s, wheel, values.data());
+  double sum = 0;
+  for (std::size_t i = 0; i < known.size(); ++i) sum += known[i] * values[i];
+  to[0] = sum;
+}
+
+void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to) const {
   std::array<double, 64> a, b;
   const double c = value_of(axis, s, wheel);
   switch (shape) {
@@ -103,8 +112,9 @@ void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
 
 std::vector<double> Factor::roughness() const {
   std::vector<double> rough(size(), 1.0);
+  if (!known.empty()) return rough;
   if (shape == Shape::kCosines) {
-    for (std::uint32_t k = 0; k < count; ++k) rough[k] = first + k;
+    for (std::uint32_t k = 0; k < count; ++k) rough[k] = std::max(first + k, 1u);
   } else if (shape == Shape::kHarmonics) {
     for (std::uint32_t k = 0; k < count; ++k) rough[2 * k] = rough[2 * k + 1] = first + k;
   } else if (shape == Shape::kCosines2) {

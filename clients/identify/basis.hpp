@@ -30,11 +30,17 @@ struct Factor {
   /// Above 0: u runs as log(1 + (c - low) / warp), so that what is near `low` is resolved finely.
   double warp = 0;
   std::vector<double> points;
+  /// Not empty: the columns are added up by these coefficients into one, a curve that is known.
+  std::vector<double> known = {};
 
-  [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] std::size_t size() const { return known.empty() ? columns() : 1; }
+  [[nodiscard]] std::size_t columns() const;  ///< before they are added up
   void evaluate(const Situation&, std::size_t wheel, double* to) const;
   /// How wiggly each column is; 1 for the smoothest. Larger roughness is less probable beforehand.
   [[nodiscard]] std::vector<double> roughness() const;
+
+ private:
+  void evaluate_columns(const Situation&, std::size_t wheel, double* to) const;
 };
 
 /// The products of columns of all factors; one column of ones where there are none.

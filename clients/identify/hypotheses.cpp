@@ -119,11 +119,71 @@ class Catalogue {
     of_neighbours();
     of_history();
     of_floor();
+    of_lately();
     of_robots();
-    make_.finish();
   }
+  /// What is found already and is larger for some than for others: an amount for each robot, and for each command.
+  void of_found(const std::vector<Term>& terms) {
+    for (const Term& term : terms) {
+      const Block& block = term.blocks.front();
+      const Acting* acting = nullptr;
+      for (const Acting* one : {&kSpeed, &kTurning, &kSlip, &kWorld})
+        if (one->targets.front() == block.target) acting = one;
+      if (acting == nullptr || block.basis.factors.size() > 1) continue;
+      std::string of;
+      std::vector<std::string> words;
+      Basis known;
+      if (!block.basis.factors.empty()) {
+        Factor factor = block.basis.factors.front();
+        if (factor.shape == Shape::kTable || !factor.known.empty()) continue;
+        of = "-and-" + of_words(factor.axis.of).first;
+        words.push_back(of_words(factor.axis.of).second);
+        factor.known.assign(factor.columns(), 0);
+        for (std::size_t i = 0; i < block.basis.size(); ++i)
+          factor.known[block.basis.chosen.empty() ? i : block.basis.chosen[i]] =
+              term.coefficients[static_cast<Eigen::Index>(i)];
+        known.factors.push_back(std::move(factor));
+      }
+      const auto amounts = [&](Covariate covariate, const std::vector<double>& keys) {
+        Basis basis = known;
+        basis.factors.insert(basis.factors.begin(), keyed(Shape::kTable, covariate, keys));
+        // Of a drift the amounts along x and along y are of one shape only where it has but one.
+        if (acting == &kWorld && !of.empty()) return;
+        std::vector<std::string> all = words;
+        all.push_back(of_words(covariate).second);
+        add(*acting, of_words(covariate).first + of, all,
+            some(put(*acting, basis, block.during), 0, static_cast<Eigen::Index>(keys.size())));
+      };
+      if (extent_.has_straight && extent_.has_turns) amounts(Covariate::kCommand, {1, 2, 3});
+      if (acting != &kWorld && extent_.robots.size() > 1 && extent_.robots.size() <= 40)
+        amounts(Covariate::kRobot, {extent_.robots.begin(), extent_.robots.end()});
+    }
+  }
+  void finish() { make_.finish(); }
 
  private:
+  /// As names of effects have a covariate, and as result.json has it.
+  static std::pair<std::string, std::string> of_words(Covariate covariate) {
+    switch (covariate) {
+      case Covariate::kTime: return {"time", "time"};
+      case Covariate::kX:
+      case Covariate::kY:
+      case Covariate::kRadius: return {"position", "position"};
+      case Covariate::kHeading: return {"heading", "heading"};
+      case Covariate::kCommand: return {"command", "command"};
+      case Covariate::kSinceCommand: return {"time-since-command", "time_since_command"};
+      case Covariate::kMotorTime:
+      case Covariate::kLeftMotorTime:
+      case Covariate::kRightMotorTime:
+      case Covariate::kDrivenTime: return {"motor-time", "motor_time"};
+      case Covariate::kNeighbours:
+      case Covariate::kNearest:
+      case Covariate::kDensity:
+      case Covariate::kBearing: return {"neighbours", "neighbours"};
+      case Covariate::kRobot: return {"robot", "robot"};
+      default: return {"history", "history"};
+    }
+  }
   std::vector<Eigen::Index> put(const Acting& acting, const Basis& basis, std::uint8_t during = kDriven) {
     std::vector<Eigen::Index> bases;
     for (const Target target : acting.targets) bases.push_back(make_.put(target, basis, during));
@@ -255,6 +315,12 @@ class Catalogue {
     curve(kSpeed, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
     curve(kTurning, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
     curve(kSlip, "time-since-command", {"time_since_command"}, start, {3}, false);
+    if (n == 1) return;
+    since.count = 3;
+    const Basis each{{keyed(Shape::kTable, Covariate::kCommand, moving), since}};
+    for (const Acting* acting : {&kSpeed, &kTurning})
+      add(*acting, "command-and-time-since-command", {"command", "time_since_command"},
+          some(put(*acting, each), 0, 3 * n));
   }
   void of_neighbours() {
     if (!extent_.neighbours) return;
@@ -288,19 +354,44 @@ class Catalogue {
       for (const Eigen::Index n : {1, 3}) add(kSpeed, "neighbours", {"neighbours"}, some(dense, 0, n), 8);
     }
   }
+  /// What came before: in constant amounts or in curves since the command, whatever it does now, and going straight.
   void of_history() {
-    if (!extent_.has_turns || !extent_.has_straight) return;
+    if (!extent_.has_turns && !extent_.has_stop) return;
     constexpr std::uint8_t kStraightOnly = 1u << 1;
-    const Factor before = keyed(Shape::kTable, Covariate::kPreviousCommand, {2, 3});
-    const Factor last = keyed(Shape::kTable, Covariate::kLastTurn, {2, 3});
-    const Factor fading = keyed(Shape::kExponential, Covariate::kSinceCommand, {0.5, 1.5, 5});
+    constexpr Eigen::Index kCurve = 4;
+    std::vector<double> before{kNoCommand};
+    if (extent_.has_turns) before.insert(before.begin(), {2, 3});
+    const auto turns = static_cast<Eigen::Index>(before.size()) - 1;
+    if (extent_.has_stop) before.push_back(0);
+    const auto keys = static_cast<Eigen::Index>(before.size());
+    Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent_.since_s, kCurve);
+    since.first = 0;
+    since.warp = 1;
+    const Basis basis{{keyed(Shape::kTable, Covariate::kPreviousCommand, before), since}};
     for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
-      const auto while_straight = put(*acting, Basis{{before}}, kStraightOnly);
-      add(*acting, "previous-command", {"history"}, some(while_straight, 0, 2));
-      const auto after = put(*acting, Basis{{before, fading}}, kStraightOnly);
-      for (Eigen::Index i = 0; i < 3; ++i)
-        add(*acting, "previous-command", {"history", "time_since_command"}, {after[0] + i, after[0] + 3 + i}, 3);
-      add(*acting, "previous-command", {"history", "time_since_command"}, some(after, 0, 6));
+      const auto driven = put(*acting, basis), straight = put(*acting, basis, kStraightOnly);
+      const auto after = [&](std::vector<Eigen::Index> bases, Eigen::Index from, Eigen::Index to) {
+        for (const Eigen::Index size : {Eigen::Index{1}, kCurve}) {
+          std::vector<Eigen::Index> columns;
+          for (Eigen::Index key = from; key < to; ++key)
+            for (const Eigen::Index c : some(bases, key * kCurve, size)) columns.push_back(c);
+          std::vector<std::string> words{"history"};
+          if (size > 1) words.emplace_back("time_since_command");
+          add(*acting, "previous-command", words, columns, 4);
+        }
+      };
+      for (const auto& bases : {driven, straight, std::vector<Eigen::Index>{driven[0], straight[0]}}) {
+        if (turns > 0) after(bases, 0, turns);
+        if (extent_.has_stop) {
+          after(bases, keys - 1, keys);
+          after(bases, turns, keys);
+        }
+        after(bases, 0, keys);
+      }
+    }
+    if (!extent_.has_turns) return;
+    const Factor last = keyed(Shape::kTable, Covariate::kLastTurn, {2, 3});
+    for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
       const auto turned = put(*acting, Basis{{last}}, kStraightOnly);
       add(*acting, "last-turn", {"history"}, some(turned, 0, 2));
     }
@@ -311,6 +402,28 @@ class Catalogue {
       f.axis.radius = cells;
       const auto bases = put(kSpeed, Basis{{f}});
       add(kSpeed, "trodden", {"history", "position"}, some(bases, 0, 3), kFloorCells);
+    }
+  }
+  /// What motors did lately, which fades: they warm up and cool down, recover, turned more to one side than to the other.
+  void of_lately() {
+    const auto lately = [&](Shape shape, Covariate of, std::size_t forget, std::uint32_t count) {
+      Factor f = over(shape, of, 0, std::min(kForget_s[forget], extent_.driven_s), count);
+      f.axis.forget = static_cast<std::uint8_t>(forget + 1);
+      return f;
+    };
+    constexpr auto kChoices = static_cast<double>(kForget_s.size());
+    for (std::size_t f = 0; f < kForget_s.size(); ++f) {
+      for (const Covariate of : {Covariate::kMotorTime, Covariate::kDrivenTime}) {
+        const auto bases = put(kSpeed, Basis{{lately(Shape::kCosines, of, f, 3)}});
+        for (const Eigen::Index size : {1, 3})
+          add(kSpeed, of == Covariate::kMotorTime ? "motor-time-of-late" : "driven-time-of-late",
+              {"motor_time", "history"}, some(bases, 0, size), kChoices);
+      }
+      if (!extent_.has_turns) continue;
+      const auto left = make_.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kLeftMotorTime, f, 1)}}),
+                 right =
+                     make_.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kRightMotorTime, f, 1)}});
+      add(kTurning, "turns-of-late", {"history"}, {left, right}, kChoices);
     }
   }
   void of_robots() {
@@ -371,9 +484,12 @@ Extent extent_of(const PreparedSet& set) {
   return e;
 }
 
-Dictionary dictionary_of(const Extent& extent) {
+Dictionary dictionary_of(const Extent& extent, const std::vector<Term>& found) {
   Dictionary dictionary;
-  Catalogue(extent, dictionary).fill();
+  Catalogue catalogue(extent, dictionary);
+  catalogue.fill();
+  catalogue.of_found(found);
+  catalogue.finish();
   return dictionary;
 }
 

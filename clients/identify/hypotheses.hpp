@@ -43,6 +43,7 @@ struct Extent {
 };
 [[nodiscard]] Extent extent_of(const PreparedSet&);
 
-[[nodiscard]] Dictionary dictionary_of(const Extent&);
+/// Beside what is `found` already: that some show more of it than others is tried as well.
+[[nodiscard]] Dictionary dictionary_of(const Extent&, const std::vector<Term>& found = {});
 
 }  // namespace kilotwin::identify

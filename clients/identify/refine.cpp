@@ -18,6 +18,7 @@ constexpr double kSettled = 1;
 constexpr double kFaint = 0.03;
 
 Factor richer(Factor f) {
+  if (!f.known.empty()) return f;
   switch (f.shape) {
     case Shape::kLinear: {
       f.shape = Shape::kCosines;
@@ -73,12 +74,40 @@ Basis along(const Factor& map, bool second) {
   return Basis{{f}};
 }
 
+/// A table times something else, with the keys alone that some chosen column has.
+Basis with_chosen_keys(Basis basis) {
+  if (basis.factors.size() != 2 || basis.factors.front().shape != Shape::kTable || basis.chosen.empty())
+    return basis;
+  const std::size_t each = basis.factors[1].size();
+  std::vector<double> kept;
+  const std::vector<double>& keys = basis.factors.front().points;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const bool used = std::any_of(basis.chosen.begin(), basis.chosen.end(),
+                                  [&](std::uint32_t column) { return column / each == i; });
+    if (used) kept.push_back(keys[i]);
+  }
+  basis.factors.front().points = kept;
+  return basis;
+}
+
+/// Products have as many cosines as there is room for.
+void shorten(Basis& basis) {
+  if (basis.factors.size() < 2) return;
+  for (Factor& factor : basis.factors) {
+    if (factor.shape != Shape::kCosines || !factor.known.empty()) continue;
+    const auto room = static_cast<std::uint32_t>(kMostColumns * factor.count / basis.size());
+    factor.count = std::clamp(room, 1u, factor.count);
+  }
+}
+
 std::vector<Block> richer(const Term& term) {
   std::vector<Block> blocks;
   for (const Block& block : term.blocks) {
     Block rich = block;
+    rich.basis = with_chosen_keys(block.basis);
     rich.basis.chosen.clear();
     for (Factor& factor : rich.basis.factors) factor = richer(factor);
+    shorten(rich.basis);
     // Too many columns: as they were.
     if (rich.basis.size() > kMostColumns) rich.basis = block.basis;
     blocks.push_back(rich);

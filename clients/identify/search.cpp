@@ -21,6 +21,8 @@ constexpr double kManyChoices = 2.5;
 constexpr std::uint64_t kSeed = 20180729;
 /// Look-alikes whose evidence lies closer than this (a Bayes factor of 20) are not told apart.
 constexpr double kClose = 3;
+/// What another cause in a term's place must reach in log likelihood: with few columns, and with the shape that the data support.
+constexpr double kMostByShape = 200, kAsGood = 10;
 /// As many samples as hypotheses are tested on; there are no more surprises in more.
 constexpr std::size_t kEnoughSamples = 130000;
 
@@ -28,7 +30,7 @@ class Loop {
  public:
   Loop(const Fitter& fitter, const MotionModel& base,
        const std::function<void(double, const std::string&)>& progress)
-      : fitter_(fitter), progress_(progress), dictionary_(dictionary_of(extent_of(fitter.set()))) {
+      : fitter_(fitter), progress_(progress), extent_(extent_of(fitter.set())) {
     out_.model = base;
     units_ = fitter.set().units();
     std::size_t samples = 0;
@@ -71,6 +73,7 @@ class Loop {
 
  private:
   void measure() {
+    dictionary_ = dictionary_of(extent_, out_.model.terms);
     std::vector<Block> blocks = blocks_of(out_.model);
     blocks.insert(blocks.end(), dictionary_.blocks.begin(), dictionary_.blocks.end());
     const std::vector<Unit> units = linearise(out_.model, units_, blocks, {100, fitter_.threads()});
@@ -148,18 +151,31 @@ class Loop {
           best_finding = other;
         }
       }
-      if (best != nullptr && best->name != out_.model.terms[place].name &&
-          best_finding.evidence > own.evidence + kClose) {
-        const double log10_p = out_.reasons[place].finding.log10_p;
-        out_.model.terms[place] = dictionary_.term_of(*best, best_finding.relative_scale);
-        best_finding.log10_p = log10_p;
-        out_.reasons[place] = {best->covariates, best->acts_on, best_finding,
-                               out_.reasons[place].threshold_log10_p};
-        fitter_.fit(out_.model, 2);
-        shape(place);
-        return true;
-      }
+      if (best == nullptr || best->name == out_.model.terms[place].name ||
+          best_finding.evidence <= own.evidence + kClose ||
+          failed_.contains(best->name + " for " + out_.model.terms[place].name))
+        continue;
+      if (exchanged(place, *best, best_finding)) return true;
     }
+    return false;
+  }
+  /// Puts another cause in the place of a term. What is weighed far from where the data were linearised may promise too much:
+  /// where it explains less after all, everything is as it was.
+  bool exchanged(std::size_t place, const Hypothesis& other, Finding finding) {
+    const Search before = out_;
+    const double likelihood = fitter_.log_likelihood(out_.model);
+    finding.log10_p = out_.reasons[place].finding.log10_p;
+    out_.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
+    out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
+    fitter_.fit(out_.model, 2);
+    // The shape that it is given then explains more, but not all of what is lacking.
+    if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
+      shape(place);
+      if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
+    }
+    out_ = before;
+    fitter_.set().find_headings(out_.model, fitter_.threads());
+    failed_.insert(other.name + " for " + out_.model.terms[place].name);
     return false;
   }
   /// Takes a term out, but for one without which the data are less probable after all.
@@ -205,7 +221,8 @@ class Loop {
 
   const Fitter& fitter_;
   const std::function<void(double, const std::string&)>& progress_;
-  const Dictionary dictionary_;
+  const Extent extent_;
+  Dictionary dictionary_;  ///< what is tried beside the model
   std::vector<std::vector<const TrackView*>> units_;
   std::optional<Scores> scores_;
   Search out_;

@@ -15,6 +15,22 @@ void CommandState::advance(double by_s) {
   if (driven()) driven_s += by_s;
 }
 
+double CommandState::remembered_s(std::size_t forget, std::size_t motor) const {
+  const double span_s = kForget_s[forget], kept = std::exp(-since_s / span_s);
+  const bool on = motor == 0 ? left_on() : motor == 1 ? right_on() : driven();
+  return left_s[forget][motor] * kept + (on ? span_s * (1 - kept) : 0);
+}
+
+namespace {
+
+/// For which a motor has turned, or either: all of it, or what is not forgotten.
+double use_s(const CommandState& commands, std::size_t motor, std::uint8_t forget) {
+  if (forget > 0) return commands.remembered_s(forget - 1u, motor);
+  return motor < 2 ? commands.motor_s[motor] : commands.driven_s;
+}
+
+}  // namespace
+
 double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
   switch (axis.of) {
     case Covariate::kNothing: return 0;
@@ -25,8 +41,10 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kHeading: return s.heading_rad;
     case Covariate::kCommand: return static_cast<double>(s.commands.command);
     case Covariate::kSinceCommand: return s.commands.since_s;
-    case Covariate::kMotorTime: return s.commands.motor_s[wheel];
-    case Covariate::kDrivenTime: return s.commands.driven_s;
+    case Covariate::kMotorTime: return use_s(s.commands, wheel, axis.forget);
+    case Covariate::kLeftMotorTime: return use_s(s.commands, 0, axis.forget);
+    case Covariate::kRightMotorTime: return use_s(s.commands, 1, axis.forget);
+    case Covariate::kDrivenTime: return use_s(s.commands, 2, axis.forget);
     case Covariate::kNeighbours: return s.near.count[axis.radius];
     case Covariate::kNearest: return std::min(s.near.nearest_mm, kNeighbourRadii_mm[axis.radius]);
     case Covariate::kDensity: return s.near.density[axis.radius];
@@ -34,7 +52,8 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
       return s.near.nearest_mm > kNeighbourRadii_mm[axis.radius]
                  ? 0
                  : wrapped_angle(s.near.direction_rad - s.heading_rad);
-    case Covariate::kPreviousCommand: return static_cast<double>(s.commands.previous);
+    case Covariate::kPreviousCommand:
+      return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
     case Covariate::kTrodden: return s.near.trodden_s[axis.radius];
     case Covariate::kRobot: return s.robot;
@@ -45,11 +64,16 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
 
 CommandClock::CommandClock(const Track& track) {
   CommandState state;
+  auto left = state.left_s;
   double now_s = 0;
   for (const CommandChange& change : track.commands) {
     const double at_s = std::max(change.time_s, 0.0);
     if (!starts_s_.empty()) state.advance(at_s - now_s);
     now_s = at_s;
+    for (std::size_t f = 0; f < kForget_s.size(); ++f)
+      for (std::size_t motor = 0; motor < 3; ++motor) left[f][motor] = state.remembered_s(f, motor);
+    state.left_s = left;
+    state.first = starts_s_.empty() || starts_s_.front() == at_s;
     state.previous = state.command;
     state.command = change.motion;
     state.since_s = 0;

@@ -24,18 +24,26 @@ struct NeighbourView {
   std::array<float, kFloorCells> trodden_s = {};  ///< for which driven robots stood in its cell, itself included
 };
 
+/// Within these times, s, what motors did is forgotten: by exp(-age / time). Of a warm motor that cools, of a battery that recovers.
+inline constexpr std::array<double, 4> kForget_s = {5, 15, 40, 120};
+
 /// What the commands of a robot say of an instant.
 struct CommandState {
   Motion command = Motion::kStop, previous = Motion::kStop, last_turn = Motion::kStop;
+  bool first = true;                       ///< no command came before; `previous` is kStop then
   double since_s = 0;                      ///< since the command changed
   std::array<double, 2> motor_s = {0, 0};  ///< for which the motor of the left, of the right wheel has turned
   double driven_s = 0;                     ///< for which either has
+  /// What is left of these times of the left, the right, of either motor, with kForget_s, when the command began.
+  std::array<std::array<double, 3>, kForget_s.size()> left_s = {};
 
   [[nodiscard]] bool driven() const { return command != Motion::kStop; }
   [[nodiscard]] bool left_on() const { return command == Motion::kStraight || command == Motion::kRight; }
   [[nodiscard]] bool right_on() const { return command == Motion::kStraight || command == Motion::kLeft; }
   /// `by_s` later, under the same command.
   void advance(double by_s);
+  /// Of a motor (0: of the left wheel, 1: of the right) or of either (2), what kForget_s[forget] leaves of its time.
+  [[nodiscard]] double remembered_s(std::size_t forget, std::size_t motor) const;
 };
 
 struct Situation {
@@ -59,21 +67,27 @@ enum class Covariate : std::uint8_t {
   kCommand,
   kSinceCommand,
   kMotorTime,  ///< of the wheel's own motor
+  kLeftMotorTime,
+  kRightMotorTime,
   kDrivenTime,
   kNeighbours,  ///< within radius
   kNearest,     ///< at most radius
   kDensity,
-  kBearing,  ///< to the nearest, from the heading
-  kPreviousCommand,
+  kBearing,          ///< to the nearest, from the heading
+  kPreviousCommand,  ///< kNoCommand for the first
   kLastTurn,
   kTrodden,  ///< time that driven robots stood in its cell of the floor
   kRobot,
   kRun,
 };
 
+/// What the previous command is where there was none: the simulator takes it for a stop.
+inline constexpr double kNoCommand = 4;
+
 struct Axis {
   Covariate of = Covariate::kNothing;
   std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; of kTrodden, into MotionModel::cells_mm
+  std::uint8_t forget = 0;  ///< with motor and driven times: 1 + index into kForget_s; 0: all counts
 
   bool operator==(const Axis&) const = default;
 };

@@ -191,7 +191,10 @@ Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, doub
   const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced.information * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
   const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(0);
-  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * scale.cwiseProduct(reduced.score);
+  Eigen::VectorXd along = eigen.eigenvectors().transpose() * scale.cwiseProduct(reduced.score);
+  // What the data say nothing about is known to no more than rounding.
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    if (values[i] < std::max(1e-7 * values.maxCoeff(), 1.0)) along[i] = 0;
   double best = 0, best_t = 0;
   for (int step = 0; step <= 28; ++step) {
     const double t = std::pow(10.0, -4.0 + step / 6.0), t2 = t * t;

@@ -20,7 +20,7 @@ constexpr int kMostWidened = 3;
 /// The same covariates with fewer columns: for what is only to be found.
 Basis modest(Basis basis) {
   for (Factor& f : basis.factors) {
-    if (f.shape == Shape::kAtLeast || f.shape == Shape::kTable) continue;
+    if (f.shape == Shape::kAtLeast || f.shape == Shape::kTable || !f.known.empty()) continue;
     basis.chosen.clear();
     if (f.shape == Shape::kGrid) {
       f.shape = Shape::kCosines2;

@@ -23,6 +23,9 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kCommand: return Function::COMMAND;
     case Covariate::kSinceCommand: return Function::TIME_SINCE_COMMAND;
     case Covariate::kMotorTime: return Function::MOTOR_TIME;
+    // The left motor drives the right-hand wheel.
+    case Covariate::kLeftMotorTime: return Function::RIGHT_MOTOR_TIME;
+    case Covariate::kRightMotorTime: return Function::LEFT_MOTOR_TIME;
     case Covariate::kDrivenTime: return Function::DRIVEN_TIME;
     case Covariate::kNeighbours: return Function::NEIGHBOURS;
     case Covariate::kNearest: return Function::NEAREST;
@@ -37,6 +40,7 @@ Function::Covariate covariate_of(Covariate c) {
   return Function::NOTHING;
 }
 
+bool is_of_use(Covariate c) { return c >= Covariate::kMotorTime && c <= Covariate::kDrivenTime; }
 bool is_of_neighbours(Covariate c) { return c >= Covariate::kNeighbours && c <= Covariate::kBearing; }
 
 /// A situation in which one covariate, or two, have values; what else there is does not matter.
@@ -48,9 +52,15 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kRadius: s.x_mm = value; break;
     case Covariate::kHeading: s.heading_rad = value; break;
     case Covariate::kSinceCommand: s.commands.since_s = value; break;
-    case Covariate::kMotorTime: s.commands.motor_s = {value, value}; break;
-    case Covariate::kDrivenTime: s.commands.driven_s = value; break;
     case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
+    case Covariate::kMotorTime:
+    case Covariate::kLeftMotorTime:
+    case Covariate::kRightMotorTime:
+    case Covariate::kDrivenTime:
+      s.commands.motor_s = {value, value};
+      s.commands.driven_s = value;
+      if (axis.forget > 0) s.commands.left_s[axis.forget - 1u] = {value, value, value};
+      break;
     case Covariate::kNearest: s.near.nearest_mm = value; break;
     case Covariate::kDensity: s.near.density[axis.radius] = static_cast<float>(value); break;
     case Covariate::kTrodden: s.near.trodden_s[axis.radius] = static_cast<float>(value); break;
@@ -64,7 +74,7 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
 }
 
 double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const Situation& s) {
-  std::vector<double> values(factor.size());
+  std::vector<double> values(factor.columns());
   factor.evaluate(s, 0, values.data());
   return coefficients.dot(Eigen::Map<const Eigen::VectorXd>(values.data(), coefficients.size()));
 }
@@ -73,6 +83,8 @@ void set_axis(Function& function, const Factor& factor) {
   function.set_of(covariate_of(factor.axis.of));
   if (is_of_neighbours(factor.axis.of)) function.set_radius_mm(kNeighbourRadii_mm[factor.axis.radius]);
   if (factor.axis.of == Covariate::kTrodden) function.set_field(field_name(factor.axis.radius));
+  if (is_of_use(factor.axis.of) && factor.axis.forget > 0)
+    function.set_forget_s(kForget_s[factor.axis.forget - 1u]);
 }
 
 /// The natural spline through the curve, with knots as dense as it bends.
@@ -90,6 +102,13 @@ void set_spline(Function& function, const Factor& factor, const Eigen::VectorXd&
 
 /// The sum of a factor's columns by coefficients, as one function.
 Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) {
+  if (!factor.known.empty()) {
+    Factor open = factor;
+    open.known.clear();
+    return function_of(
+        open, coefficients[0] * Eigen::Map<const Eigen::VectorXd>(factor.known.data(),
+                                                                  static_cast<Eigen::Index>(factor.known.size())));
+  }
   Function function;
   set_axis(function, factor);
   switch (factor.shape) {
@@ -117,6 +136,7 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
     }
     case Shape::kTable:
       for (std::size_t i = 0; i < factor.points.size(); ++i) {
+        if (factor.axis.of == Covariate::kPreviousCommand && factor.points[i] == kNoCommand) continue;
         function.mutable_table()->add_key(static_cast<std::uint32_t>(factor.points[i]));
         function.mutable_table()->add_value(rounded(coefficients[static_cast<Eigen::Index>(i)]));
       }

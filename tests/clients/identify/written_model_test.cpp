@@ -51,6 +51,15 @@ std::vector<Form> forms() {
     for (int i = 0; i < 7; ++i) grid.points.push_back(0.2 * i - 0.1 * j + 0.02 * i * j);
   Factor bearing = over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 1);
   const Factor previous = over(Shape::kTable, Covariate::kPreviousCommand, 0, 1, 1, {2, 3});
+  Factor since = late;
+  since.first = 0;
+  const auto of_late = [](Covariate of, std::uint8_t forget) {
+    Factor f = over(Shape::kLinear, of, 0, 5, 1);
+    f.axis.forget = forget;
+    return f;
+  };
+  Factor known = over(Shape::kCosines, Covariate::kTime, 0, 18, 3);
+  known.known = {0.7, 0, -0.4};
   return {{"constant", {}},
           {"linear in time", {{over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}},
           {"curve over time", {{over(Shape::kCosines, Covariate::kTime, 0, 18, 5)}}},
@@ -77,6 +86,12 @@ std::vector<Form> forms() {
           {"density", {{over(Shape::kCosines, Covariate::kDensity, 0, 4, 2)}}},
           {"bearing", {{over(Shape::kTaper, Covariate::kNearest, 0, 150, 1), bearing}}},
           {"history", {{previous, over(Shape::kExponential, Covariate::kSinceCommand, 0, 1, 1, {0.5, 1.5})}}},
+          {"curves after turns", {{previous, since}}},
+          {"own motor of late", {{of_late(Covariate::kMotorTime, 2)}}},
+          {"left motor of late", {{of_late(Covariate::kLeftMotorTime, 2)}}},
+          {"right motor", {{of_late(Covariate::kRightMotorTime, 0)}}},
+          {"driven of late", {{of_late(Covariate::kDrivenTime, 3)}}},
+          {"amounts of a curve", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2}), known}}},
           {"robots in time",
            {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
              over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}}};
@@ -105,6 +120,8 @@ double size_of(Target target) {
     default: return 1.5;
   }
 }
+
+static_assert(kNeighbourRadii_mm[11] == 150);
 
 class WrittenModel : public testing::Test {
  protected:

@@ -1,0 +1,128 @@
+// What effects know of the past of a robot, and how causes that act more on some are tried.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/identify/hypotheses.hpp"
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+Track told(std::vector<CommandChange> commands) {
+  Track track;
+  commands.insert(commands.begin(), {-1e300, Motion::kStop});
+  track.commands = std::move(commands);
+  return track;
+}
+
+TEST(History, MotorsForgetAsTheSumOverTheirPastSays) {
+  const Random random(5);
+  std::vector<CommandChange> commands;
+  double at_s = 0;
+  for (std::uint32_t i = 0; at_s < 100; ++i) {
+    commands.push_back({at_s, static_cast<Motion>((i * 7 + i * i) % 4)});
+    at_s += 0.5 + 9 * random.uniform(Stream::kLayout, 1, Tick{0}, i);
+  }
+  const CommandClock clock(told(commands));
+  constexpr double kStep_s = 1e-3;
+  std::array<std::array<double, 3>, kForget_s.size()> sums{};
+  double now_s = 0;
+  for (int i = 0; now_s < 90; ++i) {
+    const CommandState state = clock.at(now_s + kStep_s / 2);
+    for (std::size_t f = 0; f < kForget_s.size(); ++f) {
+      const std::array<bool, 3> on = {state.left_on(), state.right_on(), state.driven()};
+      for (std::size_t m = 0; m < 3; ++m)
+        sums[f][m] = sums[f][m] * std::exp(-kStep_s / kForget_s[f]) + (on[m] ? kStep_s : 0);
+    }
+    now_s = (i + 1) * kStep_s;
+    if (i % 7919 != 0) continue;
+    for (std::size_t f = 0; f < kForget_s.size(); ++f)
+      for (std::size_t m = 0; m < 3; ++m) EXPECT_NEAR(clock.at(now_s).remembered_s(f, m), sums[f][m], 0.01);
+  }
+}
+
+TEST(History, NothingComesBeforeTheFirstCommand) {
+  const CommandClock clock(told({{0, Motion::kStraight}, {4, Motion::kStop}, {6, Motion::kLeft}}));
+  const Axis previous{Covariate::kPreviousCommand};
+  const auto at = [&](double time_s) {
+    Situation s;
+    s.commands = clock.at(time_s);
+    return value_of(previous, s, 0);
+  };
+  EXPECT_EQ(at(1), kNoCommand);
+  EXPECT_EQ(at(5), static_cast<double>(Motion::kStraight));
+  EXPECT_EQ(at(7), static_cast<double>(Motion::kStop));
+  // Who rests at first comes from a stop afterwards.
+  const CommandClock rested(told({{2, Motion::kStraight}}));
+  Situation s;
+  s.commands = rested.at(3);
+  EXPECT_EQ(value_of(previous, s, 0), static_cast<double>(Motion::kStop));
+}
+
+TEST(History, AKnownCurveIsTheSumOfItsColumns) {
+  Factor curve;
+  curve.shape = Factor::Shape::kCosines;
+  curve.axis.of = Covariate::kTime;
+  curve.high = 50;
+  curve.first = 0;
+  curve.count = 4;
+  Factor known = curve;
+  known.known = {0.3, -1, 0, 2};
+  ASSERT_EQ(known.size(), 1u);
+  for (double time_s = 0; time_s < 60; time_s += 3.7) {
+    Situation s;
+    s.time_s = time_s;
+    std::array<double, 4> columns;
+    curve.evaluate(s, 0, columns.data());
+    double sum = 0, one = 0;
+    for (std::size_t i = 0; i < 4; ++i) sum += known.known[i] * columns[i];
+    known.evaluate(s, 0, &one);
+    EXPECT_DOUBLE_EQ(one, sum);
+  }
+}
+
+TEST(History, WhatIsFoundIsTriedWithAnAmountForEachRobotAndCommand) {
+  Extent extent;
+  extent.duration_s = 100;
+  extent.has_straight = extent.has_turns = extent.has_stop = true;
+  extent.robots = {3, 5, 9};
+  Term battery;
+  battery.name = "speed-by-time";
+  Factor curve;
+  curve.shape = Factor::Shape::kCosines;
+  curve.axis.of = Covariate::kTime;
+  curve.high = 100;
+  curve.count = 6;
+  battery.blocks = {{Target::kGain, Basis{{curve}, {0, 3}}}};
+  battery.coefficients = Eigen::Vector2d(-0.2, 0.05);
+  battery.precision = Eigen::Vector2d(1, 1);
+  const Dictionary without = dictionary_of(extent), with = dictionary_of(extent, {battery});
+  EXPECT_EQ(with.columns(), without.columns() + 3 + 3);
+  for (const auto& [covariate, word] : {std::pair{Covariate::kRobot, "robot"}, {Covariate::kCommand, "command"}}) {
+    const Hypothesis* found = nullptr;
+    for (std::size_t h = without.hypotheses.size(); h < with.hypotheses.size(); ++h) {
+      const auto& words = with.hypotheses[h].covariates;
+      if (std::find(words.begin(), words.end(), word) != words.end()) found = &with.hypotheses[h];
+    }
+    ASSERT_NE(found, nullptr);
+    EXPECT_EQ(found->covariates.size(), 2u);
+    const Term term = with.term_of(*found, 1);
+    ASSERT_EQ(term.blocks.size(), 1u);
+    const Basis& basis = term.blocks[0].basis;
+    EXPECT_TRUE(basis.looks_at(covariate));
+    Situation s;
+    s.time_s = 30;
+    s.robot = 5;
+    s.commands.command = Motion::kLeft;
+    std::array<double, 3> values;
+    basis.evaluate(s, 0, values.data());
+    EXPECT_NEAR(values[1], -0.2 * std::cos(M_PI * 0.3) + 0.05 * std::cos(4 * M_PI * 0.3), 1e-12);
+    EXPECT_EQ(values[0], 0);
+    EXPECT_EQ(values[2], 0);
+  }
+}
+
+}  // namespace
+}  // namespace kilotwin::identify
