@@ -42,6 +42,13 @@ std::vector<Form> forms() {
   map.and_axis.of = Covariate::kY;
   map.and_low = -250;
   map.and_high = 250;
+  // Between nodes the engine bends where the fitted map is linear, but for what is linear anyway.
+  Factor grid = map;
+  grid.shape = Shape::kGrid;
+  grid.count = 7;
+  grid.points.clear();
+  for (int j = 0; j < 5; ++j)
+    for (int i = 0; i < 7; ++i) grid.points.push_back(0.2 * i - 0.1 * j + 0.02 * i * j);
   Factor bearing = over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 1);
   const Factor previous = over(Shape::kTable, Covariate::kPreviousCommand, 0, 1, 1, {2, 3});
   Factor since = late;
@@ -61,6 +68,7 @@ std::vector<Form> forms() {
           {"curve over y", {{over(Shape::kCosines, Covariate::kY, -250, 250, 3)}}},
           {"curve over radius", {{over(Shape::kCosines, Covariate::kRadius, 0, 300, 3)}}},
           {"map", {{map}}},
+          {"grid", {{grid}}},
           {"heading", {{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 1)}}},
           {"harmonics of heading", {{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
           {"command", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2, 3})}}},
