@@ -7,6 +7,7 @@
 #include <set>
 
 #include "clients/identify/refine.hpp"
+#include "clients/identify/simplify.hpp"
 #include "clients/identify/widen.hpp"
 
 namespace kilotwin::identify {
@@ -65,6 +66,7 @@ class Loop {
       }
       if (!defend()) break;
     }
+    for (std::size_t t = 0; t < out_.model.terms.size(); ++t) simplify(fitter_, out_.model, t);
     return std::move(out_);
   }
 
