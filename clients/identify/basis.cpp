@@ -27,7 +27,8 @@ void cosines(double angle, std::uint32_t last, double* to) {
 
 std::size_t Factor::columns() const {
   switch (shape) {
-    case Shape::kLinear: return 1;
+    case Shape::kLinear:
+    case Shape::kGrid: return 1;
     case Shape::kCosines:
     case Shape::kTaper: return count;
     case Shape::kCosines2: return (count + 1) * (count + 2) / 2 - 1;
@@ -74,7 +75,11 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
       return;
     case Shape::kAtLeast:
-      for (std::size_t i = 0; i < points.size(); ++i) to[i] = c >= points[i] ? 1 : 0;
+      // Within a sub-step, for as much of it as lies after the point.
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        to[i] = axis.of == Covariate::kTime && s.span_s > 0 ? std::clamp((c - points[i]) / s.span_s + 0.5, 0.0, 1.0)
+                                                            : (c >= points[i] ? 1 : 0);
+      }
       return;
     case Shape::kExponential:
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = std::exp(-c / points[i]);
@@ -83,6 +88,17 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       const double rest = std::max(0.0, 1 - c / high);
       double power = 1;
       for (std::uint32_t k = 0; k < count; ++k) to[k] = power *= rest;
+      return;
+    }
+    case Shape::kGrid: {
+      const std::size_t columns = count, rows = points.size() / columns;
+      const double u = unit_of(c, low, high, 0) * static_cast<double>(columns - 1);
+      const double v = unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0) * static_cast<double>(rows - 1);
+      const std::size_t i = std::min(static_cast<std::size_t>(u), columns - 2),
+                        j = std::min(static_cast<std::size_t>(v), rows - 2);
+      const double x = u - static_cast<double>(i), y = v - static_cast<double>(j);
+      const double* const at = points.data() + j * columns + i;
+      to[0] = (1 - y) * ((1 - x) * at[0] + x * at[1]) + y * ((1 - x) * at[columns] + x * at[columns + 1]);
       return;
     }
     case Shape::kWave:
@@ -147,7 +163,8 @@ std::vector<double> Basis::roughness() const {
 
 bool Basis::looks_at(Covariate covariate) const {
   return std::any_of(factors.begin(), factors.end(), [&](const Factor& f) {
-    return f.axis.of == covariate || (f.shape == Factor::Shape::kCosines2 && f.and_axis.of == covariate);
+    return f.axis.of == covariate || (f.shape == Factor::Shape::kCosines2 && f.and_axis.of == covariate) ||
+           (f.shape == Factor::Shape::kGrid && f.and_axis.of == covariate);
   });
 }
 

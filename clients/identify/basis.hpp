@@ -18,12 +18,15 @@ struct Factor {
     kAtLeast,      ///< 1 from the point on, one column per point
     kExponential,  ///< exp(-c / point), one column per point
     kTaper,        ///< (1 - c / high)^k, k = 1..: 0 from high on
+    kGrid,         ///< one column: linear between `points` at the nodes of a grid, over two covariates
     kWave,         ///< cos and sin of 2 pi c / point: two columns per point
   };
   Shape shape = Shape::kLinear;
   Axis axis, and_axis;
   double low = 0, high = 1, and_low = 0, and_high = 1;
-  std::uint32_t first = 1, count = 1;  ///< of kCosines, kHarmonics, kTaper; kCosines2: count is the order
+  std::uint32_t
+      first = 1,
+      count = 1;  ///< of kCosines, kHarmonics, kTaper; kCosines2: count is the order; kGrid: nodes along the first
   /// Above 0: u runs as log(1 + (c - low) / warp), so that what is near `low` is resolved finely.
   double warp = 0;
   std::vector<double> points;

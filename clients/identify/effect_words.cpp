@@ -40,7 +40,8 @@ Unit unit_of(Function::Covariate of) {
     case Function::MOTOR_TIME:
     case Function::LEFT_MOTOR_TIME:
     case Function::RIGHT_MOTOR_TIME:
-    case Function::DRIVEN_TIME: return {"s", 1};
+    case Function::DRIVEN_TIME:
+    case Function::PLACE: return {"s", 1};
     case Function::X:
     case Function::Y:
     case Function::RADIUS:
@@ -65,6 +66,7 @@ const char* name_of(Function::Covariate of) {
     case Function::HEADING: return "heading";
     case Function::NEIGHBOURS: return "neighbours";
     case Function::DENSITY: return "density";
+    case Function::PLACE: return "time robots stood there";
     case Function::ROBOT: return "robot";
     default: return "covariate";
   }

@@ -63,6 +63,9 @@ double best_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told,
 constexpr double kSwapGain = 100;
 constexpr std::size_t kFewestSwapped = 16;
 constexpr double kSwapGainEach = 0.5;
+// Where robots differ from what they are taken for (faster at first, say), any other's commands may fit better than their own.
+// Those of the one whose number it carries fit so many times better than those of anybody else.
+constexpr double kSwapDistinct = 2;
 // Where two robots were each seen at the other's place at once, no robot can have gone there: faster than this, in a step so
 // short, with so much for the tracker's noise.
 constexpr double kFastest_mm_s = 35, kExchangeStep_s = 3, kSlack_mm = 4;
@@ -171,19 +174,54 @@ void exclude_exchanges(Run& run, const ToldAndDone& told, std::vector<DataFault>
   }
 }
 
+/// What each track of a run gains, over its best stretch, if it did what another is told to.
+class OthersCommands {
+ public:
+  OthersCommands(const Run& run, const ToldAndDone& told) : run_(run), told_(told) {
+    for (const Track& track : run.tracks) deeds_.push_back(deeds_of(track));
+    gains_.assign(run.tracks.size(), std::vector<double>(run.tracks.size()));
+    for (std::size_t a = 0; a < run.tracks.size(); ++a) look_at(a);
+  }
+  /// Again, after some of its samples were taken out.
+  void look_again(std::size_t a) {
+    deeds_[a] = deeds_of(run_.tracks[a]);
+    look_at(a);
+  }
+  [[nodiscard]] std::vector<Gain> of(std::size_t a, std::size_t b) const {
+    return gains(deeds_[a], run_.tracks[a], run_.tracks[b], told_);
+  }
+  /// Whether the one does what the other is told to, and nobody else.
+  [[nodiscard]] bool is_like(std::size_t a, std::size_t b) const {
+    double other = 0;
+    for (std::size_t c = 0; c < gains_.size(); ++c)
+      if (c != b) other = std::max(other, gains_[a][c]);
+    return gains_[a][b] > std::max(0.25 * kSwapGain, kSwapDistinct * other);
+  }
+
+ private:
+  void look_at(std::size_t a) {
+    for (std::size_t b = 0; b < gains_.size(); ++b)
+      if (b != a) gains_[a][b] = best_stretch(of(a, b)).gain;
+  }
+
+  const Run& run_;
+  const ToldAndDone& told_;
+  std::vector<std::vector<Deed>> deeds_;
+  std::vector<std::vector<double>> gains_;  ///< by track, then by whose commands
+};
+
 /// Numbers that were exchanged from the start, or while nobody looked.
 void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFault>& faults) {
-  std::vector<std::vector<Deed>> deeds;
-  for (const Track& track : run.tracks) deeds.push_back(deeds_of(track));
+  OthersCommands others(run, told);
   while (true) {
     Stretch best;
     std::size_t first = 0, second = 0;
     for (std::size_t a = 0; a < run.tracks.size(); ++a) {
       for (std::size_t b = a + 1; b < run.tracks.size(); ++b) {
-        std::vector<Gain> both = gains(deeds[a], run.tracks[a], run.tracks[b], told);
-        const std::vector<Gain> of_b = gains(deeds[b], run.tracks[b], run.tracks[a], told);
-        // Both must gain: a robot that does nobody's bidding gains by any exchange.
-        if (best_stretch(both).gain < 0.25 * kSwapGain || best_stretch(of_b).gain < 0.25 * kSwapGain) continue;
+        // Both must: a robot that does nobody's bidding gains by any exchange.
+        if (!others.is_like(a, b) || !others.is_like(b, a)) continue;
+        std::vector<Gain> both = others.of(a, b);
+        const std::vector<Gain> of_b = others.of(b, a);
         both.insert(both.end(), of_b.begin(), of_b.end());
         const Stretch stretch = best_stretch(std::move(both));
         if (stretch.count < kFewestSwapped || stretch.gain < kSwapGainEach * static_cast<double>(stretch.count))
@@ -200,7 +238,7 @@ void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFaul
     std::size_t gone = 0;
     for (const std::size_t k : {first, second}) {
       gone += take_out(run.tracks[k], best.from_s - kDoubt_s, best.to_s + kDoubt_s);
-      deeds[k] = deeds_of(run.tracks[k]);
+      others.look_again(k);
     }
     faults.push_back({DataFault::Kind::kSwapped, run.name, run.tracks[first].robot, run.tracks[second].robot,
                       best.from_s, best.to_s, best.gain, gone});

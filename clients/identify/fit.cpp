@@ -9,26 +9,21 @@
 #include <utility>
 
 #include "clients/identify/follower.hpp"
+#include "clients/identify/noise_fit.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
 struct LogLikelihood {
   double sum = 0;
-  std::vector<double> parts;  ///< of so many samples each
-  std::size_t count = 0;
   bool touched = false;
   bool with_touching = false;  ///< what was measured after touching counts as well
-  static constexpr std::size_t kPart = 50;
 
   void start(const TrackFilter&) {}
   void step(const StepRecord& record) { touched = touched || record.touching(); }
   void update(const Innovation& innovation, const Sample&) {
     if (std::exchange(touched, false) && !with_touching) return;
-    if (count++ % kPart == 0) parts.push_back(0);
-    const double value = std::max(innovation.log_likelihood, -1e3);
-    parts.back() += value;
-    sum += value;
+    sum += std::max(innovation.log_likelihood, -1e3);
   }
 };
 
@@ -44,34 +39,13 @@ LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, boo
 }
 
 constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
-constexpr int kNoises = 6;
-using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
-
-NoiseVector to_vector(const Noise& n) {
-  NoiseVector v;
-  v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
-  return v.array().log();
-}
-Noise to_noise(const NoiseVector& logs, Noise noise) {
-  // Below the lower bounds a noise is as good as none, above the upper ones nothing would be told from noise.
-  const std::array<double, kNoises> low = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6}, high = {1, 100, 1, 100, 1e4, 10};
-  std::array<double, kNoises> v;
-  for (std::size_t i = 0; i < kNoises; ++i)
-    v[i] = std::clamp(std::exp(logs[static_cast<Eigen::Index>(i)]), low[i], high[i]);
-  noise.factor_s = v[0];
-  noise.wheel_mm2_s = v[1];
-  noise.heading_rad2_s = v[2];
-  noise.drift_mm2_s = v[3];
-  noise.position_mm2 = v[4];
-  noise.heading_rad2 = v[5];
-  return noise;
-}
 
 }  // namespace
 
 PreparedSet::PreparedSet(const MeasuredSet& set) : set_(&set) {
   for (std::size_t r = 0; r < set.runs.size(); ++r) {
     neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
+    neighbours_.back()->remember(set.runs[r], MotionModel{}.cells_mm);
     for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
       const Track& track = set.runs[r].tracks[t];
       if (track.samples.size() < 2) continue;
@@ -109,7 +83,12 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
     for (std::size_t v = 0; v < views_.size(); ++v)
       if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
     *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
+    neighbours_[r]->remember(set_->runs[r], model.cells_mm);
   }
+}
+
+void PreparedSet::remember(const MotionModel& model) {
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells_mm);
 }
 
 Meetings PreparedSet::meetings() const {
@@ -230,6 +209,9 @@ void Fitter::find_shape(MotionModel& model) const {
   const auto add = [&](double centre_mm) {
     Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
     c.model.base.centre_mm = centre_mm;
+    // Without headings nobody sees which way the centre lies from the point that is tracked.
+    constexpr double kMostly = 0.75;
+    c.model.touch_mm = kTouch_mm + (headings ? 0 : kMostly * std::abs(centre_mm - model.base.ahead_mm));
     set_.find_centres(c.model, threads_);
     if (headings) {
       c.model.room = room_of(set_, c.model);
@@ -311,85 +293,7 @@ void Fitter::find_walls(MotionModel& model) const {
 }
 
 void Fitter::fit_noise(MotionModel& model) const {
-  const std::vector<const TrackView*> chosen = some_tracks(kEnoughSamples);
-  const bool headings = set_.set().has_headings;
-  const auto parts_at = [&](const NoiseVector& at) {
-    MotionModel trial = model;
-    trial.noise = to_noise(at, model.noise);
-    std::vector<std::vector<double>> parts(chosen.size());
-    in_parallel(chosen.size(), threads_, [&](std::size_t i) { parts[i] = likelihood_of(trial, *chosen[i]).parts; });
-    std::vector<double> flat;
-    for (const auto& p : parts) flat.insert(flat.end(), p.begin(), p.end());
-    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(flat.data(), static_cast<Eigen::Index>(flat.size())));
-  };
-  // Noises beyond the data's reach are held near these by a weak prior, so that the search has an end.
-  const NoiseVector middle = to_vector(Noise{});
-  const double weak = 1.0 / (6 * 6);
-  const auto prior = [&](const NoiseVector& at) { return -0.5 * weak * (at - middle).squaredNorm(); };
-
-  const auto value_at = [&](const NoiseVector& at) { return parts_at(at).sum() + prior(at); };
-  const auto gradient_at = [&](const NoiseVector& at) {
-    constexpr double kStep = 0.02;
-    NoiseVector gradient = NoiseVector::Zero();
-    for (int i = 0; i < kNoises; ++i) {
-      if (i == 5 && !headings) continue;
-      NoiseVector up = at, down = at;
-      up[i] += kStep;
-      down[i] -= kStep;
-      gradient[i] = (value_at(up) - value_at(down)) / (2 * kStep);
-    }
-    return gradient;
-  };
-  // Broyden, Fletcher, Goldfarb and Shanno, on logarithms of variances.
-  const auto climb = [&](NoiseVector& at) {
-    double value = value_at(at);
-    NoiseVector gradient = gradient_at(at);
-    // A log variance is known to about sqrt(2 / n).
-    const double curvature =
-        std::max<double>(10, 0.1 * static_cast<double>(parts_at(at).size()) * LogLikelihood::kPart);
-    Eigen::Matrix<double, kNoises, kNoises> inverse =
-        Eigen::Matrix<double, kNoises, kNoises>::Identity() / curvature;
-    for (int pass = 0; pass < 20; ++pass) {
-      NoiseVector move = inverse * gradient;
-      const double longest = move.cwiseAbs().maxCoeff();
-      if (longest > 1.5) move *= 1.5 / longest;
-      bool better = false;
-      double gained = 0;
-      for (int halve = 0; halve < 6; ++halve, move *= 0.3) {
-        const double found = value_at(at + move);
-        if (!(found > value)) continue;
-        gained = found - value;
-        value = found;
-        better = true;
-        break;
-      }
-      if (!better) break;
-      at += move;
-      if (gained < 0.3) break;
-      const NoiseVector next = gradient_at(at);
-      const NoiseVector change = gradient - next;  // of the negative
-      const double along = change.dot(move);
-      if (along > 1e-9) {
-        const Eigen::Matrix<double, kNoises, kNoises> side =
-            Eigen::Matrix<double, kNoises, kNoises>::Identity() - move * change.transpose() / along;
-        inverse = (side * inverse * side.transpose() + move * move.transpose() / along).eval();
-      }
-      gradient = next;
-    }
-    return value;
-  };
-  NoiseVector at = to_vector(model.noise);
-  const double value = climb(at);
-  // What once seemed to be no noise has no slope any more that would lead back; a new start shows whether it is some.
-  constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
-  if (std::exp(at[4]) < kNone_mm2 || std::exp(at[0]) < kNone_s) {
-    NoiseVector anew = at;
-    anew[0] = std::max(at[0], middle[0]);
-    anew[3] = std::min(at[3], std::log(1e-2));
-    anew[4] = std::max(at[4], std::log(0.1));
-    if (climb(anew) > value) at = anew;
-  }
-  model.noise = to_noise(at, model.noise);
+  model.noise = most_likely_noise(model, some_tracks(kEnoughSamples), set_.set().has_headings, threads_);
 }
 
 void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {
@@ -457,6 +361,31 @@ double Fitter::log_likelihood(const MotionModel& model) const {
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
+double Fitter::log_evidence(const MotionModel& model) const {
+  double value = log_likelihood(model);
+  if (model.terms.empty()) return value;
+  const std::vector<Unit> units = linearise(model, set_.units(), blocks_of(model), {100, threads_});
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());
+  for (const Unit& unit : units) information += unit.information;
+  Eigen::VectorXd unused = Eigen::VectorXd::Zero(information.rows());
+  add_base_prior(model, information, unused);
+  const Eigen::Index n = information.rows() - kBaseColumns;
+  Eigen::VectorXd sd(n);
+  Eigen::Index first = 0;
+  for (const Term& term : model.terms) {
+    sd.segment(first, term.precision.size()) = term.precision.cwiseInverse().cwiseSqrt();
+    value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+    first += term.precision.size();
+  }
+  // Of the terms' coefficients, whatever the base parameters are.
+  const Eigen::MatrixXd cross = information.topRightCorner(kBaseColumns, n);
+  const Eigen::MatrixXd by = information.topLeftCorner<kBaseColumns, kBaseColumns>().ldlt().solve(cross);
+  Eigen::MatrixXd posterior = information.bottomRightCorner(n, n) - cross.transpose() * by;
+  posterior = (sd.asDiagonal() * posterior * sd.asDiagonal()).eval();
+  posterior.diagonal().array() += 1;
+  return value - Eigen::LLT<Eigen::MatrixXd>(posterior).matrixLLT().diagonal().array().log().sum();
+}
+
 void Fitter::fit_base(MotionModel& model) const {
   const bool headings = set_.set().has_headings;
   set_.find_headings(model, threads_);
@@ -512,15 +441,16 @@ void Fitter::fit(MotionModel& model, int passes) const {
       score += unit.score;
     }
     add_base_prior(model, information, score);
+    Eigen::VectorXd beforehand = Eigen::VectorXd::Zero(information.rows());
     Eigen::Index first = kBaseColumns;
     for (const Term& term : model.terms) {
       const Eigen::Index n = term.coefficients.size();
+      beforehand.segment(first, n) = term.precision;
       information.diagonal().segment(first, n) += term.precision;
       score.segment(first, n) -= term.precision.cwiseProduct(term.coefficients);
       first += n;
     }
-    Eigen::VectorXd step = information.ldlt().solve(score);
-    // A step that makes things worse was too long.
+    // A step that makes things worse is held back first where the data say little, then everywhere.
     const MotionModel start = model;
     // Of the coefficients beforehand as well.
     const auto worth = [&](const MotionModel& trial) {
@@ -529,12 +459,20 @@ void Fitter::fit(MotionModel& model, int passes) const {
       return value;
     };
     const double before = worth(start);
-    for (int halve = 0; halve < 5; ++halve, step *= 0.4) {
+    struct Trial {
+      double firmness, length;
+    };
+    constexpr std::array<Trial, 6> kTrials = {{{0, 1}, {10, 1}, {100, 1}, {100, 0.4}, {100, 0.16}, {100, 0.06}}};
+    bool better = false;
+    for (const Trial& trial : kTrials) {
+      Eigen::MatrixXd held = information;
+      held.diagonal() += trial.firmness * beforehand;
       model = start;
-      apply(model, units, step);
-      if (worth(model) > before - 2) break;
-      if (halve == 4) model = start;
+      apply(model, units, trial.length * held.ldlt().solve(score));
+      better = worth(model) > before - 2;
+      if (better) break;
     }
+    if (!better) model = start;
   }
 }
 

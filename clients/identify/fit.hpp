@@ -36,6 +36,8 @@ class PreparedSet {
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
   /// Looks again at where discs are, which is not where they are measured, for what robots see of each other.
   void find_centres(const MotionModel&, std::uint32_t threads);
+  /// Looks again at what floors remember, in cells of the model's sizes.
+  void remember(const MotionModel&);
   [[nodiscard]] Meetings meetings() const;
   /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
   void find_headings(const MotionModel&, std::uint32_t threads);
@@ -65,7 +67,7 @@ class Fitter {
   void fit_surroundings(MotionModel&) const;
   /// Fits base, biases, noise and the coefficients of the model's terms. Few passes suffice from a fitted model.
   void fit(MotionModel&, int passes) const;
-  /// The noise alone: a quasi-Newton search on the likelihood of some of the tracks.
+  /// The noise alone, on some of the tracks.
   void fit_noise(MotionModel&) const;
   /// What touching adds to the motion, likewise.
   void fit_touching(MotionModel&) const;
@@ -75,6 +77,8 @@ class Fitter {
   void find_walls(MotionModel&) const;
   /// Of all that was measured on tracks that may be fitted to.
   [[nodiscard]] double log_likelihood(const MotionModel&) const;
+  /// Log marginal likelihood over the coefficients of the terms (Laplace's approximation), up to what all models have in common.
+  [[nodiscard]] double log_evidence(const MotionModel&) const;
   /// Information and score of the base's prior, added to those of the data.
   void add_base_prior(const MotionModel&, Eigen::MatrixXd& information, Eigen::VectorXd& score) const;
   /// Moves base parameters, terms and biases by a step in all columns.

@@ -39,12 +39,14 @@ class Normals {
 
 }  // namespace
 
-std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starting>& robots, double from_s,
-                              double to_s, std::uint32_t count, bool neighbours, std::array<std::uint32_t, 2> key) {
+std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starting>& robots,
+                              const Floors& floors_then, double from_s, double to_s, std::uint32_t count,
+                              bool neighbours, std::array<std::uint32_t, 2> key) {
   const Normals normals(key);
   std::vector<Foreseen> out(robots.size());
   std::vector<double> x(robots.size()), y(robots.size());
   std::vector<TrackFilter> filters;
+  std::vector<NeighbourView> nears(robots.size());
   for (std::uint32_t sample = 0; sample < count; ++sample) {
     // Samples come in pairs that mirror each other.
     const double mirror = sample % 2 == 0 ? 1 : -1;
@@ -63,14 +65,21 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
       belief.covariance.setZero();
     }
     double now_s = from_s;
+    Floors floors = floors_then;
     for (std::uint32_t step = 1; now_s < to_s - 1e-9; ++step) {
       const double next_s = std::min(to_s, now_s + kRaster_s);
       for (std::size_t r = 0; r < robots.size(); ++r) {
         x[r] = filters[r].belief().centre_x_mm();
         y[r] = filters[r].belief().centre_y_mm();
       }
+      for (std::size_t r = 0; r < robots.size(); ++r) {
+        nears[r] = neighbours ? view_of(r, x, y) : NeighbourView{};
+        floors.see(x[r], y[r], nears[r]);
+      }
+      for (std::size_t r = 0; floors.any() && r < robots.size(); ++r)
+        if (robots[r].view->clock.at(now_s).driven()) floors.add(x[r], y[r], next_s - now_s);
       for (std::uint32_t r = 0; r < robots.size(); ++r) {
-        const NeighbourView near = neighbours ? view_of(r, x, y) : NeighbourView{};
+        const NeighbourView& near = nears[r];
         const double start_s = step == 1 ? robots[r].now_s : now_s;
         Belief& belief = filters[r].belief();
         sub_steps(robots[r].view->clock, start_s, next_s,

@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "clients/identify/floors.hpp"
 #include "clients/identify/walk.hpp"
 
 namespace kilotwin::identify {
@@ -22,9 +23,9 @@ struct Foreseen {
   double x_mm = 0, y_mm = 0, square_mm2 = 0;  ///< mean, and mean squared distance from it
 };
 
-/// `neighbours`: whether effects look at neighbours. `key` tells what is drawn.
-[[nodiscard]] std::vector<Foreseen> futures(const MotionModel&, const std::vector<Starting>&, double from_s,
-                                            double to_s, std::uint32_t count, bool neighbours,
+/// `neighbours`: whether effects look at neighbours; `floors` as they are at from_s. `key` tells what is drawn.
+[[nodiscard]] std::vector<Foreseen> futures(const MotionModel&, const std::vector<Starting>&, const Floors& floors,
+                                            double from_s, double to_s, std::uint32_t count, bool neighbours,
                                             std::array<std::uint32_t, 2> key);
 
 }  // namespace kilotwin::identify

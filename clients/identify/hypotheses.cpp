@@ -118,6 +118,7 @@ class Catalogue {
     of_commands();
     of_neighbours();
     of_history();
+    of_floor();
     of_lately();
     of_robots();
   }
@@ -323,11 +324,13 @@ class Catalogue {
   }
   void of_neighbours() {
     if (!extent_.neighbours) return;
+    // 70, 100 and 150 mm; which it is exactly is found when the effect gets its shape.
+    constexpr std::uint8_t kSought[] = {3, 6, 11};
     const auto with_radius = [](Factor f, std::uint8_t radius) {
       f.axis.radius = radius;
       return f;
     };
-    for (std::uint8_t r = 1; r < kNeighbourRadii_mm.size(); ++r) {
+    for (const std::uint8_t r : kSought) {
       const double reach = kNeighbourRadii_mm[r];
       const Factor near = with_radius(over(Shape::kTaper, Covariate::kNearest, 0, reach, 3), r);
       const auto bases = put(kSpeed, Basis{{near}});
@@ -342,7 +345,7 @@ class Catalogue {
       const auto forward = make_.put(Target::kAhead, Basis{{falling, bearing}});
       make_.add("speed-by-neighbours", {"neighbours"}, kSpeed.in_words, {forward, forward + 2}, 6);
     }
-    for (std::uint8_t r = 0; r < kNeighbourRadii_mm.size(); ++r) {
+    for (const std::uint8_t r : kSought) {
       const Factor count = with_radius(over(Shape::kCosines, Covariate::kNeighbours, 0, 8, 3), r);
       const auto bases = put(kSpeed, Basis{{count}});
       for (const Eigen::Index n : {1, 3}) add(kSpeed, "neighbours", {"neighbours"}, some(bases, 0, n), 8);
@@ -395,6 +398,14 @@ class Catalogue {
     for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
       const auto turned = put(*acting, Basis{{last}}, kStraightOnly);
       add(*acting, "last-turn", {"history"}, some(turned, 0, 2));
+    }
+  }
+  void of_floor() {
+    for (std::uint8_t cells = 0; cells < kFloorCells; ++cells) {
+      Factor f = keyed(Shape::kExponential, Covariate::kTrodden, {2, 8, 32});
+      f.axis.radius = cells;
+      const auto bases = put(kSpeed, Basis{{f}});
+      add(kSpeed, "trodden", {"history", "position"}, some(bases, 0, 3), kFloorCells);
     }
   }
   /// What motors did lately, which fades: they warm up and cool down, recover, turned more to one side than to the other.

@@ -203,6 +203,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     }
   }
   const MotionModel& after = found.model;
+  if (other) other->find_centres(after, options.threads);
   json document;
 
   say_progress(0.9, "predictions");

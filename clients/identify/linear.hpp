@@ -38,7 +38,7 @@ struct Beside {
 
 /// Puts blocks in place of the term's, whose columns are `columns` with these standard deviations beforehand: all moves with
 /// them as the linearised data have it. `score` is that without the term.
-void exchange(MotionModel&, std::size_t term, const Linear&, const std::vector<Block>&, const Eigen::VectorXd& score,
-              const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd);
+void exchange(MotionModel&, std::size_t term, const Linear&, const std::vector<Block>&,
+              const Eigen::VectorXd& score, const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd);
 
 }  // namespace kilotwin::identify

@@ -226,6 +226,7 @@ class Sensitivities {
     if (!measures_) return;
     Situation at = last_;
     at.time_s = sample.time_s;
+    at.span_s = 0;
     at.x_mm = pose[0] + model_.base.centre_mm * c;
     at.y_mm = pose[1] + model_.base.centre_mm * s;
     at.heading_rad = heading;

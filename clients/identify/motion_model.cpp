@@ -88,6 +88,14 @@ Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) c
   return r;
 }
 
+bool MotionModel::looks_at(const Axis& axis) const {
+  for (const Term& term : terms)
+    for (const Block& block : term.blocks)
+      for (const Factor& factor : block.basis.factors)
+        if (factor.axis == axis) return true;
+  return false;
+}
+
 bool MotionModel::measures() const {
   return std::any_of(terms.begin(), terms.end(), [](const Term& term) {
     return std::any_of(term.blocks.begin(), term.blocks.end(),

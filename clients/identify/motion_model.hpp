@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <map>
 #include <string>
 #include <vector>
@@ -94,12 +95,17 @@ struct MotionModel {
   Noise noise;
   Room room;
   bool contacts = true;  ///< robots push each other
+  /// Robots whose centres are this near, by what is known of where they are, may touch, mm.
+  double touch_mm = kTouch_mm;
+  /// Sides of the square cells in which the floor may remember, the first cell from 0 on.
+  std::array<double, kFloorCells> cells_mm = {20, 28, 39, 55, 78, 110};
   std::vector<Term> terms;
   std::map<std::uint32_t, RobotBias> robots;
 
   /// The robot's own, or the distribution of all.
   [[nodiscard]] RobotBias bias_of(std::uint32_t robot) const;
   [[nodiscard]] Rates rates(const Situation&, const Eigen::Vector2d& bias_mm_s) const;
+  [[nodiscard]] bool looks_at(const Axis&) const;
   [[nodiscard]] bool measures() const;  ///< whether some term acts on what is measured
 
   /// What is measured of a robot whose reference point is at x, y: position and heading.

@@ -17,9 +17,9 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
       nearest2 = d2;
       nearest = other;
     }
-    for (std::size_t r = 0; r < kNeighbourRadii_mm.size(); ++r) {
-      const double part = 1 - d2 / (kNeighbourRadii_mm[r] * kNeighbourRadii_mm[r]);
-      if (part < 0) continue;
+    for (std::size_t r = kNeighbourRadii_mm.size(); r-- > 0;) {
+      const auto part = static_cast<float>(1 - d2 / (kNeighbourRadii_mm[r] * kNeighbourRadii_mm[r]));
+      if (part < 0) break;
       view.count[r] += 1;
       view.density[r] += part * part;
     }
@@ -40,9 +40,11 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
     end_s = std::max(end_s, track.samples.back().time_s);
   }
   const std::size_t robots = run.tracks.size();
-  if (robots < 2 || end_s < start_s_) return;
+  if (robots == 0 || end_s < start_s_) return;
   instants_ = static_cast<std::size_t>((end_s - start_s_) / kRaster_s) + 2;
   views_.resize(robots * instants_);
+  spots_.assign(robots * instants_, {std::nan(""), std::nan(""), false});
+  std::vector<CommandClock> clocks(run.tracks.begin(), run.tracks.end());
   std::vector<std::size_t> next(robots, 0);
   std::vector<double> x(robots), y(robots);
   for (std::size_t i = 0; i < instants_; ++i) {
@@ -70,8 +72,27 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
       x[r] = ax + part * (bx - ax);
       y[r] = ay + part * (by - ay);
     }
-    for (std::size_t r = 0; r < robots; ++r)
-      if (!std::isnan(x[r])) views_[r * instants_ + i] = view_of(r, x, y);
+    for (std::size_t r = 0; r < robots; ++r) {
+      if (std::isnan(x[r])) continue;
+      views_[r * instants_ + i] = view_of(r, x, y);
+      spots_[r * instants_ + i] = {x[r], y[r], clocks[r].at(t + 1e-9).driven()};
+    }
+  }
+}
+
+void RunNeighbours::remember(const Run& run, const std::array<double, kFloorCells>& cells_mm) {
+  for (std::size_t c = 0; c < kFloorCells; ++c) {
+    FloorMemory memory(cells_mm[c]);
+    for (std::size_t i = 0; i < instants(); ++i) {
+      for (std::size_t r = 0; r < run.tracks.size(); ++r) {
+        const Spot& s = spot(r, i);
+        if (!std::isnan(s.x_mm)) views_[r * instants_ + i].trodden_s[c] = memory.value_s(s.x_mm, s.y_mm);
+      }
+      for (std::size_t r = 0; r < run.tracks.size(); ++r) {
+        const Spot& s = spot(r, i);
+        if (!std::isnan(s.x_mm) && s.driven) memory.add(s.x_mm, s.y_mm, kRaster_s);
+      }
+    }
   }
 }
 

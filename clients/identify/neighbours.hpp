@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "clients/identify/floor_memory.hpp"
 #include "clients/identify/situation.hpp"
 
 namespace kilotwin::identify {
@@ -26,11 +27,27 @@ class RunNeighbours {
   /// Where robots were measured; with `centres`, by track, where their discs were instead.
   explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr);
   [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
+  /// Fills in what the floor remembers in cells of these sizes.
+  void remember(const Run&, const std::array<double, kFloorCells>& cells_mm);
+
+  /// Where the disc of a robot was at an instant of the raster.
+  struct Spot {
+    double x_mm, y_mm;  ///< NaN: it was not there
+    bool driven;
+  };
+  [[nodiscard]] std::size_t instants() const { return spots_.empty() ? 0 : instants_; }
+  [[nodiscard]] double time_s(std::size_t instant) const {
+    return start_s_ + static_cast<double>(instant) * kRaster_s;
+  }
+  [[nodiscard]] const Spot& spot(std::size_t track, std::size_t instant) const {
+    return spots_[track * instants_ + instant];
+  }
 
  private:
   double start_s_ = 0;
   std::size_t instants_ = 0;
   std::vector<NeighbourView> views_;  ///< by track, then by instant
+  std::vector<Spot> spots_;           ///< likewise
   NeighbourView nobody_;
 };
 

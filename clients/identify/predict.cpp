@@ -11,11 +11,49 @@
 namespace kilotwin::identify {
 namespace {
 
+/// Where a floor that is mapped finely changes from one place to the next.
+class Edges {
+ public:
+  explicit Edges(const MotionModel& model) {
+    for (const Term& term : model.terms)
+      for (const Block& block : term.blocks)
+        if (block.basis.factors.size() == 1 && block.basis.factors.front().shape == Factor::Shape::kGrid)
+          maps_.push_back(&block.basis);
+  }
+  [[nodiscard]] bool any() const { return !maps_.empty(); }
+  [[nodiscard]] bool near(double x_mm, double y_mm, double reach_mm) const {
+    constexpr double kMuch = 0.1;  // of a robot's speed
+    for (const Basis* const map : maps_) {
+      double least = 1e300, most = -1e300;
+      for (const auto& [x, y] : {std::pair{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        Situation s;
+        s.x_mm = x_mm + x * reach_mm;
+        s.y_mm = y_mm + y * reach_mm;
+        double value = 0;
+        map->evaluate(s, 0, &value);
+        least = std::min(least, value);
+        most = std::max(most, value);
+      }
+      if (most - least > kMuch) return true;
+    }
+    return false;
+  }
+
+ private:
+  std::vector<const Basis*> maps_;
+};
+
 /// Robots of a run that go on from an instant by their commands alone.
 class Outlook {
  public:
-  Outlook(const MotionModel& model, std::vector<Follower>& followers, double from_s, bool neighbours)
-      : model_(model), neighbours_(neighbours), now_s_(from_s) {
+  Outlook(const MotionModel& model, std::vector<Follower>& followers, const Floors& floors, double from_s,
+          bool neighbours)
+      : model_(model),
+        neighbours_(neighbours),
+        now_s_(from_s),
+        edges_(model),
+        floors_(floors),
+        floors_then_(floors) {
     for (Follower& follower : followers) {
       Robot& robot = robots_.emplace_back();
       robot.view = &follower.view();
@@ -38,29 +76,29 @@ class Outlook {
   void go_to(double to_s) {
     constexpr double kRaster_s = 0.25;
     while (now_s_ < to_s - 1e-9) {
-      see();
       const double next = neighbours_ ? std::min(to_s, now_s_ + kRaster_s) : to_s;
+      see(next - now_s_);
       advance(next);
       now_s_ = next;
     }
     advance(to_s);
   }
-  /// Draws futures of the robots that came near each other, or were uncertain enough to.
+  /// Draws futures of the robots that came near each other or an edge of the floor, or were uncertain enough to.
   void draw_futures(double from_s, std::uint32_t count, bool all, std::array<std::uint32_t, 2> key) {
     std::vector<Starting> together;
     std::vector<std::size_t> who;
     bool any = false;
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       if (robots_[r].filters.empty()) continue;
-      any = any || robots_[r].may_touch;
-      if (!all && !robots_[r].may_touch) continue;
+      any = any || robots_[r].branches;
+      if (!all && !robots_[r].branches) continue;
       together.push_back(robots_[r].start);
       who.push_back(r);
     }
     if (!any) return;
-    const std::vector<Foreseen> seen = futures(model_, together, from_s, now_s_, count, all, key);
+    const std::vector<Foreseen> seen = futures(model_, together, floors_then_, from_s, now_s_, count, all, key);
     for (std::size_t i = 0; i < who.size(); ++i)
-      if (robots_[who[i]].may_touch) robots_[who[i]].foreseen = seen[i];
+      if (robots_[who[i]].branches) robots_[who[i]].foreseen = seen[i];
   }
   bool expected(std::size_t place, Predicted& out) const {
     const Robot& robot = robots_[place];
@@ -94,10 +132,11 @@ class Outlook {
     double now_s = 0;
     NeighbourView near;
     Starting start;
-    bool may_touch = false;
+    bool branches = false;  ///< what becomes of it is not what becomes of its mean
     std::optional<Foreseen> foreseen;
   };
-  void see() {
+  /// All look at each other and at the floor, on which they stay for `for_s`.
+  void see(double for_s) {
     if (!neighbours_) return;
     locate();
     for (std::size_t r = 0; r < robots_.size(); ++r) {
@@ -105,9 +144,13 @@ class Outlook {
       robots_[r].near = view_of(r, x_, y_);
       const StateCovariance& p = robots_[r].filters.front().belief().covariance;
       const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
-      if (model_.contacts && robots_[r].near.nearest_mm < kTouch_mm + std::min(uncertain, 20.0))
-        robots_[r].may_touch = true;
+      if (model_.contacts && robots_[r].near.nearest_mm < model_.touch_mm + std::min(uncertain, 20.0))
+        robots_[r].branches = true;
+      if (!robots_[r].branches) robots_[r].branches = edges_.near(x_[r], y_[r], std::clamp(uncertain, 6.0, 30.0));
+      floors_.see(x_[r], y_[r], robots_[r].near);
     }
+    for (std::size_t r = 0; floors_.any() && r < robots_.size(); ++r)
+      if (!std::isnan(x_[r]) && robots_[r].view->clock.at(now_s_).driven()) floors_.add(x_[r], y_[r], for_s);
   }
   void locate() {
     x_.assign(robots_.size(), std::nan(""));
@@ -149,8 +192,52 @@ class Outlook {
   const MotionModel& model_;
   const bool neighbours_;
   double now_s_;
+  const Edges edges_;
+  Floors floors_;
+  const Floors& floors_then_;
   std::vector<Robot> robots_;
   std::vector<double> x_, y_;
+};
+
+/// What the floor of a run remembers, by what has been measured so far.
+class Trodden {
+ public:
+  Trodden(const MotionModel& model, std::size_t robots) : known_(model), next_(robots, 0) {}
+
+  [[nodiscard]] Floors at(double now_s, const std::vector<Follower>& followers) {
+    for (std::size_t f = 0; known_.any() && f < followers.size(); ++f) {
+      if (!followers[f].started()) continue;
+      const auto [near, place] = of(followers[f]);
+      for (std::size_t& i = next_[f];
+           i < near->instants() && is_before(near->time_s(i), followers[f].last_s(), now_s); ++i)
+        add(near->spot(place, i), known_);
+    }
+    Floors now = known_;
+    // Since they were seen last robots are thought to have stood there.
+    for (std::size_t f = 0; known_.any() && f < followers.size(); ++f) {
+      if (!followers[f].started() || next_[f] == 0) continue;
+      const auto [near, place] = of(followers[f]);
+      RunNeighbours::Spot last = near->spot(place, next_[f] - 1);
+      for (std::size_t i = next_[f]; i < near->instants() && near->time_s(i) < now_s - 1e-6; ++i) {
+        last.driven = followers[f].view().clock.at(near->time_s(i) + 1e-9).driven();
+        add(last, now);
+      }
+    }
+    return now;
+  }
+
+ private:
+  static std::pair<const RunNeighbours*, std::size_t> of(const Follower& follower) {
+    return {follower.view().neighbours, follower.view().place};
+  }
+  static bool is_before(double time_s, double seen_s, double now_s) {
+    return time_s <= seen_s + 1e-6 && time_s < now_s - 1e-6;
+  }
+  static void add(const RunNeighbours::Spot& spot, Floors& to) {
+    if (!std::isnan(spot.x_mm) && spot.driven) to.add(spot.x_mm, spot.y_mm, RunNeighbours::kRaster_s);
+  }
+  Floors known_;
+  std::vector<std::size_t> next_;  ///< instants that are known already
 };
 
 /// The end of a run is not told; it may last to the next frame, which need not have come.
@@ -185,7 +272,7 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
   const std::vector<Run>& runs = set.set().runs;
   std::vector<std::vector<Predicted>> by_run(runs.size());
   const bool effects_of_neighbours = looks_at_neighbours(model),
-             neighbours = effects_of_neighbours || model.contacts;
+             neighbours = effects_of_neighbours || model.contacts || Floors(model).any() || Edges(model).any();
   in_parallel(runs.size(), threads, [&](std::size_t run) {
     std::vector<Follower> followers;
     double last_s = 0;
@@ -198,15 +285,17 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
       last_s = std::max(last_s, end_of(view.track->samples));
     }
     if (!wanted) return;
+    Trodden trodden(model, followers.size());
     const double first_s = std::max(asked.first_s, std::ceil(asked.horizon_s / asked.every_s) * asked.every_s);
     for (int k = 0;; ++k) {
       const double time_s = first_s + k * asked.every_s;
       if (time_s > last_s + 1e-6) break;
       const double from_s = time_s - asked.horizon_s;
       for (Follower& follower : followers) follower.follow(from_s);
-      Outlook outlook(model, followers, from_s, neighbours);
+      const Floors floors = trodden.at(from_s, followers);
+      Outlook outlook(model, followers, floors, from_s, neighbours);
       outlook.go_to(time_s);
-      if (asked.futures > 0 && model.contacts)
+      if (asked.futures > 0 && (model.contacts || Edges(model).any()))
         outlook.draw_futures(from_s, asked.futures, effects_of_neighbours,
                              {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(k)});
       for (std::size_t i = 0; i < followers.size(); ++i) {

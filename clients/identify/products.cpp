@@ -2,37 +2,30 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace kilotwin::identify {
 namespace {
 
-constexpr Eigen::Index kLanes = 8, kStrip = 2 * kLanes, kColumns = 4;
+constexpr Eigen::Index kLanes = 8, kStrip = 2 * kLanes, kColumns = 8;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 
-/// One strip of rows of `sums` by some of its columns, in registers.
-template <std::size_t columns>
+/// One strip of rows of `sums` by some of its columns, in registers: written out, or a compiler keeps them in memory.
+template <Eigen::Index... column>
 inline __attribute__((always_inline)) void strip(const double* rows, Eigen::Index count, Eigen::Index n,
-                                                 Eigen::Index i, Eigen::Index j, double* sums) {
-  Lanes low[columns], high[columns];
-  for (std::size_t c = 0; c < columns; ++c) {
-    std::memcpy(&low[c], sums + (j + static_cast<Eigen::Index>(c)) * n + i, sizeof(Lanes));
-    std::memcpy(&high[c], sums + (j + static_cast<Eigen::Index>(c)) * n + i + kLanes, sizeof(Lanes));
-  }
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const double* const row = rows + k * n;
+                                                 double* sums, const double* by,
+                                                 std::integer_sequence<Eigen::Index, column...>) {
+  Lanes low[sizeof...(column)], high[sizeof...(column)];
+  (std::memcpy(&low[column], sums + column * n, sizeof(Lanes)), ...);
+  (std::memcpy(&high[column], sums + column * n + kLanes, sizeof(Lanes)), ...);
+  for (Eigen::Index k = 0; k < count; ++k, rows += n, by += n) {
     Lanes a, b;
-    std::memcpy(&a, row + i, sizeof(Lanes));
-    std::memcpy(&b, row + i + kLanes, sizeof(Lanes));
-    for (std::size_t c = 0; c < columns; ++c) {
-      const double by = row[j + static_cast<Eigen::Index>(c)];
-      low[c] += a * by;
-      high[c] += b * by;
-    }
+    std::memcpy(&a, rows, sizeof(Lanes));
+    std::memcpy(&b, rows + kLanes, sizeof(Lanes));
+    ((low[column] += a * by[column], high[column] += b * by[column]), ...);
   }
-  for (std::size_t c = 0; c < columns; ++c) {
-    std::memcpy(sums + (j + static_cast<Eigen::Index>(c)) * n + i, &low[c], sizeof(Lanes));
-    std::memcpy(sums + (j + static_cast<Eigen::Index>(c)) * n + i + kLanes, &high[c], sizeof(Lanes));
-  }
+  (std::memcpy(sums + column * n, &low[column], sizeof(Lanes)), ...);
+  (std::memcpy(sums + column * n + kLanes, &high[column], sizeof(Lanes)), ...);
 }
 
 inline __attribute__((always_inline)) void add(const double* rows, Eigen::Index count, Eigen::Index n,
@@ -42,9 +35,10 @@ inline __attribute__((always_inline)) void add(const double* rows, Eigen::Index 
     Eigen::Index i = j;
     for (; i + kStrip <= n; i += kStrip) {
       if (columns == kColumns) {
-        strip<kColumns>(rows, count, n, i, j, sums);
+        strip(rows + i, count, n, sums + j * n + i, rows + j, std::make_integer_sequence<Eigen::Index, kColumns>());
       } else {
-        for (Eigen::Index c = 0; c < columns; ++c) strip<1>(rows, count, n, i, j + c, sums);
+        for (Eigen::Index c = j; c < n; ++c)
+          strip(rows + i, count, n, sums + c * n + i, rows + c, std::make_integer_sequence<Eigen::Index, 1>());
       }
     }
     for (Eigen::Index c = 0; c < columns; ++c) {

@@ -54,6 +54,7 @@ Factor richer(Factor f) {
       f.points.clear();
       break;
     case Shape::kTable:
+    case Shape::kGrid:
     case Shape::kWave: break;
   }
   return f;

@@ -31,8 +31,8 @@ struct Room {
   [[nodiscard]] double inside_y(double y_mm) const { return std::clamp(y_mm, y_low_mm, y_high_mm); }
 };
 
-/// Two robots whose centres are this near may touch, mm: two radii of 16.5 mm, the tracker's noise, and their ways between looks.
-inline constexpr double kTouch_mm = 40;
+/// Two robots whose centres are this near may touch, mm: two radii of 16.5 mm, and what they move between looks.
+inline constexpr double kTouch_mm = 36;
 inline constexpr double kDiscs_mm = 33;
 inline constexpr double kWallMargin_mm = 4;
 

@@ -6,6 +6,9 @@
 #include <optional>
 #include <set>
 
+#include "clients/identify/fine_map.hpp"
+#include "clients/identify/memory_shape.hpp"
+#include "clients/identify/neighbour_shape.hpp"
 #include "clients/identify/refine.hpp"
 #include "clients/identify/simplify.hpp"
 #include "clients/identify/widen.hpp"
@@ -118,7 +121,8 @@ class Loop {
 
   /// Gives a term the form that the data support.
   void shape(std::size_t place) {
-    refine(fitter_, out_.model, place);
+    if (!shape_neighbours(fitter_, out_.model, place) && !shape_memory(fitter_, out_.model, place))
+      refine(fitter_, out_.model, place);
     const std::string before = out_.model.terms[place].name, name = find_steps(fitter_, out_.model, place);
     if (name != before) {
       for (const Hypothesis& h : dictionary_.hypotheses) {
@@ -127,6 +131,7 @@ class Loop {
         out_.reasons[place].acts_on = h.acts_on;
       }
     }
+    sharpen(fitter_, out_.model, place);
     widen(fitter_, out_.model, place);
   }
   /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.
@@ -137,10 +142,7 @@ class Loop {
       const Finding own = scores_->weigh_term(t);
       out_.reasons[place].finding.held_out = own.held_out;
       out_.reasons[place].finding.held_out_se = own.held_out_se;
-      if (own.held_out < 2) {
-        drop(place);
-        return true;
-      }
+      if (own.held_out < 2 && dropped(place)) return true;
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
@@ -178,10 +180,17 @@ class Loop {
     failed_.insert(other.name + " for " + out_.model.terms[place].name);
     return false;
   }
-  void drop(std::size_t t) {
+  /// Takes a term out, but for one without which the data are less probable after all.
+  bool dropped(std::size_t t) {
+    const Search before = out_;
+    const double evidence = fitter_.log_evidence(out_.model);
     out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
     fitter_.fit(out_.model, 1);
+    if (fitter_.log_evidence(out_.model) > evidence - kClose) return true;
+    out_ = before;
+    fitter_.set().find_headings(out_.model, fitter_.threads());
+    return false;
   }
   void note_rejected(const Scores::Outcome& outcome) {
     out_.rejected.clear();

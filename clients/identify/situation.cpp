@@ -55,6 +55,7 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kPreviousCommand:
       return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
+    case Covariate::kTrodden: return s.near.trodden_s[axis.radius];
     case Covariate::kRobot: return s.robot;
     case Covariate::kRun: return s.run;
   }

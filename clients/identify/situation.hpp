@@ -8,15 +8,20 @@
 
 namespace kilotwin::identify {
 
-/// Radii within which robots count as neighbours, mm, centre to centre: touching, one robot between, within reach of a loud message.
-inline constexpr std::array<double, 4> kNeighbourRadii_mm = {40, 70, 100, 150};
+/// Radii within which robots count as neighbours, mm, centre to centre: from touching to well within reach of a message.
+inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,  80,  90,  100,
+                                                              110, 120, 130, 140, 150, 175, 200};
 
-/// The other robots, seen from one.
+/// So many sizes of cells in which a floor may remember where robots went (MotionModel::cells_mm).
+inline constexpr std::size_t kFloorCells = 6;
+
+/// The other robots, seen from one, and what they left on the floor.
 struct NeighbourView {
-  double nearest_mm = 1e9;             ///< centre to centre
-  double direction_rad = 0;            ///< to the nearest, from the x axis
-  std::array<double, 4> count = {};    ///< within kNeighbourRadii_mm
-  std::array<double, 4> density = {};  ///< sum of (1 - (distance / radius)^2)^2
+  double nearest_mm = 1e9;                                    ///< centre to centre
+  double direction_rad = 0;                                   ///< to the nearest, from the x axis
+  std::array<float, kNeighbourRadii_mm.size()> count = {};    ///< within kNeighbourRadii_mm
+  std::array<float, kNeighbourRadii_mm.size()> density = {};  ///< sum of (1 - (distance / radius)^2)^2
+  std::array<float, kFloorCells> trodden_s = {};  ///< for which driven robots stood in its cell, itself included
 };
 
 /// Within these times, s, what motors did is forgotten: by exp(-age / time). Of a warm motor that cools, of a battery that recovers.
@@ -49,6 +54,7 @@ struct Situation {
   NeighbourView near;
   std::uint32_t robot = 0;  ///< its number
   std::uint32_t run = 0;    ///< place in the set
+  double span_s = 0;        ///< of the sub-step of which this is the middle; 0: an instant
 };
 
 enum class Covariate : std::uint8_t {
@@ -70,6 +76,7 @@ enum class Covariate : std::uint8_t {
   kBearing,          ///< to the nearest, from the heading
   kPreviousCommand,  ///< kNoCommand for the first
   kLastTurn,
+  kTrodden,  ///< time that driven robots stood in its cell of the floor
   kRobot,
   kRun,
 };
@@ -79,7 +86,7 @@ inline constexpr double kNoCommand = 4;
 
 struct Axis {
   Covariate of = Covariate::kNothing;
-  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm
+  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; of kTrodden, into MotionModel::cells_mm
   std::uint8_t forget = 0;  ///< with motor and driven times: 1 + index into kForget_s; 0: all counts
 
   bool operator==(const Axis&) const = default;

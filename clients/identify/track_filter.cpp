@@ -15,6 +15,25 @@ constexpr double kFar = 60;
 
 }  // namespace
 
+StepWays ways_of(const StepRecord& record, double wheel_base_mm) {
+  const Arc& arc = record.arc;
+  const double h = record.h_s;
+  const double world_x = record.rates.world_x_mm_s * h, world_y = record.rates.world_y_mm_s * h;
+  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 * h;
+  // A turn within the step also bends the rest of it.
+  const double bend_x = -arc.along_y * forward / 2, bend_y = arc.along_x * forward / 2;
+  StepWays ways;
+  ways.by_wheel << arc.along_x / 2 - bend_x / wheel_base_mm, arc.along_x / 2 + bend_x / wheel_base_mm,  //
+      arc.along_y / 2 - bend_y / wheel_base_mm, arc.along_y / 2 + bend_y / wheel_base_mm,               //
+      -1 / wheel_base_mm, 1 / wheel_base_mm;
+  ways.by_heading << -(arc.dy_mm - world_y), arc.dx_mm - world_x;
+  return ways;
+}
+
+double outlier_factor(double distance2, int size) {
+  return std::max(1.0, distance2 / (size == 3 ? kGate3 : kGate2));
+}
+
 TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run)
     : model_(&model), measures_(model.measures()) {
   belief_.centre_mm = model.base.centre_mm;
@@ -71,6 +90,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   StepRecord record;
   record.h_s = h_s;
   record.middle = situation(time_s + h_s / 2, commands, near);
+  record.middle.span_s = h_s;
   record.middle.commands.advance(h_s / 2);
   if (!model_->terms.empty() && commands.driven()) {
     // Half a step ahead by the base model, for what depends on the pose.
@@ -86,7 +106,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
         belief_.mean[1] + half.dy_mm + model_->base.centre_mm * std::sin(record.middle.heading_rad);
   }
   // A robot at rest is pushed by others as well.
-  record.at_robot = model_->contacts && near.nearest_mm < kTouch_mm;
+  record.at_robot = model_->contacts && near.nearest_mm < model_->touch_mm;
   record.at_wall =
       commands.driven() && model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm);
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
@@ -141,21 +161,12 @@ void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards
 
 /// The covariance at the end of the step: what was uncertain moves along, and the noise of the step comes in.
 void TrackFilter::spread(const StepRecord& record) {
-  const double h = record.h_s, base = model_->base.wheel_base_mm;
-  const Arc& arc = record.arc;
-  const double world_x = record.rates.world_x_mm_s * h, world_y = record.rates.world_y_mm_s * h;
-  Eigen::Matrix<double, 3, 2> by_wheel;  // pose by the wheels' ways
-  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 * h;
-  // A turn within the step also bends the rest of it.
-  const double bend_x = -arc.along_y * forward / 2, bend_y = arc.along_x * forward / 2;
-  by_wheel << arc.along_x / 2 - bend_x / base, arc.along_x / 2 + bend_x / base,  //
-      arc.along_y / 2 - bend_y / base, arc.along_y / 2 + bend_y / base,          //
-      -1 / base, 1 / base;
+  const double h = record.h_s;
+  const auto [by_heading, by_wheel] = ways_of(record, model_->base.wheel_base_mm);
   StateCovariance& p = belief_.covariance;
-  const Eigen::Vector2d by_heading(-(arc.dy_mm - world_y), arc.dx_mm - world_x);
   const Noise& noise = model_->noise;
   Eigen::Vector3d own = Eigen::Vector3d::Constant(noise.drift_mm2_s * h);
-  own[2] = 1e-9 * h;
+  own[2] = kLeastTurn_rad2_s * h;
   Eigen::Matrix<double, 3, 2> by_bias = Eigen::Matrix<double, 3, 2>::Zero();
   if (record.middle.commands.driven()) {
     by_bias.col(0) = h * record.rates.left_gain * by_wheel.col(0);
@@ -248,10 +259,8 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   s(2, 2) = out.size == 3 ? s(2, 2) + noise.heading_rad2 : 1;
   Eigen::Matrix3d inverse = s.inverse();
   out.distance2 = out.difference.dot(inverse * out.difference);
-  double factor = 1;
-  const double gate = out.size == 3 ? kGate3 : kGate2;
-  if (out.distance2 > gate) {
-    factor = out.distance2 / gate;
+  const double factor = outlier_factor(out.distance2, out.size);
+  if (factor > 1) {
     out.weight = 1 / factor;
     outliers_ = out.distance2 > kFar ? outliers_ + 1 : 0;
   } else {

@@ -36,6 +36,16 @@ struct StepRecord {
   [[nodiscard]] bool touching() const { return at_wall || at_robot; }
 };
 
+/// How the pose at the end of a sub-step depends on the heading at its start, and on the wheels' ways within it.
+struct StepWays {
+  Eigen::Vector2d by_heading;  ///< x and y
+  Eigen::Matrix<double, 3, 2> by_wheel;
+};
+[[nodiscard]] StepWays ways_of(const StepRecord&, double wheel_base_mm);
+
+/// By how much the covariance of a measurement of so many numbers is widened where it is so far off, squared: 1, but for outliers.
+[[nodiscard]] double outlier_factor(double distance2, int size);
+
 /// A measurement taken in.
 struct Innovation {
   int size = 0;  ///< 2 or 3: with the heading
@@ -52,6 +62,9 @@ struct Innovation {
 
 class TrackFilter {
  public:
+  /// Of the heading, always: so that it is never known exactly.
+  static constexpr double kLeastTurn_rad2_s = 1e-9;
+
   TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run);
 
   /// At the first sample; `heading_rad` replaces a measured heading, with that standard deviation.

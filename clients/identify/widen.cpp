@@ -22,6 +22,11 @@ Basis modest(Basis basis) {
   for (Factor& f : basis.factors) {
     if (f.shape == Shape::kAtLeast || f.shape == Shape::kTable || !f.known.empty()) continue;
     basis.chosen.clear();
+    if (f.shape == Shape::kGrid) {
+      f.shape = Shape::kCosines2;
+      f.count = 6;
+      f.points.clear();
+    }
     if (f.shape == Shape::kCosines)
       f.count = std::min<std::uint32_t>(f.count, f.axis.of == Covariate::kTime ? 24 : 12);
     if (f.shape == Shape::kCosines2) f.count = std::min<std::uint32_t>(f.count, 6);
@@ -397,7 +402,9 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
     const double curve = form.beside ? 0 : bends(fitter, model, place);
     const double worth = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
                          price * static_cast<double>(form.at_s.size());
-    if (worth <= best_worth) continue;
+    // What is as likely to be the one as the other stays what it was found as.
+    constexpr double kSurelyOther = 3;
+    if (worth <= best_worth + (other ? kSurelyOther : 0)) continue;
     best_worth = worth;
     best = trial;
   }

@@ -33,6 +33,7 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kBearing: return Function::NEAREST_BEARING;
     case Covariate::kPreviousCommand: return Function::PREVIOUS_COMMAND;
     case Covariate::kLastTurn: return Function::LAST_TURN;
+    case Covariate::kTrodden: return Function::PLACE;
     case Covariate::kRobot: return Function::ROBOT;
     case Covariate::kRun: return Function::RUN;
   }
@@ -51,6 +52,7 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kRadius: s.x_mm = value; break;
     case Covariate::kHeading: s.heading_rad = value; break;
     case Covariate::kSinceCommand: s.commands.since_s = value; break;
+    case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
     case Covariate::kRightMotorTime:
@@ -59,9 +61,9 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
       s.commands.driven_s = value;
       if (axis.forget > 0) s.commands.left_s[axis.forget - 1u] = {value, value, value};
       break;
-    case Covariate::kNeighbours: s.near.count[axis.radius] = value; break;
     case Covariate::kNearest: s.near.nearest_mm = value; break;
-    case Covariate::kDensity: s.near.density[axis.radius] = value; break;
+    case Covariate::kDensity: s.near.density[axis.radius] = static_cast<float>(value); break;
+    case Covariate::kTrodden: s.near.trodden_s[axis.radius] = static_cast<float>(value); break;
     case Covariate::kBearing:
       s.near.nearest_mm = 0;
       s.near.direction_rad = value;
@@ -80,6 +82,7 @@ double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const S
 void set_axis(Function& function, const Factor& factor) {
   function.set_of(covariate_of(factor.axis.of));
   if (is_of_neighbours(factor.axis.of)) function.set_radius_mm(kNeighbourRadii_mm[factor.axis.radius]);
+  if (factor.axis.of == Covariate::kTrodden) function.set_field(field_name(factor.axis.radius));
   if (is_of_use(factor.axis.of) && factor.axis.forget > 0)
     function.set_forget_s(kForget_s[factor.axis.forget - 1u]);
 }
@@ -163,6 +166,18 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
       function.mutable_harmonic()->set_cosine(rounded(coefficients[0]));
       function.mutable_harmonic()->set_sine(rounded(coefficients[1]));
       function.mutable_harmonic()->set_period(factor.points[0]);
+      break;
+    }
+    case Shape::kGrid: {
+      function.set_and_of(covariate_of(factor.and_axis.of));
+      proto::Spline2d& grid = *function.mutable_spline_2d();
+      const std::size_t columns = factor.count, rows = factor.points.size() / columns;
+      const auto at = [](double low, double high, std::size_t i, std::size_t n) {
+        return rounded(low + (high - low) * static_cast<double>(i) / static_cast<double>(n - 1));
+      };
+      for (std::size_t i = 0; i < columns; ++i) grid.add_knot(at(factor.low, factor.high, i, columns));
+      for (std::size_t j = 0; j < rows; ++j) grid.add_and_knot(at(factor.and_low, factor.and_high, j, rows));
+      for (const double value : factor.points) grid.add_value(rounded(coefficients[0] * value));
       break;
     }
     case Shape::kCosines2: {
@@ -252,6 +267,8 @@ void set_target(Effect& effect, Target target) {
 
 }  // namespace
 
+std::string field_name(std::uint8_t cells) { return fmt::format("trodden-{}", cells); }
+
 double rounded(double value) {
   if (!std::isfinite(value)) return 0;
   const std::string digits = fmt::format("{:.7g}", value);
@@ -267,7 +284,8 @@ const char* form_of(const Term& term) {
     case Shape::kLinear: return "linear";
     case Shape::kCosines:
     case Shape::kTaper: return "curve";
-    case Shape::kCosines2: return "map";
+    case Shape::kCosines2:
+    case Shape::kGrid: return "map";
     case Shape::kHarmonics:
     case Shape::kWave: return "harmonic";
     case Shape::kTable: return "table";

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "clients/identify/motion_model.hpp"
@@ -14,6 +15,9 @@ namespace kilotwin::identify {
 
 /// "constant", "steps", "curve", "map", "table"... of its first block.
 [[nodiscard]] const char* form_of(const Term&);
+
+/// Of the arena field that holds what the floor remembers in cells of MotionModel::cells_mm[cells].
+[[nodiscard]] std::string field_name(std::uint8_t cells);
 
 /// A number with seven digits.
 [[nodiscard]] double rounded(double value);

@@ -1,12 +1,15 @@
 // Judges `kilotwin identify`: plays the scenes of tests/identify/truth, has each identified, and prints the errors before and
 // after beside those of an oracle, whether causes were named, and what was found where nothing is. Ends with status 1 where
 // anything misses.
-// Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] [SCENE|nothing:SEED]...
+// Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S]
+//              [--nothing N] [--jobs N] [SCENE|nothing:SEED]...
+// --robots, --runs and --seconds stand in place of a scene's own number of robots, of training runs and their length.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -35,17 +38,21 @@ struct Arguments {
   std::uint64_t seed = 1;
   fs::path keep;
   bool small = false;
+  int robots = 0;      ///< 0: as many as the scene has
+  int runs = 0;        ///< to train on; 0: as many as the scene has
+  double seconds = 0;  ///< of training runs; 0: as long as the scene's
   int nothing = 0;
   int jobs = 1;
   std::vector<std::string> scenes;
 };
 
 int usage() {
-  fmt::print(stderr,
-             "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--nothing N] [--jobs N] "
-             "[SCENE|nothing:SEED]...\n"
-             "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
-             fmt::join(scenario_names(), " "));
+  fmt::print(
+      stderr,
+      "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S] "
+      "[--nothing N] [--jobs N] [SCENE|nothing:SEED]...\n"
+      "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
+      fmt::join(scenario_names(), " "));
   return 2;
 }
 
@@ -77,6 +84,19 @@ Scene smaller(Scene scene) {
   scene.height_mm *= 0.75;
   scene.train_s *= 0.75;
   scene.test_runs = 1;
+  return scene;
+}
+
+/// With so many robots as closely together, and training runs so long.
+Scene resized(Scene scene, int robots, int runs, double seconds) {
+  if (robots > 0) {
+    const double wider = std::sqrt(robots / static_cast<double>(scene.robots));
+    scene.robots = robots;
+    scene.width_mm *= wider;
+    scene.height_mm *= wider;
+  }
+  if (runs > 0) scene.train_runs = runs;
+  if (seconds > 0) scene.train_s = seconds;
   return scene;
 }
 
@@ -158,6 +178,7 @@ int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   share_out(static_cast<int>(arguments.scenes.size()), arguments.jobs, [&](int i) {
     Scene scene = scene_of(arguments.scenes[static_cast<std::size_t>(i)]);
     if (arguments.small) scene = smaller(std::move(scene));
+    scene = resized(std::move(scene), arguments.robots, arguments.runs, arguments.seconds);
     const Verdict verdict =
         try_scene(arguments, scene, arguments.seed, arguments.small ? 30 : 100, folder / scene.name);
     const std::lock_guard lock(printing);
@@ -212,6 +233,12 @@ int main(int argc, char** argv) {
         arguments.seed = std::stoull(argv[++i]);
       } else if (word == "--keep") {
         arguments.keep = argv[++i];
+      } else if (word == "--robots") {
+        arguments.robots = std::stoi(argv[++i]);
+      } else if (word == "--runs") {
+        arguments.runs = std::stoi(argv[++i]);
+      } else if (word == "--seconds") {
+        arguments.seconds = std::stod(argv[++i]);
       } else if (word == "--nothing") {
         arguments.nothing = std::stoi(argv[++i]);
       } else if (word == "--jobs") {

@@ -22,7 +22,7 @@ Factor over(Shape shape, Covariate of, double low, double high, std::uint32_t co
   Factor factor;
   factor.shape = shape;
   factor.axis.of = of;
-  factor.axis.radius = 3;
+  factor.axis.radius = 11;  // 150 mm
   factor.low = low;
   factor.high = high;
   factor.count = count;
@@ -112,6 +112,8 @@ double size_of(Target target) {
     default: return 1.5;
   }
 }
+
+static_assert(kNeighbourRadii_mm[11] == 150);
 
 class WrittenModel : public testing::Test {
  protected:
