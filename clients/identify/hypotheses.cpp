@@ -367,14 +367,18 @@ class Catalogue {
     Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent_.since_s, kCurve);
     since.first = 0;
     since.warp = 1;
-    const Basis basis{{keyed(Shape::kTable, Covariate::kPreviousCommand, before), since}};
+    const Factor which = keyed(Shape::kTable, Covariate::kPreviousCommand, before);
     for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
+      // Slip in constant amounts alone.
+      const Eigen::Index curve = acting == &kSlip ? 1 : kCurve;
+      const Basis basis = curve > 1 ? Basis{{which, since}} : Basis{{which}};
       const auto driven = put(*acting, basis), straight = put(*acting, basis, kStraightOnly);
       const auto after = [&](std::vector<Eigen::Index> bases, Eigen::Index from, Eigen::Index to) {
-        for (const Eigen::Index size : {Eigen::Index{1}, kCurve}) {
+        for (const Eigen::Index size :
+             curve > 1 ? std::vector<Eigen::Index>{1, curve} : std::vector<Eigen::Index>{1}) {
           std::vector<Eigen::Index> columns;
           for (Eigen::Index key = from; key < to; ++key)
-            for (const Eigen::Index c : some(bases, key * kCurve, size)) columns.push_back(c);
+            for (const Eigen::Index c : some(bases, key * curve, size)) columns.push_back(c);
           std::vector<std::string> words{"history"};
           if (size > 1) words.emplace_back("time_since_command");
           add(*acting, "previous-command", words, columns, 4);

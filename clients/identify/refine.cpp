@@ -90,13 +90,17 @@ Basis with_chosen_keys(Basis basis) {
   return basis;
 }
 
-/// Products have as many cosines as there is room for.
+/// Products have as many cosines as there is room for; each robot by itself few.
 void shorten(Basis& basis) {
   if (basis.factors.size() < 2) return;
+  constexpr std::uint32_t kOfARobot = 6;
+  const bool of_robots = basis.looks_at(Covariate::kRobot);
   for (Factor& factor : basis.factors) {
     if (factor.shape != Shape::kCosines || !factor.known.empty()) continue;
     const auto room = static_cast<std::uint32_t>(kMostColumns * factor.count / basis.size());
-    factor.count = std::clamp(room, 1u, factor.count);
+    factor.count = std::clamp(of_robots ? std::min(room, kOfARobot) : room, 1u, factor.count);
+    // What a robot has throughout goes along.
+    if (of_robots) factor.first = 0;
   }
 }
 

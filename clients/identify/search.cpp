@@ -10,6 +10,7 @@
 #include "clients/identify/memory_shape.hpp"
 #include "clients/identify/neighbour_shape.hpp"
 #include "clients/identify/refine.hpp"
+#include "clients/identify/simplify.hpp"
 #include "clients/identify/widen.hpp"
 
 namespace kilotwin::identify {
@@ -72,6 +73,7 @@ class Loop {
       }
       if (!defend()) break;
     }
+    for (std::size_t t = 0; t < out_.model.terms.size(); ++t) simplify(fitter_, out_.model, t);
     return std::move(out_);
   }
 

@@ -32,6 +32,13 @@ Basis modest(Basis basis) {
     if (f.shape == Shape::kCosines2) f.count = std::min<std::uint32_t>(f.count, 6);
     if (f.shape == Shape::kHarmonics) f.count = std::min<std::uint32_t>(f.count, 4);
   }
+  // Of products a few columns.
+  constexpr std::size_t kMost = 40;
+  if (basis.factors.size() > 1 && basis.chosen.empty()) {
+    for (Factor& f : basis.factors)
+      if (f.shape == Shape::kCosines && f.known.empty() && basis.size() > kMost)
+        f.count = std::max(1u, static_cast<std::uint32_t>(kMost * f.count / basis.size()));
+  }
   return basis;
 }
 

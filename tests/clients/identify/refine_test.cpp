@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "clients/identify/simplify.hpp"
 #include "clients/identify/widen.hpp"
 #include "core/random/random.hpp"
 
@@ -135,6 +136,55 @@ TEST(Refine, ASharpShapeIsRecovered) {
   };
   const double late = gain_at(5);
   for (const double s : {0.4, 1.4, 2.5}) EXPECT_NEAR(gain_at(s) / late, acting.gain(s), 0.06) << s;
+}
+
+/// Speed by the time since the command, fitted as a curve of any shape, then simplified.
+MotionModel simplified(const Acting& acting, std::uint64_t seed, bool& simpler) {
+  const MeasuredSet set = played(acting, seed, 6, 100);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  model.terms.push_back(
+      unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+  simpler = simplify(fitter, model, 0);
+  return model;
+}
+
+TEST(Simplify, AnExponentialIsTakenForOne) {
+  Acting acting;
+  acting.gain = [](double s) { return 1 - 0.6 * std::exp(-s / 1.5); };
+  bool simpler = false;
+  const MotionModel model = simplified(acting, 6, simpler);
+  ASSERT_TRUE(simpler);
+  const Term& term = model.terms[0];
+  ASSERT_EQ(term.coefficients.size(), 1);
+  const Factor& factor = term.blocks[0].basis.factors.front();
+  ASSERT_EQ(factor.shape, Factor::Shape::kExponential);
+  EXPECT_NEAR(factor.points[0], 1.5, 0.3);
+  EXPECT_NEAR(term.coefficients[0], -0.6, 0.06);
+}
+
+TEST(Simplify, AStepIsTakenForOne) {
+  Acting acting;
+  acting.gain = [](double s) { return s < 2.2 ? 0.6 : 1.0; };
+  bool simpler = false;
+  const MotionModel model = simplified(acting, 7, simpler);
+  ASSERT_TRUE(simpler);
+  const Factor& factor = model.terms[0].blocks[0].basis.factors.front();
+  ASSERT_EQ(factor.shape, Factor::Shape::kAtLeast);
+  EXPECT_NEAR(factor.points[0], 2.2, 0.15);
+}
+
+TEST(Simplify, WhatHasNoSimpleFormStaysACurve) {
+  Acting acting;
+  acting.gain = [](double s) { return 1 - 0.5 * std::exp(-(s - 2) * (s - 2)); };
+  bool simpler = false;
+  const MotionModel model = simplified(acting, 8, simpler);
+  EXPECT_FALSE(simpler);
+  EXPECT_GT(model.terms[0].coefficients.size(), 3);
 }
 
 /// A smooth curve in 80 s of time, fitted and refined.
