@@ -145,7 +145,8 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
       function.mutable_harmonic()->set_period(factor.points[0]);
       break;
     }
-    case Shape::kCosines2: {
+    case Shape::kCosines2:
+    case Shape::kPolynomials2: {
       function.set_and_of(covariate_of(factor.and_axis.of));
       proto::Spline2d& grid = *function.mutable_spline_2d();
       const int knots = 4 * static_cast<int>(factor.count) + 5;
@@ -226,8 +227,19 @@ void set_target(Effect& effect, Target target) {
       effect.set_direction_deg(90);
       break;
     case Target::kMeasuredScale: effect.set_acts_on(Effect::MEASURED_SCALE); break;
+    case Target::kMeasuredTurn:
     case Target::kMeasuredHeading: effect.set_acts_on(Effect::MEASURED_HEADING); break;
   }
+}
+
+/// What a small turn of the picture does to one axis of positions: x falls with y, y rises with x.
+Effect turned_position(const Effect& turn, Target axis) {
+  Effect effect = turn;
+  set_target(effect, axis);
+  Function& other = *effect.add_function();
+  other.set_of(axis == Target::kMeasuredX ? Function::Y : Function::X);
+  other.mutable_linear()->set_slope(axis == Target::kMeasuredX ? -1 : 1);
+  return effect;
 }
 
 }  // namespace
@@ -247,7 +259,8 @@ const char* form_of(const Term& term) {
     case Shape::kLinear: return "linear";
     case Shape::kCosines:
     case Shape::kTaper: return "curve";
-    case Shape::kCosines2: return "map";
+    case Shape::kCosines2:
+    case Shape::kPolynomials2: return "map";
     case Shape::kHarmonics:
     case Shape::kWave: return "harmonic";
     case Shape::kTable: return "table";
@@ -280,6 +293,10 @@ std::vector<Effect> effects_of_term(const Term& term) {
           if ((block.during >> command & 1) != 0) effect.add_during(static_cast<proto::Command>(command));
       }
       for (const Function& function : product) *effect.add_function() = function;
+      if (block.target == Target::kMeasuredTurn) {
+        effects.push_back(turned_position(effect, Target::kMeasuredX));
+        effects.push_back(turned_position(effect, Target::kMeasuredY));
+      }
       effects.push_back(std::move(effect));
     }
   }
