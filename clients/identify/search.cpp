@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 
 #include "clients/identify/fine_map.hpp"
+#include "clients/identify/jumps.hpp"
 #include "clients/identify/memory_shape.hpp"
 #include "clients/identify/neighbour_shape.hpp"
 #include "clients/identify/refine.hpp"
@@ -52,6 +54,7 @@ class Loop {
   Search run() {
     for (int round = 0; round < kMostRounds; ++round) {
       progress_(0.9 * round / kMostRounds, fmt::format("looking for causes, {} found", out_.model.terms.size()));
+      if (add_picture_jumps()) continue;
       measure();
       const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
       note_rejected(outcome);
@@ -100,6 +103,28 @@ class Loop {
   }
   const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
 
+  /// Whether the picture jumps, which is then part of the model.
+  bool add_picture_jumps() {
+    const std::vector<Jump> jumps = add_jumps(fitter_, out_.model);
+    if (jumps.empty()) return false;
+    fitter_.fit_surroundings(out_.model);
+    Finding finding;
+    bool pushed = true;
+    for (const Jump& jump : jumps) {
+      finding.evidence += jump.gain;
+      finding.degrees += Jump::kNumbers;
+      // Half chi squared of four numbers, at one of some thousand instants.
+      constexpr double kInstants = 5000;
+      finding.log10_p =
+          std::min(finding.log10_p, (std::log1p(jump.gain) - jump.gain + std::log(kInstants)) / std::log(10.0));
+      pushed = pushed && std::abs(jump.gain - jump.gain_as_push) < kClose;
+    }
+    const std::vector<std::string> covariates{"measurement", "time"}, room{"world_frame", "time"};
+    out_.reasons.push_back({covariates, "measured position", finding, std::log10(Scores::kFamilyAlarm)});
+    if (pushed) out_.ambiguous.push_back({kJumpsName, "drift-by-time", covariates, room, 0});
+    out_.steps.push_back({kJumpsName, finding.evidence});
+    return true;
+  }
   void add(const Finding& found, double threshold) {
     const Hypothesis& h = hypothesis(found);
     Term term = dictionary_.term_of(h, found.relative_scale);
