@@ -296,7 +296,7 @@ std::string size_in_words(const std::vector<Effect>& effects) {
   for (const Effect* one : all.others) {
     if (parts.size() == kMost) break;
     const Effect& effect = *one;
-    if (effect.function_size() != 1) return "";
+    if (effect.function_size() != 1) continue;
     const std::string size = of_function(effect.function(0), effect.acts_on());
     if (size.empty()) return "";
     parts.push_back(which_of(effect) + size);
@@ -308,7 +308,8 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
   nlohmann::json all = nlohmann::json::array();
   for (const Effect* one : sorted(effects).others) {
     const Effect& effect = *one;
-    if (effect.function_size() != 1 || !effect.function(0).has_spline()) continue;
+    if (effect.function_size() != 1 || !(effect.function(0).has_spline() || effect.function(0).has_steps()))
+      continue;
     const Function& f = effect.function(0);
     const Unit unit = unit_of(f.of()), acting = unit_of(effect.acts_on());
     nlohmann::json curve = {{"name", name},
@@ -322,6 +323,22 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
     for (int i = 0; i < f.spline().knot_size(); ++i) {
       curve["at"].push_back(f.spline().knot(i) * unit.factor);
       curve["value"].push_back(f.spline().value(i) * acting.factor);
+    }
+    if (f.has_steps() && f.steps().at_size() > 0) {
+      // A staircase, a tenth of its length beyond its ends.
+      const proto::Steps& steps = f.steps();
+      const double first = steps.at(0), last = steps.at(steps.at_size() - 1);
+      const double beyond = std::max(0.1 * (last - first), 1.0);
+      const auto add = [&](double at, int value) {
+        curve["at"].push_back(at * unit.factor);
+        curve["value"].push_back(steps.value(value) * acting.factor);
+      };
+      add(first - beyond, 0);
+      for (int i = 0; i < steps.at_size(); ++i) {
+        add(steps.at(i), i);
+        add(steps.at(i), i + 1);
+      }
+      add(last + beyond, steps.at_size());
     }
     all.push_back(std::move(curve));
   }

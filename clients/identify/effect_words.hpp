@@ -9,7 +9,7 @@
 
 namespace kilotwin::identify {
 
-/// "+26 % at 0 s, -20 % at 200 s": the sizes of all records of one cause. Empty where they are products of functions.
+/// "+26 % at 0 s, -20 % at 200 s": the sizes of records of one cause, but for products of functions. Empty where there is no other.
 [[nodiscard]] std::string size_in_words(const std::vector<proto::Effect>&);
 
 /// Those records that are a curve over one covariate, and no part of a map: [{name, covariate, unit, acts_on, acts_on_unit, at [..], value [..]}].
