@@ -466,6 +466,13 @@ class Catalogue {
     const auto slopes = put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys),
                                            over(Shape::kLinear, Covariate::kTime, 0, extent_.duration_s, 1)}});
     add(kSpeed, "robot-and-time", {"robot", "time"}, some(slopes, 0, n));
+    // A leg that is bent, a marker that was put on askew.
+    const Basis each{{keyed(Shape::kTable, Covariate::kRobot, keys)}};
+    add(kSlip, "robot", {"robot"}, some(put(kSlip, each), 0, n));
+    if (extent_.headings) add(kCompass, "robot", {"robot"}, some(put(kCompass, each), 0, n));
+    const auto ahead = make_.put(Target::kMeasuredAhead, each, kAlways),
+               left = make_.put(Target::kMeasuredLeft, each, kAlways);
+    make_.add("camera-by-robot", {"measurement", "robot"}, kCamera.in_words, some({ahead, left}, 0, n));
   }
 
   /// What is set up anew for each run. A shift or turn of all that is measured shows nowhere.

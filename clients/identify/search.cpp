@@ -70,6 +70,7 @@ class Loop {
           out_ = before;
           failed_.insert(hypothesis(*best).name);
         } else {
+          reconsider();
           fitter_.fit_surroundings(out_.model);
         }
         continue;
@@ -173,7 +174,7 @@ class Loop {
       const Finding own = scores_->weigh_term(t);
       out_.reasons[place].finding.held_out = own.held_out;
       out_.reasons[place].finding.held_out_se = own.held_out_se;
-      if (own.held_out < 2 && dropped(place)) return true;
+      if (own.held_out < 2 && dropped(place, false)) return true;
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
@@ -185,7 +186,7 @@ class Loop {
         }
       }
       if (best == nullptr || best->name == out_.model.terms[place].name ||
-          best_finding.evidence <= own.evidence + kClose ||
+          best_finding.evidence <= own.evidence + std::max(kClose, kRemnant * own.evidence) ||
           failed_.contains(best->name + " for " + out_.model.terms[place].name))
         continue;
       if (exchanged(place, *best, best_finding)) return true;
@@ -211,13 +212,20 @@ class Loop {
     failed_.insert(other.name + " for " + out_.model.terms[place].name);
     return false;
   }
+  /// The last term may be what those before it were taken for. Each is taken out, and the last given the shape that it has
+  /// without it.
+  void reconsider() {
+    for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;)
+      if (out_.model.terms[t].name != out_.model.terms.back().name) dropped(t, true);
+  }
   /// Takes a term out, but for one without which the data are less probable after all.
-  bool dropped(std::size_t t) {
+  bool dropped(std::size_t t, bool shape_last) {
     const Search before = out_;
     const double evidence = fitter_.log_evidence(out_.model);
     out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
-    fitter_.fit(out_.model, 1);
+    fitter_.fit(out_.model, shape_last ? 2 : 1);
+    if (shape_last) shape(out_.model.terms.size() - 1);
     if (fitter_.log_evidence(out_.model) > evidence - kClose) return true;
     out_ = before;
     fitter_.set().find_headings(out_.model, fitter_.threads());
