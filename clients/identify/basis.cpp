@@ -23,6 +23,13 @@ void cosines(double angle, std::uint32_t last, double* to) {
   for (std::uint32_t k = 5; k <= last; ++k) to[k] = 2 * c4 * to[k - 4] - (k < 8 ? to[8 - k] : to[k - 8]);
 }
 
+/// Legendre's polynomials P_k(at), k = 0..last.
+void legendre(double at, std::uint32_t last, double* to) {
+  to[0] = 1;
+  to[1] = at;
+  for (std::uint32_t k = 1; k < last; ++k) to[k + 1] = ((2 * k + 1) * at * to[k] - k * to[k - 1]) / (k + 1);
+}
+
 }  // namespace
 
 std::size_t Factor::columns() const {
@@ -31,7 +38,8 @@ std::size_t Factor::columns() const {
     case Shape::kGrid: return 1;
     case Shape::kCosines:
     case Shape::kTaper: return count;
-    case Shape::kCosines2: return (count + 1) * (count + 2) / 2 - 1;
+    case Shape::kCosines2:
+    case Shape::kPolynomials2: return (count + 1) * (count + 2) / 2 - 1;
     case Shape::kHarmonics: return 2 * std::size_t{count};
     case Shape::kTable:
     case Shape::kAtLeast:
@@ -62,6 +70,12 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
     case Shape::kCosines2:
       cosines(M_PI * unit_of(c, low, high, warp), count, a.data());
       cosines(M_PI * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0), count, b.data());
+      for (std::uint32_t sum = 1; sum <= count; ++sum)
+        for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
+      return;
+    case Shape::kPolynomials2:
+      legendre(2 * unit_of(c, low, high, warp) - 1, count, a.data());
+      legendre(2 * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0) - 1, count, b.data());
       for (std::uint32_t sum = 1; sum <= count; ++sum)
         for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
       return;
@@ -117,6 +131,10 @@ std::vector<double> Factor::roughness() const {
     for (std::uint32_t k = 0; k < count; ++k) rough[k] = std::max(first + k, 1u);
   } else if (shape == Shape::kHarmonics) {
     for (std::uint32_t k = 0; k < count; ++k) rough[2 * k] = rough[2 * k + 1] = first + k;
+  } else if (shape == Shape::kPolynomials2) {
+    std::size_t i = 0;
+    for (std::uint32_t sum = 1; sum <= count; ++sum)
+      for (std::uint32_t k = 0; k <= sum; ++k) rough[i++] = sum;
   } else if (shape == Shape::kCosines2) {
     std::size_t i = 0;
     for (std::uint32_t sum = 1; sum <= count; ++sum)
@@ -163,8 +181,7 @@ std::vector<double> Basis::roughness() const {
 
 bool Basis::looks_at(Covariate covariate) const {
   return std::any_of(factors.begin(), factors.end(), [&](const Factor& f) {
-    return f.axis.of == covariate || (f.shape == Factor::Shape::kCosines2 && f.and_axis.of == covariate) ||
-           (f.shape == Factor::Shape::kGrid && f.and_axis.of == covariate);
+    return f.axis.of == covariate || (f.of_two() && f.and_axis.of == covariate);
   });
 }
 

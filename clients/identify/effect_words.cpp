@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/effects/function.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -175,25 +177,139 @@ std::string which_of(const Effect& effect) {
   return parts.empty() ? "" : fmt::format("{}: ", fmt::join(parts, ", "));
 }
 
+bool of_place(Function::Covariate of) { return of == Function::X || of == Function::Y || of == Function::RADIUS; }
+/// Whether what an effect does depends on the place alone.
+bool is_of_place(const Effect& effect) {
+  return effect.function_size() > 0 &&
+         std::all_of(effect.function().begin(), effect.function().end(), [](const Function& f) {
+           return of_place(f.of()) && (!f.has_spline_2d() || of_place(f.and_of()));
+         });
+}
+bool is_map(const Effect& effect) {
+  return is_of_place(effect) && (effect.function_size() > 1 || effect.function(0).has_spline_2d());
+}
+
+/// All records of one cause that do the same, each in its place, added up.
+struct MapSum {
+  std::vector<double> x_mm, y_mm;
+  std::vector<double> value;  ///< by y, then by x
+
+  [[nodiscard]] double quantile(double share) const {
+    std::vector<double> sorted = value;
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
+    std::nth_element(sorted.begin(), at, sorted.end());
+    return *at;
+  }
+};
+
+/// The sum of these effects over the reach of their splines; empty where none has any.
+MapSum sum_of(const std::vector<const Effect*>& effects) {
+  double low_x = 1e300, high_x = -1e300, low_y = 1e300, high_y = -1e300;
+  const auto reach = [&](Function::Covariate of, const auto& knots) {
+    if (knots.empty() || of == Function::RADIUS) return;
+    double &low = of == Function::X ? low_x : low_y, &high = of == Function::X ? high_x : high_y;
+    low = std::min(low, *knots.begin());
+    high = std::max(high, *knots.rbegin());
+  };
+  for (const Effect* effect : effects) {
+    for (const Function& f : effect->function()) {
+      if (f.has_spline()) reach(f.of(), f.spline().knot());
+      if (!f.has_spline_2d()) continue;
+      reach(f.of(), f.spline_2d().knot());
+      reach(f.and_of(), f.spline_2d().and_knot());
+    }
+  }
+  MapSum sum;
+  if (!(low_x < high_x && low_y < high_y)) return sum;
+  constexpr int kAcross = 40;
+  for (int i = 0; i < kAcross; ++i) {
+    const double part = (i + 0.5) / kAcross;
+    sum.x_mm.push_back(low_x + part * (high_x - low_x));
+    sum.y_mm.push_back(low_y + part * (high_y - low_y));
+  }
+  sum.value.assign(sum.x_mm.size() * sum.y_mm.size(), 0);
+  for (const Effect* effect : effects) {
+    std::vector<EffectFunction> functions(effect->function().begin(), effect->function().end());
+    std::size_t k = 0;
+    for (const double y : sum.y_mm) {
+      for (const double x : sum.x_mm) {
+        const auto value_of = [&](Function::Covariate of) {
+          return of == Function::X ? x : of == Function::Y ? y : std::hypot(x, y);
+        };
+        double product = 1;
+        for (std::size_t f = 0; f < functions.size(); ++f) {
+          const Function& by = effect->function(static_cast<int>(f));
+          product *= functions[f](value_of(by.of()), by.has_spline_2d() ? value_of(by.and_of()) : 0);
+        }
+        sum.value[k++] += product;
+      }
+    }
+  }
+  return sum;
+}
+
+/// The effects of a cause that make up maps, those together that act alike; and all others.
+struct Sorted {
+  std::vector<std::vector<const Effect*>> maps;
+  std::vector<const Effect*> others;
+};
+Sorted sorted(const std::vector<Effect>& effects) {
+  const auto alike = [](const Effect& a, const Effect& b) {
+    return a.acts_on() == b.acts_on() && which_of(a) == which_of(b);
+  };
+  Sorted out;
+  for (const Effect& effect : effects) {
+    if (!is_map(effect)) continue;
+    const auto with =
+        std::find_if(out.maps.begin(), out.maps.end(), [&](const auto& m) { return alike(*m.front(), effect); });
+    (with == out.maps.end() ? out.maps.emplace_back() : *with).push_back(&effect);
+  }
+  for (const Effect& effect : effects) {
+    if (is_map(effect)) continue;
+    const auto with = std::find_if(out.maps.begin(), out.maps.end(),
+                                   [&](const auto& m) { return is_of_place(effect) && alike(*m.front(), effect); });
+    if (with == out.maps.end()) {
+      out.others.push_back(&effect);
+    } else {
+      with->push_back(&effect);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string size_in_words(const std::vector<Effect>& effects) {
   constexpr std::size_t kMost = 3;
   std::vector<std::string> parts;
-  for (const Effect& effect : effects) {
-    if (effect.function_size() != 1) return "";
+  const Sorted all = sorted(effects);
+  for (const std::vector<const Effect*>& map : all.maps) {
+    const MapSum sum = sum_of(map);
+    if (sum.value.empty()) return "";
+    // Far corners, of which little is known, may be anything.
+    constexpr double kTail = 0.02;
+    const Effect::Target target = map.front()->acts_on();
+    parts.push_back(fmt::format("{}between {} and {} over the arena", which_of(*map.front()),
+                                amount(sum.quantile(kTail), target), amount(sum.quantile(1 - kTail), target)));
+    if (parts.size() == kMost) break;
+  }
+  for (const Effect* one : all.others) {
+    if (parts.size() == kMost) break;
+    const Effect& effect = *one;
+    if (effect.function_size() != 1) continue;
     const std::string size = of_function(effect.function(0), effect.acts_on());
     if (size.empty()) return "";
     parts.push_back(which_of(effect) + size);
-    if (parts.size() == kMost) break;
   }
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
 nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& effects) {
   nlohmann::json all = nlohmann::json::array();
-  for (const Effect& effect : effects) {
-    if (effect.function_size() != 1 || !effect.function(0).has_spline()) continue;
+  for (const Effect* one : sorted(effects).others) {
+    const Effect& effect = *one;
+    if (effect.function_size() != 1 || !(effect.function(0).has_spline() || effect.function(0).has_steps()))
+      continue;
     const Function& f = effect.function(0);
     const Unit unit = unit_of(f.of()), acting = unit_of(effect.acts_on());
     nlohmann::json curve = {{"name", name},
@@ -208,7 +324,48 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
       curve["at"].push_back(f.spline().knot(i) * unit.factor);
       curve["value"].push_back(f.spline().value(i) * acting.factor);
     }
+    if (f.has_steps() && f.steps().at_size() > 0) {
+      // A staircase, a tenth of its length beyond its ends.
+      const proto::Steps& steps = f.steps();
+      const double first = steps.at(0), last = steps.at(steps.at_size() - 1);
+      const double beyond = std::max(0.1 * (last - first), 1.0);
+      const auto add = [&](double at, int value) {
+        curve["at"].push_back(at * unit.factor);
+        curve["value"].push_back(steps.value(value) * acting.factor);
+      };
+      add(first - beyond, 0);
+      for (int i = 0; i < steps.at_size(); ++i) {
+        add(steps.at(i), i);
+        add(steps.at(i), i + 1);
+      }
+      add(last + beyond, steps.at_size());
+    }
     all.push_back(std::move(curve));
+  }
+  return all;
+}
+
+nlohmann::json maps_of(const std::string& name, const std::vector<Effect>& effects) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const std::vector<const Effect*>& map : sorted(effects).maps) {
+    const MapSum sum = sum_of(map);
+    if (sum.value.empty()) continue;
+    const Effect::Target target = map.front()->acts_on();
+    const Unit acting = unit_of(target);
+    nlohmann::json rows = nlohmann::json::array();
+    for (std::size_t j = 0; j < sum.y_mm.size(); ++j) {
+      nlohmann::json row = nlohmann::json::array();
+      for (std::size_t i = 0; i < sum.x_mm.size(); ++i)
+        row.push_back(sum.value[j * sum.x_mm.size() + i] * acting.factor);
+      rows.push_back(std::move(row));
+    }
+    all.push_back({{"name", name},
+                   {"which", which_of(*map.front())},
+                   {"acts_on", Effect::Target_Name(target)},
+                   {"unit", acting.name},
+                   {"x_mm", sum.x_mm},
+                   {"y_mm", sum.y_mm},
+                   {"effect", std::move(rows)}});
   }
   return all;
 }

@@ -9,10 +9,14 @@
 
 namespace kilotwin::identify {
 
-/// "+26 % at 0 s, -20 % at 200 s": the sizes of all records of one cause. Empty where they are products of functions.
+/// "+26 % at 0 s, -20 % at 200 s": the sizes of records of one cause, but for products of functions. Empty where there is no other.
 [[nodiscard]] std::string size_in_words(const std::vector<proto::Effect>&);
 
-/// Those records that are a curve over one covariate: [{name, covariate, unit, acts_on, acts_on_unit, at [..], value [..]}].
+/// Those records that are a curve over one covariate, and no part of a map: [{name, covariate, unit, acts_on, acts_on_unit, at [..], value [..]}].
 [[nodiscard]] nlohmann::json curves_of(const std::string& name, const std::vector<proto::Effect>&);
+
+/// Those that are maps over the arena, added up where they act alike: [{name, which, acts_on, unit, x_mm [..], y_mm [..],
+/// effect [[..] by y]}].
+[[nodiscard]] nlohmann::json maps_of(const std::string& name, const std::vector<proto::Effect>&);
 
 }  // namespace kilotwin::identify

@@ -31,7 +31,7 @@ struct LogLikelihood {
 LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, bool with_touching = false) {
   RobotBias bias = model.bias_of(view.track->robot);
   bias.covariance.setZero();
-  TrackFilter filter(model, bias, view.track->robot, view.run);
+  TrackFilter filter(model, bias, view.track->robot, view.number);
   LogLikelihood likelihood;
   likelihood.with_touching = with_touching;
   walk(filter, view, view.track->samples.size(), likelihood);
@@ -42,14 +42,15 @@ constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
 
 }  // namespace
 
-PreparedSet::PreparedSet(const MeasuredSet& set) : set_(&set) {
+PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number) : set_(&set) {
   for (std::size_t r = 0; r < set.runs.size(); ++r) {
     neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
     neighbours_.back()->remember(set.runs[r], MotionModel{}.cells_mm);
     for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
       const Track& track = set.runs[r].tracks[t];
       if (track.samples.size() < 2) continue;
-      views_.push_back({&track, static_cast<std::uint32_t>(r), t, neighbours_.back().get(), CommandClock(track)});
+      const auto place = static_cast<std::uint32_t>(r);
+      views_.push_back({&track, place, first_number + place, t, neighbours_.back().get(), CommandClock(track)});
     }
   }
 }
@@ -97,7 +98,7 @@ Meetings PreparedSet::meetings() const {
   for (const TrackView& view : views_) {
     for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s) {
       const double nearest = view.neighbours->view(view.place, t).nearest_mm;
-      if (nearest < kDiscs_mm - 2) ++sum.within;
+      if (nearest < Meetings::kInside_mm) ++sum.within;
       if (nearest > kTouch_mm && nearest < Meetings::kRing_mm) ++sum.near;
     }
   }
@@ -124,7 +125,7 @@ void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads)
     const auto value = [&](double heading, double sd) {
       view.start_heading_rad = heading;
       view.start_heading_sd_rad = sd;
-      TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.run);
+      TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.number);
       LogLikelihood likelihood;
       walk(filter, view, samples + 1, likelihood);
       return likelihood.sum;
@@ -235,14 +236,22 @@ void Fitter::find_shape(MotionModel& model) const {
       best = &c;
   }
   model = best->model;
-  constexpr double kUnhindered = 0.6;
-  model.contacts = best->meetings.share_within() < kUnhindered;
+  model.contacts = best->meetings.share_within() < Meetings::kUnhindered;
   if (best != &candidates.back()) set_.find_centres(model, threads_);
 }
 
 void Fitter::find_walls(MotionModel& model) const {
   // How far the tracked point may lie beyond the disc's centre, or before it.
   const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
+  // Where the tracked point was, by view and sample: not where a picture that is bent shows it.
+  const bool measures = model.measures();
+  const auto place_of = [&](const TrackView& view, const Sample& s) {
+    if (!measures) return s;
+    const Eigen::Vector3d pose = model.pose_of(s, view.at(s.time_s));
+    const double c = std::cos(pose[2]), n = std::sin(pose[2]);
+    return Sample{s.time_s, pose[0] + model.base.ahead_mm * c - model.base.left_mm * n,
+                  pose[1] + model.base.ahead_mm * n + model.base.left_mm * c, pose[2]};
+  };
   struct Side {
     double Room::*wall;
     double Sample::*along;
@@ -256,7 +265,7 @@ void Fitter::find_walls(MotionModel& model) const {
     if (set_.set().has_headings && std::isfinite(model.room.*side.wall)) continue;
     std::vector<double> places;
     for (const TrackView& view : set_.views())
-      for (const Sample& s : view.track->samples) places.push_back(side.sign * s.*side.along);
+      for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
     const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
     if (places.size() < 100) return;
     std::nth_element(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(rank), places.end());
@@ -266,9 +275,9 @@ void Fitter::find_walls(MotionModel& model) const {
     std::vector<const TrackView*> near;
     for (const TrackView& view : set_.views()) {
       if (view.track->held_out || near.size() == kMost) continue;
-      const auto there =
-          std::count_if(view.track->samples.begin(), view.track->samples.end(),
-                        [&](const Sample& s) { return std::abs(side.sign * s.*side.along - edge) < reach + 5; });
+      const auto there = std::count_if(
+          view.track->samples.begin(), view.track->samples.end(),
+          [&](const Sample& s) { return std::abs(side.sign * place_of(view, s).*side.along - edge) < reach + 5; });
       if (there > 5) near.push_back(&view);
     }
     model.room.*side.wall = side.sign * std::numeric_limits<double>::infinity();
@@ -416,6 +425,8 @@ void Fitter::fit_surroundings(MotionModel& model) const {
   for (int round = 0; round < (set_.set().has_headings ? 1 : 2); ++round) {
     find_walls(model);
     set_.find_centres(model, threads_);
+    // In a picture that is bent robots seem to meet where they do not.
+    if (model.measures()) model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
     fit_touching(model);
     fit(model, 1);
   }

@@ -13,11 +13,14 @@ namespace kilotwin::identify {
 /// How often the nearest robot was so near that discs would overlap, and a little farther away.
 struct Meetings {
   static constexpr double kRing_mm = 55;
+  /// Well within two radii, so that no lens makes robots that touch look as if they overlapped.
+  static constexpr double kInside_mm = 0.85 * kDiscs_mm;
+  /// Such a share within, and robots do not feel each other.
+  static constexpr double kUnhindered = 0.6;
   std::size_t within = 0, near = 0;
   /// Of what there would be within if robots did not feel each other, by areas; 0.2 where few have met.
   [[nodiscard]] double share_within() const {
-    constexpr double kInner = (kDiscs_mm - 2) * (kDiscs_mm - 2),
-                     kOuter = kRing_mm * kRing_mm - kTouch_mm * kTouch_mm;
+    constexpr double kInner = kInside_mm * kInside_mm, kOuter = kRing_mm * kRing_mm - kTouch_mm * kTouch_mm;
     constexpr double kFew = 10;
     return (static_cast<double>(within) + 0.2 * kFew) / (static_cast<double>(near) * kInner / kOuter + kFew);
   }
@@ -26,7 +29,8 @@ struct Meetings {
 /// The tracks of a set, ready to be walked along.
 class PreparedSet {
  public:
-  explicit PreparedSet(const MeasuredSet&);
+  /// Runs are numbered from `first_number` on: no run of one set is one of another.
+  explicit PreparedSet(const MeasuredSet&, std::uint32_t first_number = 0);
 
   [[nodiscard]] const MeasuredSet& set() const { return *set_; }
   [[nodiscard]] std::vector<TrackView>& views() { return views_; }

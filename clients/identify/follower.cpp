@@ -33,7 +33,7 @@ void Follower::start(const Sample& sample) {
   RobotBias bias = model_.bias_of(view_.track->robot);
   hypotheses_.clear();
   const auto add = [&](double heading, double sd) {
-    TrackFilter filter(model_, bias, view_.track->robot, view_.run);
+    TrackFilter filter(model_, bias, view_.track->robot, view_.number);
     filter.start(sample, {}, heading, sd);
     hypotheses_.push_back({std::move(filter), 0});
   };

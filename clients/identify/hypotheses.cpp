@@ -25,6 +25,7 @@ double natural(Target target) {
     case Target::kMeasuredAhead:
     case Target::kMeasuredLeft: return 10;
     case Target::kMeasuredScale:
+    case Target::kMeasuredTurn: return 0.1;
     case Target::kMeasuredHeading: return 0.3;
   }
   return 1;
@@ -104,6 +105,9 @@ const Acting kTurning{"turning", "turn rate", {Target::kTurn}, {}};
 const Acting kSlip{"slip", "sideways slip", {Target::kSideways}, {}};
 const Acting kWorld{"drift", "drift in the room", {Target::kWorldX, Target::kWorldY}, {"world_frame"}};
 const Acting kCamera{"camera", "measured position", {Target::kMeasuredX, Target::kMeasuredY}, {"measurement"}};
+/// Turn and scale of the picture, each as of one camera.
+const Acting kPicture{
+    "camera", "measured position", {Target::kMeasuredTurn, Target::kMeasuredScale}, {"measurement"}};
 const Acting kCompass{"compass", "measured heading", {Target::kMeasuredHeading}, {"measurement"}};
 
 class Catalogue {
@@ -121,6 +125,7 @@ class Catalogue {
     of_floor();
     of_lately();
     of_robots();
+    of_runs();
   }
   /// What is found already and is larger for some than for others: an amount for each robot, and for each command.
   void of_found(const std::vector<Term>& terms) {
@@ -215,7 +220,16 @@ class Catalogue {
     curve(kSpeed, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
     curve(kTurning, "time", {"time"}, smooth(12), {1, 3, 12}, true);
     curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
-    curve(kCamera, "time", {"time"}, smooth(16), {1, 3, 8, 16}, false);
+    // The picture may creep aside, turn and grow, each by itself or all at once.
+    const auto aside = put(kCamera, smooth(16));
+    const auto turned = put(kPicture, smooth(8));
+    for (const Eigen::Index n : {1, 3, 8, 16}) add(kCamera, "time", {"time"}, some(aside, 0, n));
+    for (const Eigen::Index n : {1, 3, 8}) {
+      auto all = some(turned, 0, n);
+      for (const Eigen::Index base : turned) add(kCamera, "time", {"time"}, some({base}, 0, n));
+      for (const Eigen::Index c : some(aside, 0, n)) all.push_back(c);
+      add(kCamera, "time", {"time"}, all);
+    }
     if (extent_.headings) curve(kCompass, "time", {"time"}, smooth(6), {1, 3, 6}, false);
     // Steps, and pulses between two of them.
     constexpr int kSteps = 40;
@@ -223,7 +237,7 @@ class Catalogue {
     for (int i = 1; i < kSteps; ++i) at.push_back(extent_.duration_s * i / kSteps);
     const Basis steps{{keyed(Shape::kAtLeast, Covariate::kTime, at)}};
     const auto n = static_cast<Eigen::Index>(at.size());
-    for (const Acting* acting : {&kSpeed, &kWorld, &kCamera}) {
+    for (const Acting* acting : {&kSpeed, &kWorld}) {
       const auto bases = put(*acting, steps);
       for (Eigen::Index i = 0; i < n; ++i) add(*acting, "time", {"time"}, some(bases, i, 1), kSteps);
       for (Eigen::Index width : {1, 2, 4, 8, 16}) {
@@ -258,7 +272,18 @@ class Catalogue {
     map(kSpeed, 8);
     map(kTurning, 3);
     map(kWorld, 5);
-    map(kCamera, 7);
+    map(kCamera, 5);
+    // Lenses and tilts bend the picture most at its rim, where waves are flat. What they bend may be wider than what is seen.
+    Factor bent = plane(5);
+    bent.shape = Shape::kPolynomials2;
+    const double beyond_x = 0.15 * (bent.high - bent.low), beyond_y = 0.15 * (bent.and_high - bent.and_low);
+    bent.low -= beyond_x;
+    bent.high += beyond_x;
+    bent.and_low -= beyond_y;
+    bent.and_high += beyond_y;
+    const auto lens = put(kCamera, Basis{{bent}});
+    for (Eigen::Index o = 1; o <= 5; ++o)
+      add(kCamera, "position", {"position"}, some(lens, 0, (o + 1) * (o + 2) / 2 - 1));
     if (extent_.headings) map(kCompass, 2);
     // Stripes are finer than what a map of the plane resolves: pictures put together, boards of a floor.
     const auto stripes = [&](const Acting& acting, Covariate of, double low, double high, std::uint32_t count) {
@@ -443,6 +468,19 @@ class Catalogue {
     add(kSpeed, "robot-and-time", {"robot", "time"}, some(slopes, 0, n));
   }
 
+  /// What is set up anew for each run. A shift or turn of all that is measured shows nowhere.
+  void of_runs() {
+    constexpr std::size_t kMost = 40;
+    if (extent_.runs.size() < 2 || extent_.runs.size() > kMost) return;
+    const Basis which{{keyed(Shape::kTable, Covariate::kRun, {extent_.runs.begin(), extent_.runs.end()})}};
+    const auto n = static_cast<Eigen::Index>(extent_.runs.size());
+    const auto scale = make_.put(Target::kMeasuredScale, which);
+    make_.add("camera-by-run", {"measurement"}, kCamera.in_words, some({scale}, 0, n));
+    // Robots may as well have been slower: turns tell the one from the other.
+    add(kSpeed, "run", {"history"}, some(put(kSpeed, which), 0, n));
+    if (extent_.headings) add(kCompass, "run", {}, some(put(kCompass, which), 0, n));
+  }
+
   const Extent& extent_;
   Maker make_;
 };
@@ -460,6 +498,7 @@ Extent extent_of(const PreparedSet& set) {
       xs.push_back(samples[i].x_mm);
       ys.push_back(samples[i].y_mm);
     }
+    if (std::find(e.runs.begin(), e.runs.end(), view.number) == e.runs.end()) e.runs.push_back(view.number);
     const double end_s = samples.back().time_s;
     const CommandState last = view.clock.at(end_s);
     e.duration_s = std::max(e.duration_s, end_s);

@@ -39,7 +39,7 @@ struct Extent {
   double x_low_mm = 0, x_high_mm = 1, y_low_mm = 0, y_high_mm = 1;
   double duration_s = 1, motor_s = 1, driven_s = 1, since_s = 1;
   bool has_stop = false, has_turns = false, has_straight = false, neighbours = false, headings = false;
-  std::vector<std::uint32_t> robots;
+  std::vector<std::uint32_t> robots, runs;
 };
 [[nodiscard]] Extent extent_of(const PreparedSet&);
 

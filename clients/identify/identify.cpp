@@ -165,7 +165,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   if (prepared.units().empty())
     throw UserError("no robot was measured twice in a run that may be fitted to; there is nothing to identify");
   std::optional<PreparedSet> other;
-  if (test != nullptr) other.emplace(*test);
+  if (test != nullptr) other.emplace(*test, static_cast<std::uint32_t>(train.runs.size()));
   const PreparedSet& judged = other ? *other : prepared;
   const bool held_out_only = !other && std::any_of(train.runs.begin(), train.runs.end(), [](const Run& run) {
     return std::any_of(run.tracks.begin(), run.tracks.end(), [](const Track& t) { return t.held_out; });
@@ -196,7 +196,9 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
       without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(t));
       fitter.fit(without, 1);
       const double without_mm = fitted_mm(without);
-      if (without_mm > with_mm * 1.0005) continue;
+      // What happens to the picture seldom matters to where robots go; it must not spoil it.
+      const bool picture = is_measured(found.model.terms[t].blocks.front().target);
+      if (without_mm > with_mm * (picture ? 0.9995 : 1.0005)) continue;
       found.model = without;
       found.reasons.erase(found.reasons.begin() + static_cast<std::ptrdiff_t>(t));
       with_mm = without_mm;
@@ -251,10 +253,12 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
         errors_of(judged.set(), predict(without, judged, asked, held_out_only, options.threads)).rmse_mm());
   }
   contract["effects"] = effects_of(found, without_mm, errors_before.rmse_mm(), errors_after.rmse_mm());
-  document["effect_curves"] = json::array();
-  for (const Term& term : after.terms)
-    for (json& curve : curves_of(term.name, effects_of_term(term)))
-      document["effect_curves"].push_back(std::move(curve));
+  document["effect_curves"] = document["effect_maps"] = json::array();
+  for (const Term& term : after.terms) {
+    const std::vector<proto::Effect> written = effects_of_term(term);
+    for (json& curve : curves_of(term.name, written)) document["effect_curves"].push_back(std::move(curve));
+    for (json& map : maps_of(term.name, written)) document["effect_maps"].push_back(std::move(map));
+  }
   contract["rejected"] = json::array();
   for (const Rejected& r : found.rejected) {
     contract["rejected"].push_back({{"name", r.name},

@@ -17,6 +17,7 @@
 ///                 of one covariate; `fitted` (null where nothing was) is the effect as added
 ///   maps          [{target, unit, x_mm [..], y_mm [..], before [[..]..], after [[..]..], count [[..]..]}]: rows are y
 ///   effect_curves [{name, which, covariate, unit, acts_on, acts_on_unit, at [..], value [..]}]: effects as they were written
+///   effect_maps   [{name, which, acts_on, unit, x_mm [..], y_mm [..], effect [[..]..]}]: those that depend on the place
 ///   distributions [{name, unit, edges [..], measured [..], base [..], simulated [..]}]: counts; `base` by the base model
 ///   msd           {lag_s [..], measured_mm2 [..], base_mm2 [..], simulated_mm2 [..]}
 ///   speed_over_time {time_s [..], measured_mm_s [..], base_mm_s [..], simulated_mm_s [..]}: means

@@ -230,6 +230,9 @@ class Sensitivities {
     at.x_mm = pose[0] + model_.base.centre_mm * c;
     at.y_mm = pose[1] + model_.base.centre_mm * s;
     at.heading_rad = heading;
+    const BaseParameters& base = model_.base;
+    const double point_x = pose[0] + base.ahead_mm * c - base.left_mm * s,
+                 point_y = pose[1] + base.ahead_mm * s + base.left_mm * c;
     Eigen::Index first = kBaseColumns;
     for (const Block& block : blocks_) {
       const auto n = static_cast<Eigen::Index>(block.basis.size());
@@ -246,7 +249,8 @@ class Sensitivities {
           case Target::kMeasuredY: add(0, 1, 0); break;
           case Target::kMeasuredAhead: add(c, s, 0); break;
           case Target::kMeasuredLeft: add(-s, c, 0); break;
-          case Target::kMeasuredScale: add(at.x_mm, at.y_mm, 0); break;
+          case Target::kMeasuredScale: add(point_x, point_y, 0); break;
+          case Target::kMeasuredTurn: add(-point_y, point_x, 1); break;
           default: add(0, 0, 1); break;
         }
       }
@@ -296,7 +300,7 @@ std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vec
       bias = model.bias_of(view->track->robot);
       RobotBias fixed = bias;
       fixed.covariance.setZero();
-      TrackFilter filter(model, fixed, view->track->robot, view->run);
+      TrackFilter filter(model, fixed, view->track->robot, view->number);
       sums.begin_track(view->run);
       walk(filter, *view, view->track->samples.size(), sums);
       sums.flush();

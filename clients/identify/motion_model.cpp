@@ -105,7 +105,7 @@ bool MotionModel::measures() const {
 
 Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_rad, const Situation& at) const {
   const double c = std::cos(heading_rad), s = std::sin(heading_rad);
-  double ahead = base.ahead_mm, left = base.left_mm, scale = 1, x = 0, y = 0, turn = 0;
+  double ahead = base.ahead_mm, left = base.left_mm, scale = 1, x = 0, y = 0, turn = 0, picture = 0;
   if (measures()) {
     Situation there = at;
     there.x_mm = x_mm + base.centre_mm * c;
@@ -130,12 +130,28 @@ Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_r
           case Target::kMeasuredAhead: ahead += v; break;
           case Target::kMeasuredLeft: left += v; break;
           case Target::kMeasuredScale: scale *= 1 + v; break;
+          case Target::kMeasuredTurn: picture += v; break;
           default: turn += v; break;
         }
       }
     }
   }
-  return {(x_mm + ahead * c - left * s) * scale + x, (y_mm + ahead * s + left * c) * scale + y, heading_rad + turn};
+  const double point_x = x_mm + ahead * c - left * s, point_y = y_mm + ahead * s + left * c;
+  return {point_x * scale - point_y * picture + x, point_y * scale + point_x * picture + y,
+          heading_rad + turn + picture};
+}
+
+Eigen::Vector3d MotionModel::pose_of(const Sample& sample, const Situation& at) const {
+  const bool turned = !std::isnan(sample.heading_rad);
+  Eigen::Vector3d pose(sample.x_mm, sample.y_mm, turned ? sample.heading_rad : 0);
+  // What the tracker does to a place changes little over a few mm.
+  for (int pass = 0; pass < (measures() ? 6 : 2); ++pass) {
+    const Eigen::Vector3d seen = measured(pose[0], pose[1], pose[2], at);
+    pose[0] += sample.x_mm - seen[0];
+    pose[1] += sample.y_mm - seen[1];
+    if (turned) pose[2] += wrapped_angle(sample.heading_rad - seen[2]);
+  }
+  return pose;
 }
 
 Arc arc_of(const Rates& r, double wheel_base_mm, double heading_rad, double h_s) {

@@ -58,6 +58,7 @@ enum class Target : std::uint8_t {
   kMeasuredAhead,  ///< mm, in the body
   kMeasuredLeft,
   kMeasuredScale,    ///< relative
+  kMeasuredTurn,     ///< rad: of the whole picture about its origin, headings with it
   kMeasuredHeading,  ///< rad
 };
 [[nodiscard]] constexpr bool is_measured(Target target) { return target >= Target::kMeasuredX; }
@@ -110,6 +111,8 @@ struct MotionModel {
 
   /// What is measured of a robot whose reference point is at x, y: position and heading.
   [[nodiscard]] Eigen::Vector3d measured(double x_mm, double y_mm, double heading_rad, const Situation&) const;
+  /// Where the reference point is and how it points, of what was measured; without a heading it is taken to point along x.
+  [[nodiscard]] Eigen::Vector3d pose_of(const Sample&, const Situation&) const;
 };
 
 /// Adds the forces of a block's columns: for each column the change per unit of its coefficient.

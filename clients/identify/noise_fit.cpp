@@ -128,7 +128,7 @@ struct Path {
 Path path_of(const MotionModel& model, const TrackView& view) {
   RobotBias bias = model.bias_of(view.track->robot);
   bias.covariance.setZero();
-  TrackFilter filter(model, bias, view.track->robot, view.run);
+  TrackFilter filter(model, bias, view.track->robot, view.number);
   Recorder recorder(model.base.wheel_base_mm);
   walk(filter, view, view.track->samples.size(), recorder);
   return {recorder.first, model.noise.position_mm2, std::move(recorder.stretches)};

@@ -40,6 +40,7 @@ Factor richer(Factor f) {
       }
       break;
     case Shape::kCosines2: f.count = 11; break;
+    case Shape::kPolynomials2: f.count = 7; break;
     case Shape::kHarmonics: f.count = f.axis.of == Covariate::kBearing ? 3 : 10; break;
     case Shape::kTaper: f.count = 6; break;
     case Shape::kExponential: f.points = {0.25, 0.5, 1, 2, 4, 8}; break;
@@ -112,6 +113,11 @@ std::vector<Block> richer(const Term& term) {
     rich.basis.chosen.clear();
     for (Factor& factor : rich.basis.factors) factor = richer(factor);
     shorten(rich.basis);
+    // Pictures creep; what makes them jump is found elsewhere.
+    constexpr std::uint32_t kCreep = 24;
+    if (is_measured(block.target))
+      for (Factor& f : rich.basis.factors)
+        if (f.shape == Shape::kCosines && f.axis.of == Covariate::kTime) f.count = std::min(f.count, kCreep);
     // Too many columns: as they were.
     if (rich.basis.size() > kMostColumns) rich.basis = block.basis;
     blocks.push_back(rich);

@@ -208,23 +208,17 @@ Scene scene_of(const MotionModel& model, const PreparedSet& set, std::size_t run
   Scene scene;
   scene.room = model.room;
   scene.contacts = model.contacts;
-  scene.run = static_cast<std::uint32_t>(run);
   for (const TrackView& view : set.views()) {
     if (view.run != run) continue;
     const Sample& first = view.track->samples.front();
-    Situation at;
-    at.time_s = first.time_s;
-    at.commands = view.clock.at(first.time_s);
-    at.robot = view.track->robot;
-    at.run = view.run;
-    // Where it must be for the tracker to see it there: what the tracker does to a place changes little over a few mm.
-    double x_mm = first.x_mm, y_mm = first.y_mm, heading_rad = view.start_heading_rad;
-    for (int pass = 0; pass < 6; ++pass) {
-      const Eigen::Vector3d seen = model.measured(x_mm, y_mm, heading_rad, at);
-      x_mm += first.x_mm - seen[0];
-      y_mm += first.y_mm - seen[1];
-      if (TrackFilter::has_heading(first)) heading_rad += wrapped_angle(first.heading_rad - seen[2]);
-    }
+    // Where it must be for the tracker to see it there, pointing as it was found to.
+    const bool turned = TrackFilter::has_heading(first);
+    Sample seen = first;
+    if (!turned)
+      seen.heading_rad = model.measured(first.x_mm, first.y_mm, view.start_heading_rad, view.at(first.time_s))[2];
+    const Eigen::Vector3d pose = model.pose_of(seen, view.at(first.time_s));
+    const double x_mm = pose[0], y_mm = pose[1], heading_rad = pose[2];
+    scene.run = view.number;
     scene.robots.push_back({view.track, x_mm + model.base.centre_mm * std::cos(heading_rad),
                             y_mm + model.base.centre_mm * std::sin(heading_rad), wrapped_angle(heading_rad)});
   }

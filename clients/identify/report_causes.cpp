@@ -90,6 +90,10 @@ std::string cards(const json& contract, const json& document, Figures& figures) 
     out += "</dl></div>";
     out += "<div>";
     std::string plots;
+    for (const json& map : part(document, "effect_maps")) {
+      if (text(map, "name") == text(effect, "name") && !text(effect, "name").empty())
+        plots += figures.place(plot_effect_map(figures.plots(), map), "The effect, as it is in the model");
+    }
     for (const json& curve : part(document, "effect_curves")) {
       if (text(curve, "name") == text(effect, "name") && !text(effect, "name").empty())
         plots += figures.place(plot_effect(figures.plots(), curve), "The effect, as it is in the model");

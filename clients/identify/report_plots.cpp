@@ -85,10 +85,10 @@ Grid grid_of(const json& map, const char* when) {
   return grid;
 }
 
-/// What 98 % of the map's values are below, of both times.
+/// What 98 % of the map's values are below, of all times.
 double reach(const json& map) {
   std::vector<double> all;
-  for (const char* when : {"before", "after"}) {
+  for (const char* when : {"before", "after", "effect"}) {
     for (const auto& row : grid_of(map, when).value) {
       for (const double v : row) {
         if (std::isfinite(v)) all.push_back(std::abs(v));
@@ -230,7 +230,7 @@ PlotNumber plot_arrows(Gnuplot& plots, const json& map_x, const json& map_y, con
   return plots.add(kMap_px, kMapHigh_px, commands);
 }
 
-PlotNumber plot_map(Gnuplot& plots, const json& map, const char* when) {
+PlotNumber plot_map(Gnuplot& plots, const json& map, const char* when, const std::string& title) {
   const Grid grid = grid_of(map, when);
   const double most = reach(map);
   if (!grid.good() || !(most > 0)) return std::nullopt;
@@ -250,7 +250,7 @@ PlotNumber plot_map(Gnuplot& plots, const json& map, const char* when) {
   commands += fmt::format(
       "set title {}\nset cbrange [{}:{}]\nset palette defined (-1 '#2563a8', 0 '#f6f4ef', 1 '#d95f0e')\nset "
       "cblabel {} offset -0.5,0\n",
-      gnuplot_text(when), -most, most, gnuplot_text(text(map, "unit")));
+      gnuplot_text(title.empty() ? when : title), -most, most, gnuplot_text(text(map, "unit")));
   commands +=
       fmt::format("plot $d using 1:2:({}):({}):3 with boxxyerror fs solid 1 noborder fc palette", half_x, half_y);
   return plots.add(kMap_px, kMapHigh_px, commands);
@@ -307,6 +307,11 @@ PlotNumber plot_speed_over_time(Gnuplot& plots, const json& speeds) {
   commands += kMeasuredAndModels;
   if (any_finite(base)) commands += kBaseModel;
   return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_effect_map(Gnuplot& plots, const json& map) {
+  const std::string title = text(map, "which") + words_of(text(map, "acts_on"));
+  return plot_map(plots, map, "effect", title);
 }
 
 PlotNumber plot_effect(Gnuplot& plots, const json& curve) {

@@ -62,7 +62,7 @@ std::vector<Disturbance> disturbances_of(const MotionModel& model, const Prepare
     const TrackView& view = set.views()[v];
     RobotBias bias = model.bias_of(view.track->robot);
     bias.covariance.setZero();
-    TrackFilter filter(model, bias, view.track->robot, view.run);
+    TrackFilter filter(model, bias, view.track->robot, view.number);
     Corrections corrections(static_cast<std::uint32_t>(v), parts[v]);
     walk(filter, view, view.track->samples.size(), corrections);
   });

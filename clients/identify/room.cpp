@@ -48,11 +48,19 @@ double upper_wall(std::vector<Place> places, double noise_mm) {
 
 Room room_of(const PreparedSet& set, const MotionModel& model) {
   std::vector<Place> x, y;
+  const bool measures = model.measures();
   const double ahead = model.base.centre_mm - model.base.ahead_mm;
   for (std::size_t v = 0; v < set.views().size(); ++v) {
     const TrackView& view = set.views()[v];
     for (const Sample& s : view.track->samples) {
       if (view.clock.at(s.time_s).command != Motion::kStraight) continue;
+      if (measures) {
+        const Eigen::Vector3d pose = model.pose_of(s, view.at(s.time_s));
+        const double centre = std::isnan(s.heading_rad) ? model.base.ahead_mm : model.base.centre_mm;
+        x.push_back({pose[0] + centre * std::cos(pose[2]), v});
+        y.push_back({pose[1] + centre * std::sin(pose[2]), v});
+        continue;
+      }
       const double heading = std::isnan(s.heading_rad) ? 0 : s.heading_rad;
       const double by = std::isnan(s.heading_rad) ? 0 : ahead;
       x.push_back({s.x_mm + by * std::cos(heading), v});

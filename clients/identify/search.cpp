@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 
 #include "clients/identify/fine_map.hpp"
+#include "clients/identify/jumps.hpp"
 #include "clients/identify/memory_shape.hpp"
 #include "clients/identify/neighbour_shape.hpp"
 #include "clients/identify/refine.hpp"
@@ -24,6 +26,8 @@ constexpr std::uint64_t kSeed = 20180729;
 constexpr double kClose = 3;
 /// What another cause in a term's place must reach in log likelihood: with few columns, and with the shape that the data support.
 constexpr double kMostByShape = 200, kAsGood = 10;
+/// No form fits a cause exactly. What is left of all that was found, by this share of what that explains, is no other cause.
+constexpr double kRemnant = 0.003;
 /// As many samples as hypotheses are tested on; there are no more surprises in more.
 constexpr std::size_t kEnoughSamples = 130000;
 
@@ -33,6 +37,7 @@ class Loop {
        const std::function<void(double, const std::string&)>& progress)
       : fitter_(fitter), progress_(progress), extent_(extent_of(fitter.set())) {
     out_.model = base;
+    base_likelihood_ = fitter.log_likelihood(base);
     units_ = fitter.set().units();
     std::size_t samples = 0;
     for (const auto& unit : units_)
@@ -49,10 +54,12 @@ class Loop {
   Search run() {
     for (int round = 0; round < kMostRounds; ++round) {
       progress_(0.9 * round / kMostRounds, fmt::format("looking for causes, {} found", out_.model.terms.size()));
+      if (add_picture_jumps()) continue;
       measure();
       const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
       note_rejected(outcome);
-      const Finding* const best = best_of(outcome);
+      const double explained = fitter_.log_likelihood(out_.model) - base_likelihood_;
+      const Finding* const best = best_of(outcome, kRemnant * explained);
       if (best != nullptr) {
         const Search before = out_;
         const double likelihood = fitter_.log_likelihood(out_.model);
@@ -81,10 +88,12 @@ class Loop {
     const std::vector<Unit> units = linearise(out_.model, units_, blocks, {100, fitter_.threads()});
     scores_.emplace(fitter_, out_.model, units, dictionary_);
   }
-  const Finding* best_of(const Scores::Outcome& outcome) const {
+  const Finding* best_of(const Scores::Outcome& outcome, double least_evidence) const {
     const Finding* best = nullptr;
     for (const Finding& f : outcome.findings) {
-      if (!good(f, outcome.threshold_log10_p) || failed_.contains(hypothesis(f).name)) continue;
+      if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
+          failed_.contains(hypothesis(f).name))
+        continue;
       if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
@@ -115,6 +124,28 @@ class Loop {
   }
   const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
 
+  /// Whether the picture jumps, which is then part of the model.
+  bool add_picture_jumps() {
+    const std::vector<Jump> jumps = add_jumps(fitter_, out_.model);
+    if (jumps.empty()) return false;
+    fitter_.fit_surroundings(out_.model);
+    Finding finding;
+    bool pushed = true;
+    for (const Jump& jump : jumps) {
+      finding.evidence += jump.gain;
+      finding.degrees += Jump::kNumbers;
+      // Half chi squared of four numbers, at one of some thousand instants.
+      constexpr double kInstants = 5000;
+      finding.log10_p =
+          std::min(finding.log10_p, (std::log1p(jump.gain) - jump.gain + std::log(kInstants)) / std::log(10.0));
+      pushed = pushed && std::abs(jump.gain - jump.gain_as_push) < kClose;
+    }
+    const std::vector<std::string> covariates{"measurement", "time"}, room{"world_frame", "time"};
+    out_.reasons.push_back({covariates, "measured position", finding, std::log10(Scores::kFamilyAlarm)});
+    if (pushed) out_.ambiguous.push_back({kJumpsName, "drift-by-time", covariates, room, 0});
+    out_.steps.push_back({kJumpsName, finding.evidence});
+    return true;
+  }
   void add(const Finding& found, double threshold) {
     const Hypothesis& h = hypothesis(found);
     Term term = dictionary_.term_of(h, found.relative_scale);
@@ -249,6 +280,7 @@ class Loop {
   std::vector<std::vector<const TrackView*>> units_;
   std::optional<Scores> scores_;
   Search out_;
+  double base_likelihood_ = 0;
   std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
   int defences_ = 0;
 };

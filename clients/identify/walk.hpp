@@ -31,11 +31,22 @@ template <class Each> void sub_steps(const CommandClock& clock, double from_s, d
 /// A track with what belongs to it.
 struct TrackView {
   const Track* track = nullptr;
-  std::uint32_t run = 0;  ///< place in the set
-  std::size_t place = 0;  ///< in the run
+  std::uint32_t run = 0;     ///< place in the set
+  std::uint32_t number = 0;  ///< of the run, by which effects know it
+  std::size_t place = 0;     ///< in the run
   const RunNeighbours* neighbours = nullptr;
   CommandClock clock;
   double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample
+
+  /// What is known of an instant without knowing where the robot is.
+  [[nodiscard]] Situation at(double time_s) const {
+    Situation s;
+    s.time_s = time_s;
+    s.commands = clock.at(time_s);
+    s.robot = track->robot;
+    s.run = number;
+    return s;
+  }
 };
 
 /// Leads the filter from the first sample to the last. Calls visitor.start(filter), visitor.step(record),

@@ -30,6 +30,7 @@ Basis modest(Basis basis) {
     if (f.shape == Shape::kCosines)
       f.count = std::min<std::uint32_t>(f.count, f.axis.of == Covariate::kTime ? 24 : 12);
     if (f.shape == Shape::kCosines2) f.count = std::min<std::uint32_t>(f.count, 6);
+    if (f.shape == Shape::kPolynomials2) f.count = std::min<std::uint32_t>(f.count, 4);
     if (f.shape == Shape::kHarmonics) f.count = std::min<std::uint32_t>(f.count, 4);
   }
   // Of products a few columns.
@@ -68,20 +69,9 @@ std::vector<Widening> widenings_of(const Term& term, bool headings) {
     if (headings && !acts(term, Target::kMeasuredHeading, kAlways))
       all.push_back({{{Target::kMeasuredHeading, basis, kAlways}}});
     if (basis.looks_at(Covariate::kX) || first.target != Target::kMeasuredX) return all;
-    // A turn of the picture about any point.
-    const auto along = [&](Covariate of) {
-      Basis product = basis;
-      if (!product.chosen.empty()) return Basis{};
-      Factor f;
-      f.axis.of = of;
-      f.low = -1000;
-      f.high = 1000;
-      product.factors.push_back(f);
-      return product;
-    };
-    if (basis.chosen.empty())
-      all.push_back({{{Target::kMeasuredX, along(Covariate::kY), kAlways},
-                      {Target::kMeasuredY, along(Covariate::kX), kAlways}}});
+    // A picture that moves aside may turn and grow as well.
+    for (const Target target : {Target::kMeasuredTurn, Target::kMeasuredScale})
+      if (!acts(term, target, kAlways)) all.push_back({{{target, basis, kAlways}}});
     return all;
   }
   if (is_world(first.target)) {
@@ -365,6 +355,8 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
   std::vector<Block> kinds;
   for (const Block& block : model.terms[place].blocks) {
     if (block.basis.factors.size() != 1) return name;
+    // Jumps of the picture that are more than a shift are found by themselves.
+    if (block.target == Target::kMeasuredTurn || block.target == Target::kMeasuredScale) return name;
     const Factor& f = block.basis.factors.front();
     if (f.axis.of != Covariate::kTime || f.shape != Shape::kCosines) return name;
     duration_s = std::max(duration_s, f.high);

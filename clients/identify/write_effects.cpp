@@ -180,7 +180,8 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
       for (const double value : factor.points) grid.add_value(rounded(coefficients[0] * value));
       break;
     }
-    case Shape::kCosines2: {
+    case Shape::kCosines2:
+    case Shape::kPolynomials2: {
       function.set_and_of(covariate_of(factor.and_axis.of));
       proto::Spline2d& grid = *function.mutable_spline_2d();
       const int knots = 4 * static_cast<int>(factor.count) + 5;
@@ -261,8 +262,19 @@ void set_target(Effect& effect, Target target) {
       effect.set_direction_deg(90);
       break;
     case Target::kMeasuredScale: effect.set_acts_on(Effect::MEASURED_SCALE); break;
+    case Target::kMeasuredTurn:
     case Target::kMeasuredHeading: effect.set_acts_on(Effect::MEASURED_HEADING); break;
   }
+}
+
+/// What a small turn of the picture does to one axis of positions: x falls with y, y rises with x.
+Effect turned_position(const Effect& turn, Target axis) {
+  Effect effect = turn;
+  set_target(effect, axis);
+  Function& other = *effect.add_function();
+  other.set_of(axis == Target::kMeasuredX ? Function::Y : Function::X);
+  other.mutable_linear()->set_slope(axis == Target::kMeasuredX ? -1 : 1);
+  return effect;
 }
 
 }  // namespace
@@ -285,6 +297,7 @@ const char* form_of(const Term& term) {
     case Shape::kCosines:
     case Shape::kTaper: return "curve";
     case Shape::kCosines2:
+    case Shape::kPolynomials2:
     case Shape::kGrid: return "map";
     case Shape::kHarmonics:
     case Shape::kWave: return "harmonic";
@@ -318,6 +331,10 @@ std::vector<Effect> effects_of_term(const Term& term) {
           if ((block.during >> command & 1) != 0) effect.add_during(static_cast<proto::Command>(command));
       }
       for (const Function& function : product) *effect.add_function() = function;
+      if (block.target == Target::kMeasuredTurn) {
+        effects.push_back(turned_position(effect, Target::kMeasuredX));
+        effects.push_back(turned_position(effect, Target::kMeasuredY));
+      }
       effects.push_back(std::move(effect));
     }
   }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/identify/kilogrid/quick_swarm.hpp"
+
 namespace kilotwin::kilogrid {
 namespace {
 
@@ -48,13 +50,13 @@ double beyond_chance(double slope, double variance) {
   return slope * std::max(0.0, 1 - kBeyond * variance / std::max(slope * slope, 1e-30));
 }
 
-/// Statistics at one point of the design: of one of the runs, in turn, and not of all of it.
+/// Statistics at one point of the design: of one of the runs, in turn, and not of all of it. Quickly: what is taken from
+/// these runs is how they differ from each other.
 FloorStatistics statistics_at(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
                               std::size_t point) {
   FloorScene scene = target.scenes()[point % target.scenes().size()];
   scene.duration_s = std::min(scene.duration_s, kExplored_s);
-  return statistics_of(robot_sums(
-      simulate(scene, target.floor(), settings.model, settings.times, settings.radio, seed), target.floor()));
+  return statistics_of(robot_sums(simulate_quickly(scene, target.floor(), settings, seed), target.floor()));
 }
 
 /// `here`: the model's statistics. `moves`: which parameters are varied; the others have slopes of 0.
@@ -62,7 +64,7 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const Floo
                   const std::vector<bool>& moves, double width, std::uint64_t seed) {
   const std::vector<FloorParameter> parameters = model.parameters();
   const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
-  const std::size_t points = 3 * moving / 2 + 10;
+  const std::size_t points = 2 * moving + 10;
   Dice dice(seed);
   auto design = design_of(parameters.size(), points, dice);
   for (std::vector<double>& steps : design) {
@@ -118,12 +120,12 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const Floo
 
 /// Slopes of parameters that are 0 in the model, each by itself: a width of it against none, in the same runs. What else is
 /// in the model stays as it is, so that small runs show it.
-void switch_on(Surrogate& surrogate, const FloorModel& model, const FloorTarget& target, const FloorStatistics& here,
-               const std::vector<std::size_t>& switches, std::uint64_t seed) {
+void switch_on(Surrogate& surrogate, const FloorModel& model, const FloorTarget& target,
+               const FloorStatistics& here, const std::vector<std::size_t>& switches, std::uint64_t seed) {
   const std::vector<FloorParameter> parameters = model.parameters();
-  const std::size_t scenes = std::min<std::size_t>(target.scenes().size(), 2), repeats = 2;
+  const std::size_t scenes = std::min<std::size_t>(target.scenes().size(), 4);
   // First without any, more often since all are compared with it.
-  const std::size_t without = scenes * repeats * 2, count = without + switches.size() * scenes;
+  const std::size_t without = scenes * 4, count = without + switches.size() * scenes;
   std::vector<FloorStatistics> results(count);
   in_parallel(target.threads(), count, [&](std::size_t i) {
     std::vector<double> values = model.values;
@@ -182,6 +184,17 @@ Eigen::VectorXd best_steps(const Surrogate& surrogate, const std::vector<bool>& 
   return steps;
 }
 
+/// The misfit as steps lower it: what is far off counts by its size, not by its square.
+double robust_misfit(const FloorTarget& target, const FloorStatistics& at) {
+  double sum = 0;
+  for (std::size_t s = 0; s < statistic_count(); ++s) {
+    const double variance = target.tolerance()[s] + at.variance[s];
+    const double off = (at.value[s] - target.statistics().value[s]) / std::sqrt(variance);
+    if (std::isfinite(off) && target.tolerance()[s] > 0) sum += off * off * std::min(1.0, 3 / std::abs(off));
+  }
+  return sum;
+}
+
 double expected(const Surrogate& surrogate, const Eigen::VectorXd& steps) {
   const Eigen::VectorXd weights = weights_of(surrogate.off);
   const Eigen::VectorXd residual = surrogate.off + surrogate.slopes * steps;
@@ -196,7 +209,7 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   const std::vector<bool> all(parameters.size(), true);
   model.later = target.later();
   FloorStatistics at = simulated_statistics(target, model.settings(), seed * 7 + 1);
-  double misfit = target.misfit(at);
+  double misfit = robust_misfit(target, at);
   for (int round = 0; round < rounds; ++round) {
     const Surrogate surrogate =
         explore(model, target, at, all, width, seed * 10 + static_cast<std::uint64_t>(round));
@@ -205,19 +218,19 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
     model.values = moved(parameters, before.values, {steps.data(), steps.data() + steps.size()}, width);
     const FloorStatistics there =
         simulated_statistics(target, model.settings(), seed * 7 + 2 + static_cast<std::uint64_t>(round));
-    const double now = target.misfit(there);
+    const double now = robust_misfit(target, there);
     progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
     // A step that leads away was too long for the surrogate.
-    if (now > 1.05 * misfit) {
+    if (now > misfit) {
       model = before;
       width *= 0.5;
       continue;
     }
     misfit = now;
     at = there;
-    width *= 0.75;
+    width *= 0.8;
   }
-  return misfit;
+  return target.misfit(at);
 }
 
 double fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed, double least_gain,

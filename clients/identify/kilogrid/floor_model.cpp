@@ -37,18 +37,32 @@ void set_episodes(Function& function, std::span<const double> v) {
   episodes.set_tail(v[2]);
 }
 
-/// Every robot's own gain, as a table: its quantile in the distribution z + skew (z^2 - 1) of the normal z. Successive numbers
-/// are spread evenly over it, so that any swarm has nearly the whole distribution.
-void add_speeds(FloorSettings& settings, double sd, double skew) {
+/// Every robot's own value, as a table: of its normal number z. Successive robots are spread evenly over the distribution, so that
+/// any swarm has nearly the whole of it; `step` tells tables apart that must not go together.
+void add_table_of_robots(Effect& effect, double step, const std::function<double(double z)>& value) {
   constexpr std::uint32_t kRobots = 256;
-  constexpr double kGolden = 0.6180339887498949, kSlowest = -0.95;
-  proto::Table& table =
-      *add_function(add_effect(settings, "speed-of-robots", Effect::WHEEL_GAIN), Function::ROBOT).mutable_table();
+  proto::Table& table = *add_function(effect, Function::ROBOT).mutable_table();
   for (std::uint32_t robot = 0; robot < kRobots; ++robot) {
-    const double share = (robot + 0.5) * kGolden, z = kt_inverse_normal(share - std::floor(share));
+    const double share = (robot + 0.5) * step;
     table.add_key(robot);
-    table.add_value(std::max(sd * (z + skew * (z * z - 1)) / std::sqrt(1 + 2 * skew * skew), kSlowest));
+    table.add_value(value(kt_inverse_normal(share - std::floor(share))));
   }
+}
+
+/// Gains distributed as z + skew (z^2 - 1).
+void add_speeds(FloorSettings& settings, double sd, double skew) {
+  constexpr double kGolden = 0.6180339887498949, kSlowest = -0.95;
+  add_table_of_robots(add_effect(settings, "speed-of-robots", Effect::WHEEL_GAIN), kGolden, [=](double z) {
+    return std::max(sd * (z + skew * (z * z - 1)) / std::sqrt(1 + 2 * skew * skew), kSlowest);
+  });
+}
+
+/// Turn rates distributed as z + tail z^3.
+void add_turning(FloorSettings& settings, double sd, double tail) {
+  constexpr double kSilver = 0.41421356237309505;
+  const double scale = sd / std::sqrt(1 + 6 * tail + 15 * tail * tail);
+  add_table_of_robots(add_effect(settings, "turning-of-robots", Effect::TURN_RATE), kSilver,
+                      [=](double z) { return scale * (z + tail * z * z * z); });
 }
 
 /// Beside one wall: `across` is the axis that leads to it, `at_mm` where it begins.
@@ -114,17 +128,18 @@ void add_harmonic(Function& function, double cosine, double sine, double period)
 FloorTerm base_term() {
   FloorTerm term{"base", {}, "", "", "", {}, 0, {}};
   term.parameters = {{"straight_speed_mm_s", 11.5, 3, 20, 1.2},
-                     {"turn_speed_mm_s", 20, 5, 40, 3},
+                     {"turn_speed_mm_s", 19, 5, 40, 3},
                      {"bias_sd_mm_s", 1.2, 0.05, 4, 0.4},
                      {"factor_variance_s", 0.06, 0, 2, 0.06},
                      {"range_mm", 47, 35, 70, 2},
-                     {"heard", 0.95, 0.1, 1, 0.08},
-                     {"heard_sd", 0.26, 0, 0.5, 0.06},
-                     {"wall_range_mm", 47, 20, 75, 3},
-                     {"wall_heard", 2.9, 0.3, 7, 1},
-                     {"wall_noise", 4, 0.5, 60, 4},
-                     {"while_talking", 0.3, 0.05, 1, 0.15},
-                     {"same_cell", 0.15, 0.02, 0.5, 0.04}};
+                     {"heard", 0.97, 0.1, 1, 0.08},
+                     {"heard_sd", 0.12, 0, 0.5, 0.06},
+                     {"wall_range_mm", 52, 20, 75, 3},
+                     {"wall_heard", 3.5, 0.3, 7, 1},
+                     {"wall_noise", 4, 0.5, 60, 3},
+                     {"while_talking", 0.15, 0.01, 1, 0.06},
+                     {"same_cell", 0.12, 0.02, 0.5, 0.04},
+                     {"in_turn", 0.6, 0, 1, 0.1}};
   term.apply = [](std::span<const double> v, FloorSettings& s) {
     proto::Motion& motion = *s.model.mutable_motion();
     motion.set_straight_speed_mm_s(v[0]);
@@ -141,6 +156,7 @@ FloorTerm base_term() {
     s.radio.while_talking = v[10];
     for (std::size_t i = 1; i < 4; ++i) s.radio.later[i] *= 4 * (1 - v[11]) / 3;
     s.radio.later[0] = v[11];
+    s.radio.in_turn = v[12];
   };
   return term;
 }
@@ -155,6 +171,15 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    {{"sd", 0, 0, 0.5, 0.25}, {"skew", 0, -0.6, 0.6, 0.2}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) { add_speeds(s, v[0], v[1]); }});
+  terms.push_back({"turning-of-robots",
+                   {"robot"},
+                   "TURN_RATE",
+                   "every robot turns by itself at a rate of its own: they spread by {0:.3f} rad/s, a few by far "
+                   "more (tail {1:.2f})",
+                   "",
+                   {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"tail", 0.1, 0, 0.5, 0.1}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) { add_turning(s, v[0], v[1]); }});
   terms.push_back({"wandering-turn",
                    {"history"},
                    "TURN_RATE",
@@ -193,7 +218,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "within 50 mm of a wall robots get stuck, {0:.1f} times an hour and wall, longer than t with "
                    "the chance (1 + t / {1:.0f} s)^-{2:.2f}",
                    "film robots that stand beside a wall: their motors push in vain, or rest",
-                   {{"per_hour", 0, 0, 120, 12}, {"scale_s", 40, 2, 300, 15}, {"tail", 1.8, 1.1, 5, 0.3}},
+                   {{"per_hour", 0, 0, 120, 12}, {"scale_s", 40, 2, 300, 15}, {"tail", 1.2, 0.3, 5, 0.25}},
                    1,
                    [floor](std::span<const double> v, FloorSettings& s) {
                      for (const Side& side : sides_of(floor)) {

@@ -1,5 +1,7 @@
 #include "clients/identify/kilogrid/floor_plots.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -85,6 +87,66 @@ json numbers(const std::vector<double>& values, const StatisticGroup& group, boo
     list.push_back(std::isfinite(v) ? json(v) : json());
   }
   return list;
+}
+
+json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before, const FloorStatistics& after) {
+  json rows = json::array();
+  // A number of the statistics, as it is read.
+  const auto row = [&](const std::string& what, const char* format, const auto& read) {
+    rows.push_back({what, fmt::format(fmt::runtime(format), read(held_out.statistics().value)),
+                    fmt::format(fmt::runtime(format), read(before.value)),
+                    fmt::format(fmt::runtime(format), read(after.value))});
+  };
+  const auto value = [&](const char* group, std::size_t i) {
+    return [at = statistic_group(group).first + i](const std::vector<double>& v) { return v[at]; };
+  };
+  const auto share_of = [&](const char* group, std::size_t from, std::size_t to) {
+    return [first = statistic_group(group).first, from, to](const std::vector<double>& v) {
+      double sum = 0;
+      for (std::size_t i = from; i < to; ++i) sum += v[first + i];
+      return sum;
+    };
+  };
+  const std::array lags_s = {10, 20, 50, 100, 200, 300, 600};
+  for (std::size_t i = 0; i < lags_s.size(); ++i) {
+    row(fmt::format("root mean square way in {} s, mm", lags_s[i]), "{:.0f}",
+        [&, i](const auto& v) { return std::sqrt(value("msd", i)(v)); });
+  }
+  // Between robots, about the mean of all; halves of a run tell what lasts.
+  const auto add_own = [&](const char* group, double about, double scale, const std::string& name,
+                           const char* format) {
+    const auto off = [=](const auto& v) { return value(group, 0)(v) - about; };
+    row(name + ": mean", format, [=](const auto& v) { return value(group, 0)(v) * scale; });
+    const auto variance = [=](const auto& v, std::size_t i) { return value(group, i)(v) - off(v) * off(v); };
+    row(name + ": standard deviation between robots", format,
+        [=](const auto& v) { return std::sqrt(std::max(variance(v, 1), 0.0)) * scale; });
+    row(name + ": correlation of a robot's first and second half of the run", "{:.2f}",
+        [=](const auto& v) { return variance(v, 2) / variance(v, 1); });
+  };
+  constexpr double kPerSecond = 1 / FloorBlocks::kBlock_s, kAboutSpeed_mm = 75;
+  add_own("speed", kAboutSpeed_mm, kPerSecond, "speed in the open, mm/s", "{:.2f}");
+  add_own("turn-bias", 0, kPerSecond, "turning to one side, rad/s", "{:+.4f}");
+  row("standing still in the open: episodes of 10 s or more, in 1000 blocks", "{:.1f}",
+      value("still-in-the-open", 0));
+  row("... of 30 s or more", "{:.2f}", value("still-in-the-open", 2));
+  row("standing still beside walls: episodes of 10 s or more, in 1000 blocks", "{:.0f}",
+      value("still-beside-walls", 0));
+  row("... of 40 s or more", "{:.1f}", value("still-beside-walls", 3));
+  row("stays beside a wall of 200 s or more, in 1000 blocks", "{:.2f}", value("stays-beside-walls", 5));
+  row("share of time within 50 mm of a wall", "{:.3f}", value("occupancy", 0));
+  row("share of time within 100 mm of a wall", "{:.3f}", share_of("occupancy", 0, 2));
+  row("speed after 45 minutes, of that in the first 10", "{:.3f}", [&](const auto& v) {
+    const auto of = share_of("step-by-time", 9, 11), at = share_of("step-by-time", 0, 2);
+    return of(v) / at(v);
+  });
+  row("share of blocks of 10 s without a report", "{:.3f}", value("reports", 7));
+  return {{"id", "motion"},
+          {"title", "How robots move, measured and simulated"},
+          {"lead",
+           "On runs held out. All from cells alike: mean places in blocks of 10 s, in which steps below 16 mm are "
+           "standing still; in the open is 150 mm off the walls."},
+          {"head", {"", "measured", "base model", "with effects"}},
+          {"rows", rows}};
 }
 
 void add_plots(json& document, const FloorTarget& held_out, const FloorStatistics& before,

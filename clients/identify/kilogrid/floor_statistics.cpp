@@ -117,7 +117,8 @@ std::vector<StatisticGroup> make_groups() {
   add("drift", "world_frame", {"x", "y"});
   add("reports", "measurement",
       {"blocks unheard", "heard again after 2 s", "heard twice at once", "cell as before", "next to it",
-       "blocks unheard, between robots"});
+       "blocks unheard, between robots", "as many cells on as before", "blocks without any report",
+       "unheard after such a block"});
   add("stays-beside-walls", "position", each(kStays, "stays of {} blocks or more, in 1000"));
   add("middle-by-time", "time", counted(kMiddleBins, "share in the middle in 10 minutes {}"));
   add("extent", "robot", {"mean", "between robots", "in halves"});
@@ -289,7 +290,32 @@ class Motions {
   std::vector<std::complex<double>> steps_;
 };
 
+/// Of reports to three cells of one module, each 2 s after the other: whether the module went on by as many cells again.
+void add_pace(Sums& sums, const FloorTrack& track, double cell_mm) {
+  const auto cell = [&](std::size_t i) {
+    return std::pair{static_cast<int>(track.x_mm[i] / cell_mm), static_cast<int>(track.y_mm[i] / cell_mm)};
+  };
+  const auto place = [](std::pair<int, int> c) { return c.first % 2 + 2 * (c.second % 2); };
+  for (std::size_t i = 2; i < track.size(); ++i) {
+    if (track.time_s[i] - track.time_s[i - 1] != 2 || track.time_s[i - 1] - track.time_s[i - 2] != 2) continue;
+    const auto a = cell(i - 2), b = cell(i - 1), c = cell(i);
+    const auto same = [&](std::pair<int, int> other) {
+      return a.first / 2 == other.first / 2 && a.second / 2 == other.second / 2;
+    };
+    if (!same(b) || !same(c)) continue;
+    sums.add(kReports, 6, (place(b) - place(a) + 4) % 4 == (place(c) - place(b) + 4) % 4 ? 1 : 0);
+  }
+}
+
 void add_reports(Sums& sums, const FloorTrack& track, const std::vector<double>& block_x_mm, double cell_mm) {
+  add_pace(sums, track, cell_mm);
+  std::vector<bool> empty(block_x_mm.size(), true);
+  for (const double time_s : track.time_s)
+    empty[std::min(static_cast<std::size_t>(time_s / FloorBlocks::kBlock_s), empty.size() - 1)] = false;
+  for (std::size_t k = 0; k < empty.size(); ++k) {
+    sums.add(kReports, 7, empty[k] ? 1 : 0);
+    if (k > 0 && empty[k - 1]) sums.add(kReports, 8, empty[k] ? 1 : 0);
+  }
   Mean unheard;
   for (const double x : block_x_mm) {
     sums.add(kReports, 0, std::isnan(x) ? 1 : 0);

@@ -79,7 +79,15 @@ FloorReporter::FloorReporter(const Floor& floor, const FloorRadio& radio, std::u
     talking_.push_back(dice_.uniform() * (radio.silent_s + radio.talking_s) < radio.talking_s);
     change_s_.push_back(-(talking_.back() ? radio.talking_s : radio.silent_s) * kt_log(dice_.uniform()));
     phase_.push_back(static_cast<std::uint32_t>(dice_.bits() >> 62));
+    pace_.push_back(draw_pace());
   }
+}
+
+std::uint32_t FloorReporter::draw_pace() {
+  const double turn = dice_.uniform() * (radio_.later[0] + radio_.later[1] + radio_.later[2] + radio_.later[3]);
+  std::uint32_t later = 0;
+  for (double below = radio_.later[0]; turn > below && later < 3; below += radio_.later[later]) ++later;
+  return later;
 }
 
 void FloorReporter::see(std::uint32_t robot, double time_s, double x_mm, double y_mm) {
@@ -90,14 +98,9 @@ void FloorReporter::see(std::uint32_t robot, double time_s, double x_mm, double 
     change_s_[robot] -= (talking_[robot] ? radio_.talking_s : radio_.silent_s) * kt_log(dice_.uniform());
   }
   const double chance = heard_[robot] * (talking_[robot] ? radio_.while_talking : 1);
-  const double turn = dice_.uniform() * (radio_.later[0] + radio_.later[1] + radio_.later[2] + radio_.later[3]);
-  double below = 0;
-  for (std::uint32_t later = 0; later < 4; ++later) {
-    below += radio_.later[later];
-    if (turn > below && later < 3) continue;
-    phase_[robot] += later;
-    break;
-  }
+  if (dice_.uniform() * radio_.same_pace_s < every_s_[robot]) pace_[robot] = draw_pace();
+  phase_[robot] += pace_[robot];
+  const auto off = dice_.uniform() < radio_.in_turn ? 0u : static_cast<std::uint32_t>(dice_.bits() >> 62);
   const double module_mm = 2 * floor_.cell_mm;
   const int columns = static_cast<int>(floor_.width_mm / module_mm),
             rows = static_cast<int>(floor_.height_mm / module_mm);
@@ -107,7 +110,7 @@ void FloorReporter::see(std::uint32_t robot, double time_s, double x_mm, double 
     for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c) {
       // Each module began with a cell of its own.
       const auto cell =
-          static_cast<int>(phase_[robot] + Dice(static_cast<std::uint64_t>(r * columns + c)).bits() % 4) % 4;
+          static_cast<int>(phase_[robot] + off + Dice(static_cast<std::uint64_t>(r * columns + c)).bits() % 4) % 4;
       const double cell_x_mm = (2 * c + (cell & 1) + 0.5) * floor_.cell_mm,
                    cell_y_mm = (2 * r + (cell >> 1) + 0.5) * floor_.cell_mm;
       const double dx = x_mm - cell_x_mm, dy = y_mm - cell_y_mm;
@@ -174,9 +177,10 @@ FloorRun simulate(const FloorScene& scene, const Floor& floor, const proto::Mode
     for (std::size_t i = 0; i < bodies.robot.size(); ++i) {
       const std::uint32_t robot = bodies.robot[i];
       const double x_mm = bodies.x_mm[i] + floor.width_mm / 2, y_mm = bodies.y_mm[i] + floor.height_mm / 2;
-      if (const double rim_mm = rim_cell_distance_mm(floor, x_mm, y_mm);
-          rim_mm < radio.wall_range_mm + 4 * radio.wall_noise && dice.uniform() < radio.wall_heard * tick_s) {
-        const double reading_mm = rim_mm + radio.wall_noise * dice.normal();
+      if (dice.uniform() < radio.wall_heard * tick_s) {
+        const double rim_mm = rim_cell_distance_mm(floor, x_mm, y_mm);
+        const bool may_be_heard = rim_mm < radio.wall_range_mm + 4 * radio.wall_noise;
+        const double reading_mm = may_be_heard ? rim_mm + radio.wall_noise * dice.normal() : rim_mm;
         // The program compares readings; where they begin does not matter as long as they are positive.
         constexpr double kStrongest = 1000;
         if (reading_mm < radio.wall_range_mm) programs[robot].hear_wall(kilo_ticks, kStrongest - reading_mm);

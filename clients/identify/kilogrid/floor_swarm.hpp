@@ -31,8 +31,11 @@ struct FloorRadio {
   /// Robots talk to each other for a while now and then; their reports are then lost more often, by this factor.
   double while_talking = 0.6;
   double silent_s = 300, talking_s = 225;  ///< mean times between and of that
-  /// A module listens to one of its four cells at a time, in turn: chances of the cell to be 0..3 later at the next report.
+  /// A module listens to one of its four cells at a time, in turn. From one report of a robot to the next it goes on by 0..3
+  /// cells, the same for a while: these are the chances of each.
   std::array<double, 4> later = {0.25, 0.25, 0.25, 0.25};
+  double in_turn = 0.6;       ///< chance of a report to meet the cell whose turn it is, not just any
+  double same_pace_s = 120;   ///< mean time for which a robot meets cells by the same number on
   double wall_range_mm = 46;  ///< at which robots hear cells of the rim
   double wall_heard = 2;      ///< such messages a second; at most one in 4 kilo_ticks
   double wall_noise = 5;      ///< of one reading, in mm of distance
@@ -61,12 +64,16 @@ class FloorReporter {
   [[nodiscard]] FloorRun take(std::string name, double duration_s);
 
  private:
+  /// By how many cells a module goes on.
+  std::uint32_t draw_pace();
+
   Floor floor_;
   FloorRadio radio_;
   Dice dice_;
   std::vector<double> next_s_, every_s_, heard_, change_s_;
   std::vector<bool> talking_;
   std::vector<std::uint32_t> phase_;  ///< which cell modules listen to, but for what each began with
+  std::vector<std::uint32_t> pace_;   ///< by how many cells it goes on from report to report
   std::vector<FloorTrack> tracks_;
 };
 

@@ -155,7 +155,7 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   FloorModel model;
   model.add(base_term());
   part = 0.02;
-  fit(model, learned, 1, 0.8, 1, progress);
+  fit(model, learned, 2, 1, 1, progress);
   const FloorModel base = model;
   note("base", model);
 
@@ -191,11 +191,11 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
       if (chosen.empty()) break;
       std::sort(taken.rbegin(), taken.rend());
       for (const std::size_t c : taken) candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(c));
-      fit(model, learned, round == 0 ? 3 : 2, round == 0 ? 0.8 : 0.5, 100 + round, progress);
+      fit(model, learned, round == 0 ? 3 : 2, round == 0 ? 1 : 0.7, 100 + round, progress);
       note(names, model);
     }
     part = 0.65;
-    fit_walls(model, learned, 3, 6000, kLeastGain, progress);
+    fit_walls(model, learned, 2, 6000, kLeastGain, progress);
     if (model.wall) note(kWall, model);
 
     // Each effect must earn its place.
@@ -308,6 +308,7 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
               {"statistics", statistics},
               {"classifier", classify(alike, unlike, test, held_out, base.settings(), settings)}};
   add_words(result.document, contract.at("classifier"));
+  result.document["tables"].push_back(table_of_motion(held_out, out_before, out_after));
   const auto parameters = base_term().parameters;
   for (std::size_t p = 0; p < parameters.size(); ++p)
     contract[p < 4 ? "base" : "floor"][parameters[p].name] = model.values[p];

@@ -42,6 +42,15 @@ std::vector<Form> forms() {
   map.and_axis.of = Covariate::kY;
   map.and_low = -250;
   map.and_high = 250;
+  // Between nodes the engine bends where the fitted map is linear, but for what is linear anyway.
+  Factor grid = map;
+  grid.shape = Shape::kGrid;
+  grid.count = 7;
+  grid.points.clear();
+  for (int j = 0; j < 5; ++j)
+    for (int i = 0; i < 7; ++i) grid.points.push_back(0.2 * i - 0.1 * j + 0.02 * i * j);
+  Factor lens = map;
+  lens.shape = Shape::kPolynomials2;
   Factor bearing = over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 1);
   const Factor previous = over(Shape::kTable, Covariate::kPreviousCommand, 0, 1, 1, {2, 3});
   Factor since = late;
@@ -61,6 +70,8 @@ std::vector<Form> forms() {
           {"curve over y", {{over(Shape::kCosines, Covariate::kY, -250, 250, 3)}}},
           {"curve over radius", {{over(Shape::kCosines, Covariate::kRadius, 0, 300, 3)}}},
           {"map", {{map}}},
+          {"grid", {{grid}}},
+          {"lens", {{lens}}},
           {"heading", {{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 1)}}},
           {"harmonics of heading", {{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
           {"command", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2, 3})}}},
@@ -90,9 +101,9 @@ std::vector<Form> forms() {
 }
 
 const char* name_of(Target target) {
-  constexpr const char* kNames[] = {"gain",       "gain left",  "gain right", "offset",  "turn",
-                                    "ahead",      "sideways",   "world x",    "world y", "measured x",
-                                    "measured y", "body ahead", "body left",  "scale",   "measured heading"};
+  constexpr const char* kNames[] = {
+      "gain",    "gain left",  "gain right", "offset",     "turn",      "ahead", "sideways", "world x",
+      "world y", "measured x", "measured y", "body ahead", "body left", "scale", "picture",  "measured heading"};
   return kNames[static_cast<std::size_t>(target)];
 }
 
@@ -103,7 +114,8 @@ double size_of(Target target) {
     case Target::kGainLeft:
     case Target::kGainRight: return 0.15;
     case Target::kTurn: return 0.05;
-    case Target::kMeasuredScale: return 0.02;
+    case Target::kMeasuredScale:
+    case Target::kMeasuredTurn: return 0.02;
     case Target::kMeasuredHeading: return 0.1;
     case Target::kMeasuredX:
     case Target::kMeasuredY:

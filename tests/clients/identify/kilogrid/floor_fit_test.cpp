@@ -35,7 +35,7 @@ FloorModel base_model() {
 }
 
 /// What identify_floor asks of an effect.
-constexpr double kBeyondChance = 40;
+constexpr double kBeyondChance = 120;
 const FloorProgress kQuiet = [](const std::string& s) { puts(s.c_str()); };
 
 TEST(FloorFit, RecoversTheSpeedAndTheRange) {
@@ -61,7 +61,7 @@ TEST(FloorFit, FindsAnEffectThatIsThereAndNoneThatIsNot) {
   const auto speed = std::find_if(candidates.begin(), candidates.end(),
                                   [](const FloorTerm& t) { return t.name == "speed-of-robots"; });
   truth.add(*speed);
-  truth.values[truth.values.size() - 2] = 0.35;  // spread; the last is the skew
+  truth.values[truth.values.size() - 2] = 0.5;  // spread; the last is the skew
   const FloorTarget with(runs_of(truth, 300), {});
   const std::vector<CandidateScore> found = choose(base_model(), candidates, with, kBeyondChance, 5, kQuiet);
   ASSERT_FALSE(found.empty());

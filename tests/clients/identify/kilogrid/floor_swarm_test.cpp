@@ -96,6 +96,32 @@ TEST(FloorReporter, HearsAsOftenAsItsRangeSays) {
   EXPECT_NEAR(static_cast<double>(run.tracks[0].size()), expected, 0.03 * expected);
 }
 
+TEST(FloorReporter, ARobotAtRestIsHeardByCellsInTurn) {
+  // In the middle of a module, in reach of its four cells; every report is heard.
+  FloorRadio radio;
+  radio.heard = 1;
+  radio.heard_sd = 0;
+  radio.while_talking = 1;
+  radio.in_turn = 1;
+  radio.blur_mm = 0.1;
+  for (const std::size_t pace : {std::size_t{0}, std::size_t{1}, std::size_t{2}}) {
+    radio.later = {0, 0, 0, 0};
+    radio.later[pace] = 1;
+    FloorReporter reporter({}, radio, 1, 3);
+    for (int i = 0; i < 40; ++i) reporter.see(0, 2.2 * i, 550, 1050);
+    const FloorRun run = reporter.take("r", 100);
+    const FloorTrack& track = run.tracks[0];
+    ASSERT_GE(track.size(), 39u);
+    const std::size_t period = pace == 0 ? 1 : pace == 1 ? 4 : 2;
+    for (std::size_t i = 0; i + period < track.size(); ++i) {
+      EXPECT_EQ(std::pair(track.x_mm[i], track.y_mm[i]), std::pair(track.x_mm[i + period], track.y_mm[i + period]));
+    }
+    if (pace > 0) {
+      EXPECT_NE(std::pair(track.x_mm[0], track.y_mm[0]), std::pair(track.x_mm[1], track.y_mm[1]));
+    }
+  }
+}
+
 TEST(FloorReporter, CellsThatHearAreNear) {
   const Floor floor;
   FloorRadio radio;

@@ -1,0 +1,236 @@
+// What depends on places and on neighbours is found in the shape it has: an edge of the floor, a radius within which robots count,
+// the cells in which a floor remembers.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "clients/identify/fine_map.hpp"
+#include "clients/identify/memory_shape.hpp"
+#include "clients/identify/neighbour_shape.hpp"
+#include "clients/identify/refine.hpp"
+#include "clients/identify/write_effects.hpp"
+#include "clients/identify/write_model.hpp"
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+constexpr double kCell_mm = 43;
+
+/// What a robot's speed may depend on.
+struct Around {
+  std::size_t robot;
+  const std::vector<double>&x_mm, &y_mm;  ///< of all
+  double trodden_s;                       ///< in cells of kCell_mm
+};
+using Gain = std::function<double(const Around&)>;
+
+/// Ghosts that walk through each other, by arcs of 50 ms.
+MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, double duration_s) {
+  const Random random(seed);
+  const double dt = 0.05, factor_s = 0.001, tracker_mm = 0.3, tracker_rad = 0.03;
+  MeasuredSet set;
+  set.has_commands = set.has_headings = true;
+  Run& run = set.runs.emplace_back();
+  run.name = "r";
+  run.tracks.resize(robots);
+  std::vector<double> x(robots), y(robots), heading(robots), next_s(robots, 0), disc_x(robots), disc_y(robots);
+  for (std::uint32_t r = 0; r < robots; ++r) {
+    run.tracks[r].robot = r;
+    run.tracks[r].commands.push_back({-1e300, Motion::kStop});
+    x[r] = 90.0 * (r % 4) - 135;
+    y[r] = 90.0 * (r / 4) - 90;
+    heading[r] = 1.7 * r;
+  }
+  FloorMemory memory(kCell_mm);
+  for (int k = 0; k * dt <= duration_s; ++k) {
+    const double t = k * dt;
+    for (std::uint32_t r = 0; r < robots; ++r) {
+      disc_x[r] = x[r] + kAxleOffset_mm * std::cos(heading[r]);
+      disc_y[r] = y[r] + kAxleOffset_mm * std::sin(heading[r]);
+    }
+    for (std::uint32_t r = 0; r < robots; ++r) {
+      Track& track = run.tracks[r];
+      const auto noise = [&](Stream stream, std::uint32_t draw) { return random.normal(stream, r, Tick{k}, draw); };
+      if (k % 10 == 0)
+        track.samples.push_back({t, disc_x[r] + tracker_mm * noise(Stream::kMeasurementNoise, 0),
+                                 disc_y[r] + tracker_mm * noise(Stream::kMeasurementNoise, 1),
+                                 wrapped_angle(heading[r] + tracker_rad * noise(Stream::kMeasurementNoise, 2))});
+      if (t >= next_s[r] - 1e-9) {
+        const bool straight = track.commands.back().motion != Motion::kStraight;
+        const double draw = random.uniform(Stream::kLayout, r, Tick{k}, 0);
+        track.commands.push_back({t, straight ? Motion::kStraight : draw < 0.5 ? Motion::kLeft : Motion::kRight});
+        next_s[r] = t + (straight ? 3 + 6 * draw : 1 + 2 * draw);
+      }
+      const double speed = gain({r, disc_x, disc_y, memory.value_s(disc_x[r], disc_y[r])});
+      const Eigen::Vector2d v = speed * nominal_speeds(BaseParameters{}, track.commands.back().motion);
+      const double sd = std::sqrt(factor_s / dt);
+      Rates rates;
+      rates.left_mm_s = v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
+      rates.right_mm_s = v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
+      const Arc arc = arc_of(rates, 25, heading[r], dt);
+      x[r] += arc.dx_mm;
+      y[r] += arc.dy_mm;
+      heading[r] += arc.dheading_rad;
+    }
+    for (std::uint32_t r = 0; r < robots; ++r) memory.add(disc_x[r], disc_y[r], dt);
+  }
+  return set;
+}
+
+Term unfitted(Factor factor) {
+  const Basis basis{{std::move(factor)}};
+  const auto columns = static_cast<Eigen::Index>(basis.size());
+  return {"effect",
+          {{Target::kGain, basis, kDriven}},
+          Eigen::VectorXd::Zero(columns),
+          Eigen::VectorXd::Constant(columns, 1)};
+}
+
+/// The model without effects, fitted; nothing touches.
+MotionModel fitted(const Fitter& fitter) {
+  MotionModel model;
+  model.contacts = false;
+  fitter.fit(model, 2);
+  return model;
+}
+
+double gain_of(const MotionModel& model, const Situation& s) { return model.rates(s, {0, 0}).left_gain; }
+
+Situation driven_at(double x_mm, double y_mm) {
+  Situation s;
+  s.x_mm = x_mm;
+  s.y_mm = y_mm;
+  s.commands.command = Motion::kStraight;
+  return s;
+}
+
+TEST(Place, AnEdgeOfTheFloorStaysSharp) {
+  // Half the floor is slow, along a line that follows no axis.
+  const auto side = [](double x, double y) { return x + 0.5 * y - 15; };
+  const MeasuredSet set =
+      played([&](const Around& a) { return side(a.x_mm[a.robot], a.y_mm[a.robot]) > 0 ? 0.5 : 1.0; }, 5, 12, 300);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = fitted(fitter);
+  Factor map;
+  map.shape = Shape::kCosines2;
+  map.axis.of = Covariate::kX;
+  map.and_axis.of = Covariate::kY;
+  map.low = map.and_low = -300;
+  map.high = map.and_high = 300;
+  map.count = 5;
+  model.terms.push_back(unfitted(map));
+  fitter.fit(model, 2);
+  const double smooth = fitter.log_likelihood(model);
+  sharpen(fitter, model, 0);
+  EXPECT_GT(fitter.log_likelihood(model), smooth + 50);
+  // 25 mm from the edge, on both of its sides, speeds are what they are far from it.
+  const double along = std::hypot(1, 0.5);
+  for (const double y : {-60.0, 0.0, 60.0}) {
+    const double edge = 15 - 0.5 * y;
+    const double fast = gain_of(model, driven_at(edge - 25 * along, y)),
+                 slow = gain_of(model, driven_at(edge + 25 * along, y));
+    EXPECT_NEAR(slow / fast, 0.5, 0.1) << y;
+  }
+}
+
+TEST(Place, NothingIsSharpenedWhereTheFloorIsSmooth) {
+  const MeasuredSet set = played([](const Around& a) { return 1 + 0.001 * a.x_mm[a.robot]; }, 6, 12, 150);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = fitted(fitter);
+  Factor map;
+  map.shape = Shape::kCosines2;
+  map.axis.of = Covariate::kX;
+  map.and_axis.of = Covariate::kY;
+  map.low = map.and_low = -300;
+  map.high = map.and_high = 300;
+  map.count = 3;
+  model.terms.push_back(unfitted(map));
+  fitter.fit(model, 2);
+  sharpen(fitter, model, 0);
+  EXPECT_EQ(model.terms[0].blocks.front().basis.factors.front().shape, Shape::kCosines2);
+}
+
+TEST(Place, RobotsCountWithinTheRadiusTheyDo) {
+  const MeasuredSet set = played(
+      [](const Around& a) {
+        int count = 0;
+        for (std::size_t i = 0; i < a.x_mm.size(); ++i)
+          if (i != a.robot && std::hypot(a.x_mm[i] - a.x_mm[a.robot], a.y_mm[i] - a.y_mm[a.robot]) < 110) ++count;
+        return 1 - 0.2 * std::min(count, 2);
+      },
+      7, 12, 200);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = fitted(fitter);
+  Factor density;
+  density.shape = Shape::kCosines;
+  density.axis = {Covariate::kDensity, 6};
+  density.high = 4;
+  density.count = 3;
+  model.terms.push_back(unfitted(density));
+  fitter.fit(model, 2);
+  ASSERT_TRUE(shape_neighbours(fitter, model, 0));
+  const auto gain = [&](std::initializer_list<double> x_mm) {
+    std::vector<double> x{0}, y(x_mm.size() + 1, 0);
+    x.insert(x.end(), x_mm);
+    Situation s = driven_at(0, 0);
+    s.near = view_of(0, x, y);
+    return gain_of(model, s);
+  };
+  const double alone = gain({});
+  EXPECT_NEAR(gain({125}) / alone, 1, 0.05);
+  EXPECT_NEAR(gain({95}) / alone, 0.8, 0.05);
+  EXPECT_NEAR(gain({70}) / alone, 0.8, 0.05);
+  EXPECT_NEAR(gain({70, -95}) / alone, 0.6, 0.05);
+  EXPECT_NEAR(gain({70, -95, 80}) / alone, 0.6, 0.07);
+}
+
+TEST(Place, AFloorRemembersInItsCells) {
+  FloorMemory memory(30);
+  memory.add(31, -1, 2);
+  memory.add(59, -29, 0.5);
+  EXPECT_FLOAT_EQ(memory.value_s(45, -15), 2.5F);
+  EXPECT_FLOAT_EQ(memory.value_s(29, -15), 0);
+  EXPECT_FLOAT_EQ(memory.value_s(45, 1), 0);
+  // Far away all places are one.
+  memory.add(1e6, 1e6, 1);
+  EXPECT_FLOAT_EQ(memory.value_s(2e6, 3e6), 1);
+}
+
+TEST(Place, TheCellsOfTheFloorAreFound) {
+  const MeasuredSet set =
+      played([](const Around& a) { return 1 - 0.5 * a.trodden_s / (a.trodden_s + 4); }, 8, 12, 150);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = fitted(fitter);
+  Factor trodden;
+  trodden.shape = Shape::kExponential;
+  trodden.axis = {Covariate::kTrodden, 2};
+  trodden.points = {2, 8, 32};
+  model.terms.push_back(unfitted(trodden));
+  fitter.fit(model, 2);
+  ASSERT_TRUE(shape_memory(fitter, model, 0));
+  const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
+  EXPECT_NEAR(model.cells_mm[axis.radius], kCell_mm, 0.5);
+  Situation fresh = driven_at(0, 0), worn = fresh;
+  worn.near.trodden_s[axis.radius] = 12;
+  EXPECT_NEAR(gain_of(model, worn) / gain_of(model, fresh), 1 - 0.5 * 12 / 16, 0.05);
+  // As it is written.
+  const proto::Model written = proto_of(model);
+  ASSERT_EQ(written.field_size(), 1);
+  EXPECT_EQ(written.field(0).name(), field_name(axis.radius));
+  EXPECT_NEAR(written.field(0).cell_mm(), model.cells_mm[axis.radius], 1e-5);
+  const auto& effects = written.effect();
+  EXPECT_TRUE(std::any_of(effects.begin(), effects.end(), [&](const proto::Effect& e) {
+    return e.function_size() == 1 && e.function(0).of() == proto::Function::PLACE &&
+           e.function(0).field() == field_name(axis.radius);
+  }));
+}
+
+}  // namespace
+}  // namespace kilotwin::identify
