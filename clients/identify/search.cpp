@@ -95,9 +95,30 @@ class Loop {
       if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
           failed_.contains(hypothesis(f).name))
         continue;
+      if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
       if (best == nullptr || f.evidence > best->evidence) best = &f;
     }
     return best;
+  }
+  static bool of_robots_and_more(const Hypothesis& h) {
+    return h.covariates.size() == 2 &&
+           std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
+  }
+  /// Of robots that differ and of something that acts on all, each by itself, where either is good: what both may explain together.
+  double parts_evidence(const Hypothesis& pair, const Scores::Outcome& outcome) const {
+    double sum = 0;
+    bool any = false;
+    for (const std::string& part : pair.covariates) {
+      double most = 0;
+      for (const Finding& f : outcome.findings) {
+        const Hypothesis& h = hypothesis(f);
+        if (h.acts_on != pair.acts_on || h.covariates != std::vector<std::string>{part}) continue;
+        any = any || (good(f, outcome.threshold_log10_p) && !failed_.contains(h.name));
+        most = std::max({most, f.evidence, (f.statistic - f.degrees) / 2});
+      }
+      sum += most;
+    }
+    return any ? sum : 0;
   }
   static bool good(const Finding& f, double threshold) {
     return f.log10_p < threshold && f.evidence > 3 && f.held_out > 2;
