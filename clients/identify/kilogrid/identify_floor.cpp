@@ -64,7 +64,7 @@ json faults_of(const std::vector<FloorRun>& train, const std::vector<FloorRun>& 
         faults.push_back({{"kind", fault.reason.starts_with("in two") ? "duplicated" : "silent"},
                           {"run", run.name},
                           {"robot", fault.robot},
-                          {"in_words", fault.reason}});
+                          {"in_words", fmt::format("{}, robot {}: {}", run.name, fault.robot, fault.reason)}});
       }
     }
   }
@@ -255,7 +255,8 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
           {{"misfit on runs held out", fmt::format("{:.0f} without it, {:.0f} with it", misfit, misfit_after)},
            {"cells 10 s ahead",
             fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after.rmse_mm())},
-           {"likelihood of cells", fmt::format("{:+.0f} nat", after.log_likelihood - lesser.log_likelihood)}}},
+           {"likelihood of cells", fmt::format("{:+.0f} nat with it, to a filter that follows one robot",
+                                               after.log_likelihood - lesser.log_likelihood)}}},
          {"in_words", is_wall ? words_of_wall(model) : words_of(model, e + 1)}});
     progress(fmt::format("{}: misfit {:.0f} without it, {:.0f} with it", name_of(model, e), misfit, misfit_after));
   }
@@ -307,8 +308,8 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
               {"faults", faults},
               {"statistics", statistics},
               {"classifier", classify(alike, unlike, test, held_out, base.settings(), settings)}};
+  result.document["tables"] = {table_of_motion(held_out, out_before, out_after)};
   add_words(result.document, contract.at("classifier"));
-  result.document["tables"].push_back(table_of_motion(held_out, out_before, out_after));
   const auto parameters = base_term().parameters;
   for (std::size_t p = 0; p < parameters.size(); ++p)
     contract[p < 4 ? "base" : "floor"][parameters[p].name] = model.values[p];
