@@ -329,6 +329,14 @@ class Catalogue {
       for (Eigen::Index i = 0; i < n; ++i)
         make_.add("speed-by-command", {"command"}, kSpeed.in_words, {base + i}, static_cast<double>(n) * 2);
     }
+    // Robots that are told to stop may creep on.
+    if (extent_.has_stop) {
+      constexpr std::uint8_t kAtRest = 1;
+      const auto ahead = make_.put(Target::kAhead, {}, kAtRest), aside = make_.put(Target::kSideways, {}, kAtRest),
+                 turning = make_.put(Target::kTurn, {}, kAtRest);
+      make_.add("creep-by-command", {"command"}, "motion at rest", {ahead}, 2);
+      make_.add("creep-by-command", {"command"}, "motion at rest", {ahead, aside, turning}, 2);
+    }
     // A tracker that lags sees moving robots where they were.
     if (moving.size() > 1) {
       const auto ahead = make_.put(Target::kMeasuredAhead, which);
