@@ -18,8 +18,9 @@ namespace {
 using identify::Identified, identify::Options;
 using nlohmann::json;
 
-/// What an effect has to remove of the misfit to be tried, and what the model has to lose without it to be kept. In 12 small
-/// sets simulated without an effect the largest was 104 (tests/clients/identify/kilogrid/floor_alarms.cpp).
+/// What an effect has to remove of the misfit to be tried, and what the model has to lose without it to be kept. In three small
+/// sets simulated without an effect the largest were 113, 50 and 165 (tests/clients/identify/kilogrid/floor_alarms.cpp): long
+/// runs of a hundred robots are needed for it to be beyond chance.
 constexpr double kLeastGain = 120;
 constexpr std::size_t kMostAdded = 4, kRoundsOfEffects = 2;
 constexpr const char* kWall = "wall";
