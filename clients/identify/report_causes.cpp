@@ -83,9 +83,9 @@ std::string cards(const json& contract, const json& document, Figures& figures) 
         fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
       if (number(effect, "rmse_without_mm"))
         fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
-      fact("by chance",
-           chance(number(evidence, "p_family") ? std::log10(std::max(*number(evidence, "p_family"), 1e-300))
-                                               : number(evidence, "log10_p")));
+      const auto family = number(evidence, "p_family");
+      const auto log10_p = family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p");
+      if (log10_p) fact("by chance", chance(log10_p));
     }
     out += "</dl></div>";
     out += "<div>";

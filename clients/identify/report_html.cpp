@@ -39,7 +39,7 @@ h3::first-letter, .what::first-letter, .cause p::first-letter { text-transform: 
 .verdict { font-size: 1.1rem; max-width: 50rem; margin: 0 0 1.2rem; }
 .lead { color: var(--faint); max-width: 50rem; margin: 0 0 0.8rem; }
 .bars { display: grid; gap: 0.45rem; }
-.bar { display: grid; grid-template-columns: 4rem 1fr 18rem; gap: 0.8rem; align-items: center; }
+.bar { display: grid; grid-template-columns: 5.5rem 1fr 18rem; gap: 0.8rem; align-items: center; }
 .track { display: block; height: 1.1rem; background: #f1f4f7; border-radius: 3px; }
 .fill { display: block; height: 100%; border-radius: 3px; }
 .fill.before { background: var(--before); } .fill.after { background: var(--after); } .fill.floor { background: #b6c0ca; }
@@ -63,12 +63,12 @@ td { border-bottom: 1px solid #eef1f4; padding: 0.3rem 0.8rem 0.3rem 0; vertical
 table.facts thead { display: none; } table.facts td:last-child { text-align: right; padding-right: 0; }
 details summary { cursor: pointer; color: var(--faint); margin: 0.4rem 0; }
 .faults b { text-transform: capitalize; margin-right: 0.3em; }
-@media screen and (max-width: 56rem) { .cause, .grid, .thirds, figure.pair { grid-template-columns: 1fr; } .bar { grid-template-columns: 4rem 1fr; } .bar .value { grid-column: 2; } }
+@media screen and (max-width: 56rem) { .cause, .grid, .thirds, figure.pair { grid-template-columns: 1fr; } .bar { grid-template-columns: 5.5rem 1fr; } .bar .value { grid-column: 2; } }
 @page { size: A4; margin: 14mm 13mm; }
 @media print {
   body { padding: 0; max-width: none; font-size: 10pt; }
   h1 { font-size: 16pt; } .verdict { font-size: 11pt; } h2 { font-size: 12.5pt; margin-top: 1.2rem; break-after: avoid; } .lead { break-after: avoid; break-inside: avoid; }
-  .cause { grid-template-columns: 1fr 9cm; } .bar { grid-template-columns: 3.5rem 1fr 15rem; }
+  .cause { grid-template-columns: 1fr 9cm; } .bar { grid-template-columns: 5rem 1fr 15rem; }
   figure, .cause, tr, .bars, .thirds > div { break-inside: avoid; }
   .grid, figure.pair { grid-template-columns: 1fr 1fr; }
   .thirds { grid-template-columns: repeat(3, 1fr); } table { font-size: 8pt; }

@@ -177,8 +177,8 @@ Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int wit
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(columns.size()));
   out.score = Eigen::VectorXd::Zero(out.information.rows());
   for (std::size_t f = 0; f < folds.score.size(); ++f) {
-    out.fold_information.push_back(reduced(folds.information[f]) / dispersion_);
-    out.fold_score.push_back(reduced_score(score_of(folds.information[f], folds.score[f])) / dispersion_);
+    out.fold_information.push_back(reduced(folds.information[f]));
+    out.fold_score.push_back(reduced_score(score_of(folds.information[f], folds.score[f])));
     out.information += out.fold_information.back();
     out.score += out.fold_score.back();
   }

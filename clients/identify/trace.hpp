@@ -34,7 +34,6 @@ class Scores {
     std::vector<Finding> findings;  ///< of all hypotheses, in their order
     double threshold_log10_p =
         0;  ///< the most surprising of all falls below it with kFamilyAlarm where there is no effect
-    double dispersion = 1;
   };
   /// As seen beside all of the model.
   [[nodiscard]] Outcome test(std::uint64_t seed) const;
@@ -69,7 +68,6 @@ class Scores {
   Folds by_stretch_{0, 0};
   Eigen::MatrixXd clusters_;  ///< scores of all columns, a column per cluster
   std::vector<std::size_t> cluster_unit_;
-  double dispersion_ = 1;
 };
 
 }  // namespace kilotwin::identify
