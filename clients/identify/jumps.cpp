@@ -26,7 +26,7 @@ constexpr double kMostOfATrack = 5;
 constexpr double kCertain = 25, kBeyondUsual = 18;
 /// By which a push explains more before a jump is taken for one.
 constexpr double kClear = 2;
-constexpr int kMostJumps = 8, kMostLooks = 12;
+constexpr int kMostJumps = 8, kMostLooks = 40;
 
 /// What the filter had to correct when a robot was seen.
 struct Surprise {
@@ -208,6 +208,21 @@ Eigen::Vector4d usual_excess(const std::vector<Candidate>& all) {
   return excess;
 }
 
+/// Whether frames well before or well after show much of the same: then everything goes on moving, as in a wind. Just after a
+/// jump the filter is still on its way.
+bool lasts(const Scan& scan, const Candidate& found, double frame_s) {
+  const Eigen::Matrix4d information = found.covariance.inverse();
+  const Eigen::Vector4d along = information * found.size;
+  const double all = found.size.dot(along);
+  const auto share = [&](int from, int to) {
+    double sum = 0;
+    for (int k = from; k <= to; ++k) sum += candidate_at(scan, found.time_s + k * frame_s).size.dot(along) / all;
+    return sum / (to - from + 1);
+  };
+  constexpr double kMuch = 0.3;
+  return share(-6, -2) > kMuch || share(4, 8) > kMuch;
+}
+
 /// The middle of all instants between frames that say the same.
 double middle_of(const Scan& scan, const Candidate& found, double step_s) {
   double low = found.time_s, high = found.time_s;
@@ -222,7 +237,7 @@ double middle_of(const Scan& scan, const Candidate& found, double step_s) {
 
 }  // namespace
 
-std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model) {
+std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model, double least_gain) {
   const std::vector<Surprises> all = surprises_of(fitter, model);
   std::vector<std::uint32_t> runs;
   std::vector<double> steps;
@@ -238,6 +253,7 @@ std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model) {
   if (steps.size() < kFewest) return std::nullopt;
   std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
   constexpr int kMostInstants = 20000;
+  const double frame_s = steps[steps.size() / 2];
   const double step_s = std::max(steps[steps.size() / 2] / 2, (to_s - from_s) / kMostInstants);
 
   std::vector<Scan> scans{Scan(all, std::nullopt)};
@@ -258,7 +274,7 @@ std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model) {
     });
     const Eigen::Vector4d excess = usual_excess(of);
     for (const Candidate& c : of) {
-      if (c.gain < kCertain) continue;
+      if (c.gain < std::max(kCertain, least_gain)) continue;
       const Eigen::Matrix4d usual = c.covariance + Eigen::Matrix4d(excess.asDiagonal());
       if (c.size.dot(usual.ldlt().solve(c.size)) / 2 > kBeyondUsual) looks.push_back({&scan, c});
     }
@@ -267,6 +283,7 @@ std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model) {
                    [](const Look& a, const Look& b) { return a.candidate.gain > b.candidate.gain; });
   for (std::size_t i = 0; i < std::min<std::size_t>(looks.size(), kMostLooks); ++i) {
     const auto& [scan, found] = looks[i];
+    if (lasts(*scan, found, frame_s)) continue;
     const Instant instant = scan->at(found.time_s);
     const Numbers picture = instant.fit(Story::kPicture), push = instant.fit(Story::kPush),
                   own = instant.fit(Story::kOwnAlone);
@@ -333,11 +350,11 @@ Term term_of(const std::vector<Jump>& jumps, const std::array<bool, 4>& acting) 
 
 }  // namespace
 
-std::vector<Jump> add_jumps(const Fitter& fitter, MotionModel& model) {
+std::vector<Jump> add_jumps(const Fitter& fitter, MotionModel& model, double least_gain) {
   const std::size_t place = model.terms.size();
   std::vector<Jump> jumps;
   for (bool fitted = false; static_cast<int>(jumps.size()) < kMostJumps;) {
-    const std::optional<Jump> found = find_jump(fitter, model);
+    const std::optional<Jump> found = find_jump(fitter, model, least_gain);
     if (!found) {
       // What was noise to a model that knew of no jumps is not, and may have hidden smaller ones.
       if (jumps.empty() || fitted) break;

@@ -22,13 +22,13 @@ struct Jump {
   double gain_as_push = 0;
 };
 
-/// The most certain jump that the model leaves in the tracks that may be fitted to. Nothing where none is certain: there
-/// chance finds one in far fewer than one of a thousand sets.
-[[nodiscard]] std::optional<Jump> find_jump(const Fitter&, const MotionModel&);
+/// The most certain jump that the model leaves in the tracks that may be fitted to, of at least this gain. Nothing where none is
+/// certain: there chance finds one in far fewer than one of a thousand sets.
+[[nodiscard]] std::optional<Jump> find_jump(const Fitter&, const MotionModel&, double least_gain = 0);
 
 /// Everything that jumps, put into the model as one term of steps, fitted. Pushes of the driven robots are no jumps and are
-/// left to others. Returns the jumps; none: the model is as it was.
-std::vector<Jump> add_jumps(const Fitter&, MotionModel&);
+/// left to others, and so is what goes on for some frames. Returns the jumps; none: the model is as it was.
+std::vector<Jump> add_jumps(const Fitter&, MotionModel&, double least_gain = 0);
 
 inline constexpr const char* kJumpsName = "camera-jumps";
 

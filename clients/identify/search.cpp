@@ -58,8 +58,7 @@ class Loop {
       measure();
       const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
       note_rejected(outcome);
-      const double explained = fitter_.log_likelihood(out_.model) - base_likelihood_;
-      const Finding* const best = best_of(outcome, kRemnant * explained);
+      const Finding* const best = best_of(outcome, kRemnant * explained());
       if (best != nullptr) {
         const Search before = out_;
         const double likelihood = fitter_.log_likelihood(out_.model);
@@ -125,9 +124,16 @@ class Loop {
   }
   const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
 
+  /// Log likelihood that all that was found has gained.
+  [[nodiscard]] double explained() const { return fitter_.log_likelihood(out_.model) - base_likelihood_; }
+
   /// Whether the picture jumps, which is then part of the model.
   bool add_picture_jumps() {
-    const std::vector<Jump> jumps = add_jumps(fitter_, out_.model);
+    // What a drift that begins or ends suddenly has too round a curve for looks like jumps.
+    if (std::any_of(out_.model.terms.begin(), out_.model.terms.end(),
+                    [](const Term& term) { return term.name == "drift-by-time"; }))
+      return false;
+    const std::vector<Jump> jumps = add_jumps(fitter_, out_.model, kRemnant * explained());
     if (jumps.empty()) return false;
     fitter_.fit_surroundings(out_.model);
     Finding finding;
