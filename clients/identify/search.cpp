@@ -239,11 +239,14 @@ class Loop {
     failed_.insert(other.name + " for " + out_.model.terms[place].name);
     return false;
   }
-  /// The last term may be what those before it were taken for. Each is taken out, and the last given the shape that it has
-  /// without it.
+  /// The last term may be what those before it were taken for, unless it explains far less. Each is taken out, and the last given
+  /// the shape that it has without it.
   void reconsider() {
-    for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;)
-      if (out_.model.terms[t].name != out_.model.terms.back().name) dropped(t, true);
+    constexpr double kFarLess = 0.1;
+    for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;) {
+      const bool far_less = out_.reasons.back().finding.evidence < kFarLess * out_.reasons[t].finding.evidence;
+      if (!far_less && out_.model.terms[t].name != out_.model.terms.back().name) dropped(t, true);
+    }
   }
   /// Takes a term out, but for one without which the data are less probable after all.
   bool dropped(std::size_t t, bool shape_last) {
