@@ -77,24 +77,16 @@ class FineSums {
   void start(const TrackFilter&) { active_.clear(); }
   void step(const StepRecord& record) {
     const Rates& r = record.rates;
-    const Arc& arc = record.arc;
-    const double h = record.h_s, base = model_.base.wheel_base_mm;
-    const double by_x = -(arc.dy_mm - r.world_y_mm_s * h), by_y = arc.dx_mm - r.world_x_mm_s * h;
-    for (Active& a : active_) {
-      a.pose[0] += by_x * a.pose[2];
-      a.pose[1] += by_y * a.pose[2];
-    }
+    const StepWays ways = ways_of(record, model_.base.wheel_base_mm);
+    for (Active& a : active_) a.pose.head<2>() += ways.by_heading * a.pose[2];
     touched_ = touched_ || record.touching();
     const int command = static_cast<int>(record.middle.commands.command);
     if (!record.middle.commands.driven() || (map_.during >> command & 1) == 0) return;
     double own = 0;
     map_.basis.evaluate(record.middle, 0, &own);
     const double factor = std::max(0.05, std::abs(1 + own));
-    const double forward = (r.left_mm_s + r.right_mm_s) / 2 * h;
-    const Eigen::Vector3d turn = h * Eigen::Vector3d(-arc.along_y * forward / 2, arc.along_x * forward / 2, 1);
-    const Eigen::Vector3d ahead = h * Eigen::Vector3d(arc.along_x, arc.along_y, 0);
-    const Eigen::Vector3d force = (ahead / 2 - turn / base) * (r.left_base_mm_s * r.left_gain / factor) +
-                                  (ahead / 2 + turn / base) * (r.right_base_mm_s * r.right_gain / factor);
+    const Eigen::Vector3d force = record.h_s / factor * ways.by_wheel *
+                                  Eigen::Vector2d(r.left_base_mm_s * r.left_gain, r.right_base_mm_s * r.right_gain);
     const Grid& g = to_.grid;
     const double u = std::clamp((record.middle.x_mm - g.x_mm) / g.pitch_mm, 0.0, g.columns - 1.001),
                  v = std::clamp((record.middle.y_mm - g.y_mm) / g.pitch_mm, 0.0, g.rows - 1.001);
@@ -350,10 +342,6 @@ Eigen::VectorXd sampled(const Term& term, const Grid& grid) {
   }
   return f;
 }
-
-}  // namespace
-
-namespace {
 
 /// A map as it is fitted.
 struct Fitted {

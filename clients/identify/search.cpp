@@ -66,7 +66,7 @@ class Loop {
         add(*best, outcome.threshold_log10_p);
         // What promised to explain much must do so.
         if (fitter_.log_likelihood(out_.model) < likelihood + 3) {
-          out_ = before;
+          restore(before);
           failed_.insert(hypothesis(*best).name);
         } else {
           reconsider();
@@ -234,10 +234,15 @@ class Loop {
       shape(place);
       if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
     }
-    out_ = before;
-    fitter_.set().find_headings(out_.model, fitter_.threads());
+    restore(before);
     failed_.insert(other.name + " for " + out_.model.terms[place].name);
     return false;
+  }
+  /// All as it was, also what tracks were prepared with: headings at their starts, and what floors remember.
+  void restore(const Search& before) {
+    out_ = before;
+    fitter_.set().remember(out_.model);
+    fitter_.set().find_headings(out_.model, fitter_.threads());
   }
   /// The last term may be what those before it were taken for, unless it explains far less. Each is taken out, and the last given
   /// the shape that it has without it.
@@ -257,8 +262,7 @@ class Loop {
     fitter_.fit(out_.model, shape_last ? 2 : 1);
     if (shape_last) shape(out_.model.terms.size() - 1);
     if (fitter_.log_evidence(out_.model) > evidence - kClose) return true;
-    out_ = before;
-    fitter_.set().find_headings(out_.model, fitter_.threads());
+    restore(before);
     return false;
   }
   void note_rejected(const Scores::Outcome& outcome) {

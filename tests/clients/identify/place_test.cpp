@@ -107,6 +107,17 @@ Situation driven_at(double x_mm, double y_mm) {
   return s;
 }
 
+Factor map_of_the_floor(std::uint32_t order) {
+  Factor map;
+  map.shape = Shape::kCosines2;
+  map.axis.of = Covariate::kX;
+  map.and_axis.of = Covariate::kY;
+  map.low = map.and_low = -300;
+  map.high = map.and_high = 300;
+  map.count = order;
+  return map;
+}
+
 TEST(Place, AnEdgeOfTheFloorStaysSharp) {
   // Half the floor is slow, along a line that follows no axis.
   const auto side = [](double x, double y) { return x + 0.5 * y - 15; };
@@ -115,14 +126,7 @@ TEST(Place, AnEdgeOfTheFloorStaysSharp) {
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model = fitted(fitter);
-  Factor map;
-  map.shape = Shape::kCosines2;
-  map.axis.of = Covariate::kX;
-  map.and_axis.of = Covariate::kY;
-  map.low = map.and_low = -300;
-  map.high = map.and_high = 300;
-  map.count = 5;
-  model.terms.push_back(unfitted(map));
+  model.terms.push_back(unfitted(map_of_the_floor(5)));
   fitter.fit(model, 2);
   const double smooth = fitter.log_likelihood(model);
   sharpen(fitter, model, 0);
@@ -142,14 +146,7 @@ TEST(Place, NothingIsSharpenedWhereTheFloorIsSmooth) {
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model = fitted(fitter);
-  Factor map;
-  map.shape = Shape::kCosines2;
-  map.axis.of = Covariate::kX;
-  map.and_axis.of = Covariate::kY;
-  map.low = map.and_low = -300;
-  map.high = map.and_high = 300;
-  map.count = 3;
-  model.terms.push_back(unfitted(map));
+  model.terms.push_back(unfitted(map_of_the_floor(3)));
   fitter.fit(model, 2);
   sharpen(fitter, model, 0);
   EXPECT_EQ(model.terms[0].blocks.front().basis.factors.front().shape, Shape::kCosines2);
