@@ -379,7 +379,7 @@ PlotNumber plot_robots(Gnuplot& plots, const json& robots) {
       "set xlabel 'robot'\nset ylabel 'rms error, mm'\nset yrange [0:*]\nset xrange [-0.7:{}]\nset grid noxtics\n",
       static_cast<double>(rows.size()) - 0.3);
   if (rows.size() <= 60) {
-    commands += "set xtics (";
+    commands += rows.size() <= 12 ? "set xtics (" : "set xtics font ',7' (";  // names side by side, also long ones
     for (std::size_t k = 0; k < rows.size(); ++k)
       commands += fmt::format("{}{} {}", k == 0 ? "" : ", ", gnuplot_text(rows[k].name), k);
     commands += ")\n";
