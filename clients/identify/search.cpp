@@ -53,7 +53,8 @@ class Loop {
 
   Search run() {
     for (int round = 0; round < kMostRounds; ++round) {
-      progress_(0.9 * round / kMostRounds, fmt::format("looking for causes, {} found", out_.model.terms.size()));
+      round_ = round;
+      say("looking for causes");
       if (add_picture_jumps()) continue;
       measure();
       const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
@@ -69,18 +70,26 @@ class Loop {
           restore(before);
           failed_.insert(hypothesis(*best).name);
         } else {
+          say("is all of it needed");
           reconsider();
           fitter_.fit_surroundings(out_.model);
         }
         continue;
       }
+      say("is it something else");
       if (!defend()) break;
     }
+    say("simplest forms");
     for (std::size_t t = 0; t < out_.model.terms.size(); ++t) simplify(fitter_, out_.model, t);
     return std::move(out_);
   }
 
  private:
+  void say(const char* doing) const {
+    std::string text = doing;
+    for (const Term& term : out_.model.terms) text += (&term == &out_.model.terms.front() ? "; found " : ", ") + term.name;
+    progress_(0.9 * round_ / kMostRounds, text);
+  }
   void measure() {
     dictionary_ = dictionary_of(extent_, out_.model.terms);
     std::vector<Block> blocks = blocks_of(out_.model);
@@ -173,6 +182,7 @@ class Loop {
     }
     out_.model.terms.push_back(std::move(term));
     out_.reasons.push_back(reason);
+    say("fitting");
     fitter_.fit(out_.model, 2);
     shape(out_.model.terms.size() - 1);
     out_.steps.push_back({h.name, found.held_out});
@@ -303,7 +313,7 @@ class Loop {
   Search out_;
   double base_likelihood_ = 0;
   std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
-  int defences_ = 0;
+  int defences_ = 0, round_ = 0;
 };
 
 }  // namespace
