@@ -40,6 +40,12 @@ LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, boo
 
 constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
 
+/// How near to each other robots may touch. Without headings nobody sees which way the centre lies from the point that is tracked.
+double touching_mm(const BaseParameters& base, bool headings) {
+  constexpr double kMostly = 0.75;
+  return kTouch_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
+}
+
 /// By how much, along an axis, robots were moved while they touched others, from the first measurement of that to the last.
 struct Pushes {
   explicit Pushes(double tracker_mm2) : tracker_mm2_(tracker_mm2) {}
@@ -266,14 +272,14 @@ void Fitter::find_shape(MotionModel& model) const {
   const auto add = [&](double centre_mm) {
     Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
     c.model.base.centre_mm = centre_mm;
-    // Without headings nobody sees which way the centre lies from the point that is tracked.
-    constexpr double kMostly = 0.75;
-    c.model.touch_mm = kTouch_mm + (headings ? 0 : kMostly * std::abs(centre_mm - model.base.ahead_mm));
+    c.model.touch_mm = touching_mm(c.model.base, headings);
     set_.find_centres(c.model, threads_);
     if (headings) {
       c.model.room = room_of(set_, c.model);
     } else {
       find_walls(c.model);
+      // Of what may touch more often less is known: with noise that is not its own it would look worse than it is.
+      fit_touching(c.model);
     }
     c.log_likelihood = with_touching(c.model, tracks);
     c.meetings = set_.meetings();
@@ -453,8 +459,29 @@ double Fitter::log_evidence(const MotionModel& model) const {
 
 void Fitter::fit_base(MotionModel& model) const {
   const bool headings = set_.set().has_headings;
-  set_.find_headings(model, threads_);
-  if (!headings) find_walls(model);
+  if (headings) {
+    set_.find_headings(model, threads_);
+  } else {
+    // In a room that robots are hardly ever free in, a tracked point and walls that do not belong together hold each other
+    // where they are: those that explain most to start with are taken, of either point that is likely to be tracked.
+    const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+    const MotionModel given = model;
+    double best = -1e300;
+    for (const double ahead_mm : {0.0, given.base.ahead_mm}) {
+      MotionModel start = given;
+      start.base.ahead_mm = ahead_mm;
+      start.touch_mm = touching_mm(start.base, headings);
+      set_.find_headings(start, threads_);
+      find_walls(start);
+      const double value = with_touching(start, tracks);
+      if (value <= best) continue;
+      best = value;
+      model = start;
+    }
+    set_.find_headings(model, threads_);
+    // What is not known to be a push would pass for noise of the wheels.
+    fit_touching(model);
+  }
   fit(model, 3);
   find_shape(model);
   // Where headings are not measured, walls, centres and what touching does lean on each other.
