@@ -53,12 +53,15 @@ RunAmount::Between RunAmount::mean(const std::vector<double>& log_likelihood) co
   std::vector<double> value = log_likelihood;
   for (std::size_t i = 0; i < value.size(); ++i) value[i] += log_prior_[i];
   const double best = *std::max_element(value.begin(), value.end());
-  // Much data leave less than the raster's width: between its points the logarithm bends as three of them do.
+  const auto bend_at = [&](std::size_t i) {
+    const std::size_t middle = std::clamp<std::size_t>(i, 1, value.size() - 2);
+    return (value[middle - 1] - 2 * value[middle] + value[middle + 1]) / 2;
+  };
+  // Much data leave less than the raster's width: between two of its points the logarithm bends as it does about them.
   constexpr int kFine = 40;
   double sum = 0, mean = 0;
   for (std::size_t i = 0; i + 1 < value.size(); ++i) {
-    const std::size_t middle = std::clamp<std::size_t>(i, 1, value.size() - 2);
-    const double bend = (value[middle - 1] - 2 * value[middle] + value[middle + 1]) / 2;
+    const double bend = (bend_at(i) + bend_at(i + 1)) / 2;
     for (int k = 0; k < kFine; ++k) {
       const double u = (k + 0.5) / kFine;
       const double at = value[i] + u * (value[i + 1] - value[i]) - bend * u * (1 - u);
