@@ -59,7 +59,7 @@ void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
 }
 
 void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to) const {
-  std::array<double, 64> a, b;
+  std::array<double, kMostColumns + 1> a, b;
   const double c = value_of(axis, s, wheel);
   switch (shape) {
     case Shape::kLinear: to[0] = (std::clamp(c, low, high) - low) / (high - low); return;

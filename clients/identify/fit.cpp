@@ -40,6 +40,41 @@ LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, boo
 
 constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
 
+/// How near to each other robots may touch. Without headings nobody sees which way the centre lies from the point that is tracked.
+double touching_mm(const BaseParameters& base, bool headings) {
+  constexpr double kMostly = 0.75;
+  return kTouch_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
+}
+
+/// By how much, along an axis, robots were moved while they touched others, from the first measurement of that to the last.
+struct Pushes {
+  explicit Pushes(double tracker_mm2) : tracker_mm2_(tracker_mm2) {}
+  double sum_mm2 = 0, time_s = 0;
+  std::size_t count = 0;
+
+  void start(const TrackFilter&) {}
+  void step(const StepRecord& record) {
+    if (record.at_robot) touched_s_ += record.h_s;
+  }
+  void update(const Innovation& innovation, const Sample&) {
+    const double touched_s = std::exchange(touched_s_, 0);
+    if (touched_s > 0 && !innovation.lost) {
+      way_ += std::sqrt(innovation.weight) * innovation.difference.head<2>();
+      way_s_ += touched_s;
+    } else if (way_s_ > 0) {
+      // The tracker was off at either end.
+      sum_mm2 += way_.squaredNorm() / 2 - 2 * tracker_mm2_;
+      time_s += std::exchange(way_s_, 0);
+      ++count;
+      way_.setZero();
+    }
+  }
+
+ private:
+  double tracker_mm2_, touched_s_ = 0, way_s_ = 0;
+  Eigen::Vector2d way_ = Eigen::Vector2d::Zero();
+};
+
 }  // namespace
 
 PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number) : set_(&set) {
@@ -178,8 +213,7 @@ double Fitter::with_touching(const MotionModel& model, const std::vector<const T
 void Fitter::fit_touching(MotionModel& model) const {
   const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
   double best = with_touching(model, tracks);
-  for (double Noise::*const part :
-       {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s}) {
+  const auto climb = [&](double Noise::*part) {
     const double start = model.noise.*part;
     for (const double factor : {4.0, 0.25}) {
       bool better = true;
@@ -195,7 +229,35 @@ void Fitter::fit_touching(MotionModel& model) const {
       }
       if (model.noise.*part != start) break;
     }
+  };
+  for (double Noise::*const part : {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s}) climb(part);
+  // A robot is pushed one way for as long as it touches: as noise without a memory that looks like less than it adds up to, and
+  // a turn, which does go on, would be blamed for the rest.
+  if (const double lasting_mm2_s = lasting_push_mm2_s(model, tracks); lasting_mm2_s > model.noise.contact_mm2_s) {
+    model.noise.contact_mm2_s = lasting_mm2_s;
+    best = with_touching(model, tracks);
   }
+  climb(&Noise::contact_rad2_s);
+}
+
+double Fitter::lasting_push_mm2_s(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
+  std::vector<Pushes> pushes(tracks.size(), Pushes(model.noise.position_mm2));
+  in_parallel(tracks.size(), threads_, [&](std::size_t i) {
+    RobotBias bias = model.bias_of(tracks[i]->track->robot);
+    bias.covariance.setZero();
+    TrackFilter filter(model, bias, tracks[i]->track->robot, tracks[i]->number);
+    walk(filter, *tracks[i], tracks[i]->track->samples.size(), pushes[i]);
+  });
+  std::size_t count = 0;
+  double sum_mm2 = 0, time_s = 0;
+  for (const Pushes& p : pushes) {
+    count += p.count;
+    sum_mm2 += p.sum_mm2;
+    time_s += p.time_s;
+  }
+  constexpr std::size_t kFew = 10;
+  constexpr double kMost_mm2_s = 1e3;
+  return count < kFew ? 0 : std::min(sum_mm2 / time_s, kMost_mm2_s);
 }
 
 void Fitter::find_shape(MotionModel& model) const {
@@ -210,14 +272,14 @@ void Fitter::find_shape(MotionModel& model) const {
   const auto add = [&](double centre_mm) {
     Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
     c.model.base.centre_mm = centre_mm;
-    // Without headings nobody sees which way the centre lies from the point that is tracked.
-    constexpr double kMostly = 0.75;
-    c.model.touch_mm = kTouch_mm + (headings ? 0 : kMostly * std::abs(centre_mm - model.base.ahead_mm));
+    c.model.touch_mm = touching_mm(c.model.base, headings);
     set_.find_centres(c.model, threads_);
     if (headings) {
       c.model.room = room_of(set_, c.model);
     } else {
       find_walls(c.model);
+      // Of what may touch more often less is known: with noise that is not its own it would look worse than it is.
+      fit_touching(c.model);
     }
     c.log_likelihood = with_touching(c.model, tracks);
     c.meetings = set_.meetings();
@@ -397,8 +459,29 @@ double Fitter::log_evidence(const MotionModel& model) const {
 
 void Fitter::fit_base(MotionModel& model) const {
   const bool headings = set_.set().has_headings;
-  set_.find_headings(model, threads_);
-  if (!headings) find_walls(model);
+  if (headings) {
+    set_.find_headings(model, threads_);
+  } else {
+    // In a room that robots are hardly ever free in, a tracked point and walls that do not belong together hold each other
+    // where they are: those that explain most to start with are taken, of either point that is likely to be tracked.
+    const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+    const MotionModel given = model;
+    double best = -1e300;
+    for (const double ahead_mm : {0.0, given.base.ahead_mm}) {
+      MotionModel start = given;
+      start.base.ahead_mm = ahead_mm;
+      start.touch_mm = touching_mm(start.base, headings);
+      set_.find_headings(start, threads_);
+      find_walls(start);
+      const double value = with_touching(start, tracks);
+      if (value <= best) continue;
+      best = value;
+      model = start;
+    }
+    set_.find_headings(model, threads_);
+    // What is not known to be a push would pass for noise of the wheels.
+    fit_touching(model);
+  }
   fit(model, 3);
   find_shape(model);
   // Where headings are not measured, walls, centres and what touching does lean on each other.

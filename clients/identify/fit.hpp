@@ -95,6 +95,8 @@ class Fitter {
   /// Tracks spread over the whole set, until there are so many samples.
   [[nodiscard]] std::vector<const TrackView*> some_tracks(std::size_t samples) const;
   [[nodiscard]] double with_touching(const MotionModel&, const std::vector<const TrackView*>&) const;
+  /// What pushes of other robots add up to, as noise of the position; 0 where there are few.
+  [[nodiscard]] double lasting_push_mm2_s(const MotionModel&, const std::vector<const TrackView*>&) const;
 
   PreparedSet& set_;
   std::uint32_t threads_;

@@ -4,6 +4,17 @@
 #include <cmath>
 
 namespace kilotwin::identify {
+namespace {
+
+/// Logarithm of the sum of all weights.
+double total_of(const std::vector<Follower::Hypothesis>& hypotheses) {
+  double best = -1e300, sum = 0;
+  for (const auto& h : hypotheses) best = std::max(best, h.log_weight);
+  for (const auto& h : hypotheses) sum += std::exp(h.log_weight - best);
+  return best + std::log(sum);
+}
+
+}  // namespace
 
 void Follower::follow(double to_s) {
   const std::vector<Sample>& samples = view_.track->samples;
@@ -12,7 +23,7 @@ void Follower::follow(double to_s) {
 
 void Follower::take(const Sample& sample) {
   if (next_ == 0) return start(sample);
-  const double from_s = last_s();
+  const double from_s = last_s(), weight = total_of(hypotheses_);
   double lost = 0;
   for (Hypothesis& h : hypotheses_) {
     sub_steps(view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
@@ -24,6 +35,7 @@ void Follower::take(const Sample& sample) {
     h.log_weight -= 20;
     lost += 1;
   }
+  log_likelihood_ += total_of(hypotheses_) - weight;
   // Where it is is known, but not which way it points.
   if (lost > 0 && lost == static_cast<double>(hypotheses_.size())) return start(sample);
   prune();

@@ -25,6 +25,8 @@ class Follower {
   };
   [[nodiscard]] const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   [[nodiscard]] const TrackView& view() const { return view_; }
+  /// Of all that was taken in.
+  [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
  private:
   void take(const Sample&);
@@ -35,6 +37,7 @@ class Follower {
   const TrackView& view_;
   std::vector<Hypothesis> hypotheses_;
   std::size_t next_ = 0;
+  double log_likelihood_ = 0;
 };
 
 /// Each by all that was measured until then.

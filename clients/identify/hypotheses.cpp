@@ -162,11 +162,30 @@ class Catalogue {
       if (extent_.has_straight && extent_.has_turns) amounts(Covariate::kCommand, {1, 2, 3});
       if (acting != &kWorld && extent_.robots.size() > 1 && extent_.robots.size() <= 40)
         amounts(Covariate::kRobot, {extent_.robots.begin(), extent_.robots.end()});
+      of_time_and_place(*acting, known, block.during);
     }
   }
   void finish() { make_.finish(); }
 
  private:
+  /// What is known by place may grow or shrink with time, and the other way round. What is known comes first, so that it is
+  /// written once.
+  void of_time_and_place(const Acting& acting, const Basis& known, std::uint8_t during) {
+    if (&acting == &kWorld || known.factors.empty()) return;
+    const std::string is = of_words(known.factors.front().axis.of).second;
+    const auto beside = [&](const char* of, Factor factor) {
+      Basis basis = known;
+      basis.factors.push_back(std::move(factor));
+      const auto n = static_cast<Eigen::Index>(basis.size());
+      const auto bases = put(acting, basis, during);
+      for (const Eigen::Index size : {Eigen::Index{1}, Eigen::Index{2}, n})
+        add(acting, of, {"time", "position"}, some(bases, 0, size));
+    };
+    constexpr std::uint32_t kCurve = 6, kOrder = 3;
+    if (is == "position")
+      beside("time-and-position", over(Shape::kCosines, Covariate::kTime, 0, extent_.duration_s, kCurve));
+    if (is == "time") beside("time-and-position", plane(kOrder));
+  }
   /// As names of effects have a covariate, and as result.json has it.
   static std::pair<std::string, std::string> of_words(Covariate covariate) {
     switch (covariate) {
@@ -202,15 +221,16 @@ class Catalogue {
   static std::string fmt_name(const std::string& acting, const std::string& of) { return acting + "-by-" + of; }
 
   /// The smooth curve with ever more columns, and waves of one kind.
-  void curve(const Acting& acting, const std::string& of, const std::vector<std::string>& words, const Basis& basis,
-             std::vector<Eigen::Index> sizes, bool windows) {
+  std::vector<Eigen::Index> curve(const Acting& acting, const std::string& of,
+                                  const std::vector<std::string>& words, const Basis& basis,
+                                  std::vector<Eigen::Index> sizes, bool windows) {
     const auto bases = put(acting, basis);
     const auto n = static_cast<Eigen::Index>(basis.size());
     for (const Eigen::Index size : sizes)
       if (size <= n) add(acting, of, words, some(bases, 0, size));
-    if (!windows) return;
-    for (Eigen::Index first = 4; first + 4 <= n; first += 2)
+    for (Eigen::Index first = 4; windows && first + 4 <= n; first += 2)
       add(acting, of, words, some(bases, first, 4), static_cast<double>(n) / 2);
+    return bases;
   }
 
   void of_time() {
@@ -219,7 +239,7 @@ class Catalogue {
     };
     curve(kSpeed, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
     curve(kTurning, "time", {"time"}, smooth(12), {1, 3, 12}, true);
-    curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
+    drift_in_time_ = curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
     // The picture may creep aside, turn and grow, each by itself or all at once.
     const auto aside = put(kCamera, smooth(16));
     const auto turned = put(kPicture, smooth(8));
@@ -268,10 +288,11 @@ class Catalogue {
       const auto bases = put(acting, Basis{{plane(order)}});
       for (std::uint32_t o = 1; o <= order; ++o)
         add(acting, "position", {"position"}, some(bases, 0, (o + 1) * (o + 2) / 2 - 1));
+      return bases;
     };
     map(kSpeed, 8);
     map(kTurning, 3);
-    map(kWorld, 5);
+    drift_in_place_ = map(kWorld, 5);
     map(kCamera, 5);
     // Lenses and tilts bend the picture most at its rim, where waves are flat. What they bend may be wider than what is seen.
     Factor bent = plane(5);
@@ -304,6 +325,16 @@ class Catalogue {
     if (extent_.headings) curve(kCompass, "heading", {"heading"}, round, {2, 4}, false);
     const auto constant = put(kWorld, Basis{});
     make_.add("drift", {"world_frame"}, kWorld.in_words, some(constant, 0, 1));
+    // A drift that changes has a mean as well.
+    const auto and_constant = [&](std::vector<Eigen::Index> columns) {
+      for (const Eigen::Index c : constant) columns.push_back(c);
+      return columns;
+    };
+    for (const Eigen::Index size : {1, 3, 8})
+      add(kWorld, "time", {"time"}, and_constant(some(drift_in_time_, 0, size)));
+    for (const Eigen::Index order : {1, 2, 3})
+      add(kWorld, "position", {"position"},
+          and_constant(some(drift_in_place_, 0, (order + 1) * (order + 2) / 2 - 1)));
     if (extent_.has_stop) {
       const auto at_rest = put(kWorld, Basis{}, 1);
       make_.add("drift-at-rest", {"world_frame"}, kWorld.in_words, some(at_rest, 0, 1));
@@ -498,6 +529,7 @@ class Catalogue {
 
   const Extent& extent_;
   Maker make_;
+  std::vector<Eigen::Index> drift_in_time_, drift_in_place_;  ///< first columns, along x and along y
 };
 
 }  // namespace

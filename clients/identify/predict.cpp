@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <optional>
 
 #include "clients/identify/follower.hpp"
 #include "clients/identify/futures.hpp"
+#include "clients/identify/run_amount.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -267,6 +269,49 @@ bool measured_at(const Track& track, double time_s, Sample& out) {
   return true;
 }
 
+namespace {
+
+/// A run as one of the models that it may be of has it.
+struct RunOutlook {
+  RunOutlook(const MotionModel& of, const std::vector<const TrackView*>& views, bool near)
+      : model(of), neighbours(near), trodden(model, views.size()) {
+    followers.reserve(views.size());
+    for (const TrackView* view : views) followers.emplace_back(model, *view);
+  }
+  RunOutlook(const RunOutlook&) = delete;
+  void follow(double to_s) {
+    for (Follower& follower : followers) follower.follow(to_s);
+  }
+  [[nodiscard]] double log_likelihood() const {
+    double sum = 0;
+    for (const Follower& follower : followers) sum += follower.log_likelihood();
+    return sum;
+  }
+  /// By track; NaN where there is nothing to be foretold.
+  std::vector<Predicted> at(double from_s, double time_s, std::uint32_t futures, bool all,
+                            std::array<std::uint32_t, 2> key) {
+    const Floors floors = trodden.at(from_s, followers);
+    Outlook outlook(model, followers, floors, from_s, neighbours);
+    outlook.go_to(time_s);
+    if (futures > 0 && (model.contacts || Edges(model).any())) outlook.draw_futures(from_s, futures, all, key);
+    std::vector<Predicted> out;
+    for (std::size_t i = 0; i < followers.size(); ++i) {
+      const TrackView& view = followers[i].view();
+      Predicted p{view.run, static_cast<std::uint32_t>(view.place), time_s, 0, 0, 0};
+      if (!outlook.expected(i, p)) p.x_mm = std::nan("");
+      out.push_back(p);
+    }
+    return out;
+  }
+
+  const MotionModel model;
+  const bool neighbours;
+  std::vector<Follower> followers;
+  Trodden trodden;
+};
+
+}  // namespace
+
 std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set, const Asked& asked,
                                bool held_out_only, std::uint32_t threads) {
   const std::vector<Run>& runs = set.set().runs;
@@ -274,41 +319,46 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
   const bool effects_of_neighbours = looks_at_neighbours(model),
              neighbours = effects_of_neighbours || model.contacts || Floors(model).any() || Edges(model).any();
   in_parallel(runs.size(), threads, [&](std::size_t run) {
-    std::vector<Follower> followers;
+    std::vector<const TrackView*> views;
     double last_s = 0;
     bool wanted = false;
     for (const TrackView& view : set.views()) {
       if (view.run != run) continue;
       if (held_out_only && !view.track->held_out && !neighbours) continue;
       wanted = wanted || !held_out_only || view.track->held_out;
-      followers.emplace_back(model, view);
+      views.push_back(&view);
       last_s = std::max(last_s, end_of(view.track->samples));
     }
     if (!wanted) return;
-    Trodden trodden(model, followers.size());
+    const RunAmount amount(model, views.front()->number);
+    std::deque<RunOutlook> outlooks;
+    for (const MotionModel& one : amount.models()) outlooks.emplace_back(one, views, neighbours);
     const double first_s = std::max(asked.first_s, std::ceil(asked.horizon_s / asked.every_s) * asked.every_s);
     for (int k = 0;; ++k) {
       const double time_s = first_s + k * asked.every_s;
       if (time_s > last_s + 1e-6) break;
       const double from_s = time_s - asked.horizon_s;
-      for (Follower& follower : followers) follower.follow(from_s);
-      const Floors floors = trodden.at(from_s, followers);
-      Outlook outlook(model, followers, floors, from_s, neighbours);
-      outlook.go_to(time_s);
-      if (asked.futures > 0 && (model.contacts || Edges(model).any()))
-        outlook.draw_futures(from_s, asked.futures, effects_of_neighbours,
-                             {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(k)});
-      for (std::size_t i = 0; i < followers.size(); ++i) {
-        const Track& track = *followers[i].view().track;
-        if (held_out_only && !track.held_out) continue;
-        Predicted p{static_cast<std::uint32_t>(run),
-                    static_cast<std::uint32_t>(followers[i].view().place),
-                    time_s,
-                    0,
-                    0,
-                    0};
-        if (outlook.expected(i, p)) by_run[run].push_back(p);
+      std::vector<double> log_likelihood;
+      for (RunOutlook& outlook : outlooks) {
+        outlook.follow(from_s);
+        log_likelihood.push_back(outlook.log_likelihood());
       }
+      const RunAmount::Between between = outlooks.size() > 1 ? amount.mean(log_likelihood) : RunAmount::Between{};
+      const auto foretold = [&](std::size_t i) {
+        return outlooks[i].at(from_s, time_s, asked.futures, effects_of_neighbours,
+                              {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(k)});
+      };
+      std::vector<Predicted> seen = foretold(between.low);
+      if (between.high != between.low) {
+        const std::vector<Predicted> high = foretold(between.high);
+        for (std::size_t i = 0; i < seen.size(); ++i) {
+          for (double Predicted::*const number : {&Predicted::x_mm, &Predicted::y_mm, &Predicted::spread_mm})
+            seen[i].*number += between.part * (high[i].*number - seen[i].*number);
+        }
+      }
+      for (std::size_t i = 0; i < seen.size(); ++i)
+        if (!std::isnan(seen[i].x_mm) && (!held_out_only || views[i]->track->held_out))
+          by_run[run].push_back(seen[i]);
     }
   });
   std::vector<Predicted> all;

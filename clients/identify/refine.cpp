@@ -105,13 +105,31 @@ void shorten(Basis& basis) {
   }
 }
 
+/// Of a drift or slip a constant part shows, which no bias of a robot's wheels takes up: it belongs to a cause's own shape.
+bool has_constant_part(Target target) {
+  return target == Target::kWorldX || target == Target::kWorldY || target == Target::kSideways;
+}
+
+/// One curve over time, or one over anything else: its column of frequency 0 is the constant.
+bool is_curve(const Basis& basis) {
+  return basis.factors.size() == 1 && basis.factors.front().shape == Shape::kCosines &&
+         basis.factors.front().known.empty();
+}
+
 std::vector<Block> richer(const Term& term) {
   std::vector<Block> blocks;
   for (const Block& block : term.blocks) {
+    // Beside a shape, a constant is part of it.
+    if (block.basis.factors.empty() && has_constant_part(block.target) &&
+        std::any_of(term.blocks.begin(), term.blocks.end(), [&](const Block& other) {
+          return other.target == block.target && other.during == block.during && is_curve(other.basis);
+        }))
+      continue;
     Block rich = block;
     rich.basis = with_chosen_keys(block.basis);
     rich.basis.chosen.clear();
     for (Factor& factor : rich.basis.factors) factor = richer(factor);
+    if (has_constant_part(block.target) && is_curve(rich.basis)) rich.basis.factors.front().first = 0;
     shorten(rich.basis);
     // Pictures creep; what makes them jump is found elsewhere.
     constexpr std::uint32_t kCreep = 24;
@@ -128,6 +146,18 @@ std::vector<Block> richer(const Term& term) {
         blocks.push_back(rich);
       }
     }
+  }
+  // A map has no constant column: where it needs one, it gets one beside it.
+  const std::vector<Block> shaped = blocks;
+  for (const Block& block : shaped) {
+    if (!has_constant_part(block.target) || block.basis.factors.size() != 1 ||
+        !block.basis.factors.front().of_two())
+      continue;
+    const Block constant{block.target, {}, block.during};
+    if (std::none_of(blocks.begin(), blocks.end(), [&](const Block& b) {
+          return b.basis.factors.empty() && b.target == constant.target && b.during == constant.during;
+        }))
+      blocks.push_back(constant);
   }
   return blocks;
 }

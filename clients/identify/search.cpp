@@ -216,6 +216,8 @@ class Loop {
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
+        // Amounts of a curve that a term has found: in its place they would have the curve for nothing.
+        if (rests_on_found(dictionary_.term_of(h, 1))) continue;
         const Finding other = scores_->weigh(h, t);
         if (best == nullptr || other.evidence > best_finding.evidence) {
           best = &h;
@@ -254,13 +256,31 @@ class Loop {
     fitter_.set().remember(out_.model);
     fitter_.set().find_headings(out_.model, fitter_.threads());
   }
+  /// Whether a term is built on a curve that another found.
+  static bool rests_on_found(const Term& term) {
+    return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
+      return std::any_of(block.basis.factors.begin(), block.basis.factors.end(),
+                         [](const Factor& factor) { return !factor.known.empty(); });
+    });
+  }
+  /// Whether a term is but the constant part of what another does.
+  static bool is_constant_of(const Term& term, const Term& other) {
+    return std::all_of(term.blocks.begin(), term.blocks.end(), [&](const Block& block) {
+      return block.basis.factors.empty() &&
+             std::any_of(other.blocks.begin(), other.blocks.end(), [&](const Block& b) {
+               return b.target == block.target && (b.during & block.during) == block.during;
+             });
+    });
+  }
   /// The last term may be what those before it were taken for, unless it explains far less. Each is taken out, and the last given
   /// the shape that it has without it.
   void reconsider() {
+    if (rests_on_found(out_.model.terms.back())) return;
     constexpr double kFarLess = 0.1;
     for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;) {
+      const Term &earlier = out_.model.terms[t], &last = out_.model.terms.back();
       const bool far_less = out_.reasons.back().finding.evidence < kFarLess * out_.reasons[t].finding.evidence;
-      if (!far_less && out_.model.terms[t].name != out_.model.terms.back().name) dropped(t, true);
+      if ((!far_less || is_constant_of(earlier, last)) && earlier.name != last.name) dropped(t, true);
     }
   }
   /// Takes a term out, but for one without which the data are less probable after all.

@@ -83,6 +83,60 @@ TEST(History, AKnownCurveIsTheSumOfItsColumns) {
   }
 }
 
+TEST(History, WhatIsFoundInPlaceIsTriedWithTimeAsWell) {
+  Extent extent;
+  extent.duration_s = 200;
+  extent.x_low_mm = extent.y_low_mm = -100;
+  extent.x_high_mm = extent.y_high_mm = 100;
+  extent.has_straight = true;
+  extent.robots = {1};
+  Factor map;
+  map.shape = Factor::Shape::kCosines2;
+  map.axis.of = Covariate::kX;
+  map.and_axis.of = Covariate::kY;
+  map.low = map.and_low = -100;
+  map.high = map.and_high = 100;
+  map.count = 1;  // cos(pi u), cos(pi v)
+  Term patch;
+  patch.name = "speed-by-position";
+  patch.blocks = {{Target::kGain, Basis{{map}}}};
+  patch.coefficients = Eigen::Vector2d(0.1, -0.3);
+  patch.precision = Eigen::Vector2d(1, 1);
+  const Dictionary with = dictionary_of(extent, {patch});
+  const Hypothesis& last = with.hypotheses.back();
+  EXPECT_EQ(last.name, "speed-by-time-and-position");
+  EXPECT_EQ(last.covariates, (std::vector<std::string>{"time", "position"}));
+  const Term term = with.term_of(last, 1);
+  ASSERT_EQ(term.blocks.size(), 1u);
+  std::array<double, kMostColumns> values;
+  Situation s;
+  s.time_s = 50;
+  s.x_mm = -20;
+  s.y_mm = 70;
+  term.blocks[0].basis.evaluate(s, 0, values.data());
+  const double there = 0.1 * std::cos(M_PI * 0.4) - 0.3 * std::cos(M_PI * 0.85);
+  for (std::size_t k = 0; k < term.blocks[0].basis.size(); ++k)
+    EXPECT_NEAR(values[k], there * std::cos(M_PI * static_cast<double>(k + 1) * 0.25), 1e-12);
+}
+
+TEST(History, ADriftOverTimeOrPlaceHasItsMean) {
+  Extent extent;
+  extent.has_straight = true;
+  extent.robots = {1};
+  const Dictionary all = dictionary_of(extent);
+  for (const char* const name : {"drift-by-time", "drift-by-position"}) {
+    // Along x and along y.
+    const auto constants = [&](const Hypothesis& h) {
+      const Term term = all.term_of(h, 1);
+      return std::count_if(term.blocks.begin(), term.blocks.end(),
+                           [](const Block& block) { return block.basis.factors.empty(); });
+    };
+    EXPECT_TRUE(std::any_of(all.hypotheses.begin(), all.hypotheses.end(), [&](const Hypothesis& h) {
+      return h.name == name && constants(h) == 2;
+    })) << name;
+  }
+}
+
 TEST(History, WhatIsFoundIsTriedWithAnAmountForEachRobotAndCommand) {
   Extent extent;
   extent.duration_s = 100;
@@ -99,7 +153,8 @@ TEST(History, WhatIsFoundIsTriedWithAnAmountForEachRobotAndCommand) {
   battery.coefficients = Eigen::Vector2d(-0.2, 0.05);
   battery.precision = Eigen::Vector2d(1, 1);
   const Dictionary without = dictionary_of(extent), with = dictionary_of(extent, {battery});
-  EXPECT_EQ(with.columns(), without.columns() + 3 + 3);
+  // An amount for each robot, for each command, and for nine waves over the plane.
+  EXPECT_EQ(with.columns(), without.columns() + 3 + 3 + 9);
   for (const auto& [covariate, word] : {std::pair{Covariate::kRobot, "robot"}, {Covariate::kCommand, "command"}}) {
     const Hypothesis* found = nullptr;
     for (std::size_t h = without.hypotheses.size(); h < with.hypotheses.size(); ++h) {

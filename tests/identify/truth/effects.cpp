@@ -67,6 +67,43 @@ Effect slow_patch(double strength) {
           {}};
 }
 
+Effect warming_patch(double strength) {
+  return {"warming-patch",
+          "speed is 1 - 0.6 w / (1 + d^6), w = q / (1 + q), q = (t / 75 s)^4, d = distance from (-110, 80) mm over "
+          "190 mm",
+          {{"position", "time"}},
+          {"robot", "measurement"},
+          [=](const Situation& at, Push& push) {
+            const double d2 = (square(at.disc.x + 110) + square(at.disc.y - 80)) / square(190);
+            const double q = std::pow(at.time_s / 75, 4);
+            slow_both(push, 1 - 0.6 * strength * q / (1 + q) / (1 + d2 * d2 * d2));
+          },
+          {}};
+}
+
+Effect lamp(double strength) {
+  return {"lamp",
+          "from 64.5 s on speed is 1 + 0.45 / (1 + exp(-(0.8 x + 0.6 y - 60 mm) / 35 mm))",
+          {{"position", "time"}},
+          {"robot", "measurement"},
+          [=](const Situation& at, Push& push) {
+            if (at.time_s < 64.5 - 1e-9) return;
+            const double ahead = (0.8 * at.disc.x + 0.6 * at.disc.y - 60) / 35;
+            slow_both(push, 1 + 0.45 * strength / (1 + std::exp(-ahead)));
+          },
+          {}};
+}
+
+Effect batteries_of_the_day(double strength) {
+  return {
+      "batteries-of-the-day",
+      "in run r all wheels run at 1 + 0.13 sin(2.3 r + 0.4) of their speed",
+      {{"history"}},
+      {"robot", "position"},
+      [=](const Situation& at, Push& push) { slow_both(push, 1 + 0.13 * strength * std::sin(2.3 * at.run + 0.4)); },
+      {}};
+}
+
 Effect slower_outside(double strength) {
   return {"slower-outside",
           "speed is 1 - 0.45 min(1, (r / 480 mm)^3.5), r = distance from the middle",

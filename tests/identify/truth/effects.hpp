@@ -15,9 +15,14 @@ Effect slow_patch(double strength = 1);      // an oval patch of rough floor
 Effect slower_outside(double strength = 1);  // speed falls towards the rim: what a lens seems to do
 Effect grain(double strength = 1);           // the floor is slower against its grain
 Effect vortex(double strength = 1);          // air turns about a point of the room
+Effect warming_patch(double strength = 1);   // a patch that gets warm, and slow, within the first minutes
+Effect lamp(double strength = 1);            // robots are faster in a part of the room once it is lit
 Effect tilt(double strength = 1);            // vibrating robots slide down a tilted table
 Effect draught(double strength = 1);         // a draught that comes and goes moves all robots, stopped ones too
 Effect table_knock(double strength = 1);     // vibrating robots slide when the table is knocked
+
+// Of runs.
+Effect batteries_of_the_day(double strength = 1);  // every run has another speed
 
 // Of robots.
 Effect slow_robots(double strength = 1);  // every third robot is slow, wherever it is
