@@ -10,6 +10,7 @@
 
 #include "clients/identify/follower.hpp"
 #include "clients/identify/noise_fit.hpp"
+#include "clients/identify/picture_scale.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -77,7 +78,8 @@ struct Pushes {
 
 }  // namespace
 
-PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number) : set_(&set) {
+PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
+    : set_(&set), first_number_(first_number) {
   for (std::size_t r = 0; r < set.runs.size(); ++r) {
     neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
     neighbours_.back()->remember(set.runs[r], MotionModel{}.cells_mm);
@@ -138,6 +140,13 @@ Meetings PreparedSet::meetings() const {
     }
   }
   return sum;
+}
+
+std::vector<Pair> PreparedSet::pairs() const {
+  std::vector<Pair> pairs;
+  for (std::size_t r = 0; r < neighbours_.size(); ++r)
+    add_pairs(*neighbours_[r], set_->runs[r].tracks.size(), first_number_ + static_cast<std::uint32_t>(r), pairs);
+  return pairs;
 }
 
 void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads) {
@@ -508,11 +517,48 @@ void Fitter::fit_surroundings(MotionModel& model) const {
   for (int round = 0; round < (set_.set().has_headings ? 1 : 2); ++round) {
     find_walls(model);
     set_.find_centres(model, threads_);
+    if (model.measures() && set_scale(model)) set_.find_centres(model, threads_);
     // In a picture that is bent robots seem to meet where they do not.
     if (model.measures()) model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
     fit_touching(model);
     fit(model, 1);
   }
+}
+
+bool Fitter::set_scale(MotionModel& model) const {
+  constexpr double kNear = 0.15, kSame = 0.001;
+  const std::vector<Pair> pairs = set_.pairs();
+  const std::optional<TouchingApart> apart = touching_apart(pairs);
+  hold_.reset();
+  if (!apart || std::abs(apart->mm / kDiscs_mm - 1) > kNear) return false;
+  const double factor = kDiscs_mm / apart->mm;
+  if (!rescale(model, factor)) return false;
+  std::vector<Pair> met;
+  for (Pair pair : pairs)
+    if (std::abs(pair.apart_mm - apart->mm) < 2) met.push_back(pair);
+  hold_ = std::make_shared<const ScaleHold>(model, met, apart->sd_mm / kDiscs_mm);
+  return std::abs(factor - 1) > kSame;
+}
+
+void Fitter::settle_scale(MotionModel& model) const {
+  // Where it is least surprising by the seed's lengths, beforehand normal each: a square in the factor.
+  const BaseParameters seed;
+  double by_seed = 0, precision = 0;
+  for (const auto& [value, expected, sd] :
+       {std::array{model.base.straight_mm_s, seed.straight_mm_s, prior_.straight_mm_s},
+        std::array{model.base.turn_mm_s, seed.turn_mm_s, prior_.turn_mm_s},
+        std::array{model.base.wheel_base_mm, seed.wheel_base_mm, prior_.wheel_base_mm}}) {
+    by_seed += value * expected / (sd * sd);
+    precision += value * value / (sd * sd);
+  }
+  if (by_seed <= 0) return;
+  double log_factor = precision * std::log(by_seed / precision);
+  if (hold_) {
+    const double sure = 1 / (hold_->relative_sd() * hold_->relative_sd());
+    log_factor += sure * std::log(hold_->factor(model));
+    precision += sure;
+  }
+  rescale(model, std::exp(log_factor / precision));
 }
 
 void Fitter::fit(MotionModel& model, int passes) const {
@@ -546,6 +592,7 @@ void Fitter::fit(MotionModel& model, int passes) const {
     }
     // A step that makes things worse is held back first where the data say little, then everywhere.
     const MotionModel start = model;
+    const bool pictured = start.measures() && start.room.any();
     // Of the coefficients beforehand as well.
     const auto worth = [&](const MotionModel& trial) {
       double value = log_likelihood(trial);
@@ -563,10 +610,12 @@ void Fitter::fit(MotionModel& model, int passes) const {
       held.diagonal() += trial.firmness * beforehand;
       model = start;
       apply(model, units, trial.length * held.ldlt().solve(score));
+      if (pictured) model.room = carried(start.room, start, model);
       better = worth(model) > before - 2;
       if (better) break;
     }
     if (!better) model = start;
+    if (model.measures()) settle_scale(model);
   }
 }
 

@@ -10,6 +10,9 @@
 
 namespace kilotwin::identify {
 
+struct Pair;
+class ScaleHold;
+
 /// How often the nearest robot was so near that discs would overlap, and a little farther away.
 struct Meetings {
   static constexpr double kRing_mm = 55;
@@ -43,11 +46,14 @@ class PreparedSet {
   /// Looks again at what floors remember, in cells of the model's sizes.
   void remember(const MotionModel&);
   [[nodiscard]] Meetings meetings() const;
+  /// Robots that came near each other, by where discs are.
+  [[nodiscard]] std::vector<Pair> pairs() const;
   /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
   void find_headings(const MotionModel&, std::uint32_t threads);
 
  private:
   const MeasuredSet* set_;
+  std::uint32_t first_number_;
   std::vector<std::unique_ptr<RunNeighbours>> neighbours_;
   std::vector<TrackView> views_;
 };
@@ -92,6 +98,11 @@ class Fitter {
   [[nodiscard]] PreparedSet& set() const { return set_; }
 
  private:
+  /// Makes a picture that is put straight as large as robots that touch show it to be. Whether it was not.
+  bool set_scale(MotionModel&) const;
+  /// Tracks leave the common scale of such a picture's map, speeds and wheel base open: it becomes the most probable one by what
+  /// else is known, where steps of a fit that is linear would drift.
+  void settle_scale(MotionModel&) const;
   /// Tracks spread over the whole set, until there are so many samples.
   [[nodiscard]] std::vector<const TrackView*> some_tracks(std::size_t samples) const;
   [[nodiscard]] double with_touching(const MotionModel&, const std::vector<const TrackView*>&) const;
@@ -101,6 +112,8 @@ class Fitter {
   PreparedSet& set_;
   std::uint32_t threads_;
   BasePrior prior_;
+  /// Where robots touched in the picture: what tells its scale.
+  mutable std::shared_ptr<const ScaleHold> hold_;
 };
 
 /// The blocks of all terms of a model, in order.

@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "clients/identify/picture_scale.hpp"
+
 namespace kilotwin::identify {
 
 Linear linear(const Fitter& fitter, const MotionModel& model, std::size_t term, const std::vector<Block>& more,
@@ -84,10 +86,12 @@ void exchange(MotionModel& model, std::size_t place, const Linear& l, const std:
   Eigen::VectorXd step = Eigen::VectorXd::Zero(l.information.rows());
   for (std::size_t i = 0; i < moved.size(); ++i) step[moved[i]] = part[static_cast<Eigen::Index>(i)];
   step.segment(l.first, l.count) = -term.coefficients;
+  const MotionModel before = model;
   Fitter::apply(model, l.units, step);
   term.blocks = blocks;
   term.coefficients = step(columns);
   term.precision = precision(columns);
+  if (model.room.any() && (before.measures() || model.measures())) model.room = carried(model.room, before, model);
 }
 
 }  // namespace kilotwin::identify

@@ -37,19 +37,23 @@ class Sensitivities {
     for (const Block& block : blocks) measures_ = measures_ || is_measured(block.target);
   }
 
-  void begin_track(std::uint32_t run) {
-    run_ = run;
+  void begin_track(const TrackView& view) {
+    run_ = view.run;
     cluster_start_s_ = -1e300;
+    first_ = &view.track->samples.front();
+    last_ = view.at(first_->time_s);
   }
   void start(const TrackFilter& filter) {
-    pose_.setZero();
-    const double heading = filter.belief().mean[2];
-    const double c = std::cos(heading), s = std::sin(heading);
-    pose_(0, kAheadPoint) = -c;
-    pose_(1, kAheadPoint) = -s;
-    pose_(0, kLeftPoint) = s;
-    pose_(1, kLeftPoint) = -c;
     filter_ = &filter;
+    const Eigen::Vector3d pose = filter.belief().mean.head<3>();
+    Eigen::Matrix2d by_place = Eigen::Matrix2d::Identity();
+    if (model_.measures()) {
+      constexpr double kStep_mm = 0.1;
+      const Eigen::Vector3d here = model_.measured(pose[0], pose[1], pose[2], last_);
+      by_place.col(0) = (model_.measured(pose[0] + kStep_mm, pose[1], pose[2], last_) - here).head<2>() / kStep_mm;
+      by_place.col(1) = (model_.measured(pose[0], pose[1] + kStep_mm, pose[2], last_) - here).head<2>() / kStep_mm;
+    }
+    place(*first_, pose, by_place);
   }
   void step(const StepRecord& record) {
     const Rates& r = record.rates;
@@ -143,7 +147,7 @@ class Sensitivities {
     if (innovation.lost || touched_) {
       lost += innovation.lost ? 1 : 0;
       touched_ = false;
-      start(*filter_);
+      place(sample, filter_->belief().mean.head<3>(), innovation.jacobian.topLeftCorner<2, 2>());
       return;
     }
     if (sample.time_s > cluster_start_s_ + cluster_s_ || clusters_.empty()) {
@@ -216,6 +220,16 @@ class Sensitivities {
     double left = 1, right = 1;
   };
 
+  /// The robot is where it was seen, whatever the columns are: what the picture adds there is taken off.
+  void place(const Sample& sample, const Eigen::Vector3d& pose, const Eigen::Matrix2d& by_place) {
+    seen_.setZero();
+    add_measured(sample, pose);
+    pose_.topRows<2>().noalias() = -by_place.inverse() * seen_.topRows<2>();
+    if (TrackFilter::has_heading(sample))
+      pose_.row(2) = -seen_.row(2);
+    else
+      pose_.row(2).setZero();
+  }
   void add_measured(const Sample& sample, const Eigen::Vector3d& pose) {
     const double heading = pose[2];
     const double c = std::cos(heading), s = std::sin(heading);
@@ -271,6 +285,7 @@ class Sensitivities {
   std::uint32_t run_ = 0;
   double cluster_start_s_ = -1e300;
   const TrackFilter* filter_ = nullptr;
+  const Sample* first_ = nullptr;  ///< of the track
   Situation last_;
   bool measures_ = false, touched_ = false;
   double of_left_[kMostColumns], of_right_[kMostColumns];
@@ -301,7 +316,7 @@ std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vec
       RobotBias fixed = bias;
       fixed.covariance.setZero();
       TrackFilter filter(model, fixed, view->track->robot, view->number);
-      sums.begin_track(view->run);
+      sums.begin_track(*view);
       walk(filter, *view, view->track->samples.size(), sums);
       sums.flush();
     }

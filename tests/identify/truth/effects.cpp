@@ -291,6 +291,43 @@ Effect lens(double strength) {
           }};
 }
 
+Effect pincushion(double strength) {
+  return {"pincushion",
+          "a point at r from (-35, 25) mm is seen at f tan(r / f), f = 900 mm",
+          {{"measurement"}},
+          {},
+          {},
+          [=](const Situation&, View& view) {
+            const double x = view.point.x + 35, y = view.point.y - 25, q = std::min(std::hypot(x, y) / 900, 1.4);
+            const double scale = q > 1e-9 ? 1 + strength * (std::tan(q) / q - 1) : 1;
+            view.point = {-35 + x * scale, 25 + y * scale};
+          }};
+}
+
+Effect growing_picture(double strength) {
+  return {"growing-picture",
+          "the picture grows about the middle by 0.024 q / (1 + q), q = (t / 140 s)^2.5: the camera sinks",
+          {{"measurement", "time"}},
+          {"robot", "position"},
+          {},
+          [=](const Situation& at, View& view) {
+            const double q = std::pow(at.time_s / 140, 2.5), scale = 1 + 0.024 * strength * q / (1 + q);
+            view.point = {view.point.x * scale, view.point.y * scale};
+          }};
+}
+
+Effect keystone(double strength) {
+  return {"keystone",
+          "seen positions are those of a camera that leans: divided by 1 + (0.17 x + 0.09 y) / 1000 mm",
+          {{"measurement"}},
+          {},
+          {},
+          [=](const Situation&, View& view) {
+            const double away = 1 + strength * (0.17 * view.point.x + 0.09 * view.point.y) / 1000;
+            view.point = {view.point.x / away, view.point.y / away};
+          }};
+}
+
 Effect camera_bump(double strength) {
   return {"camera-bump",
           "from 52.3 s to 96.7 s all is seen 11 mm to the right, 7 mm up and turned by 0.015 rad about the middle",
