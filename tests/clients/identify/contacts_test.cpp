@@ -20,7 +20,6 @@ MeasuredSet held_fast(bool headings) {
   set.has_commands = true;
   set.has_headings = headings;
   Run& run = set.runs.emplace_back();
-  run.name = "r";
   for (std::uint32_t r = 0; r < 16; ++r) {
     Track& track = run.tracks.emplace_back();
     track.robot = r;
@@ -75,7 +74,7 @@ TEST(Contacts, ARobotThatPushesOthersComesAsFarAsWithShortSteps) {
     x[0] += 10 * dt;
     for (int pass = 0; pass < 50 && push_apart(x, y); ++pass) continue;
   }
-  Run run;
+  identify::Run run;
   for (std::uint32_t r = 0; r < 3; ++r) {
     Track& track = run.tracks.emplace_back();
     track.robot = r;
