@@ -11,20 +11,25 @@
 #include "clients/identify/follower.hpp"
 #include "clients/identify/noise_fit.hpp"
 #include "clients/identify/picture_scale.hpp"
+#include "clients/identify/touched.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
 struct LogLikelihood {
   double sum = 0;
-  bool touched = false;
+  Touched touched;
   bool with_touching = false;  ///< what was measured after touching counts as well
 
   void start(const TrackFilter&) {}
-  void step(const StepRecord& record) { touched = touched || record.touching(); }
+  void step(const StepRecord& record) { touched.step(record); }
   void update(const Innovation& innovation, const Sample&) {
-    if (std::exchange(touched, false) && !with_touching) return;
-    sum += std::max(innovation.log_likelihood, -1e3);
+    constexpr double kLeast = -1e3;
+    const Touched::Counts counts = touched.update(innovation);
+    if (counts == Touched::Counts::kAll || with_touching)
+      sum += std::max(innovation.log_likelihood, kLeast);
+    else if (counts == Touched::Counts::kHeading)
+      sum += std::max(heading_log_likelihood(innovation), kLeast);
   }
 };
 
@@ -82,7 +87,7 @@ PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
     : set_(&set), first_number_(first_number) {
   for (std::size_t r = 0; r < set.runs.size(); ++r) {
     neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
-    neighbours_.back()->remember(set.runs[r], MotionModel{}.cells_mm);
+    neighbours_.back()->remember(set.runs[r], MotionModel{}.cells);
     for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
       const Track& track = set.runs[r].tracks[t];
       if (track.samples.size() < 2) continue;
@@ -121,12 +126,12 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
     for (std::size_t v = 0; v < views_.size(); ++v)
       if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
     *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
-    neighbours_[r]->remember(set_->runs[r], model.cells_mm);
+    neighbours_[r]->remember(set_->runs[r], model.cells);
   }
 }
 
 void PreparedSet::remember(const MotionModel& model) {
-  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells_mm);
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells);
 }
 
 Meetings PreparedSet::meetings() const {

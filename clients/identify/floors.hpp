@@ -12,7 +12,7 @@ class Floors {
  public:
   explicit Floors(const MotionModel& model) {
     for (std::uint8_t c = 0; c < kFloorCells; ++c)
-      if (model.looks_at({Covariate::kTrodden, c})) floors_.push_back({c, FloorMemory(model.cells_mm[c])});
+      if (model.looks_at({Covariate::kTrodden, c})) floors_.push_back({c, FloorMemory(model.cells[c])});
   }
   [[nodiscard]] bool any() const { return !floors_.empty(); }
   /// A driven robot stood there for so long.

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "clients/identify/products.hpp"
+#include "clients/identify/touched.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -63,7 +64,7 @@ class Sensitivities {
     pose_.row(0) += by_heading_x * pose_.row(2);
     pose_.row(1) += by_heading_y * pose_.row(2);
     last_ = record.middle;
-    touched_ = touched_ || record.touching();
+    touched_.step(record);
     const double forward = (r.left_mm_s + r.right_mm_s) / 2 * h;
     const Eigen::Vector3d turn = h * Eigen::Vector3d(-arc.along_y * forward / 2, arc.along_x * forward / 2, 1);
     const Eigen::Vector3d ahead = h * Eigen::Vector3d(arc.along_x, arc.along_y, 0);
@@ -140,14 +141,16 @@ class Sensitivities {
     }
   }
   void update(const Innovation& innovation, const Sample& sample) {
-    if (!touched_) log_likelihood += innovation.log_likelihood;
+    const Touched::Counts counts = touched_.update(innovation);
+    const bool heading_alone = counts == Touched::Counts::kHeading;
+    if (counts == Touched::Counts::kAll) log_likelihood += innovation.log_likelihood;
+    if (heading_alone) log_likelihood += heading_log_likelihood(innovation);
     ++samples;
     if (innovation.weight < 1) ++outliers;
-    // What happened to a robot while it touched something tells nothing of the model; it starts anew from here.
-    if (innovation.lost || touched_) {
+    // Otherwise it starts anew from here.
+    if (innovation.lost || counts == Touched::Counts::kNothing) {
       lost += innovation.lost ? 1 : 0;
-      touched_ = false;
-      place(sample, filter_->belief().mean.head<3>(), innovation.jacobian.topLeftCorner<2, 2>());
+      place(sample, innovation);
       return;
     }
     if (sample.time_s > cluster_start_s_ + cluster_s_ || clusters_.empty()) {
@@ -158,10 +161,11 @@ class Sensitivities {
     }
     seen_.noalias() = innovation.jacobian * pose_;
     add_measured(sample, innovation.pose);
+    if (filled_ + 3 > kBuffer) flush();
+    if (heading_alone) return add_heading(sample, innovation);
     if (innovation.size == 2) seen_.row(2).setZero();
     const Eigen::LLT<Eigen::Matrix3d> root(innovation.covariance);
     const Eigen::Matrix3d whiten = root.matrixL().solve(Eigen::Matrix3d::Identity());
-    if (filled_ + 3 > kBuffer) flush();
     buffer_.middleRows(filled_, innovation.size).noalias() = (whiten * seen_).topRows(innovation.size);
     values_.segment(filled_, innovation.size) = (whiten * innovation.difference).head(innovation.size);
     filled_ += innovation.size;
@@ -230,6 +234,18 @@ class Sensitivities {
     else
       pose_.row(2).setZero();
   }
+  void place(const Sample& sample, const Innovation& innovation) {
+    place(sample, filter_->belief().mean.head<3>(), innovation.jacobian.topLeftCorner<2, 2>());
+  }
+  /// Where a robot is that was pushed starts anew; how it points goes on.
+  void add_heading(const Sample& sample, const Innovation& innovation) {
+    const double spread = std::sqrt(innovation.covariance(2, 2));
+    buffer_.row(filled_) = seen_.row(2) / spread;
+    values_[filled_++] = innovation.difference[2] / spread;
+    const Eigen::RowVectorXd heading = pose_.row(2) - innovation.gain(2, 2) * seen_.row(2);
+    place(sample, innovation);
+    pose_.row(2) = heading;
+  }
   void add_measured(const Sample& sample, const Eigen::Vector3d& pose) {
     const double heading = pose[2];
     const double c = std::cos(heading), s = std::sin(heading);
@@ -287,7 +303,8 @@ class Sensitivities {
   const TrackFilter* filter_ = nullptr;
   const Sample* first_ = nullptr;  ///< of the track
   Situation last_;
-  bool measures_ = false, touched_ = false;
+  Touched touched_;
+  bool measures_ = false;
   double of_left_[kMostColumns], of_right_[kMostColumns];
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "clients/identify/linear.hpp"
+#include "clients/identify/memory_cells.hpp"
 #include "clients/identify/refine.hpp"
 
 namespace kilotwin::identify {
@@ -19,19 +20,72 @@ Block curve_of(const Block& like, std::uint8_t cells, std::vector<double> points
   return {like.target, Basis{{f}}, like.during};
 }
 
-/// What a size of cells makes of the data.
-struct Weighed {
-  double cell_mm = 0, evidence = -1e300, sd = 1;
+/// Forms of the effect, by the time that robots stood there: smooth ones, and steps, of which some are chosen.
+struct Form {
+  std::vector<Block> blocks;
+  std::vector<Eigen::Index> columns;  ///< of those that were weighed
+  Eigen::VectorXd sd;
+  double evidence = -1e300;
 };
 
-/// How far robots came from the middle of the room, where cells of all sizes begin.
-double extent_mm(const PreparedSet& set) {
-  std::vector<double> away;
-  for (const TrackView& view : set.views())
-    for (const Sample& s : view.track->samples) away.push_back(std::max(std::abs(s.x_mm), std::abs(s.y_mm)));
-  const auto most = away.begin() + static_cast<std::ptrdiff_t>(away.size() - 1 - away.size() / 50);
-  std::nth_element(away.begin(), most, away.end());
-  return *most;
+/// One standard deviation for all columns, the best.
+void weigh(const Beside& data, const std::vector<Eigen::Index>& columns, Form& form) {
+  const Eigen::MatrixXd information = data.information(columns, columns);
+  const Eigen::VectorXd score = data.score(columns);
+  form.columns = columns;
+  form.evidence = -1e300;
+  for (double size = 0.01; size < 6; size *= 2) {
+    const Eigen::VectorXd sd = Eigen::VectorXd::Constant(score.size(), size);
+    const double evidence = log_evidence(information, score, sd);
+    if (evidence <= form.evidence) continue;
+    form.evidence = evidence;
+    form.sd = sd;
+  }
+}
+
+/// Steps are added one by one, while each earns what choosing it costs.
+Form some_steps(const Beside& data, Eigen::Index first, const Block& steps) {
+  constexpr std::size_t kMostSteps = 5;
+  const std::vector<double>& points = steps.basis.factors.front().points;
+  const double price = std::log(static_cast<double>(points.size()));
+  Form best;
+  std::vector<std::size_t> chosen;
+  while (chosen.size() < kMostSteps) {
+    Form next;
+    std::size_t added = 0;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      if (std::find(chosen.begin(), chosen.end(), p) != chosen.end()) continue;
+      std::vector<Eigen::Index> columns;
+      for (const std::size_t c : chosen) columns.push_back(first + static_cast<Eigen::Index>(c));
+      columns.push_back(first + static_cast<Eigen::Index>(p));
+      Form trial;
+      weigh(data, columns, trial);
+      trial.evidence -= price * static_cast<double>(columns.size());
+      if (trial.evidence <= next.evidence) continue;
+      next = trial;
+      added = p;
+    }
+    if (next.evidence <= std::max(best.evidence, 0.0)) break;
+    best = next;
+    chosen.push_back(added);
+  }
+  std::sort(chosen.begin(), chosen.end());
+  Block block = steps;
+  std::vector<double>& own = block.basis.factors.front().points;
+  own.clear();
+  best.columns.clear();
+  for (const std::size_t c : chosen) {
+    own.push_back(points[c]);
+    best.columns.push_back(first + static_cast<Eigen::Index>(c));
+  }
+  best.blocks = {block};
+  return best;
+}
+
+Block of_form(const Block& like, Shape shape, std::uint8_t cells, std::vector<double> points) {
+  Block block = curve_of(like, cells, std::move(points));
+  block.basis.factors.front().shape = shape;
+  return block;
 }
 
 }  // namespace
@@ -42,56 +96,44 @@ bool shape_memory(const Fitter& fitter, MotionModel& model, std::size_t place) {
       !term.blocks.front().basis.looks_at(Covariate::kTrodden))
     return false;
   const Block like = term.blocks.front();
-  const std::uint8_t found = like.basis.factors.front().axis.radius;
-  // Cells of the other sizes are free to be tried, but for those that other terms look at.
+  // Cells of its own are free to be used, but for those that other terms look at.
   for (std::size_t t = 0; t < model.terms.size(); ++t)
     for (const Block& block : model.terms[t].blocks)
       if (t != place && block.basis.looks_at(Covariate::kTrodden)) return false;
-  const std::vector<double> points = {1, 3, 9, 27, 81};
-  const auto n = static_cast<Eigen::Index>(points.size());
-  // Cells a little too large lie elsewhere far from the middle: sizes are tried as close as that asks for.
-  double cell_mm = model.cells_mm[found];
-  double apart = std::clamp(0.5 * cell_mm / extent_mm(fitter.set()), 0.012, 0.08);
-  constexpr double kOff = 0.28;  // relative, how far the first guess may be
-  int batches = static_cast<int>(std::ceil(2 * kOff / apart / static_cast<double>(kFloorCells)));
-  // What the term looks at now stays: it is put into a cell size of its own, which is the last.
-  constexpr std::uint8_t kOwn = kFloorCells - 1;
+  // What the term looks at now stays: it is put into cells of its own, which are the last. Others are tried as the first.
+  constexpr std::uint8_t kOwn = kFloorCells - 1, kTried = 0;
+  const std::uint8_t found = like.basis.factors.front().axis.radius;
+  model.cells[kOwn] = model.cells[found];
   model.terms[place].blocks.front().basis.factors.front().axis.radius = kOwn;
-  model.cells_mm[kOwn] = cell_mm;
-  for (; apart > 0.002; apart /= 4, batches = 1) {
-    Weighed best;
-    std::vector<double> sizes;
-    const int count = batches * static_cast<int>(kOwn);
-    for (int i = 0; i < count; ++i) sizes.push_back(cell_mm * std::pow(1 + apart, i - count / 2));
-    for (int batch = 0; batch < batches; ++batch) {
-      MotionModel trial = model;
-      std::vector<Block> blocks;
-      for (std::uint8_t c = 0; c < kOwn; ++c) {
-        trial.cells_mm[c] = sizes[static_cast<std::size_t>(batch) * kOwn + c];
-        blocks.push_back(curve_of(like, c, points));
-      }
-      fitter.set().remember(trial);
-      const Linear l = linear(fitter, trial, place, blocks);
-      const Beside data = beside(l, l.score_without(trial.terms[place].coefficients), l.more());
-      for (std::uint8_t c = 0; c < kOwn; ++c) {
-        const Eigen::MatrixXd information = data.information.block(c * n, c * n, n, n);
-        const Eigen::VectorXd score = data.score.segment(c * n, n);
-        for (double sd = 0.01; sd < 6; sd *= 2) {
-          const double evidence = log_evidence(information, score, Eigen::VectorXd::Constant(n, sd));
-          if (evidence > best.evidence) best = {trial.cells_mm[c], evidence, sd};
-        }
-      }
-    }
-    // The best takes the term's place.
-    cell_mm = best.cell_mm;
+  const std::vector<double> scales = {0.5, 1, 2, 4, 8, 16, 32, 64},
+                            steps = {0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 13, 16, 20, 26, 32, 40, 50, 64};
+  // With the right cells it is better known where robots were, and what is noise.
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    MotionModel without = model;
+    without.terms[place].coefficients.setZero();
+    const FloorCells cells = find_cells(fitter, without, model.cells[kOwn], like.during);
     MotionModel next = model;
-    next.cells_mm[0] = cell_mm;
+    next.cells[kTried] = cells;
     fitter.set().remember(next);
-    const Linear l = linear(fitter, next, place, {curve_of(like, 0, points)});
+    const Block smooth = of_form(like, Shape::kExponential, kTried, scales),
+                stepping = of_form(like, Shape::kAtLeast, kTried, steps);
+    const Linear l = linear(fitter, next, place, {smooth, stepping});
     const Eigen::VectorXd at_zero = l.score_without(next.terms[place].coefficients);
-    exchange(next, place, l, {curve_of(like, kOwn, points)}, at_zero, l.more(),
-             Eigen::VectorXd::Constant(n, best.sd));
-    next.cells_mm[kOwn] = cell_mm;
+    const Beside data = beside(l, at_zero, l.more());
+    const auto n = static_cast<Eigen::Index>(scales.size());
+    Form best;
+    std::vector<Eigen::Index> columns;
+    for (Eigen::Index c = 0; c < n; ++c) columns.push_back(c);
+    weigh(data, columns, best);
+    best.blocks = {smooth};
+    Form other = some_steps(data, n, stepping);
+    if (other.evidence > best.evidence) best = std::move(other);
+    for (Block& block : best.blocks) block.basis.factors.front().axis.radius = kOwn;
+    for (Eigen::Index& c : best.columns) c += l.own;
+    exchange(next, place, l, best.blocks, at_zero, best.columns, best.sd);
+    next.cells[kOwn] = cells;
+    next.cells[kTried] = model.cells[kTried];
     model = next;
     fitter.set().remember(model);
     fitter.fit(model, 1);

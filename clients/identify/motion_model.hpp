@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/identify/basis.hpp"
+#include "clients/identify/floor_memory.hpp"
 #include "clients/identify/room.hpp"
 
 namespace kilotwin::identify {
@@ -98,8 +99,8 @@ struct MotionModel {
   bool contacts = true;  ///< robots push each other
   /// Robots whose centres are this near, by what is known of where they are, may touch, mm.
   double touch_mm = kTouch_mm;
-  /// Sides of the square cells in which the floor may remember, the first cell from 0 on.
-  std::array<double, kFloorCells> cells_mm = {20, 28, 39, 55, 78, 110};
+  /// Square cells in which the floor may remember.
+  std::array<FloorCells, kFloorCells> cells = {FloorCells{20}, {28}, {39}, {55}, {78}, {110}};
   std::vector<Term> terms;
   std::map<std::uint32_t, RobotBias> robots;
 

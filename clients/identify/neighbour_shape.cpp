@@ -17,9 +17,15 @@ constexpr double kWorth = 8;
 constexpr std::size_t kMostForms = 5;
 constexpr std::size_t kMostCounted = 6;
 
-bool of_neighbours(const Basis& basis) {
-  return basis.factors.size() == 1 && (basis.looks_at(Covariate::kNeighbours) ||
-                                       basis.looks_at(Covariate::kNearest) || basis.looks_at(Covariate::kDensity));
+/// Of speed, by neighbours alone.
+bool is_of_neighbours(const Block& block) {
+  const auto neighbours = [](const Factor& f) {
+    return f.known.empty() && (f.axis.of == Covariate::kNeighbours || f.axis.of == Covariate::kNearest ||
+                               f.axis.of == Covariate::kDensity || f.axis.of == Covariate::kBearing);
+  };
+  const std::vector<Factor>& factors = block.basis.factors;
+  return (block.target == Target::kGain || block.target == Target::kAhead) && !factors.empty() &&
+         std::all_of(factors.begin(), factors.end(), neighbours);
 }
 
 /// The largest density within each radius that the data have, but for one look in a thousand.
@@ -66,6 +72,20 @@ std::vector<Block> forms_of(const PreparedSet& set, std::uint8_t during) {
     near.high = kNeighbourRadii_mm[r];
     near.count = 4;
     if (r > 0) add(near, Covariate::kNearest, r);
+  }
+  // By where the nearest is as well: ahead, at a side, behind. Of 60, 80 and 110 mm.
+  for (const std::uint8_t r : std::array<std::uint8_t, 3>{2, 4, 7}) {
+    Factor near, bearing;
+    near.shape = Shape::kTaper;
+    near.axis = {Covariate::kNearest, r};
+    near.high = kNeighbourRadii_mm[r];
+    near.count = 2;
+    bearing.shape = Shape::kHarmonics;
+    bearing.axis = {Covariate::kBearing, r};
+    for (const auto& [target, waves] : {std::pair{Target::kGain, 2u}, {Target::kAhead, 1u}}) {
+      bearing.count = waves;
+      forms.push_back({target, Basis{{near, bearing}}, during});
+    }
   }
   return forms;
 }
@@ -145,10 +165,7 @@ class Choice {
 
 bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const std::vector<Block>& had = model.terms[place].blocks;
-  if (had.empty() || !std::all_of(had.begin(), had.end(), [](const Block& block) {
-        return block.target == Target::kGain && of_neighbours(block.basis);
-      }))
-    return false;
+  if (had.empty() || !std::all_of(had.begin(), had.end(), is_of_neighbours)) return false;
   const std::vector<Block> forms = forms_of(fitter.set(), had.front().during);
   // What seemed to be noise, and where robots were thought to be, changes with the first choice.
   constexpr int kRounds = 2;

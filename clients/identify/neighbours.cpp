@@ -80,9 +80,9 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
   }
 }
 
-void RunNeighbours::remember(const Run& run, const std::array<double, kFloorCells>& cells_mm) {
+void RunNeighbours::remember(const Run& run, const std::array<FloorCells, kFloorCells>& cells) {
   for (std::size_t c = 0; c < kFloorCells; ++c) {
-    FloorMemory memory(cells_mm[c]);
+    FloorMemory memory(cells[c]);
     for (std::size_t i = 0; i < instants(); ++i) {
       for (std::size_t r = 0; r < run.tracks.size(); ++r) {
         const Spot& s = spot(r, i);

@@ -27,8 +27,8 @@ class RunNeighbours {
   /// Where robots were measured; with `centres`, by track, where their discs were instead.
   explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr);
   [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
-  /// Fills in what the floor remembers in cells of these sizes.
-  void remember(const Run&, const std::array<double, kFloorCells>& cells_mm);
+  /// Fills in what the floor remembers in these cells.
+  void remember(const Run&, const std::array<FloorCells, kFloorCells>& cells);
 
   /// Where the disc of a robot was at an instant of the raster.
   struct Spot {

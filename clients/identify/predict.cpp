@@ -148,6 +148,8 @@ class Outlook {
       const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
       if (model_.contacts && robots_[r].near.nearest_mm < model_.touch_mm + std::min(uncertain, 20.0))
         robots_[r].branches = true;
+      // Where what the floor remembers changes from cell to cell, a robot's mean way is not the mean of its ways.
+      if (floors_.any()) robots_[r].branches = true;
       if (!robots_[r].branches) robots_[r].branches = edges_.near(x_[r], y_[r], std::clamp(uncertain, 6.0, 30.0));
       floors_.see(x_[r], y_[r], robots_[r].near);
     }
@@ -293,7 +295,8 @@ struct RunOutlook {
     const Floors floors = trodden.at(from_s, followers);
     Outlook outlook(model, followers, floors, from_s, neighbours);
     outlook.go_to(time_s);
-    if (futures > 0 && (model.contacts || Edges(model).any())) outlook.draw_futures(from_s, futures, all, key);
+    if (futures > 0 && (model.contacts || floors.any() || Edges(model).any()))
+      outlook.draw_futures(from_s, futures, all, key);
     std::vector<Predicted> out;
     for (std::size_t i = 0; i < followers.size(); ++i) {
       const TrackView& view = followers[i].view();

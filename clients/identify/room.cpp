@@ -80,7 +80,8 @@ Room room_of(const PreparedSet& set, const MotionModel& model) {
   return room;
 }
 
-void push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm) {
+bool push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm) {
+  bool any = false;
   for (std::size_t i = 0; i < x_mm.size(); ++i) {
     for (std::size_t j = i + 1; j < x_mm.size(); ++j) {
       const double dx = x_mm[j] - x_mm[i], dy = y_mm[j] - y_mm[i], square = dx * dx + dy * dy;
@@ -90,8 +91,10 @@ void push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm) {
       y_mm[i] -= half * dy;
       x_mm[j] += half * dx;
       y_mm[j] += half * dy;
+      any = true;
     }
   }
+  return any;
 }
 
 }  // namespace kilotwin::identify

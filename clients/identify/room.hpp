@@ -39,7 +39,7 @@ inline constexpr double kWallMargin_mm = 4;
 /// A side is a wall where robots that are driven stay at one line, some of them for seconds, and nobody is beyond.
 [[nodiscard]] Room room_of(const PreparedSet&, const MotionModel&);
 
-/// Pushes overlapping discs apart, half the overlap each. NaN: not there.
-void push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm);
+/// Pushes overlapping discs apart, half the overlap each; whether any did. NaN: not there.
+bool push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm);
 
 }  // namespace kilotwin::identify

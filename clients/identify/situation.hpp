@@ -12,7 +12,7 @@ namespace kilotwin::identify {
 inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,  80,  90,  100,
                                                               110, 120, 130, 140, 150, 175, 200};
 
-/// So many sizes of cells in which a floor may remember where robots went (MotionModel::cells_mm).
+/// So many sizes of cells in which a floor may remember where robots went (MotionModel::cells).
 inline constexpr std::size_t kFloorCells = 6;
 
 /// The other robots, seen from one, and what they left on the floor.
@@ -86,7 +86,7 @@ inline constexpr double kNoCommand = 4;
 
 struct Axis {
   Covariate of = Covariate::kNothing;
-  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; of kTrodden, into MotionModel::cells_mm
+  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; of kTrodden, into MotionModel::cells
   std::uint8_t forget = 0;  ///< with motor and driven times: 1 + index into kForget_s; 0: all counts
 
   bool operator==(const Axis&) const = default;

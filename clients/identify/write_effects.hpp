@@ -16,7 +16,7 @@ namespace kilotwin::identify {
 /// "constant", "steps", "curve", "map", "table"... of its first block.
 [[nodiscard]] const char* form_of(const Term&);
 
-/// Of the arena field that holds what the floor remembers in cells of MotionModel::cells_mm[cells].
+/// Of the arena field that holds what the floor remembers in cells of MotionModel::cells[cells].
 [[nodiscard]] std::string field_name(std::uint8_t cells);
 
 /// A number with seven digits.

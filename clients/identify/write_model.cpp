@@ -62,7 +62,7 @@ proto::Model proto_of(const MotionModel& fitted) {
     proto::ArenaField& field = *model.add_field();
     field.set_name(field_name(c));
     field.set_counts(proto::ArenaField::DRIVEN_TIME);
-    field.set_cell_mm(rounded(fitted.cells_mm[c]));
+    field.set_cell_mm(rounded(fitted.cells[c].side_mm));
   }
   std::set<std::string> names;
   for (const Term& term : fitted.terms) {

@@ -117,6 +117,7 @@ Verdict try_scene(const Arguments& arguments, const Scene& scene, std::uint64_t 
     const std::vector<Prediction> of_run = predict(scene, played.individuals, run, kHorizon_s, samples, seed + 1);
     oracle.insert(oracle.end(), of_run.begin(), of_run.end());
   }
+  if (!arguments.keep.empty()) write_predictions(oracle, folder / "oracle.csv");
   const fs::path out = folder / "out";
   fs::remove_all(out);
   const std::string command = fmt::format("{} identify --train {} --test {} --out {} > {} 2>&1",

@@ -17,18 +17,20 @@ namespace kilotwin::identify {
 namespace {
 
 using Shape = Factor::Shape;
-constexpr double kCell_mm = 43;
+/// As no set begins with.
+const FloorCells kCells{43, 15, -12};
 
 /// What a robot's speed may depend on.
 struct Around {
   std::size_t robot;
   const std::vector<double>&x_mm, &y_mm;  ///< of all
-  double trodden_s;                       ///< in cells of kCell_mm
+  double trodden_s;                       ///< in its cell
 };
 using Gain = std::function<double(const Around&)>;
 
 /// Ghosts that walk through each other, by arcs of 50 ms.
-MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, double duration_s) {
+MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, double duration_s,
+                   const FloorCells& cells = kCells) {
   const Random random(seed);
   const double dt = 0.05, factor_s = 0.001, tracker_mm = 0.3, tracker_rad = 0.03;
   MeasuredSet set;
@@ -44,7 +46,7 @@ MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, d
     y[r] = 90.0 * (r / 4) - 90;
     heading[r] = 1.7 * r;
   }
-  FloorMemory memory(kCell_mm);
+  FloorMemory memory(cells);
   for (int k = 0; k * dt <= duration_s; ++k) {
     const double t = k * dt;
     for (std::uint32_t r = 0; r < robots; ++r) {
@@ -188,7 +190,7 @@ TEST(Place, RobotsCountWithinTheRadiusTheyDo) {
 }
 
 TEST(Place, AFloorRemembersInItsCells) {
-  FloorMemory memory(30);
+  FloorMemory memory({30, 0, 0});
   memory.add(31, -1, 2);
   memory.add(59, -29, 0.5);
   EXPECT_FLOAT_EQ(memory.value_s(45, -15), 2.5F);
@@ -197,7 +199,15 @@ TEST(Place, AFloorRemembersInItsCells) {
   // Far away all places are one.
   memory.add(1e6, 1e6, 1);
   EXPECT_FLOAT_EQ(memory.value_s(2e6, 3e6), 1);
+  // A corner elsewhere.
+  FloorMemory moved({30, 10, -5});
+  moved.add(11, -4, 1);
+  EXPECT_FLOAT_EQ(moved.value_s(39, 24), 1);
+  EXPECT_FLOAT_EQ(moved.value_s(9, 24), 0);
 }
+
+/// How far apart two corners are, of cells that repeat.
+double off(double a_mm, double b_mm, double side_mm) { return std::abs(std::remainder(a_mm - b_mm, side_mm)); }
 
 TEST(Place, TheCellsOfTheFloorAreFound) {
   const MeasuredSet set =
@@ -213,7 +223,10 @@ TEST(Place, TheCellsOfTheFloorAreFound) {
   fitter.fit(model, 2);
   ASSERT_TRUE(shape_memory(fitter, model, 0));
   const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
-  EXPECT_NEAR(model.cells_mm[axis.radius], kCell_mm, 0.5);
+  const FloorCells& cells = model.cells[axis.radius];
+  EXPECT_NEAR(cells.side_mm, kCells.side_mm, 0.7);
+  EXPECT_LT(off(cells.x_mm, kCells.x_mm, kCells.side_mm), 3);
+  EXPECT_LT(off(cells.y_mm, kCells.y_mm, kCells.side_mm), 3);
   Situation fresh = driven_at(0, 0), worn = fresh;
   worn.near.trodden_s[axis.radius] = 12;
   EXPECT_NEAR(gain_of(model, worn) / gain_of(model, fresh), 1 - 0.5 * 12 / 16, 0.05);
@@ -221,12 +234,38 @@ TEST(Place, TheCellsOfTheFloorAreFound) {
   const proto::Model written = proto_of(model);
   ASSERT_EQ(written.field_size(), 1);
   EXPECT_EQ(written.field(0).name(), field_name(axis.radius));
-  EXPECT_NEAR(written.field(0).cell_mm(), model.cells_mm[axis.radius], 1e-5);
+  EXPECT_NEAR(written.field(0).cell_mm(), model.cells[axis.radius].side_mm, 1e-5);
   const auto& effects = written.effect();
   EXPECT_TRUE(std::any_of(effects.begin(), effects.end(), [&](const proto::Effect& e) {
     return e.function_size() == 1 && e.function(0).of() == proto::Function::PLACE &&
            e.function(0).field() == field_name(axis.radius);
   }));
+}
+
+TEST(Place, AFloorThatIsPressedDownAtOnceIsFound) {
+  const FloorCells small{24, 7, -9};
+  const MeasuredSet set = played([](const Around& a) { return a.trodden_s > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = fitted(fitter);
+  Factor trodden;
+  trodden.shape = Shape::kExponential;
+  trodden.axis = {Covariate::kTrodden, 0};
+  trodden.points = {2, 8, 32};
+  model.terms.push_back(unfitted(trodden));
+  fitter.fit(model, 2);
+  ASSERT_TRUE(shape_memory(fitter, model, 0));
+  const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
+  const FloorCells& cells = model.cells[axis.radius];
+  EXPECT_NEAR(cells.side_mm, small.side_mm, 0.3);
+  EXPECT_LT(off(cells.x_mm, small.x_mm, small.side_mm), 2);
+  EXPECT_LT(off(cells.y_mm, small.y_mm, small.side_mm), 2);
+  const auto gain_after = [&](double seconds) {
+    Situation s = driven_at(0, 0);
+    s.near.trodden_s[axis.radius] = static_cast<float>(seconds);
+    return gain_of(model, s);
+  };
+  for (const double seconds : {4.0, 10.0, 20.0}) EXPECT_NEAR(gain_after(seconds) / gain_after(0.25), 0.7, 0.06);
 }
 
 }  // namespace

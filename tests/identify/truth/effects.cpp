@@ -116,6 +116,17 @@ Effect slower_outside(double strength) {
           {}};
 }
 
+Effect slow_strip(double strength) {
+  return {"slow-strip",
+          "speed is halved where x is between -71 and 58 mm",
+          {{"position"}},
+          {"robot", "measurement"},
+          [=](const Situation& at, Push& push) {
+            if (at.disc.x > -71 && at.disc.x < 58) slow_both(push, 1 - 0.5 * strength);
+          },
+          {}};
+}
+
 Effect grain(double strength) {
   return {"grain",
           "speed is 1 - 0.38 |cos(heading - 0.7)|^5",
@@ -229,6 +240,25 @@ Effect flight(double strength) {
           {}};
 }
 
+Effect wait_behind(double strength) {
+  return {"wait-behind",
+          "speed is 1 / (1 + 0.8 sum of cos(bearing)^2 over others ahead within 80 mm)",
+          {{"neighbours"}},
+          {"position", "time"},
+          [=](const Situation& at, Push& push) {
+            double sum = 0;
+            const double c = std::cos(at.heading_rad), s = std::sin(at.heading_rad);
+            for (std::size_t i = 0; i < at.discs->size(); ++i) {
+              if (static_cast<int>(i) == at.robot) continue;
+              const double x = (*at.discs)[i].x - at.disc.x, y = (*at.discs)[i].y - at.disc.y;
+              const double d = std::hypot(x, y), ahead = x * c + y * s;
+              if (d < 80 && ahead > 0) sum += square(ahead / d);
+            }
+            slow_both(push, 1 / (1 + 0.8 * strength * sum));
+          },
+          {}};
+}
+
 Effect weak_right(double strength) {
   return {"weak-right",
           "turning right, the left wheel runs at 0.72 of its speed and the robot slips back at 1.2 mm/s",
@@ -274,6 +304,17 @@ Effect worn_floor(double strength) {
           {"robot", "neighbours"},
           [=](const Situation& at, Push& push) {
             slow_both(push, 1 - 0.5 * strength * at.trodden_s / (at.trodden_s + 9));
+          },
+          {}};
+}
+
+Effect trodden_floor(double strength) {
+  return {"trodden-floor",
+          "speed is 0.7 where driven robots have stood for more than 2 s on that spot of the floor",
+          {{"history"}},
+          {"robot", "neighbours"},
+          [=](const Situation& at, Push& push) {
+            if (at.trodden_s > 2) slow_both(push, 1 - 0.3 * strength);
           },
           {}};
 }

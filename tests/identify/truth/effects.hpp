@@ -13,6 +13,7 @@ Effect slow_start(double strength = 1);            // a motion begins slowly, ov
 // Of place and direction.
 Effect slow_patch(double strength = 1);      // an oval patch of rough floor
 Effect slower_outside(double strength = 1);  // speed falls towards the rim: what a lens seems to do
+Effect slow_strip(double strength = 1);      // a strip of another floor, across the room
 Effect grain(double strength = 1);           // the floor is slower against its grain
 Effect vortex(double strength = 1);          // air turns about a point of the room
 Effect warming_patch(double strength = 1);   // a patch that gets warm, and slow, within the first minutes
@@ -28,12 +29,14 @@ Effect batteries_of_the_day(double strength = 1);  // every run has another spee
 Effect slow_robots(double strength = 1);  // every third robot is slow, wherever it is
 Effect crowd(double strength = 1);        // robots are slow among others
 Effect flight(double strength = 1);       // robots turn away from the nearest other
+Effect wait_behind(double strength = 1);  // robots are slow behind others
 
 // Of what they are told, and were told.
 Effect weak_right(double strength = 1);      // right turns are slow and slip backwards
 Effect side_slip(double strength = 1);       // robots that go straight slip to their left
 Effect lingering_turn(double strength = 1);  // after a turn robots go on turning
 Effect worn_floor(double strength = 1);      // the floor is polished where robots have been
+Effect trodden_floor(double strength = 1);   // the floor is pressed down at once where robots have been
 
 // Of the tracker.
 Effect lens(double strength = 1);         // a barrel distortion

@@ -90,6 +90,8 @@ const Entry kEntries[] = {
      [] { return with(tidy_lab(), Effects{batteries_of_the_day()}); }},
     {"rim", "position: slower towards the rim, as through a lens",
      [] { return with(tidy_lab(), Effects{slower_outside()}); }},
+    {"strip", "position: a strip of another floor, with straight edges",
+     [] { return with(tidy_lab(), Effects{slow_strip()}); }},
     {"lens", "measurement: a lens", [] { return with(tidy_lab(), Effects{lens()}); }},
     {"pincushion-blind", "measurement: the other lens, no headings",
      [] { return with(blind_lab(), Effects{pincushion()}); }},
@@ -114,10 +116,19 @@ const Entry kEntries[] = {
     {"crowd", "neighbours: robots are slow among others", [] { return with(crowded_lab(), Effects{crowd()}); }},
     {"flight", "neighbours: robots turn away from the nearest",
      [] { return with(crowded_lab(), Effects{flight()}); }},
+    {"ahead", "neighbours: robots are slow behind others",
+     [] { return with(crowded_lab(), Effects{wait_behind()}); }},
     {"linger", "history: after a turn robots go on turning",
      [] { return with(plain_lab(), Effects{lingering_turn()}); }},
     {"worn", "history: the floor is polished where robots have been",
      [] { return with(crowded_lab(), Effects{worn_floor()}); }},
+    {"trodden", "history: the floor is pressed down at once, in small cells that begin elsewhere",
+     [] {
+       Scene s = with(tidy_lab(), Effects{trodden_floor()});
+       s.spot_mm = 20;
+       s.spot_corner = {7, -6};
+       return s;
+     }},
     // Two at once.
     {"fatigue-lens", "motor_time and measurement",
      [] {

@@ -102,6 +102,10 @@ struct Scene {
   double factor_sd = 0.12;  // of f in a step
   double step_s = 0.1;
 
+  // The floor's spots: their side, and a corner of one.
+  double spot_mm = 37;
+  Vec spot_corner;
+
   // Orders: a random walk of stretches, uniform in these ranges; left and right alike often.
   double straight_low_s = 3, straight_high_s = 12, turn_low_s = 0.5, turn_high_s = 5, stop_low_s = 1,
          stop_high_s = 6;

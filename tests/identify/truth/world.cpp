@@ -7,9 +7,8 @@
 namespace kilotwin::truth {
 namespace {
 
-// The floor in spots of a size that no other part of the project uses, over 3 m; beyond, the last spot counts.
-constexpr double kSpot_mm = 37;
-constexpr int kSpots = 81;
+// The floor in spots over 3 m; beyond, the last spot counts.
+constexpr double kFloor_mm = 3000;
 constexpr int kPasses = 4;
 // A robot further out is nowhere: no wall takes it back.
 constexpr double kFarAway_mm = 1e5;
@@ -124,16 +123,18 @@ Memory::Memory(const Scene& scene, int run, const std::vector<std::vector<Order>
     : orders_(&orders),
       run_(run),
       robots_(static_cast<std::size_t>(scene.robots)),
-      trodden_s_(static_cast<std::size_t>(kSpots) * kSpots, 0) {
+      spot_mm_(scene.spot_mm),
+      spot_corner_(scene.spot_corner),
+      spots_(2 * static_cast<int>(kFloor_mm / 2 / scene.spot_mm) + 1),
+      trodden_s_(static_cast<std::size_t>(spots_ * spots_), 0) {
   take_orders();
 }
 
 std::size_t Memory::spot(Vec place) const {
-  const auto index = [](double c) {
-    return static_cast<std::size_t>(
-        std::clamp(static_cast<int>(std::floor(c / kSpot_mm)) + kSpots / 2, 0, kSpots - 1));
+  const auto index = [this](double c) {
+    return std::clamp(static_cast<int>(std::floor(c / spot_mm_)) + spots_ / 2, 0, spots_ - 1);
   };
-  return index(place.x) * kSpots + index(place.y);
+  return static_cast<std::size_t>(index(place.x - spot_corner_.x) * spots_ + index(place.y - spot_corner_.y));
 }
 
 void Memory::take_orders() {

@@ -58,6 +58,9 @@ class Memory {
   int run_;
   double time_s_ = 0;
   std::vector<Robot> robots_;
+  double spot_mm_;
+  Vec spot_corner_;
+  int spots_;                     // along a side of the floor
   std::vector<float> trodden_s_;  // by spot
 };
 

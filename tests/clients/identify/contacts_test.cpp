@@ -1,0 +1,112 @@
+// What is concluded from robots that touch each other, and where such robots come to be.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "clients/identify/fit.hpp"
+#include "clients/identify/futures.hpp"
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr double kSlow = 0.6;
+
+/// Pairs of robots. The second of each rests; the first leans against it and turns on the spot, at kSlow of its speed.
+MeasuredSet held_fast(bool headings) {
+  const Random random(4);
+  const double dt = 0.5, tracker_mm = 0.3, tracker_rad = 0.03;
+  MeasuredSet set;
+  set.has_commands = true;
+  set.has_headings = headings;
+  Run& run = set.runs.emplace_back();
+  for (std::uint32_t r = 0; r < 16; ++r) {
+    Track& track = run.tracks.emplace_back();
+    track.robot = r;
+    track.commands.push_back({-1e300, Motion::kStop});
+    const bool turns = r % 2 == 0;
+    double heading = 0.3 * r;
+    for (int k = 0; k < 240; ++k) {
+      const auto noise = [&](std::uint32_t draw) {
+        return random.normal(Stream::kMeasurementNoise, r, Tick{k}, draw);
+      };
+      if (turns && k % 10 == 0)
+        track.commands.push_back({k * dt, k % 20 == 0 ? Motion::kLeft : Motion::kRight});
+      track.samples.push_back({k * dt, 200.0 * (r / 2) + (turns ? 0 : 33.5) + tracker_mm * noise(0),
+                               tracker_mm * noise(1),
+                               headings ? wrapped_angle(heading + tracker_rad * noise(2)) : std::nan("")});
+      if (turns) heading += (k % 20 < 10 ? 1 : -1) * kSlow * 20 / 25 * dt;
+    }
+  }
+  return set;
+}
+
+/// How fast robots are beside others, by a fit to that; they are as fast as they are told to be elsewhere.
+double gain_beside_others(bool headings) {
+  const MeasuredSet set = held_fast(headings);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  Factor near;
+  near.shape = Factor::Shape::kTaper;
+  near.axis = {Covariate::kNearest, 3};
+  near.high = kNeighbourRadii_mm[3];
+  model.terms.push_back({"effect",
+                         {{Target::kGain, Basis{{near}}, kDriven}},
+                         Eigen::VectorXd::Zero(1),
+                         Eigen::VectorXd::Constant(1, 1)});
+  fitter.fit(model, 4);
+  Situation s;
+  s.commands.command = Motion::kLeft;
+  s.near.nearest_mm = 33.5;
+  return model.rates(s, {0, 0}).right_gain * model.base.turn_mm_s / model.base.wheel_base_mm / 0.8;
+}
+
+TEST(Contacts, HeadingsTellHowWheelsRunBesideOthers) { EXPECT_NEAR(gain_beside_others(true), kSlow, 0.03); }
+
+TEST(Contacts, NothingIsConcludedFromPositionsBesideOthers) { EXPECT_NEAR(gain_beside_others(false), 1, 1e-6); }
+
+TEST(Contacts, ARobotThatPushesOthersComesAsFarAsWithShortSteps) {
+  // One drives against two that rest, the second of them aside.
+  const double dt = 0.01, duration_s = 8;
+  std::vector<double> x{0, 36, 70}, y{0, 5, -6};
+  for (double t = 0; t < duration_s - dt / 2; t += dt) {
+    x[0] += 10 * dt;
+    for (int pass = 0; pass < 50 && push_apart(x, y); ++pass) continue;
+  }
+  identify::Run run;
+  for (std::uint32_t r = 0; r < 3; ++r) {
+    Track& track = run.tracks.emplace_back();
+    track.robot = r;
+    track.commands.push_back({-1e300, r == 0 ? Motion::kStraight : Motion::kStop});
+    const std::array<double, 3> from_x{0, 36, 70}, from_y{0, 5, -6};
+    track.samples.push_back({0, from_x[r], from_y[r], 0});
+  }
+  MotionModel model;
+  model.noise = {1e-12, 1e-12, 1e-12, 1e-12, 1e-8, 1e-10};
+  const RobotBias none{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  std::vector<TrackView> views;
+  std::vector<TrackFilter> filters;
+  for (const Track& track : run.tracks) {
+    views.push_back({&track, 0, 0, track.robot, nullptr, CommandClock(track)});
+    filters.emplace_back(model, none, track.robot, 0);
+    filters.back().start(track.samples.front(), {}, 0, 1e-6);
+  }
+  std::vector<Starting> robots;
+  for (std::size_t r = 0; r < 3; ++r) robots.push_back({&views[r], {&filters[r]}, {1.0}, 0});
+  const std::vector<Foreseen> seen = futures(model, robots, Floors(model), 0, duration_s, 4, false, {1, 2});
+  for (std::size_t r = 0; r < 3; ++r) {
+    EXPECT_NEAR(seen[r].x_mm, x[r], 1.0);
+    EXPECT_NEAR(seen[r].y_mm, y[r], 1.0);
+  }
+}
+
+TEST(Contacts, WhetherDiscsOverlappedIsTold) {
+  std::vector<double> x{0, 40, 70}, y{0, 0, 0};
+  EXPECT_TRUE(push_apart(x, y));
+  EXPECT_NEAR(x[2] - x[1], 33, 1e-9);
+  EXPECT_FALSE(push_apart(x, y));
+}
+
+}  // namespace
+}  // namespace kilotwin::identify
