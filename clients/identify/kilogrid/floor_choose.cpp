@@ -12,7 +12,7 @@ namespace kilotwin::kilogrid {
 namespace {
 
 /// Sets simulated without an effect; and how often the engine simulates the measured runs, to be compared with them.
-constexpr std::size_t kSets = 20, kRepeats = 2;
+constexpr std::size_t kSets = 16, kRepeats = 2;
 constexpr double kWhole_s = std::numeric_limits<double>::infinity();
 
 std::vector<FloorSet> sets_of(const FloorModel& model, const FloorTarget& target, std::uint64_t seed) {
@@ -140,7 +140,7 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
                              chance.evidence(c, in_chances[c]),
                              {first, first + static_cast<std::ptrdiff_t>(candidates[c].parameters.size())}});
     if (choice.scores[c].evidence > choice.scores[choice.best].evidence) choice.best = c;
-    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, gains[c], choice.scores[c].needed);
+    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, gains.of[c], choice.scores[c].needed);
   }
   progress(fmt::format("of {:.0f} ({:.0f} by chance, {} numbers) would remove, of what is beyond chance:{}",
                        choice.misfit, choice.by_chance, choice.numbers, tried));

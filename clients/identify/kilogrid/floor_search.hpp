@@ -10,6 +10,8 @@
 
 namespace kilotwin::kilogrid {
 
+/// Of the fit of a base model.
+inline constexpr int kBaseRounds = 4;
 inline constexpr const char* kWallEffect = "wall";
 
 /// What an effect removed of the misfit when it was asked for last, and what would have been beyond chance.

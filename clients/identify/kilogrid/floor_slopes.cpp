@@ -23,9 +23,8 @@ std::vector<std::vector<double>> design_of(std::size_t parameters, std::size_t p
 
 /// A slope with this variance, less what chance makes of it. Many statistics do not depend on a parameter; what chance makes of
 /// those would only dampen steps.
-double beyond_chance(double slope, double variance) {
-  constexpr double kBeyond = 1;
-  return slope * std::max(0.0, 1 - kBeyond * variance / std::max(slope * slope, 1e-30));
+double beyond_chance(double slope, double variance, double times = 1) {
+  return slope * std::max(0.0, 1 - times * variance / std::max(slope * slope, 1e-30));
 }
 
 std::vector<RobotSums> sums_at(const FloorTarget& target, const FloorSettings& settings, std::size_t which,
@@ -168,9 +167,13 @@ Eigen::MatrixXd slopes_around(const FloorModel& model, const FloorTarget& target
 void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, const FloorTarget& target,
                             const std::vector<std::size_t>& switches, double longest_s, std::uint64_t seed) {
   const std::vector<FloorParameter> parameters = model.parameters();
-  // So many runs tell a switch's slopes: of all that were measured, those of few again with other numbers.
-  constexpr std::size_t kRuns = 8;
-  const std::size_t scenes = target.scenes().size(), runs = std::max(kRuns, scenes) / scenes * scenes;
+  // So much tells a switch's slopes: of all runs that were measured, those of small sets again with other numbers.
+  constexpr double kRobotTime_s = 6e5;
+  double robot_time_s = 0;
+  for (const FloorScene& scene : target.scenes())
+    robot_time_s += std::min(scene.duration_s, longest_s) * static_cast<double>(scene.x_mm.size());
+  const std::size_t scenes = target.scenes().size(),
+                    runs = scenes * std::max<std::size_t>(static_cast<std::size_t>(kRobotTime_s / robot_time_s), 1);
   const std::size_t statistics = statistic_count();
   std::vector<std::vector<RobotSums>> none(runs);
   in_parallel(target.threads(), runs, [&](std::size_t i) {
@@ -180,8 +183,10 @@ void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, co
   for (const auto& run : none) without.add(run);
   in_parallel(target.threads(), switches.size(), [&](std::size_t k) {
     const std::size_t p = switches[k];
+    // What goes both ways is nearly linear, so that a longer step tells more; what only grows need not be.
     std::vector<double> values = model.values;
-    values[p] = std::min(values[p] + parameters[p].width, parameters[p].most);
+    values[p] = std::min(values[p] + (parameters[p].least < 0 ? 2 : 1) * parameters[p].width, parameters[p].most);
+    const double widths = (values[p] - model.values[p]) / parameters[p].width;
     std::vector<std::vector<RobotSums>> on;
     Pooled with(statistics);
     for (std::size_t i = 0; i < runs; ++i) {
@@ -197,9 +202,12 @@ void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, co
           chance += differs * differs;
         }
       }
-      const double slope = with.mean(s) - without.mean(s);
+      const double slope = (with.mean(s) - without.mean(s)) / widths;
+      chance /= widths * widths;
+      // Hundreds of slopes that are chance would together hide the few that are not.
+      constexpr double kTimes = 2;
       if (!std::isfinite(slope + chance)) continue;
-      slopes(static_cast<Eigen::Index>(s), static_cast<Eigen::Index>(p)) = beyond_chance(slope, chance);
+      slopes(static_cast<Eigen::Index>(s), static_cast<Eigen::Index>(p)) = beyond_chance(slope, chance, kTimes);
     }
   });
 }

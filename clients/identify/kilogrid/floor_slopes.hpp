@@ -24,7 +24,7 @@ struct FloorBox {
 [[nodiscard]] Eigen::MatrixXd slopes_around(const FloorModel&, const FloorTarget&, const std::vector<bool>& moves,
                                             double width, double longest_s, std::uint64_t seed);
 
-/// Into `slopes`: of parameters that are 0 in the model, each by itself, a width of it against none in the same runs.
+/// Into `slopes`: of parameters that are 0 in the model, each by itself, against none in the same runs.
 void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel&, const FloorTarget&,
                             const std::vector<std::size_t>& switches, double longest_s, std::uint64_t seed);
 

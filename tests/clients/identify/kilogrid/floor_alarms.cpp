@@ -34,7 +34,7 @@ const std::vector<Cause> kCauses = {
 FloorModel base_of(const FloorTarget& target, std::uint64_t seed) {
   FloorModel model;
   model.add(base_term());
-  fit(model, target, 2, 1, seed, [](const std::string&) {});
+  fit(model, target, kBaseRounds, 1, seed, [](const std::string&) {});
   return model;
 }
 
