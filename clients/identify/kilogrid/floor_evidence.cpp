@@ -117,38 +117,48 @@ double FloorGap::at(const Eigen::VectorXd& steps) const {
   return misfit + 2 * pull.dot(steps) + steps.dot(curve * steps);
 }
 
-FloorChance::FloorChance(const std::vector<std::vector<double>>& gains, const std::vector<std::size_t>& switches)
-    : switches_(switches), scale_(switches.size(), 1) {
+std::vector<double> FloorChance::scales_of(const std::vector<std::vector<double>>& gains, std::size_t but) const {
   // A candidate's scale from its own gains and, as if there were so many more, from those of all.
-  constexpr double kOthers = 10;
-  std::vector<double> sum(switches.size(), 0), count(switches.size(), 0);
-  for (const auto& set : gains) {
-    for (std::size_t c = 0; c < set.size(); ++c) {
+  constexpr double kOthers = 5;
+  std::vector<double> sum(switches_.size(), 0), count(switches_.size(), 0);
+  for (std::size_t b = 0; b < gains.size(); ++b) {
+    for (std::size_t c = 0; c < switches_.size(); ++c) {
       // Where the parameter cannot go below 0, half of the gains are none.
-      if (!(set[c] > 0)) continue;
-      sum[c] += set[c] / static_cast<double>(switches[c]);
+      if (b == but || !(gains[b][c] > 0)) continue;
+      sum[c] += gains[b][c] / static_cast<double>(switches_[c]);
       ++count[c];
     }
   }
   const double all = std::accumulate(sum.begin(), sum.end(), 0.0) /
                      std::max(std::accumulate(count.begin(), count.end(), 0.0), 1.0);
-  for (std::size_t c = 0; c < scale_.size(); ++c)
-    scale_[c] = std::max((sum[c] + kOthers * all) / (count[c] + kOthers), 1e-9);
+  std::vector<double> scales;
+  for (std::size_t c = 0; c < sum.size(); ++c)
+    scales.push_back(std::max((sum[c] + kOthers * all) / (count[c] + kOthers), 1e-9));
+  return scales;
+}
 
+FloorChance::FloorChance(const std::vector<std::vector<double>>& gains, const std::vector<std::size_t>& switches)
+    : switches_(switches) {
   // The largest of many has an extreme-value distribution; of logarithms of probabilities its spread is that of a standard
-  // one, so that some sets tell it better than they would alone.
-  constexpr double kSpread = 1.2825, kLikeKnown = 10, kQuantile = 3.137;  // (4.600 - 0.577) / 1.2825: 1 %
+  // one, so that some sets tell it better than they would alone. Each set is weighed with scales from the others, as a
+  // measured one is.
+  constexpr double kSpread = 1.2825, kLikeKnown = 10;
+  // 1 % are beyond 3.14, (4.600 - 0.577) / 1.2825; the rest is for what so few sets do not tell of the scales.
+  constexpr double kQuantile = 3.5;
   const auto sets = static_cast<double>(gains.size());
   double mean = 0, square = 0;
-  for (const auto& set : gains) {
+  for (std::size_t b = 0; b < gains.size(); ++b) {
+    scale_ = scales_of(gains, b);
     double largest = 0;
-    for (std::size_t c = 0; c < set.size(); ++c) largest = std::max(largest, evidence(c, set[c]));
+    for (std::size_t c = 0; c < switches_.size(); ++c) largest = std::max(largest, evidence(c, gains[b][c]));
     mean += largest / sets;
     square += largest * largest / sets;
   }
   const double variance = std::max(square - mean * mean, 0.0) * sets;
-  const double spread = std::sqrt((variance + kLikeKnown * kSpread * kSpread) / (sets - 1 + kLikeKnown));
+  const double spread =
+      std::max(kSpread, std::sqrt((variance + kLikeKnown * kSpread * kSpread) / (sets - 1 + kLikeKnown)));
   bound_ = mean + kQuantile * spread * std::sqrt(1 + 1 / sets);
+  scale_ = scales_of(gains, gains.size());
 }
 
 double FloorChance::evidence(std::size_t candidate, double gain) const {

@@ -42,6 +42,9 @@ class FloorChance {
   [[nodiscard]] double gain_of(std::size_t candidate, double evidence) const;
 
  private:
+  /// From all sets but one.
+  [[nodiscard]] std::vector<double> scales_of(const std::vector<std::vector<double>>& gains, std::size_t but) const;
+
   std::vector<std::size_t> switches_;
   std::vector<double> scale_;  ///< of the chi-square distribution that a candidate's gains have
   double bound_ = 0;

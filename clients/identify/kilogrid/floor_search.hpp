@@ -11,7 +11,7 @@
 namespace kilotwin::kilogrid {
 
 /// Of the fit of a base model.
-inline constexpr int kBaseRounds = 4;
+inline constexpr int kBaseRounds = 3;
 inline constexpr const char* kWallEffect = "wall";
 
 /// What an effect removed of the misfit when it was asked for last, and what would have been beyond chance.
