@@ -20,10 +20,10 @@ struct CandidateScore {
 struct Choice {
   std::vector<CandidateScore> scores;  ///< of each candidate
   std::size_t best = 0;                ///< with the most evidence
-  double bound = 0;                    ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
-  double misfit = 0;                   ///< where the model stands, refitted, with correlations
-  double by_chance = 0;                ///< that of sets that the model made
-  std::size_t numbers = 0;             ///< that it is of
+  double bound = 0;         ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
+  double misfit = 0;        ///< where the model stands, refitted, with correlations
+  double by_chance = 0;     ///< that of sets that the model made
+  std::size_t numbers = 0;  ///< that it is of
 
   [[nodiscard]] bool found() const { return !scores.empty() && scores[best].evidence > bound; }
 };

@@ -14,7 +14,7 @@ namespace kilotwin::kilogrid {
 struct FloorGap {
   Eigen::MatrixXd curve;  ///< per pair of parameters
   Eigen::VectorXd pull;
-  double misfit = 0;      ///< where the model stands
+  double misfit = 0;  ///< where the model stands
   std::size_t numbers = 0;
 
   /// `correlation` of statistics in sets like these.

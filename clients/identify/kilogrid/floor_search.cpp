@@ -57,8 +57,7 @@ class Search {
 
   void add(const FloorTerm& term, const std::vector<double>& values) {
     found_.model.add(term);
-    std::copy(values.begin(), values.end(),
-              found_.model.values.end() - static_cast<std::ptrdiff_t>(values.size()));
+    std::copy(values.begin(), values.end(), found_.model.values.end() - static_cast<std::ptrdiff_t>(values.size()));
   }
 
   /// Effects that came before others, asked once more: each against a model that was fitted without it.
@@ -73,8 +72,8 @@ class Search {
       EffectGain& gain = found_.gains[e];
       gain = {term.name, choice.scores[0].gain, choice.scores[0].needed};
       if (choice.found()) continue;
-      found_.rejected.push_back({gain, term.covariates, term.acts_on,
-                                 "beside the other effects the model fits as well without it"});
+      found_.rejected.push_back(
+          {gain, term.covariates, term.acts_on, "beside the other effects the model fits as well without it"});
       found_.model = less;
       found_.gains.erase(found_.gains.begin() + static_cast<std::ptrdiff_t>(e));
     }

@@ -39,13 +39,16 @@ class Lines {
  public:
   /// `x`: a column per run, then the parameters'; `moving`: of those, how many are not 0 throughout.
   Lines(Eigen::MatrixXd x, Eigen::Index scenes, std::size_t moving)
-      : x_(std::move(x)), scenes_(scenes), fitted_(scenes + static_cast<Eigen::Index>(moving)), all_(inverse_of(x_)) {}
+      : x_(std::move(x)),
+        scenes_(scenes),
+        fitted_(scenes + static_cast<Eigen::Index>(moving)),
+        all_(inverse_of(x_)) {}
 
   /// Slopes less what chance makes of them; none where too little is known.
   Eigen::VectorXd slopes(const std::vector<double>& y) const {
     const auto rows = static_cast<Eigen::Index>(y.size()), columns = x_.cols() - scenes_;
-    const auto known = static_cast<Eigen::Index>(
-        std::count_if(y.begin(), y.end(), [](double v) { return std::isfinite(v); }));
+    const auto known =
+        static_cast<Eigen::Index>(std::count_if(y.begin(), y.end(), [](double v) { return std::isfinite(v); }));
     if (known == rows) return line(x_, all_, Eigen::Map<const Eigen::VectorXd>(y.data(), rows));
     constexpr Eigen::Index kSpare = 5;
     if (known < fitted_ + kSpare) return Eigen::VectorXd::Zero(columns);
@@ -118,8 +121,7 @@ std::vector<double> moved(const FloorModel& model, const std::vector<double>& st
   std::vector<double> to;
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     const FloorParameter& parameter = parameters[p];
-    to.push_back(
-        std::clamp(model.values[p] + steps[p] * width * parameter.width, parameter.least, parameter.most));
+    to.push_back(std::clamp(model.values[p] + steps[p] * width * parameter.width, parameter.least, parameter.most));
   }
   return to;
 }

@@ -30,8 +30,7 @@ Fitted fitted(FloorModel model, const FloorSet& set, int rounds, const Simulate&
   if (!model.wall) model.wall.emplace().fill(1);
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < kRimParts; ++i) {
-      const double ratio =
-          (at.value[group.first + i] + kSome) / (set.statistics.value[group.first + i] + kSome);
+      const double ratio = (at.value[group.first + i] + kSome) / (set.statistics.value[group.first + i] + kSome);
       (*model.wall)[i] = std::clamp((*model.wall)[i] * std::pow(ratio, kPower), kSlowest, kFastest);
     }
     at = simulate(model, 1 + static_cast<std::uint64_t>(round));
@@ -75,10 +74,9 @@ double beyond_chance(const FloorModel& model, const FloorTarget& target, int rou
 
 WallGain fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed,
                    const FloorProgress& progress) {
-  const Fitted walls =
-      fitted(model, target.set(), rounds, [&](const FloorModel& of, std::uint64_t number) {
-        return simulated_statistics(target, of.settings(), seed + number);
-      });
+  const Fitted walls = fitted(model, target.set(), rounds, [&](const FloorModel& of, std::uint64_t number) {
+    return simulated_statistics(target, of.settings(), seed + number);
+  });
   progress(fmt::format("beside walls: misfit {:.0f} -> {:.0f}", walls.before, walls.after));
   WallGain gain{walls.before - walls.after, 0};
   if (gain.gain <= 0) return gain;

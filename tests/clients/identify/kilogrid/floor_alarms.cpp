@@ -42,7 +42,8 @@ FloorModel base_of(const FloorTarget& target, std::uint64_t seed) {
 
 int main(int argc, char** argv) {
   const auto given = [&](int at, int otherwise) { return argc > at ? std::atoi(argv[at]) : otherwise; };
-  const int sets = given(1, 12), robots = given(2, 40), seconds = given(3, 1500), runs = given(4, 3), begin = given(5, 0);
+  const int sets = given(1, 12), robots = given(2, 40), seconds = given(3, 1500), runs = given(4, 3),
+            begin = given(5, 0);
   const std::vector<std::string> wanted(argv + std::min(argc, 6), argv + argc);
   for (const Cause& cause : kCauses) {
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), cause.name) == wanted.end()) continue;
@@ -55,8 +56,9 @@ int main(int argc, char** argv) {
       const auto progress = [](double, const std::string& what) {
         if (std::getenv("FLOOR_ALARMS_VERBOSE") != nullptr) fmt::print("  {}\n", what);
       };
-      const FloorFound found = search_effects(base_of(target, static_cast<std::uint64_t>(set + 1)), target,
-                                              candidate_terms({}), progress, [](const std::string&, const FloorModel&) {});
+      const FloorFound found =
+          search_effects(base_of(target, static_cast<std::uint64_t>(set + 1)), target, candidate_terms({}),
+                         progress, [](const std::string&, const FloorModel&) {});
       std::string line = fmt::format("{} {}: found", cause.name, set);
       bool named = false, others = false;
       for (const EffectGain& effect : found.gains) {
