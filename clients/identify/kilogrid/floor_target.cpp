@@ -62,6 +62,12 @@ Unlike unlike_of(const std::vector<FloorStatistics>& runs, std::size_t run, std:
   return {off * off / (variance * (1 + 1 / count) + runs[run].variance[s] + kExact * kExact * mean * mean), mean};
 }
 
+std::vector<std::vector<RobotSums>> sums_of(const std::vector<FloorRun>& runs, const Floor& floor) {
+  std::vector<std::vector<RobotSums>> sums;
+  for (const FloorRun& run : runs) sums.push_back(robot_sums(run, floor));
+  return sums;
+}
+
 }  // namespace
 
 void in_parallel(std::uint32_t threads_to_use, std::size_t n, const std::function<void(std::size_t)>& work) {
@@ -104,19 +110,16 @@ std::vector<UnlikeRun> unlike_runs(const std::vector<FloorRun>& runs, const Floo
   return unlike;
 }
 
-FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor, std::uint32_t threads)
-    : floor_(floor), threads_(threads), later_(order_of_listening(runs, floor)) {
+FloorSet::FloorSet(std::vector<std::vector<RobotSums>> sums) : runs(std::move(sums)) {
   std::vector<RobotSums> all;
   std::vector<FloorStatistics> each;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    scenes_.push_back(scene_of(runs[i], floor, i + 1));
-    const std::vector<RobotSums> sums = robot_sums(runs[i], floor);
-    each.push_back(statistics_of(sums));
-    all.insert(all.end(), sums.begin(), sums.end());
+  for (const std::vector<RobotSums>& run : runs) {
+    each.push_back(statistics_of(run));
+    all.insert(all.end(), run.begin(), run.end());
   }
-  statistics_ = statistics_of(all);
+  statistics = statistics_of(all);
   for (std::size_t s = 0; s < statistic_count(); ++s) {
-    const double mean = statistics_.value[s];
+    const double mean = statistics.value[s];
     double spread = 0, count = 0;
     for (const FloorStatistics& run : each) {
       if (!std::isfinite(run.value[s])) continue;
@@ -124,29 +127,34 @@ FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor, 
       ++count;
     }
     const double between = count > 1 ? spread / (count - 1) / count : 0;
-    tolerance_.push_back(std::max(statistics_.variance[s], between) + kExact * kExact * mean * mean);
+    tolerance.push_back(std::max(statistics.variance[s], between) + kExact * kExact * mean * mean);
   }
+}
+
+double FloorSet::misfit(const FloorStatistics& simulated, const StatisticGroup& group) const {
+  double sum = 0;
+  for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
+    const double off = simulated.value[s] - statistics.value[s];
+    const double variance = tolerance[s] + simulated.variance[s];
+    if (std::isfinite(off) && variance > 0) sum += off * off / variance;
+  }
+  return sum;
+}
+
+double FloorSet::misfit(const FloorStatistics& simulated) const {
+  double sum = 0;
+  for (const StatisticGroup& group : statistic_groups()) sum += misfit(simulated, group);
+  return sum;
+}
+
+FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor, std::uint32_t threads)
+    : floor_(floor), threads_(threads), set_(sums_of(runs, floor)), later_(order_of_listening(runs, floor)) {
+  for (std::size_t i = 0; i < runs.size(); ++i) scenes_.push_back(scene_of(runs[i], floor, i + 1));
 }
 
 std::size_t FloorTarget::size() const {
   return static_cast<std::size_t>(
-      std::count_if(tolerance_.begin(), tolerance_.end(), [](double t) { return t > 0; }));
-}
-
-double FloorTarget::misfit(const FloorStatistics& simulated, const StatisticGroup& group) const {
-  double sum = 0;
-  for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
-    const double off = simulated.value[s] - statistics_.value[s];
-    const double tolerance = tolerance_[s] + simulated.variance[s];
-    if (std::isfinite(off) && tolerance > 0) sum += off * off / tolerance;
-  }
-  return sum;
-}
-
-double FloorTarget::misfit(const FloorStatistics& simulated) const {
-  double sum = 0;
-  for (const StatisticGroup& group : statistic_groups()) sum += misfit(simulated, group);
-  return sum;
+      std::count_if(tolerance().begin(), tolerance().end(), [](double t) { return t > 0; }));
 }
 
 std::vector<FloorRun> simulate_scenes(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,

@@ -20,6 +20,19 @@ struct UnlikeRun {
 /// Of four runs or more.
 [[nodiscard]] std::vector<UnlikeRun> unlike_runs(const std::vector<FloorRun>&, const Floor&);
 
+/// Runs as what they have in common, to be compared with others.
+struct FloorSet {
+  std::vector<std::vector<RobotSums>> runs;
+  FloorStatistics statistics;
+  /// What a perfect model's statistics would differ by, squared: chance among robots, and differences among runs.
+  std::vector<double> tolerance;
+
+  explicit FloorSet(std::vector<std::vector<RobotSums>>);
+  /// How many times the tolerance the statistics lie off, squared and summed; of one group, or of all.
+  [[nodiscard]] double misfit(const FloorStatistics&) const;
+  [[nodiscard]] double misfit(const FloorStatistics&, const StatisticGroup&) const;
+};
+
 /// Measured runs, as what is fitted to.
 class FloorTarget {
  public:
@@ -28,15 +41,16 @@ class FloorTarget {
   [[nodiscard]] std::uint32_t threads() const { return threads_; }
 
   [[nodiscard]] const std::vector<FloorScene>& scenes() const { return scenes_; }
-  [[nodiscard]] const FloorStatistics& statistics() const { return statistics_; }
-  /// What a perfect model's statistics would differ by, squared: chance among robots, and differences among runs.
-  [[nodiscard]] const std::vector<double>& tolerance() const { return tolerance_; }
+  [[nodiscard]] const FloorSet& set() const { return set_; }
+  [[nodiscard]] const FloorStatistics& statistics() const { return set_.statistics; }
+  [[nodiscard]] const std::vector<double>& tolerance() const { return set_.tolerance; }
   [[nodiscard]] const Floor& floor() const { return floor_; }
   /// By which of its cells a module hears a robot next, counted from the last: chances of 0..3; that of 0 is not known yet.
   [[nodiscard]] const std::array<double, 4>& later() const { return later_; }
-  /// How many times the tolerance the statistics lie off, squared and summed; of one group, or of all.
-  [[nodiscard]] double misfit(const FloorStatistics&) const;
-  [[nodiscard]] double misfit(const FloorStatistics&, const StatisticGroup&) const;
+  [[nodiscard]] double misfit(const FloorStatistics& of) const { return set_.misfit(of); }
+  [[nodiscard]] double misfit(const FloorStatistics& of, const StatisticGroup& group) const {
+    return set_.misfit(of, group);
+  }
   /// How many statistics there are.
   [[nodiscard]] std::size_t size() const;
 
@@ -44,8 +58,7 @@ class FloorTarget {
   Floor floor_;
   std::uint32_t threads_;
   std::vector<FloorScene> scenes_;
-  FloorStatistics statistics_;
-  std::vector<double> tolerance_;
+  FloorSet set_;
   std::array<double, 4> later_;
 };
 

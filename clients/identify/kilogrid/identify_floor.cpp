@@ -7,9 +7,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "clients/identify/kilogrid/floor_fit.hpp"
 #include "clients/identify/kilogrid/floor_judge.hpp"
 #include "clients/identify/kilogrid/floor_plots.hpp"
+#include "clients/identify/kilogrid/floor_search.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::kilogrid {
@@ -17,13 +17,6 @@ namespace {
 
 using identify::Identified, identify::Options;
 using nlohmann::json;
-
-/// What an effect has to remove of the misfit to be tried, and what the model has to lose without it to be kept. In three small
-/// sets simulated without an effect the largest were 113, 50 and 165 (tests/clients/identify/kilogrid/floor_alarms.cpp): long
-/// runs of a hundred robots are needed for it to be beyond chance.
-constexpr double kLeastGain = 120;
-constexpr std::size_t kMostAdded = 4, kRoundsOfEffects = 2;
-constexpr const char* kWall = "wall";
 
 std::string words_of(const FloorModel& model, std::size_t term) {
   const double* v = model.values.data() + model.first_of(term);
@@ -49,7 +42,7 @@ FloorModel without(const FloorModel& model, std::size_t effect) {
 }
 std::size_t effects_of(const FloorModel& model) { return model.terms.size() - 1 + (model.wall ? 1 : 0); }
 std::string name_of(const FloorModel& model, std::size_t effect) {
-  return effect + 1 < model.terms.size() ? model.terms[effect + 1].name : kWall;
+  return effect + 1 < model.terms.size() ? model.terms[effect + 1].name : kWallEffect;
 }
 
 std::vector<std::string> covariates_of(const FloorModel& model, std::size_t effect) {
@@ -156,64 +149,30 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   FloorModel model;
   model.add(base_term());
   part = 0.02;
-  fit(model, learned, 2, 1, 1, progress);
+  fit(model, learned, kBaseRounds, 1, 1, progress);
   const FloorModel base = model;
   note("base", model);
 
-  std::vector<FloorTerm> candidates = candidate_terms(floor);
   json effects = json::array(), rejected = json::array(), ambiguous = json::array();
+  std::vector<EffectGain> gains;
   if (options.trace) {
-    for (std::size_t round = 0; round < kRoundsOfEffects; ++round) {
-      part = 0.15 + 0.3 * static_cast<double>(round);
-      std::vector<double> gains;
-      std::vector<CandidateScore> chosen =
-          choose(model, candidates, learned, kLeastGain, 50 + round, progress, &gains);
-      chosen.resize(std::min(chosen.size(), kMostAdded));
-      std::string names;
-      std::vector<std::size_t> taken;
-      for (const CandidateScore& score : chosen) {
-        model.add(candidates[score.candidate]);
-        std::copy(score.values.begin(), score.values.end(),
-                  model.values.end() - static_cast<std::ptrdiff_t>(score.values.size()));
-        names += (names.empty() ? "" : ", ") + candidates[score.candidate].name;
-        taken.push_back(score.candidate);
-      }
-      rejected = json::array();
-      for (std::size_t c = 0; c < candidates.size(); ++c) {
-        if (std::find(taken.begin(), taken.end(), c) != taken.end()) continue;
-        rejected.push_back({{"name", candidates[c].name},
-                            {"covariates", candidates[c].covariates},
-                            {"acts_on", candidates[c].acts_on},
-                            {"misfit_gain", gains[c]},
-                            {"misfit_gain_needed", kLeastGain},
-                            {"why", fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance",
-                                                gains[c], kLeastGain)}});
-      }
-      if (chosen.empty()) break;
-      std::sort(taken.rbegin(), taken.rend());
-      for (const std::size_t c : taken) candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(c));
-      fit(model, learned, round == 0 ? 3 : 2, round == 0 ? 1 : 0.7, 100 + round, progress);
-      note(names, model);
-    }
-    part = 0.65;
-    fit_walls(model, learned, 2, 6000, kLeastGain, progress);
-    if (model.wall) note(kWall, model);
-
-    // Each effect must earn its place.
-    part = 0.7;
-    double with = learned.misfit(simulated_statistics(learned, model.settings(), 77));
-    for (std::size_t e = effects_of(model); e-- > 0;) {
-      const FloorModel less = without(model, e);
-      const double misfit = learned.misfit(simulated_statistics(learned, less.settings(), 77));
-      progress(fmt::format("without {}: misfit {:.0f} against {:.0f}", name_of(model, e), misfit, with));
-      if (misfit > with + kLeastGain) continue;
-      rejected.push_back({{"name", name_of(model, e)},
-                          {"covariates", covariates_of(model, e)},
-                          {"why", "beside the other effects the model fits as well without it"}});
-      model = less;
-      with = misfit;
-    }
-    if (effects_of(model) > 0) fit(model, learned, 1, 0.5, 300, progress);
+    const double from = 0.15, to = 0.85;
+    FloorFound found = search_effects(
+        base, learned, candidate_terms(floor),
+        [&](double done, const std::string& what) {
+          part = from + (to - from) * done;
+          progress(what);
+        },
+        note);
+    model = std::move(found.model);
+    gains = std::move(found.gains);
+    for (const RejectedEffect& effect : found.rejected)
+      rejected.push_back({{"name", effect.gain.name},
+                          {"covariates", effect.covariates},
+                          {"acts_on", effect.acts_on},
+                          {"misfit_gain", effect.gain.gain},
+                          {"misfit_gain_needed", effect.gain.needed},
+                          {"why", effect.why}});
   }
 
   part = 0.85;
@@ -226,7 +185,7 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   const double misfit_before = held_out.misfit(out_before), misfit_after = held_out.misfit(out_after);
   for (std::size_t e = 0; e < effects_of(model); ++e) {
     const FloorModel less = without(model, e);
-    const bool is_wall = name_of(model, e) == kWall;
+    const bool is_wall = name_of(model, e) == kWallEffect;
     const double misfit = held_out.misfit(simulated_statistics(held_out, less.settings(), 79));
     const Judged lesser = judge(test, floor, less.settings(), options.horizon_s, nullptr);
     json parameters;
@@ -246,14 +205,18 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
          {"covariates", covariates_of(model, e)},
          {"acts_on", is_wall ? "WHEEL_GAIN" : model.terms[e + 1].acts_on},
          {"evidence",
-          {{"held_out_misfit_without", misfit},
+          {{"misfit_gain", gains[e].gain},
+           {"misfit_gain_needed", gains[e].needed},
+           {"held_out_misfit_without", misfit},
            {"held_out_misfit", misfit_after},
            {"log_likelihood_gain", after.log_likelihood - lesser.log_likelihood}}},
          {"parameters", parameters},
          {"rmse_without_mm", lesser.rmse_mm()},
          {"share_removed", (misfit - misfit_after) / std::max(misfit_before - misfit_after, 1e-9)},
          {"facts",
-          {{"misfit on runs held out", fmt::format("{:.0f} without it, {:.0f} with it", misfit, misfit_after)},
+          {{"misfit of runs learned from",
+            fmt::format("lowered by {:.0f}; {:.0f} is beyond chance", gains[e].gain, gains[e].needed)},
+           {"misfit on runs held out", fmt::format("{:.0f} without it, {:.0f} with it", misfit, misfit_after)},
            {"cells 10 s ahead",
             fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after.rmse_mm())},
            {"likelihood of cells", fmt::format("{:+.0f} nat with it, to a filter that follows one robot",
@@ -262,7 +225,7 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
     progress(fmt::format("{}: misfit {:.0f} without it, {:.0f} with it", name_of(model, e), misfit, misfit_after));
   }
   if (model.wall)
-    ambiguous.push_back({{"found", kWall},
+    ambiguous.push_back({{"found", kWallEffect},
                          {"instead", "messages of the rim that make robots turn away for longer at some places"},
                          {"experiment", "let robots drive along the wall with the rim's messages switched off"}});
   std::stable_sort(effects.begin(), effects.end(),

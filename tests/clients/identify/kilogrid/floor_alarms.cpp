@@ -1,52 +1,81 @@
 // How often the search for effects on a floor finds one where there is none, and whether it names one that is there: on sets by
-// a generator of its own (plain_floor.hpp). floor_alarms [SETS] [ROBOTS] [SECONDS]
+// a generator of its own (plain_floor.hpp). floor_alarms SETS ROBOTS SECONDS RUNS [FIRST-SET] [CAUSE...]; without causes, all.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdlib>
+#include <string>
 
-#include "clients/identify/kilogrid/floor_fit.hpp"
+#include "clients/identify/kilogrid/floor_search.hpp"
 #include "tests/clients/identify/kilogrid/plain_floor.hpp"
 
+namespace {
+
+using namespace kilotwin::kilogrid;
+
+struct Cause {
+  test::Truth truth;
+  const char* name;
+  std::vector<std::string> named;  ///< effects that say so
+};
+
+const std::vector<Cause> kCauses = {
+    {test::Truth::kNothing, "nothing", {}},
+    {test::Truth::kTwoKindsOfRobots, "two-kinds", {"speed-of-robots"}},
+    {test::Truth::kCaughtByWalls, "caught-by-walls", {"stuck-beside-walls", "wall"}},
+    {test::Truth::kDeadPatch, "dead-patch", {"slope-of-speed", "middle"}},
+    {test::Truth::kSlowerAtHalfTime, "half-time", {"slowing"}},
+    {test::Truth::kTired, "tired", {"slowing"}},
+    {test::Truth::kSlowCorner, "slow-corner", {"slope-of-speed", "middle"}},
+    {test::Truth::kDriftInTheMiddle, "drift", {"drift"}},
+    {test::Truth::kTurningSpells, "turning-spells", {"wandering-turn", "turning-of-robots"}},
+    {test::Truth::kSlowInCrowds, "slow-in-crowds", {"crowd"}}};
+
+FloorModel base_of(const FloorTarget& target, std::uint64_t seed) {
+  FloorModel model;
+  model.add(base_term());
+  fit(model, target, kBaseRounds, 1, seed, [](const std::string&) {});
+  return model;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  using namespace kilotwin::kilogrid;
   const auto given = [&](int at, int otherwise) { return argc > at ? std::atoi(argv[at]) : otherwise; };
-  const int sets = given(1, 20), robots = given(2, 40), seconds = given(3, 1500);
-  const struct {
-    test::Truth truth;
-    const char *name, *cause;
-  } truths[] = {{test::Truth::kNothing, "nothing", ""},
-                {test::Truth::kTwoKindsOfRobots, "two kinds of robots", "robot"},
-                {test::Truth::kCaughtByWalls, "caught by walls", "position"},
-                {test::Truth::kDeadPatch, "dead patch", "position"},
-                {test::Truth::kSlowerAtHalfTime, "slower at half time", "time"}};
-  for (const auto& truth : truths) {
-    const int repeats = truth.truth == test::Truth::kNothing ? sets : std::max(sets / 10, 1);
-    for (int set = 0; set < repeats; ++set) {
-      std::vector<FloorRun> runs;
-      for (int r = 0; r < 3; ++r)
-        runs.push_back(test::play(truth.truth, static_cast<std::size_t>(robots), seconds,
-                                  static_cast<std::uint64_t>(1000 * set + r + 1)));
-      const FloorTarget target(runs, {});
-      FloorModel model;
-      model.add(base_term());
-      const auto quiet = [](const std::string&) {};
-      const auto seed = static_cast<std::uint64_t>(set + 1);
-      fit(model, target, 2, 0.7, seed, quiet);
-      const std::vector<FloorTerm> candidates = candidate_terms({});
-      std::vector<double> gains;
-      const auto chosen = choose(model, candidates, target, 1e9, seed, quiet, &gains);
-      std::vector<std::size_t> order(gains.size());
-      for (std::size_t c = 0; c < order.size(); ++c) order[c] = c;
-      std::stable_sort(order.begin(), order.end(),
-                       [&](std::size_t a, std::size_t b) { return gains[a] > gains[b]; });
-      fmt::print("{} {}:", truth.name, set);
-      for (std::size_t k = 0; k < 4; ++k) fmt::print(" {} {:.0f}", candidates[order[k]].name, gains[order[k]]);
-      const auto& first = candidates[order[0]].covariates;
-      if (*truth.cause != 0)
-        fmt::print(" - {}",
-                   std::find(first.begin(), first.end(), truth.cause) != first.end() ? "named" : "not named");
-      fmt::print("\n");
+  const int sets = given(1, 12), robots = given(2, 40), seconds = given(3, 1500), runs = given(4, 3),
+            begin = given(5, 0);
+  const std::vector<std::string> wanted(argv + std::min(argc, 6), argv + argc);
+  for (const Cause& cause : kCauses) {
+    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), cause.name) == wanted.end()) continue;
+    for (int set = begin; set < begin + sets; ++set) {
+      std::vector<FloorRun> played;
+      for (int r = 0; r < runs; ++r)
+        played.push_back(test::play(cause.truth, static_cast<std::size_t>(robots), seconds,
+                                    static_cast<std::uint64_t>(1000 * set + r + 1)));
+      const FloorTarget target(played, {});
+      const auto progress = [](double, const std::string& what) {
+        if (std::getenv("FLOOR_ALARMS_VERBOSE") != nullptr) fmt::print("  {}\n", what);
+      };
+      const FloorFound found =
+          search_effects(base_of(target, static_cast<std::uint64_t>(set + 1)), target, candidate_terms({}),
+                         progress, [](const std::string&, const FloorModel&) {});
+      std::string line = fmt::format("{} {}: found", cause.name, set);
+      bool named = false, others = false;
+      for (const EffectGain& effect : found.gains) {
+        const bool says = std::find(cause.named.begin(), cause.named.end(), effect.name) != cause.named.end();
+        (says ? named : others) = true;
+        line += fmt::format(" {} {:.0f}/{:.0f}", effect.name, effect.gain, effect.needed);
+      }
+      if (found.gains.empty()) line += " nothing";
+      // What came nearest of those that were not.
+      const auto share = [](const RejectedEffect& e) { return e.gain.gain / std::max(e.gain.needed, 1e-9); };
+      const auto next = std::max_element(found.rejected.begin(), found.rejected.end(),
+                                         [&](const auto& a, const auto& b) { return share(a) < share(b); });
+      if (next != found.rejected.end())
+        line += fmt::format("; next {} {:.0f}/{:.0f}", next->gain.name, next->gain.gain, next->gain.needed);
+      if (!cause.named.empty()) line += named ? " - named" : " - not named";
+      if (others) line += cause.named.empty() ? " - FALSE ALARM" : ", and others";
+      fmt::print("{}\n", line);
       std::fflush(stdout);
     }
   }

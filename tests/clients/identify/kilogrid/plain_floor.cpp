@@ -19,7 +19,8 @@ struct Point {
   double sum = 0, reading = 0, before = 0;
   int readings = 0;
   bool fresh = false, at_wall = false;
-  double held_s = 0;
+  double held_s = 0, spell_s = 0, spell_rad_s = 0;
+  int near = 0;
 };
 
 class Play {
@@ -47,6 +48,7 @@ class Play {
 
   FloorRun go() {
     for (double now_s = 0; now_s < duration_s_; now_s += kStep_s) {
+      if (truth_ == Truth::kSlowInCrowds) count_near();
       for (std::size_t i = 0; i < points_.size(); ++i) {
         Point& p = points_[i];
         hear_rim(p, now_s);
@@ -123,13 +125,33 @@ class Play {
     }
   }
 
+  void count_near() {
+    for (Point& p : points_) p.near = -1;  // itself
+    for (Point& p : points_) {
+      for (const Point& other : points_) p.near += std::hypot(p.x - other.x, p.y - other.y) < 90 ? 1 : 0;
+    }
+  }
+
   double speed_there(const Point& p, double now_s) const {
     if (truth_ == Truth::kSlowerAtHalfTime) return now_s > duration_s_ / 2 ? 0.75 : 1;
     if (truth_ == Truth::kDeadPatch) {
       const double a = (p.x - 350) / 300, b = (p.y - 800) / 600;
       return a * a + b * b < 1 ? 0.5 : 1;
     }
+    if (truth_ == Truth::kTired) return 1 - 0.35 * std::sqrt(now_s / duration_s_);
+    if (truth_ == Truth::kSlowCorner) return std::hypot(p.x, p.y) < 600 ? 0.4 : 1;
+    if (truth_ == Truth::kSlowInCrowds) return p.near >= 2 ? 0.5 : 1;
     return p.factor;
+  }
+
+  double spell(Point& p) {
+    p.spell_s -= kStep_s;
+    if (p.spell_s < 0) {
+      p.spell_s = 40 + 80 * uniform();
+      const double kind = uniform();
+      p.spell_rad_s = kind < 0.5 ? 0 : kind < 0.75 ? 0.12 : -0.12;
+    }
+    return p.spell_rad_s;
   }
 
   void move(Point& p, double now_s) {
@@ -147,12 +169,15 @@ class Play {
     left = (left + p.left_bias) * (1 + spread * normal()) * k;
     right = (right + p.right_bias) * (1 + spread * normal()) * k;
     // The point between the legs moves along the mean of both headings.
-    const double turn = (right - left) / kBase * kStep_s, way = (left + right) / 2 * kStep_s;
+    double turn = (right - left) / kBase * kStep_s;
+    if (truth_ == Truth::kTurningSpells) turn += spell(p) * kStep_s;
+    const double drift = truth_ == Truth::kDriftInTheMiddle ? 1.5 * std::sin(3.14159265 * p.x / kWidth) : 0;
+    const double way = (left + right) / 2 * kStep_s;
     const double legs_x = p.x - kAxle * std::cos(p.heading) + way * std::cos(p.heading + turn / 2);
     const double legs_y = p.y - kAxle * std::sin(p.heading) + way * std::sin(p.heading + turn / 2);
     p.heading += turn;
     p.x = std::clamp(legs_x + kAxle * std::cos(p.heading), kRobot, kWidth - kRobot);
-    p.y = std::clamp(legs_y + kAxle * std::sin(p.heading), kRobot, kHeight - kRobot);
+    p.y = std::clamp(legs_y + kAxle * std::sin(p.heading) + drift * kStep_s, kRobot, kHeight - kRobot);
   }
 
   void report(Point& p, double now_s, FloorTrack& track) {

@@ -15,6 +15,11 @@ enum class Truth {
   kCaughtByWalls,     ///< who comes to a wall is held for 40 to 200 s with a chance of 0.25
   kDeadPatch,         ///< an ellipse off the middle in which everybody goes at half the speed
   kSlowerAtHalfTime,  ///< at half of the run speeds fall to 0.75, at once
+  kTired,             ///< speeds fall with the square root of time, to 0.65 at the end
+  kSlowCorner,        ///< within 600 mm of the corner at the origin everybody goes at 0.4 of the speed
+  kDriftInTheMiddle,  ///< along y, at 1.5 mm/s in the middle between the long walls, falling to nothing there
+  kTurningSpells,     ///< robots turn to one side by 0.12 rad/s for spells of 40 to 120 s, half of the time
+  kSlowInCrowds,      ///< with two others or more within 90 mm a robot goes at half the speed
 };
 
 /// `robots` on the floor for `duration_s`.

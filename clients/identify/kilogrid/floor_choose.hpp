@@ -1,0 +1,36 @@
+/// Which effect a model of the floor lacks most, and whether that is beyond chance.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "clients/identify/kilogrid/floor_fit.hpp"
+
+namespace kilotwin::kilogrid {
+
+/// What the neighbourhood of a model says about a candidate.
+struct CandidateScore {
+  double gain = 0;             ///< by how much it would lower the misfit, with the model refitted
+  double needed = 0;           ///< that much is beyond chance
+  double evidence = 0;         ///< negative logarithm of the chance of such a gain
+  std::vector<double> values;  ///< of its parameters
+};
+
+struct Choice {
+  std::vector<CandidateScore> scores;  ///< of each candidate
+  std::size_t best = 0;                ///< with the most evidence
+  double bound = 0;         ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
+  double misfit = 0;        ///< where the model stands, refitted, with correlations
+  double by_chance = 0;     ///< that of sets that the model made
+  std::size_t numbers = 0;  ///< that it is of
+
+  [[nodiscard]] bool found() const { return !scores.empty() && scores[best].evidence > bound; }
+};
+
+/// Weighs each candidate that the model lacks against sets simulated by the model: as many runs and robots as measured, from
+/// the same places, as long.
+[[nodiscard]] Choice choose(const FloorModel&, const std::vector<FloorTerm>& candidates, const FloorTarget&,
+                            std::uint64_t seed, const FloorProgress&);
+
+}  // namespace kilotwin::kilogrid
