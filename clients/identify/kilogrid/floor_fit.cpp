@@ -64,7 +64,8 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const Floo
                   const std::vector<bool>& moves, double width, std::uint64_t seed) {
   const std::vector<FloorParameter> parameters = model.parameters();
   const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
-  const std::size_t points = 2 * moving + 10;
+  // Four for each: less, and what chance makes of the slopes leads steps astray.
+  const std::size_t points = 4 * moving + 12;
   Dice dice(seed);
   auto design = design_of(parameters.size(), points, dice);
   for (std::vector<double>& steps : design) {
@@ -74,7 +75,8 @@ Surrogate explore(const FloorModel& model, const FloorTarget& target, const Floo
   std::vector<std::vector<double>> at(points);
   for (std::size_t i = 0; i < points; ++i) at[i] = moved(parameters, model.values, design[i], width);
   in_parallel(target.threads(), points, [&](std::size_t i) {
-    results[i] = statistics_at(target, model.settings(at[i]), seed * 1000 + i, i);
+    // The same robots in all of them, scene by scene.
+    results[i] = statistics_at(target, model.settings(at[i]), seed * 1000 + i % target.scenes().size(), i);
   });
 
   // Each run has a column of its own, for what it has begun with.
@@ -162,20 +164,36 @@ Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
   return off.unaryExpr([](double r) { return std::abs(r) < 3 ? 1.0 : 3 / std::abs(r); });
 }
 
-/// Steps, at most `most` of each, that lower the misfit most; only of parameters in use.
-Eigen::VectorXd best_steps(const Surrogate& surrogate, const std::vector<bool>& in_use, double most) {
+/// What counts how much as parameters are fitted: what windows of tracks say the most, since that is what is seen when runs are told
+/// apart. Which effects there are is decided with all alike.
+constexpr double kWindows = 2.5;
+const Eigen::VectorXd& importance() {
+  static const Eigen::VectorXd all = [] {
+    Eigen::VectorXd v = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(statistic_count()));
+    for (const StatisticGroup& group : statistic_groups()) {
+      if (group.name.starts_with("windows"))
+        v.segment(static_cast<Eigen::Index>(group.first), static_cast<Eigen::Index>(group.size()))
+            .setConstant(kWindows);
+    }
+    return v;
+  }();
+  return all;
+}
+
+/// Steps, at most `most` of each, that lower the misfit most; only of parameters in use. The more they `stay`, the less go those
+/// that it hardly depends on.
+Eigen::VectorXd best_steps(const Surrogate& surrogate, const std::vector<bool>& in_use, double most,
+                           const Eigen::VectorXd& weights, double stay) {
   const Eigen::Index columns = surrogate.slopes.cols();
   Eigen::VectorXd steps = Eigen::VectorXd::Zero(columns);
-  const Eigen::VectorXd weights = weights_of(surrogate.off);
   // Coordinate descent: small, and it keeps to the box.
   Eigen::VectorXd residual = surrogate.off;
-  constexpr double kStay = 0.3;
   for (int sweep = 0; sweep < 300; ++sweep) {
     for (Eigen::Index p = 0; p < columns; ++p) {
       if (!in_use[static_cast<std::size_t>(p)]) continue;
       const auto slope = surrogate.slopes.col(p);
-      const double curve = (weights.array() * slope.array().square()).sum() + kStay;
-      const double pull = (weights.array() * slope.array() * residual.array()).sum() + kStay * steps(p);
+      const double curve = (weights.array() * slope.array().square()).sum() + stay;
+      const double pull = (weights.array() * slope.array() * residual.array()).sum() + stay * steps(p);
       const double to = std::clamp(steps(p) - pull / curve, -most, most);
       residual += (to - steps(p)) * slope;
       steps(p) = to;
@@ -190,7 +208,8 @@ double robust_misfit(const FloorTarget& target, const FloorStatistics& at) {
   for (std::size_t s = 0; s < statistic_count(); ++s) {
     const double variance = target.tolerance()[s] + at.variance[s];
     const double off = (at.value[s] - target.statistics().value[s]) / std::sqrt(variance);
-    if (std::isfinite(off) && target.tolerance()[s] > 0) sum += off * off * std::min(1.0, 3 / std::abs(off));
+    if (std::isfinite(off) && target.tolerance()[s] > 0)
+      sum += importance()(static_cast<Eigen::Index>(s)) * off * off * std::min(1.0, 3 / std::abs(off));
   }
   return sum;
 }
@@ -208,27 +227,32 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   const std::vector<FloorParameter> parameters = model.parameters();
   const std::vector<bool> all(parameters.size(), true);
   model.later = target.later();
-  FloorStatistics at = simulated_statistics(target, model.settings(), seed * 7 + 1);
+  // The same chance for all, so that misfits differ by what the models differ.
+  const std::uint64_t chance = seed * 7 + 1;
+  FloorStatistics at = simulated_statistics(target, model.settings(), chance);
   double misfit = robust_misfit(target, at);
   for (int round = 0; round < rounds; ++round) {
     const Surrogate surrogate =
         explore(model, target, at, all, width, seed * 10 + static_cast<std::uint64_t>(round));
-    const Eigen::VectorXd steps = best_steps(surrogate, all, 1.5);
     const FloorModel before = model;
-    model.values = moved(parameters, before.values, {steps.data(), steps.data() + steps.size()}, width);
-    const FloorStatistics there =
-        simulated_statistics(target, model.settings(), seed * 7 + 2 + static_cast<std::uint64_t>(round));
-    const double now = robust_misfit(target, there);
-    progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
     // A step that leads away was too long for the surrogate.
-    if (now > misfit) {
+    constexpr double kLongest = 1.5, kShortest = 0.3, kStay = 3;
+    const Eigen::VectorXd weights = weights_of(surrogate.off).cwiseProduct(importance());
+    double most = kLongest;
+    for (; most > kShortest; most /= 2.5) {
+      const Eigen::VectorXd steps = best_steps(surrogate, all, most, weights, kStay);
+      model.values = moved(parameters, before.values, {steps.data(), steps.data() + steps.size()}, width);
+      const FloorStatistics there = simulated_statistics(target, model.settings(), chance);
+      const double now = robust_misfit(target, there);
+      progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
+      if (now < misfit) {
+        misfit = now;
+        at = there;
+        break;
+      }
       model = before;
-      width *= 0.5;
-      continue;
     }
-    misfit = now;
-    at = there;
-    width *= 0.8;
+    width *= most > kShortest ? 0.8 : 0.5;
   }
   return target.misfit(at);
 }
@@ -286,7 +310,9 @@ std::vector<CandidateScore> choose(const FloorModel& model, const std::vector<Fl
   std::vector<CandidateScore> chosen;
   std::vector<bool> taken(candidates.size(), false);
   if (gains != nullptr) gains->assign(candidates.size(), 0);
-  double without = expected(surrogate, best_steps(surrogate, in_use, 1));
+  constexpr double kStay = 0.3;
+  const Eigen::VectorXd weights = weights_of(surrogate.off);
+  double without = expected(surrogate, best_steps(surrogate, in_use, 1, weights, kStay));
   while (chosen.size() < candidates.size()) {
     CandidateScore best{candidates.size(), 0, {}};
     std::string tried;
@@ -295,7 +321,7 @@ std::vector<CandidateScore> choose(const FloorModel& model, const std::vector<Fl
       const std::size_t first = all.first_of(model.terms.size() + c), count = candidates[c].parameters.size();
       std::vector<bool> with = in_use;
       std::fill_n(with.begin() + static_cast<std::ptrdiff_t>(first), count, true);
-      const Eigen::VectorXd steps = best_steps(surrogate, with, 1);
+      const Eigen::VectorXd steps = best_steps(surrogate, with, 1, weights, kStay);
       const double gain = without - expected(surrogate, steps);
       if (gains != nullptr) (*gains)[c] = gain;
       tried += fmt::format(" {} {:.0f}", candidates[c].name, gain);

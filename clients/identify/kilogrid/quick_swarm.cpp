@@ -70,9 +70,12 @@ FloorRun simulate_quickly(const FloorScene& scene, const Floor& floor, const Flo
   Dice dice(seed * 2 + 1);
   const LoneRobot model(floor, settings);
   std::vector<LoneState> robots;
+  // Every robot has dice of its own, so that models that differ a little have nearly the same robots.
+  std::vector<Dice> own;
   for (std::size_t i = 0; i < scene.x_mm.size(); ++i) {
+    own.emplace_back(dice.bits());
     robots.push_back(model.start(static_cast<std::uint32_t>(i), scene.x_mm[i], scene.y_mm[i],
-                                 (2 * dice.uniform() - 1) * kPi, dice));
+                                 (2 * own[i].uniform() - 1) * kPi, own[i]));
   }
   FloorReporter reporter(floor, settings.radio, static_cast<std::uint32_t>(robots.size()), dice.bits());
   NearPairs pairs(robots.size());
@@ -94,7 +97,7 @@ FloorRun simulate_quickly(const FloorScene& scene, const Floor& floor, const Flo
       reporter.see(static_cast<std::uint32_t>(i), static_cast<double>(k) * LoneRobot::kStep_s, robots[i].x_mm,
                    robots[i].y_mm);
       before[i] = {robots[i].x_mm, robots[i].y_mm};
-      model.step(robots[i], k, dice, neighbours[i]);
+      model.step(robots[i], k, own[i], neighbours[i]);
     }
     for (int pass = 0; pass < kPasses; ++pass) {
       pairs.sort(robots);
