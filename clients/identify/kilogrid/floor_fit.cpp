@@ -37,14 +37,30 @@ Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
   return off.unaryExpr([](double r) { return std::abs(r) < 3 ? 1.0 : 3 / std::abs(r); });
 }
 
+/// What counts how much as parameters are fitted: what windows of tracks say the most, since that is what is seen when runs are told
+/// apart. Which effects there are is decided with all alike.
+const Eigen::VectorXd& importance() {
+  constexpr double kWindows = 2.5;
+  static const Eigen::VectorXd all = [] {
+    Eigen::VectorXd v = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(statistic_count()));
+    for (const StatisticGroup& group : statistic_groups()) {
+      if (group.name.starts_with("windows"))
+        v.segment(static_cast<Eigen::Index>(group.first), static_cast<Eigen::Index>(group.size()))
+            .setConstant(kWindows);
+    }
+    return v;
+  }();
+  return all;
+}
+
 /// Steps within the box that lower the misfit most.
 Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
   const Eigen::Index columns = surrogate.slopes.cols();
   Eigen::VectorXd steps = Eigen::VectorXd::Zero(columns);
-  const Eigen::VectorXd weights = weights_of(surrogate.off);
-  // Coordinate descent: small, and it keeps to the box.
+  const Eigen::VectorXd weights = weights_of(surrogate.off).cwiseProduct(importance());
+  // Coordinate descent: small, and it keeps to the box. Parameters that the misfit hardly depends on stay.
   Eigen::VectorXd residual = surrogate.off;
-  constexpr double kStay = 0.3;
+  constexpr double kStay = 3;
   for (int sweep = 0; sweep < 300; ++sweep) {
     for (Eigen::Index p = 0; p < columns; ++p) {
       const auto slope = surrogate.slopes.col(p);
@@ -65,7 +81,8 @@ double robust_misfit(const FloorTarget& target, const FloorStatistics& at) {
   for (std::size_t s = 0; s < statistic_count(); ++s) {
     const double variance = target.tolerance()[s] + at.variance[s];
     const double off = (at.value[s] - target.statistics().value[s]) / std::sqrt(variance);
-    if (std::isfinite(off) && target.tolerance()[s] > 0) sum += off * off * std::min(1.0, 3 / std::abs(off));
+    if (std::isfinite(off) && target.tolerance()[s] > 0)
+      sum += importance()(static_cast<Eigen::Index>(s)) * off * off * std::min(1.0, 3 / std::abs(off));
   }
   return sum;
 }
@@ -76,28 +93,32 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
            const FloorProgress& progress) {
   const std::vector<bool> all(model.values.size(), true);
   model.later = target.later();
-  FloorStatistics at = simulated_statistics(target, model.settings(), seed * 7 + 1);
+  // The same chance for all, so that misfits differ by what the models differ.
+  const std::uint64_t chance = seed * 7 + 1;
+  FloorStatistics at = simulated_statistics(target, model.settings(), chance);
   double misfit = robust_misfit(target, at);
   for (int round = 0; round < rounds; ++round) {
     const Surrogate surrogate = surrogate_of(
         target, at,
         slopes_around(model, target, all, width, kExplored_s, seed * 10 + static_cast<std::uint64_t>(round)));
-    const Eigen::VectorXd steps = best_steps(surrogate, box_around(model, width, 1.5));
     const FloorModel before = model;
-    model.values = moved(before, {steps.data(), steps.data() + steps.size()}, width);
-    const FloorStatistics there =
-        simulated_statistics(target, model.settings(), seed * 7 + 2 + static_cast<std::uint64_t>(round));
-    const double now = robust_misfit(target, there);
-    progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
     // A step that leads away was too long for the surrogate.
-    if (now > misfit) {
+    constexpr double kLongest = 1.5, kShortest = 0.3;
+    double most = kLongest;
+    for (; most > kShortest; most /= 2.5) {
+      const Eigen::VectorXd steps = best_steps(surrogate, box_around(before, width, most));
+      model.values = moved(before, {steps.data(), steps.data() + steps.size()}, width);
+      const FloorStatistics there = simulated_statistics(target, model.settings(), chance);
+      const double now = robust_misfit(target, there);
+      progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
+      if (now < misfit) {
+        misfit = now;
+        at = there;
+        break;
+      }
       model = before;
-      width *= 0.5;
-      continue;
     }
-    misfit = now;
-    at = there;
-    width *= 0.8;
+    width *= most > kShortest ? 0.8 : 0.5;
   }
   return target.misfit(at);
 }

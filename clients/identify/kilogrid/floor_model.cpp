@@ -57,6 +57,17 @@ void add_speeds(FloorSettings& settings, double sd, double skew) {
   });
 }
 
+/// Speeds going straight, distributed as z + skew (z^2 - 1): what turns robots stays as it is, their biases too.
+void add_straight_speeds(FloorSettings& settings, double sd_mm_s, double skew) {
+  constexpr double kGolden = 0.6180339887498949;
+  Effect& effect = add_effect(settings, "straight-speed-of-robots", Effect::WHEEL_OFFSET);
+  effect.add_during(proto::STRAIGHT);
+  const double slowest_mm_s = 0.5 - settings.model.motion().straight_speed_mm_s();
+  add_table_of_robots(effect, kGolden, [=](double z) {
+    return std::max(sd_mm_s * (z + skew * (z * z - 1)) / std::sqrt(1 + 2 * skew * skew), slowest_mm_s);
+  });
+}
+
 /// Turn rates distributed as z + tail z^3.
 void add_turning(FloorSettings& settings, double sd, double tail) {
   constexpr double kSilver = 0.41421356237309505;
@@ -139,7 +150,10 @@ FloorTerm base_term() {
                      {"wall_noise", 4, 0.5, 60, 3},
                      {"while_talking", 0.15, 0.01, 1, 0.06},
                      {"same_cell", 0.12, 0.02, 0.5, 0.04},
-                     {"in_turn", 0.6, 0, 1, 0.1}};
+                     {"in_turn", 0.6, 0, 1, 0.1},
+                     {"blur_mm", 2, 0.5, 12, 1},
+                     {"silent_s", 300, 30, 2000, 60},
+                     {"talking_s", 225, 20, 2000, 50}};
   term.apply = [](std::span<const double> v, FloorSettings& s) {
     proto::Motion& motion = *s.model.mutable_motion();
     motion.set_straight_speed_mm_s(v[0]);
@@ -157,6 +171,9 @@ FloorTerm base_term() {
     for (std::size_t i = 1; i < 4; ++i) s.radio.later[i] *= 4 * (1 - v[11]) / 3;
     s.radio.later[0] = v[11];
     s.radio.in_turn = v[12];
+    s.radio.blur_mm = v[13];
+    s.radio.silent_s = v[14];
+    s.radio.talking_s = v[15];
   };
   return term;
 }
@@ -171,6 +188,15 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    {{"sd", 0, 0, 0.5, 0.25}, {"skew", 0, -0.6, 0.6, 0.2}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) { add_speeds(s, v[0], v[1]); }});
+  terms.push_back({"straight-speed-of-robots",
+                   {"robot", "command"},
+                   "WHEEL_OFFSET",
+                   "every robot has a speed of its own as it goes straight, but not as it turns: they spread by "
+                   "{0:.1f} mm/s, skewed by {1:+.2f}",
+                   "",
+                   {{"sd_mm_s", 0, 0, 6, 2.5}, {"skew", -0.2, -0.6, 0.6, 0.2}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) { add_straight_speeds(s, v[0], v[1]); }});
   terms.push_back({"turning-of-robots",
                    {"robot"},
                    "TURN_RATE",
@@ -185,7 +211,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "TURN_RATE",
                    "robots turn by themselves, by {0:.3f} rad/s (standard deviation), which lasts {1:.0f} s",
                    "",
-                   {{"sd_rad_s", 0, 0, 0.4, 0.1}, {"correlation_s", 30, 5, 600, 20}},
+                   {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"correlation_s", 200, 5, 3000, 100}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      add_noise(s, "wandering-turn", Effect::TURN_RATE, v[0], v[1]);
@@ -195,7 +221,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                    "BODY_DRIFT",
                    "a robot's speed wanders by {0:.2f} mm/s (standard deviation), which lasts {1:.0f} s",
                    "",
-                   {{"sd_mm_s", 0, 0, 5, 2.5}, {"correlation_s", 30, 5, 600, 20}},
+                   {{"sd_mm_s", 0, 0, 5, 1}, {"correlation_s", 300, 5, 3000, 150}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) {
                      add_noise(s, "wandering-speed", Effect::BODY_DRIFT, v[0], v[1]);

@@ -130,7 +130,8 @@ Eigen::MatrixXd slopes_around(const FloorModel& model, const FloorTarget& target
                               double width, double longest_s, std::uint64_t seed) {
   const std::vector<FloorParameter> parameters = model.parameters();
   const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
-  const std::size_t points = 2 * moving + 10, runs = target.scenes().size();
+  // Four for each: with less, what chance makes of the slopes leads steps astray.
+  const std::size_t points = 4 * moving + 12, runs = target.scenes().size();
   Dice dice(seed);
   auto design = design_of(parameters.size(), points, dice);
   std::vector<std::vector<double>> at(points);

@@ -76,8 +76,9 @@ FloorReporter::FloorReporter(const Floor& floor, const FloorRadio& radio, std::u
     every_s_.push_back(radio.report_every_s * (1 + kClock_sd * dice_.normal()));
     next_s_.push_back(every_s_.back() * dice_.uniform());
     heard_.push_back(std::clamp(radio.heard + radio.heard_sd * dice_.normal(), 0.05, 1.0));
-    talking_.push_back(dice_.uniform() * (radio.silent_s + radio.talking_s) < radio.talking_s);
-    change_s_.push_back(-(talking_.back() ? radio.talking_s : radio.silent_s) * kt_log(dice_.uniform()));
+    // Nobody talks from the start: all are heard within seconds.
+    talking_.push_back(false);
+    change_s_.push_back(-radio.silent_s * kt_log(dice_.uniform()));
     phase_.push_back(static_cast<std::uint32_t>(dice_.bits() >> 62));
     pace_.push_back(draw_pace());
   }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "clients/identify/kilogrid/floor_choose.hpp"
 
@@ -94,6 +95,34 @@ TEST(FloorModel, WallsAreRecordsThatActBesideThem) {
   EXPECT_NEAR(settings.model.effect(0).function(1).steps().value(0), -0.75, 1e-12);
   EXPECT_NEAR(settings.model.effect(1).function(1).steps().value(7), -0.5, 1e-12);
   EXPECT_EQ(settings.model.effect(1).function(0).steps().at(0), 500 - FloorModel::kBeside_mm);
+}
+
+const FloorTerm& term_of(const std::vector<FloorTerm>& terms, const std::string& name) {
+  return *std::find_if(terms.begin(), terms.end(), [&](const FloorTerm& t) { return t.name == name; });
+}
+
+TEST(FloorModel, SpeedsOfTheirOwnGoingStraightLeaveTurnsAsTheyAre) {
+  const std::vector<FloorTerm> candidates = candidate_terms({});
+  FloorModel model = base_model();
+  model.values[2] = model.values[3] = 0;  // no bias, no noise
+  model.add(term_of(candidates, "straight-speed-of-robots"));
+  model.values[model.values.size() - 2] = 3;
+  const FloorSettings settings = model.settings();
+  ASSERT_EQ(settings.model.effect_size(), 1);
+  const proto::Effect& effect = settings.model.effect(0);
+  EXPECT_EQ(effect.acts_on(), proto::Effect::WHEEL_OFFSET);
+  ASSERT_EQ(effect.during_size(), 1);
+  EXPECT_EQ(effect.during(0), proto::STRAIGHT);
+  double sum = 0, squares = 0;
+  const proto::Table& table = effect.function(0).table();
+  for (const double value : table.value()) {
+    sum += value;
+    squares += value * value;
+    EXPECT_GT(settings.model.motion().straight_speed_mm_s() + value, 0);  // nobody goes backwards
+  }
+  const double count = table.value_size();
+  EXPECT_NEAR(sum / count, 0, 0.1);
+  EXPECT_NEAR(std::sqrt(squares / count), 3, 0.2);
 }
 
 }  // namespace

@@ -122,6 +122,18 @@ TEST(FloorReporter, ARobotAtRestIsHeardByCellsInTurn) {
   }
 }
 
+TEST(FloorReporter, AllAreHeardAtTheStart) {  // in the middle of a module
+  FloorRadio radio;
+  radio.while_talking = 0;
+  constexpr std::uint32_t kRobots = 200;
+  FloorReporter reporter({}, radio, kRobots, 9);
+  for (int i = 0; i < 60; ++i) {
+    for (std::uint32_t robot = 0; robot < kRobots; ++robot) reporter.see(robot, i * 0.5, 450, 950);
+  }
+  // Some begin to talk within half a minute, with the chance 30 / 300.
+  EXPECT_GT(reporter.take("", 30).tracks.size(), 0.97 * kRobots);
+}
+
 TEST(FloorReporter, CellsThatHearAreNear) {
   const Floor floor;
   FloorRadio radio;
