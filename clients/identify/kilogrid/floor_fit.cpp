@@ -40,8 +40,8 @@ Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
 /// What counts how much as parameters are fitted: what windows of tracks say the most, since that is what is seen when runs are told
 /// apart. Which effects there are is decided with all alike.
 const Eigen::VectorXd& importance() {
-  constexpr double kWindows = 2.5;
   static const Eigen::VectorXd all = [] {
+    constexpr double kWindows = 2.5;
     Eigen::VectorXd v = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(statistic_count()));
     for (const StatisticGroup& group : statistic_groups()) {
       if (group.name.starts_with("windows"))
