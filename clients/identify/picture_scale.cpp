@@ -190,12 +190,16 @@ Room carried(const Room& room, const MotionModel& before, const MotionModel& aft
   };
   const auto [x_low, x_high] = range(room.x_low_mm, room.x_high_mm);
   const auto [y_low, y_high] = range(room.y_low_mm, room.y_high_mm);
-  const double centre = before.base.centre_mm;
+  // Of centres, wherever the point that is tracked is thought to be.
+  const auto of_centres = [](MotionModel model) {
+    model.base.ahead_mm = model.base.centre_mm = model.base.left_mm = 0;
+    return model;
+  };
+  const MotionModel then = of_centres(before), now = of_centres(after);
   const auto moved = [&](double x_mm, double y_mm) {
     const Situation at;
-    const Eigen::Vector3d seen = before.measured(x_mm - centre, y_mm, 0, at);
-    const Eigen::Vector3d pose = after.pose_of({0, seen[0], seen[1], std::nan("")}, at);
-    return Eigen::Vector2d(pose[0] + after.base.centre_mm, pose[1]);
+    const Eigen::Vector3d seen = then.measured(x_mm, y_mm, 0, at);
+    return Eigen::Vector2d(now.pose_of({0, seen[0], seen[1], std::nan("")}, at).head<2>());
   };
   Room out = room;
   const auto carry = [&](double Room::*side, bool of_x) {
