@@ -88,7 +88,7 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionMo
     const std::size_t tracks = set.set().runs[r].tracks.size();
     if (tracks == 0) continue;
     runs[r].resize(std::min(near.instants(), kMost / runs.size() / tracks));
-    // Places of the track's residuals at the instants.
+    // Residuals by track, then by instant.
     std::vector<std::vector<std::pair<float, float>>> known(tracks);
     for (std::size_t v = 0; v < views.size(); ++v) {
       if (views[v].run != r) continue;
@@ -173,9 +173,8 @@ Weighed climbed(const std::vector<std::vector<Instant>>& runs, Weighed best, dou
       better = false;
       // A side changes by as much as moves cells at the end of the room by such a part of theirs.
       const double side = best.cells.side_mm, move = step * side;
-      for (const auto& [by_side, by_x, by_y] : {std::array{move * side / extent_mm, 0.0, 0.0},
-                                                {0.0, move, 0.0},
-                                                {0.0, 0.0, move}}) {
+      for (const auto& [by_side, by_x, by_y] :
+           {std::array{move * side / extent_mm, 0.0, 0.0}, {0.0, move, 0.0}, {0.0, 0.0, move}}) {
         for (const double sign : {1.0, -1.0}) {
           Weighed trial;
           trial.cells = {best.cells.side_mm + sign * by_side, best.cells.x_mm + sign * by_x,
@@ -219,9 +218,9 @@ FloorCells find_cells(const Fitter& fitter, const MotionModel& model, const Floo
   constexpr std::size_t kClimbed = 6;
   all.resize(std::min(all.size(), kClimbed));
   in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i] = climbed(runs, all[i], extent_mm); });
-  return std::max_element(all.begin(), all.end(), [](const Weighed& a, const Weighed& b) {
-           return a.value < b.value;
-         })->cells;
+  return std::max_element(all.begin(), all.end(),
+                          [](const Weighed& a, const Weighed& b) { return a.value < b.value; })
+      ->cells;
 }
 
 }  // namespace kilotwin::identify

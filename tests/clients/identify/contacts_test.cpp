@@ -30,8 +30,7 @@ MeasuredSet held_fast(bool headings) {
       const auto noise = [&](std::uint32_t draw) {
         return random.normal(Stream::kMeasurementNoise, r, Tick{k}, draw);
       };
-      if (turns && k % 10 == 0)
-        track.commands.push_back({k * dt, k % 20 == 0 ? Motion::kLeft : Motion::kRight});
+      if (turns && k % 10 == 0) track.commands.push_back({k * dt, k % 20 == 0 ? Motion::kLeft : Motion::kRight});
       track.samples.push_back({k * dt, 200.0 * (r / 2) + (turns ? 0 : 33.5) + tracker_mm * noise(0),
                                tracker_mm * noise(1),
                                headings ? wrapped_angle(heading + tracker_rad * noise(2)) : std::nan("")});
