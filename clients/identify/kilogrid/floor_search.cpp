@@ -82,7 +82,9 @@ class Search {
 
   void reject(EffectGain gain, std::vector<std::string> covariates, std::string acts_on) {
     const std::string why =
-        fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance", gain.gain, gain.needed);
+        gain.gain <= 0
+            ? "would not lower the misfit"
+            : fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance", gain.gain, gain.needed);
     found_.rejected.push_back({std::move(gain), std::move(covariates), std::move(acts_on), why});
   }
 

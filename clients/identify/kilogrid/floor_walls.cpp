@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 
 #include "clients/identify/kilogrid/quick_swarm.hpp"
 
@@ -39,8 +40,12 @@ Fitted fitted(FloorModel model, const FloorSet& set, int rounds, const Simulate&
   return best;
 }
 
-/// What is beyond what walls remove in all but 1 % of sets that the model itself made.
-double beyond_chance(const FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed) {
+/// Sets that the model itself made.
+struct ByChance {
+  double bound;   ///< what walls remove of all but 1 % of these
+  double misfit;  ///< that is left
+};
+ByChance by_chance(const FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed) {
   constexpr std::size_t kSets = 10;
   const auto sums = [&](const FloorModel& of, std::uint64_t number) {
     std::vector<std::vector<RobotSums>> runs;
@@ -51,15 +56,17 @@ double beyond_chance(const FloorModel& model, const FloorTarget& target, int rou
           target.floor()));
     return FloorSet(std::move(runs));
   };
-  std::vector<double> gains(kSets);
+  std::vector<double> gains(kSets), left(kSets);
   in_parallel(target.threads(), kSets, [&](std::size_t b) {
     const std::uint64_t own = 10 * b;
     const Fitted walls = fitted(model, sums(model, own), rounds, [&](const FloorModel& of, std::uint64_t number) {
       return sums(of, own + 1 + number).statistics;
     });
     gains[b] = walls.before - walls.after;
+    left[b] = walls.after;
   });
   double mean = 0, square = 0;
+  const double misfit = std::accumulate(left.begin(), left.end(), 0.0) / kSets;
   for (const double gain : gains) {
     mean += gain / kSets;
     square += gain * gain / kSets;
@@ -67,7 +74,7 @@ double beyond_chance(const FloorModel& model, const FloorTarget& target, int rou
   // Of a sum of many numbers: Student's t of nine degrees of freedom at 1 %.
   constexpr double kQuantile = 2.821;
   const double variance = std::max(square - mean * mean, 0.0) * kSets / (kSets - 1);
-  return mean + kQuantile * std::sqrt(variance * (1 + 1.0 / kSets));
+  return {mean + kQuantile * std::sqrt(variance * (1 + 1.0 / kSets)), misfit};
 }
 
 }  // namespace
@@ -80,7 +87,9 @@ WallGain fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std
   progress(fmt::format("beside walls: misfit {:.0f} -> {:.0f}", walls.before, walls.after));
   WallGain gain{walls.before - walls.after, 0};
   if (gain.gain <= 0) return gain;
-  gain.needed = std::max(beyond_chance(model, target, rounds, seed), 0.0);
+  // As for other effects: what stays unexplained counts as if chance were so much larger.
+  const ByChance chance = by_chance(model, target, rounds, seed);
+  gain.needed = std::max(chance.bound, 0.0) * std::max(1.0, walls.after / chance.misfit);
   if (gain.found()) model = walls.model;
   return gain;
 }

@@ -56,6 +56,7 @@ class Play {
         move(p, now_s);
         report(p, now_s, run_.tracks[i]);
       }
+      part();
     }
     return std::move(run_);
   }
@@ -122,6 +123,22 @@ class Play {
       p.avoid = 2;
     } else if (p.avoid == 2 && p.before < p.reading) {
       p.avoid = 0;
+    }
+  }
+
+  /// Robots are solid: two that overlap give way to each other.
+  void part() {
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      for (std::size_t k = 0; k < i; ++k) {
+        Point &a = points_[i], &b = points_[k];
+        const double x = a.x - b.x, y = a.y - b.y, square = x * x + y * y;
+        if (square >= 4 * kRobot * kRobot || square == 0) continue;
+        const double give = kRobot / std::sqrt(square) - 0.5;
+        a.x += give * x;
+        a.y += give * y;
+        b.x -= give * x;
+        b.y -= give * y;
+      }
     }
   }
 

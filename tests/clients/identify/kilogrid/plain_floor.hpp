@@ -1,5 +1,5 @@
 /// A floor of its own for tests: points that do the robots' program by an integrator, random numbers and a way of hearing that
-/// are not those of the project, and effects of shapes that no candidate has. Robots pass through each other.
+/// are not those of the project, and effects of shapes that no candidate has. Robots are solid discs without friction.
 #pragma once
 
 #include <cstdint>
