@@ -164,8 +164,8 @@ Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
   return off.unaryExpr([](double r) { return std::abs(r) < 3 ? 1.0 : 3 / std::abs(r); });
 }
 
-/// What counts how much as parameters are fitted: what windows of tracks say the most, since that is what is seen when runs are told
-/// apart. Which effects there are is decided with all alike.
+/// What counts how much as parameters are fitted: what windows of tracks say counts most, since that is what is seen
+/// when runs are told apart. Which effects there are is decided with all alike.
 constexpr double kWindows = 2.5;
 const Eigen::VectorXd& importance() {
   static const Eigen::VectorXd all = [] {
@@ -180,8 +180,8 @@ const Eigen::VectorXd& importance() {
   return all;
 }
 
-/// Steps, at most `most` of each, that lower the misfit most; only of parameters in use. The more they `stay`, the less go those
-/// that it hardly depends on.
+/// Steps, at most `most` of each, that lower the misfit most; only of parameters in use. The larger `stay`, the less go
+/// those that the misfit hardly depends on.
 Eigen::VectorXd best_steps(const Surrogate& surrogate, const std::vector<bool>& in_use, double most,
                            const Eigen::VectorXd& weights, double stay) {
   const Eigen::Index columns = surrogate.slopes.cols();

@@ -19,12 +19,12 @@ FloorScene scene(std::uint32_t robots, double duration_s, int which) {
 }
 
 /// Runs of a model, as if they had been measured.
-std::vector<FloorRun> runs_of(const FloorModel& model, std::uint64_t seed) {
+std::vector<FloorRun> runs_of(const FloorModel& model, std::uint64_t seed, std::uint32_t robots = 40) {
   std::vector<FloorRun> runs;
   for (int i = 0; i < 3; ++i) {
     const FloorSettings s = model.settings();
     runs.push_back(
-        simulate(scene(40, 1000, i), {}, s.model, s.times, s.radio, seed + static_cast<std::uint64_t>(i)));
+        simulate(scene(robots, 1000, i), {}, s.model, s.times, s.radio, seed + static_cast<std::uint64_t>(i)));
   }
   return runs;
 }
@@ -63,7 +63,7 @@ TEST(FloorFit, FindsAnEffectThatIsThereAndNoneThatIsNot) {
                                   [](const FloorTerm& t) { return t.name == "speed-of-robots"; });
   truth.add(*speed);
   truth.values[truth.values.size() - 2] = 0.5;  // spread; the last is the skew
-  const FloorTarget with(runs_of(truth, 300), {});
+  const FloorTarget with(runs_of(truth, 300, 72), {});
   const std::vector<CandidateScore> found = choose(base_model(), candidates, with, kBeyondChance, 5, kQuiet);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(candidates[found.front().candidate].covariates.front(), "robot");
