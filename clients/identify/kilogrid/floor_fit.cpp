@@ -37,8 +37,8 @@ Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
   return off.unaryExpr([](double r) { return std::abs(r) < 3 ? 1.0 : 3 / std::abs(r); });
 }
 
-/// What counts how much as parameters are fitted: what windows of tracks say the most, since that is what is seen when runs are told
-/// apart. Which effects there are is decided with all alike.
+/// What counts how much as parameters are fitted: what windows of tracks say counts most, since that is what is seen
+/// when runs are told apart. Which effects there are is decided with all alike.
 const Eigen::VectorXd& importance() {
   static const Eigen::VectorXd all = [] {
     constexpr double kWindows = 2.5;
