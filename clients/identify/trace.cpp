@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "core/random/random.hpp"
 
@@ -75,6 +76,22 @@ double within_units(const Eigen::MatrixXd& scores, const std::vector<std::size_t
   return freedom < kFewest ? 0 : sum;
 }
 
+/// The same where the stretches of a group, of a run, do not lie side by side.
+double within_groups(const Eigen::MatrixXd& scores, const std::vector<std::size_t>& group) {
+  std::vector<Eigen::Index> order(group.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto of = [&](Eigen::Index i) { return group[static_cast<std::size_t>(i)]; };
+  std::stable_sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) { return of(a) < of(b); });
+  std::vector<std::size_t> sorted = group;
+  std::sort(sorted.begin(), sorted.end());
+  return within_units(scores(Eigen::all, order), sorted);
+}
+
+bool looks_at_runs(const Term& term) {
+  return std::any_of(term.blocks.begin(), term.blocks.end(),
+                     [](const Block& block) { return block.basis.looks_at(Covariate::kRun); });
+}
+
 }  // namespace
 
 struct Scores::Reduced {
@@ -117,6 +134,7 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
     information_ += units[u].information;
     score_ += units[u].score;
     cluster_unit_.insert(cluster_unit_.end(), static_cast<std::size_t>(units[u].cluster_scores.cols()), u);
+    cluster_run_.insert(cluster_run_.end(), units[u].cluster_run.begin(), units[u].cluster_run.end());
     clusters_.middleCols(next, units[u].cluster_scores.cols()) = units[u].cluster_scores;
     next += units[u].cluster_scores.cols();
   }
@@ -301,11 +319,14 @@ Scores::Outcome Scores::test(std::uint64_t seed) const {
     const Eigen::VectorXd statistics = (whiten * flips).colwise().squaredNorm();
     const double dispersion = std::max(1.0, statistics.mean() / degrees);
     double own_dispersion = dispersion;
-    if (of_robots(dictionary_.hypotheses[h])) {
+    // What robots, or runs, have of their own is not noise either.
+    const bool robots = of_robots(dictionary_.hypotheses[h]);
+    if (robots || looks_at_runs(dictionary_.term_of(dictionary_.hypotheses[h], 1))) {
       Eigen::MatrixXd scores(scale.size(), cluster.cols());
       for (Eigen::Index i = 0; i < scale.size(); ++i)
         scores.row(i) = cluster.row(own_columns[static_cast<std::size_t>(i)]);
-      const double within = within_units(whiten * scores, cluster_unit_);
+      const double within =
+          robots ? within_units(whiten * scores, cluster_unit_) : within_groups(whiten * scores, cluster_run_);
       if (within > 0) own_dispersion = std::clamp(within / degrees, 1.0, dispersion);
     }
     finding.log10_p = log10_tail(finding.statistic / own_dispersion, degrees);

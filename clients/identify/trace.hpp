@@ -67,7 +67,7 @@ class Scores {
   /// Stretches of every robot's tracks: for what is each robot's own, of which robots left out tell nothing.
   Folds by_stretch_{0, 0};
   Eigen::MatrixXd clusters_;  ///< scores of all columns, a column per cluster
-  std::vector<std::size_t> cluster_unit_;
+  std::vector<std::size_t> cluster_unit_, cluster_run_;
 };
 
 }  // namespace kilotwin::identify
