@@ -519,9 +519,14 @@ void Fitter::fit_surroundings(MotionModel& model) const {
   for (double Noise::*const part :
        {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
     model.noise.*part = anew.*part;
-  for (int round = 0; round < (set_.set().has_headings ? 1 : 2); ++round) {
-    find_walls(model);
-    set_.find_centres(model, threads_);
+  const bool headings = set_.set().has_headings;
+  // What a model lacked may have passed for a disc that lies elsewhere.
+  if (!headings) find_shape(model);
+  for (int round = 0; round < (headings ? 1 : 2); ++round) {
+    if (headings || round > 0) {
+      find_walls(model);
+      set_.find_centres(model, threads_);
+    }
     if (model.measures() && set_scale(model)) set_.find_centres(model, threads_);
     // In a picture that is bent robots seem to meet where they do not.
     if (model.measures()) model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
