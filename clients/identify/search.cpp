@@ -87,7 +87,8 @@ class Loop {
  private:
   void say(const char* doing) const {
     std::string text = doing;
-    for (const Term& term : out_.model.terms) text += (&term == &out_.model.terms.front() ? "; found " : ", ") + term.name;
+    for (const Term& term : out_.model.terms)
+      text += (&term == &out_.model.terms.front() ? "; found " : ", ") + term.name;
     progress_(0.9 * round_ / kMostRounds, text);
   }
   void measure() {

@@ -209,18 +209,24 @@ TEST(Place, AFloorRemembersInItsCells) {
 /// How far apart two corners are, of cells that repeat.
 double off(double a_mm, double b_mm, double side_mm) { return std::abs(std::remainder(a_mm - b_mm, side_mm)); }
 
+/// A fitted model of a floor that remembers, by the cells of that number.
+MotionModel remembering(const Fitter& fitter, std::uint8_t cells) {
+  MotionModel model = fitted(fitter);
+  Factor trodden;
+  trodden.shape = Shape::kExponential;
+  trodden.axis = {Covariate::kTrodden, cells};
+  trodden.points = {2, 8, 32};
+  model.terms.push_back(unfitted(trodden));
+  fitter.fit(model, 2);
+  return model;
+}
+
 TEST(Place, TheCellsOfTheFloorAreFound) {
   const MeasuredSet set =
       played([](const Around& a) { return 1 - 0.5 * a.trodden_s / (a.trodden_s + 4); }, 8, 12, 150);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
-  MotionModel model = fitted(fitter);
-  Factor trodden;
-  trodden.shape = Shape::kExponential;
-  trodden.axis = {Covariate::kTrodden, 2};
-  trodden.points = {2, 8, 32};
-  model.terms.push_back(unfitted(trodden));
-  fitter.fit(model, 2);
+  MotionModel model = remembering(fitter, 2);
   ASSERT_TRUE(shape_memory(fitter, model, 0));
   const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
   const FloorCells& cells = model.cells[axis.radius];
@@ -247,13 +253,7 @@ TEST(Place, AFloorThatIsPressedDownAtOnceIsFound) {
   const MeasuredSet set = played([](const Around& a) { return a.trodden_s > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
-  MotionModel model = fitted(fitter);
-  Factor trodden;
-  trodden.shape = Shape::kExponential;
-  trodden.axis = {Covariate::kTrodden, 0};
-  trodden.points = {2, 8, 32};
-  model.terms.push_back(unfitted(trodden));
-  fitter.fit(model, 2);
+  MotionModel model = remembering(fitter, 0);
   ASSERT_TRUE(shape_memory(fitter, model, 0));
   const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
   const FloorCells& cells = model.cells[axis.radius];

@@ -39,11 +39,11 @@ Effect worn_floor(double strength = 1);      // the floor is polished where robo
 Effect trodden_floor(double strength = 1);   // the floor is pressed down at once where robots have been
 
 // Of the tracker.
-Effect lens(double strength = 1);         // a barrel distortion
+Effect lens(double strength = 1);             // a barrel distortion
 Effect pincushion(double strength = 1);       // the opposite, of a lens that is no polynomial
 Effect keystone(double strength = 1);         // a camera that looks at the floor askew
 Effect growing_picture(double strength = 1);  // the camera sinks slowly
-Effect camera_bump(double strength = 1);  // the camera is pushed aside, and put right later
-Effect mosaic(double strength = 1);       // cameras whose pictures do not match
+Effect camera_bump(double strength = 1);      // the camera is pushed aside, and put right later
+Effect mosaic(double strength = 1);           // cameras whose pictures do not match
 
 }  // namespace kilotwin::truth
