@@ -11,6 +11,7 @@
 #include "clients/identify/follower.hpp"
 #include "clients/identify/noise_fit.hpp"
 #include "clients/identify/picture_scale.hpp"
+#include "clients/identify/rim.hpp"
 #include "clients/identify/touched.hpp"
 
 namespace kilotwin::identify {
@@ -132,6 +133,17 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
 
 void PreparedSet::remember(const MotionModel& model) {
   for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells);
+}
+
+void PreparedSet::doubt_rim(bool doubt) {
+  constexpr double kMargin_mm = 12;
+  std::optional<Rim> rim;
+  if (doubt) rim.emplace(*set_, kMargin_mm);
+  for (TrackView& view : views_) {
+    view.at_rim.clear();
+    if (rim)
+      for (const Sample& s : view.track->samples) view.at_rim.push_back(rim->holds(s.x_mm, s.y_mm));
+  }
 }
 
 Meetings PreparedSet::meetings() const {
@@ -572,60 +584,15 @@ void Fitter::settle_scale(MotionModel& model) const {
 }
 
 void Fitter::fit(MotionModel& model, int passes) const {
-  const std::vector<Block> blocks = blocks_of(model);
+  // With a new map of the picture, all that was seen of walls and of who meets whom is to be seen anew.
+  const bool new_picture = !model.terms.empty() && is_measured(model.terms.back().blocks.front().target);
+  if (passes > 1 && new_picture) straighten(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
-    if (set_.set().has_headings) {
-      const Room known = model.room;
-      model.room = room_of(set_, model);
-      for (double Room::*const side : {&Room::x_low_mm, &Room::x_high_mm, &Room::y_low_mm, &Room::y_high_mm})
-        if (std::isinf(model.room.*side)) model.room.*side = known.*side;
-    }
+    look_for_walls(model);
     // What was noise to a model without its new terms is not, once they have their size.
     if (pass != 0 || passes == 1) fit_noise(model);
-    const std::vector<Unit> units = linearise(model, set_.units(), blocks, {100, threads_});
-    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());
-    Eigen::VectorXd score = Eigen::VectorXd::Zero(information.rows());
-    for (const Unit& unit : units) {
-      information += unit.information;
-      score += unit.score;
-    }
-    add_base_prior(model, information, score);
-    Eigen::VectorXd beforehand = Eigen::VectorXd::Zero(information.rows());
-    Eigen::Index first = kBaseColumns;
-    for (const Term& term : model.terms) {
-      const Eigen::Index n = term.coefficients.size();
-      beforehand.segment(first, n) = term.precision;
-      information.diagonal().segment(first, n) += term.precision;
-      score.segment(first, n) -= term.precision.cwiseProduct(term.coefficients);
-      first += n;
-    }
-    // A step that makes things worse is held back first where the data say little, then everywhere.
-    const MotionModel start = model;
-    const bool pictured = start.measures() && start.room.any();
-    // Of the coefficients beforehand as well.
-    const auto worth = [&](const MotionModel& trial) {
-      double value = log_likelihood(trial);
-      for (const Term& term : trial.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
-      return value;
-    };
-    const double before = worth(start);
-    struct Trial {
-      double firmness, length;
-    };
-    constexpr std::array<Trial, 6> kTrials = {{{0, 1}, {10, 1}, {100, 1}, {100, 0.4}, {100, 0.16}, {100, 0.06}}};
-    bool better = false;
-    for (const Trial& trial : kTrials) {
-      Eigen::MatrixXd held = information;
-      held.diagonal() += trial.firmness * beforehand;
-      model = start;
-      apply(model, units, trial.length * held.ldlt().solve(score));
-      if (pictured) model.room = carried(start.room, start, model);
-      better = worth(model) > before - 2;
-      if (better) break;
-    }
-    if (!better) model = start;
-    if (model.measures()) settle_scale(model);
+    step(model);
   }
 }
 

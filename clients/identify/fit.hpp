@@ -45,6 +45,8 @@ class PreparedSet {
   void find_centres(const MotionModel&, std::uint32_t threads);
   /// Looks again at what floors remember, in cells of the model's sizes.
   void remember(const MotionModel&);
+  /// Takes walls to be anywhere along the rim of what robots reached, or no longer.
+  void doubt_rim(bool);
   [[nodiscard]] Meetings meetings() const;
   /// Robots that came near each other, by where discs are.
   [[nodiscard]] std::vector<Pair> pairs() const;
@@ -98,6 +100,15 @@ class Fitter {
   [[nodiscard]] PreparedSet& set() const { return set_; }
 
  private:
+  /// One Gauss-Newton step of all but the noise, held back where it would make things worse.
+  void step(MotionModel&) const;
+  /// Puts a picture straight while nothing is concluded from robots that may touch something: in a picture that is bent walls are
+  /// no lines, and robots seem to meet where they do not or to pass through each other.
+  void straighten(MotionModel&) const;
+  /// Walls where robots with headings stay at a line.
+  void look_for_walls(MotionModel&) const;
+  /// Likelihood of what was measured and of the coefficients beforehand.
+  [[nodiscard]] double worth(const MotionModel&) const;
   /// Makes a picture that is put straight as large as robots that touch show it to be. Whether it was not.
   bool set_scale(MotionModel&) const;
   /// Tracks leave the common scale of such a picture's map, speeds and wheel base open: it becomes the most probable one by what

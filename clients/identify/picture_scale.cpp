@@ -218,6 +218,24 @@ Room carried(const Room& room, const MotionModel& before, const MotionModel& aft
   return out;
 }
 
+Eigen::VectorXd log_scale_by_coefficients(const MotionModel& model) {
+  MotionModel copy = model;
+  Eigen::Index columns = 0;
+  for (const Term& term : copy.terms) columns += term.coefficients.size();
+  Eigen::VectorXd by(0);
+  Eigen::Index first = 0;
+  for (Term& term : copy.terms) {
+    const LinearMap map = linear_map_of(term);
+    if (map.x != nullptr && map.y != nullptr) {
+      by.setZero(columns);
+      by[first + (map.x - term.coefficients.data())] = 1 / (map.of->high - map.of->low);
+      by[first + (map.y - term.coefficients.data())] = 1 / (map.of->and_high - map.of->and_low);
+    }
+    first += term.coefficients.size();
+  }
+  return by;
+}
+
 bool rescale(MotionModel& model, double factor) {
   MotionModel scaled = model;
   LinearMap map;

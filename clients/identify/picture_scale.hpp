@@ -56,5 +56,8 @@ class ScaleHold {
 /// The same model with all lengths in the room `factor` times as long, and the picture as it was, about the middle of the map
 /// of the picture. False, and the model as it was, where it has no map that could take it up.
 bool rescale(MotionModel&, double factor);
+/// By how much such a map makes the picture larger (logarithm of the scale) with each coefficient of all terms, in order; none where
+/// it has no such map.
+[[nodiscard]] Eigen::VectorXd log_scale_by_coefficients(const MotionModel&);
 
 }  // namespace kilotwin::identify

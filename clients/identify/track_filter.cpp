@@ -108,7 +108,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   // A robot at rest is pushed by others as well.
   record.at_robot = model_->contacts && near.nearest_mm < model_->touch_mm;
   record.at_wall =
-      commands.driven() && model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm);
+      commands.driven() && (held_ || model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm));
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
   spread(record);

@@ -77,6 +77,8 @@ class TrackFilter {
   void step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
   /// Nothing is measured any more, and what contacts will do is left to whoever knows all robots.
   void look_ahead() { looking_ahead_ = true; }
+  /// In the steps from here on: something whose place is not known may hold the robot.
+  void may_be_held(bool held) { held_ = held; }
   Innovation update(const Sample&, const CommandState& commands);
 
   [[nodiscard]] const Belief& belief() const { return belief_; }
@@ -101,6 +103,7 @@ class TrackFilter {
   int outliers_ = 0;  ///< in a row
   bool measures_;
   bool looking_ahead_ = false;
+  bool held_ = false;
 };
 
 }  // namespace kilotwin::identify
