@@ -96,6 +96,10 @@ PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
       views_.push_back({&track, place, first_number + place, t, neighbours_.back().get(), CommandClock(track)});
     }
   }
+  constexpr double kMargin_mm = 12;
+  const Rim rim(set, kMargin_mm);
+  for (TrackView& view : views_)
+    for (const Sample& s : view.track->samples) view.at_rim.push_back(rim.holds(s.x_mm, s.y_mm));
 }
 
 std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
@@ -133,17 +137,6 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
 
 void PreparedSet::remember(const MotionModel& model) {
   for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells);
-}
-
-void PreparedSet::doubt_rim(bool doubt) {
-  constexpr double kMargin_mm = 12;
-  std::optional<Rim> rim;
-  if (doubt) rim.emplace(*set_, kMargin_mm);
-  for (TrackView& view : views_) {
-    view.at_rim.clear();
-    if (rim)
-      for (const Sample& s : view.track->samples) view.at_rim.push_back(rim->holds(s.x_mm, s.y_mm));
-  }
 }
 
 Meetings PreparedSet::meetings() const {
@@ -458,6 +451,10 @@ double Fitter::log_likelihood(const MotionModel& model) const {
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
+double Fitter::log_likelihood_of_all(const MotionModel& model) const {
+  return with_touching(model, some_tracks(std::numeric_limits<std::size_t>::max()));
+}
+
 double Fitter::log_evidence(const MotionModel& model) const {
   double value = log_likelihood(model);
   if (model.terms.empty()) return value;
@@ -523,6 +520,7 @@ void Fitter::fit_base(MotionModel& model) const {
     if (found < likelihood + kSettled) break;
     likelihood = found;
   }
+  if (holds_seem_elsewhere(model)) fit(model, 2);
 }
 
 void Fitter::fit_surroundings(MotionModel& model) const {

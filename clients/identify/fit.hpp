@@ -45,8 +45,6 @@ class PreparedSet {
   void find_centres(const MotionModel&, std::uint32_t threads);
   /// Looks again at what floors remember, in cells of the model's sizes.
   void remember(const MotionModel&);
-  /// Takes walls to be anywhere along the rim of what robots reached, or no longer.
-  void doubt_rim(bool);
   [[nodiscard]] Meetings meetings() const;
   /// Robots that came near each other, by where discs are.
   [[nodiscard]] std::vector<Pair> pairs() const;
@@ -87,8 +85,10 @@ class Fitter {
   void find_shape(MotionModel&) const;
   /// The room, where its walls are not seen because headings are not: walls that make the tracks most likely.
   void find_walls(MotionModel&) const;
-  /// Of all that was measured on tracks that may be fitted to.
+  /// Of all that was measured of free robots, on tracks that may be fitted to.
   [[nodiscard]] double log_likelihood(const MotionModel&) const;
+  /// Of robots that touch something as well: for models that differ in who does.
+  [[nodiscard]] double log_likelihood_of_all(const MotionModel&) const;
   /// Log marginal likelihood over the coefficients of the terms (Laplace's approximation), up to what all models have in common.
   [[nodiscard]] double log_evidence(const MotionModel&) const;
   /// Information and score of the base's prior, added to those of the data.
@@ -105,6 +105,8 @@ class Fitter {
   /// Puts a picture straight while nothing is concluded from robots that may touch something: in a picture that is bent walls are
   /// no lines, and robots seem to meet where they do not or to pass through each other.
   void straighten(MotionModel&) const;
+  /// Whether what holds robots is not where walls and discs seem to be. If so, all of the rim is doubted.
+  bool holds_seem_elsewhere(MotionModel&) const;
   /// Walls where robots with headings stay at a line.
   void look_for_walls(MotionModel&) const;
   /// Likelihood of what was measured and of the coefficients beforehand.

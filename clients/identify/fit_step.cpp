@@ -46,6 +46,9 @@ Equations equations_of(const Fitter& fitter, const MotionModel& model) {
   return e;
 }
 
+/// In a picture that shows all larger or smaller, robots that are so near may touch.
+constexpr double kMayTouch_mm = 1.15 * kTouch_mm;
+
 }  // namespace
 
 void Fitter::look_for_walls(MotionModel& model) const {
@@ -86,18 +89,34 @@ void Fitter::step(MotionModel& model) const {
   if (model.measures()) settle_scale(model);
 }
 
+bool Fitter::holds_seem_elsewhere(MotionModel& model) const {
+  MotionModel trial = model;
+  trial.doubts_rim = true;
+  trial.touch_mm = kMayTouch_mm;
+  trial.contacts = true;
+  // Noise that robots do not have unless they touch something, looked at where they do not.
+  const double with_noise = log_likelihood(trial);
+  fit_noise(trial);
+  const double without = log_likelihood(trial);
+  std::size_t samples = 0;
+  for (const TrackView& view : set_.views()) samples += view.track->held_out ? 0 : view.track->samples.size();
+  constexpr double kSure = 30, kEach = 0.002;
+  if (without < with_noise + kSure + kEach * static_cast<double>(samples)) return false;
+  model = trial;
+  return true;
+}
+
 void Fitter::straighten(MotionModel& model) const {
-  constexpr double kMayTouch_mm = 1.15 * kTouch_mm;
   const double touch_mm = std::exchange(model.touch_mm, kMayTouch_mm);
   const Room room = std::exchange(model.room, {});
   model.contacts = true;
-  set_.doubt_rim(true);
+  model.doubts_rim = true;
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
     fit_noise(model);
     step(model);
   }
-  set_.doubt_rim(false);
+  model.doubts_rim = false;
   model.touch_mm = touch_mm;
   model.room = room;
   set_.find_centres(model, threads_);

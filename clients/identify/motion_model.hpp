@@ -97,6 +97,8 @@ struct MotionModel {
   Noise noise;
   Room room;
   bool contacts = true;  ///< robots push each other
+  /// Walls may be anywhere along the rim of what robots reached, whatever `room` has.
+  bool doubts_rim = false;
   /// Robots whose centres are this near, by what is known of where they are, may touch, mm.
   double touch_mm = kTouch_mm;
   /// Square cells in which the floor may remember.

@@ -37,7 +37,7 @@ class Loop {
        const std::function<void(double, const std::string&)>& progress)
       : fitter_(fitter), progress_(progress), extent_(extent_of(fitter.set())) {
     out_.model = base;
-    base_likelihood_ = fitter.log_likelihood(base);
+    base_likelihood_ = fitter.log_likelihood_of_all(base);
     units_ = fitter.set().units();
     std::size_t samples = 0;
     for (const auto& unit : units_)
@@ -62,11 +62,11 @@ class Loop {
       const Finding* const best = best_of(outcome, kRemnant * explained());
       if (best != nullptr) {
         const Search before = out_;
-        const double likelihood = fitter_.log_likelihood(out_.model);
+        const double likelihood = fitter_.log_likelihood_of_all(out_.model);
         note_ambiguous(*best, outcome);
         add(*best, outcome.threshold_log10_p);
         // What promised to explain much must do so.
-        if (fitter_.log_likelihood(out_.model) < likelihood + 3) {
+        if (fitter_.log_likelihood_of_all(out_.model) < likelihood + 3) {
           restore(before);
           failed_.insert(hypothesis(*best).name);
         } else {
@@ -135,7 +135,7 @@ class Loop {
   const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
 
   /// Log likelihood that all that was found has gained.
-  [[nodiscard]] double explained() const { return fitter_.log_likelihood(out_.model) - base_likelihood_; }
+  [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.model) - base_likelihood_; }
 
   /// Whether the picture jumps, which is then part of the model.
   bool add_picture_jumps() {
@@ -253,6 +253,7 @@ class Loop {
   }
   /// All as it was, also what tracks were prepared with: headings at their starts, and what floors remember.
   void restore(const Search& before) {
+    if (out_.model.measures() || before.model.measures()) fitter_.set().find_centres(before.model, fitter_.threads());
     out_ = before;
     fitter_.set().remember(out_.model);
     fitter_.set().find_headings(out_.model, fitter_.threads());

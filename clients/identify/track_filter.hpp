@@ -77,8 +77,8 @@ class TrackFilter {
   void step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
   /// Nothing is measured any more, and what contacts will do is left to whoever knows all robots.
   void look_ahead() { looking_ahead_ = true; }
-  /// In the steps from here on: something whose place is not known may hold the robot.
-  void may_be_held(bool held) { held_ = held; }
+  /// In the steps from here on: the robot is at the rim of what robots reached.
+  void at_rim(bool at_rim) { held_ = at_rim && model_->doubts_rim; }
   Innovation update(const Sample&, const CommandState& commands);
 
   [[nodiscard]] const Belief& belief() const { return belief_; }

@@ -37,7 +37,7 @@ struct TrackView {
   const RunNeighbours* neighbours = nullptr;
   CommandClock clock;
   double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample
-  std::vector<bool> at_rim = {};                           ///< at each sample; empty where walls are known
+  std::vector<bool> at_rim = {};                           ///< of what robots reached, at each sample
 
   /// What is known of an instant without knowing where the robot is.
   [[nodiscard]] Situation at(double time_s) const {
@@ -58,7 +58,7 @@ void walk(TrackFilter& filter, const TrackView& view, std::size_t samples, Visit
   filter.start(all.front(), {}, view.start_heading_rad, view.start_heading_sd_rad);
   visitor.start(filter);
   for (std::size_t i = 1; i < std::min(samples, all.size()); ++i) {
-    filter.may_be_held(!view.at_rim.empty() && (view.at_rim[i - 1] || view.at_rim[i]));
+    filter.at_rim(view.at_rim[i - 1] || view.at_rim[i]);
     sub_steps(view.clock, all[i - 1].time_s, all[i].time_s, [&](double t, double h, const CommandState& commands) {
       visitor.step(filter.step(t, h, commands, view.neighbours->view(view.place, t + h / 2)));
     });
