@@ -47,12 +47,6 @@ LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, boo
 
 constexpr std::size_t kEnoughSamples = 8000;  ///< for noise
 
-/// How near to each other robots may touch. Without headings nobody sees which way the centre lies from the point that is tracked.
-double touching_mm(const BaseParameters& base, bool headings) {
-  constexpr double kMostly = 0.75;
-  return kTouch_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
-}
-
 /// By how much, along an axis, robots were moved while they touched others, from the first measurement of that to the last.
 struct Pushes {
   explicit Pushes(double tracker_mm2) : tracker_mm2_(tracker_mm2) {}
@@ -83,6 +77,11 @@ struct Pushes {
 };
 
 }  // namespace
+
+double touching_mm(const BaseParameters& base, bool headings) {
+  constexpr double kMostly = 0.75;
+  return kTouch_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
+}
 
 PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
     : set_(&set), first_number_(first_number) {
@@ -520,10 +519,14 @@ void Fitter::fit_base(MotionModel& model) const {
     if (found < likelihood + kSettled) break;
     likelihood = found;
   }
-  if (holds_seem_elsewhere(model)) fit(model, 2);
+  if (holds_seem_elsewhere(model)) {
+    model = doubting(model);
+    fit(model, 2);
+  }
 }
 
 void Fitter::fit_surroundings(MotionModel& model) const {
+  if (model.doubts_rim) settle_doubts(model);
   // With much noise at walls it would not matter where they are.
   const Noise anew;
   for (double Noise::*const part :
@@ -539,7 +542,8 @@ void Fitter::fit_surroundings(MotionModel& model) const {
     }
     if (model.measures() && set_scale(model)) set_.find_centres(model, threads_);
     // In a picture that is bent robots seem to meet where they do not.
-    if (model.measures()) model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
+    if (model.measures() && !model.doubts_rim)
+      model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
     fit_touching(model);
     fit(model, 1);
   }

@@ -105,8 +105,12 @@ class Fitter {
   /// Puts a picture straight while nothing is concluded from robots that may touch something: in a picture that is bent walls are
   /// no lines, and robots seem to meet where they do not or to pass through each other.
   void straighten(MotionModel&) const;
-  /// Whether what holds robots is not where walls and discs seem to be. If so, all of the rim is doubted.
-  bool holds_seem_elsewhere(MotionModel&) const;
+  /// The same, but whoever is at the rim or near another may be held.
+  [[nodiscard]] MotionModel doubting(MotionModel) const;
+  /// Whether what holds robots is not where walls and discs seem to be.
+  [[nodiscard]] bool holds_seem_elsewhere(const MotionModel&) const;
+  /// Takes walls and discs to be where they now seem to be, if that will do.
+  void settle_doubts(MotionModel&) const;
   /// Walls where robots with headings stay at a line.
   void look_for_walls(MotionModel&) const;
   /// Likelihood of what was measured and of the coefficients beforehand.
@@ -128,6 +132,9 @@ class Fitter {
   /// Where robots touched in the picture: what tells its scale.
   mutable std::shared_ptr<const ScaleHold> hold_;
 };
+
+/// How near to each other robots may touch. Without headings nobody sees which way the centre lies from the point that is tracked.
+[[nodiscard]] double touching_mm(const BaseParameters&, bool headings);
 
 /// The blocks of all terms of a model, in order.
 [[nodiscard]] std::vector<Block> blocks_of(const MotionModel&);

@@ -89,38 +89,47 @@ void Fitter::step(MotionModel& model) const {
   if (model.measures()) settle_scale(model);
 }
 
-bool Fitter::holds_seem_elsewhere(MotionModel& model) const {
-  MotionModel trial = model;
-  trial.doubts_rim = true;
-  trial.touch_mm = kMayTouch_mm;
-  trial.contacts = true;
+MotionModel Fitter::doubting(MotionModel model) const {
+  model.touch_mm = std::max(model.touch_mm, kMayTouch_mm);
+  model.contacts = true;
+  model.doubts_rim = true;
+  return model;
+}
+
+bool Fitter::holds_seem_elsewhere(const MotionModel& model) const {
   // Noise that robots do not have unless they touch something, looked at where they do not.
+  MotionModel trial = doubting(model);
   const double with_noise = log_likelihood(trial);
   fit_noise(trial);
-  const double without = log_likelihood(trial);
   std::size_t samples = 0;
   for (const TrackView& view : set_.views()) samples += view.track->held_out ? 0 : view.track->samples.size();
   constexpr double kSure = 30, kEach = 0.002;
-  if (without < with_noise + kSure + kEach * static_cast<double>(samples)) return false;
-  model = trial;
-  return true;
+  return log_likelihood(trial) > with_noise + kSure + kEach * static_cast<double>(samples);
 }
 
 void Fitter::straighten(MotionModel& model) const {
-  const double touch_mm = std::exchange(model.touch_mm, kMayTouch_mm);
-  const Room room = std::exchange(model.room, {});
-  model.contacts = true;
-  model.doubts_rim = true;
+  const MotionModel before = model;
+  model = doubting(model);
+  model.room = {};
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
     fit_noise(model);
     step(model);
   }
-  model.doubts_rim = false;
-  model.touch_mm = touch_mm;
-  model.room = room;
-  set_.find_centres(model, threads_);
-  model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
+  model.room = carried(before.room, before, model);
+  settle_doubts(model);
+}
+
+void Fitter::settle_doubts(MotionModel& model) const {
+  MotionModel trial = model;
+  trial.doubts_rim = false;
+  trial.touch_mm = touching_mm(trial.base, set_.set().has_headings);
+  set_.find_centres(trial, threads_);
+  trial.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
+  look_for_walls(trial);
+  if (!set_.set().has_headings) find_walls(trial);
+  fit_noise(trial);
+  if (!holds_seem_elsewhere(trial)) model = trial;
 }
 
 }  // namespace kilotwin::identify

@@ -1,5 +1,7 @@
 #include "clients/identify/room.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -14,10 +16,14 @@ struct Place {
   std::size_t track;
 };
 
+/// How often, and how many robots, must have been at a line to make it a wall.
+struct Evidence {
+  std::size_t places, tracks;
+};
+
 /// The line at the upper end of a coordinate where robots stay; infinite where there is none.
-double upper_wall(std::vector<Place> places, double noise_mm) {
+double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  constexpr std::size_t kFewest = 25, kFewestTracks = 2;
   if (places.size() < 500) return kNone;
   std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.at_mm > b.at_mm; });
   // Outliers lie beyond walls too.
@@ -40,7 +46,7 @@ double upper_wall(std::vector<Place> places, double noise_mm) {
   }
   // Of a free robot's places no strip holds many times what the strips beside it hold.
   const bool crowded = static_cast<double>(at_edge) > 2 * (static_cast<double>(before) / 2 + 3);
-  if (at_edge < kFewest || tracks.size() < kFewestTracks || !crowded) return kNone;
+  if (at_edge < fewest.places || tracks.size() < fewest.tracks || !crowded) return kNone;
   return sum / static_cast<double>(at_edge);
 }
 
@@ -72,12 +78,18 @@ Room room_of(const PreparedSet& set, const MotionModel& model) {
     for (Place& p : places) p.at_mm = -p.at_mm;
     return places;
   };
-  Room room;
-  room.x_high_mm = upper_wall(x, noise);
-  room.y_high_mm = upper_wall(y, noise);
-  room.x_low_mm = -upper_wall(turned(std::move(x)), noise);
-  room.y_low_mm = -upper_wall(turned(std::move(y)), noise);
-  return room;
+  const std::vector<Place> x_turned = turned(x), y_turned = turned(y);
+  const auto seen = [&](Evidence fewest) {
+    return Room{-upper_wall(x_turned, noise, fewest), upper_wall(x, noise, fewest),
+                -upper_wall(y_turned, noise, fewest), upper_wall(y, noise, fewest)};
+  };
+  const Room room = seen({25, 2});
+  // Where there are walls on most sides, there is one on the others.
+  constexpr std::ptrdiff_t kMostSides = 3;
+  const std::array<double, 4> sides = {room.x_low_mm, room.x_high_mm, room.y_low_mm, room.y_high_mm};
+  const bool closed =
+      std::count_if(sides.begin(), sides.end(), [](double s) { return std::isfinite(s); }) >= kMostSides;
+  return closed ? seen({8, 1}) : room;
 }
 
 bool push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm) {

@@ -253,7 +253,8 @@ class Loop {
   }
   /// All as it was, also what tracks were prepared with: headings at their starts, and what floors remember.
   void restore(const Search& before) {
-    if (out_.model.measures() || before.model.measures()) fitter_.set().find_centres(before.model, fitter_.threads());
+    if (out_.model.measures() || before.model.measures())
+      fitter_.set().find_centres(before.model, fitter_.threads());
     out_ = before;
     fitter_.set().remember(out_.model);
     fitter_.set().find_headings(out_.model, fitter_.threads());
