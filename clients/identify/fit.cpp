@@ -587,7 +587,7 @@ void Fitter::settle_scale(MotionModel& model) const {
 
 void Fitter::fit(MotionModel& model, int passes) const {
   // With a new map of the picture, all that was seen of walls and of who meets whom is to be seen anew.
-  const bool new_picture = !model.terms.empty() && is_measured(model.terms.back().blocks.front().target);
+  const bool new_picture = !model.terms.empty() && is_map_of_picture(model.terms.back());
   if (passes > 1 && new_picture) straighten(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);

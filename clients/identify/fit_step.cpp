@@ -129,7 +129,7 @@ void Fitter::settle_doubts(MotionModel& model) const {
   look_for_walls(trial);
   if (!set_.set().has_headings) find_walls(trial);
   fit_noise(trial);
-  if (!holds_seem_elsewhere(trial)) model = trial;
+  if (log_likelihood_of_all(trial) > log_likelihood_of_all(model)) model = trial;
 }
 
 }  // namespace kilotwin::identify

@@ -274,6 +274,9 @@ std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model, do
     });
     const Eigen::Vector4d excess = usual_excess(of);
     for (const Candidate& c : of) {
+      // With hardly a frame before it or after it, a jump is but a picture that was off.
+      constexpr double kFrames = 3;
+      if (c.time_s < from_s + kFrames * frame_s || c.time_s > to_s - kFrames * frame_s) continue;
       if (c.gain < std::max(kCertain, least_gain)) continue;
       const Eigen::Matrix4d usual = c.covariance + Eigen::Matrix4d(excess.asDiagonal());
       if (c.size.dot(usual.ldlt().solve(c.size)) / 2 > kBeyondUsual) looks.push_back({&scan, c});

@@ -6,6 +6,16 @@
 
 namespace kilotwin::identify {
 
+bool is_map_of_picture(const Term& term) {
+  return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
+    const auto of_place = [](Covariate c) { return c == Covariate::kX || c == Covariate::kY; };
+    return is_measured(block.target) &&
+           std::any_of(block.basis.factors.begin(), block.basis.factors.end(), [&](const Factor& f) {
+             return of_place(f.axis.of) || (f.of_two() && of_place(f.and_axis.of));
+           });
+  });
+}
+
 RobotBias MotionModel::bias_of(std::uint32_t robot) const {
   if (const auto known = robots.find(robot); known != robots.end()) return known->second;
   RobotBias unknown;

@@ -82,6 +82,9 @@ struct Term {
   Eigen::VectorXd precision;
 };
 
+/// Whether it bends what is seen from place to place.
+[[nodiscard]] bool is_map_of_picture(const Term&);
+
 /// Speeds of a robot at an instant.
 struct Rates {
   double left_mm_s = 0, right_mm_s = 0;            ///< of the wheels, effects included
