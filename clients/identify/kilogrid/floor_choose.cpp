@@ -67,6 +67,11 @@ class Candidates {
     std::fill_n(use.begin(), in_model_, true);
     return use;
   }
+  [[nodiscard]] std::vector<bool> with_all() const {
+    std::vector<bool> use = model_only();
+    for (const std::size_t p : switches()) use[p] = true;
+    return use;
+  }
   [[nodiscard]] std::vector<bool> with(std::size_t c) const {
     std::vector<bool> use = model_only();
     std::fill_n(use.begin() + static_cast<std::ptrdiff_t>(first_of(c)), candidates_[c].switches, true);
@@ -87,44 +92,36 @@ class Candidates {
   std::size_t in_model_, terms_;
 };
 
-/// What stands for chance and for doubt as candidates are weighed.
-class Scales {
- public:
-  Scales(const Candidates& of, const FloorBox& box) : of_(of), box_(box) {}
+/// What candidates remove of a set's misfit.
+struct Gains {
+  double without = 0;      ///< misfit, refitted
+  double with_all = 0;     ///< that no candidate explains
+  std::vector<double> of;  ///< each candidate
 
-  /// What groups of statistics are off by in sets that the model made, as their mean squares.
-  void learn(const std::vector<FloorGap>& made) {
-    by_chance_.assign(statistic_groups().size(), 0);
-    for (const FloorGap& gap : made) {
-      const std::vector<double> left = gap.left(gap.best_steps(of_.model_only(), box_));
-      for (std::size_t g = 0; g < left.size(); ++g) by_chance_[g] += left[g] / static_cast<double>(made.size());
-    }
+  Gains(const FloorGap& gap, const Candidates& candidates, std::size_t count, const FloorBox& box)
+      : without(gap.at(gap.best_steps(candidates.model_only(), box))),
+        with_all(gap.at(gap.best_steps(candidates.with_all(), box))) {
+    for (std::size_t c = 0; c < count; ++c)
+      of.push_back(without - gap.at(gap.best_steps(candidates.with(c), box)));
   }
-  /// How far the model with a candidate is from each group of statistics beyond chance, as variances in those of chance: what
-  /// it cannot explain there may be anything, and a candidate must not win by it.
-  [[nodiscard]] std::vector<double> doubts(const FloorGap& gap, std::size_t c) const {
-    std::vector<double> of = gap.left(gap.best_steps(of_.with(c), box_));
-    for (std::size_t g = 0; g < of.size(); ++g) of[g] = std::max(1.0, of[g] / std::max(by_chance_[g], 1e-9));
-    return of;
-  }
-  /// What the candidate removes, in that measure.
-  [[nodiscard]] double gain(const FloorGap& gap, std::size_t c) const {
-    const FloorGap doubting = gap.doubting(doubts(gap, c));
-    return doubting.at(doubting.best_steps(of_.model_only(), box_)) -
-           doubting.at(doubting.best_steps(of_.with(c), box_));
-  }
-  /// What it removes of `other`, learned from `own`, both in the measure of `doubts`.
-  [[nodiscard]] double gain_of_other(const FloorGap& own, const FloorGap& other, std::size_t c,
-                                     const std::vector<double>& doubts) const {
-    const FloorGap learned = own.doubting(doubts), judged = other.doubting(doubts);
-    return judged.at(learned.best_steps(of_.model_only(), box_)) - judged.at(learned.best_steps(of_.with(c), box_));
-  }
-
- private:
-  const Candidates& of_;
-  const FloorBox& box_;
-  std::vector<double> by_chance_;
 };
+
+/// What a candidate removes of `other`, learned from `own`.
+double gain_of_other(const FloorGap& own, const FloorGap& other, const Candidates& of, std::size_t c,
+                     const FloorBox& box) {
+  return other.at(own.best_steps(of.model_only(), box)) - other.at(own.best_steps(of.with(c), box));
+}
+
+/// Of the model's parameters a step of one width, of candidates' two: those are off, and may be far from it.
+FloorBox box_of(const FloorModel& all, std::size_t in_model) {
+  FloorBox box = box_around(all, 1, 1);
+  const FloorBox wide = box_around(all, 1, 2);
+  std::copy(wide.least.begin() + static_cast<std::ptrdiff_t>(in_model), wide.least.end(),
+            box.least.begin() + static_cast<std::ptrdiff_t>(in_model));
+  std::copy(wide.most.begin() + static_cast<std::ptrdiff_t>(in_model), wide.most.end(),
+            box.most.begin() + static_cast<std::ptrdiff_t>(in_model));
+  return box;
+}
 
 }  // namespace
 
@@ -149,32 +146,33 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
   const auto here = [&](const std::function<bool(std::size_t)>& in) { return statistics_but(simulated, runs, in); };
   Eigen::MatrixXd slopes = slopes_around(of.all(), target, of.model_only(), 1, kWhole_s, seed);
   add_slopes_of_switches(slopes, of.all(), target, of.switches(), kWhole_s, seed);
-  const FloorBox box = box_around(of.all(), 1, 1);
+  const FloorBox box = box_of(of.all(), model.values.size());
   const std::vector<FloorSet> sets = sets_of(model, target, seed * 3 + 2);
   const Eigen::MatrixXd correlation = correlation_of(sets);
 
-  std::vector<std::optional<FloorGap>> built(sets.size());
+  std::vector<std::optional<Gains>> made(sets.size());
   in_parallel(target.threads(), sets.size(), [&](std::size_t b) {
-    built[b].emplace(sets[b], others_than(sets, b), slopes, correlation);
+    made[b].emplace(FloorGap(sets[b], others_than(sets, b), slopes, correlation), of, candidates.size(), box);
   });
-  std::vector<FloorGap> made;
-  for (std::optional<FloorGap>& gap : built) made.push_back(std::move(*gap));
-  Scales scales(of, box);
-  scales.learn(made);
-  std::vector<std::vector<double>> by_chance(sets.size());
-  in_parallel(target.threads(), sets.size(), [&](std::size_t b) {
-    for (std::size_t c = 0; c < candidates.size(); ++c) by_chance[b].push_back(scales.gain(made[b], c));
-  });
-  for (const FloorGap& gap : made)
-    choice.by_chance += gap.at(gap.best_steps(of.model_only(), box)) / static_cast<double>(sets.size());
+  double all_by_chance = 0;
+  std::vector<std::vector<double>> by_chance;
+  for (const std::optional<Gains>& set : made) {
+    choice.by_chance += set->without / static_cast<double>(sets.size());
+    all_by_chance += set->with_all / static_cast<double>(sets.size());
+    by_chance.push_back(set->of);
+  }
   std::vector<std::size_t> switches;
   for (const FloorTerm& candidate : candidates) switches.push_back(candidate.switches);
   const FloorChance chance(by_chance, switches);
   choice.bound = chance.bound();
 
   const FloorGap gap(target.set(), here([](std::size_t) { return true; }), slopes, correlation);
+  const Gains gains(gap, of, candidates.size(), box);
   choice.numbers = gap.numbers;
-  choice.misfit = gap.at(gap.best_steps(of.model_only(), box));
+  choice.misfit = gains.without;
+  // What all candidates together do not explain counts as if chance were so much larger, as an analysis of variance takes its
+  // errors from what its largest model leaves.
+  choice.unexplained = std::max(1.0, gains.with_all / all_by_chance);
   // Each run and all but it: what is learned from these must help with it.
   std::vector<FloorGap> alone, others;
   constexpr std::size_t kFewestRuns = 3;
@@ -190,28 +188,27 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
     return a.helps_others() != b.helps_others() ? a.helps_others() : a.evidence > b.evidence;
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    const std::vector<double> doubts = scales.doubts(gap, c);
-    const FloorGap doubting = gap.doubting(doubts);
-    const Eigen::VectorXd steps = doubting.best_steps(of.with(c), box);
+    const Eigen::VectorXd steps = gap.best_steps(of.with(c), box);
     const std::vector<double> values = moved(of.all(), {steps.data(), steps.data() + steps.size()}, 1);
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(of.first_of(c));
-    const double gain = doubting.at(doubting.best_steps(of.model_only(), box)) - doubting.at(steps);
-    choice.scores.push_back({gain,
-                             chance.gain_of(c, choice.bound),
-                             chance.evidence(c, gain),
+    choice.scores.push_back({gains.of[c],
+                             chance.gain_of(c, choice.bound) * choice.unexplained,
+                             chance.evidence(c, gains.of[c] / choice.unexplained),
                              {},
                              {first, first + static_cast<std::ptrdiff_t>(candidates[c].parameters.size())}});
     CandidateScore& score = choice.scores.back();
     for (std::size_t r = 0; r < alone.size(); ++r)
-      score.by_run.push_back(scales.gain_of_other(others[r], alone[r], c, doubts));
+      score.by_run.push_back(gain_of_other(others[r], alone[r], of, c, box));
     if (better(score, choice.scores[choice.best])) choice.best = c;
-    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, gain, score.needed);
+    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, score.gain, score.needed);
     for (std::size_t r = 0; r < score.by_run.size(); ++r)
       tried += fmt::format("{}{:.0f}", r == 0 ? " (" : " ", score.by_run[r]);
     if (!score.by_run.empty()) tried += ")";
   }
-  progress(fmt::format("of {:.0f} ({:.0f} by chance, {} numbers) would remove, of what is beyond chance:{}",
-                       choice.misfit, choice.by_chance, choice.numbers, tried));
+  progress(
+      fmt::format("of {:.0f} ({:.0f} by chance, {} numbers, unexplained {:.1f} times) would remove, of what is beyond "
+                  "chance (of each run, by the others):{}",
+                  choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried));
   return choice;
 }
 

@@ -27,6 +27,7 @@ struct Choice {
   double bound = 0;         ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
   double misfit = 0;        ///< where the model stands, refitted, with correlations
   double by_chance = 0;     ///< that of sets that the model made
+  double unexplained = 1;   ///< what is left with all candidates, in what is left of those sets
   std::size_t numbers = 0;  ///< that it is of
 
   [[nodiscard]] bool found() const {

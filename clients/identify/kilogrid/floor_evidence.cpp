@@ -64,9 +64,8 @@ FloorGap::FloorGap(const FloorSet& measured, const FloorStatistics& simulated, c
                    const Eigen::MatrixXd& correlation) {
   const auto statistics = static_cast<Eigen::Index>(statistic_count());
   Eigen::MatrixXd covariance = (1 - kOwn) * correlation;
-  off_ = Eigen::VectorXd::Zero(statistics);
-  scaled_ = Eigen::MatrixXd::Zero(statistics, slopes.cols());
-  known_.assign(statistic_count(), false);
+  Eigen::VectorXd off = Eigen::VectorXd::Zero(statistics);
+  Eigen::MatrixXd scaled = Eigen::MatrixXd::Zero(statistics, slopes.cols());
   Eigen::VectorXd widen = Eigen::VectorXd::Ones(statistics);
   for (Eigen::Index s = 0; s < statistics; ++s) {
     const auto q = static_cast<std::size_t>(s);
@@ -80,49 +79,17 @@ FloorGap::FloorGap(const FloorSet& measured, const FloorStatistics& simulated, c
       continue;
     }
     ++numbers;
-    known_[q] = true;
-    off_(s) = difference / std::sqrt(variance);
-    scaled_.row(s) = slopes.row(s) / std::sqrt(variance);
-    widen(s) = std::sqrt(std::max(1.0, std::abs(off_(s)) / kFar));
+    off(s) = difference / std::sqrt(variance);
+    scaled.row(s) = slopes.row(s) / std::sqrt(variance);
+    widen(s) = std::sqrt(std::max(1.0, std::abs(off(s)) / kFar));
   }
   covariance = widen.asDiagonal() * covariance * widen.asDiagonal();
-  factor_ = covariance.llt().matrixL();
-  whiten(Eigen::VectorXd::Ones(statistics));
-}
-
-void FloorGap::whiten(const Eigen::VectorXd& sd) {
-  const auto roots = factor_.triangularView<Eigen::Lower>();
-  const Eigen::VectorXd r = roots.solve(Eigen::VectorXd(off_.cwiseQuotient(sd)));
-  const Eigen::MatrixXd a = roots.solve(Eigen::MatrixXd(sd.cwiseInverse().asDiagonal() * scaled_));
+  const Eigen::LLT<Eigen::MatrixXd> roots(covariance);
+  const Eigen::VectorXd r = roots.matrixL().solve(off);
+  const Eigen::MatrixXd a = roots.matrixL().solve(scaled);
   curve = a.transpose() * a;
   pull = a.transpose() * r;
   misfit = r.squaredNorm();
-}
-
-std::vector<double> FloorGap::left(const Eigen::VectorXd& steps) const {
-  const Eigen::VectorXd off = off_ + scaled_ * steps;
-  std::vector<double> of;
-  for (const StatisticGroup& group : statistic_groups()) {
-    double sum = 0, count = 0;
-    for (std::size_t s = group.first; s < group.first + group.size(); ++s) {
-      sum += known_[s] ? off(static_cast<Eigen::Index>(s)) * off(static_cast<Eigen::Index>(s)) : 0;
-      count += known_[s] ? 1 : 0;
-    }
-    of.push_back(sum / std::max(count, 1.0));
-  }
-  return of;
-}
-
-FloorGap FloorGap::doubting(const std::vector<double>& variances) const {
-  Eigen::VectorXd sd = Eigen::VectorXd::Ones(off_.size());
-  for (std::size_t g = 0; g < variances.size(); ++g) {
-    const StatisticGroup& group = statistic_groups()[g];
-    sd.segment(static_cast<Eigen::Index>(group.first), static_cast<Eigen::Index>(group.size()))
-        .setConstant(std::sqrt(variances[g]));
-  }
-  FloorGap gap = *this;
-  gap.whiten(sd);
-  return gap;
 }
 
 Eigen::VectorXd FloorGap::best_steps(const std::vector<bool>& in_use, const FloorBox& box) const {

@@ -23,19 +23,6 @@ struct FloorGap {
   /// The steps that lower it most, of parameters in use and within the box.
   [[nodiscard]] Eigen::VectorXd best_steps(const std::vector<bool>& in_use, const FloorBox&) const;
   [[nodiscard]] double at(const Eigen::VectorXd& steps) const;
-  /// What is left after steps, as mean squares in tolerances, per group of statistics.
-  [[nodiscard]] std::vector<double> left(const Eigen::VectorXd& steps) const;
-  /// The same where the model is not believed to be nearer to each group of statistics than by these variances, in those of chance.
-  [[nodiscard]] FloorGap doubting(const std::vector<double>& variances) const;
-
- private:
-  /// Of all statistics in the measure of their correlations.
-  void whiten(const Eigen::VectorXd& sd);
-
-  Eigen::VectorXd off_;      ///< simulated less measured, in tolerances; 0 where not known
-  Eigen::MatrixXd scaled_;   ///< slopes, in tolerances
-  Eigen::MatrixXd factor_;   ///< lower, of the covariance
-  std::vector<bool> known_;
 };
 
 /// Correlations of statistics over robots of simulated sets, each set's about its own means. Statistics that are not known have none.

@@ -77,7 +77,7 @@ Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
 }
 
 /// How often measured runs are simulated to say where a model stands.
-constexpr int kEngineRuns = 2;
+constexpr int kEngineRuns = 1;
 constexpr std::size_t kQuickRuns = 2;
 
 FloorStatistics quick_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed) {

@@ -192,8 +192,8 @@ Eigen::MatrixXd slopes_around(const FloorModel& model, const FloorTarget& target
                               double width, double longest_s, std::uint64_t seed) {
   const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
   FloorPoints points;
-  // Four for each: with less, what chance makes of the slopes leads steps astray.
-  add_points(points, model, target, moves, 4 * moving + 12, width, longest_s, seed);
+  // Three for each: with less, what chance makes of the slopes leads steps astray.
+  add_points(points, model, target, moves, 3 * moving + 12, width, longest_s, seed);
   return slopes_of(points, model, moves, target.scenes().size(), width);
 }
 
