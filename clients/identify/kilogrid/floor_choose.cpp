@@ -101,8 +101,7 @@ struct Gains {
   Gains(const FloorGap& gap, const Candidates& candidates, std::size_t count, const FloorBox& box)
       : without(gap.at(gap.best_steps(candidates.model_only(), box))),
         with_all(gap.at(gap.best_steps(candidates.with_all(), box))) {
-    for (std::size_t c = 0; c < count; ++c)
-      of.push_back(without - gap.at(gap.best_steps(candidates.with(c), box)));
+    for (std::size_t c = 0; c < count; ++c) of.push_back(without - gap.at(gap.best_steps(candidates.with(c), box)));
   }
 };
 
@@ -181,7 +180,8 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
     rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(r));
     alone.emplace_back(FloorSet({target.set().runs[r]}), here([r](std::size_t i) { return i == r; }), slopes,
                        correlation);
-    others.emplace_back(FloorSet(std::move(rest)), here([r](std::size_t i) { return i != r; }), slopes, correlation);
+    others.emplace_back(FloorSet(std::move(rest)), here([r](std::size_t i) { return i != r; }), slopes,
+                        correlation);
   }
   std::string tried;
   const auto better = [](const CandidateScore& a, const CandidateScore& b) {
@@ -205,10 +205,10 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
       tried += fmt::format("{}{:.0f}", r == 0 ? " (" : " ", score.by_run[r]);
     if (!score.by_run.empty()) tried += ")";
   }
-  progress(
-      fmt::format("of {:.0f} ({:.0f} by chance, {} numbers, unexplained {:.1f} times) would remove, of what is beyond "
-                  "chance (of each run, by the others):{}",
-                  choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried));
+  progress(fmt::format(
+      "of {:.0f} ({:.0f} by chance, {} numbers, unexplained {:.1f} times) would remove, of what is beyond "
+      "chance (of each run, by the others):{}",
+      choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried));
   return choice;
 }
 

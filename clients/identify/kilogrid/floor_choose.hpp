@@ -11,10 +11,11 @@ namespace kilotwin::kilogrid {
 
 /// What the neighbourhood of a model says about a candidate.
 struct CandidateScore {
-  double gain = 0;             ///< by how much it would lower the misfit, with the model refitted
-  double needed = 0;           ///< that much is beyond chance
-  double evidence = 0;         ///< negative logarithm of the chance of such a gain
-  std::vector<double> by_run;  ///< what it removes of each run's misfit, learned from the others; empty of fewer than three
+  double gain = 0;      ///< by how much it would lower the misfit, with the model refitted
+  double needed = 0;    ///< that much is beyond chance
+  double evidence = 0;  ///< negative logarithm of the chance of such a gain
+  std::vector<double>
+      by_run;  ///< what it removes of each run's misfit, learned from the others; empty of fewer than three
   std::vector<double> values;  ///< of its parameters
 
   /// Whether it helps with runs that it was not learned from: all together, and each but one of four.
@@ -23,7 +24,7 @@ struct CandidateScore {
 
 struct Choice {
   std::vector<CandidateScore> scores;  ///< of each candidate
-  std::size_t best = 0;                ///< with the most evidence, of those that help with other runs if there are any
+  std::size_t best = 0;     ///< with the most evidence, of those that help with other runs if there are any
   double bound = 0;         ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
   double misfit = 0;        ///< where the model stands, refitted, with correlations
   double by_chance = 0;     ///< that of sets that the model made

@@ -151,8 +151,7 @@ void add_points(FloorPoints& points, const FloorModel& model, const FloorTarget&
   in_parallel(target.threads(), more, [&](std::size_t i) {
     const std::size_t run = points.run[before + i];
     points.said[before + i] =
-        statistics_of(
-            sums_at(target, model.settings(points.values[before + i]), run, longest_s, seed * 1000 + run))
+        statistics_of(sums_at(target, model.settings(points.values[before + i]), run, longest_s, seed * 1000 + run))
             .value;
   });
 }
@@ -175,7 +174,8 @@ Eigen::MatrixXd slopes_of(const FloorPoints& points, const FloorModel& model, co
       x(i, scenes + p) = (points.values[k][q] - model.values[q]) / (width * parameters[q].width);
     }
     // Points of a design within the width have a mean square of a third; what is farther off bends away.
-    const double far = 3 * x.row(i).tail(columns).squaredNorm() / static_cast<double>(std::max<std::size_t>(moving, 1));
+    const double far =
+        3 * x.row(i).tail(columns).squaredNorm() / static_cast<double>(std::max<std::size_t>(moving, 1));
     weight(i) = std::exp(-std::max(far - 1, 0.0) / 2);
   }
   const Lines lines(std::move(x), std::move(weight), scenes, moving);

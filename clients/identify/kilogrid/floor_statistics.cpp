@@ -28,7 +28,7 @@ constexpr double kExtentScale_mm = 100;
 constexpr double kMiddle_mm = 300;  ///< from walls
 constexpr double kNear_mm = 100;
 constexpr double kAboutSpeed_mm = 75;  ///< a usual step
-constexpr double kGentle_rad = 1.2;  ///< turns of a straight robot with a bias, not of the walk
+constexpr double kGentle_rad = 1.2;    ///< turns of a straight robot with a bias, not of the walk
 
 constexpr std::array kSteps_mm = {0., 8., 16., 24., 32., 40., 50., 60., 70., 80., 90., 100., 110., 120., 150.};
 constexpr std::array kLags = {1, 2, 5, 10, 20, 30, 60};

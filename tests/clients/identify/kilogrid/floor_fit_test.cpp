@@ -150,7 +150,8 @@ TEST(FloorModel, ADriftToTheMiddleTakesRobotsThereAlongItsAxis) {
   const auto said = [&](const FloorModel& of) {
     std::vector<RobotSums> all;
     for (int i = 0; i < 4; ++i) {
-      const FloorRun run = simulate_quickly(scene(40, 1500, i), {}, of.settings(), 20 + static_cast<std::uint64_t>(i));
+      const FloorRun run =
+          simulate_quickly(scene(40, 1500, i), {}, of.settings(), 20 + static_cast<std::uint64_t>(i));
       for (RobotSums& robot : robot_sums(run, {})) all.push_back(std::move(robot));
     }
     return statistics_of(all);
