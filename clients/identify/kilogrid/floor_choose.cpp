@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <optional>
 
 #include "clients/identify/kilogrid/floor_evidence.hpp"
 #include "clients/identify/kilogrid/quick_swarm.hpp"
@@ -41,22 +43,15 @@ FloorStatistics others_than(const std::vector<FloorSet>& sets, std::size_t set) 
   return statistics_of(all);
 }
 
-/// What candidates remove of a set's misfit. What the model cannot explain with a candidate either counts as if chance were so
-/// much larger, as in an F test: a gain is measured by the misfit that it leaves.
-struct Gains {
-  double without = 0;      ///< misfit, refitted
-  std::vector<double> of;  ///< each candidate
-
-  [[nodiscard]] std::vector<double> in_chances(double by_chance) const {
-    std::vector<double> all;
-    for (const double gain : of) all.push_back(gain / std::max(1.0, (without - gain) / by_chance));
-    return all;
+/// Each run's robots, of simulated runs in the order of their scenes, time and again.
+FloorStatistics statistics_but(const std::vector<std::vector<RobotSums>>& simulated, std::size_t scenes,
+                               const std::function<bool(std::size_t scene)>& in) {
+  std::vector<RobotSums> all;
+  for (std::size_t i = 0; i < simulated.size(); ++i) {
+    if (in(i % scenes)) all.insert(all.end(), simulated[i].begin(), simulated[i].end());
   }
-  /// The gain that counts for as much as this one does where the misfit is by chance.
-  [[nodiscard]] double needed(double in_chances, double by_chance) const {
-    return std::max(in_chances, in_chances * without / (by_chance + in_chances));
-  }
-};
+  return statistics_of(all);
+}
 
 /// Parameters of the model and of its candidates, as those that are in use.
 class Candidates {
@@ -70,6 +65,11 @@ class Candidates {
   [[nodiscard]] std::vector<bool> model_only() const {
     std::vector<bool> use(all_.values.size(), false);
     std::fill_n(use.begin(), in_model_, true);
+    return use;
+  }
+  [[nodiscard]] std::vector<bool> with_all() const {
+    std::vector<bool> use = model_only();
+    for (const std::size_t p : switches()) use[p] = true;
     return use;
   }
   [[nodiscard]] std::vector<bool> with(std::size_t c) const {
@@ -92,58 +92,123 @@ class Candidates {
   std::size_t in_model_, terms_;
 };
 
+/// What candidates remove of a set's misfit.
+struct Gains {
+  double without = 0;      ///< misfit, refitted
+  double with_all = 0;     ///< that no candidate explains
+  std::vector<double> of;  ///< each candidate
+
+  Gains(const FloorGap& gap, const Candidates& candidates, std::size_t count, const FloorBox& box)
+      : without(gap.at(gap.best_steps(candidates.model_only(), box))),
+        with_all(gap.at(gap.best_steps(candidates.with_all(), box))) {
+    for (std::size_t c = 0; c < count; ++c) of.push_back(without - gap.at(gap.best_steps(candidates.with(c), box)));
+  }
+};
+
+/// What a candidate removes of `other`, learned from `own`.
+double gain_of_other(const FloorGap& own, const FloorGap& other, const Candidates& of, std::size_t c,
+                     const FloorBox& box) {
+  return other.at(own.best_steps(of.model_only(), box)) - other.at(own.best_steps(of.with(c), box));
+}
+
+/// Of the model's parameters a step of one width, of candidates' two: those are off, and may be far from it.
+FloorBox box_of(const FloorModel& all, std::size_t in_model) {
+  FloorBox box = box_around(all, 1, 1);
+  const FloorBox wide = box_around(all, 1, 2);
+  std::copy(wide.least.begin() + static_cast<std::ptrdiff_t>(in_model), wide.least.end(),
+            box.least.begin() + static_cast<std::ptrdiff_t>(in_model));
+  std::copy(wide.most.begin() + static_cast<std::ptrdiff_t>(in_model), wide.most.end(),
+            box.most.begin() + static_cast<std::ptrdiff_t>(in_model));
+  return box;
+}
+
 }  // namespace
+
+bool CandidateScore::helps_others() const {
+  if (by_run.empty()) return true;
+  double sum = 0;
+  std::size_t against = 0;
+  for (const double removed : by_run) {
+    sum += removed;
+    against += removed > 0 ? 0 : 1;
+  }
+  return sum > 0 && against <= by_run.size() / 4;
+}
 
 Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates, const FloorTarget& target,
               std::uint64_t seed, const FloorProgress& progress) {
   Choice choice;
   if (candidates.empty()) return choice;
   const Candidates of(model, candidates);
-  const FloorStatistics here =
-      simulated_statistics(target, model.settings(), seed * 7 + 3, static_cast<int>(kRepeats));
+  const std::size_t runs = target.scenes().size();
+  const auto simulated = simulated_sums(target, model.settings(), seed * 7 + 3, static_cast<int>(kRepeats));
+  const auto here = [&](const std::function<bool(std::size_t)>& in) { return statistics_but(simulated, runs, in); };
   Eigen::MatrixXd slopes = slopes_around(of.all(), target, of.model_only(), 1, kWhole_s, seed);
   add_slopes_of_switches(slopes, of.all(), target, of.switches(), kWhole_s, seed);
-  const FloorBox box = box_around(of.all(), 1, 1);
+  const FloorBox box = box_of(of.all(), model.values.size());
   const std::vector<FloorSet> sets = sets_of(model, target, seed * 3 + 2);
   const Eigen::MatrixXd correlation = correlation_of(sets);
 
-  const auto gains_of = [&](const FloorGap& gap) {
-    Gains gains{gap.at(gap.best_steps(of.model_only(), box)), {}};
-    for (std::size_t c = 0; c < candidates.size(); ++c)
-      gains.of.push_back(gains.without - gap.at(gap.best_steps(of.with(c), box)));
-    return gains;
-  };
-  std::vector<Gains> simulated(sets.size());
+  std::vector<std::optional<Gains>> made(sets.size());
   in_parallel(target.threads(), sets.size(), [&](std::size_t b) {
-    simulated[b] = gains_of({sets[b], others_than(sets, b), slopes, correlation});
+    made[b].emplace(FloorGap(sets[b], others_than(sets, b), slopes, correlation), of, candidates.size(), box);
   });
-  for (const Gains& set : simulated) choice.by_chance += set.without / static_cast<double>(sets.size());
+  double all_by_chance = 0;
   std::vector<std::vector<double>> by_chance;
-  for (const Gains& set : simulated) by_chance.push_back(set.in_chances(choice.by_chance));
+  for (const std::optional<Gains>& set : made) {
+    choice.by_chance += set->without / static_cast<double>(sets.size());
+    all_by_chance += set->with_all / static_cast<double>(sets.size());
+    by_chance.push_back(set->of);
+  }
   std::vector<std::size_t> switches;
   for (const FloorTerm& candidate : candidates) switches.push_back(candidate.switches);
   const FloorChance chance(by_chance, switches);
   choice.bound = chance.bound();
 
-  const FloorGap gap(target.set(), here, slopes, correlation);
+  const FloorGap gap(target.set(), here([](std::size_t) { return true; }), slopes, correlation);
+  const Gains gains(gap, of, candidates.size(), box);
   choice.numbers = gap.numbers;
-  const Gains gains = gains_of(gap);
-  const std::vector<double> in_chances = gains.in_chances(choice.by_chance);
   choice.misfit = gains.without;
+  // What all candidates together do not explain counts as if chance were so much larger, as an analysis of variance takes its
+  // errors from what its largest model leaves.
+  choice.unexplained = std::max(1.0, gains.with_all / all_by_chance);
+  // Each run and all but it: what is learned from these must help with it.
+  std::vector<FloorGap> alone, others;
+  constexpr std::size_t kFewestRuns = 3;
+  for (std::size_t r = 0; runs >= kFewestRuns && r < runs; ++r) {
+    std::vector<std::vector<RobotSums>> rest = target.set().runs;
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(r));
+    alone.emplace_back(FloorSet({target.set().runs[r]}), here([r](std::size_t i) { return i == r; }), slopes,
+                       correlation);
+    others.emplace_back(FloorSet(std::move(rest)), here([r](std::size_t i) { return i != r; }), slopes,
+                        correlation);
+  }
   std::string tried;
+  const auto better = [](const CandidateScore& a, const CandidateScore& b) {
+    return a.helps_others() != b.helps_others() ? a.helps_others() : a.evidence > b.evidence;
+  };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     const Eigen::VectorXd steps = gap.best_steps(of.with(c), box);
     const std::vector<double> values = moved(of.all(), {steps.data(), steps.data() + steps.size()}, 1);
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(of.first_of(c));
     choice.scores.push_back({gains.of[c],
-                             gains.needed(chance.gain_of(c, choice.bound), choice.by_chance),
-                             chance.evidence(c, in_chances[c]),
+                             chance.gain_of(c, choice.bound) * choice.unexplained,
+                             chance.evidence(c, gains.of[c] / choice.unexplained),
+                             {},
                              {first, first + static_cast<std::ptrdiff_t>(candidates[c].parameters.size())}});
-    if (choice.scores[c].evidence > choice.scores[choice.best].evidence) choice.best = c;
-    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, gains.of[c], choice.scores[c].needed);
+    CandidateScore& score = choice.scores.back();
+    for (std::size_t r = 0; r < alone.size(); ++r)
+      score.by_run.push_back(gain_of_other(others[r], alone[r], of, c, box));
+    if (better(score, choice.scores[choice.best])) choice.best = c;
+    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, score.gain, score.needed);
+    for (std::size_t r = 0; r < score.by_run.size(); ++r)
+      tried += fmt::format("{}{:.0f}", r == 0 ? " (" : " ", score.by_run[r]);
+    if (!score.by_run.empty()) tried += ")";
   }
-  progress(fmt::format("of {:.0f} ({:.0f} by chance, {} numbers) would remove, of what is beyond chance:{}",
-                       choice.misfit, choice.by_chance, choice.numbers, tried));
+  progress(fmt::format(
+      "of {:.0f} ({:.0f} by chance, {} numbers, unexplained {:.1f} times) would remove, of what is beyond "
+      "chance (of each run, by the others):{}",
+      choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried));
   return choice;
 }
 

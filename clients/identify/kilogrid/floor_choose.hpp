@@ -11,21 +11,29 @@ namespace kilotwin::kilogrid {
 
 /// What the neighbourhood of a model says about a candidate.
 struct CandidateScore {
-  double gain = 0;             ///< by how much it would lower the misfit, with the model refitted
-  double needed = 0;           ///< that much is beyond chance
-  double evidence = 0;         ///< negative logarithm of the chance of such a gain
+  double gain = 0;      ///< by how much it would lower the misfit, with the model refitted
+  double needed = 0;    ///< that much is beyond chance
+  double evidence = 0;  ///< negative logarithm of the chance of such a gain
+  std::vector<double>
+      by_run;  ///< what it removes of each run's misfit, learned from the others; empty of fewer than three
   std::vector<double> values;  ///< of its parameters
+
+  /// Whether it helps with runs that it was not learned from: all together, and each but one of four.
+  [[nodiscard]] bool helps_others() const;
 };
 
 struct Choice {
   std::vector<CandidateScore> scores;  ///< of each candidate
-  std::size_t best = 0;                ///< with the most evidence
+  std::size_t best = 0;     ///< with the most evidence, of those that help with other runs if there are any
   double bound = 0;         ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
   double misfit = 0;        ///< where the model stands, refitted, with correlations
   double by_chance = 0;     ///< that of sets that the model made
+  double unexplained = 1;   ///< what is left with all candidates, in what is left of those sets
   std::size_t numbers = 0;  ///< that it is of
 
-  [[nodiscard]] bool found() const { return !scores.empty() && scores[best].evidence > bound; }
+  [[nodiscard]] bool found() const {
+    return !scores.empty() && scores[best].evidence > bound && scores[best].helps_others();
+  }
 };
 
 /// Weighs each candidate that the model lacks against sets simulated by the model: as many runs and robots as measured, from

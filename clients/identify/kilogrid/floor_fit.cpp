@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "clients/identify/kilogrid/floor_slopes.hpp"
+#include "clients/identify/kilogrid/quick_swarm.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -75,6 +76,34 @@ Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
   return steps;
 }
 
+/// How often measured runs are simulated to say where a model stands.
+constexpr int kEngineRuns = 1;
+constexpr std::size_t kQuickRuns = 2;
+
+FloorStatistics quick_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed) {
+  const std::size_t scenes = target.scenes().size();
+  std::vector<std::vector<RobotSums>> sums(scenes * kQuickRuns);
+  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
+    sums[i] = robot_sums(simulate_quickly(target.scenes()[i % scenes], target.floor(), settings, seed * 100 + i),
+                         target.floor());
+  });
+  std::vector<RobotSums> all;
+  for (std::vector<RobotSums>& run : sums)
+    all.insert(all.end(), std::make_move_iterator(run.begin()), std::make_move_iterator(run.end()));
+  return statistics_of(all);
+}
+
+/// What one says more than the other, less what chance makes of it.
+std::vector<double> differences(const FloorStatistics& one, const FloorStatistics& other) {
+  std::vector<double> more(one.value.size(), 0);
+  for (std::size_t s = 0; s < more.size(); ++s) {
+    const double difference = one.value[s] - other.value[s], chance = one.variance[s] + other.variance[s];
+    if (std::isfinite(difference) && difference != 0)
+      more[s] = difference * std::max(0.0, 1 - chance / (difference * difference));
+  }
+  return more;
+}
+
 /// The misfit as steps lower it: what is far off counts by its size, not by its square.
 double robust_misfit(const FloorTarget& target, const FloorStatistics& at) {
   double sum = 0;
@@ -92,23 +121,36 @@ double robust_misfit(const FloorTarget& target, const FloorStatistics& at) {
 double fit(FloorModel& model, const FloorTarget& target, int rounds, double width, std::uint64_t seed,
            const FloorProgress& progress) {
   const std::vector<bool> all(model.values.size(), true);
+  const std::size_t parameters = all.size(), runs = target.scenes().size();
   model.later = target.later();
-  // The same chance for all, so that misfits differ by what the models differ.
-  const std::uint64_t chance = seed * 7 + 1;
-  FloorStatistics at = simulated_statistics(target, model.settings(), chance);
+  // Quick runs, brought near to the engine's by what these differ by where the search begins. The same chance for all, so that
+  // misfits differ by what the models differ.
+  const FloorStatistics engine = simulated_statistics(target, model.settings(), seed * 7 + 1, kEngineRuns);
+  FloorStatistics quick = quick_statistics(target, model.settings(), seed * 7 + 2);
+  const std::vector<double> more = differences(engine, quick);
+  const auto said_by = [&](const FloorModel& of) {
+    FloorStatistics at = quick_statistics(target, of.settings(), seed * 7 + 2);
+    for (std::size_t s = 0; s < more.size(); ++s) at.value[s] += more[s];
+    return at;
+  };
+  FloorStatistics at = said_by(model);
   double misfit = robust_misfit(target, at);
+  FloorPoints points;
+  // Points stay as wide apart as they were: what chance makes of slopes falls as they become more. Steps become shorter.
+  constexpr double kLongest = 1.5, kShorter = 0.4;
+  constexpr int kTries = 2;
+  double most = kLongest;
   for (int round = 0; round < rounds; ++round) {
-    const Surrogate surrogate = surrogate_of(
-        target, at,
-        slopes_around(model, target, all, width, kExplored_s, seed * 10 + static_cast<std::uint64_t>(round)));
+    // Four for each parameter: with less, what chance makes of the slopes leads steps astray. Later those from before count, too.
+    add_points(points, model, target, all, (round == 0 ? 4 : 2) * parameters + 12, width, kExplored_s,
+               seed * 10 + static_cast<std::uint64_t>(round));
+    const Surrogate surrogate = surrogate_of(target, at, slopes_of(points, model, all, runs, width));
     const FloorModel before = model;
     // A step that leads away was too long for the surrogate.
-    constexpr double kLongest = 1.5, kShortest = 0.3;
-    double most = kLongest;
-    for (; most > kShortest; most /= 2.5) {
+    for (int attempt = 0; attempt < kTries; ++attempt) {
       const Eigen::VectorXd steps = best_steps(surrogate, box_around(before, width, most));
       model.values = moved(before, {steps.data(), steps.data() + steps.size()}, width);
-      const FloorStatistics there = simulated_statistics(target, model.settings(), chance);
+      const FloorStatistics there = said_by(model);
       const double now = robust_misfit(target, there);
       progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
       if (now < misfit) {
@@ -117,8 +159,8 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
         break;
       }
       model = before;
+      most *= kShorter;
     }
-    width *= most > kShortest ? 0.8 : 0.5;
   }
   return target.misfit(at);
 }

@@ -338,6 +338,23 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
          effect.set_direction_deg(90);
          add_function(effect, Function::NOTHING).set_constant(v[1]);
        }});
+  terms.push_back(
+      {"to-the-middle",
+       {"position", "world_frame"},
+       "WORLD_DRIFT",
+       "robots drift towards the middle lines of the floor, by {0:+.2f} mm/s beside the walls along x and {1:+.2f} "
+       "along y, by less the nearer to the middle",
+       "turn the floor's level by a spirit level, or film robots at rest on it that are tapped: robots that slide "
+       "do so, robots that turn to the middle do not",
+       {{"x_mm_s", 0, -2, 2, 0.3}, {"y_mm_s", 0, -2, 2, 0.3}},
+       2,
+       [floor](std::span<const double> v, FloorSettings& s) {
+         add_harmonic(add_function(add_effect(s, "to-the-middle-x", Effect::WORLD_DRIFT), Function::X), 0, -v[0],
+                      2 * floor.width_mm);
+         Effect& effect = add_effect(s, "to-the-middle-y", Effect::WORLD_DRIFT);
+         effect.set_direction_deg(90);
+         add_harmonic(add_function(effect, Function::Y), 0, -v[1], 2 * floor.height_mm);
+       }});
   terms.push_back({"slow-start",
                    {"time_since_command"},
                    "WHEEL_GAIN",

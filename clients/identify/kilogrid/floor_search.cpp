@@ -84,7 +84,8 @@ class Search {
     const std::string why =
         gain.gain <= 0
             ? "would not lower the misfit"
-            : fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance", gain.gain, gain.needed);
+            : fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance{}", gain.gain, gain.needed,
+                          gain.gain > gain.needed ? ", but not that of runs that it is not learned from" : "");
     found_.rejected.push_back({std::move(gain), std::move(covariates), std::move(acts_on), why});
   }
 

@@ -37,52 +37,62 @@ std::vector<RobotSums> sums_at(const FloorTarget& target, const FloorSettings& s
 /// Regression of one statistic over the points at which it is known.
 class Lines {
  public:
-  /// `x`: a column per run, then the parameters'; `moving`: of those, how many are not 0 throughout.
-  Lines(Eigen::MatrixXd x, Eigen::Index scenes, std::size_t moving)
+  /// `x`: a column per run, then the parameters'; `moving`: of those, how many are not 0 throughout. Rows count by `weight`.
+  Lines(Eigen::MatrixXd x, Eigen::VectorXd weight, Eigen::Index scenes, std::size_t moving)
       : x_(std::move(x)),
+        weight_(std::move(weight)),
         scenes_(scenes),
         fitted_(scenes + static_cast<Eigen::Index>(moving)),
-        all_(inverse_of(x_)) {}
+        all_(x_, weight_, scenes) {}
 
   /// Slopes less what chance makes of them; none where too little is known.
   Eigen::VectorXd slopes(const std::vector<double>& y) const {
     const auto rows = static_cast<Eigen::Index>(y.size()), columns = x_.cols() - scenes_;
     const auto known =
         static_cast<Eigen::Index>(std::count_if(y.begin(), y.end(), [](double v) { return std::isfinite(v); }));
-    if (known == rows) return line(x_, all_, Eigen::Map<const Eigen::VectorXd>(y.data(), rows));
+    if (known == rows) return line(x_, weight_, all_, Eigen::Map<const Eigen::VectorXd>(y.data(), rows));
     constexpr Eigen::Index kSpare = 5;
     if (known < fitted_ + kSpare) return Eigen::VectorXd::Zero(columns);
     Eigen::MatrixXd x(known, x_.cols());
-    Eigen::VectorXd some(known);
+    Eigen::VectorXd some(known), weight(known);
     for (Eigen::Index i = 0, k = 0; i < rows; ++i) {
       if (!std::isfinite(y[static_cast<std::size_t>(i)])) continue;
       x.row(k) = x_.row(i);
+      weight(k) = weight_(i);
       some(k++) = y[static_cast<std::size_t>(i)];
     }
-    return line(x, inverse_of(x), some);
+    return line(x, weight, Normal(x, weight, scenes_), some);
   }
 
  private:
-  Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& x) const {
-    // A little ridge: a parameter at the end of its range moves to one side only, and a run may lack the statistic.
-    Eigen::MatrixXd normal = x.transpose() * x;
-    normal.diagonal().head(scenes_).array() += 1e-6;
-    normal.diagonal().tail(x.cols() - scenes_).array() += 0.02 * static_cast<double>(x.rows());
-    return normal.inverse();
-  }
-  Eigen::VectorXd line(const Eigen::MatrixXd& x, const Eigen::MatrixXd& inverse, const Eigen::VectorXd& y) const {
-    const Eigen::VectorXd fitted = inverse * (x.transpose() * y);
-    const double spare = std::max(static_cast<double>(x.rows() - fitted_), 1.0);
-    const double variance = (y - x * fitted).squaredNorm() / spare;
+  struct Normal {
+    Eigen::MatrixXd inverse, variance;  ///< variance: of what is fitted, in that of a point
+    Normal(const Eigen::MatrixXd& x, const Eigen::VectorXd& weight, Eigen::Index scenes) {
+      // A little ridge: a parameter at the end of its range moves to one side only, and a run may lack the statistic.
+      Eigen::MatrixXd normal = x.transpose() * weight.asDiagonal() * x;
+      normal.diagonal().head(scenes).array() += 1e-6;
+      normal.diagonal().tail(x.cols() - scenes).array() += 0.02 * weight.sum();
+      inverse = normal.inverse();
+      variance = inverse * (x.transpose() * weight.cwiseAbs2().asDiagonal() * x) * inverse;
+    }
+  };
+  Eigen::VectorXd line(const Eigen::MatrixXd& x, const Eigen::VectorXd& weight, const Normal& normal,
+                       const Eigen::VectorXd& y) const {
+    const Eigen::VectorXd fitted = normal.inverse * (x.transpose() * weight.cwiseProduct(y));
+    // As many points as the weights are worth.
+    const double worth = weight.sum() * weight.sum() / weight.squaredNorm();
+    const double spare = std::max(worth - static_cast<double>(fitted_), 0.1 * worth);
+    const double variance = (y - x * fitted).cwiseAbs2().dot(weight) / weight.sum() * worth / spare;
     Eigen::VectorXd slopes(x.cols() - scenes_);
     for (Eigen::Index p = 0; p < slopes.size(); ++p)
-      slopes(p) = beyond_chance(fitted(scenes_ + p), variance * inverse(scenes_ + p, scenes_ + p));
+      slopes(p) = beyond_chance(fitted(scenes_ + p), variance * normal.variance(scenes_ + p, scenes_ + p));
     return slopes;
   }
 
   Eigen::MatrixXd x_;
+  Eigen::VectorXd weight_;
   Eigen::Index scenes_, fitted_;
-  Eigen::MatrixXd all_;
+  Normal all_;
 };
 
 /// Adds to a mean over robots, with what each contributes to its deviation.
@@ -126,45 +136,65 @@ std::vector<double> moved(const FloorModel& model, const std::vector<double>& st
   return to;
 }
 
-Eigen::MatrixXd slopes_around(const FloorModel& model, const FloorTarget& target, const std::vector<bool>& moves,
-                              double width, double longest_s, std::uint64_t seed) {
-  const std::vector<FloorParameter> parameters = model.parameters();
-  const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
-  // Four for each: with less, what chance makes of the slopes leads steps astray.
-  const std::size_t points = 4 * moving + 12, runs = target.scenes().size();
+void add_points(FloorPoints& points, const FloorModel& model, const FloorTarget& target,
+                const std::vector<bool>& moves, std::size_t more, double width, double longest_s,
+                std::uint64_t seed) {
+  const std::size_t parameters = model.values.size(), runs = target.scenes().size(), before = points.run.size();
   Dice dice(seed);
-  auto design = design_of(parameters.size(), points, dice);
-  std::vector<std::vector<double>> at(points);
-  for (std::size_t i = 0; i < points; ++i) {
-    for (std::size_t p = 0; p < parameters.size(); ++p) design[i][p] = moves[p] ? design[i][p] : 0;
-    at[i] = moved(model, design[i], width);
+  auto design = design_of(parameters, more, dice);
+  for (std::size_t i = 0; i < more; ++i) {
+    for (std::size_t p = 0; p < parameters; ++p) design[i][p] = moves[p] ? design[i][p] : 0;
+    points.values.push_back(moved(model, design[i], width));
+    points.run.push_back(i % runs);
   }
-  std::vector<FloorStatistics> results(points);
-  in_parallel(target.threads(), points, [&](std::size_t i) {
-    const std::size_t run = i % runs;
-    results[i] = statistics_of(sums_at(target, model.settings(at[i]), run, longest_s, seed * 1000 + run));
+  points.said.resize(before + more);
+  in_parallel(target.threads(), more, [&](std::size_t i) {
+    const std::size_t run = points.run[before + i];
+    points.said[before + i] =
+        statistics_of(sums_at(target, model.settings(points.values[before + i]), run, longest_s, seed * 1000 + run))
+            .value;
   });
+}
 
+Eigen::MatrixXd slopes_of(const FloorPoints& points, const FloorModel& model, const std::vector<bool>& moves,
+                          std::size_t runs, double width) {
+  const std::vector<FloorParameter> parameters = model.parameters();
   // Each run has a column of its own, for what it has begun with and for its random numbers.
-  const auto rows = static_cast<Eigen::Index>(points), columns = static_cast<Eigen::Index>(parameters.size());
-  const auto scenes = static_cast<Eigen::Index>(runs);
+  const auto rows = static_cast<Eigen::Index>(points.run.size()),
+             columns = static_cast<Eigen::Index>(parameters.size()), scenes = static_cast<Eigen::Index>(runs);
+  const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
   Eigen::MatrixXd x = Eigen::MatrixXd::Zero(rows, scenes + columns);
+  Eigen::VectorXd weight = Eigen::VectorXd::Ones(rows);
   for (Eigen::Index i = 0; i < rows; ++i) {
-    x(i, i % scenes) = 1;
+    const auto k = static_cast<std::size_t>(i);
+    x(i, static_cast<Eigen::Index>(points.run[k])) = 1;
     for (Eigen::Index p = 0; p < columns; ++p) {
       const auto q = static_cast<std::size_t>(p);
       // What was really done, within the parameter's range.
-      x(i, scenes + p) = (at[static_cast<std::size_t>(i)][q] - model.values[q]) / (width * parameters[q].width);
+      x(i, scenes + p) = (points.values[k][q] - model.values[q]) / (width * parameters[q].width);
     }
+    // Points of a design within the width have a mean square of a third; what is farther off bends away.
+    const double far =
+        3 * x.row(i).tail(columns).squaredNorm() / static_cast<double>(std::max<std::size_t>(moving, 1));
+    weight(i) = std::exp(-std::max(far - 1, 0.0) / 2);
   }
-  const Lines lines(std::move(x), scenes, moving);
+  const Lines lines(std::move(x), std::move(weight), scenes, moving);
   Eigen::MatrixXd slopes(static_cast<Eigen::Index>(statistic_count()), columns);
-  std::vector<double> y(points);
+  std::vector<double> y(points.run.size());
   for (std::size_t s = 0; s < statistic_count(); ++s) {
-    for (std::size_t i = 0; i < points; ++i) y[i] = results[i].value[s];
+    for (std::size_t i = 0; i < y.size(); ++i) y[i] = points.said[i][s];
     slopes.row(static_cast<Eigen::Index>(s)) = lines.slopes(y);
   }
   return slopes;
+}
+
+Eigen::MatrixXd slopes_around(const FloorModel& model, const FloorTarget& target, const std::vector<bool>& moves,
+                              double width, double longest_s, std::uint64_t seed) {
+  const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
+  FloorPoints points;
+  // Three for each: with less, what chance makes of the slopes leads steps astray.
+  add_points(points, model, target, moves, 3 * moving + 12, width, longest_s, seed);
+  return slopes_of(points, model, moves, target.scenes().size(), width);
 }
 
 void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, const FloorTarget& target,

@@ -19,8 +19,20 @@ struct FloorBox {
 /// Values `steps` away from those of the model, each within its range.
 [[nodiscard]] std::vector<double> moved(const FloorModel&, const std::vector<double>& steps, double width);
 
-/// Per statistic and parameter, of a step of `width` widths: by regression over a design of runs, one of the measured ones at
-/// each point in turn, not longer than `longest_s`. Parameters that `moves` leaves out have slopes of 0.
+/// What quick runs of models around one said: kept, so that where the search has been counts again as long as it is near.
+struct FloorPoints {
+  std::vector<std::vector<double>> values;  ///< of all parameters
+  std::vector<std::size_t> run;             ///< of the measured ones
+  std::vector<std::vector<double>> said;    ///< statistics
+};
+/// `points` more, within `width` widths of the model, of one run each in turn, not longer than `longest_s`.
+void add_points(FloorPoints&, const FloorModel&, const FloorTarget&, const std::vector<bool>& moves,
+                std::size_t points, double width, double longest_s, std::uint64_t seed);
+/// Per statistic and parameter, of a step of `width` widths: by regression over points, those beyond it by less the farther they are.
+[[nodiscard]] Eigen::MatrixXd slopes_of(const FloorPoints&, const FloorModel&, const std::vector<bool>& moves,
+                                        std::size_t runs, double width);
+
+/// The same of points of its own. Parameters that `moves` leaves out have slopes of 0.
 [[nodiscard]] Eigen::MatrixXd slopes_around(const FloorModel&, const FloorTarget&, const std::vector<bool>& moves,
                                             double width, double longest_s, std::uint64_t seed);
 

@@ -27,7 +27,8 @@ constexpr std::size_t kExtentFeature = 8;  ///< of a track window, taken in 100 
 constexpr double kExtentScale_mm = 100;
 constexpr double kMiddle_mm = 300;  ///< from walls
 constexpr double kNear_mm = 100;
-constexpr double kGentle_rad = 1.2;  ///< turns of a straight robot with a bias, not of the walk
+constexpr double kAboutSpeed_mm = 75;  ///< a usual step
+constexpr double kGentle_rad = 1.2;    ///< turns of a straight robot with a bias, not of the walk
 
 constexpr std::array kSteps_mm = {0., 8., 16., 24., 32., 40., 50., 60., 70., 80., 90., 100., 110., 120., 150.};
 constexpr std::array kLags = {1, 2, 5, 10, 20, 30, 60};
@@ -37,6 +38,9 @@ constexpr std::array kOpenRuns = {1, 2, 3, 4};
 constexpr std::array kWallRuns = {1, 2, 3, 4, 6, 9, 12};
 constexpr std::array kStays = {1, 2, 3, 5, 10, 20, 40, 80};
 constexpr std::size_t kColumns = 4, kRows = 8;
+constexpr std::size_t kAcross = 10, kToMiddle = 5;
+constexpr std::size_t kWay = 10;  ///< blocks, over which robots go to the middle
+constexpr std::array kLasting = {1, 2, 5, 10, 20, 60};
 
 /// Of a feature of track windows: lower edges of the bins of its distribution, the first open to below; and what makes it
 /// about 0 and 1 wide where features are multiplied.
@@ -78,6 +82,12 @@ enum Group : std::size_t {
   kStay,
   kMiddle,
   kExtent,
+  kShareX,
+  kShareY,
+  kInwardX,
+  kInwardY,
+  kSpeedLasts,
+  kTurnLasts,
   kWindows,  ///< the first of one group per feature
   kPairs = kWindows + 12,
 };
@@ -122,6 +132,14 @@ std::vector<StatisticGroup> make_groups() {
   add("stays-beside-walls", "position", each(kStays, "stays of {} blocks or more, in 1000"));
   add("middle-by-time", "time", counted(kMiddleBins, "share in the middle in 10 minutes {}"));
   add("extent", "robot", {"mean", "between robots", "in halves"});
+  add("occupancy-along-x", "position", counted(kAcross, "tenth {}"));
+  add("occupancy-along-y", "position", counted(kAcross, "tenth {}"));
+  add("way-to-the-middle-along-x", "position", counted(kToMiddle, "in 100 s from fifth {}, of the middle, mm"));
+  add("way-to-the-middle-along-y", "position", counted(kToMiddle, "in 100 s from fifth {}, of the middle, mm"));
+  std::vector<int> lasting_s;
+  for (const int lag : kLasting) lasting_s.push_back(lag * 10);
+  add("speed-lasts", "history", each(lasting_s, "steps' product after {} s"));
+  add("turning-lasts", "history", each(lasting_s, "turns' product after {} s"));
   const std::vector<std::string>& features = feature_names();
   for (std::size_t f = 0; f < kFeatures.size(); ++f)
     add("windows: " + features[f], "history", each(kFeatures[f].edges, "from {}"));
@@ -186,8 +204,13 @@ class Motions {
   }
   void add_to(Sums& sums, const std::vector<std::size_t>& neighbours) {
     std::array<Mean, 2> turning, speeds;
+    std::vector<double> open(steps_.size(), kNan), gentle(steps_.size(), kNan);
     for (std::size_t k = 0; k < steps_.size(); ++k) {
       if (!known(k)) continue;
+      sums.count(kShareX, part_of(x_[k], floor_.width_mm, kAcross), kAcross);
+      sums.count(kShareY, part_of(y_[k], floor_.height_mm, kAcross), kAcross);
+      add_inward(sums, kInwardX, x_, k, floor_.width_mm);
+      add_inward(sums, kInwardY, y_, k, floor_.height_mm);
       const double step_mm = std::abs(steps_[k]), wall_mm = wall_distance_mm(floor_, x_[k], y_[k]);
       const std::size_t half = k < steps_.size() / 2 ? 0 : 1;
       sums.add(kWall, bin_of(kWalls_mm, wall_mm), step_mm);
@@ -211,12 +234,16 @@ class Motions {
                         row = part_of(y_[k], floor_.height_mm, kRows);
       sums.add(kPlace, row * kColumns + column, step_mm);
       speeds[half].add(step_mm);
+      open[k] = (step_mm - kAboutSpeed_mm) / kAboutSpeed_mm;
       if (k == 0 || !known(k - 1) || step_mm < kMoving_mm || std::abs(steps_[k - 1]) < kMoving_mm) continue;
       const double turn_rad = std::arg(steps_[k] * std::conj(steps_[k - 1]));
       sums.count(kTurn, part_of(std::abs(turn_rad), 3.14159265, kTurns), kTurns);
-      if (std::abs(turn_rad) < kGentle_rad) turning[half].add(turn_rad);
+      if (std::abs(turn_rad) > kGentle_rad) continue;
+      turning[half].add(turn_rad);
+      gentle[k] = turn_rad;
     }
-    constexpr double kAboutSpeed_mm = 75;
+    add_lasting(sums, kSpeedLasts, open);
+    add_lasting(sums, kTurnLasts, gentle);
     add_halves(sums, kBias, turning, 0);
     add_halves(sums, kSpeed, speeds, kAboutSpeed_mm);
     add_ways(sums);
@@ -227,6 +254,23 @@ class Motions {
 
  private:
   [[nodiscard]] bool known(std::size_t k) const { return !std::isnan(steps_[k].real()); }
+
+  /// How far it goes towards the middle line of the floor, from how far off.
+  void add_inward(Sums& sums, Group group, const std::vector<double>& at, std::size_t k, double whole_mm) {
+    if (k + kWay >= at.size() || std::isnan(at[k + kWay])) return;
+    const double off = at[k] - whole_mm / 2, way = at[k + kWay] - at[k];
+    sums.add(group, part_of(std::abs(off), whole_mm / 2, kToMiddle), off > 0 ? -way : way);
+  }
+
+  static void add_lasting(Sums& sums, Group group, const std::vector<double>& of) {
+    for (std::size_t i = 0; i < kLasting.size(); ++i) {
+      const auto lag = static_cast<std::size_t>(kLasting[i]);
+      for (std::size_t k = 0; k + lag < of.size(); ++k) {
+        const double product = of[k] * of[k + lag];
+        if (!std::isnan(product)) sums.add(group, i, product);
+      }
+    }
+  }
 
   void add_ways(Sums& sums) {
     for (std::size_t i = 0; i < kLags.size(); ++i) {

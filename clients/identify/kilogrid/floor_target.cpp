@@ -168,9 +168,8 @@ std::vector<FloorRun> simulate_scenes(const FloorTarget& target, const FloorSett
   return runs;
 }
 
-FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
-                                     int repeats) {
-  std::vector<RobotSums> all;
+std::vector<std::vector<RobotSums>> simulated_sums(const FloorTarget& target, const FloorSettings& settings,
+                                                   std::uint64_t seed, int repeats) {
   const std::size_t scenes = target.scenes().size();
   std::vector<std::vector<RobotSums>> sums(scenes * static_cast<std::size_t>(repeats));
   in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
@@ -178,7 +177,13 @@ FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSetti
                                   settings.radio, seed * 100 + i);
     sums[i] = robot_sums(run, target.floor());
   });
-  for (std::vector<RobotSums>& run : sums)
+  return sums;
+}
+
+FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
+                                     int repeats) {
+  std::vector<RobotSums> all;
+  for (std::vector<RobotSums>& run : simulated_sums(target, settings, seed, repeats))
     all.insert(all.end(), std::make_move_iterator(run.begin()), std::make_move_iterator(run.end()));
   return statistics_of(all);
 }

@@ -68,6 +68,9 @@ void in_parallel(std::uint32_t threads, std::size_t n, const std::function<void(
 /// One simulated run per scene, `repeats` times.
 [[nodiscard]] std::vector<FloorRun> simulate_scenes(const FloorTarget&, const FloorSettings&, std::uint64_t seed,
                                                     int repeats = 1);
+/// Sums of these runs' robots, in the same order.
+[[nodiscard]] std::vector<std::vector<RobotSums>> simulated_sums(const FloorTarget&, const FloorSettings&,
+                                                                 std::uint64_t seed, int repeats = 1);
 [[nodiscard]] FloorStatistics simulated_statistics(const FloorTarget&, const FloorSettings&, std::uint64_t seed,
                                                    int repeats = 1);
 

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "clients/identify/kilogrid/floor_choose.hpp"
+#include "clients/identify/kilogrid/floor_slopes.hpp"
+#include "clients/identify/kilogrid/quick_swarm.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -84,6 +86,93 @@ TEST(FloorChoice, FindsAnEffectThatIsThere) {
   EXPECT_GT(choice.scores[0].values[0], 0.1);
 }
 
+TEST(FloorChoice, AnEffectOfOneRunAloneIsNotFound) {
+  const FloorModel base = base_model();
+  const std::vector<FloorTerm> candidates = some_candidates();
+  FloorModel odd = base;
+  odd.add(candidates[0]);
+  odd.values[odd.values.size() - 2] = 0.5;  // spread of speeds
+  std::vector<FloorRun> runs = runs_of(base, 400);
+  runs[1] = runs_of(odd, 400)[1];
+  const Choice choice = choose(base, candidates, FloorTarget(runs, {}), 5, kQuiet);
+  ASSERT_EQ(choice.scores[0].by_run.size(), 3u);
+  EXPECT_FALSE(choice.found());
+}
+
+TEST(CandidateScore, HelpsOthersWithAllRunsButOneOfFourAndAltogether) {
+  const auto helps = [](std::vector<double> by_run) { return CandidateScore{1, 1, 1, by_run, {}}.helps_others(); };
+  EXPECT_TRUE(helps({}));  // of fewer than three runs nothing can be said
+  EXPECT_TRUE(helps({3, 1, 2}));
+  EXPECT_FALSE(helps({9, 9, -1}));
+  EXPECT_TRUE(helps({3, 1, 2, -1}));
+  EXPECT_FALSE(helps({3, 1, 2, -7}));
+  EXPECT_FALSE(helps({9, 9, -1, -1}));
+}
+
+TEST(FloorSlopes, AreThoseOfThePointsThatAreNear) {
+  FloorModel model = base_model();
+  std::vector<bool> moves(model.values.size(), false);
+  moves[0] = moves[4] = true;
+  const std::vector<FloorParameter> parameters = model.parameters();
+  FloorPoints points;
+  Dice dice(3);
+  for (std::size_t i = 0; i < 400; ++i) {
+    // Every second point is far off, where the statistics bend away.
+    const double reach = i % 2 == 0 ? 1 : 6;
+    std::vector<double> at = model.values, steps(2);
+    for (std::size_t p = 0; p < 2; ++p) {
+      steps[p] = reach * (2 * dice.uniform() - 1);
+      at[4 * p] += steps[p] * parameters[4 * p].width;
+    }
+    points.values.push_back(at);
+    points.run.push_back(i % 3);
+    std::vector<double> said(statistic_count(), 0);
+    said[0] = 5 + 2 * steps[0] - steps[1] + (reach > 1 ? 0.5 * steps[0] * steps[0] * steps[0] : 0);
+    said[0] += 7.0 * static_cast<double>(i % 3) + 0.2 * dice.normal();
+    points.said.push_back(said);
+  }
+  const Eigen::MatrixXd slopes = slopes_of(points, model, moves, 3, 1);
+  // Two hundred points that are near, with a mean square of a third, and a ridge of 2 % on them: 0.02 for chance and 6 % for the ridge;
+  // of the others a tenth are near enough to count a little.
+  EXPECT_NEAR(slopes(0, 0), 2, 0.35);
+  EXPECT_NEAR(slopes(0, 4), -1, 0.2);
+  EXPECT_EQ(slopes(1, 0), 0);
+  EXPECT_EQ(slopes(0, 2), 0);
+}
+
+const FloorTerm& term_of(const std::vector<FloorTerm>& terms, const std::string& name) {
+  return *std::find_if(terms.begin(), terms.end(), [&](const FloorTerm& t) { return t.name == name; });
+}
+
+TEST(FloorModel, ADriftToTheMiddleTakesRobotsThereAlongItsAxis) {
+  const std::vector<FloorTerm> candidates = candidate_terms({});
+  FloorModel model = base_model();
+  const auto said = [&](const FloorModel& of) {
+    std::vector<RobotSums> all;
+    for (int i = 0; i < 4; ++i) {
+      const FloorRun run =
+          simulate_quickly(scene(40, 1500, i), {}, of.settings(), 20 + static_cast<std::uint64_t>(i));
+      for (RobotSums& robot : robot_sums(run, {})) all.push_back(std::move(robot));
+    }
+    return statistics_of(all);
+  };
+  const FloorStatistics none = said(model);
+  model.add(term_of(candidates, "to-the-middle"));
+  model.values[model.values.size() - 2] = 1.6;  // along x
+  const FloorStatistics drift = said(model);
+  const auto more = [&](const char* group, std::size_t i) {
+    const std::size_t s = statistic_group(group).first + i;
+    return (drift.value[s] - none.value[s]) / std::sqrt(drift.variance[s] + none.variance[s]);
+  };
+  // In standard errors: the middle two tenths of the floor's width hold more, the outer ones less; nothing along the other axis.
+  EXPECT_GT(more("occupancy-along-x", 4), 3);
+  EXPECT_GT(more("occupancy-along-x", 5), 3);
+  EXPECT_LT(more("occupancy-along-x", 1), -2);
+  EXPECT_LT(more("occupancy-along-x", 8), -2);
+  EXPECT_LT(std::abs(more("occupancy-along-y", 4)), 4);
+  EXPECT_LT(std::abs(more("way-to-the-middle-along-y", 2)), 4);
+}
+
 TEST(FloorModel, WallsAreRecordsThatActBesideThem) {
   FloorModel model = base_model();
   model.wall.emplace().fill(1);
@@ -95,10 +184,6 @@ TEST(FloorModel, WallsAreRecordsThatActBesideThem) {
   EXPECT_NEAR(settings.model.effect(0).function(1).steps().value(0), -0.75, 1e-12);
   EXPECT_NEAR(settings.model.effect(1).function(1).steps().value(7), -0.5, 1e-12);
   EXPECT_EQ(settings.model.effect(1).function(0).steps().at(0), 500 - FloorModel::kBeside_mm);
-}
-
-const FloorTerm& term_of(const std::vector<FloorTerm>& terms, const std::string& name) {
-  return *std::find_if(terms.begin(), terms.end(), [&](const FloorTerm& t) { return t.name == name; });
 }
 
 TEST(FloorModel, SpeedsOfTheirOwnGoingStraightLeaveTurnsAsTheyAre) {
