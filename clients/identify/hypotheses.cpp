@@ -517,8 +517,10 @@ class Catalogue {
     }
     if (!extent_.has_turns) return;
     // All that it has turned, as a cable winds up.
-    const auto left = make_.put(Target::kTurn, Basis{{over(Shape::kLinear, Covariate::kLeftMotorTime, 0, extent_.motor_s, 1)}}),
-               right = make_.put(Target::kTurn, Basis{{over(Shape::kLinear, Covariate::kRightMotorTime, 0, extent_.motor_s, 1)}});
+    const auto left = make_.put(Target::kTurn,
+                                Basis{{over(Shape::kLinear, Covariate::kLeftMotorTime, 0, extent_.motor_s, 1)}}),
+               right = make_.put(Target::kTurn,
+                                 Basis{{over(Shape::kLinear, Covariate::kRightMotorTime, 0, extent_.motor_s, 1)}});
     add(kTurning, "turns-so-far", {"history", "motor_time"}, {left, right}, kChoices);
   }
   void of_robots() {

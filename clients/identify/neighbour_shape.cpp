@@ -135,7 +135,8 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
     f.high = axis.of == Covariate::kDensity ? most[axis.radius] : kMostCounted;
     return Basis{{f}};
   };
-  const auto add = [&](Covariate of, std::uint8_t radius, std::uint8_t focus, std::initializer_list<int> directions) {
+  const auto add = [&](Covariate of, std::uint8_t radius, std::uint8_t focus,
+                       std::initializer_list<int> directions) {
     Form form;
     for (const Target target : targets)
       for (const int degrees : directions)

@@ -18,7 +18,7 @@ inline constexpr std::size_t kFloorCells = 6;
 
 /// One of the other robots, seen from one.
 struct OtherRobot {
-  float distance_mm = 0;     ///< centre to centre
+  float distance_mm = 0;               ///< centre to centre
   float towards_x = 0, towards_y = 0;  ///< of length 1; 0 where it stands at the same place
 };
 /// Others farther away are not listed.

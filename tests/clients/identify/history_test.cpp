@@ -45,7 +45,8 @@ TEST(History, MotorsForgetAsTheSumOverTheirPastSays) {
 
 TEST(History, HowLongTheCommandBeforeLastedIsKnown) {
   const CommandClock clock(told({{1, Motion::kStraight}, {4.5, Motion::kStop}, {6, Motion::kLeft}}));
-  for (const auto& [time_s, lasted_s] : {std::pair{0.5, 0.0}, {2.0, 1.0}, {5.0, 3.5}, {5.9, 3.5}, {7.0, 1.5}, {60.0, 1.5}}) {
+  for (const auto& [time_s, lasted_s] :
+       {std::pair{0.5, 0.0}, {2.0, 1.0}, {5.0, 3.5}, {5.9, 3.5}, {7.0, 1.5}, {60.0, 1.5}}) {
     Situation s;
     s.commands = clock.at(time_s);
     EXPECT_DOUBLE_EQ(value_of({Covariate::kPreviousLasted}, s, 0), lasted_s) << time_s;

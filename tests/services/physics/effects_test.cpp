@@ -228,7 +228,8 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
   EXPECT_NEAR(value("DENSITY", start), weight(50) + weight(70) + weight(99), 1e-8);
   // By where they are: 0, 90 and 180 - 0.5 rad = 151.4 degrees from the heading.
   const auto share = [](double degrees) { return (1 + std::cos(degrees * kPi / 180)) / 2; };
-  EXPECT_NEAR(value("NEIGHBOURS", start, "focus: 2"), 1 + std::pow(share(90), 2) + std::pow(share(151.3521), 2), 1e-6);
+  EXPECT_NEAR(value("NEIGHBOURS", start, "focus: 2"), 1 + std::pow(share(90), 2) + std::pow(share(151.3521), 2),
+              1e-6);
   EXPECT_NEAR(value("DENSITY", start, "focus: 1 toward_deg: 90"),
               weight(50) * share(90) + weight(70) + weight(99) * share(61.3521), 1e-6);
   const std::vector<ScenePose> fewer = {start[0], start[2], start[4]};
