@@ -178,10 +178,13 @@ class Catalogue {
       Basis basis = known;
       basis.factors.push_back(std::move(factor));
       const auto bases = put(acting, basis, during);
-      const bool plain = is.first == "time" || is.first == "position";
-      const std::string name =
-          plain && word != std::string("heading") ? "time-and-position" : is.first + "-and-" + word;
-      for (const Eigen::Index size : sizes) add(acting, name, {is.second, word}, some(bases, 0, size));
+      std::string first = is.first;
+      std::vector<std::string> words{is.second, word};
+      if (words == std::vector<std::string>{"position", "time"}) {
+        std::swap(words[0], words[1]);
+        first = words[0];
+      }
+      for (const Eigen::Index size : sizes) add(acting, first + "-and-" + words[1], words, some(bases, 0, size));
     };
     beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent_.duration_s, 6), {1, 2, 6});
     beside("position", plane(3), {1, 2, 9});

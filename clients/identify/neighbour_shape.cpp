@@ -15,6 +15,8 @@ using Shape = Factor::Shape;
 /// Log evidence that one more form must bring, besides the price of choosing it.
 constexpr double kWorth = 8;
 constexpr std::size_t kMostForms = 5;
+/// So many of them at first: what is found far from where data were linearised is known roughly.
+constexpr std::size_t kFirstForms = 2;
 constexpr std::size_t kMostCounted = 6;
 
 /// Places in kNeighbourRadii_mm of 50, 70, 80, 100, 120 and 150 mm: within which robots are added up by their directions.
@@ -191,10 +193,10 @@ class Choice {
     }
   }
 
-  Chosen choose() const {
+  Chosen choose(std::size_t most_forms) const {
     Chosen chosen;
     const double price = std::log(static_cast<double>(columns_.size()));
-    while (chosen.forms.size() < kMostForms) {
+    while (chosen.forms.size() < most_forms) {
       // What is left of all beside those that are chosen.
       Eigen::MatrixXd left = data_.information;
       Eigen::VectorXd score = data_.score;
@@ -258,7 +260,7 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
     const Linear l = linear(fitter, trial, place, all);
     const Eigen::VectorXd at_zero = l.score_without(trial.terms[place].coefficients);
     const Beside data = beside(l, at_zero, l.more());
-    const Chosen chosen = Choice(data, forms).choose();
+    const Chosen chosen = Choice(data, forms).choose(round == 0 ? kFirstForms : kMostForms);
     if (chosen.forms.empty()) break;
     std::vector<Block> blocks;
     for (const std::size_t f : chosen.forms) blocks.insert(blocks.end(), forms[f].begin(), forms[f].end());
@@ -268,7 +270,7 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
     fitter.fit(trial, 1);
     settle(fitter, trial, place);
     const double found = fitter.log_likelihood(trial);
-    if (any && found < likelihood + kWorth) break;
+    if (found < likelihood + (any ? kWorth : 0)) break;
     model = trial;
     likelihood = found;
     any = true;

@@ -206,7 +206,7 @@ TEST(Place, RobotsCountByWhereTheyAre) {
       [](const Around& a) {
         return 1 / (1 + 0.7 * sum_of_others(a, 110, [](double, double cosine) { return std::max(0.0, cosine); }));
       },
-      11, 12, 250);
+      11, 12, 160);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model = fitted(fitter);
