@@ -43,7 +43,8 @@ std::size_t Factor::columns() const {
     case Shape::kHarmonics: return 2 * std::size_t{count};
     case Shape::kTable:
     case Shape::kAtLeast:
-    case Shape::kExponential: return points.size();
+    case Shape::kExponential:
+    case Shape::kLevelling: return points.size();
     case Shape::kWave: return 2 * points.size();
   }
   return 0;
@@ -94,6 +95,9 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
         to[i] = axis.of == Covariate::kTime && s.span_s > 0 ? std::clamp((c - points[i]) / s.span_s + 0.5, 0.0, 1.0)
                                                             : (c >= points[i] ? 1 : 0);
       }
+      return;
+    case Shape::kLevelling:
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = -std::expm1(-c / points[i]);
       return;
     case Shape::kExponential:
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = std::exp(-c / points[i]);

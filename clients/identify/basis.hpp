@@ -18,6 +18,7 @@ struct Factor {
     kTable,         ///< 1 where the covariate is the key, one column per point
     kAtLeast,       ///< 1 from the point on, one column per point
     kExponential,   ///< exp(-c / point), one column per point
+    kLevelling,     ///< 1 - exp(-c / point), one column per point
     kTaper,         ///< (1 - c / high)^k, k = 1..: 0 from high on
     kGrid,          ///< one column: linear between `points` at the nodes of a grid, over two covariates
     kWave,          ///< cos and sin of 2 pi c / point: two columns per point

@@ -39,6 +39,7 @@ Unit unit_of(Function::Covariate of) {
   switch (of) {
     case Function::TIME:
     case Function::TIME_SINCE_COMMAND:
+    case Function::PREVIOUS_LASTED:
     case Function::MOTOR_TIME:
     case Function::LEFT_MOTOR_TIME:
     case Function::RIGHT_MOTOR_TIME:
@@ -58,6 +59,7 @@ const char* name_of(Function::Covariate of) {
   switch (of) {
     case Function::TIME: return "time";
     case Function::TIME_SINCE_COMMAND: return "time_since_command";
+    case Function::PREVIOUS_LASTED: return "how long the command before lasted";
     case Function::MOTOR_TIME: return "motor_time";
     case Function::DRIVEN_TIME: return "driven_time";
     case Function::X: return "x";
@@ -174,6 +176,14 @@ std::string which_of(const Effect& effect) {
   if (effect.acts_on() == Effect::BODY_DRIFT || effect.acts_on() == Effect::MEASURED_BODY_OFFSET)
     parts.emplace_back(effect.direction_deg() == 90 ? "to the left" : "ahead");
   if (effect.during_size() == 1) parts.emplace_back(fmt::format("going {}", command_name(effect.during(0))));
+  // Others count most where they are there.
+  for (const Function& f : effect.function()) {
+    if (f.focus() > 0)
+      parts.emplace_back(fmt::format("others {}", f.toward_deg() == 0               ? "ahead"
+                                                  : std::abs(f.toward_deg()) == 180 ? "behind"
+                                                  : f.toward_deg() > 0              ? "on the left"
+                                                                                    : "on the right"));
+  }
   return parts.empty() ? "" : fmt::format("{}: ", fmt::join(parts, ", "));
 }
 

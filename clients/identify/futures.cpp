@@ -51,6 +51,7 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
   std::vector<double> x(robots.size()), y(robots.size());
   std::vector<TrackFilter> filters;
   std::vector<NeighbourView> nears(robots.size());
+  std::vector<OtherRobot> list;
   for (std::uint32_t sample = 0; sample < count; ++sample) {
     // Samples come in pairs that mirror each other.
     const double mirror = sample % 2 == 0 ? 1 : -1;
@@ -76,8 +77,9 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
         x[r] = filters[r].belief().centre_x_mm();
         y[r] = filters[r].belief().centre_y_mm();
       }
+      list.clear();
       for (std::size_t r = 0; r < robots.size(); ++r) {
-        nears[r] = neighbours ? view_of(r, x, y) : NeighbourView{};
+        nears[r] = neighbours ? view_of(r, x, y, &list) : NeighbourView{};
         floors.see(x[r], y[r], nears[r]);
       }
       for (std::size_t r = 0; floors.any() && r < robots.size(); ++r)

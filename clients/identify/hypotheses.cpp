@@ -162,29 +162,33 @@ class Catalogue {
       if (extent_.has_straight && extent_.has_turns) amounts(Covariate::kCommand, {1, 2, 3});
       if (acting != &kWorld && extent_.robots.size() > 1 && extent_.robots.size() <= 40)
         amounts(Covariate::kRobot, {extent_.robots.begin(), extent_.robots.end()});
-      of_time_and_place(*acting, known, block.during);
+      of_known_and_more(*acting, known, block.during);
     }
   }
   void finish() { make_.finish(); }
 
  private:
-  /// What is known by place may grow or shrink with time, and the other way round. What is known comes first, so that it is
-  /// written once.
-  void of_time_and_place(const Acting& acting, const Basis& known, std::uint8_t during) {
+  /// What is known by one covariate may grow or shrink with time, be larger in some places, or as the robot points. What is known
+  /// comes first, so that it is written once.
+  void of_known_and_more(const Acting& acting, const Basis& known, std::uint8_t during) {
     if (&acting == &kWorld || known.factors.empty()) return;
-    const std::string is = of_words(known.factors.front().axis.of).second;
-    const auto beside = [&](const char* of, Factor factor) {
+    const auto is = of_words(known.factors.front().axis.of);
+    const auto beside = [&](const char* word, Factor factor, std::initializer_list<Eigen::Index> sizes) {
+      if (is.second == word) return;
       Basis basis = known;
       basis.factors.push_back(std::move(factor));
-      const auto n = static_cast<Eigen::Index>(basis.size());
       const auto bases = put(acting, basis, during);
-      for (const Eigen::Index size : {Eigen::Index{1}, Eigen::Index{2}, n})
-        add(acting, of, {"time", "position"}, some(bases, 0, size));
+      std::string first = is.first;
+      std::vector<std::string> words{is.second, word};
+      if (words == std::vector<std::string>{"position", "time"}) {
+        std::swap(words[0], words[1]);
+        first = words[0];
+      }
+      for (const Eigen::Index size : sizes) add(acting, first + "-and-" + words[1], words, some(bases, 0, size));
     };
-    constexpr std::uint32_t kCurve = 6, kOrder = 3;
-    if (is == "position")
-      beside("time-and-position", over(Shape::kCosines, Covariate::kTime, 0, extent_.duration_s, kCurve));
-    if (is == "time") beside("time-and-position", plane(kOrder));
+    beside("time", over(Shape::kCosines, Covariate::kTime, 0, extent_.duration_s, 6), {1, 2, 6});
+    beside("position", plane(3), {1, 2, 9});
+    beside("heading", over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 2), {2, 4});
   }
   /// As names of effects have a covariate, and as result.json has it.
   static std::pair<std::string, std::string> of_words(Covariate covariate) {
@@ -409,6 +413,10 @@ class Catalogue {
       const auto forward = make_.put(Target::kAhead, Basis{{falling, bearing}});
       make_.add("speed-by-neighbours", {"neighbours"}, kSpeed.in_words, {forward, forward + 2}, 6);
     }
+    // Wherever the nearest is.
+    const Factor close = with_radius(over(Shape::kTaper, Covariate::kNearest, 0, kNeighbourRadii_mm[6], 2), 6);
+    const auto spun = put(kTurning, Basis{{close}});
+    add(kTurning, "neighbours", {"neighbours"}, some(spun, 0, 2), 6);
     for (const std::uint8_t r : kSought) {
       const Factor count = with_radius(over(Shape::kCosines, Covariate::kNeighbours, 0, 8, 3), r);
       const auto bases = put(kSpeed, Basis{{count}});
@@ -457,12 +465,29 @@ class Catalogue {
         after(bases, 0, keys);
       }
     }
+    of_lasting(kStraightOnly);
     if (!extent_.has_turns) return;
     const Factor last = keyed(Shape::kTable, Covariate::kLastTurn, {2, 3});
     for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
       const auto turned = put(*acting, Basis{{last}}, kStraightOnly);
       add(*acting, "last-turn", {"history"}, some(turned, 0, 2));
     }
+  }
+  /// How long it did what came before: whatever it does now, or going straight. Turns that lasted go on turning.
+  void of_lasting(std::uint8_t straight_only) {
+    constexpr Eigen::Index kCurve = 3;
+    Factor lasted = over(Shape::kCosines, Covariate::kPreviousLasted, 0, extent_.since_s, kCurve);
+    lasted.warp = 1;
+    for (const std::uint8_t during : {kDriven, straight_only}) {
+      const auto bases = put(kSpeed, Basis{{lasted}}, during);
+      for (const Eigen::Index size : {Eigen::Index{1}, kCurve})
+        add(kSpeed, "previous-lasted", {"history"}, some(bases, 0, size), 4);
+    }
+    if (!extent_.has_turns) return;
+    const Factor which = keyed(Shape::kTable, Covariate::kPreviousCommand, {2, 3});
+    lasted.count = 2;
+    const auto turned = put(kTurning, Basis{{which, lasted}}, straight_only);
+    add(kTurning, "previous-lasted", {"history"}, some(turned, 0, 4), 2);
   }
   void of_floor() {
     for (std::uint8_t cells = 0; cells < kFloorCells; ++cells) {
@@ -493,6 +518,13 @@ class Catalogue {
                      make_.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kRightMotorTime, f, 1)}});
       add(kTurning, "turns-of-late", {"history"}, {left, right}, kChoices);
     }
+    if (!extent_.has_turns) return;
+    // All that it has turned, as a cable winds up.
+    const auto left = make_.put(Target::kTurn,
+                                Basis{{over(Shape::kLinear, Covariate::kLeftMotorTime, 0, extent_.motor_s, 1)}}),
+               right = make_.put(Target::kTurn,
+                                 Basis{{over(Shape::kLinear, Covariate::kRightMotorTime, 0, extent_.motor_s, 1)}});
+    add(kTurning, "turns-so-far", {"history", "motor_time"}, {left, right}, kChoices);
   }
   void of_robots() {
     constexpr std::size_t kMost = 120;

@@ -5,8 +5,13 @@
 
 namespace kilotwin::identify {
 
-NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm) {
+NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm,
+                      std::vector<OtherRobot>* list) {
   NeighbourView view;
+  if (list != nullptr) {
+    view.list = list;
+    view.first_listed = static_cast<std::uint32_t>(list->size());
+  }
   double nearest2 = view.nearest_mm * view.nearest_mm;
   std::size_t nearest = robot;
   const double reach2 = kNeighbourRadii_mm.back() * kNeighbourRadii_mm.back();
@@ -17,6 +22,10 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
       nearest2 = d2;
       nearest = other;
     }
+    if (list != nullptr && d2 <= kListed_mm * kListed_mm) {
+      const double d = std::sqrt(d2), by = d > 0 ? 1 / d : 0;
+      list->push_back({static_cast<float>(d), static_cast<float>(dx * by), static_cast<float>(dy * by)});
+    }
     for (std::size_t r = kNeighbourRadii_mm.size(); r-- > 0;) {
       const auto part = static_cast<float>(1 - d2 / (kNeighbourRadii_mm[r] * kNeighbourRadii_mm[r]));
       if (part < 0) break;
@@ -24,6 +33,7 @@ NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span
       view.density[r] += part * part;
     }
   }
+  if (list != nullptr) view.listed = static_cast<std::uint32_t>(list->size()) - view.first_listed;
   if (nearest != robot) {
     view.nearest_mm = std::sqrt(nearest2);
     view.direction_rad = std::atan2(y_mm[nearest] - y_mm[robot], x_mm[nearest] - x_mm[robot]);
@@ -74,7 +84,7 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
     }
     for (std::size_t r = 0; r < robots; ++r) {
       if (std::isnan(x[r])) continue;
-      views_[r * instants_ + i] = view_of(r, x, y);
+      views_[r * instants_ + i] = view_of(r, x, y, others_.get());
       spots_[r * instants_ + i] = {x[r], y[r], clocks[r].at(t + 1e-9).driven()};
     }
   }

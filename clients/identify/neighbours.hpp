@@ -1,6 +1,7 @@
 /// The other robots as they were measured, between samples too.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -9,8 +10,10 @@
 
 namespace kilotwin::identify {
 
-/// One robot among others, all at one instant. Robots whose x is NaN are not there.
-[[nodiscard]] NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm);
+/// One robot among others, all at one instant. Robots whose x is NaN are not there. The others are added to the list, where
+/// there is one; it must outlive the view.
+[[nodiscard]] NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm,
+                                    std::vector<OtherRobot>* list = nullptr);
 
 /// Where the disc's centre of a track was when it was sampled.
 struct Centres {
@@ -48,6 +51,8 @@ class RunNeighbours {
   std::size_t instants_ = 0;
   std::vector<NeighbourView> views_;  ///< by track, then by instant
   std::vector<Spot> spots_;           ///< likewise
+  /// Of all views. It stays where it is when the run is moved.
+  std::unique_ptr<std::vector<OtherRobot>> others_ = std::make_unique<std::vector<OtherRobot>>();
   NeighbourView nobody_;
 };
 

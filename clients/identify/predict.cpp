@@ -141,9 +141,11 @@ class Outlook {
   void see(double for_s) {
     if (!neighbours_) return;
     locate();
+    list_.clear();
     for (std::size_t r = 0; r < robots_.size(); ++r) {
+      robots_[r].near = {};
       if (std::isnan(x_[r])) continue;
-      robots_[r].near = view_of(r, x_, y_);
+      robots_[r].near = view_of(r, x_, y_, &list_);
       const StateCovariance& p = robots_[r].filters.front().belief().covariance;
       const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
       if (model_.contacts && robots_[r].near.nearest_mm < model_.touch_mm + std::min(uncertain, 20.0))
@@ -201,6 +203,7 @@ class Outlook {
   const Floors& floors_then_;
   std::vector<Robot> robots_;
   std::vector<double> x_, y_;
+  std::vector<OtherRobot> list_;  ///< of what robots see of each other
 };
 
 /// What the floor of a run remembers, by what has been measured so far.

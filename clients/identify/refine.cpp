@@ -55,6 +55,7 @@ Factor richer(Factor f) {
       f.points.clear();
       break;
     case Shape::kTable:
+    case Shape::kLevelling:
     case Shape::kGrid:
     case Shape::kWave: break;
   }

@@ -29,6 +29,26 @@ double use_s(const CommandState& commands, std::size_t motor, std::uint8_t forge
   return motor < 2 ? commands.motor_s[motor] : commands.driven_s;
 }
 
+/// Neighbours added up by where they are, too. Where they are not listed, as if all lay in that direction.
+double toward(const Axis& axis, const Situation& s) {
+  const NeighbourView& near = s.near;
+  const bool count = axis.of == Covariate::kNeighbours;
+  if (near.list == nullptr) return count ? near.count[axis.radius] : near.density[axis.radius];
+  const double reach = kNeighbourRadii_mm[axis.radius], ahead = s.heading_rad + axis.toward_deg * (M_PI / 180);
+  const double ahead_x = std::cos(ahead), ahead_y = std::sin(ahead);
+  double sum = 0;
+  for (std::uint32_t i = 0; i < near.listed; ++i) {
+    const OtherRobot& other = (*near.list)[near.first_listed + i];
+    if (other.distance_mm > reach) continue;
+    const double once = (1 + other.towards_x * ahead_x + other.towards_y * ahead_y) / 2;
+    const double part = 1 - other.distance_mm * other.distance_mm / (reach * reach);
+    double share = count ? 1 : part * part;
+    for (std::uint8_t k = 0; k < axis.focus; ++k) share *= once;
+    sum += share;
+  }
+  return sum;
+}
+
 }  // namespace
 
 double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
@@ -45,15 +65,16 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kLeftMotorTime: return use_s(s.commands, 0, axis.forget);
     case Covariate::kRightMotorTime: return use_s(s.commands, 1, axis.forget);
     case Covariate::kDrivenTime: return use_s(s.commands, 2, axis.forget);
-    case Covariate::kNeighbours: return s.near.count[axis.radius];
+    case Covariate::kNeighbours: return axis.focus > 0 ? toward(axis, s) : s.near.count[axis.radius];
     case Covariate::kNearest: return std::min(s.near.nearest_mm, kNeighbourRadii_mm[axis.radius]);
-    case Covariate::kDensity: return s.near.density[axis.radius];
+    case Covariate::kDensity: return axis.focus > 0 ? toward(axis, s) : s.near.density[axis.radius];
     case Covariate::kBearing:
       return s.near.nearest_mm > kNeighbourRadii_mm[axis.radius]
                  ? 0
                  : wrapped_angle(s.near.direction_rad - s.heading_rad);
     case Covariate::kPreviousCommand:
       return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
+    case Covariate::kPreviousLasted: return s.commands.previous_lasted_s;
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
     case Covariate::kTrodden: return s.near.trodden_s[axis.radius];
     case Covariate::kRobot: return s.robot;
@@ -74,6 +95,7 @@ CommandClock::CommandClock(const Track& track) {
       for (std::size_t motor = 0; motor < 3; ++motor) left[f][motor] = state.remembered_s(f, motor);
     state.left_s = left;
     state.first = starts_s_.empty() || starts_s_.front() == at_s;
+    state.previous_lasted_s = state.first ? 0 : state.since_s;
     state.previous = state.command;
     state.command = change.motion;
     state.since_s = 0;

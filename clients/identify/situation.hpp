@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "clients/identify/measured_set.hpp"
 
@@ -15,6 +16,14 @@ inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,
 /// So many sizes of cells in which a floor may remember where robots went (MotionModel::cells).
 inline constexpr std::size_t kFloorCells = 6;
 
+/// One of the other robots, seen from one.
+struct OtherRobot {
+  float distance_mm = 0;               ///< centre to centre
+  float towards_x = 0, towards_y = 0;  ///< of length 1; 0 where it stands at the same place
+};
+/// Others farther away are not listed.
+inline constexpr double kListed_mm = 150;
+
 /// The other robots, seen from one, and what they left on the floor.
 struct NeighbourView {
   double nearest_mm = 1e9;                                    ///< centre to centre
@@ -22,6 +31,9 @@ struct NeighbourView {
   std::array<float, kNeighbourRadii_mm.size()> count = {};    ///< within kNeighbourRadii_mm
   std::array<float, kNeighbourRadii_mm.size()> density = {};  ///< sum of (1 - (distance / radius)^2)^2
   std::array<float, kFloorCells> trodden_s = {};  ///< for which driven robots stood in its cell, itself included
+  /// Those within kListed_mm, one by one: of this list, from `first_listed` on. Null: they are not listed.
+  const std::vector<OtherRobot>* list = nullptr;
+  std::uint32_t first_listed = 0, listed = 0;
 };
 
 /// Within these times, s, what motors did is forgotten: by exp(-age / time). Of a warm motor that cools, of a battery that recovers.
@@ -32,6 +44,7 @@ struct CommandState {
   Motion command = Motion::kStop, previous = Motion::kStop, last_turn = Motion::kStop;
   bool first = true;                       ///< no command came before; `previous` is kStop then
   double since_s = 0;                      ///< since the command changed
+  double previous_lasted_s = 0;            ///< 0 where there was none
   std::array<double, 2> motor_s = {0, 0};  ///< for which the motor of the left, of the right wheel has turned
   double driven_s = 0;                     ///< for which either has
   /// What is left of these times of the left, the right, of either motor, with kForget_s, when the command began.
@@ -75,6 +88,7 @@ enum class Covariate : std::uint8_t {
   kDensity,
   kBearing,          ///< to the nearest, from the heading
   kPreviousCommand,  ///< kNoCommand for the first
+  kPreviousLasted,   ///< s for which that lasted; 0 where there was none
   kLastTurn,
   kTrodden,  ///< time that driven robots stood in its cell of the floor
   kRobot,
@@ -88,6 +102,9 @@ struct Axis {
   Covariate of = Covariate::kNothing;
   std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; of kTrodden, into MotionModel::cells
   std::uint8_t forget = 0;  ///< with motor and driven times: 1 + index into kForget_s; 0: all counts
+  /// With kNeighbours and kDensity within at most kListed_mm: another robot counts ((1 + cos(bearing - toward)) / 2)^focus times.
+  std::uint8_t focus = 0;
+  std::int16_t toward_deg = 0;
 
   bool operator==(const Axis&) const = default;
 };

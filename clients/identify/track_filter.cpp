@@ -58,9 +58,11 @@ void TrackFilter::start(const Sample& sample, const Situation&, double heading_r
   belief_.covariance(1, 1) += model_->noise.position_mm2;
   if (measures_) {
     // What the tracker adds is taken off.
-    Situation at = situation(sample.time_s, CommandState{}, {});
-    for (int pass = 0; pass < 3; ++pass) {
+    const Situation at = situation(sample.time_s, CommandState{}, {});
+    constexpr int kPasses = 6;
+    for (int pass = 0; pass < kPasses; ++pass) {
       const Eigen::Vector3d seen = model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], at);
+      if (has_heading(sample)) belief_.mean[2] += wrapped_angle(sample.heading_rad - seen[2]);
       belief_.mean[0] += sample.x_mm - seen[0];
       belief_.mean[1] += sample.y_mm - seen[1];
     }

@@ -32,6 +32,7 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kDensity: return Function::DENSITY;
     case Covariate::kBearing: return Function::NEAREST_BEARING;
     case Covariate::kPreviousCommand: return Function::PREVIOUS_COMMAND;
+    case Covariate::kPreviousLasted: return Function::PREVIOUS_LASTED;
     case Covariate::kLastTurn: return Function::LAST_TURN;
     case Covariate::kTrodden: return Function::PLACE;
     case Covariate::kRobot: return Function::ROBOT;
@@ -52,6 +53,7 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kRadius: s.x_mm = value; break;
     case Covariate::kHeading: s.heading_rad = value; break;
     case Covariate::kSinceCommand: s.commands.since_s = value; break;
+    case Covariate::kPreviousLasted: s.commands.previous_lasted_s = value; break;
     case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
@@ -82,6 +84,10 @@ double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const S
 void set_axis(Function& function, const Factor& factor) {
   function.set_of(covariate_of(factor.axis.of));
   if (is_of_neighbours(factor.axis.of)) function.set_radius_mm(kNeighbourRadii_mm[factor.axis.radius]);
+  if (factor.axis.focus > 0) {
+    function.set_focus(factor.axis.focus);
+    if (factor.axis.toward_deg != 0) function.set_toward_deg(factor.axis.toward_deg);
+  }
   if (factor.axis.of == Covariate::kTrodden) function.set_field(field_name(factor.axis.radius));
   if (is_of_use(factor.axis.of) && factor.axis.forget > 0)
     function.set_forget_s(kForget_s[factor.axis.forget - 1u]);
@@ -155,6 +161,16 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
     case Shape::kExponential: {
       if (factor.points.size() == 1) {
         function.mutable_exponential()->set_at_zero(rounded(coefficients[0]));
+        function.mutable_exponential()->set_scale(factor.points[0]);
+      } else {
+        const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
+        set_spline(function, factor, coefficients, 0, 6 * slowest, factor.points.front(), 60);
+      }
+      break;
+    }
+    case Shape::kLevelling: {
+      if (factor.points.size() == 1) {
+        function.mutable_exponential()->set_at_infinity(rounded(coefficients[0]));
         function.mutable_exponential()->set_scale(factor.points[0]);
       } else {
         const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
@@ -303,7 +319,8 @@ const char* form_of(const Term& term) {
     case Shape::kWave: return "harmonic";
     case Shape::kTable: return "table";
     case Shape::kAtLeast: return "steps";
-    case Shape::kExponential: return "exponential";
+    case Shape::kExponential:
+    case Shape::kLevelling: return "exponential";
   }
   return "curve";
 }

@@ -24,8 +24,22 @@ std::optional<MemorySlot> slot_of(Function::Covariate covariate, double forget_s
     case Function::PREVIOUS_TURN: return MemorySlot{Kind::kPreviousTurn};
     case Function::PREVIOUS_COMMAND: return MemorySlot{Kind::kPreviousCommand};
     case Function::LAST_TURN: return MemorySlot{Kind::kLastTurn};
+    case Function::PREVIOUS_LASTED: return MemorySlot{Kind::kPreviousLasted};
     default: return std::nullopt;
   }
+}
+
+/// Whether neighbours are added up.
+bool is_sum(Function::Covariate covariate) {
+  return covariate == Function::NEIGHBOURS || covariate == Function::DENSITY;
+}
+
+/// What of a robot counts whose direction is off by an angle of that cosine.
+double focused(double cosine, std::uint32_t focus) {
+  const double once = (1 + cosine) / 2;
+  double share = 1;
+  for (std::uint32_t i = 0; i < focus; ++i) share *= once;
+  return share;
 }
 
 }  // namespace
@@ -39,9 +53,13 @@ Function::Covariate of_wheel(Function::Covariate covariate, std::uint32_t wheel)
 Covariates::Covariates(const RunPlan& plan) : plan_(plan) {}
 
 std::uint32_t Covariates::need(Covariate covariate, const Function& function) {
-  Column column{covariate, 0, 0, 0, 0, {}};
+  Column column{covariate, 0, 0, 0, 0, 0, 0, {}};
   if (is_of_neighbours(covariate)) {
     column.radius_mm = function.radius_mm();
+    if (is_sum(covariate) && function.focus() > 0) {
+      column.focus = function.focus();
+      column.toward_rad = function.toward_deg() * (kPi / 180);
+    }
     if (column.radius_mm > radius_mm_) {
       radius_mm_ = column.radius_mm;
       cells_.emplace(radius_mm_);
@@ -60,7 +78,7 @@ std::uint32_t Covariates::need(Covariate covariate, const Function& function) {
   for (std::uint32_t i = 0; i < columns_.size(); ++i) {
     const Column& known = columns_[i];
     if (known.covariate == covariate && known.radius_mm == column.radius_mm && known.forget_s == column.forget_s &&
-        known.field == column.field) {
+        known.focus == column.focus && known.toward_rad == column.toward_rad && known.field == column.field) {
       return i;
     }
   }
@@ -80,7 +98,8 @@ Range Covariates::range(std::uint32_t index) const {
     case Function::TIME_SINCE_COMMAND:
     case Function::LEFT_MOTOR_TIME:
     case Function::RIGHT_MOTOR_TIME:
-    case Function::DRIVEN_TIME: return {0, e.duration_s()};
+    case Function::DRIVEN_TIME:
+    case Function::PREVIOUS_LASTED: return {0, e.duration_s()};
     case Function::X: return {-x_mm, x_mm};
     case Function::Y: return {-y_mm, y_mm};
     case Function::RADIUS: return {0, __builtin_sqrt(x_mm * x_mm + y_mm * y_mm)};
@@ -155,6 +174,15 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
                                                                                     : memory[command];
       });
     }
+    case Function::PREVIOUS_LASTED: {
+      const std::uint32_t command = plan_.memory.index_of({Kind::kCommand}),
+                          time = plan_.memory.index_of({Kind::kTimeSinceCommand});
+      return each([&](std::size_t r) {
+        const double* const memory = robots.memory.data() + r * stride;
+        return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot]
+                                                                                    : memory[time];
+      });
+    }
     case Function::LAST_TURN:
       return each([&](std::size_t r) {
         const proto::Command command = command_of(robots.duties[r]);
@@ -191,14 +219,21 @@ void Covariates::fill_neighbours(const RobotColumns& robots, std::span<const std
     for (Column& column : columns_) {
       if (!is_of_neighbours(column.covariate)) continue;
       const double radius_square_mm2 = column.radius_mm * column.radius_mm;
-      double nearest_square_mm2 = radius_square_mm2, neighbours = 0, density = 0;
+      double nearest_square_mm2 = radius_square_mm2, neighbours = 0, density = 0, toward_x = 0, toward_y = 0;
       std::uint32_t nearest = self;
+      if (column.focus > 0) kt_sincos(robots.heading_rad[self] + column.toward_rad, &toward_y, &toward_x);
       for (std::size_t k = 0; k < count; ++k) {
         const double dx = robots.x_mm[found_[k]] - x, dy = robots.y_mm[found_[k]] - y, square = dx * dx + dy * dy;
         if (square > radius_square_mm2) continue;
-        neighbours += 1;
+        double share = 1;
+        // Of one that stands at the same place there is no direction.
+        if (column.focus > 0) {
+          const double d = __builtin_sqrt(square);
+          share = focused(d > 0 ? (dx * toward_x + dy * toward_y) / d : 0, column.focus);
+        }
+        neighbours += share;
         const double weight = 1 - square / radius_square_mm2;
-        density += weight * weight;
+        density += share * (weight * weight);
         // Of several that are equally near, the first.
         if (square < nearest_square_mm2 || nearest == self) {
           nearest_square_mm2 = square;

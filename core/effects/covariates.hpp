@@ -39,7 +39,8 @@ class Covariates {
   using Covariate = proto::Function::Covariate;
   struct Column {
     Covariate covariate;
-    double radius_mm = 0, forget_s = 0;
+    double radius_mm = 0, forget_s = 0, toward_rad = 0;
+    std::uint32_t focus = 0;
     std::uint32_t field = 0;
     std::uint32_t slot = 0;  ///< of memory, where it is remembered
     std::vector<double> values;

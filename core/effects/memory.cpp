@@ -28,6 +28,7 @@ EffectMemory::EffectMemory(const RunPlan& plan)
     notes_motion_ = notes_motion_ || (slot.kind >= Kind::kPreviousForward && slot.kind <= Kind::kPreviousTurn);
     if (slot.kind == Kind::kTimeSinceCommand) time_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kPreviousCommand) previous_slot_ = static_cast<std::uint32_t>(s);
+    if (slot.kind == Kind::kPreviousLasted) lasted_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kNoise) {
       const proto::Effect& effect = plan.experiment().effect(static_cast<int>(slot.index));
       const double keep =
@@ -82,6 +83,7 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
         each(s, [&](std::size_t i, double was) {
           const double command = static_cast<double>(command_of(robots.duties[i]));
           double* const own = memory.data() + i * stride;
+          if (lasted_slot_ && was != command) own[*lasted_slot_] = own[*time_slot_];
           if (time_slot_) own[*time_slot_] = (was == command ? own[*time_slot_] : 0) + tick_s_;
           if (previous_slot_ && was != command) own[*previous_slot_] = was;
           return command;
@@ -109,6 +111,7 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
         break;
       case Kind::kTimeSinceCommand:  // with the command
       case Kind::kPreviousCommand:
+      case Kind::kPreviousLasted:
       case Kind::kPreviousForward:
       case Kind::kPreviousSideways:
       case Kind::kPreviousTurn:      // below

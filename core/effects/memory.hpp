@@ -37,8 +37,9 @@ class EffectMemory {
   const RunPlan& plan_;
   const Random random_;
   double tick_s_;
-  std::vector<Fade> fades_;                                 ///< per slot
-  std::optional<std::uint32_t> time_slot_, previous_slot_;  ///< slots that the command keeps up to date
+  std::vector<Fade> fades_;  ///< per slot
+  /// Slots that the command keeps up to date.
+  std::optional<std::uint32_t> time_slot_, previous_slot_, lasted_slot_;
   bool notes_motion_ = false;
 };
 

@@ -93,6 +93,8 @@ constexpr FieldRule kRules[] = {
     {"Effect.robot", 0, kMostRobots - 1, ""},
     {"Function.radius_mm", 1, 2000, "mm"},
     {"Function.forget_s", 0, kLongest_s, "s"},
+    {"Function.focus", 0, 16, ""},
+    {"Function.toward_deg", -360, 360, "degrees"},
     {"Function.constant", -kLargestValue, kLargestValue, ""},
     {"Linear.at_zero", -kLargestValue, kLargestValue, ""},
     {"Linear.slope", -kLargestValue, kLargestValue, ""},

@@ -41,6 +41,11 @@ MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
         need({Kind::kPreviousCommand});
         break;
       case Function::LAST_TURN: need({Kind::kLastTurn}); break;
+      case Function::PREVIOUS_LASTED:
+        need({Kind::kCommand});
+        need({Kind::kTimeSinceCommand});
+        need({Kind::kPreviousLasted});
+        break;
       default: break;
     }
   };

@@ -25,6 +25,7 @@ struct MemorySlot {
     kNoise,            ///< of effect `index`, `function`, `wheel`
     kPreviousCommand,  ///< number of the Command before kCommand; STOP at first
     kLastTurn,         ///< number of the last Command that was LEFT or RIGHT; 0 at first
+    kPreviousLasted,   ///< s for which the Command before kCommand lasted; 0 at first
   };
   Kind kind;
   double forget_s = 0;

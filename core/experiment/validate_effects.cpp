@@ -24,6 +24,7 @@ constexpr double kMostCells = 4e6;
 const char* name_of(Function::Covariate covariate) { return Function::Covariate_Name(covariate).c_str(); }
 
 bool needs_radius(Function::Covariate c) { return c >= Function::NEIGHBOURS && c <= Function::NEAREST_BEARING; }
+bool adds_up(Function::Covariate c) { return c == Function::NEIGHBOURS || c == Function::DENSITY; }
 bool forgets(Function::Covariate c) { return c >= Function::MOTOR_TIME && c <= Function::DRIVEN_TIME; }
 bool is_own_motors(Function::Covariate c) { return c == Function::DUTY || c == Function::MOTOR_TIME; }
 bool is_count(Function::Covariate c) {
@@ -136,6 +137,10 @@ class EffectCheck {
            function.has_radius_mm()
                ? "radius_mm has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and NEAREST_BEARING"
                : "radius_mm is missing; state how far away robots count, mm");
+    demand(!function.has_focus() || any(adds_up), path + ".focus",
+           "focus has no effect here; it goes with NEIGHBOURS and DENSITY");
+    demand(!function.has_toward_deg() || function.focus() > 0, path + ".toward_deg",
+           "toward_deg has no effect here; it goes with a focus above 0");
     demand(
         !function.has_forget_s() || any(forgets), path + ".forget_s",
         "forget_s has no effect here; it goes with MOTOR_TIME, LEFT_MOTOR_TIME, RIGHT_MOTOR_TIME and DRIVEN_TIME");
@@ -201,6 +206,8 @@ class EffectCheck {
                fmt::format("a table takes whole numbers, and {} is none; take ROBOT, RUN, COMMAND, NEIGHBOURS or a "
                            "duty, or another shape",
                            name_of(function.of())));
+        demand(function.focus() == 0, path + ".focus",
+               "a table takes whole numbers, and with a focus neighbours add up to none; take another shape");
         demand(table.key_size() == table.value_size(), path + ".table",
                fmt::format("table has {} keys and {} values; give as many of one as of the other", table.key_size(),
                            table.value_size()));

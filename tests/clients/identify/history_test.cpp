@@ -43,6 +43,16 @@ TEST(History, MotorsForgetAsTheSumOverTheirPastSays) {
   }
 }
 
+TEST(History, HowLongTheCommandBeforeLastedIsKnown) {
+  const CommandClock clock(told({{1, Motion::kStraight}, {4.5, Motion::kStop}, {6, Motion::kLeft}}));
+  for (const auto& [time_s, lasted_s] :
+       {std::pair{0.5, 0.0}, {2.0, 1.0}, {5.0, 3.5}, {5.9, 3.5}, {7.0, 1.5}, {60.0, 1.5}}) {
+    Situation s;
+    s.commands = clock.at(time_s);
+    EXPECT_DOUBLE_EQ(value_of({Covariate::kPreviousLasted}, s, 0), lasted_s) << time_s;
+  }
+}
+
 TEST(History, NothingComesBeforeTheFirstCommand) {
   const CommandClock clock(told({{0, Motion::kStraight}, {4, Motion::kStop}, {6, Motion::kLeft}}));
   const Axis previous{Covariate::kPreviousCommand};
@@ -103,8 +113,15 @@ TEST(History, WhatIsFoundInPlaceIsTriedWithTimeAsWell) {
   patch.coefficients = Eigen::Vector2d(0.1, -0.3);
   patch.precision = Eigen::Vector2d(1, 1);
   const Dictionary with = dictionary_of(extent, {patch});
-  const Hypothesis& last = with.hypotheses.back();
-  EXPECT_EQ(last.name, "speed-by-time-and-position");
+  const auto last_of = [&](const std::string& name) {
+    return std::find_if(with.hypotheses.rbegin(), with.hypotheses.rend(),
+                        [&](const Hypothesis& h) { return h.name == name; });
+  };
+  // As robots point, too.
+  ASSERT_NE(last_of("speed-by-position-and-heading"), with.hypotheses.rend());
+  EXPECT_EQ(last_of("speed-by-position-and-heading")->columns.size(), 4u);
+  ASSERT_NE(last_of("speed-by-time-and-position"), with.hypotheses.rend());
+  const Hypothesis& last = *last_of("speed-by-time-and-position");
   EXPECT_EQ(last.covariates, (std::vector<std::string>{"time", "position"}));
   const Term term = with.term_of(last, 1);
   ASSERT_EQ(term.blocks.size(), 1u);
@@ -153,8 +170,8 @@ TEST(History, WhatIsFoundIsTriedWithAnAmountForEachRobotAndCommand) {
   battery.coefficients = Eigen::Vector2d(-0.2, 0.05);
   battery.precision = Eigen::Vector2d(1, 1);
   const Dictionary without = dictionary_of(extent), with = dictionary_of(extent, {battery});
-  // An amount for each robot, for each command, and for nine waves over the plane.
-  EXPECT_EQ(with.columns(), without.columns() + 3 + 3 + 9);
+  // An amount for each robot, for each command, for nine waves over the plane and for two of the heading.
+  EXPECT_EQ(with.columns(), without.columns() + 3 + 3 + 9 + 4);
   for (const auto& [covariate, word] : {std::pair{Covariate::kRobot, "robot"}, {Covariate::kCommand, "command"}}) {
     const Hypothesis* found = nullptr;
     for (std::size_t h = without.hypotheses.size(); h < with.hypotheses.size(); ++h) {

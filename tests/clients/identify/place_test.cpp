@@ -25,8 +25,19 @@ struct Around {
   std::size_t robot;
   const std::vector<double>&x_mm, &y_mm;  ///< of all
   double trodden_s;                       ///< in its cell
+  double heading_rad;
 };
 using Gain = std::function<double(const Around&)>;
+/// Other robots within a radius: each by its distance and the cosine of its bearing.
+double sum_of_others(const Around& a, double radius_mm, const std::function<double(double, double)>& each) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.x_mm.size(); ++i) {
+    const double x = a.x_mm[i] - a.x_mm[a.robot], y = a.y_mm[i] - a.y_mm[a.robot], d = std::hypot(x, y);
+    if (i != a.robot && d < radius_mm)
+      sum += each(d, d > 0 ? (x * std::cos(a.heading_rad) + y * std::sin(a.heading_rad)) / d : 0);
+  }
+  return sum;
+}
 
 /// Ghosts that walk through each other, by arcs of 50 ms.
 MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, double duration_s,
@@ -66,7 +77,7 @@ MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, d
         track.commands.push_back({t, straight ? Motion::kStraight : draw < 0.5 ? Motion::kLeft : Motion::kRight});
         next_s[r] = t + (straight ? 3 + 6 * draw : 1 + 2 * draw);
       }
-      const double speed = gain({r, disc_x, disc_y, memory.value_s(disc_x[r], disc_y[r])});
+      const double speed = gain({r, disc_x, disc_y, memory.value_s(disc_x[r], disc_y[r]), heading[r]});
       const Eigen::Vector2d v = speed * nominal_speeds(BaseParameters{}, track.commands.back().motion);
       const double sd = std::sqrt(factor_s / dt);
       Rates rates;
@@ -187,6 +198,42 @@ TEST(Place, RobotsCountWithinTheRadiusTheyDo) {
   EXPECT_NEAR(gain({70}) / alone, 0.8, 0.05);
   EXPECT_NEAR(gain({70, -95}) / alone, 0.6, 0.05);
   EXPECT_NEAR(gain({70, -95, 80}) / alone, 0.6, 0.07);
+}
+
+TEST(Place, RobotsCountByWhereTheyAre) {
+  // Slow behind all that are ahead, however many: of the nearest alone that shows in part.
+  const MeasuredSet set = played(
+      [](const Around& a) {
+        return 1 / (1 + 0.7 * sum_of_others(a, 110, [](double, double cosine) { return std::max(0.0, cosine); }));
+      },
+      11, 12, 160);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = fitted(fitter);
+  Factor near;
+  near.shape = Shape::kTaper;
+  near.axis = {Covariate::kNearest, 6};
+  near.high = 100;
+  near.count = 3;
+  model.terms.push_back(unfitted(near));
+  fitter.fit(model, 2);
+  ASSERT_TRUE(shape_neighbours(fitter, model, 0));
+  std::vector<OtherRobot> list;
+  const auto gain = [&](std::initializer_list<double> x_mm, double heading_rad) {
+    std::vector<double> x{0}, y(x_mm.size() + 1, 0);
+    x.insert(x.end(), x_mm);
+    Situation s = driven_at(0, 0);
+    s.heading_rad = heading_rad;
+    s.near = view_of(0, x, y, &list);
+    const Rates r = model.rates(s, {0, 0});
+    return (r.left_mm_s + r.right_mm_s) / 2 + r.ahead_mm_s;
+  };
+  const double alone = gain({}, 0);
+  EXPECT_NEAR(gain({80}, 0) / alone, 1 / 1.7, 0.06);
+  EXPECT_NEAR(gain({-80}, 0) / alone, 1, 0.06);
+  EXPECT_NEAR(gain({80}, M_PI / 2) / alone, 1, 0.08);
+  EXPECT_NEAR(gain({-60, 80}, 0) / alone, 1 / 1.7, 0.08);
+  EXPECT_NEAR(gain({60, 90}, 0) / alone, 1 / 2.4, 0.06);
 }
 
 TEST(Place, AFloorRemembersInItsCells) {

@@ -60,6 +60,12 @@ std::vector<Form> forms() {
     f.axis.forget = forget;
     return f;
   };
+  Factor behind = over(Shape::kLevelling, Covariate::kDensity, 0, 1, 1, {0.3, 1});
+  behind.axis.focus = 2;
+  behind.axis.toward_deg = 150;
+  Factor beside = over(Shape::kLinear, Covariate::kNeighbours, 0, 6, 1);
+  beside.axis.focus = 1;
+  beside.axis.toward_deg = -90;
   Factor known = over(Shape::kCosines, Covariate::kTime, 0, 18, 3);
   known.known = {0.7, 0, -0.4};
   return {{"constant", {}},
@@ -76,6 +82,7 @@ std::vector<Form> forms() {
           {"harmonics of heading", {{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
           {"command", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2, 3})}}},
           {"previous command", {{previous}}},
+          {"previous lasted", {{over(Shape::kCosines, Covariate::kPreviousLasted, 0, 3, 3)}}},
           {"last turn", {{over(Shape::kTable, Covariate::kLastTurn, 0, 1, 1, {2, 3})}}},
           {"robot", {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5, 7, 9})}}},
           {"steps", {{over(Shape::kAtLeast, Covariate::kTime, 0, 1, 1, {4, 9})}}},
@@ -87,6 +94,8 @@ std::vector<Form> forms() {
           {"nearest", {{over(Shape::kTaper, Covariate::kNearest, 0, 150, 2)}}},
           {"count", {{over(Shape::kCosines, Covariate::kNeighbours, 0, 8, 2)}}},
           {"density", {{over(Shape::kCosines, Covariate::kDensity, 0, 4, 2)}}},
+          {"density behind", {{behind}}},
+          {"count beside", {{beside}}},
           {"bearing", {{over(Shape::kTaper, Covariate::kNearest, 0, 150, 1), bearing}}},
           {"history", {{previous, over(Shape::kExponential, Covariate::kSinceCommand, 0, 1, 1, {0.5, 1.5})}}},
           {"curves after turns", {{previous, since}}},
@@ -178,13 +187,14 @@ class WrittenModel : public testing::Test {
         y.push_back(s.y + model_.base.centre_mm * std::sin(s.heading));
       }
       std::vector<Situation> all(states.size());
+      list_.clear();
       for (std::size_t r = 0; r < states.size(); ++r) {
         all[r] = {time_s,
                   x[r],
                   y[r],
                   wrapped_angle(states[r].heading),
                   clocks[r].at(time_s + within_s),
-                  view_of(r, x, y),
+                  view_of(r, x, y, &list_),
                   scene.robots[r].track->robot,
                   0};
         // At the start of a tick what has run is what ran before it.
@@ -220,6 +230,7 @@ class WrittenModel : public testing::Test {
 
   MeasuredSet set_;
   MotionModel model_;
+  mutable std::vector<OtherRobot> list_;  ///< of what robots see of each other at an instant
 };
 
 TEST_F(WrittenModel, GoesWhereTheFittedOneSays) {

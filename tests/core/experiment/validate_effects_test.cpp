@@ -73,6 +73,12 @@ TEST_F(ValidateEffects, WhatIsWrongIsNamedWithItsPlace) {
        "e.txtpb:2:39: radius_mm is missing; state how far away robots count, mm"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: TIME radius_mm: 5 linear { } } }",
        "e.txtpb:2:59: radius_mm has no effect here; it goes with NEIGHBOURS, NEAREST, DENSITY and NEAREST_BEARING"},
+      {"effect { name: 'a' acts_on: TURN_RATE function { of: NEAREST radius_mm: 5 focus: 2 linear { } } }",
+       "e.txtpb:2:75: focus has no effect here; it goes with NEIGHBOURS and DENSITY"},
+      {"effect { name: 'a' acts_on: TURN_RATE function { of: DENSITY radius_mm: 5 toward_deg: 2 linear { } } }",
+       "e.txtpb:2:75: toward_deg has no effect here; it goes with a focus above 0"},
+      {"effect { name: 'a' acts_on: TURN_RATE function { of: NEIGHBOURS radius_mm: 5 focus: 2 table { } } }",
+       "e.txtpb:2:78: a table takes whole numbers, and with a focus neighbours add up to none; take another shape"},
       {"effect { name: 'a' acts_on: TURN_RATE function { of: MOTOR_TIME linear { } } }",
        "e.txtpb:2:50: MOTOR_TIME is that of a wheel's own motor, and the effect does not act on wheels; take one "
        "of the left or the right motor"},

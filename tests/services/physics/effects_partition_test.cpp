@@ -50,6 +50,7 @@ std::string everything() {
     const std::string target = is_own_motors(kCovariates[c]) ? "WHEEL_GAIN" : targets[c % 5];
     add(target, "of: " + kCovariates[c] + with(kCovariates[c]) + " linear { at_zero: 0.02 slope: 0.0007 }");
   }
+  add("TURN_RATE", "of: DENSITY radius_mm: 90 focus: 3 toward_deg: -60 linear { slope: 0.001 }");
   add("WORLD_DRIFT direction_deg: 45 during: [STOP, LEFT]",
       "of: X and_of: Y spline_2d { knot: [-300, 0, 300] and_knot: [-300, 300] value: [1, -1, 2, 0, 1, -2] }");
   add("TURN_RATE during: [STOP, STRAIGHT]", "noise { sd: 0.1 correlation_s: 2 }");

@@ -212,10 +212,11 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
                                         {-70 * std::sin(0.5), 70 * std::cos(0.5), 0},
                                         {-99, 0, 0},
                                         {0, -101, 0}};
-  const auto value = [&](const std::string& covariate, const std::vector<ScenePose>& poses) {
+  const auto value = [&](const std::string& covariate, const std::vector<ScenePose>& poses,
+                         const std::string& how = "") {
     const RunPlan plan =
         make_plan(kQuiet + "effect { name: 'e' acts_on: WORLD_DRIFT robot: 0 during: STOP function { " +
-                      thousandth(covariate, "radius_mm: 100") + " } }",
+                      thousandth(covariate, "radius_mm: 100 " + how) + " } }",
                   poses);
     Swarm swarm(plan);
     return 1000 * seen(swarm);
@@ -225,6 +226,12 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
   EXPECT_NEAR(value("NEAREST_BEARING", start), 0, 1e-7);
   const auto weight = [](double d) { return (1 - d * d / 1e4) * (1 - d * d / 1e4); };
   EXPECT_NEAR(value("DENSITY", start), weight(50) + weight(70) + weight(99), 1e-8);
+  // By where they are: 0, 90 and 180 - 0.5 rad = 151.4 degrees from the heading.
+  const auto share = [](double degrees) { return (1 + std::cos(degrees * kPi / 180)) / 2; };
+  EXPECT_NEAR(value("NEIGHBOURS", start, "focus: 2"), 1 + std::pow(share(90), 2) + std::pow(share(151.3521), 2),
+              1e-6);
+  EXPECT_NEAR(value("DENSITY", start, "focus: 1 toward_deg: 90"),
+              weight(50) * share(90) + weight(70) + weight(99) * share(61.3521), 1e-6);
   const std::vector<ScenePose> fewer = {start[0], start[2], start[4]};
   EXPECT_NEAR(value("NEAREST_BEARING", fewer), kPi / 2, 1e-7);
   const std::vector<ScenePose> alone = {start[0], start[4]};
@@ -297,8 +304,11 @@ TEST(Effects, CommandsOfThePastAreRemembered) {
                         {{{70, 0}, {70, 70}}, 2, 2},
                         {{{70, 0}, {0, 70}, {0, 0}, {70, 70}}, 0, 3},
                         {{{70, 0}, {70, 70}, {0, 70}, {70, 70}}, 3, 3}};
-  for (const auto& [covariate, is_turn] : {std::pair{"PREVIOUS_COMMAND", false}, {"LAST_TURN", true}}) {
+  for (const std::string covariate : {"PREVIOUS_COMMAND", "LAST_TURN", "PREVIOUS_LASTED"}) {
     for (const Case& c : cases) {
+      const double expected = covariate == "LAST_TURN"          ? c.turn
+                              : covariate == "PREVIOUS_COMMAND" ? c.previous
+                                                                : (c.duties.size() > 1 ? 4 * kTick_s : 0);
       const RunPlan plan =
           make_plan("motion { noise: false straight_speed_mm_s: 0 turn_speed_mm_s: 0 } " +
                         effect("acts_on: WORLD_DRIFT during: [STOP, STRAIGHT, LEFT, RIGHT]", thousandth(covariate)),
@@ -309,7 +319,7 @@ TEST(Effects, CommandsOfThePastAreRemembered) {
         swarm.run(i + 1 < c.duties.size() ? 4 : 0);
       }
       for (int tick = 0; tick < 3; ++tick)
-        EXPECT_NEAR(1000 * seen(swarm, 0), is_turn ? c.turn : c.previous, 1e-8) << covariate << " " << tick;
+        EXPECT_NEAR(1000 * seen(swarm, 0), expected, 1e-8) << covariate << " " << tick;
     }
   }
 }
