@@ -4,7 +4,7 @@
 
 #include "clients/cli/radio_data.hpp"
 #include "clients/identify/bristle/identify_ridden.hpp"
-#include "clients/identify/import.hpp"
+#include "clients/identify/data/import.hpp"
 #include "clients/identify/kilogrid/identify_floor.hpp"
 #include "core/base/error.hpp"
 

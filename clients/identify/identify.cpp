@@ -6,15 +6,15 @@
 #include <chrono>
 #include <cmath>
 
-#include "clients/identify/effect_words.hpp"
-#include "clients/identify/fit.hpp"
-#include "clients/identify/predict.hpp"
-#include "clients/identify/prediction_errors.hpp"
-#include "clients/identify/residuals.hpp"
-#include "clients/identify/search.hpp"
-#include "clients/identify/simulated_check.hpp"
-#include "clients/identify/write_effects.hpp"
-#include "clients/identify/write_model.hpp"
+#include "clients/identify/causes/search.hpp"
+#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/residuals.hpp"
+#include "clients/identify/model/effect_words.hpp"
+#include "clients/identify/model/write_effects.hpp"
+#include "clients/identify/model/write_model.hpp"
+#include "clients/identify/predict/predict.hpp"
+#include "clients/identify/predict/prediction_errors.hpp"
+#include "clients/identify/replay/simulated_check.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {

@@ -33,7 +33,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identify/measured_set.hpp"
+#include "clients/identify/data/measured_set.hpp"
 #include "idl/model.pb.h"
 
 namespace kilotwin::identify {

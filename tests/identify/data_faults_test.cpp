@@ -1,5 +1,5 @@
 // Faults of the data are found, named and excluded; where there are none, none is found.
-#include "clients/identify/data_faults.hpp"
+#include "clients/identify/data/data_faults.hpp"
 
 #include <gtest/gtest.h>
 

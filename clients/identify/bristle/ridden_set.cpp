@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "clients/identify/csv_reader.hpp"
+#include "clients/identify/data/csv_reader.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::bristle {

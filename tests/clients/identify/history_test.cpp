@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/identify/hypotheses.hpp"
+#include "clients/identify/causes/hypotheses.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

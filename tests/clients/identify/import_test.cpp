@@ -1,5 +1,5 @@
 // ARK logs and our own recordings as data directories.
-#include "clients/identify/import.hpp"
+#include "clients/identify/data/import.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <string>
 
-#include "clients/identify/measured_set.hpp"
+#include "clients/identify/data/measured_set.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
 

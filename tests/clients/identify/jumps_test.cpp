@@ -1,5 +1,5 @@
 // Jumps of the picture: found where they are and as large as they are, in all runs or in one; nowhere else.
-#include "clients/identify/jumps.hpp"
+#include "clients/identify/causes/jumps.hpp"
 
 #include <gtest/gtest.h>
 

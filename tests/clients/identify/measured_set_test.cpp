@@ -1,5 +1,5 @@
 // What is read is what was written, in any order of rows and columns; what is wrong is named with its place.
-#include "clients/identify/measured_set.hpp"
+#include "clients/identify/data/measured_set.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,11 +1,11 @@
 // The scale of a picture that is put straight: told by robots that touch, kept while its map is fitted, and all lengths with it.
-#include "clients/identify/picture_scale.hpp"
+#include "clients/identify/model/picture_scale.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "clients/identify/fit.hpp"
+#include "clients/identify/fit/fit.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

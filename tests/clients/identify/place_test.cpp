@@ -5,12 +5,12 @@
 #include <cmath>
 #include <functional>
 
-#include "clients/identify/fine_map.hpp"
-#include "clients/identify/memory_shape.hpp"
-#include "clients/identify/neighbour_shape.hpp"
-#include "clients/identify/refine.hpp"
-#include "clients/identify/write_effects.hpp"
-#include "clients/identify/write_model.hpp"
+#include "clients/identify/causes/fine_map.hpp"
+#include "clients/identify/causes/memory_shape.hpp"
+#include "clients/identify/causes/neighbour_shape.hpp"
+#include "clients/identify/causes/refine.hpp"
+#include "clients/identify/model/write_effects.hpp"
+#include "clients/identify/model/write_model.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -1,5 +1,5 @@
 // What data cannot be is said, with what would be right; what they can be passes.
-#include "clients/identify/plausible.hpp"
+#include "clients/identify/data/plausible.hpp"
 
 #include <gtest/gtest.h>
 

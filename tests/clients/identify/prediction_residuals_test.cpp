@@ -1,5 +1,5 @@
 // Residuals of known predictions.
-#include "clients/identify/prediction_residuals.hpp"
+#include "clients/identify/report/prediction_residuals.hpp"
 
 #include <gtest/gtest.h>
 

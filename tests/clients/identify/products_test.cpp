@@ -1,7 +1,7 @@
 // Sums of products are those of the plain loop, to the bit, for all sizes about those of registers.
 #include <gtest/gtest.h>
 
-#include "clients/identify/products.hpp"
+#include "clients/identify/fit/products.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -1,13 +1,13 @@
 // Laws of the refinement: evidence in closed form, smoothness that fits the data, shapes and instants recovered.
-#include "clients/identify/refine.hpp"
+#include "clients/identify/causes/refine.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 
-#include "clients/identify/simplify.hpp"
-#include "clients/identify/widen.hpp"
+#include "clients/identify/causes/simplify.hpp"
+#include "clients/identify/causes/widen.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -1,5 +1,5 @@
 // The report shows what the document holds, whatever that is.
-#include "clients/identify/report.hpp"
+#include "clients/identify/report/report.hpp"
 
 #include <gtest/gtest.h>
 #include <libxml/HTMLparser.h>
@@ -9,8 +9,8 @@
 #include <random>
 #include <string>
 
-#include "clients/identify/gnuplot.hpp"
-#include "clients/identify/report_html.hpp"
+#include "clients/identify/report/gnuplot.hpp"
+#include "clients/identify/report/report_html.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {

@@ -1,5 +1,5 @@
 // The rim of what robots reached, in rooms whose walls are no lines.
-#include "clients/identify/rim.hpp"
+#include "clients/identify/model/rim.hpp"
 
 #include <gtest/gtest.h>
 

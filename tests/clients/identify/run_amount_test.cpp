@@ -1,5 +1,5 @@
 // What a run that was not fitted to has of its own, told by its past.
-#include "clients/identify/run_amount.hpp"
+#include "clients/identify/predict/run_amount.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
 // Runs of the simulator's own robots, played again: the model that made them is not told from them; without its effect it is.
-#include "clients/identify/simulated_check.hpp"
+#include "clients/identify/replay/simulated_check.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "clients/identify/identify.hpp"
-#include "clients/identify/replay.hpp"
-#include "clients/identify/track_statistics.hpp"
-#include "clients/identify/write_model.hpp"
+#include "clients/identify/model/write_model.hpp"
+#include "clients/identify/replay/replay.hpp"
+#include "clients/identify/replay/track_statistics.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <string>
 
-#include "clients/identify/replay.hpp"
-#include "clients/identify/write_effects.hpp"
-#include "clients/identify/write_model.hpp"
+#include "clients/identify/model/write_effects.hpp"
+#include "clients/identify/model/write_model.hpp"
+#include "clients/identify/replay/replay.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

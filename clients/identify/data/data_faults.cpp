@@ -1,0 +1,341 @@
+#include "clients/identify/data/data_faults.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "clients/identify/data/told_and_done.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+double distance(const Sample& a, const Sample& b) { return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm); }
+bool same_place(const Sample& a, const Sample& b) { return a.x_mm == b.x_mm && a.y_mm == b.y_mm; }
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Takes out of a track what `out` marks; returns how many.
+std::size_t take_out(Track& track, const std::vector<bool>& out) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < track.samples.size(); ++k) {
+    if (!out[k]) track.samples[kept++] = track.samples[k];
+  }
+  const std::size_t gone = track.samples.size() - kept;
+  track.samples.resize(kept);
+  return gone;
+}
+
+// --- duplicates ---
+
+// Discs are 33 mm wide. Two tracked points that are half a disc apart or less belong to one robot, whatever point it is
+// that the tracker follows.
+constexpr double kOneRobot_mm = 12;
+// For so many samples in common, and at least this share of them.
+constexpr std::size_t kFewestCommon = 10;
+constexpr double kShareCommon = 0.5;
+
+struct Common {
+  std::size_t count = 0, together = 0;
+  std::vector<double> apart_mm;
+};
+
+Common compare(const Track& a, const Track& b) {
+  Common common;
+  std::size_t j = 0;
+  for (const Sample& sample : a.samples) {
+    while (j < b.samples.size() && b.samples[j].time_s < sample.time_s - 1e-6) ++j;
+    if (j == b.samples.size()) break;
+    if (b.samples[j].time_s > sample.time_s + 1e-6) continue;
+    ++common.count;
+    common.apart_mm.push_back(distance(sample, b.samples[j]));
+    if (common.apart_mm.back() < kOneRobot_mm) ++common.together;
+  }
+  return common;
+}
+
+}  // namespace
+
+void exclude_duplicates(MeasuredSet& set, std::vector<DataFault>& faults) {
+  std::map<std::uint32_t, std::size_t> runs_of;  // in how many runs each robot is
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) ++runs_of[track.robot];
+  }
+  for (Run& run : set.runs) {
+    for (std::size_t a = 0; a < run.tracks.size(); ++a) {
+      for (std::size_t b = a + 1; b < run.tracks.size(); ++b) {
+        if (run.tracks[a].samples.empty() || run.tracks[b].samples.empty()) continue;
+        const Common common = compare(run.tracks[a], run.tracks[b]);
+        if (common.together < kFewestCommon ||
+            static_cast<double>(common.together) < kShareCommon * static_cast<double>(common.count))
+          continue;
+        // The copy is the number that is in fewer runs; where both are in as many, the higher.
+        const bool first = runs_of[run.tracks[a].robot] < runs_of[run.tracks[b].robot];
+        Track& copy = run.tracks[first ? a : b];
+        const Track& origin = run.tracks[first ? b : a];
+        faults.push_back({DataFault::Kind::kDuplicate, run.name, copy.robot, origin.robot,
+                          copy.samples.front().time_s, copy.samples.back().time_s, median(common.apart_mm),
+                          copy.samples.size()});
+        copy.samples.clear();
+      }
+    }
+  }
+}
+
+// --- frozen ---
+
+namespace {
+
+// A tracker is held to be frozen where a robot that is told to move has not moved by a digit for so long.
+constexpr double kFrozen_s = 4;
+constexpr std::size_t kFewestFrozen = 4;
+// Trackers that round, or that see cells, repeat positions all the time: where the share of repeated positions of robots at
+// rest is above this, a repeated position means that the robot stands still, and no more.
+constexpr double kRepeats = 0.2;
+
+/// Share of positions that repeat the one before, of robots that rest in that time.
+double repeats_at_rest(const MeasuredSet& set) {
+  std::size_t rest = 0, same = 0;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      for (std::size_t k = 1; k < track.samples.size(); ++k) {
+        if (told_at(track, track.samples[k - 1].time_s) != Motion::kStop ||
+            told_at(track, track.samples[k].time_s) != Motion::kStop)
+          continue;
+        ++rest;
+        if (same_place(track.samples[k - 1], track.samples[k])) ++same;
+      }
+    }
+  }
+  return rest == 0 ? 0 : static_cast<double>(same) / static_cast<double>(rest);
+}
+
+/// Share of all steps that repeat, stretches of more than kFrozen_s counted once: how often it happens by rounding.
+double lone_repeats(const MeasuredSet& set) {
+  std::size_t steps = 0, same = 0;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      for (std::size_t k = 1, begin = 0; k < track.samples.size(); ++k) {
+        ++steps;
+        if (!same_place(track.samples[k - 1], track.samples[k])) {
+          begin = k;
+        } else if (track.samples[k].time_s - track.samples[begin].time_s < kFrozen_s) {
+          ++same;
+        }
+      }
+    }
+  }
+  return steps == 0 ? 0 : static_cast<double>(same) / static_cast<double>(steps);
+}
+
+}  // namespace
+
+void exclude_frozen(MeasuredSet& set, std::vector<DataFault>& faults) {
+  if (repeats_at_rest(set) > kRepeats || lone_repeats(set) > kRepeats) return;
+  for (Run& run : set.runs) {
+    for (Track& track : run.tracks) {
+      std::vector<bool> out(track.samples.size());
+      std::size_t end = 0;
+      const auto stretch = [&](std::size_t begin) {
+        end = begin + 1;
+        double driven_s = 0;
+        while (end < track.samples.size() && same_place(track.samples[begin], track.samples[end])) {
+          const double from_s = track.samples[end - 1].time_s, to_s = track.samples[end].time_s;
+          if (told_at(track, 0.5 * (from_s + to_s)) != Motion::kStop) driven_s += to_s - from_s;
+          ++end;
+        }
+        return driven_s;
+      };
+      for (std::size_t begin = 0; begin < track.samples.size(); begin = end) {
+        if (stretch(begin) < kFrozen_s || end - begin < kFewestFrozen) continue;
+        // The first of them is where the robot was seen last.
+        for (std::size_t k = begin + 1; k < end; ++k) out[k] = true;
+        faults.push_back({DataFault::Kind::kFrozen, run.name, track.robot, std::nullopt,
+                          track.samples[begin].time_s, track.samples[end - 1].time_s, 0, end - begin - 1});
+      }
+      take_out(track, out);
+    }
+  }
+}
+
+// --- outliers ---
+
+namespace {
+
+// A position is out where it is further than this from where the robot is by the positions before, by those after, and
+// between them: so many times the robust standard deviation of that distance in the run. To and from it the robot must
+// besides have gone faster than robots do: so many times the speed that 19 of 20 steps stay below.
+constexpr double kOutlierSds = 12;
+constexpr double kLeastOutlier_mm = 6;
+constexpr double kTooFast = 1.5;
+constexpr int kOutlierPasses = 3;
+// Positions that lie further apart in time say nothing about each other.
+constexpr double kLongestStep_s = 2.5;
+
+/// How far sample k is from where its neighbours in time have the robot; 0 at the ends and beside gaps.
+double off_course_mm(const std::vector<Sample>& s, std::size_t k) {
+  if (k < 2 || k + 2 >= s.size() || s[k + 2].time_s - s[k - 2].time_s > 4 * kLongestStep_s) return 0;
+  const auto from_line = [&](std::size_t a, std::size_t b) {
+    const double span = s[b].time_s - s[a].time_s;
+    if (span <= 0) return 0.0;
+    const double u = (s[k].time_s - s[a].time_s) / span;
+    return std::hypot(s[a].x_mm + u * (s[b].x_mm - s[a].x_mm) - s[k].x_mm,
+                      s[a].y_mm + u * (s[b].y_mm - s[a].y_mm) - s[k].y_mm);
+  };
+  return std::min({from_line(k - 2, k - 1), from_line(k + 1, k + 2), from_line(k - 1, k + 1)});
+}
+
+struct Bounds {
+  double off_mm, speed_mm_s;
+};
+
+/// How far sample k is off, where that makes it an outlier; else 0.
+double outlier_mm(const std::vector<Sample>& s, std::size_t k, const Bounds& bounds) {
+  const double off = off_course_mm(s, k);
+  if (off < bounds.off_mm) return 0;
+  const auto too_far = [&](std::size_t a, std::size_t b) {
+    return distance(s[a], s[b]) > bounds.speed_mm_s * (s[b].time_s - s[a].time_s) + 0.5 * bounds.off_mm;
+  };
+  return too_far(k - 1, k) && too_far(k, k + 1) ? off : 0;
+}
+
+}  // namespace
+
+void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
+  for (Run& run : set.runs) {
+    std::vector<double> course, speeds;
+    for (const Track& track : run.tracks) {
+      for (std::size_t k = 0; k < track.samples.size(); ++k) {
+        if (const double off = off_course_mm(track.samples, k); off > 0) course.push_back(off);
+        if (k == 0) continue;
+        const double dt = track.samples[k].time_s - track.samples[k - 1].time_s;
+        if (dt > 0 && dt < kLongestStep_s) speeds.push_back(distance(track.samples[k - 1], track.samples[k]) / dt);
+      }
+    }
+    if (course.size() < 20) continue;
+    // The distance of a plane normal distribution has a median of 1.18 standard deviations.
+    const auto fast = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() * 19 / 20);
+    std::nth_element(speeds.begin(), fast, speeds.end());
+    const Bounds bounds{std::max(kOutlierSds * median(course) / 1.18, kLeastOutlier_mm), kTooFast * *fast};
+    DataFault fault{DataFault::Kind::kOutliers,
+                    run.name,
+                    std::nullopt,
+                    std::nullopt,
+                    std::numeric_limits<double>::infinity(),
+                    -std::numeric_limits<double>::infinity(),
+                    0,
+                    0};
+    std::size_t robots = 0;
+    for (Track& track : run.tracks) {
+      std::size_t of_track = 0;
+      for (int pass = 0; pass < kOutlierPasses; ++pass) {
+        std::vector<bool> out(track.samples.size());
+        // One by one, the worst of its surroundings first: beside an outlier good positions look bad.
+        for (std::size_t k = 0; k < track.samples.size(); ++k) {
+          const double off = outlier_mm(track.samples, k, bounds);
+          if (off == 0) continue;
+          const bool worst = (k == 0 || off >= outlier_mm(track.samples, k - 1, bounds)) &&
+                             (k + 1 == track.samples.size() || off > outlier_mm(track.samples, k + 1, bounds));
+          if (!worst) continue;
+          out[k] = true;
+          fault.from_s = std::min(fault.from_s, track.samples[k].time_s);
+          fault.to_s = std::max(fault.to_s, track.samples[k].time_s);
+          fault.strength = std::max(fault.strength, off);
+        }
+        const std::size_t gone = take_out(track, out);
+        of_track += gone;
+        if (gone == 0) break;
+      }
+      if (of_track > 0) {
+        ++robots;
+        fault.robot = track.robot;
+        fault.excluded += of_track;
+      }
+    }
+    if (robots > 1) fault.robot.reset();
+    if (fault.excluded > 0) faults.push_back(fault);
+  }
+}
+
+// --- all ---
+
+std::vector<DataFault> exclude_faults(MeasuredSet& set) {
+  std::vector<DataFault> faults;
+  exclude_duplicates(set, faults);
+  exclude_frozen(set, faults);
+  exclude_wrong_clocks(set, faults);
+  exclude_swapped(set, faults);
+  exclude_outliers(set, faults);
+  std::map<std::string, std::size_t> place;
+  for (std::size_t r = 0; r < set.runs.size(); ++r) place.emplace(set.runs[r].name, r);
+  std::stable_sort(faults.begin(), faults.end(), [&](const DataFault& a, const DataFault& b) {
+    return std::pair(place[a.run], a.kind) < std::pair(place[b.run], b.kind);
+  });
+  return faults;
+}
+
+const char* name_of(DataFault::Kind kind) {
+  constexpr std::array kNames = {"outliers", "frozen", "duplicate", "swapped", "clock"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::string DataFault::in_words() const {
+  const std::string who = robot ? fmt::format("robot {}", *robot) : "several robots";
+  switch (kind) {
+    case Kind::kOutliers:
+      return fmt::format(
+          "Run {}: {} position{} of {} up to {:.0f} mm away from where {} before and after; excluded.", run,
+          excluded, excluded == 1 ? "" : "s", who, strength, robot ? "it was" : "they were");
+    case Kind::kFrozen:
+      return fmt::format(
+          "Run {}: the tracker held {} at one place from {:.1f} to {:.1f} s, to the last digit, while it was told "
+          "to move; {} positions excluded.",
+          run, who, from_s, to_s, excluded);
+    case Kind::kDuplicate:
+      return fmt::format(
+          "Run {}: robot {} is robot {} tracked twice, {:.1f} mm apart, where discs are 33 mm wide; its {} "
+          "positions excluded.",
+          run, *robot, *other, strength, excluded);
+    case Kind::kSwapped:
+      return fmt::format(
+          "Run {}: robots {} and {} carry each other's number, by where they are or by what they do, from {:.1f} "
+          "to {:.1f} "
+          "s: log-likelihood of "
+          "their commands exchanged +{:.0f}; {} positions excluded.",
+          run, *robot, *other, from_s, to_s, strength, excluded);
+    case Kind::kClock:
+      return fmt::format(
+          "Run {}: robots follow their commands when the tracker's times are divided by {:.4f}: its clock is "
+          "wrong; the run's {} positions excluded.",
+          run, strength, excluded);
+  }
+  return {};
+}
+
+nlohmann::json document_of(const std::vector<DataFault>& faults) {
+  nlohmann::json all = nlohmann::json::array();
+  const auto number = [](const std::optional<std::uint32_t>& n) {
+    return n ? nlohmann::json(*n) : nlohmann::json();
+  };
+  for (const DataFault& f : faults) {
+    all.push_back({{"kind", name_of(f.kind)},
+                   {"run", f.run},
+                   {"robot", number(f.robot)},
+                   {"other", number(f.other)},
+                   {"from_s", f.from_s},
+                   {"to_s", f.to_s},
+                   {"strength", f.strength},
+                   {"excluded", f.excluded},
+                   {"in_words", f.in_words()}});
+  }
+  return all;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,196 @@
+#include "clients/identify/data/import.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <string_view>
+
+#include "clients/identify/data/csv_reader.hpp"
+#include "clients/identify/data/measured_set.hpp"
+#include "clients/recorder/file.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::identify {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::string_view kRecordingHeader = "time_s,robot,x_mm,y_mm,heading_rad";
+// An ARK log's columns that are read, of at least so many.
+constexpr std::size_t kTime = 0, kId = 1, kX = 3, kY = 4, kArkColumns = 6;
+
+bool is_ark_log(const fs::path& file) {
+  const std::string ending = file.extension().string();
+  return ending == ".tsv" || ending == ".txt" || ending == ".log";
+}
+
+std::string_view without_return(std::string_view line) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line;
+}
+
+std::vector<std::string_view> cells_of(std::string_view line) {
+  std::vector<std::string_view> cells;
+  for (std::size_t at = 0;;) {
+    const std::size_t end = std::min(line.find('\t', at), line.size());
+    cells.push_back(line.substr(at, end - at));
+    if (end == line.size()) return cells;
+    at = end + 1;
+  }
+}
+
+template <class Number> bool parse(std::string_view cell, Number& value) {
+  while (cell.starts_with(' ')) cell.remove_prefix(1);
+  while (cell.ends_with(' ')) cell.remove_suffix(1);
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  return error == std::errc() && end == cell.data() + cell.size() && !cell.empty();
+}
+
+/// A finite number that a position or a time can be.
+bool parse_finite(std::string_view cell, double& value) {
+  return parse(cell, value) && std::isfinite(value) && std::abs(value) < 1e9;
+}
+
+std::string name_of_run(const fs::path& file) {
+  std::string name = file.stem().string();
+  for (char& c : name) {
+    if (c == ',' || c == '"' || c == '\n' || c == '\r') c = '-';
+  }
+  return name;
+}
+
+/// Whether the first line that is not blank has a log's columns: a time, or its name, and enough cells.
+bool looks_like_ark_log(const fs::path& file) {
+  const std::string content = recorder::read_file(file);
+  for (std::size_t at = 0; at < content.size();) {
+    const std::size_t end = std::min(content.find('\n', at), content.size());
+    const std::string_view line = without_return(std::string_view(content).substr(at, end - at));
+    at = end + 1;
+    if (line.find_first_not_of(" \t") == std::string_view::npos) continue;
+    const std::vector<std::string_view> cells = cells_of(line);
+    double time_s = 0;
+    return cells.size() >= kArkColumns && (parse_finite(cells[kTime], time_s) || cells[kTime] == "t");
+  }
+  return false;
+}
+
+bool looks_like_recording(const fs::path& file) {
+  const std::string content = recorder::read_file(file);
+  return std::string_view(content).starts_with(kRecordingHeader);
+}
+
+}  // namespace
+
+std::vector<fs::path> importable(const fs::path& directory) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  if (!fs::is_directory(directory, error) || has_trajectories(directory)) return files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
+    const fs::path& file = entry.path();
+    if (!entry.is_regular_file(error) || file.stem() == "commands") continue;
+    if ((is_ark_log(file) && looks_like_ark_log(file)) ||
+        (file.extension() == ".csv" && looks_like_recording(file)))
+      files.push_back(file);
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string rows_of_ark_log(const fs::path& file) {
+  const std::string content = recorder::read_file(file);
+  const std::string run = name_of_run(file);
+  std::string rows;
+  std::size_t number = 0;
+  for (std::size_t at = 0; at < content.size();) {
+    const std::size_t end = std::min(content.find('\n', at), content.size());
+    const bool cut_off = end == content.size();
+    const std::string_view line = without_return(std::string_view(content).substr(at, end - at));
+    at = end + 1;
+    ++number;
+    if (line.find_first_not_of(" \t") == std::string_view::npos) continue;
+    const std::vector<std::string_view> cells = cells_of(line);
+    double time_s = 0, x = 0, y = 0;
+    std::uint32_t id = 0;
+    // Names of columns, above all rows.
+    if (rows.empty() && !parse_finite(cells[kTime], time_s) && cells.size() >= kArkColumns &&
+        !parse_finite(cells[kX], x))
+      continue;
+    const auto complain = [&](std::size_t column, const std::string& what) {
+      throw UserError(fmt::format("{}:{}:{}: {}", file.string(), number,
+                                  column < cells.size() ? cells[column].data() - line.data() + 1 : 1, what));
+    };
+    if (cells.size() < kArkColumns) {
+      if (cut_off) break;
+      complain(0, fmt::format("{} cells, separated by tabs; an ARK log has t, id, colour, x, y, orientation",
+                              cells.size()));
+    }
+    if (!parse_finite(cells[kTime], time_s))
+      complain(kTime, fmt::format("time is \"{}\"; give seconds", cells[kTime]));
+    if (!parse(cells[kId], id)) complain(kId, fmt::format("id is \"{}\"; give a whole number", cells[kId]));
+    if (!parse_finite(cells[kX], x)) complain(kX, fmt::format("x is \"{}\"; give pixels", cells[kX]));
+    if (!parse_finite(cells[kY], y)) complain(kY, fmt::format("y is \"{}\"; give pixels", cells[kY]));
+    rows += fmt::format("{},{},{:.10g},{:.10g},{:.10g}\n", run, id, time_s, x - 0.5 * kArkMosaic_mm,
+                        0.5 * kArkMosaic_mm - y);
+  }
+  if (rows.empty())
+    throw UserError(fmt::format(
+        "{}: has no rows; an ARK log has t, id, colour, x, y, orientation, separated by tabs", file.string()));
+  return rows;
+}
+
+std::string rows_of_recording(const fs::path& file) {
+  CsvReader csv(file);
+  const std::size_t time = csv.column("time_s"), robot = csv.column("robot"), x = csv.column("x_mm"),
+                    y = csv.column("y_mm"), heading = csv.column("heading_rad");
+  const std::string run = name_of_run(file);
+  std::string rows;
+  while (csv.next()) {
+    rows += fmt::format("{},{},{:.10g},{:.10g},{:.10g},{:.10g}\n", run, csv.whole(robot), csv.number(time),
+                        csv.number(x), csv.number(y), csv.number(heading));
+  }
+  if (rows.empty()) throw UserError(fmt::format("{}: has no rows", file.string()));
+  return rows;
+}
+
+void import_set(const fs::path& from, const fs::path& to) {
+  const std::vector<fs::path> files = importable(from);
+  if (files.empty()) {
+    throw UserError(
+        fmt::format("{}: holds neither trajectories.csv, nor ARK logs (*.tsv, *.txt, *.log), nor recordings "
+                    "(*.csv of kilotwin export --trajectories)",
+                    from.string()));
+  }
+  std::map<std::string, fs::path> runs;
+  std::string text;
+  for (const fs::path& file : files) {
+    if (is_ark_log(file) != is_ark_log(files.front())) {
+      throw UserError(fmt::format("{}: is of another kind than {}; give ARK logs or recordings, not both",
+                                  file.string(), files.front().filename().string()));
+    }
+    const auto [known, fresh] = runs.emplace(name_of_run(file), file);
+    if (!fresh)
+      throw UserError(fmt::format("{}: names the same run as {}; rename one", file.string(),
+                                  known->second.filename().string()));
+    text += is_ark_log(file) ? rows_of_ark_log(file) : rows_of_recording(file);
+  }
+  std::error_code error;
+  fs::create_directories(to, error);
+  recorder::write_file(
+      to / "trajectories.csv",
+      (is_ark_log(files.front()) ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") +
+          text);
+  for (const char* name : {"commands.csv", "commands.csv.gz"}) {
+    fs::remove(to / name, error);
+    if (fs::exists(from / name, error)) recorder::write_file(to / name, recorder::read_file(from / name));
+  }
+}
+
+MeasuredSet load_or_import(const fs::path& directory, const fs::path& converted) {
+  if (importable(directory).empty()) return load_measured_set(directory);
+  import_set(directory, converted);
+  return load_measured_set(converted);
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,296 @@
+#include "clients/identify/fit/noise_fit.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "clients/identify/fit/linearise.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// Parts of Noise that are fitted, as logarithms: those that spread a robot's pose, then those of the tracker.
+enum : Eigen::Index { kFactor, kWheel, kHeading, kDrift, kPosition, kMeasuredHeading, kNoises };
+constexpr std::size_t kSpreading = kPosition;
+using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
+
+NoiseVector logs_of(const Noise& n) {
+  NoiseVector v;
+  v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
+  return v.array().log();
+}
+/// Below the lower bounds a noise is as good as none, above the upper ones nothing would be told from noise.
+NoiseVector variances(const NoiseVector& logs) {
+  constexpr std::array<double, kNoises> kLow = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
+                                        kHigh = {1, 100, 1, 100, 1e4, 10};
+  NoiseVector v;
+  for (Eigen::Index i = 0; i < kNoises; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    v[i] = std::clamp(std::exp(logs[i]), kLow[k], kHigh[k]);
+  }
+  return v;
+}
+Noise with(Noise noise, const NoiseVector& v) {
+  noise.factor_s = v[kFactor];
+  noise.wheel_mm2_s = v[kWheel];
+  noise.heading_rad2_s = v[kHeading];
+  noise.drift_mm2_s = v[kDrift];
+  noise.position_mm2 = v[kPosition];
+  noise.heading_rad2 = v[kMeasuredHeading];
+  return noise;
+}
+
+/// From one measurement to the next, about the path of a filter.
+struct Stretch {
+  Stretch() {
+    for (Eigen::Matrix3d& m : spread) m.setZero();
+  }
+  Eigen::Matrix3d transition = Eigen::Matrix3d::Identity();  ///< of the pose
+  /// What it is spread by, per unit of each noise, and by what is not fitted.
+  std::array<Eigen::Matrix3d, kSpreading> spread;
+  Eigen::Matrix3d more = Eigen::Matrix3d::Zero();
+  // The measurement at its end.
+  int size = 0;
+  Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
+  /// From what the path promised, and what that moved the path by.
+  Eigen::Vector3d difference = Eigen::Vector3d::Zero(), correction = Eigen::Vector3d::Zero();
+  bool counts = true;  ///< otherwise all begins anew here, with this covariance
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+class Recorder {
+ public:
+  explicit Recorder(double wheel_base_mm) : wheel_base_mm_(wheel_base_mm) {}
+  Eigen::Matrix3d first;  ///< covariance of the pose at the first sample
+  std::vector<Stretch> stretches;
+
+  void start(const TrackFilter& filter) {
+    filter_ = &filter;
+    first = filter.belief().covariance.topLeftCorner<3, 3>();
+    begin();
+  }
+  void step(const StepRecord& record) {
+    touched_ = touched_ || record.touching();
+    const StepWays ways = ways_of(record, wheel_base_mm_);
+    const auto carry = [&](Eigen::Matrix3d& m) {
+      m.row(0) += ways.by_heading[0] * m.row(2);
+      m.row(1) += ways.by_heading[1] * m.row(2);
+    };
+    const auto carry_covariance = [&](Eigen::Matrix3d& m) {
+      carry(m);
+      m.col(0) += ways.by_heading[0] * m.col(2);
+      m.col(1) += ways.by_heading[1] * m.col(2);
+    };
+    carry(now_.transition);
+    for (Eigen::Matrix3d& m : now_.spread) carry_covariance(m);
+    carry_covariance(now_.more);
+    const double h = record.h_s;
+    now_.spread[kDrift](0, 0) += h;
+    now_.spread[kDrift](1, 1) += h;
+    now_.more(2, 2) += TrackFilter::kLeastTurn_rad2_s * h;
+    if (!record.middle.commands.driven()) return;
+    const Eigen::Vector2d speeds(record.rates.left_mm_s, record.rates.right_mm_s);
+    now_.spread[kFactor] += ways.by_wheel * (h * speeds.cwiseAbs2()).asDiagonal() * ways.by_wheel.transpose();
+    now_.spread[kWheel] += h * ways.by_wheel * ways.by_wheel.transpose();
+    now_.spread[kHeading](2, 2) += h;
+  }
+  void update(const Innovation& innovation, const Sample&) {
+    now_.size = innovation.size;
+    now_.jacobian = innovation.jacobian;
+    now_.difference = innovation.difference;
+    now_.correction = innovation.gain.topRows<3>() * innovation.difference;
+    now_.counts = !innovation.lost && !touched_;
+    now_.covariance = filter_->belief().covariance.topLeftCorner<3, 3>();
+    stretches.push_back(now_);
+    begin();
+  }
+
+ private:
+  void begin() {
+    now_ = Stretch();
+    touched_ = false;
+  }
+  const double wheel_base_mm_;
+  const TrackFilter* filter_ = nullptr;
+  Stretch now_;
+  bool touched_ = false;
+};
+
+struct Path {
+  Eigen::Matrix3d first;
+  double position_mm2;  ///< that is part of `first`
+  std::vector<Stretch> stretches;
+};
+
+Path path_of(const MotionModel& model, const TrackView& view) {
+  RobotBias bias = model.bias_of(view.track->robot);
+  bias.covariance.setZero();
+  TrackFilter filter(model, bias, view.track->robot, view.number);
+  Recorder recorder(model.base.wheel_base_mm);
+  walk(filter, view, view.track->samples.size(), recorder);
+  return {recorder.first, model.noise.position_mm2, std::move(recorder.stretches)};
+}
+
+/// Of all measurements of a path that count, with other noise.
+double log_likelihood(const Path& path, const NoiseVector& variance) {
+  double sum = 0;
+  Eigen::Matrix3d p = path.first;
+  p(0, 0) += variance[kPosition] - path.position_mm2;
+  p(1, 1) += variance[kPosition] - path.position_mm2;
+  Eigen::Vector3d off = Eigen::Vector3d::Zero();  // of the mean from the path
+  for (const Stretch& s : path.stretches) {
+    if (!s.counts) {
+      p = s.covariance;
+      off.setZero();
+      continue;
+    }
+    off = (s.transition * off).eval();
+    Eigen::Matrix3d moved = s.transition * p;
+    p.noalias() = moved * s.transition.transpose();
+    p += s.more;
+    for (std::size_t i = 0; i < kSpreading; ++i) p += variance[static_cast<Eigen::Index>(i)] * s.spread[i];
+    const Eigen::Matrix3d ph = p * s.jacobian.transpose();
+    Eigen::Matrix3d seen = s.jacobian * ph;
+    seen(0, 0) += variance[kPosition];
+    seen(1, 1) += variance[kPosition];
+    seen(2, 2) = s.size == 3 ? seen(2, 2) + variance[kMeasuredHeading] : 1;
+    const Eigen::Vector3d difference = s.difference - s.jacobian * off;
+    Eigen::Matrix3d inverse = seen.inverse();
+    const double distance2 = difference.dot(inverse * difference);
+    const double factor = outlier_factor(distance2, s.size);
+    sum += std::max(-1e3, -0.5 * (std::log(seen.determinant()) + s.size * std::log(factor) + distance2 / factor));
+    inverse /= factor;
+    const Eigen::Matrix3d gain = ph * inverse;
+    off += gain * difference - s.correction;
+    p.noalias() -= gain * ph.transpose();
+    p = (0.5 * (p + p.transpose())).eval();
+  }
+  return sum;
+}
+
+/// Noises beyond the data's reach are held near those of the start by a weak prior, so that the search has an end.
+double log_prior(const NoiseVector& logs) {
+  constexpr double kWeak = 1.0 / (6 * 6);
+  static const NoiseVector middle = logs_of(Noise{});
+  return -0.5 * kWeak * (logs - middle).squaredNorm();
+}
+
+/// A quasi-Newton search (Broyden, Fletcher, Goldfarb and Shanno) on the logarithms of variances.
+class Climb {
+ public:
+  Climb(const std::vector<Path>& paths, bool has_headings, std::uint32_t threads)
+      : paths_(paths), has_headings_(has_headings), threads_(threads) {
+    for (const Path& path : paths) samples_ += path.stretches.size();
+  }
+
+  /// Moves to the top; returns its height.
+  double operator()(NoiseVector& at) const {
+    double value = values({at}).front();
+    NoiseVector gradient = gradient_at(at);
+    // A log variance is known to about sqrt(2 / n).
+    const double curvature = std::max<double>(10, 0.1 * static_cast<double>(samples_));
+    using Square = Eigen::Matrix<double, kNoises, kNoises>;
+    Square inverse = Square::Identity() / curvature;
+    for (int pass = 0; pass < 20; ++pass) {
+      NoiseVector move = inverse * gradient;
+      const double longest = move.cwiseAbs().maxCoeff();
+      if (longest > 1.5) move *= 1.5 / longest;
+      bool better = false;
+      double gained = 0;
+      for (int halve = 0; halve < 6; ++halve, move *= 0.3) {
+        const double found = values({at + move}).front();
+        if (!(found > value)) continue;
+        gained = found - value;
+        value = found;
+        better = true;
+        break;
+      }
+      if (!better) break;
+      at += move;
+      if (gained < 0.3) break;
+      const NoiseVector next = gradient_at(at);
+      const NoiseVector change = gradient - next;  // of the negative
+      const double along = change.dot(move);
+      if (along > 1e-9) {
+        const Square side = Square::Identity() - move * change.transpose() / along;
+        inverse = (side * inverse * side.transpose() + move * move.transpose() / along).eval();
+      }
+      gradient = next;
+    }
+    return value;
+  }
+
+ private:
+  [[nodiscard]] std::vector<double> values(const std::vector<NoiseVector>& at) const {
+    std::vector<NoiseVector> variance;
+    for (const NoiseVector& logs : at) variance.push_back(variances(logs));
+    std::vector<std::vector<double>> of_paths(paths_.size(), std::vector<double>(at.size()));
+    in_parallel(paths_.size(), threads_, [&](std::size_t p) {
+      for (std::size_t i = 0; i < at.size(); ++i) of_paths[p][i] = log_likelihood(paths_[p], variance[i]);
+    });
+    std::vector<double> sums(at.size());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      for (const std::vector<double>& of_path : of_paths) sums[i] += of_path[i];
+      sums[i] += log_prior(at[i]);
+    }
+    return sums;
+  }
+  [[nodiscard]] NoiseVector gradient_at(const NoiseVector& at) const {
+    constexpr double kStep = 0.02;
+    const Eigen::Index count = has_headings_ ? kNoises : kMeasuredHeading;
+    std::vector<NoiseVector> trials;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      for (const double by : {kStep, -kStep}) {
+        trials.push_back(at);
+        trials.back()[i] += by;
+      }
+    }
+    const std::vector<double> found = values(trials);
+    NoiseVector gradient = NoiseVector::Zero();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto k = static_cast<std::size_t>(2 * i);
+      gradient[i] = (found[k] - found[k + 1]) / (2 * kStep);
+    }
+    return gradient;
+  }
+
+  const std::vector<Path>& paths_;
+  const bool has_headings_;
+  const std::uint32_t threads_;
+  std::size_t samples_ = 0;
+};
+
+}  // namespace
+
+Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackView*>& tracks, bool has_headings,
+                        std::uint32_t threads) {
+  MotionModel model = start;
+  constexpr int kMostRounds = 4;
+  constexpr double kSettled = 0.1;  // of a logarithm: the paths are those of noise like this
+  for (int round = 0; round < kMostRounds; ++round) {
+    std::vector<Path> paths(tracks.size());
+    in_parallel(tracks.size(), threads, [&](std::size_t i) { paths[i] = path_of(model, *tracks[i]); });
+    const Climb climb(paths, has_headings, threads);
+    const NoiseVector before = logs_of(model.noise);
+    NoiseVector at = before;
+    const double value = climb(at);
+    // What once seemed to be no noise has no slope any more that would lead back; a new start shows whether it is some.
+    constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
+    if (std::exp(at[kPosition]) < kNone_mm2 || std::exp(at[kFactor]) < kNone_s) {
+      const NoiseVector middle = logs_of(Noise{});
+      NoiseVector anew = at;
+      anew[kFactor] = std::max(at[kFactor], middle[kFactor]);
+      anew[kDrift] = std::min(at[kDrift], std::log(1e-2));
+      anew[kPosition] = std::max(at[kPosition], std::log(0.1));
+      if (climb(anew) > value) at = anew;
+    }
+    model.noise = with(model.noise, variances(at));
+    if ((at - before).cwiseAbs().maxCoeff() < kSettled) break;
+  }
+  return model.noise;
+}
+
+}  // namespace kilotwin::identify

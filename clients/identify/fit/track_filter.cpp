@@ -1,0 +1,291 @@
+#include "clients/identify/fit/track_filter.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+
+namespace kilotwin::identify {
+namespace {
+
+/// Squared distances beyond which a measurement is an outlier: what normal noise exceeds once in about 1e5 times, of 2 and 3 numbers.
+constexpr double kGate2 = 23, kGate3 = 25.9;
+/// So many far outliers in a row mean that the robot is elsewhere.
+constexpr int kLostAfter = 4;
+constexpr double kFar = 60;
+
+}  // namespace
+
+StepWays ways_of(const StepRecord& record, double wheel_base_mm) {
+  const Arc& arc = record.arc;
+  const double h = record.h_s;
+  const double world_x = record.rates.world_x_mm_s * h, world_y = record.rates.world_y_mm_s * h;
+  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 * h;
+  // A turn within the step also bends the rest of it.
+  const double bend_x = -arc.along_y * forward / 2, bend_y = arc.along_x * forward / 2;
+  StepWays ways;
+  ways.by_wheel << arc.along_x / 2 - bend_x / wheel_base_mm, arc.along_x / 2 + bend_x / wheel_base_mm,  //
+      arc.along_y / 2 - bend_y / wheel_base_mm, arc.along_y / 2 + bend_y / wheel_base_mm,               //
+      -1 / wheel_base_mm, 1 / wheel_base_mm;
+  ways.by_heading << -(arc.dy_mm - world_y), arc.dx_mm - world_x;
+  return ways;
+}
+
+double outlier_factor(double distance2, int size) {
+  return std::max(1.0, distance2 / (size == 3 ? kGate3 : kGate2));
+}
+
+TrackFilter::TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run)
+    : model_(&model), measures_(model.measures()) {
+  belief_.centre_mm = model.base.centre_mm;
+  belief_.mean.tail<2>() = bias.mean_mm_s;
+  belief_.covariance.bottomRightCorner<2, 2>() = bias.covariance;
+  place_.robot = robot;
+  place_.run = run;
+}
+
+void TrackFilter::start(const Sample& sample, const Situation&, double heading_rad, double heading_sd_rad) {
+  const BaseParameters& base = model_->base;
+  const double c = std::cos(heading_rad), s = std::sin(heading_rad);
+  const double variance = heading_sd_rad * heading_sd_rad;
+  // The point is where it was seen; the reference point lies behind it, wherever that is.
+  Eigen::Vector3d by_heading(base.ahead_mm * s + base.left_mm * c, -base.ahead_mm * c + base.left_mm * s, 1);
+  belief_.mean.head<3>() << sample.x_mm - base.ahead_mm * c + base.left_mm * s,
+      sample.y_mm - base.ahead_mm * s - base.left_mm * c, heading_rad;
+  belief_.covariance.topRows<3>().setZero();
+  belief_.covariance.leftCols<3>().setZero();
+  belief_.covariance.topLeftCorner<3, 3>() = variance * by_heading * by_heading.transpose();
+  belief_.covariance(0, 0) += model_->noise.position_mm2;
+  belief_.covariance(1, 1) += model_->noise.position_mm2;
+  if (measures_) {
+    // What the tracker adds is taken off.
+    const Situation at = situation(sample.time_s, CommandState{}, {});
+    constexpr int kPasses = 6;
+    for (int pass = 0; pass < kPasses; ++pass) {
+      const Eigen::Vector3d seen = model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], at);
+      if (has_heading(sample)) belief_.mean[2] += wrapped_angle(sample.heading_rad - seen[2]);
+      belief_.mean[0] += sample.x_mm - seen[0];
+      belief_.mean[1] += sample.y_mm - seen[1];
+    }
+  }
+  outliers_ = 0;
+}
+
+Situation TrackFilter::situation(double time_s, const CommandState& commands, const NeighbourView& near) const {
+  Situation s = place_;
+  s.time_s = time_s;
+  s.heading_rad = belief_.mean[2];
+  s.x_mm = belief_.centre_x_mm();
+  s.y_mm = belief_.centre_y_mm();
+  s.commands = commands;
+  s.near = near;
+  return s;
+}
+
+StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
+  const StepRecord record = step_freely(time_s, h_s, commands, near);
+  hold_inside();
+  return record;
+}
+
+StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandState& commands,
+                                    const NeighbourView& near) {
+  StepRecord record;
+  record.h_s = h_s;
+  record.middle = situation(time_s + h_s / 2, commands, near);
+  record.middle.span_s = h_s;
+  record.middle.commands.advance(h_s / 2);
+  if (!model_->terms.empty() && commands.driven()) {
+    // Half a step ahead by the base model, for what depends on the pose.
+    Rates plain;
+    const Eigen::Vector2d v = nominal_speeds(model_->base, commands.command) + belief_.mean.tail<2>();
+    plain.left_mm_s = v[0];
+    plain.right_mm_s = v[1];
+    const Arc half = arc_of(plain, model_->base.wheel_base_mm, belief_.mean[2], h_s / 2);
+    record.middle.heading_rad += half.dheading_rad;
+    record.middle.x_mm =
+        belief_.mean[0] + half.dx_mm + model_->base.centre_mm * std::cos(record.middle.heading_rad);
+    record.middle.y_mm =
+        belief_.mean[1] + half.dy_mm + model_->base.centre_mm * std::sin(record.middle.heading_rad);
+  }
+  // A robot at rest is pushed by others as well.
+  record.at_robot = model_->contacts && near.nearest_mm < model_->touch_mm;
+  record.at_wall =
+      commands.driven() && (held_ || model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm));
+  record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
+  record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
+  spread(record);
+  belief_.mean[0] += record.arc.dx_mm;
+  belief_.mean[1] += record.arc.dy_mm;
+  belief_.mean[2] += record.arc.dheading_rad;
+  return record;
+}
+
+void TrackFilter::hold_inside() {
+  const Room& room = model_->room;
+  const double ahead = model_->base.centre_mm;
+  const Eigen::Vector2d by_heading(-ahead * std::sin(belief_.mean[2]), ahead * std::cos(belief_.mean[2]));
+  const Eigen::Vector2d centre(belief_.mean[0] + by_heading[1], belief_.mean[1] - by_heading[0]);
+  // Few are near a wall.
+  const StateCovariance& p = belief_.covariance;
+  constexpr double kNear = 6;  // standard deviations
+  const double reach = kNear * (std::sqrt(p(0, 0) + p(1, 1)) + std::abs(ahead) * std::sqrt(p(2, 2)));
+  if (!room.at_wall(centre[0], centre[1], reach)) return;
+  hold_behind(0, room.x_high_mm, 1);
+  hold_behind(0, room.x_low_mm, -1);
+  hold_behind(1, room.y_high_mm, 1);
+  hold_behind(1, room.y_low_mm, -1);
+}
+
+/// A normal variable X of the centre becomes min(X, wall), whose first two moments are known; its covariance with any other
+/// normal variable is that of X times the chance of X < wall (Stein's lemma).
+void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards) {
+  if (std::isinf(wall_mm)) return;
+  const double c = std::cos(belief_.mean[2]), s = std::sin(belief_.mean[2]);
+  const double by_heading = axis == 0 ? -model_->base.centre_mm * s : model_->base.centre_mm * c;
+  StateCovariance& p = belief_.covariance;
+  const double beyond = outwards * (belief_.mean[axis] + model_->base.centre_mm * (axis == 0 ? c : s) - wall_mm);
+  const double variance = p(axis, axis) + 2 * by_heading * p(axis, 2) + by_heading * by_heading * p(2, 2);
+  const double sd = std::sqrt(std::max(variance, 1e-6));
+  constexpr double kNever = 4;  // standard deviations
+  if (beyond < -kNever * sd) return;
+  const double inside = 0.5 * std::erfc(beyond / sd * M_SQRT1_2);
+  const double density = std::exp(-0.5 * beyond * beyond / (sd * sd)) / std::sqrt(2 * M_PI);
+  const double mean = beyond * inside - sd * density;
+  const double square = (beyond * beyond + sd * sd) * inside - beyond * sd * density;
+  const State with_all = p.col(axis) + by_heading * p.col(2);
+  State own = inside * with_all - by_heading * p.col(2);
+  own[axis] = std::max(0.0, square - mean * mean) - 2 * by_heading * inside * with_all[2] +
+              by_heading * by_heading * p(2, 2);
+  p.col(axis) = own;
+  p.row(axis) = own.transpose();
+  belief_.mean[axis] += outwards * (mean - beyond);
+}
+
+/// The covariance at the end of the step: what was uncertain moves along, and the noise of the step comes in.
+void TrackFilter::spread(const StepRecord& record) {
+  const double h = record.h_s;
+  const auto [by_heading, by_wheel] = ways_of(record, model_->base.wheel_base_mm);
+  StateCovariance& p = belief_.covariance;
+  const Noise& noise = model_->noise;
+  Eigen::Vector3d own = Eigen::Vector3d::Constant(noise.drift_mm2_s * h);
+  own[2] = kLeastTurn_rad2_s * h;
+  Eigen::Matrix<double, 3, 2> by_bias = Eigen::Matrix<double, 3, 2>::Zero();
+  if (record.middle.commands.driven()) {
+    by_bias.col(0) = h * record.rates.left_gain * by_wheel.col(0);
+    by_bias.col(1) = h * record.rates.right_gain * by_wheel.col(1);
+    own[2] += noise.heading_rad2_s * h;
+  }
+  // F P F^T, F being 1 but for these columns: rows first, then columns. Biases may be known, with zeros in P.
+  const bool biased = p(3, 3) > 0 || p(4, 4) > 0;
+  p.row(0) += by_heading[0] * p.row(2);
+  p.row(1) += by_heading[1] * p.row(2);
+  if (biased) p.topRows<3>() += by_bias * p.bottomRows<2>();
+  p.col(0) += by_heading[0] * p.col(2);
+  p.col(1) += by_heading[1] * p.col(2);
+  if (biased) p.leftCols<3>() += p.rightCols<2>() * by_bias.transpose();
+  if (record.middle.commands.driven()) {
+    const double left = record.rates.left_mm_s, right = record.rates.right_mm_s;
+    const Eigen::Vector2d wheels(h * (noise.factor_s * left * left + noise.wheel_mm2_s),
+                                 h * (noise.factor_s * right * right + noise.wheel_mm2_s));
+    p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
+  }
+  if (!looking_ahead_) {
+    if (record.at_wall) own += h * Eigen::Vector3d(noise.wall_mm2_s, noise.wall_mm2_s, noise.wall_rad2_s);
+    if (record.at_robot) own += h * Eigen::Vector3d(noise.contact_mm2_s, noise.contact_mm2_s, noise.contact_rad2_s);
+  }
+  p.diagonal().head<3>() += own;
+}
+
+void TrackFilter::step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
+  const State before = belief_.mean;
+  const StateCovariance p = belief_.covariance;
+  look_ahead();
+  const StepRecord record = step_freely(time_s, h_s, commands, near);
+  // With a normal heading of variance P, E[cos] = cos exp(-P / 2), and speeds that go with the heading shift it.
+  const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 + record.rates.ahead_mm_s;
+  const double shrink = std::exp(-p(2, 2) / 2);
+  const double together = (record.rates.left_gain * p(2, 3) + record.rates.right_gain * p(2, 4)) / 2;
+  const double cx = record.arc.along_x * shrink, cy = record.arc.along_y * shrink;
+  const Rates& r = record.rates;
+  belief_.mean[0] = before[0] + h_s * (forward * cx - together * cy - r.sideways_mm_s * cy + r.world_x_mm_s);
+  belief_.mean[1] = before[1] + h_s * (forward * cy + together * cx + r.sideways_mm_s * cx + r.world_y_mm_s);
+  hold_inside();
+}
+
+Eigen::Matrix3d TrackFilter::jacobian(const Situation& at) const {
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+  const State& m = belief_.mean;
+  if (!measures_) {
+    const BaseParameters& base = model_->base;
+    const double c = std::cos(m[2]), s = std::sin(m[2]);
+    h(0, 2) = -base.ahead_mm * s - base.left_mm * c;
+    h(1, 2) = base.ahead_mm * c - base.left_mm * s;
+    return h;
+  }
+  // Differences on one side: what trackers add bends far less within these steps.
+  const Eigen::Vector3d here = model_->measured(m[0], m[1], m[2], at);
+  const double steps[] = {0.1, 0.1, 1e-4};
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Vector3d d = Eigen::Vector3d::Zero();
+    d[i] = steps[i];
+    h.col(i) = (model_->measured(m[0] + d[0], m[1] + d[1], m[2] + d[2], at) - here) / steps[i];
+  }
+  return h;
+}
+
+Eigen::Vector3d TrackFilter::expected(double time_s, const CommandState& commands) const {
+  return model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], situation(time_s, commands, {}));
+}
+
+double TrackFilter::expected_spread_mm2(double time_s, const CommandState& commands) const {
+  const Eigen::Matrix3d h = jacobian(situation(time_s, commands, {}));
+  const Eigen::Matrix3d s = h * belief_.covariance.topLeftCorner<3, 3>() * h.transpose();
+  return s(0, 0) + s(1, 1);
+}
+
+Innovation TrackFilter::update(const Sample& sample, const CommandState& commands) {
+  Innovation out;
+  out.size = has_heading(sample) ? 3 : 2;
+  out.pose = belief_.mean.head<3>();
+  const Situation at = situation(sample.time_s, commands, {});
+  const Eigen::Vector3d seen = model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], at);
+  out.jacobian = jacobian(at);
+  out.difference << sample.x_mm - seen[0], sample.y_mm - seen[1],
+      out.size == 3 ? wrapped_angle(sample.heading_rad - seen[2]) : 0.0;
+  if (out.size == 2) out.jacobian.row(2).setZero();
+  const Noise& noise = model_->noise;
+  const Eigen::Matrix<double, 5, 3> ph = belief_.covariance.leftCols<3>() * out.jacobian.transpose();
+  Eigen::Matrix3d s = out.jacobian * ph.topRows<3>();
+  s(0, 0) += noise.position_mm2;
+  s(1, 1) += noise.position_mm2;
+  s(2, 2) = out.size == 3 ? s(2, 2) + noise.heading_rad2 : 1;
+  Eigen::Matrix3d inverse = s.inverse();
+  out.distance2 = out.difference.dot(inverse * out.difference);
+  const double factor = outlier_factor(out.distance2, out.size);
+  if (factor > 1) {
+    out.weight = 1 / factor;
+    outliers_ = out.distance2 > kFar ? outliers_ + 1 : 0;
+  } else {
+    outliers_ = 0;
+  }
+  out.log_likelihood = -0.5 * (std::log(s.determinant()) + out.size * std::log(factor) + out.distance2 / factor);
+  if (outliers_ >= kLostAfter) {
+    // Wherever it was, it is here now; which way it points is less known than before, unless it is measured.
+    out.lost = true;
+    constexpr double kLeast_rad = 0.4, kMost_rad = 1.8;
+    const double known = std::clamp(3 * std::sqrt(belief_.covariance(2, 2)), kLeast_rad, kMost_rad);
+    start(sample, at, out.size == 3 ? sample.heading_rad : belief_.mean[2],
+          out.size == 3 ? std::sqrt(noise.heading_rad2) : known);
+    return out;
+  }
+  s *= factor;
+  inverse /= factor;
+  out.covariance = s;
+  out.gain = ph * inverse;
+  belief_.mean += out.gain * out.difference;
+  belief_.covariance -= out.gain * (s * out.gain.transpose());
+  belief_.covariance = (0.5 * (belief_.covariance + belief_.covariance.transpose())).eval();
+  return out;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,69 @@
+/// A filter led along a track: sub-steps between samples and at changes of command, a measurement at each sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/identify/fit/track_filter.hpp"
+#include "clients/identify/model/neighbours.hpp"
+
+namespace kilotwin::identify {
+
+/// Calls each(time_s, h_s, commands at its start) for the sub-steps from one time to another.
+template <class Each> void sub_steps(const CommandClock& clock, double from_s, double to_s, Each&& each) {
+  double t = from_s;
+  while (t < to_s - 1e-9) {
+    const double end = std::min(to_s, clock.next_change_s(t));
+    const double length = end - t;
+    CommandState state = clock.at(t);
+    // At rest nothing changes.
+    const double longest = state.driven() ? kSubStep_s : 2.0;
+    const int count = std::max(1, static_cast<int>(std::ceil(length / longest - 1e-9)));
+    const double h = length / count;
+    for (int i = 0; i < count; ++i) {
+      each(t + i * h, h, state);
+      state.advance(h);
+    }
+    t = end;
+  }
+}
+
+/// A track with what belongs to it.
+struct TrackView {
+  const Track* track = nullptr;
+  std::uint32_t run = 0;     ///< place in the set
+  std::uint32_t number = 0;  ///< of the run, by which effects know it
+  std::size_t place = 0;     ///< in the run
+  const RunNeighbours* neighbours = nullptr;
+  CommandClock clock;
+  double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample
+  std::vector<bool> at_rim = {};                           ///< of what robots reached, at each sample
+
+  /// What is known of an instant without knowing where the robot is.
+  [[nodiscard]] Situation at(double time_s) const {
+    Situation s;
+    s.time_s = time_s;
+    s.commands = clock.at(time_s);
+    s.robot = track->robot;
+    s.run = number;
+    return s;
+  }
+};
+
+/// Leads the filter from the first sample to the last. Calls visitor.start(filter), visitor.step(record),
+/// visitor.update(innovation, sample).
+template <class Visitor>
+void walk(TrackFilter& filter, const TrackView& view, std::size_t samples, Visitor&& visitor) {
+  const std::vector<Sample>& all = view.track->samples;
+  filter.start(all.front(), {}, view.start_heading_rad, view.start_heading_sd_rad);
+  visitor.start(filter);
+  for (std::size_t i = 1; i < std::min(samples, all.size()); ++i) {
+    filter.at_rim(view.at_rim[i - 1] || view.at_rim[i]);
+    sub_steps(view.clock, all[i - 1].time_s, all[i].time_s, [&](double t, double h, const CommandState& commands) {
+      visitor.step(filter.step(t, h, commands, view.neighbours->view(view.place, t + h / 2)));
+    });
+    visitor.update(filter.update(all[i], view.clock.at(all[i].time_s - 1e-9)), all[i]);
+  }
+}
+
+}  // namespace kilotwin::identify

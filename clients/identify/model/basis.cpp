@@ -1,0 +1,192 @@
+#include "clients/identify/model/basis.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+double unit_of(double c, double low, double high, double warp) {
+  const double inside = std::clamp(c, low, high) - low;
+  if (warp > 0) return std::log1p(inside / warp) / std::log1p((high - low) / warp);
+  return inside / (high - low);
+}
+
+/// cos(k a), k = 0..last, by the recurrence of Chebyshev in steps of four, so that none waits for the one before.
+void cosines(double angle, std::uint32_t last, double* to) {
+  const double c = std::cos(angle), c2 = 2 * c * c - 1, c4 = 2 * c2 * c2 - 1;
+  const double start[] = {1, c, c2, c * (2 * c2 - 1), c4};
+  for (std::uint32_t k = 0; k <= std::min(last, 4u); ++k) to[k] = start[k];
+  for (std::uint32_t k = 5; k <= last; ++k) to[k] = 2 * c4 * to[k - 4] - (k < 8 ? to[8 - k] : to[k - 8]);
+}
+
+/// Legendre's polynomials P_k(at), k = 0..last.
+void legendre(double at, std::uint32_t last, double* to) {
+  to[0] = 1;
+  to[1] = at;
+  for (std::uint32_t k = 1; k < last; ++k) to[k + 1] = ((2 * k + 1) * at * to[k] - k * to[k - 1]) / (k + 1);
+}
+
+}  // namespace
+
+std::size_t Factor::columns() const {
+  switch (shape) {
+    case Shape::kLinear:
+    case Shape::kGrid: return 1;
+    case Shape::kCosines:
+    case Shape::kTaper: return count;
+    case Shape::kCosines2:
+    case Shape::kPolynomials2: return (count + 1) * (count + 2) / 2 - 1;
+    case Shape::kHarmonics: return 2 * std::size_t{count};
+    case Shape::kTable:
+    case Shape::kAtLeast:
+    case Shape::kExponential:
+    case Shape::kLevelling: return points.size();
+    case Shape::kWave: return 2 * points.size();
+  }
+  return 0;
+}
+
+void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
+  if (known.empty()) return evaluate_columns(s, wheel, to);
+  std::array<double, kMostColumns> values;
+  evaluate_columns(s, wheel, values.data());
+  double sum = 0;
+  for (std::size_t i = 0; i < known.size(); ++i) sum += known[i] * values[i];
+  to[0] = sum;
+}
+
+void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to) const {
+  std::array<double, kMostColumns + 1> a, b;
+  const double c = value_of(axis, s, wheel);
+  switch (shape) {
+    case Shape::kLinear: to[0] = (std::clamp(c, low, high) - low) / (high - low); return;
+    case Shape::kCosines:
+      cosines(M_PI * unit_of(c, low, high, warp), first + count - 1, a.data());
+      for (std::uint32_t k = 0; k < count; ++k) to[k] = a[first + k];
+      return;
+    case Shape::kCosines2:
+      cosines(M_PI * unit_of(c, low, high, warp), count, a.data());
+      cosines(M_PI * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0), count, b.data());
+      for (std::uint32_t sum = 1; sum <= count; ++sum)
+        for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
+      return;
+    case Shape::kPolynomials2:
+      legendre(2 * unit_of(c, low, high, warp) - 1, count, a.data());
+      legendre(2 * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0) - 1, count, b.data());
+      for (std::uint32_t sum = 1; sum <= count; ++sum)
+        for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
+      return;
+    case Shape::kHarmonics:
+      for (std::uint32_t k = 0; k < count; ++k) {
+        to[2 * k] = std::cos((first + k) * c);
+        to[2 * k + 1] = std::sin((first + k) * c);
+      }
+      return;
+    case Shape::kTable:
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
+      return;
+    case Shape::kAtLeast:
+      // Within a sub-step, for as much of it as lies after the point.
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        to[i] = axis.of == Covariate::kTime && s.span_s > 0 ? std::clamp((c - points[i]) / s.span_s + 0.5, 0.0, 1.0)
+                                                            : (c >= points[i] ? 1 : 0);
+      }
+      return;
+    case Shape::kLevelling:
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = -std::expm1(-c / points[i]);
+      return;
+    case Shape::kExponential:
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = std::exp(-c / points[i]);
+      return;
+    case Shape::kTaper: {
+      const double rest = std::max(0.0, 1 - c / high);
+      double power = 1;
+      for (std::uint32_t k = 0; k < count; ++k) to[k] = power *= rest;
+      return;
+    }
+    case Shape::kGrid: {
+      const std::size_t columns = count, rows = points.size() / columns;
+      const double u = unit_of(c, low, high, 0) * static_cast<double>(columns - 1);
+      const double v = unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0) * static_cast<double>(rows - 1);
+      const std::size_t i = std::min(static_cast<std::size_t>(u), columns - 2),
+                        j = std::min(static_cast<std::size_t>(v), rows - 2);
+      const double x = u - static_cast<double>(i), y = v - static_cast<double>(j);
+      const double* const at = points.data() + j * columns + i;
+      to[0] = (1 - y) * ((1 - x) * at[0] + x * at[1]) + y * ((1 - x) * at[columns] + x * at[columns + 1]);
+      return;
+    }
+    case Shape::kWave:
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        to[2 * i] = std::cos(2 * M_PI * c / points[i]);
+        to[2 * i + 1] = std::sin(2 * M_PI * c / points[i]);
+      }
+      return;
+  }
+}
+
+std::vector<double> Factor::roughness() const {
+  std::vector<double> rough(size(), 1.0);
+  if (!known.empty()) return rough;
+  if (shape == Shape::kCosines) {
+    for (std::uint32_t k = 0; k < count; ++k) rough[k] = std::max(first + k, 1u);
+  } else if (shape == Shape::kHarmonics) {
+    for (std::uint32_t k = 0; k < count; ++k) rough[2 * k] = rough[2 * k + 1] = first + k;
+  } else if (shape == Shape::kPolynomials2) {
+    std::size_t i = 0;
+    for (std::uint32_t sum = 1; sum <= count; ++sum)
+      for (std::uint32_t k = 0; k <= sum; ++k) rough[i++] = sum;
+  } else if (shape == Shape::kCosines2) {
+    std::size_t i = 0;
+    for (std::uint32_t sum = 1; sum <= count; ++sum)
+      for (std::uint32_t k = 0; k <= sum; ++k) rough[i++] = std::sqrt((sum - k) * (sum - k) + k * k + 0.0);
+  }
+  return rough;
+}
+
+std::size_t Basis::size() const {
+  if (!chosen.empty()) return chosen.size();
+  std::size_t size = 1;
+  for (const Factor& factor : factors) size *= factor.size();
+  return size;
+}
+
+void Basis::evaluate(const Situation& s, std::size_t wheel, double* to) const {
+  to[0] = 1;
+  std::size_t have = 1;
+  std::array<double, kMostColumns> of_factor;
+  for (const Factor& factor : factors) {
+    const std::size_t n = factor.size();
+    KILOTWIN_DEMAND(have * n <= kMostColumns);
+    factor.evaluate(s, wheel, of_factor.data());
+    // From the last, so that nothing is overwritten before it is read.
+    for (std::size_t i = have; i-- > 0;)
+      for (std::size_t j = n; j-- > 0;) to[i * n + j] = to[i] * of_factor[j];
+    have *= n;
+  }
+  for (std::size_t i = 0; i < chosen.size(); ++i) to[i] = to[chosen[i]];
+}
+
+std::vector<double> Basis::roughness() const {
+  std::vector<double> rough{1.0};
+  for (const Factor& factor : factors) {
+    std::vector<double> next;
+    for (const double r : rough)
+      for (const double own : factor.roughness()) next.push_back(r * own);
+    rough = std::move(next);
+  }
+  for (std::size_t i = 0; i < chosen.size(); ++i) rough[i] = rough[chosen[i]];
+  if (!chosen.empty()) rough.resize(chosen.size());
+  return rough;
+}
+
+bool Basis::looks_at(Covariate covariate) const {
+  return std::any_of(factors.begin(), factors.end(), [&](const Factor& f) {
+    return f.axis.of == covariate || (f.of_two() && f.and_axis.of == covariate);
+  });
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,177 @@
+#include "clients/identify/model/motion_model.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace kilotwin::identify {
+
+bool is_map_of_picture(const Term& term) {
+  return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
+    const auto of_place = [](Covariate c) { return c == Covariate::kX || c == Covariate::kY; };
+    return is_measured(block.target) &&
+           std::any_of(block.basis.factors.begin(), block.basis.factors.end(), [&](const Factor& f) {
+             return of_place(f.axis.of) || (f.of_two() && of_place(f.and_axis.of));
+           });
+  });
+}
+
+RobotBias MotionModel::bias_of(std::uint32_t robot) const {
+  if (const auto known = robots.find(robot); known != robots.end()) return known->second;
+  RobotBias unknown;
+  unknown.mean_mm_s.setConstant(base.bias_mean_mm_s);
+  unknown.covariance = Eigen::Matrix2d::Identity() * base.bias_sd_mm_s * base.bias_sd_mm_s;
+  return unknown;
+}
+
+Eigen::Vector2d nominal_speeds(const BaseParameters& base, Motion motion) {
+  switch (motion) {
+    case Motion::kStop: return {0, 0};
+    case Motion::kStraight: return {base.straight_mm_s, base.straight_mm_s};
+    case Motion::kLeft: return {0, base.turn_mm_s};
+    case Motion::kRight: return {base.turn_mm_s, 0};
+  }
+  return {0, 0};
+}
+
+Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) const {
+  Rates r;
+  if (s.commands.driven()) {
+    const Eigen::Vector2d v = nominal_speeds(base, s.commands.command) + bias_mm_s;
+    r.left_base_mm_s = v[0];
+    r.right_base_mm_s = v[1];
+  }
+  double left_offset = 0, right_offset = 0;
+  std::array<double, kMostColumns> left, right;
+  for (const Term& term : terms) {
+    Eigen::Index c = 0;
+    for (const Block& block : term.blocks) {
+      const auto n = static_cast<Eigen::Index>(block.basis.size());
+      const Eigen::Index first = c;
+      c += n;
+      if (is_measured(block.target) || (block.during >> static_cast<int>(s.commands.command) & 1) == 0) continue;
+      block.basis.evaluate(s, 0, left.data());
+      double l = 0;
+      for (Eigen::Index i = 0; i < n; ++i) l += left[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+      switch (block.target) {
+        case Target::kGain:
+        case Target::kOffset: {
+          double w = l;
+          if (block.basis.per_wheel()) {
+            block.basis.evaluate(s, 1, right.data());
+            w = 0;
+            for (Eigen::Index i = 0; i < n; ++i)
+              w += right[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+          }
+          if (block.target == Target::kGain) {
+            r.left_gain *= 1 + l;
+            r.right_gain *= 1 + w;
+          } else {
+            left_offset += l;
+            right_offset += w;
+          }
+          break;
+        }
+        case Target::kGainLeft: r.left_gain *= 1 + l; break;
+        case Target::kGainRight: {
+          double w = l;
+          if (block.basis.per_wheel()) {
+            block.basis.evaluate(s, 1, right.data());
+            w = 0;
+            for (Eigen::Index i = 0; i < n; ++i)
+              w += right[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+          }
+          r.right_gain *= 1 + w;
+          break;
+        }
+        case Target::kTurn: r.turn_rad_s += l; break;
+        case Target::kAhead: r.ahead_mm_s += l; break;
+        case Target::kSideways: r.sideways_mm_s += l; break;
+        case Target::kWorldX: r.world_x_mm_s += l; break;
+        case Target::kWorldY: r.world_y_mm_s += l; break;
+        default: break;
+      }
+    }
+  }
+  r.left_mm_s = r.left_base_mm_s * r.left_gain + left_offset;
+  r.right_mm_s = r.right_base_mm_s * r.right_gain + right_offset;
+  return r;
+}
+
+bool MotionModel::looks_at(const Axis& axis) const {
+  for (const Term& term : terms)
+    for (const Block& block : term.blocks)
+      for (const Factor& factor : block.basis.factors)
+        if (factor.axis == axis) return true;
+  return false;
+}
+
+bool MotionModel::measures() const {
+  return std::any_of(terms.begin(), terms.end(), [](const Term& term) {
+    return std::any_of(term.blocks.begin(), term.blocks.end(),
+                       [](const Block& b) { return is_measured(b.target); });
+  });
+}
+
+Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_rad, const Situation& at) const {
+  const double c = std::cos(heading_rad), s = std::sin(heading_rad);
+  double ahead = base.ahead_mm, left = base.left_mm, scale = 1, x = 0, y = 0, turn = 0, picture = 0;
+  if (measures()) {
+    Situation there = at;
+    there.x_mm = x_mm + base.centre_mm * c;
+    there.y_mm = y_mm + base.centre_mm * s;
+    there.heading_rad = heading_rad;
+    std::array<double, kMostColumns> values;
+    for (const Term& term : terms) {
+      Eigen::Index c0 = 0;
+      for (const Block& block : term.blocks) {
+        const auto n = static_cast<Eigen::Index>(block.basis.size());
+        const Eigen::Index first = c0;
+        c0 += n;
+        if (!is_measured(block.target) || (block.during >> static_cast<int>(at.commands.command) & 1) == 0)
+          continue;
+        block.basis.evaluate(there, 0, values.data());
+        double v = 0;
+        for (Eigen::Index i = 0; i < n; ++i)
+          v += values[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+        switch (block.target) {
+          case Target::kMeasuredX: x += v; break;
+          case Target::kMeasuredY: y += v; break;
+          case Target::kMeasuredAhead: ahead += v; break;
+          case Target::kMeasuredLeft: left += v; break;
+          case Target::kMeasuredScale: scale *= 1 + v; break;
+          case Target::kMeasuredTurn: picture += v; break;
+          default: turn += v; break;
+        }
+      }
+    }
+  }
+  const double point_x = x_mm + ahead * c - left * s, point_y = y_mm + ahead * s + left * c;
+  return {point_x * scale - point_y * picture + x, point_y * scale + point_x * picture + y,
+          heading_rad + turn + picture};
+}
+
+Eigen::Vector3d MotionModel::pose_of(const Sample& sample, const Situation& at) const {
+  const bool turned = !std::isnan(sample.heading_rad);
+  Eigen::Vector3d pose(sample.x_mm, sample.y_mm, turned ? sample.heading_rad : 0);
+  // What the tracker does to a place changes little over a few mm.
+  for (int pass = 0; pass < (measures() ? 6 : 2); ++pass) {
+    const Eigen::Vector3d seen = measured(pose[0], pose[1], pose[2], at);
+    pose[0] += sample.x_mm - seen[0];
+    pose[1] += sample.y_mm - seen[1];
+    if (turned) pose[2] += wrapped_angle(sample.heading_rad - seen[2]);
+  }
+  return pose;
+}
+
+Arc arc_of(const Rates& r, double wheel_base_mm, double heading_rad, double h_s) {
+  const double turn = (r.right_mm_s - r.left_mm_s) / wheel_base_mm + r.turn_rad_s;
+  const double forward = (r.left_mm_s + r.right_mm_s) / 2 + r.ahead_mm_s;
+  const double half = turn * h_s / 2;
+  const double shorter = std::abs(half) < 1e-4 ? 1 - half * half / 6 : std::sin(half) / half;
+  const double c = std::cos(heading_rad + half) * shorter, s = std::sin(heading_rad + half) * shorter;
+  return {h_s * (forward * c - r.sideways_mm_s * s + r.world_x_mm_s),
+          h_s * (forward * s + r.sideways_mm_s * c + r.world_y_mm_s), turn * h_s, c, s};
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,170 @@
+#include "clients/identify/predict/prediction_errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr std::int64_t kDraws = 2000;
+
+double root_mean(double sum, std::size_t rows) { return rows > 0 ? std::sqrt(sum / static_cast<double>(rows)) : 0; }
+
+Interval middle_95(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const auto last = static_cast<double>(values.size() - 1);
+  return {values[static_cast<std::size_t>(std::lround(0.025 * last))],
+          values[static_cast<std::size_t>(std::lround(0.975 * last))]};
+}
+
+/// How often each of `count` things is drawn in `count` draws with replacement; once each where there is one alone.
+std::vector<double> drawn(const Random& random, std::size_t count, std::int64_t k, std::uint32_t what) {
+  std::vector<double> times(count, count == 1 ? 1.0 : 0.0);
+  for (std::uint32_t i = 0; count > 1 && i < count; ++i) {
+    const double u = random.uniform(Stream::kLayout, i, Tick{k}, what);
+    times[std::min(count - 1, static_cast<std::size_t>(u * static_cast<double>(count)))] += 1;
+  }
+  return times;
+}
+
+/// One prediction's error, turned into the body at the start.
+struct Window {
+  const Track* track;
+  double ahead_mm, left_mm;
+};
+
+/// Whether two robots were told the same from one time to another, changes at most a little apart.
+bool told_the_same(const Track& a, const Track& b, double from_s, double to_s) {
+  constexpr double kApart_s = 0.25;
+  const auto changes = [&](const Track& track) {
+    std::vector<CommandChange> out;
+    for (std::size_t c = 0; c < track.commands.size(); ++c) {
+      const CommandChange& change = track.commands[c];
+      const bool last_before = c + 1 == track.commands.size() || track.commands[c + 1].time_s > from_s;
+      if (change.time_s <= from_s && last_before) out.push_back({from_s, change.motion});
+      if (change.time_s > from_s && change.time_s < to_s) out.push_back(change);
+    }
+    return out;
+  };
+  const std::vector<CommandChange> first = changes(a), second = changes(b);
+  return std::equal(first.begin(), first.end(), second.begin(), second.end(),
+                    [](const CommandChange& x, const CommandChange& y) {
+                      return x.motion == y.motion && std::abs(x.time_s - y.time_s) < kApart_s;
+                    });
+}
+
+}  // namespace
+
+double PredictionErrors::rmse_mm() const { return root_mean(sum_mm2, rows); }
+double PredictionErrors::expected_mm() const { return root_mean(expected_mm2, rows); }
+
+PredictionErrors errors_of(const MeasuredSet& set, const std::vector<Predicted>& predictions) {
+  PredictionErrors errors;
+  for (const Predicted& p : predictions) {
+    Sample seen;
+    if (!measured_at(set.runs[p.run].tracks[p.place], p.time_s, seen)) continue;
+    const double dx = seen.x_mm - p.x_mm, dy = seen.y_mm - p.y_mm, square = dx * dx + dy * dy;
+    auto& track = errors.by_track[{p.run, p.place}];
+    track.sum_mm2 += square;
+    track.rows += 1;
+    errors.sum_mm2 += square;
+    errors.expected_mm2 += p.spread_mm * p.spread_mm;
+    ++errors.rows;
+  }
+  return errors;
+}
+
+std::optional<ErrorBounds> bounds_of(const MeasuredSet& set, const PredictionErrors& before,
+                                     const PredictionErrors& after) {
+  struct Row {
+    std::size_t robot, run;
+    double before_mm2, after_mm2, count;
+  };
+  std::map<std::size_t, std::size_t> robot_place, run_place;
+  std::vector<Row> rows;
+  for (const auto& [track, part] : before.by_track) {
+    const auto other = after.by_track.find(track);
+    if (other == after.by_track.end() || other->second.rows != part.rows) continue;
+    const std::size_t robot = set.runs[track.first].tracks[track.second].robot;
+    const std::size_t r = robot_place.emplace(robot, robot_place.size()).first->second;
+    const std::size_t n = run_place.emplace(track.first, run_place.size()).first->second;
+    rows.push_back({r, n, part.sum_mm2, other->second.sum_mm2, static_cast<double>(part.rows)});
+  }
+  if (rows.size() < 2) return std::nullopt;
+  const Random random(20180729);
+  std::vector<double> was, is, less;
+  for (std::int64_t k = 0; k < kDraws; ++k) {
+    const std::vector<double> of_robot = drawn(random, robot_place.size(), k, 0),
+                              of_run = drawn(random, run_place.size(), k, 1);
+    double count = 0, sum_before = 0, sum_after = 0;
+    for (const Row& row : rows) {
+      const double times = of_robot[row.robot] * of_run[row.run];
+      count += times * row.count;
+      sum_before += times * row.before_mm2;
+      sum_after += times * row.after_mm2;
+    }
+    if (!(count > 0)) continue;
+    was.push_back(std::sqrt(sum_before / count));
+    is.push_back(std::sqrt(sum_after / count));
+    less.push_back(was.back() - is.back());
+  }
+  if (was.size() < 100) return std::nullopt;
+  return ErrorBounds{middle_95(was), middle_95(is), middle_95(less), robot_place.size(), run_place.size()};
+}
+
+std::optional<Replicates> replicates_of(
+    const std::vector<std::pair<const MeasuredSet*, const std::vector<Predicted>*>>& sets, double horizon_s) {
+  constexpr std::size_t kFewest = 30;
+  // By robot and time, in ms.
+  std::map<std::pair<std::uint32_t, std::int64_t>, std::vector<Window>> at;
+  for (const auto& [set, predictions] : sets) {
+    for (const Predicted& p : *predictions) {
+      const Track& track = set->runs[p.run].tracks[p.place];
+      Sample end, start;
+      if (!measured_at(track, p.time_s, end) || !measured_at(track, p.time_s - horizon_s, start)) continue;
+      // The heading may be rough: it turns what is left, not the way.
+      const double heading =
+          std::isnan(start.heading_rad) ? std::atan2(p.y_mm - start.y_mm, p.x_mm - start.x_mm) : start.heading_rad;
+      const double dx = end.x_mm - p.x_mm, dy = end.y_mm - p.y_mm, c = std::cos(heading), s = std::sin(heading);
+      at[{track.robot, std::llround(p.time_s * 1000)}].push_back({&track, dx * c + dy * s, dy * c - dx * s});
+    }
+  }
+  Replicates out;
+  double within_mm2 = 0, all_mm2 = 0;
+  std::size_t degrees = 0;
+  for (auto& [key, windows] : at) {
+    const double time_s = static_cast<double>(key.second) / 1000;
+    while (windows.size() > 1) {
+      // Those that were told what the first was told.
+      const Track& first = *windows.front().track;
+      const auto rest = std::stable_partition(windows.begin(), windows.end(), [&](const Window& w) {
+        return told_the_same(first, *w.track, time_s - horizon_s, time_s);
+      });
+      const auto count = static_cast<double>(rest - windows.begin());
+      double ahead = 0, left = 0, square = 0;
+      for (auto w = windows.begin(); w != rest; ++w) {
+        ahead += w->ahead_mm / count;
+        left += w->left_mm / count;
+        square += w->ahead_mm * w->ahead_mm + w->left_mm * w->left_mm;
+      }
+      if (count > 1) {
+        within_mm2 += square - count * (ahead * ahead + left * left);
+        all_mm2 += square;
+        degrees += static_cast<std::size_t>(count) - 1;
+        out.windows += static_cast<std::size_t>(count);
+        ++out.groups;
+      }
+      windows.erase(windows.begin(), rest);
+    }
+  }
+  if (degrees < kFewest) return std::nullopt;
+  const double floor_mm2 = within_mm2 / static_cast<double>(degrees);
+  out.floor_mm = std::sqrt(std::max(0.0, floor_mm2));
+  out.repeatable_mm = std::sqrt(std::max(0.0, all_mm2 / static_cast<double>(out.windows) - floor_mm2));
+  return out;
+}
+
+}  // namespace kilotwin::identify

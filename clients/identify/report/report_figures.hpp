@@ -1,0 +1,65 @@
+/// Plots of the report, and where on the page they stand.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "clients/identify/report/report_html.hpp"
+#include "clients/identify/report/report_plots.hpp"
+
+namespace kilotwin::identify::report {
+
+/// Plots in the order of the page; the page is put together before they are drawn.
+class Figures {
+ public:
+  explicit Figures(Gnuplot& plots) : plots_(plots) {}
+  Gnuplot& plots() { return plots_; }
+
+  /// Where the plot will stand; empty where there is none.
+  std::string place(PlotNumber number, const std::string& caption, const char* kind = "") {
+    if (!number) return "";
+    return fmt::format("<figure{}>{}{}</figure>\n", *kind == 0 ? "" : fmt::format(" class=\"{}\"", kind),
+                       mark(*number, caption),
+                       caption.empty() ? "" : "<figcaption>" + html::escaped(caption) + "</figcaption>");
+  }
+  std::string pair(PlotNumber before, PlotNumber after, const std::string& caption) {
+    if (!before && !after) return "";
+    std::string out = "<figure class=\"pair\">";
+    if (before) out += mark(*before, caption + ", before");
+    if (after) out += mark(*after, caption + ", after");
+    return out + "<figcaption>" + html::escaped(caption) + "</figcaption></figure>\n";
+  }
+  /// The page with all plots in it.
+  std::string filled(std::string page) const {
+    const std::vector<Gnuplot::Drawn> drawn = plots_.draw();
+    for (const auto& [number, alt] : alts_) {
+      const std::string here = html::mark_of(number);
+      const std::string shown = drawn[number].error.empty() ? html::image(drawn[number].svg, alt)
+                                                            : "<p>This plot could not be drawn.</p>";
+      page.replace(page.find(here), here.size(), shown);
+    }
+    return page;
+  }
+
+ private:
+  std::string mark(std::size_t number, const std::string& alt) {
+    alts_.emplace(number, alt);
+    return html::mark_of(number);
+  }
+
+  Gnuplot& plots_;
+  std::map<std::size_t, std::string> alts_;
+};
+
+/// A part of the page; nothing where its body is empty. `lead` and `body` are markup.
+[[nodiscard]] inline std::string section(const char* id, const char* title, const std::string& lead,
+                                         const std::string& body) {
+  if (body.empty()) return "";
+  return fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}{}</section>\n", id, title,
+                     lead.empty() ? "" : "<p class=\"lead\">" + lead + "</p>\n", body);
+}
+
+}  // namespace kilotwin::identify::report

@@ -1,0 +1,396 @@
+#include "clients/identify/report/report_plots.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <vector>
+
+namespace kilotwin::identify {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// No figure of a robot in a room is as large; axes have no room for it.
+constexpr double kAbsurd = 1e12;
+constexpr int kHalf_px = 460, kLow_px = 280, kFlat_px = 210;
+
+constexpr const char* kMeasuredAndModels =
+    "plot $d using 1:2 with points pt 7 ps 0.7 lc rgb '#66727f' title 'measured', $d using 1:3 with lines lt 2 "
+    "title "
+    "'this model'";
+constexpr const char* kBaseModel = ", $d using 1:4 with lines lt 5 title 'base model'";
+
+std::vector<double> numbers(const json& from, const char* key) {
+  std::vector<double> out;
+  const auto list = from.find(key);
+  if (list == from.end() || !list->is_array()) return out;
+  for (const json& value : *list) {
+    const double v = value.is_number() ? value.get<double>() : kNaN;
+    out.push_back(std::abs(v) < kAbsurd ? v : kNaN);
+  }
+  return out;
+}
+
+std::string text(const json& from, const char* key) {
+  const auto at = from.find(key);
+  return at != from.end() && at->is_string() ? at->get<std::string>() : "";
+}
+
+double number(const json& from, const char* key) {
+  const auto at = from.find(key);
+  return at != from.end() && at->is_number() ? at->get<double>() : kNaN;
+}
+
+bool any_finite(const std::vector<double>& values) {
+  return std::any_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+/// A data block of columns; what is not finite is left empty. Columns are as long as the first.
+std::string block(const char* name, const std::vector<std::vector<double>>& columns) {
+  std::string out = fmt::format("${} << EOD\n", name);
+  for (std::size_t row = 0; row < columns[0].size(); ++row) {
+    for (const std::vector<double>& column : columns) {
+      const double value = row < column.size() ? column[row] : kNaN;
+      out += std::isfinite(value) ? fmt::format("{:.9g} ", value) : "NaN ";
+    }
+    out += '\n';
+  }
+  return out + "EOD\n";
+}
+
+std::string axis(const char* which, const std::string& name, const std::string& unit) {
+  return fmt::format("set {}label {}\n", which,
+                     gnuplot_text(unit.empty() ? words_of(name) : words_of(name) + ", " + unit));
+}
+
+/// A grid of values: rows are y.
+struct Grid {
+  std::vector<double> x, y;
+  std::vector<std::vector<double>> value;
+
+  bool good() const {
+    if (x.size() < 2 || y.size() < 2 || value.size() != y.size()) return false;
+    return std::all_of(value.begin(), value.end(), [&](const auto& row) { return row.size() == x.size(); });
+  }
+};
+
+Grid grid_of(const json& map, const char* when) {
+  Grid grid{numbers(map, "x_mm"), numbers(map, "y_mm"), {}};
+  if (!map.contains(when) || !map[when].is_array()) return grid;
+  for (const json& row : map[when]) grid.value.push_back(numbers(json{{"row", row}}, "row"));
+  return grid;
+}
+
+/// What 98 % of the map's values are below, of all times.
+double reach(const json& map) {
+  std::vector<double> all;
+  for (const char* when : {"before", "after", "effect"}) {
+    for (const auto& row : grid_of(map, when).value) {
+      for (const double v : row) {
+        if (std::isfinite(v)) all.push_back(std::abs(v));
+      }
+    }
+  }
+  if (all.empty()) return 0;
+  const auto at = all.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(all.size() - 1) * 0.98);
+  std::nth_element(all.begin(), at, all.end());
+  return *at;
+}
+
+/// A round distance between ticks, about four over a length.
+double tick_step(double length) {
+  const double rough = length / 4, power = std::pow(10, std::floor(std::log10(rough))), lead = rough / power;
+  return power * (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10);
+}
+
+std::string map_frame(const Grid& grid) {
+  const double half_x = 0.5 * (grid.x[1] - grid.x[0]), half_y = 0.5 * (grid.y[1] - grid.y[0]);
+  const double step = tick_step(std::max(grid.x.back() - grid.x.front(), grid.y.back() - grid.y.front()));
+  return fmt::format(
+      "set size ratio -1\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'x, mm'\nset ylabel 'y, mm'\nunset "
+      "grid\nunset key\nset tics front\nset xtics {}\nset ytics {}\n",
+      grid.x.front() - half_x, grid.x.back() + half_x, grid.y.front() - half_y, grid.y.back() + half_y, step, step);
+}
+
+constexpr int kMap_px = 380, kMapHigh_px = 340;
+
+}  // namespace
+
+std::string words_of(const std::string& name) {
+  static const std::map<std::string, std::string> kWords = {{"ahead", "residual ahead"},
+                                                            {"WHEEL_GAIN", "change of speed"},
+                                                            {"WHEEL_OFFSET", "change of speed"},
+                                                            {"TURN_RATE", "turning"},
+                                                            {"BODY_DRIFT", "drift"},
+                                                            {"WORLD_DRIFT", "drift"},
+                                                            {"MEASURED_OFFSET", "the tracker's error"},
+                                                            {"MEASURED_BODY_OFFSET", "tracked point"},
+                                                            {"MEASURED_SCALE", "the tracker's scale"},
+                                                            {"MEASURED_HEADING", "the tracker's error"},
+                                                            {"nearest", "distance to the nearest robot"},
+                                                            {"bearing", "direction to the nearest robot"},
+                                                            {"left", "residual to the left"},
+                                                            {"residual", "predicted position"},
+                                                            {"residual_x", "residual along x"},
+                                                            {"residual_y", "residual along y"},
+                                                            {"driven_time", "time for which it was driven"},
+                                                            {"radius", "distance from the middle"},
+                                                            {"forward", "speed ahead"},
+                                                            {"sideways", "slip sideways"},
+                                                            {"turn", "turning"},
+                                                            {"world_x", "drift along x"},
+                                                            {"world_y", "drift along y"},
+                                                            {"measured_x", "measured position along x"},
+                                                            {"measured_y", "measured position along y"},
+                                                            {"measured", "measured position"},
+                                                            {"world", "drift"},
+                                                            {"time", "time in the run"},
+                                                            {"position", "place"},
+                                                            {"command", "command"},
+                                                            {"time_since_command", "time since the command"},
+                                                            {"motor_time", "motor's own running time"},
+                                                            {"neighbours", "neighbours"},
+                                                            {"world_frame", "direction in the room"},
+                                                            {"measurement", "the tracker"},
+                                                            {"robot", "robot"},
+                                                            {"history", "what was before"},
+                                                            {"heading", "heading"}};
+  const auto at = kWords.find(name);
+  if (at != kWords.end()) return at->second;
+  std::string plain = name;
+  std::replace(plain.begin(), plain.end(), '_', ' ');
+  return plain;
+}
+
+PlotNumber plot_horizon(Gnuplot& plots, const json& horizon) {
+  const std::vector<double> at = numbers(horizon, "at_s"), before = numbers(horizon, "before_mm"),
+                            after = numbers(horizon, "after_mm"), floor = numbers(horizon, "floor_mm");
+  if (at.size() < 2 || !any_finite(before)) return std::nullopt;
+  std::string commands = block("d", {at, before, after, floor});
+  commands +=
+      "set xlabel 'predicted so far ahead, s'\nset ylabel 'rms error, mm'\nset xrange [0:*]\nset yrange [0:*]\nset "
+      "key top left\n";
+  commands +=
+      "plot $d using 1:2 with linespoints lt 1 title 'before', $d using 1:3 with linespoints lt 2 title 'after'";
+  if (any_finite(floor)) commands += ", $d using 1:4 with lines lt 3 title 'floor'";
+  return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
+  const std::vector<double> at = numbers(plot, "at"), before = numbers(plot, "before"),
+                            se = numbers(plot, "before_se"), after = numbers(plot, "after"),
+                            fitted = numbers(plot, "fitted");
+  if (at.size() < 2 || !any_finite(before)) return std::nullopt;
+  std::vector<double> low(at.size(), kNaN), high(at.size(), kNaN);
+  for (std::size_t k = 0; k < std::min({at.size(), before.size(), se.size()}); ++k) {
+    low[k] = before[k] - 2 * se[k];
+    high[k] = before[k] + 2 * se[k];
+  }
+  std::string commands = block("d", {at, before, low, high, after, fitted});
+  commands += axis("x", text(plot, "covariate"), text(plot, "unit")) +
+              axis("y", text(plot, "target"), text(plot, "acts_on_unit"));
+  commands +=
+      "set xzeroaxis lc rgb '#8896a4'\nset key bottom left horizontal opaque\nset offsets graph 0.02, graph 0.02, "
+      "graph 0.12, graph 0.14\n";
+  commands += "plot $d using 1:2:3:4 with yerrorbars lt 1 lw 1.2 dt solid ps 0.45 title 'before'";
+  if (any_finite(after)) commands += ", $d using 1:5 with points lt 2 title 'after'";
+  if (any_finite(fitted)) commands += ", $d using 1:6 with lines lt 4 title 'as added'";
+  return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_arrows(Gnuplot& plots, const json& map_x, const json& map_y, const char* when) {
+  const Grid x = grid_of(map_x, when), y = grid_of(map_y, when);
+  if (!x.good() || !y.good() || x.x != y.x || x.y != y.y) return std::nullopt;
+  const double most = std::max(reach(map_x), reach(map_y));
+  if (!(most > 0)) return std::nullopt;
+  // The longest arrows span a cell and a bit.
+  const double scale = 1.1 * (x.x[1] - x.x[0]) / most;
+  std::vector<std::vector<double>> columns(5);
+  for (std::size_t row = 0; row < x.y.size(); ++row) {
+    for (std::size_t col = 0; col < x.x.size(); ++col) {
+      const double dx = x.value[row][col], dy = y.value[row][col];
+      if (!std::isfinite(dx) || !std::isfinite(dy)) continue;
+      const double length = std::hypot(dx, dy), cut = std::min(1.0, 1.5 * most / std::max(length, 1e-12));
+      const double values[] = {x.x[col] - 0.5 * scale * cut * dx, x.y[row] - 0.5 * scale * cut * dy,
+                               scale * cut * dx, scale * cut * dy, length};
+      for (std::size_t k = 0; k < 5; ++k) columns[k].push_back(values[k]);
+    }
+  }
+  if (columns[0].empty()) return std::nullopt;
+  std::string commands = block("d", columns) + map_frame(x);
+  commands += fmt::format(
+      "set title {}\nset cbrange [0:{}]\nset palette defined (0 '#9fb6cc', 1 '#b3400a')\nset cblabel {} offset "
+      "-0.5,0\n",
+      gnuplot_text(when), most, gnuplot_text(text(map_x, "unit")));
+  commands += "plot $d using 1:2:3:4:5 with vectors head filled size graph 0.018,20 lw 1.6 lc palette";
+  return plots.add(kMap_px, kMapHigh_px, commands);
+}
+
+PlotNumber plot_map(Gnuplot& plots, const json& map, const char* when, const std::string& title) {
+  const Grid grid = grid_of(map, when);
+  const double most = reach(map);
+  if (!grid.good() || !(most > 0)) return std::nullopt;
+  std::vector<std::vector<double>> columns(3);
+  for (std::size_t row = 0; row < grid.y.size(); ++row) {
+    for (std::size_t col = 0; col < grid.x.size(); ++col) {
+      if (!std::isfinite(grid.value[row][col])) continue;
+      columns[0].push_back(grid.x[col]);
+      columns[1].push_back(grid.y[row]);
+      columns[2].push_back(grid.value[row][col]);
+    }
+  }
+  if (columns[0].empty()) return std::nullopt;
+  // A little wider than the cells, so that no seams show.
+  const double half_x = 0.505 * (grid.x[1] - grid.x[0]), half_y = 0.505 * (grid.y[1] - grid.y[0]);
+  std::string commands = block("d", columns) + map_frame(grid);
+  commands += fmt::format(
+      "set title {}\nset cbrange [{}:{}]\nset palette defined (-1 '#2563a8', 0 '#f6f4ef', 1 '#d95f0e')\nset "
+      "cblabel {} offset -0.5,0\n",
+      gnuplot_text(title.empty() ? when : title), -most, most, gnuplot_text(text(map, "unit")));
+  commands +=
+      fmt::format("plot $d using 1:2:({}):({}):3 with boxxyerror fs solid 1 noborder fc palette", half_x, half_y);
+  return plots.add(kMap_px, kMapHigh_px, commands);
+}
+
+PlotNumber plot_distribution(Gnuplot& plots, const json& distribution) {
+  const std::vector<double> edges = numbers(distribution, "edges"), measured = numbers(distribution, "measured"),
+                            simulated = numbers(distribution, "simulated");
+  if (edges.size() < 3 || measured.size() + 1 != edges.size() || simulated.size() != measured.size())
+    return std::nullopt;
+  const auto share = [](std::vector<double> counts) {
+    double sum = 0;
+    for (const double c : counts) sum += c;
+    for (double& c : counts) c = sum > 0 ? 100 * c / sum : 0;
+    return counts;
+  };
+  std::vector<double> middle, width;
+  for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
+    middle.push_back(0.5 * (edges[k] + edges[k + 1]));
+    width.push_back(edges[k + 1] - edges[k]);
+  }
+  const std::vector<double> base = numbers(distribution, "base");
+  std::string commands = block("d", {middle, share(measured), share(simulated), width, share(base)});
+  commands += axis("x", text(distribution, "name"), text(distribution, "unit"));
+  commands += fmt::format("set ylabel 'share, %'\nset xrange [{}:{}]\nset yrange [0:*]\nset grid noxtics\n",
+                          edges.front(), edges.back());
+  commands += "plot $d using 1:2:4 with boxes fc rgb '#c3ccd5' fs solid 1 noborder title 'measured', ";
+  if (base.size() == measured.size()) commands += "$d using 1:5 with histeps lt 5 title 'base model', ";
+  commands += "$d using 1:3 with histeps lc rgb '#2563a8' lw 2 dt solid title 'this model'";
+  return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_msd(Gnuplot& plots, const json& msd) {
+  const std::vector<double> lag = numbers(msd, "lag_s"), measured = numbers(msd, "measured_mm2"),
+                            simulated = numbers(msd, "simulated_mm2");
+  if (lag.size() < 2 || !any_finite(measured) || !any_finite(simulated)) return std::nullopt;
+  const std::vector<double> base = numbers(msd, "base_mm2");
+  std::string commands = block("d", {lag, measured, simulated, base});
+  commands +=
+      "set logscale xy\nset format y '10^{%L}'\nset xlabel 'lag, s'\nset ylabel 'mean square displacement, "
+      "mm²'\n";
+  commands += kMeasuredAndModels;
+  if (any_finite(base)) commands += kBaseModel;
+  return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_speed_over_time(Gnuplot& plots, const json& speeds) {
+  const std::vector<double> at = numbers(speeds, "time_s"), measured = numbers(speeds, "measured_mm_s"),
+                            simulated = numbers(speeds, "simulated_mm_s"), base = numbers(speeds, "base_mm_s");
+  if (at.size() < 2 || !any_finite(measured) || !any_finite(simulated)) return std::nullopt;
+  std::string commands = block("d", {at, measured, simulated, base});
+  commands +=
+      "set xlabel 'time in the run, s'\nset ylabel 'mean speed, mm/s'\nset offsets 0, 0, graph 0.1, graph 0.1\n";
+  commands += kMeasuredAndModels;
+  if (any_finite(base)) commands += kBaseModel;
+  return plots.add(kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_effect_map(Gnuplot& plots, const json& map) {
+  const std::string title = text(map, "which") + words_of(text(map, "acts_on"));
+  return plot_map(plots, map, "effect", title);
+}
+
+PlotNumber plot_effect(Gnuplot& plots, const json& curve) {
+  const std::vector<double> at = numbers(curve, "at"), value = numbers(curve, "value");
+  if (at.size() < 2 || value.size() != at.size() || !any_finite(value)) return std::nullopt;
+  std::string commands = block("d", {at, value});
+  const std::string acts_on = text(curve, "acts_on"), unit = text(curve, "acts_on_unit"),
+                    which = text(curve, "which");
+  commands += axis("x", text(curve, "covariate"), text(curve, "unit")) +
+              fmt::format("set ylabel {}\n", gnuplot_text(which + words_of(acts_on) + ", " + unit));
+  commands += "set xzeroaxis lc rgb '#8896a4'\nunset key\nset offsets 0, 0, graph 0.1, graph 0.1\n";
+  commands += "plot $d using 1:2 with lines lt 2";
+  return plots.add(kHalf_px, kFlat_px, commands);
+}
+
+PlotNumber plot_steps(Gnuplot& plots, const json& steps, double floor_mm) {
+  if (!steps.is_array() || steps.size() < 2) return std::nullopt;
+  std::string commands = "$d << EOD\n";
+  double most = floor_mm;
+  std::size_t count = 0;
+  for (const json& step : steps) {
+    const double rmse = number(step, "rmse_mm");
+    if (!std::isfinite(rmse)) continue;
+    commands += fmt::format("{} {:.6g} {:.2f}\n", count++, rmse, rmse);
+    most = std::max(most, rmse);
+  }
+  if (count < 2) return std::nullopt;
+  commands +=
+      "EOD\nunset key\nset ylabel 'rms error, mm'\nset boxwidth 0.6\nset grid noxtics\nset xtics rotate by 0 (";
+  for (std::size_t k = 0; k < count; ++k) {
+    commands +=
+        fmt::format("{}{} {}", k == 0 ? "" : ", ", gnuplot_text((k == 0 ? "" : "+ ") + text(steps[k], "added")), k);
+  }
+  commands +=
+      fmt::format(")\nset xrange [-0.6:{}]\nset yrange [0:{}]\n", static_cast<double>(count) - 0.4, 1.15 * most);
+  commands +=
+      "plot $d using 1:2 with boxes fc rgb '#9fb6cc' fs solid 1 noborder, $d using 1:2:3 with labels offset 0,0.6 "
+      "tc rgb '#1f2933'";
+  if (std::isfinite(floor_mm)) commands += fmt::format(", {} with lines lt 3", floor_mm);
+  return plots.add(count > 5 ? 2 * kHalf_px : kHalf_px, kLow_px, commands);
+}
+
+PlotNumber plot_robots(Gnuplot& plots, const json& robots) {
+  if (!robots.is_array()) return std::nullopt;
+  struct Row {
+    std::string name;
+    double before, after;
+  };
+  std::vector<Row> rows;
+  for (const json& robot : robots) {
+    const Row row{robot.contains("robot") ? robot["robot"].dump() : "?", number(robot, "before_mm"),
+                  number(robot, "after_mm")};
+    if (std::isfinite(row.before) && std::isfinite(row.after)) rows.push_back(row);
+  }
+  if (rows.size() < 2) return std::nullopt;
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.before > b.before; });
+  std::vector<std::vector<double>> columns(3);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    columns[0].push_back(static_cast<double>(k));
+    columns[1].push_back(rows[k].before);
+    columns[2].push_back(rows[k].after);
+  }
+  std::string commands = block("d", columns);
+  commands += fmt::format(
+      "set xlabel 'robot'\nset ylabel 'rms error, mm'\nset yrange [0:*]\nset xrange [-0.7:{}]\nset grid noxtics\n",
+      static_cast<double>(rows.size()) - 0.3);
+  if (rows.size() <= 60) {
+    commands += rows.size() <= 12 ? "set xtics (" : "set xtics font ',7' (";  // names side by side, also long ones
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      commands += fmt::format("{}{} {}", k == 0 ? "" : ", ", gnuplot_text(rows[k].name), k);
+    commands += ")\n";
+  } else {
+    commands += "unset xtics\n";
+  }
+  commands +=
+      "plot $d using 1:2:(0):($3-$2) with vectors nohead lw 1.2 lc rgb '#c8d0d9' notitle, "
+      "$d using 1:2 with points lt 1 ps 0.7 title 'before', $d using 1:3 with points lt 2 ps 0.7 title 'after'";
+  constexpr std::size_t kFew = 24;
+  return plots.add(rows.size() <= kFew ? kHalf_px : 2 * kHalf_px, kLow_px, commands);
+}
+
+}  // namespace kilotwin::identify
