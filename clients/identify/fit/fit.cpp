@@ -567,10 +567,18 @@ bool Fitter::set_scale(MotionModel& model) const {
 void Fitter::settle_scale(MotionModel& model) const {
   // Where it is least surprising by the seed's lengths, beforehand normal each: a square in the factor.
   const BaseParameters seed;
+  // An effect on speed leaves open at which value of its covariates robots have the seed's.
+  constexpr double kByEffects = 0.5;
+  const bool nominal = std::none_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
+    return std::any_of(term.blocks.begin(), term.blocks.end(),
+                       [](const Block& block) { return !is_measured(block.target); });
+  });
+  const auto speed_sd = [&](double sd, double value) { return nominal ? sd : std::hypot(sd, kByEffects * value); };
   double by_seed = 0, precision = 0;
   for (const auto& [value, expected, sd] :
-       {std::array{model.base.straight_mm_s, seed.straight_mm_s, prior_.straight_mm_s},
-        std::array{model.base.turn_mm_s, seed.turn_mm_s, prior_.turn_mm_s},
+       {std::array{model.base.straight_mm_s, seed.straight_mm_s,
+                   speed_sd(prior_.straight_mm_s, seed.straight_mm_s)},
+        std::array{model.base.turn_mm_s, seed.turn_mm_s, speed_sd(prior_.turn_mm_s, seed.turn_mm_s)},
         std::array{model.base.wheel_base_mm, seed.wheel_base_mm, prior_.wheel_base_mm}}) {
     by_seed += value * expected / (sd * sd);
     precision += value * value / (sd * sd);
