@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -26,6 +27,8 @@ constexpr std::uint64_t kSeed = 20180729;
 constexpr double kClose = 3;
 /// What another cause in a term's place must reach in log likelihood: with few columns, and with the shape that the data support.
 constexpr double kMostByShape = 200, kAsGood = 10;
+/// Whatever explained nearly as much, in the few columns that causes are compared by, may be the cause once it has its own shape.
+constexpr double kContender = 0.97;
 /// No form fits a cause exactly. What is left of all that was found, by this share of what that explains, is no other cause.
 constexpr double kRemnant = 0.003;
 /// As many samples as hypotheses are tested on; there are no more surprises in more.
@@ -64,6 +67,8 @@ class Loop {
         const Search before = out_;
         const double likelihood = fitter_.log_likelihood_of_all(out_.model);
         note_ambiguous(*best, outcome);
+        if (contended(hypothesis(*best).name)) continue;
+        note_contenders(*best, outcome);
         add(*best, outcome.threshold_log10_p);
         // What promised to explain much must do so.
         if (fitter_.log_likelihood_of_all(out_.model) < likelihood + 3) {
@@ -313,6 +318,40 @@ class Loop {
       if (out_.rejected.size() == 12) break;
     }
   }
+  /// Whether a cause that nearly was chosen in place of the one found last, and now shows beside it, explains more in its place.
+  bool contended(const std::string& name) {
+    const auto c = contest_.contenders.find(name);
+    if (c == contest_.contenders.end() || out_.model.terms.size() != contest_.before.model.terms.size() + 1 ||
+        out_.model.terms.back().name != contest_.chosen)
+      return false;
+    const auto [term, reason] = c->second;
+    contest_.contenders.erase(c);
+    const Search now = out_;
+    const double evidence = fitter_.log_evidence(now.model);
+    restore(contest_.before);
+    out_.model.terms.push_back(term);
+    out_.reasons.push_back(reason);
+    say("fitting");
+    fitter_.fit(out_.model, 2);
+    shape(out_.model.terms.size() - 1);
+    fitter_.fit_surroundings(out_.model);
+    out_.steps.push_back({term.name, reason.finding.held_out});
+    if (fitter_.log_evidence(out_.model) > evidence) return true;
+    restore(now);
+    return false;
+  }
+  void note_contenders(const Finding& best, const Scores::Outcome& outcome) {
+    const std::string& chosen = hypothesis(best).name;
+    contest_ = {out_, chosen, {}};
+    std::map<std::string, double> most;
+    for (const Finding& f : outcome.findings) {
+      const Hypothesis& h = hypothesis(f);
+      if (f.evidence < std::max(kContender * best.evidence, most[h.name]) || h.name == chosen) continue;
+      most[h.name] = f.evidence;
+      contest_.contenders[h.name] = {dictionary_.term_of(h, f.relative_scale),
+                                     {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+    }
+  }
   void note_ambiguous(const Finding& best, const Scores::Outcome& outcome) {
     const Hypothesis& chosen = hypothesis(best);
     for (const Finding& f : outcome.findings) {
@@ -335,6 +374,13 @@ class Loop {
   std::optional<Scores> scores_;
   Search out_;
   double base_likelihood_ = 0;
+  /// What might have been chosen in place of the cause that was found last.
+  struct Contest {
+    Search before;
+    std::string chosen;
+    std::map<std::string, std::pair<Term, Reason>> contenders;  ///< by name
+  };
+  Contest contest_;
   std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
   int defences_ = 0, round_ = 0;
 };

@@ -61,6 +61,15 @@ bool acts(const Term& term, Target target, std::uint8_t during) {
 
 bool is_world(Target t) { return t == Target::kWorldX || t == Target::kWorldY; }
 
+/// What all robots have on one side alone no mean of their biases takes up: it would pass for biases that differ.
+bool is_one_sided(Target t) { return t == Target::kGainLeft || t == Target::kGainRight || t == Target::kTurn; }
+
+void with_constant(Basis& basis) {
+  if (basis.factors.size() == 1 && basis.factors.front().shape == Shape::kCosines && basis.chosen.empty() &&
+      basis.factors.front().known.empty())
+    basis.factors.front().first = 0;
+}
+
 std::vector<Widening> widenings_of(const Term& term, bool headings) {
   const Block& first = term.blocks.front();
   const Basis basis = modest(first.basis);
@@ -86,7 +95,8 @@ std::vector<Widening> widenings_of(const Term& term, bool headings) {
     if (target == Target::kGain &&
         (acts(term, Target::kGainLeft, kDriven) || acts(term, Target::kGainRight, kDriven)))
       continue;
-    all.push_back({{{target, basis, first.during}}});
+    Widening& more = all.emplace_back(Widening{{{target, basis, first.during}}});
+    if (is_one_sided(target)) with_constant(more.blocks.front().basis);
   }
   return all;
 }
