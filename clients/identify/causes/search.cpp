@@ -13,6 +13,7 @@
 #include "clients/identify/causes/neighbour_shape.hpp"
 #include "clients/identify/causes/refine.hpp"
 #include "clients/identify/causes/simplify.hpp"
+#include "clients/identify/causes/steps.hpp"
 #include "clients/identify/causes/widen.hpp"
 
 namespace kilotwin::identify {
