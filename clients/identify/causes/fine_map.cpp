@@ -7,6 +7,8 @@
 #include <numeric>
 #include <utility>
 
+#include "clients/identify/causes/fine_map_solver.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -15,64 +17,11 @@ using Shape = Factor::Shape;
 constexpr std::size_t kFolds = 4;
 /// Log likelihood of robots left out that a fine map must bring.
 constexpr double kWorth = 15;
-/// Nodes farther than this from where a robot is do not matter any more to what is seen of it, in cells.
-constexpr int kReach = 1;
-constexpr int kAcross = 4 * kReach + 3;  ///< nodes that have to do with one, along an axis
-
-struct Grid {
-  int columns = 0, rows = 0;
-  double x_mm = 0, y_mm = 0, pitch_mm = 1;
-
-  [[nodiscard]] std::size_t nodes() const {
-    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
-  }
-  [[nodiscard]] std::size_t at(int i, int j) const {
-    return static_cast<std::size_t>(j) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(i);
-  }
-};
-
-/// Sums of squares over nodes: each with those around it.
-struct Normal {
-  explicit Normal(const Grid& of_grid)
-      : grid(of_grid),
-        information(of_grid.nodes() * kAcross * kAcross, 0.0F),
-        score(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(of_grid.nodes()))) {}
-
-  Grid grid;
-  std::vector<float> information;
-  Eigen::VectorXd score;
-
-  float* of(int i, int j) { return information.data() + grid.at(i, j) * kAcross * kAcross; }
-  void add(const Normal& other, double factor) {
-    for (std::size_t k = 0; k < information.size(); ++k)
-      information[k] += static_cast<float>(factor) * other.information[k];
-    score += factor * other.score;
-  }
-  [[nodiscard]] Eigen::VectorXd times(const Eigen::VectorXd& v) const {
-    constexpr int kHalf = kAcross / 2;
-    Eigen::VectorXd out = Eigen::VectorXd::Zero(v.size());
-    for (int j = 0; j < grid.rows; ++j) {
-      for (int i = 0; i < grid.columns; ++i) {
-        const float* const own = information.data() + grid.at(i, j) * kAcross * kAcross;
-        if (own[kHalf * kAcross + kHalf] == 0) continue;
-        double sum = 0;
-        const int left = std::max(-kHalf, -i), right = std::min(kHalf, grid.columns - 1 - i);
-        for (int dj = std::max(-kHalf, -j); dj <= std::min(kHalf, grid.rows - 1 - j); ++dj) {
-          const float* const by = own + (dj + kHalf) * kAcross + kHalf;
-          const double* const from = v.data() + static_cast<std::ptrdiff_t>(grid.at(i, j + dj));
-          for (int di = left; di <= right; ++di) sum += by[di] * from[di];
-        }
-        out[static_cast<Eigen::Index>(grid.at(i, j))] = sum;
-      }
-    }
-    return out;
-  }
-};
 
 /// Regresses innovations on the values at the nodes near a robot's way.
 class FineSums {
  public:
-  FineSums(const MotionModel& model, const Block& map, Normal& to) : model_(model), map_(map), to_(to) {}
+  FineSums(const MotionModel& model, const Block& map, NormalEquations& to) : model_(model), map_(map), to_(to) {}
 
   void start(const TrackFilter&) { active_.clear(); }
   void step(const StepRecord& record) {
@@ -87,7 +36,7 @@ class FineSums {
     const double factor = std::max(0.05, std::abs(1 + own));
     const Eigen::Vector3d force = record.h_s / factor * ways.by_wheel *
                                   Eigen::Vector2d(r.left_base_mm_s * r.left_gain, r.right_base_mm_s * r.right_gain);
-    const Grid& g = to_.grid;
+    const NodeGrid& g = to_.grid;
     const double u = std::clamp((record.middle.x_mm - g.x_mm) / g.pitch_mm, 0.0, g.columns - 1.001),
                  v = std::clamp((record.middle.y_mm - g.y_mm) / g.pitch_mm, 0.0, g.rows - 1.001);
     i_ = static_cast<int>(u);
@@ -136,15 +85,16 @@ class FineSums {
 
   const MotionModel& model_;
   const Block& map_;
-  Normal& to_;
+  NormalEquations& to_;
   std::vector<Active> active_;
   int i_ = 0, j_ = 0;
   bool touched_ = false;
 };
 
-std::vector<Normal> sums_of(const Fitter& fitter, const MotionModel& model, const Block& map, const Grid& grid) {
+std::vector<NormalEquations> sums_of(const Fitter& fitter, const MotionModel& model, const Block& map,
+                                     const NodeGrid& grid) {
   const auto units = fitter.set().units();
-  std::vector<Normal> folds(std::min(kFolds, units.size()), Normal(grid));
+  std::vector<NormalEquations> folds(std::min(kFolds, units.size()), NormalEquations(grid));
   in_parallel(folds.size(), fitter.threads(), [&](std::size_t f) {
     FineSums sums(model, map, folds[f]);
     for (std::size_t u = f; u < units.size(); u += folds.size()) {
@@ -159,86 +109,6 @@ std::vector<Normal> sums_of(const Fitter& fitter, const MotionModel& model, cons
   return folds;
 }
 
-/// What is held against a map beforehand: in proportion to weight, the sum over nodes of (|slope|^2 + soft^2)^(power / 2). With a
-/// power of 1 that is its total variation; with a smaller one few large steps cost less than many small ones.
-struct Variation {
-  double weight = 1, soft = 0.01, power = 1;
-
-  /// Of the square of a slope in the quadratic form that touches the sum there.
-  [[nodiscard]] double stiffness(double square) const {
-    constexpr double kUsual = 0.03;  // a slope, from node to node, that costs alike with all powers
-    return weight / kUsual * std::pow((square + soft * soft) / (kUsual * kUsual), power / 2 - 1);
-  }
-};
-
-/// The map that maximises score (f - f0) - (f - f0) information (f - f0) / 2 less the variation: weights of slopes in turn
-/// with conjugate gradients.
-struct Effort {
-  int rounds, steps;
-};
-Eigen::VectorXd solve(const Normal& data, const Eigen::VectorXd& from, const Variation& by, const Effort& effort) {
-  Eigen::VectorXd f = from;
-  const Grid& g = data.grid;
-  const Eigen::VectorXd right = data.times(from) + data.score;
-  Eigen::VectorXd diagonal(f.size());
-  constexpr std::size_t kMiddle = (kAcross / 2) * kAcross + kAcross / 2;
-  for (std::size_t n = 0; n < g.nodes(); ++n)
-    diagonal[static_cast<Eigen::Index>(n)] = data.information[n * kAcross * kAcross + kMiddle];
-  const auto at = [&](int i, int j) { return static_cast<Eigen::Index>(g.at(i, j)); };
-  Eigen::VectorXd weights(f.size());
-  for (int round = 0; round < effort.rounds; ++round) {
-    for (int j = 0; j < g.rows; ++j) {
-      for (int i = 0; i < g.columns; ++i) {
-        const double x = i + 1 < g.columns ? f[at(i + 1, j)] - f[at(i, j)] : 0,
-                     y = j + 1 < g.rows ? f[at(i, j + 1)] - f[at(i, j)] : 0;
-        weights[at(i, j)] = by.stiffness(x * x + y * y);
-      }
-    }
-    const auto times = [&](const Eigen::VectorXd& v) {
-      Eigen::VectorXd out = data.times(v);
-      for (int j = 0; j < g.rows; ++j) {
-        for (int i = 0; i < g.columns; ++i) {
-          const Eigen::Index n = at(i, j);
-          for (const Eigen::Index m : {i + 1 < g.columns ? at(i + 1, j) : n, j + 1 < g.rows ? at(i, j + 1) : n}) {
-            const double flow = weights[n] * (v[m] - v[n]);
-            out[m] += flow;
-            out[n] -= flow;
-          }
-        }
-      }
-      return out;
-    };
-    Eigen::VectorXd preconditioner = diagonal;
-    for (int j = 0; j < g.rows; ++j) {
-      for (int i = 0; i < g.columns; ++i) {
-        const Eigen::Index n = at(i, j);
-        for (const Eigen::Index m : {i + 1 < g.columns ? at(i + 1, j) : n, j + 1 < g.rows ? at(i, j + 1) : n}) {
-          if (m == n) continue;
-          preconditioner[n] += weights[n];
-          preconditioner[m] += weights[n];
-        }
-      }
-    }
-    Eigen::VectorXd rest = right - times(f);
-    Eigen::VectorXd direction = rest.cwiseQuotient(preconditioner);
-    double size = rest.dot(direction);
-    const double enough = 1e-6 * size;
-    for (int step = 0; step < effort.steps && size > enough && size > 1e-12; ++step) {
-      const Eigen::VectorXd image = times(direction);
-      const double along = direction.dot(image);
-      if (!(along > 0)) break;
-      const double length = size / along;
-      f += length * direction;
-      rest -= length * image;
-      const Eigen::VectorXd next = rest.cwiseQuotient(preconditioner);
-      const double next_size = rest.dot(next);
-      direction = next + next_size / size * direction;
-      size = next_size;
-    }
-  }
-  return f;
-}
-
 bool is_map_of_speed(const Block& block) {
   if (block.target != Target::kGain || block.during != kDriven || block.basis.factors.size() != 1) return false;
   const Factor& f = block.basis.factors.front();
@@ -247,7 +117,7 @@ bool is_map_of_speed(const Block& block) {
 }
 
 /// The place where robots were, in cells as fine as samples are dense.
-Grid grid_of(const PreparedSet& set) {
+NodeGrid grid_of(const PreparedSet& set) {
   double x_low = 1e300, x_high = -1e300, y_low = 1e300, y_high = -1e300;
   std::vector<double> xs, ys;
   for (const TrackView& view : set.views()) {
@@ -268,7 +138,7 @@ Grid grid_of(const PreparedSet& set) {
   constexpr double kPerNode = 4, kFinest_mm = 10;
   constexpr int kMostNodes = 95;
   const double width = x_high - x_low, height = y_high - y_low;
-  Grid g;
+  NodeGrid g;
   g.pitch_mm = std::max({kFinest_mm, std::sqrt(width * height * kPerNode / static_cast<double>(xs.size())),
                          std::max(width, height) / (kMostNodes - 2)});
   g.x_mm = x_low;
@@ -278,7 +148,7 @@ Grid grid_of(const PreparedSet& set) {
   return g;
 }
 
-Block block_of(const Grid& g, const Eigen::VectorXd& f) {
+Block block_of(const NodeGrid& g, const Eigen::VectorXd& f) {
   Factor factor;
   factor.shape = Shape::kGrid;
   factor.axis.of = Covariate::kX;
@@ -293,7 +163,7 @@ Block block_of(const Grid& g, const Eigen::VectorXd& f) {
 }
 
 /// The term with the fine map in place of its smooth ones.
-Term with_map(const Term& term, const Grid& grid, const Eigen::VectorXd& f) {
+Term with_map(const Term& term, const NodeGrid& grid, const Eigen::VectorXd& f) {
   Term out = term;
   out.blocks.clear();
   std::vector<double> coefficients, precision;
@@ -319,7 +189,7 @@ Term with_map(const Term& term, const Grid& grid, const Eigen::VectorXd& f) {
 }
 
 /// What the smooth maps of a term come to at the nodes.
-Eigen::VectorXd sampled(const Term& term, const Grid& grid) {
+Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid) {
   Eigen::VectorXd f(static_cast<Eigen::Index>(grid.nodes()));
   std::array<double, kMostColumns> values;
   Situation s;
@@ -345,13 +215,13 @@ Eigen::VectorXd sampled(const Term& term, const Grid& grid) {
 
 /// A map as it is fitted.
 struct Fitted {
-  Grid grid;
+  NodeGrid grid;
   Eigen::VectorXd f;
   Variation by;
 };
 
 /// Weights are tried in units of this: the root of what the data know of a node.
-double unit_of_weight(const Normal& all) {
+double unit_of_weight(const NormalEquations& all) {
   double sum = 0, count = 0;
   const Eigen::VectorXd rows = all.times(Eigen::VectorXd::Ones(all.score.size()));
   for (Eigen::Index n = 0; n < rows.size(); ++n) {
@@ -363,12 +233,12 @@ double unit_of_weight(const Normal& all) {
 }
 
 /// The variation with which robots left out are foretold best, and by how much better than by the map as it is.
-double choose(const std::vector<Normal>& folds, const Normal& all, const std::vector<Variation>& tried,
-              std::uint32_t threads, Fitted& map) {
+double choose(const std::vector<NormalEquations>& folds, const NormalEquations& all,
+              const std::vector<Variation>& tried, std::uint32_t threads, Fitted& map) {
   std::vector<double> gains(tried.size() * folds.size());
   in_parallel(gains.size(), threads, [&](std::size_t k) {
-    const Normal& out = folds[k % folds.size()];
-    Normal rest = all;
+    const NormalEquations& out = folds[k % folds.size()];
+    NormalEquations rest = all;
     rest.add(out, -1);
     const Eigen::VectorXd change = solve(rest, map.f, tried[k / folds.size()], {4, 12}) - map.f;
     gains[k] = out.score.dot(change) - 0.5 * change.dot(out.times(change));
@@ -421,10 +291,10 @@ void sharpen(const Fitter& fitter, MotionModel& model, std::size_t place) {
       halve(map);
       trial.terms[place].blocks.front() = block_of(map.grid, map.f);
     }
-    const std::vector<Normal> folds = sums_of(fitter, trial, trial.terms[place].blocks.front(), map.grid);
+    const std::vector<NormalEquations> folds = sums_of(fitter, trial, trial.terms[place].blocks.front(), map.grid);
     if (folds.size() < 2) return;
-    Normal all(map.grid);
-    for (const Normal& fold : folds) all.add(fold, 1);
+    NormalEquations all(map.grid);
+    for (const NormalEquations& fold : folds) all.add(fold, 1);
     // With the first map in, what is noise and what is not is better known.
     if (pass != 1) {
       const double unit = unit_of_weight(all);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/prepared_set.hpp"
 
 namespace kilotwin::identify {
 

@@ -14,6 +14,7 @@
 #include "clients/identify/causes/neighbour_shape.hpp"
 #include "clients/identify/causes/refine.hpp"
 #include "clients/identify/causes/simplify.hpp"
+#include "clients/identify/causes/steps.hpp"
 #include "clients/identify/causes/widen.hpp"
 
 namespace kilotwin::identify {
@@ -208,6 +209,27 @@ class Loop {
     }
     sharpen(fitter_, out_.model, place);
     widen(fitter_, out_.model, place);
+    if (moves_at_rest(out_.model.terms[place])) try_picture(place);
+  }
+  /// Whether it drifts with time, and so also robots whose motors are off.
+  static bool moves_at_rest(const Term& term) {
+    return term.name == "drift-by-time" &&
+           std::any_of(term.blocks.begin(), term.blocks.end(),
+                       [](const Block& block) { return (block.during & ~kDriven) != 0; });
+  }
+  /// What moves robots at rest as well is more likely a picture that moves.
+  void try_picture(std::size_t place) {
+    measure();
+    const Hypothesis* best = nullptr;
+    Finding best_finding;
+    for (const Hypothesis& h : dictionary_.hypotheses) {
+      if (h.name != "camera-by-time") continue;
+      const Finding finding = scores_->weigh(h, static_cast<int>(place));
+      if (best != nullptr && finding.evidence <= best_finding.evidence) continue;
+      best = &h;
+      best_finding = finding;
+    }
+    if (best != nullptr) exchanged(place, *best, best_finding);
   }
   /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.
   bool defend() {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/identify/causes/hypotheses.hpp"
+#include "clients/identify/fit/fit.hpp"
 
 namespace kilotwin::identify {
 

@@ -1,7 +1,5 @@
-/// What a cause does besides what it was found by, and where it does so from one instant to the next.
+/// What a cause does besides what it was found by.
 #pragma once
-
-#include <string>
 
 #include "clients/identify/fit/fit.hpp"
 
@@ -10,9 +8,5 @@ namespace kilotwin::identify {
 /// Lets a term act on more of what its kind of effect acts on (the wheels, the turn rate, slip, robots at rest, the measured
 /// heading), as long as the data become more probable by it.
 void widen(const Fitter&, MotionModel&, std::size_t term);
-
-/// Puts steps at times of their own in place of a curve over time, or beside it, where that is more probable. A drift in the
-/// room may turn out to be a shift of the picture, or the other way round. Returns the name of the term as it then is.
-std::string find_steps(const Fitter&, MotionModel&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -7,56 +7,11 @@
 #include <vector>
 
 #include "clients/identify/fit/linearise.hpp"
+#include "clients/identify/fit/prepared_set.hpp"
 
 namespace kilotwin::identify {
 
-struct Pair;
 class ScaleHold;
-
-/// How often the nearest robot was so near that discs would overlap, and a little farther away.
-struct Meetings {
-  static constexpr double kRing_mm = 55;
-  /// Well within two radii, so that no lens makes robots that touch look as if they overlapped.
-  static constexpr double kInside_mm = 0.85 * kDiscs_mm;
-  /// Such a share within, and robots do not feel each other.
-  static constexpr double kUnhindered = 0.6;
-  std::size_t within = 0, near = 0;
-  /// Of what there would be within if robots did not feel each other, by areas; 0.2 where few have met.
-  [[nodiscard]] double share_within() const {
-    constexpr double kInner = kInside_mm * kInside_mm, kOuter = kRing_mm * kRing_mm - kTouch_mm * kTouch_mm;
-    constexpr double kFew = 10;
-    return (static_cast<double>(within) + 0.2 * kFew) / (static_cast<double>(near) * kInner / kOuter + kFew);
-  }
-};
-
-/// The tracks of a set, ready to be walked along.
-class PreparedSet {
- public:
-  /// Runs are numbered from `first_number` on: no run of one set is one of another.
-  explicit PreparedSet(const MeasuredSet&, std::uint32_t first_number = 0);
-
-  [[nodiscard]] const MeasuredSet& set() const { return *set_; }
-  [[nodiscard]] std::vector<TrackView>& views() { return views_; }
-  [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
-  [[nodiscard]] const RunNeighbours& neighbours(std::size_t run) const { return *neighbours_[run]; }
-  /// The tracks that may be fitted to, by unit: by robot, or each for itself where there are fewer than six robots.
-  [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
-  /// Looks again at where discs are, which is not where they are measured, for what robots see of each other.
-  void find_centres(const MotionModel&, std::uint32_t threads);
-  /// Looks again at what floors remember, in cells of the model's sizes.
-  void remember(const MotionModel&);
-  [[nodiscard]] Meetings meetings() const;
-  /// Robots that came near each other, by where discs are.
-  [[nodiscard]] std::vector<Pair> pairs() const;
-  /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
-  void find_headings(const MotionModel&, std::uint32_t threads);
-
- private:
-  const MeasuredSet* set_;
-  std::uint32_t first_number_;
-  std::vector<std::unique_ptr<RunNeighbours>> neighbours_;
-  std::vector<TrackView> views_;
-};
 
 /// Prior standard deviations of the base parameters about the seed's values.
 struct BasePrior {
@@ -100,6 +55,8 @@ class Fitter {
   [[nodiscard]] PreparedSet& set() const { return set_; }
 
  private:
+  static constexpr std::size_t kEnoughSamples = 8000;  ///< for noise, and for what touching does
+
   /// One Gauss-Newton step of all but the noise, held back where it would make things worse.
   void step(MotionModel&) const;
   /// Puts a picture straight while nothing is concluded from robots that may touch something: in a picture that is bent walls are

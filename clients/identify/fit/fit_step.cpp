@@ -1,7 +1,8 @@
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 
 #include "clients/identify/fit/fit.hpp"
 #include "clients/identify/model/picture_scale.hpp"
@@ -46,17 +47,61 @@ Equations equations_of(const Fitter& fitter, const MotionModel& model) {
   return e;
 }
 
-/// In a picture that shows all larger or smaller, robots that are so near may touch.
-constexpr double kMayTouch_mm = 1.15 * kTouch_mm;
-
 }  // namespace
 
-void Fitter::look_for_walls(MotionModel& model) const {
-  if (!set_.set().has_headings) return;
-  const Room known = model.room;
-  model.room = room_of(set_, model);
-  for (double Room::*const side : {&Room::x_low_mm, &Room::x_high_mm, &Room::y_low_mm, &Room::y_high_mm})
-    if (std::isinf(model.room.*side)) model.room.*side = known.*side;
+void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {
+  const BaseParameters seed;
+  const auto add = [&](Eigen::Index i, double from, double sd) {
+    information(i, i) += 1 / (sd * sd);
+    score[i] += from / (sd * sd);
+  };
+  add(kStraightSpeed, seed.straight_mm_s - model.base.straight_mm_s, prior_.straight_mm_s);
+  add(kTurnSpeed, seed.turn_mm_s - model.base.turn_mm_s, prior_.turn_mm_s);
+  add(kWheelBase, seed.wheel_base_mm - model.base.wheel_base_mm, prior_.wheel_base_mm);
+  add(kAheadPoint, seed.ahead_mm - model.base.ahead_mm, prior_.point_mm);
+  add(kLeftPoint, seed.left_mm - model.base.left_mm, prior_.point_mm / 4);
+}
+
+void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eigen::VectorXd& step) {
+  const auto limited = [](double value, double most) { return std::clamp(value, -most, most); };
+  model.base.straight_mm_s += limited(step[kStraightSpeed], 20);
+  model.base.turn_mm_s += limited(step[kTurnSpeed], 20);
+  model.base.wheel_base_mm = std::clamp(model.base.wheel_base_mm + limited(step[kWheelBase], 3), 10.0, 60.0);
+  model.base.ahead_mm += limited(step[kAheadPoint], 8);
+  model.base.left_mm += limited(step[kLeftPoint], 8);
+  Eigen::Index first = kBaseColumns;
+  for (Term& term : model.terms) {
+    term.coefficients += step.segment(first, term.coefficients.size());
+    first += term.coefficients.size();
+  }
+  // A robot may be several units (tracks): its bias is their mean by precision.
+  std::map<std::uint32_t, std::pair<Eigen::Matrix2d, Eigen::Vector2d>> sums;
+  for (const Unit& unit : units) {
+    const RobotBias was = model.bias_of(unit.robot);
+    const Eigen::Vector2d bias = was.mean_mm_s + unit.bias_step - unit.bias_by_column * step;
+    const Eigen::Matrix2d precision = unit.bias_covariance.inverse();
+    auto [sum, made] = sums.try_emplace(unit.robot, Eigen::Matrix2d::Zero(), Eigen::Vector2d::Zero());
+    sum->second.first += precision;
+    sum->second.second += precision * bias;
+  }
+  double sum = 0, square = 0, count = 0;
+  for (const auto& [robot, s] : sums) {
+    RobotBias& bias = model.robots[robot];
+    bias.covariance = s.first.inverse();
+    bias.mean_mm_s = (bias.covariance * s.second).cwiseMax(-15).cwiseMin(15);
+    sum += bias.mean_mm_s.sum();
+    square += bias.mean_mm_s.squaredNorm() + bias.covariance.trace();
+    count += 2;
+  }
+  // The distribution of biases, held near the seed's where robots are few.
+  const BaseParameters seed;
+  constexpr double kSeedRobots = 4;
+  const double mean = sum / (count + kSeedRobots);
+  const double variance =
+      (square - 2 * mean * sum + count * mean * mean + kSeedRobots * seed.bias_sd_mm_s * seed.bias_sd_mm_s) /
+      (count + kSeedRobots);
+  model.base.bias_mean_mm_s = mean;
+  model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
 }
 
 double Fitter::worth(const MotionModel& model) const {
@@ -87,49 +132,6 @@ void Fitter::step(MotionModel& model) const {
   }
   if (!better) model = start;
   if (model.measures()) settle_scale(model);
-}
-
-MotionModel Fitter::doubting(MotionModel model) const {
-  model.touch_mm = std::max(model.touch_mm, kMayTouch_mm);
-  model.contacts = true;
-  model.doubts_rim = true;
-  return model;
-}
-
-bool Fitter::holds_seem_elsewhere(const MotionModel& model) const {
-  // Noise that robots do not have unless they touch something, looked at where they do not.
-  MotionModel trial = doubting(model);
-  const double with_noise = log_likelihood(trial);
-  fit_noise(trial);
-  std::size_t samples = 0;
-  for (const TrackView& view : set_.views()) samples += view.track->held_out ? 0 : view.track->samples.size();
-  constexpr double kSure = 30, kEach = 0.002;
-  return log_likelihood(trial) > with_noise + kSure + kEach * static_cast<double>(samples);
-}
-
-void Fitter::straighten(MotionModel& model) const {
-  const MotionModel before = model;
-  model = doubting(model);
-  model.room = {};
-  constexpr int kPasses = 3;
-  for (int pass = 0; pass < kPasses; ++pass) {
-    fit_noise(model);
-    step(model);
-  }
-  model.room = carried(before.room, before, model);
-  settle_doubts(model);
-}
-
-void Fitter::settle_doubts(MotionModel& model) const {
-  MotionModel trial = model;
-  trial.doubts_rim = false;
-  trial.touch_mm = touching_mm(trial.base, set_.set().has_headings);
-  set_.find_centres(trial, threads_);
-  trial.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
-  look_for_walls(trial);
-  if (!set_.set().has_headings) find_walls(trial);
-  fit_noise(trial);
-  if (log_likelihood_of_all(trial) > log_likelihood_of_all(model)) model = trial;
 }
 
 }  // namespace kilotwin::identify

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/prepared_set.hpp"
 
 namespace kilotwin::identify {
 namespace {

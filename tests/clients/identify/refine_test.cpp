@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "clients/identify/causes/simplify.hpp"
+#include "clients/identify/causes/steps.hpp"
 #include "clients/identify/causes/widen.hpp"
 #include "core/random/random.hpp"
 

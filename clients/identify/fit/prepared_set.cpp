@@ -1,0 +1,132 @@
+#include "clients/identify/fit/prepared_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/identify/fit/likelihood.hpp"
+#include "clients/identify/fit/linearise.hpp"
+#include "clients/identify/model/picture_scale.hpp"
+#include "clients/identify/model/rim.hpp"
+#include "clients/identify/predict/follower.hpp"
+
+namespace kilotwin::identify {
+
+PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
+    : set_(&set), first_number_(first_number) {
+  for (std::size_t r = 0; r < set.runs.size(); ++r) {
+    neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
+    neighbours_.back()->remember(set.runs[r], MotionModel{}.cells);
+    for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
+      const Track& track = set.runs[r].tracks[t];
+      if (track.samples.size() < 2) continue;
+      const auto place = static_cast<std::uint32_t>(r);
+      views_.push_back({&track, place, first_number + place, t, neighbours_.back().get(), CommandClock(track)});
+    }
+  }
+  constexpr double kMargin_mm = 12;
+  const Rim rim(set, kMargin_mm);
+  for (TrackView& view : views_)
+    for (const Sample& s : view.track->samples) view.at_rim.push_back(rim.holds(s.x_mm, s.y_mm));
+}
+
+std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
+  const std::vector<std::uint32_t> robots = set_->robots();
+  constexpr std::size_t kFewRobots = 6;
+  std::vector<std::vector<const TrackView*>> units(robots.size() < kFewRobots ? views_.size() : robots.size());
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    if (views_[v].track->held_out) continue;
+    const auto robot = std::lower_bound(robots.begin(), robots.end(), views_[v].track->robot) - robots.begin();
+    units[robots.size() < kFewRobots ? v : static_cast<std::size_t>(robot)].push_back(&views_[v]);
+  }
+  std::erase_if(units, [](const auto& unit) { return unit.empty(); });
+  return units;
+}
+
+void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) {
+  std::vector<Centres> centres(views_.size());
+  in_parallel(views_.size(), threads, [&](std::size_t v) { centres[v] = centres_of(model, views_[v]); });
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) {
+    // Tracks that are too short to be followed are where they were seen.
+    std::vector<Centres> of_run;
+    for (const Track& track : set_->runs[r].tracks) {
+      Centres& own = of_run.emplace_back();
+      for (const Sample& s : track.samples) {
+        own.x_mm.push_back(s.x_mm);
+        own.y_mm.push_back(s.y_mm);
+      }
+    }
+    for (std::size_t v = 0; v < views_.size(); ++v)
+      if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
+    *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
+    neighbours_[r]->remember(set_->runs[r], model.cells);
+  }
+}
+
+void PreparedSet::remember(const MotionModel& model) {
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells);
+}
+
+Meetings PreparedSet::meetings() const {
+  Meetings sum;
+  constexpr double kEvery_s = 1;
+  for (const TrackView& view : views_) {
+    for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s) {
+      const double nearest = view.neighbours->view(view.place, t).nearest_mm;
+      if (nearest < Meetings::kInside_mm) ++sum.within;
+      if (nearest > kTouch_mm && nearest < Meetings::kRing_mm) ++sum.near;
+    }
+  }
+  return sum;
+}
+
+std::vector<Pair> PreparedSet::pairs() const {
+  std::vector<Pair> pairs;
+  for (std::size_t r = 0; r < neighbours_.size(); ++r)
+    add_pairs(*neighbours_[r], set_->runs[r].tracks.size(), first_number_ + static_cast<std::uint32_t>(r), pairs);
+  return pairs;
+}
+
+void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads) {
+  in_parallel(views_.size(), threads, [&](std::size_t v) {
+    TrackView& view = views_[v];
+    const Sample& first = view.track->samples.front();
+    if (TrackFilter::has_heading(first)) {
+      view.start_heading_rad = first.heading_rad;
+      view.start_heading_sd_rad = std::sqrt(model.noise.heading_rad2);
+      return;
+    }
+    // As many samples as it takes to move a good way, and no more than these.
+    constexpr std::size_t kMost = 200;
+    constexpr double kWay_mm = 60;
+    std::size_t samples = 2;
+    for (; samples < std::min(kMost, view.track->samples.size()); ++samples) {
+      const Sample& s = view.track->samples[samples];
+      if (std::hypot(s.x_mm - first.x_mm, s.y_mm - first.y_mm) > kWay_mm || TrackFilter::has_heading(s)) break;
+    }
+    const auto value = [&](double heading, double sd) {
+      view.start_heading_rad = heading;
+      view.start_heading_sd_rad = sd;
+      TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.number);
+      LogLikelihood likelihood;
+      walk(filter, view, samples + 1, likelihood);
+      return likelihood.sum;
+    };
+    double best = 0, best_value = -1e300;
+    const auto search = [&](double around, double spacing, int count, double sd) {
+      for (int i = -count; i <= count; ++i) {
+        const double heading = around + spacing * i, found = value(heading, sd);
+        if (found > best_value) {
+          best_value = found;
+          best = heading;
+        }
+      }
+    };
+    search(0, M_PI / 8, 8, 0.25);
+    best_value = -1e300;
+    search(best, M_PI / 40, 3, 0.08);
+    view.start_heading_rad = wrapped_angle(best);
+    view.start_heading_sd_rad = 0.3;
+  });
+}
+
+}  // namespace kilotwin::identify
