@@ -30,6 +30,7 @@ constexpr double kClose = 3;
 constexpr double kMostByShape = 200, kAsGood = 10;
 /// Whatever explained nearly as much, in the few columns that causes are compared by, may be the cause once it has its own shape.
 constexpr double kContender = 0.97;
+constexpr const char* kPictureForDrift = "camera-by-time for drift-by-time";
 /// No form fits a cause exactly. What is left of all that was found, by this share of what that explains, is no other cause.
 constexpr double kRemnant = 0.003;
 /// As many samples as hypotheses are tested on; there are no more surprises in more.
@@ -79,6 +80,7 @@ class Loop {
           say("is all of it needed");
           reconsider();
           fitter_.fit_surroundings(out_.model);
+          try_picture();
         }
         continue;
       }
@@ -209,16 +211,17 @@ class Loop {
     }
     sharpen(fitter_, out_.model, place);
     widen(fitter_, out_.model, place);
-    if (moves_at_rest(out_.model.terms[place])) try_picture(place);
   }
-  /// Whether it drifts with time, and so also robots whose motors are off.
-  static bool moves_at_rest(const Term& term) {
-    return term.name == "drift-by-time" &&
-           std::any_of(term.blocks.begin(), term.blocks.end(),
-                       [](const Block& block) { return (block.during & ~kDriven) != 0; });
-  }
-  /// What moves robots at rest as well is more likely a picture that moves.
-  void try_picture(std::size_t place) {
+  /// A picture that moves looks like robots that drift, but for those at rest and for where walls are.
+  void try_picture() {
+    const auto drift = std::find_if(out_.model.terms.begin(), out_.model.terms.end(),
+                                    [](const Term& term) { return term.name == "drift-by-time"; });
+    if (drift == out_.model.terms.end() || failed_.contains(kPictureForDrift)) return;
+    // Once: steps of the picture may be taken for drifts again.
+    failed_.insert(kPictureForDrift);
+    const auto place = static_cast<std::size_t>(drift - out_.model.terms.begin());
+    const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
+                                     [](const Block& block) { return (block.during & ~kDriven) != 0; });
     measure();
     const Hypothesis* best = nullptr;
     Finding best_finding;
@@ -229,7 +232,11 @@ class Loop {
       best = &h;
       best_finding = finding;
     }
-    if (best != nullptr) exchanged(place, *best, best_finding);
+    constexpr double kAlike = 0.8;
+    if (best == nullptr ||
+        (!at_rest && best_finding.evidence < kAlike * scores_->weigh_term(static_cast<int>(place)).evidence))
+      return;
+    exchanged(place, *best, best_finding);
   }
   /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.
   bool defend() {
@@ -264,15 +271,25 @@ class Loop {
   /// where it explains less after all, everything is as it was.
   bool exchanged(std::size_t place, const Hypothesis& other, Finding finding) {
     const Search before = out_;
-    const double likelihood = fitter_.log_likelihood(out_.model);
+    // Where robots are held tells what moves: they, or the picture of them.
+    const auto of_picture = [&] { return is_measured(out_.model.terms[place].blocks.front().target); };
+    const bool was_of_picture = of_picture();
     finding.log10_p = out_.reasons[place].finding.log10_p;
     out_.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
     out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
     fitter_.fit(out_.model, 2);
-    // The shape that it is given then explains more, but not all of what is lacking.
-    if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
+    if (was_of_picture != of_picture()) {
       shape(place);
-      if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
+      fitter_.fit_surroundings(out_.model);
+      if (fitter_.log_likelihood_of_all(out_.model) > fitter_.log_likelihood_of_all(before.model) - kAsGood)
+        return true;
+    } else {
+      const double likelihood = fitter_.log_likelihood(before.model);
+      // The shape that it is given then explains more, but not all of what is lacking.
+      if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
+        shape(place);
+        if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
+      }
     }
     restore(before);
     failed_.insert(other.name + " for " + out_.model.terms[place].name);

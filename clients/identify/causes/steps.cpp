@@ -20,7 +20,7 @@ constexpr double kLeastGain = 2;
 Block stepping(const Block& like, const std::vector<double>& points) {
   Factor f;
   f.shape = Shape::kAtLeast;
-  f.axis.of = Covariate::kTime;
+  f.axis = like.basis.factors.front().axis;
   f.points = points;
   return {like.target, Basis{{f}}, like.during};
 }
@@ -217,6 +217,18 @@ bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, cons
   return true;
 }
 
+/// What goes on as time does: of the run, or while motors turn.
+bool goes_on(const Axis& axis) {
+  switch (axis.of) {
+    case Covariate::kTime:
+    case Covariate::kMotorTime:
+    case Covariate::kLeftMotorTime:
+    case Covariate::kRightMotorTime:
+    case Covariate::kDrivenTime: return axis.forget == 0;
+    default: return false;
+  }
+}
+
 }  // namespace
 
 std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t place) {
@@ -228,7 +240,7 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
     // Jumps of the picture that are more than a shift are found by themselves.
     if (block.target == Target::kMeasuredTurn || block.target == Target::kMeasuredScale) return name;
     const Factor& f = block.basis.factors.front();
-    if (f.axis.of != Covariate::kTime || f.shape != Shape::kCosines) return name;
+    if (!goes_on(f.axis) || f.shape != Shape::kCosines) return name;
     duration_s = std::max(duration_s, f.high);
     if (std::none_of(kinds.begin(), kinds.end(),
                      [&](const Block& b) { return b.target == block.target && b.during == block.during; }))
@@ -246,7 +258,8 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
   const Target acts_on = kinds.front().target;
   const bool in_room = acts_on == Target::kWorldX || acts_on == Target::kWorldY,
              in_picture = acts_on == Target::kMeasuredX;
-  if (in_room || in_picture) forms.push_back({in_room ? picture : room, false, {}, 0});
+  const bool by_the_clock = basis.factors.front().axis.of == Covariate::kTime;
+  if (by_the_clock && (in_room || in_picture)) forms.push_back({in_room ? picture : room, false, {}, 0});
   // On the raster an instant is only roughly known: what it is worth shows once it is found.
   MotionModel best = model;
   double best_worth = 0;

@@ -7,7 +7,7 @@
 
 namespace kilotwin::identify {
 
-/// Puts steps at times of their own in place of a curve over time, or beside it, where that is more probable. A drift in the
+/// Puts steps at times of their own, of the run or for which motors have turned, in place of a curve over such time, or beside it, where that is more probable. A drift in the
 /// room may turn out to be a shift of the picture, or the other way round. Returns the name of the term as it then is.
 std::string find_steps(const Fitter&, MotionModel&, std::size_t term);
 
