@@ -167,6 +167,28 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
   return forms;
 }
 
+/// The same forms with radii of their own near by.
+std::vector<Form> with_radii_about(const std::vector<Form>& forms) {
+  constexpr int kAbout_mm = 9;
+  std::vector<Form> out;
+  for (const Form& form : forms) {
+    for (int by_mm = -kAbout_mm; by_mm <= kAbout_mm; ++by_mm) {
+      Form other = form;
+      bool listed = true;
+      for (Block& block : other) {
+        for (Factor& f : block.basis.factors) {
+          const double reach = reach_mm(f.axis) + by_mm;
+          listed = listed && reach <= kListed_mm;
+          f.axis.within_mm = static_cast<float>(reach);
+          if (f.shape == Shape::kTaper) f.high = reach;
+        }
+      }
+      if (listed) out.push_back(std::move(other));
+    }
+  }
+  return out;
+}
+
 /// Some of the forms, and the standard deviations of their columns beforehand.
 struct Chosen {
   std::vector<std::size_t> forms;
@@ -246,36 +268,47 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
   const std::vector<Block>& had = model.terms[place].blocks;
   if (had.empty() || !std::all_of(had.begin(), had.end(), is_of_neighbours)) return false;
   const bool pushes = had.front().target == Target::kTurn || had.front().target == Target::kSideways;
-  const std::vector<Form> forms =
+  std::vector<Form> forms =
       pushes ? forms_of_push(fitter.set(), had.front().target == Target::kTurn, had.front().during)
              : forms_of_speed(fitter.set(), had.front().during);
-  std::vector<Block> all;
-  for (const Form& form : forms) all.insert(all.end(), form.begin(), form.end());
-  // What seemed to be noise, and where robots were thought to be, changes with the first choice.
-  constexpr int kRounds = 2;
   double likelihood = fitter.log_likelihood(model);
   bool any = false;
-  for (int round = 0; round < kRounds; ++round) {
+  // In place of the term, some of the forms, if they explain more.
+  const auto try_forms = [&](const std::vector<Form>& of, std::size_t most) {
+    std::vector<Block> all;
+    for (const Form& form : of) all.insert(all.end(), form.begin(), form.end());
     MotionModel trial = model;
     const Linear l = linear(fitter, trial, place, all);
     const Eigen::VectorXd at_zero = l.score_without(trial.terms[place].coefficients);
     const Beside data = beside(l, at_zero, l.more());
-    const Chosen chosen = Choice(data, forms).choose(round == 0 ? kFirstForms : kMostForms);
-    if (chosen.forms.empty()) break;
+    const Chosen chosen = Choice(data, of).choose(most);
+    std::vector<Form> found;
     std::vector<Block> blocks;
-    for (const std::size_t f : chosen.forms) blocks.insert(blocks.end(), forms[f].begin(), forms[f].end());
+    for (const std::size_t f : chosen.forms) {
+      found.push_back(of[f]);
+      blocks.insert(blocks.end(), of[f].begin(), of[f].end());
+    }
+    if (found.empty()) return found;
     std::vector<Eigen::Index> columns;
     for (const Eigen::Index c : chosen.columns) columns.push_back(l.own + c);
     exchange(trial, place, l, blocks, at_zero, columns, chosen.sd);
     fitter.fit(trial, 1);
     settle(fitter, trial, place);
-    const double found = fitter.log_likelihood(trial);
-    if (found < likelihood + (any ? kWorth : 0)) break;
+    const double reached = fitter.log_likelihood(trial);
+    if (reached < likelihood + (any ? kWorth : 0)) return std::vector<Form>{};
     model = trial;
-    likelihood = found;
+    likelihood = reached;
     any = true;
-    if (round + 1 < kRounds) fitter.fit_surroundings(model);
-  }
+    return found;
+  };
+  const std::vector<Form> first = try_forms(forms, kFirstForms);
+  if (first.empty()) return false;
+  // What seemed to be noise, and where robots were thought to be, changes with the first choice.
+  fitter.fit_surroundings(model);
+  likelihood = fitter.log_likelihood(model);
+  const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms);
+  forms.insert(forms.end(), finer.begin(), finer.end());
+  try_forms(forms, kMostForms);
   return any;
 }
 

@@ -29,12 +29,15 @@ double use_s(const CommandState& commands, std::size_t motor, std::uint8_t forge
   return motor < 2 ? commands.motor_s[motor] : commands.driven_s;
 }
 
+/// Whether it is not among what is added up beforehand.
+bool is_listed(const Axis& axis) { return axis.focus > 0 || axis.within_mm > 0; }
+
 /// Neighbours added up by where they are, too. Where they are not listed, as if all lay in that direction.
 double toward(const Axis& axis, const Situation& s) {
   const NeighbourView& near = s.near;
   const bool count = axis.of == Covariate::kNeighbours;
   if (near.list == nullptr) return count ? near.count[axis.radius] : near.density[axis.radius];
-  const double reach = kNeighbourRadii_mm[axis.radius], ahead = s.heading_rad + axis.toward_deg * (M_PI / 180);
+  const double reach = reach_mm(axis), ahead = s.heading_rad + axis.toward_deg * (M_PI / 180);
   const double ahead_x = std::cos(ahead), ahead_y = std::sin(ahead);
   double sum = 0;
   for (std::uint32_t i = 0; i < near.listed; ++i) {
@@ -51,6 +54,8 @@ double toward(const Axis& axis, const Situation& s) {
 
 }  // namespace
 
+double reach_mm(const Axis& axis) { return axis.within_mm > 0 ? axis.within_mm : kNeighbourRadii_mm[axis.radius]; }
+
 double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
   switch (axis.of) {
     case Covariate::kNothing: return 0;
@@ -65,13 +70,11 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kLeftMotorTime: return use_s(s.commands, 0, axis.forget);
     case Covariate::kRightMotorTime: return use_s(s.commands, 1, axis.forget);
     case Covariate::kDrivenTime: return use_s(s.commands, 2, axis.forget);
-    case Covariate::kNeighbours: return axis.focus > 0 ? toward(axis, s) : s.near.count[axis.radius];
-    case Covariate::kNearest: return std::min(s.near.nearest_mm, kNeighbourRadii_mm[axis.radius]);
-    case Covariate::kDensity: return axis.focus > 0 ? toward(axis, s) : s.near.density[axis.radius];
+    case Covariate::kNeighbours: return is_listed(axis) ? toward(axis, s) : s.near.count[axis.radius];
+    case Covariate::kNearest: return std::min(s.near.nearest_mm, reach_mm(axis));
+    case Covariate::kDensity: return is_listed(axis) ? toward(axis, s) : s.near.density[axis.radius];
     case Covariate::kBearing:
-      return s.near.nearest_mm > kNeighbourRadii_mm[axis.radius]
-                 ? 0
-                 : wrapped_angle(s.near.direction_rad - s.heading_rad);
+      return s.near.nearest_mm > reach_mm(axis) ? 0 : wrapped_angle(s.near.direction_rad - s.heading_rad);
     case Covariate::kPreviousCommand:
       return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
     case Covariate::kPreviousLasted: return s.commands.previous_lasted_s;

@@ -105,10 +105,14 @@ struct Axis {
   /// With kNeighbours and kDensity within at most kListed_mm: another robot counts ((1 + cos(bearing - toward)) / 2)^focus times.
   std::uint8_t focus = 0;
   std::int16_t toward_deg = 0;
+  /// With neighbours: a radius of its own in mm, at most kListed_mm; 0: that of kNeighbourRadii_mm.
+  float within_mm = 0;
 
   bool operator==(const Axis&) const = default;
 };
 
+/// Of an axis of neighbours: robots farther away do not count.
+[[nodiscard]] double reach_mm(const Axis&);
 /// `wheel`: 0 left, 1 right; matters to kMotorTime alone.
 [[nodiscard]] double value_of(const Axis&, const Situation&, std::size_t wheel);
 [[nodiscard]] double wrapped_angle(double rad);

@@ -83,7 +83,7 @@ double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const S
 
 void set_axis(Function& function, const Factor& factor) {
   function.set_of(covariate_of(factor.axis.of));
-  if (is_of_neighbours(factor.axis.of)) function.set_radius_mm(kNeighbourRadii_mm[factor.axis.radius]);
+  if (is_of_neighbours(factor.axis.of)) function.set_radius_mm(reach_mm(factor.axis));
   if (factor.axis.focus > 0) {
     function.set_focus(factor.axis.focus);
     if (factor.axis.toward_deg != 0) function.set_toward_deg(factor.axis.toward_deg);
