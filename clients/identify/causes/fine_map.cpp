@@ -101,7 +101,7 @@ std::vector<NormalEquations> sums_of(const Fitter& fitter, const MotionModel& mo
       for (const TrackView* view : units[u]) {
         RobotBias bias = model.bias_of(view->track->robot);
         bias.covariance.setZero();
-        TrackFilter filter(model, bias, view->track->robot, view->run);
+        TrackFilter filter(model, bias, view->track->robot, view->number);
         walk(filter, *view, view->track->samples.size(), sums);
       }
     }

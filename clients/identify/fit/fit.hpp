@@ -62,7 +62,7 @@ class Fitter {
   /// Puts a picture straight while nothing is concluded from robots that may touch something: in a picture that is bent walls are
   /// no lines, and robots seem to meet where they do not or to pass through each other.
   void straighten(MotionModel&) const;
-  /// The same, but whoever is at the rim or near another may be held.
+  /// That model, but whoever is at the rim or near another may be held.
   [[nodiscard]] MotionModel doubting(MotionModel) const;
   /// Whether what holds robots is not where walls and discs seem to be.
   [[nodiscard]] bool holds_seem_elsewhere(const MotionModel&) const;
@@ -70,7 +70,7 @@ class Fitter {
   void settle_doubts(MotionModel&) const;
   /// Walls where robots with headings stay at a line.
   void look_for_walls(MotionModel&) const;
-  /// Likelihood of what was measured and of the coefficients beforehand.
+  /// Log likelihood of what was measured and of the coefficients beforehand.
   [[nodiscard]] double worth(const MotionModel&) const;
   /// Makes a picture that is put straight as large as robots that touch show it to be. Whether it was not.
   bool set_scale(MotionModel&) const;

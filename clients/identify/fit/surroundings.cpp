@@ -78,8 +78,8 @@ void Fitter::find_walls(MotionModel& model) const {
     std::vector<double> places;
     for (const TrackView& view : set_.views())
       for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
-    const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
     if (places.size() < 100) return;
+    const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
     std::nth_element(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(rank), places.end());
     const double edge = places[rank];
     // Those that came near; of many, some.

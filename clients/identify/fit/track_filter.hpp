@@ -67,7 +67,7 @@ class TrackFilter {
 
   TrackFilter(const MotionModel& model, const RobotBias& bias, std::uint32_t robot, std::uint32_t run);
 
-  /// At the first sample; `heading_rad` replaces a measured heading, with that standard deviation.
+  /// At the first sample, with this heading; where one was measured there, what the tracker adds to it is taken off. `at` is not used.
   void start(const Sample&, const Situation& at, double heading_rad, double heading_sd_rad);
   [[nodiscard]] static bool has_heading(const Sample& sample) { return !std::isnan(sample.heading_rad); }
 

@@ -121,8 +121,8 @@ struct MotionModel {
   [[nodiscard]] Eigen::Vector3d pose_of(const Sample&, const Situation&) const;
 };
 
-/// Adds the forces of a block's columns: for each column the change per unit of its coefficient.
-/// Nominal speeds of the wheels with no bias.
+/// Speeds of the left and the right wheel with no bias, mm/s: both going straight, in a turn only the one on its outside, at rest
+/// none.
 [[nodiscard]] Eigen::Vector2d nominal_speeds(const BaseParameters&, Motion);
 
 /// A way at constant rates for `h_s` from a heading: exact arcs.

@@ -65,6 +65,31 @@ TEST(Contacts, HeadingsTellHowWheelsRunBesideOthers) { EXPECT_NEAR(gain_beside_o
 
 TEST(Contacts, NothingIsConcludedFromPositionsBesideOthers) { EXPECT_NEAR(gain_beside_others(false), 1, 1e-6); }
 
+TEST(Contacts, TheLikelihoodOfAllHoldsWhatRobotsDoThatTouch) {
+  // Without headings nothing is concluded from who touches, and here all do, all the time. Where a wheel that runs would have
+  // moved them, they are held: touching must be allowed to do much.
+  MeasuredSet set = held_fast(false);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel much, little;
+  little.noise.contact_mm2_s = much.noise.contact_mm2_s / 100;
+  EXPECT_EQ(fitter.log_likelihood(much), 0);
+  EXPECT_EQ(fitter.log_likelihood(little), 0);
+  EXPECT_GT(fitter.log_likelihood_of_all(much), fitter.log_likelihood_of_all(little) + 100);
+  // Where nobody can touch anybody both are the same.
+  MotionModel none = much;
+  none.contacts = false;
+  EXPECT_NEAR(fitter.log_likelihood_of_all(none), fitter.log_likelihood(none), 1e-6);
+  EXPECT_NE(fitter.log_likelihood(none), 0);
+  // Tracks that are held out are in neither.
+  const double before = fitter.log_likelihood_of_all(much);
+  for (Track& track : set.runs.front().tracks) track.held_out = track.robot >= 8;
+  const double half = fitter.log_likelihood_of_all(much);
+  for (Track& track : set.runs.front().tracks) track.held_out = track.robot < 8;
+  EXPECT_NEAR(fitter.log_likelihood_of_all(much) + half, before, 1e-6);
+  EXPECT_NEAR(half / before, 0.5, 0.1);
+}
+
 TEST(Contacts, ARobotThatPushesOthersComesAsFarAsWithShortSteps) {
   // One drives against two that rest, the second of them aside.
   const double dt = 0.01, duration_s = 8;

@@ -123,8 +123,42 @@ TEST(PictureScale, WallsGoWhereTheyAreSeen) {
   EXPECT_TRUE(std::isinf(carried(flat.room, flat, larger).x_low_mm));
 }
 
-/// A shift of the whole picture moves all that is seen and where robots are thought to have started: it shows nowhere.
-TEST(PictureScale, AShiftOfThePictureTellsNothing) {
+TEST(PictureScale, OnlyTheLinearColumnsOfAMapMakeThePictureLarger) {
+  EXPECT_EQ(log_scale_by_coefficients(MotionModel{}).size(), 0);
+  // Another term before it, and a map that has lost some of its columns.
+  MotionModel model = bent();
+  Factor clock;
+  clock.axis.of = Covariate::kTime;
+  clock.count = 3;
+  const Term slow{"speed-by-time",
+                  {{Target::kGain, Basis{{clock}}, kDriven}},
+                  Eigen::VectorXd::Zero(3),
+                  Eigen::VectorXd::Ones(3)};
+  model.terms.insert(model.terms.begin(), slow);
+  Term& map = model.terms.back();
+  map.blocks[0].basis.chosen = {0, 2, 4};
+  map.blocks[1].basis.chosen = {1, 5};
+  map.coefficients = Eigen::VectorXd::LinSpaced(5, -9, 8);
+  map.precision = Eigen::VectorXd::Ones(5);
+  const Eigen::VectorXd by = log_scale_by_coefficients(model);
+  ASSERT_EQ(by.size(), 8);
+  // What rescale() does to the coefficients makes the picture smaller by as much as the room gets larger, to first order.
+  const double factor = 1.001;
+  MotionModel larger = model;
+  ASSERT_TRUE(rescale(larger, factor));
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(8);
+  change.tail(5) = larger.terms.back().coefficients - map.coefficients;
+  EXPECT_NEAR(by.dot(change), 1 - factor, 2e-6);
+  EXPECT_EQ((by.array() != 0).count(), 2);
+  // Larger by 1 % along x alone is larger by half of that in all.
+  Eigen::VectorXd wider = Eigen::VectorXd::Zero(8);
+  wider[3] = 0.01 * (520 + 500) / 2;
+  EXPECT_NEAR(by.dot(wider), 0.005, 1e-12);
+}
+
+/// A shift of the whole picture moves all that is seen and where robots are thought to have started, a turn of it how they
+/// pointed as well: neither shows anywhere.
+TEST(PictureScale, AShiftOrATurnOfThePictureTellsNothing) {
   MeasuredSet set;
   set.has_commands = set.has_headings = true;
   auto& run = set.runs.emplace_back();
@@ -135,19 +169,27 @@ TEST(PictureScale, AShiftOfThePictureTellsNothing) {
     for (int i = 0; i < 40; ++i)
       track.samples.push_back({0.5 * i, 5.0 * i + 0.3 * (i % 3), 200.0 * robot + 0.2 * (i % 4), 0.01 * (i % 2)});
   }
+  // Tracked is the point that robots turn about: a start is freed of a turn as if all of a robot were where it was seen.
+  MotionModel model;
+  model.base.ahead_mm = 0;
   PreparedSet prepared(set);
-  prepared.find_headings(MotionModel{}, 1);
+  prepared.find_headings(model, 1);
   Factor slope;
   slope.axis.of = Covariate::kX;
   slope.high = 200;
   const std::vector<Block> blocks = {{Target::kMeasuredX, Basis{}, kAlways},
-                                     {Target::kMeasuredX, Basis{{slope}}, kAlways}};
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(kBaseColumns + 2, kBaseColumns + 2);
-  for (const Unit& unit : linearise(MotionModel{}, prepared.units(), blocks, {100, 1}))
-    information += unit.information;
-  EXPECT_NEAR(information(kBaseColumns, kBaseColumns), 0, 1e-9);
-  // That it bends by 30 mm over the way would be seen.
-  EXPECT_GT(30 * 30 * information(kBaseColumns + 1, kBaseColumns + 1), 1);
+                                     {Target::kMeasuredTurn, Basis{}, kAlways},
+                                     {Target::kMeasuredX, Basis{{slope}}, kAlways},
+                                     {Target::kMeasuredHeading, Basis{}, kAlways}};
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(kBaseColumns + 4, kBaseColumns + 4);
+  for (const Unit& unit : linearise(model, prepared.units(), blocks, {100, 1})) information += unit.information;
+  const auto known = [&](Eigen::Index block) { return information(kBaseColumns + block, kBaseColumns + block); };
+  EXPECT_NEAR(known(0), 0, 1e-9);
+  // But for what the filter believes of its surprises, which do not turn.
+  EXPECT_LT(0.1 * 0.1 * known(1), 0.01);
+  // That it bends by 30 mm over the way would be seen, and a compass that is off by 0.1 rad: robots do not go where they point.
+  EXPECT_GT(30 * 30 * known(2), 1);
+  EXPECT_GT(0.1 * 0.1 * known(3), 1);
 }
 
 }  // namespace
