@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 
 #include "clients/identify/kilogrid/floor_slopes.hpp"
-#include "clients/identify/kilogrid/quick_swarm.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -77,21 +78,7 @@ Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
 }
 
 /// How often measured runs are simulated to say where a model stands.
-constexpr int kEngineRuns = 1;
-constexpr std::size_t kQuickRuns = 2;
-
-FloorStatistics quick_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed) {
-  const std::size_t scenes = target.scenes().size();
-  std::vector<std::vector<RobotSums>> sums(scenes * kQuickRuns);
-  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
-    sums[i] = robot_sums(simulate_quickly(target.scenes()[i % scenes], target.floor(), settings, seed * 100 + i),
-                         target.floor());
-  });
-  std::vector<RobotSums> all;
-  for (std::vector<RobotSums>& run : sums)
-    all.insert(all.end(), std::make_move_iterator(run.begin()), std::make_move_iterator(run.end()));
-  return statistics_of(all);
-}
+constexpr int kEngineRuns = 1, kQuickRuns = 2;
 
 /// What one says more than the other, less what chance makes of it.
 std::vector<double> differences(const FloorStatistics& one, const FloorStatistics& other) {
@@ -116,53 +103,124 @@ double robust_misfit(const FloorTarget& target, const FloorStatistics& at) {
   return sum;
 }
 
+/// What a model's runs say: with the same chance for all models, so that misfits differ by what the models differ.
+using Said = std::function<FloorStatistics(const FloorModel&)>;
+
+/// Steps of a model, each to where the runs around it say that the misfit is least.
+class Approach {
+ public:
+  Approach(const FloorTarget& target, double width, double longest_s, std::uint64_t seed,
+           const FloorProgress& progress)
+      : target_(target), width_(width), longest_s_(longest_s), seed_(seed), progress_(progress) {}
+
+  /// One step; the model stays where it is if that is best. Returns the misfit then.
+  double step(FloorModel& model, const Said& said_by) {
+    const std::size_t parameters = model.values.size(), runs = target_.scenes().size();
+    const std::vector<bool> all(parameters, true);
+    const FloorStatistics at = said_by(model);
+    const double misfit = robust_misfit(target_, at);
+    // Four for each parameter: with less, what chance makes of the slopes leads steps astray. Later those from before count, too:
+    // points stay as wide apart as they were, and what chance makes of slopes falls as they become more.
+    add_points(points_, model, target_, all, (rounds_ == 0 ? 4 : 2) * parameters + 12, width_, longest_s_,
+               seed_ * 10 + rounds_);
+    ++rounds_;
+    const Surrogate surrogate = surrogate_of(target_, at, slopes_of(points_, model, all, runs, width_));
+    const FloorModel before = model;
+    // A step that leads away was too long for the surrogate; it is made shorter.
+    constexpr double kShorter = 0.4;
+    constexpr int kTries = 2;
+    for (int attempt = 0; attempt < kTries; ++attempt) {
+      const Eigen::VectorXd steps = best_steps(surrogate, box_around(before, width_, most_));
+      model.values = moved(before, {steps.data(), steps.data() + steps.size()}, width_);
+      const double now = robust_misfit(target_, said_by(model));
+      progress_(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target_.size()));
+      if (now < misfit) return now;
+      model = before;
+      most_ *= kShorter;
+    }
+    return misfit;
+  }
+
+ private:
+  const FloorTarget& target_;
+  double width_, longest_s_;
+  std::uint64_t seed_, rounds_ = 0;
+  const FloorProgress& progress_;
+  FloorPoints points_;
+  double most_ = 1.5;  ///< of a step, in widths
+};
+
+/// From coarse to fine by quick runs alone, of the first `longest_s` of each measured run. Returns the misfit there.
+double approach_coarsely(FloorModel& model, const FloorTarget& begun, double width, int rounds, double longest_s,
+                         std::uint64_t seed, const FloorProgress& progress) {
+  const auto said_by = [&](const FloorModel& of) {
+    return simulated_statistics(begun, of.settings(), seed * 7 + 2, kQuickRuns, Simulator::kQuick);
+  };
+  Approach approach(begun, width, longest_s, seed, progress);
+  double misfit = 0;
+  for (int round = 0; round < rounds; ++round) misfit = approach.step(model, said_by);
+  return misfit;
+}
+
 }  // namespace
 
 double fit(FloorModel& model, const FloorTarget& target, int rounds, double width, std::uint64_t seed,
            const FloorProgress& progress) {
-  const std::vector<bool> all(model.values.size(), true);
-  const std::size_t parameters = all.size(), runs = target.scenes().size();
   model.later = target.later();
-  // Quick runs, brought near to the engine's by what these differ by where the search begins. The same chance for all, so that
-  // misfits differ by what the models differ.
-  const FloorStatistics engine = simulated_statistics(target, model.settings(), seed * 7 + 1, kEngineRuns);
-  FloorStatistics quick = quick_statistics(target, model.settings(), seed * 7 + 2);
-  const std::vector<double> more = differences(engine, quick);
-  const auto said_by = [&](const FloorModel& of) {
-    FloorStatistics at = quick_statistics(target, of.settings(), seed * 7 + 2);
-    for (std::size_t s = 0; s < more.size(); ++s) at.value[s] += more[s];
-    return at;
+  const auto quick = [&](const FloorModel& of) {
+    return simulated_statistics(target, of.settings(), seed * 7 + 2, kQuickRuns, Simulator::kQuick);
   };
-  FloorStatistics at = said_by(model);
-  double misfit = robust_misfit(target, at);
-  FloorPoints points;
-  // Points stay as wide apart as they were: what chance makes of slopes falls as they become more. Steps become shorter.
-  constexpr double kLongest = 1.5, kShorter = 0.4;
-  constexpr int kTries = 2;
-  double most = kLongest;
-  for (int round = 0; round < rounds; ++round) {
-    // Four for each parameter: with less, what chance makes of the slopes leads steps astray. Later those from before count, too.
-    add_points(points, model, target, all, (round == 0 ? 4 : 2) * parameters + 12, width, kExplored_s,
-               seed * 10 + static_cast<std::uint64_t>(round));
-    const Surrogate surrogate = surrogate_of(target, at, slopes_of(points, model, all, runs, width));
-    const FloorModel before = model;
-    // A step that leads away was too long for the surrogate.
-    for (int attempt = 0; attempt < kTries; ++attempt) {
-      const Eigen::VectorXd steps = best_steps(surrogate, box_around(before, width, most));
-      model.values = moved(before, {steps.data(), steps.data() + steps.size()}, width);
-      const FloorStatistics there = said_by(model);
-      const double now = robust_misfit(target, there);
-      progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
-      if (now < misfit) {
-        misfit = now;
-        at = there;
-        break;
-      }
-      model = before;
-      most *= kShorter;
+  FloorModel best = model;
+  double least = std::numeric_limits<double>::infinity(), misfit = 0;
+  Approach approach(target, width, kExplored_s, seed, progress);
+  for (int round = 0;; ++round) {
+    // Quick runs say where to go, brought near to the engine's by what these differ by here; the engine says what was best.
+    const FloorStatistics engine = simulated_statistics(target, model.settings(), seed * 7 + 1, kEngineRuns);
+    const double here = robust_misfit(target, engine);
+    progress(fmt::format("misfit {:.0f} by the engine", here));
+    if (here < least) {
+      least = here;
+      best = model;
+      misfit = target.misfit(engine);
     }
+    if (round == rounds) break;
+    const std::vector<double> more = differences(engine, quick(model));
+    approach.step(model, [&](const FloorModel& of) {
+      FloorStatistics at = quick(of);
+      for (std::size_t s = 0; s < more.size(); ++s) at.value[s] += more[s];
+      return at;
+    });
   }
-  return target.misfit(at);
+  model = best;
+  return misfit;
+}
+
+void fit_from_afar(FloorModel& model, const FloorTarget& target, std::uint64_t seed, const FloorProgress& progress) {
+  // Where the misfit has several hollows, slopes over wide steps lead to deep ones. What is wide is seen in short runs.
+  struct Stage {
+    double width, longest_s;
+    int rounds;
+  };
+  constexpr Stage kStages[] = {{4, 500, 3}, {2, 800, 2}};
+  std::vector<FloorModel> starts{model};
+  // From where the search once began, too, but for effects: hollows differ with them.
+  starts.push_back(model);
+  for (std::size_t p = 0; p < model.terms[0].parameters.size(); ++p)
+    starts.back().values[p] = model.terms[0].parameters[p].start;
+  if (starts[1].values == starts[0].values) starts.pop_back();
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<FloorTarget> begun;
+  for (const Stage& stage : kStages) begun.push_back(target.cut(stage.longest_s));
+  for (FloorModel& start : starts) {
+    start.later = target.later();
+    double misfit = 0;
+    for (std::size_t i = 0; i < begun.size(); ++i)
+      misfit = approach_coarsely(start, begun[i], kStages[i].width, kStages[i].rounds, kStages[i].longest_s,
+                                 seed * 3 + i, progress);
+    if (misfit >= least) continue;
+    least = misfit;
+    model = start;
+  }
 }
 
 }  // namespace kilotwin::kilogrid
