@@ -8,49 +8,30 @@
 #include <optional>
 
 #include "clients/identify/kilogrid/floor_evidence.hpp"
-#include "clients/identify/kilogrid/quick_swarm.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
 
 /// Sets simulated without an effect; and how often the engine simulates the measured runs, to be compared with them.
-constexpr std::size_t kSets = 16, kRepeats = 2;
+constexpr int kSets = 16, kRepeats = 2;
 constexpr double kWhole_s = std::numeric_limits<double>::infinity();
 
 std::vector<FloorSet> sets_of(const FloorModel& model, const FloorTarget& target, std::uint64_t seed) {
-  const std::size_t scenes = target.scenes().size();
-  std::vector<std::vector<RobotSums>> sums(kSets * scenes);
-  const FloorSettings settings = model.settings();
-  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
-    sums[i] = robot_sums(simulate_quickly(target.scenes()[i % scenes], target.floor(), settings, seed * 1000 + i),
-                         target.floor());
-  });
+  auto sums = simulated_sums(target, model.settings(), seed, kSets, Simulator::kQuick);
+  const auto scenes = static_cast<std::ptrdiff_t>(target.scenes().size());
   std::vector<FloorSet> sets;
-  for (std::size_t b = 0; b < kSets; ++b) {
-    const auto first = sums.begin() + static_cast<std::ptrdiff_t>(b * scenes);
-    sets.emplace_back(std::vector(std::make_move_iterator(first),
-                                  std::make_move_iterator(first + static_cast<std::ptrdiff_t>(scenes))));
-  }
+  for (auto first = sums.begin(); first != sums.end(); first += scenes)
+    sets.emplace_back(std::vector(std::make_move_iterator(first), std::make_move_iterator(first + scenes)));
   return sets;
 }
 
 /// What other sets than this one say together, as many as the engine's repeats.
 FloorStatistics others_than(const std::vector<FloorSet>& sets, std::size_t set) {
-  std::vector<RobotSums> all;
-  for (std::size_t k = 1; k <= kRepeats; ++k) {
-    for (const auto& run : sets[(set + k) % sets.size()].runs) all.insert(all.end(), run.begin(), run.end());
+  std::vector<std::vector<RobotSums>> others;
+  for (std::size_t k = 1; k <= std::size_t{kRepeats}; ++k) {
+    for (const auto& run : sets[(set + k) % sets.size()].runs) others.push_back(run);
   }
-  return statistics_of(all);
-}
-
-/// Each run's robots, of simulated runs in the order of their scenes, time and again.
-FloorStatistics statistics_but(const std::vector<std::vector<RobotSums>>& simulated, std::size_t scenes,
-                               const std::function<bool(std::size_t scene)>& in) {
-  std::vector<RobotSums> all;
-  for (std::size_t i = 0; i < simulated.size(); ++i) {
-    if (in(i % scenes)) all.insert(all.end(), simulated[i].begin(), simulated[i].end());
-  }
-  return statistics_of(all);
+  return pooled(others);
 }
 
 /// Parameters of the model and of its candidates, as those that are in use.
@@ -141,8 +122,10 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
   if (candidates.empty()) return choice;
   const Candidates of(model, candidates);
   const std::size_t runs = target.scenes().size();
-  const auto simulated = simulated_sums(target, model.settings(), seed * 7 + 3, static_cast<int>(kRepeats));
-  const auto here = [&](const std::function<bool(std::size_t)>& in) { return statistics_but(simulated, runs, in); };
+  const auto simulated = simulated_sums(target, model.settings(), seed * 7 + 3, kRepeats);
+  const auto here = [&](const std::function<bool(std::size_t)>& in) { 
+    return pooled(simulated, [&](std::size_t i) { return in(i % runs); });
+  };
   Eigen::MatrixXd slopes = slopes_around(of.all(), target, of.model_only(), 1, kWhole_s, seed);
   add_slopes_of_switches(slopes, of.all(), target, of.switches(), kWhole_s, seed);
   const FloorBox box = box_of(of.all(), model.values.size());

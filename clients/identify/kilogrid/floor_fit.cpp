@@ -4,34 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 
-#include "clients/identify/kilogrid/floor_slopes.hpp"
-#include "clients/identify/kilogrid/quick_swarm.hpp"
+#include "clients/identify/kilogrid/floor_evidence.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
 
 /// Runs of the design are cut to that: what parameters change shows soon.
 constexpr double kExplored_s = 1500;
-
-/// Statistics as a linear function of the parameters around a model, in tolerances: residual = off + slopes * steps.
-struct Surrogate {
-  Eigen::VectorXd off;     ///< simulated less measured
-  Eigen::MatrixXd slopes;  ///< per statistic and parameter
-};
-
-Surrogate surrogate_of(const FloorTarget& target, const FloorStatistics& here, Eigen::MatrixXd slopes) {
-  Surrogate surrogate{Eigen::VectorXd::Zero(slopes.rows()), std::move(slopes)};
-  for (Eigen::Index s = 0; s < surrogate.off.size(); ++s) {
-    const auto q = static_cast<std::size_t>(s);
-    const double off = here.value[q] - target.statistics().value[q];
-    const bool known = target.tolerance()[q] > 0 && std::isfinite(off);
-    const double sd = known ? std::sqrt(target.tolerance()[q] + here.variance[q]) : 1;
-    surrogate.off(s) = known ? off / sd : 0;
-    surrogate.slopes.row(s) *= known ? 1 / sd : 0;
-  }
-  return surrogate;
-}
 
 /// Single statistics that no parameter can reach must not pull at all of them: weights fall beyond three tolerances.
 Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
@@ -53,6 +35,66 @@ const Eigen::VectorXd& importance() {
   }();
   return all;
 }
+
+/// How far off a model is, in numbers that do not go together: statistics in tolerances, those of windows parted from each other by
+/// their correlations over robots. So their sum of squares is what tells windows apart when all are seen together.
+class Metric {
+ public:
+  Metric(const FloorTarget& target, const FloorSet& simulated) : target_(target), parts_(correlation_of({&simulated, 1})) {
+    // As where effects are weighed: half of each variance is left to the number alone.
+    constexpr double kOwn = 0.5;
+    parts_ *= 1 - kOwn;
+    for (Eigen::Index s = 0; s < parts_.rows(); ++s) {
+      for (Eigen::Index t = 0; t < s; ++t) {
+        const bool both = importance()(s) > 1 && importance()(t) > 1;
+        if (!both) parts_(s, t) = parts_(t, s) = 0;
+      }
+      parts_(s, s) = 1;
+    }
+    roots_.compute(parts_);
+  }
+  /// In which numbers are off, of a model that says that.
+  [[nodiscard]] Eigen::VectorXd off(const FloorStatistics& at) const {
+    Eigen::VectorXd v = Eigen::VectorXd::Zero(parts_.rows());
+    for (Eigen::Index s = 0; s < v.size(); ++s) {
+      const auto q = static_cast<std::size_t>(s);
+      const double by = at.value[q] - target_.statistics().value[q];
+      if (known(at, q)) v(s) = by / sd(at, q);
+    }
+    return roots_.matrixL().solve(v);
+  }
+  [[nodiscard]] Eigen::MatrixXd slopes(const FloorStatistics& at, Eigen::MatrixXd of) const {
+    for (Eigen::Index s = 0; s < of.rows(); ++s) {
+      const auto q = static_cast<std::size_t>(s);
+      of.row(s) *= known(at, q) ? 1 / sd(at, q) : 0;
+    }
+    return roots_.matrixL().solve(of);
+  }
+  /// The misfit as steps lower it: what is far off counts by its size, not by its square.
+  [[nodiscard]] double misfit(const FloorStatistics& at) const {
+    const Eigen::VectorXd off = this->off(at);
+    return (importance().array() * weights_of(off).array() * off.array().square()).sum();
+  }
+
+ private:
+  [[nodiscard]] bool known(const FloorStatistics& at, std::size_t s) const {
+    return target_.tolerance()[s] > 0 && std::isfinite(at.value[s] - target_.statistics().value[s]) &&
+           std::isfinite(at.variance[s]);
+  }
+  [[nodiscard]] double sd(const FloorStatistics& at, std::size_t s) const {
+    return std::sqrt(target_.tolerance()[s] + at.variance[s]);
+  }
+
+  const FloorTarget& target_;
+  Eigen::MatrixXd parts_;
+  Eigen::LLT<Eigen::MatrixXd> roots_;
+};
+
+/// Numbers as a linear function of the parameters around a model: off + slopes * steps.
+struct Surrogate {
+  Eigen::VectorXd off;
+  Eigen::MatrixXd slopes;  ///< per number and parameter
+};
 
 /// Steps within the box that lower the misfit most.
 Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
@@ -77,21 +119,7 @@ Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
 }
 
 /// How often measured runs are simulated to say where a model stands.
-constexpr int kEngineRuns = 1;
-constexpr std::size_t kQuickRuns = 2;
-
-FloorStatistics quick_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed) {
-  const std::size_t scenes = target.scenes().size();
-  std::vector<std::vector<RobotSums>> sums(scenes * kQuickRuns);
-  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
-    sums[i] = robot_sums(simulate_quickly(target.scenes()[i % scenes], target.floor(), settings, seed * 100 + i),
-                         target.floor());
-  });
-  std::vector<RobotSums> all;
-  for (std::vector<RobotSums>& run : sums)
-    all.insert(all.end(), std::make_move_iterator(run.begin()), std::make_move_iterator(run.end()));
-  return statistics_of(all);
-}
+constexpr int kEngineRuns = 1, kQuickRuns = 2;
 
 /// What one says more than the other, less what chance makes of it.
 std::vector<double> differences(const FloorStatistics& one, const FloorStatistics& other) {
@@ -104,65 +132,134 @@ std::vector<double> differences(const FloorStatistics& one, const FloorStatistic
   return more;
 }
 
-/// The misfit as steps lower it: what is far off counts by its size, not by its square.
-double robust_misfit(const FloorTarget& target, const FloorStatistics& at) {
-  double sum = 0;
-  for (std::size_t s = 0; s < statistic_count(); ++s) {
-    const double variance = target.tolerance()[s] + at.variance[s];
-    const double off = (at.value[s] - target.statistics().value[s]) / std::sqrt(variance);
-    if (std::isfinite(off) && target.tolerance()[s] > 0)
-      sum += importance()(static_cast<Eigen::Index>(s)) * off * off * std::min(1.0, 3 / std::abs(off));
+/// What a model's runs say: with the same chance for all models, so that misfits differ by what the models differ.
+using Said = std::function<FloorStatistics(const FloorModel&)>;
+
+/// Steps of a model, each to where the runs around it say that the misfit is least.
+class Approach {
+ public:
+  Approach(const FloorTarget& target, const Metric& metric, double width, double longest_s, std::uint64_t seed,
+           const FloorProgress& progress)
+      : target_(target), metric_(metric), width_(width), longest_s_(longest_s), seed_(seed), progress_(progress) {}
+
+  /// One step; the model stays where it is if that is best. Returns the misfit then.
+  double step(FloorModel& model, const Said& said_by) {
+    const std::size_t parameters = model.values.size(), runs = target_.scenes().size();
+    const std::vector<bool> all(parameters, true);
+    const FloorStatistics at = said_by(model);
+    const double misfit = metric_.misfit(at);
+    // Four for each parameter: with less, what chance makes of the slopes leads steps astray. Later those from before count, too:
+    // points stay as wide apart as they were, and what chance makes of slopes falls as they become more.
+    add_points(points_, model, target_, all, (rounds_ == 0 ? 4 : 2) * parameters + 12, width_, longest_s_,
+               seed_ * 10 + rounds_);
+    ++rounds_;
+    const Surrogate surrogate{metric_.off(at), metric_.slopes(at, slopes_of(points_, model, all, runs, width_))};
+    const FloorModel before = model;
+    // A step that leads away was too long for the surrogate; it is made shorter.
+    constexpr double kShorter = 0.4;
+    constexpr int kTries = 2;
+    for (int attempt = 0; attempt < kTries; ++attempt) {
+      const Eigen::VectorXd steps = best_steps(surrogate, box_around(before, width_, most_));
+      model.values = moved(before, {steps.data(), steps.data() + steps.size()}, width_);
+      const double now = metric_.misfit(said_by(model));
+      progress_(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target_.size()));
+      if (now < misfit) return now;
+      model = before;
+      most_ *= kShorter;
+    }
+    return misfit;
   }
-  return sum;
+
+ private:
+  const FloorTarget& target_;
+  const Metric& metric_;
+  double width_, longest_s_;
+  std::uint64_t seed_, rounds_ = 0;
+  const FloorProgress& progress_;
+  FloorPoints points_;
+  double most_ = 1.5;  ///< of a step, in widths
+};
+
+/// Runs of the model as a set, for how their numbers go together.
+FloorSet quick_set(const FloorTarget& target, const FloorModel& model, std::uint64_t seed) {
+  return FloorSet(simulated_sums(target, model.settings(), seed * 7 + 3, kQuickRuns, Simulator::kQuick));
+}
+
+/// From coarse to fine by quick runs alone, of the first `longest_s` of each measured run. Returns the misfit there.
+double approach_coarsely(FloorModel& model, const FloorTarget& begun, double width, int rounds, double longest_s,
+                         std::uint64_t seed, const FloorProgress& progress) {
+  const auto said_by = [&](const FloorModel& of) {
+    return simulated_statistics(begun, of.settings(), seed * 7 + 2, kQuickRuns, Simulator::kQuick);
+  };
+  const Metric metric(begun, quick_set(begun, model, seed));
+  Approach approach(begun, metric, width, longest_s, seed, progress);
+  double misfit = 0;
+  for (int round = 0; round < rounds; ++round) misfit = approach.step(model, said_by);
+  return misfit;
 }
 
 }  // namespace
 
 double fit(FloorModel& model, const FloorTarget& target, int rounds, double width, std::uint64_t seed,
            const FloorProgress& progress) {
-  const std::vector<bool> all(model.values.size(), true);
-  const std::size_t parameters = all.size(), runs = target.scenes().size();
   model.later = target.later();
-  // Quick runs, brought near to the engine's by what these differ by where the search begins. The same chance for all, so that
-  // misfits differ by what the models differ.
-  const FloorStatistics engine = simulated_statistics(target, model.settings(), seed * 7 + 1, kEngineRuns);
-  FloorStatistics quick = quick_statistics(target, model.settings(), seed * 7 + 2);
-  const std::vector<double> more = differences(engine, quick);
-  const auto said_by = [&](const FloorModel& of) {
-    FloorStatistics at = quick_statistics(target, of.settings(), seed * 7 + 2);
-    for (std::size_t s = 0; s < more.size(); ++s) at.value[s] += more[s];
-    return at;
+  const auto quick = [&](const FloorModel& of) {
+    return simulated_statistics(target, of.settings(), seed * 7 + 2, kQuickRuns, Simulator::kQuick);
   };
-  FloorStatistics at = said_by(model);
-  double misfit = robust_misfit(target, at);
-  FloorPoints points;
-  // Points stay as wide apart as they were: what chance makes of slopes falls as they become more. Steps become shorter.
-  constexpr double kLongest = 1.5, kShorter = 0.4;
-  constexpr int kTries = 2;
-  double most = kLongest;
-  for (int round = 0; round < rounds; ++round) {
-    // Four for each parameter: with less, what chance makes of the slopes leads steps astray. Later those from before count, too.
-    add_points(points, model, target, all, (round == 0 ? 4 : 2) * parameters + 12, width, kExplored_s,
-               seed * 10 + static_cast<std::uint64_t>(round));
-    const Surrogate surrogate = surrogate_of(target, at, slopes_of(points, model, all, runs, width));
-    const FloorModel before = model;
-    // A step that leads away was too long for the surrogate.
-    for (int attempt = 0; attempt < kTries; ++attempt) {
-      const Eigen::VectorXd steps = best_steps(surrogate, box_around(before, width, most));
-      model.values = moved(before, {steps.data(), steps.data() + steps.size()}, width);
-      const FloorStatistics there = said_by(model);
-      const double now = robust_misfit(target, there);
-      progress(fmt::format("misfit {:.0f} -> {:.0f} of {} statistics", misfit, now, target.size()));
-      if (now < misfit) {
-        misfit = now;
-        at = there;
-        break;
-      }
-      model = before;
-      most *= kShorter;
+  FloorModel best = model;
+  double least = std::numeric_limits<double>::infinity(), misfit = 0;
+  const Metric metric(target, quick_set(target, model, seed));
+  Approach approach(target, metric, width, kExplored_s, seed, progress);
+  for (int round = 0;; ++round) {
+    // Quick runs say where to go, brought near to the engine's by what these differ by here; the engine says what was best.
+    const FloorStatistics engine = simulated_statistics(target, model.settings(), seed * 7 + 1, kEngineRuns);
+    const double here = metric.misfit(engine);
+    progress(fmt::format("misfit {:.0f} by the engine", here));
+    if (here < least) {
+      least = here;
+      best = model;
+      misfit = target.misfit(engine);
     }
+    if (round == rounds) break;
+    const std::vector<double> more = differences(engine, quick(model));
+    approach.step(model, [&](const FloorModel& of) {
+      FloorStatistics at = quick(of);
+      for (std::size_t s = 0; s < more.size(); ++s) at.value[s] += more[s];
+      return at;
+    });
   }
-  return target.misfit(at);
+  model = best;
+  return misfit;
+}
+
+void fit_from_afar(FloorModel& model, const FloorTarget& target, std::uint64_t seed, const FloorProgress& progress) {
+  // Where the misfit has several hollows, slopes over wide steps lead to deep ones. What is wide is seen in short runs.
+  struct Stage {
+    double width, longest_s;
+    int rounds;
+  };
+  const bool fitted_before = model.terms.size() > 1;
+  const std::vector<Stage> stages =
+      fitted_before ? std::vector<Stage>{{2, 800, 2}} : std::vector<Stage>{{4, 500, 3}, {2, 800, 2}};
+  std::vector<FloorModel> starts{model};
+  // From where the search once began, too, but for effects: hollows differ with them.
+  starts.push_back(model);
+  for (std::size_t p = 0; p < model.terms[0].parameters.size(); ++p)
+    starts.back().values[p] = model.terms[0].parameters[p].start;
+  if (starts[1].values == starts[0].values) starts.pop_back();
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<FloorTarget> begun;
+  for (const Stage& stage : stages) begun.push_back(target.cut(stage.longest_s));
+  for (FloorModel& start : starts) {
+    start.later = target.later();
+    double misfit = 0;
+    for (std::size_t i = 0; i < begun.size(); ++i)
+      misfit = approach_coarsely(start, begun[i], stages[i].width, stages[i].rounds, stages[i].longest_s,
+                                 seed * 3 + i, progress);
+    if (misfit >= least) continue;
+    least = misfit;
+    model = start;
+  }
 }
 
 }  // namespace kilotwin::kilogrid

@@ -50,7 +50,8 @@ class Search {
     add(candidates_[choice.best], score.values);
     found_.gains.push_back({candidates_[choice.best].name, score.gain, score.needed});
     candidates_.erase(candidates_.begin() + static_cast<std::ptrdiff_t>(choice.best));
-    fit(found_.model, target_, 3, 0.8, 100 + round, progress_);
+    fit_from_afar(found_.model, target_, 100 + round, progress_);
+    fit(found_.model, target_, 2, 0.8, 100 + round, progress_);
     note_(found_.gains.back().name, found_.model);
     return true;
   }

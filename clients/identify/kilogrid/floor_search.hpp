@@ -10,8 +10,6 @@
 
 namespace kilotwin::kilogrid {
 
-/// Of the fit of a base model.
-inline constexpr int kBaseRounds = 3;
 inline constexpr const char* kWallEffect = "wall";
 
 /// What an effect removed of the misfit when it was asked for last, and what would have been beyond chance.

@@ -1,18 +1,18 @@
 #include "clients/identify/kilogrid/floor_statistics.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <limits>
 #include <optional>
 
-#include "clients/identify/kilogrid/floor_swarm.hpp"
+#include "clients/identify/kilogrid/floor_groups.hpp"
 #include "clients/identify/kilogrid/track_windows.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
+
+using namespace groups;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kOpen_mm = 150;   ///< from walls: no cell of the rim is heard there
@@ -22,134 +22,12 @@ constexpr double kStill_mm = 16;   ///< in a block: less than what cells blur
 constexpr double kMoving_mm = 40;  ///< in a block: the direction is known
 constexpr double kTimeBin_s = 300;
 constexpr double kFewestRobots = 4;  ///< that a mean is taken of, counted by their weights
-constexpr std::size_t kTimeBins = 16, kMiddleBins = 8;
 constexpr std::size_t kExtentFeature = 8;  ///< of a track window, taken in 100 mm
 constexpr double kExtentScale_mm = 100;
 constexpr double kMiddle_mm = 300;  ///< from walls
 constexpr double kNear_mm = 100;
 constexpr double kAboutSpeed_mm = 75;  ///< a usual step
 constexpr double kGentle_rad = 1.2;    ///< turns of a straight robot with a bias, not of the walk
-
-constexpr std::array kSteps_mm = {0., 8., 16., 24., 32., 40., 50., 60., 70., 80., 90., 100., 110., 120., 150.};
-constexpr std::array kLags = {1, 2, 5, 10, 20, 30, 60};
-constexpr std::array kWalls_mm = {0., 40., 50., 60., 75., 100., 150., 200., 300.};
-constexpr std::size_t kRings = 10, kTurns = 8, kSectors = 8, kNeighbours = 5;
-constexpr std::array kOpenRuns = {1, 2, 3, 4};
-constexpr std::array kWallRuns = {1, 2, 3, 4, 6, 9, 12};
-constexpr std::array kStays = {1, 2, 3, 5, 10, 20, 40, 80};
-constexpr std::size_t kColumns = 4, kRows = 8;
-constexpr std::size_t kAcross = 10, kToMiddle = 5;
-constexpr std::size_t kWay = 10;  ///< blocks, over which robots go to the middle
-constexpr std::array kLasting = {1, 2, 5, 10, 20, 60};
-
-/// Of a feature of track windows: lower edges of the bins of its distribution, the first open to below; and what makes it
-/// about 0 and 1 wide where features are multiplied.
-struct FeatureScale {
-  std::vector<double> edges;
-  double middle, width;
-};
-/// In the order of feature_names().
-const std::array kFeatures = {FeatureScale{{0, 20, 35, 50, 60, 70, 80, 90, 100}, 65, 25},
-                              FeatureScale{{0, 15, 20, 25, 30, 35, 40}, 28, 10},
-                              FeatureScale{{0, 0.01, 0.1, 0.2, 0.4, 0.7}, 0.1, 0.17},
-                              FeatureScale{{0, 0.5, 1.5, 2.5, 4.5, 8.5}, 0.7, 1.3},
-                              FeatureScale{{0, 0.4, 0.8, 1.2, 1.6}, 1, 0.65},
-                              FeatureScale{{0, 0.15, 0.3, 0.45, 0.6}, 0.35, 0.3},
-                              FeatureScale{{-4, -1, -0.4, 0, 0.4, 1}, 0, 0.85},
-                              FeatureScale{{0, 100, 200, 300, 400, 600}, 305, 225},
-                              FeatureScale{{0, 150, 300, 400, 500, 650}, 465, 245},
-                              FeatureScale{{0, 0.01, 0.15, 0.35, 0.65, 0.95}, 0.17, 0.3},
-                              FeatureScale{{0, 70, 120, 180, 250, 320, 400}, 230, 125},
-                              FeatureScale{{0, 1.5, 3.5, 5.5, 7.5}, 4.4, 2.9}};
-
-enum Group : std::size_t {
-  kStep,
-  kMsd,
-  kWall,
-  kRing,
-  kTime,
-  kTurn,
-  kBias,
-  kSpeed,
-  kStillOpen,
-  kStillWall,
-  kCrowd,
-  kDirection,
-  kPlace,
-  kRim,
-  kDrift,
-  kReports,
-  kStay,
-  kMiddle,
-  kExtent,
-  kShareX,
-  kShareY,
-  kInwardX,
-  kInwardY,
-  kSpeedLasts,
-  kTurnLasts,
-  kWindows,  ///< the first of one group per feature
-  kPairs = kWindows + 12,
-};
-
-std::vector<StatisticGroup> make_groups() {
-  std::vector<StatisticGroup> groups;
-  const auto add = [&](std::string name, std::string covariate, std::vector<std::string> labels) {
-    const std::size_t first = groups.empty() ? 0 : groups.back().first + groups.back().size();
-    groups.push_back({std::move(name), std::move(covariate), std::move(labels), first});
-  };
-  const auto each = [](const auto& values, const char* format) {
-    std::vector<std::string> labels;
-    for (const auto v : values) labels.push_back(fmt::format(fmt::runtime(format), v));
-    return labels;
-  };
-  const auto counted = [](std::size_t n, const char* format) {
-    std::vector<std::string> labels;
-    for (std::size_t i = 0; i < n; ++i) labels.push_back(fmt::format(fmt::runtime(format), i));
-    return labels;
-  };
-  std::vector<int> lags_s;
-  for (const int lag : kLags) lags_s.push_back(lag * 10);
-  add("step", "history", each(kSteps_mm, "from {} mm in 10 s"));
-  add("msd", "history", each(lags_s, "root mean square way in {} s, mm"));
-  add("step-by-wall", "position", each(kWalls_mm, "mean step from {} mm off the wall, mm"));
-  add("occupancy", "position", counted(kRings, "ring {}"));
-  add("step-by-time", "time", counted(kTimeBins, "mean step in 5 minutes {}, mm"));
-  add("turn", "history", counted(kTurns, "eighth {} of 0..pi"));
-  add("turn-bias", "robot", {"mean", "between robots", "in halves"});
-  add("speed", "robot", {"mean", "between robots", "in halves"});
-  add("still-in-the-open", "history", each(kOpenRuns, "episodes of {} blocks or more, in 1000"));
-  add("still-beside-walls", "position", each(kWallRuns, "episodes of {} blocks or more, in 1000"));
-  add("step-by-neighbours", "neighbours", counted(kNeighbours, "{} within 100 mm"));
-  add("step-by-direction", "world_frame", counted(kSectors, "eighth {} of the compass"));
-  add("step-by-place", "position", counted(kColumns * kRows, "place {}"));
-  add("occupancy-of-the-rim", "position", counted(kRimParts, "part {}"));
-  add("drift", "world_frame", {"x", "y"});
-  add("reports", "measurement",
-      {"blocks unheard", "heard again after 2 s", "heard twice at once", "cell as before", "next to it",
-       "blocks unheard, between robots", "as many cells on as before", "blocks without any report",
-       "unheard after such a block"});
-  add("stays-beside-walls", "position", each(kStays, "stays of {} blocks or more, in 1000"));
-  add("middle-by-time", "time", counted(kMiddleBins, "share in the middle in 10 minutes {}"));
-  add("extent", "robot", {"mean", "between robots", "in halves"});
-  add("occupancy-along-x", "position", counted(kAcross, "tenth {}"));
-  add("occupancy-along-y", "position", counted(kAcross, "tenth {}"));
-  add("way-to-the-middle-along-x", "position", counted(kToMiddle, "in 100 s from fifth {}, of the middle, mm"));
-  add("way-to-the-middle-along-y", "position", counted(kToMiddle, "in 100 s from fifth {}, of the middle, mm"));
-  std::vector<int> lasting_s;
-  for (const int lag : kLasting) lasting_s.push_back(lag * 10);
-  add("speed-lasts", "history", each(lasting_s, "steps' product after {} s"));
-  add("turning-lasts", "history", each(lasting_s, "turns' product after {} s"));
-  const std::vector<std::string>& features = feature_names();
-  for (std::size_t f = 0; f < kFeatures.size(); ++f)
-    add("windows: " + features[f], "history", each(kFeatures[f].edges, "from {}"));
-  std::vector<std::string> pairs;
-  for (std::size_t f = 0; f < features.size(); ++f) {
-    for (std::size_t g = 0; g < f; ++g) pairs.push_back(features[f] + " with " + features[g]);
-  }
-  add("windows: pairs", "history", std::move(pairs));
-  return groups;
-}
 
 /// Adds up what one robot contributes.
 class Sums {
@@ -419,18 +297,6 @@ std::vector<std::vector<std::size_t>> count_neighbours(const FloorBlocks& blocks
 }
 
 }  // namespace
-
-const std::vector<StatisticGroup>& statistic_groups() {
-  static const std::vector<StatisticGroup> groups = make_groups();
-  return groups;
-}
-
-const StatisticGroup& statistic_group(std::string_view name) {
-  const auto& groups = statistic_groups();
-  return *std::find_if(groups.begin(), groups.end(), [&](const StatisticGroup& g) { return g.name == name; });
-}
-
-std::size_t statistic_count() { return statistic_groups().back().first + statistic_groups().back().size(); }
 
 std::vector<RobotSums> robot_sums(const FloorRun& run, const Floor& floor) {
   const FloorBlocks blocks = blocks_of(run);

@@ -7,6 +7,8 @@
 #include <limits>
 #include <thread>
 
+#include "clients/identify/kilogrid/quick_swarm.hpp"
+
 namespace kilotwin::kilogrid {
 namespace {
 
@@ -111,13 +113,9 @@ std::vector<UnlikeRun> unlike_runs(const std::vector<FloorRun>& runs, const Floo
 }
 
 FloorSet::FloorSet(std::vector<std::vector<RobotSums>> sums) : runs(std::move(sums)) {
-  std::vector<RobotSums> all;
   std::vector<FloorStatistics> each;
-  for (const std::vector<RobotSums>& run : runs) {
-    each.push_back(statistics_of(run));
-    all.insert(all.end(), run.begin(), run.end());
-  }
-  statistics = statistics_of(all);
+  for (const std::vector<RobotSums>& run : runs) each.push_back(statistics_of(run));
+  statistics = pooled(runs);
   for (std::size_t s = 0; s < statistic_count(); ++s) {
     const double mean = statistics.value[s];
     double spread = 0, count = 0;
@@ -148,8 +146,28 @@ double FloorSet::misfit(const FloorStatistics& simulated) const {
 }
 
 FloorTarget::FloorTarget(const std::vector<FloorRun>& runs, const Floor& floor, std::uint32_t threads)
-    : floor_(floor), threads_(threads), set_(sums_of(runs, floor)), later_(order_of_listening(runs, floor)) {
+    : floor_(floor),
+      threads_(threads),
+      runs_(runs),
+      set_(sums_of(runs, floor)),
+      later_(order_of_listening(runs, floor)) {
   for (std::size_t i = 0; i < runs.size(); ++i) scenes_.push_back(scene_of(runs[i], floor, i + 1));
+}
+
+FloorTarget FloorTarget::cut(double longest_s) const {
+  std::vector<FloorRun> begun;
+  for (const FloorRun& run : runs_) {
+    FloorRun& begin = begun.emplace_back(FloorRun{run.name, std::min(run.duration_s, longest_s), {}, {}});
+    for (FloorTrack track : run.tracks) {
+      const auto end = std::lower_bound(track.time_s.begin(), track.time_s.end(), longest_s) - track.time_s.begin();
+      const auto reports = static_cast<std::size_t>(end);
+      track.time_s.resize(reports);
+      track.x_mm.resize(reports);
+      track.y_mm.resize(reports);
+      if (reports > 1) begin.tracks.push_back(std::move(track));
+    }
+  }
+  return FloorTarget(begun, floor_, threads_);
 }
 
 std::size_t FloorTarget::size() const {
@@ -169,23 +187,31 @@ std::vector<FloorRun> simulate_scenes(const FloorTarget& target, const FloorSett
 }
 
 std::vector<std::vector<RobotSums>> simulated_sums(const FloorTarget& target, const FloorSettings& settings,
-                                                   std::uint64_t seed, int repeats) {
+                                                   std::uint64_t seed, int repeats, Simulator by) {
   const std::size_t scenes = target.scenes().size();
   std::vector<std::vector<RobotSums>> sums(scenes * static_cast<std::size_t>(repeats));
   in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
-    const FloorRun run = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times,
-                                  settings.radio, seed * 100 + i);
+    const FloorScene& scene = target.scenes()[i % scenes];
+    const FloorRun run = by == Simulator::kQuick ? simulate_quickly(scene, target.floor(), settings, seed * 100 + i)
+                                                 : simulate(scene, target.floor(), settings.model, settings.times,
+                                                            settings.radio, seed * 100 + i);
     sums[i] = robot_sums(run, target.floor());
   });
   return sums;
 }
 
-FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
-                                     int repeats) {
+FloorStatistics pooled(const std::vector<std::vector<RobotSums>>& runs,
+                       const std::function<bool(std::size_t run)>& in) {
   std::vector<RobotSums> all;
-  for (std::vector<RobotSums>& run : simulated_sums(target, settings, seed, repeats))
-    all.insert(all.end(), std::make_move_iterator(run.begin()), std::make_move_iterator(run.end()));
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (!in || in(i)) all.insert(all.end(), runs[i].begin(), runs[i].end());
+  }
   return statistics_of(all);
+}
+
+FloorStatistics simulated_statistics(const FloorTarget& target, const FloorSettings& settings, std::uint64_t seed,
+                                     int repeats, Simulator by) {
+  return pooled(simulated_sums(target, settings, seed, repeats, by));
 }
 
 }  // namespace kilotwin::kilogrid

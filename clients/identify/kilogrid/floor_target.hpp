@@ -39,6 +39,8 @@ class FloorTarget {
   /// `threads`: for simulated runs, without effect on them.
   FloorTarget(const std::vector<FloorRun>&, const Floor&, std::uint32_t threads = 2);
   [[nodiscard]] std::uint32_t threads() const { return threads_; }
+  /// Of each run the first `longest_s` alone.
+  [[nodiscard]] FloorTarget cut(double longest_s) const;
 
   [[nodiscard]] const std::vector<FloorScene>& scenes() const { return scenes_; }
   [[nodiscard]] const FloorSet& set() const { return set_; }
@@ -57,6 +59,7 @@ class FloorTarget {
  private:
   Floor floor_;
   std::uint32_t threads_;
+  std::vector<FloorRun> runs_;
   std::vector<FloorScene> scenes_;
   FloorSet set_;
   std::array<double, 4> later_;
@@ -68,10 +71,16 @@ void in_parallel(std::uint32_t threads, std::size_t n, const std::function<void(
 /// One simulated run per scene, `repeats` times.
 [[nodiscard]] std::vector<FloorRun> simulate_scenes(const FloorTarget&, const FloorSettings&, std::uint64_t seed,
                                                     int repeats = 1);
+enum class Simulator { kEngine, kQuick };
 /// Sums of these runs' robots, in the same order.
 [[nodiscard]] std::vector<std::vector<RobotSums>> simulated_sums(const FloorTarget&, const FloorSettings&,
-                                                                 std::uint64_t seed, int repeats = 1);
+                                                                 std::uint64_t seed, int repeats = 1,
+                                                                 Simulator by = Simulator::kEngine);
+/// Statistics of all these runs' robots together, or of the runs that are `in`.
+[[nodiscard]] FloorStatistics pooled(const std::vector<std::vector<RobotSums>>& runs,
+                                     const std::function<bool(std::size_t run)>& in = {});
+/// Of simulated_sums.
 [[nodiscard]] FloorStatistics simulated_statistics(const FloorTarget&, const FloorSettings&, std::uint64_t seed,
-                                                   int repeats = 1);
+                                                   int repeats = 1, Simulator by = Simulator::kEngine);
 
 }  // namespace kilotwin::kilogrid

@@ -149,7 +149,8 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   FloorModel model;
   model.add(base_term());
   part = 0.02;
-  fit(model, learned, kBaseRounds, 1, 1, progress);
+  fit_from_afar(model, learned, 1, progress);
+  fit(model, learned, 2, 1, 1, progress);
   const FloorModel base = model;
   note("base", model);
 

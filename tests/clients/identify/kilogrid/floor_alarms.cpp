@@ -34,7 +34,8 @@ const std::vector<Cause> kCauses = {
 FloorModel base_of(const FloorTarget& target, std::uint64_t seed) {
   FloorModel model;
   model.add(base_term());
-  fit(model, target, kBaseRounds, 1, seed, [](const std::string&) {});
+  fit_from_afar(model, target, seed, [](const std::string&) {});
+  fit(model, target, 2, 1, seed, [](const std::string&) {});
   return model;
 }
 

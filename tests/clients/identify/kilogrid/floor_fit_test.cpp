@@ -53,6 +53,53 @@ TEST(FloorFit, RecoversTheSpeedAndTheRange) {
   EXPECT_NEAR(model.values[4], 46, 2.8);
 }
 
+TEST(FloorFit, FindsItsWayFromAfar) {
+  // Three to five widths from where the search begins, in parameters that stand in for each other.
+  FloorModel truth = base_model();
+  truth.values[1] = 27;   // turning; the search begins at 19
+  truth.values[7] = 38;   // range of the walls; at 52
+  truth.values[8] = 1.5;  // their messages; at 3.5
+  truth.values[9] = 15;   // noise of these; at 4
+  const FloorTarget target(runs_of(truth, 500), {});
+  const auto misfit = [&](const FloorModel& of) {
+    return target.misfit(simulated_statistics(target, of.settings(), 1, 2));
+  };
+  FloorModel model = base_model();
+  const double before = misfit(model);
+  fit_from_afar(model, target, 3, kQuiet);
+  const double after = misfit(model), best = misfit(truth);
+  EXPECT_GT(before, 3 * best);
+  // Three quarters of the way to what the truth itself leaves; finer steps go the rest.
+  EXPECT_LT(after - best, 0.25 * (before - best));
+}
+
+TEST(FloorTarget, CutIsTheBeginningOfEachRun) {
+  const std::vector<FloorRun> runs = runs_of(base_model(), 600);
+  const FloorTarget target(runs, {}), begun = target.cut(400);
+  ASSERT_EQ(begun.scenes().size(), runs.size());
+  const StatisticGroup& by_time = statistic_group("step-by-time");  // in 5 minutes
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    EXPECT_EQ(begun.scenes()[r].duration_s, 400);
+    EXPECT_EQ(begun.set().runs[r].size(), target.set().runs[r].size());
+    for (std::size_t i = 0; i < begun.set().runs[r].size(); ++i) {
+      EXPECT_EQ(begun.set().runs[r][i].sum[by_time.first], target.set().runs[r][i].sum[by_time.first]);
+      EXPECT_EQ(begun.set().runs[r][i].weight[by_time.first + 2], 0);
+    }
+  }
+}
+
+TEST(FloorTarget, PoolsTheRunsThatAreIn) {
+  const FloorTarget target(runs_of(base_model(), 700), {});
+  const auto& runs = target.set().runs;
+  std::vector<RobotSums> first_and_last = runs[0];
+  first_and_last.insert(first_and_last.end(), runs[2].begin(), runs[2].end());
+  const FloorStatistics all = pooled(runs), some = pooled(runs, [](std::size_t run) { return run != 1; });
+  const StatisticGroup& msd = statistic_group("msd");
+  EXPECT_EQ(some.value[msd.first], statistics_of(first_and_last).value[msd.first]);
+  EXPECT_EQ(all.value[msd.first], target.statistics().value[msd.first]);
+  EXPECT_NE(all.value[msd.first], some.value[msd.first]);
+}
+
 /// Some of the candidates: each costs simulations.
 std::vector<FloorTerm> some_candidates() {
   std::vector<FloorTerm> some;

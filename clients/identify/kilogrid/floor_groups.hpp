@@ -1,0 +1,65 @@
+/// Which numbers there are: what each group of them is over, in order.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "clients/identify/kilogrid/floor_statistics.hpp"
+#include "clients/identify/kilogrid/floor_swarm.hpp"
+
+namespace kilotwin::kilogrid::groups {
+
+inline constexpr std::size_t kTimeBins = 16, kMiddleBins = 8;
+inline constexpr std::array kSteps_mm = {0., 8., 16., 24., 32., 40., 50., 60., 70., 80., 90., 100., 110., 120., 150.};
+inline constexpr std::array kLags = {1, 2, 5, 10, 20, 30, 60};
+inline constexpr std::array kWalls_mm = {0., 40., 50., 60., 75., 100., 150., 200., 300.};
+inline constexpr std::size_t kRings = 10, kTurns = 8, kSectors = 8, kNeighbours = 5;
+inline constexpr std::array kOpenRuns = {1, 2, 3, 4};
+inline constexpr std::array kWallRuns = {1, 2, 3, 4, 6, 9, 12};
+inline constexpr std::array kStays = {1, 2, 3, 5, 10, 20, 40, 80};
+inline constexpr std::size_t kColumns = 4, kRows = 8;
+inline constexpr std::size_t kAcross = 10, kToMiddle = 5;
+inline constexpr std::size_t kWay = 10;  ///< blocks, over which robots go to the middle
+inline constexpr std::array kLasting = {1, 2, 5, 10, 20, 60};
+
+/// Of a feature of track windows: lower edges of the bins of its distribution, the first open to below; and what makes it
+/// about 0 and 1 wide where features are multiplied.
+struct FeatureScale {
+  std::vector<double> edges;
+  double middle, width;
+};
+/// In the order of feature_names().
+extern const std::array<FeatureScale, 12> kFeatures;
+
+enum Group : std::size_t {
+  kStep,
+  kMsd,
+  kWall,
+  kRing,
+  kTime,
+  kTurn,
+  kBias,
+  kSpeed,
+  kStillOpen,
+  kStillWall,
+  kCrowd,
+  kDirection,
+  kPlace,
+  kRim,
+  kDrift,
+  kReports,
+  kStay,
+  kMiddle,
+  kExtent,
+  kShareX,
+  kShareY,
+  kInwardX,
+  kInwardY,
+  kSpeedLasts,
+  kTurnLasts,
+  kWindows,  ///< the first of one group per feature
+  kPairs = kWindows + 12,
+};
+
+}  // namespace kilotwin::kilogrid::groups

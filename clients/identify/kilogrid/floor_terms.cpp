@@ -1,0 +1,323 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "clients/identify/kilogrid/floor_records.hpp"
+#include "core/math/elementary.h"
+
+namespace kilotwin::kilogrid {
+namespace {
+
+using proto::Effect, proto::Function;
+
+void add_noise(FloorSettings& settings, const char* name, Effect::Target target, double sd, double correlation_s) {
+  proto::Noise& noise = *add_function(add_effect(settings, name, target), Function::NOTHING).mutable_noise();
+  noise.set_sd(sd);
+  noise.set_correlation_s(correlation_s);
+}
+
+/// v: episodes per hour, their scale in s, their tail.
+void set_episodes(Function& function, std::span<const double> v) {
+  proto::Episodes& episodes = *function.mutable_episodes();
+  episodes.set_mean_apart_s(3600 / std::max(v[0], 0.0036));
+  episodes.set_scale_s(v[1]);
+  episodes.set_tail(v[2]);
+}
+
+/// Every robot's own value, as a table: of its normal number z. Successive robots are spread evenly over the distribution, so that
+/// any swarm has nearly the whole of it; `step` tells tables apart that must not go together.
+void add_table_of_robots(Effect& effect, double step, const std::function<double(double z)>& value) {
+  constexpr std::uint32_t kRobots = 256;
+  proto::Table& table = *add_function(effect, Function::ROBOT).mutable_table();
+  for (std::uint32_t robot = 0; robot < kRobots; ++robot) {
+    const double share = (robot + 0.5) * step;
+    table.add_key(robot);
+    table.add_value(value(kt_inverse_normal(share - std::floor(share))));
+  }
+}
+
+/// Gains distributed as z + skew (z^2 - 1).
+void add_speeds(FloorSettings& settings, double sd, double skew) {
+  constexpr double kGolden = 0.6180339887498949, kSlowest = -0.95;
+  add_table_of_robots(add_effect(settings, "speed-of-robots", Effect::WHEEL_GAIN), kGolden, [=](double z) {
+    return std::max(sd * (z + skew * (z * z - 1)) / std::sqrt(1 + 2 * skew * skew), kSlowest);
+  });
+}
+
+/// Speeds going straight, distributed as z + skew (z^2 - 1): what turns robots stays as it is, their biases too.
+void add_straight_speeds(FloorSettings& settings, double sd_mm_s, double skew) {
+  constexpr double kGolden = 0.6180339887498949;
+  Effect& effect = add_effect(settings, "straight-speed-of-robots", Effect::WHEEL_OFFSET);
+  effect.add_during(proto::STRAIGHT);
+  const double slowest_mm_s = 0.5 - settings.model.motion().straight_speed_mm_s();
+  add_table_of_robots(effect, kGolden, [=](double z) {
+    return std::max(sd_mm_s * (z + skew * (z * z - 1)) / std::sqrt(1 + 2 * skew * skew), slowest_mm_s);
+  });
+}
+
+/// Turn rates distributed as z + tail z^3.
+void add_turning(FloorSettings& settings, double sd, double tail) {
+  constexpr double kSilver = 0.41421356237309505;
+  const double scale = sd / std::sqrt(1 + 6 * tail + 15 * tail * tail);
+  add_table_of_robots(add_effect(settings, "turning-of-robots", Effect::TURN_RATE), kSilver,
+                      [=](double z) { return scale * (z + tail * z * z * z); });
+}
+
+void add_harmonic(Function& function, double cosine, double sine, double period) {
+  function.mutable_harmonic()->set_cosine(cosine);
+  function.mutable_harmonic()->set_sine(sine);
+  function.mutable_harmonic()->set_period(period);
+}
+
+}  // namespace
+
+FloorTerm base_term() {
+  FloorTerm term{"base", {}, "", "", "", {}, 0, {}};
+  term.parameters = {{"straight_speed_mm_s", 11.5, 3, 20, 1.2},
+                     {"turn_speed_mm_s", 19, 5, 40, 3},
+                     {"bias_sd_mm_s", 1.2, 0.05, 4, 0.4},
+                     {"factor_variance_s", 0.06, 0, 2, 0.06},
+                     {"range_mm", 47, 35, 70, 2},
+                     {"heard", 0.97, 0.1, 1, 0.08},
+                     {"heard_sd", 0.12, 0, 0.5, 0.06},
+                     {"wall_range_mm", 52, 20, 75, 3},
+                     {"wall_heard", 3.5, 0.3, 7, 1},
+                     {"wall_noise", 4, 0.5, 60, 3},
+                     {"while_talking", 0.15, 0.01, 1, 0.06},
+                     {"same_cell", 0.12, 0.02, 0.5, 0.04},
+                     {"in_turn", 0.6, 0, 1, 0.1},
+                     {"blur_mm", 2, 0.5, 12, 1},
+                     {"silent_s", 300, 30, 2000, 60},
+                     {"talking_s", 225, 20, 2000, 50}};
+  term.apply = [](std::span<const double> v, FloorSettings& s) {
+    proto::Motion& motion = *s.model.mutable_motion();
+    motion.set_straight_speed_mm_s(v[0]);
+    motion.set_turn_speed_mm_s(v[1]);
+    motion.set_bias_mean_mm_s(0);
+    motion.set_bias_sd_mm_s(v[2]);
+    motion.set_factor_variance_s(v[3]);
+    s.radio.range_mm = v[4];
+    s.radio.heard = v[5];
+    s.radio.heard_sd = v[6];
+    s.radio.wall_range_mm = v[7];
+    s.radio.wall_heard = v[8];
+    s.radio.wall_noise = v[9];
+    s.radio.while_talking = v[10];
+    for (std::size_t i = 1; i < 4; ++i) s.radio.later[i] *= 4 * (1 - v[11]) / 3;
+    s.radio.later[0] = v[11];
+    s.radio.in_turn = v[12];
+    s.radio.blur_mm = v[13];
+    s.radio.silent_s = v[14];
+    s.radio.talking_s = v[15];
+  };
+  return term;
+}
+
+std::vector<FloorTerm> candidate_terms(const Floor& floor) {
+  std::vector<FloorTerm> terms;
+  terms.push_back({"speed-of-robots",
+                   {"robot"},
+                   "WHEEL_GAIN",
+                   "every robot has a speed of its own: they spread by {0:.2f} of the mean, skewed by {1:+.2f}",
+                   "",
+                   {{"sd", 0, 0, 0.5, 0.25}, {"skew", 0, -0.6, 0.6, 0.2}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) { add_speeds(s, v[0], v[1]); }});
+  terms.push_back({"straight-speed-of-robots",
+                   {"robot", "command"},
+                   "WHEEL_OFFSET",
+                   "every robot has a speed of its own as it goes straight, but not as it turns: they spread by "
+                   "{0:.1f} mm/s, skewed by {1:+.2f}",
+                   "",
+                   {{"sd_mm_s", 0, 0, 6, 2.5}, {"skew", -0.2, -0.6, 0.6, 0.2}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) { add_straight_speeds(s, v[0], v[1]); }});
+  terms.push_back({"turning-of-robots",
+                   {"robot"},
+                   "TURN_RATE",
+                   "every robot turns by itself at a rate of its own: they spread by {0:.3f} rad/s, a few by far "
+                   "more (tail {1:.2f})",
+                   "",
+                   {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"tail", 0.1, 0, 0.5, 0.1}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) { add_turning(s, v[0], v[1]); }});
+  terms.push_back({"wandering-turn",
+                   {"history"},
+                   "TURN_RATE",
+                   "robots turn by themselves, by {0:.3f} rad/s (standard deviation), which lasts {1:.0f} s",
+                   "",
+                   {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"correlation_s", 200, 5, 3000, 100}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) {
+                     add_noise(s, "wandering-turn", Effect::TURN_RATE, v[0], v[1]);
+                   }});
+  terms.push_back({"wandering-speed",
+                   {"history"},
+                   "BODY_DRIFT",
+                   "a robot's speed wanders by {0:.2f} mm/s (standard deviation), which lasts {1:.0f} s",
+                   "",
+                   {{"sd_mm_s", 0, 0, 5, 1}, {"correlation_s", 300, 5, 3000, 150}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) {
+                     add_noise(s, "wandering-speed", Effect::BODY_DRIFT, v[0], v[1]);
+                   }});
+  terms.push_back({"stalls",
+                   {"history"},
+                   "WHEEL_GAIN",
+                   "robots stall {0:.1f} times an hour, longer than t with the chance (1 + t / {1:.1f} s)^-{2:.2f}",
+                   "",
+                   {{"per_hour", 0, 0, 240, 25}, {"scale_s", 8, 1, 120, 4}, {"tail", 1.8, 1.1, 6, 0.3}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) {
+                     Effect& effect = add_effect(s, "stalls", Effect::WHEEL_GAIN);
+                     add_function(effect, Function::NOTHING).set_constant(-1);
+                     set_episodes(add_function(effect, Function::NOTHING), v);
+                   }});
+  terms.push_back({"stuck-beside-walls",
+                   {"position", "history"},
+                   "WHEEL_GAIN",
+                   "within 50 mm of a wall robots get stuck, {0:.1f} times an hour and wall, longer than t with "
+                   "the chance (1 + t / {1:.0f} s)^-{2:.2f}",
+                   "film robots that stand beside a wall: their motors push in vain, or rest",
+                   {{"per_hour", 0, 0, 120, 12}, {"scale_s", 40, 2, 300, 15}, {"tail", 1.2, 0.3, 5, 0.25}},
+                   1,
+                   [floor](std::span<const double> v, FloorSettings& s) {
+                     for (const Side& side : sides_of(floor)) {
+                       Effect& effect =
+                           add_effect(s, (std::string("stuck-") + side.name).c_str(), Effect::WHEEL_GAIN);
+                       add_beside(effect, side, -1);
+                       set_episodes(add_function(effect, Function::NOTHING), v);
+                     }
+                   }});
+  terms.push_back(
+      {"slowing",
+       {"time"},
+       "WHEEL_GAIN",
+       "speeds fall with time, by {0:.2f} of themselves in an hour",
+       "the clock and the motors' own time are one here, since motors never rest: let some robots rest for half of "
+       "a run",
+       {{"per_hour", 0, -1, 2, 0.3}},
+       1,
+       [](std::span<const double> v, FloorSettings& s) {
+         const double rate = std::abs(v[0]) < 1e-4 ? 1e-4 : v[0];
+         proto::Exponential& decay =
+             *add_function(add_effect(s, "slowing", Effect::WHEEL_GAIN), Function::TIME).mutable_exponential();
+         decay.set_at_zero(0);
+         decay.set_at_infinity(-1);
+         decay.set_scale(3600 / rate);
+       }});
+  terms.push_back({"crowd",
+                   {"neighbours"},
+                   "WHEEL_GAIN",
+                   "in a crowd wheels change their speed, at most by {0:+.2f}, with others within {1:.0f} mm",
+                   "",
+                   {{"gain", 0, -0.95, 1, 0.3}, {"radius_mm", 50, 34, 120, 10}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) {
+                     Function& function =
+                         add_function(add_effect(s, "crowd", Effect::WHEEL_GAIN), Function::DENSITY);
+                     function.set_radius_mm(v[1]);
+                     function.mutable_exponential()->set_at_zero(0);
+                     function.mutable_exponential()->set_at_infinity(v[0]);
+                     function.mutable_exponential()->set_scale(1);
+                   }});
+  terms.push_back(
+      {"middle",
+       {"position"},
+       "WHEEL_GAIN",
+       "in the middle of the floor wheels change their speed by {0:+.2f}, falling to nothing at the walls",
+       "",
+       {{"gain", 0, -0.9, 0.9, 0.25}},
+       1,
+       [floor](std::span<const double> v, FloorSettings& s) {
+         Effect& effect = add_effect(s, "middle", Effect::WHEEL_GAIN);
+         add_harmonic(add_function(effect, Function::X), v[0], 0, 2 * floor.width_mm);
+         add_harmonic(add_function(effect, Function::Y), 1, 0, 2 * floor.height_mm);
+       }});
+  terms.push_back({"slope-of-speed",
+                   {"position"},
+                   "WHEEL_GAIN",
+                   "speed changes over the floor: by {0:+.2f} at the right end and {1:+.2f} at the upper end, the "
+                   "other way at the others",
+                   "",
+                   {{"x", 0, -0.6, 0.6, 0.2}, {"y", 0, -0.6, 0.6, 0.2}},
+                   2,
+                   [floor](std::span<const double> v, FloorSettings& s) {
+                     add_harmonic(add_function(add_effect(s, "slope-x", Effect::WHEEL_GAIN), Function::X), 0, v[0],
+                                  2 * floor.width_mm);
+                     add_harmonic(add_function(add_effect(s, "slope-y", Effect::WHEEL_GAIN), Function::Y), 0, v[1],
+                                  2 * floor.height_mm);
+                   }});
+  terms.push_back({"grain",
+                   {"heading", "world_frame"},
+                   "WHEEL_GAIN",
+                   "speed depends on the direction as a grain makes it, by {0:+.3f} and {1:+.3f}",
+                   "",
+                   {{"cosine", 0, -0.5, 0.5, 0.1}, {"sine", 0, -0.5, 0.5, 0.1}},
+                   2,
+                   [](std::span<const double> v, FloorSettings& s) {
+                     add_harmonic(add_function(add_effect(s, "grain", Effect::WHEEL_GAIN), Function::HEADING), v[0],
+                                  v[1], 3.141592653589793);
+                   }});
+  terms.push_back(
+      {"drift",
+       {"world_frame"},
+       "WORLD_DRIFT",
+       "robots drift in the room, by {0:+.2f} and {1:+.2f} mm/s along x and y",
+       "",
+       {{"x_mm_s", 0, -3, 3, 0.8}, {"y_mm_s", 0, -3, 3, 0.8}},
+       2,
+       [](std::span<const double> v, FloorSettings& s) {
+         add_function(add_effect(s, "drift-x", Effect::WORLD_DRIFT), Function::NOTHING).set_constant(v[0]);
+         Effect& effect = add_effect(s, "drift-y", Effect::WORLD_DRIFT);
+         effect.set_direction_deg(90);
+         add_function(effect, Function::NOTHING).set_constant(v[1]);
+       }});
+  terms.push_back(
+      {"to-the-middle",
+       {"position", "world_frame"},
+       "WORLD_DRIFT",
+       "robots drift towards the middle lines of the floor, by {0:+.2f} mm/s beside the walls along x and {1:+.2f} "
+       "along y, by less the nearer to the middle",
+       "turn the floor's level by a spirit level, or film robots at rest on it that are tapped: robots that slide "
+       "do so, robots that turn to the middle do not",
+       {{"x_mm_s", 0, -2, 2, 0.3}, {"y_mm_s", 0, -2, 2, 0.3}},
+       2,
+       [floor](std::span<const double> v, FloorSettings& s) {
+         add_harmonic(add_function(add_effect(s, "to-the-middle-x", Effect::WORLD_DRIFT), Function::X), 0, -v[0],
+                      2 * floor.width_mm);
+         Effect& effect = add_effect(s, "to-the-middle-y", Effect::WORLD_DRIFT);
+         effect.set_direction_deg(90);
+         add_harmonic(add_function(effect, Function::Y), 0, -v[1], 2 * floor.height_mm);
+       }});
+  terms.push_back({"slow-start",
+                   {"time_since_command"},
+                   "WHEEL_GAIN",
+                   "after a command wheels begin with a change of {0:+.2f}, which fades in {1:.1f} s",
+                   "",
+                   {{"gain", 0, -0.95, 0.95, 0.4}, {"scale_s", 2, 0.2, 15, 1}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) {
+                     proto::Exponential& e = *add_function(add_effect(s, "slow-start", Effect::WHEEL_GAIN),
+                                                           Function::TIME_SINCE_COMMAND)
+                                                  .mutable_exponential();
+                     e.set_at_zero(v[0]);
+                     e.set_at_infinity(0);
+                     e.set_scale(v[1]);
+                   }});
+  terms.push_back({"pull",
+                   {},
+                   "TURN_RATE",
+                   "robots that go straight turn by {0:+.3f} rad/s on average",
+                   "",
+                   {{"rad_s", 0, -0.2, 0.2, 0.04}},
+                   1,
+                   [](std::span<const double> v, FloorSettings& s) {
+                     Effect& effect = add_effect(s, "pull", Effect::TURN_RATE);
+                     effect.add_during(proto::STRAIGHT);
+                     add_function(effect, Function::NOTHING).set_constant(v[0]);
+                   }});
+  return terms;
+}
+
+}  // namespace kilotwin::kilogrid
