@@ -2,8 +2,6 @@
 // the cells in which a floor remembers.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 
@@ -270,52 +268,51 @@ MotionModel remembering(const Fitter& fitter, std::uint8_t cells) {
   return model;
 }
 
-TEST(Place, TheCellsOfAFloorThatRemembersAreFound) {
-  /// What a robot's speed is there, by how long its cell was trodden.
-  struct Floor {
-    FloorCells cells;
-    std::function<double(double)> gain;
-    std::uint64_t seed;
-    double duration_s;
-    std::uint8_t sought_from;  ///< the cells of the model, by number
-    double side_off_mm, corner_off_mm, gain_off;
+TEST(Place, TheCellsOfTheFloorAreFound) {
+  const MeasuredSet set =
+      played([](const Around& a) { return 1 - 0.5 * a.trodden_s / (a.trodden_s + 4); }, 8, 12, 150);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = remembering(fitter, 2);
+  ASSERT_TRUE(shape_memory(fitter, model, 0));
+  const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
+  const FloorCells& cells = model.cells[axis.radius];
+  EXPECT_NEAR(cells.side_mm, kCells.side_mm, 0.7);
+  EXPECT_LT(off(cells.x_mm, kCells.x_mm, kCells.side_mm), 3);
+  EXPECT_LT(off(cells.y_mm, kCells.y_mm, kCells.side_mm), 3);
+  Situation fresh = driven_at(0, 0), worn = fresh;
+  worn.near.trodden_s[axis.radius] = 12;
+  EXPECT_NEAR(gain_of(model, worn) / gain_of(model, fresh), 1 - 0.5 * 12 / 16, 0.05);
+  // As it is written.
+  const proto::Model written = proto_of(model);
+  ASSERT_EQ(written.field_size(), 1);
+  EXPECT_EQ(written.field(0).name(), field_name(axis.radius));
+  EXPECT_NEAR(written.field(0).cell_mm(), model.cells[axis.radius].side_mm, 1e-5);
+  const auto& effects = written.effect();
+  EXPECT_TRUE(std::any_of(effects.begin(), effects.end(), [&](const proto::Effect& e) {
+    return e.function_size() == 1 && e.function(0).of() == proto::Function::PLACE &&
+           e.function(0).field() == field_name(axis.radius);
+  }));
+}
+
+TEST(Place, AFloorThatIsPressedDownAtOnceIsFound) {
+  const FloorCells small{24, 7, -9};
+  const MeasuredSet set = played([](const Around& a) { return a.trodden_s > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model = remembering(fitter, 0);
+  ASSERT_TRUE(shape_memory(fitter, model, 0));
+  const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
+  const FloorCells& cells = model.cells[axis.radius];
+  EXPECT_NEAR(cells.side_mm, small.side_mm, 0.3);
+  EXPECT_LT(off(cells.x_mm, small.x_mm, small.side_mm), 2);
+  EXPECT_LT(off(cells.y_mm, small.y_mm, small.side_mm), 2);
+  const auto gain_after = [&](double seconds) {
+    Situation s = driven_at(0, 0);
+    s.near.trodden_s[axis.radius] = static_cast<float>(seconds);
+    return gain_of(model, s);
   };
-  // One that gives way little by little, and one that is pressed down at once.
-  const std::array<Floor, 2> floors = {
-      Floor{kCells, [](double s) { return 1 - 0.5 * s / (s + 4); }, 8, 150, 2, 0.7, 3, 0.05},
-      Floor{{24, 7, -9}, [](double s) { return s > 2 ? 0.7 : 1.0; }, 9, 200, 0, 0.3, 2, 0.06}};
-  for (const Floor& floor : floors) {
-    SCOPED_TRACE(floor.seed);
-    const MeasuredSet set = played([&](const Around& a) { return floor.gain(a.trodden_s); }, floor.seed, 12,
-                                   floor.duration_s, floor.cells);
-    PreparedSet prepared(set);
-    const Fitter fitter(prepared, 2);
-    MotionModel model = remembering(fitter, floor.sought_from);
-    ASSERT_TRUE(shape_memory(fitter, model, 0));
-    const std::uint8_t number = model.terms[0].blocks.front().basis.factors.front().axis.radius;
-    const FloorCells& cells = model.cells[number];
-    EXPECT_NEAR(cells.side_mm, floor.cells.side_mm, floor.side_off_mm);
-    EXPECT_LT(off(cells.x_mm, floor.cells.x_mm, floor.cells.side_mm), floor.corner_off_mm);
-    EXPECT_LT(off(cells.y_mm, floor.cells.y_mm, floor.cells.side_mm), floor.corner_off_mm);
-    const auto gain_after = [&](double seconds) {
-      Situation s = driven_at(0, 0);
-      s.near.trodden_s[number] = static_cast<float>(seconds);
-      return gain_of(model, s);
-    };
-    for (const double seconds : {4.0, 12.0, 20.0})
-      EXPECT_NEAR(gain_after(seconds) / gain_after(0.25), floor.gain(seconds) / floor.gain(0.25), floor.gain_off)
-          << seconds;
-    // As it is written.
-    const proto::Model written = proto_of(model);
-    ASSERT_EQ(written.field_size(), 1);
-    EXPECT_EQ(written.field(0).name(), field_name(number));
-    EXPECT_NEAR(written.field(0).cell_mm(), cells.side_mm, 1e-5);
-    const auto& effects = written.effect();
-    EXPECT_TRUE(std::any_of(effects.begin(), effects.end(), [&](const proto::Effect& e) {
-      return e.function_size() == 1 && e.function(0).of() == proto::Function::PLACE &&
-             e.function(0).field() == field_name(number);
-    }));
-  }
+  for (const double seconds : {4.0, 10.0, 20.0}) EXPECT_NEAR(gain_after(seconds) / gain_after(0.25), 0.7, 0.06);
 }
 
 }  // namespace
