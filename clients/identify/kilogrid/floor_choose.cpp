@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "clients/identify/kilogrid/floor_evidence.hpp"
@@ -116,6 +119,20 @@ bool CandidateScore::helps_others() const {
   return sum > 0 && against <= by_run.size() / 4;
 }
 
+bool CandidateScore::helps_all_alike() const {
+  // One-sided, of 2 to 9 degrees of freedom; more are as good as nine.
+  constexpr std::array kStudent = {6.965, 4.541, 3.747, 3.365, 3.143, 2.998, 2.896, 2.821};
+  if (by_run.size() < 3) return false;
+  const auto count = static_cast<double>(by_run.size());
+  const double mean = std::accumulate(by_run.begin(), by_run.end(), 0.0) / count;
+  double squares = 0;
+  for (const double removed : by_run) {
+    if (!(removed > 0)) return false;
+    squares += (removed - mean) * (removed - mean);
+  }
+  return mean > kStudent[std::min(by_run.size() - 3, kStudent.size() - 1)] * std::sqrt(squares / (count - 1) / count);
+}
+
 Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates, const FloorTarget& target,
               std::uint64_t seed, const FloorProgress& progress) {
   Choice choice;
@@ -167,7 +184,8 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
                         correlation);
   }
   std::string tried;
-  const auto better = [](const CandidateScore& a, const CandidateScore& b) {
+  const auto better = [&](const CandidateScore& a, const CandidateScore& b) {
+    if (a.beyond(choice.bound) != b.beyond(choice.bound)) return a.beyond(choice.bound);
     return a.helps_others() != b.helps_others() ? a.helps_others() : a.evidence > b.evidence;
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
@@ -180,8 +198,10 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
                              {},
                              {first, first + static_cast<std::ptrdiff_t>(candidates[c].parameters.size())}});
     CandidateScore& score = choice.scores.back();
+    score.by_chance_alone = chance.evidence(c, gains.of[c]);
     for (std::size_t r = 0; r < alone.size(); ++r)
       score.by_run.push_back(gain_of_other(others[r], alone[r], of, c, box));
+    if (score.helps_all_alike()) score.needed = chance.gain_of(c, choice.bound);
     if (better(score, choice.scores[choice.best])) choice.best = c;
     tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, score.gain, score.needed);
     for (std::size_t r = 0; r < score.by_run.size(); ++r)

@@ -147,13 +147,41 @@ TEST(FloorChoice, AnEffectOfOneRunAloneIsNotFound) {
 }
 
 TEST(CandidateScore, HelpsOthersWithAllRunsButOneOfFourAndAltogether) {
-  const auto helps = [](std::vector<double> by_run) { return CandidateScore{1, 1, 1, by_run, {}}.helps_others(); };
+  const auto helps = [](std::vector<double> by_run) { return CandidateScore{1, 1, 1, by_run, {}, 0}.helps_others(); };
   EXPECT_TRUE(helps({}));  // of fewer than three runs nothing can be said
   EXPECT_TRUE(helps({3, 1, 2}));
   EXPECT_FALSE(helps({9, 9, -1}));
   EXPECT_TRUE(helps({3, 1, 2, -1}));
   EXPECT_FALSE(helps({3, 1, 2, -7}));
   EXPECT_FALSE(helps({9, 9, -1, -1}));
+}
+
+TEST(CandidateScore, HelpsAllAlikeWhereTheMeanIsBeyondWhatRunsDifferBy) {
+  const auto alike = [](std::vector<double> by_run) {
+    return CandidateScore{1, 1, 1, by_run, {}, 0}.helps_all_alike();
+  };
+  EXPECT_FALSE(alike({}));
+  EXPECT_FALSE(alike({5, 5}));
+  // Student's t: 7.4, where 4.54 is beyond 1 % of four runs; 2.8; 2.9.
+  EXPECT_TRUE(alike({23, 36, 43, 28}));
+  EXPECT_FALSE(alike({10, 2, 24, 25}));
+  EXPECT_FALSE(alike({9, 30, 8, 19}));
+  // Three runs: 6.97 is asked for. These have 8.7 and 5.2.
+  EXPECT_TRUE(alike({4, 5, 6}));
+  EXPECT_FALSE(alike({2, 3, 4}));
+  EXPECT_FALSE(alike({30, 31, 32, -0.1}));
+}
+
+TEST(CandidateScore, WhatTheModelLeavesCountsUnlessRunsAgree) {
+  const double bound = 10;
+  const auto beyond = [&](double evidence, double by_chance_alone, std::vector<double> by_run) {
+    return CandidateScore{1, 1, evidence, by_run, {}, by_chance_alone}.beyond(bound);
+  };
+  EXPECT_TRUE(beyond(11, 40, {9, 30, 8, 19}));
+  EXPECT_FALSE(beyond(9, 40, {9, 30, 8, 19}));
+  EXPECT_TRUE(beyond(9, 40, {23, 36, 43, 28}));
+  EXPECT_FALSE(beyond(3, 9, {23, 36, 43, 28}));
+  EXPECT_FALSE(beyond(11, 40, {23, 36, -43, -28}));
 }
 
 TEST(FloorSlopes, AreThoseOfThePointsThatAreNear) {
