@@ -41,6 +41,29 @@ Effect fatigue_of_motors(double strength) {
           {}};
 }
 
+Effect fatigue_of_left_motors(double strength) {
+  return {"fatigue-of-left-motors",
+          "a left wheel runs at 1 - 0.4 (1 - exp(-u / 60 s)) of its speed, u = time that its motor has run",
+          {{"motor_time"}},
+          {"robot"},
+          [=](const Situation& at, Push& push) {
+            push.gain.left *= 1 - 0.4 * strength * (1 - std::exp(-at.driven_s.left / 60));
+          },
+          {}};
+}
+
+Effect worn_brushes(double strength) {
+  return {"worn-brushes",
+          "a wheel runs at 0.72 of its speed once its own motor has run for 75 s",
+          {{"motor_time"}},
+          {"time", "robot"},
+          [=](const Situation& at, Push& push) {
+            if (at.driven_s.left > 75) push.gain.left *= 1 - 0.28 * strength;
+            if (at.driven_s.right > 75) push.gain.right *= 1 - 0.28 * strength;
+          },
+          {}};
+}
+
 Effect slow_start(double strength) {
   return {
       "slow-start",
@@ -220,6 +243,22 @@ Effect crowd(double strength) {
           {}};
 }
 
+Effect third_of_a_party(double strength) {
+  return {"third-of-a-party",
+          "speed is 0.55 while two or more others are within 95 mm",
+          {{"neighbours"}},
+          {"position", "time"},
+          [=](const Situation& at, Push& push) {
+            int near = 0;
+            for (std::size_t i = 0; i < at.discs->size(); ++i) {
+              if (static_cast<int>(i) == at.robot) continue;
+              near += std::hypot((*at.discs)[i].x - at.disc.x, (*at.discs)[i].y - at.disc.y) < 95 ? 1 : 0;
+            }
+            if (near >= 2) slow_both(push, 1 - 0.45 * strength);
+          },
+          {}};
+}
+
 Effect flight(double strength) {
   return {"flight",
           "robots turn away from the nearest other, at 0.25 rad/s times sin(bearing) exp(-(d / 70 mm)^2)",
@@ -366,6 +405,18 @@ Effect keystone(double strength) {
           [=](const Situation&, View& view) {
             const double away = 1 + strength * (0.17 * view.point.x + 0.09 * view.point.y) / 1000;
             view.point = {view.point.x / away, view.point.y / away};
+          }};
+}
+
+Effect creeping_camera(double strength) {
+  return {"creeping-camera",
+          "the picture shifts by 12 mm (1 - exp(-t / 50 s)) along x and by 1 mm a minute along y",
+          {{"measurement", "time"}},
+          {"robot", "world_frame"},
+          {},
+          [=](const Situation& at, View& view) {
+            view.point.x += 12 * strength * (1 - std::exp(-at.time_s / 50));
+            view.point.y += strength * at.time_s / 60;
           }};
 }
 

@@ -6,9 +6,11 @@
 namespace kilotwin::truth {
 
 // Of time and use.
-Effect battery_by_the_clock(double strength = 1);  // all wheels slow down with the time of day
-Effect fatigue_of_motors(double strength = 1);     // each wheel slows down as its own motor is used
-Effect slow_start(double strength = 1);            // a motion begins slowly, overshoots, settles
+Effect battery_by_the_clock(double strength = 1);    // all wheels slow down with the time of day
+Effect fatigue_of_motors(double strength = 1);       // each wheel slows down as its own motor is used
+Effect fatigue_of_left_motors(double strength = 1);  // left wheels alone do so
+Effect worn_brushes(double strength = 1);            // at once, after so much use
+Effect slow_start(double strength = 1);              // a motion begins slowly, overshoots, settles
 
 // Of place and direction.
 Effect slow_patch(double strength = 1);      // an oval patch of rough floor
@@ -26,10 +28,11 @@ Effect table_knock(double strength = 1);     // vibrating robots slide when the 
 Effect batteries_of_the_day(double strength = 1);  // every run has another speed
 
 // Of robots.
-Effect slow_robots(double strength = 1);  // every third robot is slow, wherever it is
-Effect crowd(double strength = 1);        // robots are slow among others
-Effect flight(double strength = 1);       // robots turn away from the nearest other
-Effect wait_behind(double strength = 1);  // robots are slow behind others
+Effect slow_robots(double strength = 1);       // every third robot is slow, wherever it is
+Effect crowd(double strength = 1);             // robots are slow among others
+Effect third_of_a_party(double strength = 1);  // robots are slow among two or more others
+Effect flight(double strength = 1);            // robots turn away from the nearest other
+Effect wait_behind(double strength = 1);       // robots are slow behind others
 
 // Of what they are told, and were told.
 Effect weak_right(double strength = 1);      // right turns are slow and slip backwards
@@ -43,6 +46,7 @@ Effect lens(double strength = 1);             // a barrel distortion
 Effect pincushion(double strength = 1);       // the opposite, of a lens that is no polynomial
 Effect keystone(double strength = 1);         // a camera that looks at the floor askew
 Effect growing_picture(double strength = 1);  // the camera sinks slowly
+Effect creeping_camera(double strength = 1);  // the camera turns aside, ever more slowly
 Effect camera_bump(double strength = 1);      // the camera is pushed aside, and put right later
 Effect mosaic(double strength = 1);           // cameras whose pictures do not match
 

@@ -80,6 +80,10 @@ const Entry kEntries[] = {
     {"battery", "time: a battery by the clock", [] { return with(tidy_lab(), Effects{battery_by_the_clock()}); }},
     {"fatigue", "motor_time: each motor tires by its own use",
      [] { return with(blind_lab(), Effects{fatigue_of_motors()}); }},
+    {"left-motors", "motor_time: the left motors alone tire",
+     [] { return with(tidy_lab(), Effects{fatigue_of_left_motors()}); }},
+    {"brushes", "motor_time: motors are slow at once, after so much use",
+     [] { return with(tidy_lab(), Effects{worn_brushes()}); }},
     {"start", "time_since_command: a motion starts slowly and overshoots",
      [] { return with(tidy_lab(), Effects{slow_start()}); }},
     {"patch", "position: a rough patch of floor", [] { return with(blind_lab(), Effects{slow_patch()}); }},
@@ -114,6 +118,12 @@ const Entry kEntries[] = {
     {"slow-robots", "robot, not the floor: some robots are slow",
      [] { return with(tidy_lab(), Effects{slow_robots()}); }},
     {"crowd", "neighbours: robots are slow among others", [] { return with(crowded_lab(), Effects{crowd()}); }},
+    {"third", "neighbours: robots are slow among two or more, within a radius of no raster",
+     [] {
+       Scene s = with(crowded_lab(), Effects{third_of_a_party()});
+       s.width_mm = s.height_mm = 560;
+       return s;
+     }},
     {"flight", "neighbours: robots turn away from the nearest",
      [] { return with(crowded_lab(), Effects{flight()}); }},
     {"ahead", "neighbours: robots are slow behind others",
@@ -133,6 +143,10 @@ const Entry kEntries[] = {
     {"fatigue-lens", "motor_time and measurement",
      [] {
        return with(tidy_lab(), Effects{fatigue_of_motors(), lens()});
+     }},
+    {"creep-battery", "time and measurement",
+     [] {
+       return with(tidy_lab(), Effects{battery_by_the_clock(), creeping_camera()});
      }},
     {"patch-tilt", "position and world_frame",
      [] {
