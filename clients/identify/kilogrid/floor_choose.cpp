@@ -130,7 +130,8 @@ bool CandidateScore::helps_all_alike() const {
     if (!(removed > 0)) return false;
     squares += (removed - mean) * (removed - mean);
   }
-  return mean > kStudent[std::min(by_run.size() - 3, kStudent.size() - 1)] * std::sqrt(squares / (count - 1) / count);
+  return mean >
+         kStudent[std::min(by_run.size() - 3, kStudent.size() - 1)] * std::sqrt(squares / (count - 1) / count);
 }
 
 Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates, const FloorTarget& target,
@@ -140,7 +141,7 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
   const Candidates of(model, candidates);
   const std::size_t runs = target.scenes().size();
   const auto simulated = simulated_sums(target, model.settings(), seed * 7 + 3, kRepeats);
-  const auto here = [&](const std::function<bool(std::size_t)>& in) { 
+  const auto here = [&](const std::function<bool(std::size_t)>& in) {
     return pooled(simulated, [&](std::size_t i) { return in(i % runs); });
   };
   Eigen::MatrixXd slopes = slopes_around(of.all(), target, of.model_only(), 1, kWhole_s, seed);

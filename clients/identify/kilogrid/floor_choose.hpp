@@ -32,16 +32,15 @@ struct CandidateScore {
 
 struct Choice {
   std::vector<CandidateScore> scores;  ///< of each candidate
-  std::size_t best = 0;     ///< with the most evidence, of those that are beyond chance, else that help with other runs
-  double bound = 0;         ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
-  double misfit = 0;        ///< where the model stands, refitted, with correlations
+  std::size_t best =
+      0;              ///< with the most evidence, of those that are beyond chance, else that help with other runs
+  double bound = 0;   ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
+  double misfit = 0;  ///< where the model stands, refitted, with correlations
   double by_chance = 0;     ///< that of sets that the model made
   double unexplained = 1;   ///< what is left with all candidates, in what is left of those sets
   std::size_t numbers = 0;  ///< that it is of
 
-  [[nodiscard]] bool found() const {
-    return !scores.empty() && scores[best].beyond(bound);
-  }
+  [[nodiscard]] bool found() const { return !scores.empty() && scores[best].beyond(bound); }
 };
 
 /// Weighs each candidate that the model lacks against sets simulated by the model: as many runs and robots as measured, from

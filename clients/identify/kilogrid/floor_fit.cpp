@@ -40,7 +40,8 @@ const Eigen::VectorXd& importance() {
 /// their correlations over robots. So their sum of squares is what tells windows apart when all are seen together.
 class Metric {
  public:
-  Metric(const FloorTarget& target, const FloorSet& simulated) : target_(target), parts_(correlation_of({&simulated, 1})) {
+  Metric(const FloorTarget& target, const FloorSet& simulated)
+      : target_(target), parts_(correlation_of({&simulated, 1})) {
     // As where effects are weighed: half of each variance is left to the number alone.
     constexpr double kOwn = 0.5;
     parts_ *= 1 - kOwn;
@@ -232,7 +233,8 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   return misfit;
 }
 
-void fit_from_afar(FloorModel& model, const FloorTarget& target, std::uint64_t seed, const FloorProgress& progress) {
+void fit_from_afar(FloorModel& model, const FloorTarget& target, std::uint64_t seed,
+                   const FloorProgress& progress) {
   // Where the misfit has several hollows, slopes over wide steps lead to deep ones. What is wide is seen in short runs.
   struct Stage {
     double width, longest_s;

@@ -8,18 +8,19 @@
 
 namespace kilotwin::kilogrid {
 
-const std::array<groups::FeatureScale, 12> groups::kFeatures = {groups::FeatureScale{{0, 20, 35, 50, 60, 70, 80, 90, 100}, 65, 25},
-                              groups::FeatureScale{{0, 15, 20, 25, 30, 35, 40}, 28, 10},
-                              groups::FeatureScale{{0, 0.01, 0.1, 0.2, 0.4, 0.7}, 0.1, 0.17},
-                              groups::FeatureScale{{0, 0.5, 1.5, 2.5, 4.5, 8.5}, 0.7, 1.3},
-                              groups::FeatureScale{{0, 0.4, 0.8, 1.2, 1.6}, 1, 0.65},
-                              groups::FeatureScale{{0, 0.15, 0.3, 0.45, 0.6}, 0.35, 0.3},
-                              groups::FeatureScale{{-4, -1, -0.4, 0, 0.4, 1}, 0, 0.85},
-                              groups::FeatureScale{{0, 100, 200, 300, 400, 600}, 305, 225},
-                              groups::FeatureScale{{0, 150, 300, 400, 500, 650}, 465, 245},
-                              groups::FeatureScale{{0, 0.01, 0.15, 0.35, 0.65, 0.95}, 0.17, 0.3},
-                              groups::FeatureScale{{0, 70, 120, 180, 250, 320, 400}, 230, 125},
-                              groups::FeatureScale{{0, 1.5, 3.5, 5.5, 7.5}, 4.4, 2.9}};
+const std::array<groups::FeatureScale, 12> groups::kFeatures = {
+    groups::FeatureScale{{0, 20, 35, 50, 60, 70, 80, 90, 100}, 65, 25},
+    groups::FeatureScale{{0, 15, 20, 25, 30, 35, 40}, 28, 10},
+    groups::FeatureScale{{0, 0.01, 0.1, 0.2, 0.4, 0.7}, 0.1, 0.17},
+    groups::FeatureScale{{0, 0.5, 1.5, 2.5, 4.5, 8.5}, 0.7, 1.3},
+    groups::FeatureScale{{0, 0.4, 0.8, 1.2, 1.6}, 1, 0.65},
+    groups::FeatureScale{{0, 0.15, 0.3, 0.45, 0.6}, 0.35, 0.3},
+    groups::FeatureScale{{-4, -1, -0.4, 0, 0.4, 1}, 0, 0.85},
+    groups::FeatureScale{{0, 100, 200, 300, 400, 600}, 305, 225},
+    groups::FeatureScale{{0, 150, 300, 400, 500, 650}, 465, 245},
+    groups::FeatureScale{{0, 0.01, 0.15, 0.35, 0.65, 0.95}, 0.17, 0.3},
+    groups::FeatureScale{{0, 70, 120, 180, 250, 320, 400}, 230, 125},
+    groups::FeatureScale{{0, 1.5, 3.5, 5.5, 7.5}, 4.4, 2.9}};
 
 namespace {
 

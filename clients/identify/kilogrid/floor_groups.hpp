@@ -11,7 +11,8 @@
 namespace kilotwin::kilogrid::groups {
 
 inline constexpr std::size_t kTimeBins = 16, kMiddleBins = 8;
-inline constexpr std::array kSteps_mm = {0., 8., 16., 24., 32., 40., 50., 60., 70., 80., 90., 100., 110., 120., 150.};
+inline constexpr std::array kSteps_mm = {0.,  8.,  16., 24.,  32.,  40.,  50., 60.,
+                                         70., 80., 90., 100., 110., 120., 150.};
 inline constexpr std::array kLags = {1, 2, 5, 10, 20, 30, 60};
 inline constexpr std::array kWalls_mm = {0., 40., 50., 60., 75., 100., 150., 200., 300.};
 inline constexpr std::size_t kRings = 10, kTurns = 8, kSectors = 8, kNeighbours = 5;

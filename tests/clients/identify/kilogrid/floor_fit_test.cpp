@@ -147,7 +147,9 @@ TEST(FloorChoice, AnEffectOfOneRunAloneIsNotFound) {
 }
 
 TEST(CandidateScore, HelpsOthersWithAllRunsButOneOfFourAndAltogether) {
-  const auto helps = [](std::vector<double> by_run) { return CandidateScore{1, 1, 1, by_run, {}, 0}.helps_others(); };
+  const auto helps = [](std::vector<double> by_run) {
+    return CandidateScore{1, 1, 1, by_run, {}, 0}.helps_others();
+  };
   EXPECT_TRUE(helps({}));  // of fewer than three runs nothing can be said
   EXPECT_TRUE(helps({3, 1, 2}));
   EXPECT_FALSE(helps({9, 9, -1}));
