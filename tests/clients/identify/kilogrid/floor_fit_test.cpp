@@ -164,7 +164,7 @@ TEST(CandidateScore, HelpsAllAlikeWhereTheMeanIsBeyondWhatRunsDifferBy) {
   };
   EXPECT_FALSE(alike({}));
   EXPECT_FALSE(alike({5, 5}));
-  // Student's t: 7.4, where 4.54 is beyond 1 % of four runs; 2.8; 2.9.
+  // Student's t: 7.4, where 4.54 is beyond 1 % of four runs; then 2.7 and 3.2.
   EXPECT_TRUE(alike({23, 36, 43, 28}));
   EXPECT_FALSE(alike({10, 2, 24, 25}));
   EXPECT_FALSE(alike({9, 30, 8, 19}));
