@@ -272,9 +272,8 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
       pushes ? forms_of_push(fitter.set(), had.front().target == Target::kTurn, had.front().during)
              : forms_of_speed(fitter.set(), had.front().during);
   double likelihood = fitter.log_likelihood(model);
-  bool any = false;
-  // In place of the term, some of the forms, if they explain more.
-  const auto try_forms = [&](const std::vector<Form>& of, std::size_t most) {
+  // In place of the term, some of the forms, if they explain more by so much.
+  const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double worth) {
     std::vector<Block> all;
     for (const Form& form : of) all.insert(all.end(), form.begin(), form.end());
     MotionModel trial = model;
@@ -295,21 +294,20 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
     fitter.fit(trial, 1);
     settle(fitter, trial, place);
     const double reached = fitter.log_likelihood(trial);
-    if (reached < likelihood + (any ? kWorth : 0)) return std::vector<Form>{};
+    if (reached < likelihood + worth) return std::vector<Form>{};
     model = trial;
     likelihood = reached;
-    any = true;
     return found;
   };
-  const std::vector<Form> first = try_forms(forms, kFirstForms);
+  const std::vector<Form> first = try_forms(forms, kFirstForms, 0);
   if (first.empty()) return false;
   // What seemed to be noise, and where robots were thought to be, changes with the first choice.
   fitter.fit_surroundings(model);
   likelihood = fitter.log_likelihood(model);
-  const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms);
+  const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms, kWorth);
   forms.insert(forms.end(), finer.begin(), finer.end());
-  try_forms(forms, kMostForms);
-  return any;
+  try_forms(forms, kMostForms, kWorth);
+  return true;
 }
 
 }  // namespace kilotwin::identify

@@ -1,7 +1,5 @@
 #include "clients/identify/causes/search.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>

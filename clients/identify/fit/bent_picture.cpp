@@ -11,6 +11,17 @@ namespace {
 /// In a picture that shows all larger or smaller, robots that are so near may touch.
 constexpr double kMayTouch_mm = 1.15 * kTouch_mm;
 
+bool acts_on_speed(const Block& block) {
+  switch (block.target) {
+    case Target::kGain:
+    case Target::kGainLeft:
+    case Target::kGainRight:
+    case Target::kOffset:
+    case Target::kAhead: return true;
+    default: return false;
+  }
+}
+
 }  // namespace
 
 MotionModel Fitter::doubting(MotionModel model) const {
@@ -77,8 +88,7 @@ void Fitter::settle_scale(MotionModel& model) const {
   // An effect on speed leaves open at which value of its covariates robots have the seed's.
   constexpr double kByEffects = 0.5;
   const bool nominal = std::none_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
-    return std::any_of(term.blocks.begin(), term.blocks.end(),
-                       [](const Block& block) { return !is_measured(block.target); });
+    return std::any_of(term.blocks.begin(), term.blocks.end(), acts_on_speed);
   });
   const auto speed_sd = [&](double sd, double value) { return nominal ? sd : std::hypot(sd, kByEffects * value); };
   double by_seed = 0, precision = 0;

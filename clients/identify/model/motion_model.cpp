@@ -53,16 +53,17 @@ Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) c
       block.basis.evaluate(s, 0, left.data());
       double l = 0;
       for (Eigen::Index i = 0; i < n; ++i) l += left[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+      const auto of_right = [&] {
+        if (!block.basis.per_wheel()) return l;
+        block.basis.evaluate(s, 1, right.data());
+        double w = 0;
+        for (Eigen::Index i = 0; i < n; ++i) w += right[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+        return w;
+      };
       switch (block.target) {
         case Target::kGain:
         case Target::kOffset: {
-          double w = l;
-          if (block.basis.per_wheel()) {
-            block.basis.evaluate(s, 1, right.data());
-            w = 0;
-            for (Eigen::Index i = 0; i < n; ++i)
-              w += right[static_cast<std::size_t>(i)] * term.coefficients[first + i];
-          }
+          const double w = of_right();
           if (block.target == Target::kGain) {
             r.left_gain *= 1 + l;
             r.right_gain *= 1 + w;
@@ -73,17 +74,7 @@ Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) c
           break;
         }
         case Target::kGainLeft: r.left_gain *= 1 + l; break;
-        case Target::kGainRight: {
-          double w = l;
-          if (block.basis.per_wheel()) {
-            block.basis.evaluate(s, 1, right.data());
-            w = 0;
-            for (Eigen::Index i = 0; i < n; ++i)
-              w += right[static_cast<std::size_t>(i)] * term.coefficients[first + i];
-          }
-          r.right_gain *= 1 + w;
-          break;
-        }
+        case Target::kGainRight: r.right_gain *= 1 + of_right(); break;
         case Target::kTurn: r.turn_rad_s += l; break;
         case Target::kAhead: r.ahead_mm_s += l; break;
         case Target::kSideways: r.sideways_mm_s += l; break;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -18,6 +19,8 @@ namespace {
 struct Acting {
   std::function<double(double since_s)> gain = [](double) { return 1.0; };
   std::function<double(double time_s)> drift_x_mm_s = [](double) { return 0.0; };
+  /// By how long the wheel's own motor has run.
+  std::function<double(double used_s)> left = [](double) { return 1.0; }, right = [](double) { return 1.0; };
 };
 
 /// Robots far from each other that go straight and turn by turns, by arcs of 20 ms, with noise of wheels and tracker.
@@ -32,6 +35,7 @@ MeasuredSet played(const Acting& acting, std::uint64_t seed, std::uint32_t robot
     Track& track = run.tracks.emplace_back();
     track.robot = robot;
     double x = 3000.0 * robot, y = 0, heading = robot, since_s = 0, next_s = 0;
+    double left_s = 0, right_s = 0;
     track.commands.push_back({-1e300, Motion::kStop});
     for (int k = 0; k * dt <= duration_s; ++k) {
       const double t = k * dt;
@@ -53,14 +57,16 @@ MeasuredSet played(const Acting& acting, std::uint64_t seed, std::uint32_t robot
           acting.gain(since_s) * nominal_speeds(BaseParameters{}, track.commands.back().motion);
       const double sd = std::sqrt(factor_s / dt);
       Rates rates;
-      rates.left_mm_s = v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
-      rates.right_mm_s = v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
+      rates.left_mm_s = acting.left(left_s) * v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
+      rates.right_mm_s = acting.right(right_s) * v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
       rates.world_x_mm_s = acting.drift_x_mm_s(t);
       const Arc arc = arc_of(rates, 25, heading, dt);
       x += arc.dx_mm;
       y += arc.dy_mm;
       heading += arc.dheading_rad;
       since_s += dt;
+      left_s += v[0] > 0 ? dt : 0;
+      right_s += v[1] > 0 ? dt : 0;
     }
   }
   return set;
@@ -215,6 +221,53 @@ TEST(Refine, TheInstantOfAPulseIsFound) {
   EXPECT_NEAR(steps.points[1], 41, 0.3);
   // How far it moved the robots is surer than how fast.
   EXPECT_NEAR(model.terms[0].coefficients[0] * (steps.points[1] - steps.points[0]), 12, 1);
+}
+
+/// A curve in the time that each motor has run, fitted and refined.
+void add_speed_by_motor_time(const Fitter& fitter, MotionModel& model, double longest_s) {
+  const Basis basis{{cosines(Covariate::kMotorTime, longest_s, 8, 0)}};
+  model.terms.push_back(unfitted("speed-by-motor-time", {{Target::kGain, basis, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+}
+
+TEST(Refine, WhatEndsAtOnceWithUseIsAStep) {
+  Acting acting;
+  acting.left = acting.right = [](double used_s) { return used_s < 35 ? 1.0 : 0.7; };
+  const MeasuredSet set = played(acting, 9, 8, 80);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  add_speed_by_motor_time(fitter, model, 75);
+  EXPECT_EQ(find_steps(fitter, model, 0), "speed-by-motor-time");
+  const auto& blocks = model.terms[0].blocks;
+  const Factor& steps = blocks.back().basis.factors[0];
+  ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
+  EXPECT_EQ(steps.axis.of, Covariate::kMotorTime);
+  EXPECT_TRUE(
+      std::any_of(steps.points.begin(), steps.points.end(), [](double at_s) { return std::abs(at_s - 35) < 0.5; }));
+}
+
+// Biases of robots, which have a mean for both wheels, would take up what the left ones do on the average.
+TEST(Widen, WhatLeftWheelsDoIsNoBias) {
+  Acting acting;
+  acting.left = [](double used_s) { return 1 - 0.4 * (1 - std::exp(-used_s / 20)); };
+  const MeasuredSet set = played(acting, 10, 8, 80);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  add_speed_by_motor_time(fitter, model, 75);
+  widen(fitter, model, 0);
+  Situation at;
+  at.commands.command = Motion::kStraight;
+  const auto ratio = [&](double used_s) {
+    at.commands.motor_s = {used_s, used_s};
+    const Rates rates = model.rates(at, Eigen::Vector2d::Zero());
+    return rates.left_gain / rates.right_gain;
+  };
+  for (const double used_s : {5.0, 20.0, 50.0}) EXPECT_NEAR(ratio(used_s), acting.left(used_s), 0.05) << used_s;
 }
 
 // A shift that stays is as good as a push; one that is put right takes half as many steps as two pushes.

@@ -15,6 +15,15 @@ void slow_both(Push& push, double factor) {
 
 double square(double x) { return x * x; }
 
+/// Every other robot: `look` gets how far along x and y its disc lies from this one's, and its distance, mm.
+template <class Look> void for_others(const Situation& at, const Look& look) {
+  for (std::size_t i = 0; i < at.discs->size(); ++i) {
+    if (static_cast<int>(i) == at.robot) continue;
+    const double x = (*at.discs)[i].x - at.disc.x, y = (*at.discs)[i].y - at.disc.y;
+    look(x, y, std::hypot(x, y));
+  }
+}
+
 }  // namespace
 
 Effect battery_by_the_clock(double strength) {
@@ -233,11 +242,9 @@ Effect crowd(double strength) {
           {"position", "time"},
           [=](const Situation& at, Push& push) {
             double sum = 0;
-            for (std::size_t i = 0; i < at.discs->size(); ++i) {
-              if (static_cast<int>(i) == at.robot) continue;
-              const double d = std::hypot((*at.discs)[i].x - at.disc.x, (*at.discs)[i].y - at.disc.y);
+            for_others(at, [&](double, double, double d) {
               if (d < 130) sum += std::pow(40 / std::max(d, 30.0), 3);
-            }
+            });
             slow_both(push, 1 / (1 + 0.2 * strength * sum));
           },
           {}};
@@ -250,10 +257,7 @@ Effect third_of_a_party(double strength) {
           {"position", "time"},
           [=](const Situation& at, Push& push) {
             int near = 0;
-            for (std::size_t i = 0; i < at.discs->size(); ++i) {
-              if (static_cast<int>(i) == at.robot) continue;
-              near += std::hypot((*at.discs)[i].x - at.disc.x, (*at.discs)[i].y - at.disc.y) < 95 ? 1 : 0;
-            }
+            for_others(at, [&](double, double, double d) { near += d < 95 ? 1 : 0; });
             if (near >= 2) slow_both(push, 1 - 0.45 * strength);
           },
           {}};
@@ -267,13 +271,11 @@ Effect flight(double strength) {
           [=](const Situation& at, Push& push) {
             if (!at.driven()) return;
             double nearest = 1e9, bearing = 0;
-            for (std::size_t i = 0; i < at.discs->size(); ++i) {
-              if (static_cast<int>(i) == at.robot) continue;
-              const double x = (*at.discs)[i].x - at.disc.x, y = (*at.discs)[i].y - at.disc.y, d = std::hypot(x, y);
-              if (d >= nearest) continue;
+            for_others(at, [&](double x, double y, double d) {
+              if (d >= nearest) return;
               nearest = d;
               bearing = std::atan2(y, x) - at.heading_rad;
-            }
+            });
             push.turn_rad_s -= 0.25 * strength * std::sin(bearing) * std::exp(-square(nearest / 70));
           },
           {}};
@@ -287,12 +289,10 @@ Effect wait_behind(double strength) {
           [=](const Situation& at, Push& push) {
             double sum = 0;
             const double c = std::cos(at.heading_rad), s = std::sin(at.heading_rad);
-            for (std::size_t i = 0; i < at.discs->size(); ++i) {
-              if (static_cast<int>(i) == at.robot) continue;
-              const double x = (*at.discs)[i].x - at.disc.x, y = (*at.discs)[i].y - at.disc.y;
-              const double d = std::hypot(x, y), ahead = x * c + y * s;
+            for_others(at, [&](double x, double y, double d) {
+              const double ahead = x * c + y * s;
               if (d < 80 && ahead > 0) sum += square(ahead / d);
-            }
+            });
             slow_both(push, 1 / (1 + 0.8 * strength * sum));
           },
           {}};
