@@ -63,8 +63,9 @@ Factor richer(Factor f) {
 }
 
 /// What lies beyond a map's order, along one axis.
-Basis along(const Factor& map, bool second) {
-  Factor f = map;
+Basis along(Basis basis, bool second) {
+  Factor& f = *basis.only_open();
+  const Factor map = f;
   f.shape = Shape::kCosines;
   f.first = map.count + 1;
   f.count = 20;
@@ -73,12 +74,13 @@ Basis along(const Factor& map, bool second) {
     f.low = map.and_low;
     f.high = map.and_high;
   }
-  return Basis{{f}};
+  return basis;
 }
 
 /// A table times something else, with the keys alone that some chosen column has.
 Basis with_chosen_keys(Basis basis) {
-  if (basis.factors.size() != 2 || basis.factors.front().shape != Shape::kTable || basis.chosen.empty())
+  if (basis.factors.size() != 2 || basis.only_open() != nullptr || basis.factors.front().shape != Shape::kTable ||
+      basis.chosen.empty())
     return basis;
   const std::size_t each = basis.factors[1].size();
   std::vector<double> kept;
@@ -94,7 +96,7 @@ Basis with_chosen_keys(Basis basis) {
 
 /// Products have as many cosines as there is room for; each robot by itself few.
 void shorten(Basis& basis) {
-  if (basis.factors.size() < 2) return;
+  if (basis.only_open() != nullptr || basis.factors.size() < 2) return;
   constexpr std::uint32_t kOfARobot = 6;
   const bool of_robots = basis.looks_at(Covariate::kRobot);
   for (Factor& factor : basis.factors) {
@@ -113,8 +115,19 @@ bool has_constant_part(Target target) {
 
 /// One curve over time, or one over anything else: its column of frequency 0 is the constant.
 bool is_curve(const Basis& basis) {
-  return basis.factors.size() == 1 && basis.factors.front().shape == Shape::kCosines &&
-         basis.factors.front().known.empty();
+  const Factor* const open = basis.only_open();
+  return open != nullptr && open->shape == Shape::kCosines;
+}
+
+/// Whether a block holds what a map beside it, refined before, had no columns for: it gets such blocks again.
+bool lies_beyond_map(const Block& block, const std::vector<Block>& blocks) {
+  const Factor* const open = block.basis.only_open();
+  return open != nullptr && open->shape == Shape::kCosines && open->first > 1 &&
+         std::any_of(blocks.begin(), blocks.end(), [&](const Block& other) {
+           const Factor* const map = other.basis.only_open();
+           return other.target == block.target && other.during == block.during && map != nullptr &&
+                  map->shape == Shape::kCosines2;
+         });
 }
 
 std::vector<Block> richer(const Term& term) {
@@ -126,11 +139,12 @@ std::vector<Block> richer(const Term& term) {
           return other.target == block.target && other.during == block.during && is_curve(other.basis);
         }))
       continue;
+    if (lies_beyond_map(block, term.blocks)) continue;
     Block rich = block;
     rich.basis = with_chosen_keys(block.basis);
     rich.basis.chosen.clear();
     for (Factor& factor : rich.basis.factors) factor = richer(factor);
-    if (has_constant_part(block.target) && is_curve(rich.basis)) rich.basis.factors.front().first = 0;
+    if (has_constant_part(block.target) && is_curve(rich.basis)) rich.basis.only_open()->first = 0;
     shorten(rich.basis);
     // Pictures creep; what makes them jump is found elsewhere.
     constexpr std::uint32_t kCreep = 24;
@@ -140,8 +154,8 @@ std::vector<Block> richer(const Term& term) {
     // Too many columns: as they were.
     if (rich.basis.size() > kMostColumns) rich.basis = block.basis;
     blocks.push_back(rich);
-    if (rich.basis.factors.size() == 1 && rich.basis.factors.front().shape == Shape::kCosines2) {
-      const Factor map = rich.basis.factors.front();
+    if (const Factor* const open = rich.basis.only_open(); open != nullptr && open->shape == Shape::kCosines2) {
+      const Basis map = rich.basis;
       for (const bool second : {false, true}) {
         rich.basis = along(map, second);
         blocks.push_back(rich);

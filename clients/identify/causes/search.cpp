@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "clients/identify/causes/amounts.hpp"
 #include "clients/identify/causes/fine_map.hpp"
 #include "clients/identify/causes/jumps.hpp"
 #include "clients/identify/causes/memory_shape.hpp"
@@ -191,8 +192,17 @@ class Loop {
     out_.reasons.push_back(reason);
     say("fitting");
     fitter_.fit(out_.model, 2);
-    shape(out_.model.terms.size() - 1);
     out_.steps.push_back({h.name, found.held_out});
+    if (!joined(out_.model.terms.size() - 1)) shape(out_.model.terms.size() - 1);
+  }
+
+  /// Whether the last term, amounts of what another found, became one with that.
+  bool joined(std::size_t place) {
+    const std::optional<std::size_t> curve = join_amounts(fitter_, out_.model, place);
+    if (!curve) return false;
+    out_.reasons.back().finding.evidence += out_.reasons[*curve].finding.evidence;
+    out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));
+    return true;
   }
 
   /// Gives a term the form that the data support.
@@ -250,7 +260,7 @@ class Loop {
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
         // Amounts of a curve that a term has found: in its place they would have the curve for nothing.
-        if (rests_on_found(dictionary_.term_of(h, 1))) continue;
+        if (rests_on_another(dictionary_.term_of(h, 1))) continue;
         const Finding other = scores_->weigh(h, t);
         if (best == nullptr || other.evidence > best_finding.evidence) {
           best = &h;
@@ -301,13 +311,6 @@ class Loop {
     fitter_.set().remember(out_.model);
     fitter_.set().find_headings(out_.model, fitter_.threads());
   }
-  /// Whether a term is built on a curve that another found.
-  static bool rests_on_found(const Term& term) {
-    return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
-      return std::any_of(block.basis.factors.begin(), block.basis.factors.end(),
-                         [](const Factor& factor) { return !factor.known.empty(); });
-    });
-  }
   /// Whether a term is but the constant part of what another does.
   static bool is_constant_of(const Term& term, const Term& other) {
     return std::all_of(term.blocks.begin(), term.blocks.end(), [&](const Block& block) {
@@ -320,7 +323,7 @@ class Loop {
   /// The last term may be what those before it were taken for, unless it explains far less. Each is taken out, and the last given
   /// the shape that it has without it.
   void reconsider() {
-    if (rests_on_found(out_.model.terms.back())) return;
+    if (rests_on_another(out_.model.terms.back())) return;
     constexpr double kFarLess = 0.1;
     for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;) {
       const Term &earlier = out_.model.terms[t], &last = out_.model.terms.back();

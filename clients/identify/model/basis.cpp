@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/base/error.hpp"
 
@@ -54,7 +55,7 @@ void Factor::evaluate(const Situation& s, std::size_t wheel, double* to) const {
   if (known.empty()) return evaluate_columns(s, wheel, to);
   std::array<double, kMostColumns> values;
   evaluate_columns(s, wheel, values.data());
-  double sum = 0;
+  double sum = plus;
   for (std::size_t i = 0; i < known.size(); ++i) sum += known[i] * values[i];
   to[0] = sum;
 }
@@ -182,6 +183,18 @@ std::vector<double> Basis::roughness() const {
   if (!chosen.empty()) rough.resize(chosen.size());
   return rough;
 }
+
+const Factor* Basis::only_open() const {
+  const Factor* open = nullptr;
+  for (const Factor& factor : factors) {
+    if (!factor.known.empty()) continue;
+    if (open != nullptr) return nullptr;
+    open = &factor;
+  }
+  return open;
+}
+
+Factor* Basis::only_open() { return const_cast<Factor*>(std::as_const(*this).only_open()); }
 
 bool Basis::looks_at(Covariate covariate) const {
   return std::any_of(factors.begin(), factors.end(), [&](const Factor& f) {

@@ -33,6 +33,8 @@ struct Factor {
   std::vector<double> points;
   /// Not empty: the columns are added up by these coefficients into one, a curve that is known.
   std::vector<double> known = {};
+  /// Of a curve that is known: added to it.
+  double plus = 0;
 
   [[nodiscard]] bool of_two() const {
     return shape == Shape::kCosines2 || shape == Shape::kPolynomials2 || shape == Shape::kGrid;
@@ -58,6 +60,9 @@ struct Basis {
   void evaluate(const Situation&, std::size_t wheel, double* to) const;
   [[nodiscard]] std::vector<double> roughness() const;
   [[nodiscard]] bool looks_at(Covariate) const;
+  /// Its factor, where all others are curves that are known.
+  [[nodiscard]] const Factor* only_open() const;
+  [[nodiscard]] Factor* only_open();
   /// Whether left and right wheels have values of their own.
   [[nodiscard]] bool per_wheel() const { return looks_at(Covariate::kMotorTime); }
 };

@@ -166,6 +166,29 @@ std::string of_function(const Function& f, Effect::Target target) {
   }
 }
 
+/// Of a record that is one more amount of another's curve: "times 0.2 (robot 3) to 1.9 (robot 17)".
+std::string amounts_in_words(const Function& f) {
+  if (f.has_table() && f.table().value_size() > 0) {
+    const proto::Table& table = f.table();
+    if (f.of() != Function::ROBOT) {
+      std::vector<std::string> parts;
+      for (int i = 0; i < table.value_size(); ++i)
+        parts.push_back(fmt::format("{:.2f} {}", 1 + table.value(i), command_name(table.key(i))));
+      return fmt::format("times {}", fmt::join(parts, ", "));
+    }
+    const auto [low, high] = std::minmax_element(table.value().begin(), table.value().end());
+    const auto key = [&](auto at) {
+      return place(table.key(static_cast<int>(at - table.value().begin())), f.of());
+    };
+    return fmt::format("times {:.2f} ({}) to {:.2f} ({})", 1 + *low, key(low), 1 + *high, key(high));
+  }
+  if (!f.has_spline() || f.spline().knot_size() == 0) return "";
+  const int last = f.spline().knot_size() - 1;
+  return fmt::format("times {:.2f} at {} to {:.2f} at {}", 1 + f.spline().value(0),
+                     place(f.spline().knot(0), f.of()), 1 + f.spline().value(last),
+                     place(f.spline().knot(last), f.of()));
+}
+
 /// What tells a record from others of the same cause: "along y, going straight: ".
 std::string which_of(const Effect& effect) {
   std::vector<std::string> parts;
@@ -306,6 +329,13 @@ std::string size_in_words(const std::vector<Effect>& effects) {
   for (const Effect* one : all.others) {
     if (parts.size() == kMost) break;
     const Effect& effect = *one;
+    if (effect.function_size() == 2 && std::none_of(parts.begin(), parts.end(), [](const std::string& part) {
+          return part.starts_with("times ");
+        })) {
+      if (std::string amounts = amounts_in_words(effect.function(0)); !amounts.empty())
+        parts.push_back(std::move(amounts));
+      continue;
+    }
     if (effect.function_size() != 1) continue;
     const std::string size = of_function(effect.function(0), effect.acts_on());
     if (size.empty()) return "";

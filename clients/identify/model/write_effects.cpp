@@ -228,6 +228,15 @@ std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factor
     return {{constant}};
   }
   const Factor& factor = factors[from];
+  if (factor.plus != 0) {
+    std::vector<Factor> rest = factors;
+    rest[from].plus = 0;
+    auto all = products_of(rest, from, coefficients);
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(from));
+    for (std::vector<Function>& product : products_of(rest, from, factor.plus * coefficients))
+      all.push_back(std::move(product));
+    return all;
+  }
   if (from + 1 == factors.size()) return {{function_of(factor, coefficients)}};
   std::vector<std::vector<Function>> all;
   const auto n = static_cast<Eigen::Index>(factor.size());
