@@ -25,6 +25,7 @@ std::optional<MemorySlot> slot_of(Function::Covariate covariate, double forget_s
     case Function::PREVIOUS_COMMAND: return MemorySlot{Kind::kPreviousCommand};
     case Function::LAST_TURN: return MemorySlot{Kind::kLastTurn};
     case Function::PREVIOUS_LASTED: return MemorySlot{Kind::kPreviousLasted};
+    case Function::SINCE_REST: return MemorySlot{Kind::kSinceRest};
     default: return std::nullopt;
   }
 }
@@ -99,7 +100,9 @@ Range Covariates::range(std::uint32_t index) const {
     case Function::LEFT_MOTOR_TIME:
     case Function::RIGHT_MOTOR_TIME:
     case Function::DRIVEN_TIME:
-    case Function::PREVIOUS_LASTED: return {0, e.duration_s()};
+    case Function::PREVIOUS_LASTED:
+    case Function::SINCE_REST: return {0, e.duration_s()};
+    case Function::MOTOR_TIME_DIFFERENCE: return {-e.duration_s(), e.duration_s()};
     case Function::X: return {-x_mm, x_mm};
     case Function::Y: return {-y_mm, y_mm};
     case Function::RADIUS: return {0, __builtin_sqrt(x_mm * x_mm + y_mm * y_mm)};
@@ -181,6 +184,17 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
         const double* const memory = robots.memory.data() + r * stride;
         return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot]
                                                                                     : memory[time];
+      });
+    }
+    case Function::SINCE_REST:
+      return each(
+          [&](std::size_t r) { return robots.duties[r].any() ? robots.memory[r * stride + column.slot] : 0.0; });
+    case Function::MOTOR_TIME_DIFFERENCE: {
+      const std::uint32_t left = plan_.memory.index_of({Kind::kLeftMotorTime}),
+                          right = plan_.memory.index_of({Kind::kRightMotorTime});
+      return each([&](std::size_t r) {
+        const double* const memory = robots.memory.data() + r * stride;
+        return memory[left] - memory[right];
       });
     }
     case Function::LAST_TURN:

@@ -98,6 +98,9 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
       case Kind::kLeftMotorTime: lasts(s, [](Duties d) { return d.left != 0 || d.spin_up != 0; }); break;
       case Kind::kRightMotorTime: lasts(s, [](Duties d) { return d.right != 0 || d.spin_up != 0; }); break;
       case Kind::kDrivenTime: lasts(s, [](Duties d) { return d.any(); }); break;
+      case Kind::kSinceRest:
+        each(s, [&](std::size_t i, double was) { return robots.duties[i].any() ? was + tick_s_ : 0; });
+        break;
       case Kind::kNoise:
         each(s, [&, fade = fades_[s]](std::size_t i, double was) {
           const double next =

@@ -33,6 +33,11 @@ MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
       case Function::LEFT_MOTOR_TIME: need({Kind::kLeftMotorTime, forget_s}); break;
       case Function::RIGHT_MOTOR_TIME: need({Kind::kRightMotorTime, forget_s}); break;
       case Function::DRIVEN_TIME: need({Kind::kDrivenTime, forget_s}); break;
+      case Function::SINCE_REST: need({Kind::kSinceRest}); break;
+      case Function::MOTOR_TIME_DIFFERENCE:
+        need({Kind::kLeftMotorTime});
+        need({Kind::kRightMotorTime});
+        break;
       case Function::PREVIOUS_FORWARD: need({Kind::kPreviousForward}); break;
       case Function::PREVIOUS_SIDEWAYS: need({Kind::kPreviousSideways}); break;
       case Function::PREVIOUS_TURN: need({Kind::kPreviousTurn}); break;

@@ -26,6 +26,7 @@ struct MemorySlot {
     kPreviousCommand,  ///< number of the Command before kCommand; STOP at first
     kLastTurn,         ///< number of the last Command that was LEFT or RIGHT; 0 at first
     kPreviousLasted,   ///< s for which the Command before kCommand lasted; 0 at first
+    kSinceRest,        ///< s for which a motor has turned without a rest of both
   };
   Kind kind;
   double forget_s = 0;

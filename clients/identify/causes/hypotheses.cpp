@@ -23,7 +23,14 @@ Extent extent_of(const PreparedSet& set) {
     e.duration_s = std::max(e.duration_s, end_s);
     e.motor_s = std::max({e.motor_s, last.motor_s[0], last.motor_s[1]});
     e.driven_s = std::max(e.driven_s, last.driven_s);
+    const auto note = [&](const CommandState& state) {
+      e.since_rest_s = std::max(e.since_rest_s, state.since_rest_s);
+      e.difference_s = std::max(e.difference_s, std::abs(state.motor_s[1] - state.motor_s[0]));
+    };
+    note(last);
     for (const CommandChange& change : view.track->commands) {
+      // As the command before ended.
+      note(view.clock.at(std::nextafter(change.time_s, -1.0)));
       e.has_stop = e.has_stop || (change.motion == Motion::kStop && change.time_s > 0);
       e.has_straight = e.has_straight || change.motion == Motion::kStraight;
       e.has_turns = e.has_turns || change.motion == Motion::kLeft || change.motion == Motion::kRight;

@@ -38,6 +38,8 @@ struct Dictionary {
 struct Extent {
   double x_low_mm = 0, x_high_mm = 1, y_low_mm = 0, y_high_mm = 1;
   double duration_s = 1, motor_s = 1, driven_s = 1, since_s = 1;
+  double since_rest_s = 1;  ///< the longest
+  double difference_s = 1;  ///< of the use of a robot's motors, the largest
   bool has_stop = false, has_turns = false, has_straight = false, neighbours = false, headings = false;
   std::vector<std::uint32_t> robots, runs;
 };

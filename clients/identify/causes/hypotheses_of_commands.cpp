@@ -143,7 +143,17 @@ void hypotheses_of_lately(DictionaryMaker& make, const Extent& extent) {
                right = make.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kRightMotorTime, f, 1)}});
     make.add(kTurning, "turns-of-late", {"history"}, {left, right}, kChoices);
   }
+  // Since it rested, as a battery sags that recovers at once.
+  if (extent.has_stop) {
+    Factor unbroken = over(Shape::kCosines, Covariate::kSinceRest, 0, extent.since_rest_s, 6);
+    unbroken.warp = 1;
+    for (const Acting* acting : {&kSpeed, &kTurning})
+      make.curve(*acting, "time-since-rest", {"motor_time", "history"}, Basis{{unbroken}}, {1, 3, 6}, false);
+  }
   if (!extent.has_turns) return;
+  const Basis wound{
+      {over(Shape::kCosines, Covariate::kUseDifference, -extent.difference_s, extent.difference_s, 6)}};
+  make.curve(kTurning, "turns-so-far", {"motor_time", "history"}, wound, {1, 3, 6}, false);
   // All that it has turned, as a cable winds up.
   const auto left = make.put(Target::kTurn,
                              Basis{{over(Shape::kLinear, Covariate::kLeftMotorTime, 0, extent.motor_s, 1)}}),

@@ -44,6 +44,8 @@ Unit unit_of(Function::Covariate of) {
     case Function::LEFT_MOTOR_TIME:
     case Function::RIGHT_MOTOR_TIME:
     case Function::DRIVEN_TIME:
+    case Function::SINCE_REST:
+    case Function::MOTOR_TIME_DIFFERENCE:
     case Function::PLACE: return {"s", 1};
     case Function::X:
     case Function::Y:
@@ -62,6 +64,8 @@ const char* name_of(Function::Covariate of) {
     case Function::PREVIOUS_LASTED: return "how long the command before lasted";
     case Function::MOTOR_TIME: return "motor_time";
     case Function::DRIVEN_TIME: return "driven_time";
+    case Function::SINCE_REST: return "time since it rested";
+    case Function::MOTOR_TIME_DIFFERENCE: return "left motor's time less the right one's";
     case Function::X: return "x";
     case Function::Y: return "y";
     case Function::RADIUS: return "radius";

@@ -13,6 +13,7 @@ void CommandState::advance(double by_s) {
   if (left_on()) motor_s[0] += by_s;
   if (right_on()) motor_s[1] += by_s;
   if (driven()) driven_s += by_s;
+  since_rest_s = driven() ? since_rest_s + by_s : 0;
 }
 
 double CommandState::remembered_s(std::size_t forget, std::size_t motor) const {
@@ -78,6 +79,8 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kPreviousCommand:
       return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
     case Covariate::kPreviousLasted: return s.commands.previous_lasted_s;
+    case Covariate::kSinceRest: return s.commands.since_rest_s;
+    case Covariate::kUseDifference: return s.commands.motor_s[1] - s.commands.motor_s[0];
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
     case Covariate::kTrodden: return s.near.trodden_s[axis.radius];
     case Covariate::kRobot: return s.robot;
@@ -101,6 +104,7 @@ CommandClock::CommandClock(const Track& track) {
     state.previous_lasted_s = state.first ? 0 : state.since_s;
     state.previous = state.command;
     state.command = change.motion;
+    if (!state.driven()) state.since_rest_s = 0;
     state.since_s = 0;
     if (change.motion == Motion::kLeft || change.motion == Motion::kRight) state.last_turn = change.motion;
     if (!starts_s_.empty() && starts_s_.back() == at_s) {

@@ -47,6 +47,7 @@ struct CommandState {
   double previous_lasted_s = 0;            ///< 0 where there was none
   std::array<double, 2> motor_s = {0, 0};  ///< for which the motor of the left, of the right wheel has turned
   double driven_s = 0;                     ///< for which either has
+  double since_rest_s = 0;                 ///< for which either has without a rest of both
   /// What is left of these times of the left, the right, of either motor, with kForget_s, when the command began.
   std::array<std::array<double, 3>, kForget_s.size()> left_s = {};
 
@@ -90,7 +91,9 @@ enum class Covariate : std::uint8_t {
   kPreviousCommand,  ///< kNoCommand for the first
   kPreviousLasted,   ///< s for which that lasted; 0 where there was none
   kLastTurn,
-  kTrodden,  ///< time that driven robots stood in its cell of the floor
+  kSinceRest,      ///< s since which it is driven without a rest
+  kUseDifference,  ///< s for which the right wheel's motor has turned longer than the left one's
+  kTrodden,        ///< time that driven robots stood in its cell of the floor
   kRobot,
   kRun,
 };

@@ -33,6 +33,8 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kBearing: return Function::NEAREST_BEARING;
     case Covariate::kPreviousCommand: return Function::PREVIOUS_COMMAND;
     case Covariate::kPreviousLasted: return Function::PREVIOUS_LASTED;
+    case Covariate::kSinceRest: return Function::SINCE_REST;
+    case Covariate::kUseDifference: return Function::MOTOR_TIME_DIFFERENCE;
     case Covariate::kLastTurn: return Function::LAST_TURN;
     case Covariate::kTrodden: return Function::PLACE;
     case Covariate::kRobot: return Function::ROBOT;
@@ -54,6 +56,8 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kHeading: s.heading_rad = value; break;
     case Covariate::kSinceCommand: s.commands.since_s = value; break;
     case Covariate::kPreviousLasted: s.commands.previous_lasted_s = value; break;
+    case Covariate::kSinceRest: s.commands.since_rest_s = value; break;
+    case Covariate::kUseDifference: s.commands.motor_s = {0, value}; break;
     case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:

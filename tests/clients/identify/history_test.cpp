@@ -53,6 +53,23 @@ TEST(History, HowLongTheCommandBeforeLastedIsKnown) {
   }
 }
 
+TEST(History, ARestBeginsTheTimeSinceItAnew) {
+  const CommandClock clock(
+      told({{1, Motion::kStraight}, {4.5, Motion::kLeft}, {6, Motion::kStop}, {9, Motion::kRight}}));
+  for (const auto& [time_s, since_s, difference_s] : {std::tuple{0.5, 0.0, 0.0},
+                                                      {2.0, 1.0, 0.0},
+                                                      {5.0, 4.0, 0.5},
+                                                      {6.5, 0.0, 1.5},
+                                                      {9.0, 0.0, 1.5},
+                                                      {10.0, 1.0, 0.5},
+                                                      {12.0, 3.0, -1.5}}) {
+    Situation s;
+    s.commands = clock.at(time_s);
+    EXPECT_DOUBLE_EQ(value_of({Covariate::kSinceRest}, s, 0), since_s) << time_s;
+    EXPECT_DOUBLE_EQ(value_of({Covariate::kUseDifference}, s, 0), difference_s) << time_s;
+  }
+}
+
 TEST(History, NothingComesBeforeTheFirstCommand) {
   const CommandClock clock(told({{0, Motion::kStraight}, {4, Motion::kStop}, {6, Motion::kLeft}}));
   const Axis previous{Covariate::kPreviousCommand};

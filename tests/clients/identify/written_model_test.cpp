@@ -72,6 +72,11 @@ std::vector<Form> forms() {
   };
   Factor known = over(Shape::kCosines, Covariate::kTime, 0, 18, 3);
   known.known = {0.7, 0, -0.4};
+  Factor amounts = over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5});
+  amounts.known = {0.6, -0.9};
+  amounts.plus = 1;
+  Factor growing = known;
+  growing.plus = 0.5;
   return {
       {"constant", {}},
       {"linear in time", {{over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}},
@@ -88,6 +93,8 @@ std::vector<Form> forms() {
       {"command", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2, 3})}}},
       {"previous command", {{previous}}},
       {"previous lasted", {{over(Shape::kCosines, Covariate::kPreviousLasted, 0, 3, 3)}}},
+      {"since rest", {{over(Shape::kCosines, Covariate::kSinceRest, 0, 8, 3)}}},
+      {"difference of use", {{over(Shape::kCosines, Covariate::kUseDifference, -5, 5, 3)}}},
       {"last turn", {{over(Shape::kTable, Covariate::kLastTurn, 0, 1, 1, {2, 3})}}},
       {"robot", {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5, 7, 9})}}},
       {"steps", {{over(Shape::kAtLeast, Covariate::kTime, 0, 1, 1, {4, 9})}}},
@@ -112,6 +119,8 @@ std::vector<Form> forms() {
       {"right motor", {{of_late(Covariate::kRightMotorTime, 0)}}},
       {"driven of late", {{of_late(Covariate::kDrivenTime, 3)}}},
       {"amounts of a curve", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2}), known}}},
+      {"robots' known amounts of a curve", {{amounts, over(Shape::kCosines, Covariate::kTime, 0, 18, 4)}}},
+      {"a known curve times harmonics", {{growing, over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
       {"robots in time",
        {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
          over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}}};

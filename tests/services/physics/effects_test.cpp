@@ -177,15 +177,18 @@ TEST(Effects, TimesCountWhatTheMotorsDid) {
   const auto plan_of = [](const std::string& function) { return make_plan(shown(function), {{0, 0, kPi / 2}}); };
   const RunPlan left = plan_of(thousandth("LEFT_MOTOR_TIME")), right = plan_of(thousandth("RIGHT_MOTOR_TIME")),
                 driven = plan_of(thousandth("DRIVEN_TIME")), since = plan_of(thousandth("TIME_SINCE_COMMAND")),
-                fading = plan_of(thousandth("DRIVEN_TIME", "forget_s: 2"));
-  Swarm swarms[] = {Swarm(left), Swarm(right), Swarm(driven), Swarm(since), Swarm(fading)};
-  double expected[5] = {};
+                fading = plan_of(thousandth("DRIVEN_TIME", "forget_s: 2")),
+                rest = plan_of(thousandth("SINCE_REST")), difference = plan_of(thousandth("MOTOR_TIME_DIFFERENCE"));
+  Swarm swarms[] = {Swarm(left),   Swarm(right), Swarm(driven),    Swarm(since),
+                    Swarm(fading), Swarm(rest),  Swarm(difference)};
+  double expected[7] = {};
   std::pair<bool, bool> last{false, false};
   for (int k = 0; k < 400; ++k) {
     const bool l = k / 50 % 3 != 0, r = k / 70 % 2 != 0;
     if (std::pair(l, r) != last) expected[3] = 0;
     last = {l, r};
-    for (int s = 0; s < 5; ++s) {
+    for (int s = 0; s < 7; ++s) {
+      if (!l && !r) expected[5] = 0;
       swarms[s].set_all_motors(l ? 70 : 0, r ? 70 : 0);
       const double before = swarms[s].poses()[0].x_mm;
       // What the motors alone would do in this step is subtracted: a robot of the same pose without effects.
@@ -201,6 +204,8 @@ TEST(Effects, TimesCountWhatTheMotorsDid) {
     expected[1] += r ? kTick_s : 0;
     expected[2] += l || r ? kTick_s : 0;
     expected[3] += kTick_s;
+    expected[5] += l || r ? kTick_s : 0;
+    expected[6] = expected[0] - expected[1];
     expected[4] = expected[4] * std::exp(-kTick_s / 2) + (l || r ? kTick_s : 0);
   }
 }
