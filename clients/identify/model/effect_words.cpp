@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/effects/function.hpp"
 
@@ -170,27 +171,43 @@ std::string of_function(const Function& f, Effect::Target target) {
   }
 }
 
-/// Of a record that is one more amount of another's curve: "times 0.2 (robot 3) to 1.9 (robot 17)".
+/// "times 0.2 (robot 3) to 1.9 (robot 17)".
 std::string amounts_in_words(const Function& f) {
   if (f.has_table() && f.table().value_size() > 0) {
     const proto::Table& table = f.table();
-    if (f.of() != Function::ROBOT) {
+    if (f.of() == Function::COMMAND) {
       std::vector<std::string> parts;
       for (int i = 0; i < table.value_size(); ++i)
-        parts.push_back(fmt::format("{:.2f} {}", 1 + table.value(i), command_name(table.key(i))));
+        parts.push_back(fmt::format("{:.2f} {}", table.value(i), command_name(table.key(i))));
       return fmt::format("times {}", fmt::join(parts, ", "));
     }
     const auto [low, high] = std::minmax_element(table.value().begin(), table.value().end());
     const auto key = [&](auto at) {
       return place(table.key(static_cast<int>(at - table.value().begin())), f.of());
     };
-    return fmt::format("times {:.2f} ({}) to {:.2f} ({})", 1 + *low, key(low), 1 + *high, key(high));
+    return fmt::format("times {:.2f} ({}) to {:.2f} ({})", *low, key(low), *high, key(high));
   }
-  if (!f.has_spline() || f.spline().knot_size() == 0) return "";
+  if (!f.has_spline() || f.spline().knot_size() == 0) return "times what the other depends on";
   const int last = f.spline().knot_size() - 1;
-  return fmt::format("times {:.2f} at {} to {:.2f} at {}", 1 + f.spline().value(0),
-                     place(f.spline().knot(0), f.of()), 1 + f.spline().value(last),
-                     place(f.spline().knot(last), f.of()));
+  return fmt::format("times {:.2f} at {} to {:.2f} at {}", f.spline().value(0), place(f.spline().knot(0), f.of()),
+                     f.spline().value(last), place(f.spline().knot(last), f.of()));
+}
+
+/// What is shown of a cause of one curve times amounts: the curve, where the amount is 1.
+struct Amounts {
+  std::vector<Effect> curves;
+  std::optional<Function> amounts;
+};
+Amounts without_amounts(const std::vector<Effect>& effects) {
+  Amounts out{effects, {}};
+  const auto alike = [&](const Effect& effect) {
+    return effect.function_size() > 1 &&
+           effect.function(0).SerializeAsString() == effects.front().function(0).SerializeAsString();
+  };
+  if (effects.empty() || !std::all_of(effects.begin(), effects.end(), alike)) return out;
+  out.amounts = effects.front().function(0);
+  for (Effect& effect : out.curves) effect.mutable_function()->DeleteSubrange(0, 1);
+  return out;
 }
 
 /// What tells a record from others of the same cause: "along y, going straight: ".
@@ -319,7 +336,8 @@ Sorted sorted(const std::vector<Effect>& effects) {
 std::string size_in_words(const std::vector<Effect>& effects) {
   constexpr std::size_t kMost = 3;
   std::vector<std::string> parts;
-  const Sorted all = sorted(effects);
+  const Amounts shown = without_amounts(effects);
+  const Sorted all = sorted(shown.curves);
   for (const std::vector<const Effect*>& map : all.maps) {
     const MapSum sum = sum_of(map);
     if (sum.value.empty()) return "";
@@ -333,24 +351,19 @@ std::string size_in_words(const std::vector<Effect>& effects) {
   for (const Effect* one : all.others) {
     if (parts.size() == kMost) break;
     const Effect& effect = *one;
-    if (effect.function_size() == 2 && std::none_of(parts.begin(), parts.end(), [](const std::string& part) {
-          return part.starts_with("times ");
-        })) {
-      if (std::string amounts = amounts_in_words(effect.function(0)); !amounts.empty())
-        parts.push_back(std::move(amounts));
-      continue;
-    }
     if (effect.function_size() != 1) continue;
     const std::string size = of_function(effect.function(0), effect.acts_on());
     if (size.empty()) return "";
     parts.push_back(which_of(effect) + size);
   }
+  if (shown.amounts && !parts.empty()) parts.push_back(amounts_in_words(*shown.amounts));
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
 nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& effects) {
   nlohmann::json all = nlohmann::json::array();
-  for (const Effect* one : sorted(effects).others) {
+  const Amounts shown = without_amounts(effects);
+  for (const Effect* one : sorted(shown.curves).others) {
     const Effect& effect = *one;
     if (effect.function_size() != 1 || !(effect.function(0).has_spline() || effect.function(0).has_steps()))
       continue;
@@ -391,7 +404,8 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
 
 nlohmann::json maps_of(const std::string& name, const std::vector<Effect>& effects) {
   nlohmann::json all = nlohmann::json::array();
-  for (const std::vector<const Effect*>& map : sorted(effects).maps) {
+  const Amounts shown = without_amounts(effects);
+  for (const std::vector<const Effect*>& map : sorted(shown.curves).maps) {
     const MapSum sum = sum_of(map);
     if (sum.value.empty()) continue;
     const Effect::Target target = map.front()->acts_on();

@@ -10,6 +10,8 @@
 namespace kilotwin::identify {
 
 /// "+26 % at 0 s, -20 % at 200 s": the sizes of records of one cause, but for products of functions. Empty where there is no other.
+/// Where all records have the same first factor it is taken for the amount: "...; times 0.1 (robot 3) to 1.9 (robot 17)". Curves and
+/// maps are then shown as they are where the amount is 1.
 [[nodiscard]] std::string size_in_words(const std::vector<proto::Effect>&);
 
 /// Those records that are a curve over one covariate, and no part of a map: [{name, covariate, unit, acts_on, acts_on_unit, at [..], value [..]}].

@@ -82,7 +82,7 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
 double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const Situation& s) {
   std::vector<double> values(factor.columns());
   factor.evaluate(s, 0, values.data());
-  return coefficients.dot(Eigen::Map<const Eigen::VectorXd>(values.data(), coefficients.size()));
+  return factor.plus + coefficients.dot(Eigen::Map<const Eigen::VectorXd>(values.data(), coefficients.size()));
 }
 
 void set_axis(Function& function, const Factor& factor) {
@@ -115,6 +115,7 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
   if (!factor.known.empty()) {
     Factor open = factor;
     open.known.clear();
+    open.plus *= coefficients[0];
     return function_of(
         open, coefficients[0] * Eigen::Map<const Eigen::VectorXd>(factor.known.data(),
                                                                   static_cast<Eigen::Index>(factor.known.size())));
@@ -135,7 +136,7 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
     }
     case Shape::kTaper: set_spline(function, factor, coefficients, 0, factor.high, 0, 25); break;
     case Shape::kHarmonics: {
-      if (factor.count == 1) {
+      if (factor.count == 1 && factor.plus == 0) {
         function.mutable_harmonic()->set_cosine(rounded(coefficients[0]));
         function.mutable_harmonic()->set_sine(rounded(coefficients[1]));
         function.mutable_harmonic()->set_period(2 * M_PI / factor.first);
@@ -148,8 +149,9 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
       for (std::size_t i = 0; i < factor.points.size(); ++i) {
         if (factor.axis.of == Covariate::kPreviousCommand && factor.points[i] == kNoCommand) continue;
         function.mutable_table()->add_key(static_cast<std::uint32_t>(factor.points[i]));
-        function.mutable_table()->add_value(rounded(coefficients[static_cast<Eigen::Index>(i)]));
+        function.mutable_table()->add_value(rounded(factor.plus + coefficients[static_cast<Eigen::Index>(i)]));
       }
+      if (factor.plus != 0) function.mutable_table()->set_otherwise(rounded(factor.plus));
       break;
     case Shape::kAtLeast: {
       double value = 0;
@@ -232,15 +234,6 @@ std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factor
     return {{constant}};
   }
   const Factor& factor = factors[from];
-  if (factor.plus != 0) {
-    std::vector<Factor> rest = factors;
-    rest[from].plus = 0;
-    auto all = products_of(rest, from, coefficients);
-    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(from));
-    for (std::vector<Function>& product : products_of(rest, from, factor.plus * coefficients))
-      all.push_back(std::move(product));
-    return all;
-  }
   if (from + 1 == factors.size()) return {{function_of(factor, coefficients)}};
   std::vector<std::vector<Function>> all;
   const auto n = static_cast<Eigen::Index>(factor.size());

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 
+#include "clients/identify/causes/amounts.hpp"
 #include "clients/identify/causes/simplify.hpp"
 #include "clients/identify/causes/steps.hpp"
 #include "clients/identify/causes/widen.hpp"
@@ -18,6 +19,7 @@ namespace {
 /// What acts on the robots of a set.
 struct Acting {
   std::function<double(double since_s)> gain = [](double) { return 1.0; };
+  std::function<double(std::uint32_t robot, double time_s)> own_gain = [](std::uint32_t, double) { return 1.0; };
   std::function<double(double time_s)> drift_x_mm_s = [](double) { return 0.0; };
   /// By how long the wheel's own motor has run.
   std::function<double(double used_s)> left = [](double) { return 1.0; }, right = [](double) { return 1.0; };
@@ -53,8 +55,8 @@ MeasuredSet played(const Acting& acting, std::uint64_t seed, std::uint32_t robot
         next_s = t + (straight ? 3 + 6 * draw : 1 + 2 * draw);
         since_s = 0;
       }
-      const Eigen::Vector2d v =
-          acting.gain(since_s) * nominal_speeds(BaseParameters{}, track.commands.back().motion);
+      const Eigen::Vector2d v = acting.own_gain(robot, t) * acting.gain(since_s) *
+                                nominal_speeds(BaseParameters{}, track.commands.back().motion);
       const double sd = std::sqrt(factor_s / dt);
       Rates rates;
       rates.left_mm_s = acting.left(left_s) * v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
@@ -289,6 +291,60 @@ TEST(Refine, AShiftOfThePictureIsNotADrift) {
   for (std::size_t i = 0; i < steps.points.size(); ++i)
     if (steps.points[i] < 45) shift_mm += model.terms[0].coefficients[static_cast<Eigen::Index>(i)];
   EXPECT_NEAR(shift_mm, 6, 0.5);
+}
+
+TEST(Amounts, OfOneCurveThatSomeRobotsShowAndOthersDoNot) {
+  // Every second robot tires; what all show in the mean is half of that.
+  const double duration_s = 150;
+  const auto tired = [&](double t) { return -0.5 * (t / duration_s) * (t / duration_s); };
+  Acting acting;
+  acting.own_gain = [&](std::uint32_t robot, double t) { return 1 + (robot % 2 == 0 ? tired(t) : 0); };
+  const std::uint32_t robots = 8;
+  const MeasuredSet set = played(acting, 31, robots, duration_s);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 1);
+  MotionModel model;
+  model.contacts = false;
+  const Basis curve{{cosines(Covariate::kTime, duration_s, 4, 0)}};
+  model.terms.push_back(unfitted("speed-by-time", {{Target::kGain, curve}}));
+  fitter.fit(model, 2);
+  // A term by itself is no amount of another.
+  EXPECT_EQ(join_amounts(fitter, model, 0), std::nullopt);
+  ASSERT_EQ(model.terms.size(), 1U);
+  Factor known = curve.factors.front();
+  known.known.assign(model.terms[0].coefficients.begin(), model.terms[0].coefficients.end());
+  Factor each;
+  each.shape = Factor::Shape::kTable;
+  each.axis.of = Covariate::kRobot;
+  for (std::uint32_t robot = 0; robot < robots; ++robot) each.points.push_back(robot);
+  Term amounts = unfitted("speed-by-robot-and-time", {{Target::kGain, Basis{{each, known}}}});
+  amounts.precision.setConstant(1);
+  model.terms.push_back(amounts);
+  fitter.fit(model, 2);
+  const double as_two = fitter.log_likelihood(model);
+  EXPECT_EQ(join_amounts(fitter, model, 1), 0U);
+  ASSERT_EQ(model.terms.size(), 1U);
+  EXPECT_EQ(model.terms[0].name, "speed-by-robot-and-time");
+  EXPECT_GT(fitter.log_likelihood(model), as_two - 10);
+  const Block& block = model.terms[0].blocks.front();
+  const Factor& shown = block.basis.factors.front();
+  ASSERT_EQ(shown.known.size(), robots);
+  EXPECT_EQ(shown.plus, 1);  // the mean robot's, and that of one never seen
+  for (std::uint32_t robot = 0; robot < robots; ++robot)
+    EXPECT_NEAR(shown.plus + shown.known[robot], robot % 2 == 0 ? 2 : 0, 0.25) << robot;
+  std::vector<double> columns(kMostColumns);
+  for (const double t : {20.0, 75.0, 130.0}) {
+    // Robots' biases take the curve's mean.
+    const auto effect_at = [&](double time_s) {
+      Situation s;
+      s.time_s = time_s;
+      s.robot = 4;
+      block.basis.evaluate(s, 0, columns.data());
+      return model.terms[0].coefficients.dot(
+          Eigen::Map<Eigen::VectorXd>(columns.data(), model.terms[0].coefficients.size()));
+    };
+    EXPECT_NEAR((1 + effect_at(t)) / (1 + effect_at(2)), (1 + tired(t)) / (1 + tired(2)), 0.04) << t;
+  }
 }
 
 }  // namespace
