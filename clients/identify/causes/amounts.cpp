@@ -94,9 +94,9 @@ std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model
   const std::size_t own = model.terms.size();
   model.terms.push_back(std::move(one));
   fitter.fit(model, 2);
-  refine(fitter, model, own);
   double best = fitter.log_likelihood(model);
-  for (int turn = 0; turn < kMostTurns; ++turn) {
+  // Amounts with the curve known, then the rest with the amounts known. Whether something is gained by it.
+  const auto in_turn = [&](bool shape) {
     const MotionModel before = model;
     const Factor known = amounts;
     Term changes = found;
@@ -110,17 +110,24 @@ std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model
     add(model.terms.back().coefficients);
     model.terms.pop_back();
     for (Block& block : model.terms[own].blocks) block.basis.factors.front() = amounts;
-    settle(fitter, model, own);
-    const double now = fitter.log_likelihood(model);
-    if (now < best) {
+    if (shape) {
+      settle(fitter, model, own);
+    } else {
+      fitter.fit(model, 1);
+    }
+    const double now = fitter.log_likelihood(model), gained = now - best;
+    if (gained < 0) {
       model = before;
       amounts = known;
-      break;
+    } else {
+      best = now;
     }
-    const bool last = now < best + kSettled;
-    best = now;
-    if (last) break;
-  }
+    return gained > kSettled;
+  };
+  for (int turn = 0; turn < kMostTurns && in_turn(false);) ++turn;
+  refine(fitter, model, own);
+  best = fitter.log_likelihood(model);
+  in_turn(true);
   if (best > likelihood - kAsGood) {
     about_the_mean(model.terms[own]);
     widen(fitter, model, own);
