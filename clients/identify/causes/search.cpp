@@ -65,7 +65,7 @@ class Loop {
       note_rejected(outcome);
       const Finding* const best = best_of(outcome, kRemnant * explained());
       if (best != nullptr) {
-        const Search before = out_;
+        const Kept before = keep();
         const double likelihood = fitter_.log_likelihood_of_all(out_.model);
         note_ambiguous(*best, outcome);
         if (contended(hypothesis(*best).name)) continue;
@@ -278,10 +278,13 @@ class Loop {
   /// Puts another cause in the place of a term. What is weighed far from where the data were linearised may promise too much:
   /// where it explains less after all, everything is as it was.
   bool exchanged(std::size_t place, const Hypothesis& other, Finding finding) {
-    const Search before = out_;
+    const Kept before = keep();
     // Where robots are held tells what moves: they, or the picture of them.
     const auto of_picture = [&] { return is_measured(out_.model.terms[place].blocks.front().target); };
     const bool was_of_picture = of_picture();
+    // By where discs lay then.
+    const double likelihood = fitter_.log_likelihood(out_.model),
+                 likelihood_of_all = fitter_.log_likelihood_of_all(out_.model);
     finding.log10_p = out_.reasons[place].finding.log10_p;
     out_.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
     out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
@@ -289,10 +292,8 @@ class Loop {
     if (was_of_picture != of_picture()) {
       shape(place);
       fitter_.fit_surroundings(out_.model);
-      if (fitter_.log_likelihood_of_all(out_.model) > fitter_.log_likelihood_of_all(before.model) - kAsGood)
-        return true;
+      if (fitter_.log_likelihood_of_all(out_.model) > likelihood_of_all - kAsGood) return true;
     } else {
-      const double likelihood = fitter_.log_likelihood(before.model);
       // The shape that it is given then explains more, but not all of what is lacking.
       if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
         shape(place);
@@ -303,13 +304,15 @@ class Loop {
     failed_.insert(other.name + " for " + out_.model.terms[place].name);
     return false;
   }
-  /// All as it was, also what tracks were prepared with: headings at their starts, and what floors remember.
-  void restore(const Search& before) {
-    if (out_.model.measures() || before.model.measures())
-      fitter_.set().find_centres(before.model, fitter_.threads());
-    out_ = before;
-    fitter_.set().remember(out_.model);
-    fitter_.set().find_headings(out_.model, fitter_.threads());
+  /// The search as it stands, with what tracks were prepared with: where discs lie, headings at starts.
+  struct Kept {
+    Search found;
+    PreparedSet::Found tracks;
+  };
+  [[nodiscard]] Kept keep() const { return {out_, fitter_.set().found()}; }
+  void restore(const Kept& kept) {
+    out_ = kept.found;
+    fitter_.set().go_back(kept.tracks, out_.model);
   }
   /// Whether a term is but the constant part of what another does.
   static bool is_constant_of(const Term& term, const Term& other) {
@@ -333,7 +336,7 @@ class Loop {
   }
   /// Takes a term out, but for one without which the data are less probable after all.
   bool dropped(std::size_t t, bool shape_last) {
-    const Search before = out_;
+    const Kept before = keep();
     const double evidence = fitter_.log_evidence(out_.model);
     out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
@@ -361,13 +364,13 @@ class Loop {
   /// Whether a cause that nearly was chosen in place of the one found last, and now shows beside it, explains more in its place.
   bool contended(const std::string& name) {
     const auto c = contest_.contenders.find(name);
-    if (c == contest_.contenders.end() || out_.model.terms.size() != contest_.before.model.terms.size() + 1 ||
+    if (c == contest_.contenders.end() || out_.model.terms.size() != contest_.before.found.model.terms.size() + 1 ||
         out_.model.terms.back().name != contest_.chosen)
       return false;
     const auto [term, reason] = c->second;
     contest_.contenders.erase(c);
-    const Search now = out_;
-    const double evidence = fitter_.log_evidence(now.model);
+    const Kept now = keep();
+    const double evidence = fitter_.log_evidence(now.found.model);
     restore(contest_.before);
     out_.model.terms.push_back(term);
     out_.reasons.push_back(reason);
@@ -382,7 +385,7 @@ class Loop {
   }
   void note_contenders(const Finding& best, const Scores::Outcome& outcome) {
     const std::string& chosen = hypothesis(best).name;
-    contest_ = {out_, chosen, {}};
+    contest_ = {keep(), chosen, {}};
     std::map<std::string, double> most;
     for (const Finding& f : outcome.findings) {
       const Hypothesis& h = hypothesis(f);
@@ -416,7 +419,7 @@ class Loop {
   double base_likelihood_ = 0;
   /// What might have been chosen in place of the cause that was found last.
   struct Contest {
-    Search before;
+    Kept before;
     std::string chosen;
     std::map<std::string, std::pair<Term, Reason>> contenders;  ///< by name
   };

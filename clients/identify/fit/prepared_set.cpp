@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "clients/identify/fit/likelihood.hpp"
 #include "clients/identify/fit/linearise.hpp"
@@ -45,9 +46,10 @@ std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
 void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) {
   std::vector<Centres> centres(views_.size());
   in_parallel(views_.size(), threads, [&](std::size_t v) { centres[v] = centres_of(model, views_[v]); });
+  centres_.clear();
   for (std::size_t r = 0; r < neighbours_.size(); ++r) {
     // Tracks that are too short to be followed are where they were seen.
-    std::vector<Centres> of_run;
+    std::vector<Centres>& of_run = centres_.emplace_back();
     for (const Track& track : set_->runs[r].tracks) {
       Centres& own = of_run.emplace_back();
       for (const Sample& s : track.samples) {
@@ -60,6 +62,23 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
     *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
     neighbours_[r]->remember(set_->runs[r], model.cells);
   }
+}
+
+PreparedSet::Found PreparedSet::found() const {
+  Found found{centres_, {}};
+  for (const TrackView& view : views_)
+    found.starts_rad.emplace_back(view.start_heading_rad, view.start_heading_sd_rad);
+  return found;
+}
+
+void PreparedSet::go_back(const Found& found, const MotionModel& model) {
+  centres_ = found.centres;
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) {
+    *neighbours_[r] = centres_.empty() ? RunNeighbours(set_->runs[r]) : RunNeighbours(set_->runs[r], &centres_[r]);
+    neighbours_[r]->remember(set_->runs[r], model.cells);
+  }
+  for (std::size_t v = 0; v < views_.size(); ++v)
+    std::tie(views_[v].start_heading_rad, views_[v].start_heading_sd_rad) = found.starts_rad[v];
 }
 
 void PreparedSet::remember(const MotionModel& model) {

@@ -41,6 +41,14 @@ class PreparedSet {
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
   /// Looks again at where discs are, which is not where they are measured, for what robots see of each other.
   void find_centres(const MotionModel&, std::uint32_t threads);
+  /// What was found of tracks: where discs are, and headings at starts.
+  struct Found {
+    std::vector<std::vector<Centres>> centres;          ///< by run; none: where they were measured
+    std::vector<std::pair<double, double>> starts_rad;  ///< of each view: the heading, and its standard deviation
+  };
+  [[nodiscard]] Found found() const;
+  /// All as it was when that was found, but for what floors remember, which is by the model's cells.
+  void go_back(const Found&, const MotionModel&);
   /// Looks again at what floors remember, in cells of the model's sizes.
   void remember(const MotionModel&);
   [[nodiscard]] Meetings meetings() const;
@@ -53,6 +61,8 @@ class PreparedSet {
   const MeasuredSet* set_;
   std::uint32_t first_number_;
   std::vector<std::unique_ptr<RunNeighbours>> neighbours_;
+  std::vector<std::vector<Centres>>
+      centres_;  ///< by which neighbours were found last; none: where they were measured
   std::vector<TrackView> views_;
 };
 
