@@ -65,6 +65,84 @@ void about_the_mean(Term& term) {
   term.precision /= unit * unit;
 }
 
+/// The last term of a model while its curve and its amounts are fitted in turn.
+class CurveTimesAmounts {
+ public:
+  /// In place of the terms `source`, whose curve it is, and `found`, which are amounts of it.
+  CurveTimesAmounts(const Fitter& fitter, MotionModel& model, std::size_t source, std::size_t found)
+      : fitter_(fitter), model_(model), found_(model.terms[found]) {
+    const Basis& basis = found_.blocks.front().basis;
+    open_ = basis.factors[0].known.empty() ? 0 : 1;
+    // Everything has the curve once, but for what was found of its amount. What was left out of the amounts' columns is none.
+    amounts_ = basis.factors[open_];
+    amounts_.known.assign(amounts_.columns(), 0);
+    amounts_.plus = 1;
+    add(found_.coefficients);
+    Term one = model.terms[source];
+    one.name = found_.name;
+    for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amounts_);
+    for (const std::size_t t : {std::max(source, found), std::min(source, found)})
+      model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    model.terms.push_back(std::move(one));
+  }
+
+  void fit() {
+    fitter_.fit(model_, 2);
+    likelihood_ = fitter_.log_likelihood(model_);
+    int turns = 0;
+    while (turns < kMostTurns && in_turn(false)) ++turns;
+    refine(fitter_, model_, model_.terms.size() - 1);
+    likelihood_ = fitter_.log_likelihood(model_);
+    in_turn(true);
+    about_the_mean(model_.terms.back());
+  }
+  [[nodiscard]] double log_likelihood() const { return likelihood_; }
+
+ private:
+  void add(const Eigen::VectorXd& coefficients) {
+    const Basis& basis = found_.blocks.front().basis;
+    for (std::size_t i = 0; i < basis.size(); ++i)
+      amounts_.known[basis.chosen.empty() ? i : basis.chosen[i]] += coefficients[static_cast<Eigen::Index>(i)];
+  }
+  /// Changes of the amounts with the curve known, then all else with the amounts known. Whether something is gained.
+  bool in_turn(bool with_smoothness) {
+    const MotionModel before = model_;
+    const Factor known = amounts_;
+    Term changes = found_;
+    changes.blocks.resize(1);
+    Basis& basis = changes.blocks.front().basis;
+    const auto n = static_cast<Eigen::Index>(basis.size());
+    changes.coefficients = Eigen::VectorXd::Zero(n);
+    changes.precision = found_.precision.head(n).eval();
+    basis.factors[1 - open_] = curve_of(model_.terms.back(), 1);
+    model_.terms.push_back(std::move(changes));
+    fitter_.fit(model_, 1);
+    add(model_.terms.back().coefficients);
+    model_.terms.pop_back();
+    for (Block& block : model_.terms.back().blocks) block.basis.factors.front() = amounts_;
+    if (with_smoothness) {
+      settle(fitter_, model_, model_.terms.size() - 1);
+    } else {
+      fitter_.fit(model_, 1);
+    }
+    const double now = fitter_.log_likelihood(model_), gained = now - likelihood_;
+    if (gained < 0) {
+      model_ = before;
+      amounts_ = known;
+    } else {
+      likelihood_ = now;
+    }
+    return gained > kSettled;
+  }
+
+  const Fitter& fitter_;
+  MotionModel& model_;
+  Term found_;
+  std::size_t open_ = 0;  ///< of the found term's factors the one that is not the curve
+  Factor amounts_;
+  double likelihood_ = 0;
+};
+
 }  // namespace
 
 std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model, std::size_t place) {
@@ -72,65 +150,10 @@ std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model
   if (!source) return std::nullopt;
   const MotionModel was = model;
   const double likelihood = fitter.log_likelihood(was);
-  const Term found = model.terms[place];
-  const Block& more = found.blocks.front();
-  const std::size_t which = more.basis.factors[0].known.empty() ? 0 : 1;
-  // Everything has the curve once, but for what was found of its amount. What was left out of the amounts' columns is none.
-  Factor amounts = more.basis.factors[which];
-  amounts.known.assign(amounts.columns(), 0);
-  amounts.plus = 1;
-  const auto add = [&](const Eigen::VectorXd& coefficients) {
-    for (std::size_t i = 0; i < more.basis.size(); ++i)
-      amounts.known[more.basis.chosen.empty() ? i : more.basis.chosen[i]] +=
-          coefficients[static_cast<Eigen::Index>(i)];
-  };
-  add(found.coefficients.head(static_cast<Eigen::Index>(more.basis.size())));
-
-  Term one = model.terms[*source];
-  for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amounts);
-  one.name = found.name;
-  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(std::max(place, *source)));
-  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(std::min(place, *source)));
-  const std::size_t own = model.terms.size();
-  model.terms.push_back(std::move(one));
-  fitter.fit(model, 2);
-  double best = fitter.log_likelihood(model);
-  // Amounts with the curve known, then the rest with the amounts known. Whether something is gained by it.
-  const auto in_turn = [&](bool shape) {
-    const MotionModel before = model;
-    const Factor known = amounts;
-    Term changes = found;
-    changes.blocks.resize(1);
-    const auto n = static_cast<Eigen::Index>(more.basis.size());
-    changes.coefficients = Eigen::VectorXd::Zero(n);
-    changes.precision = found.precision.head(n).eval();
-    changes.blocks.front().basis.factors[1 - which] = curve_of(model.terms[own], 1);
-    model.terms.push_back(changes);
-    fitter.fit(model, 1);
-    add(model.terms.back().coefficients);
-    model.terms.pop_back();
-    for (Block& block : model.terms[own].blocks) block.basis.factors.front() = amounts;
-    if (shape) {
-      settle(fitter, model, own);
-    } else {
-      fitter.fit(model, 1);
-    }
-    const double now = fitter.log_likelihood(model), gained = now - best;
-    if (gained < 0) {
-      model = before;
-      amounts = known;
-    } else {
-      best = now;
-    }
-    return gained > kSettled;
-  };
-  for (int turn = 0; turn < kMostTurns && in_turn(false);) ++turn;
-  refine(fitter, model, own);
-  best = fitter.log_likelihood(model);
-  in_turn(true);
-  if (best > likelihood - kAsGood) {
-    about_the_mean(model.terms[own]);
-    widen(fitter, model, own);
+  CurveTimesAmounts one(fitter, model, *source, place);
+  one.fit();
+  if (one.log_likelihood() > likelihood - kAsGood) {
+    widen(fitter, model, model.terms.size() - 1);
     return source;
   }
   model = was;

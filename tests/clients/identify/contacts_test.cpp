@@ -132,5 +132,27 @@ TEST(Contacts, WhetherDiscsOverlappedIsTold) {
   EXPECT_FALSE(push_apart(x, y));
 }
 
+TEST(Contacts, WhatWasFoundOfTracksIsAsItWas) {
+  const MeasuredSet set = held_fast(false);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  prepared.find_centres(model, 2);
+  prepared.find_headings(model, 2);
+  const double likelihood = fitter.log_likelihood_of_all(model);
+  const PreparedSet::Found found = prepared.found();
+  // In a picture that is larger discs lie elsewhere, and robots began otherwise.
+  MotionModel larger = model;
+  larger.terms.push_back({"camera",
+                          {{Target::kMeasuredScale, {}}},
+                          Eigen::VectorXd::Constant(1, 0.3),
+                          Eigen::VectorXd::Constant(1, 1)});
+  prepared.find_centres(larger, 2);
+  prepared.find_headings(larger, 2);
+  EXPECT_GT(std::abs(fitter.log_likelihood_of_all(model) - likelihood), 1);
+  prepared.go_back(found, model);
+  EXPECT_EQ(fitter.log_likelihood_of_all(model), likelihood);
+}
+
 }  // namespace
 }  // namespace kilotwin::identify
