@@ -14,7 +14,7 @@ constexpr double kSettled = 2;
 /// One term of which the curve is known has far fewer freedoms than two: so much less likely it may be.
 constexpr double kAsGood = 10;
 
-/// Factor `a` as it is and `b` as a curve of it that is known.
+/// Whether one factor is the other as a curve that is known.
 bool is_known_of(const Factor& known, const Factor& open) {
   return known.shape == open.shape && known.axis == open.axis && known.low == open.low && known.high == open.high &&
          known.count == open.count && known.points == open.points;
@@ -34,16 +34,6 @@ std::optional<std::size_t> source_of(const MotionModel& model, const Term& amoun
       return t;
   }
   return std::nullopt;
-}
-
-/// The first block's curve, as the coefficients are now.
-Factor curve_of(const Term& term, std::size_t factor) {
-  const Basis& basis = term.blocks.front().basis;
-  Factor curve = basis.factors[factor];
-  curve.known.assign(curve.columns(), 0);
-  for (std::size_t i = 0; i < basis.size(); ++i)
-    curve.known[basis.chosen.empty() ? i : basis.chosen[i]] = term.coefficients[static_cast<Eigen::Index>(i)];
-  return curve;
 }
 
 /// Amounts of keys are told relative to their mean, which is that of a robot that nobody has seen. Where they have next to none, the
@@ -68,9 +58,9 @@ void about_the_mean(Term& term) {
 /// The last term of a model while its curve and its amounts are fitted in turn.
 class CurveTimesAmounts {
  public:
-  /// In place of the terms `source`, whose curve it is, and `found`, which are amounts of it.
-  CurveTimesAmounts(const Fitter& fitter, MotionModel& model, std::size_t source, std::size_t found)
-      : fitter_(fitter), model_(model), found_(model.terms[found]) {
+  /// In place of the term `source`, whose curve it is, and of the last, which are amounts of it.
+  CurveTimesAmounts(const Fitter& fitter, MotionModel& model, std::size_t source)
+      : fitter_(fitter), model_(model), found_(model.terms.back()) {
     const Basis& basis = found_.blocks.front().basis;
     open_ = basis.factors[0].known.empty() ? 0 : 1;
     // Everything has the curve once, but for what was found of its amount. What was left out of the amounts' columns is none.
@@ -81,8 +71,8 @@ class CurveTimesAmounts {
     Term one = model.terms[source];
     one.name = found_.name;
     for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amounts_);
-    for (const std::size_t t : {std::max(source, found), std::min(source, found)})
-      model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    model.terms.pop_back();
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(source));
     model.terms.push_back(std::move(one));
   }
 
@@ -114,7 +104,7 @@ class CurveTimesAmounts {
     const auto n = static_cast<Eigen::Index>(basis.size());
     changes.coefficients = Eigen::VectorXd::Zero(n);
     changes.precision = found_.precision.head(n).eval();
-    basis.factors[1 - open_] = curve_of(model_.terms.back(), 1);
+    basis.factors[1 - open_] = known_curve(model_.terms.back(), 1);
     model_.terms.push_back(std::move(changes));
     fitter_.fit(model_, 1);
     add(model_.terms.back().coefficients);
@@ -145,18 +135,20 @@ class CurveTimesAmounts {
 
 }  // namespace
 
-std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  const std::optional<std::size_t> source = source_of(model, model.terms[place]);
+std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model) {
+  const std::optional<std::size_t> source = source_of(model, model.terms.back());
   if (!source) return std::nullopt;
   const MotionModel was = model;
+  const PreparedSet::Found tracks = fitter.set().found();
   const double likelihood = fitter.log_likelihood(was);
-  CurveTimesAmounts one(fitter, model, *source, place);
+  CurveTimesAmounts one(fitter, model, *source);
   one.fit();
   if (one.log_likelihood() > likelihood - kAsGood) {
     widen(fitter, model, model.terms.size() - 1);
     return source;
   }
   model = was;
+  fitter.set().go_back(tracks, model);
   return std::nullopt;
 }
 

@@ -68,15 +68,11 @@ void hypotheses_of_found(DictionaryMaker& make, const Extent& extent, const std:
     std::vector<std::string> words;
     Basis known;
     if (!block.basis.factors.empty()) {
-      Factor factor = block.basis.factors.front();
+      const Factor& factor = block.basis.factors.front();
       if (factor.shape == Shape::kTable || !factor.known.empty()) continue;
       of = "-and-" + of_words(factor.axis.of).first;
       words.push_back(of_words(factor.axis.of).second);
-      factor.known.assign(factor.columns(), 0);
-      for (std::size_t i = 0; i < block.basis.size(); ++i)
-        factor.known[block.basis.chosen.empty() ? i : block.basis.chosen[i]] =
-            term.coefficients[static_cast<Eigen::Index>(i)];
-      known.factors.push_back(std::move(factor));
+      known.factors.push_back(known_curve(term, 0));
     }
     const auto amounts = [&](Covariate covariate, const std::vector<double>& keys) {
       Basis basis = known;

@@ -193,12 +193,12 @@ class Loop {
     say("fitting");
     fitter_.fit(out_.model, 2);
     out_.steps.push_back({h.name, found.held_out});
-    if (!joined(out_.model.terms.size() - 1)) shape(out_.model.terms.size() - 1);
+    if (!joined()) shape(out_.model.terms.size() - 1);
   }
 
   /// Whether the last term, amounts of what another found, became one with that.
-  bool joined(std::size_t place) {
-    const std::optional<std::size_t> curve = join_amounts(fitter_, out_.model, place);
+  bool joined() {
+    const std::optional<std::size_t> curve = join_amounts(fitter_, out_.model);
     if (!curve) return false;
     out_.reasons.back().finding.evidence += out_.reasons[*curve].finding.evidence;
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));

@@ -33,7 +33,7 @@ struct Factor {
   std::vector<double> points;
   /// Not empty: the columns are added up by these coefficients into one, a curve that is known.
   std::vector<double> known = {};
-  /// Of a curve that is known: added to it.
+  /// Of a curve that is known: added to it. Amounts alone have it: tables, cosines, maps, harmonics.
   double plus = 0;
 
   [[nodiscard]] bool of_two() const {

@@ -82,6 +82,9 @@ struct Term {
   Eigen::VectorXd precision;
 };
 
+/// The curve of its first block as one that is known, as the coefficients are now. `factor`: which of the block's it is; others, if
+/// there are any, are known.
+[[nodiscard]] Factor known_curve(const Term&, std::size_t factor);
 /// Whether it bends what is seen from place to place.
 [[nodiscard]] bool is_map_of_picture(const Term&);
 

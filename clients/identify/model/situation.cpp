@@ -104,7 +104,6 @@ CommandClock::CommandClock(const Track& track) {
     state.previous_lasted_s = state.first ? 0 : state.since_s;
     state.previous = state.command;
     state.command = change.motion;
-    if (!state.driven()) state.since_rest_s = 0;
     state.since_s = 0;
     if (change.motion == Motion::kLeft || change.motion == Motion::kRight) state.last_turn = change.motion;
     if (!starts_s_.empty() && starts_s_.back() == at_s) {

@@ -233,17 +233,24 @@ void add_speed_by_motor_time(const Fitter& fitter, MotionModel& model, double lo
   refine(fitter, model, 0);
 }
 
+/// What is found of motors by their use, before it is given its shape.
+struct FoundInUse {
+  FoundInUse(const Acting& acting, std::uint64_t seed) : set(played(acting, seed, 8, 80)) {
+    fitter.fit_base(model);
+    add_speed_by_motor_time(fitter, model, 75);
+  }
+  MeasuredSet set;
+  PreparedSet prepared{set};
+  Fitter fitter{prepared, 2};
+  MotionModel model;
+};
+
 TEST(Refine, WhatEndsAtOnceWithUseIsAStep) {
   Acting acting;
   acting.left = acting.right = [](double used_s) { return used_s < 35 ? 1.0 : 0.7; };
-  const MeasuredSet set = played(acting, 9, 8, 80);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
-  add_speed_by_motor_time(fitter, model, 75);
-  EXPECT_EQ(find_steps(fitter, model, 0), "speed-by-motor-time");
-  const auto& blocks = model.terms[0].blocks;
+  FoundInUse found(acting, 9);
+  EXPECT_EQ(find_steps(found.fitter, found.model, 0), "speed-by-motor-time");
+  const auto& blocks = found.model.terms[0].blocks;
   const Factor& steps = blocks.back().basis.factors[0];
   ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
   EXPECT_EQ(steps.axis.of, Covariate::kMotorTime);
@@ -255,18 +262,13 @@ TEST(Refine, WhatEndsAtOnceWithUseIsAStep) {
 TEST(Widen, WhatLeftWheelsDoIsNoBias) {
   Acting acting;
   acting.left = [](double used_s) { return 1 - 0.4 * (1 - std::exp(-used_s / 20)); };
-  const MeasuredSet set = played(acting, 10, 8, 80);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
-  add_speed_by_motor_time(fitter, model, 75);
-  widen(fitter, model, 0);
+  FoundInUse found(acting, 10);
+  widen(found.fitter, found.model, 0);
   Situation at;
   at.commands.command = Motion::kStraight;
   const auto ratio = [&](double used_s) {
     at.commands.motor_s = {used_s, used_s};
-    const Rates rates = model.rates(at, Eigen::Vector2d::Zero());
+    const Rates rates = found.model.rates(at, Eigen::Vector2d::Zero());
     return rates.left_gain / rates.right_gain;
   };
   for (const double used_s : {5.0, 20.0, 50.0}) EXPECT_NEAR(ratio(used_s), acting.left(used_s), 0.05) << used_s;
@@ -309,7 +311,7 @@ TEST(Amounts, OfOneCurveThatSomeRobotsShowAndOthersDoNot) {
   model.terms.push_back(unfitted("speed-by-time", {{Target::kGain, curve}}));
   fitter.fit(model, 2);
   // A term by itself is no amount of another.
-  EXPECT_EQ(join_amounts(fitter, model, 0), std::nullopt);
+  EXPECT_EQ(join_amounts(fitter, model), std::nullopt);
   ASSERT_EQ(model.terms.size(), 1U);
   Factor known = curve.factors.front();
   known.known.assign(model.terms[0].coefficients.begin(), model.terms[0].coefficients.end());
@@ -322,7 +324,7 @@ TEST(Amounts, OfOneCurveThatSomeRobotsShowAndOthersDoNot) {
   model.terms.push_back(amounts);
   fitter.fit(model, 2);
   const double as_two = fitter.log_likelihood(model);
-  EXPECT_EQ(join_amounts(fitter, model, 1), 0U);
+  EXPECT_EQ(join_amounts(fitter, model), 0U);
   ASSERT_EQ(model.terms.size(), 1U);
   EXPECT_EQ(model.terms[0].name, "speed-by-robot-and-time");
   EXPECT_GT(fitter.log_likelihood(model), as_two - 10);
