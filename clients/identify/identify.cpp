@@ -12,6 +12,7 @@
 #include "clients/identify/model/effect_words.hpp"
 #include "clients/identify/model/write_effects.hpp"
 #include "clients/identify/model/write_model.hpp"
+#include "clients/identify/predict/held_out_gain.hpp"
 #include "clients/identify/predict/predict.hpp"
 #include "clients/identify/predict/prediction_errors.hpp"
 #include "clients/identify/replay/simulated_check.hpp"
@@ -71,8 +72,14 @@ std::string experiment_for(const std::vector<std::string>& found, const std::vec
   return "repeat the runs with more robots, or for longer";
 }
 
-/// Of terms by the same cause, one entry. `without_mm` are errors without each term.
-json effects_of(const Search& found, const std::vector<double>& without_mm, double before_mm, double after_mm) {
+/// What became of data never fitted without a term, all else being fitted again.
+struct Without {
+  double rmse_mm;
+  HeldOutGain gain;  ///< of the model with it
+};
+
+/// Of terms by the same cause, one entry.
+json effects_of(const Search& found, const std::vector<Without>& without, double before_mm, double after_mm) {
   json effects = json::array();
   for (std::size_t t = 0; t < found.model.terms.size(); ++t) {
     const Term& term = found.model.terms[t];
@@ -80,11 +87,11 @@ json effects_of(const Search& found, const std::vector<double>& without_mm, doub
     const auto known =
         std::find_if(effects.begin(), effects.end(), [&](const json& e) { return e["name"] == term.name; });
     if (known != effects.end()) {
-      (*known)["rmse_without_mm"] = std::max((*known)["rmse_without_mm"].get<double>(), without_mm[t]);
+      (*known)["rmse_without_mm"] = std::max((*known)["rmse_without_mm"].get<double>(), without[t].rmse_mm);
       continue;
     }
     const double gap = before_mm * before_mm - after_mm * after_mm;
-    const double share = gap > 0 ? (without_mm[t] * without_mm[t] - after_mm * after_mm) / gap : 0;
+    const double share = gap > 0 ? (without[t].rmse_mm * without[t].rmse_mm - after_mm * after_mm) / gap : 0;
     const std::vector<proto::Effect> written = effects_of_term(term);
     json records = json::array();
     for (const proto::Effect& effect : written) records.push_back(effect.ShortDebugString());
@@ -100,11 +107,11 @@ json effects_of(const Search& found, const std::vector<double>& without_mm, doub
             std::min(1.0, Scores::kFamilyAlarm *
                               std::pow(10.0, std::max(-300.0, reason.finding.log10_p - reason.threshold_log10_p)))},
            {"log_likelihood_gain", reason.finding.evidence},
-           {"held_out_gain", reason.finding.held_out},
-           {"held_out_gain_se", reason.finding.held_out_se},
+           {"held_out_gain", without[t].gain.nat},
+           {"held_out_gain_se", without[t].gain.nat_se},
            {"degrees", reason.finding.degrees}}},
          {"parameters", {{"form", form_of(term)}, {"columns", term.coefficients.size()}, {"records", records}}},
-         {"rmse_without_mm", without_mm[t]},
+         {"rmse_without_mm", without[t].rmse_mm},
          {"share_removed", std::clamp(share, 0.0, 1.0)},
          {"in_words", fmt::format("{} depends on {}{}{}", reason.acts_on, fmt::join(reason.covariates, ", "),
                                   size.empty() ? "" : ": ", size)}});
@@ -166,7 +173,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     throw UserError("no robot was measured twice in a run that may be fitted to; there is nothing to identify");
   std::optional<PreparedSet> other;
   if (test != nullptr) other.emplace(*test, static_cast<std::uint32_t>(train.runs.size()));
-  const PreparedSet& judged = other ? *other : prepared;
+  PreparedSet& judged = other ? *other : prepared;
   const bool held_out_only = !other && std::any_of(train.runs.begin(), train.runs.end(), [](const Run& run) {
     return std::any_of(run.tracks.begin(), run.tracks.end(), [](const Track& t) { return t.held_out; });
   });
@@ -244,15 +251,16 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     }
   }
   contract["horizon_s"] = options.horizon_s;
-  std::vector<double> without_mm;
+  std::vector<Without> without;
   for (std::size_t t = 0; t < after.terms.size(); ++t) {
-    MotionModel without = after;
-    without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(t));
-    fitter.fit(without, 1);
-    without_mm.push_back(
-        errors_of(judged.set(), predict(without, judged, asked, held_out_only, options.threads)).rmse_mm());
+    MotionModel less = after;
+    less.terms.erase(less.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    fitter.fit(less, 1);
+    without.push_back(
+        {errors_of(judged.set(), predict(less, judged, asked, held_out_only, options.threads)).rmse_mm(),
+         held_out_gain(after, less, judged, held_out_only, options.threads)});
   }
-  contract["effects"] = effects_of(found, without_mm, errors_before.rmse_mm(), errors_after.rmse_mm());
+  contract["effects"] = effects_of(found, without, errors_before.rmse_mm(), errors_after.rmse_mm());
   document["effect_curves"] = document["effect_maps"] = json::array();
   for (const Term& term : after.terms) {
     const std::vector<proto::Effect> written = effects_of_term(term);

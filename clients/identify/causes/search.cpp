@@ -252,8 +252,6 @@ class Loop {
     for (int t = 0; t < static_cast<int>(out_.model.terms.size()); ++t) {
       const auto place = static_cast<std::size_t>(t);
       const Finding own = scores_->weigh_term(t);
-      out_.reasons[place].finding.held_out = own.held_out;
-      out_.reasons[place].finding.held_out_se = own.held_out_se;
       if (own.held_out < 2 && dropped(place, false)) return true;
       const Hypothesis* best = nullptr;
       Finding best_finding;

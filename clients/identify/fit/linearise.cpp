@@ -12,7 +12,6 @@
 namespace kilotwin::identify {
 namespace {
 
-using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
 constexpr Eigen::Index kBuffer = 96;  ///< rows of innovations that are summed at once
 
 /// Derivatives of one track's filter by all columns, and the sums that come of them.
@@ -61,8 +60,7 @@ class Sensitivities {
     const Arc& arc = record.arc;
     const double h = record.h_s, base = model_.base.wheel_base_mm;
     const double by_heading_x = -(arc.dy_mm - r.world_y_mm_s * h), by_heading_y = arc.dx_mm - r.world_x_mm_s * h;
-    pose_.row(0) += by_heading_x * pose_.row(2);
-    pose_.row(1) += by_heading_y * pose_.row(2);
+    add_row({by_heading_x, by_heading_y, 0}, pose_.row(2).data(), all_, pose_, 0);
     last_ = record.middle;
     touched_.step(record);
     const double forward = (r.left_mm_s + r.right_mm_s) / 2 * h;
@@ -90,9 +88,7 @@ class Sensitivities {
       if (is_measured(block.target) || (block.during >> static_cast<int>(commands.command) & 1) == 0) continue;
       block.basis.evaluate(record.middle, 0, of_left_);
       const auto add = [&](const Eigen::Vector3d& force, const double* values) {
-        const Eigen::Map<const Eigen::RowVectorXd> row(values, n);
-        for (int i = 0; i < 3; ++i)
-          if (force[i] != 0) pose_.row(i).segment(first, n) += force[i] * row;
+        add_row(force, values, n, pose_, first);
       };
       const double* right_values = of_left_;
       if (block.basis.per_wheel()) {
@@ -159,17 +155,17 @@ class Sensitivities {
       clusters_.emplace_back(Eigen::VectorXd::Zero(all_));
       cluster_run.push_back(run_);
     }
-    seen_.noalias() = innovation.jacobian * pose_;
+    put_combined(innovation.jacobian, pose_, 3, seen_.data());
     add_measured(sample, innovation.pose);
     if (filled_ + 3 > kBuffer) flush();
     if (heading_alone) return add_heading(sample, innovation);
     if (innovation.size == 2) seen_.row(2).setZero();
     const Eigen::LLT<Eigen::Matrix3d> root(innovation.covariance);
     const Eigen::Matrix3d whiten = root.matrixL().solve(Eigen::Matrix3d::Identity());
-    buffer_.middleRows(filled_, innovation.size).noalias() = (whiten * seen_).topRows(innovation.size);
+    put_combined(whiten, seen_, innovation.size, buffer_.row(filled_).data());
     values_.segment(filled_, innovation.size) = (whiten * innovation.difference).head(innovation.size);
     filled_ += innovation.size;
-    pose_.noalias() -= innovation.gain.topRows<3>() * seen_;
+    take_combined(innovation.gain.topRows<3>(), seen_, innovation.size, pose_);
   }
   void flush() {
     if (filled_ == 0) return;
@@ -293,7 +289,7 @@ class Sensitivities {
   std::vector<Own> own_;  ///< of the first blocks
   const double cluster_s_;
   Eigen::Index columns_ = 0, all_ = 0, filled_ = 0;
-  Rows pose_, seen_;
+  PoseRows pose_, seen_;
   Eigen::MatrixXd information_;
   RowMajorMatrix buffer_;
   Eigen::VectorXd values_;

@@ -51,35 +51,90 @@ inline __attribute__((always_inline)) void add(const double* rows, Eigen::Index 
   }
 }
 
-#if defined(__x86_64__)
-__attribute__((target("avx512f"))) void add_avx512(const double* rows, Eigen::Index count, Eigen::Index n,
-                                                   double* sums) {
-  add(rows, count, n, sums);
-}
-__attribute__((target("avx2"))) void add_avx2(const double* rows, Eigen::Index count, Eigen::Index n,
-                                              double* sums) {
-  add(rows, count, n, sums);
-}
-#endif
-void add_baseline(const double* rows, Eigen::Index count, Eigen::Index n, double* sums) {
-  add(rows, count, n, sums);
+/// to = start + by[0] * from[0] + .. over `terms` rows of n numbers, `start` being `to` itself or 0.
+template <int terms, bool onto>
+inline __attribute__((always_inline)) void combine(const double* by, const double* from, Eigen::Index stride,
+                                                   Eigen::Index n, double* to) {
+  Eigen::Index i = 0;
+  for (; i + kLanes <= n; i += kLanes) {
+    Lanes sum = {}, next;
+    if (onto) std::memcpy(&sum, to + i, sizeof(Lanes));
+    for (int k = 0; k < terms; ++k) {
+      std::memcpy(&next, from + k * stride + i, sizeof(Lanes));
+      sum += by[k] * next;
+    }
+    std::memcpy(to + i, &sum, sizeof(Lanes));
+  }
+  for (; i < n; ++i) {
+    double sum = onto ? to[i] : 0;
+    for (int k = 0; k < terms; ++k) sum += by[k] * from[k * stride + i];
+    to[i] = sum;
+  }
 }
 
 using Add = void (*)(const double*, Eigen::Index, Eigen::Index, double*);
+using Combine = void (*)(const double*, const double*, Eigen::Index, Eigen::Index, double*);
 
-Add fastest() {
+/// The same sums by the instructions of a kind of processor.
+struct Kernels {
+  Add add;
+  Combine put3, onto3, onto2, onto1;
+};
+
+#define KILOTWIN_KERNELS(name, instructions)                                                                    \
+  struct name {                                                                                                 \
+    instructions static void add(const double* rows, Eigen::Index count, Eigen::Index n, double* sums) {        \
+      identify::add(rows, count, n, sums);                                                                      \
+    }                                                                                                           \
+    template <int terms, bool onto>                                                                             \
+    instructions static void combine(const double* by, const double* from, Eigen::Index stride, Eigen::Index n, \
+                                     double* to) {                                                              \
+      identify::combine<terms, onto>(by, from, stride, n, to);                                                  \
+    }                                                                                                           \
+    static constexpr Kernels kernels() {                                                                        \
+      return {add, combine<3, false>, combine<3, true>, combine<2, true>, combine<1, true>};                    \
+    }                                                                                                           \
+  }
+
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") != 0) return add_avx512;
-  if (__builtin_cpu_supports("avx2") != 0) return add_avx2;
+KILOTWIN_KERNELS(Avx512, __attribute__((target("avx512f"))));
+KILOTWIN_KERNELS(Avx2, __attribute__((target("avx2"))));
 #endif
-  return add_baseline;
+KILOTWIN_KERNELS(Baseline, );
+
+Kernels fastest() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") != 0) return Avx512::kernels();
+  if (__builtin_cpu_supports("avx2") != 0) return Avx2::kernels();
+#endif
+  return Baseline::kernels();
 }
+const Kernels kFastest = fastest();
+
+using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 }  // namespace
 
 void add_products(const RowMajorMatrix& rows, Eigen::Index count, Eigen::MatrixXd& sums) {
-  static const Add add = fastest();
-  add(rows.data(), count, rows.cols(), sums.data());
+  kFastest.add(rows.data(), count, rows.cols(), sums.data());
+}
+
+void put_combined(const Eigen::Matrix3d& by, const PoseRows& from, Eigen::Index count, double* to) {
+  const RowMajor3 rows = by;
+  for (Eigen::Index i = 0; i < count; ++i)
+    kFastest.put3(rows.row(i).data(), from.data(), from.cols(), from.cols(), to + i * from.cols());
+}
+
+void take_combined(const Eigen::Matrix3d& by, const PoseRows& from, Eigen::Index count, PoseRows& to) {
+  const RowMajor3 rows = -by;
+  const Combine onto = count == 3 ? kFastest.onto3 : kFastest.onto2;
+  for (Eigen::Index i = 0; i < 3; ++i)
+    onto(rows.row(i).data(), from.data(), from.cols(), from.cols(), to.data() + i * to.cols());
+}
+
+void add_row(const Eigen::Vector3d& times, const double* row, Eigen::Index n, PoseRows& to, Eigen::Index first) {
+  for (Eigen::Index i = 0; i < 3; ++i)
+    if (times[i] != 0) kFastest.onto1(&times[i], row, n, n, to.data() + i * to.cols() + first);
 }
 
 }  // namespace kilotwin::identify

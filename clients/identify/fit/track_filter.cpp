@@ -71,11 +71,16 @@ void TrackFilter::start(const Sample& sample, const Situation&, double heading_r
 }
 
 Situation TrackFilter::situation(double time_s, const CommandState& commands, const NeighbourView& near) const {
+  return situation(time_s, belief_.mean.head<3>(), commands, near);
+}
+
+Situation TrackFilter::situation(double time_s, const Eigen::Vector3d& pose, const CommandState& commands,
+                                 const NeighbourView& near) const {
   Situation s = place_;
   s.time_s = time_s;
-  s.heading_rad = belief_.mean[2];
-  s.x_mm = belief_.centre_x_mm();
-  s.y_mm = belief_.centre_y_mm();
+  s.heading_rad = pose[2];
+  s.x_mm = pose[0] + belief_.centre_mm * std::cos(pose[2]);
+  s.y_mm = pose[1] + belief_.centre_mm * std::sin(pose[2]);
   s.commands = commands;
   s.near = near;
   return s;
@@ -91,22 +96,19 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
                                     const NeighbourView& near) {
   StepRecord record;
   record.h_s = h_s;
-  record.middle = situation(time_s + h_s / 2, commands, near);
-  record.middle.span_s = h_s;
-  record.middle.commands.advance(h_s / 2);
+  Eigen::Vector3d pose = belief_.mean.head<3>();
   if (!model_->terms.empty() && commands.driven()) {
     // Half a step ahead by the base model, for what depends on the pose.
     Rates plain;
     const Eigen::Vector2d v = nominal_speeds(model_->base, commands.command) + belief_.mean.tail<2>();
     plain.left_mm_s = v[0];
     plain.right_mm_s = v[1];
-    const Arc half = arc_of(plain, model_->base.wheel_base_mm, belief_.mean[2], h_s / 2);
-    record.middle.heading_rad += half.dheading_rad;
-    record.middle.x_mm =
-        belief_.mean[0] + half.dx_mm + model_->base.centre_mm * std::cos(record.middle.heading_rad);
-    record.middle.y_mm =
-        belief_.mean[1] + half.dy_mm + model_->base.centre_mm * std::sin(record.middle.heading_rad);
+    const Arc half = arc_of(plain, model_->base.wheel_base_mm, pose[2], h_s / 2);
+    pose += Eigen::Vector3d(half.dx_mm, half.dy_mm, half.dheading_rad);
   }
+  record.middle = situation(time_s + h_s / 2, pose, commands, near);
+  record.middle.span_s = h_s;
+  record.middle.commands.advance(h_s / 2);
   // A robot at rest is pushed by others as well.
   record.at_robot = model_->contacts && near.nearest_mm < model_->touch_mm;
   record.at_wall =
@@ -123,12 +125,13 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
 void TrackFilter::hold_inside() {
   const Room& room = model_->room;
   const double ahead = model_->base.centre_mm;
-  const Eigen::Vector2d by_heading(-ahead * std::sin(belief_.mean[2]), ahead * std::cos(belief_.mean[2]));
-  const Eigen::Vector2d centre(belief_.mean[0] + by_heading[1], belief_.mean[1] - by_heading[0]);
   // Few are near a wall.
   const StateCovariance& p = belief_.covariance;
   constexpr double kNear = 6;  // standard deviations
   const double reach = kNear * (std::sqrt(p(0, 0) + p(1, 1)) + std::abs(ahead) * std::sqrt(p(2, 2)));
+  if (!room.at_wall(belief_.mean[0], belief_.mean[1], reach + std::abs(ahead))) return;
+  const Eigen::Vector2d by_heading(-ahead * std::sin(belief_.mean[2]), ahead * std::cos(belief_.mean[2]));
+  const Eigen::Vector2d centre(belief_.mean[0] + by_heading[1], belief_.mean[1] - by_heading[0]);
   if (!room.at_wall(centre[0], centre[1], reach)) return;
   hold_behind(0, room.x_high_mm, 1);
   hold_behind(0, room.x_low_mm, -1);

@@ -94,6 +94,8 @@ class TrackFilter {
   void hold_inside();
   void hold_behind(Eigen::Index axis, double wall_mm, double outwards);
   [[nodiscard]] Situation situation(double time_s, const CommandState&, const NeighbourView&) const;
+  [[nodiscard]] Situation situation(double time_s, const Eigen::Vector3d& pose, const CommandState&,
+                                    const NeighbourView&) const;
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
   void spread(const StepRecord&);
 

@@ -98,7 +98,8 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       }
       return;
     case Shape::kLevelling:
-      for (std::size_t i = 0; i < points.size(); ++i) to[i] = -std::expm1(-c / points[i]);
+      // Mostly there are none, or it has just begun.
+      for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == 0 ? 0 : -std::expm1(-c / points[i]);
       return;
     case Shape::kExponential:
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = std::exp(-c / points[i]);
@@ -159,7 +160,13 @@ void Basis::evaluate(const Situation& s, std::size_t wheel, double* to) const {
   to[0] = 1;
   std::size_t have = 1;
   std::array<double, kMostColumns> of_factor;
-  for (const Factor& factor : factors) {
+  if (!factors.empty()) {
+    have = factors.front().size();
+    KILOTWIN_DEMAND(have <= kMostColumns);
+    factors.front().evaluate(s, wheel, to);
+  }
+  for (std::size_t f = 1; f < factors.size(); ++f) {
+    const Factor& factor = factors[f];
     const std::size_t n = factor.size();
     KILOTWIN_DEMAND(have * n <= kMostColumns);
     factor.evaluate(s, wheel, of_factor.data());

@@ -43,6 +43,14 @@ Eigen::Vector2d nominal_speeds(const BaseParameters& base, Motion motion) {
   return {0, 0};
 }
 
+namespace {
+/// What a block's columns come to.
+double sum_of(const std::array<double, kMostColumns>& columns, const Term& term, Eigen::Index first,
+              Eigen::Index n) {
+  return Eigen::Map<const Eigen::VectorXd>(columns.data(), n).dot(term.coefficients.segment(first, n));
+}
+}  // namespace
+
 Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) const {
   Rates r;
   if (s.commands.driven()) {
@@ -60,14 +68,11 @@ Rates MotionModel::rates(const Situation& s, const Eigen::Vector2d& bias_mm_s) c
       c += n;
       if (is_measured(block.target) || (block.during >> static_cast<int>(s.commands.command) & 1) == 0) continue;
       block.basis.evaluate(s, 0, left.data());
-      double l = 0;
-      for (Eigen::Index i = 0; i < n; ++i) l += left[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+      const double l = sum_of(left, term, first, n);
       const auto of_right = [&] {
         if (!block.basis.per_wheel()) return l;
         block.basis.evaluate(s, 1, right.data());
-        double w = 0;
-        for (Eigen::Index i = 0; i < n; ++i) w += right[static_cast<std::size_t>(i)] * term.coefficients[first + i];
-        return w;
+        return sum_of(right, term, first, n);
       };
       switch (block.target) {
         case Target::kGain:
@@ -131,9 +136,7 @@ Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_r
         if (!is_measured(block.target) || (block.during >> static_cast<int>(at.commands.command) & 1) == 0)
           continue;
         block.basis.evaluate(there, 0, values.data());
-        double v = 0;
-        for (Eigen::Index i = 0; i < n; ++i)
-          v += values[static_cast<std::size_t>(i)] * term.coefficients[first + i];
+        const double v = sum_of(values, term, first, n);
         switch (block.target) {
           case Target::kMeasuredX: x += v; break;
           case Target::kMeasuredY: y += v; break;
@@ -167,8 +170,11 @@ Eigen::Vector3d MotionModel::pose_of(const Sample& sample, const Situation& at) 
 Arc arc_of(const Rates& r, double wheel_base_mm, double heading_rad, double h_s) {
   const double turn = (r.right_mm_s - r.left_mm_s) / wheel_base_mm + r.turn_rad_s;
   const double forward = (r.left_mm_s + r.right_mm_s) / 2 + r.ahead_mm_s;
-  const double half = turn * h_s / 2;
-  const double shorter = std::abs(half) < 1e-4 ? 1 - half * half / 6 : std::sin(half) / half;
+  // sin(half) / half, to the last digit where a robot turns by little, as in nearly all steps.
+  const double half = turn * h_s / 2, half2 = half * half;
+  constexpr double kLittle_rad = 0.06;
+  const double shorter =
+      std::abs(half) < kLittle_rad ? 1 - half2 / 6 * (1 - half2 / 20 * (1 - half2 / 42)) : std::sin(half) / half;
   const double c = std::cos(heading_rad + half) * shorter, s = std::sin(heading_rad + half) * shorter;
   return {h_s * (forward * c - r.sideways_mm_s * s + r.world_x_mm_s),
           h_s * (forward * s + r.sideways_mm_s * c + r.world_y_mm_s), turn * h_s, c, s};

@@ -38,7 +38,9 @@ double toward(const Axis& axis, const Situation& s) {
   const NeighbourView& near = s.near;
   const bool count = axis.of == Covariate::kNeighbours;
   if (near.list == nullptr) return count ? near.count[axis.radius] : near.density[axis.radius];
-  const double reach = reach_mm(axis), ahead = s.heading_rad + axis.toward_deg * (M_PI / 180);
+  const double reach = reach_mm(axis);
+  if (near.nearest_mm > reach) return 0;
+  const double ahead = s.heading_rad + axis.toward_deg * (M_PI / 180);
   const double ahead_x = std::cos(ahead), ahead_y = std::sin(ahead);
   double sum = 0;
   for (std::uint32_t i = 0; i < near.listed; ++i) {

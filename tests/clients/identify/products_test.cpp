@@ -27,5 +27,35 @@ TEST(Products, AreThoseOfThePlainLoop) {
   }
 }
 
+TEST(Products, OfThreeRowsAreThoseOfThePlainLoop) {
+  std::uint32_t drawn = 0;
+  const auto draw = [&] {
+    return static_cast<double>(philox4x32({++drawn, 0, 0, 0}, {3, 4})[0]) / 4294967296.0 - 0.5;
+  };
+  for (const Eigen::Index n : {1, 7, 8, 9, 16, 33, 100}) {
+    for (const Eigen::Index count : {2, 3}) {
+      const Eigen::Matrix3d by = Eigen::Matrix3d::NullaryExpr(draw);
+      const PoseRows from = PoseRows::NullaryExpr(3, n, draw), had = PoseRows::NullaryExpr(3, n, draw);
+      PoseRows put = had, taken = had, added = had;
+      put_combined(by, from, count, put.data());
+      take_combined(by, from, count, taken);
+      const Eigen::Index first = n / 3, width = n - first;
+      add_row({by(0, 0), 0, by(1, 1)}, from.data(), width, added, first);
+      for (Eigen::Index c = 0; c < n; ++c) {
+        for (Eigen::Index i = 0; i < 3; ++i) {
+          double sum = 0, less = had(i, c);
+          for (Eigen::Index k = 0; k < 3; ++k) sum += by(i, k) * from(k, c);
+          for (Eigen::Index k = 0; k < count; ++k) less += -by(i, k) * from(k, c);
+          ASSERT_EQ(put(i, c), i < count ? sum : had(i, c)) << n << " columns, at " << i << ", " << c;
+          ASSERT_EQ(taken(i, c), less) << n << " columns, at " << i << ", " << c;
+          const double times = i == 1 ? 0 : i == 0 ? by(0, 0) : by(1, 1);
+          const double more = c < first ? had(i, c) : had(i, c) + times * from(0, c - first);
+          ASSERT_EQ(added(i, c), more) << n << " columns, at " << i << ", " << c;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace kilotwin::identify
