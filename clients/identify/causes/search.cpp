@@ -177,6 +177,10 @@ class Loop {
     // More of what is there already may be one thing in a richer form.
     for (std::size_t t = 0; t < out_.model.terms.size(); ++t) {
       if (out_.model.terms[t].name != h.name) continue;
+      if (reshaped(t, found.evidence)) {
+        out_.steps.push_back({h.name, found.held_out});
+        return;
+      }
       const Finding instead = scores_->weigh(h, static_cast<int>(t));
       const Finding own = scores_->weigh_term(static_cast<int>(t));
       if (instead.evidence < own.evidence + found.evidence - 2) continue;
@@ -194,6 +198,18 @@ class Loop {
     fitter_.fit(out_.model, 2);
     out_.steps.push_back({h.name, found.held_out});
     if (!joined()) shape(out_.model.terms.size() - 1);
+  }
+
+  /// Whether a term, its shape chosen anew beside what was found since, explains most of what more of it promises.
+  bool reshaped(std::size_t place, double promised) {
+    constexpr double kMost = 0.5;
+    const Kept before = keep();
+    const double likelihood = fitter_.log_likelihood(out_.model);
+    say("fitting");
+    shape(place);
+    if (fitter_.log_likelihood(out_.model) > likelihood + kMost * promised) return true;
+    restore(before);
+    return false;
   }
 
   /// Whether the last term, amounts of what another found, became one with that.
