@@ -113,6 +113,40 @@ Effect warming_patch(double strength) {
           {}};
 }
 
+Effect drying_patch(double strength) {
+  return {"drying-patch",
+          "speed is 1 - 0.55 exp(-(d / 180 mm)^2) exp(-t / 110 s), d = distance from (90, -60) mm",
+          {{"position", "time"}},
+          {"robot", "measurement"},
+          [=](const Situation& at, Push& push) {
+            const double d2 = square(at.disc.x - 90) + square(at.disc.y + 60);
+            slow_both(push, 1 - 0.55 * strength * std::exp(-d2 / square(180)) * std::exp(-at.time_s / 110));
+          },
+          {}};
+}
+
+Effect growing_grain(double strength) {
+  return {"growing-grain",
+          "speed is 1 + 0.4 min(1, t / 220 s) cos(heading - 0.7)",
+          {{"heading", "time"}},
+          {"robot"},
+          [=](const Situation& at, Push& push) {
+            slow_both(push, 1 + 0.4 * strength * std::min(1.0, at.time_s / 220) * std::cos(at.heading_rad - 0.7));
+          },
+          {}};
+}
+
+Effect half_the_room(double strength) {
+  return {"half-the-room",
+          "robots with even numbers run at 1 - 0.4 / (1 + exp(-x / 40 mm)) of their speed",
+          {{"position", "robot"}},
+          {"measurement", "time"},
+          [=](const Situation& at, Push& push) {
+            if (at.robot % 2 == 0) slow_both(push, 1 - 0.4 * strength / (1 + std::exp(-at.disc.x / 40)));
+          },
+          {}};
+}
+
 Effect lamp(double strength) {
   return {"lamp",
           "from 64.5 s on speed is 1 + 0.45 / (1 + exp(-(0.8 x + 0.6 y - 60 mm) / 35 mm))",
@@ -332,6 +366,29 @@ Effect lingering_turn(double strength) {
             const double rate = 0.22 * strength / (1 + std::pow(at.since_change_s / 2.5, 3));
             if (at.before == Motion::kLeft) push.turn_rad_s += rate;
             if (at.before == Motion::kRight) push.turn_rad_s -= rate;
+          },
+          {}};
+}
+
+Effect breathless(double strength) {
+  return {"breathless",
+          "speed is 0.75 + 0.4 exp(-s / 14 s), s = time since the last rest",
+          {{"history"}},
+          {"robot", "time"},
+          [=](const Situation& at, Push& push) {
+            slow_both(push, 1 + strength * (0.4 * std::exp(-at.since_rest_s / 14) - 0.25));
+          },
+          {}};
+}
+
+Effect winding_cable(double strength) {
+  return {"winding-cable",
+          "turn rate of -0.12 tanh(u / 15 s) rad/s, u = time that the right motor has run longer than the left one",
+          {{"history"}, {"motor_time"}},
+          {"robot", "time"},
+          [=](const Situation& at, Push& push) {
+            if (at.driven())
+              push.turn_rad_s -= 0.12 * strength * std::tanh((at.driven_s.right - at.driven_s.left) / 15);
           },
           {}};
 }

@@ -37,6 +37,7 @@ struct Situation {
   Motion before = Motion::kStop;  // the motion before this one; kStop for the first
   double since_change_s = 0;
   Wheels<double> driven_s;  // for which each wheel's motor has turned in this run; robots rest before it
+  double since_rest_s = 0;  // for which either motor has turned since both last rested
   double trodden_s = 0;     // for which driven robots have stood on this spot of the floor in this run
   const std::vector<Vec>* discs = nullptr;  // of all robots, this one included
   bool driven() const { return motion != Motion::kStop; }

@@ -159,6 +159,7 @@ void Memory::go_to(double time_s, const std::vector<Vec>& discs) {
     const Wheels<double> nominal = nominal_mm_s(robot.motion);
     if (nominal.left > 0) robot.driven_s.left += dt;
     if (nominal.right > 0) robot.driven_s.right += dt;
+    robot.since_rest_s = robot.motion == Motion::kStop ? 0 : robot.since_rest_s + dt;
     if (robot.motion != Motion::kStop) trodden_s_[spot(discs[i])] += static_cast<float>(dt);
   }
   time_s_ = time_s;
@@ -176,8 +177,17 @@ double Memory::next_change_s() const {
 
 Situation Memory::situation(int robot, Vec disc, double heading_rad, const std::vector<Vec>& discs) const {
   const Robot& r = robots_[static_cast<std::size_t>(robot)];
-  return {time_s_,  run_,     robot,     disc,       heading_rad,
-          r.motion, r.before, r.since_s, r.driven_s, trodden_s_[spot(disc)],
+  return {time_s_,
+          run_,
+          robot,
+          disc,
+          heading_rad,
+          r.motion,
+          r.before,
+          r.since_s,
+          r.driven_s,
+          r.since_rest_s,
+          trodden_s_[spot(disc)],
           &discs};
 }
 

@@ -50,6 +50,7 @@ class Memory {
     Motion motion = Motion::kStop, before = Motion::kStop;
     double since_s = 0;
     Wheels<double> driven_s;
+    double since_rest_s = 0;
   };
   std::size_t spot(Vec place) const;
   void take_orders();
