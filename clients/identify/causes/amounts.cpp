@@ -55,6 +55,23 @@ void about_the_mean(Term& term) {
   term.precision /= unit * unit;
 }
 
+/// Leaves out what acts on anything else.
+void keep_target(Term& term, Target target) {
+  std::vector<Block> blocks;
+  std::vector<Eigen::Index> columns;
+  Eigen::Index next = 0;
+  for (Block& block : term.blocks) {
+    const auto n = static_cast<Eigen::Index>(block.basis.size());
+    next += n;
+    if (block.target != target) continue;
+    for (Eigen::Index c = next - n; c < next; ++c) columns.push_back(c);
+    blocks.push_back(std::move(block));
+  }
+  term.blocks = std::move(blocks);
+  term.coefficients = Eigen::VectorXd(term.coefficients(columns));
+  term.precision = Eigen::VectorXd(term.precision(columns));
+}
+
 /// The last term of a model while its curve and its amounts are fitted in turn.
 class CurveTimesAmounts {
  public:
@@ -70,6 +87,8 @@ class CurveTimesAmounts {
     add(found_.coefficients);
     Term one = model.terms[source];
     one.name = found_.name;
+    // What else it seemed to do may have come of amounts that differ.
+    keep_target(one, found_.blocks.front().target);
     for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amounts_);
     model.terms.pop_back();
     model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(source));
@@ -79,10 +98,11 @@ class CurveTimesAmounts {
   void fit() {
     fitter_.fit(model_, 2);
     likelihood_ = fitter_.log_likelihood(model_);
-    int turns = 0;
-    while (turns < kMostTurns && in_turn(false)) ++turns;
+    in_turns();
     refine(fitter_, model_, model_.terms.size() - 1);
     likelihood_ = fitter_.log_likelihood(model_);
+    // The curve may have got a constant part, which the amounts had to do without.
+    in_turns();
     in_turn(true);
     about_the_mean(model_.terms.back());
   }
@@ -93,6 +113,9 @@ class CurveTimesAmounts {
     const Basis& basis = found_.blocks.front().basis;
     for (std::size_t i = 0; i < basis.size(); ++i)
       amounts_.known[basis.chosen.empty() ? i : basis.chosen[i]] += coefficients[static_cast<Eigen::Index>(i)];
+  }
+  void in_turns() {
+    for (int turns = 0; turns < kMostTurns && in_turn(false); ++turns) {}
   }
   /// Changes of the amounts with the curve known, then all else with the amounts known. Whether something is gained.
   bool in_turn(bool with_smoothness) {

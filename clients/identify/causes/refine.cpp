@@ -108,15 +108,29 @@ void shorten(Basis& basis) {
   }
 }
 
-/// Of a drift or slip a constant part shows, which no bias of a robot's wheels takes up: it belongs to a cause's own shape.
-bool has_constant_part(Target target) {
-  return target == Target::kWorldX || target == Target::kWorldY || target == Target::kSideways;
+/// Known amounts by which a curve or a map is multiplied.
+const Factor* amounts_of(const Basis& basis) {
+  const bool any = basis.factors.size() == 2 && basis.only_open() == &basis.factors[1];
+  return any ? &basis.factors.front() : nullptr;
+}
+
+/// Of a drift or slip a constant part shows, which no bias of a robot's wheels takes up, and so does one of which some show more than
+/// others: it belongs to a cause's own shape.
+bool has_constant_part(const Block& block) {
+  const Target target = block.target;
+  return target == Target::kWorldX || target == Target::kWorldY || target == Target::kSideways ||
+         (!is_measured(target) && amounts_of(block.basis) != nullptr);
 }
 
 /// One curve over time, or one over anything else: its column of frequency 0 is the constant.
 bool is_curve(const Basis& basis) {
   const Factor* const open = basis.only_open();
   return open != nullptr && open->shape == Shape::kCosines;
+}
+
+/// The same everywhere, but for known amounts.
+bool is_constant(const Basis& basis) {
+  return std::all_of(basis.factors.begin(), basis.factors.end(), [](const Factor& f) { return !f.known.empty(); });
 }
 
 /// Whether a block holds what a map beside it, refined before, had no columns for: it gets such blocks again.
@@ -134,9 +148,9 @@ std::vector<Block> richer(const Term& term) {
   std::vector<Block> blocks;
   for (const Block& block : term.blocks) {
     // Beside a shape, a constant is part of it.
-    if (block.basis.factors.empty() && has_constant_part(block.target) &&
-        std::any_of(term.blocks.begin(), term.blocks.end(), [&](const Block& other) {
-          return other.target == block.target && other.during == block.during && is_curve(other.basis);
+    if (is_constant(block.basis) && std::any_of(term.blocks.begin(), term.blocks.end(), [&](const Block& other) {
+          return other.target == block.target && other.during == block.during && has_constant_part(other) &&
+                 is_curve(other.basis);
         }))
       continue;
     if (lies_beyond_map(block, term.blocks)) continue;
@@ -144,7 +158,7 @@ std::vector<Block> richer(const Term& term) {
     rich.basis = with_chosen_keys(block.basis);
     rich.basis.chosen.clear();
     for (Factor& factor : rich.basis.factors) factor = richer(factor);
-    if (has_constant_part(block.target) && is_curve(rich.basis)) rich.basis.only_open()->first = 0;
+    if (has_constant_part(block) && is_curve(rich.basis)) rich.basis.only_open()->first = 0;
     shorten(rich.basis);
     // Pictures creep; what makes them jump is found elsewhere.
     constexpr std::uint32_t kCreep = 24;
@@ -165,12 +179,12 @@ std::vector<Block> richer(const Term& term) {
   // A map has no constant column: where it needs one, it gets one beside it.
   const std::vector<Block> shaped = blocks;
   for (const Block& block : shaped) {
-    if (!has_constant_part(block.target) || block.basis.factors.size() != 1 ||
-        !block.basis.factors.front().of_two())
-      continue;
-    const Block constant{block.target, {}, block.during};
+    const Factor* const open = block.basis.only_open();
+    if (!has_constant_part(block) || open == nullptr || !open->of_two()) continue;
+    Block constant{block.target, {}, block.during};
+    if (const Factor* const amounts = amounts_of(block.basis)) constant.basis.factors = {*amounts};
     if (std::none_of(blocks.begin(), blocks.end(), [&](const Block& b) {
-          return b.basis.factors.empty() && b.target == constant.target && b.during == constant.during;
+          return is_constant(b.basis) && b.target == constant.target && b.during == constant.during;
         }))
       blocks.push_back(constant);
   }
