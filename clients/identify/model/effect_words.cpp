@@ -232,11 +232,11 @@ std::string which_of(const Effect& effect) {
 }
 
 bool of_place(Function::Covariate of) { return of == Function::X || of == Function::Y || of == Function::RADIUS; }
-/// Whether what an effect does depends on the place alone.
+/// Whether what an effect does depends on nothing but the place.
 bool is_of_place(const Effect& effect) {
   return effect.function_size() > 0 &&
          std::all_of(effect.function().begin(), effect.function().end(), [](const Function& f) {
-           return of_place(f.of()) && (!f.has_spline_2d() || of_place(f.and_of()));
+           return f.has_constant() || (of_place(f.of()) && (!f.has_spline_2d() || of_place(f.and_of())));
          });
 }
 bool is_map(const Effect& effect) {

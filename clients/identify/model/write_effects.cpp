@@ -234,7 +234,9 @@ std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factor
     return {{constant}};
   }
   const Factor& factor = factors[from];
-  if (from + 1 == factors.size()) return {{function_of(factor, coefficients)}};
+  // Amounts of a constant stay amounts, as those of the curve beside it.
+  const bool of_a_constant = factors.size() == 1 && !factor.known.empty();
+  if (from + 1 == factors.size() && !of_a_constant) return {{function_of(factor, coefficients)}};
   std::vector<std::vector<Function>> all;
   const auto n = static_cast<Eigen::Index>(factor.size());
   const Eigen::Index rest = coefficients.size() / n;

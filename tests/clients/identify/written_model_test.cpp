@@ -120,6 +120,7 @@ std::vector<Form> forms() {
       {"driven of late", {{of_late(Covariate::kDrivenTime, 3)}}},
       {"amounts of a curve", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2}), known}}},
       {"robots' known amounts of a curve", {{amounts, over(Shape::kCosines, Covariate::kTime, 0, 18, 4)}}},
+      {"robots' known amounts of a constant", {{amounts}}},
       {"a known curve times harmonics", {{growing, over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
       {"robots in time",
        {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
