@@ -101,6 +101,7 @@ KILOTWIN_KERNELS(Avx512, __attribute__((target("avx512f"))));
 KILOTWIN_KERNELS(Avx2, __attribute__((target("avx2"))));
 #endif
 KILOTWIN_KERNELS(Baseline, );
+#undef KILOTWIN_KERNELS
 
 Kernels fastest() {
 #if defined(__x86_64__)
