@@ -78,7 +78,7 @@ struct Without {
   HeldOutGain gain;  ///< of the model with it
 };
 
-/// Of terms by the same cause, one entry.
+/// Of terms by the same cause, one entry, with what the term does without which most is lost.
 json effects_of(const Search& found, const std::vector<Without>& without, double before_mm, double after_mm) {
   json effects = json::array();
   for (std::size_t t = 0; t < found.model.terms.size(); ++t) {
@@ -88,6 +88,10 @@ json effects_of(const Search& found, const std::vector<Without>& without, double
         std::find_if(effects.begin(), effects.end(), [&](const json& e) { return e["name"] == term.name; });
     if (known != effects.end()) {
       (*known)["rmse_without_mm"] = std::max((*known)["rmse_without_mm"].get<double>(), without[t].rmse_mm);
+      if (json& evidence = (*known)["evidence"]; without[t].gain.nat > evidence["held_out_gain"].get<double>()) {
+        evidence["held_out_gain"] = without[t].gain.nat;
+        evidence["held_out_gain_se"] = without[t].gain.nat_se;
+      }
       continue;
     }
     const double gap = before_mm * before_mm - after_mm * after_mm;

@@ -231,19 +231,12 @@ Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, doub
   found.degrees = static_cast<int>((values.array() > 1e-9 * values.maxCoeff()).count());
   // Held out.
   const Eigen::VectorXd precision = (best_t * scale).cwiseAbs2().cwiseInverse();
-  std::vector<double> gains;
   for (std::size_t f = 0; f < reduced.fold_information.size(); ++f) {
     Eigen::MatrixXd rest = reduced.information - reduced.fold_information[f];
     rest.diagonal() += precision;
     const Eigen::VectorXd b = rest.ldlt().solve(reduced.score - reduced.fold_score[f]);
-    gains.push_back(b.dot(reduced.fold_score[f]) - 0.5 * b.dot(reduced.fold_information[f] * b));
+    found.held_out += b.dot(reduced.fold_score[f]) - 0.5 * b.dot(reduced.fold_information[f] * b);
   }
-  double sum = 0, square = 0;
-  for (const double gain : gains) sum += gain;
-  const double n = static_cast<double>(gains.size());
-  for (const double gain : gains) square += (gain - sum / n) * (gain - sum / n);
-  found.held_out = sum;
-  found.held_out_se = n > 1 ? std::sqrt(square * n / (n - 1)) : 0;
   return found;
 }
 
@@ -344,7 +337,6 @@ Scores::Outcome Scores::test(std::uint64_t seed) const {
     finding.evidence = weighed.evidence;
     finding.relative_scale = weighed.relative_scale;
     finding.held_out = weighed.held_out;
-    finding.held_out_se = weighed.held_out_se;
   }
   return out;
 }

@@ -22,7 +22,6 @@ struct Finding {
   double evidence = 0;        ///< log marginal likelihood over that of no effect, less the price of choosing it
   double relative_scale = 0;  ///< of its coefficients, at which that is largest
   double held_out = 0;        ///< gain in log likelihood on robots left out
-  double held_out_se = 0;
 };
 
 /// Scores of all columns of a dictionary beside a model.

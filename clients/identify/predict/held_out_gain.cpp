@@ -17,6 +17,7 @@ std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet& set, 
     const TrackView& view = set.views()[v];
     TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.number);
     LogLikelihood likelihood;
+    likelihood.with_touching = true;
     walk(filter, view, view.track->samples.size(), likelihood);
     sums[v] = likelihood.sum;
   });

@@ -12,7 +12,7 @@ struct HeldOutGain {
 
 /// Of one model over another on all tracks of a set, or on those held out: each measurement is foretold from those before it, a
 /// robot's bias being known as well as the model knows it. Both models start from the headings that explain most with them.
-/// What touched something does not count, as in a fit.
+/// What was measured after touching counts too, as models differ in when they take a robot to touch: both have the same measurements.
 [[nodiscard]] HeldOutGain held_out_gain(const MotionModel& with, const MotionModel& without, PreparedSet&,
                                         bool held_out_only, std::uint32_t threads);
 
