@@ -9,9 +9,9 @@
 #include <filesystem>
 #include <string>
 
-#include "clients/behaviours/compiler.hpp"
-#include "clients/behaviours/engine.hpp"
-#include "clients/behaviours/files.hpp"
+#include "services/behaviours/compiler.hpp"
+#include "services/behaviours/engine.hpp"
+#include "core/os/files.hpp"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "core/base/error.hpp"
-#include "tests/clients/firmware/timeline.hpp"
+#include "tests/services/comm/firmware/timeline.hpp"
 
 namespace {
 

@@ -12,7 +12,7 @@
 #include <functional>
 #include <thread>
 
-#include "clients/behaviours/compiler.hpp"
+#include "services/behaviours/compiler.hpp"
 #include "core/base/error.hpp"
 #include "core/dds/dds.hpp"
 #include "core/federation/topics.hpp"
@@ -95,7 +95,7 @@ Finding check_dds(std::optional<std::uint32_t> wanted) {
 }
 
 Finding check_address_space() {
-  // Programs are loaded at fixed addresses (clients/behaviours/image.hpp).
+  // Programs are loaded at fixed addresses (services/behaviours/image.hpp).
   constexpr std::uintptr_t kProbe = 0x20000000;
   void* const at = mmap(reinterpret_cast<void*>(kProbe), 4096, PROT_NONE,
                         MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0);

@@ -4,7 +4,7 @@
 #include <google/protobuf/text_format.h>
 
 #include "clients/recorder/file.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/model/robot_parameters.hpp"
 
 namespace kilotwin::cli {

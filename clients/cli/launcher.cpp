@@ -14,12 +14,12 @@
 #include <optional>
 #include <thread>
 
-#include "clients/behaviours/running_note.hpp"
+#include "services/behaviours/running_note.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/cli/recovery.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/os/interrupt.hpp"
 #include "core/federation/session.hpp"
 
 namespace kilotwin::cli {
@@ -72,7 +72,7 @@ class Launcher {
     std::error_code ignored;
     fs::create_directories(directory_.path() / "logs", ignored);
     start(plan_.station(), {"station"});
-    start(plan_.comm(), {"comm"});
+    start(plan_.radio(), {"comm"});
     for (std::uint32_t p = 0; p < plan_.grid.size(); ++p) {
       start(plan_.physics(PartitionId{p}),
             {"physics", "--partition", fmt::format("{},{}", p % plan_.grid.columns(), p / plan_.grid.columns())});

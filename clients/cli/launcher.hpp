@@ -3,7 +3,7 @@
 #pragma once
 
 #include "clients/cli/prepare.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {
 

@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <limits>
 
-#include "clients/behaviours/compiler.hpp"
-#include "clients/behaviours/robot_warnings.hpp"
+#include "services/behaviours/compiler.hpp"
+#include "services/behaviours/robot_warnings.hpp"
 #include "clients/cli/doctor_command.hpp"
 #include "clients/cli/export_model.hpp"
 #include "clients/cli/identify_command.hpp"

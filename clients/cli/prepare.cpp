@@ -7,15 +7,15 @@
 #include <fstream>
 #include <random>
 
-#include "clients/behaviours/compiler.hpp"
-#include "clients/behaviours/files.hpp"
-#include "clients/behaviours/sha256.hpp"
-#include "clients/firmware/flash_image.hpp"
+#include "services/behaviours/compiler.hpp"
+#include "core/os/files.hpp"
+#include "services/behaviours/sha256.hpp"
+#include "services/comm/firmware/flash_image.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/experiment/layout.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/experiment/surroundings.hpp"
 #include "core/federation/checkpoint.hpp"
 

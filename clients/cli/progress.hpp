@@ -4,7 +4,7 @@
 #include <chrono>
 #include <string>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/federation/run_observer.hpp"
 
 namespace kilotwin::cli {

@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "clients/behaviours/running_note.hpp"
+#include "services/behaviours/running_note.hpp"
 #include "clients/recorder/run_directory.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/schedule.hpp"
 

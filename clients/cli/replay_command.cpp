@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "clients/behaviours/program_set.hpp"
+#include "services/behaviours/program_set.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/cli/run_recorder.hpp"
@@ -13,7 +13,7 @@
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_check.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/os/interrupt.hpp"
 
 namespace kilotwin::cli {
 namespace {

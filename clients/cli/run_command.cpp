@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <sys/wait.h>
 
-#include "clients/behaviours/program_set.hpp"
+#include "services/behaviours/program_set.hpp"
 #include "clients/cli/launcher.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/progress.hpp"
@@ -13,7 +13,7 @@
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
 #include "core/dds/dds.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/os/interrupt.hpp"
 
 namespace kilotwin::cli {
 namespace {

@@ -11,7 +11,7 @@
 #include "clients/recorder/summary.hpp"
 #include "clients/recorder/writer.hpp"
 #include "core/effects/measurement.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/run_observer.hpp"
 

@@ -6,15 +6,15 @@
 #include <charconv>
 #include <thread>
 
-#include "clients/behaviours/behaviours_service.hpp"
+#include "services/behaviours/behaviours_service.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_recorder.hpp"
-#include "clients/firmware/firmware_swarm.hpp"
+#include "services/comm/firmware/firmware_swarm.hpp"
 #include "core/base/error.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/os/interrupt.hpp"
 #include "services/ark/station_service.hpp"
-#include "services/comm/comm_service.hpp"
+#include "services/comm/radio_service.hpp"
 #include "services/physics/physics_service.hpp"
 
 namespace kilotwin::cli {

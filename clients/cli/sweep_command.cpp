@@ -14,7 +14,7 @@
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/experiment/validate.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/os/interrupt.hpp"
 
 namespace kilotwin::cli {
 namespace {

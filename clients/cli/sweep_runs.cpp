@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "core/base/error.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/os/interrupt.hpp"
 
 namespace kilotwin::cli {
 namespace {

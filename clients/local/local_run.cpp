@@ -11,18 +11,18 @@
 #include <thread>
 #include <utility>
 
-#include "clients/behaviours/eeprom_files.hpp"
-#include "clients/behaviours/engine.hpp"
-#include "clients/behaviours/robot_logs.hpp"
-#include "clients/behaviours/running_note.hpp"
-#include "clients/behaviours/watchdog.hpp"
-#include "clients/firmware/firmware_swarm.hpp"
+#include "services/behaviours/eeprom_files.hpp"
+#include "services/behaviours/engine.hpp"
+#include "services/behaviours/robot_logs.hpp"
+#include "services/behaviours/running_note.hpp"
+#include "services/behaviours/watchdog.hpp"
+#include "services/comm/firmware/firmware_swarm.hpp"
 #include "core/base/say.hpp"
 #include "core/base/state_hash.hpp"
-#include "core/federation/hash_book.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/federation/hash_sums.hpp"
+#include "core/os/interrupt.hpp"
 #include "core/federation/pace.hpp"
-#include "core/federation/spare_checkpoints.hpp"
+#include "core/federation/snapshots.hpp"
 #include "services/ark/station_engine.hpp"
 #include "services/comm/radio_engine.hpp"
 #include "services/physics/engine.hpp"
@@ -63,7 +63,7 @@ class LocalRun {
         station_(plan),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()),
-        spare_(options.run_directory,
+        snapshots_(options.run_directory,
                options.save_checkpoints && !options.run_directory.empty() && plan.checkpoint_every() == 0) {
     for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
       physics_.push_back(physics::make_engine(plan, PartitionId{p}));
@@ -108,9 +108,9 @@ class LocalRun {
       observer_.state(now, frames_of(now).all_bodies, frames_of(now).all_actuation, last);
       const auto recorded_to = Clock::now();
       recording_ns_ += ns(recorded_from, recorded_to);
-      if (!last && spare_.due(recorded_to)) {
+      if (!last && snapshots_.due(recorded_to)) {
         save(now, chain);
-        spare_.taken(now);
+        snapshots_.taken(now);
       }
       if (recorded_to >= next_idle) {
         next_idle = recorded_to + kIdlePeriod;
@@ -126,7 +126,7 @@ class LocalRun {
     totals.last = now;
     totals.state_hash = chain;
     totals.stopped_early = schedule_.stopped_early();
-    if (totals.failure.empty()) spare_.remove_all();
+    if (totals.failure.empty()) snapshots_.remove_all();
     if (!options_.run_directory.empty()) {
       for (std::uint32_t h = 0; h < plan_.hosts; ++h)
         behaviours::write_eeproms(*hosts_[h], plan_.share(HostId{h}), options_.run_directory);
@@ -364,7 +364,7 @@ class LocalRun {
   std::vector<std::unique_ptr<behaviours::RunningNote>> notes_;
   const Tick first_;
   RunSchedule schedule_;
-  SpareCheckpoints spare_;
+  Snapshots snapshots_;
   Frames frames_[2];  // of even and of odd ticks: while one is read the other is written
   std::vector<std::uint64_t> task_ns_, hash_parts_;
   std::vector<std::pair<std::size_t, std::size_t>> told_;  // per host: of its failures and warnings

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "clients/behaviours/program_set.hpp"
+#include "services/behaviours/program_set.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/run_observer.hpp"
 

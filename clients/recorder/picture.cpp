@@ -18,7 +18,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
-#include "core/experiment/world.hpp"
+#include "core/plan/world.hpp"
 #include "core/senses/light_source.hpp"
 
 namespace kilotwin::recorder {

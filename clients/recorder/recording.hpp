@@ -6,7 +6,7 @@
 #include <span>
 
 #include "core/base/time.hpp"
-#include "core/experiment/world.hpp"
+#include "core/plan/world.hpp"
 #include "idl/manifest.pb.h"
 #include "idl/recording.pb.h"
 

@@ -14,7 +14,7 @@
 #include <string_view>
 
 #include "core/base/time.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::recorder {
 

@@ -87,7 +87,7 @@ Qos make_qos(const Channel& channel) {
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(10));
   switch (channel.delivery) {
     case Delivery::kFrame: dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kFrameDepth); break;
-    case Delivery::kRoster:
+    case Delivery::kMembership:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
       dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
       dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, static_cast<dds_duration_t>(kLease_s * 1e9));

@@ -33,7 +33,7 @@ inline constexpr double kLease_s = 2.0;
 /// Who may hear what, for how long.
 enum class Delivery {
   kFrame,  ///< reliable, keep-last 8 per publisher, volatile: tick topics
-  kRoster,  ///< reliable, keep-last 1, transient-local, with a lease: who is here. An instance lives while any writer does
+  kMembership,  ///< reliable, keep-last 1, transient-local, with a lease: who is here. An instance lives while any writer does
   kLog,        ///< reliable, keep-all, transient-local: late readers get everything
   kStatus,     ///< reliable, keep-last 1, transient-local
   kRequest,    ///< reliable, keep-last 16, volatile: what outsiders ask

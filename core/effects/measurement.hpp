@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/effects/term.hpp"
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin {
 

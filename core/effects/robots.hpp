@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin {
 

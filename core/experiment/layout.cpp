@@ -11,7 +11,7 @@
 #include "core/experiment/occupancy.hpp"
 #include "core/experiment/poses_csv.hpp"
 #include "core/experiment/validate.hpp"
-#include "core/experiment/world.hpp"
+#include "core/plan/world.hpp"
 #include "core/math/elementary.h"
 #include "core/random/random.hpp"
 

@@ -13,7 +13,7 @@
 #include "core/experiment/layout.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/surroundings.hpp"
-#include "core/experiment/world.hpp"
+#include "core/plan/world.hpp"
 
 namespace kilotwin {
 namespace pb = google::protobuf;

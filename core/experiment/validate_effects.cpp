@@ -6,7 +6,7 @@
 
 #include "core/experiment/fields.hpp"
 #include "core/experiment/limits.hpp"
-#include "core/experiment/memory_layout.hpp"
+#include "core/plan/memory_layout.hpp"
 #include "core/experiment/validate.hpp"
 
 namespace kilotwin {

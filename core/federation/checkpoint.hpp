@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "idl/checkpoint.pb.h"
 
 namespace kilotwin {

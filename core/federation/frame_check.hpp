@@ -2,8 +2,8 @@
 /// Anybody on the domain can write a sample.
 #pragma once
 
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 #include "core/federation/schedule.hpp"
 
 namespace kilotwin {

@@ -61,7 +61,7 @@ template <class Frame> class Input : public InputBase {
       return session_.notify();
     }
     if (!session_.expects_frames())
-      return;  // from a run in full swing, in which our place is taken: the roster will say so
+      return;  // from a run in full swing, in which our place is taken: the membership will say so
     switch (gate_.arrived(publisher, Tick{wire.tick})) {
       case TickGate::Arrival::kRepeated: return;
       case TickGate::Arrival::kUnexpected:

@@ -5,8 +5,8 @@
 #include <chrono>
 #include <thread>
 
-#include "core/experiment/plan.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/plan/plan.hpp"
+#include "core/os/interrupt.hpp"
 
 namespace kilotwin {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/time.hpp"
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 #include "core/federation/schedule.hpp"
 
 namespace kilotwin {

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "core/base/time.hpp"
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin {
 

@@ -9,8 +9,8 @@
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_io.hpp"
-#include "core/federation/hash_book.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/federation/hash_sums.hpp"
+#include "core/os/interrupt.hpp"
 
 namespace kilotwin {
 namespace {
@@ -26,8 +26,8 @@ constexpr auto kComplainEvery = milliseconds(5000);
 constexpr double kFlush_s = 2.0;
 /// For how long a directive that frames mention may fail to come from a station that lives.
 constexpr auto kDirectivePatience = milliseconds(10'000);
-/// Ticks per ledger sample.
-constexpr std::size_t kLedgerTicks = 32;
+/// Ticks per metrics sample.
+constexpr std::size_t kMetricsTicks = 32;
 
 std::uint64_t elapsed_ns(Clock::time_point from, Clock::time_point to) {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(to - from).count());
@@ -54,7 +54,7 @@ Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& tra
   for (const Directive& directive : inputs) schedule_.add(directive);
   known_ = schedule_.known();
   member_writer_ = std::make_unique<dds::Writer<WireMember>>(participant_, topics::members());
-  ledger_writer_ = std::make_unique<dds::Writer<WireLedger>>(participant_, topics::ledgers());
+  metrics_writer_ = std::make_unique<dds::Writer<WireMetrics>>(participant_, topics::metrics());
   if (self_ == plan_.station()) {
     directive_writer_ = std::make_unique<dds::Writer<WireDirective>>(participant_, topics::directives());
   } else {
@@ -299,38 +299,38 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
 /// The books lag behind by wall time no more than the period of this, also where the run goes slowly or stands.
 void Session::idle(Federate& federate) {
   next_idle_ = Clock::now() + kIdlePeriod;
-  write_ledger(federate, false);
+  write_metrics(federate, false);
   federate.idle();
 }
 
 void Session::save_once(Federate& federate, Tick now) {
   if (saved_ == now) return;
   saved_ = now;
-  write_ledger(federate, false);
+  write_metrics(federate, false);
   federate.save(now);
 }
 
-void Session::write_ledger(Federate& federate, bool last) {
+void Session::write_metrics(Federate& federate, bool last) {
   if (hash_parts_.empty() && !last) return;
-  WireLedger ledger{};
-  ledger.publisher = self_.value();
-  ledger.run = plan_.run();
-  ledger.first_tick = hash_first_.count();
-  ledger.hash_parts._length = ledger.hash_parts._maximum = static_cast<std::uint32_t>(hash_parts_.size());
-  ledger.hash_parts._buffer = hash_parts_.data();
-  ledger.last = last;
-  ledger.step_ns = step_ns_;
-  ledger.exchange_ns = exchange_ns_;
-  ledger.wait_ns = wait_ns_;
+  WireMetrics metrics{};
+  metrics.publisher = self_.value();
+  metrics.run = plan_.run();
+  metrics.first_tick = hash_first_.count();
+  metrics.hash_parts._length = metrics.hash_parts._maximum = static_cast<std::uint32_t>(hash_parts_.size());
+  metrics.hash_parts._buffer = hash_parts_.data();
+  metrics.last = last;
+  metrics.step_ns = step_ns_;
+  metrics.exchange_ns = exchange_ns_;
+  metrics.wait_ns = wait_ns_;
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   const auto ns = [](const timeval& t) {
     return static_cast<std::uint64_t>(t.tv_sec) * 1'000'000'000u + static_cast<std::uint64_t>(t.tv_usec) * 1000u;
   };
-  ledger.cpu_ns = ns(usage.ru_utime) + ns(usage.ru_stime);
-  ledger.peak_memory_kib = static_cast<std::uint32_t>(usage.ru_maxrss);
-  federate.count(ledger, last);
-  ledger_writer_->write(ledger);
+  metrics.cpu_ns = ns(usage.ru_utime) + ns(usage.ru_stime);
+  metrics.peak_memory_kib = static_cast<std::uint32_t>(usage.ru_maxrss);
+  federate.count(metrics, last);
+  metrics_writer_->write(metrics);
   hash_first_ = hash_first_ + static_cast<std::int64_t>(hash_parts_.size());
   hash_parts_.clear();
 }
@@ -362,7 +362,7 @@ void Session::run(Federate& federate) {
       federate.step(now_);
       ++now_;
       hash_parts_.push_back(federate.hash_part());
-      if (hash_parts_.size() >= kLedgerTicks) write_ledger(federate, false);
+      if (hash_parts_.size() >= kMetricsTicks) write_metrics(federate, false);
       const auto stepped = Clock::now();
       exchange_ns_ += elapsed_ns(begun, published);
       wait_ns_ += elapsed_ns(published, released);
@@ -393,10 +393,10 @@ void Session::run(Federate& federate) {
 }
 
 void Session::leave(Federate& federate) {
-  write_ledger(federate, true);
+  write_metrics(federate, true);
   for (const OutputBase* output : outputs_) output->flush(kFlush_s);
   if (directive_writer_) directive_writer_->flush(kFlush_s);
-  ledger_writer_->flush(kFlush_s);
+  metrics_writer_->flush(kFlush_s);
   {
     const std::lock_guard lock(mutex_);
     finished_ = true;

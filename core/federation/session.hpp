@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "core/dds/dds.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/tick_gate.hpp"
 #include "core/federation/wire.hpp"
@@ -47,7 +47,7 @@ class Federate {
   /// Write this federate's part of the checkpoint of `now`.
   virtual void save(Tick now) = 0;
   /// Add what is counted; `last`: nothing follows. Sequences must outlive the call.
-  virtual void count(WireLedger& ledger, bool last) { static_cast<void>(ledger), static_cast<void>(last); }
+  virtual void count(WireMetrics& metrics, bool last) { static_cast<void>(metrics), static_cast<void>(last); }
   /// Called about every 100 ms while the session waits, and about as often while it steps.
   virtual void idle() {}
 };
@@ -103,7 +103,7 @@ class Session {
   void write_member(kilotwin_wire_MemberPhase phase, const std::string& failure = {});
   void on_member(const WireMember& member, dds::SampleState state);
   void on_directive(const WireDirective& wire);
-  void write_ledger(Federate&, bool last);
+  void write_metrics(Federate&, bool last);
   void idle(Federate&);
   void save_once(Federate&, Tick now);
   void check() const;
@@ -144,7 +144,7 @@ class Session {
   std::unique_ptr<dds::Reader<WireMember>> member_reader_;
   std::unique_ptr<dds::Writer<WireDirective>> directive_writer_;
   std::unique_ptr<dds::Reader<WireDirective>> directive_reader_;
-  std::unique_ptr<dds::Writer<WireLedger>> ledger_writer_;
+  std::unique_ptr<dds::Writer<WireMetrics>> metrics_writer_;
 };
 
 }  // namespace kilotwin

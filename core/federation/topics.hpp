@@ -15,7 +15,7 @@ using WireRadioFrame = kilotwin_wire_RadioFrame;
 using WireOverheadFrame = kilotwin_wire_OverheadFrame;
 using WireMember = kilotwin_wire_Member;
 using WireDirective = kilotwin_wire_Directive;
-using WireLedger = kilotwin_wire_Ledger;
+using WireMetrics = kilotwin_wire_Metrics;
 using PublicRunControl = kilotwin_open_RunControl;
 using PublicOverheadPacket = kilotwin_open_OverheadPacket;
 using PublicTrackedPose = kilotwin_open_TrackedPose;
@@ -38,9 +38,9 @@ inline Channel actuation() { return {"kilotwin/actuation", Delivery::kFrame, ""}
 inline Channel radio(std::uint32_t to) { return {"kilotwin/radio", Delivery::kFrame, "to." + std::to_string(to)}; }
 inline Channel overhead() { return {"kilotwin/overhead", Delivery::kFrame, ""}; }
 
-inline Channel members() { return {"kilotwin/members", Delivery::kRoster, ""}; }
+inline Channel members() { return {"kilotwin/members", Delivery::kMembership, ""}; }
 inline Channel directives() { return {"kilotwin/directives", Delivery::kLog, ""}; }
-inline Channel ledgers() { return {"kilotwin/ledgers", Delivery::kLog, ""}; }
+inline Channel metrics() { return {"kilotwin/metrics", Delivery::kLog, ""}; }
 
 inline Channel run_control() { return {"kilotwin/run_control", Delivery::kRequest, ""}; }
 inline Channel overhead_packets() { return {"kilotwin/overhead_packets", Delivery::kRequest, ""}; }
@@ -67,7 +67,7 @@ template <> inline const dds_topic_descriptor_t* descriptor<WireMember>() { retu
 template <> inline const dds_topic_descriptor_t* descriptor<WireDirective>() {
   return &kilotwin_wire_Directive_desc;
 }
-template <> inline const dds_topic_descriptor_t* descriptor<WireLedger>() { return &kilotwin_wire_Ledger_desc; }
+template <> inline const dds_topic_descriptor_t* descriptor<WireMetrics>() { return &kilotwin_wire_Metrics_desc; }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicRunControl>() {
   return &kilotwin_open_RunControl_desc;
 }

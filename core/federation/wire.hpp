@@ -3,7 +3,7 @@
 /// plan is for frame_check.hpp to say.
 #pragma once
 
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/topics.hpp"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/ir_calibration.h"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin {
 

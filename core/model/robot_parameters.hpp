@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin {
 

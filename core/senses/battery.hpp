@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::senses {
 

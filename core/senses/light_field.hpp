@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 #include "core/senses/light_image.hpp"
 #include "core/senses/light_source.hpp"
 #include "core/senses/shadows.hpp"

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 #include "core/senses/battery.hpp"
 #include "core/senses/light_field.hpp"
 

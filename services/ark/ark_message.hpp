@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin::ark {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/effects/measurement.hpp"
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/ark/virtual_environment.hpp"
 

@@ -8,11 +8,11 @@
 
 #include "core/base/error.hpp"
 #include "core/federation/frame_io.hpp"
-#include "core/federation/interrupt.hpp"
+#include "core/os/interrupt.hpp"
 #include "core/federation/pace.hpp"
-#include "core/federation/spare_checkpoints.hpp"
-#include "services/ark/outside.hpp"
-#include "services/ark/run_books.hpp"
+#include "core/federation/snapshots.hpp"
+#include "services/ark/external_input.hpp"
+#include "services/ark/run_metrics.hpp"
 #include "services/ark/station_engine.hpp"
 
 namespace kilotwin::ark {
@@ -20,23 +20,23 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// For how long the station waits for the other federates' last ledgers, s.
-constexpr double kBooksPatience_s = 5.0;
+/// For how long the station waits for the other federates' last metrics, s.
+constexpr double kMetricsPatience_s = 5.0;
 /// How often observers get robots' states, wall time.
 constexpr auto kRobotsPeriod = std::chrono::milliseconds(100);
 
 class StationFederate : public Federate {
  public:
-  StationFederate(Session& session, StationEngine& engine, RunBooks& books, RunObserver& observer,
+  StationFederate(Session& session, StationEngine& engine, RunMetrics& books, RunObserver& observer,
                   const ServiceContext& context)
       : session_(session),
         context_(context),
         engine_(engine),
-        books_(books),
+        metrics_(books),
         observer_(observer),
         ingress_(context.inputs),
-        spare_(context.run_directory, session.plan().checkpoint_every() == 0),
-        outside_(session.plan(), session.participant()),
+        snapshots_(context.run_directory, session.plan().checkpoint_every() == 0),
+        external_input_(session.plan(), session.participant()),
         bodies_(session, topics::bodies(), session.plan().all_physics()),
         actuation_(session, topics::actuation(), session.plan().all_behaviours()),
         overhead_(session, topics::overhead()),
@@ -86,7 +86,7 @@ class StationFederate : public Federate {
   /// Brings the books up to date, and writes checkpoint parts whose state hash has become known.
   void settle() {
     write_checkpoint();
-    books_.advance([this](Tick tick, std::uint64_t chain) {
+    metrics_.advance([this](Tick tick, std::uint64_t chain) {
       observer_.hash(tick, chain);
       write_checkpoint();
     });
@@ -94,7 +94,7 @@ class StationFederate : public Federate {
 
   [[nodiscard]] RunProgress progress() {
     RunTotals totals;
-    books_.fill(totals);
+    metrics_.fill(totals);
     return {session_.now(),       session_.wall_s(), totals.sent,           totals.received,
             totals.robots_failed, session_.paused(), session_.waiting_for()};
   }
@@ -117,7 +117,7 @@ class StationFederate : public Federate {
     status_.write(status);
   }
   /// The run has come to its end in order.
-  void finish() { spare_.remove_all(); }
+  void finish() { snapshots_.remove_all(); }
   void flush_status() const { status_.flush(1.0); }
 
   [[nodiscard]] std::uint64_t recording_ns() const { return recording_ns_; }
@@ -127,26 +127,26 @@ class StationFederate : public Federate {
   /// Writes the part of the checkpoint of the tick whose state hash is the last one known, if there is one. The books know
   /// no tick beyond that at which the station stands, so a part that comes to be saved is never too late.
   void write_checkpoint() {
-    if (unfinished_.empty() || unfinished_.front().first != books_.hash_tick()) return;
+    if (unfinished_.empty() || unfinished_.front().first != metrics_.hash_tick()) return;
     auto& [tick, part] = unfinished_.front();
-    part.mutable_station()->set_hash_chain(books_.chain());
+    part.mutable_station()->set_hash_chain(metrics_.chain());
     observer_.saved();
     write_checkpoint_part(context_.run_directory, session_.plan(), tick, session_.plan().station(), part);
     unfinished_.pop_front();
   }
 
   void announce(Tick now) {
-    for (const Directive& directive : outside_.take()) announce(now, directive);
+    for (const Directive& directive : external_input_.take()) announce(now, directive);
     if (interrupted() != 0 && !stop_announced_) {
       stop_announced_ = true;
       Directive stop;
       stop.kind = DirectiveKind::kStop;
       announce(now, stop);
     }
-    if (session_.started() && !session_.paused() && spare_.due(Clock::now())) {
+    if (session_.started() && !session_.paused() && snapshots_.due(Clock::now())) {
       Directive save;
       save.kind = DirectiveKind::kCheckpoint;
-      spare_.taken(announce(now, save));
+      snapshots_.taken(announce(now, save));
     }
   }
 
@@ -181,11 +181,11 @@ class StationFederate : public Federate {
   Session& session_;
   const ServiceContext& context_;
   StationEngine& engine_;
-  RunBooks& books_;
+  RunMetrics& metrics_;
   RunObserver& observer_;
   Ingress ingress_;
-  SpareCheckpoints spare_;
-  Outside outside_;
+  Snapshots snapshots_;
+  ExternalInput external_input_;
   Input<BodyFrame> bodies_;
   Input<ActuationFrame> actuation_;
   Output<OverheadFrame> overhead_;
@@ -206,14 +206,14 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   if (context.resumed) engine.load(context.first(), context.resumed->station());
   Session session(plan, plan.station(), context.transport, context.first(), context.inputs);
   // The chain of a resumed run goes on from H at the checkpoint: its first own sum is that of the tick after.
-  RunBooks books(plan, session.participant(), first_hashed(context.first()),
+  RunMetrics books(plan, session.participant(), first_hashed(context.first()),
                  context.resumed ? context.resumed->hash_chain() : 0);
   StationFederate federate(session, engine, books, observer, context);
   RunTotals totals;
   try {
     federate.publish_status(kilotwin_open_STARTING, federate.progress());
     session.run(federate);
-    const auto patience = Clock::now() + std::chrono::duration<double>(kBooksPatience_s);
+    const auto patience = Clock::now() + std::chrono::duration<double>(kMetricsPatience_s);
     while (!books.complete() && Clock::now() < patience) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   } catch (const UserError&) {
     throw;

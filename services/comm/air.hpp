@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin::comm {
 

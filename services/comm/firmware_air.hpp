@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/random/random.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"

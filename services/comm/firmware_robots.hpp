@@ -1,5 +1,5 @@
 /// The robots that run real firmware, as the radio drives them: light in, light out, to the cycle. Implemented by
-/// clients/firmware.
+/// services/comm/firmware.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/time.hpp"
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 #include "core/model/ranging.hpp"
 #include "services/comm/air.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/model/radio_parameters.hpp"
 #include "core/model/ranging.hpp"
 #include "core/random/random.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/base/error.hpp"
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin::comm {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/air.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 #include "services/comm/air.hpp"
 
 namespace kilotwin::comm {

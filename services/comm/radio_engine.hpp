@@ -31,8 +31,8 @@
 #include <span>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 #include "core/federation/run_observer.hpp"
 #include "core/model/ranging.hpp"
 #include "core/random/random.hpp"

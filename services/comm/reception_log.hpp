@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 #include "core/model/ranging.hpp"
 #include "idl/checkpoint.pb.h"
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/federation/frames.hpp"
+#include "core/frames/frames.hpp"
 #include "services/comm/air.hpp"
 
 namespace kilotwin::comm {

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "services/comm/air.hpp"
 
 namespace kilotwin::comm {

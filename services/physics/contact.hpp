@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "core/base/pose.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "services/physics/bodies.hpp"
 #include "services/physics/candidate_list.hpp"
 #include "services/physics/contact_limits.hpp"

@@ -165,7 +165,7 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
     slip_y = slip_y + (larger(smaller(y, most_y), least_y) - y);
     x = larger(smaller(x, most_x), least_x);
     y = larger(smaller(y, most_y), least_y);
-    // Outside of a wall it moves inwards, as far as its neighbours let it.
+    // ExternalInput of a wall it moves inwards, as far as its neighbours let it.
     x = x + (larger(smaller(high_x, zero), -separation_mm) + smaller(larger(low_x, zero), separation_mm));
     y = y + (larger(smaller(high_y, zero), -separation_mm) + smaller(larger(low_y, zero), separation_mm));
     high_x = larger(high_x, zero);

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "core/base/pose.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "services/physics/contact_batch.hpp"
 #include "services/physics/contact_constants.hpp"
 #include "services/physics/drive.hpp"

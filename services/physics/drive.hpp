@@ -8,7 +8,7 @@
 #include "core/base/time.hpp"
 #include "core/effects/motion_effects.hpp"
 #include "core/effects/robots.hpp"
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "core/model/robot_parameters.hpp"
 #include "core/random/random.hpp"
 #include "services/physics/drive_kernel.hpp"

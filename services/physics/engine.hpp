@@ -9,8 +9,8 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 #include "idl/checkpoint.pb.h"
 
 namespace kilotwin::physics {

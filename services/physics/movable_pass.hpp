@@ -13,7 +13,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "services/physics/contact_limits.hpp"
 #include "services/physics/contact_pass.hpp"
 #include "services/physics/contact_state.hpp"

@@ -23,7 +23,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/experiment/world.hpp"
+#include "core/plan/world.hpp"
 #include "core/random/random.hpp"
 #include "services/physics/candidate_list.hpp"
 #include "services/physics/ode_world.hpp"

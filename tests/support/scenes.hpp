@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
-#include "core/federation/frames.hpp"
+#include "core/plan/plan.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin::testing {
 

@@ -130,21 +130,21 @@ TEST_F(Control, OverheadPacketsFromOutsideAreStampedRecordedAndReplayed) {
   EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
 }
 
-TEST_F(Control, ALedgerThatCannotBeOursEndsTheRunInOneLine) {
-  dds::Writer<WireLedger> ledgers(participant_, topics::ledgers());
+TEST_F(Control, MetricsOfAnotherRunEndTheRunInOneLine) {
+  dds::Writer<WireMetrics> metrics(participant_, topics::metrics());
   start({"--quiet"});
-  ASSERT_TRUE(eventually([&] { return ledgers.readers() > 0; }));
+  ASSERT_TRUE(eventually([&] { return metrics.readers() > 0; }));
   std::uint64_t part = 1;
-  WireLedger ledger{};
-  ledger.run = latest().run;
-  ledger.first_tick = 1'000'000'000'000;
-  ledger.hash_parts._length = ledger.hash_parts._maximum = 1;
-  ledger.hash_parts._buffer = &part;
-  ledgers.write(ledger);
+  WireMetrics metrics{};
+  metrics.run = latest().run;
+  metrics.first_tick = 1'000'000'000'000;
+  metrics.hash_parts._length = metrics.hash_parts._maximum = 1;
+  metrics.hash_parts._buffer = &part;
+  metrics.write(metrics);
   const Outcome outcome = process_->wait(30);
   EXPECT_EQ(outcome.status, 1);
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  EXPECT_NE(outcome.err.find("a ledger does not fit the run"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("a metrics does not fit the run"), std::string::npos) << outcome.err;
 }
 
 TEST_F(Control, RobotsAreTracedForWhoListens) {

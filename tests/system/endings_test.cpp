@@ -184,10 +184,10 @@ TEST_F(Endings, AServiceThatStandsStillIsNamed) {
   const pid_t id = service("comm");
   ASSERT_GT(id, 0);
   kill(id, SIGSTOP);
-  EXPECT_TRUE(process.says("comm was lost", 3)) << "named within 3 s";
+  EXPECT_TRUE(process.says("radio was lost", 3)) << "named within 3 s";
   const Outcome outcome = process.wait(30);
   EXPECT_EQ(outcome.status, 1);
-  EXPECT_NE(outcome.err.find("comm was lost"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("radio was lost"), std::string::npos) << outcome.err;
   expect_nothing_left();
   expect_usable_recording();
 }

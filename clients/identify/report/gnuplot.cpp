@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "clients/behaviours/process.hpp"
+#include "core/os/process.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
 

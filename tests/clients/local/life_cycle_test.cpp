@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "clients/local/local_run.hpp"
-#include "tests/clients/behaviours/swarm.hpp"
+#include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::local {
 namespace {

@@ -37,7 +37,7 @@ class Tiny : public Federate {
     if (self == physics[0]) {
       actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
       bodies_ = std::make_unique<Output<BodyFrame>>(session, topics::bodies());
-    } else if (self == plan_.comm()) {
+    } else if (self == plan_.radio()) {
       bodies_in_ = std::make_unique<Input<BodyFrame>>(session, topics::bodies(), physics);
       actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
       overhead_in_ =
@@ -48,7 +48,7 @@ class Tiny : public Federate {
       actuation_in_ = std::make_unique<Input<ActuationFrame>>(session, topics::actuation(), hosts);
       overhead_ = std::make_unique<Output<OverheadFrame>>(session, topics::overhead());
     } else {
-      radio_in_ = std::make_unique<Input<RadioFrame>>(session, topics::radio(0), std::vector{plan_.comm()});
+      radio_in_ = std::make_unique<Input<RadioFrame>>(session, topics::radio(0), std::vector{plan_.radio()});
       actuation_ = std::make_unique<Output<ActuationFrame>>(session, topics::actuation());
     }
   }
@@ -316,7 +316,7 @@ TEST_F(Sessions, NameTheOneThatFails) {
   run_all();
   EXPECT_EQ(outcomes_[host_.value()].failure, "the disk is full");
   expect_all_name(host_, "behaviours 1/1");
-  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("the disk is full"), std::string::npos)
+  EXPECT_NE(outcomes_[plan_.radio().value()].failure.find("the disk is full"), std::string::npos)
       << outcomes_[1].failure;
 }
 
@@ -340,7 +340,7 @@ TEST_F(Sessions, DoNotWaitForOneThatLeftTooEarly) {
   };
   run_all();
   expect_all_name(host_, "behaviours 1/1");
-  EXPECT_NE(outcomes_[plan_.comm().value()].failure.find("left without its frame of tick 5"), std::string::npos)
+  EXPECT_NE(outcomes_[plan_.radio().value()].failure.find("left without its frame of tick 5"), std::string::npos)
       << outcomes_[1].failure;
 }
 
@@ -408,12 +408,12 @@ TEST_F(Sessions, RefuseAnOfferOfAStranger) {
   expect_malformed("it offers");
 }
 TEST_F(Sessions, RefuseAReceptionWithoutMessage) {
-  of(plan_.comm()).spoil_radio = [](RadioFrame& frame) { frame.reception_message[1] = 2; };
+  of(plan_.radio()).spoil_radio = [](RadioFrame& frame) { frame.reception_message[1] = 2; };
   run_all();
   expect_malformed("a reception");
 }
 TEST_F(Sessions, RefuseReceptionsOutOfOrder) {
-  of(plan_.comm()).spoil_radio = [](RadioFrame& frame) { frame.reception_robot = {2, 0, 1}; };
+  of(plan_.radio()).spoil_radio = [](RadioFrame& frame) { frame.reception_robot = {2, 0, 1}; };
   run_all();
   expect_malformed("its receptions");
 }

@@ -1,4 +1,4 @@
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 
 #include <gtest/gtest.h>
 
@@ -198,7 +198,7 @@ TEST(RunPlan, NamesOfFederates) {
   ASSERT_EQ(plan.federates(), 12u);
   EXPECT_EQ(plan.name(plan.physics(PartitionId{0})), "physics 0,0");
   EXPECT_EQ(plan.name(plan.physics(PartitionId{5})), "physics 2,1");
-  EXPECT_EQ(plan.name(plan.comm()), "comm");
+  EXPECT_EQ(plan.name(plan.radio()), "radio");
   EXPECT_EQ(plan.name(plan.station()), "station");
   EXPECT_EQ(plan.name(plan.behaviours(HostId{0})), "behaviours 1/4");
   EXPECT_EQ(plan.name(plan.behaviours(HostId{3})), "behaviours 4/4");

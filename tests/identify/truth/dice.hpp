@@ -19,8 +19,8 @@ class Dice {
 
   /// Mean 0, standard deviation 1: the polar method.
   double normal() {
-    if (spare_) {
-      spare_ = false;
+    if (snapshots_) {
+      snapshots_ = false;
       return spare_value_;
     }
     double u = 0, v = 0, s = 0;
@@ -30,14 +30,14 @@ class Dice {
       s = u * u + v * v;
     } while (s >= 1 || s == 0);
     const double stretch = std::sqrt(-2 * std::log(s) / s);
-    spare_ = true;
+    snapshots_ = true;
     spare_value_ = v * stretch;
     return u * stretch;
   }
 
  private:
   std::mt19937_64 engine_;
-  bool spare_ = false;
+  bool snapshots_ = false;
   double spare_value_ = 0;
 };
 

@@ -1,5 +1,5 @@
 /// Stands in for physics and for the hosts of behaviours, so that tests and benchmarks can drive the radio engine alone:
-/// robots at rest whose programs answer every ask. Follows the timeline of core/federation/frames.hpp: an ask of tick k is
+/// robots at rest whose programs answer every ask. Follows the timeline of core/frames/frames.hpp: an ask of tick k is
 /// answered in actuation frame k+1, and a slot stays full until its message is reported as sent.
 #pragma once
 
@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/experiment/plan.hpp"
+#include "core/plan/plan.hpp"
 #include "services/comm/radio_engine.hpp"
 #include "tests/support/scenes.hpp"
 

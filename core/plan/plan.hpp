@@ -1,0 +1,136 @@
+/// RunPlan: the experiment as resolved. Every federate computes the same plan from the same manifest, and every engine is
+/// built from a plan and its own index in it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/ids.hpp"
+#include "core/base/pose.hpp"
+#include "core/base/time.hpp"
+#include "core/plan/memory_layout.hpp"
+#include "core/plan/world.hpp"
+#include "idl/manifest.pb.h"
+
+namespace kilotwin {
+
+/// A half-open rectangle of the arena, mm. Edges of outermost partitions lie at +-infinity, so that every pose has an owner.
+struct Rectangle {
+  double x_min_mm, y_min_mm, x_max_mm, y_max_mm;
+  [[nodiscard]] bool contains(double x_mm, double y_mm) const {
+    return x_mm >= x_min_mm && x_mm < x_max_mm && y_mm >= y_min_mm && y_mm < y_max_mm;
+  }
+  /// Distance of a point from the rectangle; 0 inside.
+  [[nodiscard]] double distance_mm(double x_mm, double y_mm) const;
+  /// Distance of two rectangles; 0 where they touch or overlap.
+  [[nodiscard]] double distance_mm(const Rectangle& other) const;
+};
+
+/// The arena cut into columns x rows of equal rectangles. Partition (column, row) has id row * columns + column; row 0 lies
+/// at the bottom.
+class PartitionGrid {
+ public:
+  PartitionGrid(double arena_width_mm, double arena_height_mm, std::uint32_t columns, std::uint32_t rows);
+  [[nodiscard]] std::uint32_t columns() const { return columns_; }
+  [[nodiscard]] std::uint32_t rows() const { return rows_; }
+  [[nodiscard]] std::uint32_t size() const { return columns_ * rows_; }
+  [[nodiscard]] const Rectangle& rectangle(PartitionId p) const { return rectangles_[p.value()]; }
+  /// The partition that owns a robot at this place: a pure function of the pose.
+  [[nodiscard]] PartitionId owner(double x_mm, double y_mm) const;
+  /// Ascending ids of the partitions other than `p` whose rectangle lies within `margin_mm` of that of `p`.
+  [[nodiscard]] std::vector<PartitionId> neighbours(PartitionId p, double margin_mm) const;
+
+ private:
+  std::uint32_t columns_, rows_;
+  double x0_mm_, y0_mm_, cell_width_mm_, cell_height_mm_;
+  std::vector<Rectangle> rectangles_;
+};
+
+/// A range of robot ids, [first, last).
+struct Share {
+  std::uint32_t first, last;
+  [[nodiscard]] std::uint32_t size() const { return last - first; }
+  [[nodiscard]] bool contains(std::uint32_t robot) const { return robot >= first && robot < last; }
+};
+
+inline constexpr std::uint32_t kNoProgram = 0xffffffffu;
+
+/// The name of a program's file in the run directory's programs/: SHA256 and .so, .elf or .hex.
+[[nodiscard]] std::string program_file(const proto::Program&);
+
+class RunPlan {
+ public:
+  /// Throws UserError where the manifest is of another format.
+  explicit RunPlan(proto::Manifest manifest);
+
+  const proto::Manifest manifest;
+  const TickLength tick_length;
+  const Tick last_tick;  ///< where the run ends
+  const World world;     ///< walls, obstacles, movable bodies
+  const PartitionGrid grid;
+  const std::uint32_t hosts;
+  const MemoryLayout memory;  ///< of each robot, for the model's effects
+  const std::uint64_t hash;   ///< of what determines results and topology; alike in all federates of a run
+
+  [[nodiscard]] const proto::Experiment& experiment() const { return manifest.experiment(); }
+  [[nodiscard]] std::uint64_t run() const { return manifest.run(); }
+  [[nodiscard]] std::uint64_t seed() const { return experiment().seed(); }
+  /// Ticks between checkpoints; 0: none.
+  [[nodiscard]] std::int64_t checkpoint_every() const {
+    return tick_length.at_or_after(experiment().deployment().checkpoint_every_s()).count();
+  }
+  [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(manifest.x_mm_size()); }
+  [[nodiscard]] Pose initial_pose(std::uint32_t robot) const;
+  /// Index of the robot's program in manifest.program, or kNoProgram where its group is tracked.
+  [[nodiscard]] std::uint32_t program_of(std::uint32_t robot) const { return program_of_[robot]; }
+  [[nodiscard]] bool tracked(std::uint32_t robot) const { return program_of_[robot] == kNoProgram; }
+  /// Whether the robot is a beacon: motors have no effect on it, and nothing moves it.
+  [[nodiscard]] bool immobile(std::uint32_t robot) const { return immobile_[robot] != 0; }
+  /// Bodies that robots can push, numbered from 0: world.movables.
+  [[nodiscard]] std::uint32_t movables() const { return static_cast<std::uint32_t>(world.movables.size()); }
+  /// Whether the robot runs firmware for its own processor. The radio simulates that processor.
+  [[nodiscard]] bool firmware(std::uint32_t robot) const {
+    return !tracked(robot) && manifest.program(static_cast<int>(program_of_[robot])).firmware();
+  }
+  /// Whether any robot does.
+  [[nodiscard]] bool has_firmware() const;
+  /// The robot's kilo_uid as it is calibrated: its number, or counted through its group from where the group says.
+  [[nodiscard]] std::uint16_t uid_of(std::uint32_t robot) const { return uid_of_[robot]; }
+  /// Whether hosts of behaviours need poses: for light, and for batteries that can be charged.
+  [[nodiscard]] bool hosts_see_bodies() const {
+    return experiment().has_light() || experiment().battery().charger_size() > 0;
+  }
+  /// The group of the experiment that the robot belongs to.
+  [[nodiscard]] const proto::RobotGroup& group(std::uint32_t robot) const {
+    return experiment().robots(static_cast<int>(group_of_[robot]));
+  }
+  /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
+  [[nodiscard]] Share share(HostId host) const;
+  [[nodiscard]] HostId host_of(std::uint32_t robot) const;
+
+  // Federates, in the order of their ids: partitions, radio, station, hosts.
+  [[nodiscard]] std::uint32_t federates() const { return grid.size() + 2 + hosts; }
+  [[nodiscard]] FederateId physics(PartitionId p) const { return FederateId{p.value()}; }
+  [[nodiscard]] FederateId radio() const { return FederateId{grid.size()}; }
+  [[nodiscard]] FederateId station() const { return FederateId{grid.size() + 1}; }
+  [[nodiscard]] FederateId behaviours(HostId h) const { return FederateId{grid.size() + 2 + h.value()}; }
+  [[nodiscard]] std::vector<FederateId> all_physics() const { return ids(0, grid.size()); }
+  [[nodiscard]] std::vector<FederateId> all_behaviours() const { return ids(grid.size() + 2, federates()); }
+  /// "physics 0,1" (column, row), "radio", "station", "behaviours 1/3" (counted from 1).
+  [[nodiscard]] std::string name(FederateId id) const;
+
+ private:
+  static std::vector<FederateId> ids(std::uint32_t from, std::uint32_t to) {
+    std::vector<FederateId> result;
+    for (std::uint32_t i = from; i < to; ++i) result.push_back(FederateId{i});
+    return result;
+  }
+
+  std::vector<std::uint32_t> program_of_, group_of_;
+  std::vector<std::uint8_t> immobile_;
+  std::vector<std::uint16_t> uid_of_;
+};
+
+}  // namespace kilotwin

@@ -1,0 +1,86 @@
+#include "services/ark/external_input.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilotwin::ark {
+namespace {
+
+/// A tracker that sees a robot farther from the arena's centre is wrong: arenas are at most 1e6 mm wide.
+constexpr double kFarthest_mm = 1e7;
+
+}  // namespace
+
+ExternalInput::ExternalInput(const RunPlan& plan, const dds::Participant& participant)
+    : plan_(plan),
+      run_control_(participant, topics::run_control(),
+                   [this](const PublicRunControl& sample, dds::SampleState state) {
+                     if (state.valid) on_run_control(sample);
+                   }),
+      overhead_packets_(participant, topics::overhead_packets(),
+                        [this](const PublicOverheadPacket& sample, dds::SampleState state) {
+                          if (state.valid) on_overhead_packet(sample);
+                        }),
+      tracked_poses_(participant, topics::tracked_poses(),
+                     [this](const PublicTrackedPose& sample, dds::SampleState state) {
+                       if (state.valid) on_tracked_pose(sample);
+                     }) {}
+
+std::vector<Directive> ExternalInput::take() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(waiting_, {});
+}
+
+bool ExternalInput::is_new(const std::string& client, std::uint32_t request) {
+  const auto [entry, inserted] = last_request_.try_emplace(client, request);
+  if (!inserted && entry->second == request) return false;
+  entry->second = request;
+  return true;
+}
+
+void ExternalInput::on_run_control(const PublicRunControl& sample) {
+  const std::lock_guard lock(mutex_);
+  if (!ours(sample.run) || !is_new(std::string("control ") + sample.client, sample.request)) return;
+  Directive directive;
+  switch (sample.command) {
+    case kilotwin_open_PAUSE_RUN: directive.kind = DirectiveKind::kPause; break;
+    case kilotwin_open_CONTINUE_RUN: directive.kind = DirectiveKind::kContinue; break;
+    case kilotwin_open_STEP_RUN:
+      directive.kind = DirectiveKind::kStep;
+      directive.steps = sample.steps;
+      break;
+    case kilotwin_open_STOP_RUN: directive.kind = DirectiveKind::kStop; break;
+    case kilotwin_open_CHECKPOINT_RUN: directive.kind = DirectiveKind::kCheckpoint; break;
+    default: return;
+  }
+  waiting_.push_back(directive);
+}
+
+void ExternalInput::on_overhead_packet(const PublicOverheadPacket& sample) {
+  const std::lock_guard lock(mutex_);
+  if (!ours(sample.run) || !is_new(std::string("overhead ") + sample.client, sample.request)) return;
+  Directive directive;
+  directive.kind = DirectiveKind::kOverheadInput;
+  switch (sample.command) {
+    case 0: directive.packet.command = OverheadCommand::kStop; break;
+    case 2: directive.packet.command = OverheadCommand::kRepeat; break;
+    case 6: directive.packet.command = OverheadCommand::kOnce; break;
+    default: return;
+  }
+  std::copy_n(sample.message, directive.packet.message.size(), directive.packet.message.begin());
+  waiting_.push_back(directive);
+}
+
+void ExternalInput::on_tracked_pose(const PublicTrackedPose& sample) {
+  const std::lock_guard lock(mutex_);
+  // False where a value is not finite, too.
+  const bool sound = std::abs(sample.x_mm) <= kFarthest_mm && std::abs(sample.y_mm) <= kFarthest_mm &&
+                     std::abs(sample.heading_rad) < 100;
+  if (!ours(sample.run) || !sound || sample.robot >= plan_.robots() || !plan_.tracked(sample.robot)) return;
+  Directive directive;
+  directive.kind = DirectiveKind::kTrackedPose;
+  directive.tracked_pose = {sample.robot, sample.x_mm, sample.y_mm, wrapped(sample.heading_rad)};
+  waiting_.push_back(directive);
+}
+
+}  // namespace kilotwin::ark

@@ -1,0 +1,39 @@
+/// What comes in from outside by the public topics: collected on receive threads, handed over on the station's own.
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/plan/plan.hpp"
+#include "core/federation/schedule.hpp"
+#include "core/federation/topics.hpp"
+
+namespace kilotwin::ark {
+
+class ExternalInput {
+ public:
+  ExternalInput(const RunPlan& plan, const dds::Participant& participant);
+
+  /// What has come since the last call, in the order of arrival; sequence numbers and ticks are still to be given.
+  std::vector<Directive> take();
+
+ private:
+  void on_run_control(const PublicRunControl&);
+  void on_overhead_packet(const PublicOverheadPacket&);
+  void on_tracked_pose(const PublicTrackedPose&);
+  [[nodiscard]] bool ours(std::uint64_t run) const { return run == 0 || run == plan_.run(); }
+  /// False where the client's request was seen before; with the mutex held.
+  bool is_new(const std::string& client, std::uint32_t request);
+
+  const RunPlan& plan_;
+  std::mutex mutex_;
+  std::vector<Directive> waiting_;
+  std::map<std::string, std::uint32_t> last_request_;  // per topic and client
+  dds::Reader<PublicRunControl> run_control_;
+  dds::Reader<PublicOverheadPacket> overhead_packets_;
+  dds::Reader<PublicTrackedPose> tracked_poses_;
+};
+
+}  // namespace kilotwin::ark

@@ -1,0 +1,37 @@
+#include <algorithm>
+#include <array>
+
+#include "services/behaviours/cycle_counters.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+struct Cost {
+  std::string_view start;  ///< of the instruction's name
+  unsigned cycles;
+};
+
+}  // namespace
+
+unsigned avr_cycles(std::string_view name, std::string_view operands) {
+  // Mnemonics by their beginning, the first that fits.
+  static constexpr std::array kCosts{
+      Cost{"call", 8},    Cost{"ret", 4},     Cost{"push", 2},   Cost{"pop", 2},    Cost{"lea", 2},
+      Cost{"nop", 0},     Cost{"cltq", 0},    Cost{"cltd", 0},   Cost{"cqto", 0},   Cost{"movs", 1},
+      Cost{"movz", 1},    Cost{"jmp", 2},     Cost{"j", 2},      Cost{"div", 210},  Cost{"idiv", 220},
+      Cost{"imulq", 180}, Cost{"imul", 40},   Cost{"mul", 8},    Cost{"set", 2},    Cost{"cmov", 3},
+      Cost{"xchg", 2},    Cost{"adds", 110},  Cost{"subs", 110}, Cost{"muls", 140}, Cost{"divs", 480},
+      Cost{"sqrts", 490}, Cost{"ucomis", 50}, Cost{"comis", 50}, Cost{"cvt", 80},   Cost{"mova", 2},
+      Cost{"pxor", 1},
+  };
+  unsigned cycles = 2;
+  for (const Cost& cost : kCosts) {
+    if (name.starts_with(cost.start)) {
+      cycles = cost.cycles;
+      break;
+    }
+  }
+  return operands.find('(') != std::string_view::npos && !name.starts_with("lea") ? cycles + 3 : cycles;
+}
+
+}  // namespace kilotwin::behaviours

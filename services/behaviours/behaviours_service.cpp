@@ -1,0 +1,91 @@
+#include "services/behaviours/behaviours_service.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "services/behaviours/eeprom_files.hpp"
+#include "services/behaviours/engine.hpp"
+#include "services/behaviours/robot_logs.hpp"
+#include "services/behaviours/running_note.hpp"
+#include "services/behaviours/watchdog.hpp"
+#include "core/base/say.hpp"
+#include "core/federation/frame_io.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+class BehavioursFederate : public Federate {
+ public:
+  BehavioursFederate(Session& session, HostId host, BehavioursEngine& engine, const ServiceContext& context)
+      : session_(session),
+        context_(context),
+        host_(host),
+        engine_(engine),
+        radio_(session, topics::radio(host.value()), {session.plan().radio()}),
+        actuation_(session, topics::actuation()),
+        told_(engine.failures().size()),
+        logs_(context.run_directory, session.plan().tick_length, context.first(), session.plan().share(host)) {
+    if (session.plan().hosts_see_bodies()) bodies_.emplace(session, topics::bodies(), session.plan().all_physics());
+  }
+
+  void publish(Tick) override {
+    engine_.emit(actuation_.frame);
+    actuation_.write();
+  }
+
+  void step(Tick from) override {
+    engine_.step(from, *radio_.at(from)[0], bodies_ ? bodies_->at(from) : std::span<const BodyFrame* const>());
+    logs_.write(from, engine_.printed());
+    for (; told_ < engine_.failures().size(); ++told_) {
+      const auto& failure = engine_.failures()[told_];
+      say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot,
+                      session_.plan().tick_length.seconds_at(from), failure.text));
+    }
+    for (; warned_ < engine_.warnings().size(); ++warned_) {
+      const auto& warning = engine_.warnings()[warned_];
+      say(fmt::format("robot {} at {:.3f} s: {}", warning.robot, session_.plan().tick_length.seconds_at(from),
+                      warning.text));
+    }
+  }
+
+  [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
+
+  void save(Tick now) override {
+    proto::CheckpointPart part;
+    engine_.save(*part.mutable_behaviours());
+    write_checkpoint_part(context_.run_directory, session_.plan(), now, session_.plan().behaviours(host_), part);
+  }
+
+  void count(WireMetrics& metrics, bool last) override {
+    metrics.robots_failed = engine_.robots_failed();
+    if (last) write_eeproms(engine_, session_.plan().share(host_), context_.run_directory);
+  }
+
+ private:
+  Session& session_;
+  const ServiceContext& context_;
+  const HostId host_;
+  BehavioursEngine& engine_;
+  Input<RadioFrame> radio_;
+  std::optional<Input<BodyFrame>> bodies_;  // only where the experiment has something to sense by place
+  Output<ActuationFrame> actuation_;
+  std::size_t told_;  // of the engine's failures; those of a checkpoint were told when they happened
+  RobotLogs logs_;
+  std::size_t warned_ = 0;
+};
+
+}  // namespace
+
+void run_service(const RunPlan& plan, HostId host, const ServiceContext& context) {
+  BehavioursEngine engine(plan, host, ProgramSet::load(plan.manifest, context.run_directory));
+  if (context.resumed) engine.load(context.first(), context.resumed->behaviours());
+  Session session(plan, plan.behaviours(host), context.transport, context.first(), context.inputs);
+  RunningNote note(context.run_directory, host);
+  engine.note_running_in(note.place());
+  const Watchdog watchdog({&engine});
+  BehavioursFederate federate(session, host, engine, context);
+  session.run(federate);
+}
+
+}  // namespace kilotwin::behaviours

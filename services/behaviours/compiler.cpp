@@ -1,0 +1,451 @@
+#include "services/behaviours/compiler.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <set>
+#include <system_error>
+
+#include "services/behaviours/compiler_common.hpp"
+#include "services/behaviours/cycle_counters.hpp"
+#include "services/behaviours/elf_file.hpp"
+#include "core/os/files.hpp"
+#include "services/behaviours/loop_barriers.hpp"
+#include "core/os/process.hpp"
+#include "services/behaviours/program_text.hpp"
+#include "services/behaviours/sha256.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace fs = std::filesystem;
+namespace {
+
+using Arguments = std::vector<std::string>;
+
+void append(Arguments& to, const Arguments& more) { to.insert(to.end(), more.begin(), more.end()); }
+
+/// A C compiler and what it says of itself.
+struct Compiler {
+  std::string path, version;
+  [[nodiscard]] bool is_clang() const { return version.find("clang") != std::string::npos; }
+  [[nodiscard]] int major_version() const {
+    const std::size_t at = version.find("version ");
+    return at == std::string::npos ? 0 : std::atoi(version.c_str() + at + 8);
+  }
+};
+
+Compiler find_compiler(const fs::path& wanted) {
+  Compiler compiler{wanted.string(), ""};
+  for (const char* name : {"cc", "gcc", "clang"}) {
+    if (compiler.path.empty()) compiler.path = find_executable(name).string();
+  }
+  if (!compiler.path.empty() && access(compiler.path.c_str(), X_OK) == 0) {
+    const ProcessResult result = run_process({compiler.path, "--version"});
+    compiler.version = result.output;
+    if (result.status == 0) return compiler;
+  }
+  throw UserError("no C compiler" + (wanted.empty() ? "" : " at " + wanted.string()) +
+                  "; robots' programs are compiled when a run starts: apt-get install gcc");
+}
+
+/// As kilolib is built for the robot (unsigned char, packed structs, short enums, common globals of avr-gcc's age), with
+/// what makes results equal everywhere: no contraction, no libm, wrapping integers, locals that start as zero, one CPU.
+Arguments code_flags(const Compiler& compiler) {
+  Arguments flags{
+      "-O2", "-g1", "-w", "-fdiagnostics-color=never", "-nostdinc", "-DF_CPU=8000000", "-funsigned-char",
+      "-fpack-struct", "-fshort-enums", "-fcommon", "-march=x86-64", "-fPIC", "-fvisibility=hidden",
+      "-ffp-contract=off", "-fno-math-errno", "-fno-strict-aliasing", "-fwrapv", "-fno-delete-null-pointer-checks",
+      "-fcf-protection=none", "-fno-stack-protector", "-fstack-clash-protection", "-fno-asynchronous-unwind-tables",
+      // What the counters of cycles rely on: whatever lies below the stack pointer is free, jumps tell where they
+      // go, recursion uses the stack, and loops that do nothing stay.
+      "-mno-red-zone", "-fno-jump-tables", "-fno-optimize-sibling-calls", "-fno-finite-loops",
+      "-ffunction-sections", "-fdata-sections", "-ftrivial-auto-var-init=zero"};
+  if (compiler.is_clang()) {
+    // Before 16, clang wants to be told twice.
+    if (compiler.major_version() < 16) {
+      flags.emplace_back("-enable-trivial-auto-var-init-zero-knowing-it-will-be-removed-from-clang");
+    }
+  } else {
+    append(flags, {"-fno-tree-loop-distribute-patterns", "-funsigned-bitfields",
+                   "-fno-isolate-erroneous-paths-dereference"});
+  }
+  return flags;
+}
+
+/// The runtime is the C library: no function of it may be made a call of another.
+const Arguments kRuntimeFlags{"-std=gnu11", "-ffreestanding", "-fno-builtin", "-fno-common"};
+
+/// Robots have neither exceptions nor threads, and avr-gcc no C++ library.
+Arguments language_flags(bool cpp) {
+  if (!cpp) return {"-std=gnu11"};
+  return {"-std=gnu++17", "-fno-exceptions",     "-fno-rtti",  "-fno-threadsafe-statics",
+          "-fpermissive", "-fno-use-cxa-atexit", "-nostdinc++"};
+}
+
+const Arguments kLinkFlags{"-shared",           "-nostdlib",           "-Wl,-Bsymbolic",       "-Wl,-z,relro",
+                           "-Wl,-z,now",        "-Wl,-z,noexecstack",  "-Wl,-z,separate-code", "-Wl,--no-undefined",
+                           "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,kilotwin_image"};
+
+/// Headers: ours before the compiler's own, no others.
+Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
+  std::string own = run_process({compiler.path, "-print-file-name=include"}).output;
+  while (!own.empty() && own.back() == '\n') own.pop_back();
+  return {"-isystem",
+          (runtime / "kilolib").string(),
+          "-isystem",
+          (runtime / "libc").string(),
+          "-isystem",
+          own,
+          "-include",
+          (runtime / "machine.h").string(),
+          "-ffile-prefix-map=" + runtime.string() + "=/kilotwin"};
+}
+
+/// Leaves the folders of the sources out of the result, so that the same content gives the same octets wherever it lies.
+Arguments place_flags(const std::vector<fs::path>& sources) {
+  std::error_code error;
+  Arguments flags;
+  if (const fs::path here = fs::current_path(error); !error)
+    flags.push_back("-ffile-prefix-map=" + here.string() + "=.");
+  for (const fs::path& source : sources) {
+    if (source.has_parent_path()) flags.push_back("-ffile-prefix-map=" + source.parent_path().string() + "=.");
+  }
+  return flags;
+}
+
+CompiledProgram checked(const fs::path& file, const std::string& octets) {
+  (void)ElfFile::parse(octets, file.string());
+  return {file, sha256_hex(octets), {}};
+}
+
+CompiledProgram given(const fs::path& file) {
+  const auto octets = read_file(file);
+  if (!octets) throw UserError(file.string() + ": cannot be read; name a C source or a .so of `kilotwin build`");
+  return checked(file, *octets);
+}
+
+/// A private name next to `file`, in a directory that is made if need be, that ceases to exist with this object.
+class Temporary {
+ public:
+  explicit Temporary(const fs::path& file) : path_(file.string() + ".XXXXXX") {
+    std::error_code error;
+    fs::create_directories(file.parent_path(), error);
+    const int descriptor = mkstemp(path_.data());
+    if (descriptor < 0) throw RunError(path_ + ": cannot be written; is the disk full?");
+    close(descriptor);
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+  ~Temporary() { unlink(path_.c_str()); }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// Runs a compilation that ends in `-o FILE`, and keeps the file as `kept`. Throws UserError with the compiler's words.
+std::string build(Arguments arguments, const fs::path& kept, const std::vector<fs::path>& sources) {
+  const Temporary result(kept);
+  append(arguments, {"-o", result.path()});
+  const ProcessResult process = run_process(arguments);
+  if (process.status != 0) throw UserError(first_error(process.errors, sources));
+  const auto octets = read_file(result.path());
+  if (!octets || !write_file(kept, *octets))
+    throw RunError(kept.string() + ": cannot be written; is the disk full?");
+  return *octets;
+}
+
+/// Runs a compilation to assembly. Nothing where it fails; `errors` is then what the compiler said.
+std::optional<std::string> assembly_of(Arguments arguments, const fs::path& place, std::string& errors) {
+  const Temporary result(place);
+  append(arguments, {"-S", "-o", result.path()});
+  const ProcessResult process = run_process(arguments);
+  errors = process.errors;
+  if (process.status != 0) return std::nullopt;
+  return read_file(result.path());
+}
+
+/// Nested functions that use variables of the one around them, and whose address is taken, are called by way of code on the
+/// stack. avr-gcc has none of that either, as a robot cannot execute its RAM.
+void refuse_code_on_stack(const std::string& assembly, Arguments compile, const std::vector<fs::path>& sources,
+                          const fs::path& place) {
+  if (assembly.find(".note.GNU-stack,\"x\"") == std::string::npos) return;
+  std::erase(compile, "-w");
+  append(compile, {"-Wtrampolines", "-Werror=trampolines"});
+  std::string errors;
+  (void)assembly_of(compile, place, errors);
+  const std::string error = first_error(errors, sources);
+  throw UserError(
+      error.substr(0, error.find(" [-W")) +
+      "; a robot cannot run code on its stack: let the nested function use no variable of the one around it, or "
+      "call it there by its name alone");
+}
+
+/// One source to assembly that counts cycles, with loops that see what interrupts change. The text that is compiled for that
+/// differs from the source; what the compiler says of it is said of the source.
+std::string counted_assembly(const Arguments& compiler, const fs::path& source, const std::string& preprocessed,
+                             const std::vector<fs::path>& sources, const fs::path& place) {
+  const Temporary marked(place);
+  if (!write_file(marked.path(), with_loop_barriers(preprocessed)))
+    throw RunError(place.string() + ": cannot be written; is the disk full?");
+  std::string errors;
+  Arguments arguments;
+  for (std::size_t i = 0; i < compiler.size(); ++i) {
+    if (compiler[i] == "-include")
+      ++i;  // is in the text already
+    else
+      arguments.push_back(compiler[i]);
+  }
+  append(arguments, {"-x", is_cpp(source) ? "c++-cpp-output" : "cpp-output", marked.path()});
+  auto assembly = assembly_of(arguments, place, errors);
+  if (!assembly) {
+    arguments = compiler;
+    arguments.push_back(source.string());
+    assembly = assembly_of(arguments, place, errors);
+  }
+  if (!assembly) throw UserError(first_error(errors, sources));
+  refuse_code_on_stack(*assembly, arguments, sources, place);
+  return with_cycle_counters(*assembly);
+}
+
+/// The runtime as one object, made once per compiler.
+fs::path runtime_object(const Compiler& compiler, const Arguments& includes, const fs::path& runtime,
+                        const std::string& content) {
+  const fs::path kept = runtime / (sha256_hex(content) + ".o");
+  std::error_code error;
+  if (fs::is_regular_file(kept, error)) return kept;
+  Arguments compile{compiler.path};
+  append(compile, code_flags(compiler));
+  append(compile, kRuntimeFlags);
+  append(compile, includes);
+  append(compile, {"-I", runtime.string()});
+  Arguments link = compile;
+  append(link, {"-r", "-nostdlib", (runtime / "switch.c").string(), "-x", "assembler"});
+  std::vector<std::unique_ptr<Temporary>> parts;
+  for (const char* name : {"kilolib.c", "machine.c", "libavr.c", "libc.c", "libcomplex.c", "libm.c", "libnumbers.c",
+                           "libstdio.c", "core/math/elementary.c"}) {
+    Arguments arguments = compile;
+    arguments.push_back((runtime / name).string());
+    std::string errors;
+    const auto assembly = assembly_of(arguments, kept, errors);
+    if (!assembly) throw UserError(first_error(errors, {runtime / name}));
+    parts.push_back(std::make_unique<Temporary>(kept));
+    const bool is_firmware = name == std::string_view("kilolib.c") || name == std::string_view("machine.c");
+    const auto counted = is_firmware ? Counted::kTestsOnly : Counted::kAll;
+    if (!write_file(parts.back()->path(), with_cycle_counters(*assembly, counted)))
+      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    link.push_back(parts.back()->path());
+  }
+  (void)build(link, kept, {runtime / "kilolib.c"});
+  return kept;
+}
+
+/// Functions and variables that a linker did not find.
+std::set<std::string> undefined_names(const std::string& errors) {
+  constexpr std::string_view kMark = "undefined reference to `";
+  std::set<std::string> names;
+  for (std::size_t at = errors.find(kMark); at != std::string::npos; at = errors.find(kMark, at + 1)) {
+    const std::size_t first = at + kMark.size();
+    names.insert(errors.substr(first, errors.find_first_of("'(", first) - first));
+  }
+  names.erase("main");
+  return names;
+}
+
+/// What the linker said of a program whose sources are not all there.
+struct Incomplete {
+  std::string errors;
+};
+
+/// One compiler with everything that does not depend on the program.
+struct Toolchain {
+  Compiler compiler;
+  fs::path cache, runtime;
+  Arguments code, includes, defines;
+
+  /// Compiles and links, or takes the result of an earlier time. Throws Incomplete where functions are missing, UserError for
+  /// all other errors.
+  [[nodiscard]] CompiledProgram make(const ProgramText& text, const Arguments& dialect) const;
+
+  /// A source alone after the preprocessor, or nothing where that fails.
+  [[nodiscard]] std::string preprocessed(const fs::path& source, const Arguments& dialect) const;
+
+ private:
+  [[nodiscard]] Arguments flags_for(const ProgramText& text, const fs::path& file, const Arguments& dialect) const {
+    const bool as_cpp = std::find(dialect.begin(), dialect.end(), "c++") != dialect.end();
+    Arguments result = language_flags(as_cpp || is_cpp(file));
+    for (const Arguments& part : {code, dialect, defines, place_flags(text.sources), includes})
+      append(result, part);
+    return result;
+  }
+};
+
+std::string Toolchain::preprocessed(const fs::path& source, const Arguments& dialect) const {
+  const ProgramText text = program_text({source}, cache);
+  Arguments preprocess{compiler.path, "-E", "-P"};
+  append(preprocess, flags_for(text, text.files[0], dialect));
+  preprocess.push_back(text.files[0].string());
+  const ProcessResult process = run_process(preprocess);
+  return process.status == 0 ? process.output : "";
+}
+
+CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialect) const {
+  std::string content = runtime.filename().string() + '\n' + compiler.path + '\n' + compiler.version +
+                        "\ncounters " + std::to_string(kCountersVersion) + '\n';
+  for (const std::string& flag : code) content += flag + '\n';
+  for (const std::string& flag : kLinkFlags) content += flag + '\n';
+  const std::string runtime_content = content;
+  for (const std::string& flag : defines) content += flag + '\n';
+  for (const std::string& flag : dialect) content += flag + '\n';
+  std::vector<fs::path> files = text.files;
+  std::vector<std::string> texts;
+  bool for_kilombo = std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const fs::path file = files[i];
+    Arguments preprocess{compiler.path, "-E"};
+    append(preprocess, flags_for(text, file, dialect));
+    preprocess.push_back(file.string());
+    ProcessResult process = run_process(preprocess);
+    if (process.status != 0) throw UserError(first_error(process.errors, text.sources));
+    content += sha256_hex(process.output);
+    for_kilombo = for_kilombo || process.output.find("UserdataSize") != std::string::npos;
+    texts.push_back(std::move(process.output));
+    if (i + 1 == text.files.size() && for_kilombo) files.push_back(runtime / "simulator.c");
+  }
+  const fs::path kept = cache / "programs" / (sha256_hex(content) + ".so");
+  if (const auto octets = read_file(kept)) {
+    try {
+      return checked(kept, *octets);
+    } catch (const UserError&) {
+      // Damaged on disk: made again below.
+    }
+  }
+  Arguments link{compiler.path};
+  append(link, kLinkFlags);
+  // The runtime's variables come first: what is written past the end of an array meets the program's own, as on the robot.
+  link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
+  append(link, {"-x", "assembler"});
+  std::vector<std::unique_ptr<Temporary>> parts;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    Arguments compile{compiler.path};
+    append(compile, flags_for(text, files[i], dialect));
+    parts.push_back(std::make_unique<Temporary>(kept));
+    const std::string assembly = counted_assembly(compile, files[i], texts[i], text.sources, kept);
+    if (!write_file(parts.back()->path(), assembly))
+      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    link.push_back(parts.back()->path());
+  }
+  append(link, {"-x", "none", "-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
+  const Temporary result(kept);
+  append(link, {"-o", result.path()});
+  const ProcessResult linked = run_process(link);
+  if (linked.status != 0) {
+    if (!undefined_names(linked.errors).empty()) throw Incomplete{linked.errors};
+    throw UserError(first_error(linked.errors, text.sources));
+  }
+  const auto octets = read_file(result.path());
+  if (!octets || !write_file(kept, *octets))
+    throw RunError(kept.string() + ": cannot be written; is the disk full?");
+  return checked(kept, *octets);
+}
+
+bool mentions(const std::vector<fs::path>& sources, std::string_view word) {
+  for (const fs::path& source : sources) {
+    if (read_file(source).value_or("").find(word) != std::string::npos) return true;
+  }
+  return false;
+}
+
+/// Makes the program; adds sources that are missing as long as some are found.
+CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sources, const Arguments& dialect) {
+  std::vector<std::string> notes;
+  for (;;) {
+    const ProgramText text = program_text(sources, toolchain.cache);
+    try {
+      CompiledProgram program = toolchain.make(text, dialect);
+      notes.insert(notes.begin(), text.notes.begin(), text.notes.end());
+      program.notes = std::move(notes);
+      return program;
+    } catch (const Incomplete& incomplete) {
+      auto preprocessed = [&](const fs::path& source) { return toolchain.preprocessed(source, dialect); };
+      const std::vector<fs::path> more = sources_with(undefined_names(incomplete.errors), text, preprocessed);
+      if (more.empty()) throw UserError(first_error(incomplete.errors, text.sources));
+      for (const fs::path& source : more) {
+        notes.push_back(source.string() + ": compiled too; it has what the program lacks");
+        sources.push_back(source);
+      }
+    }
+  }
+}
+
+/// A way to understand a program that is none in the robot's own compiler's eyes.
+struct Dialect {
+  Arguments flags;
+  std::string note;
+};
+
+/// What could help after this error, likeliest first.
+std::vector<Dialect> dialects_for(const std::string& error, const std::vector<fs::path>& sources,
+                                  const fs::path& runtime) {
+  auto says = [&](std::string_view word) { return error.find(word) != std::string::npos; };
+  std::vector<Dialect> result;
+  const Arguments headers{"-include", (runtime / "headers.h").string()};
+  const std::string with_headers = "compiled with headers that it does not include";
+  if (says("undefined reference"))
+    result.push_back({{"-fgnu89-inline"}, "compiled with inline functions as before C99"});
+  if (says("'debug_info_t' undeclared"))
+    result.push_back({{"-DKILOTWIN_NO_DEBUG_INFO"}, "compiled without debug_info_t"});
+  if (says("undeclared") || says("unknown type name") || says("was not declared")) {
+    result.push_back({headers, with_headers});
+    result.push_back(
+        {{"-DKILOTWIN_NO_DEBUG_INFO", headers[0], headers[1]}, with_headers + ", without debug_info_t"});
+  }
+  if (mentions(sources, "SIMULATOR")) {
+    const std::string for_kilombo = "compiled with SIMULATOR, as for Kilombo";
+    result.push_back({{"-DSIMULATOR"}, for_kilombo});
+    result.push_back({{"-DSIMULATOR", headers[0], headers[1]}, for_kilombo + "; " + with_headers});
+  }
+  if (!says("undefined reference") && !says("No such file")) {
+    const Arguments as_cpp{"-x", "c++", headers[0], headers[1]};
+    const std::string note = "compiled as C++, " + with_headers.substr(9);
+    result.push_back({as_cpp, note});
+    if (mentions(sources, "log_message")) {
+      result.push_back({as_cpp, note + ", and with log_message()"});
+      append(result.back().flags, {"-include", (runtime / "log_message.h").string()});
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptions& options) {
+  if (sources.size() == 1 && sources[0].extension() == ".so") return given(sources[0]);
+  check_sources(sources);
+  Toolchain toolchain;
+  toolchain.defines = define_flags(options.defines);
+  toolchain.compiler = find_compiler(options.compiler);
+  toolchain.cache = cache_directory(options.cache_directory);
+  toolchain.runtime = unpacked_runtime(toolchain.cache);
+  toolchain.includes = include_flags(toolchain.compiler, toolchain.runtime);
+  toolchain.code = code_flags(toolchain.compiler);
+  try {
+    return complete(toolchain, sources, {});
+  } catch (const UserError& error) {
+    for (const Dialect& dialect : dialects_for(error.what(), sources, toolchain.runtime)) {
+      try {
+        CompiledProgram program = complete(toolchain, sources, dialect.flags);
+        program.notes.push_back(sources.front().string() + ": " + dialect.note);
+        return program;
+      } catch (const UserError&) {
+        // The first error is the one that tells.
+      }
+    }
+    throw;
+  }
+}
+
+}  // namespace kilotwin::behaviours

@@ -1,0 +1,87 @@
+#include <cstdlib>
+#include <sstream>
+#include <system_error>
+
+#include "services/behaviours/compiler.hpp"
+#include "services/behaviours/compiler_common.hpp"
+#include "core/os/files.hpp"
+#include "core/os/process.hpp"
+#include "services/behaviours/program_text.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace fs = std::filesystem;
+namespace {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() : path_((fs::temp_directory_path() / "kilotwin-avr-XXXXXX").string()) {
+    if (mkdtemp(path_.data()) == nullptr) throw RunError(path_ + ": cannot be made; is the disk full?");
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  [[nodiscard]] fs::path path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+std::string required_tool(const char* name, const char* package) {
+  const fs::path path = find_executable(name);
+  if (path.empty()) throw UserError(std::string("no ") + name + " on this machine; apt-get install " + package);
+  return path.string();
+}
+
+/// What avr-size says of an object: text, data and bss in the second line.
+AvrSize parsed_size(const std::string& table) {
+  std::istringstream stream(table);
+  std::string header;
+  std::getline(stream, header);
+  std::uint32_t text = 0, data = 0, bss = 0;
+  if (!(stream >> text >> data >> bss)) throw RunError("avr-size said something unexpected: " + table);
+  return {text + data, data + bss};
+}
+
+}  // namespace
+
+AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptions& options) {
+  check_sources(sources);
+  const std::string gcc = required_tool("avr-gcc", "gcc-avr avr-libc");
+  const std::string size = required_tool("avr-size", "binutils-avr");
+  const fs::path runtime = unpacked_runtime(cache_directory(options.cache_directory));
+  const TemporaryFolder folder;
+  std::vector<std::string> link{gcc, "-mmcu=atmega328p", "-r", "-nostartfiles", "-Wl,-d"};
+  const ProgramText text = program_text(sources, cache_directory(options.cache_directory));
+  for (const fs::path& source : text.files) {
+    const std::string object = (folder.path() / (std::to_string(link.size()) + ".o")).string();
+    std::vector<std::string> arguments{gcc,
+                                       "-mmcu=atmega328p",
+                                       "-Os",
+                                       is_cpp(source) ? "-std=gnu++11" : "-std=gnu11",
+                                       "-DF_CPU=8000000",
+                                       "-funsigned-char",
+                                       "-funsigned-bitfields",
+                                       "-fpack-struct",
+                                       "-fshort-enums",
+                                       "-fdiagnostics-color=never",
+                                       "-isystem",
+                                       (runtime / "kilolib").string()};
+    for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
+    arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
+    const ProcessResult result = run_process(arguments);
+    if (result.status != 0) throw UserError(first_error(result.errors, text.sources));
+    link.push_back(object);
+  }
+  // One object of all, with the variables that several files share and what is used of the C library; kilolib stays open.
+  const std::string whole = (folder.path() / "program.o").string();
+  link.insert(link.end(), {"-Wl,--start-group", "-lm", "-lc", "-lgcc", "-Wl,--end-group", "-o", whole});
+  const ProcessResult linked = run_process(link);
+  if (linked.status != 0) throw UserError(first_error(linked.errors, sources));
+  return parsed_size(run_process({size, whole}).output);
+}
+
+}  // namespace kilotwin::behaviours

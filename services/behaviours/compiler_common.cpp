@@ -1,0 +1,172 @@
+#include "services/behaviours/compiler_common.hpp"
+
+#include <algorithm>
+
+#include <optional>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+
+#include "core/os/files.hpp"
+#include "services/behaviours/program_text.hpp"
+#include "services/behaviours/runtime_files.hpp"
+#include "services/behaviours/sha256.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace fs = std::filesystem;
+namespace {
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
+}  // namespace
+
+fs::path unpacked_runtime(const fs::path& cache) {
+  static const std::string content_hash = [] {
+    std::string all;
+    for (const RuntimeFile& file : runtime_files())
+      all.append(file.name).append(1, '\0').append(file.text).append(1, '\0');
+    return sha256_hex(all);
+  }();
+  const fs::path folder = cache / ("runtime-" + content_hash.substr(0, 16));
+  for (const RuntimeFile& file : runtime_files()) {
+    const fs::path path = folder / file.name;
+    if (read_file(path) == file.text) continue;
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    if (!write_file(path, file.text)) throw RunError(path.string() + ": cannot be written; is the disk full?");
+  }
+  return folder;
+}
+
+std::vector<std::string> define_flags(const std::vector<std::string>& defines) {
+  auto is_macro = [](std::string_view define) {
+    const std::string_view name = define.substr(0, define.find('='));
+    return !name.empty() && !is_digit(name[0]) && define.find('\n') == std::string_view::npos &&
+           std::all_of(name.begin(), name.end(), [](char c) { return c == '_' || is_digit(c) || is_letter(c); });
+  };
+  std::vector<std::string> flags;
+  for (const std::string& define : defines) {
+    if (!is_macro(define)) {
+      throw UserError("--define " + define + ": not a macro; write NAME or NAME=VALUE, as in TAU_S=2.5");
+    }
+    flags.push_back("-D" + define);
+  }
+  return flags;
+}
+
+void check_sources(const std::vector<fs::path>& sources) {
+  if (sources.empty()) throw UserError("no program given; name one or more C files");
+  for (const fs::path& source : sources) {
+    std::error_code error;
+    if (!fs::is_regular_file(source, error)) {
+      throw UserError(source.string() +
+                      ": no such file; a program is one or more C or C++ files, or a .so of `kilotwin build`");
+    }
+    if (source.extension() != ".c" && !is_cpp(source)) {
+      throw UserError(
+          source.string() +
+          ": not a C or C++ source; a program is one or more .c or .cpp files, or a .so of `kilotwin build`");
+    }
+  }
+}
+
+namespace {
+
+/// Removes ":NUMBER" from the end; false where there is none.
+bool drop_number(std::string_view& text) {
+  std::size_t end = text.size();
+  while (end > 0 && is_digit(text[end - 1])) --end;
+  if (end == text.size() || end < 2 || text[end - 1] != ':') return false;
+  text = text.substr(0, end - 1);
+  return true;
+}
+
+/// "FILE:LINE:COLUMN: error: WHAT" of a compiler, whose fatal errors are errors here.
+std::optional<std::string> compiler_error(std::string_view line) {
+  for (const std::string_view mark : {": error: ", ": fatal error: "}) {
+    const std::size_t at = line.find(mark);
+    if (at == std::string_view::npos) continue;
+    const std::string_view place = line.substr(0, at);
+    std::string_view file = place;
+    if (drop_number(file) && drop_number(file)) {
+      return std::string(place) + ": error: " + std::string(line.substr(at + mark.size()));
+    }
+  }
+  return std::nullopt;
+}
+
+/// "FILE:LINE: Error: WHAT" of an assembler, at an asm statement.
+std::optional<std::string> assembler_error(std::string_view line) {
+  constexpr std::string_view kMark = ": Error: ";
+  const std::size_t at = line.find(kMark);
+  if (at == std::string_view::npos) return std::nullopt;
+  const std::string_view place = line.substr(0, at);
+  std::string_view file = place;
+  if (!drop_number(file)) return std::nullopt;
+  return std::string(place) + ":1: error: " + std::string(line.substr(at + kMark.size()));
+}
+
+std::size_t linker_complaint(std::string_view line) {
+  return std::min(line.find("undefined reference"), line.find("multiple definition"));
+}
+
+/// "... FILE:LINE: WHAT" of a linker, which knows sources by their names alone and no columns.
+std::optional<std::string> linker_error(std::string_view line, const std::vector<fs::path>& sources) {
+  const std::size_t at = linker_complaint(line);
+  if (at == std::string_view::npos || at < 2 || line.substr(at - 2, 2) != ": ") return std::nullopt;
+  const std::string_view place = line.substr(0, at - 2);
+  std::string_view file = place;
+  if (!drop_number(file)) return std::nullopt;
+  const std::string number(place.substr(file.size()));
+  if (const std::size_t before = file.find_last_of(": "); before != std::string_view::npos)
+    file.remove_prefix(before + 1);
+  std::string named(file);
+  for (const fs::path& source : sources) {
+    if (source.filename() == fs::path(named).filename()) named = source.string();
+  }
+  // Where the first of several definitions is, the linker tells by the name of a temporary file.
+  return named + number + ":1: error: " + std::string(line.substr(at, line.find("; ", at) - at));
+}
+
+/// Only the runtime calls main(), so its place would tell a user nothing.
+std::optional<std::string> missing_main(std::string_view line, const fs::path& source) {
+  if (line.find("undefined reference to `main'") == std::string_view::npos) return std::nullopt;
+  return source.string() +
+         ":1:1: error: there is no main(); a program has one that calls kilo_init() and kilo_start(setup, loop)";
+}
+
+/// What says nothing of a place.
+std::optional<std::string> placeless_error(std::string_view line, const fs::path& source) {
+  const std::size_t at = std::min(linker_complaint(line), line.find("error"));
+  if (at == std::string_view::npos) return std::nullopt;
+  return source.string() + ":1:1: error: " + std::string(line.substr(at));
+}
+
+}  // namespace
+
+std::string first_error(const std::string& output, const std::vector<fs::path>& sources) {
+  std::vector<std::string> lines;
+  std::istringstream stream(output);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  std::string first;
+  std::size_t count = 0;
+  auto look_for = [&](auto parse) {
+    if (count > 0) return;
+    for (const std::string& line : lines) {
+      const std::optional<std::string> found = parse(line);
+      if (found && count++ == 0) first = *found;
+    }
+  };
+  look_for(compiler_error);
+  look_for(assembler_error);
+  look_for([&](const std::string& line) { return missing_main(line, sources.front()); });
+  look_for([&](const std::string& line) { return linker_error(line, sources); });
+  look_for([&](const std::string& line) { return placeless_error(line, sources.front()); });
+  if (count == 0) return sources.front().string() + ":1:1: error: the compiler failed";
+  if (count > 1) first += " (" + std::to_string(count - 1) + (count == 2 ? " more error)" : " more errors)");
+  return first;
+}
+
+}  // namespace kilotwin::behaviours

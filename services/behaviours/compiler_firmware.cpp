@@ -1,0 +1,55 @@
+// Programs for the robot's own processor: compiled by avr-gcc and linked with this project's kilolib for it.
+#include <cstdlib>
+#include <system_error>
+
+#include "services/behaviours/compiler.hpp"
+#include "services/behaviours/compiler_common.hpp"
+#include "core/os/files.hpp"
+#include "core/os/process.hpp"
+#include "services/behaviours/sha256.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace fs = std::filesystem;
+
+CompiledProgram compile_firmware(const std::vector<fs::path>& sources, const CompileOptions& options) {
+  const fs::path gcc = find_executable("avr-gcc");
+  if (gcc.empty()) throw UserError("no avr-gcc on this machine; apt-get install gcc-avr avr-libc binutils-avr");
+  const fs::path cache = cache_directory(options.cache_directory), runtime = unpacked_runtime(cache);
+  std::error_code error;
+  fs::create_directories(cache / "firmware", error);
+  std::string unfinished = (cache / "firmware" / "linking-XXXXXX").string();
+  if (mkdtemp(unfinished.data()) == nullptr) throw RunError(unfinished + ": cannot be made; is the disk full?");
+
+  const fs::path whole = fs::path(unfinished) / "program.elf";
+  std::vector<std::string> arguments{gcc.string(),
+                                     "-mmcu=atmega328p",
+                                     "-Os",
+                                     "-std=gnu11",
+                                     "-DF_CPU=8000000",
+                                     "-funsigned-char",
+                                     "-funsigned-bitfields",
+                                     "-fpack-struct",
+                                     "-fshort-enums",
+                                     "-ffunction-sections",
+                                     "-fdata-sections",
+                                     "-fcommon",
+                                     "-Wl,--gc-sections",
+                                     "-fdiagnostics-color=never",
+                                     "-isystem",
+                                     (runtime / "kilolib").string()};
+  for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
+  for (const fs::path& source : sources) arguments.push_back(source.string());
+  arguments.insert(arguments.end(), {(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(),
+                                     "-lm", "-o", whole.string()});
+  const ProcessResult result = run_process(arguments);
+  const auto octets = read_file(whole);
+  fs::remove_all(unfinished, error);
+  if (result.status != 0 || !octets) throw UserError(first_error(result.errors, sources));
+  const std::string sha256 = sha256_hex(*octets);
+  const fs::path file = cache / "firmware" / (sha256 + ".elf");
+  if (!write_file(file, *octets)) throw RunError(file.string() + ": cannot be written; is the disk full?");
+  return {file, sha256, {}};
+}
+
+}  // namespace kilotwin::behaviours

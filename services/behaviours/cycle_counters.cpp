@@ -1,0 +1,298 @@
+#include "services/behaviours/cycle_counters.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "services/behaviours/assembly.hpp"
+#include "services/behaviours/runtime/image_abi.h"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+/// What is known of the strongly connected component of a block.
+struct Component {
+  bool is_cycle = false;
+  bool reads = false;      ///< memory that an interrupt may change, or it calls something
+  bool can_leave = false;  ///< from here some return can be reached
+  bool calls = false;      ///< from here some call can be reached
+};
+
+/// Depth first over all blocks: the targets of edges that close a cycle, and strongly connected components.
+class Cycles {
+ public:
+  Cycles(const FlowGraph& graph, const std::vector<Statement>& statements)
+      : graph_(graph),
+        component_of(graph.blocks.size(), kNone),
+        closes(graph.blocks.size(), false),
+        index_(graph.blocks.size(), kNone),
+        low_(graph.blocks.size()),
+        on_path_(graph.blocks.size(), false) {
+    for (std::uint32_t b = 0; b < graph.blocks.size(); ++b) {
+      if (index_[b] == kNone) search(b, statements);
+    }
+  }
+
+ private:
+  const FlowGraph& graph_;
+
+ public:
+  std::vector<std::uint32_t> component_of;
+  std::vector<bool> closes;  ///< per block: some cycle ends with a jump to it
+  std::vector<Component> components;
+
+ private:
+  void search(std::uint32_t root, const std::vector<Statement>& statements) {
+    struct Visit {
+      std::uint32_t block;
+      std::size_t next;
+    };
+    std::vector<Visit> path;
+    auto enter = [&](std::uint32_t b) {
+      index_[b] = low_[b] = counter_++;
+      on_path_[b] = true;
+      open_.push_back(b);
+      path.push_back({b, 0});
+    };
+    enter(root);
+    while (!path.empty()) {
+      const std::uint32_t b = path.back().block;
+      const auto& next = graph_.blocks[b].next;
+      if (path.back().next < next.size()) {
+        const std::uint32_t to = next[path.back().next++];
+        if (index_[to] == kNone) {
+          enter(to);
+        } else if (component_of[to] == kNone) {
+          low_[b] = std::min(low_[b], index_[to]);
+          if (on_path_[to]) closes[to] = true;
+        }
+        continue;
+      }
+      path.pop_back();
+      on_path_[b] = false;
+      if (!path.empty()) low_[path.back().block] = std::min(low_[path.back().block], low_[b]);
+      if (low_[b] == index_[b]) close_component(b, statements);
+    }
+  }
+
+  /// Components are found after all that they lead to.
+  void close_component(std::uint32_t root, const std::vector<Statement>& statements) {
+    std::vector<std::uint32_t> members;
+    do {
+      members.push_back(open_.back());
+      component_of[open_.back()] = static_cast<std::uint32_t>(components.size());
+      open_.pop_back();
+    } while (members.back() != root);
+    Component component;
+    component.is_cycle = members.size() > 1;
+    for (const std::uint32_t b : members) {
+      const FlowGraph::Block& block = graph_.blocks[b];
+      component.can_leave = component.can_leave || block.leaves;
+      for (std::uint32_t i = block.first; i < block.last; ++i) {
+        if (statements[i].kind != Statement::Kind::kInstruction) continue;
+        const bool calls = flow_of(statements[i]) == Flow::kCall;
+        component.calls = component.calls || calls;
+        component.reads = component.reads || calls || reads_memory(statements[i]);
+      }
+      for (const std::uint32_t to : block.next) {
+        if (component_of[to] == components.size()) {
+          component.is_cycle = component.is_cycle || to == b;
+          continue;
+        }
+        component.can_leave = component.can_leave || components[component_of[to]].can_leave;
+        component.calls = component.calls || components[component_of[to]].calls;
+      }
+    }
+    components.push_back(component);
+  }
+
+  std::vector<std::uint32_t> index_, low_, open_;
+  std::vector<bool> on_path_;
+  std::uint32_t counter_ = 0;
+};
+
+/// Which blocks need the flags as they find them.
+std::vector<bool> blocks_that_need_flags(const FlowGraph& graph, const std::vector<Statement>& statements) {
+  std::vector<bool> needs(graph.blocks.size(), false), passes(graph.blocks.size(), true);
+  for (std::uint32_t b = 0; b < graph.blocks.size(); ++b) {
+    for (std::uint32_t i = graph.blocks[b].first; i < graph.blocks[b].last; ++i) {
+      if (statements[i].kind != Statement::Kind::kInstruction) continue;
+      if (reads_flags(statements[i].name)) needs[b] = true;
+      passes[b] = !needs[b] && !overwrites_flags(statements[i].name);
+      if (!passes[b]) break;
+    }
+  }
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::uint32_t b = static_cast<std::uint32_t>(graph.blocks.size()); b-- > 0;) {
+      if (needs[b] || !passes[b]) continue;
+      for (const std::uint32_t to : graph.blocks[b].next) {
+        if (needs[to]) needs[b] = changed = true;
+      }
+    }
+  }
+  return needs;
+}
+
+class Instrumenter {
+ public:
+  explicit Instrumenter(std::string_view assembly, Counted counted)
+      : assembly_(assembly),
+        counted_(counted),
+        statements_(read_assembly(assembly)),
+        graph_(flow_graph(statements_)),
+        cycles_(graph_, statements_),
+        needs_flags_(blocks_that_need_flags(graph_, statements_)) {}
+
+  std::string instrument() {
+    plan();
+    std::string result;
+    result.reserve(assembly_.size() * 3 / 2);
+    std::string_view place;  // the last .loc
+    std::string stubs;
+    std::uint32_t next = 0;
+    for (std::uint32_t i = 0; i < statements_.size(); ++i) {
+      const Statement& s = statements_[i];
+      if (s.kind == Statement::Kind::kDirective && s.section == Statement::Section::kCode) {
+        if (s.name == ".loc") place = s.text.substr(0, s.text.find(" view "));
+        // The end of a function: what its counters call when they have run out.
+        if (s.name == ".size" && !stubs.empty()) {
+          result += stubs;
+          stubs.clear();
+        }
+      }
+      for (; next < counters_.size() && counters_[next].before == i; ++next) {
+        emit(counters_[next], next, place, result, stubs);
+      }
+      result.append(s.text).append(1, '\n');
+    }
+    if (!stubs.empty()) result.append("\t.text\n").append(stubs);
+    return result;
+  }
+
+ private:
+  struct Counter {
+    std::uint32_t before = 0;  ///< which statement
+    std::uint32_t cycles = 0;
+    bool tests = false, keeps_flags = false;
+    unsigned kind = 0;  ///< KT_CHECK_*
+  };
+
+  void plan() {
+    for (std::uint32_t b = 0; b < graph_.blocks.size(); ++b) {
+      const FlowGraph::Block& block = graph_.blocks[b];
+      Counter counter;
+      bool calls = false;
+      for (std::uint32_t i = block.first; i < block.last; ++i) {
+        const Statement& s = statements_[i];
+        if (s.kind != Statement::Kind::kInstruction) continue;
+        if (counted_ == Counted::kAll) counter.cycles += avr_cycles(s.name, s.operands);
+        calls = calls || flow_of(s) == Flow::kCall;
+      }
+      counter.tests = cycles_.closes[b] || (block.is_function && function_calls(b));
+      if (counter.cycles == 0 && !counter.tests) continue;
+      const std::optional<std::uint32_t> place = place_in(b);
+      if (!place && !counter.tests) continue;
+      counter.before = place ? *place : first_instruction(block);
+      counter.keeps_flags = !place;
+      if (counter.before == block.last) continue;  // no instruction at all: nothing is executed
+      const Component& component = cycles_.components[cycles_.component_of[b]];
+      if (!component.is_cycle || component.reads) counter.kind |= KT_CHECK_WAITS;
+      if (component.is_cycle && !component.can_leave && !component.calls) counter.kind |= KT_CHECK_ENDLESS;
+      if (function_uses_vectors(b)) counter.kind |= KT_CHECK_VECTORS;
+      counters_.push_back(counter);
+    }
+    verify();
+  }
+
+  /// Without the blocks that test, no cycle may be left.
+  void verify() const {
+    FlowGraph rest = graph_;
+    for (std::uint32_t b = 0; b < rest.blocks.size(); ++b) {
+      const FlowGraph::Block& block = rest.blocks[b];
+      const bool tests = std::any_of(counters_.begin(), counters_.end(), [&](const Counter& c) {
+        return c.tests && c.before >= block.first && c.before < block.last;
+      });
+      if (tests) rest.blocks[b].next.clear();
+    }
+    const Cycles left(rest, statements_);
+    if (std::find(left.closes.begin(), left.closes.end(), true) != left.closes.end())
+      throw RunError("a loop of this program cannot be interrupted; this is an error of kilotwin");
+  }
+
+  [[nodiscard]] std::uint32_t first_instruction(const FlowGraph::Block& block) const {
+    std::uint32_t i = block.first;
+    while (i < block.last && statements_[i].kind != Statement::Kind::kInstruction) ++i;
+    return i;
+  }
+
+  /// The first instruction before which nobody needs the flags.
+  [[nodiscard]] std::optional<std::uint32_t> place_in(std::uint32_t b) const {
+    const FlowGraph::Block& block = graph_.blocks[b];
+    bool needed =
+        std::any_of(block.next.begin(), block.next.end(), [&](std::uint32_t to) { return needs_flags_[to]; });
+    std::optional<std::uint32_t> first;
+    for (std::uint32_t i = block.last; i-- > block.first;) {
+      const Statement& s = statements_[i];
+      if (s.kind != Statement::Kind::kInstruction) continue;
+      needed = reads_flags(s.name) || (needed && !overwrites_flags(s.name));
+      if (!needed) first = i;
+    }
+    return first;
+  }
+
+  /// Properties of the function that begins at or before a block; the code of a file counts as functions in a row.
+  [[nodiscard]] bool function_calls(std::uint32_t b) const {
+    return any_in_function(
+        b, [](const Statement& s) { return flow_of(s) == Flow::kCall || flow_of(s) == Flow::kIndirect; });
+  }
+  [[nodiscard]] bool function_uses_vectors(std::uint32_t b) const { return any_in_function(b, uses_vectors); }
+  template <class Predicate> [[nodiscard]] bool any_in_function(std::uint32_t b, Predicate predicate) const {
+    while (b > 0 && !graph_.blocks[b].is_function) --b;
+    do {
+      for (std::uint32_t i = graph_.blocks[b].first; i < graph_.blocks[b].last; ++i) {
+        if (statements_[i].kind == Statement::Kind::kInstruction && predicate(statements_[i])) return true;
+      }
+    } while (++b < graph_.blocks.size() && !graph_.blocks[b].is_function);
+    return false;
+  }
+
+  static void emit(const Counter& c, std::uint32_t number, std::string_view place, std::string& code,
+                   std::string& stubs) {
+    const std::string count =
+        "\tsubl\t$" + std::to_string(std::max(c.cycles, 1u)) + ", %gs:" + std::to_string(KT_THREAD_BUDGET) + "\n";
+    const std::string id = std::to_string(number), preempt = "kt_preempt_" + std::to_string(c.kind) + "\n";
+    if (!c.tests) {
+      code += count;
+    } else if (c.keeps_flags) {
+      code += "\tpushfq\n" + count + "\tjns\t.Lkt_back" + id + "\n\tcall\t" + preempt + ".Lkt_back" + id +
+              ":\n\tpopfq\n";
+    } else {
+      code += count + "\tjs\t.Lkt_out" + id + "\n.Lkt_back" + id + ":\n";
+      stubs.append(".Lkt_out" + id + ":\n").append(place).append(place.empty() ? "" : "\n");
+      // A call, but for the processor's prediction of returns: see switch.c.
+      stubs.append("\tleaq\t-8(%rsp), %rsp\n\tpushq\t%rax\n\tleaq\t.Lkt_back" + id +
+                   "(%rip), %rax\n\tmovq\t%rax, 8(%rsp)\n\tpopq\t%rax\n\tjmp\t" + preempt);
+    }
+  }
+
+  std::string_view assembly_;
+  const Counted counted_;
+  const std::vector<Statement> statements_;
+  const FlowGraph graph_;
+  const Cycles cycles_;
+  const std::vector<bool> needs_flags_;
+  std::vector<Counter> counters_;
+};
+
+}  // namespace
+
+std::string with_cycle_counters(std::string_view assembly, Counted counted) {
+  return Instrumenter(assembly, counted).instrument();
+}
+
+}  // namespace kilotwin::behaviours

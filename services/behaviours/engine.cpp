@@ -1,0 +1,442 @@
+#include "services/behaviours/engine.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+/// How long a message is on the air, 13 octets of 10 bits of 269 cycles (kilolib): it keeps its receivers' converters busy, and
+/// its sender's processor with interrupts off.
+constexpr std::uint64_t kPacketCycles = 13 * 10 * 269;
+/// For how long a program may go round in a loop that has no way out and calls nothing: one second.
+constexpr std::int64_t kPatienceCycles = 8'000'000;
+/// So many robots before its turn, a robot's memory is asked for.
+constexpr std::size_t kAhead = 2;
+
+constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
+
+/// CRC-16/MCRF4XX over data and type.
+std::uint16_t message_crc(const IrMessage& message) {
+  std::uint32_t crc = 0xffff;
+  for (const std::uint8_t octet : message) {
+    std::uint32_t x = (octet ^ crc) & 0xff;
+    x = (x ^ x << 4) & 0xff;
+    crc = (crc >> 8 ^ x << 8 ^ x << 3 ^ x >> 4) & 0xffff;
+  }
+  return static_cast<std::uint16_t>(crc);
+}
+
+}  // namespace
+
+BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs)
+    : plan_(plan),
+      host_(host),
+      share_(plan.share(host)),
+      random_(plan.seed()),
+      parameters_(plan),
+      programs_(std::move(programs)),
+      senses_(plan, share_),
+      memory_(share_.size()),
+      calibrated_(share_.size(), 0),
+      eeprom_(share_.size()),
+      presence_(share_.size(), Presence::kNone),
+      motor_left_(share_.size()),
+      motor_right_(share_.size()),
+      spin_up_(share_.size()),
+      led_(share_.size()),
+      life_cycle_(share_.size(), static_cast<std::uint8_t>(LifeCycle::kIdle)),
+      tx_period_(share_.size(), kInitialTxPeriod),
+      holds_(share_.size()),
+      offers_(share_.size()),
+      message_(share_.size()),
+      asked_(share_.size()),
+      sent_(share_.size()),
+      first_reception_(share_.size() + 1),
+      spins_(share_.size()),
+      divided_(programs_->size()) {
+  KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.manifest.program_size()));
+  for (const proto::RobotEeprom& brought : plan.manifest.eeprom()) {
+    if (!share_.contains(brought.robot())) continue;
+    auto& eeprom = eeprom_[brought.robot() - share_.first] = std::make_unique<Eeprom>();
+    std::copy_n(brought.content().begin(), eeprom->size(), eeprom->begin());
+  }
+  if (const RadioParameters radios(plan); radios.own_tables()) calibrate_ranging(radios);
+  // Hosts of one process start at different slots, so that they seldom wait for each other.
+  const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
+  for (std::uint32_t s = 0; s < kSlots; ++s) {
+    for (std::uint32_t p = 0; p < programs_->size(); ++p) {
+      if (plan.manifest.program(static_cast<int>(p)).firmware()) continue;
+      Group group{p, (first_slot + s) % kSlots, {}};
+      for (std::uint32_t i = 0; i < share_.size(); ++i) {
+        const std::uint32_t robot = share_.first + i;
+        if (robot % kSlots == group.slot && plan.program_of(robot) == p) group.robots.push_back(i);
+      }
+      for (const std::uint32_t i : group.robots) presence_[i] = Presence::kNew;
+      if (!group.robots.empty()) groups_.push_back(std::move(group));
+    }
+  }
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (plan.firmware(share_.first + i)) presence_[i] = Presence::kFirmware;
+  }
+}
+
+void BehavioursEngine::gather(const RadioFrame& radio) {
+  auto own = [&](std::uint32_t robot) {
+    KILOTWIN_DEMAND(share_.contains(robot));
+    return robot - share_.first;
+  };
+  std::fill(asked_.begin(), asked_.end(), std::uint8_t{0});
+  std::fill(sent_.begin(), sent_.end(), std::uint8_t{0});
+  for (const std::uint32_t robot : radio.ask) asked_[own(robot)] = 1;
+  for (const std::uint32_t robot : radio.sent) sent_[own(robot)] = 1;
+
+  messages_.resize(radio.messages.size());
+  for (std::size_t m = 0; m < radio.messages.size(); ++m) {
+    const IrMessage& message = radio.messages[m];
+    std::copy_n(message.begin(), 9, messages_[m].data);
+    messages_[m].type = message[9];
+    messages_[m].crc = message_crc(message);
+  }
+  receptions_.resize(radio.reception_robot.size());
+  std::uint32_t next = 0;
+  for (std::uint32_t n = 0; n < receptions_.size(); ++n) {
+    const std::uint32_t i = own(radio.reception_robot[n]);
+    KILOTWIN_DEMAND(i + 1 >= next && radio.reception_message[n] < messages_.size());
+    while (next <= i) first_reception_[next++] = n;
+    receptions_[n] = {messages_[radio.reception_message[n]], radio.reception_low_gain[n],
+                      radio.reception_high_gain[n]};
+  }
+  while (next < first_reception_.size()) first_reception_[next++] = static_cast<std::uint32_t>(receptions_.size());
+}
+
+void BehavioursEngine::step(Tick from, const RadioFrame& radio, std::span<const BodyFrame* const> bodies) {
+  KILOTWIN_DEMAND(from == now_ && radio.tick == from && radio.first_robot == share_.first &&
+                  radio.kilo_ticks.size() == share_.size());
+  ++now_;
+  gather(radio);
+  senses_.at(from, bodies);
+  printed_.clear();
+  std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
+  running_->tick.store(from.count(), std::memory_order_relaxed);
+  fail_known_culprits(from);
+  const FaultGuard guard;
+  for (const Group& group : groups_) {
+    const Program& program = programs_->program(group.program);
+    Slot& slot = program.slot(group.slot);
+    const std::lock_guard lock(slot.mutex);
+    const Executor executor(program, slot, guard.thread());
+    slot.exchange()->log_length = slot.exchange()->log_lost = 0;
+    for (std::size_t n = 0; n < group.robots.size(); ++n) {
+      // Others have used the caches since the last tick.
+      if (n + kAhead < group.robots.size()) memory_[group.robots[n + kAhead]].prefetch();
+      const std::uint32_t i = group.robots[n];
+      run_robot(from, i, radio.kilo_ticks[i], program, slot, executor);
+      if (slot.exchange()->log_length != 0) take_log(i, slot);
+    }
+    running_->robot.store(kNobody, std::memory_order_relaxed);
+  }
+  relay_firmware(radio);
+  if (!senses_.has_batteries()) return;
+  for (std::uint32_t i = 0; i < share_.size(); ++i) use_battery(i);
+}
+
+/// Robots that run firmware show in the next frame what their processors have set by this one: as with programs that have
+/// run in between, so that the same motion comes at the same time from either kind.
+void BehavioursEngine::relay_firmware(const RadioFrame& radio) {
+  for (std::size_t n = 0; n < radio.firmware_robot.size(); ++n) {
+    const std::uint32_t robot = radio.firmware_robot[n], i = robot - share_.first;
+    KILOTWIN_DEMAND(share_.contains(robot) && presence_[i] == Presence::kFirmware);
+    motor_left_[i] = radio.firmware_motor_left[n];
+    motor_right_[i] = radio.firmware_motor_right[n];
+    spin_up_[i] = radio.firmware_spin_up[n];
+    led_[i] = radio.firmware_led[n];
+    const bool failed = life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kFailed);
+    life_cycle_[i] = radio.firmware_life_cycle[n];
+    if (const std::uint32_t fault = radio.firmware_fault[n]; fault != 0 && !failed) {
+      constexpr const char* kCauses[] = {"", "no instruction of the ATmega328P",
+                                         "an access to memory that the ATmega328P does not have"};
+      char text[128];
+      std::snprintf(text, sizeof text, "its firmware executed %s, at 0x%04x of the flash",
+                    kCauses[std::min(fault >> 24, 2u)], fault & 0xffffffu);
+      failures_.push_back({robot, text});
+    }
+  }
+}
+
+void BehavioursEngine::use_battery(std::uint32_t i) {
+  if (presence_[i] != Presence::kNew && presence_[i] != Presence::kAlive) return;
+  constexpr auto kFlat = static_cast<std::uint8_t>(LifeCycle::kFlat);
+  if (life_cycle_[i] == kFlat) {
+    senses_.rest(i);
+    if (senses_.can_restart(i)) life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kIdle);
+    return;
+  }
+  const bool asleep = life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kSleeping);
+  senses_.spend(i, {motor_left_[i], motor_right_[i], led_[i], asleep, sent_[i] != 0});
+  if (!senses_.is_flat(i)) return;
+  // Off: what its memory held is lost.
+  presence_[i] = Presence::kNew;
+  memory_[i].release();
+  life_cycle_[i] = kFlat;
+  motor_left_[i] = motor_right_[i] = spin_up_[i] = led_[i] = 0;
+  holds_[i] = offers_[i] = 0;
+}
+
+void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program& program,
+                                 const Slot& slot, const Executor& executor) {
+  spin_up_[i] = 0;
+  if (presence_[i] == Presence::kFailed || life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kFlat)) return;
+  if (presence_[i] == Presence::kNew) reset_robot(from, i, program, slot);
+  RobotMemory& memory = memory_[i];
+  std::span<const KtReception> receptions(receptions_.data() + first_reception_[i],
+                                          receptions_.data() + first_reception_[i + 1]);
+  bool sent = (sent_[i] & holds_[i]) != 0;
+  if (sent_[i] != 0) holds_[i] = 0;
+
+  const bool deaf = memory.get<std::uint8_t>(program, program.file.table.robot + offsetof(KtRobot, deaf)) != 0;
+  if (deaf) {
+    receptions = {};
+    sent = false;
+    kilo_ticks = 0;
+  }
+  const bool eventful = !receptions.empty() || sent;
+  if (!eventful && memory.get<std::uint8_t>(program, program.file.table.robot + offsetof(KtRobot, parked)) != 0) {
+    const auto ticks = memory.get<std::uint32_t>(program, program.file.table.ticks);
+    memory.set(program, program.file.table.ticks, ticks + kilo_ticks);
+    return;
+  }
+
+  running_->robot.store(share_.first + i, std::memory_order_relaxed);
+  running_->entry.store(running_->entry.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  RobotThread& thread = executor.thread();
+  thread.divided = 0;
+  memory.copy_in(slot, thread);
+  executor.advance_clock(kilo_ticks);
+  surround(i, slot, static_cast<std::uint32_t>(receptions.size()));
+  std::int32_t interrupted_cycles = 0;
+  if (eventful) {
+    const Fault* const fault = executor.interrupt(receptions, sent, interrupted_cycles);
+    if (fault != nullptr) return fail_robot(i, *fault, program, slot);
+    if (executor.robot().reset != 0) {
+      static_cast<void>(memory.copy_out(slot, executor.data_octets(), thread));
+      reset_robot(from, i, program, slot);
+      memory.copy_in(slot, thread);
+      sent = false;
+      interrupted_cycles = 0;
+    }
+  }
+  if (executor.robot().parked == 0) {
+    if (sent) interrupted_cycles += static_cast<std::int32_t>(kPacketCycles);
+    const Fault* const fault = run_main(i, executor, interrupted_cycles);
+    if (fault != nullptr) return fail_robot(i, *fault, program, slot);
+  }
+  // Field by field: what the robot has just written a part of, a processor cannot read as a whole at once.
+  KtRobot& robot = executor.robot();
+  if (robot.state != static_cast<std::uint8_t>(LifeCycle::kRunning)) holds_[i] = 0;
+  if (asked_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
+    const KtMessage* message = nullptr;
+    std::int32_t cycles = 0;
+    const Fault* const fault = executor.transmit(message, cycles);
+    if (fault != nullptr) return fail_robot(i, *fault, program, slot);
+    if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) robot.debt_cycles += static_cast<std::uint64_t>(cycles);
+    if (message != nullptr) {
+      std::copy_n(message->data, 9, message_[i].begin());
+      message_[i][9] = message->type;
+      holds_[i] = offers_[i] = 1;
+    }
+  }
+  keep_eeprom(i, slot);
+  note_outputs(i, robot, executor.tx_period());
+  if (thread.divided != 0) note_division(i, thread.divided, program, slot);
+  robot.spin_up = 0;
+  if (!memory.copy_out(slot, executor.data_octets(), thread))
+    fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
+}
+
+/// The main program's share of a tick.
+const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executor,
+                                        std::int32_t interrupted_cycles) {
+  KtRobot& robot = executor.robot();
+  const auto tick_cycles = static_cast<std::int32_t>(plan_.tick_length.cycles());
+  std::int64_t cycles = tick_cycles;
+  const bool as_on_robot = robot.loop_rate == KT_LOOP_AS_ON_ROBOT;
+  if (as_on_robot) {
+    // Callbacks, transmissions and what the last tick used too much come first.
+    const std::uint64_t owed = robot.debt_cycles + static_cast<std::uint64_t>(interrupted_cycles);
+    const std::uint64_t paid = std::min<std::uint64_t>(owed, static_cast<std::uint64_t>(tick_cycles));
+    robot.debt_cycles = owed - paid;
+    cycles -= static_cast<std::int64_t>(paid);
+    if (cycles <= 0) return nullptr;
+  }
+  Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), spins_[i]);
+  spins_[i] = main.spins;
+  if (main.fault != nullptr) return main.fault;
+  if (as_on_robot && main.left < 0) robot.debt_cycles += static_cast<std::uint64_t>(-main.left);
+  if (main.preempted) ++robot.waits;
+  robot.looped = main.preempted && (executor.thread().check & KT_CHECK_WAITS) == 0 ? 1 : 0;
+  const bool endless = main.preempted && (executor.thread().check & KT_CHECK_ENDLESS) != 0;
+  robot.stuck_ticks = endless ? static_cast<std::uint16_t>(robot.stuck_ticks + 1) : std::uint16_t{0};
+  if (endless && std::int64_t{robot.stuck_ticks} * tick_cycles >= kPatienceCycles)
+    return executor.fail({Fault::kEndlessLoop, 0, executor.thread().place});
+  return nullptr;
+}
+
+/// What the robot in the slot senses in this tick.
+void BehavioursEngine::surround(std::uint32_t i, const Slot& slot, std::uint32_t receptions) {
+  KtSurroundings& around = *slot.surroundings();
+  const senses::Readings readings = senses_.readings(i);
+  around.light = readings.light;
+  around.light_sd = readings.light_sd;
+  around.voltage = readings.voltage;
+  around.voltage_sd = readings.voltage_sd;
+  around.temperature = readings.temperature;
+  around.temperature_sd = readings.temperature_sd;
+  around.charging = readings.charging ? 1 : 0;
+  around.receiving_cycles = receptions * kPacketCycles;
+  around.receiving_from = 0;
+  around.eeprom = eeprom_[i] ? eeprom_[i]->data() : nullptr;
+  around.eeprom_filled = around.eeprom_written = 0;
+}
+
+void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
+  const KtSurroundings& around = *slot.surroundings();
+  if (around.eeprom_written == 0) return;
+  calibrated_[i] = 0;
+  if (eeprom_[i]) return;
+  eeprom_[i] = std::make_unique<Eeprom>();
+  std::copy_n(around.eeprom_copy, eeprom_[i]->size(), eeprom_[i]->begin());
+}
+
+/// Robots that have brought no EEPROM find their own ranging tables in it.
+void BehavioursEngine::calibrate_ranging(const RadioParameters& radios) {
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    const std::uint32_t id = share_.first + i;
+    if (eeprom_[i] || plan_.tracked(id) || plan_.firmware(id)) continue;
+    const Calibration& calibration = parameters_.calibration(id);
+    const RangingTable table = radios.table(id);
+    eeprom_[i] = std::make_unique<Eeprom>();
+    kilotwin_fill_eeprom(eeprom_[i]->data(), {plan_.uid_of(id), calibration.turn_left, calibration.turn_right,
+                                              calibration.straight_left, calibration.straight_right});
+    calibrated_[i] = 1;
+    kilotwin_fill_ranging(eeprom_[i]->data(), table.high.data(), table.low.data());
+  }
+}
+
+void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& program, const Slot& slot) {
+  const std::uint32_t id = share_.first + i;
+  const Calibration& calibration = parameters_.calibration(id);
+  memory_[i].reset(program, slot);
+  auto robot = memory_[i].get<KtRobot>(program, program.file.table.robot);
+  robot.noise = random_.bits(Stream::kProgram, id, tick, 0);
+  robot.tick_cycles = plan_.tick_length.cycles();
+  robot.loop_rate =
+      plan_.group(id).loop_rate() == proto::RobotGroup::AS_ON_ROBOT ? KT_LOOP_AS_ON_ROBOT : KT_LOOP_PER_TICK;
+  robot.uid = plan_.uid_of(id);
+  robot.turn_left = calibration.turn_left;
+  robot.turn_right = calibration.turn_right;
+  robot.straight_left = calibration.straight_left;
+  robot.straight_right = calibration.straight_right;
+  memory_[i].set(program, program.file.table.robot, robot);
+  presence_[i] = Presence::kAlive;
+  holds_[i] = 0;
+}
+
+void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Program& program, const Slot& slot) {
+  fail_robot(i, describe(fault, program, slot));
+}
+
+/// Robots that brought down their host in an earlier attempt at this run.
+void BehavioursEngine::fail_known_culprits(Tick from) {
+  for (const proto::ProgramFailure& failure : plan_.manifest.program_failure()) {
+    if (failure.tick() != from.count() || !share_.contains(failure.robot())) continue;
+    const std::uint32_t i = failure.robot() - share_.first;
+    if (presence_[i] == Presence::kNew || presence_[i] == Presence::kAlive)
+      fail_robot(i, "its program brings down its host");
+  }
+}
+
+void BehavioursEngine::fail_robot(std::uint32_t i, std::string text) {
+  failures_.push_back({share_.first + i, std::move(text)});
+  presence_[i] = Presence::kFailed;
+  life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kFailed);
+  motor_left_[i] = motor_right_[i] = spin_up_[i] = 0;
+  holds_[i] = offers_[i] = 0;
+  memory_[i].release();
+}
+
+void BehavioursEngine::note_division(std::uint32_t i, std::uint64_t code, const Program& program,
+                                     const Slot& slot) {
+  const std::uint32_t index = plan_.program_of(share_.first + i);
+  if (divided_[index] != 0) return;
+  divided_[index] = 1;
+  warnings_.push_back({share_.first + i, describe_division(code, program, slot)});
+}
+
+void BehavioursEngine::take_log(std::uint32_t i, const Slot& slot) {
+  KtExchange& exchange = *slot.exchange();
+  // The robot may have written anything here.
+  const std::uint32_t length = std::min<std::uint32_t>(exchange.log_length, KT_LOG_OCTETS);
+  printed_.push_back({share_.first + i, std::string(exchange.log, length)});
+  if (exchange.log_lost != 0)
+    printed_.back().text += "... (" + std::to_string(exchange.log_lost) + " more octets)\n";
+  exchange.log_length = exchange.log_lost = 0;
+}
+
+void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period) {
+  motor_left_[i] = robot.motors_on != 0 ? robot.duty_left : std::uint8_t{0};
+  motor_right_[i] = robot.motors_on != 0 ? robot.duty_right : std::uint8_t{0};
+  spin_up_[i] = robot.motors_on != 0 ? robot.spin_up : std::uint8_t{0};
+  led_[i] = robot.led & 63;
+  // A sleeping robot that has woken up to listen is, for the radio, one that is idle.
+  const bool listens = robot.state == static_cast<std::uint8_t>(LifeCycle::kSleeping) && robot.deaf == 0;
+  life_cycle_[i] = listens ? static_cast<std::uint8_t>(LifeCycle::kIdle) : robot.state;
+  tx_period_[i] = tx_period;
+}
+
+void BehavioursEngine::emit(ActuationFrame& frame) const {
+  frame.tick = now_;
+  frame.first_robot = share_.first;
+  frame.motor_left = motor_left_;
+  frame.motor_right = motor_right_;
+  frame.spin_up = spin_up_;
+  frame.led = led_;
+  frame.life_cycle = life_cycle_;
+  frame.tx_period = tx_period_;
+  frame.offer_robot.clear();
+  frame.offer_message.clear();
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (offers_[i] == 0) continue;
+    frame.offer_robot.push_back(share_.first + i);
+    frame.offer_message.push_back(message_[i]);
+  }
+}
+
+std::uint64_t BehavioursEngine::hash_part() const {
+  std::uint64_t sum = 0;
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (presence_[i] == Presence::kNone) continue;
+    const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 |
+                                  std::uint64_t{led_[i]} << 16 | std::uint64_t{life_cycle_[i]} << 24 |
+                                  std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48 |
+                                  std::uint64_t{spin_up_[i]} << 49;
+    if (senses_.has_batteries()) {
+      const auto charge = static_cast<std::uint64_t>(senses_.charge(i));
+      sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs, charge});
+    } else {
+      sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs});
+    }
+  }
+  return sum;
+}
+
+std::uint64_t BehavioursEngine::memory_octets() const {
+  std::uint64_t sum = 0;
+  for (const RobotMemory& memory : memory_) sum += memory.data().size() + memory.stack().size();
+  return sum;
+}
+
+}  // namespace kilotwin::behaviours

@@ -1,0 +1,216 @@
+#include "services/behaviours/executor.hpp"
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <vector>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+
+void RobotMemory::resize(std::uint32_t data_octets, std::uint32_t stack_octets) {
+  constexpr std::uint32_t kRoom = 256;  // for a stack that grows a little
+  const std::uint32_t needed = data_octets + stack_octets;
+  if (needed > capacity_) {
+    capacity_ = (needed + kRoom + 63) / 64 * 64;
+    octets_ = std::make_unique_for_overwrite<std::uint8_t[]>(capacity_);
+  }
+  data_octets_ = data_octets;
+  stack_octets_ = stack_octets;
+}
+
+void RobotMemory::reset(const Program& program, const Slot& slot) {
+  // What the entry into the main program pops: six registers, the address where it starts, and an end for back-traces.
+  std::array<std::uint64_t, 8> frame{};
+  frame[6] = slot.image_address() + program.file.table.boot;
+  // What a reset does not touch, of a robot that has run before.
+  std::vector<std::uint8_t> kept;
+  if (octets_) {
+    for (const ElfFile::Range& range : program.file.kept) {
+      const std::uint8_t* const first = octets_.get() + (range.first - program.file.data.first);
+      kept.insert(kept.end(), first, first + (range.last - range.first));
+    }
+  }
+  resize(static_cast<std::uint32_t>(program.data_size()), sizeof frame);
+  std::memcpy(octets_.get(), slot.initial_data().data(), data_octets_);
+  auto from = kept.cbegin();
+  if (!kept.empty()) {
+    for (const ElfFile::Range& range : program.file.kept) {
+      const auto size = static_cast<std::ptrdiff_t>(range.last - range.first);
+      std::copy_n(from, size, octets_.get() + (range.first - program.file.data.first));
+      from += size;
+    }
+  }
+  std::memcpy(octets_.get() + data_octets_, frame.data(), sizeof frame);
+}
+
+void RobotMemory::restore(const Program& program, const Slot& slot, std::span<const std::uint8_t> data,
+                          std::span<const std::uint8_t> stack) {
+  const ElfFile::Range& heap = program.file.heap;
+  if (data.size() < program.data_size() || data.size() > program.data_size() + (heap.last - heap.first) ||
+      stack.size() > kStackOctets || stack.size() < 56 || slot.initial_data().empty()) {
+    throw RunError(program.name + ": the checkpoint was made with another program");
+  }
+  resize(static_cast<std::uint32_t>(data.size()), static_cast<std::uint32_t>(stack.size()));
+  std::memcpy(octets_.get(), data.data(), data.size());
+  std::memcpy(octets_.get() + data_octets_, stack.data(), stack.size());
+}
+
+namespace {
+
+/// What a callback may use, of its robot's time: one second. On a robot, a longer one would have kept every message, every
+/// tick and the program waiting.
+constexpr std::int32_t kCallbackCycles = 8'000'000;
+/// A program that is suspected of waiting in a loop is looked at each time round, this many times.
+constexpr int kLooks = 24;
+/// Of Main::spins: the loop has one test; shorter than any loop.
+constexpr std::int32_t kOneTest = 1;
+
+/// The state of the robot in a slot.
+class Snapshot {
+ public:
+  void take(const Slot& slot, std::size_t data_octets, const RobotThread& thread) {
+    robot_stack_ = thread.robot_stack;
+    const std::uint64_t size = stack_octets(slot);
+    octets_.resize(data_octets + size);
+    std::memcpy(octets_.data(), slot.data(), data_octets);
+    std::memcpy(octets_.data() + data_octets, stack(), size);
+  }
+  [[nodiscard]] bool equals(const Slot& slot, std::size_t data_octets, const RobotThread& thread) const {
+    return robot_stack_ == thread.robot_stack && octets_.size() == data_octets + stack_octets(slot) &&
+           std::memcmp(octets_.data(), slot.data(), data_octets) == 0 &&
+           std::memcmp(octets_.data() + data_octets, stack(), stack_octets(slot)) == 0;
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t stack_octets(const Slot& slot) const {
+    const std::uint64_t size = slot.stack_top() - robot_stack_;
+    return size <= kStackOctets ? size : 0;
+  }
+  [[nodiscard]] const void* stack() const { return reinterpret_cast<const void*>(robot_stack_); }  // NOLINT
+
+  std::uint64_t robot_stack_ = 0;
+  std::vector<std::uint8_t> octets_;
+};
+
+/// " in f() at FILE:LINE", as far as known.
+std::string place(std::uint64_t code, const Program& program, const Slot& slot) {
+  const std::uint64_t offset = code - slot.image_address();
+  const std::string function = program.file.function_at(offset);
+  const auto line = program.file.lines.find(offset);
+  return (function.empty() ? "" : " in " + function + "()") +
+         (line ? " at " + line->file + ':' + std::to_string(line->line) : " of " + program.name);
+}
+
+}  // namespace
+
+/// The main program until it waits or has used up the tick: one that waits in a loop, or did in the tick before, or has run
+/// for long enough to be suspected of it.
+void Executor::follow(Main& main, std::int32_t spun) const {
+  thread_local Snapshot snapshot;
+  if (robot_->looped != 0) {
+    // The last tick ended in a loop that reads nothing which an interrupt could change. If it comes to the same state
+    // again, nothing ever will.
+    snapshot.take(slot_, data_octets(), thread_);
+    if (!run(main, 0)) return;
+    if (snapshot.equals(slot_, data_octets(), thread_)) {
+      main.fault = fail({Fault::kEndlessLoop, 0, thread_.place});
+      return;
+    }
+    if (spun == 0 && main.left >= 0 && !run(main, std::min(main.left, kUnsuspected))) return;
+  }
+  // Whoever comes to the same place in the same state goes round in a loop that only an interrupt can end: it need not be
+  // followed any further than for its phase at the end of the tick.
+  int next_snapshot = 0, snapshot_look = 0;
+  std::int32_t snapshot_left = 0;
+  // A loop with several tests is likely to be the one of the last tick. The first round may end otherwise than it began, with
+  // what an interrupt has changed in a register.
+  if (spun > kOneTest && main.left >= 0 && !run(main, std::min(spun, main.left + 1) - 1)) return;
+  for (int look = 0; look < kLooks && main.left >= 0; ++look) {
+    const bool whole_round = look == 0 && spun > kOneTest;
+    if (look == next_snapshot) {
+      snapshot.take(slot_, data_octets(), thread_);
+      snapshot_look = look;
+      snapshot_left = main.left;
+      next_snapshot = 2 * look + 1;
+    }
+    if (!run(main, whole_round ? std::min(spun, main.left + 1) - 1 : 0)) return;
+    if (!snapshot.equals(slot_, data_octets(), thread_)) continue;
+    const std::int32_t period = snapshot_left - main.left;
+    const bool one_test = look == snapshot_look && !whole_round;
+    main.spins = one_test ? kOneTest : period;
+    if (main.left >= 0) main.left %= period;
+    if (one_test && main.left >= 0) main.left -= period;
+    break;
+  }
+  if (main.left >= 0) run(main, main.left);
+}
+
+const Fault* Executor::call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const {
+  thread_.budget = kCallbackCycles;
+  thread_.overrun = 0;
+  clear(reinterpret_cast<std::uint8_t*>(slot_.interrupt_stack_top()) - kClearedOctets, kClearedOctets);  // NOLINT
+  begin();
+  result = call_(function);
+  end();
+  cycles += kCallbackCycles - thread_.budget;
+  if (thread_.overrun != 0) return fail({Fault::kCallbackOverrun, robot_->in_interrupt, thread_.place});
+  return fault();
+}
+
+const Fault* Executor::interrupt(std::span<const KtReception> receptions, bool sent, std::int32_t& cycles) const {
+  KtExchange& exchange = *slot_.exchange();
+  exchange.sent = sent ? 1 : 0;
+  do {
+    const auto part = receptions.first(std::min<std::size_t>(receptions.size(), KT_MOST_RECEPTIONS));
+    exchange.receptions = static_cast<std::uint32_t>(part.size());
+    std::copy(part.begin(), part.end(), exchange.reception);
+    std::uint64_t result = 0;
+    if (const Fault* const fault = call(interrupts_, result, cycles)) return fault;
+    receptions = receptions.subspan(part.size());
+    exchange.sent = 0;
+  } while (!receptions.empty() && robot_->reset == 0);
+  return nullptr;
+}
+
+const Fault* Executor::transmit(const KtMessage*& message, std::int32_t& cycles) const {
+  std::uint64_t sends = 0;
+  const Fault* const fault = call(transmit_, sends, cycles);
+  message = fault == nullptr && sends == 1 ? &slot_.exchange()->message : nullptr;
+  return fault;
+}
+
+std::string describe(const Fault& fault, const Program& program, const Slot& slot) {
+  std::string text;
+  char address[32];
+  std::snprintf(address, sizeof address, "0x%llx", static_cast<unsigned long long>(fault.address));
+  const std::uint64_t stack_bottom = slot.stack_top() - kStackOctets;
+  switch (fault.signal) {
+    case SIGFPE: text = "arithmetic"; break;
+    case Fault::kEndlessLoop: text = "endless loop"; break;
+    case Fault::kCallbackOverrun:
+      text = std::string("does not return from ") + (fault.address == KT_IN_TX_SUCCESS ? "kilo_message_tx_success"
+                                                     : fault.address == KT_IN_RX       ? "kilo_message_rx"
+                                                                                       : "kilo_message_tx");
+      text += ": it loops";
+      break;
+    case SIGILL: text = "illegal instruction (abort, or what the compiler knew to be undefined)"; break;
+    case SIGSEGV:
+    case SIGBUS:
+      text = fault.address < stack_bottom && fault.address >= stack_bottom - 4 * kPage ? "stack overflow, address "
+                                                                                       : "access to address ";
+      text += address;
+      break;
+    default: text = "stack pointer lost";
+  }
+  return text + place(fault.code, program, slot);
+}
+
+std::string describe_division(std::uint64_t code, const Program& program, const Slot& slot) {
+  return "division by zero" + place(code, program, slot) +
+         "; the quotient is all ones (of a negative number 1), the remainder the dividend, as on the robot";
+}
+
+}  // namespace kilotwin::behaviours

@@ -1,0 +1,82 @@
+/// A program in memory, ready to run: copies of its image at fixed addresses, so that pointers in a robot's memory and on its
+/// stack are valid in every process, on every machine and after every checkpoint.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "services/behaviours/elf_file.hpp"
+
+namespace kilotwin::behaviours {
+
+/// Robot r runs in slot r % kSlots of its program: up to kSlots robots of a program run at the same time.
+inline constexpr std::uint32_t kSlots = 8;
+/// Where images live. Free of everything else in a position-independent program, under sanitizers as well.
+inline constexpr std::uint64_t kFirstAddress = 0x20000000, kLastAddress = 0x70000000;
+inline constexpr std::uint64_t kAddressStep = 64 * 1024;  ///< slots begin at multiples of it
+inline constexpr std::uint64_t kStackOctets = 64 * 1024;
+
+/// One copy of an image with its stacks. From low to high addresses, each followed by a guard: main stack, interrupt stack,
+/// surroundings, exchange, image. Code and constants are not writable, data and stacks not executable.
+class Slot {
+ public:
+  /// Maps the slot. Throws RunError where the addresses are taken or memory is short.
+  Slot(const ElfFile&, std::uint64_t address);
+  ~Slot();
+  Slot(const Slot&) = delete;
+  Slot& operator=(const Slot&) = delete;
+
+  /// Octets of address space that a slot of this program takes.
+  [[nodiscard]] static std::uint64_t size(const ElfFile&);
+
+  /// A function or variable of the image; `offset` is one of ElfFile::table.
+  template <class T> [[nodiscard]] T at(std::uint64_t offset) const {
+    return reinterpret_cast<T>(image_ + offset);
+  }                                                                                                // NOLINT
+  [[nodiscard]] KtExchange* exchange() const { return reinterpret_cast<KtExchange*>(exchange_); }  // NOLINT
+  [[nodiscard]] KtSurroundings* surroundings() const {
+    return reinterpret_cast<KtSurroundings*>(surroundings_);  // NOLINT
+  }
+  /// A robot's data; behind them its heap.
+  [[nodiscard]] std::uint8_t* data() const { return at<std::uint8_t*>(data_offset_); }
+  /// One past the highest octet of the main stack; aligned to 16.
+  [[nodiscard]] std::uint64_t stack_top() const { return stack_top_; }
+  [[nodiscard]] std::uint64_t interrupt_stack_top() const { return interrupt_stack_top_; }
+  [[nodiscard]] std::uint64_t image_address() const { return image_; }
+  /// A robot's data as they are at reset.
+  [[nodiscard]] const std::vector<std::uint8_t>& initial_data() const { return initial_data_; }
+
+  std::mutex mutex;  ///< held while robots run here
+
+ private:
+  std::uint64_t address_, size_, stack_top_, interrupt_stack_top_, surroundings_, exchange_, image_, data_offset_;
+  std::vector<std::uint8_t> initial_data_;
+};
+
+/// A program in all its slots.
+class Program {
+ public:
+  /// The program at this address. Engines and program sets of one process share what is the same. Throws RunError where
+  /// something else lies there or memory is short.
+  [[nodiscard]] static std::shared_ptr<Program> load(ElfFile file, const std::string& name,
+                                                     const std::string& sha256, std::uint64_t address);
+  /// Octets of address space that it takes.
+  [[nodiscard]] static std::uint64_t size(const ElfFile& file) { return kSlots * Slot::size(file); }
+
+  Program(ElfFile file, std::string name, std::string sha256, std::uint64_t address);
+
+  const ElfFile file;
+  const std::string name;
+  const std::string sha256;
+  const std::uint64_t address, end;  ///< [address, end) is taken
+  [[nodiscard]] Slot& slot(std::uint32_t index) const { return *slots_[index]; }
+  [[nodiscard]] std::uint64_t data_size() const { return file.data.last - file.data.first; }
+
+ private:
+  std::vector<std::unique_ptr<Slot>> slots_;
+};
+
+}  // namespace kilotwin::behaviours

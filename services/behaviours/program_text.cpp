@@ -1,0 +1,370 @@
+#include "services/behaviours/program_text.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <map>
+#include <optional>
+#include <regex>
+#include <string_view>
+#include <system_error>
+
+#include "core/os/files.hpp"
+#include "services/behaviours/runtime_files.hpp"
+#include "services/behaviours/sha256.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace fs = std::filesystem;
+namespace {
+
+/// Files of kilolib and of the simulators' copies of it, each with words that only a copy contains, one of which suffices.
+struct Vendored {
+  const char* name;
+  std::vector<const char*> words;
+};
+const std::vector<Vendored>& vendored_headers() {
+  static const std::vector<Vendored> kHeaders{{"kilolib.h", {"kilo_ticks"}},
+                                              {"kilombo.h", {"REGISTER_USERDATA"}},
+                                              {"message.h", {"calibmsg_t", "BOOTPGM_PAGE"}},
+                                              {"message_crc.h", {"message_crc"}},
+                                              {"message_buffered.h", {"rxbuffer"}},
+                                              {"ringbuffer.h", {"RB_pushback"}},
+                                              {"debug.h", {"debug_init", "debug_info_create"}},
+                                              {"jansson.h", {"json_object"}},
+                                              {"params.h", {"get_int_param"}}};
+  return kHeaders;
+}
+
+/// Kilolib's and the simulators' own sources, which the runtime replaces.
+bool is_kilolib_source(const fs::path& path, const std::string& text) {
+  const std::string name = path.filename().string();
+  if (name == "message_crc.c") return text.find("message_crc") != std::string::npos;
+  if (name != "kilolib.c" && name != "kbapi.c" && name != "skilobot.c" && name != "kilolib.cpp") return false;
+  static const std::regex kDefinition(R"(\bvoid\s+kilo_start\s*\([^;{]*\{)");
+  return std::regex_search(text, kDefinition) || name == "skilobot.c";
+}
+
+struct Include {
+  std::size_t begin, end;  ///< of "NAME" or <NAME> with what encloses it
+  std::string name;
+  bool quoted;
+};
+
+std::vector<Include> includes_of(const std::string& text) {
+  std::vector<Include> result;
+  std::size_t line = 0;
+  while (line < text.size()) {
+    std::size_t end = text.find('\n', line);
+    if (end == std::string::npos) end = text.size();
+    std::size_t at = text.find_first_not_of(" \t", line);
+    if (at < end && text[at] == '#') {
+      at = text.find_first_not_of(" \t", at + 1);
+      if (at < end && text.compare(at, 7, "include") == 0) {
+        at = text.find_first_not_of(" \t", at + 7);
+        if (at < end && (text[at] == '"' || text[at] == '<')) {
+          const std::size_t close = text.find(text[at] == '"' ? '"' : '>', at + 1);
+          if (close < end) result.push_back({at, close + 1, text.substr(at + 1, close - at - 1), text[at] == '"'});
+        }
+      }
+    }
+    line = end + 1;
+  }
+  return result;
+}
+
+/// The text without comments and with string literals emptied, for what is looked up in it.
+std::string code_of(const std::string& text) {
+  std::string code;
+  code.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text.compare(i, 2, "//") == 0) {
+      i = text.find('\n', i);
+      if (i == std::string::npos) break;
+      code += '\n';
+    } else if (text.compare(i, 2, "/*") == 0) {
+      i = text.find("*/", i + 2);
+      if (i == std::string::npos) break;
+      ++i;
+      code += ' ';
+    } else if (text[i] == '"') {
+      for (++i; i < text.size() && text[i] != '"' && text[i] != '\n'; ++i) i += text[i] == '\\';
+      code += "\"\"";
+    } else {
+      code += text[i];
+    }
+  }
+  return code;
+}
+
+fs::path normal(const fs::path& path) {
+  std::error_code error;
+  const fs::path absolute = fs::absolute(path, error);
+  return (error ? path : absolute).lexically_normal();
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+/// Files of a folder and of those in it, at most three deep, in the order of their names.
+std::vector<fs::path> files_below(const fs::path& folder) {
+  constexpr std::size_t kMost = 4000;
+  std::vector<fs::path> result;
+  std::error_code error;
+  for (fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, error), end;
+       !error && at != end && result.size() < kMost; at.increment(error)) {
+    const bool hidden = at->path().filename().string().starts_with('.');
+    std::error_code kind;
+    if (at->is_directory(kind)) {
+      if (hidden || at.depth() >= 3 || at->is_symlink(kind)) at.disable_recursion_pending();
+    } else if (!hidden) {
+      result.push_back(at->path());
+    }
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+/// Whether a project could begin here: it has what lies at the top of a repository.
+bool is_top(const fs::path& folder) {
+  std::error_code error;
+  for (const char* name :
+       {".git", "README.md", "README", "README.txt", "Readme.md", "readme.md", "LICENSE", "LICENSE.md"}) {
+    if (fs::exists(folder / name, error)) return true;
+  }
+  return false;
+}
+
+/// Whether a folder is as wide as a home, or wider.
+bool is_wide(const fs::path& folder) {
+  const char* const home = std::getenv("HOME");
+  return std::distance(folder.begin(), folder.end()) < 3 || folder.parent_path() == "/home" ||
+         (home != nullptr && folder == fs::path(home));
+}
+
+/// A project's folders around a file: its own, up to two above, and farther up to its top where that is found.
+std::vector<fs::path> folders_around(const fs::path& file) {
+  constexpr std::size_t kSurely = 3, kMost = 8;
+  std::vector<fs::path> result;
+  std::size_t used = 0;
+  for (fs::path folder = normal(file).parent_path(); result.size() < kMost && !is_wide(folder);
+       folder = folder.parent_path()) {
+    result.push_back(folder);
+    if (result.size() <= kSurely || is_top(folder)) used = result.size();
+    if (fs::exists(folder / ".git")) break;
+  }
+  result.resize(used);
+  if (result.empty()) result.push_back(normal(file).parent_path());
+  return result;
+}
+
+/// A header that is not where it is named, as a makefile's -I would find it.
+std::optional<fs::path> header_around(const fs::path& includer, const std::string& name) {
+  for (const fs::path& folder : folders_around(includer)) {
+    for (const fs::path& candidate : files_below(folder)) {
+      const std::string path = candidate.string();
+      if (path.ends_with("/" + name)) return candidate;
+    }
+  }
+  return std::nullopt;
+}
+
+class Preparation {
+ public:
+  Preparation(ProgramText& result, fs::path cache) : result_(result), cache_(std::move(cache)) {}
+
+  /// The file as it is to be compiled: itself, or a copy.
+  fs::path prepared(const fs::path& file) {
+    const fs::path key = normal(file);
+    if (const auto known = done_.find(key); known != done_.end()) return known->second;
+    done_.emplace(key, file);  // for headers that include each other
+    const auto text = read_file(file);
+    if (!text) return file;
+    std::vector<std::pair<Include, std::string>> changes, fixed;
+    for (const Include& include : includes_of(*text)) {
+      const std::string target = replacement(file, include);
+      if (!target.empty())
+        changes.emplace_back(include, target);
+      else if (include.quoted && is_file(key.parent_path() / include.name))
+        fixed.emplace_back(include, '"' + (key.parent_path() / include.name).lexically_normal().string() + '"');
+    }
+    if (changes.empty()) return file;
+    changes.insert(changes.end(), fixed.begin(), fixed.end());
+    std::sort(changes.begin(), changes.end(),
+              [](const auto& a, const auto& b) { return a.first.begin < b.first.begin; });
+    std::string copy = "#line 1 \"" + quotable(file) + "\"\n";
+    std::size_t at = 0;
+    for (const auto& [include, target] : changes) {
+      copy.append(*text, at, include.begin - at).append(target);
+      at = include.end;
+    }
+    copy.append(*text, at);
+    const fs::path kept = cache_ / "sources" / (sha256_hex(copy) + file.extension().string());
+    std::error_code error;
+    fs::create_directories(kept.parent_path(), error);
+    if (!is_file(kept) && !write_file(kept, copy))
+      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    return done_[key] = kept;
+  }
+
+  void note(const std::string& text) {
+    if (std::find(result_.notes.begin(), result_.notes.end(), text) == result_.notes.end())
+      result_.notes.push_back(text);
+  }
+
+ private:
+  static std::string quotable(const fs::path& file) {
+    std::string result;
+    for (const char c : file.string()) {
+      if (c == '"' || c == '\\') result += '\\';
+      result += c;
+    }
+    return result;
+  }
+
+  /// What an #include is to name instead; empty where it stays.
+  std::string replacement(const fs::path& file, const Include& include) {
+    const fs::path named(include.name);
+    const std::string base = named.filename().string();
+    const fs::path target = (normal(file).parent_path() / named).lexically_normal();
+    const bool there = include.quoted && is_file(target);
+    for (const Vendored& header : vendored_headers()) {
+      if (base != header.name) continue;
+      if (!there) return named.has_parent_path() && !include.name.starts_with("argos3/") ? "<" + base + ">" : "";
+      const std::string text = read_file(target).value_or("");
+      for (const char* word : header.words) {
+        if (text.find(word) == std::string::npos) continue;
+        note((file.parent_path() / named).lexically_normal().string() +
+             ": left aside; programs are compiled with Kilotwin's own " + base);
+        return "<" + base + ">";
+      }
+    }
+    if (there) {
+      result_.included.insert(target);
+      const fs::path copy = prepared((file.parent_path() / named).lexically_normal());
+      return normal(copy) == target ? "" : '"' + copy.string() + '"';
+    }
+    if (is_runtime_header(include.name)) return "";
+    const std::optional<fs::path> found = header_around(file, named.lexically_normal().string());
+    if (!found) return "";
+    note(found->string() + ": found for #include " +
+         (include.quoted ? '"' + include.name + '"' : '<' + include.name + '>'));
+    result_.included.insert(*found);
+    return '"' + fs::absolute(prepared(*found)).string() + '"';
+  }
+
+  /// Whether the search for headers finds it anyway: in the runtime, or among the compiler's own.
+  static bool is_runtime_header(const std::string& name) {
+    static const std::set<std::string> kCompilers{"stdbool.h", "stddef.h", "stdarg.h",
+                                                  "float.h",   "iso646.h", "stdalign.h"};
+    const auto files = runtime_files();
+    return kCompilers.contains(name) || std::any_of(files.begin(), files.end(), [&](const RuntimeFile& file) {
+             return file.name == "libc/" + name || file.name == "kilolib/" + name;
+           });
+  }
+
+  ProgramText& result_;
+  fs::path cache_;
+  std::map<fs::path, fs::path> done_;
+};
+
+}  // namespace
+
+bool is_cpp(const fs::path& source) {
+  const std::string extension = source.extension().string();
+  return extension == ".cpp" || extension == ".cc" || extension == ".cxx" || extension == ".C";
+}
+
+ProgramText program_text(const std::vector<fs::path>& sources, const fs::path& cache) {
+  ProgramText result;
+  Preparation preparation(result, cache);
+  for (const fs::path& source : sources) {
+    if (sources.size() > 1 && is_kilolib_source(source, read_file(source).value_or(""))) {
+      preparation.note(source.string() + ": left aside; programs are linked with Kilotwin's own kilolib");
+      continue;
+    }
+    result.sources.push_back(source);
+    result.files.push_back(preparation.prepared(source));
+  }
+  if (result.sources.empty())
+    throw UserError(sources.front().string() + ": a copy of kilolib alone; name the program's own files");
+  return result;
+}
+
+namespace {
+
+/// What a text defines of these names, and does not merely declare: functions with a body, variables at the beginning of a line.
+std::set<std::string> defined_names(const std::string& code, const std::set<std::string>& names) {
+  std::set<std::string> result;
+  for (const std::string& name : names) {
+    if (code.find(name) == std::string::npos) continue;
+    const std::regex definition("(^|\\n)[A-Za-z_][^;{}()#]*\\b" + name + "\\s*(\\([^;{}]*\\)\\s*\\{|=|\\[|;)");
+    const std::regex elsewhere("(^|\\n)\\s*(extern|static)\\b[^;{}()]*\\b" + name + "\\b");
+    if (std::regex_search(code, definition) && !std::regex_search(code, elsewhere)) result.insert(name);
+  }
+  return result;
+}
+
+/// Sources around these: first what bears the name of an included header, then whatever lies next to the sources, then farther
+/// off.
+std::vector<fs::path> sources_around(const ProgramText& text) {
+  std::set<std::string> stems;
+  for (const fs::path& header : text.included) stems.insert(header.stem().string());
+  std::set<fs::path> taken(text.included.begin(), text.included.end());
+  for (const fs::path& source : text.sources) taken.insert(normal(source));
+  std::vector<fs::path> result, others;
+  for (const fs::path& source : text.sources) {
+    for (const fs::path& folder : folders_around(source)) {
+      for (const fs::path& file : files_below(folder)) {
+        if ((file.extension() != ".c" && !is_cpp(file)) || !taken.insert(normal(file)).second) continue;
+        (stems.contains(file.stem().string()) ? result : others).push_back(file);
+      }
+    }
+  }
+  result.insert(result.end(), others.begin(), others.end());
+  return result;
+}
+
+}  // namespace
+
+std::vector<fs::path> sources_with(const std::set<std::string>& missing, const ProgramText& text,
+                                   const std::function<std::string(const fs::path&)>& preprocessed) {
+  static const std::regex kMain(R"(\bmain\s*\()");
+  constexpr std::size_t kMostOctets = 200'000;  // what regular expressions cope with
+  std::set<std::string> open;
+  for (const std::string& name : missing) {
+    // Of a C++ name the last part, where that is a word.
+    const std::string last = name.substr(name.rfind(':') == std::string::npos ? 0 : name.rfind(':') + 1);
+    if (std::all_of(last.begin(), last.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; }) &&
+        !last.empty())
+      open.insert(last);
+  }
+  std::vector<fs::path> result, without;
+  auto take = [&](const fs::path& candidate, const std::string& code) {
+    const std::set<std::string> found = defined_names(code, open);
+    for (const std::string& name : found) open.erase(name);
+    if (!found.empty()) result.push_back(fs::relative(candidate));
+    return !found.empty();
+  };
+  for (const fs::path& candidate : sources_around(text)) {
+    if (open.empty()) break;
+    const std::string original = read_file(candidate).value_or("");
+    if (original.size() > kMostOctets || is_kilolib_source(candidate, original)) continue;
+    const std::string code = code_of(original);
+    if (!std::regex_search(code, kMain) && !take(candidate, code)) without.push_back(candidate);
+  }
+  if (!result.empty()) return result;
+  // Names that macros put together are to be seen in preprocessed text alone.
+  constexpr std::size_t kMostFiles = 100;
+  if (without.size() > kMostFiles) without.resize(kMostFiles);
+  for (const fs::path& candidate : without) {
+    if (open.empty()) break;
+    const std::string code = code_of(preprocessed(candidate));
+    if (code.size() <= kMostOctets) take(candidate, code);
+  }
+  return result;
+}
+
+}  // namespace kilotwin::behaviours

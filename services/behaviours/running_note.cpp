@@ -1,0 +1,55 @@
+#include "services/behaviours/running_note.hpp"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <new>
+
+#include "core/os/files.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+using Running = BehavioursEngine::Running;
+static_assert(std::atomic<std::uint32_t>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free);
+
+std::filesystem::path note_of(const std::filesystem::path& run_directory, HostId host) {
+  return run_directory / ("running-" + std::to_string(host.value() + 1));
+}
+
+}  // namespace
+
+RunningNote::RunningNote(const std::filesystem::path& run_directory, HostId host)
+    : path_(note_of(run_directory, host)) {
+  const int file = open(path_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  void* mapped = MAP_FAILED;
+  if (file >= 0 && ftruncate(file, sizeof(Running)) == 0)
+    mapped = mmap(nullptr, sizeof(Running), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  if (file >= 0) close(file);
+  if (mapped == MAP_FAILED) throw RunError(path_.string() + ": cannot be written; is the disk full?");
+  place_ = new (mapped) Running;
+}
+
+RunningNote::~RunningNote() {
+  munmap(static_cast<void*>(place_), sizeof(Running));
+  unlink(path_.c_str());
+}
+
+std::optional<Culprit> take_note(const std::filesystem::path& run_directory, HostId host) {
+  const std::filesystem::path path = note_of(run_directory, host);
+  const auto octets = read_file(path);
+  unlink(path.c_str());
+  if (!octets || octets->size() != sizeof(Running)) return std::nullopt;
+  Culprit culprit;
+  std::int64_t tick = 0;
+  std::memcpy(&culprit.robot, octets->data() + offsetof(Running, robot), sizeof culprit.robot);
+  std::memcpy(&tick, octets->data() + offsetof(Running, tick), sizeof tick);
+  culprit.tick = Tick{tick};
+  if (culprit.robot == BehavioursEngine::kNobody) return std::nullopt;
+  return culprit;
+}
+
+}  // namespace kilotwin::behaviours

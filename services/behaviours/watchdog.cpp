@@ -1,0 +1,64 @@
+#include "services/behaviours/watchdog.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdlib>
+
+#include "core/base/say.hpp"
+#include "core/os/interrupt.hpp"
+
+namespace kilotwin::behaviours {
+namespace {
+
+/// How often it is looked.
+constexpr auto kPeriod = std::chrono::milliseconds(1000);
+/// A call that takes so many looks does not come back. Programs count what they execute and hand over within milliseconds,
+/// unless one has jumped into the middle of an instruction, say, and left the code that counts.
+constexpr int kNamed = 2, kLost = 30;
+
+}  // namespace
+
+Watchdog::Watchdog(std::vector<const BehavioursEngine*> engines) : engines_(std::move(engines)) {
+  thread_ = std::thread([this] { watch(); });
+}
+
+Watchdog::~Watchdog() {
+  {
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+  }
+  wake_.notify_one();
+  thread_.join();
+}
+
+void Watchdog::watch() {
+  struct Watched {
+    std::uint64_t entry = 0;
+    int looks = 0;  // that have found the same call
+  };
+  std::vector<Watched> watched(engines_.size());
+  std::unique_lock lock(mutex_);
+  while (!wake_.wait_for(lock, kPeriod, [this] { return done_; })) {
+    for (std::size_t i = 0; i < engines_.size(); ++i) {
+      const BehavioursEngine::Running& running = engines_[i]->running();
+      const std::uint64_t entry = running.entry.load(std::memory_order_acquire);
+      const std::uint32_t robot = running.robot.load(std::memory_order_relaxed);
+      auto& [before, looks] = watched[i];
+      looks = robot != BehavioursEngine::kNobody && entry == before ? looks + 1 : 0;
+      before = entry;
+      if (looks < kNamed) continue;
+      if (looks == kNamed) say(fmt::format("the program of robot {} has not returned for over 1 s", robot));
+      if (interrupted() != 0) {
+        say(fmt::format("kilotwin: interrupted while the program of robot {} did not return", robot));
+        std::_Exit(1);
+      }
+      if (looks == kLost) {
+        say(fmt::format("kilotwin: the program of robot {} does not return", robot));
+        std::abort();
+      }
+    }
+  }
+}
+
+}  // namespace kilotwin::behaviours

@@ -1,0 +1,26 @@
+/// What a firmware robot finds in its EEPROM when it is switched on.
+#pragma once
+
+#include <array>
+
+#include "services/comm/firmware/flash_image.hpp"
+#include "core/base/eeprom_layout.h"
+#include "core/model/radio_parameters.hpp"
+#include "core/model/robot_parameters.hpp"
+
+namespace kilotwin::firmware {
+
+/// As a calibrated robot has it: core/base/eeprom_layout.h. kilo_uid is the robot's id.
+[[nodiscard]] inline std::array<std::uint8_t, kEepromOctets> make_eeprom(std::uint32_t robot,
+                                                                         const Calibration& calibration,
+                                                                         const RangingTable& ranging) {
+  static_assert(kEepromOctets == KILOTWIN_EEPROM_OCTETS);
+  std::array<std::uint8_t, kEepromOctets> octets{};
+  kilotwin_fill_eeprom(octets.data(),
+                       {static_cast<std::uint16_t>(robot), calibration.turn_left, calibration.turn_right,
+                        calibration.straight_left, calibration.straight_right});
+  kilotwin_fill_ranging(octets.data(), ranging.high.data(), ranging.low.data());
+  return octets;
+}
+
+}  // namespace kilotwin::firmware

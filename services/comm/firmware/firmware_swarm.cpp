@@ -1,0 +1,253 @@
+#include "services/comm/firmware/firmware_swarm.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "core/os/worker_pool.hpp"
+#include "services/comm/firmware/eeprom.hpp"
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+#include "services/comm/tick_timers.hpp"
+
+namespace kilotwin::firmware {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Own cycles of a robot between two of its regular timer interrupts.
+constexpr comm::Cycles kPeriod = comm::kTimerCounts * comm::kTimerCount;
+
+FlashImage read_program(const proto::Program& program, const fs::path& run_directory) {
+  const fs::path path = run_directory / "programs" / program_file(program);
+  std::ifstream stream(path, std::ios::binary);
+  const std::string octets{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) {
+    throw UserError(path.string() + ": cannot be read; the run directory must hold the programs of its manifest");
+  }
+  return parse_firmware(octets, path.string());
+}
+
+}  // namespace
+
+FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory, std::uint32_t threads,
+                             bool keeps_logs)
+    : logs_(keeps_logs ? run_directory / "logs" : fs::path{}),
+      appends_logs_(plan.manifest.resumed()),
+      cycles_per_tick_(plan.tick_length.cycles()),
+      senses_(plan, {0, plan.robots()}),
+      workers_(std::make_unique<WorkerPool>(threads)) {
+  std::map<std::uint32_t, FlashImage> images;
+  const comm::TickTimers timers(plan);
+  const Random random(plan.seed());
+  const RobotParameters parameters(plan);
+  const RadioParameters radios(plan);
+  for (std::uint32_t id = 0; id < plan.robots(); ++id) {
+    if (!plan.firmware(id)) continue;
+    const std::uint32_t program = plan.program_of(id);
+    if (images.count(program) == 0)
+      images.emplace(program, read_program(plan.manifest.program(static_cast<int>(program)), run_directory));
+    ids_.push_back(id);
+    Robot& robot = robots_.emplace_back();
+    robot.period = timers.period(id);
+    robot.switched_on = timers.next(id) - robot.period;
+    robot.mcu = std::make_unique<Mcu>(images.at(program),
+                                      make_eeprom(id, parameters.calibration(id), radios.table(id)), random, id);
+  }
+  // Up to tick 0, before which nobody sends.
+  std::vector<std::vector<comm::Cycles>> flashes(robots_.size());
+  workers_->share(static_cast<std::uint32_t>(robots_.size()),
+               [&](std::uint32_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
+  commit();
+}
+
+FirmwareSwarm::~FirmwareSwarm() = default;
+
+/// The first own cycle at or after an instant.
+OwnCycles FirmwareSwarm::own(const Robot& robot, comm::Cycles t) const {
+  return static_cast<OwnCycles>(((t - robot.switched_on) * kPeriod + robot.period - 1) / robot.period);
+}
+
+comm::Cycles FirmwareSwarm::nominal(const Robot& robot, OwnCycles cycle) const {
+  return robot.switched_on + static_cast<comm::Cycles>(cycle) * robot.period / kPeriod;
+}
+
+void FirmwareSwarm::run(comm::Cycles until, std::span<const std::uint32_t> robots,
+                        const std::vector<std::vector<comm::Pulse>>& light,
+                        std::vector<std::vector<comm::Cycles>>& flashes) {
+  until_ = until;
+  workers_->share(static_cast<std::uint32_t>(robots.size()), [&](std::uint32_t n) {
+    const std::uint32_t i = robots[n];
+    run_robot(robots_[i], until, light[i], flashes[i]);
+  });
+}
+
+void FirmwareSwarm::run_robot(Robot& robot, comm::Cycles until, const std::vector<comm::Pulse>& light,
+                              std::vector<comm::Cycles>& flashes) {
+  Mcu& mcu = *robot.mcu;
+  if (robot.has_run) {
+    mcu.rewind();
+    mcu.printed().clear();
+  } else {
+    mcu.mark();
+  }
+  robot.has_run = true;
+  robot.light.clear();
+  for (const comm::Pulse& pulse : light)
+    robot.light.push_back({own(robot, pulse.time), pulse.gains.high, pulse.gains.low});
+  robot.fulls.clear();
+  flashes.clear();
+  auto next = robot.light.cbegin();
+  std::size_t pulse = 0;
+  for (comm::Cycles begin = begin_;;) {
+    const comm::Cycles end = std::min(begin + kSpan, until);
+    const auto first = next;
+    for (; pulse < light.size() && light[pulse].time < end; ++pulse) ++next;
+    mcu.run(own(robot, end), {first, next});
+    // An instruction may end a little later than the span.
+    for (std::size_t n = flashes.size(); n < mcu.flashes().size(); ++n)
+      flashes.push_back(std::min(nominal(robot, mcu.flashes()[n]), end - 1));
+    const firmware::Outputs out = mcu.outputs();
+    robot.fulls.push_back(out.motor_left == 255 && out.motor_right == 255 ? 1 : 0);
+    begin = end;
+    if (begin >= until) break;
+  }
+  mcu.clear_flashes();
+}
+
+void FirmwareSwarm::commit() {
+  begin_ = until_;
+  for (std::uint32_t i = 0; i < robots_.size(); ++i) {
+    Robot& robot = robots_[i];
+    robot.has_run = false;
+    for (const std::uint8_t full : robot.fulls) {
+      robot.full = full != 0;
+      robot.full_throughout = robot.full_throughout && robot.full;
+      robot.kicked = robot.kicked || robot.full;
+    }
+    robot.fulls.clear();
+    if (!robot.mcu->printed().empty()) write_log(i);
+  }
+}
+
+void FirmwareSwarm::begin_tick(Tick tick, std::span<const BodyFrame* const> bodies) {
+  begin_ = tick.count() * cycles_per_tick_;
+  senses_.at(tick, bodies);
+  for (std::uint32_t i = 0; i < robots_.size(); ++i) {
+    Robot& robot = robots_[i];
+    robot.full_throughout = robot.full;
+    robot.kicked = robot.kick_goes_on;
+    robot.has_sent = false;
+    robot.mcu->set_readings(senses_.readings(ids_[i]));
+  }
+}
+
+void FirmwareSwarm::end_tick() {
+  for (Robot& robot : robots_) {
+    robot.kick_goes_on = robot.full && !robot.full_throughout;
+    robot.spun_up = robot.kicked && !robot.kick_goes_on && !robot.full_throughout;
+    if (robot.kick_goes_on) continue;
+    const firmware::Outputs out = robot.mcu->outputs();
+    robot.shown_left = out.motor_left;
+    robot.shown_right = out.motor_right;
+  }
+  if (!senses_.has_batteries()) return;
+  for (std::uint32_t i = 0; i < robots_.size(); ++i) use_battery(i);
+}
+
+void FirmwareSwarm::use_battery(std::uint32_t i) {
+  Robot& robot = robots_[i];
+  const std::uint32_t id = ids_[i];
+  if (robot.flat) {
+    senses_.rest(id);
+    if (!senses_.can_restart(id)) return;
+    robot.flat = false;
+    robot.mcu->power_on();
+    return;
+  }
+  const firmware::Outputs out = robot.mcu->outputs();
+  senses_.spend(id, {robot.shown_left, robot.shown_right, out.led, !robot.mcu->listening(), robot.has_sent});
+  if (!senses_.is_flat(id)) return;
+  robot.mcu->power_off();
+  robot.flat = true;
+  robot.full = robot.kick_goes_on = robot.spun_up = false;
+  robot.shown_left = robot.shown_right = 0;
+}
+
+void FirmwareSwarm::write_log(std::uint32_t i) {
+  Robot& robot = robots_[i];
+  if (!logs_.empty()) {
+    std::error_code ignored;
+    fs::create_directories(logs_, ignored);
+    const auto mode = appends_logs_ || robot.has_printed ? std::ios::app : std::ios::trunc;
+    std::ofstream(logs_ / fmt::format("robot-{:05}.txt", ids_[i]), std::ios::out | mode) << robot.mcu->printed();
+  }
+  robot.has_printed = true;
+  robot.mcu->printed().clear();
+}
+
+comm::FirmwareRobots::Outputs FirmwareSwarm::outputs(std::uint32_t i) const {
+  const Mcu& mcu = *robots_[i].mcu;
+  const firmware::Outputs shown = mcu.outputs();
+  Outputs out;
+  out.motor_left = robots_[i].shown_left;
+  out.motor_right = robots_[i].shown_right;
+  out.led = shown.led;
+  out.spun_up = robots_[i].spun_up;
+  out.listening = mcu.listening();
+  out.flat = robots_[i].flat;
+  if (mcu.halt() == Halt::kIllegalInstruction || mcu.halt() == Halt::kBadAddress) {
+    out.fault = static_cast<std::uint8_t>(mcu.halt());
+    out.fault_at = mcu.program_counter();
+  }
+  return out;
+}
+
+std::uint64_t FirmwareSwarm::word(std::uint32_t i) const {
+  const Mcu& mcu = *robots_[i].mcu;
+  const std::uint64_t word = hash_mix(mcu.now(), mcu.program_counter());
+  return senses_.has_batteries() ? hash_mix(word, static_cast<std::uint64_t>(senses_.charge(ids_[i]))) : word;
+}
+
+std::string FirmwareSwarm::save(std::uint32_t i) const {
+  const Robot& robot = robots_[i];
+  const int flags =
+      (robot.full ? 1 : 0) | (robot.kick_goes_on ? 2 : 0) | (robot.spun_up ? 4 : 0) | (robot.flat ? 8 : 0);
+  std::string board{static_cast<char>(flags), static_cast<char>(robot.shown_left),
+                    static_cast<char>(robot.shown_right)};
+  std::int64_t battery[2] = {0, 0};
+  if (senses_.has_batteries()) battery[0] = senses_.charge(ids_[i]), battery[1] = senses_.drain(ids_[i]);
+  for (const std::int64_t value : battery) {
+    for (int shift = 0; shift < 64; shift += 8) board.push_back(static_cast<char>(value >> shift));
+  }
+  return board + robot.mcu->save();
+}
+
+void FirmwareSwarm::load(std::uint32_t i, const std::string& octets) {
+  constexpr std::size_t kBoard = 3 + 2 * sizeof(std::int64_t);
+  if (octets.size() < kBoard)
+    throw RunError("a firmware robot is missing in the checkpoint; resume from another one");
+  Robot& robot = robots_[i];
+  robot.full = (octets[0] & 1) != 0;
+  robot.kick_goes_on = (octets[0] & 2) != 0;
+  robot.spun_up = (octets[0] & 4) != 0;
+  robot.shown_left = static_cast<std::uint8_t>(octets[1]);
+  robot.shown_right = static_cast<std::uint8_t>(octets[2]);
+  robot.flat = (octets[0] & 8) != 0;
+  std::uint64_t battery[2] = {0, 0};
+  for (std::size_t n = 3; n < kBoard; ++n)
+    battery[(n - 3) / 8] |= std::uint64_t{static_cast<std::uint8_t>(octets[n])} << (n - 3) % 8 * 8;
+  if (senses_.has_batteries())
+    senses_.restore(ids_[i], static_cast<std::int64_t>(battery[0]), static_cast<std::int64_t>(battery[1]));
+  robot.mcu->load(octets.substr(kBoard));
+}
+
+std::unique_ptr<comm::FirmwareRobots> make_firmware_robots(const RunPlan& plan, const fs::path& run_directory,
+                                                           std::uint32_t threads, bool keeps_logs) {
+  if (!plan.has_firmware()) return nullptr;
+  return std::make_unique<FirmwareSwarm>(plan, run_directory, threads, keeps_logs);
+}
+
+}  // namespace kilotwin::firmware

@@ -1,0 +1,121 @@
+#include <gtest/gtest.h>
+
+#include "tests/services/behaviours/swarm.hpp"
+
+namespace kilotwin::behaviours::test {
+namespace {
+
+/// Robot 9 of 18 does `deed` when its clock shows 5; all count in their left motor.
+void one_fails(const std::string& deed, const std::string& told, const std::string& before = "",
+               const std::string& after = "") {
+  Swarm swarm({program(before +
+                       "\nstatic uint8_t n;\nstatic void loop(void) { set_color(5); set_motors(++n, 1);\n"
+                       "  if (kilo_uid == 9 && kilo_ticks == 5) { " +
+                       deed + " } }\n" + after)},
+              18);
+  swarm.start();
+  swarm.steps(10);
+  const ActuationFrame frame = swarm.frame();
+  for (std::uint32_t robot = 0; robot < 18; ++robot) {
+    const bool failed = robot == 9;
+    EXPECT_EQ(LifeCycle{frame.life_cycle[robot]}, failed ? LifeCycle::kFailed : LifeCycle::kRunning) << robot;
+    EXPECT_EQ(frame.motor_left[robot], failed ? 0 : 11) << robot;
+    EXPECT_EQ(frame.led[robot], 5) << robot;
+  }
+  ASSERT_EQ(swarm.hosts[0]->robots_failed(), 1u);
+  EXPECT_EQ(swarm.hosts[0]->failures()[0].robot, 9u);
+  EXPECT_NE(swarm.hosts[0]->failures()[0].text.find(told), std::string::npos) << swarm.hosts[0]->failures()[0].text;
+}
+
+TEST(Faults, NullWrite) {
+  one_fails("volatile int* p = (int*)(uintptr_t)(n - n); *p = 1;", "access to address 0x0 in loop()");
+}
+
+TEST(Faults, WildJump) { one_fails("((void (*)(void))(uintptr_t)(n + 16))();", "access to address 0x1"); }
+
+TEST(Faults, WriteToCode) { one_fails("*(volatile uint8_t*)&loop = 0;", "access to address 0x"); }
+
+TEST(Faults, EndlessLoop) {
+  one_fails("for (;;) {}", "endless loop in loop() at program0.c:4");
+  one_fails("for (volatile int i = 0; i < 10;) {}", "endless loop in loop() at program0.c:4");
+}
+
+TEST(Faults, EndlessLoopThatIsBusy) {
+  Swarm swarm({program("uint32_t counter; static void loop(void) { for (;;) ++counter; }")}, 2);
+  swarm.start();
+  swarm.steps(20);
+  EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kRunning);
+  swarm.steps(20);
+  EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kFailed);
+  EXPECT_NE(swarm.hosts[0]->failures().at(0).text.find("endless loop in loop()"), std::string::npos);
+}
+
+TEST(Faults, ACallbackThatDoesNotReturn) {
+  for (const std::string body : {"for (;;) {}", "static uint32_t n; while (kilo_uid < 5) ++n;"}) {
+    Swarm swarm({program("static void rx(message_t* m, distance_measurement_t* d) { " + body + " }")}, 3);
+    swarm.start();
+    Air air;
+    air.receptions = {{1, message(0)}};
+    swarm.step(air);
+    EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kFailed);
+    EXPECT_EQ(swarm.life_cycle(2), LifeCycle::kRunning);
+    EXPECT_NE(swarm.hosts[0]->failures().at(0).text.find("does not return from kilo_message_rx"),
+              std::string::npos);
+  }
+}
+
+TEST(Faults, StackOverflow) {
+  one_fails(
+      "n = deep(n);", "stack overflow",
+      "static int deep(int n) { volatile char room[300]; room[n & 127] = n; return deep(n + 1) + room[n & 127]; }");
+}
+
+TEST(Faults, AStackThatIsAlmostFull) {
+  // Robots wait with so many octets left, from none to hundreds; whoever has room for that goes on.
+  Swarm swarm({program("static char* top;\n"
+                       "static int deep(void) { volatile char room[8]; room[0] = 0;\n"
+                       "  if (top - (char*)room > 65536 - 256 - 16 * kilo_uid) { delay(100); return room[0]; }\n"
+                       "  return deep() + room[0]; }\n"
+                       "static void loop(void) { char here; top = &here; deep(); set_color(RGB(0, 3, 0)); }")},
+              40);
+  swarm.start();
+  swarm.steps(20);
+  EXPECT_EQ(swarm.led(39), 3 << 2);
+  std::uint32_t lowest = 39;
+  while (lowest > 0 && swarm.life_cycle(lowest - 1) == LifeCycle::kRunning) --lowest;
+  EXPECT_LT(lowest, 20u);
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), lowest) << "the deepest overflow, all others do not";
+}
+
+TEST(Faults, LargeFrame) { one_fails("volatile char room[1000000]; room[n] = 1;", "stack overflow"); }
+
+TEST(Faults, FailedAssertion) { one_fails("assert(n == 200);", "illegal instruction", "#include <assert.h>"); }
+
+TEST(Faults, InACallback) {
+  Swarm swarm({program("static void rx(message_t* m, distance_measurement_t* d) { *(volatile char*)8 = 1; }")}, 4);
+  swarm.start();
+  Air air;
+  air.receptions = {{1, message(0)}};
+  swarm.step(air);
+  EXPECT_EQ(swarm.life_cycle(1), LifeCycle::kFailed);
+  EXPECT_EQ(swarm.life_cycle(2), LifeCycle::kRunning);
+  swarm.step(air);  // a failed robot hears nothing
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), 1u);
+}
+
+TEST(Faults, AnEndedProgramIsSilentNotFailed) {
+  Swarm swarm({"#include <kilolib.h>\nint main(void) { kilo_init(); set_color(3); return 0; }\n"}, 1);
+  swarm.start();
+  EXPECT_EQ(swarm.led(0), 3);
+  EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kIdle);
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), 0u);
+}
+
+TEST(FaultsDeathTest, OtherFaultsOfTheProcessStayFatal) {
+  Swarm swarm({program("")}, 1);
+  swarm.start();
+  EXPECT_DEATH(std::raise(SIGSEGV); volatile int* nowhere = nullptr; *nowhere = 1;, "");
+}
+
+}  // namespace
+}  // namespace kilotwin::behaviours::test

@@ -1,0 +1,275 @@
+// One processor and its board.
+#include "services/comm/firmware/mcu.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "services/comm/firmware/eeprom.hpp"
+#include "core/base/error.hpp"
+#include "services/comm/packet_bits.hpp"
+#include "tests/services/comm/firmware/programs.hpp"
+
+namespace kilotwin::firmware {
+namespace {
+
+constexpr OwnCycles kSecond = 8'000'000;
+constexpr Calibration kDuties{60, 61, 70, 71};
+const RangingTable kNominal{KILOTWIN_IR_HIGH, KILOTWIN_IR_LOW};
+
+Mcu make(const FlashImage& image, std::uint32_t robot = 5) {
+  return Mcu(image, make_eeprom(robot, kDuties, kNominal), Random(1), robot);
+}
+
+/// The light of a message that starts at a cycle.
+std::vector<Light> light(std::uint8_t type, OwnCycles at, std::int16_t high = 627, std::int16_t low = 464,
+                         std::uint8_t first = 0) {
+  IrMessage message{};
+  message[0] = first;
+  message[9] = type;
+  const comm::PacketBits bits = comm::packet_bits(message);
+  std::vector<Light> pulses;
+  for (std::size_t b = 0; b < bits.size(); ++b) {
+    if (bits[b]) pulses.push_back({at + b * comm::kBit, high, low});
+  }
+  return pulses;
+}
+
+void tell(Mcu& mcu, std::uint8_t type) { mcu.run(mcu.now() + kSecond / 20, light(type, mcu.now() + 1000)); }
+
+enum : std::uint8_t { kReset = 0x83, kSleep = 0x84, kWakeup = 0x85, kRun = 0x88 };
+
+const FlashImage& talker() {
+  static const FlashImage image = firmware(whole_program(
+      "static message_t hello; static uint8_t heard, distance;\n"
+      "static message_t* send(void) { return &hello; }\n"
+      "static void receive(message_t* m, distance_measurement_t* d) { ++heard; distance = estimate_distance(d); "
+      "set_color(m->data[0] & 63); }\n"
+      "static void setup(void) { hello.data[3] = 0xa5; hello.crc = message_crc(&hello); }\n"
+      "static void loop(void) { set_motors(heard, distance); }\n",
+      "kilo_message_tx = send; kilo_message_rx = receive;"));
+  return image;
+}
+
+TEST(Mcu, RunsWhenToldAndDrivesMotorsAndLight) {
+  Mcu mcu =
+      make(firmware(whole_program("static void setup(void) { set_color(RGB(1, 2, 3)); }\n"
+                                  "static void loop(void) { set_motors(kilo_turn_left, kilo_straight_right); }")));
+  mcu.run(kSecond / 2, {});
+  EXPECT_EQ(mcu.outputs().motor_left, 0);
+  tell(mcu, kRun);
+  EXPECT_EQ(mcu.outputs().motor_left, kDuties.turn_left);
+  EXPECT_EQ(mcu.outputs().motor_right, kDuties.straight_right);
+  EXPECT_EQ(mcu.outputs().led, 1 | 2 << 2 | 3 << 4);
+  tell(mcu, kWakeup);
+  EXPECT_EQ(mcu.outputs().motor_left, 0) << "paused";
+}
+
+TEST(Mcu, SendsWholePacketsEverySixteenTicks) {
+  Mcu mcu = make(talker());
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kRun);
+  mcu.clear_flashes();
+  mcu.run(mcu.now() + 20 * kSecond, {});
+  comm::PulseDecoder decoder(comm::kTimerCounts * comm::kTimerCount);
+  std::vector<comm::Cycles> starts, ends;
+  for (const OwnCycles flash : mcu.flashes()) {
+    const auto time = static_cast<comm::Cycles>(flash);
+    EXPECT_EQ(decoder.pass(time, true), comm::PulseDecoder::Event::kNone);
+    const auto event = decoder.feed(time);
+    if (event == comm::PulseDecoder::Event::kStarted) starts.push_back(time);
+    if (event != comm::PulseDecoder::Event::kReceived) continue;
+    ends.push_back(time);
+    EXPECT_EQ(decoder.message()[3], 0xa5);
+  }
+  ASSERT_EQ(starts.size(), 38u);
+  ASSERT_EQ(ends.size(), 38u);
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    EXPECT_NEAR(static_cast<double>(ends[i] - starts[i]), static_cast<double>(comm::kPacket - comm::kBit), 200);
+    if (i > 0) {
+      EXPECT_NEAR(static_cast<double>(starts[i] - starts[i - 1]), 16.0 * 262144, 500);
+    }
+  }
+}
+
+TEST(Mcu, MeasuresTheDistanceOfWhoItHears) {
+  Mcu mcu = make(talker());
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kRun);
+  // Entry 4 of the ranging table: 20 mm beyond contact.
+  mcu.run(mcu.now() + kSecond / 20, light(0, mcu.now() + 1000, 627, 464, 9));
+  EXPECT_EQ(mcu.outputs().motor_left, 1);
+  EXPECT_NEAR(mcu.outputs().motor_right, 33 + 20, 2);
+  EXPECT_EQ(mcu.outputs().led, 9);
+}
+
+TEST(Mcu, HearsASenderWhoseClockIsTwoPercentOff) {
+  for (const double rate : {0.98, 1.02}) {
+    Mcu mcu = make(talker());
+    mcu.run(kSecond / 2, {});
+    std::vector<Light> pulses = light(0, mcu.now() + 1000);
+    const OwnCycles start = pulses[0].at;
+    for (Light& pulse : pulses)
+      pulse.at = start + static_cast<OwnCycles>(static_cast<double>(pulse.at - start) * rate);
+    mcu.run(mcu.now() + kSecond / 20, pulses);
+    tell(mcu, kRun);
+    EXPECT_EQ(mcu.outputs().motor_left, 1) << rate;
+  }
+}
+
+TEST(Mcu, GivesUpWhereItNoticesAnotherPacket) {
+  Mcu mcu = make(talker());
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kRun);
+  mcu.mark();
+  mcu.clear_flashes();
+  mcu.run(mcu.now() + kSecond, {});
+  const OwnCycles start = mcu.flashes().front();
+  EXPECT_GT(mcu.flashes().size(), 20u);
+  for (const auto& [after, gives_up] :
+       {std::pair<OwnCycles, bool>{300, false}, {700, true}, {2300, true}, {3000, false}}) {
+    mcu.rewind();
+    mcu.clear_flashes();
+    mcu.run(start + 30000, std::vector<Light>{{start + after, 500, 400}});
+    EXPECT_EQ(mcu.flashes().front(), start);
+    EXPECT_EQ(mcu.flashes().size() == 1, gives_up) << after;
+  }
+}
+
+TEST(Mcu, IsTheSameHoweverTimeIsCut) {
+  const auto run = [](std::uint32_t seed) {
+    Mcu mcu = make(talker());
+    std::mt19937 random(seed);
+    std::vector<Light> all;
+    for (OwnCycles at : {400000u, 900000u, 1300000u, 1500000u}) {
+      for (const Light& pulse : light(at == 400000u ? kRun : 0, at)) all.push_back(pulse);
+    }
+    std::size_t next = 0;
+    while (mcu.now() < 3 * kSecond) {
+      const OwnCycles until =
+          std::min<OwnCycles>(3 * kSecond, mcu.now() + 1 + random() % (seed == 0 ? 10 * kSecond : 5000));
+      std::size_t last = next;
+      while (last < all.size() && all[last].at < until) ++last;
+      mcu.run(until, std::span(all).subspan(next, last - next));
+      next = last;
+    }
+    return std::pair(mcu.save(), mcu.flashes());
+  };
+  const auto whole = run(0);
+  EXPECT_GT(whole.second.size(), 50u);
+  EXPECT_EQ(run(1), whole);
+  EXPECT_EQ(run(2), whole);
+}
+
+TEST(Mcu, GoesBackToItsMarkAndGoesOnFromWhatWasSaved) {
+  Mcu mcu = make(talker());
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kRun);
+  mcu.mark();
+  const std::string before = mcu.save();
+  mcu.run(mcu.now() + 2 * kSecond, {});
+  const std::string after = mcu.save();
+  EXPECT_NE(before, after);
+  mcu.rewind();
+  EXPECT_EQ(mcu.save(), before);
+  Mcu other = make(talker());
+  other.run(kSecond / 3, {});
+  other.load(before);
+  EXPECT_EQ(other.save(), before);
+  EXPECT_EQ(other.now(), mcu.now());
+  mcu.run(mcu.now() + 2 * kSecond, {});
+  other.run(other.now() + 2 * kSecond, {});
+  EXPECT_EQ(mcu.save(), after);
+  EXPECT_EQ(other.save(), after);
+  EXPECT_LT(after.size(), 20000u);
+  EXPECT_THROW(other.load(before.substr(0, before.size() / 2)), RunError);
+}
+
+TEST(Mcu, StopsAtAFaultAndSaysWhere) {
+  Mcu mcu =
+      make(firmware(whole_program("static void setup(void) { __asm__ volatile(\".word 0xff0f\\n.word "
+                                  "0x9409\\n.word 0x0001\\n.word 0x95a7\"); }\n"
+                                  "static void loop(void) { __asm__ volatile(\".word 0x940b\"); }")));
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kRun);
+  // What is no instruction, or a jump to nowhere, must not take anybody else along.
+  mcu.run(mcu.now() + kSecond, {});
+  EXPECT_GE(mcu.now(), kSecond);
+  Mcu wild = make(firmware(whole_program(
+      "static void setup(void) {} static void loop(void) { *(volatile uint8_t*)0xabcd = 1; set_motors(9, 9); }")));
+  wild.run(kSecond / 2, {});
+  tell(wild, kRun);
+  EXPECT_EQ(wild.halt(), Halt::kBadAddress);
+  EXPECT_EQ(wild.outputs().motor_left, 0);
+  EXPECT_NE(wild.program_counter(), 0u);
+  EXPECT_FALSE(wild.listening());
+}
+
+TEST(Mcu, SleepsWithItsClocksOffAndWakesAfterEightSeconds) {
+  Mcu mcu = make(talker());
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kSleep);
+  EXPECT_FALSE(mcu.listening());
+  bool white = false;
+  for (int i = 0; i < 200; ++i) {
+    mcu.run(mcu.now() + kSecond / 20, light(kWakeup, mcu.now() + 100));
+    white = white || mcu.outputs().led == 63;
+  }
+  EXPECT_TRUE(mcu.listening()) << "a copy fell into the moment in which it listens";
+  tell(mcu, kRun);
+  mcu.clear_flashes();
+  mcu.run(mcu.now() + kSecond, {});
+  EXPECT_FALSE(mcu.flashes().empty());
+}
+
+TEST(Mcu, TossesBitsWithTheNoiseOfItsConverter) {
+  Mcu mcu =
+      make(firmware(whole_program("static void setup(void) {}\n"
+                                  "static void loop(void) { set_motors(rand_hard(), 0); delay(1); }")));
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kRun);
+  // Ones among 8 x 1000 bits: 4000 +- 45; 6 of those.
+  int ones = 0;
+  std::vector<int> seen(256, 0);
+  for (int i = 0; i < 1000; ++i) {
+    mcu.run(mcu.now() + kSecond / 100, {});
+    ones += __builtin_popcount(mcu.outputs().motor_left);
+    seen[mcu.outputs().motor_left] = 1;
+  }
+  EXPECT_NEAR(ones, 4000, 270);
+  EXPECT_GT(std::count(seen.begin(), seen.end(), 1), 200);
+}
+
+TEST(Mcu, PrintsOnItsSerialPort) {
+  Mcu mcu = make(firmware("#define DEBUG\n#include <debug.h>\n" +
+                          whole_program("static void setup(void) { printf(\"robot %u\\n\", kilo_uid); }\n"
+                                        "static void loop(void) {}",
+                                        "debug_init();")));
+  mcu.run(kSecond / 2, {});
+  tell(mcu, kRun);
+  EXPECT_EQ(mcu.printed(), "robot 5\n");
+}
+
+TEST(Mcu, StoresItsCalibration) {
+  Mcu mcu = make(talker());
+  mcu.run(kSecond / 2, {});
+  IrMessage message{};
+  const auto send = [&](std::initializer_list<std::uint8_t> data) {
+    message = {};
+    std::copy(data.begin(), data.end(), message.begin());
+    message[9] = 0x8a;
+    const comm::PacketBits bits = comm::packet_bits(message);
+    std::vector<Light> pulses;
+    for (std::size_t b = 0; b < bits.size(); ++b) {
+      if (bits[b]) pulses.push_back({mcu.now() + 1000 + b * comm::kBit, 500, 400});
+    }
+    mcu.run(mcu.now() + kSecond / 5, pulses);
+  };
+  send({2, 0, 0, 99});  // turn left at 99
+  EXPECT_EQ(mcu.outputs().motor_left, 99);
+  send({0});  // save
+  EXPECT_EQ(mcu.eeprom()[0x05], 99);
+}
+
+}  // namespace
+}  // namespace kilotwin::firmware

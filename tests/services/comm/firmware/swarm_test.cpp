@@ -1,0 +1,184 @@
+// Firmware robots among others: they act as robots with native programs do, and the same on any number of threads.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "tests/services/comm/firmware/programs.hpp"
+#include "tests/services/comm/firmware/timeline.hpp"
+
+namespace kilotwin::firmware {
+namespace {
+
+namespace fs = std::filesystem;
+
+class FirmwareRun : public testing::Test {
+ protected:
+  FirmwareRun() : folder_(fs::temp_directory_path() / ("kilotwin-firmware-run-" + std::to_string(getpid()))) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~FirmwareRun() override { fs::remove_all(folder_); }
+
+  std::string program(const std::string& name, const std::string& source) const {
+    std::ofstream(folder_ / name) << source;
+    return "behaviour: \"" + (folder_ / name).string() + "\" ";
+  }
+  [[nodiscard]] Timeline run(const std::string& experiment, std::uint32_t threads = 1,
+                             const std::vector<std::string>& set = {}) {
+    return run_timeline(experiment, folder_ / std::to_string(runs_++), threads, set);
+  }
+
+  const fs::path folder_;
+  int runs_ = 0;
+};
+
+/// Shows in its motors what it has sent and heard, and in its LED who spoke last.
+const std::string kTalker = whole_program(
+    "static message_t hello; static uint8_t sent, heard;\n"
+    "static message_t* send(void) { return &hello; }\n"
+    "static void note(void) { ++sent; }\n"
+    "static void receive(message_t* m, distance_measurement_t* d) { (void)d; ++heard; set_color(m->data[0] + 1); "
+    "}\n"
+    "static void setup(void) { hello.data[0] = kilo_uid; hello.crc = message_crc(&hello); }\n"
+    "static void loop(void) { set_motors(sent, heard); }\n",
+    "kilo_message_tx = send; kilo_message_rx = receive; kilo_message_tx_success = note;");
+
+std::string pair_of(const std::string& behaviour, const std::string& kind) {
+  return "duration_s: 40 seed: 5 radio { oscillator_sd: 0 range_mm: 300 } recording { messages: true }\n"
+         "robots { count: 2 " +
+         behaviour + kind + " layout { grid { pitch_mm: 100 heading: HEADING_FIXED } } }\n";
+}
+
+TEST_F(FirmwareRun, SendsAndHearsWhenANativeRobotDoes) {
+  const std::string talker = program("talker.c", kTalker);
+  const Timeline native = run(pair_of(talker, "")), firmware = run(pair_of(talker, "avr: true"));
+  const std::int64_t end = native.totals.last.count();
+  const Agreement motors = agreement(native.motors, firmware.motors, end),
+                  led = agreement(native.led, firmware.led, end);
+  EXPECT_GT(motors.first, 100u);
+  EXPECT_TRUE(motors.whole()) << motors.first << ' ' << motors.second << ' ' << motors.same;
+  EXPECT_GE(led.first, 2u);
+  EXPECT_TRUE(led.whole()) << led.first << ' ' << led.second << ' ' << led.same;
+  EXPECT_EQ(native.totals.sent, firmware.totals.sent);
+  EXPECT_EQ(native.totals.received, firmware.totals.received);
+}
+
+TEST_F(FirmwareRun, MovesWhenANativeRobotDoes) {
+  const std::string walk = "behaviour: \"" KILOTWIN_SOURCE_DIR "/behaviours/walk.c\" ";
+  const Timeline native = run(pair_of(walk, "")), firmware = run(pair_of(walk, "avr: true"));
+  const std::int64_t end = native.totals.last.count();
+  const Agreement motors = agreement(native.motors, firmware.motors, end),
+                  led = agreement(native.led, firmware.led, end);
+  EXPECT_GE(motors.first, 12u);
+  EXPECT_TRUE(motors.whole()) << motors.first << ' ' << motors.second << ' ' << motors.same;
+  EXPECT_TRUE(led.whole()) << led.first << ' ' << led.second << ' ' << led.same;
+}
+
+TEST_F(FirmwareRun, IsTheSameOnAnyNumberOfThreadsAndHosts) {
+  const std::string talker = program("talker.c", kTalker);
+  const std::string experiment =
+      "duration_s: 6 radio { range_mm: 300 loss: 0.05 } recording { messages: true }\n"
+      "robots { count: 3 " +
+      talker +
+      " layout { grid {} } }\n"
+      "robots { count: 4 avr: true " +
+      talker + " layout { x_mm: 100 grid {} } }\n";
+  const Timeline one = run(experiment);
+  EXPECT_GT(one.totals.received, 50u);
+  for (const std::uint32_t threads : {2u, 5u}) {
+    EXPECT_EQ(run(experiment, threads).totals.state_hash, one.totals.state_hash) << threads;
+  }
+  EXPECT_EQ(run(experiment, 2, {"deployment.hosts=3", "deployment.partition_columns=2"}).totals.state_hash,
+            one.totals.state_hash);
+  EXPECT_NE(run(experiment, 1, {"seed=2"}).totals.state_hash, one.totals.state_hash);
+}
+
+TEST_F(FirmwareRun, FailsAloneAndSaysSo) {
+  const std::string wild = program("wild.c", whole_program("static void setup(void) {} static void loop(void) { if "
+                                                           "(kilo_ticks > 60) *(volatile uint8_t*)0xabcd = 1; }"));
+  const std::string talker = program("talker.c", kTalker);
+  const Timeline timeline =
+      run("duration_s: 6 radio { range_mm: 300 }\n"
+          "robots { count: 1 avr: true " +
+          wild +
+          " }\n"
+          "robots { count: 2 avr: true " +
+          talker + " layout { x_mm: 100 grid {} } }\n");
+  EXPECT_EQ(timeline.totals.robots_failed, 1u);
+  EXPECT_GT(timeline.totals.sent, 15u);
+}
+
+TEST_F(FirmwareRun, ReadsWhatANativeRobotReads) {
+  // The first duties that a robot shows tell what setup() has read where it stood, once no message was arriving.
+  const std::string reader = program(
+      "reader.c",
+      whole_program(
+          "static int16_t wait_for(int16_t read(void)) { int16_t r; do r = read(); while (r < 0); return r; }\n"
+          "static void setup(void) { delay(200); set_motors(wait_for(get_ambientlight) / 4, "
+          "(wait_for(get_voltage) + wait_for(get_temperature)) & 255); }\n"
+          "static void loop(void) {}\n"));
+  const auto first_duties = [&](const std::string& kind) {
+    const Timeline timeline =
+        run("duration_s: 2 seed: 7 radio { range_mm: 300 } motion { noise: false }\n"
+            "light { ambient: 30 source { x_mm: 120 height_mm: 150 intensity: 6 } shadows: true sensor { "
+            "noise_floor: 0 noise_relative: "
+            "0 } } temperature { celsius: 40 reading_sd: 0 } battery { charge: 0.6 charge_sd: 0.2 reading_sd: 0 }\n"
+            "robots { count: 6 " +
+            reader + kind + " layout { grid { pitch_mm: 40 } } }\n");
+    std::vector<std::uint32_t> result;
+    for (const auto& changes : timeline.motors) result.push_back(changes.at(0).value);
+    return result;
+  };
+  const auto native = first_duties(""), firmware = first_duties("avr: true");
+  std::set<std::uint32_t> different;
+  for (std::size_t i = 0; i < native.size(); ++i) {
+    EXPECT_NEAR(native[i] >> 8, firmware[i] >> 8, 1) << "light of robot " << i;
+    EXPECT_NEAR(native[i] & 255, firmware[i] & 255, 2) << "voltage and temperature of robot " << i;
+    different.insert(native[i] >> 8);
+  }
+  EXPECT_GE(different.size(), 4u) << "they stand in different light";
+}
+
+TEST_F(FirmwareRun, AnEmptyBatterySwitchesItOff) {
+  // Some 20 s of white light; then the charger, which gives more than an idle robot takes, brings it back, idle.
+  const std::string lamp = program("lamp.c", whole_program("static void setup(void) { set_color(RGB(3, 3, 3)); }\n"
+                                                           "static void loop(void) {}\n"));
+  const auto dark_at = [&](const std::string& kind) {
+    const Timeline timeline =
+        run("duration_s: 60 seed: 3 battery { capacity_mAh: 0.1 charger { radius_mm: 50 current_mA: 8 } }\n"
+            "robots { count: 1 " +
+            lamp + kind + " }\n");
+    std::int64_t tick = 0;
+    int lit = 0;
+    for (std::size_t n = 0; n + 1 < timeline.led[0].size(); ++n) {
+      if (timeline.led[0][n].value != 63) continue;
+      tick = timeline.led[0][n + 1].tick;
+      ++lit;
+    }
+    EXPECT_EQ(lit, 1) << "it does not run again by itself";
+    return static_cast<double>(tick);
+  };
+  const double native = dark_at(""), firmware = dark_at("avr: true");
+  EXPECT_GT(native, 300);
+  EXPECT_NEAR(native, firmware, 5);
+}
+
+TEST_F(FirmwareRun, IsHeardByNativeRobotsAndHearsThem) {
+  const std::string talker = program("talker.c", kTalker);
+  const Timeline timeline =
+      run("duration_s: 10 radio { range_mm: 300 } recording { messages: true }\n"
+          "robots { count: 1 " +
+          talker +
+          " }\n"
+          "robots { count: 1 avr: true " +
+          talker + " layout { x_mm: 60 } }\n");
+  for (std::size_t robot = 0; robot < 2; ++robot) {
+    ASSERT_FALSE(timeline.led[robot].empty());
+    EXPECT_EQ(timeline.led[robot].back().value, 2 - robot) << "who spoke last: the other";
+    EXPECT_GT(timeline.motors[robot].back().value & 0xff, 12u) << "messages heard";
+    EXPECT_GT(timeline.motors[robot].back().value >> 8, 12u) << "messages sent";
+  }
+}
+
+}  // namespace
+}  // namespace kilotwin::firmware

@@ -1,0 +1,120 @@
+/// What robots show over a run, so that runs of the same source, native and as firmware, can be compared.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "services/behaviours/program_set.hpp"
+#include "clients/cli/prepare.hpp"
+#include "clients/local/local_run.hpp"
+
+namespace kilotwin::firmware {
+
+/// From this tick on a robot shows another duty of its motors, or another colour.
+struct Change {
+  std::int64_t tick;
+  std::uint32_t value;
+  bool operator==(const Change&) const = default;
+};
+
+struct Timeline {
+  std::vector<std::vector<Change>> motors, led;  ///< per robot
+  RunTotals totals;
+};
+
+class TimelineObserver : public RunObserver {
+ public:
+  explicit TimelineObserver(std::uint32_t robots) {
+    timeline.motors.resize(robots);
+    timeline.led.resize(robots);
+  }
+  void state(Tick tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const> frames,
+             bool) override {
+    for (const ActuationFrame* frame : frames) {
+      for (std::size_t i = 0; i < frame->led.size(); ++i) {
+        const std::size_t robot = frame->first_robot + i;
+        // A kick is shorter than a tick: whether its duties are those at a tick's end is by chance.
+        const bool kick = frame->motor_left[i] == 255 && frame->motor_right[i] == 255;
+        if (!kick) {
+          note(timeline.motors[robot], tick, std::uint32_t{frame->motor_left[i]} << 8 | frame->motor_right[i]);
+        }
+        note(timeline.led[robot], tick, frame->led[i]);
+      }
+    }
+  }
+  void hash(Tick, std::uint64_t) override {}
+  void input(const Directive&) override {}
+
+  Timeline timeline;
+
+ private:
+  static void note(std::vector<Change>& changes, Tick tick, std::uint32_t value) {
+    if (value != (changes.empty() ? 0 : changes.back().value)) changes.push_back({tick.count(), value});
+  }
+};
+
+/// Runs an experiment locally. `folder`: for the experiment and its run.
+inline Timeline run_timeline(const std::string& experiment, const std::filesystem::path& folder,
+                             std::uint32_t threads = 1, const std::vector<std::string>& set = {}) {
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path file = folder / "experiment.txtpb";
+  std::ofstream(file) << experiment;
+  cli::RunArguments arguments;
+  arguments.experiment = file;
+  arguments.mode = "local";
+  arguments.out = folder / "run";
+  arguments.set = set;
+  const cli::Prepared prepared = cli::prepare(arguments);
+  const RunPlan plan(prepared.manifest);
+  local::LocalOptions options;
+  options.threads = threads;
+  options.run_directory = prepared.directory.path();
+  TimelineObserver observer(plan.robots());
+  const auto programs = behaviours::ProgramSet::load(plan.manifest, options.run_directory);
+  observer.timeline.totals = local::run(plan, programs, options, observer);
+  return observer.timeline;
+}
+
+/// How many changes two histories have, and how many of them are the same, in the same order, within a tick.
+struct Agreement {
+  std::size_t first = 0, second = 0, same = 0;
+  [[nodiscard]] bool whole() const { return same == first && same == second; }
+  Agreement& operator+=(const Agreement& other) {
+    first += other.first;
+    second += other.second;
+    same += other.same;
+    return *this;
+  }
+};
+
+/// Changes in the last tick are left out: the other's may come one later.
+inline Agreement agreement(const std::vector<Change>& first, const std::vector<Change>& second, std::int64_t end) {
+  const auto length = [end](const std::vector<Change>& changes) {
+    std::size_t n = changes.size();
+    while (n > 0 && changes[n - 1].tick >= end - 1) --n;
+    return n;
+  };
+  Agreement result{length(first), length(second), 0};
+  for (std::size_t i = 0, j = 0; i < result.first && j < result.second;) {
+    const std::int64_t late = second[j].tick - first[i].tick;
+    if (first[i].value == second[j].value && late >= -1 && late <= 1) {
+      ++result.same, ++i, ++j;
+    } else if (first[i].tick <= second[j].tick) {
+      ++i;
+    } else {
+      ++j;
+    }
+  }
+  return result;
+}
+
+inline Agreement agreement(const std::vector<std::vector<Change>>& first,
+                           const std::vector<std::vector<Change>>& second, std::int64_t end) {
+  Agreement sum;
+  for (std::size_t i = 0; i < first.size(); ++i) sum += agreement(first[i], second[i], end);
+  return sum;
+}
+
+}  // namespace kilotwin::firmware
