@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "clients/cli/radio_data.hpp"
-#include "clients/identify/bristle/identify_ridden.hpp"
+#include "clients/identify/bristle/identify_bristle.hpp"
 #include "clients/identify/data/import.hpp"
 #include "clients/identify/kilogrid/identify_floor.hpp"
 #include "core/base/error.hpp"

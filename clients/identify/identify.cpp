@@ -6,16 +6,16 @@
 #include <chrono>
 #include <cmath>
 
-#include "clients/identify/causes/search.hpp"
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/search/search.hpp"
+#include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/fit/residuals.hpp"
-#include "clients/identify/model/effect_words.hpp"
-#include "clients/identify/model/write_effects.hpp"
-#include "clients/identify/model/write_model.hpp"
+#include "clients/identify/model/effect_text.hpp"
+#include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/model/model_file.hpp"
 #include "clients/identify/predict/held_out_gain.hpp"
-#include "clients/identify/predict/predict.hpp"
+#include "clients/identify/predict/forecast.hpp"
 #include "clients/identify/predict/prediction_errors.hpp"
-#include "clients/identify/replay/simulated_check.hpp"
+#include "clients/identify/replay/simulation_check.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/fitter.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/play.hpp"
 #include "tests/identify/truth/scenarios.hpp"

@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "clients/identify/data/told_and_done.hpp"
+#include "clients/identify/data/command_response.hpp"
 
 namespace kilotwin::identify {
 namespace {

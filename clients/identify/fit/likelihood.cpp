@@ -4,7 +4,7 @@
 #include <limits>
 #include <numeric>
 
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
 

@@ -1,8 +1,8 @@
 /// Log likelihood of what was measured, by the filter's innovations.
 #pragma once
 
-#include "clients/identify/fit/touched.hpp"
-#include "clients/identify/fit/walk.hpp"
+#include "clients/identify/fit/contact_gate.hpp"
+#include "clients/identify/fit/filter_pass.hpp"
 
 namespace kilotwin::identify {
 

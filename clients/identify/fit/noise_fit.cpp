@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "clients/identify/fit/linearise.hpp"
+#include "clients/identify/fit/linearisation.hpp"
 
 namespace kilotwin::identify {
 namespace {

@@ -5,10 +5,10 @@
 #include <tuple>
 
 #include "clients/identify/fit/likelihood.hpp"
-#include "clients/identify/fit/linearise.hpp"
-#include "clients/identify/model/picture_scale.hpp"
-#include "clients/identify/model/rim.hpp"
-#include "clients/identify/predict/follower.hpp"
+#include "clients/identify/fit/linearisation.hpp"
+#include "clients/identify/model/camera_scale.hpp"
+#include "clients/identify/model/visited_boundary.hpp"
+#include "clients/identify/fit/filter_bank.hpp"
 
 namespace kilotwin::identify {
 

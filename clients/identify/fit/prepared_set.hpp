@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "clients/identify/fit/walk.hpp"
+#include "clients/identify/fit/filter_pass.hpp"
 
 namespace kilotwin::identify {
 

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
 

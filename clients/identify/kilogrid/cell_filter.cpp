@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/identify/kilogrid/lone_robot.hpp"
+#include "clients/identify/kilogrid/single_robot.hpp"
 #include "core/base/pose.hpp"
 #include "core/math/elementary.h"
 

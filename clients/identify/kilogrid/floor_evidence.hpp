@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "clients/identify/kilogrid/floor_slopes.hpp"
+#include "clients/identify/kilogrid/floor_sensitivity.hpp"
 
 namespace kilotwin::kilogrid {
 

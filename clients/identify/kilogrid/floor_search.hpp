@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identify/kilogrid/floor_choose.hpp"
+#include "clients/identify/kilogrid/floor_selection.hpp"
 
 namespace kilotwin::kilogrid {
 

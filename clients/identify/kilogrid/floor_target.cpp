@@ -7,7 +7,7 @@
 #include <limits>
 #include <thread>
 
-#include "clients/identify/kilogrid/quick_swarm.hpp"
+#include "clients/identify/kilogrid/fast_swarm.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {

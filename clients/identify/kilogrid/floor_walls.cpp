@@ -8,7 +8,7 @@
 #include <limits>
 #include <numeric>
 
-#include "clients/identify/kilogrid/quick_swarm.hpp"
+#include "clients/identify/kilogrid/fast_swarm.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {

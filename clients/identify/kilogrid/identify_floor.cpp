@@ -7,7 +7,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "clients/identify/kilogrid/floor_judge.hpp"
+#include "clients/identify/kilogrid/floor_validation.hpp"
 #include "clients/identify/kilogrid/floor_plots.hpp"
 #include "clients/identify/kilogrid/floor_search.hpp"
 #include "core/base/error.hpp"

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "clients/identify/model/situation.hpp"
+#include "clients/identify/model/covariates.hpp"
 
 namespace kilotwin::identify {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "clients/identify/model/basis.hpp"
-#include "clients/identify/model/floor_memory.hpp"
-#include "clients/identify/model/room.hpp"
+#include "clients/identify/model/traffic_grid.hpp"
+#include "clients/identify/model/contact_geometry.hpp"
 
 namespace kilotwin::identify {
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "clients/identify/model/floor_memory.hpp"
-#include "clients/identify/model/situation.hpp"
+#include "clients/identify/model/traffic_grid.hpp"
+#include "clients/identify/model/covariates.hpp"
 
 namespace kilotwin::identify {
 

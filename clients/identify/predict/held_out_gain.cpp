@@ -4,7 +4,7 @@
 #include <map>
 
 #include "clients/identify/fit/likelihood.hpp"
-#include "clients/identify/fit/linearise.hpp"
+#include "clients/identify/fit/linearisation.hpp"
 
 namespace kilotwin::identify {
 namespace {

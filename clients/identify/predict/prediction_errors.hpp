@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "clients/identify/data/measured_set.hpp"
-#include "clients/identify/predict/predict.hpp"
+#include "clients/identify/predict/forecast.hpp"
 
 namespace kilotwin::identify {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/fitter.hpp"
 #include "idl/model.pb.h"
 
 namespace kilotwin::identify {

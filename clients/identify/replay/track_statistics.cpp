@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "clients/identify/model/situation.hpp"
+#include "clients/identify/model/covariates.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -7,7 +7,7 @@
 
 #include "clients/identify/data/measured_set.hpp"
 #include "clients/identify/model/neighbours.hpp"
-#include "clients/identify/model/room.hpp"
+#include "clients/identify/model/contact_geometry.hpp"
 
 namespace kilotwin::identify {
 

@@ -6,13 +6,13 @@
 #include <set>
 #include <vector>
 
-#include "clients/identify/report/report_causes.hpp"
+#include "clients/identify/report/report_effects.hpp"
 #include "clients/identify/report/report_figures.hpp"
 #include "clients/identify/report/report_html.hpp"
 #include "clients/identify/report/report_plots.hpp"
 #include "clients/identify/report/report_simulated.hpp"
-#include "clients/identify/report/report_top.hpp"
-#include "clients/identify/report/report_words.hpp"
+#include "clients/identify/report/report_summary.hpp"
+#include "clients/identify/report/report_text.hpp"
 #include "clients/recorder/file.hpp"
 
 namespace kilotwin::identify {

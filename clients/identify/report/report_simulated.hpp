@@ -4,7 +4,7 @@
 #include <string>
 
 #include "clients/identify/report/report_figures.hpp"
-#include "clients/identify/report/report_words.hpp"
+#include "clients/identify/report/report_text.hpp"
 
 namespace kilotwin::identify::report {
 

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "clients/identify/fit/fit.hpp"
-#include "clients/identify/predict/futures.hpp"
+#include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/predict/rollout.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/identify/causes/hypotheses.hpp"
+#include "clients/identify/search/hypotheses.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "clients/identify/fit/fit.hpp"
+#include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/identify.hpp"
-#include "clients/identify/model/write_effects.hpp"
+#include "clients/identify/model/effect_records.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

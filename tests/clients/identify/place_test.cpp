@@ -5,12 +5,12 @@
 #include <cmath>
 #include <functional>
 
-#include "clients/identify/causes/fine_map.hpp"
-#include "clients/identify/causes/memory_shape.hpp"
-#include "clients/identify/causes/neighbour_shape.hpp"
-#include "clients/identify/causes/refine.hpp"
-#include "clients/identify/model/write_effects.hpp"
-#include "clients/identify/model/write_model.hpp"
+#include "clients/identify/search/total_variation_map.hpp"
+#include "clients/identify/search/traffic_shape.hpp"
+#include "clients/identify/search/neighbour_shape.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/model/model_file.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

@@ -1,0 +1,293 @@
+#include "clients/identify/bristle/bristle_model.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "clients/identify/bristle/velocity_circle.hpp"
+
+namespace kilotwin::bristle {
+namespace {
+
+constexpr double kLine_s = 0.5, kEvery_s = 1, kFirst_s = 3, kNear_s = 0.1;
+constexpr std::size_t kFewest = 4;
+/// Instants that a run's own values are blended with: those of all runs.
+constexpr double kPrior = 6;
+/// A run tells what carries it if it has that many velocities, and their directions have no mean beyond that.
+constexpr std::size_t kFewestOnCircle = 12;
+constexpr double kOneWay = 0.7;
+constexpr std::size_t kFewestRuns = 4;
+constexpr std::complex<double> kI(0, 1);
+
+std::complex<double> unit(double angle_rad) { return std::exp(kI * angle_rad); }
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The line through rows first..last at `at_s`: place and slope.
+std::pair<double, double> line(const std::vector<double>& t, const std::vector<double>& v, std::size_t first,
+                               std::size_t last, double at_s) {
+  double mean_t = 0, mean_v = 0, tt = 0, tv = 0;
+  const auto n = static_cast<double>(last - first);
+  for (std::size_t i = first; i < last; ++i) {
+    mean_t += t[i] / n;
+    mean_v += v[i] / n;
+  }
+  for (std::size_t i = first; i < last; ++i) {
+    tt += (t[i] - mean_t) * (t[i] - mean_t);
+    tv += (t[i] - mean_t) * (v[i] - mean_v);
+  }
+  const double slope = tt > 0 ? tv / tt : 0;
+  return {mean_v + slope * (at_s - mean_t), slope};
+}
+
+double speed_of(const RideInstant& i) { return std::hypot(i.vx_mm_s, i.vy_mm_s); }
+
+struct RobotWay {
+  std::size_t run;
+  std::complex<double> way, forward;  ///< front and back not told apart
+  double speed;
+};
+
+/// The drift, in speeds, that leaves least of ways across headings: once with each run left out, as what runs say (jackknife
+/// pseudo-values).
+void carried_across(const std::vector<RobotWay>& all, std::vector<double>& xs, std::vector<double>& ys) {
+  const auto fit = [&](std::size_t without) {
+    // The third: by how much the axis of headings is off, which goes with the side to which the robot drives.
+    Eigen::Vector3d left = Eigen::Vector3d::Zero();
+    constexpr double kLimit = 0.3;  // of the speed: beyond it the heading is wrong
+    for (int iteration = 0; iteration < 10; ++iteration) {
+      Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
+      Eigen::Vector3d right = Eigen::Vector3d::Zero();
+      for (const RobotWay& w : all) {
+        if (w.run == without || !(w.speed > 0)) continue;
+        const std::complex<double> own = w.way * std::conj(w.forward) / w.speed;
+        const Eigen::Vector3d across(-w.forward.imag(), w.forward.real(), own.real() < 0 ? -1 : 1);
+        const double weight = std::min(1.0, kLimit / std::max(std::abs(own.imag() - across.dot(left)), 1e-9));
+        normal += weight * across * across.transpose();
+        right += weight * own.imag() * across;
+      }
+      left = normal.ldlt().solve(right);
+    }
+    return Eigen::Vector2d(left.head<2>());
+  };
+  std::set<std::size_t> runs;
+  for (const RobotWay& w : all) runs.insert(w.run);
+  const Eigen::Vector2d whole = fit(SIZE_MAX);
+  xs.clear();
+  ys.clear();
+  const auto n = static_cast<double>(runs.size());
+  for (const std::size_t run : runs) {
+    const Eigen::Vector2d pseudo = runs.size() > 1 ? Eigen::Vector2d(n * whole - (n - 1) * fit(run)) : whole;
+    xs.push_back(pseudo.x());
+    ys.push_back(pseudo.y());
+  }
+}
+
+/// The chance that the mean of pairs is as far from 0 as it is, were the truth 0 (Hotelling; F with 2 and n - 2 degrees).
+double chance_of_mean(const std::vector<double>& xs, const std::vector<double>& ys) {
+  const auto n = static_cast<Eigen::Index>(xs.size());
+  if (n < 5) return 1;
+  Eigen::MatrixX2d v(n, 2);
+  v.col(0) = Eigen::Map<const Eigen::VectorXd>(xs.data(), n);
+  v.col(1) = Eigen::Map<const Eigen::VectorXd>(ys.data(), n);
+  const Eigen::RowVector2d mean = v.colwise().mean();
+  const Eigen::MatrixX2d off = v.rowwise() - mean;
+  const auto count = static_cast<double>(n);
+  const Eigen::Matrix2d covariance = off.transpose() * off / (count - 1);
+  const double square = count * mean * covariance.ldlt().solve(mean.transpose());
+  const double f = square * (count - 2) / (2 * (count - 1));
+  return std::pow(1 + 2 * f / (count - 2), -(count - 2) / 2);
+}
+
+/// Values of one run so far, blended with those of all runs.
+struct OwnPast {
+  std::vector<double> speeds;
+  std::vector<std::complex<double>> ways;
+  VelocityCircle circle;
+  std::complex<double> mount = 0;
+  double turn = 0, turns = 0;
+  std::complex<double> last_way = 0;
+  double last_time_s = -std::numeric_limits<double>::infinity();
+
+  void add(const RideInstant& now, const RideModel& all, const RideEffects& effects) {
+    const std::complex<double> way(now.vx_mm_s, now.vy_mm_s);
+    speeds.push_back(std::abs(way));
+    if (speeds.size() > 20) speeds.erase(speeds.begin());
+    ways.push_back(way);
+    circle = circle_through(ways, {all.drift_x, all.drift_y}, kPrior);
+    const bool carried = effects[static_cast<std::size_t>(RideEffect::kDrift)];
+    // Twice the angle: front and back are one.
+    mount += unit(2 * (std::arg(own_way(way, carried)) + now.axis_rad - all.sense_rad));
+    if (now.time_s - last_time_s < 1.5 * kEvery_s) {
+      const double turned = std::arg(way * std::conj(last_way));
+      if (std::abs(turned) < 1.2) {
+        turn += turned / (now.time_s - last_time_s);
+        ++turns;
+      }
+    }
+    last_way = way;
+    last_time_s = now.time_s;
+  }
+  /// Of a way, what is not the table's.
+  [[nodiscard]] std::complex<double> own_way(std::complex<double> way, bool carried) const {
+    return carried ? way - circle.drift * circle.speed_mm_s : way;
+  }
+  [[nodiscard]] double own_speed(bool carried) const { return carried ? circle.speed_mm_s : median(speeds); }
+  [[nodiscard]] double own_mount() const { return std::arg(mount + kPrior) / 2; }
+  [[nodiscard]] double own_turn() const { return turn / (turns + kPrior); }
+  /// Where it goes, if nothing carries it.
+  [[nodiscard]] std::complex<double> direction(const RideInstant& now, const RideModel& all,
+                                               const RideEffects& on) const {
+    const auto has = [&](RideEffect effect) { return on[static_cast<std::size_t>(effect)]; };
+    const double measured = has(RideEffect::kAxis) ? now.axis_rad : now.heading_rad;
+    double heading = has(RideEffect::kSense) ? all.sense_rad - measured : measured;
+    if (has(RideEffect::kMount)) heading += own_mount();
+    std::complex<double> forward = unit(heading);
+    const std::complex<double> way = own_way({now.vx_mm_s, now.vy_mm_s}, has(RideEffect::kDrift));
+    if (has(RideEffect::kAxis) && (way * std::conj(forward)).real() < 0) forward = -forward;
+    return forward;
+  }
+};
+
+}  // namespace
+
+std::vector<RideInstant> instants_of(const std::vector<RiddenRun>& runs, double horizon_s) {
+  std::vector<RideInstant> all;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const RiddenRun& run = runs[r];
+    if (run.size() < 2) continue;
+    for (double now_s = run.time_s.front() + kFirst_s; now_s + horizon_s < run.time_s.back(); now_s += kEvery_s) {
+      const auto row = [&](double t) {
+        return static_cast<std::size_t>(std::upper_bound(run.time_s.begin(), run.time_s.end(), t) -
+                                        run.time_s.begin());
+      };
+      const std::size_t first = row(now_s - kLine_s), last = row(now_s);
+      std::size_t later = row(now_s + horizon_s);
+      if (later == run.size() ||
+          (later > 0 && now_s + horizon_s - run.time_s[later - 1] < run.time_s[later] - now_s - horizon_s))
+        --later;
+      if (last < first + kFewest || std::abs(run.time_s[later] - now_s - horizon_s) > kNear_s) continue;
+      std::complex<double> heading = 0, axis = 0;
+      for (std::size_t i = first; i < last; ++i) {
+        heading += unit(run.heading_rad[i]);
+        axis += unit(2 * run.heading_rad[i]);
+      }
+      const auto [x, vx] = line(run.time_s, run.x_mm, first, last, now_s);
+      const auto [y, vy] = line(run.time_s, run.y_mm, first, last, now_s);
+      all.push_back({r, run.time_s[later], x, y, vx, vy, std::arg(heading), std::arg(axis) / 2, run.x_mm[later],
+                     run.y_mm[later]});
+    }
+  }
+  return all;
+}
+
+RideModel::RideModel(const std::vector<RideInstant>& train) {
+  std::vector<double> speeds;
+  std::complex<double> same = 0, turned = 0, same_axis = 0, turned_axis = 0;
+  for (const RideInstant& i : train) {
+    const double way = std::atan2(i.vy_mm_s, i.vx_mm_s);
+    speeds.push_back(speed_of(i));
+    same += unit(way - i.heading_rad);
+    turned += unit(way + i.heading_rad);
+    turned_axis += unit(2 * (way + i.axis_rad));
+    same_axis += unit(2 * (way - i.axis_rad));
+  }
+  const double n = std::max<double>(static_cast<double>(train.size()), 1);
+  speed_mm_s = median(speeds);
+  aligned = std::abs(same) / n;
+  aligned_turned = std::abs(turned) / n;
+  aligned_axis = std::abs(turned_axis) / n;
+  sense_rad = std::arg(turned);
+  // What carries robots: the median over runs that went in many directions. Each run is one measurement.
+  std::map<std::size_t, std::vector<std::complex<double>>> ways_of;
+  for (const RideInstant& i : train) ways_of[i.run].emplace_back(i.vx_mm_s, i.vy_mm_s);
+  std::vector<double> xs, ys;
+  for (const auto& [run, ways] : ways_of) {
+    const VelocityCircle circle = circle_through(ways, 0, 0.5);
+    if (ways.size() < kFewestOnCircle || circle.one_way > kOneWay || std::abs(circle.drift) > 1) continue;
+    xs.push_back(circle.drift.real());
+    ys.push_back(circle.drift.imag());
+  }
+  const bool across = xs.size() < kFewestRuns;
+  if (across) {
+    // Runs that went one way each: what carries them shows across their headings.
+    std::vector<RobotWay> all;
+    for (const RideInstant& i : train) {
+      std::vector<double> own;
+      for (const std::complex<double>& way : ways_of[i.run]) own.push_back(std::abs(way));
+      all.push_back({i.run, {i.vx_mm_s, i.vy_mm_s}, unit(sense_rad - i.axis_rad), median(own)});
+    }
+    carried_across(all, xs, ys);
+  }
+  drift_runs = xs.size();
+  if (xs.empty()) return;
+  const auto middle = [&](const std::vector<double>& v) {
+    return across ? std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size()) : median(v);
+  };
+  drift_x = middle(xs);
+  drift_y = middle(ys);
+  double spread = 0;
+  for (std::size_t r = 0; r < xs.size(); ++r)
+    spread += (xs[r] - drift_x) * (xs[r] - drift_x) + (ys[r] - drift_y) * (ys[r] - drift_y);
+  const auto runs = static_cast<double>(xs.size());
+  drift_sd = xs.size() > 1 ? std::sqrt(spread / 2 / (runs - 1)) : 0;
+  drift_p = chance_of_mean(xs, ys);
+  // Per axis; the standard error of a median is 1.25 that of a mean.
+  drift_se = xs.size() > 1 ? (across ? 1 : 1.25) * std::sqrt(spread / 2 / (runs - 1) / runs) : 1;
+}
+
+std::vector<RideModel::Place> RideModel::predict(const std::vector<RideInstant>& instants, double horizon_s,
+                                                 const RideEffects& on) const {
+  const auto has = [&](RideEffect effect) { return on[static_cast<std::size_t>(effect)]; };
+  std::vector<Place> places;
+  OwnPast past;
+  std::size_t run = SIZE_MAX;
+  for (const RideInstant& now : instants) {
+    if (now.run != run) past = {};
+    run = now.run;
+    past.add(now, *this, on);
+    const double speed = has(RideEffect::kSpeed) ? past.own_speed(has(RideEffect::kDrift)) : speed_mm_s;
+    std::complex<double> way = speed * horizon_s * past.direction(now, *this, on);
+    if (has(RideEffect::kTurn)) {
+      // Along an arc.
+      const double turn = past.own_turn() * horizon_s;
+      if (std::abs(turn) > 1e-6) way *= (unit(turn) - 1.0) / (kI * turn);
+    }
+    if (has(RideEffect::kDrift)) way += speed * horizon_s * past.circle.drift;
+    places.push_back({now.x_mm + way.real(), now.y_mm + way.imag()});
+  }
+  return places;
+}
+
+std::vector<RideSummary> summaries_of(const RideModel& model, const std::vector<RiddenRun>& runs,
+                                      const std::vector<RideInstant>& instants) {
+  RideEffects all;
+  all.fill(true);
+  std::vector<OwnPast> pasts(runs.size());
+  std::vector<std::vector<double>> speeds(runs.size());
+  for (const RideInstant& now : instants) {
+    pasts[now.run].add(now, model, all);
+    speeds[now.run].push_back(speed_of(now));
+  }
+  std::vector<RideSummary> summaries;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    if (speeds[r].empty()) continue;
+    const VelocityCircle& circle = pasts[r].circle;
+    const std::complex<double> drift = circle.drift * circle.speed_mm_s;
+    summaries.push_back(
+        {runs[r].name, circle.speed_mm_s, drift.real(), drift.imag(), pasts[r].own_turn(), pasts[r].own_mount()});
+  }
+  return summaries;
+}
+
+}  // namespace kilotwin::bristle

@@ -1,0 +1,95 @@
+#include "clients/identify/data/command_response.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilotwin::identify {
+namespace {
+
+// Positions are taken at least so far apart, so that the tracker's noise does not drown the motion.
+constexpr double kDeed_s = 0.9;
+// Longer ones hold several motions.
+constexpr double kLongest_s = 3;
+constexpr std::size_t kFewest = 30;
+// No deed speaks louder against a command than one so many standard deviations off.
+constexpr double kMostSds = 3.5;
+
+/// Median and, by the median of deviations, standard deviation.
+template <class Spread> Spread spread_of(std::vector<double> values, double least_sd) {
+  const auto middle = [&] {
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+  };
+  const double centre = middle();
+  for (double& v : values) v = std::abs(v - centre);
+  return {centre, std::max(1.4826 * middle(), least_sd)};
+}
+
+}  // namespace
+
+Motion told_at(const Track& track, double time_s) {
+  const auto after = std::upper_bound(track.commands.begin(), track.commands.end(), time_s,
+                                      [](double t, const CommandChange& c) { return t < c.time_s; });
+  return after == track.commands.begin() ? Motion::kStop : std::prev(after)->motion;
+}
+
+std::vector<Deed> deeds_of(const Track& track) {
+  std::vector<Deed> deeds;
+  struct Leg {
+    double from_s, to_s, x, y;  // velocity
+  };
+  std::vector<Leg> legs;
+  const Sample* from = nullptr;
+  for (const Sample& to : track.samples) {
+    if (from != nullptr && to.time_s - from->time_s < kDeed_s) continue;
+    if (from != nullptr && to.time_s - from->time_s <= kLongest_s) {
+      const double dt = to.time_s - from->time_s;
+      legs.push_back({from->time_s, to.time_s, (to.x_mm - from->x_mm) / dt, (to.y_mm - from->y_mm) / dt});
+    }
+    from = &to;
+  }
+  for (std::size_t k = 1; k + 1 < legs.size(); ++k) {
+    const Leg &before = legs[k - 1], &leg = legs[k], &after = legs[k + 1];
+    if (before.to_s != leg.from_s || leg.to_s != after.from_s) continue;
+    const double curve = 0.5 * (before.x * leg.y - before.y * leg.x + leg.x * after.y - leg.y * after.x);
+    deeds.push_back({0.5 * (leg.from_s + leg.to_s), std::hypot(leg.x, leg.y), curve});
+  }
+  return deeds;
+}
+
+ToldAndDone::ToldAndDone(const MeasuredSet& set) {
+  if (!set.has_commands) return;
+  std::array<std::vector<double>, 4> speeds, curves;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      for (const Deed& deed : deeds_of(track)) {
+        const auto m = static_cast<std::size_t>(told_at(track, deed.time_s));
+        speeds[m].push_back(deed.speed_mm_s);
+        curves[m].push_back(deed.curve_mm2_s2);
+      }
+    }
+  }
+  int known = 0;
+  for (std::size_t m = 0; m < 4; ++m) {
+    known_[m] = speeds[m].size() >= kFewest;
+    if (!known_[m]) continue;
+    ++known;
+    speed_[m] = spread_of<Spread>(speeds[m], 0.5);
+    curve_[m] = spread_of<Spread>(curves[m], 5);
+  }
+  tells_ = known >= 2;
+}
+
+double ToldAndDone::log_likelihood(const Deed& deed, Motion motion) const {
+  const auto m = static_cast<std::size_t>(motion);
+  if (!known_[m]) return 0;
+  const auto of = [](double value, const Spread& spread) {
+    const double z = std::min(std::abs(value - spread.middle) / spread.sd, kMostSds);
+    return -0.5 * z * z;
+  };
+  return of(deed.speed_mm_s, speed_[m]) - std::log(speed_[m].sd) + of(deed.curve_mm2_s2, curve_[m]) -
+         std::log(curve_[m].sd);
+}
+
+}  // namespace kilotwin::identify

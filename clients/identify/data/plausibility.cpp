@@ -1,0 +1,169 @@
+#include "clients/identify/data/plausibility.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "clients/identify/model/covariates.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+// No run of robots lasts as long: eleven days.
+constexpr double kLongest_s = 1e6;
+constexpr double kSlowestSampling_s = 60;
+// No arena is as large.
+constexpr double kFarthest_mm = 1e6;
+// Discs are 33 mm wide, so that two of them need more room than this.
+constexpr double kSmallestRoom_mm = 15;
+// Kilobots go 10 mm/s; nothing on two vibrating legs goes as fast as this, nor as slowly as that when all is well.
+constexpr double kFastest_mm_s = 150, kSlowest_mm_s = 0.1;
+constexpr double kLook_s = 5;
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+std::string of(const Run& run, const Track& track) {
+  return fmt::format("run {}, robot {}", run.name, track.robot);
+}
+
+void demand_seconds(const MeasuredSet& set, const std::string& from) {
+  std::vector<double> steps;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      for (const Sample& s : track.samples) {
+        if (std::abs(s.time_s) > kLongest_s)
+          throw UserError(
+              fmt::format("{}: {}: time_s is {:g}; give seconds since the start of the run (not since 1970, "
+                          "nor milliseconds)",
+                          from, of(run, track), s.time_s));
+      }
+      for (std::size_t i = 1; i < track.samples.size(); ++i)
+        steps.push_back(track.samples[i].time_s - track.samples[i - 1].time_s);
+    }
+  }
+  if (steps.size() < 5) return;
+  const double step = median(steps);
+  if (step > kSlowestSampling_s)
+    throw UserError(
+        fmt::format("{}: robots are seen every {:g} s; give time_s in seconds (not milliseconds or frames), and a "
+                    "sample a second or so",
+                    from, step));
+}
+
+void demand_millimetres(const MeasuredSet& set, const std::string& from) {
+  for (const Run& run : set.runs) {
+    double low_x = 1e300, high_x = -1e300, low_y = 1e300, high_y = -1e300;
+    std::size_t samples = 0;
+    for (const Track& track : run.tracks) {
+      for (const Sample& s : track.samples) {
+        if (std::abs(s.x_mm) > kFarthest_mm || std::abs(s.y_mm) > kFarthest_mm)
+          throw UserError(
+              fmt::format("{}: {}: x_mm, y_mm are {:g}, {:g}; give mm", from, of(run, track), s.x_mm, s.y_mm));
+        low_x = std::min(low_x, s.x_mm), high_x = std::max(high_x, s.x_mm);
+        low_y = std::min(low_y, s.y_mm), high_y = std::max(high_y, s.y_mm);
+        ++samples;
+      }
+    }
+    if (run.tracks.size() > 1 && samples > 10 && high_x - low_x < kSmallestRoom_mm &&
+        high_y - low_y < kSmallestRoom_mm)
+      throw UserError(
+          fmt::format("{}: run {}: {} robots, 33 mm wide each, within {:.3g} mm x {:.3g} mm; give x_mm and y_mm "
+                      "in mm (not metres)",
+                      from, run.name, run.tracks.size(), high_x - low_x, high_y - low_y));
+  }
+}
+
+void demand_radians(const MeasuredSet& set, const std::string& from) {
+  std::size_t all = 0, beyond = 0;
+  double most = 0;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      for (const Sample& s : track.samples) {
+        if (std::isnan(s.heading_rad)) continue;
+        ++all;
+        if (std::abs(s.heading_rad) > 2 * M_PI) ++beyond;
+        most = std::max(most, std::abs(s.heading_rad));
+      }
+    }
+  }
+  // Headings that go on counting beyond a turn are known too, but they do not end at 360.
+  if (all > 10 && beyond * 3 > all && most > 90 && most < 361)
+    throw UserError(fmt::format("{}: heading_rad is up to {:g}; give radians (not degrees)", from, most));
+}
+
+void demand_motion(const MeasuredSet& set, const std::string& from) {
+  std::vector<double> speeds;
+  bool driven = false;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      if (track.samples.size() < 2) continue;
+      const CommandClock clock(track);
+      for (std::size_t i = 0; i + 1 < track.samples.size();) {
+        std::size_t j = i + 1;
+        while (j + 1 < track.samples.size() && track.samples[j].time_s < track.samples[i].time_s + kLook_s) ++j;
+        const Sample &a = track.samples[i], &b = track.samples[j];
+        const CommandState at = clock.at(a.time_s);
+        const double lasts_s = b.time_s - a.time_s;
+        i = j;
+        if (!at.driven()) {
+          driven = driven || clock.next_change_s(a.time_s) < b.time_s;
+          continue;
+        }
+        driven = true;
+        if (lasts_s > 0) speeds.push_back(std::hypot(b.x_mm - a.x_mm, b.y_mm - a.y_mm) / lasts_s);
+      }
+    }
+  }
+  if (!driven)
+    throw UserError(
+        fmt::format("{}: no robot is told to move while it is seen; let commands.csv name the runs and robots of "
+                    "trajectories.csv, or leave it out where robots always go straight",
+                    from));
+  if (speeds.size() < 5) return;
+  const double speed = median(speeds);
+  if (speed > kFastest_mm_s)
+    throw UserError(
+        fmt::format("{}: robots go {:.3g} mm/s; Kilobots go some 10 mm/s: give x_mm and y_mm in mm (not pixels), "
+                    "time_s in seconds",
+                    from, speed));
+  if (speed < kSlowest_mm_s)
+    throw UserError(
+        fmt::format("{}: robots that are told to move go {:.3g} mm/s; Kilobots go some 10 mm/s: give x_mm and y_mm "
+                    "in mm (not metres), time_s in seconds (not milliseconds)",
+                    from, speed));
+}
+
+}  // namespace
+
+void demand_plausible(const MeasuredSet& set, const std::string& from) {
+  demand_seconds(set, from);
+  demand_millimetres(set, from);
+  demand_radians(set, from);
+  demand_motion(set, from);
+}
+
+void demand_longer_than(const MeasuredSet& set, double horizon_s, bool held_out_only, const std::string& from) {
+  double longest_s = 0;
+  for (const Run& run : set.runs) {
+    for (const Track& track : run.tracks) {
+      if (track.samples.empty() || (held_out_only && !track.held_out)) continue;
+      // Predictions are for times from the horizon on, from what was seen the horizon before.
+      if (track.samples.front().time_s <= track.samples.back().time_s - horizon_s)
+        longest_s = std::max(longest_s, track.samples.back().time_s);
+    }
+  }
+  if (longest_s >= horizon_s) return;
+  throw UserError(fmt::format(
+      "{}: no robot is seen for as long as the horizon of {:g} s; give a shorter one with --horizon, or "
+      "longer runs",
+      from, horizon_s));
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,232 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "clients/identify/fit/fitter.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// By how much, along an axis, robots were moved while they touched others, from the first measurement of that to the last.
+struct Pushes {
+  explicit Pushes(double tracker_mm2) : tracker_mm2_(tracker_mm2) {}
+  double sum_mm2 = 0, time_s = 0;
+  std::size_t count = 0;
+
+  void start(const TrackFilter&) {}
+  void step(const StepRecord& record) {
+    if (record.at_robot) touched_s_ += record.h_s;
+  }
+  void update(const Innovation& innovation, const Sample&) {
+    const double touched_s = std::exchange(touched_s_, 0);
+    if (touched_s > 0 && !innovation.lost) {
+      way_ += std::sqrt(innovation.weight) * innovation.difference.head<2>();
+      way_s_ += touched_s;
+    } else if (way_s_ > 0) {
+      // The tracker was off at either end.
+      sum_mm2 += way_.squaredNorm() / 2 - 2 * tracker_mm2_;
+      time_s += std::exchange(way_s_, 0);
+      ++count;
+      way_.setZero();
+    }
+  }
+
+ private:
+  double tracker_mm2_, touched_s_ = 0, way_s_ = 0;
+  Eigen::Vector2d way_ = Eigen::Vector2d::Zero();
+};
+
+}  // namespace
+
+double touching_mm(const BaseParameters& base, bool headings) {
+  constexpr double kMostly = 0.75;
+  return kTouch_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
+}
+
+void Fitter::look_for_walls(MotionModel& model) const {
+  if (!set_.set().has_headings) return;
+  const Room known = model.room;
+  model.room = room_of(set_, model);
+  for (double Room::*const side : {&Room::x_low_mm, &Room::x_high_mm, &Room::y_low_mm, &Room::y_high_mm})
+    if (std::isinf(model.room.*side)) model.room.*side = known.*side;
+}
+
+void Fitter::find_walls(MotionModel& model) const {
+  // How far the tracked point may lie beyond the disc's centre, or before it.
+  const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
+  // Where the tracked point was, by view and sample: not where a picture that is bent shows it.
+  const bool measures = model.measures();
+  const auto place_of = [&](const TrackView& view, const Sample& s) {
+    if (!measures) return s;
+    const Eigen::Vector3d pose = model.pose_of(s, view.at(s.time_s));
+    const double c = std::cos(pose[2]), n = std::sin(pose[2]);
+    return Sample{s.time_s, pose[0] + model.base.ahead_mm * c - model.base.left_mm * n,
+                  pose[1] + model.base.ahead_mm * n + model.base.left_mm * c, pose[2]};
+  };
+  struct Side {
+    double Room::*wall;
+    double Sample::*along;
+    double sign;
+  };
+  const std::array<Side, 4> sides = {
+      Side{&Room::x_high_mm, &Sample::x_mm, 1}, Side{&Room::x_low_mm, &Sample::x_mm, -1},
+      Side{&Room::y_high_mm, &Sample::y_mm, 1}, Side{&Room::y_low_mm, &Sample::y_mm, -1}};
+  for (const Side& side : sides) {
+    // Where headings are measured, discs that stay at one line have shown most walls already.
+    if (set_.set().has_headings && std::isfinite(model.room.*side.wall)) continue;
+    std::vector<double> places;
+    for (const TrackView& view : set_.views())
+      for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
+    if (places.size() < 100) return;
+    const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
+    std::nth_element(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(rank), places.end());
+    const double edge = places[rank];
+    // Those that came near; of many, some.
+    constexpr std::size_t kMost = 16;
+    std::vector<const TrackView*> near;
+    for (const TrackView& view : set_.views()) {
+      if (view.track->held_out || near.size() == kMost) continue;
+      const auto there = std::count_if(
+          view.track->samples.begin(), view.track->samples.end(),
+          [&](const Sample& s) { return std::abs(side.sign * place_of(view, s).*side.along - edge) < reach + 5; });
+      if (there > 5) near.push_back(&view);
+    }
+    model.room.*side.wall = side.sign * std::numeric_limits<double>::infinity();
+    if (near.empty()) continue;
+    MotionModel best = model;
+    // A wall has to be worth more than chance and bad luck with a few outliers.
+    double best_value = with_touching(model, near) + 30;
+    const auto try_at = [&](double wall) {
+      MotionModel trial = model;
+      trial.room.*side.wall = side.sign * wall;
+      const double value = with_touching(trial, near);
+      if (value <= best_value) return;
+      best_value = value;
+      best = trial;
+    };
+    for (double wall = edge - 2; wall <= edge + reach + 2; wall += 2) try_at(wall);
+    const double found = side.sign * best.room.*side.wall;
+    if (std::isinf(found)) continue;
+    for (const double by : {-1.0, 1.0, -0.5, 0.5}) try_at(found + by);
+    model = best;
+  }
+}
+
+void Fitter::fit_touching(MotionModel& model) const {
+  const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+  double best = with_touching(model, tracks);
+  const auto climb = [&](double Noise::*part) {
+    const double start = model.noise.*part;
+    for (const double factor : {4.0, 0.25}) {
+      bool better = true;
+      while (better) {
+        MotionModel trial = model;
+        trial.noise.*part *= factor;
+        if (trial.noise.*part < 1e-6 || trial.noise.*part > 1e3) break;
+        const double value = with_touching(trial, tracks);
+        better = value > best + 0.5;
+        if (!better) break;
+        best = value;
+        model = trial;
+      }
+      if (model.noise.*part != start) break;
+    }
+  };
+  for (double Noise::*const part : {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s}) climb(part);
+  // A robot is pushed one way for as long as it touches: as noise without a memory that looks like less than it adds up to, and
+  // a turn, which does go on, would be blamed for the rest.
+  if (const double lasting_mm2_s = lasting_push_mm2_s(model, tracks); lasting_mm2_s > model.noise.contact_mm2_s) {
+    model.noise.contact_mm2_s = lasting_mm2_s;
+    best = with_touching(model, tracks);
+  }
+  climb(&Noise::contact_rad2_s);
+}
+
+double Fitter::lasting_push_mm2_s(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
+  std::vector<Pushes> pushes(tracks.size(), Pushes(model.noise.position_mm2));
+  in_parallel(tracks.size(), threads_, [&](std::size_t i) {
+    RobotBias bias = model.bias_of(tracks[i]->track->robot);
+    bias.covariance.setZero();
+    TrackFilter filter(model, bias, tracks[i]->track->robot, tracks[i]->number);
+    walk(filter, *tracks[i], tracks[i]->track->samples.size(), pushes[i]);
+  });
+  std::size_t count = 0;
+  double sum_mm2 = 0, time_s = 0;
+  for (const Pushes& p : pushes) {
+    count += p.count;
+    sum_mm2 += p.sum_mm2;
+    time_s += p.time_s;
+  }
+  constexpr std::size_t kFew = 10;
+  constexpr double kMost_mm2_s = 1e3;
+  return count < kFew ? 0 : std::min(sum_mm2 / time_s, kMost_mm2_s);
+}
+
+void Fitter::find_shape(MotionModel& model) const {
+  const bool headings = set_.set().has_headings;
+  const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+  struct Candidate {
+    MotionModel model;
+    double log_likelihood = 0;
+    Meetings meetings;
+  };
+  std::vector<Candidate> candidates;
+  const auto add = [&](double centre_mm) {
+    Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
+    c.model.base.centre_mm = centre_mm;
+    c.model.touch_mm = touching_mm(c.model.base, headings);
+    set_.find_centres(c.model, threads_);
+    if (headings) {
+      c.model.room = room_of(set_, c.model);
+    } else {
+      find_walls(c.model);
+      // Of what may touch more often less is known: with noise that is not its own it would look worse than it is.
+      fit_touching(c.model);
+    }
+    c.log_likelihood = with_touching(c.model, tracks);
+    c.meetings = set_.meetings();
+  };
+  add(kAxleOffset_mm);
+  // Or the tracked point is the centre.
+  constexpr double kApart_mm = 3;
+  if (std::abs(model.base.ahead_mm - kAxleOffset_mm) > kApart_mm) add(model.base.ahead_mm);
+  const Candidate* best = &candidates.front();
+  for (const Candidate& c : candidates) {
+    // Walls tell more than robots that met. Without walls the likelihood tells nothing: it would only count who is thought to touch.
+    constexpr double kSure = 50;
+    const bool walls = c.model.room.any() || best->model.room.any();
+    const double better = walls ? c.log_likelihood - best->log_likelihood : 0;
+    if (better > kSure || (better > -kSure && c.meetings.share_within() < 0.5 * best->meetings.share_within()))
+      best = &c;
+  }
+  model = best->model;
+  model.contacts = best->meetings.share_within() < Meetings::kUnhindered;
+  if (best != &candidates.back()) set_.find_centres(model, threads_);
+}
+
+void Fitter::fit_surroundings(MotionModel& model) const {
+  if (model.doubts_rim) settle_doubts(model);
+  // With much noise at walls it would not matter where they are.
+  const Noise anew;
+  for (double Noise::*const part :
+       {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
+    model.noise.*part = anew.*part;
+  const bool headings = set_.set().has_headings;
+  // What a model lacked may have passed for a disc that lies elsewhere.
+  if (!headings) find_shape(model);
+  for (int round = 0; round < (headings ? 1 : 2); ++round) {
+    if (headings || round > 0) {
+      find_walls(model);
+      set_.find_centres(model, threads_);
+    }
+    if (model.measures() && set_scale(model)) set_.find_centres(model, threads_);
+    // In a picture that is bent robots seem to meet where they do not.
+    if (model.measures() && !model.doubts_rim)
+      model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
+    fit_touching(model);
+    fit(model, 1);
+  }
+}
+
+}  // namespace kilotwin::identify

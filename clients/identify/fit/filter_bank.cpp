@@ -1,0 +1,99 @@
+#include "clients/identify/fit/filter_bank.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilotwin::identify {
+namespace {
+
+/// Logarithm of the sum of all weights.
+double total_of(const std::vector<Follower::Hypothesis>& hypotheses) {
+  double best = -1e300, sum = 0;
+  for (const auto& h : hypotheses) best = std::max(best, h.log_weight);
+  for (const auto& h : hypotheses) sum += std::exp(h.log_weight - best);
+  return best + std::log(sum);
+}
+
+}  // namespace
+
+void Follower::follow(double to_s) {
+  const std::vector<Sample>& samples = view_.track->samples;
+  for (; next_ < samples.size() && samples[next_].time_s <= to_s + 1e-6; ++next_) take(samples[next_]);
+}
+
+void Follower::take(const Sample& sample) {
+  if (next_ == 0) return start(sample);
+  const double from_s = last_s(), weight = total_of(hypotheses_);
+  double lost = 0;
+  for (Hypothesis& h : hypotheses_) {
+    sub_steps(view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
+      h.filter.step(t, length, commands, view_.neighbours->view(view_.place, std::min(t, from_s)));
+    });
+    const Innovation innovation = h.filter.update(sample, view_.clock.at(sample.time_s - 1e-9));
+    h.log_weight += innovation.log_likelihood;
+    if (!innovation.lost || innovation.size != 2) continue;
+    h.log_weight -= 20;
+    lost += 1;
+  }
+  log_likelihood_ += total_of(hypotheses_) - weight;
+  // Where it is is known, but not which way it points.
+  if (lost > 0 && lost == static_cast<double>(hypotheses_.size())) return start(sample);
+  prune();
+}
+
+void Follower::start(const Sample& sample) {
+  RobotBias bias = model_.bias_of(view_.track->robot);
+  hypotheses_.clear();
+  const auto add = [&](double heading, double sd) {
+    TrackFilter filter(model_, bias, view_.track->robot, view_.number);
+    filter.start(sample, {}, heading, sd);
+    hypotheses_.push_back({std::move(filter), 0});
+  };
+  if (TrackFilter::has_heading(sample)) return add(sample.heading_rad, std::sqrt(model_.noise.heading_rad2));
+  constexpr int kHeadings = 18;
+  for (int i = 0; i < kHeadings; ++i) add(2 * M_PI * i / kHeadings, M_PI / kHeadings);
+}
+
+void Follower::prune() {
+  constexpr double kHopeless = 20;
+  double best = -1e300;
+  for (const Hypothesis& h : hypotheses_) best = std::max(best, h.log_weight);
+  for (Hypothesis& h : hypotheses_) h.log_weight -= best;
+  std::erase_if(hypotheses_, [](const Hypothesis& h) { return h.log_weight < -kHopeless; });
+  // Two that have become the same are one.
+  for (std::size_t i = 0; i + 1 < hypotheses_.size(); ++i) {
+    for (std::size_t j = i + 1; j < hypotheses_.size();) {
+      const Belief& a = hypotheses_[i].filter.belief();
+      const Belief& b = hypotheses_[j].filter.belief();
+      const double apart = wrapped_angle(a.mean[2] - b.mean[2]);
+      if (apart * apart < 0.25 * std::min(a.covariance(2, 2), b.covariance(2, 2))) {
+        const double wa = std::exp(hypotheses_[i].log_weight), wb = std::exp(hypotheses_[j].log_weight);
+        if (wb > wa) hypotheses_[i].filter = hypotheses_[j].filter;
+        hypotheses_[i].log_weight = std::log(wa + wb);
+        hypotheses_.erase(hypotheses_.begin() + static_cast<std::ptrdiff_t>(j));
+      } else {
+        ++j;
+      }
+    }
+  }
+}
+
+Centres centres_of(const MotionModel& model, const TrackView& view) {
+  Centres centres;
+  Follower follower(model, view);
+  for (const Sample& sample : view.track->samples) {
+    follower.follow(sample.time_s);
+    double sum = 0, x = 0, y = 0;
+    for (const Follower::Hypothesis& h : follower.hypotheses()) {
+      const double weight = std::exp(h.log_weight);
+      sum += weight;
+      x += weight * h.filter.belief().centre_x_mm();
+      y += weight * h.filter.belief().centre_y_mm();
+    }
+    centres.x_mm.push_back(x / sum);
+    centres.y_mm.push_back(y / sum);
+  }
+  return centres;
+}
+
+}  // namespace kilotwin::identify

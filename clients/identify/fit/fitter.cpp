@@ -1,0 +1,92 @@
+#include "clients/identify/fit/fitter.hpp"
+
+#include <algorithm>
+
+#include "clients/identify/fit/noise_fit.hpp"
+
+namespace kilotwin::identify {
+
+std::vector<Block> blocks_of(const MotionModel& model) {
+  std::vector<Block> blocks;
+  for (const Term& term : model.terms) blocks.insert(blocks.end(), term.blocks.begin(), term.blocks.end());
+  return blocks;
+}
+
+std::vector<const TrackView*> Fitter::some_tracks(std::size_t samples) const {
+  std::vector<const TrackView*> chosen, all;
+  for (const TrackView& view : set_.views())
+    if (!view.track->held_out) all.push_back(&view);
+  std::size_t sum = 0;
+  for (std::size_t i = 0; i < all.size() && sum < samples; ++i) {
+    chosen.push_back(all[(i * 7919) % all.size()]);
+    sum += chosen.back()->track->samples.size();
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+void Fitter::fit_noise(MotionModel& model) const {
+  model.noise = most_likely_noise(model, some_tracks(kEnoughSamples), set_.set().has_headings, threads_);
+}
+
+void Fitter::fit_base(MotionModel& model) const {
+  const bool headings = set_.set().has_headings;
+  if (headings) {
+    set_.find_headings(model, threads_);
+  } else {
+    // In a room that robots are hardly ever free in, a tracked point and walls that do not belong together hold each other
+    // where they are: those that explain most to start with are taken, of either point that is likely to be tracked.
+    const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+    const MotionModel given = model;
+    double best = -1e300;
+    for (const double ahead_mm : {0.0, given.base.ahead_mm}) {
+      MotionModel start = given;
+      start.base.ahead_mm = ahead_mm;
+      start.touch_mm = touching_mm(start.base, headings);
+      set_.find_headings(start, threads_);
+      find_walls(start);
+      const double value = with_touching(start, tracks);
+      if (value <= best) continue;
+      best = value;
+      model = start;
+    }
+    set_.find_headings(model, threads_);
+    // What is not known to be a push would pass for noise of the wheels.
+    fit_touching(model);
+  }
+  fit(model, 3);
+  find_shape(model);
+  // Where headings are not measured, walls, centres and what touching does lean on each other.
+  constexpr int kMostRounds = 4;
+  constexpr double kSettled = 20;
+  double likelihood = -1e300;
+  for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
+    if (headings || round > 0) find_walls(model);
+    if (round > 0) set_.find_centres(model, threads_);
+    fit_touching(model);
+    fit(model, 2);
+    const double found = log_likelihood(model);
+    if (found < likelihood + kSettled) break;
+    likelihood = found;
+  }
+  if (holds_seem_elsewhere(model)) {
+    model = doubting(model);
+    fit(model, 2);
+  }
+}
+
+void Fitter::fit(MotionModel& model, int passes) const {
+  // With a new map of the picture, all that was seen of walls and of who meets whom is to be seen anew.
+  const bool new_picture = !model.terms.empty() && is_map_of_picture(model.terms.back());
+  if (passes > 1 && new_picture) straighten(model);
+  for (int pass = 0; pass < passes; ++pass) {
+    set_.find_headings(model, threads_);
+    look_for_walls(model);
+    // What was noise to a model without its new terms is not, once they have their size.
+    if (pass != 0 || passes == 1) fit_noise(model);
+    step(model);
+  }
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,137 @@
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/model/camera_scale.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// The normal equations of a step: of the data, the base's prior and the terms'.
+struct Equations {
+  std::vector<Unit> units;
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+  Eigen::VectorXd beforehand;  ///< precisions of the terms' coefficients
+};
+
+Equations equations_of(const Fitter& fitter, const MotionModel& model) {
+  Equations e;
+  e.units = linearise(model, fitter.set().units(), blocks_of(model), {100, fitter.threads()});
+  const Eigen::Index n = e.units.front().information.rows();
+  e.information = Eigen::MatrixXd::Zero(n, n);
+  e.score = e.beforehand = Eigen::VectorXd::Zero(n);
+  for (const Unit& unit : e.units) {
+    e.information += unit.information;
+    e.score += unit.score;
+  }
+  fitter.add_base_prior(model, e.information, e.score);
+  Eigen::Index first = kBaseColumns;
+  for (const Term& term : model.terms) {
+    const Eigen::Index count = term.coefficients.size();
+    e.beforehand.segment(first, count) = term.precision;
+    e.score.segment(first, count) -= term.precision.cwiseProduct(term.coefficients);
+    first += count;
+  }
+  e.information.diagonal() += e.beforehand;
+  // Along the common scale of a picture, speeds and wheel base nothing changes but how wide the noise is, which a step does not
+  // see: it would go far for nothing.
+  if (const Eigen::VectorXd by_scale = log_scale_by_coefficients(model); by_scale.size() > 0) {
+    constexpr double kHeld = 1e-4;
+    const Eigen::VectorXd row = by_scale / kHeld;
+    e.information.bottomRightCorner(row.size(), row.size()).noalias() += row * row.transpose();
+  }
+  return e;
+}
+
+}  // namespace
+
+void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {
+  const BaseParameters seed;
+  const auto add = [&](Eigen::Index i, double from, double sd) {
+    information(i, i) += 1 / (sd * sd);
+    score[i] += from / (sd * sd);
+  };
+  add(kStraightSpeed, seed.straight_mm_s - model.base.straight_mm_s, prior_.straight_mm_s);
+  add(kTurnSpeed, seed.turn_mm_s - model.base.turn_mm_s, prior_.turn_mm_s);
+  add(kWheelBase, seed.wheel_base_mm - model.base.wheel_base_mm, prior_.wheel_base_mm);
+  add(kAheadPoint, seed.ahead_mm - model.base.ahead_mm, prior_.point_mm);
+  add(kLeftPoint, seed.left_mm - model.base.left_mm, prior_.point_mm / 4);
+}
+
+void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eigen::VectorXd& step) {
+  const auto limited = [](double value, double most) { return std::clamp(value, -most, most); };
+  model.base.straight_mm_s += limited(step[kStraightSpeed], 20);
+  model.base.turn_mm_s += limited(step[kTurnSpeed], 20);
+  model.base.wheel_base_mm = std::clamp(model.base.wheel_base_mm + limited(step[kWheelBase], 3), 10.0, 60.0);
+  model.base.ahead_mm += limited(step[kAheadPoint], 8);
+  model.base.left_mm += limited(step[kLeftPoint], 8);
+  Eigen::Index first = kBaseColumns;
+  for (Term& term : model.terms) {
+    term.coefficients += step.segment(first, term.coefficients.size());
+    first += term.coefficients.size();
+  }
+  // A robot may be several units (tracks): its bias is their mean by precision.
+  std::map<std::uint32_t, std::pair<Eigen::Matrix2d, Eigen::Vector2d>> sums;
+  for (const Unit& unit : units) {
+    const RobotBias was = model.bias_of(unit.robot);
+    const Eigen::Vector2d bias = was.mean_mm_s + unit.bias_step - unit.bias_by_column * step;
+    const Eigen::Matrix2d precision = unit.bias_covariance.inverse();
+    auto [sum, made] = sums.try_emplace(unit.robot, Eigen::Matrix2d::Zero(), Eigen::Vector2d::Zero());
+    sum->second.first += precision;
+    sum->second.second += precision * bias;
+  }
+  double sum = 0, square = 0, count = 0;
+  for (const auto& [robot, s] : sums) {
+    RobotBias& bias = model.robots[robot];
+    bias.covariance = s.first.inverse();
+    bias.mean_mm_s = (bias.covariance * s.second).cwiseMax(-15).cwiseMin(15);
+    sum += bias.mean_mm_s.sum();
+    square += bias.mean_mm_s.squaredNorm() + bias.covariance.trace();
+    count += 2;
+  }
+  // The distribution of biases, held near the seed's where robots are few.
+  const BaseParameters seed;
+  constexpr double kSeedRobots = 4;
+  const double mean = sum / (count + kSeedRobots);
+  const double variance =
+      (square - 2 * mean * sum + count * mean * mean + kSeedRobots * seed.bias_sd_mm_s * seed.bias_sd_mm_s) /
+      (count + kSeedRobots);
+  model.base.bias_mean_mm_s = mean;
+  model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
+}
+
+double Fitter::worth(const MotionModel& model) const {
+  double value = log_likelihood(model);
+  for (const Term& term : model.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+  return value;
+}
+
+void Fitter::step(MotionModel& model) const {
+  const Equations e = equations_of(*this, model);
+  // A step that makes things worse is held back first where the data say little, then everywhere.
+  const MotionModel start = model;
+  const bool pictured = start.measures() && start.room.any();
+  const double before = worth(start);
+  struct Trial {
+    double firmness, length;
+  };
+  constexpr std::array<Trial, 6> kTrials = {{{0, 1}, {10, 1}, {100, 1}, {100, 0.4}, {100, 0.16}, {100, 0.06}}};
+  bool better = false;
+  for (const Trial& trial : kTrials) {
+    Eigen::MatrixXd held = e.information;
+    held.diagonal() += trial.firmness * e.beforehand;
+    model = start;
+    apply(model, e.units, trial.length * held.ldlt().solve(e.score));
+    if (pictured) model.room = carried(start.room, start, model);
+    better = worth(model) > before - 2;
+    if (better) break;
+  }
+  if (!better) model = start;
+  if (model.measures()) settle_scale(model);
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,219 @@
+#include "clients/identify/kilogrid/floor_selection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "clients/identify/kilogrid/floor_evidence.hpp"
+
+namespace kilotwin::kilogrid {
+namespace {
+
+/// Sets simulated without an effect; and how often the engine simulates the measured runs, to be compared with them.
+constexpr int kSets = 16, kRepeats = 2;
+constexpr double kWhole_s = std::numeric_limits<double>::infinity();
+
+std::vector<FloorSet> sets_of(const FloorModel& model, const FloorTarget& target, std::uint64_t seed) {
+  auto sums = simulated_sums(target, model.settings(), seed, kSets, Simulator::kQuick);
+  const auto scenes = static_cast<std::ptrdiff_t>(target.scenes().size());
+  std::vector<FloorSet> sets;
+  for (auto first = sums.begin(); first != sums.end(); first += scenes)
+    sets.emplace_back(std::vector(std::make_move_iterator(first), std::make_move_iterator(first + scenes)));
+  return sets;
+}
+
+/// What other sets than this one say together, as many as the engine's repeats.
+FloorStatistics others_than(const std::vector<FloorSet>& sets, std::size_t set) {
+  std::vector<std::vector<RobotSums>> others;
+  for (std::size_t k = 1; k <= std::size_t{kRepeats}; ++k) {
+    for (const auto& run : sets[(set + k) % sets.size()].runs) others.push_back(run);
+  }
+  return pooled(others);
+}
+
+/// Parameters of the model and of its candidates, as those that are in use.
+class Candidates {
+ public:
+  Candidates(const FloorModel& model, const std::vector<FloorTerm>& candidates)
+      : all_(model), candidates_(candidates), in_model_(model.values.size()), terms_(model.terms.size()) {
+    for (const FloorTerm& candidate : candidates) all_.add(candidate);
+  }
+  [[nodiscard]] const FloorModel& all() const { return all_; }
+  [[nodiscard]] std::size_t first_of(std::size_t c) const { return all_.first_of(terms_ + c); }
+  [[nodiscard]] std::vector<bool> model_only() const {
+    std::vector<bool> use(all_.values.size(), false);
+    std::fill_n(use.begin(), in_model_, true);
+    return use;
+  }
+  [[nodiscard]] std::vector<bool> with_all() const {
+    std::vector<bool> use = model_only();
+    for (const std::size_t p : switches()) use[p] = true;
+    return use;
+  }
+  [[nodiscard]] std::vector<bool> with(std::size_t c) const {
+    std::vector<bool> use = model_only();
+    std::fill_n(use.begin() + static_cast<std::ptrdiff_t>(first_of(c)), candidates_[c].switches, true);
+    return use;
+  }
+  /// Candidates are off; what switches them on is varied, not their shapes.
+  [[nodiscard]] std::vector<std::size_t> switches() const {
+    std::vector<std::size_t> at;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      for (std::size_t p = 0; p < candidates_[c].switches; ++p) at.push_back(first_of(c) + p);
+    }
+    return at;
+  }
+
+ private:
+  FloorModel all_;
+  const std::vector<FloorTerm>& candidates_;
+  std::size_t in_model_, terms_;
+};
+
+/// What candidates remove of a set's misfit.
+struct Gains {
+  double without = 0;      ///< misfit, refitted
+  double with_all = 0;     ///< that no candidate explains
+  std::vector<double> of;  ///< each candidate
+
+  Gains(const FloorGap& gap, const Candidates& candidates, std::size_t count, const FloorBox& box)
+      : without(gap.at(gap.best_steps(candidates.model_only(), box))),
+        with_all(gap.at(gap.best_steps(candidates.with_all(), box))) {
+    for (std::size_t c = 0; c < count; ++c) of.push_back(without - gap.at(gap.best_steps(candidates.with(c), box)));
+  }
+};
+
+/// What a candidate removes of `other`, learned from `own`.
+double gain_of_other(const FloorGap& own, const FloorGap& other, const Candidates& of, std::size_t c,
+                     const FloorBox& box) {
+  return other.at(own.best_steps(of.model_only(), box)) - other.at(own.best_steps(of.with(c), box));
+}
+
+/// Of the model's parameters a step of one width, of candidates' two: those are off, and may be far from it.
+FloorBox box_of(const FloorModel& all, std::size_t in_model) {
+  FloorBox box = box_around(all, 1, 1);
+  const FloorBox wide = box_around(all, 1, 2);
+  std::copy(wide.least.begin() + static_cast<std::ptrdiff_t>(in_model), wide.least.end(),
+            box.least.begin() + static_cast<std::ptrdiff_t>(in_model));
+  std::copy(wide.most.begin() + static_cast<std::ptrdiff_t>(in_model), wide.most.end(),
+            box.most.begin() + static_cast<std::ptrdiff_t>(in_model));
+  return box;
+}
+
+}  // namespace
+
+bool CandidateScore::helps_others() const {
+  if (by_run.empty()) return true;
+  double sum = 0;
+  std::size_t against = 0;
+  for (const double removed : by_run) {
+    sum += removed;
+    against += removed > 0 ? 0 : 1;
+  }
+  return sum > 0 && against <= by_run.size() / 4;
+}
+
+bool CandidateScore::helps_all_alike() const {
+  // One-sided, of 2 to 9 degrees of freedom; more are as good as nine.
+  constexpr std::array kStudent = {6.965, 4.541, 3.747, 3.365, 3.143, 2.998, 2.896, 2.821};
+  if (by_run.size() < 3) return false;
+  const auto count = static_cast<double>(by_run.size());
+  const double mean = std::accumulate(by_run.begin(), by_run.end(), 0.0) / count;
+  double squares = 0;
+  for (const double removed : by_run) {
+    if (!(removed > 0)) return false;
+    squares += (removed - mean) * (removed - mean);
+  }
+  return mean >
+         kStudent[std::min(by_run.size() - 3, kStudent.size() - 1)] * std::sqrt(squares / (count - 1) / count);
+}
+
+Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates, const FloorTarget& target,
+              std::uint64_t seed, const FloorProgress& progress) {
+  Choice choice;
+  if (candidates.empty()) return choice;
+  const Candidates of(model, candidates);
+  const std::size_t runs = target.scenes().size();
+  const auto simulated = simulated_sums(target, model.settings(), seed * 7 + 3, kRepeats);
+  const auto here = [&](const std::function<bool(std::size_t)>& in) {
+    return pooled(simulated, [&](std::size_t i) { return in(i % runs); });
+  };
+  Eigen::MatrixXd slopes = slopes_around(of.all(), target, of.model_only(), 1, kWhole_s, seed);
+  add_slopes_of_switches(slopes, of.all(), target, of.switches(), kWhole_s, seed);
+  const FloorBox box = box_of(of.all(), model.values.size());
+  const std::vector<FloorSet> sets = sets_of(model, target, seed * 3 + 2);
+  const Eigen::MatrixXd correlation = correlation_of(sets);
+
+  std::vector<std::optional<Gains>> made(sets.size());
+  in_parallel(target.threads(), sets.size(), [&](std::size_t b) {
+    made[b].emplace(FloorGap(sets[b], others_than(sets, b), slopes, correlation), of, candidates.size(), box);
+  });
+  double all_by_chance = 0;
+  std::vector<std::vector<double>> by_chance;
+  for (const std::optional<Gains>& set : made) {
+    choice.by_chance += set->without / static_cast<double>(sets.size());
+    all_by_chance += set->with_all / static_cast<double>(sets.size());
+    by_chance.push_back(set->of);
+  }
+  std::vector<std::size_t> switches;
+  for (const FloorTerm& candidate : candidates) switches.push_back(candidate.switches);
+  const FloorChance chance(by_chance, switches);
+  choice.bound = chance.bound();
+
+  const FloorGap gap(target.set(), here([](std::size_t) { return true; }), slopes, correlation);
+  const Gains gains(gap, of, candidates.size(), box);
+  choice.numbers = gap.numbers;
+  choice.misfit = gains.without;
+  // What all candidates together do not explain counts as if chance were so much larger, as an analysis of variance takes its
+  // errors from what its largest model leaves.
+  choice.unexplained = std::max(1.0, gains.with_all / all_by_chance);
+  // Each run and all but it: what is learned from these must help with it.
+  std::vector<FloorGap> alone, others;
+  constexpr std::size_t kFewestRuns = 3;
+  for (std::size_t r = 0; runs >= kFewestRuns && r < runs; ++r) {
+    std::vector<std::vector<RobotSums>> rest = target.set().runs;
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(r));
+    alone.emplace_back(FloorSet({target.set().runs[r]}), here([r](std::size_t i) { return i == r; }), slopes,
+                       correlation);
+    others.emplace_back(FloorSet(std::move(rest)), here([r](std::size_t i) { return i != r; }), slopes,
+                        correlation);
+  }
+  std::string tried;
+  const auto better = [&](const CandidateScore& a, const CandidateScore& b) {
+    if (a.beyond(choice.bound) != b.beyond(choice.bound)) return a.beyond(choice.bound);
+    return a.helps_others() != b.helps_others() ? a.helps_others() : a.evidence > b.evidence;
+  };
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const Eigen::VectorXd steps = gap.best_steps(of.with(c), box);
+    const std::vector<double> values = moved(of.all(), {steps.data(), steps.data() + steps.size()}, 1);
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(of.first_of(c));
+    choice.scores.push_back({gains.of[c],
+                             chance.gain_of(c, choice.bound) * choice.unexplained,
+                             chance.evidence(c, gains.of[c] / choice.unexplained),
+                             {},
+                             {first, first + static_cast<std::ptrdiff_t>(candidates[c].parameters.size())}});
+    CandidateScore& score = choice.scores.back();
+    score.by_chance_alone = chance.evidence(c, gains.of[c]);
+    for (std::size_t r = 0; r < alone.size(); ++r)
+      score.by_run.push_back(gain_of_other(others[r], alone[r], of, c, box));
+    if (score.helps_all_alike()) score.needed = chance.gain_of(c, choice.bound);
+    if (better(score, choice.scores[choice.best])) choice.best = c;
+    tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, score.gain, score.needed);
+    for (std::size_t r = 0; r < score.by_run.size(); ++r)
+      tried += fmt::format("{}{:.0f}", r == 0 ? " (" : " ", score.by_run[r]);
+    if (!score.by_run.empty()) tried += ")";
+  }
+  progress(fmt::format(
+      "of {:.0f} ({:.0f} by chance, {} numbers, unexplained {:.1f} times) would remove, of what is beyond "
+      "chance (of each run, by the others):{}",
+      choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried));
+  return choice;
+}
+
+}  // namespace kilotwin::kilogrid

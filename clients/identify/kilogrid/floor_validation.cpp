@@ -1,0 +1,149 @@
+#include "clients/identify/kilogrid/floor_validation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/identify/kilogrid/floor_classifier.hpp"
+
+namespace kilotwin::kilogrid {
+namespace {
+
+using nlohmann::json;
+
+/// Robots and time that predictions are made for: some of each run held out.
+constexpr std::size_t kPredictedRobots = 6, kParticles = 80;
+constexpr double kPredicted_s = 900;
+
+/// A mean of areas, with its standard error.
+struct MeanArea {
+  double sum = 0, variance = 0, count = 0;
+  void add(const TellApart& t) {
+    sum += t.best();
+    variance += t.best_sd() * t.best_sd();
+    ++count;
+  }
+  [[nodiscard]] double value() const { return count > 0 ? sum / count : 0.5; }
+  [[nodiscard]] double sd() const { return count > 0 ? std::sqrt(variance) / count : 0; }
+  [[nodiscard]] json document() const {
+    return {{"area", value()}, {"low", value() - 1.96 * sd()}, {"high", value() + 1.96 * sd()}, {"pairs", count}};
+  }
+};
+
+double area_of_feature(const std::vector<TrackWindow>& a, const std::vector<TrackWindow>& b, std::size_t feature) {
+  std::vector<double> of_a, of_b;
+  for (const TrackWindow& w : a) of_a.push_back(w.feature[feature]);
+  for (const TrackWindow& w : b) of_b.push_back(w.feature[feature]);
+  return area_under_curve(of_a, of_b);
+}
+
+}  // namespace
+
+Judged judge(const std::vector<FloorRun>& runs, const Floor& floor, const FloorSettings& settings, double horizon_s,
+             std::vector<Predicted>* all) {
+  Judged judged;
+  for (const FloorRun& run : runs) {
+    const std::size_t stride = std::max<std::size_t>(run.tracks.size() / kPredictedRobots, 1);
+    for (std::size_t i = stride / 2; i < run.tracks.size(); i += stride) {
+      FloorTrack track = run.tracks[i];
+      while (track.size() > 1 && track.time_s.back() > kPredicted_s) {
+        track.time_s.pop_back();
+        track.x_mm.pop_back();
+        track.y_mm.pop_back();
+      }
+      const CellFilterResult result = filter_cells(track, floor, settings, horizon_s, kParticles, 17 * i + 5);
+      judged.log_likelihood += result.log_likelihood;
+      judged.reports += result.reports;
+      double sum = 0;
+      for (const CellPrediction& p : result.predictions) {
+        const double dx = p.x_mm - p.measured_x_mm, dy = p.y_mm - p.measured_y_mm;
+        sum += dx * dx + dy * dy;
+        if (all != nullptr) all->push_back({run.name, track.robot, p});
+      }
+      judged.sum += sum;
+      judged.rows += result.predictions.size();
+      judged.by_robot.emplace_back(sum, static_cast<double>(result.predictions.size()));
+    }
+  }
+  return judged;
+}
+
+json summary_of(const Judged& judged) {
+  const auto n = static_cast<double>(std::max<std::size_t>(judged.rows, 1));
+  const double mean = judged.sum / n;
+  double spread = 0;
+  for (const auto& [sum, count] : judged.by_robot) spread += (sum - mean * count) * (sum - mean * count);
+  const double half = 1.96 * std::sqrt(spread) / n;
+  return {{"rmse_mm", judged.rmse_mm()},
+          {"rmse_low_mm", std::sqrt(std::max(mean - half, 0.0))},
+          {"rmse_high_mm", std::sqrt(mean + half)},
+          {"rows", judged.rows},
+          {"log_likelihood_per_report",
+           judged.log_likelihood / static_cast<double>(std::max<std::size_t>(judged.reports, 1))}};
+}
+
+json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& unlike,
+              const std::vector<FloorRun>& test, const FloorTarget& held_out, const FloorSettings& before,
+              const FloorSettings& after) {
+  const Floor& floor = held_out.floor();
+  std::vector<std::vector<TrackWindow>> measured, by_before, by_after;
+  for (const auto* runs : {&test, &alike, &unlike}) {
+    for (const FloorRun& run : *runs) measured.push_back(windows_of(run, floor));
+  }
+  for (const FloorRun& run : simulate_scenes(held_out, before, 901)) by_before.push_back(windows_of(run, floor));
+  for (const FloorRun& run : simulate_scenes(held_out, after, 902)) by_after.push_back(windows_of(run, floor));
+
+  // Pairs of measured runs first, then each run held out with what was simulated for it.
+  struct Pair {
+    const std::vector<TrackWindow>*a, *b;
+    TellApart told = {};
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    for (std::size_t j = i + 1; j < measured.size(); ++j) pairs.push_back({&measured[i], &measured[j]});
+  }
+  const std::size_t days = pairs.size(), runs = test.size();
+  for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_before[i]});
+  for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_after[i]});
+  in_parallel(held_out.threads(), pairs.size(),
+              [&](std::size_t i) { pairs[i].told = tell_apart(*pairs[i].a, *pairs[i].b); });
+
+  MeanArea all_days, days_alike, mean_before, mean_after;
+  const std::size_t like_others = runs + alike.size();
+  for (std::size_t i = 0, p = 0; i < measured.size(); ++i) {
+    for (std::size_t j = i + 1; j < measured.size(); ++j, ++p) {
+      all_days.add(pairs[p].told);
+      if (i < runs && j < like_others) days_alike.add(pairs[p].told);
+    }
+  }
+  json each = json::array(), features = json::array();
+  for (std::size_t i = 0; i < runs; ++i) {
+    const TellApart &b = pairs[days + i].told, &a = pairs[days + runs + i].told;
+    mean_before.add(b);
+    mean_after.add(a);
+    each.push_back({{"run", test[i].name},
+                    {"before", b.best()},
+                    {"after", a.best()},
+                    {"after_logistic", a.logistic},
+                    {"after_boosted", a.boosted},
+                    {"after_se", a.best_sd()}});
+  }
+  for (std::size_t f = 0; f < feature_names().size(); ++f) {
+    double b = 0, a = 0;
+    for (std::size_t i = 0; i < runs; ++i) {
+      b += area_of_feature(measured[i], by_before[i], f) / static_cast<double>(runs);
+      a += area_of_feature(measured[i], by_after[i], f) / static_cast<double>(runs);
+    }
+    features.push_back({{"name", feature_names()[f]}, {"before", b}, {"after", a}});
+  }
+  const double off = mean_after.value() - all_days.value();
+  return {{"measured_days", all_days.document()},
+          {"measured_days_held_out", days_alike.document()},
+          {"before", mean_before.document()},
+          {"after", mean_after.document()},
+          {"above_measured_days", off},
+          {"above_measured_days_se", std::hypot(mean_after.sd(), all_days.sd())},
+          {"runs", each},
+          {"features", features}};
+}
+
+}  // namespace kilotwin::kilogrid

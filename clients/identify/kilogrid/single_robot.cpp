@@ -1,0 +1,222 @@
+#include "clients/identify/kilogrid/single_robot.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/pose.hpp"
+#include "core/math/elementary.h"
+
+namespace kilotwin::kilogrid {
+
+using proto::Effect, proto::Function;
+
+LoneRobot::LoneRobot(const Floor& floor, const FloorSettings& settings) : floor_(floor), settings_(settings) {
+  for (const Effect& effect : settings.model.effect()) {
+    Term term{
+        effect.acts_on(), effect.wheel() != Effect::RIGHT_WHEEL, effect.wheel() != Effect::LEFT_WHEEL, 1, 0, 0, {}};
+    kt_sincos(effect.direction_deg() * kPi / 180, &term.across, &term.along);
+    for (const int command : effect.during())
+      term.commands = static_cast<std::uint8_t>(term.commands | 1u << command);
+    if (effect.during_size() == 0) term.commands = 0xe;
+    for (const Function& f : effect.function()) {
+      const double correlation_s = f.noise().correlation_s();
+      Factor factor{EffectFunction(f),
+                    f.of(),
+                    f.and_of(),
+                    std::nullopt,
+                    f.has_noise(),
+                    f.has_episodes(),
+                    correlation_s,
+                    correlation_s > 0 ? kt_exp(-kStep_s / correlation_s) : 0,
+                    f.episodes().mean_apart_s(),
+                    f.episodes().scale_s(),
+                    f.episodes().tail(),
+                    f.episodes().longest_s()};
+      if (factor.is_noise || factor.is_episodes) factor.slot = slots_++;
+      if (f.of() == Function::DENSITY) crowd_radius_mm_ = f.radius_mm();
+      term.factors.push_back(std::move(factor));
+    }
+    terms_.push_back(std::move(term));
+  }
+}
+
+LoneState LoneRobot::start(std::uint32_t number, double x_mm, double y_mm, double heading_rad, Dice& dice) const {
+  const double sd = settings_.model.motion().bias_sd_mm_s();
+  LoneState state{number,
+                  x_mm,
+                  y_mm,
+                  heading_rad,
+                  sd * dice.normal(),
+                  sd * dice.normal(),
+                  0,
+                  Motion::kStop,
+                  FloorProgram(settings_.times, dice.bits()),
+                  std::vector<double>(slots_, 0)};
+  for (const Term& term : terms_) {
+    for (const Factor& factor : term.factors) {
+      if (factor.is_noise) state.memory[*factor.slot] = dice.normal();
+      if (factor.is_episodes) state.memory[*factor.slot] = -factor.apart_s * kt_log(dice.uniform());
+    }
+  }
+  keep_inside(state);
+  return state;
+}
+
+void LoneRobot::renew(LoneState& state, double keep, Dice& dice) const {
+  const double fresh = std::sqrt(1 - keep * keep), sd = settings_.model.motion().bias_sd_mm_s();
+  state.bias_left_mm_s = keep * state.bias_left_mm_s + fresh * sd * dice.normal();
+  state.bias_right_mm_s = keep * state.bias_right_mm_s + fresh * sd * dice.normal();
+  for (const Term& term : terms_) {
+    for (const Factor& factor : term.factors) {
+      if (factor.is_noise) state.memory[*factor.slot] = keep * state.memory[*factor.slot] + fresh * dice.normal();
+    }
+  }
+}
+
+void LoneRobot::keep_inside(LoneState& state) const {
+  state.x_mm = std::clamp(state.x_mm, kRobotRadius_mm, floor_.width_mm - kRobotRadius_mm);
+  state.y_mm = std::clamp(state.y_mm, kRobotRadius_mm, floor_.height_mm - kRobotRadius_mm);
+}
+
+LoneRobot::Driven LoneRobot::run_program(LoneState& state, std::int64_t kilo_ticks, Dice& dice) const {
+  // As often as in the engine: turns may be shorter than a step.
+  constexpr std::int64_t kEvery = 4;  // kilo_ticks
+  constexpr double kPart = static_cast<double>(kEvery) / kStepTicks;
+  const FloorRadio& radio = settings_.radio;
+  const double heard = radio.wall_heard * kStep_s * kPart;
+  // No cell of the rim is nearer than its middle is from the wall.
+  const double wall_mm = std::min(std::min(state.x_mm, floor_.width_mm - state.x_mm),
+                                  std::min(state.y_mm, floor_.height_mm - state.y_mm));
+  const double farthest_mm = radio.wall_range_mm + 4 * radio.wall_noise;
+  const bool may_hear = wall_mm - floor_.cell_mm / 2 < farthest_mm;
+  double reading_mm = -1;
+  Driven driven;
+  for (std::int64_t t = 0; t < kStepTicks; t += kEvery) {
+    if (may_hear && dice.uniform() < heard) {
+      if (reading_mm < 0) reading_mm = rim_cell_distance_mm(floor_, state.x_mm, state.y_mm);
+      // The program compares readings; where they begin does not matter as long as they are positive.
+      constexpr double kStrongest = 1000;
+      const double noisy_mm = reading_mm < farthest_mm ? reading_mm + radio.wall_noise * dice.normal() : reading_mm;
+      if (noisy_mm < radio.wall_range_mm) state.program.hear_wall(kilo_ticks + t, kStrongest - noisy_mm);
+    }
+    const Motion motion = state.program.loop(kilo_ticks + t);
+    state.since_command_s = motion == state.motion ? state.since_command_s + kStep_s * kPart : 0;
+    state.motion = motion;
+    driven.straight += motion == Motion::kStraight ? kPart : 0;
+    driven.left += motion == Motion::kLeft ? kPart : 0;
+    driven.right += motion == Motion::kRight ? kPart : 0;
+  }
+  return driven;
+}
+
+void LoneRobot::step(LoneState& state, std::int64_t k, Dice& dice, double neighbours) const {
+  const Driven driven = run_program(state, k * kStepTicks, dice);
+  if (state.motion == Motion::kStop) return remember(state, dice);
+  const proto::Motion& base = settings_.model.motion();
+  const double spread = std::sqrt(base.factor_variance_s() / kStep_s);
+  double left = driven.straight * base.straight_speed_mm_s() + driven.right * base.turn_speed_mm_s();
+  double right = driven.straight * base.straight_speed_mm_s() + driven.left * base.turn_speed_mm_s();
+  left = (left + state.bias_left_mm_s) * (1 + spread * dice.normal());
+  right = (right + state.bias_right_mm_s) * (1 + spread * dice.normal());
+  double left_gain = 1, right_gain = 1, left_more = 0, right_more = 0, sideways = 0, drift_x = 0, drift_y = 0;
+  const double half_base = base.wheel_base_mm() / 2;
+  for (const Term& term : terms_) {
+    const double value = value_of(term, state, static_cast<double>(k) * kStep_s, neighbours, dice);
+    if (value == 0) continue;
+    switch (term.target) {
+      case Effect::WHEEL_GAIN:
+        left_gain *= term.left ? 1 + value : 1;
+        right_gain *= term.right ? 1 + value : 1;
+        break;
+      case Effect::WHEEL_OFFSET:
+        left_more += term.left ? value : 0;
+        right_more += term.right ? value : 0;
+        break;
+      case Effect::TURN_RATE:
+        left_more -= value * half_base;
+        right_more += value * half_base;
+        break;
+      case Effect::BODY_DRIFT:
+        left_more += value * term.along;
+        right_more += value * term.along;
+        sideways += value * term.across;
+        break;
+      case Effect::WORLD_DRIFT:
+        drift_x += value * term.along;
+        drift_y += value * term.across;
+        break;
+      default: break;
+    }
+  }
+  left = left * left_gain + left_more;
+  right = right * right_gain + right_more;
+  const double turn_rad = (right - left) / base.wheel_base_mm() * kStep_s;
+  // Half of the turn before and half after the way: good to the second order; the reference point lies behind the centre.
+  double s, c, s1, c1, s2, c2;
+  kt_sincos(state.heading_rad, &s, &c);
+  kt_sincos(state.heading_rad + turn_rad / 2, &s1, &c1);
+  state.heading_rad = wrapped(state.heading_rad + turn_rad);
+  kt_sincos(state.heading_rad, &s2, &c2);
+  const double way = (left + right) / 2 * kStep_s, across = sideways * kStep_s, offset = base.axle_offset_mm();
+  state.x_mm += c1 * way - s1 * across + drift_x * kStep_s + offset * (c2 - c);
+  state.y_mm += s1 * way + c1 * across + drift_y * kStep_s + offset * (s2 - s);
+  keep_inside(state);
+  remember(state, dice);
+}
+
+double LoneRobot::covariate(Function::Covariate of, const LoneState& state, double time_s,
+                            double neighbours) const {
+  const double x = state.x_mm - floor_.width_mm / 2, y = state.y_mm - floor_.height_mm / 2;
+  switch (of) {
+    case Function::TIME:
+    case Function::DRIVEN_TIME:
+    case Function::MOTOR_TIME: return time_s;
+    case Function::X: return x;
+    case Function::Y: return y;
+    case Function::RADIUS: return std::sqrt(x * x + y * y);
+    case Function::HEADING: return state.heading_rad;
+    case Function::ROBOT: return state.number;
+    case Function::COMMAND: return static_cast<double>(state.motion);
+    case Function::TIME_SINCE_COMMAND: return state.since_command_s;
+    case Function::DENSITY: return neighbours;
+    default: return 0;
+  }
+}
+
+double LoneRobot::value_of(const Term& term, const LoneState& state, double time_s, double neighbours,
+                           Dice& dice) const {
+  if ((term.commands & 1u << static_cast<unsigned>(state.motion)) == 0) return 0;
+  double value = 1;
+  for (const Factor& factor : term.factors) {
+    if (factor.is_episodes && !(state.memory[*factor.slot] < 0)) return 0;
+    value *= factor.function(covariate(factor.of, state, time_s, neighbours),
+                             covariate(factor.and_of, state, time_s, neighbours));
+    if (value == 0) return 0;
+    if (factor.is_noise)
+      value *= factor.correlation_s > 0 ? state.memory[*factor.slot] : dice.normal() / std::sqrt(kStep_s);
+  }
+  return value;
+}
+
+void LoneRobot::remember(LoneState& state, Dice& dice) const {
+  for (const Term& term : terms_) {
+    for (const Factor& factor : term.factors) {
+      if (!factor.slot) continue;
+      double& slot = state.memory[*factor.slot];
+      if (factor.is_noise && factor.correlation_s > 0) {
+        slot = factor.keep * slot + std::sqrt(1 - factor.keep * factor.keep) * dice.normal();
+      } else if (factor.is_episodes) {
+        // Counts down to the next episode, then up to its end.
+        const bool on = slot < 0;
+        slot += on ? kStep_s : -kStep_s;
+        if (on && slot >= 0) slot = -factor.apart_s * kt_log(dice.uniform());
+        if (!on && slot <= 0) {
+          slot = -std::clamp(factor.scale_s * (kt_pow(dice.uniform(), -1 / factor.tail) - 1), kStep_s,
+                             factor.longest_s);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace kilotwin::kilogrid

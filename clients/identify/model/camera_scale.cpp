@@ -1,0 +1,299 @@
+#include "clients/identify/model/camera_scale.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+// What is looked at of distances, mm: two radii, and as far about them as any picture that is put straight is off.
+constexpr double kLow_mm = 24, kHigh_mm = 48, kBin_mm = 0.1;
+constexpr std::size_t kBins = 240;
+/// Discs are not round to less than this, and legs lean.
+constexpr double kMade_mm = 0.3;
+/// Pairs are looked at so often.
+constexpr double kEvery_s = 0.5;
+
+double below(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
+
+/// Shares of the bins among robots that pass each other, none nearer than `edge`, and those that stay there.
+struct Shares {
+  std::array<double, kBins> passing{}, staying{};
+  Shares(double edge_mm, double sd_mm) {
+    double all = 0, near = 0;
+    for (std::size_t i = 0; i < kBins; ++i) {
+      const double low = kLow_mm + kBin_mm * static_cast<double>(i), d = low + kBin_mm / 2;
+      all += passing[i] = d * below((d - edge_mm) / sd_mm);
+      near += staying[i] = below((low + kBin_mm - edge_mm) / sd_mm) - below((low - edge_mm) / sd_mm);
+    }
+    for (std::size_t i = 0; i < kBins; ++i) {
+      passing[i] /= all;
+      staying[i] /= std::max(near, 1e-300);
+    }
+  }
+};
+
+/// Coefficients of the map's columns that are linear along its own axis, one for each of x and y; null where it has none.
+struct LinearMap {
+  double *x = nullptr, *y = nullptr;
+  const Factor* of = nullptr;
+};
+
+LinearMap linear_map_of(Term& term) {
+  LinearMap map;
+  Eigen::Index first = 0;
+  for (const Block& block : term.blocks) {
+    const auto n = static_cast<Eigen::Index>(block.basis.size());
+    const bool x = block.target == Target::kMeasuredX, y = block.target == Target::kMeasuredY;
+    if ((x || y) && block.basis.factors.size() == 1 && block.basis.factors.front().shape == Shape::kPolynomials2) {
+      // The first column is P1 of x, the second of y.
+      const std::uint32_t wanted = x ? 0 : 1;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const std::uint32_t column = block.basis.chosen.empty() ? static_cast<std::uint32_t>(i)
+                                                                : block.basis.chosen[static_cast<std::size_t>(i)];
+        if (column == wanted) (x ? map.x : map.y) = term.coefficients.data() + first + i;
+      }
+      map.of = &block.basis.factors.front();
+    }
+    first += n;
+  }
+  return map;
+}
+
+}  // namespace
+
+void add_pairs(const RunNeighbours& run, std::size_t robots, std::uint32_t number, std::vector<Pair>& to) {
+  constexpr double kAnew_s = 5;
+  const auto stride = static_cast<std::size_t>(kEvery_s / RunNeighbours::kRaster_s);
+  std::size_t meeting = to.empty() ? 0 : to.back().meeting;
+  for (std::size_t a = 0; a < robots; ++a) {
+    for (std::size_t b = a + 1; b < robots; ++b) {
+      double last_s = -1e300;
+      for (std::size_t i = 0; i < run.instants(); i += stride) {
+        const RunNeighbours::Spot &one = run.spot(a, i), &other = run.spot(b, i);
+        const double apart = std::hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm);
+        if (!(apart > kLow_mm && apart < kHigh_mm)) continue;
+        if (run.time_s(i) > last_s + kAnew_s) ++meeting;
+        last_s = run.time_s(i);
+        Pair& pair = to.emplace_back();
+        pair.apart_mm = apart;
+        pair.meeting = meeting;
+        pair.x_mm = (one.x_mm + other.x_mm) / 2;
+        pair.y_mm = (one.y_mm + other.y_mm) / 2;
+        pair.at.time_s = last_s;
+        pair.at.run = number;
+      }
+    }
+  }
+}
+
+std::optional<TouchingApart> touching_apart(const std::vector<Pair>& pairs) {
+  constexpr std::size_t kFewest = 12;
+  std::array<double, kBins> counts{};
+  std::size_t meetings = 0, last = 0;
+  for (const Pair& pair : pairs) {
+    const double at = (pair.apart_mm - kLow_mm) / kBin_mm;
+    if (!(at >= 0 && at < kBins)) continue;
+    counts[static_cast<std::size_t>(at)] += 1;
+    if (pair.meeting != last) ++meetings;
+    last = pair.meeting;
+  }
+  if (meetings < kFewest) return std::nullopt;
+  double all = 0;
+  for (const double count : counts) all += count;
+  // Instants of one meeting count as one.
+  const double weight = static_cast<double>(meetings) / all;
+  const auto worth = [&](const Shares& shares, double staying) {
+    double sum = 0;
+    for (std::size_t i = 0; i < kBins; ++i)
+      if (counts[i] > 0)
+        // Some are where no model has them.
+        sum += counts[i] *
+               std::log(0.98 * ((1 - staying) * shares.passing[i] + staying * shares.staying[i]) + 0.02 / kBins);
+    return weight * sum;
+  };
+  // Nobody touches anybody.
+  const double nothing = worth(Shares(-100, 1), 0);
+  struct Tried {
+    double edge_mm, value;
+  };
+  std::vector<Tried> tried;
+  for (double edge = kLow_mm + 3; edge < kHigh_mm - 6; edge += kBin_mm) {
+    double best = -1e300;
+    for (const double sd : {0.3, 0.5, 0.8, 1.2, 1.8, 2.7}) {
+      const Shares shares(edge, sd);
+      for (const double staying : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85}) best = std::max(best, worth(shares, staying));
+    }
+    tried.push_back({edge, best});
+  }
+  const Tried best = *std::max_element(tried.begin(), tried.end(),
+                                       [](const Tried& a, const Tried& b) { return a.value < b.value; });
+  constexpr double kSure = 12;
+  if (best.value < nothing + kSure) return std::nullopt;
+  double sum = 0, mean = 0, square = 0;
+  for (const Tried& t : tried) {
+    const double chance = std::exp(t.value - best.value);
+    sum += chance;
+    mean += chance * t.edge_mm;
+    square += chance * t.edge_mm * t.edge_mm;
+  }
+  mean /= sum;
+  return TouchingApart{mean, std::sqrt(std::max(0.0, square / sum - mean * mean) + kMade_mm * kMade_mm), meetings};
+}
+
+ScaleHold::ScaleHold(const MotionModel& model, const std::vector<Pair>& pairs, double relative_sd)
+    : relative_sd_(relative_sd) {
+  constexpr std::size_t kMost = 300;
+  const std::size_t every = pairs.size() / kMost + 1;
+  for (std::size_t i = 0; i < pairs.size(); i += every) {
+    for (const bool along_x : {true, false}) {
+      Span& span = spans_.emplace_back();
+      span.at = pairs[i].at;
+      for (const int end : {0, 1}) {
+        const double off = (end - 0.5) * kDiscs_mm;
+        const Eigen::Vector3d seen =
+            model.measured(pairs[i].x_mm + (along_x ? off : 0), pairs[i].y_mm + (along_x ? 0 : off), 0, span.at);
+        span.x_mm[end] = seen[0];
+        span.y_mm[end] = seen[1];
+      }
+    }
+  }
+  then_ = log_length(model);
+}
+
+double ScaleHold::log_length(const MotionModel& model) const {
+  double sum = 0;
+  for (const Span& span : spans_) {
+    Eigen::Vector3d ends[2];
+    for (const int end : {0, 1})
+      ends[end] = model.pose_of({span.at.time_s, span.x_mm[end], span.y_mm[end], std::nan("")}, span.at);
+    sum += std::log(std::max(1.0, (ends[0] - ends[1]).head<2>().norm()));
+  }
+  return spans_.empty() ? 0 : sum / static_cast<double>(spans_.size());
+}
+
+double ScaleHold::factor(const MotionModel& model) const { return std::exp(then_ - log_length(model)); }
+
+Room carried(const Room& room, const MotionModel& before, const MotionModel& after) {
+  // Of a side without a wall opposite, so much to either side of the middle of the picture.
+  constexpr double kSide_mm = 250;
+  constexpr std::array<double, 5> kAlong = {0.1, 0.3, 0.5, 0.7, 0.9};
+  const auto range = [&](double low, double high) {
+    if (std::isfinite(low) && std::isfinite(high)) return std::pair{low, high};
+    if (std::isfinite(low)) return std::pair{low, low + 2 * kSide_mm};
+    if (std::isfinite(high)) return std::pair{high - 2 * kSide_mm, high};
+    return std::pair{-kSide_mm, kSide_mm};
+  };
+  const auto [x_low, x_high] = range(room.x_low_mm, room.x_high_mm);
+  const auto [y_low, y_high] = range(room.y_low_mm, room.y_high_mm);
+  // Of centres, wherever the point that is tracked is thought to be.
+  const auto of_centres = [](MotionModel model) {
+    model.base.ahead_mm = model.base.centre_mm = model.base.left_mm = 0;
+    return model;
+  };
+  const MotionModel then = of_centres(before), now = of_centres(after);
+  const auto moved = [&](double x_mm, double y_mm) {
+    const Situation at;
+    const Eigen::Vector3d seen = then.measured(x_mm, y_mm, 0, at);
+    return Eigen::Vector2d(now.pose_of({0, seen[0], seen[1], std::nan("")}, at).head<2>());
+  };
+  Room out = room;
+  const auto carry = [&](double Room::*side, bool of_x) {
+    if (std::isinf(room.*side)) return;
+    double sum = 0;
+    for (const double part : kAlong) {
+      const double along = of_x ? y_low + part * (y_high - y_low) : x_low + part * (x_high - x_low);
+      sum += of_x ? moved(room.*side, along)[0] : moved(along, room.*side)[1];
+    }
+    out.*side = sum / static_cast<double>(kAlong.size());
+  };
+  carry(&Room::x_low_mm, true);
+  carry(&Room::x_high_mm, true);
+  carry(&Room::y_low_mm, false);
+  carry(&Room::y_high_mm, false);
+  return out;
+}
+
+Eigen::VectorXd log_scale_by_coefficients(const MotionModel& model) {
+  MotionModel copy = model;
+  Eigen::Index columns = 0;
+  for (const Term& term : copy.terms) columns += term.coefficients.size();
+  Eigen::VectorXd by(0);
+  Eigen::Index first = 0;
+  for (Term& term : copy.terms) {
+    const LinearMap map = linear_map_of(term);
+    if (map.x != nullptr && map.y != nullptr) {
+      by.setZero(columns);
+      by[first + (map.x - term.coefficients.data())] = 1 / (map.of->high - map.of->low);
+      by[first + (map.y - term.coefficients.data())] = 1 / (map.of->and_high - map.of->and_low);
+    }
+    first += term.coefficients.size();
+  }
+  return by;
+}
+
+bool rescale(MotionModel& model, double factor) {
+  MotionModel scaled = model;
+  LinearMap map;
+  for (Term& term : scaled.terms) {
+    const LinearMap own = linear_map_of(term);
+    if (own.x != nullptr && own.y != nullptr) map = own;
+  }
+  if (map.of == nullptr) return false;
+  const double middle_x = (map.of->low + map.of->high) / 2, middle_y = (map.of->and_low + map.of->and_high) / 2;
+  const auto wider = [factor](double& at, double middle) { at = middle + factor * (at - middle); };
+  for (Term& term : scaled.terms) {
+    Eigen::Index first = 0;
+    for (Block& block : term.blocks) {
+      const auto n = static_cast<Eigen::Index>(block.basis.size());
+      for (Factor& f : block.basis.factors) {
+        const auto scale_axis = [&](Covariate of, double& low, double& high) {
+          if (of != Covariate::kX && of != Covariate::kY) return;
+          const double middle = of == Covariate::kX ? middle_x : middle_y;
+          wider(low, middle);
+          wider(high, middle);
+        };
+        scale_axis(f.axis.of, f.low, f.high);
+        if (f.of_two()) scale_axis(f.and_axis.of, f.and_low, f.and_high);
+      }
+      switch (block.target) {
+        case Target::kOffset:
+        case Target::kAhead:
+        case Target::kSideways:
+        case Target::kWorldX:
+        case Target::kWorldY:
+          term.coefficients.segment(first, n) *= factor;
+          term.precision.segment(first, n) /= factor * factor;
+          break;
+        default: break;
+      }
+      first += n;
+    }
+  }
+  // The picture shows all as large as before.
+  *map.x += (1 / factor - 1) * (map.of->high - map.of->low) / 2;
+  *map.y += (1 / factor - 1) * (map.of->and_high - map.of->and_low) / 2;
+  BaseParameters& base = scaled.base;
+  for (double* const length : {&base.straight_mm_s, &base.turn_mm_s, &base.wheel_base_mm, &base.ahead_mm,
+                               &base.left_mm, &base.bias_mean_mm_s, &base.bias_sd_mm_s})
+    *length *= factor;
+  for (auto& [robot, bias] : scaled.robots) {
+    bias.mean_mm_s *= factor;
+    bias.covariance *= factor * factor;
+  }
+  scaled.noise.wheel_mm2_s *= factor * factor;
+  scaled.noise.drift_mm2_s *= factor * factor;
+  wider(scaled.room.x_low_mm, middle_x);
+  wider(scaled.room.x_high_mm, middle_x);
+  wider(scaled.room.y_low_mm, middle_y);
+  wider(scaled.room.y_high_mm, middle_y);
+  // Not moved: who looks at a term goes on looking at it.
+  model = scaled;
+  return true;
+}
+
+}  // namespace kilotwin::identify

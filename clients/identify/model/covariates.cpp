@@ -1,0 +1,137 @@
+#include "clients/identify/model/covariates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kilotwin::identify {
+
+double wrapped_angle(double rad) { return std::remainder(rad, 2 * M_PI); }
+
+void CommandState::advance(double by_s) {
+  since_s += by_s;
+  if (left_on()) motor_s[0] += by_s;
+  if (right_on()) motor_s[1] += by_s;
+  if (driven()) driven_s += by_s;
+  since_rest_s = driven() ? since_rest_s + by_s : 0;
+}
+
+double CommandState::remembered_s(std::size_t forget, std::size_t motor) const {
+  const double span_s = kForget_s[forget], kept = std::exp(-since_s / span_s);
+  const bool on = motor == 0 ? left_on() : motor == 1 ? right_on() : driven();
+  return left_s[forget][motor] * kept + (on ? span_s * (1 - kept) : 0);
+}
+
+namespace {
+
+/// For which a motor has turned, or either: all of it, or what is not forgotten.
+double use_s(const CommandState& commands, std::size_t motor, std::uint8_t forget) {
+  if (forget > 0) return commands.remembered_s(forget - 1u, motor);
+  return motor < 2 ? commands.motor_s[motor] : commands.driven_s;
+}
+
+/// Whether it is not among what is added up beforehand.
+bool is_listed(const Axis& axis) { return axis.focus > 0 || axis.within_mm > 0; }
+
+/// Neighbours added up by where they are, too. Where they are not listed, as if all lay in that direction.
+double toward(const Axis& axis, const Situation& s) {
+  const NeighbourView& near = s.near;
+  const bool count = axis.of == Covariate::kNeighbours;
+  if (near.list == nullptr) return count ? near.count[axis.radius] : near.density[axis.radius];
+  const double reach = reach_mm(axis);
+  if (near.nearest_mm > reach) return 0;
+  const double ahead = s.heading_rad + axis.toward_deg * (M_PI / 180);
+  const double ahead_x = std::cos(ahead), ahead_y = std::sin(ahead);
+  double sum = 0;
+  for (std::uint32_t i = 0; i < near.listed; ++i) {
+    const OtherRobot& other = (*near.list)[near.first_listed + i];
+    if (other.distance_mm > reach) continue;
+    const double once = (1 + other.towards_x * ahead_x + other.towards_y * ahead_y) / 2;
+    const double part = 1 - other.distance_mm * other.distance_mm / (reach * reach);
+    double share = count ? 1 : part * part;
+    for (std::uint8_t k = 0; k < axis.focus; ++k) share *= once;
+    sum += share;
+  }
+  return sum;
+}
+
+}  // namespace
+
+double reach_mm(const Axis& axis) { return axis.within_mm > 0 ? axis.within_mm : kNeighbourRadii_mm[axis.radius]; }
+
+double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
+  switch (axis.of) {
+    case Covariate::kNothing: return 0;
+    case Covariate::kTime: return s.time_s;
+    case Covariate::kX: return s.x_mm;
+    case Covariate::kY: return s.y_mm;
+    case Covariate::kRadius: return std::sqrt(s.x_mm * s.x_mm + s.y_mm * s.y_mm);
+    case Covariate::kHeading: return s.heading_rad;
+    case Covariate::kCommand: return static_cast<double>(s.commands.command);
+    case Covariate::kSinceCommand: return s.commands.since_s;
+    case Covariate::kMotorTime: return use_s(s.commands, wheel, axis.forget);
+    case Covariate::kLeftMotorTime: return use_s(s.commands, 0, axis.forget);
+    case Covariate::kRightMotorTime: return use_s(s.commands, 1, axis.forget);
+    case Covariate::kDrivenTime: return use_s(s.commands, 2, axis.forget);
+    case Covariate::kNeighbours: return is_listed(axis) ? toward(axis, s) : s.near.count[axis.radius];
+    case Covariate::kNearest: return std::min(s.near.nearest_mm, reach_mm(axis));
+    case Covariate::kDensity: return is_listed(axis) ? toward(axis, s) : s.near.density[axis.radius];
+    case Covariate::kBearing:
+      return s.near.nearest_mm > reach_mm(axis) ? 0 : wrapped_angle(s.near.direction_rad - s.heading_rad);
+    case Covariate::kPreviousCommand:
+      return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
+    case Covariate::kPreviousLasted: return s.commands.previous_lasted_s;
+    case Covariate::kSinceRest: return s.commands.since_rest_s;
+    case Covariate::kUseDifference: return s.commands.motor_s[1] - s.commands.motor_s[0];
+    case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
+    case Covariate::kTrodden: return s.near.trodden_s[axis.radius];
+    case Covariate::kRobot: return s.robot;
+    case Covariate::kRun: return s.run;
+  }
+  return 0;
+}
+
+CommandClock::CommandClock(const Track& track) {
+  CommandState state;
+  auto left = state.left_s;
+  double now_s = 0;
+  for (const CommandChange& change : track.commands) {
+    const double at_s = std::max(change.time_s, 0.0);
+    if (!starts_s_.empty()) state.advance(at_s - now_s);
+    now_s = at_s;
+    for (std::size_t f = 0; f < kForget_s.size(); ++f)
+      for (std::size_t motor = 0; motor < 3; ++motor) left[f][motor] = state.remembered_s(f, motor);
+    state.left_s = left;
+    state.first = starts_s_.empty() || starts_s_.front() == at_s;
+    state.previous_lasted_s = state.first ? 0 : state.since_s;
+    state.previous = state.command;
+    state.command = change.motion;
+    state.since_s = 0;
+    if (change.motion == Motion::kLeft || change.motion == Motion::kRight) state.last_turn = change.motion;
+    if (!starts_s_.empty() && starts_s_.back() == at_s) {
+      states_.back() = state;  // nothing lasted
+      continue;
+    }
+    starts_s_.push_back(at_s);
+    states_.push_back(state);
+  }
+}
+
+std::size_t CommandClock::piece(double time_s) const {
+  const auto next = std::upper_bound(starts_s_.begin(), starts_s_.end(), time_s);
+  return next == starts_s_.begin() ? 0 : static_cast<std::size_t>(next - starts_s_.begin()) - 1;
+}
+
+CommandState CommandClock::at(double time_s) const {
+  const std::size_t p = piece(time_s);
+  CommandState state = states_[p];
+  state.advance(std::max(0.0, time_s - starts_s_[p]));
+  return state;
+}
+
+double CommandClock::next_change_s(double after_s) const {
+  const auto next = std::upper_bound(starts_s_.begin(), starts_s_.end(), after_s);
+  return next == starts_s_.end() ? std::numeric_limits<double>::infinity() : *next;
+}
+
+}  // namespace kilotwin::identify

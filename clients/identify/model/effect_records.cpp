@@ -1,0 +1,371 @@
+#include "clients/identify/model/effect_records.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+using proto::Effect, proto::Function;
+
+Function::Covariate covariate_of(Covariate c) {
+  switch (c) {
+    case Covariate::kNothing: return Function::NOTHING;
+    case Covariate::kTime: return Function::TIME;
+    case Covariate::kX: return Function::X;
+    case Covariate::kY: return Function::Y;
+    case Covariate::kRadius: return Function::RADIUS;
+    case Covariate::kHeading: return Function::HEADING;
+    case Covariate::kCommand: return Function::COMMAND;
+    case Covariate::kSinceCommand: return Function::TIME_SINCE_COMMAND;
+    case Covariate::kMotorTime: return Function::MOTOR_TIME;
+    // The left motor drives the right-hand wheel.
+    case Covariate::kLeftMotorTime: return Function::RIGHT_MOTOR_TIME;
+    case Covariate::kRightMotorTime: return Function::LEFT_MOTOR_TIME;
+    case Covariate::kDrivenTime: return Function::DRIVEN_TIME;
+    case Covariate::kNeighbours: return Function::NEIGHBOURS;
+    case Covariate::kNearest: return Function::NEAREST;
+    case Covariate::kDensity: return Function::DENSITY;
+    case Covariate::kBearing: return Function::NEAREST_BEARING;
+    case Covariate::kPreviousCommand: return Function::PREVIOUS_COMMAND;
+    case Covariate::kPreviousLasted: return Function::PREVIOUS_LASTED;
+    case Covariate::kSinceRest: return Function::SINCE_REST;
+    case Covariate::kUseDifference: return Function::MOTOR_TIME_DIFFERENCE;
+    case Covariate::kLastTurn: return Function::LAST_TURN;
+    case Covariate::kTrodden: return Function::PLACE;
+    case Covariate::kRobot: return Function::ROBOT;
+    case Covariate::kRun: return Function::RUN;
+  }
+  return Function::NOTHING;
+}
+
+bool is_of_use(Covariate c) { return c >= Covariate::kMotorTime && c <= Covariate::kDrivenTime; }
+bool is_of_neighbours(Covariate c) { return c >= Covariate::kNeighbours && c <= Covariate::kBearing; }
+
+/// A situation in which one covariate, or two, have values; what else there is does not matter.
+Situation with(const Axis& axis, double value, Situation s = {}) {
+  switch (axis.of) {
+    case Covariate::kTime: s.time_s = value; break;
+    case Covariate::kX: s.x_mm = value; break;
+    case Covariate::kY: s.y_mm = value; break;
+    case Covariate::kRadius: s.x_mm = value; break;
+    case Covariate::kHeading: s.heading_rad = value; break;
+    case Covariate::kSinceCommand: s.commands.since_s = value; break;
+    case Covariate::kPreviousLasted: s.commands.previous_lasted_s = value; break;
+    case Covariate::kSinceRest: s.commands.since_rest_s = value; break;
+    case Covariate::kUseDifference: s.commands.motor_s = {0, value}; break;
+    case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
+    case Covariate::kMotorTime:
+    case Covariate::kLeftMotorTime:
+    case Covariate::kRightMotorTime:
+    case Covariate::kDrivenTime:
+      s.commands.motor_s = {value, value};
+      s.commands.driven_s = value;
+      if (axis.forget > 0) s.commands.left_s[axis.forget - 1u] = {value, value, value};
+      break;
+    case Covariate::kNearest: s.near.nearest_mm = value; break;
+    case Covariate::kDensity: s.near.density[axis.radius] = static_cast<float>(value); break;
+    case Covariate::kTrodden: s.near.trodden_s[axis.radius] = static_cast<float>(value); break;
+    case Covariate::kBearing:
+      s.near.nearest_mm = 0;
+      s.near.direction_rad = value;
+      break;
+    default: break;
+  }
+  return s;
+}
+
+double sum_at(const Factor& factor, const Eigen::VectorXd& coefficients, const Situation& s) {
+  std::vector<double> values(factor.columns());
+  factor.evaluate(s, 0, values.data());
+  return factor.plus + coefficients.dot(Eigen::Map<const Eigen::VectorXd>(values.data(), coefficients.size()));
+}
+
+void set_axis(Function& function, const Factor& factor) {
+  function.set_of(covariate_of(factor.axis.of));
+  if (is_of_neighbours(factor.axis.of)) function.set_radius_mm(reach_mm(factor.axis));
+  if (factor.axis.focus > 0) {
+    function.set_focus(factor.axis.focus);
+    if (factor.axis.toward_deg != 0) function.set_toward_deg(factor.axis.toward_deg);
+  }
+  if (factor.axis.of == Covariate::kTrodden) function.set_field(field_name(factor.axis.radius));
+  if (is_of_use(factor.axis.of) && factor.axis.forget > 0)
+    function.set_forget_s(kForget_s[factor.axis.forget - 1u]);
+}
+
+/// The natural spline through the curve, with knots as dense as it bends.
+void set_spline(Function& function, const Factor& factor, const Eigen::VectorXd& coefficients, double low,
+                double high, double warp, int knots) {
+  proto::Spline& spline = *function.mutable_spline();
+  for (int i = 0; i < knots; ++i) {
+    const double part = static_cast<double>(i) / (knots - 1);
+    const double at =
+        warp > 0 ? low + warp * std::expm1(part * std::log1p((high - low) / warp)) : low + part * (high - low);
+    spline.add_knot(rounded(at));
+    spline.add_value(rounded(sum_at(factor, coefficients, with(factor.axis, at))));
+  }
+}
+
+/// The sum of a factor's columns by coefficients, as one function.
+Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) {
+  if (!factor.known.empty()) {
+    Factor open = factor;
+    open.known.clear();
+    open.plus *= coefficients[0];
+    return function_of(
+        open, coefficients[0] * Eigen::Map<const Eigen::VectorXd>(factor.known.data(),
+                                                                  static_cast<Eigen::Index>(factor.known.size())));
+  }
+  Function function;
+  set_axis(function, factor);
+  switch (factor.shape) {
+    // Through two points: beyond them, where there were no data, it stays as it is at the last.
+    case Shape::kLinear: set_spline(function, factor, coefficients, factor.low, factor.high, 0, 2); break;
+    case Shape::kCosines: {
+      // Eight knots a half-wave of the finest column that counts.
+      Eigen::Index last = 0;
+      for (Eigen::Index i = 0; i < coefficients.size(); ++i)
+        if (coefficients[i] != 0) last = i;
+      const int knots = std::min(400, 8 * (static_cast<int>(last) + static_cast<int>(factor.first)) + 9);
+      set_spline(function, factor, coefficients, factor.low, factor.high, factor.warp, knots);
+      break;
+    }
+    case Shape::kTaper: set_spline(function, factor, coefficients, 0, factor.high, 0, 25); break;
+    case Shape::kHarmonics: {
+      if (factor.count == 1 && factor.plus == 0) {
+        function.mutable_harmonic()->set_cosine(rounded(coefficients[0]));
+        function.mutable_harmonic()->set_sine(rounded(coefficients[1]));
+        function.mutable_harmonic()->set_period(2 * M_PI / factor.first);
+      } else {
+        set_spline(function, factor, coefficients, -M_PI, M_PI, 0, 16 * static_cast<int>(factor.count) + 1);
+      }
+      break;
+    }
+    case Shape::kTable:
+      for (std::size_t i = 0; i < factor.points.size(); ++i) {
+        if (factor.axis.of == Covariate::kPreviousCommand && factor.points[i] == kNoCommand) continue;
+        function.mutable_table()->add_key(static_cast<std::uint32_t>(factor.points[i]));
+        function.mutable_table()->add_value(rounded(factor.plus + coefficients[static_cast<Eigen::Index>(i)]));
+      }
+      if (factor.plus != 0) function.mutable_table()->set_otherwise(rounded(factor.plus));
+      break;
+    case Shape::kAtLeast: {
+      double value = 0;
+      function.mutable_steps()->add_value(0);
+      for (std::size_t i = 0; i < factor.points.size(); ++i) {
+        if (coefficients[static_cast<Eigen::Index>(i)] == 0) continue;
+        value += coefficients[static_cast<Eigen::Index>(i)];
+        function.mutable_steps()->add_at(rounded(factor.points[i]));
+        function.mutable_steps()->add_value(rounded(value));
+      }
+      break;
+    }
+    case Shape::kExponential: {
+      if (factor.points.size() == 1) {
+        function.mutable_exponential()->set_at_zero(rounded(coefficients[0]));
+        function.mutable_exponential()->set_scale(factor.points[0]);
+      } else {
+        const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
+        set_spline(function, factor, coefficients, 0, 6 * slowest, factor.points.front(), 60);
+      }
+      break;
+    }
+    case Shape::kLevelling: {
+      if (factor.points.size() == 1) {
+        function.mutable_exponential()->set_at_infinity(rounded(coefficients[0]));
+        function.mutable_exponential()->set_scale(factor.points[0]);
+      } else {
+        const double slowest = *std::max_element(factor.points.begin(), factor.points.end());
+        set_spline(function, factor, coefficients, 0, 6 * slowest, factor.points.front(), 60);
+      }
+      break;
+    }
+    case Shape::kWave: {
+      function.mutable_harmonic()->set_cosine(rounded(coefficients[0]));
+      function.mutable_harmonic()->set_sine(rounded(coefficients[1]));
+      function.mutable_harmonic()->set_period(factor.points[0]);
+      break;
+    }
+    case Shape::kGrid: {
+      function.set_and_of(covariate_of(factor.and_axis.of));
+      proto::Spline2d& grid = *function.mutable_spline_2d();
+      const std::size_t columns = factor.count, rows = factor.points.size() / columns;
+      const auto at = [](double low, double high, std::size_t i, std::size_t n) {
+        return rounded(low + (high - low) * static_cast<double>(i) / static_cast<double>(n - 1));
+      };
+      for (std::size_t i = 0; i < columns; ++i) grid.add_knot(at(factor.low, factor.high, i, columns));
+      for (std::size_t j = 0; j < rows; ++j) grid.add_and_knot(at(factor.and_low, factor.and_high, j, rows));
+      for (const double value : factor.points) grid.add_value(rounded(coefficients[0] * value));
+      break;
+    }
+    case Shape::kCosines2:
+    case Shape::kPolynomials2: {
+      function.set_and_of(covariate_of(factor.and_axis.of));
+      proto::Spline2d& grid = *function.mutable_spline_2d();
+      const int knots = 4 * static_cast<int>(factor.count) + 5;
+      const auto at = [&](double low, double high, int i) { return low + (high - low) * i / (knots - 1); };
+      for (int i = 0; i < knots; ++i) {
+        grid.add_knot(rounded(at(factor.low, factor.high, i)));
+        grid.add_and_knot(rounded(at(factor.and_low, factor.and_high, i)));
+      }
+      for (int j = 0; j < knots; ++j) {
+        for (int i = 0; i < knots; ++i) {
+          const Situation s = with(factor.and_axis, at(factor.and_low, factor.and_high, j),
+                                   with(factor.axis, at(factor.low, factor.high, i)));
+          grid.add_value(rounded(sum_at(factor, coefficients, s)));
+        }
+      }
+      break;
+    }
+  }
+  return function;
+}
+
+/// Functions whose products, one list each, add up to the sum of a basis' columns by coefficients.
+std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factors, std::size_t from,
+                                               const Eigen::VectorXd& coefficients) {
+  if (from == factors.size()) {
+    Function constant;
+    constant.set_constant(rounded(coefficients[0]));
+    return {{constant}};
+  }
+  const Factor& factor = factors[from];
+  // Amounts of a constant stay amounts, as those of the curve beside it.
+  const bool of_a_constant = factors.size() == 1 && !factor.known.empty();
+  if (from + 1 == factors.size() && !of_a_constant) return {{function_of(factor, coefficients)}};
+  std::vector<std::vector<Function>> all;
+  const auto n = static_cast<Eigen::Index>(factor.size());
+  const Eigen::Index rest = coefficients.size() / n;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::VectorXd part = coefficients.segment(i * rest, rest);
+    if (part.isZero(0)) continue;
+    const Function own = function_of(factor, Eigen::VectorXd::Unit(n, i));
+    for (std::vector<Function>& product : products_of(factors, from + 1, part)) {
+      product.insert(product.begin(), own);
+      all.push_back(std::move(product));
+    }
+  }
+  return all;
+}
+
+void set_target(Effect& effect, Target target) {
+  switch (target) {
+    case Target::kGain: effect.set_acts_on(Effect::WHEEL_GAIN); break;
+    case Target::kGainLeft:
+      effect.set_acts_on(Effect::WHEEL_GAIN);
+      effect.set_wheel(Effect::LEFT_WHEEL);
+      break;
+    case Target::kGainRight:
+      effect.set_acts_on(Effect::WHEEL_GAIN);
+      effect.set_wheel(Effect::RIGHT_WHEEL);
+      break;
+    case Target::kOffset: effect.set_acts_on(Effect::WHEEL_OFFSET); break;
+    case Target::kTurn: effect.set_acts_on(Effect::TURN_RATE); break;
+    case Target::kAhead: effect.set_acts_on(Effect::BODY_DRIFT); break;
+    case Target::kSideways:
+      effect.set_acts_on(Effect::BODY_DRIFT);
+      effect.set_direction_deg(90);
+      break;
+    case Target::kWorldX: effect.set_acts_on(Effect::WORLD_DRIFT); break;
+    case Target::kWorldY:
+      effect.set_acts_on(Effect::WORLD_DRIFT);
+      effect.set_direction_deg(90);
+      break;
+    case Target::kMeasuredX: effect.set_acts_on(Effect::MEASURED_OFFSET); break;
+    case Target::kMeasuredY:
+      effect.set_acts_on(Effect::MEASURED_OFFSET);
+      effect.set_direction_deg(90);
+      break;
+    case Target::kMeasuredAhead: effect.set_acts_on(Effect::MEASURED_BODY_OFFSET); break;
+    case Target::kMeasuredLeft:
+      effect.set_acts_on(Effect::MEASURED_BODY_OFFSET);
+      effect.set_direction_deg(90);
+      break;
+    case Target::kMeasuredScale: effect.set_acts_on(Effect::MEASURED_SCALE); break;
+    case Target::kMeasuredTurn:
+    case Target::kMeasuredHeading: effect.set_acts_on(Effect::MEASURED_HEADING); break;
+  }
+}
+
+/// What a small turn of the picture does to one axis of positions: x falls with y, y rises with x.
+Effect turned_position(const Effect& turn, Target axis) {
+  Effect effect = turn;
+  set_target(effect, axis);
+  Function& other = *effect.add_function();
+  other.set_of(axis == Target::kMeasuredX ? Function::Y : Function::X);
+  other.mutable_linear()->set_slope(axis == Target::kMeasuredX ? -1 : 1);
+  return effect;
+}
+
+}  // namespace
+
+std::string field_name(std::uint8_t cells) { return fmt::format("trodden-{}", cells); }
+
+double rounded(double value) {
+  if (!std::isfinite(value)) return 0;
+  const std::string digits = fmt::format("{:.7g}", value);
+  double result = 0;
+  std::from_chars(digits.data(), digits.data() + digits.size(), result);
+  return result;
+}
+
+const char* form_of(const Term& term) {
+  if (term.blocks.empty() || term.blocks.front().basis.factors.empty()) return "constant";
+  if (term.blocks.front().basis.factors.size() > 1) return "product";
+  switch (term.blocks.front().basis.factors.front().shape) {
+    case Shape::kLinear: return "linear";
+    case Shape::kCosines:
+    case Shape::kTaper: return "curve";
+    case Shape::kCosines2:
+    case Shape::kPolynomials2:
+    case Shape::kGrid: return "map";
+    case Shape::kHarmonics:
+    case Shape::kWave: return "harmonic";
+    case Shape::kTable: return "table";
+    case Shape::kAtLeast: return "steps";
+    case Shape::kExponential:
+    case Shape::kLevelling: return "exponential";
+  }
+  return "curve";
+}
+
+std::vector<Effect> effects_of_term(const Term& term) {
+  std::vector<Effect> effects;
+  Eigen::Index first = 0;
+  for (const Block& block : term.blocks) {
+    const auto own = static_cast<Eigen::Index>(block.basis.size());
+    std::size_t columns = 1;
+    for (const Factor& factor : block.basis.factors) columns *= factor.size();
+    Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns));
+    for (Eigen::Index i = 0; i < own; ++i) {
+      const Eigen::Index at = block.basis.chosen.empty()
+                                  ? i
+                                  : static_cast<Eigen::Index>(block.basis.chosen[static_cast<std::size_t>(i)]);
+      coefficients[at] = term.coefficients[first + i];
+    }
+    first += own;
+    for (const std::vector<Function>& product : products_of(block.basis.factors, 0, coefficients)) {
+      Effect effect;
+      set_target(effect, block.target);
+      if (!is_measured(block.target) && block.during != kDriven) {
+        for (int command = 0; command < 4; ++command)
+          if ((block.during >> command & 1) != 0) effect.add_during(static_cast<proto::Command>(command));
+      }
+      for (const Function& function : product) *effect.add_function() = function;
+      if (block.target == Target::kMeasuredTurn) {
+        effects.push_back(turned_position(effect, Target::kMeasuredX));
+        effects.push_back(turned_position(effect, Target::kMeasuredY));
+      }
+      effects.push_back(std::move(effect));
+    }
+  }
+  for (std::size_t i = 0; i < effects.size(); ++i)
+    effects[i].set_name(effects.size() == 1 ? term.name : fmt::format("{}-{}", term.name, i + 1));
+  return effects;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,96 @@
+#include "clients/identify/model/model_file.hpp"
+
+#include <fmt/format.h>
+#include <google/protobuf/text_format.h>
+
+#include <cmath>
+#include <set>
+
+#include "clients/identify/model/effect_records.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+proto::Effect& add_effect(proto::Model& model, const std::string& name, proto::Effect::Target target) {
+  proto::Effect& effect = *model.add_effect();
+  effect.set_name(name);
+  effect.set_acts_on(target);
+  return effect;
+}
+
+void add_noise(proto::Model& model, const std::string& name, proto::Effect::Target target, double direction_deg,
+               double sd) {
+  proto::Effect& effect = add_effect(model, name, target);
+  if (direction_deg != 0) effect.set_direction_deg(direction_deg);
+  effect.add_function()->mutable_noise()->set_sd(rounded(sd));
+}
+
+}  // namespace
+
+proto::Model proto_of(const MotionModel& fitted) {
+  proto::Model model;
+  proto::Motion& motion = *model.mutable_motion();
+  motion.set_noise(true);
+  motion.set_straight_speed_mm_s(rounded(fitted.base.straight_mm_s));
+  motion.set_turn_speed_mm_s(rounded(fitted.base.turn_mm_s));
+  motion.set_wheel_base_mm(rounded(fitted.base.wheel_base_mm));
+  motion.set_axle_offset_mm(rounded(fitted.base.centre_mm));
+  motion.set_bias_mean_mm_s(rounded(fitted.base.bias_mean_mm_s));
+  motion.set_bias_sd_mm_s(rounded(fitted.base.bias_sd_mm_s));
+  motion.set_factor_variance_s(rounded(fitted.noise.factor_s));
+  motion.set_spin_up_s(0);  // part of the measured speeds
+  for (const auto& [robot, bias] : fitted.robots) {
+    proto::RobotModel& own = *model.add_robot();
+    own.set_robot(robot);
+    own.set_bias_left_mm_s(rounded(bias.mean_mm_s[0]));
+    own.set_bias_right_mm_s(rounded(bias.mean_mm_s[1]));
+  }
+  const double ahead = fitted.base.ahead_mm - fitted.base.centre_mm;
+  const double off = std::hypot(ahead, fitted.base.left_mm);
+  if (off > 1e-3) {
+    proto::Effect& point = add_effect(model, "tracked-point", proto::Effect::MEASURED_BODY_OFFSET);
+    point.set_direction_deg(rounded(std::atan2(fitted.base.left_mm, ahead) * 180 / M_PI));
+    point.add_function()->set_constant(rounded(off));
+  }
+  add_noise(model, "wheel-noise", proto::Effect::WHEEL_OFFSET, 0, std::sqrt(fitted.noise.wheel_mm2_s));
+  add_noise(model, "heading-noise", proto::Effect::TURN_RATE, 0, std::sqrt(fitted.noise.heading_rad2_s));
+  add_noise(model, "tracker-x", proto::Effect::MEASURED_OFFSET, 0, std::sqrt(fitted.noise.position_mm2));
+  add_noise(model, "tracker-y", proto::Effect::MEASURED_OFFSET, 90, std::sqrt(fitted.noise.position_mm2));
+  add_noise(model, "tracker-heading", proto::Effect::MEASURED_HEADING, 0, std::sqrt(fitted.noise.heading_rad2));
+  for (std::uint8_t c = 0; c < kFloorCells; ++c) {
+    if (!fitted.looks_at({Covariate::kTrodden, c})) continue;
+    proto::ArenaField& field = *model.add_field();
+    field.set_name(field_name(c));
+    field.set_counts(proto::ArenaField::DRIVEN_TIME);
+    field.set_cell_mm(rounded(fitted.cells[c].side_mm));
+  }
+  std::set<std::string> names;
+  for (const Term& term : fitted.terms) {
+    for (const proto::Effect& effect : effects_of_term(term)) {
+      std::string name = effect.name();
+      for (int again = 2; !names.insert(name).second; ++again)
+        name = fmt::format("{}-again{}", effect.name(), again);
+      *model.add_effect() = effect;
+      model.mutable_effect(model.effect_size() - 1)->set_name(name);
+    }
+  }
+  return model;
+}
+
+std::string text_of(const proto::Model& model, const std::string& remark) {
+  proto::Model rest = model;
+  rest.clear_robot();
+  std::string blocks;
+  google::protobuf::TextFormat::PrintToString(rest, &blocks);
+  std::string text = fmt::format("# {}\n{}", remark, blocks);
+  google::protobuf::TextFormat::Printer line;
+  line.SetSingleLineMode(true);
+  for (const proto::RobotModel& robot : model.robot()) {
+    std::string fields;
+    line.PrintToString(robot, &fields);
+    text += fmt::format("robot {{ {}}}\n", fields);
+  }
+  return text;
+}
+
+}  // namespace kilotwin::identify

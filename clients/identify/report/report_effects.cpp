@@ -1,0 +1,194 @@
+#include "clients/identify/report/report_effects.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "clients/identify/report/report_html.hpp"
+
+namespace kilotwin::identify::report {
+namespace {
+
+using html::escaped;
+
+bool shares_covariate(const json& effect, const std::string& covariate) {
+  static const std::map<std::string, std::set<std::string>> kOf = {
+      {"position", {"x", "y", "radius", "position"}},
+      {"motor_time", {"motor_time", "driven_time", "left_motor_time", "right_motor_time"}},
+      {"neighbours", {"neighbours", "nearest", "density", "nearest_bearing", "bearing"}},
+      {"history", {"previous_command", "last_turn", "place", "history"}}};
+  for (const json& c : part(effect, "covariates")) {
+    const std::string name = c.is_string() ? c.get<std::string>() : "";
+    const auto of = kOf.find(name);
+    if (name == covariate || (of != kOf.end() && of->second.contains(covariate))) return true;
+  }
+  return false;
+}
+
+/// Sum of squares of a plot's means over their standard errors, and how many there are.
+std::pair<double, double> pattern_of(const json& plot, const char* when) {
+  const json &mean = part(plot, when), &se = part(plot, "before_se");
+  double sum = 0, bins = 0;
+  for (std::size_t k = 0; mean.is_array() && se.is_array() && k < std::min(mean.size(), se.size()); ++k) {
+    if (!mean[k].is_number() || !se[k].is_number() || !(se[k].get<double>() > 0)) continue;
+    const double z = mean[k].get<double>() / se[k].get<double>();
+    sum += z * z;
+    bins += 1;
+  }
+  return {sum, bins};
+}
+
+/// The plot in which an effect shows best: over its covariate, with the effect drawn in, the strongest against its errors.
+const json* plot_for(const json& effect, const json& plots) {
+  const json* best = nullptr;
+  double best_strength = 0;
+  for (const json& plot : plots) {
+    if (!shares_covariate(effect, text(plot, "covariate"))) continue;
+    const bool fitted = part(plot, "fitted").is_array();
+    const double strength = (fitted ? 1e6 : 1e-6) + pattern_of(plot, "before").first;
+    if (strength <= best_strength) continue;
+    best = &plot;
+    best_strength = strength;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::string cards(const json& contract, const json& document, Figures& figures) {
+  const json& covariate_plots = part(document, "covariate_plots");
+  std::string out;
+  std::set<const json*> shown;
+  for (const json& effect : part(contract, "effects")) {
+    const json& evidence = part(effect, "evidence");
+    std::string words = text(effect, "in_words");
+    if (words.empty()) words = fmt::format("{} depends on {}.", acts_on_of(effect), covariates_of(effect));
+    out += "<article class=\"cause\"><div>";
+    out += fmt::format("<h3>{}</h3><p>{}</p>", escaped(covariates_of(effect)), escaped(words));
+    out += "<dl>";
+    const auto fact = [&](const char* name, const std::string& value) {
+      out += fmt::format("<dt>{}</dt><dd>{}</dd>", name, value);
+    };
+    fact("acts on", acts_on_of(effect));
+    if (const json& facts = part(effect, "facts"); facts.is_object()) {
+      for (const auto& [name, value] : facts.items())
+        out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(name), escaped(value.get<std::string>()));
+    } else {
+      if (number(effect, "share_removed"))
+        fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
+      if (number(effect, "rmse_without_mm"))
+        fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
+      const auto family = number(evidence, "p_family");
+      const auto log10_p = family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p");
+      if (log10_p) fact("by chance", chance(log10_p));
+    }
+    out += "</dl></div>";
+    out += "<div>";
+    std::string plots;
+    for (const json& map : part(document, "effect_maps")) {
+      if (text(map, "name") == text(effect, "name") && !text(effect, "name").empty())
+        plots += figures.place(plot_effect_map(figures.plots(), map), "The effect, as it is in the model");
+    }
+    for (const json& curve : part(document, "effect_curves")) {
+      if (text(curve, "name") == text(effect, "name") && !text(effect, "name").empty())
+        plots += figures.place(plot_effect(figures.plots(), curve), "The effect, as it is in the model");
+    }
+    const json* plot = covariate_plots.is_array() && plots.empty() ? plot_for(effect, covariate_plots) : nullptr;
+    if (plot != nullptr && shown.insert(plot).second)
+      plots += figures.place(plot_covariate(figures.plots(), *plot), "What it left in the residuals");
+    out += plots;
+    out += "</div></article>\n";
+  }
+  return out;
+}
+
+std::string effects_table(const json& contract) {
+  const json& effects = part(contract, "effects");
+  if (!effects.is_array() || effects.empty()) return "";
+  html::Table table({"effect", "depends on", "acts on", "form", "by chance", "gain in log-likelihood",
+                     "on data held out", "error without it, mm", "share"});
+  for (const json& effect : effects) {
+    const json& evidence = part(effect, "evidence");
+    const auto held = number(evidence, "held_out_gain"), se = number(evidence, "held_out_gain_se");
+    const auto family = number(evidence, "p_family");
+    table.row({escaped(text(effect, "name")), escaped(covariates_of(effect)), acts_on_of(effect),
+               escaped(text(part(effect, "parameters"), "form")),
+               chance(family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p")),
+               figure(number(evidence, "log_likelihood_gain")),
+               held ? figure(held) + (se ? " ± " + figure(se) : "") : "–",
+               figure(number(effect, "rmse_without_mm")), percent(number(effect, "share_removed"))});
+  }
+  return table.text();
+}
+
+std::string rejected_table(const json& contract) {
+  const json& rejected = part(contract, "rejected");
+  if (!rejected.is_array() || rejected.empty()) return "";
+  const bool reasons =
+      std::any_of(rejected.begin(), rejected.end(), [](const json& tried) { return !text(tried, "why").empty(); });
+  std::vector<std::string> heads = {"tried", "depends on", "acts on", "chance of as much", "needed"};
+  if (reasons) heads.emplace_back("why not");
+  html::Table table(std::move(heads));
+  for (const json& tried : rejected) {
+    const json& found = part(contract, "effects");
+    const bool more = std::any_of(found.begin(), found.end(), [&](const json& effect) {
+      return !text(effect, "name").empty() && text(effect, "name") == text(tried, "name");
+    });
+    std::vector<std::string> cells = {(more ? "more of " : "") + escaped(text(tried, "name")),
+                                      escaped(covariates_of(tried)), acts_on_of(tried),
+                                      chance(number(tried, "log10_p")), chance(number(tried, "threshold_log10_p"))};
+    if (reasons) cells.push_back(escaped(text(tried, "why")));
+    table.row(cells);
+  }
+  return table.text();
+}
+
+std::string ambiguous_list(const json& contract) {
+  std::string out;
+  for (const json& pair : part(contract, "ambiguous")) {
+    out += fmt::format(
+        "<li>Found: <b>{}</b>. <b>{}</b> would explain the data about as well (log-likelihood {} lower). {}</li>\n",
+        escaped(text(pair, "found")), escaped(text(pair, "instead")),
+        figure(number(pair, "log_likelihood_difference")), escaped(text(pair, "experiment")));
+  }
+  return out.empty() ? "" : "<ul>" + out + "</ul>\n";
+}
+
+std::string traced(const json& contract, const json& covariate_plots, Figures& figures) {
+  if (!covariate_plots.is_array()) return "";
+  const json& effects = part(contract, "effects");
+  // Strongest first; those below are as good as flat.
+  constexpr double kPattern = 4;
+  constexpr std::size_t kMostShown = 8;
+  std::vector<std::pair<double, const json*>> order;
+  for (const json& plot : covariate_plots) {
+    const auto [before, bins] = pattern_of(plot, "before");
+    const double after = pattern_of(plot, "after").first;
+    if (bins < 2) continue;
+    const bool found = std::any_of(effects.begin(), effects.end(),
+                                   [&](const json& e) { return shares_covariate(e, text(plot, "covariate")); });
+    order.emplace_back(std::max(before, after) / bins * (found ? 10 : 1), &plot);
+  }
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::string shown, folded;
+  std::size_t count = 0;
+  for (const auto& [strength, plot] : order) {
+    const std::string markup = figures.place(plot_covariate(figures.plots(), *plot), "");
+    if (markup.empty()) continue;
+    const bool show = count < kMostShown && (strength > kPattern || count < 2);
+    (show ? shown : folded) += markup;
+    if (show) ++count;
+  }
+  std::string out = shown.empty() ? "" : "<div class=\"grid\">" + shown + "</div>\n";
+  if (!folded.empty())
+    out += "<details><summary>The others, in which less is seen</summary><div class=\"grid\">" + folded +
+           "</div></details>\n";
+  return out;
+}
+
+}  // namespace kilotwin::identify::report

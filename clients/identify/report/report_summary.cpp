@@ -1,0 +1,148 @@
+#include "clients/identify/report/report_summary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "clients/identify/report/report_html.hpp"
+
+namespace kilotwin::identify::report {
+namespace {
+
+using html::escaped;
+
+/// How much of what a model can take away at all was taken away: errors add as squares.
+std::optional<double> share_explained(const Errors& e) {
+  if (!e.before || !e.after || !e.floor) return std::nullopt;
+  const double could = *e.before * *e.before - *e.floor * *e.floor;
+  if (could <= 0) return std::nullopt;
+  return std::clamp((*e.before * *e.before - *e.after * *e.after) / could, 0.0, 1.0);
+}
+
+}  // namespace
+
+Errors errors_of(const json& contract) {
+  return {number(part(contract, "before"), "rmse_mm"), number(part(contract, "after"), "rmse_mm"),
+          number(contract, "noise_floor_mm")};
+}
+
+std::string headline(const json& contract) {
+  std::vector<std::string> causes;
+  bool tracker = false;
+  for (const json& effect : part(contract, "effects")) {
+    if (is_measurement(effect)) {
+      tracker = true;
+      continue;
+    }
+    const std::string cause = "<em>" + escaped(covariates_of(effect)) + "</em>";
+    if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
+  }
+  const char* const kSeen = "<em>the tracker</em> does not see them where they are";
+  if (causes.empty() && !tracker) return "The base model explains these robots";
+  if (causes.empty()) return fmt::format("These robots do what the base model says, but {}", kSeen);
+  std::string because = causes[0];
+  if (causes.size() == 2) because += ", and on " + causes[1];
+  if (causes.size() > 2) because += ", on " + causes[1] + " and more";
+  return fmt::format("These robots differ from the base model: what they do depends on {}{}", because,
+                     tracker ? fmt::format("; and {}", kSeen) : "");
+}
+
+std::string verdict(const json& contract) {
+  const Errors e = errors_of(contract);
+  const std::string ahead = fmt::format("{:g}", number(contract, "horizon_s").value_or(10));
+  std::string out = fmt::format(
+      "Predicted {} s ahead, on data that nothing was fitted to, robots were <b>{} mm</b> away from where the base "
+      "model had them",
+      ahead, figure(e.before));
+  const std::size_t count = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
+  if (count == 0) {
+    out += ". No effect of anything that was tried is beyond chance.";
+    if (e.floor && e.before && *e.before > 1.15 * *e.floor)
+      out += " What is left beyond the best that is possible depends on nothing that was tried.";
+  } else {
+    out += fmt::format("; with {} in the model, <b>{} mm</b>.",
+                       count == 1 ? "one effect" : fmt::format("{} effects", count), figure(e.after));
+    const json& less = part(contract, "improvement");
+    if (number(less, "low_mm"))
+      out += fmt::format(" It is smaller by {} to {} mm (95 %).", figure(number(less, "low_mm")),
+                         figure(number(less, "high_mm")));
+  }
+  if (e.floor && e.after && *e.after <= *e.floor) {
+    out += fmt::format(
+        " That is as good as any model can be expected to be with these robots and this tracker (about <b>{} "
+        "mm</b>).",
+        figure(e.floor));
+  } else if (e.floor) {
+    out += fmt::format(" The best that any model can do with these robots and this tracker is about <b>{} mm</b>.",
+                       figure(e.floor));
+  }
+  const json& simulated = part(contract, "simulated");
+  if (part(simulated, "agrees").is_boolean()) {
+    std::size_t differ = 0, all = 0;
+    for (const json& s : part(simulated, "statistics")) {
+      ++all;
+      if (part(s, "agrees") == json(false)) ++differ;
+    }
+    out += differ == 0 ? " <a href=\"#simulated\">Simulated</a> by the written model, robots are not told from the "
+                         "measured ones."
+                       : fmt::format(
+                             " <a href=\"#simulated\">Simulated</a> by the written model, robots differ from the "
+                             "measured ones in {} of {} respects.",
+                             differ, all);
+  }
+  const json& faults = part(contract, "faults");
+  if (const auto share = share_explained(e); share && count > 0)
+    out += fmt::format(" {} of what could be explained is explained.", percent(share));
+  if (faults.is_array() && !faults.empty()) {
+    out += fmt::format(" The data have <a href=\"#faults\">{}</a>, which {} excluded.",
+                       faults.size() == 1 ? "a fault" : fmt::format("{} faults", faults.size()),
+                       faults.size() == 1 ? "was" : "were");
+  }
+  return out;
+}
+
+std::string bars(const json& contract) {
+  const Errors e = errors_of(contract);
+  if (!e.before || !e.after) return "";
+  const double most = std::max(
+      {*e.before, *e.after, e.floor.value_or(0), number(part(contract, "before"), "rmse_high_mm").value_or(0)});
+  if (most <= 0) return "";
+  const auto bar = [&](const char* kind, const char* name, double value, const json& from) {
+    const auto low = number(from, "rmse_low_mm"), high = number(from, "rmse_high_mm");
+    const std::string interval =
+        low && high ? fmt::format("<small>{} to {} (95 %)</small>", figure(low), figure(high)) : "";
+    return fmt::format(
+        "<div class=\"bar\"><span class=\"what\">{}</span><span class=\"track\"><span class=\"fill {}\" "
+        "style=\"width:{:.1f}%\"></span></span>"
+        "<span class=\"value\"><b>{} mm</b> {}</span></div>\n",
+        name, kind, 100 * value / most, figure(value), interval);
+  };
+  std::string out = "<div class=\"bars\">\n" + bar("before", "before", *e.before, part(contract, "before")) +
+                    bar("after", "after", *e.after, part(contract, "after"));
+  if (e.floor) out += bar("floor", "floor", *e.floor, json());
+  return out + "</div>\n";
+}
+
+std::string given_bars(const json& bars) {
+  double most = 0;
+  for (const json& bar : bars) {
+    const double from = number(bar, "from").value_or(0);
+    most = std::max({most, number(bar, "value").value_or(0) - from, number(bar, "high").value_or(0) - from});
+  }
+  if (most <= 0) return "";
+  std::string out;
+  for (const json& bar : bars) {
+    const auto low = number(bar, "low"), high = number(bar, "high");
+    const double above = number(bar, "value").value_or(0) - number(bar, "from").value_or(0);
+    out += fmt::format(
+        "<div class=\"bar\"><span class=\"what\">{}</span><span class=\"track\"><span class=\"fill {}\" "
+        "style=\"width:{:.1f}%\"></span></span><span class=\"value\"><b>{} {}</b> {}</span></div>\n",
+        escaped(text(bar, "name")), escaped(text(bar, "kind")), std::max(100 * above / most, 0.0),
+        figure(number(bar, "value")), escaped(text(bar, "unit")),
+        low && high ? fmt::format("<small>{} to {} (95 %)</small>", figure(low), figure(high)) : "");
+  }
+  return "<div class=\"bars\">\n" + out + "</div>\n";
+}
+
+}  // namespace kilotwin::identify::report

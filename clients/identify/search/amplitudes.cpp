@@ -1,0 +1,185 @@
+#include "clients/identify/search/amplitudes.hpp"
+
+#include <algorithm>
+
+#include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/search/target_extension.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr int kMostTurns = 3;
+/// A gain in log likelihood for which curve and amounts are not fitted in turn once more.
+constexpr double kSettled = 2;
+/// One term of which the curve is known has far fewer freedoms than two: so much less likely it may be.
+constexpr double kAsGood = 10;
+
+/// Whether one factor is the other as a curve that is known.
+bool is_known_of(const Factor& known, const Factor& open) {
+  return known.shape == open.shape && known.axis == open.axis && known.low == open.low && known.high == open.high &&
+         known.count == open.count && known.points == open.points;
+}
+
+/// The term whose curve the amounts of `amounts` are of.
+std::optional<std::size_t> source_of(const MotionModel& model, const Term& amounts) {
+  const Block& block = amounts.blocks.front();
+  if (block.basis.factors.size() != 2) return std::nullopt;
+  const auto known = std::find_if(block.basis.factors.begin(), block.basis.factors.end(),
+                                  [](const Factor& f) { return !f.known.empty(); });
+  if (known == block.basis.factors.end()) return std::nullopt;
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const Block& of = model.terms[t].blocks.front();
+    if (of.target == block.target && of.during == block.during && of.basis.factors.size() == 1 &&
+        of.basis.factors.front().known.empty() && is_known_of(*known, of.basis.factors.front()))
+      return t;
+  }
+  return std::nullopt;
+}
+
+/// Amounts of keys are told relative to their mean, which is that of a robot that nobody has seen. Where they have next to none, the
+/// largest is 1.
+void about_the_mean(Term& term) {
+  Factor& amounts = term.blocks.front().basis.factors.front();
+  if (amounts.shape != Factor::Shape::kTable) return;
+  const Eigen::Map<Eigen::ArrayXd> each(amounts.known.data(), static_cast<Eigen::Index>(amounts.known.size()));
+  const double mean = amounts.plus + each.mean(), most = (amounts.plus + each).abs().maxCoeff();
+  if (most == 0) return;
+  constexpr double kNextToNone = 0.2;
+  const double unit = std::abs(mean) > kNextToNone * most ? mean : most;
+  const Eigen::ArrayXd about = (amounts.plus + each - mean) / unit;
+  Factor scaled = amounts;
+  scaled.plus = mean / unit;
+  scaled.known.assign(about.begin(), about.end());
+  for (Block& block : term.blocks) block.basis.factors.front() = scaled;
+  term.coefficients *= unit;
+  term.precision /= unit * unit;
+}
+
+/// Leaves out what acts on anything else.
+void keep_target(Term& term, Target target) {
+  std::vector<Block> blocks;
+  std::vector<Eigen::Index> columns;
+  Eigen::Index next = 0;
+  for (Block& block : term.blocks) {
+    const auto n = static_cast<Eigen::Index>(block.basis.size());
+    next += n;
+    if (block.target != target) continue;
+    for (Eigen::Index c = next - n; c < next; ++c) columns.push_back(c);
+    blocks.push_back(std::move(block));
+  }
+  term.blocks = std::move(blocks);
+  term.coefficients = Eigen::VectorXd(term.coefficients(columns));
+  term.precision = Eigen::VectorXd(term.precision(columns));
+}
+
+/// The last term of a model while its curve and its amounts are fitted in turn.
+class CurveTimesAmounts {
+ public:
+  /// In place of the term `source`, whose curve it is, and of the last, which are amounts of it.
+  CurveTimesAmounts(const Fitter& fitter, MotionModel& model, std::size_t source)
+      : fitter_(fitter), model_(model), found_(model.terms.back()) {
+    const Basis& basis = found_.blocks.front().basis;
+    open_ = basis.factors[0].known.empty() ? 0 : 1;
+    // Everything has the curve once, but for what was found of its amount. What was left out of the amounts' columns is none.
+    amounts_ = basis.factors[open_];
+    amounts_.known.assign(amounts_.columns(), 0);
+    amounts_.plus = 1;
+    add(found_.coefficients);
+    Term one = model.terms[source];
+    one.name = found_.name;
+    // What else it seemed to do may have come of amounts that differ.
+    keep_target(one, found_.blocks.front().target);
+    for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amounts_);
+    model.terms.pop_back();
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(source));
+    model.terms.push_back(std::move(one));
+  }
+
+  void fit() {
+    fitter_.fit(model_, 2);
+    likelihood_ = fitter_.log_likelihood(model_);
+    in_turns();
+    refine(fitter_, model_, model_.terms.size() - 1);
+    likelihood_ = fitter_.log_likelihood(model_);
+    // The curve may have got a constant part, which the amounts had to do without.
+    in_turns();
+    in_turn(true);
+    about_the_mean(model_.terms.back());
+  }
+  [[nodiscard]] double log_likelihood() const { return likelihood_; }
+
+ private:
+  void add(const Eigen::VectorXd& coefficients) {
+    const Basis& basis = found_.blocks.front().basis;
+    for (std::size_t i = 0; i < basis.size(); ++i)
+      amounts_.known[basis.chosen.empty() ? i : basis.chosen[i]] += coefficients[static_cast<Eigen::Index>(i)];
+  }
+  void in_turns() {
+    for (int turns = 0; turns < kMostTurns && in_turn(false); ++turns) {}
+  }
+  /// Changes of the amounts with the curve known, then all else with the amounts known. Whether something is gained.
+  bool in_turn(bool with_smoothness) {
+    const MotionModel before = model_;
+    const Factor known = amounts_;
+    Term changes = found_;
+    changes.blocks.resize(1);
+    Basis& basis = changes.blocks.front().basis;
+    const auto n = static_cast<Eigen::Index>(basis.size());
+    changes.coefficients = Eigen::VectorXd::Zero(n);
+    changes.precision = found_.precision.head(n).eval();
+    basis.factors[1 - open_] = known_curve(model_.terms.back(), 1);
+    model_.terms.push_back(std::move(changes));
+    fitter_.fit(model_, 1);
+    add(model_.terms.back().coefficients);
+    model_.terms.pop_back();
+    for (Block& block : model_.terms.back().blocks) block.basis.factors.front() = amounts_;
+    if (with_smoothness) {
+      settle(fitter_, model_, model_.terms.size() - 1);
+    } else {
+      fitter_.fit(model_, 1);
+    }
+    const double now = fitter_.log_likelihood(model_), gained = now - likelihood_;
+    if (gained < 0) {
+      model_ = before;
+      amounts_ = known;
+    } else {
+      likelihood_ = now;
+    }
+    return gained > kSettled;
+  }
+
+  const Fitter& fitter_;
+  MotionModel& model_;
+  Term found_;
+  std::size_t open_ = 0;  ///< of the found term's factors the one that is not the curve
+  Factor amounts_;
+  double likelihood_ = 0;
+};
+
+}  // namespace
+
+std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model) {
+  const std::optional<std::size_t> source = source_of(model, model.terms.back());
+  if (!source) return std::nullopt;
+  const MotionModel was = model;
+  const PreparedSet::Found tracks = fitter.set().found();
+  const double likelihood = fitter.log_likelihood(was);
+  CurveTimesAmounts one(fitter, model, *source);
+  one.fit();
+  if (one.log_likelihood() > likelihood - kAsGood) {
+    widen(fitter, model, model.terms.size() - 1);
+    return source;
+  }
+  model = was;
+  fitter.set().go_back(tracks, model);
+  return std::nullopt;
+}
+
+bool rests_on_another(const Term& term) {
+  return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
+    return std::any_of(block.basis.factors.begin(), block.basis.factors.end(),
+                       [](const Factor& factor) { return !factor.known.empty() && factor.plus == 0; });
+  });
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,384 @@
+#include "clients/identify/search/calibration_shifts.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace kilotwin::identify {
+namespace {
+
+/// Shift, turn and scale of the picture; then what the drive may have done: ahead, aside and turn of each driven robot's own.
+constexpr int kOwn = 3, kAll = Jump::kNumbers + kOwn;
+using Columns = Eigen::Matrix<double, 3, kAll>;
+using Normal = Eigen::Matrix<double, kAll, kAll>;
+using Numbers = Eigen::Matrix<double, kAll, 1>;
+
+/// A turn or a change of scale is counted in what it does so far from the middle of the picture.
+constexpr double kArm_mm = 300;
+/// Beforehand nothing is larger than this.
+constexpr double kLargest_mm = 100, kLargest_rad = 1;
+/// In half chi squared: no track counts for more, for or against.
+constexpr double kMostOfATrack = 5;
+/// Chance makes 25 in one of 1e5 sets; the other bound is on what the picture seems to do at other instants.
+constexpr double kCertain = 25, kBeyondUsual = 18;
+/// By which a push explains more before a jump is taken for one.
+constexpr double kClear = 2;
+constexpr int kMostJumps = 8, kMostLooks = 40;
+
+/// What the filter had to correct when a robot was seen.
+struct Surprise {
+  double from_s, to_s;
+  Eigen::Vector3d whitened;
+  Columns columns;  ///< whitened
+  bool driven;
+};
+struct Surprises {
+  std::uint32_t run = 0;
+  std::vector<Surprise> of;  ///< ascending, with gaps where the filter was astray
+};
+
+struct Recorder {
+  const MotionModel& model;
+  Surprises& out;
+  double last_s = 0;
+  bool driven = false, after_outlier = false;
+
+  void start(const TrackFilter&) {}
+  void step(const StepRecord& record) { driven = driven || record.middle.commands.driven(); }
+  void update(const Innovation& innovation, const Sample& sample) {
+    Surprise s;
+    s.from_s = last_s;
+    s.to_s = last_s = sample.time_s;
+    s.driven = std::exchange(driven, false);
+    // What a filter has not believed it meets again with the next sample: that is no surprise of that instant.
+    const bool again = std::exchange(after_outlier, innovation.weight < 1);
+    if (innovation.lost || again || s.to_s <= s.from_s) return;
+    // As it was expected to be; the filter's own doubts about outliers are taken back.
+    const Eigen::Matrix3d root = Eigen::Matrix3d(
+        (innovation.covariance * innovation.weight).llt().matrixL().solve(Eigen::Matrix3d::Identity()));
+    const double seen_x = sample.x_mm - innovation.difference[0], seen_y = sample.y_mm - innovation.difference[1];
+    const double c = std::cos(innovation.pose[2]), n = std::sin(innovation.pose[2]);
+    s.columns.setZero();
+    s.columns.col(0) << 1, 0, 0;
+    s.columns.col(1) << 0, 1, 0;
+    s.columns.col(2) << -seen_y / kArm_mm, seen_x / kArm_mm, 1 / kArm_mm;
+    s.columns.col(3) << seen_x / kArm_mm, seen_y / kArm_mm, 0;
+    if (s.driven) {
+      s.columns.col(4) << c, n, 0;
+      s.columns.col(5) << -n, c, 0;
+      s.columns.col(6) << 0, 0, 1;
+    }
+    if (innovation.size == 2) s.columns.row(2).setZero();
+    s.columns = root * s.columns;
+    s.whitened = root * innovation.difference;
+    if (innovation.size == 2) {
+      s.columns.row(2).setZero();
+      s.whitened[2] = 0;
+    }
+    out.of.push_back(s);
+  }
+};
+
+std::vector<Surprises> surprises_of(const Fitter& fitter, const MotionModel& model) {
+  std::vector<const TrackView*> views;
+  for (const TrackView& view : fitter.set().views())
+    if (!view.track->held_out) views.push_back(&view);
+  std::vector<Surprises> all(views.size());
+  in_parallel(views.size(), fitter.threads(), [&](std::size_t i) {
+    const TrackView& view = *views[i];
+    RobotBias bias = model.bias_of(view.track->robot);
+    bias.covariance.setZero();
+    TrackFilter filter(model, bias, view.track->robot, view.number);
+    all[i].run = view.number;
+    Recorder recorder{model, all[i], view.track->samples.front().time_s};
+    walk(filter, view, view.track->samples.size(), recorder);
+  });
+  return all;
+}
+
+/// Which columns may explain something: the picture's, the push of those that are driven, the drive's own.
+enum class Story { kOwnAlone, kPicture, kPush };
+
+/// What all that saw an instant say of it.
+class Instant {
+ public:
+  explicit Instant(std::vector<const Surprise*> seen) : seen_(std::move(seen)) {}
+
+  /// By least squares, outliers counting less.
+  [[nodiscard]] Numbers fit(Story story, Normal* information = nullptr) const {
+    Numbers at = Numbers::Zero();
+    for (int pass = 0; pass < 4; ++pass) {
+      Normal normal = prior();
+      Numbers score = Numbers::Zero();
+      for (const Surprise* s : seen_) {
+        const Columns columns = allowed(*s, story);
+        const double far = (s->whitened - columns * at).squaredNorm();
+        constexpr double kGate = 12;
+        const double weight = far > kGate ? kGate / far : 1;
+        normal.noalias() += weight * columns.transpose() * columns;
+        score.noalias() += weight * columns.transpose() * s->whitened;
+      }
+      at = normal.llt().solve(score);
+      if (information != nullptr) *information = normal;
+    }
+    return at;
+  }
+  /// By how much one story explains more than another.
+  [[nodiscard]] double gain(Story story, const Numbers& at, Story than, const Numbers& than_at) const {
+    double sum = 0;
+    for (const Surprise* s : seen_) {
+      const double with = (s->whitened - allowed(*s, story) * at).squaredNorm(),
+                   without = (s->whitened - allowed(*s, than) * than_at).squaredNorm();
+      sum += std::clamp((without - with) / 2, -kMostOfATrack, kMostOfATrack);
+    }
+    return sum;
+  }
+
+ private:
+  static Normal prior() {
+    Numbers precision;
+    constexpr double kMm = 1 / (kLargest_mm * kLargest_mm);
+    precision << kMm, kMm, kMm, kMm, kMm, kMm, 1 / (kLargest_rad * kLargest_rad);
+    return precision.asDiagonal();
+  }
+  static Columns allowed(const Surprise& s, Story story) {
+    Columns columns = s.columns;
+    if (story == Story::kOwnAlone || (story == Story::kPush && !s.driven)) columns.leftCols<4>().setZero();
+    if (story == Story::kPush) columns.middleCols<2>(2).setZero();
+    return columns;
+  }
+  std::vector<const Surprise*> seen_;
+};
+
+/// All instants on a raster finer than the samples, of one run or of all.
+class Scan {
+ public:
+  Scan(const std::vector<Surprises>& all, std::optional<std::uint32_t> run) : run_(run) {
+    for (const Surprises& track : all)
+      if (!run || track.run == *run) tracks_.push_back(&track);
+  }
+  [[nodiscard]] Instant at(double time_s) const {
+    std::vector<const Surprise*> seen;
+    for (const Surprises* track : tracks_) {
+      const auto end = std::lower_bound(track->of.begin(), track->of.end(), time_s,
+                                        [](const Surprise& s, double t) { return s.to_s < t; });
+      if (end != track->of.end() && end->from_s < time_s) seen.push_back(&*end);
+    }
+    return Instant(std::move(seen));
+  }
+  [[nodiscard]] std::optional<std::uint32_t> run() const { return run_; }
+
+ private:
+  std::vector<const Surprises*> tracks_;
+  std::optional<std::uint32_t> run_;
+};
+
+struct Candidate {
+  double time_s, gain;
+  Eigen::Vector4d size;
+  Eigen::Matrix4d covariance;
+};
+
+Candidate candidate_at(const Scan& scan, double time_s) {
+  const Instant instant = scan.at(time_s);
+  Normal information;
+  const Numbers own = instant.fit(Story::kOwnAlone), picture = instant.fit(Story::kPicture, &information);
+  return {time_s, instant.gain(Story::kPicture, picture, Story::kOwnAlone, own), picture.head<4>(),
+          information.inverse().topLeftCorner<4, 4>()};
+}
+
+/// The variance that sizes have at most instants beyond what they should have.
+Eigen::Vector4d usual_excess(const std::vector<Candidate>& all) {
+  Eigen::Vector4d excess;
+  for (int i = 0; i < 4; ++i) {
+    std::vector<double> squares, expected;
+    for (const Candidate& c : all) {
+      squares.push_back(c.size[i] * c.size[i]);
+      expected.push_back(c.covariance(i, i));
+    }
+    const auto middle = static_cast<std::ptrdiff_t>(all.size() / 2);
+    std::nth_element(squares.begin(), squares.begin() + middle, squares.end());
+    std::nth_element(expected.begin(), expected.begin() + middle, expected.end());
+    constexpr double kMedianOfChiSquared = 0.4549;
+    excess[i] = std::max(0.0, squares[all.size() / 2] / kMedianOfChiSquared - expected[all.size() / 2]);
+  }
+  return excess;
+}
+
+/// Whether frames well before or well after show much of the same: then everything goes on moving, as in a wind. Just after a
+/// jump the filter is still on its way.
+bool lasts(const Scan& scan, const Candidate& found, double frame_s) {
+  const Eigen::Matrix4d information = found.covariance.inverse();
+  const Eigen::Vector4d along = information * found.size;
+  const double all = found.size.dot(along);
+  const auto share = [&](int from, int to) {
+    double sum = 0;
+    for (int k = from; k <= to; ++k) sum += candidate_at(scan, found.time_s + k * frame_s).size.dot(along) / all;
+    return sum / (to - from + 1);
+  };
+  constexpr double kMuch = 0.3;
+  return share(-6, -2) > kMuch || share(4, 8) > kMuch;
+}
+
+/// The middle of all instants between frames that say the same.
+double middle_of(const Scan& scan, const Candidate& found, double step_s) {
+  double low = found.time_s, high = found.time_s;
+  constexpr int kFine = 10;
+  const auto same = [&](double t) { return std::abs(candidate_at(scan, t).gain - found.gain) < 1e-9; };
+  for (int i = 1; i < kFine && same(found.time_s - i * step_s / kFine); ++i)
+    low = found.time_s - i * step_s / kFine;
+  for (int i = 1; i < kFine && same(found.time_s + i * step_s / kFine); ++i)
+    high = found.time_s + i * step_s / kFine;
+  return (low + high) / 2;
+}
+
+}  // namespace
+
+std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model, double least_gain) {
+  const std::vector<Surprises> all = surprises_of(fitter, model);
+  std::vector<std::uint32_t> runs;
+  std::vector<double> steps;
+  double from_s = 1e300, to_s = -1e300;
+  for (const Surprises& track : all) {
+    if (std::find(runs.begin(), runs.end(), track.run) == runs.end()) runs.push_back(track.run);
+    for (const Surprise& s : track.of) steps.push_back(s.to_s - s.from_s);
+    if (track.of.empty()) continue;
+    from_s = std::min(from_s, track.of.front().from_s);
+    to_s = std::max(to_s, track.of.back().to_s);
+  }
+  constexpr std::size_t kFewest = 20;
+  if (steps.size() < kFewest) return std::nullopt;
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  constexpr int kMostInstants = 20000;
+  const double frame_s = steps[steps.size() / 2];
+  const double step_s = std::max(steps[steps.size() / 2] / 2, (to_s - from_s) / kMostInstants);
+
+  std::vector<Scan> scans{Scan(all, std::nullopt)};
+  if (runs.size() > 1)
+    for (const std::uint32_t run : runs) scans.emplace_back(all, run);
+  struct Look {
+    const Scan* scan;
+    Candidate candidate;
+  };
+  std::vector<Look> looks;
+  for (const Scan& scan : scans) {
+    const auto count = static_cast<std::size_t>((to_s - from_s) / step_s);
+    if (count < kFewest) return std::nullopt;
+    std::vector<Candidate> of(count);
+    in_parallel(count, fitter.threads(), [&](std::size_t i) {
+      // A little beside the middle between frames, so that regular ones are not met.
+      of[i] = candidate_at(scan, from_s + (static_cast<double>(i) + 0.47) * step_s);
+    });
+    const Eigen::Vector4d excess = usual_excess(of);
+    for (const Candidate& c : of) {
+      // With hardly a frame before it or after it, a jump is but a picture that was off.
+      constexpr double kFrames = 3;
+      if (c.time_s < from_s + kFrames * frame_s || c.time_s > to_s - kFrames * frame_s) continue;
+      if (c.gain < std::max(kCertain, least_gain)) continue;
+      const Eigen::Matrix4d usual = c.covariance + Eigen::Matrix4d(excess.asDiagonal());
+      if (c.size.dot(usual.ldlt().solve(c.size)) / 2 > kBeyondUsual) looks.push_back({&scan, c});
+    }
+  }
+  std::stable_sort(looks.begin(), looks.end(),
+                   [](const Look& a, const Look& b) { return a.candidate.gain > b.candidate.gain; });
+  for (std::size_t i = 0; i < std::min<std::size_t>(looks.size(), kMostLooks); ++i) {
+    const auto& [scan, found] = looks[i];
+    if (lasts(*scan, found, frame_s)) continue;
+    const Instant instant = scan->at(found.time_s);
+    const Numbers picture = instant.fit(Story::kPicture), push = instant.fit(Story::kPush),
+                  own = instant.fit(Story::kOwnAlone);
+    const double as_push = instant.gain(Story::kPush, push, Story::kOwnAlone, own);
+    if (instant.gain(Story::kPush, push, Story::kPicture, picture) > kClear) continue;
+    Jump jump;
+    jump.time_s = middle_of(*scan, found, step_s);
+    jump.run = scan->run();
+    jump.size = found.size;
+    jump.size.tail<2>() /= kArm_mm;
+    jump.sd = found.covariance.diagonal().cwiseSqrt();
+    jump.sd.tail<2>() /= kArm_mm;
+    jump.gain = found.gain;
+    jump.gain_as_push = as_push;
+    return jump;
+  }
+  return std::nullopt;
+}
+
+namespace {
+
+constexpr std::array kTargets = {Target::kMeasuredX, Target::kMeasuredY, Target::kMeasuredTurn,
+                                 Target::kMeasuredScale};
+
+/// Jumps at their times, those of all runs first, then run by run.
+Term term_of(const std::vector<Jump>& jumps, const std::array<bool, 4>& acting) {
+  std::vector<std::optional<std::uint32_t>> scopes;
+  for (const Jump& jump : jumps)
+    if (std::find(scopes.begin(), scopes.end(), jump.run) == scopes.end()) scopes.push_back(jump.run);
+  Term term{kJumpsName, {}, {}, {}};
+  std::vector<double> coefficients, precision;
+  for (const auto& scope : scopes) {
+    std::vector<const Jump*> own;
+    for (const Jump& jump : jumps)
+      if (jump.run == scope) own.push_back(&jump);
+    std::sort(own.begin(), own.end(), [](const Jump* a, const Jump* b) { return a->time_s < b->time_s; });
+    Factor steps;
+    steps.shape = Factor::Shape::kAtLeast;
+    steps.axis.of = Covariate::kTime;
+    for (const Jump* jump : own) steps.points.push_back(jump->time_s);
+    Basis basis{{steps}};
+    if (scope) {
+      Factor which;
+      which.shape = Factor::Shape::kTable;
+      which.axis.of = Covariate::kRun;
+      which.points = {static_cast<double>(*scope)};
+      basis.factors.insert(basis.factors.begin(), which);
+    }
+    for (std::size_t t = 0; t < kTargets.size(); ++t) {
+      if (!acting[t]) continue;
+      term.blocks.push_back({kTargets[t], basis, kAlways});
+      for (const Jump* jump : own) {
+        coefficients.push_back(jump->size[static_cast<Eigen::Index>(t)]);
+        const double sd = t < 2 ? 50 : 0.2;
+        precision.push_back(1 / (sd * sd));
+      }
+    }
+  }
+  const auto n = static_cast<Eigen::Index>(coefficients.size());
+  term.coefficients = Eigen::Map<Eigen::VectorXd>(coefficients.data(), n);
+  term.precision = Eigen::Map<Eigen::VectorXd>(precision.data(), n);
+  return term;
+}
+
+}  // namespace
+
+std::vector<Jump> add_jumps(const Fitter& fitter, MotionModel& model, double least_gain) {
+  const std::size_t place = model.terms.size();
+  std::vector<Jump> jumps;
+  for (bool fitted = false; static_cast<int>(jumps.size()) < kMostJumps;) {
+    const std::optional<Jump> found = find_jump(fitter, model, least_gain);
+    if (!found) {
+      // What was noise to a model that knew of no jumps is not, and may have hidden smaller ones.
+      if (jumps.empty() || fitted) break;
+      fitter.fit(model, 2);
+      fitted = true;
+      continue;
+    }
+    jumps.push_back(*found);
+    MotionModel with = model;
+    with.terms.resize(place);
+    // A shift always; turns and changes of scale where some instant shows them.
+    std::array<bool, 4> acting{true, true, false, false};
+    for (const Jump& jump : jumps)
+      for (Eigen::Index t = 2; t < 4; ++t)
+        acting[static_cast<std::size_t>(t)] =
+            acting[static_cast<std::size_t>(t)] || std::abs(jump.size[t]) > 4 * jump.sd[t];
+    with.terms.push_back(term_of(jumps, acting));
+    model = with;
+    fitted = false;
+  }
+  return jumps;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,292 @@
+#include "clients/identify/search/change_points.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "clients/identify/search/local_quadratic.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+constexpr std::size_t kMostPoints = 150, kMostSteps = 12;
+constexpr double kLeastGain = 2;
+
+/// Columns of steps at chosen points of a block, one set after the other of all targets.
+Block stepping(const Block& like, const std::vector<double>& points) {
+  Factor f;
+  f.shape = Shape::kAtLeast;
+  f.axis = like.basis.factors.front().axis;
+  f.points = points;
+  return {like.target, Basis{{f}}, like.during};
+}
+std::vector<Block> stepping(const std::vector<Block>& kinds, const std::vector<double>& at) {
+  std::vector<Block> blocks;
+  for (const Block& kind : kinds) blocks.push_back(stepping(kind, at));
+  return blocks;
+}
+
+struct Picked {
+  std::vector<std::size_t> points;
+  double evidence = 0;
+  Eigen::VectorXd sd;  ///< of columns: by target, then by point
+  std::vector<Eigen::Index> columns;
+};
+
+/// Steps at some of the points, all targets of one size each.
+class StepChoice {
+ public:
+  StepChoice(const Beside& data, std::size_t points, std::size_t targets)
+      : data_(data), points_(points), targets_(targets) {}
+
+  Picked weigh(const std::vector<std::size_t>& points) const {
+    Picked out;
+    out.points = points;
+    ColumnGroup group;
+    for (std::size_t t = 0; t < targets_; ++t) {
+      for (const std::size_t p : points) {
+        out.columns.push_back(static_cast<Eigen::Index>(t * points_ + p));
+        group.columns.push_back(static_cast<Eigen::Index>(out.columns.size()) - 1);
+        group.roughness.push_back(0);
+      }
+    }
+    const Eigen::MatrixXd information = data_.information(out.columns, out.columns);
+    const Eigen::VectorXd score = data_.score(out.columns);
+    // One size for all, by the golden rule of thumb: of a few, the one that fits best.
+    out.evidence = -1e300;
+    for (double size = size_; size < 4000 * size_; size *= 3) {
+      const Eigen::VectorXd sd = Eigen::VectorXd::Constant(score.size(), size);
+      const double value = log_evidence(information, score, sd);
+      if (value <= out.evidence) continue;
+      out.evidence = value;
+      out.sd = sd;
+    }
+    return out;
+  }
+  /// The points that are best added to some that are chosen, a step or two that make a pulse, and what they gain less their price.
+  std::pair<std::vector<std::size_t>, double> best_addition(const Picked& picked, double price) const {
+    std::pair<std::vector<std::size_t>, double> best{{}, 0};
+    std::vector<double> sizes;
+    if (picked.points.empty()) {
+      for (double size = size_; size < 4000 * size_; size *= 3) sizes.push_back(size);
+    } else {
+      sizes = {picked.sd[0]};
+    }
+    for (const double size : sizes) {
+      // What is left of all beside those that are chosen.
+      Eigen::MatrixXd left = data_.information;
+      Eigen::VectorXd score = data_.score;
+      if (!picked.columns.empty()) {
+        Eigen::MatrixXd own = data_.information(picked.columns, picked.columns);
+        own.diagonal().array() += 1 / (size * size);
+        const Eigen::MatrixXd cross = data_.information(picked.columns, Eigen::all);
+        const Eigen::MatrixXd by = own.llt().solve(cross);
+        left.noalias() -= cross.transpose() * by;
+        score -= by.transpose() * Eigen::VectorXd(data_.score(picked.columns));
+      }
+      for (const std::size_t width : {0u, 1u, 2u, 4u, 8u}) {
+        for (std::size_t p = 0; p + width < points_; ++p) {
+          std::vector<Eigen::Index> columns;
+          for (std::size_t t = 0; t < targets_; ++t) {
+            columns.push_back(static_cast<Eigen::Index>(t * points_ + p));
+            if (width > 0) columns.push_back(static_cast<Eigen::Index>(t * points_ + p + width));
+          }
+          const double worth =
+              log_evidence(left(columns, columns), score(columns),
+                           Eigen::VectorXd::Constant(static_cast<Eigen::Index>(columns.size()), size)) -
+              price * (width > 0 ? 2 : 1);
+          if (worth <= best.second) continue;
+          best = {{p}, worth};
+          if (width > 0) best.first.push_back(p + width);
+        }
+      }
+    }
+    return best;
+  }
+  void set_smallest_size() {
+    double most = 0;
+    for (Eigen::Index i = 0; i < data_.information.rows(); ++i) most = std::max(most, data_.information(i, i));
+    size_ = 1 / std::sqrt(std::max(most, 1e-12));
+  }
+
+ private:
+  const Beside& data_;
+  std::size_t points_, targets_;
+  double size_ = 1;
+};
+
+/// Steps of one kind of effect, in place of a term or beside it.
+struct Steps {
+  std::vector<Block> kinds;
+  bool beside = false;
+  std::vector<double> at_s;
+  double gain = 0;  ///< log evidence over the term as it is, less the price of choosing
+};
+
+/// The steps at points of a raster that are worth their price.
+void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t place,
+                  const std::vector<double>& points, Steps& steps) {
+  const Term& term = model.terms[place];
+  const Linear l =
+      linear(fitter, model, steps.beside ? model.terms.size() : place, stepping(steps.kinds, points), steps.beside);
+  double had = 0;
+  Eigen::VectorXd score = l.score;
+  if (!steps.beside) {
+    score = l.score_without(term.coefficients);
+    const Beside now = beside(l, score, l.of_term());
+    had = log_evidence(now.information, now.score, term.precision.cwiseInverse().cwiseSqrt());
+  }
+  const Beside data = beside(l, score, l.more());
+  StepChoice choice(data, points.size(), steps.kinds.size());
+  choice.set_smallest_size();
+  const double price = std::log(static_cast<double>(points.size()));
+  Picked picked;
+  while (picked.points.size() < kMostSteps) {
+    const auto [added, worth] = choice.best_addition(picked, price);
+    if (added.empty() || worth < kLeastGain) break;
+    std::vector<std::size_t> with = picked.points;
+    with.insert(with.end(), added.begin(), added.end());
+    picked = choice.weigh(with);
+  }
+  for (const std::size_t p : picked.points) steps.at_s.push_back(points[p]);
+  std::sort(steps.at_s.begin(), steps.at_s.end());
+  steps.gain = picked.evidence - price * static_cast<double>(picked.points.size()) - had;
+}
+
+/// What a curve over time has gained by many columns beside what it explains: half the log determinant of its posterior.
+double bends(const Fitter& fitter, const MotionModel& model, std::size_t place) {
+  const Linear l = linear(fitter, model, place, {});
+  const Beside now = beside(l, l.score_without(model.terms[place].coefficients), l.of_term());
+  const Eigen::VectorXd sd = model.terms[place].precision.cwiseInverse().cwiseSqrt();
+  return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
+}
+
+/// Puts the steps into the model, at times found on ever finer rasters. False: they came to be in disorder.
+bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, const Steps& steps, double apart_s) {
+  constexpr int kSide = 6, kRaster = 2 * kSide + 1;
+  const std::size_t home = place;
+  std::vector<double> at = steps.at_s;
+  if (steps.beside) {
+    // A term of their own, which is joined to the other afterwards.
+    model.terms.push_back({model.terms[place].name, {}, {}, {}});
+    place = model.terms.size() - 1;
+  }
+  for (double fine_s = apart_s / 5; fine_s > 0.04; fine_s /= 5) {
+    std::vector<double> raster;
+    for (const double t : at)
+      for (int i = -kSide; i <= kSide; ++i) raster.push_back(t + i * fine_s);
+    if (raster.size() > kMostColumns) return false;
+    const Linear l = linear(fitter, model, place, stepping(steps.kinds, raster));
+    const Eigen::VectorXd score = l.score_without(model.terms[place].coefficients);
+    const Beside data = beside(l, score, l.more());
+    StepChoice choice(data, raster.size(), steps.kinds.size());
+    choice.set_smallest_size();
+    std::vector<std::size_t> chosen;
+    for (std::size_t k = 0; k < at.size(); ++k) chosen.push_back(kRaster * k + kSide);
+    Picked best = choice.weigh(chosen);
+    for (int sweep = 0; sweep < 3; ++sweep) {
+      for (std::size_t k = 0; k < at.size(); ++k) {
+        for (std::size_t i = 0; i < kRaster; ++i) {
+          std::vector<std::size_t> other = best.points;
+          other[k] = kRaster * k + i;
+          Picked found = choice.weigh(other);
+          if (found.evidence > best.evidence) best = std::move(found);
+        }
+      }
+    }
+    for (std::size_t k = 0; k < at.size(); ++k) at[k] = raster[best.points[k]];
+    if (!std::is_sorted(at.begin(), at.end())) return false;
+    std::vector<Eigen::Index> columns;
+    for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
+    exchange(model, place, l, stepping(steps.kinds, at), score, columns, best.sd);
+  }
+  if (!steps.beside) return true;
+  const Term own = model.terms.back();
+  model.terms.pop_back();
+  Term& term = model.terms[home];
+  term.blocks.insert(term.blocks.end(), own.blocks.begin(), own.blocks.end());
+  Eigen::VectorXd all(term.coefficients.size() + own.coefficients.size()), precision(all.size());
+  all << term.coefficients, own.coefficients;
+  precision << term.precision, own.precision;
+  term.coefficients = all;
+  term.precision = precision;
+  return true;
+}
+
+/// What goes on as time does: of the run, or while motors turn.
+bool goes_on(const Axis& axis) {
+  switch (axis.of) {
+    case Covariate::kTime:
+    case Covariate::kMotorTime:
+    case Covariate::kLeftMotorTime:
+    case Covariate::kRightMotorTime:
+    case Covariate::kDrivenTime: return axis.forget == 0;
+    default: return false;
+  }
+}
+
+}  // namespace
+
+std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  const std::string name = model.terms[place].name;
+  double duration_s = 0;
+  std::vector<Block> kinds;
+  for (const Block& block : model.terms[place].blocks) {
+    if (block.basis.factors.size() != 1) return name;
+    // Jumps of the picture that are more than a shift are found by themselves.
+    if (block.target == Target::kMeasuredTurn || block.target == Target::kMeasuredScale) return name;
+    const Factor& f = block.basis.factors.front();
+    if (!goes_on(f.axis) || f.shape != Shape::kCosines) return name;
+    duration_s = std::max(duration_s, f.high);
+    if (std::none_of(kinds.begin(), kinds.end(),
+                     [&](const Block& b) { return b.target == block.target && b.during == block.during; }))
+      kinds.push_back(block);
+  }
+  std::vector<double> points;
+  const double apart_s = std::max(1.0, duration_s / kMostPoints);
+  for (double at = apart_s; at < duration_s - apart_s / 2 && points.size() < kMostPoints; at += apart_s)
+    points.push_back(at);
+  std::vector<Steps> forms = {{kinds, false, {}, 0}, {kinds, true, {}, 0}};
+  // What jumps in the room and what jumps in the picture look alike until the instant is known.
+  const Basis basis = kinds.front().basis;
+  const std::vector<Block> room = {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}},
+                           picture = {{Target::kMeasuredX, basis, kAlways}, {Target::kMeasuredY, basis, kAlways}};
+  const Target acts_on = kinds.front().target;
+  const bool in_room = acts_on == Target::kWorldX || acts_on == Target::kWorldY,
+             in_picture = acts_on == Target::kMeasuredX;
+  const bool by_the_clock = basis.factors.front().axis.of == Covariate::kTime;
+  if (by_the_clock && (in_room || in_picture)) forms.push_back({in_room ? picture : room, false, {}, 0});
+  // On the raster an instant is only roughly known: what it is worth shows once it is found.
+  MotionModel best = model;
+  double best_worth = 0;
+  for (std::size_t f = 0; f < forms.size(); ++f) {
+    Steps& form = forms[f];
+    constexpr double kBetter = 2;
+    const bool other = f == 2;
+    choose_steps(fitter, model, place, points, form);
+    if (form.at_s.empty() || (form.gain < kBetter && !other)) continue;
+    MotionModel trial = model;
+    if (!put_steps(fitter, trial, place, form, apart_s)) continue;
+    if (other) trial.terms[place].name = in_room ? "camera-by-time" : "drift-by-time";
+    fitter.fit(trial, 2);
+    if (form.beside) settle(fitter, trial, place);
+    // A step costs the choice of its instant, and its sizes; a curve goes for what it bends.
+    const double price = std::log(static_cast<double>(points.size())) + 3 * static_cast<double>(form.kinds.size());
+    const double curve = form.beside ? 0 : bends(fitter, model, place);
+    const double worth = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
+                         price * static_cast<double>(form.at_s.size());
+    // What is as likely to be the one as the other stays what it was found as.
+    constexpr double kSurelyOther = 3;
+    if (worth <= best_worth + (other ? kSurelyOther : 0)) continue;
+    best_worth = worth;
+    best = trial;
+  }
+  model = best;
+  return model.terms[place].name;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,165 @@
+#include "clients/identify/search/covariate_hypotheses.hpp"
+
+#include <algorithm>
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+/// How long it did what came before: whatever it does now, or going straight. Turns that lasted go on turning.
+void of_lasting(DictionaryMaker& make, const Extent& extent, std::uint8_t straight_only) {
+  constexpr Eigen::Index kCurve = 3;
+  Factor lasted = over(Shape::kCosines, Covariate::kPreviousLasted, 0, extent.since_s, kCurve);
+  lasted.warp = 1;
+  for (const std::uint8_t during : {kDriven, straight_only}) {
+    const auto bases = make.put(kSpeed, Basis{{lasted}}, during);
+    for (const Eigen::Index size : {Eigen::Index{1}, kCurve})
+      make.add(kSpeed, "previous-lasted", {"history"}, some(bases, 0, size), 4);
+  }
+  if (!extent.has_turns) return;
+  const Factor which = keyed(Shape::kTable, Covariate::kPreviousCommand, {2, 3});
+  lasted.count = 2;
+  const auto turned = make.put(kTurning, Basis{{which, lasted}}, straight_only);
+  make.add(kTurning, "previous-lasted", {"history"}, some(turned, 0, 4), 2);
+}
+
+}  // namespace
+
+void hypotheses_of_use(DictionaryMaker& make, const Extent& extent) {
+  const Basis motor{{over(Shape::kCosines, Covariate::kMotorTime, 0, extent.motor_s, 8)}};
+  make.curve(kSpeed, "motor-time", {"motor_time"}, motor, {1, 3, 8}, false);
+  const Basis driven{{over(Shape::kCosines, Covariate::kDrivenTime, 0, extent.driven_s, 6)}};
+  make.curve(kTurning, "driven-time", {"motor_time"}, driven, {1, 3, 6}, false);
+}
+
+void hypotheses_of_commands(DictionaryMaker& make, const Extent& extent) {
+  std::vector<double> moving;
+  if (extent.has_straight) moving.push_back(1);
+  if (extent.has_turns) moving.insert(moving.end(), {2, 3});
+  const Basis which{{keyed(Shape::kTable, Covariate::kCommand, moving)}};
+  const auto n = static_cast<Eigen::Index>(moving.size());
+  for (const Acting* acting : {&kSpeed, &kTurning, &kSlip}) {
+    const auto bases = make.put(*acting, which);
+    for (Eigen::Index i = 0; i < n; ++i)
+      make.add(*acting, "command", {"command"}, some(bases, i, 1), static_cast<double>(n));
+    make.add(*acting, "command", {"command"}, some(bases, 0, n));
+  }
+  for (const Target wheel : {Target::kGainLeft, Target::kGainRight}) {
+    const auto base = make.put(wheel, which);
+    for (Eigen::Index i = 0; i < n; ++i)
+      make.add("speed-by-command", {"command"}, kSpeed.in_words, {base + i}, static_cast<double>(n) * 2);
+  }
+  // Robots that are told to stop may creep on.
+  if (extent.has_stop) {
+    constexpr std::uint8_t kAtRest = 1;
+    const auto ahead = make.put(Target::kAhead, {}, kAtRest), aside = make.put(Target::kSideways, {}, kAtRest),
+               turning = make.put(Target::kTurn, {}, kAtRest);
+    make.add("creep-by-command", {"command"}, "motion at rest", {ahead}, 2);
+    make.add("creep-by-command", {"command"}, "motion at rest", {ahead, aside, turning}, 2);
+  }
+  // A tracker that lags sees moving robots where they were.
+  if (moving.size() > 1) {
+    const auto ahead = make.put(Target::kMeasuredAhead, which);
+    make.add("camera-by-command", {"measurement", "command"}, kCamera.in_words, some({ahead}, 0, n));
+  }
+  Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, 8);
+  since.warp = 1;
+  const Basis start{{since}};
+  make.curve(kSpeed, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
+  make.curve(kTurning, "time-since-command", {"time_since_command"}, start, {1, 3, 8}, false);
+  make.curve(kSlip, "time-since-command", {"time_since_command"}, start, {3}, false);
+  if (n == 1) return;
+  since.count = 3;
+  const Basis each{{keyed(Shape::kTable, Covariate::kCommand, moving), since}};
+  for (const Acting* acting : {&kSpeed, &kTurning})
+    make.add(*acting, "command-and-time-since-command", {"command", "time_since_command"},
+             some(make.put(*acting, each), 0, 3 * n));
+}
+
+void hypotheses_of_history(DictionaryMaker& make, const Extent& extent) {
+  if (!extent.has_turns && !extent.has_stop) return;
+  constexpr std::uint8_t kStraightOnly = 1u << 1;
+  constexpr Eigen::Index kCurve = 4;
+  std::vector<double> before{kNoCommand};
+  if (extent.has_turns) before.insert(before.begin(), {2, 3});
+  const auto turns = static_cast<Eigen::Index>(before.size()) - 1;
+  if (extent.has_stop) before.push_back(0);
+  const auto keys = static_cast<Eigen::Index>(before.size());
+  Factor since = over(Shape::kCosines, Covariate::kSinceCommand, 0, extent.since_s, kCurve);
+  since.first = 0;
+  since.warp = 1;
+  const Factor which = keyed(Shape::kTable, Covariate::kPreviousCommand, before);
+  for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
+    // Slip in constant amounts alone.
+    const Eigen::Index curve = acting == &kSlip ? 1 : kCurve;
+    const Basis basis = curve > 1 ? Basis{{which, since}} : Basis{{which}};
+    const auto driven = make.put(*acting, basis), straight = make.put(*acting, basis, kStraightOnly);
+    const auto after = [&](std::vector<Eigen::Index> bases, Eigen::Index from, Eigen::Index to) {
+      for (const Eigen::Index size :
+           curve > 1 ? std::vector<Eigen::Index>{1, curve} : std::vector<Eigen::Index>{1}) {
+        std::vector<Eigen::Index> columns;
+        for (Eigen::Index key = from; key < to; ++key)
+          for (const Eigen::Index c : some(bases, key * curve, size)) columns.push_back(c);
+        std::vector<std::string> words{"history"};
+        if (size > 1) words.emplace_back("time_since_command");
+        make.add(*acting, "previous-command", words, columns, 4);
+      }
+    };
+    for (const auto& bases : {driven, straight, std::vector<Eigen::Index>{driven[0], straight[0]}}) {
+      if (turns > 0) after(bases, 0, turns);
+      if (extent.has_stop) {
+        after(bases, keys - 1, keys);
+        after(bases, turns, keys);
+      }
+      after(bases, 0, keys);
+    }
+  }
+  of_lasting(make, extent, kStraightOnly);
+  if (!extent.has_turns) return;
+  const Factor last = keyed(Shape::kTable, Covariate::kLastTurn, {2, 3});
+  for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
+    const auto turned = make.put(*acting, Basis{{last}}, kStraightOnly);
+    make.add(*acting, "last-turn", {"history"}, some(turned, 0, 2));
+  }
+}
+
+void hypotheses_of_lately(DictionaryMaker& make, const Extent& extent) {
+  const auto lately = [&](Shape shape, Covariate of, std::size_t forget, std::uint32_t count) {
+    Factor f = over(shape, of, 0, std::min(kForget_s[forget], extent.driven_s), count);
+    f.axis.forget = static_cast<std::uint8_t>(forget + 1);
+    return f;
+  };
+  constexpr auto kChoices = static_cast<double>(kForget_s.size());
+  for (std::size_t f = 0; f < kForget_s.size(); ++f) {
+    for (const Covariate of : {Covariate::kMotorTime, Covariate::kDrivenTime}) {
+      const auto bases = make.put(kSpeed, Basis{{lately(Shape::kCosines, of, f, 3)}});
+      for (const Eigen::Index size : {1, 3})
+        make.add(kSpeed, of == Covariate::kMotorTime ? "motor-time-of-late" : "driven-time-of-late",
+                 {"motor_time", "history"}, some(bases, 0, size), kChoices);
+    }
+    if (!extent.has_turns) continue;
+    const auto left = make.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kLeftMotorTime, f, 1)}}),
+               right = make.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kRightMotorTime, f, 1)}});
+    make.add(kTurning, "turns-of-late", {"history"}, {left, right}, kChoices);
+  }
+  // Since it rested, as a battery sags that recovers at once.
+  if (extent.has_stop) {
+    Factor unbroken = over(Shape::kCosines, Covariate::kSinceRest, 0, extent.since_rest_s, 6);
+    unbroken.warp = 1;
+    for (const Acting* acting : {&kSpeed, &kTurning})
+      make.curve(*acting, "time-since-rest", {"motor_time", "history"}, Basis{{unbroken}}, {1, 3, 6}, false);
+  }
+  if (!extent.has_turns) return;
+  const Basis wound{
+      {over(Shape::kCosines, Covariate::kUseDifference, -extent.difference_s, extent.difference_s, 6)}};
+  make.curve(kTurning, "turns-so-far", {"motor_time", "history"}, wound, {1, 3, 6}, false);
+  // All that it has turned, as a cable winds up.
+  const auto left = make.put(Target::kTurn,
+                             Basis{{over(Shape::kLinear, Covariate::kLeftMotorTime, 0, extent.motor_s, 1)}}),
+             right = make.put(Target::kTurn,
+                              Basis{{over(Shape::kLinear, Covariate::kRightMotorTime, 0, extent.motor_s, 1)}});
+  make.add(kTurning, "turns-so-far", {"history", "motor_time"}, {left, right}, kChoices);
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,313 @@
+#include "clients/identify/search/neighbour_shape.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "clients/identify/search/local_quadratic.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+/// Log evidence that one more form must bring, besides the price of choosing it.
+constexpr double kWorth = 8;
+constexpr std::size_t kMostForms = 5;
+/// So many of them at first: what is found far from where data were linearised is known roughly.
+constexpr std::size_t kFirstForms = 2;
+constexpr std::size_t kMostCounted = 6;
+
+/// Places in kNeighbourRadii_mm of 50, 70, 80, 100, 120 and 150 mm: within which robots are added up by their directions.
+constexpr std::array<std::uint8_t, 6> kDirected = {1, 3, 4, 6, 8, 11};
+/// In such powers of what falls from 1 in a direction to 0 opposite: from half a circle of them to a beam of some 45 degrees.
+constexpr std::array<std::uint8_t, 2> kFoci = {1, 4};
+
+/// By neighbours alone.
+bool is_of_neighbours(const Block& block) {
+  const auto neighbours = [](const Factor& f) {
+    return f.known.empty() && (f.axis.of == Covariate::kNeighbours || f.axis.of == Covariate::kNearest ||
+                               f.axis.of == Covariate::kDensity || f.axis.of == Covariate::kBearing);
+  };
+  const std::vector<Factor>& factors = block.basis.factors;
+  return (block.target == Target::kGain || block.target == Target::kAhead || block.target == Target::kTurn ||
+          block.target == Target::kSideways) &&
+         !factors.empty() && std::all_of(factors.begin(), factors.end(), neighbours);
+}
+
+/// The largest density within each radius that the data have, but for one look in a thousand.
+std::array<double, kNeighbourRadii_mm.size()> densities(const PreparedSet& set) {
+  std::array<std::vector<float>, kNeighbourRadii_mm.size()> all;
+  constexpr double kEvery_s = 3;
+  for (const TrackView& view : set.views()) {
+    for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s)
+      for (std::size_t r = 0; r < all.size(); ++r)
+        all[r].push_back(view.neighbours->view(view.place, t).density[r]);
+  }
+  std::array<double, kNeighbourRadii_mm.size()> most{};
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    if (all[r].empty()) continue;
+    const auto at = all[r].begin() + static_cast<std::ptrdiff_t>(all[r].size() - 1 - all[r].size() / 1000);
+    std::nth_element(all[r].begin(), at, all[r].end());
+    most[r] = *at;
+  }
+  return most;
+}
+
+Axis toward(Covariate of, std::uint8_t radius, std::uint8_t focus, int degrees) {
+  Axis axis{of, radius};
+  axis.focus = focus;
+  axis.toward_deg = static_cast<std::int16_t>(degrees);
+  return axis;
+}
+
+/// What levels off stays sensible among more neighbours than there were where nothing touched. Among none it is nothing: a constant
+/// would be shared with the speeds, which tells nothing apart and leads fits away.
+Factor levelling(Axis axis) {
+  Factor f;
+  f.shape = Shape::kLevelling;
+  f.axis = axis;
+  f.points = {0.3, 1, 3};
+  return f;
+}
+
+/// One shape that an effect may have, alone or with others.
+using Form = std::vector<Block>;
+
+/// The nearest by how far and where it is.
+Basis nearest(std::uint8_t radius, std::uint32_t distances, std::uint32_t waves) {
+  Factor near, bearing;
+  near.shape = Shape::kTaper;
+  near.axis = {Covariate::kNearest, radius};
+  near.high = kNeighbourRadii_mm[radius];
+  near.count = distances;
+  bearing.shape = Shape::kHarmonics;
+  bearing.axis = {Covariate::kBearing, radius};
+  bearing.count = waves;
+  return {{near, bearing}};
+}
+
+std::vector<Form> forms_of_speed(const PreparedSet& set, std::uint8_t during) {
+  std::vector<Form> forms;
+  const auto most = densities(set);
+  const auto add = [&](Factor f) { forms.push_back({{Target::kGain, Basis{{std::move(f)}}, during}}); };
+  for (std::uint8_t r = 0; r < kNeighbourRadii_mm.size(); ++r) {
+    Factor table;
+    table.shape = Shape::kAtLeast;
+    table.axis = {Covariate::kNeighbours, r};
+    for (std::size_t n = 1; n <= kMostCounted; ++n) table.points.push_back(static_cast<double>(n));
+    if (r > 0) add(table);
+    if (most[r] < 0.05) continue;
+    Factor sum;
+    sum.axis = {Covariate::kDensity, r};
+    sum.high = most[r];
+    add(sum);
+    add(levelling(sum.axis));
+    Factor near;
+    near.shape = Shape::kTaper;
+    near.axis = {Covariate::kNearest, r};
+    near.high = kNeighbourRadii_mm[r];
+    near.count = 4;
+    if (r > 0) add(near);
+  }
+  // Of all that lie ahead, or behind.
+  for (const std::uint8_t r : kDirected) {
+    if (most[r] < 0.05) continue;
+    for (const Covariate of : {Covariate::kNeighbours, Covariate::kDensity})
+      for (const std::uint8_t focus : kFoci)
+        for (const int degrees : {0, 180}) add(levelling(toward(of, r, focus, degrees)));
+  }
+  // By where the nearest is as well: ahead, at a side, behind. Of 60, 80 and 110 mm.
+  for (const std::uint8_t r : std::array<std::uint8_t, 3>{2, 4, 7}) {
+    forms.push_back({{Target::kGain, nearest(r, 2, 2), during}});
+    forms.push_back({{Target::kAhead, nearest(r, 2, 1), during}});
+  }
+  return forms;
+}
+
+/// Of what turns robots or pushes them aside.
+std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t during) {
+  std::vector<Form> forms;
+  const auto most = densities(set);
+  const auto targets = turns ? std::vector{Target::kTurn} : std::vector{Target::kAhead, Target::kSideways};
+  const auto linear = [&](Axis axis) {
+    Factor f;
+    f.axis = axis;
+    f.high = axis.of == Covariate::kDensity ? most[axis.radius] : kMostCounted;
+    return Basis{{f}};
+  };
+  const auto add = [&](Covariate of, std::uint8_t radius, std::uint8_t focus,
+                       std::initializer_list<int> directions) {
+    Form form;
+    for (const Target target : targets)
+      for (const int degrees : directions)
+        form.push_back({target, linear(toward(of, radius, focus, degrees)), during});
+    forms.push_back(std::move(form));
+  };
+  for (const std::uint8_t r : kDirected) {
+    if (most[r] < 0.05) continue;
+    for (const Covariate of : {Covariate::kNeighbours, Covariate::kDensity}) {
+      // At its sides and before and behind it: the waves of one, and of two and three turns about it.
+      if (turns)
+        add(of, r, 1, {-90, 90});
+      else
+        add(of, r, 1, {-90, 0, 90, 180});
+      add(of, r, 4, {-135, -45, 45, 135});
+    }
+    Form by_nearest, of_all;
+    for (const Target target : targets) {
+      by_nearest.push_back({target, nearest(r, 3, 2), during});
+      // Wherever they are.
+      of_all.push_back({target, linear({Covariate::kDensity, r}), during});
+    }
+    forms.push_back(std::move(by_nearest));
+    forms.push_back(std::move(of_all));
+  }
+  return forms;
+}
+
+/// The same forms with radii of their own near by.
+std::vector<Form> with_radii_about(const std::vector<Form>& forms) {
+  constexpr int kAbout_mm = 9;
+  std::vector<Form> out;
+  for (const Form& form : forms) {
+    for (int by_mm = -kAbout_mm; by_mm <= kAbout_mm; ++by_mm) {
+      Form other = form;
+      bool listed = true;
+      for (Block& block : other) {
+        for (Factor& f : block.basis.factors) {
+          const double reach = reach_mm(f.axis) + by_mm;
+          listed = listed && reach <= kListed_mm;
+          f.axis.within_mm = static_cast<float>(reach);
+          if (f.shape == Shape::kTaper) f.high = reach;
+        }
+      }
+      if (listed) out.push_back(std::move(other));
+    }
+  }
+  return out;
+}
+
+/// Some of the forms, and the standard deviations of their columns beforehand.
+struct Chosen {
+  std::vector<std::size_t> forms;
+  std::vector<Eigen::Index> columns;
+  Eigen::VectorXd sd;
+  double evidence = 0;
+};
+
+class Choice {
+ public:
+  Choice(const Beside& data, const std::vector<Form>& forms) : data_(data) {
+    Eigen::Index next = 0;
+    for (const Form& form : forms) {
+      std::vector<Eigen::Index> columns;
+      std::vector<double> sd;
+      for (const Block& block : form) {
+        for (const double rough : block.basis.roughness()) {
+          sd.push_back(std::pow(rough, -1.5));
+          columns.push_back(next++);
+        }
+      }
+      columns_.push_back(std::move(columns));
+      sd_.emplace_back(Eigen::Map<Eigen::VectorXd>(sd.data(), static_cast<Eigen::Index>(sd.size())));
+    }
+  }
+
+  Chosen choose(std::size_t most_forms) const {
+    Chosen chosen;
+    const double price = std::log(static_cast<double>(columns_.size()));
+    while (chosen.forms.size() < most_forms) {
+      // What is left of all beside those that are chosen.
+      Eigen::MatrixXd left = data_.information;
+      Eigen::VectorXd score = data_.score;
+      if (!chosen.columns.empty()) {
+        Eigen::MatrixXd own = data_.information(chosen.columns, chosen.columns);
+        own.diagonal() += chosen.sd.array().square().inverse().matrix();
+        const Eigen::MatrixXd cross = data_.information(chosen.columns, Eigen::all);
+        const Eigen::MatrixXd by = own.llt().solve(cross);
+        left.noalias() -= cross.transpose() * by;
+        score -= by.transpose() * Eigen::VectorXd(data_.score(chosen.columns));
+      }
+      double best = 0;
+      std::size_t best_form = columns_.size();
+      Eigen::VectorXd best_sd;
+      for (std::size_t f = 0; f < columns_.size(); ++f) {
+        if (std::find(chosen.forms.begin(), chosen.forms.end(), f) != chosen.forms.end()) continue;
+        const Eigen::MatrixXd information = left(columns_[f], columns_[f]);
+        const Eigen::VectorXd own_score = score(columns_[f]);
+        for (double size = 0.004; size < 8; size *= 2) {
+          const double value = log_evidence(information, own_score, size * sd_[f]);
+          if (value <= best) continue;
+          best = value;
+          best_form = f;
+          best_sd = size * sd_[f];
+        }
+      }
+      if (best < kWorth + price) break;
+      chosen.forms.push_back(best_form);
+      chosen.columns.insert(chosen.columns.end(), columns_[best_form].begin(), columns_[best_form].end());
+      const Eigen::Index had = chosen.sd.size();
+      chosen.sd.conservativeResize(had + best_sd.size());
+      chosen.sd.tail(best_sd.size()) = best_sd;
+      chosen.evidence += best - price;
+    }
+    return chosen;
+  }
+
+ private:
+  const Beside& data_;
+  std::vector<std::vector<Eigen::Index>> columns_;
+  std::vector<Eigen::VectorXd> sd_;  ///< of the columns of a form, to be scaled
+};
+
+}  // namespace
+
+bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  const std::vector<Block>& had = model.terms[place].blocks;
+  if (had.empty() || !std::all_of(had.begin(), had.end(), is_of_neighbours)) return false;
+  const bool pushes = had.front().target == Target::kTurn || had.front().target == Target::kSideways;
+  std::vector<Form> forms =
+      pushes ? forms_of_push(fitter.set(), had.front().target == Target::kTurn, had.front().during)
+             : forms_of_speed(fitter.set(), had.front().during);
+  double likelihood = fitter.log_likelihood(model);
+  // In place of the term, some of the forms, if they explain more by so much.
+  const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double worth) {
+    std::vector<Block> all;
+    for (const Form& form : of) all.insert(all.end(), form.begin(), form.end());
+    MotionModel trial = model;
+    const Linear l = linear(fitter, trial, place, all);
+    const Eigen::VectorXd at_zero = l.score_without(trial.terms[place].coefficients);
+    const Beside data = beside(l, at_zero, l.more());
+    const Chosen chosen = Choice(data, of).choose(most);
+    std::vector<Form> found;
+    std::vector<Block> blocks;
+    for (const std::size_t f : chosen.forms) {
+      found.push_back(of[f]);
+      blocks.insert(blocks.end(), of[f].begin(), of[f].end());
+    }
+    if (found.empty()) return found;
+    std::vector<Eigen::Index> columns;
+    for (const Eigen::Index c : chosen.columns) columns.push_back(l.own + c);
+    exchange(trial, place, l, blocks, at_zero, columns, chosen.sd);
+    fitter.fit(trial, 1);
+    settle(fitter, trial, place);
+    const double reached = fitter.log_likelihood(trial);
+    if (reached < likelihood + worth) return std::vector<Form>{};
+    model = trial;
+    likelihood = reached;
+    return found;
+  };
+  const std::vector<Form> first = try_forms(forms, kFirstForms, 0);
+  if (first.empty()) return false;
+  // What seemed to be noise, and where robots were thought to be, changes with the first choice.
+  fitter.fit_surroundings(model);
+  likelihood = fitter.log_likelihood(model);
+  const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms, kWorth);
+  forms.insert(forms.end(), finer.begin(), finer.end());
+  try_forms(forms, kMostForms, kWorth);
+  return true;
+}
+
+}  // namespace kilotwin::identify

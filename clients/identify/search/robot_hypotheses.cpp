@@ -1,0 +1,42 @@
+#include "clients/identify/search/covariate_hypotheses.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+}  // namespace
+
+void hypotheses_of_robots(DictionaryMaker& make, const Extent& extent) {
+  constexpr std::size_t kMost = 120;
+  if (extent.robots.size() < 2 || extent.robots.size() > kMost) return;
+  std::vector<double> keys(extent.robots.begin(), extent.robots.end());
+  const auto n = static_cast<Eigen::Index>(keys.size());
+  const auto gains = make.put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys)}});
+  make.add(kSpeed, "robot", {"robot"}, some(gains, 0, n));
+  if (keys.size() > 40) return;
+  const auto slopes = make.put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys),
+                                              over(Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)}});
+  make.add(kSpeed, "robot-and-time", {"robot", "time"}, some(slopes, 0, n));
+  // A leg that is bent, a marker that was put on askew.
+  const Basis each{{keyed(Shape::kTable, Covariate::kRobot, keys)}};
+  make.add(kSlip, "robot", {"robot"}, some(make.put(kSlip, each), 0, n));
+  if (extent.headings) make.add(kCompass, "robot", {"robot"}, some(make.put(kCompass, each), 0, n));
+  const auto ahead = make.put(Target::kMeasuredAhead, each, kAlways),
+             left = make.put(Target::kMeasuredLeft, each, kAlways);
+  make.add("camera-by-robot", {"measurement", "robot"}, kCamera.in_words, some({ahead, left}, 0, n));
+}
+
+void hypotheses_of_runs(DictionaryMaker& make, const Extent& extent) {
+  constexpr std::size_t kMost = 40;
+  if (extent.runs.size() < 2 || extent.runs.size() > kMost) return;
+  const Basis which{{keyed(Shape::kTable, Covariate::kRun, {extent.runs.begin(), extent.runs.end()})}};
+  const auto n = static_cast<Eigen::Index>(extent.runs.size());
+  const auto scale = make.put(Target::kMeasuredScale, which);
+  make.add("camera-by-run", {"measurement"}, kCamera.in_words, some({scale}, 0, n));
+  // Robots may as well have been slower: turns tell the one from the other.
+  make.add(kSpeed, "run", {"history"}, some(make.put(kSpeed, which), 0, n));
+  if (extent.headings) make.add(kCompass, "run", {}, some(make.put(kCompass, which), 0, n));
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,344 @@
+#include "clients/identify/search/score_test.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr std::size_t kFolds = 6;
+
+/// log10 of the upper tail of the chi-squared distribution: by the continued fraction of the incomplete gamma function, or
+/// its series.
+double log10_tail(double statistic, double degrees) {
+  const double a = degrees / 2, x = std::max(statistic, 0.0) / 2;
+  if (x <= 0) return 0;
+  const double front = a * std::log(x) - x - std::lgamma(a);
+  if (x < a + 1) {
+    double term = 1 / a, sum = term;
+    for (int n = 1; n < 500 && term > 1e-15 * sum; ++n) sum += term *= x / (a + n);
+    return std::log10(std::max(1e-300, 1 - std::min(1.0, std::exp(front) * sum)));
+  }
+  double b = x + 1 - a, c = 1e300, d = 1 / b, h = d;
+  for (int i = 1; i < 500; ++i) {
+    const double an = -i * (i - a);
+    b += 2;
+    d = 1 / (std::abs(an * d + b) < 1e-300 ? 1e-300 : an * d + b);
+    c = std::abs(b + an / c) < 1e-300 ? 1e-300 : b + an / c;
+    const double ratio = d * c;
+    h *= ratio;
+    if (std::abs(ratio - 1) < 1e-12) break;
+  }
+  return (front + std::log(h)) / std::log(10.0);
+}
+
+template <class Matrix>
+Eigen::MatrixXd pick(const Matrix& from, const std::vector<Eigen::Index>& rows,
+                     const std::vector<Eigen::Index>& cols) {
+  Eigen::MatrixXd out(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(cols.size()));
+  for (std::size_t j = 0; j < cols.size(); ++j)
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = from(rows[i], cols[j]);
+  return out;
+}
+Eigen::VectorXd pick(const Eigen::VectorXd& from, const std::vector<Eigen::Index>& rows) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) out[static_cast<Eigen::Index>(i)] = from[rows[i]];
+  return out;
+}
+
+bool of_robots(const Hypothesis& h) {
+  return std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
+}
+
+/// The sum of squares of the scores of all stretches, what those of one robot have in common taken off: what is each
+/// robot's own makes its stretches alike, not noisy. 0 where robots have too few stretches to tell.
+double within_units(const Eigen::MatrixXd& scores, const std::vector<std::size_t>& unit) {
+  constexpr double kFewest = 30;
+  double sum = 0, freedom = 0;
+  for (std::size_t first = 0; first < unit.size();) {
+    std::size_t end = first;
+    while (end < unit.size() && unit[end] == unit[first]) ++end;
+    const auto n = static_cast<Eigen::Index>(end - first);
+    const auto own = scores.middleCols(static_cast<Eigen::Index>(first), n);
+    if (n == 1) return 0;
+    const Eigen::VectorXd mean = own.rowwise().mean();
+    sum += (own.colwise() - mean).squaredNorm() * static_cast<double>(n) / static_cast<double>(n - 1);
+    freedom += static_cast<double>(n - 1);
+    first = end;
+  }
+  return freedom < kFewest ? 0 : sum;
+}
+
+/// The same where the stretches of a group, of a run, do not lie side by side.
+double within_groups(const Eigen::MatrixXd& scores, const std::vector<std::size_t>& group) {
+  std::vector<Eigen::Index> order(group.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto of = [&](Eigen::Index i) { return group[static_cast<std::size_t>(i)]; };
+  std::stable_sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) { return of(a) < of(b); });
+  std::vector<std::size_t> sorted = group;
+  std::sort(sorted.begin(), sorted.end());
+  return within_units(scores(Eigen::all, order), sorted);
+}
+
+bool looks_at_runs(const Term& term) {
+  return std::any_of(term.blocks.begin(), term.blocks.end(),
+                     [](const Block& block) { return block.basis.looks_at(Covariate::kRun); });
+}
+
+}  // namespace
+
+struct Scores::Reduced {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+  std::vector<Eigen::MatrixXd> fold_information;
+  std::vector<Eigen::VectorXd> fold_score;
+};
+
+Scores::Folds::Folds(std::size_t count, Eigen::Index columns)
+    : information(count, Eigen::MatrixXd::Zero(columns, columns)), score(count, Eigen::VectorXd::Zero(columns)) {}
+
+Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector<Unit>& units,
+               const Dictionary& dictionary)
+    : model_(model), dictionary_(dictionary) {
+  const Eigen::Index all = units.front().information.rows();
+  own_ = all - dictionary.columns();
+  information_ = Eigen::MatrixXd::Zero(all, all);
+  score_ = Eigen::VectorXd::Zero(all);
+  by_unit_ = Folds(std::min(kFolds, units.size()), all);
+  by_stretch_ = Folds(kFolds, all);
+  Eigen::Index clusters = 0;
+  for (const Unit& unit : units) clusters += unit.cluster_scores.cols();
+  clusters_.resize(all, clusters);
+  Eigen::Index next = 0;
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    const std::size_t fold = u % by_unit_.score.size();
+    by_unit_.information[fold] += units[u].information;
+    by_unit_.score[fold] += units[u].score;
+    // Stretches are about as long as each other, and tell about as much.
+    const Eigen::Index stretches = units[u].cluster_scores.cols();
+    std::array<double, kFolds> share{};
+    for (Eigen::Index k = 0; k < stretches; ++k) {
+      const std::size_t of = (static_cast<std::size_t>(k) + u) % kFolds;
+      by_stretch_.score[of] += units[u].cluster_scores.col(k);
+      share[of] += 1 / static_cast<double>(stretches);
+    }
+    for (std::size_t f = 0; f < kFolds; ++f)
+      if (share[f] > 0) by_stretch_.information[f] += share[f] * units[u].information;
+    information_ += units[u].information;
+    score_ += units[u].score;
+    cluster_unit_.insert(cluster_unit_.end(), static_cast<std::size_t>(units[u].cluster_scores.cols()), u);
+    cluster_run_.insert(cluster_run_.end(), units[u].cluster_run.begin(), units[u].cluster_run.end());
+    clusters_.middleCols(next, units[u].cluster_scores.cols()) = units[u].cluster_scores;
+    next += units[u].cluster_scores.cols();
+  }
+  // The prior of the model's own columns.
+  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
+  Eigen::VectorXd from = Eigen::VectorXd::Zero(all);
+  fitter.add_base_prior(model, base, from);
+  prior_ = Eigen::VectorXd::Zero(own_);
+  prior_.head(kBaseColumns) = base.diagonal().head(kBaseColumns);
+  Eigen::Index first = kBaseColumns;
+  for (const Term& term : model.terms) {
+    const Eigen::Index n = term.coefficients.size();
+    prior_.segment(first, n) = term.precision;
+    from.segment(first, n) -= term.precision.cwiseProduct(term.coefficients);
+    first += n;
+  }
+  score_ += from;
+}
+
+/// Columns beside the model's own (but for one term, which is taken out): what is left of them, in all folds.
+Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_stretch) const {
+  const Folds& folds = by_stretch ? by_stretch_ : by_unit_;
+  std::vector<Eigen::Index> nuisance;
+  for (Eigen::Index i = 0; i < kBaseColumns; ++i) nuisance.push_back(i);
+  Eigen::VectorXd taken_out = Eigen::VectorXd::Zero(information_.rows());
+  Eigen::Index first = kBaseColumns;
+  for (std::size_t t = 0; t < model_.terms.size(); ++t) {
+    const Eigen::Index n = model_.terms[t].coefficients.size();
+    if (static_cast<int>(t) == without_term) {
+      taken_out.segment(first, n) = model_.terms[t].coefficients;
+    } else {
+      for (Eigen::Index i = 0; i < n; ++i) nuisance.push_back(first + i);
+    }
+    first += n;
+  }
+  const bool moved = without_term >= 0;
+  const auto score_of = [&](const Eigen::MatrixXd& information, const Eigen::VectorXd& score) {
+    return moved ? Eigen::VectorXd(score + information * taken_out) : score;
+  };
+  Reduced out;
+  Eigen::MatrixXd own = pick(information_, nuisance, nuisance);
+  for (std::size_t i = 0; i < nuisance.size(); ++i)
+    own(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) += prior_[nuisance[i]];
+  const Eigen::MatrixXd cross = pick(information_, nuisance, columns);
+  const Eigen::MatrixXd by = own.ldlt().solve(cross);
+  const auto reduced = [&](const Eigen::MatrixXd& information) {
+    const Eigen::MatrixXd part = pick(information, nuisance, columns);
+    Eigen::MatrixXd result = pick(information, columns, columns);
+    result -= by.transpose() * part;
+    result -= part.transpose() * by;
+    result += by.transpose() * pick(information, nuisance, nuisance) * by;
+    return result;
+  };
+  const auto reduced_score = [&](const Eigen::VectorXd& score) {
+    return Eigen::VectorXd(pick(score, columns) - by.transpose() * pick(score, nuisance));
+  };
+  out.information =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(columns.size()));
+  out.score = Eigen::VectorXd::Zero(out.information.rows());
+  for (std::size_t f = 0; f < folds.score.size(); ++f) {
+    out.fold_information.push_back(reduced(folds.information[f]));
+    out.fold_score.push_back(reduced_score(score_of(folds.information[f], folds.score[f])));
+    out.information += out.fold_information.back();
+    out.score += out.fold_score.back();
+  }
+  return out;
+}
+
+/// With coefficients b ~ N(0, (t scale)^2): log of the marginal likelihood over that of b = 0, at the best t, and the held-out gain there.
+Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, double log_choices) const {
+  Finding found;
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced.information * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(0);
+  Eigen::VectorXd along = eigen.eigenvectors().transpose() * scale.cwiseProduct(reduced.score);
+  // What the data say nothing about is known to no more than rounding.
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    if (values[i] < std::max(1e-7 * values.maxCoeff(), 1.0)) along[i] = 0;
+  double best = 0, best_t = 0;
+  for (int step = 0; step <= 28; ++step) {
+    const double t = std::pow(10.0, -4.0 + step / 6.0), t2 = t * t;
+    double value = 0;
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      const double with = 1 + t2 * values[i];
+      value += 0.5 * (t2 * along[i] * along[i] / with - std::log(with));
+    }
+    if (best_t == 0 || value > best) {
+      best = value;
+      best_t = t;
+    }
+  }
+  found.relative_scale = best_t;
+  found.evidence = best - log_choices - 1;  // 1: the price of choosing t
+  found.degrees = static_cast<int>((values.array() > 1e-9 * values.maxCoeff()).count());
+  // Held out.
+  const Eigen::VectorXd precision = (best_t * scale).cwiseAbs2().cwiseInverse();
+  for (std::size_t f = 0; f < reduced.fold_information.size(); ++f) {
+    Eigen::MatrixXd rest = reduced.information - reduced.fold_information[f];
+    rest.diagonal() += precision;
+    const Eigen::VectorXd b = rest.ldlt().solve(reduced.score - reduced.fold_score[f]);
+    found.held_out += b.dot(reduced.fold_score[f]) - 0.5 * b.dot(reduced.fold_information[f] * b);
+  }
+  return found;
+}
+
+Finding Scores::weigh(const Hypothesis& hypothesis, int without_term) const {
+  std::vector<Eigen::Index> columns;
+  for (const Eigen::Index c : hypothesis.columns) columns.push_back(own_ + c);
+  return weigh(reduce(columns, without_term, of_robots(hypothesis)), pick(dictionary_.scale, hypothesis.columns),
+               hypothesis.log_choices);
+}
+
+Finding Scores::weigh_term(int term) const {
+  Eigen::Index first = kBaseColumns;
+  for (int t = 0; t < term; ++t) first += model_.terms[static_cast<std::size_t>(t)].coefficients.size();
+  const Term& own = model_.terms[static_cast<std::size_t>(term)];
+  std::vector<Eigen::Index> columns;
+  for (Eigen::Index i = 0; i < own.coefficients.size(); ++i) columns.push_back(first + i);
+  const bool of_each = std::any_of(own.blocks.begin(), own.blocks.end(),
+                                   [](const Block& block) { return block.basis.looks_at(Covariate::kRobot); });
+  return weigh(reduce(columns, term, of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
+}
+
+Scores::Outcome Scores::test(std::uint64_t seed) const {
+  // All of the dictionary at once, beside the model.
+  std::vector<Eigen::Index> columns, nuisance;
+  for (Eigen::Index c = own_; c < information_.rows(); ++c) columns.push_back(c);
+  for (Eigen::Index i = 0; i < own_; ++i) nuisance.push_back(i);
+  Eigen::MatrixXd own = information_.topLeftCorner(own_, own_);
+  own.diagonal() += prior_;
+  const Eigen::MatrixXd by = own.ldlt().solve(information_.topRightCorner(own_, dictionary_.columns()));
+  const Eigen::MatrixXd beside = information_.bottomRightCorner(dictionary_.columns(), dictionary_.columns()) -
+                                 information_.bottomLeftCorner(dictionary_.columns(), own_) * by;
+  const Eigen::MatrixXd cluster =
+      clusters_.bottomRows(dictionary_.columns()) - by.transpose() * clusters_.topRows(own_);
+  const Eigen::VectorXd score = score_.tail(dictionary_.columns()) - by.transpose() * score_.head(own_);
+
+  constexpr Eigen::Index kFlips = 400;
+  const std::array<std::uint32_t, 2> key{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)};
+  Eigen::MatrixXd signs(cluster.cols(), kFlips);
+  for (Eigen::Index f = 0; f < kFlips; ++f)
+    for (Eigen::Index c = 0; c < cluster.cols(); ++c)
+      signs(c, f) =
+          (philox4x32({static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(f), 0, 0}, key)[0] & 1) != 0 ? 1
+                                                                                                              : -1;
+  const Eigen::MatrixXd flipped = cluster * signs;
+
+  Outcome out;
+  out.findings.resize(dictionary_.hypotheses.size());
+  Eigen::MatrixXd worst = Eigen::VectorXd::Zero(kFlips);
+  for (std::size_t h = 0; h < dictionary_.hypotheses.size(); ++h) {
+    const std::vector<Eigen::Index>& own_columns = dictionary_.hypotheses[h].columns;
+    Finding& finding = out.findings[h];
+    finding.hypothesis = h;
+    const Eigen::VectorXd scale = pick(dictionary_.scale, own_columns);
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * pick(beside, own_columns, own_columns) * scale.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+    const double top = eigen.eigenvalues().maxCoeff();
+    // What the data say nothing about, or what the model has already, is left out.
+    std::vector<Eigen::Index> kept;
+    for (Eigen::Index i = 0; i < eigen.eigenvalues().size(); ++i)
+      if (eigen.eigenvalues()[i] > std::max(1e-7 * top, 1.0)) kept.push_back(i);
+    finding.degrees = static_cast<int>(kept.size());
+    if (kept.empty()) continue;
+    Eigen::MatrixXd whiten(static_cast<Eigen::Index>(kept.size()), scale.size());
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      whiten.row(static_cast<Eigen::Index>(i)) = eigen.eigenvectors().col(kept[i]).transpose() *
+                                                 scale.asDiagonal() / std::sqrt(eigen.eigenvalues()[kept[i]]);
+    }
+    const double degrees = static_cast<double>(kept.size());
+    finding.statistic = (whiten * pick(score, own_columns)).squaredNorm();
+    Eigen::MatrixXd flips(scale.size(), kFlips);
+    for (Eigen::Index i = 0; i < scale.size(); ++i)
+      flips.row(i) = flipped.row(own_columns[static_cast<std::size_t>(i)]);
+    const Eigen::VectorXd statistics = (whiten * flips).colwise().squaredNorm();
+    const double dispersion = std::max(1.0, statistics.mean() / degrees);
+    double own_dispersion = dispersion;
+    // What robots, or runs, have of their own is not noise either.
+    const bool robots = of_robots(dictionary_.hypotheses[h]);
+    if (robots || looks_at_runs(dictionary_.term_of(dictionary_.hypotheses[h], 1))) {
+      Eigen::MatrixXd scores(scale.size(), cluster.cols());
+      for (Eigen::Index i = 0; i < scale.size(); ++i)
+        scores.row(i) = cluster.row(own_columns[static_cast<std::size_t>(i)]);
+      const double within =
+          robots ? within_units(whiten * scores, cluster_unit_) : within_groups(whiten * scores, cluster_run_);
+      if (within > 0) own_dispersion = std::clamp(within / degrees, 1.0, dispersion);
+    }
+    finding.log10_p = log10_tail(finding.statistic / own_dispersion, degrees);
+    for (Eigen::Index f = 0; f < kFlips; ++f)
+      worst(f) = std::min(worst(f), log10_tail(statistics[f] / dispersion, degrees));
+  }
+  // The smallest p of many is distributed as Gumbel's law has it, on a logarithmic scale.
+  const double mean = worst.mean();
+  const double sd = std::sqrt((worst.array() - mean).square().mean());
+  const double gumbel = -std::log(-std::log1p(-kFamilyAlarm));
+  out.threshold_log10_p = mean - std::max(sd, 0.4) * std::sqrt(6.0) / M_PI * (gumbel - 0.5772);
+  for (Finding& finding : out.findings) {
+    if (finding.log10_p > out.threshold_log10_p) continue;
+    const Finding weighed = weigh(dictionary_.hypotheses[finding.hypothesis], -1);
+    finding.evidence = weighed.evidence;
+    finding.relative_scale = weighed.relative_scale;
+    finding.held_out = weighed.held_out;
+  }
+  return out;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,452 @@
+#include "clients/identify/search/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "clients/identify/search/amplitudes.hpp"
+#include "clients/identify/search/total_variation_map.hpp"
+#include "clients/identify/search/calibration_shifts.hpp"
+#include "clients/identify/search/traffic_shape.hpp"
+#include "clients/identify/search/neighbour_shape.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/search/simplification.hpp"
+#include "clients/identify/search/change_points.hpp"
+#include "clients/identify/search/target_extension.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr int kMostRounds = 7;
+/// Hypotheses of which so many (as a logarithm) are tried, single steps and pulses, do not challenge others.
+constexpr double kManyChoices = 2.5;
+constexpr std::uint64_t kSeed = 20180729;
+/// Look-alikes whose evidence lies closer than this (a Bayes factor of 20) are not told apart.
+constexpr double kClose = 3;
+/// What another cause in a term's place must reach in log likelihood: with few columns, and with the shape that the data support.
+constexpr double kMostByShape = 200, kAsGood = 10;
+/// Whatever explained nearly as much, in the few columns that causes are compared by, may be the cause once it has its own shape.
+constexpr double kContender = 0.97;
+constexpr const char* kPictureForDrift = "camera-by-time for drift-by-time";
+/// No form fits a cause exactly. What is left of all that was found, by this share of what that explains, is no other cause.
+constexpr double kRemnant = 0.003;
+/// As many samples as hypotheses are tested on; there are no more surprises in more.
+constexpr std::size_t kEnoughSamples = 130000;
+
+class Loop {
+ public:
+  Loop(const Fitter& fitter, const MotionModel& base,
+       const std::function<void(double, const std::string&)>& progress)
+      : fitter_(fitter), progress_(progress), extent_(extent_of(fitter.set())) {
+    out_.model = base;
+    base_likelihood_ = fitter.log_likelihood_of_all(base);
+    units_ = fitter.set().units();
+    std::size_t samples = 0;
+    for (const auto& unit : units_)
+      for (const TrackView* view : unit) samples += view->track->samples.size();
+    // Of a large set a part of every robot's tracks, or of the robots.
+    const std::size_t every = samples / kEnoughSamples + 1;
+    if (every > 1) {
+      std::vector<std::vector<const TrackView*>> part;
+      for (std::size_t u = 0; u < units_.size(); u += every) part.push_back(units_[u]);
+      if (part.size() >= 6) units_ = std::move(part);
+    }
+  }
+
+  Search run() {
+    for (int round = 0; round < kMostRounds; ++round) {
+      round_ = round;
+      say("looking for causes");
+      if (add_picture_jumps()) continue;
+      measure();
+      const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
+      note_rejected(outcome);
+      const Finding* const best = best_of(outcome, kRemnant * explained());
+      if (best != nullptr) {
+        const Kept before = keep();
+        const double likelihood = fitter_.log_likelihood_of_all(out_.model);
+        note_ambiguous(*best, outcome);
+        if (contended(hypothesis(*best).name)) continue;
+        note_contenders(*best, outcome);
+        add(*best, outcome.threshold_log10_p);
+        // What promised to explain much must do so.
+        if (fitter_.log_likelihood_of_all(out_.model) < likelihood + 3) {
+          restore(before);
+          failed_.insert(hypothesis(*best).name);
+        } else {
+          say("is all of it needed");
+          reconsider();
+          fitter_.fit_surroundings(out_.model);
+          try_picture();
+        }
+        continue;
+      }
+      say("is it something else");
+      if (!defend()) break;
+    }
+    say("simplest forms");
+    for (std::size_t t = 0; t < out_.model.terms.size(); ++t) simplify(fitter_, out_.model, t);
+    return std::move(out_);
+  }
+
+ private:
+  void say(const char* doing) const {
+    std::string text = doing;
+    for (const Term& term : out_.model.terms)
+      text += (&term == &out_.model.terms.front() ? "; found " : ", ") + term.name;
+    progress_(0.9 * round_ / kMostRounds, text);
+  }
+  void measure() {
+    dictionary_ = dictionary_of(extent_, out_.model.terms);
+    std::vector<Block> blocks = blocks_of(out_.model);
+    blocks.insert(blocks.end(), dictionary_.blocks.begin(), dictionary_.blocks.end());
+    const std::vector<Unit> units = linearise(out_.model, units_, blocks, {100, fitter_.threads()});
+    scores_.emplace(fitter_, out_.model, units, dictionary_);
+  }
+  const Finding* best_of(const Scores::Outcome& outcome, double least_evidence) const {
+    const Finding* best = nullptr;
+    for (const Finding& f : outcome.findings) {
+      if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
+          failed_.contains(hypothesis(f).name))
+        continue;
+      if (of_robots_and_more(hypothesis(f)) && parts_evidence(hypothesis(f), outcome) > f.evidence) continue;
+      if (best == nullptr || f.evidence > best->evidence) best = &f;
+    }
+    return best;
+  }
+  static bool of_robots_and_more(const Hypothesis& h) {
+    return h.covariates.size() == 2 &&
+           std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
+  }
+  /// Of robots that differ and of something that acts on all, each by itself, where either is good: what both may explain together.
+  double parts_evidence(const Hypothesis& pair, const Scores::Outcome& outcome) const {
+    double sum = 0;
+    bool any = false;
+    for (const std::string& part : pair.covariates) {
+      double most = 0;
+      for (const Finding& f : outcome.findings) {
+        const Hypothesis& h = hypothesis(f);
+        if (h.acts_on != pair.acts_on || h.covariates != std::vector<std::string>{part}) continue;
+        any = any || (good(f, outcome.threshold_log10_p) && !failed_.contains(h.name));
+        most = std::max({most, f.evidence, (f.statistic - f.degrees) / 2});
+      }
+      sum += most;
+    }
+    return any ? sum : 0;
+  }
+  static bool good(const Finding& f, double threshold) {
+    return f.log10_p < threshold && f.evidence > 3 && f.held_out > 2;
+  }
+  const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
+
+  /// Log likelihood that all that was found has gained.
+  [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.model) - base_likelihood_; }
+
+  /// Whether the picture jumps, which is then part of the model.
+  bool add_picture_jumps() {
+    // What a drift that begins or ends suddenly has too round a curve for looks like jumps.
+    if (std::any_of(out_.model.terms.begin(), out_.model.terms.end(),
+                    [](const Term& term) { return term.name == "drift-by-time"; }))
+      return false;
+    const std::vector<Jump> jumps = add_jumps(fitter_, out_.model, kRemnant * explained());
+    if (jumps.empty()) return false;
+    fitter_.fit_surroundings(out_.model);
+    Finding finding;
+    bool pushed = true;
+    for (const Jump& jump : jumps) {
+      finding.evidence += jump.gain;
+      finding.degrees += Jump::kNumbers;
+      // Half chi squared of four numbers, at one of some thousand instants.
+      constexpr double kInstants = 5000;
+      finding.log10_p =
+          std::min(finding.log10_p, (std::log1p(jump.gain) - jump.gain + std::log(kInstants)) / std::log(10.0));
+      pushed = pushed && std::abs(jump.gain - jump.gain_as_push) < kClose;
+    }
+    const std::vector<std::string> covariates{"measurement", "time"}, room{"world_frame", "time"};
+    out_.reasons.push_back({covariates, "measured position", finding, std::log10(Scores::kFamilyAlarm)});
+    if (pushed) out_.ambiguous.push_back({kJumpsName, "drift-by-time", covariates, room, 0});
+    out_.steps.push_back({kJumpsName, finding.evidence});
+    return true;
+  }
+  void add(const Finding& found, double threshold) {
+    const Hypothesis& h = hypothesis(found);
+    Term term = dictionary_.term_of(h, found.relative_scale);
+    const Reason reason{h.covariates, h.acts_on, found, threshold};
+    // More of what is there already may be one thing in a richer form.
+    for (std::size_t t = 0; t < out_.model.terms.size(); ++t) {
+      if (out_.model.terms[t].name != h.name) continue;
+      if (reshaped(t, found.evidence)) {
+        out_.steps.push_back({h.name, found.held_out});
+        return;
+      }
+      const Finding instead = scores_->weigh(h, static_cast<int>(t));
+      const Finding own = scores_->weigh_term(static_cast<int>(t));
+      if (instead.evidence < own.evidence + found.evidence - 2) continue;
+      out_.model.terms[t] = dictionary_.term_of(h, instead.relative_scale);
+      out_.reasons[t].finding = instead;
+      out_.reasons[t].finding.log10_p = std::min(reason.finding.log10_p, out_.reasons[t].finding.log10_p);
+      fitter_.fit(out_.model, 2);
+      shape(t);
+      out_.steps.push_back({h.name, found.held_out});
+      return;
+    }
+    out_.model.terms.push_back(std::move(term));
+    out_.reasons.push_back(reason);
+    say("fitting");
+    fitter_.fit(out_.model, 2);
+    out_.steps.push_back({h.name, found.held_out});
+    if (!joined()) shape(out_.model.terms.size() - 1);
+  }
+
+  /// Whether a term, its shape chosen anew beside what was found since, explains most of what more of it promises.
+  bool reshaped(std::size_t place, double promised) {
+    constexpr double kMost = 0.5;
+    const Kept before = keep();
+    const double likelihood = fitter_.log_likelihood(out_.model);
+    say("fitting");
+    shape(place);
+    if (fitter_.log_likelihood(out_.model) > likelihood + kMost * promised) return true;
+    restore(before);
+    return false;
+  }
+
+  /// Whether the last term, amounts of what another found, became one with that.
+  bool joined() {
+    const std::optional<std::size_t> curve = join_amounts(fitter_, out_.model);
+    if (!curve) return false;
+    out_.reasons.back().finding.evidence += out_.reasons[*curve].finding.evidence;
+    out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));
+    return true;
+  }
+
+  /// Gives a term the form that the data support.
+  void shape(std::size_t place) {
+    if (!shape_neighbours(fitter_, out_.model, place) && !shape_memory(fitter_, out_.model, place))
+      refine(fitter_, out_.model, place);
+    const std::string before = out_.model.terms[place].name, name = find_steps(fitter_, out_.model, place);
+    if (name != before) {
+      for (const Hypothesis& h : dictionary_.hypotheses) {
+        if (h.name != name) continue;
+        out_.reasons[place].covariates = h.covariates;
+        out_.reasons[place].acts_on = h.acts_on;
+      }
+    }
+    sharpen(fitter_, out_.model, place);
+    widen(fitter_, out_.model, place);
+  }
+  /// A picture that moves looks like robots that drift, but for those at rest and for where walls are.
+  void try_picture() {
+    const auto drift = std::find_if(out_.model.terms.begin(), out_.model.terms.end(),
+                                    [](const Term& term) { return term.name == "drift-by-time"; });
+    if (drift == out_.model.terms.end() || failed_.contains(kPictureForDrift)) return;
+    // Once: steps of the picture may be taken for drifts again.
+    failed_.insert(kPictureForDrift);
+    const auto place = static_cast<std::size_t>(drift - out_.model.terms.begin());
+    const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
+                                     [](const Block& block) { return (block.during & ~kDriven) != 0; });
+    measure();
+    const Hypothesis* best = nullptr;
+    Finding best_finding;
+    for (const Hypothesis& h : dictionary_.hypotheses) {
+      if (h.name != "camera-by-time") continue;
+      const Finding finding = scores_->weigh(h, static_cast<int>(place));
+      if (best != nullptr && finding.evidence <= best_finding.evidence) continue;
+      best = &h;
+      best_finding = finding;
+    }
+    constexpr double kAlike = 0.8;
+    if (best == nullptr ||
+        (!at_rest && best_finding.evidence < kAlike * scores_->weigh_term(static_cast<int>(place)).evidence))
+      return;
+    exchanged(place, *best, best_finding);
+  }
+  /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.
+  bool defend() {
+    if (defences_++ >= 3) return false;
+    for (int t = 0; t < static_cast<int>(out_.model.terms.size()); ++t) {
+      const auto place = static_cast<std::size_t>(t);
+      const Finding own = scores_->weigh_term(t);
+      if (own.held_out < 2 && dropped(place, false)) return true;
+      const Hypothesis* best = nullptr;
+      Finding best_finding;
+      for (const Hypothesis& h : dictionary_.hypotheses) {
+        if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
+        // Amounts of a curve that a term has found: in its place they would have the curve for nothing.
+        if (rests_on_another(dictionary_.term_of(h, 1))) continue;
+        const Finding other = scores_->weigh(h, t);
+        if (best == nullptr || other.evidence > best_finding.evidence) {
+          best = &h;
+          best_finding = other;
+        }
+      }
+      if (best == nullptr || best->name == out_.model.terms[place].name ||
+          best_finding.evidence <= own.evidence + std::max(kClose, kRemnant * own.evidence) ||
+          failed_.contains(best->name + " for " + out_.model.terms[place].name))
+        continue;
+      if (exchanged(place, *best, best_finding)) return true;
+    }
+    return false;
+  }
+  /// Puts another cause in the place of a term. What is weighed far from where the data were linearised may promise too much:
+  /// where it explains less after all, everything is as it was.
+  bool exchanged(std::size_t place, const Hypothesis& other, Finding finding) {
+    const Kept before = keep();
+    // Where robots are held tells what moves: they, or the picture of them.
+    const auto of_picture = [&] { return is_measured(out_.model.terms[place].blocks.front().target); };
+    const bool was_of_picture = of_picture();
+    // By where discs lay then.
+    const double likelihood = fitter_.log_likelihood(out_.model),
+                 likelihood_of_all = fitter_.log_likelihood_of_all(out_.model);
+    finding.log10_p = out_.reasons[place].finding.log10_p;
+    out_.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
+    out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
+    fitter_.fit(out_.model, 2);
+    if (was_of_picture != of_picture()) {
+      shape(place);
+      fitter_.fit_surroundings(out_.model);
+      if (fitter_.log_likelihood_of_all(out_.model) > likelihood_of_all - kAsGood) return true;
+    } else {
+      // The shape that it is given then explains more, but not all of what is lacking.
+      if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
+        shape(place);
+        if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
+      }
+    }
+    restore(before);
+    failed_.insert(other.name + " for " + out_.model.terms[place].name);
+    return false;
+  }
+  /// The search as it stands, with what tracks were prepared with: where discs lie, headings at starts.
+  struct Kept {
+    Search found;
+    PreparedSet::Found tracks;
+  };
+  [[nodiscard]] Kept keep() const { return {out_, fitter_.set().found()}; }
+  void restore(const Kept& kept) {
+    out_ = kept.found;
+    fitter_.set().go_back(kept.tracks, out_.model);
+  }
+  /// Whether a term is but the constant part of what another does.
+  static bool is_constant_of(const Term& term, const Term& other) {
+    return std::all_of(term.blocks.begin(), term.blocks.end(), [&](const Block& block) {
+      return block.basis.factors.empty() &&
+             std::any_of(other.blocks.begin(), other.blocks.end(), [&](const Block& b) {
+               return b.target == block.target && (b.during & block.during) == block.during;
+             });
+    });
+  }
+  /// The last term may be what those before it were taken for, unless it explains far less. Each is taken out, and the last given
+  /// the shape that it has without it.
+  void reconsider() {
+    if (rests_on_another(out_.model.terms.back())) return;
+    constexpr double kFarLess = 0.1;
+    for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;) {
+      const Term &earlier = out_.model.terms[t], &last = out_.model.terms.back();
+      const bool far_less = out_.reasons.back().finding.evidence < kFarLess * out_.reasons[t].finding.evidence;
+      if ((!far_less || is_constant_of(earlier, last)) && earlier.name != last.name) dropped(t, true);
+    }
+  }
+  /// Takes a term out, but for one without which the data are less probable after all.
+  bool dropped(std::size_t t, bool shape_last) {
+    const Kept before = keep();
+    const double evidence = fitter_.log_evidence(out_.model);
+    out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
+    fitter_.fit(out_.model, shape_last ? 2 : 1);
+    if (shape_last) shape(out_.model.terms.size() - 1);
+    if (fitter_.log_evidence(out_.model) > evidence - kClose) return true;
+    restore(before);
+    return false;
+  }
+  void note_rejected(const Scores::Outcome& outcome) {
+    out_.rejected.clear();
+    std::vector<const Finding*> order;
+    for (const Finding& f : outcome.findings) order.push_back(&f);
+    std::sort(order.begin(), order.end(),
+              [](const Finding* a, const Finding* b) { return a->log10_p < b->log10_p; });
+    for (const Finding* f : order) {
+      const Hypothesis& h = hypothesis(*f);
+      if (std::any_of(out_.rejected.begin(), out_.rejected.end(),
+                      [&](const Rejected& r) { return r.name == h.name; }))
+        continue;
+      out_.rejected.push_back({h.name, h.covariates, h.acts_on, f->log10_p, outcome.threshold_log10_p});
+      if (out_.rejected.size() == 12) break;
+    }
+  }
+  /// Whether a cause that nearly was chosen in place of the one found last, and now shows beside it, explains more in its place.
+  bool contended(const std::string& name) {
+    const auto c = contest_.contenders.find(name);
+    if (c == contest_.contenders.end() || out_.model.terms.size() != contest_.before.found.model.terms.size() + 1 ||
+        out_.model.terms.back().name != contest_.chosen)
+      return false;
+    const auto [term, reason] = c->second;
+    contest_.contenders.erase(c);
+    const Kept now = keep();
+    const double evidence = fitter_.log_evidence(now.found.model);
+    restore(contest_.before);
+    out_.model.terms.push_back(term);
+    out_.reasons.push_back(reason);
+    say("fitting");
+    fitter_.fit(out_.model, 2);
+    shape(out_.model.terms.size() - 1);
+    fitter_.fit_surroundings(out_.model);
+    out_.steps.push_back({term.name, reason.finding.held_out});
+    if (fitter_.log_evidence(out_.model) > evidence) return true;
+    restore(now);
+    return false;
+  }
+  void note_contenders(const Finding& best, const Scores::Outcome& outcome) {
+    const std::string& chosen = hypothesis(best).name;
+    contest_ = {keep(), chosen, {}};
+    std::map<std::string, double> most;
+    for (const Finding& f : outcome.findings) {
+      const Hypothesis& h = hypothesis(f);
+      if (f.evidence < std::max(kContender * best.evidence, most[h.name]) || h.name == chosen) continue;
+      most[h.name] = f.evidence;
+      contest_.contenders[h.name] = {dictionary_.term_of(h, f.relative_scale),
+                                     {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+    }
+  }
+  void note_ambiguous(const Finding& best, const Scores::Outcome& outcome) {
+    const Hypothesis& chosen = hypothesis(best);
+    for (const Finding& f : outcome.findings) {
+      const Hypothesis& other = hypothesis(f);
+      if (!good(f, outcome.threshold_log10_p) || other.name == chosen.name || f.evidence < best.evidence - kClose)
+        continue;
+      if (std::any_of(out_.ambiguous.begin(), out_.ambiguous.end(),
+                      [&](const Ambiguity& a) { return a.found == chosen.name && a.instead == other.name; }))
+        continue;
+      out_.ambiguous.push_back(
+          {chosen.name, other.name, chosen.covariates, other.covariates, best.evidence - f.evidence});
+    }
+  }
+
+  const Fitter& fitter_;
+  const std::function<void(double, const std::string&)>& progress_;
+  const Extent extent_;
+  Dictionary dictionary_;  ///< what is tried beside the model
+  std::vector<std::vector<const TrackView*>> units_;
+  std::optional<Scores> scores_;
+  Search out_;
+  double base_likelihood_ = 0;
+  /// What might have been chosen in place of the cause that was found last.
+  struct Contest {
+    Kept before;
+    std::string chosen;
+    std::map<std::string, std::pair<Term, Reason>> contenders;  ///< by name
+  };
+  Contest contest_;
+  std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
+  int defences_ = 0, round_ = 0;
+};
+
+}  // namespace
+
+Search search(const Fitter& fitter, const MotionModel& base,
+              const std::function<void(double, const std::string&)>& progress) {
+  return Loop(fitter, base, progress).run();
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,172 @@
+#include "clients/identify/search/simplification.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "clients/identify/search/local_quadratic.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+constexpr int kScales = 12, kSteps = 30, kHarmonics = 3;
+/// How much less log evidence than the curve's a simple form may have.
+constexpr double kAsGood = 1;
+/// The same before all is fitted again, and of all the evidence that there is: scales and steps lie on a coarse raster, and where
+/// speeds change with the form, data that were linearised know it roughly.
+constexpr double kRoughly = 40, kRoughShare = 0.04;
+
+/// One form for all blocks of a term.
+struct Form {
+  Basis basis;
+  double log_choices = 0;  ///< of how many like it are tried
+  Eigen::Index first = 0;  ///< of its columns among those of all forms
+};
+
+/// The one curve over one covariate that all blocks are; null where they are something else.
+const Factor* curve_of(const Term& term) {
+  const Factor* curve = nullptr;
+  for (const Block& block : term.blocks) {
+    if (is_measured(block.target) || block.basis.factors.size() != 1) return nullptr;
+    const Factor& f = block.basis.factors.front();
+    if ((f.shape != Shape::kCosines && f.shape != Shape::kHarmonics) || !f.known.empty()) return nullptr;
+    if (curve != nullptr && (curve->shape != f.shape || !(curve->axis == f.axis))) return nullptr;
+    for (const Block& other : term.blocks)
+      if (&other != &block && other.target == block.target && (other.during & block.during) != 0) return nullptr;
+    curve = &f;
+  }
+  return curve;
+}
+
+Form form(const Factor& like, Shape shape, double choices, std::vector<double> points = {},
+          std::uint32_t first = 1) {
+  Factor f;
+  f.shape = shape;
+  f.axis = like.axis;
+  f.low = like.low;
+  f.high = like.high;
+  f.first = first;
+  f.points = std::move(points);
+  return {Basis{{f}}, std::log(choices)};
+}
+
+std::vector<Form> forms_of(const Factor& curve, Target target) {
+  std::vector<Form> forms;
+  // Of speed a constant is no effect.
+  if (target != Target::kGain && target != Target::kGainLeft && target != Target::kGainRight) forms.push_back({});
+  if (curve.shape == Shape::kHarmonics) {
+    for (std::uint32_t k = 1; k <= kHarmonics; ++k)
+      forms.push_back(form(curve, Shape::kHarmonics, kHarmonics, {}, k));
+    return forms;
+  }
+  forms.push_back(form(curve, Shape::kLinear, 1));
+  const double range = curve.high - curve.low;
+  const bool place = curve.axis.of == Covariate::kX || curve.axis.of == Covariate::kY;
+  for (int i = 0; i < kScales && !place; ++i)
+    forms.push_back(form(curve, Shape::kExponential, kScales, {range * std::pow(0.66, i)}));
+  // Instants are found elsewhere.
+  if (curve.axis.of == Covariate::kTime) return forms;
+  for (int i = 1; i < kSteps; ++i)
+    forms.push_back(form(curve, Shape::kAtLeast, kSteps, {curve.low + range * i / kSteps}));
+  return forms;
+}
+
+struct Chosen {
+  const Form* form = nullptr;
+  double evidence = 0;
+  Eigen::VectorXd sd;
+  std::vector<Eigen::Index> columns;  ///< among those of all forms
+};
+
+Chosen best_of(const std::vector<Form>& forms, const Beside& data, std::size_t blocks) {
+  Chosen best;
+  for (const Form& one : forms) {
+    std::vector<Eigen::Index> columns(one.basis.size() * blocks);
+    std::iota(columns.begin(), columns.end(), one.first);
+    const Eigen::MatrixXd information = data.information(columns, columns);
+    const Eigen::VectorXd score = data.score(columns);
+    const double top = information.diagonal().maxCoeff();
+    if (!(top > 0)) continue;
+    for (double size = 1 / std::sqrt(top); size < 4000 / std::sqrt(top); size *= 3) {
+      const Eigen::VectorXd sd = Eigen::VectorXd::Constant(score.size(), size);
+      const double evidence = log_evidence(information, score, sd) - one.log_choices - 1;
+      if (best.form == nullptr || evidence > best.evidence) best = {&one, evidence, sd, columns};
+    }
+  }
+  return best;
+}
+
+/// Blocks of all forms, each with all of the term's targets; gives the forms their columns.
+std::vector<Block> blocks_of(std::vector<Form>& forms, const Term& term) {
+  std::vector<Block> blocks;
+  Eigen::Index next = 0;
+  for (Form& one : forms) {
+    one.first = next;
+    for (const Block& block : term.blocks) {
+      blocks.push_back({block.target, one.basis, block.during});
+      next += static_cast<Eigen::Index>(one.basis.size());
+    }
+  }
+  return blocks;
+}
+
+/// Puts the best of some forms in place of the term, where it has about as much evidence, or in any case. False: it has not.
+bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::vector<Form>& forms,
+              bool in_any_case) {
+  const Term& term = model.terms[place];
+  const Linear l = linear(fitter, model, place, blocks_of(forms, term));
+  const Eigen::VectorXd score = l.score_without(term.coefficients);
+  const Beside now = beside(l, score, l.of_term());
+  const double had = log_evidence(now.information, now.score, term.precision.cwiseInverse().cwiseSqrt());
+  const Chosen best = best_of(forms, beside(l, score, l.more()), term.blocks.size());
+  if (best.form == nullptr) return false;
+  if (!in_any_case && best.evidence < had - kRoughly - kRoughShare * std::abs(had)) return false;
+  std::vector<Eigen::Index> columns;
+  for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
+  std::vector<Block> blocks;
+  for (const Block& block : term.blocks) blocks.push_back({block.target, best.form->basis, block.during});
+  exchange(model, place, l, blocks, score, columns, best.sd);
+  return true;
+}
+
+/// What the freedom to bend costs a term: half the log determinant of what data and prior know over what the prior does.
+double cost_of(const Fitter& fitter, const MotionModel& model, std::size_t place) {
+  const Linear l = linear(fitter, model, place, {});
+  const Beside now = beside(l, l.score, l.of_term());
+  const Eigen::VectorXd sd = model.terms[place].precision.cwiseInverse().cwiseSqrt();
+  return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
+}
+
+}  // namespace
+
+bool simplify(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  const Factor* const curve = curve_of(model.terms[place]);
+  if (curve == nullptr || model.terms[place].coefficients.size() < 2) return false;
+  std::vector<Form> forms = forms_of(*curve, model.terms[place].blocks.front().target);
+  MotionModel simple = model;
+  if (!put_best(fitter, simple, place, forms, false)) return false;
+  const std::vector<Factor>& factors = simple.terms[place].blocks.front().basis.factors;
+  if (!factors.empty() &&
+      (factors.front().shape == Shape::kExponential || factors.front().shape == Shape::kAtLeast)) {
+    // On a finer raster about it.
+    const Factor found = factors.front();
+    std::vector<Form> finer;
+    for (int i = -6; i <= 6; ++i) {
+      const double at = found.shape == Shape::kExponential
+                            ? found.points[0] * std::pow(1.07, i)
+                            : found.points[0] + (found.high - found.low) * i / (6.0 * kSteps);
+      if (at > 0) finer.push_back(form(found, found.shape, 1, {at}));
+    }
+    put_best(fitter, simple, place, finer, true);
+  }
+  fitter.fit(simple, 2);
+  const double lost = fitter.log_likelihood(model) - fitter.log_likelihood(simple);
+  if (lost > cost_of(fitter, model, place) - cost_of(fitter, simple, place) + kAsGood) return false;
+  model = simple;
+  return true;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,115 @@
+#include "clients/identify/search/covariate_hypotheses.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+}  // namespace
+
+std::vector<Eigen::Index> hypotheses_of_time(DictionaryMaker& make, const Extent& extent) {
+  const auto smooth = [&](std::uint32_t count) {
+    return Basis{{over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, count)}};
+  };
+  make.curve(kSpeed, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
+  make.curve(kTurning, "time", {"time"}, smooth(12), {1, 3, 12}, true);
+  const auto drift = make.curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
+  // The picture may creep aside, turn and grow, each by itself or all at once.
+  const auto aside = make.put(kCamera, smooth(16));
+  const auto turned = make.put(kPicture, smooth(8));
+  for (const Eigen::Index n : {1, 3, 8, 16}) make.add(kCamera, "time", {"time"}, some(aside, 0, n));
+  for (const Eigen::Index n : {1, 3, 8}) {
+    auto all = some(turned, 0, n);
+    for (const Eigen::Index base : turned) make.add(kCamera, "time", {"time"}, some({base}, 0, n));
+    for (const Eigen::Index c : some(aside, 0, n)) all.push_back(c);
+    make.add(kCamera, "time", {"time"}, all);
+  }
+  if (extent.headings) make.curve(kCompass, "time", {"time"}, smooth(6), {1, 3, 6}, false);
+  // Steps, and pulses between two of them.
+  constexpr int kSteps = 40;
+  std::vector<double> at;
+  for (int i = 1; i < kSteps; ++i) at.push_back(extent.duration_s * i / kSteps);
+  const Basis steps{{keyed(Shape::kAtLeast, Covariate::kTime, at)}};
+  const auto n = static_cast<Eigen::Index>(at.size());
+  for (const Acting* acting : {&kSpeed, &kWorld}) {
+    const auto bases = make.put(*acting, steps);
+    for (Eigen::Index i = 0; i < n; ++i) make.add(*acting, "time", {"time"}, some(bases, i, 1), kSteps);
+    for (Eigen::Index width : {1, 2, 4, 8, 16}) {
+      for (Eigen::Index i = 0; i + width < n; ++i) {
+        auto columns = some(bases, i, 1);
+        for (const Eigen::Index c : some(bases, i + width, 1)) columns.push_back(c);
+        make.add(*acting, "time", {"time"}, columns, kSteps * 5.0);
+      }
+    }
+    make.add(*acting, "time", {"time"}, some(bases, 0, n));
+  }
+  return drift;
+}
+
+std::vector<Eigen::Index> hypotheses_of_place(DictionaryMaker& make, const Extent& extent) {
+  const auto map = [&](const Acting& acting, std::uint32_t order) {
+    const auto bases = make.put(acting, Basis{{plane(extent, order)}});
+    for (std::uint32_t o = 1; o <= order; ++o)
+      make.add(acting, "position", {"position"}, some(bases, 0, (o + 1) * (o + 2) / 2 - 1));
+    return bases;
+  };
+  map(kSpeed, 8);
+  map(kTurning, 3);
+  const auto drift = map(kWorld, 5);
+  map(kCamera, 5);
+  // Lenses and tilts bend the picture most at its rim, where waves are flat. What they bend may be wider than what is seen.
+  Factor bent = plane(extent, 5);
+  bent.shape = Shape::kPolynomials2;
+  const double beyond_x = 0.15 * (bent.high - bent.low), beyond_y = 0.15 * (bent.and_high - bent.and_low);
+  bent.low -= beyond_x;
+  bent.high += beyond_x;
+  bent.and_low -= beyond_y;
+  bent.and_high += beyond_y;
+  const auto lens = make.put(kCamera, Basis{{bent}});
+  for (Eigen::Index o = 1; o <= 5; ++o)
+    make.add(kCamera, "position", {"position"}, some(lens, 0, (o + 1) * (o + 2) / 2 - 1));
+  if (extent.headings) map(kCompass, 2);
+  // Stripes are finer than what a map of the plane resolves: pictures put together, boards of a floor.
+  const auto stripes = [&](const Acting& acting, Covariate of, double low, double high, std::uint32_t count) {
+    const auto bases = make.put(acting, Basis{{over(Shape::kCosines, of, low, high, count)}});
+    for (Eigen::Index size = count / 2; size <= count; size += count / 2)
+      make.add(acting, "position", {"position"}, some(bases, 0, size));
+  };
+  for (const auto& [acting, count] : {std::pair{&kCamera, 24u}, {&kSpeed, 16u}}) {
+    stripes(*acting, Covariate::kX, extent.x_low_mm, extent.x_high_mm, count);
+    stripes(*acting, Covariate::kY, extent.y_low_mm, extent.y_high_mm, count);
+  }
+  return drift;
+}
+
+void hypotheses_of_heading(DictionaryMaker& make, const Extent& extent) {
+  const Basis round{{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 4)}};
+  make.curve(kSpeed, "heading", {"heading"}, round, {2, 4, 8}, false);
+  make.curve(kTurning, "heading", {"heading"}, round, {2, 4, 8}, false);
+  make.curve(kSlip, "heading", {"heading"}, round, {2, 4}, false);
+  if (extent.headings) make.curve(kCompass, "heading", {"heading"}, round, {2, 4}, false);
+}
+
+void hypotheses_of_drift(DictionaryMaker& make, const Extent& extent, const std::vector<Eigen::Index>& in_time,
+                         const std::vector<Eigen::Index>& in_place) {
+  const auto constant = make.put(kWorld, Basis{});
+  make.add("drift", {"world_frame"}, kWorld.in_words, some(constant, 0, 1));
+  // A drift that changes has a mean as well.
+  const auto and_constant = [&](std::vector<Eigen::Index> columns) {
+    for (const Eigen::Index c : constant) columns.push_back(c);
+    return columns;
+  };
+  for (const Eigen::Index size : {1, 3, 8})
+    make.add(kWorld, "time", {"time"}, and_constant(some(in_time, 0, size)));
+  for (const Eigen::Index order : {1, 2, 3})
+    make.add(kWorld, "position", {"position"}, and_constant(some(in_place, 0, (order + 1) * (order + 2) / 2 - 1)));
+  if (extent.has_stop) {
+    const auto at_rest = make.put(kWorld, Basis{}, 1);
+    make.add("drift-at-rest", {"world_frame"}, kWorld.in_words, some(at_rest, 0, 1));
+    auto both = some(constant, 0, 1);
+    for (const auto c : some(at_rest, 0, 1)) both.push_back(c);
+    make.add("drift", {"world_frame"}, kWorld.in_words, both);
+  }
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,328 @@
+#include "clients/identify/search/total_variation_map.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "clients/identify/search/total_variation_solver.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+using Shape = Factor::Shape;
+
+constexpr std::size_t kFolds = 4;
+/// Log likelihood of robots left out that a fine map must bring.
+constexpr double kWorth = 15;
+
+/// Regresses innovations on the values at the nodes near a robot's way.
+class FineSums {
+ public:
+  FineSums(const MotionModel& model, const Block& map, NormalEquations& to) : model_(model), map_(map), to_(to) {}
+
+  void start(const TrackFilter&) { active_.clear(); }
+  void step(const StepRecord& record) {
+    const Rates& r = record.rates;
+    const StepWays ways = ways_of(record, model_.base.wheel_base_mm);
+    for (Active& a : active_) a.pose.head<2>() += ways.by_heading * a.pose[2];
+    touched_ = touched_ || record.touching();
+    const int command = static_cast<int>(record.middle.commands.command);
+    if (!record.middle.commands.driven() || (map_.during >> command & 1) == 0) return;
+    double own = 0;
+    map_.basis.evaluate(record.middle, 0, &own);
+    const double factor = std::max(0.05, std::abs(1 + own));
+    const Eigen::Vector3d force = record.h_s / factor * ways.by_wheel *
+                                  Eigen::Vector2d(r.left_base_mm_s * r.left_gain, r.right_base_mm_s * r.right_gain);
+    const NodeGrid& g = to_.grid;
+    const double u = std::clamp((record.middle.x_mm - g.x_mm) / g.pitch_mm, 0.0, g.columns - 1.001),
+                 v = std::clamp((record.middle.y_mm - g.y_mm) / g.pitch_mm, 0.0, g.rows - 1.001);
+    i_ = static_cast<int>(u);
+    j_ = static_cast<int>(v);
+    const double x = u - i_, y = v - j_;
+    add(i_, j_, (1 - x) * (1 - y) * force);
+    add(i_ + 1, j_, x * (1 - y) * force);
+    add(i_, j_ + 1, (1 - x) * y * force);
+    add(i_ + 1, j_ + 1, x * y * force);
+  }
+  void update(const Innovation& innovation, const Sample&) {
+    if (std::exchange(touched_, false) || innovation.lost) {
+      active_.clear();
+      return;
+    }
+    std::erase_if(active_, [&](const Active& a) {
+      return a.i < i_ - kReach || a.i > i_ + 1 + kReach || a.j < j_ - kReach || a.j > j_ + 1 + kReach;
+    });
+    Eigen::Matrix3d jacobian = innovation.jacobian;
+    if (innovation.size == 2) jacobian.row(2).setZero();
+    const Eigen::Matrix3d precision = innovation.covariance.inverse();
+    for (Active& a : active_) a.seen = jacobian * a.pose;
+    for (const Active& a : active_) {
+      const Eigen::Vector3d weighed = precision * a.seen;
+      to_.score[static_cast<Eigen::Index>(to_.grid.at(a.i, a.j))] += weighed.dot(innovation.difference);
+      float* const row = to_.of(a.i, a.j) + (kAcross / 2) * kAcross + kAcross / 2;
+      for (const Active& b : active_)
+        row[(b.j - a.j) * kAcross + b.i - a.i] += static_cast<float>(weighed.dot(b.seen));
+    }
+    for (Active& a : active_) a.pose -= innovation.gain.topRows<3>() * a.seen;
+  }
+
+ private:
+  struct Active {
+    int i, j;
+    Eigen::Vector3d pose, seen = Eigen::Vector3d::Zero();
+  };
+  void add(int i, int j, const Eigen::Vector3d& force) {
+    for (Active& a : active_) {
+      if (a.i != i || a.j != j) continue;
+      a.pose += force;
+      return;
+    }
+    active_.push_back({i, j, force});
+  }
+
+  const MotionModel& model_;
+  const Block& map_;
+  NormalEquations& to_;
+  std::vector<Active> active_;
+  int i_ = 0, j_ = 0;
+  bool touched_ = false;
+};
+
+std::vector<NormalEquations> sums_of(const Fitter& fitter, const MotionModel& model, const Block& map,
+                                     const NodeGrid& grid) {
+  const auto units = fitter.set().units();
+  std::vector<NormalEquations> folds(std::min(kFolds, units.size()), NormalEquations(grid));
+  in_parallel(folds.size(), fitter.threads(), [&](std::size_t f) {
+    FineSums sums(model, map, folds[f]);
+    for (std::size_t u = f; u < units.size(); u += folds.size()) {
+      for (const TrackView* view : units[u]) {
+        RobotBias bias = model.bias_of(view->track->robot);
+        bias.covariance.setZero();
+        TrackFilter filter(model, bias, view->track->robot, view->number);
+        walk(filter, *view, view->track->samples.size(), sums);
+      }
+    }
+  });
+  return folds;
+}
+
+bool is_map_of_speed(const Block& block) {
+  if (block.target != Target::kGain || block.during != kDriven || block.basis.factors.size() != 1) return false;
+  const Factor& f = block.basis.factors.front();
+  const bool of_place = f.axis.of == Covariate::kX || f.axis.of == Covariate::kY;
+  return of_place && (f.shape == Shape::kCosines2 || f.shape == Shape::kCosines);
+}
+
+/// The place where robots were, in cells as fine as samples are dense.
+NodeGrid grid_of(const PreparedSet& set) {
+  double x_low = 1e300, x_high = -1e300, y_low = 1e300, y_high = -1e300;
+  std::vector<double> xs, ys;
+  for (const TrackView& view : set.views()) {
+    for (const Sample& s : view.track->samples) {
+      xs.push_back(s.x_mm);
+      ys.push_back(s.y_mm);
+    }
+  }
+  const auto bounds = [](std::vector<double>& all, double& low, double& high) {
+    const auto few = static_cast<std::ptrdiff_t>(all.size() / 500);
+    std::nth_element(all.begin(), all.begin() + few, all.end());
+    low = all[static_cast<std::size_t>(few)] - 20;
+    std::nth_element(all.begin(), all.end() - 1 - few, all.end());
+    high = all[all.size() - 1 - static_cast<std::size_t>(few)] + 20;
+  };
+  bounds(xs, x_low, x_high);
+  bounds(ys, y_low, y_high);
+  constexpr double kPerNode = 4, kFinest_mm = 10;
+  constexpr int kMostNodes = 95;
+  const double width = x_high - x_low, height = y_high - y_low;
+  NodeGrid g;
+  g.pitch_mm = std::max({kFinest_mm, std::sqrt(width * height * kPerNode / static_cast<double>(xs.size())),
+                         std::max(width, height) / (kMostNodes - 2)});
+  g.x_mm = x_low;
+  g.y_mm = y_low;
+  g.columns = static_cast<int>(std::ceil(width / g.pitch_mm)) + 1;
+  g.rows = static_cast<int>(std::ceil(height / g.pitch_mm)) + 1;
+  return g;
+}
+
+Block block_of(const NodeGrid& g, const Eigen::VectorXd& f) {
+  Factor factor;
+  factor.shape = Shape::kGrid;
+  factor.axis.of = Covariate::kX;
+  factor.and_axis.of = Covariate::kY;
+  factor.low = g.x_mm;
+  factor.high = g.x_mm + g.pitch_mm * (g.columns - 1);
+  factor.and_low = g.y_mm;
+  factor.and_high = g.y_mm + g.pitch_mm * (g.rows - 1);
+  factor.count = static_cast<std::uint32_t>(g.columns);
+  factor.points.assign(f.data(), f.data() + f.size());
+  return {Target::kGain, Basis{{factor}}, kDriven};
+}
+
+/// The term with the fine map in place of its smooth ones.
+Term with_map(const Term& term, const NodeGrid& grid, const Eigen::VectorXd& f) {
+  Term out = term;
+  out.blocks.clear();
+  std::vector<double> coefficients, precision;
+  Eigen::Index first = 0;
+  for (const Block& block : term.blocks) {
+    const auto n = static_cast<Eigen::Index>(block.basis.size());
+    if (!is_map_of_speed(block)) {
+      out.blocks.push_back(block);
+      for (Eigen::Index i = first; i < first + n; ++i) {
+        coefficients.push_back(term.coefficients[i]);
+        precision.push_back(term.precision[i]);
+      }
+    }
+    first += n;
+  }
+  out.blocks.insert(out.blocks.begin(), block_of(grid, f));
+  coefficients.insert(coefficients.begin(), 1.0);
+  precision.insert(precision.begin(), 0.01);
+  out.coefficients =
+      Eigen::Map<Eigen::VectorXd>(coefficients.data(), static_cast<Eigen::Index>(coefficients.size()));
+  out.precision = Eigen::Map<Eigen::VectorXd>(precision.data(), static_cast<Eigen::Index>(precision.size()));
+  return out;
+}
+
+/// What the smooth maps of a term come to at the nodes.
+Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid) {
+  Eigen::VectorXd f(static_cast<Eigen::Index>(grid.nodes()));
+  std::array<double, kMostColumns> values;
+  Situation s;
+  for (int j = 0; j < grid.rows; ++j) {
+    for (int i = 0; i < grid.columns; ++i) {
+      s.x_mm = grid.x_mm + i * grid.pitch_mm;
+      s.y_mm = grid.y_mm + j * grid.pitch_mm;
+      double gain = 1;
+      Eigen::Index first = 0;
+      for (const Block& block : term.blocks) {
+        const auto n = static_cast<Eigen::Index>(block.basis.size());
+        if (is_map_of_speed(block)) {
+          block.basis.evaluate(s, 0, values.data());
+          gain *= 1 + term.coefficients.segment(first, n).dot(Eigen::Map<const Eigen::VectorXd>(values.data(), n));
+        }
+        first += n;
+      }
+      f[static_cast<Eigen::Index>(grid.at(i, j))] = gain - 1;
+    }
+  }
+  return f;
+}
+
+/// A map as it is fitted.
+struct Fitted {
+  NodeGrid grid;
+  Eigen::VectorXd f;
+  Variation by;
+};
+
+/// Weights are tried in units of this: the root of what the data know of a node.
+double unit_of_weight(const NormalEquations& all) {
+  double sum = 0, count = 0;
+  const Eigen::VectorXd rows = all.times(Eigen::VectorXd::Ones(all.score.size()));
+  for (Eigen::Index n = 0; n < rows.size(); ++n) {
+    if (rows[n] <= 0) continue;
+    sum += rows[n];
+    ++count;
+  }
+  return std::sqrt(sum / std::max(count, 1.0));
+}
+
+/// The variation with which robots left out are foretold best, and by how much better than by the map as it is.
+double choose(const std::vector<NormalEquations>& folds, const NormalEquations& all,
+              const std::vector<Variation>& tried, std::uint32_t threads, Fitted& map) {
+  std::vector<double> gains(tried.size() * folds.size());
+  in_parallel(gains.size(), threads, [&](std::size_t k) {
+    const NormalEquations& out = folds[k % folds.size()];
+    NormalEquations rest = all;
+    rest.add(out, -1);
+    const Eigen::VectorXd change = solve(rest, map.f, tried[k / folds.size()], {4, 12}) - map.f;
+    gains[k] = out.score.dot(change) - 0.5 * change.dot(out.times(change));
+  });
+  double best = -1e300;
+  for (std::size_t t = 0; t < tried.size(); ++t) {
+    const auto first = gains.begin() + static_cast<std::ptrdiff_t>(t * folds.size());
+    const double gain = std::accumulate(first, first + static_cast<std::ptrdiff_t>(folds.size()), 0.0);
+    if (gain <= best) continue;
+    best = gain;
+    map.by = tried[t];
+  }
+  return best;
+}
+
+/// Twice as many nodes along each axis, with the values of the coarser grid between them.
+void halve(Fitted& map) {
+  const Block coarse = block_of(map.grid, map.f);
+  map.grid.pitch_mm /= 2;
+  map.grid.columns = 2 * map.grid.columns - 1;
+  map.grid.rows = 2 * map.grid.rows - 1;
+  map.f.resize(static_cast<Eigen::Index>(map.grid.nodes()));
+  Situation s;
+  for (int j = 0; j < map.grid.rows; ++j) {
+    for (int i = 0; i < map.grid.columns; ++i) {
+      s.x_mm = map.grid.x_mm + i * map.grid.pitch_mm;
+      s.y_mm = map.grid.y_mm + j * map.grid.pitch_mm;
+      coarse.basis.evaluate(s, 0, &map.f[static_cast<Eigen::Index>(map.grid.at(i, j))]);
+    }
+  }
+}
+
+}  // namespace
+
+void sharpen(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  const std::vector<Block>& had = model.terms[place].blocks;
+  if (std::none_of(had.begin(), had.end(), is_map_of_speed)) return;
+  Fitted map;
+  map.grid = grid_of(fitter.set());
+  if (map.grid.columns < 8 || map.grid.rows < 8) return;
+  map.f = sampled(model.terms[place], map.grid);
+  MotionModel trial = model;
+  trial.terms[place] = with_map(model.terms[place], map.grid, map.f);
+  double likelihood = fitter.log_likelihood(model);
+  constexpr int kPasses = 3;
+  constexpr int kMostNodes = 190;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const bool finer = pass == 2 && std::max(map.grid.columns, map.grid.rows) * 2 - 1 < kMostNodes;
+    if (finer) {
+      halve(map);
+      trial.terms[place].blocks.front() = block_of(map.grid, map.f);
+    }
+    const std::vector<NormalEquations> folds = sums_of(fitter, trial, trial.terms[place].blocks.front(), map.grid);
+    if (folds.size() < 2) return;
+    NormalEquations all(map.grid);
+    for (const NormalEquations& fold : folds) all.add(fold, 1);
+    // With the first map in, what is noise and what is not is better known.
+    if (pass != 1) {
+      const double unit = unit_of_weight(all);
+      std::vector<Variation> tried;
+      const auto try_it = [&](double weight, double soft, double power) {
+        if (pass == 0 || power == map.by.power) tried.push_back({weight * unit, soft, power});
+      };
+      for (const double weight : {0.6, 1.8, 5.4}) {
+        try_it(weight, 0.004, 1);
+        try_it(weight, 0.01, 0.3);
+        if (pass == 0) try_it(weight, 0.04, 1);
+      }
+      const double gain = choose(folds, all, tried, fitter.threads(), map);
+      if (pass == 0 && gain < kWorth) return;
+    }
+    map.f = solve(all, map.f, map.by, {6, 30});
+    MotionModel next = trial;
+    next.terms[place].blocks.front() = block_of(map.grid, map.f);
+    fitter.fit(next, 1);
+    map.f *= next.terms[place].coefficients[0];
+    next.terms[place].blocks.front() = block_of(map.grid, map.f);
+    next.terms[place].coefficients[0] = 1;
+    const double found = fitter.log_likelihood(next);
+    if (found < likelihood + kWorth) break;
+    likelihood = found;
+    trial = next;
+    model = trial;
+  }
+}
+
+}  // namespace kilotwin::identify

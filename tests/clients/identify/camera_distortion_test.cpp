@@ -1,0 +1,117 @@
+// Pictures that are bent: that what holds robots is not where it seems to be is noticed, and settled once a map puts the picture
+// straight.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "clients/identify/fit/fitter.hpp"
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr double kWide_mm = 220, kHigh_mm = 180;  ///< half the room's sides, as centres of discs reach them
+constexpr double kBarrel = 0.15;
+
+/// A point at the corner is seen nearer by `bent`.
+Eigen::Vector2d seen(double x_mm, double y_mm, double bent) {
+  const double square = (x_mm * x_mm + y_mm * y_mm) / (kWide_mm * kWide_mm + kHigh_mm * kHigh_mm);
+  return (1 - bent * square) * Eigen::Vector2d(x_mm, y_mm);
+}
+
+/// Ghosts in a room whose walls hold them, by arcs of 50 ms, seen through a lens.
+MeasuredSet behind_walls(double bent) {
+  const Random random(21);
+  const double dt = 0.05, factor_s = 0.001, tracker_mm = 0.3, tracker_rad = 0.03, duration_s = 150;
+  MeasuredSet set;
+  set.has_commands = set.has_headings = true;
+  Run& run = set.runs.emplace_back();
+  for (std::uint32_t r = 0; r < 8; ++r) {
+    Track& track = run.tracks.emplace_back();
+    track.robot = r;
+    track.commands.push_back({-1e300, Motion::kStop});
+    double x = 90.0 * (r % 4) - 135, y = 90.0 * (r / 4) - 45, heading = 1.7 * r, next_s = 0;
+    for (int k = 0; k * dt <= duration_s; ++k) {
+      const double t = k * dt;
+      const auto noise = [&](Stream stream, std::uint32_t draw) { return random.normal(stream, r, Tick{k}, draw); };
+      if (k % 10 == 0) {
+        const Eigen::Vector2d at = seen(x, y, bent);
+        track.samples.push_back({t, at[0] + tracker_mm * noise(Stream::kMeasurementNoise, 0),
+                                 at[1] + tracker_mm * noise(Stream::kMeasurementNoise, 1),
+                                 wrapped_angle(heading + tracker_rad * noise(Stream::kMeasurementNoise, 2))});
+      }
+      if (t >= next_s - 1e-9) {
+        const bool straight = track.commands.back().motion != Motion::kStraight;
+        const double draw = random.uniform(Stream::kLayout, r, Tick{k}, 0);
+        track.commands.push_back({t, straight ? Motion::kStraight : draw < 0.5 ? Motion::kLeft : Motion::kRight});
+        next_s = t + (straight ? 5 + 10 * draw : 1 + 2 * draw);
+      }
+      const Eigen::Vector2d v = nominal_speeds(BaseParameters{}, track.commands.back().motion);
+      const double sd = std::sqrt(factor_s / dt);
+      Rates rates;
+      rates.left_mm_s = v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
+      rates.right_mm_s = v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
+      const double axle = BaseParameters{}.centre_mm;
+      const Arc arc = arc_of(rates, 25, heading, dt);
+      const double from_x = x - axle * std::cos(heading), from_y = y - axle * std::sin(heading);
+      heading += arc.dheading_rad;
+      x = std::clamp(from_x + arc.dx_mm + axle * std::cos(heading), -kWide_mm, kWide_mm);
+      y = std::clamp(from_y + arc.dy_mm + axle * std::sin(heading), -kHigh_mm, kHigh_mm);
+    }
+  }
+  return set;
+}
+
+/// A map of the picture that is not fitted yet.
+Term map_of_the_picture() {
+  Factor plane;
+  plane.shape = Factor::Shape::kPolynomials2;
+  plane.axis.of = Covariate::kX;
+  plane.and_axis.of = Covariate::kY;
+  plane.low = -250;
+  plane.high = 250;
+  plane.and_low = -210;
+  plane.and_high = 210;
+  plane.count = 3;
+  const Basis basis{{plane}};
+  const auto columns = 2 * static_cast<Eigen::Index>(basis.size());
+  return {"camera-by-position",
+          {{Target::kMeasuredX, basis, kAlways}, {Target::kMeasuredY, basis, kAlways}},
+          Eigen::VectorXd::Zero(columns),
+          Eigen::VectorXd::Constant(columns, 1 / (30.0 * 30.0))};
+}
+
+TEST(BentPicture, WallsOfAStraightPictureAreNotDoubted) {
+  const MeasuredSet set = behind_walls(0);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  EXPECT_FALSE(model.doubts_rim);
+  EXPECT_NEAR(model.room.x_high_mm, kWide_mm, 3);
+  EXPECT_NEAR(model.room.y_low_mm, -kHigh_mm, 3);
+  // Whoever doubts them all the same takes them for walls again.
+  model.doubts_rim = true;
+  fitter.fit_surroundings(model);
+  EXPECT_FALSE(model.doubts_rim);
+  EXPECT_NEAR(model.room.x_high_mm, kWide_mm, 3);
+}
+
+TEST(BentPicture, WallsAreDoubtedUntilAMapPutsThemStraight) {
+  const MeasuredSet set = behind_walls(kBarrel);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  ASSERT_TRUE(model.doubts_rim);
+  model.terms.push_back(map_of_the_picture());
+  fitter.fit(model, 2);
+  EXPECT_FALSE(model.doubts_rim);
+  // Walls in the room; how large all is, only what robots are known to be like tells.
+  EXPECT_NEAR((model.room.x_high_mm - model.room.x_low_mm) / (model.room.y_high_mm - model.room.y_low_mm),
+              kWide_mm / kHigh_mm, 0.02);
+  EXPECT_NEAR(model.room.x_high_mm - model.room.x_low_mm, 2 * kWide_mm, 20);
+}
+
+}  // namespace
+}  // namespace kilotwin::identify

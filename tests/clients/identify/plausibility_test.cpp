@@ -1,0 +1,85 @@
+// What data cannot be is said, with what would be right; what they can be passes.
+#include "clients/identify/data/plausibility.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// Four robots, straight on at 10 mm/s, seen twice a second for 30 s.
+MeasuredSet good() {
+  MeasuredSet set;
+  set.has_commands = set.has_headings = true;
+  set.runs.push_back({"r", {}});
+  for (std::uint32_t robot = 0; robot < 4; ++robot) {
+    Track& track = set.runs[0].tracks.emplace_back();
+    track.robot = robot;
+    track.commands = {{-1e300, Motion::kStop}, {0, Motion::kStraight}};
+    const double heading = 1.3 * robot - 2;
+    for (double t = 0; t <= 30; t += 0.5)
+      track.samples.push_back({t, 300.0 * robot + 10 * t * std::cos(heading), 10 * t * std::sin(heading), heading});
+  }
+  return set;
+}
+
+std::string complaint(const std::function<void(Sample&)>& change) {
+  MeasuredSet set = good();
+  for (Track& track : set.runs[0].tracks)
+    for (Sample& s : track.samples) change(s);
+  try {
+    demand_plausible(set, "DIR");
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Plausible, GoodDataPass) {
+  EXPECT_EQ(complaint([](Sample&) {}), "");
+  // Headings that count on beyond a turn; no headings.
+  EXPECT_EQ(complaint([](Sample& s) { s.heading_rad += 2 * M_PI * std::floor(s.time_s / 5); }), "");
+  EXPECT_EQ(complaint([](Sample& s) { s.heading_rad = std::nan(""); }), "");
+}
+
+TEST(Plausible, OtherUnitsAreNamed) {
+  const auto says = [](const std::function<void(Sample&)>& change, const char* what) {
+    const std::string text = complaint(change);
+    EXPECT_NE(text.find(what), std::string::npos) << text;
+    EXPECT_EQ(text.rfind("DIR: ", 0), 0U) << text;
+    EXPECT_EQ(text.find('\n'), std::string::npos);
+  };
+  says([](Sample& s) { s.time_s += 1.7e9; }, "not since 1970");
+  says([](Sample& s) { s.time_s *= 1000; }, "not milliseconds");
+  says([](Sample& s) { s.x_mm /= 1000, s.y_mm /= 1000; }, "not metres");
+  says([](Sample& s) { s.x_mm *= 40, s.y_mm *= 40; }, "not pixels");
+  says([](Sample& s) { s.x_mm = 1e300; }, "give mm");
+  says([](Sample& s) { s.heading_rad = s.heading_rad * 180 / M_PI + 180; }, "not degrees");
+  says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "told to move");
+}
+
+TEST(Plausible, CommandsForNobodyAreNamed) {
+  MeasuredSet set = good();
+  for (Track& track : set.runs[0].tracks) track.commands = {{-1e300, Motion::kStop}};
+  EXPECT_THROW(demand_plausible(set, "DIR"), UserError);
+  // One robot that moves is enough.
+  set.runs[0].tracks[2].commands.push_back({20, Motion::kStraight});
+  EXPECT_NO_THROW(demand_plausible(set, "DIR"));
+}
+
+TEST(Plausible, RunsShorterThanTheHorizonAreNamed) {
+  MeasuredSet set = good();
+  EXPECT_NO_THROW(demand_longer_than(set, 30, false, "DIR"));
+  EXPECT_THROW(demand_longer_than(set, 31, false, "DIR"), UserError);
+  EXPECT_THROW(demand_longer_than(set, 10, true, "DIR"), UserError);
+  set.runs[0].tracks[0].held_out = true;
+  EXPECT_NO_THROW(demand_longer_than(set, 10, true, "DIR"));
+}
+
+}  // namespace
+}  // namespace kilotwin::identify

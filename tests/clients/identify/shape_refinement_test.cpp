@@ -1,0 +1,353 @@
+// Laws of the refinement: evidence in closed form, smoothness that fits the data, shapes and instants recovered.
+#include "clients/identify/search/shape_refinement.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "clients/identify/search/amplitudes.hpp"
+#include "clients/identify/search/simplification.hpp"
+#include "clients/identify/search/change_points.hpp"
+#include "clients/identify/search/target_extension.hpp"
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// What acts on the robots of a set.
+struct Acting {
+  std::function<double(double since_s)> gain = [](double) { return 1.0; };
+  std::function<double(std::uint32_t robot, double time_s)> own_gain = [](std::uint32_t, double) { return 1.0; };
+  std::function<double(double time_s)> drift_x_mm_s = [](double) { return 0.0; };
+  /// By how long the wheel's own motor has run.
+  std::function<double(double used_s)> left = [](double) { return 1.0; }, right = [](double) { return 1.0; };
+};
+
+/// Robots far from each other that go straight and turn by turns, by arcs of 20 ms, with noise of wheels and tracker.
+MeasuredSet played(const Acting& acting, std::uint64_t seed, std::uint32_t robots, double duration_s) {
+  const Random random(seed);
+  const double dt = 0.02, factor_s = 0.001, tracker_mm = 0.5, tracker_rad = 0.03;
+  MeasuredSet set;
+  set.has_commands = set.has_headings = true;
+  Run& run = set.runs.emplace_back();
+  run.name = "r";
+  for (std::uint32_t robot = 0; robot < robots; ++robot) {
+    Track& track = run.tracks.emplace_back();
+    track.robot = robot;
+    double x = 3000.0 * robot, y = 0, heading = robot, since_s = 0, next_s = 0;
+    double left_s = 0, right_s = 0;
+    track.commands.push_back({-1e300, Motion::kStop});
+    for (int k = 0; k * dt <= duration_s; ++k) {
+      const double t = k * dt;
+      const auto noise = [&](Stream stream, std::uint32_t draw) {
+        return random.normal(stream, robot, Tick{k}, draw);
+      };
+      if (k % 25 == 0)
+        track.samples.push_back({t, x + 9.2 * std::cos(heading) + tracker_mm * noise(Stream::kMeasurementNoise, 0),
+                                 y + 9.2 * std::sin(heading) + tracker_mm * noise(Stream::kMeasurementNoise, 1),
+                                 wrapped_angle(heading + tracker_rad * noise(Stream::kMeasurementNoise, 2))});
+      if (t >= next_s - 1e-9) {
+        const bool straight = track.commands.back().motion != Motion::kStraight;
+        const double draw = random.uniform(Stream::kLayout, robot, Tick{k}, 0);
+        track.commands.push_back({t, straight ? Motion::kStraight : draw < 0.5 ? Motion::kLeft : Motion::kRight});
+        next_s = t + (straight ? 3 + 6 * draw : 1 + 2 * draw);
+        since_s = 0;
+      }
+      const Eigen::Vector2d v = acting.own_gain(robot, t) * acting.gain(since_s) *
+                                nominal_speeds(BaseParameters{}, track.commands.back().motion);
+      const double sd = std::sqrt(factor_s / dt);
+      Rates rates;
+      rates.left_mm_s = acting.left(left_s) * v[0] * (1 + sd * noise(Stream::kWheelFactor, 0));
+      rates.right_mm_s = acting.right(right_s) * v[1] * (1 + sd * noise(Stream::kWheelFactor, 1));
+      rates.world_x_mm_s = acting.drift_x_mm_s(t);
+      const Arc arc = arc_of(rates, 25, heading, dt);
+      x += arc.dx_mm;
+      y += arc.dy_mm;
+      heading += arc.dheading_rad;
+      since_s += dt;
+      left_s += v[0] > 0 ? dt : 0;
+      right_s += v[1] > 0 ? dt : 0;
+    }
+  }
+  return set;
+}
+
+Factor cosines(Covariate of, double high, std::uint32_t count, double warp) {
+  Factor f;
+  f.shape = Factor::Shape::kCosines;
+  f.axis.of = of;
+  f.high = high;
+  f.count = count;
+  f.warp = warp;
+  return f;
+}
+
+Term unfitted(const std::string& name, std::vector<Block> blocks) {
+  Eigen::Index columns = 0;
+  for (const Block& block : blocks) columns += static_cast<Eigen::Index>(block.basis.size());
+  return {name, std::move(blocks), Eigen::VectorXd::Zero(columns), Eigen::VectorXd::Constant(columns, 0.01)};
+}
+
+TEST(Refine, EvidenceOfOneColumnIsInClosedForm) {
+  const double information = 7, score = 3, sd = 0.8;
+  const Eigen::MatrixXd i = Eigen::MatrixXd::Constant(1, 1, information);
+  const double expected =
+      0.5 * score * score / (information + 1 / (sd * sd)) - 0.5 * std::log(1 + sd * sd * information);
+  EXPECT_NEAR(log_evidence(i, Eigen::VectorXd::Constant(1, score), Eigen::VectorXd::Constant(1, sd)), expected,
+              1e-12);
+}
+
+TEST(Refine, SmoothnessFollowsTheData) {
+  // Twenty columns told apart by the data, the first four of which are there.
+  const Eigen::MatrixXd information = 400 * Eigen::MatrixXd::Identity(20, 20);
+  ColumnGroup group;
+  Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(20);
+  for (Eigen::Index k = 0; k < 20; ++k) {
+    group.columns.push_back(k);
+    group.roughness.push_back(static_cast<double>(k + 1));
+    if (k < 4) coefficients[k] = 1;
+  }
+  std::vector<Smoothness> smoothness;
+  Eigen::VectorXd sd;
+  EXPECT_GT(choose_smoothness(information, information * coefficients, {group}, smoothness, sd), 500);
+  EXPECT_GT(sd[0], 0.4);
+  EXPECT_LT(sd[19], 0.05 * sd[0]);
+  // Nothing there, nothing chosen.
+  smoothness.clear();
+  EXPECT_EQ(choose_smoothness(information, Eigen::VectorXd::Zero(20), {group}, smoothness, sd), 0);
+  EXPECT_EQ(sd.maxCoeff(), 0);
+}
+
+TEST(Refine, ASharpShapeIsRecovered) {
+  Acting acting;
+  acting.gain = [](double s) { return s < 0.8 ? 0.4 : std::min(1.0, 0.4 + 0.5 * (s - 0.8)); };
+  const MeasuredSet set = played(acting, 5, 8, 120);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  const double before = fitter.log_likelihood(model);
+  model.terms.push_back(
+      unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
+  fitter.fit(model, 2);
+  const double coarse = fitter.log_likelihood(model);
+  refine(fitter, model, 0);
+  EXPECT_GT(coarse, before + 100);
+  EXPECT_GT(fitter.log_likelihood(model), coarse + 100);
+  // Its size shows against that of later times.
+  const auto gain_at = [&](double since_s) {
+    Situation s;
+    s.commands.command = Motion::kStraight;
+    s.commands.since_s = since_s;
+    return model.rates(s, Eigen::Vector2d::Zero()).left_gain;
+  };
+  const double late = gain_at(5);
+  for (const double s : {0.4, 1.4, 2.5}) EXPECT_NEAR(gain_at(s) / late, acting.gain(s), 0.06) << s;
+}
+
+/// Speed by the time since the command, fitted as a curve of any shape, then simplified.
+MotionModel simplified(const Acting& acting, std::uint64_t seed, bool& simpler) {
+  const MeasuredSet set = played(acting, seed, 6, 100);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  model.terms.push_back(
+      unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+  simpler = simplify(fitter, model, 0);
+  return model;
+}
+
+TEST(Simplify, AnExponentialIsTakenForOne) {
+  Acting acting;
+  acting.gain = [](double s) { return 1 - 0.6 * std::exp(-s / 1.5); };
+  bool simpler = false;
+  const MotionModel model = simplified(acting, 6, simpler);
+  ASSERT_TRUE(simpler);
+  const Term& term = model.terms[0];
+  ASSERT_EQ(term.coefficients.size(), 1);
+  const Factor& factor = term.blocks[0].basis.factors.front();
+  ASSERT_EQ(factor.shape, Factor::Shape::kExponential);
+  EXPECT_NEAR(factor.points[0], 1.5, 0.3);
+  EXPECT_NEAR(term.coefficients[0], -0.6, 0.06);
+}
+
+TEST(Simplify, AStepIsTakenForOne) {
+  Acting acting;
+  acting.gain = [](double s) { return s < 2.2 ? 0.6 : 1.0; };
+  bool simpler = false;
+  const MotionModel model = simplified(acting, 7, simpler);
+  ASSERT_TRUE(simpler);
+  const Factor& factor = model.terms[0].blocks[0].basis.factors.front();
+  ASSERT_EQ(factor.shape, Factor::Shape::kAtLeast);
+  EXPECT_NEAR(factor.points[0], 2.2, 0.15);
+}
+
+TEST(Simplify, WhatHasNoSimpleFormStaysACurve) {
+  Acting acting;
+  acting.gain = [](double s) { return 1 - 0.5 * std::exp(-(s - 2) * (s - 2)); };
+  bool simpler = false;
+  const MotionModel model = simplified(acting, 8, simpler);
+  EXPECT_FALSE(simpler);
+  EXPECT_GT(model.terms[0].coefficients.size(), 3);
+}
+
+/// A smooth curve in 80 s of time, fitted and refined.
+void add_drift_by_time(const Fitter& fitter, MotionModel& model) {
+  const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
+  model.terms.push_back(
+      unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+}
+
+TEST(Refine, TheInstantOfAPulseIsFound) {
+  Acting acting;
+  acting.drift_x_mm_s = [](double t) { return t >= 40.2 && t < 41 ? 15.0 : 0.0; };
+  const MeasuredSet set = played(acting, 6, 8, 80);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  add_drift_by_time(fitter, model);
+  EXPECT_EQ(find_steps(fitter, model, 0), "drift-by-time");
+  const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
+  ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
+  ASSERT_EQ(steps.points.size(), 2u);
+  // Samples lie half a second apart.
+  EXPECT_NEAR(steps.points[0], 40.2, 0.3);
+  EXPECT_NEAR(steps.points[1], 41, 0.3);
+  // How far it moved the robots is surer than how fast.
+  EXPECT_NEAR(model.terms[0].coefficients[0] * (steps.points[1] - steps.points[0]), 12, 1);
+}
+
+/// A curve in the time that each motor has run, fitted and refined.
+void add_speed_by_motor_time(const Fitter& fitter, MotionModel& model, double longest_s) {
+  const Basis basis{{cosines(Covariate::kMotorTime, longest_s, 8, 0)}};
+  model.terms.push_back(unfitted("speed-by-motor-time", {{Target::kGain, basis, kDriven}}));
+  fitter.fit(model, 2);
+  refine(fitter, model, 0);
+}
+
+/// What is found of motors by their use, before it is given its shape.
+struct FoundInUse {
+  FoundInUse(const Acting& acting, std::uint64_t seed) : set(played(acting, seed, 8, 80)) {
+    fitter.fit_base(model);
+    add_speed_by_motor_time(fitter, model, 75);
+  }
+  MeasuredSet set;
+  PreparedSet prepared{set};
+  Fitter fitter{prepared, 2};
+  MotionModel model;
+};
+
+TEST(Refine, WhatEndsAtOnceWithUseIsAStep) {
+  Acting acting;
+  acting.left = acting.right = [](double used_s) { return used_s < 35 ? 1.0 : 0.7; };
+  FoundInUse found(acting, 9);
+  EXPECT_EQ(find_steps(found.fitter, found.model, 0), "speed-by-motor-time");
+  const auto& blocks = found.model.terms[0].blocks;
+  const Factor& steps = blocks.back().basis.factors[0];
+  ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
+  EXPECT_EQ(steps.axis.of, Covariate::kMotorTime);
+  EXPECT_TRUE(
+      std::any_of(steps.points.begin(), steps.points.end(), [](double at_s) { return std::abs(at_s - 35) < 0.5; }));
+}
+
+// Biases of robots, which have a mean for both wheels, would take up what the left ones do on the average.
+TEST(Widen, WhatLeftWheelsDoIsNoBias) {
+  Acting acting;
+  acting.left = [](double used_s) { return 1 - 0.4 * (1 - std::exp(-used_s / 20)); };
+  FoundInUse found(acting, 10);
+  widen(found.fitter, found.model, 0);
+  Situation at;
+  at.commands.command = Motion::kStraight;
+  const auto ratio = [&](double used_s) {
+    at.commands.motor_s = {used_s, used_s};
+    const Rates rates = found.model.rates(at, Eigen::Vector2d::Zero());
+    return rates.left_gain / rates.right_gain;
+  };
+  for (const double used_s : {5.0, 20.0, 50.0}) EXPECT_NEAR(ratio(used_s), acting.left(used_s), 0.05) << used_s;
+}
+
+// A shift that stays is as good as a push; one that is put right takes half as many steps as two pushes.
+TEST(Refine, AShiftOfThePictureIsNotADrift) {
+  Acting acting;
+  MeasuredSet set = played(acting, 7, 8, 80);
+  for (Track& track : set.runs[0].tracks)
+    for (Sample& s : track.samples)
+      if (s.time_s >= 33.3 && s.time_s < 55.3) s.x_mm += 6;
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 2);
+  MotionModel model;
+  fitter.fit_base(model);
+  add_drift_by_time(fitter, model);
+  EXPECT_EQ(find_steps(fitter, model, 0), "camera-by-time");
+  EXPECT_EQ(model.terms[0].blocks[0].target, Target::kMeasuredX);
+  const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
+  double shift_mm = 0;
+  for (std::size_t i = 0; i < steps.points.size(); ++i)
+    if (steps.points[i] < 45) shift_mm += model.terms[0].coefficients[static_cast<Eigen::Index>(i)];
+  EXPECT_NEAR(shift_mm, 6, 0.5);
+}
+
+TEST(Amounts, OfOneCurveThatSomeRobotsShowAndOthersDoNot) {
+  // Every second robot tires; what all show in the mean is half of that.
+  const double duration_s = 150;
+  const auto tired = [&](double t) { return -0.5 * (t / duration_s) * (t / duration_s); };
+  Acting acting;
+  acting.own_gain = [&](std::uint32_t robot, double t) { return 1 + (robot % 2 == 0 ? tired(t) : 0); };
+  const std::uint32_t robots = 8;
+  const MeasuredSet set = played(acting, 31, robots, duration_s);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 1);
+  MotionModel model;
+  model.contacts = false;
+  const Basis curve{{cosines(Covariate::kTime, duration_s, 4, 0)}};
+  model.terms.push_back(unfitted("speed-by-time", {{Target::kGain, curve}}));
+  fitter.fit(model, 2);
+  // A term by itself is no amount of another.
+  EXPECT_EQ(join_amounts(fitter, model), std::nullopt);
+  ASSERT_EQ(model.terms.size(), 1U);
+  Factor known = curve.factors.front();
+  known.known.assign(model.terms[0].coefficients.begin(), model.terms[0].coefficients.end());
+  Factor each;
+  each.shape = Factor::Shape::kTable;
+  each.axis.of = Covariate::kRobot;
+  for (std::uint32_t robot = 0; robot < robots; ++robot) each.points.push_back(robot);
+  Term amounts = unfitted("speed-by-robot-and-time", {{Target::kGain, Basis{{each, known}}}});
+  amounts.precision.setConstant(1);
+  model.terms.push_back(amounts);
+  fitter.fit(model, 2);
+  const double as_two = fitter.log_likelihood(model);
+  EXPECT_EQ(join_amounts(fitter, model), 0U);
+  ASSERT_EQ(model.terms.size(), 1U);
+  EXPECT_EQ(model.terms[0].name, "speed-by-robot-and-time");
+  EXPECT_GT(fitter.log_likelihood(model), as_two - 10);
+  const Block& block = model.terms[0].blocks.front();
+  const Factor& shown = block.basis.factors.front();
+  ASSERT_EQ(shown.known.size(), robots);
+  EXPECT_EQ(shown.plus, 1);  // the mean robot's, and that of one never seen
+  for (std::uint32_t robot = 0; robot < robots; ++robot)
+    EXPECT_NEAR(shown.plus + shown.known[robot], robot % 2 == 0 ? 2 : 0, 0.25) << robot;
+  std::vector<double> columns(kMostColumns);
+  for (const double t : {20.0, 75.0, 130.0}) {
+    // Robots' biases take the curve's mean.
+    const auto effect_at = [&](double time_s) {
+      Situation s;
+      s.time_s = time_s;
+      s.robot = 4;
+      block.basis.evaluate(s, 0, columns.data());
+      return model.terms[0].coefficients.dot(
+          Eigen::Map<Eigen::VectorXd>(columns.data(), model.terms[0].coefficients.size()));
+    };
+    EXPECT_NEAR((1 + effect_at(t)) / (1 + effect_at(2)), (1 + tired(t)) / (1 + tired(2)), 0.04) << t;
+  }
+}
+
+}  // namespace
+}  // namespace kilotwin::identify

@@ -1,0 +1,182 @@
+// Runs of the simulator's own robots, played again: the model that made them is not told from them; without its effect it is.
+#include "clients/identify/replay/simulation_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "clients/identify/identify.hpp"
+#include "clients/identify/model/model_file.hpp"
+#include "clients/identify/replay/replay.hpp"
+#include "clients/identify/replay/track_statistics.hpp"
+#include "core/random/random.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// What robots are told: straight on and turns in turn, of random lengths. Looked at twice a second, without samples as yet.
+MeasuredSet told(std::uint32_t robots, std::uint32_t runs, double duration_s, std::uint64_t seed) {
+  const Random random(seed);
+  MeasuredSet set;
+  set.has_commands = set.has_headings = true;
+  for (std::uint32_t run = 0; run < runs; ++run) {
+    set.runs.push_back({"run" + std::to_string(run), {}});
+    for (std::uint32_t robot = 0; robot < robots; ++robot) {
+      Track& track = set.runs.back().tracks.emplace_back();
+      // Numbers with gaps: nobody counts robots from 0.
+      track.robot = 3 + 2 * robot;
+      track.commands.push_back({-1e300, Motion::kStop});
+      std::uint32_t draw = 0;
+      const auto uniform = [&] { return random.uniform(Stream::kLayout, run * 1000 + robot, Tick{0}, draw++); };
+      for (double t = 0.3; t < duration_s;) {
+        const bool straight = track.commands.back().motion != Motion::kStraight;
+        track.commands.push_back({t, straight          ? Motion::kStraight
+                                     : uniform() < 0.5 ? Motion::kLeft
+                                                       : Motion::kRight});
+        t += straight ? 6 + 6 * uniform() : 1 + 2 * uniform();
+      }
+      const double x = 400.0 * (robot % 4) - 600, y = 400.0 * (robot / 4) - 400;
+      for (double t = 0; t <= duration_s; t += 0.5) track.samples.push_back({t, x, y, 0.7 * robot});
+    }
+  }
+  return set;
+}
+
+/// Robots slow down to 60 % of their speed, with a time constant of 40 s, in a model with all else that models have.
+MotionModel slowing(std::uint32_t robots, double share) {
+  MotionModel model;
+  model.noise.position_mm2 = 0.25;
+  model.noise.heading_rad2 = 1e-3;
+  model.room = {-800, 800, -700, 700};
+  model.base.ahead_mm = kAxleOffset_mm - 4;
+  const Random random(5);
+  for (std::uint32_t robot = 0; robot < robots; ++robot) {
+    RobotBias& bias = model.robots[3 + 2 * robot];
+    for (std::uint32_t wheel = 0; wheel < 2; ++wheel)
+      bias.mean_mm_s[wheel] = 1.2 * random.normal(Stream::kWheelBias, robot, Tick{0}, wheel);
+  }
+  if (share == 0) return model;
+  Factor factor;
+  factor.shape = Factor::Shape::kExponential;
+  factor.axis.of = Covariate::kTime;
+  factor.points = {40};
+  model.terms.push_back({"slowing",
+                         {{Target::kGain, Basis{}}, {Target::kGain, Basis{{factor}}}},
+                         Eigen::Vector2d(-share, share),
+                         Eigen::Vector2d(1, 1)});
+  return model;
+}
+
+/// The set with what robots of a model do.
+void perform(MeasuredSet& set, const MotionModel& model, std::uint64_t seed) {
+  PreparedSet prepared(set);
+  prepared.find_headings(model, 1);
+  std::vector<std::vector<std::vector<Sample>>> samples;
+  for (std::size_t run = 0; run < set.runs.size(); ++run)
+    samples.push_back(play(scene_of(model, prepared, run), proto_of(model), seed + run));
+  for (std::size_t run = 0; run < set.runs.size(); ++run)
+    for (std::size_t t = 0; t < set.runs[run].tracks.size(); ++t) set.runs[run].tracks[t].samples = samples[run][t];
+}
+
+nlohmann::json checked(MeasuredSet& set, const MotionModel& base, const MotionModel& full) {
+  PreparedSet prepared(set);
+  const proto::Model written_base = proto_of(base), written_full = proto_of(full);
+  return simulated_check({base, written_base}, {full, written_full}, prepared, false, 2);
+}
+
+TEST(SimulatedCheck, TheModelThatMadeThemIsNotToldFromThem) {
+  MeasuredSet set = told(12, 2, 120, 3);
+  const MotionModel truth = slowing(12, 0.4), without = slowing(12, 0);
+  perform(set, truth, 77);
+  const nlohmann::json found = checked(set, without, truth);
+  const nlohmann::json& result = found.at("simulated");
+  EXPECT_TRUE(result.at("agrees").get<bool>()) << result.dump(1);
+  EXPECT_EQ(result.at("units"), 12);
+  bool speed_differs = false;
+  for (const auto& s : result.at("statistics"))
+    if (s.at("name") == "mean speed over the run")
+      speed_differs = s.at("base_p") < 0.01 && s.at("base_distance") > 5 * s.at("distance").get<double>();
+  EXPECT_TRUE(speed_differs) << result.dump(1);
+  EXPECT_TRUE(found.contains("msd") && found.contains("distributions") && found.contains("speed_over_time"));
+  // The other way round it is the full model that differs.
+  EXPECT_FALSE(checked(set, truth, without).at("simulated").at("agrees").get<bool>());
+}
+
+TEST(SimulatedCheck, FalseAlarmsAreAsRareAsTheyShallBe) {
+  // Sets of the very model: a statistic differs by chance in 1 % of them. Of 24 sets with six statistics each 1.4 are expected to
+  // differ; more than 6 with a chance below 0.001.
+  const MotionModel truth = slowing(8, 0.4);
+  int alarms = 0;
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    MeasuredSet set = told(8, 1, 60, 100 + seed);
+    perform(set, truth, 1000 * seed + 500);
+    const nlohmann::json found = checked(set, truth, truth);
+    for (const auto& s : found.at("simulated").at("statistics")) alarms += s.at("p") < 0.01 ? 1 : 0;
+  }
+  EXPECT_LE(alarms, 6);
+}
+
+TEST(SimulatedCheck, IsTheSameEveryTime) {
+  MeasuredSet set = told(8, 1, 40, 9);
+  const MotionModel truth = slowing(8, 0.4), without = slowing(8, 0);
+  perform(set, truth, 7);
+  EXPECT_EQ(checked(set, without, truth).dump(), checked(set, without, truth).dump());
+}
+
+TEST(Replay, RobotsStartWhereTheyWereSeen) {
+  MeasuredSet set = told(9, 1, 10, 4);
+  MotionModel model = slowing(9, 0.4);
+  model.noise.position_mm2 = 1e-8;
+  model.noise.heading_rad2 = 1e-10;
+  PreparedSet prepared(set);
+  prepared.find_headings(model, 1);
+  const Scene scene = scene_of(model, prepared, 0);
+  const auto seen = play(scene, proto_of(model), 1);
+  for (std::size_t r = 0; r < seen.size(); ++r) {
+    const Sample& first = set.runs[0].tracks[r].samples.front();
+    ASSERT_EQ(seen[r].size(), set.runs[0].tracks[r].samples.size());
+    EXPECT_NEAR(seen[r][0].x_mm, first.x_mm, 0.01);
+    EXPECT_NEAR(seen[r][0].y_mm, first.y_mm, 0.01);
+    EXPECT_NEAR(wrapped_angle(seen[r][0].heading_rad - first.heading_rad), 0, 1e-3);
+    // Four mm behind the middle of the disc.
+    EXPECT_NEAR(std::hypot(scene.robots[r].x_mm - first.x_mm, scene.robots[r].y_mm - first.y_mm), 4, 0.01);
+  }
+}
+
+TEST(Replay, WallsHoldRobotsWhereTheyHeldMeasuredOnes) {
+  // A room that does not hold the origin.
+  MeasuredSet set;
+  set.has_commands = set.has_headings = true;
+  set.runs.push_back({"r", {}});
+  for (std::uint32_t robot = 0; robot < 4; ++robot) {
+    Track& track = set.runs[0].tracks.emplace_back();
+    track.robot = robot;
+    track.commands = {{-1e300, Motion::kStop}, {0, Motion::kStraight}};
+    const double x[] = {700, 750, 500, 450}, y[] = {450, 560, 600, 480};
+    for (double t = 0; t <= 40; t += 1) track.samples.push_back({t, x[robot], y[robot], M_PI / 2 * robot});
+  }
+  MotionModel model;
+  model.room = {400, 800, 400, 640};
+  model.noise.position_mm2 = 1e-8;
+  model.base.bias_sd_mm_s = 0;
+  PreparedSet prepared(set);
+  prepared.find_headings(model, 1);
+  const auto seen = play(scene_of(model, prepared, 0), proto_of(model), 1);
+  EXPECT_NEAR(seen[0].back().x_mm, 800, 2);
+  EXPECT_NEAR(seen[1].back().y_mm, 640, 2);
+  EXPECT_NEAR(seen[2].back().x_mm, 400, 2);
+  EXPECT_NEAR(seen[3].back().y_mm, 400, 2);
+}
+
+TEST(TrackStatistics, DistancesAreThoseOfTheirLaws) {
+  const Statistic histogram{Statistic::Kind::kHistogram, "h", "", {0, 1, 2, 3}, ""};
+  // All mass one bin further: the mean shift is a bin.
+  EXPECT_DOUBLE_EQ(distance(histogram, {{0, 0, 0}, {4, 2, 0}}, {{0, 0, 0}, {0, 2, 1}}), 1);
+  const Statistic means{Statistic::Kind::kMeans, "m", "", {0, 1}, ""};
+  EXPECT_DOUBLE_EQ(distance(means, {{4, 6}, {2, 3}}, {{5, 3}, {1, 1}}), 2);
+  const Statistic squares{Statistic::Kind::kSquares, "s", "", {1}, ""};
+  EXPECT_NEAR(distance(squares, {{2}, {1}}, {{6}, {1}}), std::log(3), 1e-12);
+}
+
+}  // namespace
+}  // namespace kilotwin::identify
