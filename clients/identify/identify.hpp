@@ -34,6 +34,7 @@
 #include <vector>
 
 #include "clients/identify/data/measured_set.hpp"
+#include "clients/identify/predict/prediction.hpp"
 #include "idl/model.pb.h"
 
 namespace kilotwin::identify {
@@ -44,15 +45,6 @@ struct Options {
   bool trace = true;  ///< false: the base model alone
   /// How far the work is, 0..1, and what is being done.
   std::function<void(double, const std::string&)> progress;
-};
-
-/// Where a robot will be seen, `horizon_s` after all that was used of it.
-struct Prediction {
-  std::string run;
-  std::uint32_t robot;
-  double time_s;
-  double before_x_mm, before_y_mm;  ///< by the base model
-  double after_x_mm, after_y_mm;    ///< by the model with effects
 };
 
 struct Identified {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "clients/identify/model/covariates.hpp"
+#include "clients/identify/data/command_clock.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {

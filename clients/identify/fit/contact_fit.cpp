@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/fit/wall_detection.hpp"
 
 namespace kilotwin::identify {
 namespace {

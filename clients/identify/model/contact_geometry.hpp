@@ -10,9 +10,6 @@
 
 namespace kilotwin::identify {
 
-class PreparedSet;
-struct MotionModel;
-
 /// Centres of discs stay within.
 struct Room {
   double x_low_mm = -std::numeric_limits<double>::infinity(), x_high_mm = std::numeric_limits<double>::infinity();
@@ -35,9 +32,6 @@ struct Room {
 inline constexpr double kTouch_mm = 36;
 inline constexpr double kDiscs_mm = 33;
 inline constexpr double kWallMargin_mm = 4;
-
-/// A side is a wall where robots that are driven stay at one line, some of them for seconds, and nobody is beyond.
-[[nodiscard]] Room room_of(const PreparedSet&, const MotionModel&);
 
 /// Pushes overlapping discs apart, half the overlap each; whether any did. NaN: not there.
 bool push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm);

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "clients/identify/data/measured_set.hpp"
-#include "clients/identify/identify.hpp"
+#include "clients/identify/predict/prediction.hpp"
 
 namespace kilotwin::identify {
 

@@ -1,0 +1,66 @@
+#include "clients/identify/data/command_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kilotwin::identify {
+
+void CommandState::advance(double by_s) {
+  since_s += by_s;
+  if (left_on()) motor_s[0] += by_s;
+  if (right_on()) motor_s[1] += by_s;
+  if (driven()) driven_s += by_s;
+  since_rest_s = driven() ? since_rest_s + by_s : 0;
+}
+
+double CommandState::remembered_s(std::size_t forget, std::size_t motor) const {
+  const double span_s = kForget_s[forget], kept = std::exp(-since_s / span_s);
+  const bool on = motor == 0 ? left_on() : motor == 1 ? right_on() : driven();
+  return left_s[forget][motor] * kept + (on ? span_s * (1 - kept) : 0);
+}
+
+CommandClock::CommandClock(const Track& track) {
+  CommandState state;
+  auto left = state.left_s;
+  double now_s = 0;
+  for (const CommandChange& change : track.commands) {
+    const double at_s = std::max(change.time_s, 0.0);
+    if (!starts_s_.empty()) state.advance(at_s - now_s);
+    now_s = at_s;
+    for (std::size_t f = 0; f < kForget_s.size(); ++f)
+      for (std::size_t motor = 0; motor < 3; ++motor) left[f][motor] = state.remembered_s(f, motor);
+    state.left_s = left;
+    state.first = starts_s_.empty() || starts_s_.front() == at_s;
+    state.previous_lasted_s = state.first ? 0 : state.since_s;
+    state.previous = state.command;
+    state.command = change.motion;
+    state.since_s = 0;
+    if (change.motion == Motion::kLeft || change.motion == Motion::kRight) state.last_turn = change.motion;
+    if (!starts_s_.empty() && starts_s_.back() == at_s) {
+      states_.back() = state;  // nothing lasted
+      continue;
+    }
+    starts_s_.push_back(at_s);
+    states_.push_back(state);
+  }
+}
+
+std::size_t CommandClock::piece(double time_s) const {
+  const auto next = std::upper_bound(starts_s_.begin(), starts_s_.end(), time_s);
+  return next == starts_s_.begin() ? 0 : static_cast<std::size_t>(next - starts_s_.begin()) - 1;
+}
+
+CommandState CommandClock::at(double time_s) const {
+  const std::size_t p = piece(time_s);
+  CommandState state = states_[p];
+  state.advance(std::max(0.0, time_s - starts_s_[p]));
+  return state;
+}
+
+double CommandClock::next_change_s(double after_s) const {
+  const auto next = std::upper_bound(starts_s_.begin(), starts_s_.end(), after_s);
+  return next == starts_s_.end() ? std::numeric_limits<double>::infinity() : *next;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,94 @@
+#include "clients/identify/fit/wall_detection.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <set>
+
+namespace kilotwin::identify {
+namespace {
+
+/// One coordinate of a disc, by track, while its robot goes straight.
+struct Place {
+  double at_mm;
+  std::size_t track;
+};
+
+/// How often, and how many robots, must have been at a line to make it a wall.
+struct Evidence {
+  std::size_t places, tracks;
+};
+
+/// The line at the upper end of a coordinate where robots stay; infinite where there is none.
+double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  if (places.size() < 500) return kNone;
+  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.at_mm > b.at_mm; });
+  // Outliers lie beyond walls too.
+  const double edge = places[std::max<std::size_t>(3, places.size() / 2000)].at_mm;
+  const double width = 2 + 3 * noise_mm;
+  std::size_t at_edge = 0, before = 0;
+  double sum = 0;
+  std::set<std::size_t> tracks;
+  for (const Place& p : places) {
+    if (p.at_mm > edge + width) continue;
+    if (p.at_mm > edge - width) {
+      ++at_edge;
+      sum += p.at_mm;
+      tracks.insert(p.track);
+    } else if (p.at_mm > edge - 5 * width) {
+      ++before;
+    } else {
+      break;
+    }
+  }
+  // Of a free robot's places no strip holds many times what the strips beside it hold.
+  const bool crowded = static_cast<double>(at_edge) > 2 * (static_cast<double>(before) / 2 + 3);
+  if (at_edge < fewest.places || tracks.size() < fewest.tracks || !crowded) return kNone;
+  return sum / static_cast<double>(at_edge);
+}
+
+}  // namespace
+
+Room room_of(const PreparedSet& set, const MotionModel& model) {
+  std::vector<Place> x, y;
+  const bool measures = model.measures();
+  const double ahead = model.base.centre_mm - model.base.ahead_mm;
+  for (std::size_t v = 0; v < set.views().size(); ++v) {
+    const TrackView& view = set.views()[v];
+    for (const Sample& s : view.track->samples) {
+      if (view.clock.at(s.time_s).command != Motion::kStraight) continue;
+      if (measures) {
+        const Eigen::Vector3d pose = model.pose_of(s, view.at(s.time_s));
+        const double centre = std::isnan(s.heading_rad) ? model.base.ahead_mm : model.base.centre_mm;
+        x.push_back({pose[0] + centre * std::cos(pose[2]), v});
+        y.push_back({pose[1] + centre * std::sin(pose[2]), v});
+        continue;
+      }
+      const double heading = std::isnan(s.heading_rad) ? 0 : s.heading_rad;
+      const double by = std::isnan(s.heading_rad) ? 0 : ahead;
+      x.push_back({s.x_mm + by * std::cos(heading), v});
+      y.push_back({s.y_mm + by * std::sin(heading), v});
+    }
+  }
+  const double noise = std::sqrt(model.noise.position_mm2);
+  const auto turned = [](std::vector<Place> places) {
+    for (Place& p : places) p.at_mm = -p.at_mm;
+    return places;
+  };
+  const std::vector<Place> x_turned = turned(x), y_turned = turned(y);
+  const auto seen = [&](Evidence fewest) {
+    return Room{-upper_wall(x_turned, noise, fewest), upper_wall(x, noise, fewest),
+                -upper_wall(y_turned, noise, fewest), upper_wall(y, noise, fewest)};
+  };
+  const Room room = seen({25, 2});
+  // Where there are walls on most sides, there is one on the others.
+  constexpr std::ptrdiff_t kMostSides = 3;
+  const std::array<double, 4> sides = {room.x_low_mm, room.x_high_mm, room.y_low_mm, room.y_high_mm};
+  const bool closed =
+      std::count_if(sides.begin(), sides.end(), [](double s) { return std::isfinite(s); }) >= kMostSides;
+  return closed ? seen({8, 1}) : room;
+}
+
+}  // namespace kilotwin::identify
