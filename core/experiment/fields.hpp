@@ -1,5 +1,4 @@
-/// What the fields of an experiment may hold: one table that validation, error texts and the test of docs/experiment.md
-/// share.
+/// What the fields of an experiment may hold: one table that validation, error texts and docs/reference share.
 #pragma once
 
 #include <limits>

@@ -1,0 +1,13 @@
+/// The help of every command of kilotwin as Markdown.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace kilotwin::reference {
+
+/// What `kilotwin --help` and `kilotwin COMMAND --help` print, a section per command. Throws std::runtime_error where the
+/// program does not run.
+[[nodiscard]] std::string commands_help(const std::filesystem::path& program);
+
+}  // namespace kilotwin::reference
