@@ -138,7 +138,7 @@ TEST_F(ValidateEffects, AModelsListTakesThePlaceOfTheExperiments) {
 }
 
 TEST_F(ValidateEffects, EveryExampleOfTheDocumentRuns) {
-  std::ifstream in{std::string{KILOTWIN_SOURCE_DIR} + "/docs/model.md"};
+  std::ifstream in{std::string{KILOTWIN_SOURCE_DIR} + "/docs/explanation/motion.md"};
   std::string line, block, shapes;
   int blocks = 0;
   const auto check = [&] {
@@ -174,7 +174,7 @@ TEST_F(ValidateEffects, EveryExampleOfTheDocumentRuns) {
   for (const char* const shape :
        {"constant", "linear", "exponential", "harmonic", "spline", "spline_2d", "steps", "table", "noise"})
     EXPECT_NE(shapes.find(shape), std::string::npos) << shape;
-  std::ifstream again{std::string{KILOTWIN_SOURCE_DIR} + "/docs/model.md"};
+  std::ifstream again{std::string{KILOTWIN_SOURCE_DIR} + "/docs/explanation/motion.md"};
   const std::string all{std::istreambuf_iterator<char>(again), {}};
   for (int c = proto::Function::TIME; c <= proto::Function::Covariate_MAX; ++c) {
     const std::string name = proto::Function::Covariate_Name(static_cast<proto::Function::Covariate>(c));
