@@ -3,7 +3,7 @@
 add_library(kilotwin_flags INTERFACE)
 target_compile_options(kilotwin_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Werror
-  # Results must have the same bits whatever compiler and level built them: docs/determinism.md.
+  # Results must have the same bits whatever compiler and level built them: docs/explanation/determinism.md.
   -ffp-contract=off -fno-fast-math -fno-math-errno)
 target_include_directories(kilotwin_flags INTERFACE ${PROJECT_SOURCE_DIR})
 

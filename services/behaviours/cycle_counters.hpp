@@ -18,7 +18,7 @@ enum class Counted : bool { kAll, kTestsOnly };
 [[nodiscard]] std::string with_cycle_counters(std::string_view assembly, Counted counted = Counted::kAll);
 
 /// About how many cycles of an ATmega328P an instruction for x86-64 stands for, in code compiled from the same source.
-/// docs/execution.md tells how good that is.
+/// docs/explanation/execution.md tells how good that is.
 [[nodiscard]] unsigned avr_cycles(std::string_view instruction, std::string_view operands);
 
 }  // namespace kilotwin::behaviours

@@ -1,4 +1,4 @@
-/// Planar contact: discs, movable bodies, obstacles and walls. docs/physics.md states the mechanics.
+/// Planar contact: discs, movable bodies, obstacles and walls. docs/explanation/contact.md states the mechanics.
 ///
 /// Kilobots are quasi-static: thrust is limited and ground friction decides. The ground holds a driven robot to the velocity w
 /// of its drive with a force of at most the thrust F, and a resting one to velocity 0 with friction x mass x g. A contact is a

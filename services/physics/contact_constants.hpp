@@ -1,4 +1,4 @@
-/// Constants of contact. docs/physics.md has the evidence.
+/// Constants of contact. docs/explanation/contact.md has the evidence.
 #pragma once
 
 namespace kilotwin::physics {

@@ -1,5 +1,5 @@
 /// The model that is fitted: differential drive with a bias per robot and wheel, noise, and effects. As the simulator runs it
-/// (docs/model.md), but for effects being sums over the columns of a basis. Lengths mm, times s, angles rad.
+/// (docs/explanation/motion.md), but for effects being sums over the columns of a basis. Lengths mm, times s, angles rad.
 #pragma once
 
 #include <Eigen/Core>

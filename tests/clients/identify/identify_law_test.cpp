@@ -17,7 +17,7 @@ struct World {
   bool headings = true;
 };
 
-/// Always the same robots; they walk about, far from each other, by the model of docs/model.md in steps of 20 ms.
+/// Always the same robots; they walk about, far from each other, by the model of docs/explanation/motion.md in steps of 20 ms.
 MeasuredSet played(const World& world, std::uint64_t seed, std::uint32_t robots, std::uint32_t runs,
                    double duration_s) {
   const Random random(seed), robots_own(7);

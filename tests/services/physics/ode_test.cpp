@@ -140,7 +140,7 @@ struct Crowd {
 
 // Where groups are cut, the two sides of a border compute with forces of their own, which the iterative solver does not find
 // to the last digit; in a crowd that is pressed together such differences grow, as those from another seed do. Printed for
-// docs/engines.md.
+// docs/explanation/contact.md.
 TEST(OdePartitions, CutGroupsComeOutAlike) {
   for (const Crowd& tested :
        {Crowd{"that disperses from a 36 mm grid", 36, testing::Facing::kRandom, 8},
