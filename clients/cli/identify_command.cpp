@@ -38,13 +38,13 @@ void make_directory(const fs::path& directory) {
     throw UserError(fmt::format("--out {}: is no directory and cannot be made one", directory.string()));
 }
 
-/// Of trajectories. `faults` gets what was excluded.
+/// For trajectories. `faults` receives what was excluded.
 identify::Identified identify_trajectories(const IdentifyArguments& arguments, const identify::Options& options,
                                            std::vector<identify::DataFault>& faults) {
   identify::MeasuredSet train = identify::load_or_import(arguments.train, arguments.out / "imported-train");
   identify::demand_plausible(train, arguments.train.string());
   options.progress(0, "faults of the data");
-  // Whatever robots do, they do not do this: it is excluded before anything is fitted, and never modelled.
+  // No robot can produce these samples: they are excluded before the fit.
   faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!arguments.test.empty()) {
@@ -77,7 +77,7 @@ int identify_command(const IdentifyArguments& arguments) {
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
   std::optional<WorkProgress> progress(std::in_place, !arguments.quiet);
-  // Reading comes first and drawing last; all else lies between.
+  // Reading takes the first 2 %, drawing the last 3 %.
   options.progress = [&](double share, const std::string& what) { progress->show(0.02 + 0.95 * share, what); };
   progress->show(0, "reading " + arguments.train.string());
   std::vector<identify::DataFault> faults;

@@ -1,4 +1,4 @@
-/// `kilotwin identify`: what measured data tells of the robots, as files.
+/// `kilotwin identify`: a model, its evaluation and a report from measured data.
 #pragma once
 
 #include <cstdint>

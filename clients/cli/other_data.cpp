@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 
 std::optional<identify::Identified> identify_other_data(const fs::path& train, const fs::path& test,
                                                         const fs::path& out, const identify::Options& options) {
-  // A recording's columns begin like a floor's.
+  // The columns of a recording include those of a Kilogrid run.
   if (identify::has_trajectories(train) || !identify::importable(train).empty()) return std::nullopt;
   const auto same_kind = [&](bool is, const char* kind) {
     if (!test.empty() && !is)

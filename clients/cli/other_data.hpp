@@ -1,4 +1,4 @@
-/// Measured data other than trajectories, by the same command: runs of an instrumented floor, and robots that are always on.
+/// Measured data other than trajectories: Kilogrid runs, bristle plate tracks, radio counts.
 #pragma once
 
 #include <filesystem>
@@ -8,8 +8,8 @@
 
 namespace kilotwin::cli {
 
-/// What was identified, by whatever makes of the kind of data in `train`; none where it holds trajectories or nothing that is
-/// known. `test` may be empty. Throws UserError where the two directories hold different kinds.
+/// Identifies with the method for the kind of data in `train`. Nothing if it holds trajectories, or no known kind.
+/// `test` may be empty. Throws UserError if the two directories hold different kinds.
 [[nodiscard]] std::optional<identify::Identified> identify_other_data(const std::filesystem::path& train,
                                                                       const std::filesystem::path& test,
                                                                       const std::filesystem::path& out,

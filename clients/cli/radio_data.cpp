@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Runs simulated for each effect and set, and swarms drawn: some minutes of one core together.
+/// Simulated runs per effect and set, and sampled swarms: some minutes of one core in total.
 constexpr int kRuns = 24, kSwarms = 80;
 
 std::string text_of(const fs::path& file) {
@@ -28,7 +28,7 @@ std::string text_of(const fs::path& file) {
   return text.str();
 }
 
-/// The mean over the sets of one of a step's errors, as a size.
+/// Mean over the sets of one error of a step, in absolute value.
 double mean_of(const json& step, const char* error) {
   double sum = 0, sets = 0;
   for (const json& of_set : step.at("errors")) {
@@ -47,7 +47,7 @@ json summary_of(const json& step) {
 
 std::string figure(const json& value) { return fmt::format("{:.3f}", value.get<double>()); }
 
-/// What each step left on the runs held out, set by set.
+/// Errors of each step on held-out runs, by set.
 json table_of_errors(const json& steps) {
   json rows = json::array();
   for (const json& step : steps) {
@@ -68,7 +68,7 @@ json table_of_errors(const json& steps) {
           {"rows", rows}};
 }
 
-/// Other robots of the same kind: is what was measured one of them?
+/// Predictive check on new robots: does the measured set look like a sample of the fitted population?
 json table_of_population(const json& population) {
   json rows = json::array();
   for (const json& c : population)
@@ -115,7 +115,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   if (!google::protobuf::TextFormat::ParseFromString(text_of(fit.out / "model.txtpb"), &result.model))
     throw RunError(fmt::format("{}: it is no model", (fit.out / "model.txtpb").string()));
   const json& steps = fitted.at("effects");
-  // The first step is the seed's own model.
+  // The first step is the ARGoS model.
   json effects = json::array();
   for (std::size_t s = 1; s < steps.size(); ++s) {
     const json& step = steps[s];

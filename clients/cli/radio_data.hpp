@@ -1,4 +1,4 @@
-/// Counts of messages between robots, for `kilotwin identify`: the fit of clients/identify/radio as one more kind of data.
+/// Message counts between robots as input of `kilotwin identify`: the fit in clients/identify/radio.
 #pragma once
 
 #include <filesystem>
@@ -7,10 +7,11 @@
 
 namespace kilotwin::cli {
 
-/// Whether the directory holds runs of the kind comm_tau*_run*.dat.
+/// Whether the directory holds files comm_tau*_run*.dat.
 [[nodiscard]] bool has_radio_runs(const std::filesystem::path& directory);
 
-/// Fits the radio; the fit's own files (tables, figures, one model per set of robots) stay in out/radio. There are no
+/// Fits the radio. Tables, figures and one model per robot set are in out/radio. There are no position
+/// predictions. Throws UserError on malformed files.
 /// predictions of places. Throws UserError where a file does not parse.
 [[nodiscard]] identify::Identified identify_radio_runs(const std::filesystem::path& train,
                                                        const std::filesystem::path& test,

@@ -6,16 +6,16 @@
 #include <chrono>
 #include <cmath>
 
-#include "clients/identify/search/search.hpp"
 #include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/fit/residuals.hpp"
-#include "clients/identify/model/effect_text.hpp"
 #include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/model/effect_text.hpp"
 #include "clients/identify/model/model_file.hpp"
-#include "clients/identify/predict/held_out_gain.hpp"
 #include "clients/identify/predict/forecast.hpp"
+#include "clients/identify/predict/held_out_gain.hpp"
 #include "clients/identify/predict/prediction_errors.hpp"
 #include "clients/identify/replay/simulation_check.hpp"
+#include "clients/identify/search/search.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {
@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Root mean square, with bounds of 95 % where there are some.
+/// Root mean square error, with its 95 % interval if known.
 json summary_of(const PredictionErrors& errors, const std::optional<ErrorBounds>& bounds,
                 Interval ErrorBounds::*which) {
   json out = {{"rmse_mm", errors.rmse_mm()}, {"rows", errors.rows}};
@@ -34,7 +34,7 @@ json summary_of(const PredictionErrors& errors, const std::optional<ErrorBounds>
   return out;
 }
 
-/// How much the error has fallen.
+/// Reduction of the error.
 json improvement_of(const PredictionErrors& before, const PredictionErrors& after,
                     const std::optional<ErrorBounds>& bounds) {
   json out = {{"less_by_mm", before.rmse_mm() - after.rmse_mm()}};
@@ -49,7 +49,7 @@ json improvement_of(const PredictionErrors& before, const PredictionErrors& afte
   return out;
 }
 
-/// An experiment that would tell two causes apart, by what the one depends on and the other does not.
+/// An experiment that separates two effects: it varies the covariate of one and holds that of the other.
 std::string experiment_for(const std::vector<std::string>& found, const std::vector<std::string>& instead) {
   const auto only_one = [&](const char* word) {
     return (std::find(found.begin(), found.end(), word) != found.end()) !=
@@ -72,13 +72,13 @@ std::string experiment_for(const std::vector<std::string>& found, const std::vec
   return "repeat the runs with more robots, or for longer";
 }
 
-/// What became of data never fitted without a term, all else being fitted again.
+/// Evaluation of the model without one term, refitted, on held-out data.
 struct Without {
   double rmse_mm;
-  HeldOutGain gain;  ///< of the model with it
+  HeldOutGain gain;  ///< of the model with the term over the one without
 };
 
-/// Of terms by the same cause, one entry, with what the term does without which most is lost.
+/// One entry per effect. Terms of one name share an entry, with the largest loss among them.
 json effects_of(const Search& found, const std::vector<Without>& without, double before_mm, double after_mm) {
   json effects = json::array();
   for (std::size_t t = 0; t < found.model.terms.size(); ++t) {
@@ -195,7 +195,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
                    [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); });
   }
   const Asked asked{10, 5, options.horizon_s};
-  // An effect that does not help to look ahead is no part of the model, however sure it is one step ahead.
+  // A term stays only if it reduces the error at the prediction horizon. A small p one step ahead does not
+  // suffice.
   const auto fitted_mm = [&](const MotionModel& model) {
     return errors_of(train, predict(model, prepared, asked, false, options.threads)).rmse_mm();
   };
@@ -207,7 +208,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
       without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(t));
       fitter.fit(without, 1);
       const double without_mm = fitted_mm(without);
-      // What happens to the picture seldom matters to where robots go; it must not spoil it.
+      // Measurement effects rarely change predicted positions, so they need not reduce the error. They must not
+      // raise it.
       const bool picture = is_measured(found.model.terms[t].blocks.front().target);
       if (without_mm > with_mm * (picture ? 0.9995 : 1.0005)) continue;
       found.model = without;
@@ -301,7 +303,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
                        {"at_walls_sd_rad", std::sqrt(after.noise.wall_rad2_s)},
                        {"at_robots_sd_mm", std::sqrt(after.noise.contact_mm2_s)},
                        {"at_robots_sd_rad", std::sqrt(after.noise.contact_rad2_s)}};
-  // Lines that the centres of discs do not cross; a side without one has no wall.
+  // Lines that disc centres do not cross. A side without an entry has no wall.
   contract["walls"] = json::object();
   for (const auto& [side, at_mm] :
        {std::pair{"x_low_mm", after.room.x_low_mm}, std::pair{"x_high_mm", after.room.x_high_mm},

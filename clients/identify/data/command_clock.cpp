@@ -38,7 +38,7 @@ CommandClock::CommandClock(const Track& track) {
     state.since_s = 0;
     if (change.motion == Motion::kLeft || change.motion == Motion::kRight) state.last_turn = change.motion;
     if (!starts_s_.empty() && starts_s_.back() == at_s) {
-      states_.back() = state;  // nothing lasted
+      states_.back() = state;  // of two commands at one time the last counts
       continue;
     }
     starts_s_.push_back(at_s);

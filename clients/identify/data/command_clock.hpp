@@ -1,4 +1,4 @@
-/// The command of a robot as a function of time, and what its motors did until then.
+/// The command of a robot over time, and the motor-on times that follow from its commands. Times s.
 #pragma once
 
 #include <array>
@@ -9,37 +9,38 @@
 
 namespace kilotwin::identify {
 
-/// Within these times, s, what motors did is forgotten: by exp(-age / time). Of a warm motor that cools, of a battery that recovers.
+/// Time constants, s, of exponentially discounted motor-on time (a motor that cools down, a battery that
+/// recovers): weight exp(-age / constant).
 inline constexpr std::array<double, 4> kForget_s = {5, 15, 40, 120};
 
-/// What the commands of a robot say of an instant.
+/// The command of a robot at an instant, and its history.
 struct CommandState {
   Motion command = Motion::kStop, previous = Motion::kStop, last_turn = Motion::kStop;
-  bool first = true;                       ///< no command came before; `previous` is kStop then
+  bool first = true;                       ///< true: no command came before; `previous` is kStop then
   double since_s = 0;                      ///< since the command changed
-  double previous_lasted_s = 0;            ///< 0 where there was none
-  std::array<double, 2> motor_s = {0, 0};  ///< for which the motor of the left, of the right wheel has turned
-  double driven_s = 0;                     ///< for which either has
-  double since_rest_s = 0;                 ///< for which either has without a rest of both
-  /// What is left of these times of the left, the right, of either motor, with kForget_s, when the command began.
+  double previous_lasted_s = 0;            ///< duration of the previous command; 0 if there was none
+  std::array<double, 2> motor_s = {0, 0};  ///< motor-on time of the left and the right motor
+  double driven_s = 0;                     ///< time for which either motor was on
+  double since_rest_s = 0;                 ///< time for which either motor was on without a rest of both
+  /// Discounted motor-on times [time constant][left, right, either] at the start of the command.
   std::array<std::array<double, 3>, kForget_s.size()> left_s = {};
 
   [[nodiscard]] bool driven() const { return command != Motion::kStop; }
   [[nodiscard]] bool left_on() const { return command == Motion::kStraight || command == Motion::kRight; }
   [[nodiscard]] bool right_on() const { return command == Motion::kStraight || command == Motion::kLeft; }
-  /// `by_s` later, under the same command.
+  /// Advances by `by_s` under the same command.
   void advance(double by_s);
-  /// Of a motor (0: of the left wheel, 1: of the right) or of either (2), what kForget_s[forget] leaves of its time.
+  /// Discounted motor-on time, s, for kForget_s[forget] and a motor: 0 left, 1 right, 2 either.
   [[nodiscard]] double remembered_s(std::size_t forget, std::size_t motor) const;
 };
 
-/// The commands of a track, piece by piece.
+/// The commands of a track as a piecewise constant function of time.
 class CommandClock {
  public:
   explicit CommandClock(const Track&);
-  /// At a time: of the command that then starts or lasts.
+  /// The state at a time. At a change: under the new command.
   [[nodiscard]] CommandState at(double time_s) const;
-  /// The first change after that time; infinite where there is none.
+  /// Time of the first change after `after_s`; infinite if there is none.
   [[nodiscard]] double next_change_s(double after_s) const;
 
  private:

@@ -1,11 +1,11 @@
-// Faults that show in whose commands a track follows, and when: exchanged numbers and wrong clocks.
+// Faults of the assignment between commands and tracks: swapped robot numbers and wrong clocks.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 
-#include "clients/identify/data/data_faults.hpp"
 #include "clients/identify/data/command_response.hpp"
+#include "clients/identify/data/data_faults.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -13,12 +13,12 @@ namespace {
 // --- clocks ---
 
 constexpr double kSlowestClock = 0.5, kFastestClock = 2;
-// Rates are tried so close to each other that the end of what is compared moves by this much.
+// Grid of clock rates: neighbouring rates move the end of the compared interval by this time.
 constexpr double kStep_s = 0.4;
-// A clock is called wrong where another rate gains so much log-likelihood per robot and hundred deeds, so much in all, and
-// moves the run's end by so much.
+// A run's clock is wrong if another rate passes three bounds: gain in log-likelihood per robot and hundred motion
+// segments, total gain, and shift of the run's end.
 constexpr double kClockGainShare = 0.08, kClockGain = 60, kClockShift_s = 3;
-// So many robots of a run tell its clock.
+// Upper bound on the robots of a run whose tracks are used to estimate its clock rate.
 constexpr std::size_t kWitnesses = 16;
 
 struct Witness {
@@ -26,7 +26,8 @@ struct Witness {
   std::vector<Deed> deeds;
 };
 
-/// Log-likelihood of all deeds before until_s of stamped time, where stamped time is `rate` times true time.
+/// Log-likelihood of all motion segments before `until_s` (stamped time) if stamped time is `rate` times true
+/// time.
 double of_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told, double rate, double until_s) {
   double sum = 0;
   for (const Witness& w : witnesses) {
@@ -38,7 +39,8 @@ double of_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told, d
   return sum;
 }
 
-/// The best rate, from coarse over the run's beginning to fine over all of it.
+/// Maximum-likelihood clock rate: a coarse grid over the beginning of the run, then finer grids over longer
+/// intervals.
 double best_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told, double end_s) {
   double low = kSlowestClock, high = kFastestClock, best = 1;
   for (double until_s = std::min(60.0, end_s);; until_s = std::min(2 * until_s, end_s)) {
@@ -57,24 +59,24 @@ double best_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told,
   }
 }
 
-// --- exchanged numbers ---
+// --- swapped robot numbers ---
 
-// Two numbers are called exchanged where that gains so much log-likelihood, over at least so many deeds, so much for each.
+// Bounds for a swap: total gain in log-likelihood, number of motion segments, and gain of each of the two robots.
 constexpr double kSwapGain = 100;
 constexpr std::size_t kFewestSwapped = 16;
 constexpr double kSwapGainEach = 0.5;
-// Where robots differ from what they are taken for (faster at first, say), any other's commands may fit better than their own.
-// Those of the one whose number it carries fit so many times better than those of anybody else.
+// A robot that deviates from the common response (faster at first, say) may fit any other robot's commands better
+// than its own. The gain by the partner's commands must exceed the gain by anybody else's by this factor.
 constexpr double kSwapDistinct = 2;
-// Where two robots were each seen at the other's place at once, no robot can have gone there: faster than this, in a step so
-// short, with so much for the tracker's noise.
+// If two robots appear at each other's last position within one sampling interval, their numbers were exchanged.
+// Bounds: the speed that a robot cannot reach, the longest interval, and the slack for tracker noise.
 constexpr double kFastest_mm_s = 35, kExchangeStep_s = 3, kSlack_mm = 4;
 
 struct Gain {
   double time_s, gain;
 };
 
-/// What it gains, deed by deed, if `track` did what `other` is told to.
+/// Gain in log-likelihood of each motion segment if `track` followed the commands of `other`.
 std::vector<Gain> gains(const std::vector<Deed>& deeds, const Track& track, const Track& other,
                         const ToldAndDone& told) {
   std::vector<Gain> out;
@@ -91,7 +93,7 @@ struct Stretch {
   std::size_t count = 0;
 };
 
-/// The stretch of time that gains most.
+/// The time interval with the largest total gain (maximum subarray).
 Stretch best_stretch(std::vector<Gain> of_both) {
   std::stable_sort(of_both.begin(), of_both.end(),
                    [](const Gain& a, const Gain& b) { return a.time_s < b.time_s; });
@@ -110,8 +112,8 @@ std::size_t take_out(Track& track, double from_s, double to_s) {
   return std::erase_if(track.samples, [&](const Sample& s) { return s.time_s >= from_s && s.time_s <= to_s; });
 }
 
-/// Times after which `a` and `b` carried each other's numbers, or their own again: between two positions each jumped to where
-/// the other one was.
+/// Times at which the numbers of `a` and `b` are exchanged or return: between two samples each robot jumps to the
+/// other's position.
 std::vector<double> exchanges(const Track& a, const Track& b) {
   std::vector<double> times;
   std::size_t j = 0;
@@ -120,7 +122,7 @@ std::vector<double> exchanges(const Track& a, const Track& b) {
     const double dt = after.time_s - before.time_s, reach = kFastest_mm_s * dt + kSlack_mm;
     if (dt > kExchangeStep_s || std::hypot(after.x_mm - before.x_mm, after.y_mm - before.y_mm) < 1.4 * reach)
       continue;
-    // The other's last position at or before `before`, and its first at or after `after`.
+    // The other robot's last sample at or before `before`, and its first at or after `after`.
     while (j < b.samples.size() && b.samples[j].time_s <= before.time_s + 1e-6) ++j;
     std::size_t k = j;
     while (k < b.samples.size() && b.samples[k].time_s < after.time_s - 1e-6) ++k;
@@ -145,7 +147,7 @@ double gain_between(const std::vector<Gain>& gains, double from_s, double to_s) 
   return sum;
 }
 
-/// Numbers that were exchanged in the middle of a run.
+/// Numbers exchanged during a run, detected by position.
 void exclude_exchanges(Run& run, const ToldAndDone& told, std::vector<DataFault>& faults) {
   for (std::size_t a = 0; a < run.tracks.size(); ++a) {
     for (std::size_t b = a + 1; b < run.tracks.size(); ++b) {
@@ -155,7 +157,8 @@ void exclude_exchanges(Run& run, const ToldAndDone& told, std::vector<DataFault>
       std::vector<Gain> both = gains(deeds_of(first), first, second, told);
       const std::vector<Gain> of_second = gains(deeds_of(second), second, first, told);
       both.insert(both.end(), of_second.begin(), of_second.end());
-      // Every other piece is wrong: those that gain by the exchange; where commands tell nothing, those after the first.
+      // Every second interval is wrong: the intervals whose likelihood rises by the exchange. If the commands are
+      // not informative, the second, the fourth...
       const double begin_s = std::min(first.samples.front().time_s, second.samples.front().time_s);
       times.insert(times.begin(), -1e300);
       times.push_back(std::max(first.samples.back().time_s, second.samples.back().time_s));
@@ -174,7 +177,7 @@ void exclude_exchanges(Run& run, const ToldAndDone& told, std::vector<DataFault>
   }
 }
 
-/// What each track of a run gains, over its best stretch, if it did what another is told to.
+/// Gain of each track of a run, over its best interval, by the commands of each other track.
 class OthersCommands {
  public:
   OthersCommands(const Run& run, const ToldAndDone& told) : run_(run), told_(told) {
@@ -182,7 +185,7 @@ class OthersCommands {
     gains_.assign(run.tracks.size(), std::vector<double>(run.tracks.size()));
     for (std::size_t a = 0; a < run.tracks.size(); ++a) look_at(a);
   }
-  /// Again, after some of its samples were taken out.
+  /// Recomputes the gains of a track after samples were excluded.
   void look_again(std::size_t a) {
     deeds_[a] = deeds_of(run_.tracks[a]);
     look_at(a);
@@ -190,7 +193,7 @@ class OthersCommands {
   [[nodiscard]] std::vector<Gain> of(std::size_t a, std::size_t b) const {
     return gains(deeds_[a], run_.tracks[a], run_.tracks[b], told_);
   }
-  /// Whether the one does what the other is told to, and nobody else.
+  /// Whether track `a` follows the commands of `b`, and those of no third robot.
   [[nodiscard]] bool is_like(std::size_t a, std::size_t b) const {
     double other = 0;
     for (std::size_t c = 0; c < gains_.size(); ++c)
@@ -207,10 +210,10 @@ class OthersCommands {
   const Run& run_;
   const ToldAndDone& told_;
   std::vector<std::vector<Deed>> deeds_;
-  std::vector<std::vector<double>> gains_;  ///< by track, then by whose commands
+  std::vector<std::vector<double>> gains_;  ///< [track][track whose commands are used]
 };
 
-/// Numbers that were exchanged from the start, or while nobody looked.
+/// Numbers exchanged from the start or during a gap, detected by the commands.
 void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFault>& faults) {
   OthersCommands others(run, told);
   while (true) {
@@ -218,7 +221,7 @@ void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFaul
     std::size_t first = 0, second = 0;
     for (std::size_t a = 0; a < run.tracks.size(); ++a) {
       for (std::size_t b = a + 1; b < run.tracks.size(); ++b) {
-        // Both must: a robot that does nobody's bidding gains by any exchange.
+        // Both directions must fit: a robot that ignores commands gains by any exchange.
         if (!others.is_like(a, b) || !others.is_like(b, a)) continue;
         std::vector<Gain> both = others.of(a, b);
         const std::vector<Gain> of_b = others.of(b, a);
@@ -233,7 +236,7 @@ void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFaul
       }
     }
     if (best.gain <= 0) return;
-    // It began and ended some time between the deeds that tell.
+    // The exchange lies between two informative motion segments: margin at either end.
     constexpr double kDoubt_s = 3;
     std::size_t gone = 0;
     for (const std::size_t k : {first, second}) {

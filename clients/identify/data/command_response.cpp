@@ -6,15 +6,15 @@
 namespace kilotwin::identify {
 namespace {
 
-// Positions are taken at least so far apart, so that the tracker's noise does not drown the motion.
+// Shortest segment. Shorter ones are dominated by tracker noise.
 constexpr double kDeed_s = 0.9;
-// Longer ones hold several motions.
+// Longest segment. Longer ones mix several motions.
 constexpr double kLongest_s = 3;
 constexpr std::size_t kFewest = 30;
-// No deed speaks louder against a command than one so many standard deviations off.
+// Bound on the standardised residual: limits the influence of one segment.
 constexpr double kMostSds = 3.5;
 
-/// Median and, by the median of deviations, standard deviation.
+/// Median, and the standard deviation estimated by the median absolute deviation.
 template <class Spread> Spread spread_of(std::vector<double> values, double least_sd) {
   const auto middle = [&] {
     const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -37,7 +37,7 @@ Motion told_at(const Track& track, double time_s) {
 std::vector<Deed> deeds_of(const Track& track) {
   std::vector<Deed> deeds;
   struct Leg {
-    double from_s, to_s, x, y;  // velocity
+    double from_s, to_s, x, y;  // x, y: velocity, mm/s
   };
   std::vector<Leg> legs;
   const Sample* from = nullptr;

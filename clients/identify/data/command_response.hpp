@@ -1,5 +1,6 @@
-/// How well what a robot does fits what robots are told to do: by how fast they go and how they turn under each command, over
-/// all of a set. It knows no model and no robot's own bias; it serves to tell whose commands, and at what times, a track follows.
+/// The response of the robots of a set to their commands: distributions of speed and curvature under each command,
+/// pooled over the set. It needs no motion model and no bias per robot. It serves to test whose commands a track
+/// follows, and with which clock.
 #pragma once
 
 #include <array>
@@ -9,23 +10,23 @@
 
 namespace kilotwin::identify {
 
-/// A robot between two positions about a second apart.
+/// Motion between two positions about one second apart, under one command.
 struct Deed {
-  double time_s;  ///< halfway
+  double time_s;  ///< midpoint
   double speed_mm_s;
-  double curve_mm2_s2;  ///< cross product of the velocity before and after: positive where it bends to the left
+  double curve_mm2_s2;  ///< cross product of the velocities before and after, mm^2/s^2; positive: a left turn
 };
 
 [[nodiscard]] std::vector<Deed> deeds_of(const Track&);
 
 class ToldAndDone {
  public:
-  /// What deeds look like under each command. Tracks of few samples, and robots told nothing, count for nothing.
+  /// Estimates the distributions. Ignores short tracks and tracks without commands.
   explicit ToldAndDone(const MeasuredSet&);
 
-  /// Log-likelihood of a deed under a command, up to a constant; bounded below, as robots do get stuck.
+  /// Log-likelihood of a segment under a command, up to a constant. Bounded below, because robots get stuck.
   [[nodiscard]] double log_likelihood(const Deed&, Motion) const;
-  /// Whether commands differ in what they make robots do.
+  /// Whether the distributions differ between commands.
   [[nodiscard]] bool tells() const { return tells_; }
 
  private:
@@ -37,7 +38,7 @@ class ToldAndDone {
   bool tells_ = false;
 };
 
-/// The command at a time.
+/// The command of a track at a time.
 [[nodiscard]] Motion told_at(const Track&, double time_s);
 
 }  // namespace kilotwin::identify

@@ -22,7 +22,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Takes out of a track what `out` marks; returns how many.
+/// Removes the marked samples from a track. Returns their number.
 std::size_t take_out(Track& track, const std::vector<bool>& out) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < track.samples.size(); ++k) {
@@ -35,10 +35,10 @@ std::size_t take_out(Track& track, const std::vector<bool>& out) {
 
 // --- duplicates ---
 
-// Discs are 33 mm wide. Two tracked points that are half a disc apart or less belong to one robot, whatever point it is
-// that the tracker follows.
+// Discs are 33 mm wide. Two tracked points this close belong to one robot, whichever point of the robot the
+// tracker follows.
 constexpr double kOneRobot_mm = 12;
-// For so many samples in common, and at least this share of them.
+// Fewest common samples, and the fewest share of them that are this close.
 constexpr std::size_t kFewestCommon = 10;
 constexpr double kShareCommon = 0.5;
 
@@ -64,7 +64,7 @@ Common compare(const Track& a, const Track& b) {
 }  // namespace
 
 void exclude_duplicates(MeasuredSet& set, std::vector<DataFault>& faults) {
-  std::map<std::uint32_t, std::size_t> runs_of;  // in how many runs each robot is
+  std::map<std::uint32_t, std::size_t> runs_of;  // number of runs in which each robot occurs
   for (const Run& run : set.runs) {
     for (const Track& track : run.tracks) ++runs_of[track.robot];
   }
@@ -76,7 +76,7 @@ void exclude_duplicates(MeasuredSet& set, std::vector<DataFault>& faults) {
         if (common.together < kFewestCommon ||
             static_cast<double>(common.together) < kShareCommon * static_cast<double>(common.count))
           continue;
-        // The copy is the number that is in fewer runs; where both are in as many, the higher.
+        // The copy is the number that occurs in fewer runs. On a tie it is the higher number.
         const bool first = runs_of[run.tracks[a].robot] < runs_of[run.tracks[b].robot];
         Track& copy = run.tracks[first ? a : b];
         const Track& origin = run.tracks[first ? b : a];
@@ -93,14 +93,14 @@ void exclude_duplicates(MeasuredSet& set, std::vector<DataFault>& faults) {
 
 namespace {
 
-// A tracker is held to be frozen where a robot that is told to move has not moved by a digit for so long.
+// The tracker is frozen if a robot commanded to move repeats its position, to the last digit, for this time.
 constexpr double kFrozen_s = 4;
 constexpr std::size_t kFewestFrozen = 4;
-// Trackers that round, or that see cells, repeat positions all the time: where the share of repeated positions of robots at
-// rest is above this, a repeated position means that the robot stands still, and no more.
+// Trackers that round, or that report cells, repeat positions anyway. If robots at rest repeat a larger share of
+// their positions than this, repeats carry no evidence.
 constexpr double kRepeats = 0.2;
 
-/// Share of positions that repeat the one before, of robots that rest in that time.
+/// Share of positions that repeat the previous one, of robots at rest.
 double repeats_at_rest(const MeasuredSet& set) {
   std::size_t rest = 0, same = 0;
   for (const Run& run : set.runs) {
@@ -117,7 +117,8 @@ double repeats_at_rest(const MeasuredSet& set) {
   return rest == 0 ? 0 : static_cast<double>(same) / static_cast<double>(rest);
 }
 
-/// Share of all steps that repeat, stretches of more than kFrozen_s counted once: how often it happens by rounding.
+/// Share of all steps that repeat the position, where a repeat of more than kFrozen_s counts once: the rate of
+/// repeats by rounding.
 double lone_repeats(const MeasuredSet& set) {
   std::size_t steps = 0, same = 0;
   for (const Run& run : set.runs) {
@@ -155,7 +156,7 @@ void exclude_frozen(MeasuredSet& set, std::vector<DataFault>& faults) {
       };
       for (std::size_t begin = 0; begin < track.samples.size(); begin = end) {
         if (stretch(begin) < kFrozen_s || end - begin < kFewestFrozen) continue;
-        // The first of them is where the robot was seen last.
+        // The first sample of the interval is valid.
         for (std::size_t k = begin + 1; k < end; ++k) out[k] = true;
         faults.push_back({DataFault::Kind::kFrozen, run.name, track.robot, std::nullopt,
                           track.samples[begin].time_s, track.samples[end - 1].time_s, 0, end - begin - 1});
@@ -169,17 +170,18 @@ void exclude_frozen(MeasuredSet& set, std::vector<DataFault>& faults) {
 
 namespace {
 
-// A position is out where it is further than this from where the robot is by the positions before, by those after, and
-// between them: so many times the robust standard deviation of that distance in the run. To and from it the robot must
-// besides have gone faster than robots do: so many times the speed that 19 of 20 steps stay below.
+// A position is an outlier if it deviates from the extrapolation from before, the extrapolation from after, and
+// the interpolation, each by this many robust standard deviations of that distance in the run. The speeds towards
+// it and away from it must also exceed the 95th percentile of speeds by this factor.
 constexpr double kOutlierSds = 12;
 constexpr double kLeastOutlier_mm = 6;
 constexpr double kTooFast = 1.5;
 constexpr int kOutlierPasses = 3;
-// Positions that lie further apart in time say nothing about each other.
+// Longest interval over which positions are extrapolated.
 constexpr double kLongestStep_s = 2.5;
 
-/// How far sample k is from where its neighbours in time have the robot; 0 at the ends and beside gaps.
+/// Distance of sample k from the position interpolated from its neighbours in time, mm. 0 at the ends and beside
+/// gaps.
 double off_course_mm(const std::vector<Sample>& s, std::size_t k) {
   if (k < 2 || k + 2 >= s.size() || s[k + 2].time_s - s[k - 2].time_s > 4 * kLongestStep_s) return 0;
   const auto from_line = [&](std::size_t a, std::size_t b) {
@@ -196,7 +198,7 @@ struct Bounds {
   double off_mm, speed_mm_s;
 };
 
-/// How far sample k is off, where that makes it an outlier; else 0.
+/// Distance of sample k from its predicted position if k is an outlier, else 0, mm.
 double outlier_mm(const std::vector<Sample>& s, std::size_t k, const Bounds& bounds) {
   const double off = off_course_mm(s, k);
   if (off < bounds.off_mm) return 0;
@@ -220,7 +222,7 @@ void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
       }
     }
     if (course.size() < 20) continue;
-    // The distance of a plane normal distribution has a median of 1.18 standard deviations.
+    // The length of a two-dimensional normal vector has a median of 1.18 standard deviations.
     const auto fast = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() * 19 / 20);
     std::nth_element(speeds.begin(), fast, speeds.end());
     const Bounds bounds{std::max(kOutlierSds * median(course) / 1.18, kLeastOutlier_mm), kTooFast * *fast};
@@ -237,7 +239,7 @@ void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
       std::size_t of_track = 0;
       for (int pass = 0; pass < kOutlierPasses; ++pass) {
         std::vector<bool> out(track.samples.size());
-        // One by one, the worst of its surroundings first: beside an outlier good positions look bad.
+        // One at a time, the worst of a neighbourhood first: a good position beside an outlier looks bad.
         for (std::size_t k = 0; k < track.samples.size(); ++k) {
           const double off = outlier_mm(track.samples, k, bounds);
           if (off == 0) continue;
@@ -264,7 +266,7 @@ void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
   }
 }
 
-// --- all ---
+// --- all kinds ---
 
 std::vector<DataFault> exclude_faults(MeasuredSet& set) {
   std::vector<DataFault> faults;

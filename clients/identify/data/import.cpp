@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kRecordingHeader = "time_s,robot,x_mm,y_mm,heading_rad";
-// An ARK log's columns that are read, of at least so many.
+// Columns of an ARK log that are read, and the fewest columns that a log has.
 constexpr std::size_t kTime = 0, kId = 1, kX = 3, kY = 4, kArkColumns = 6;
 
 bool is_ark_log(const fs::path& file) {
@@ -48,7 +48,7 @@ template <class Number> bool parse(std::string_view cell, Number& value) {
   return error == std::errc() && end == cell.data() + cell.size() && !cell.empty();
 }
 
-/// A finite number that a position or a time can be.
+/// A finite number. False if the text is none.
 bool parse_finite(std::string_view cell, double& value) {
   return parse(cell, value) && std::isfinite(value) && std::abs(value) < 1e9;
 }
@@ -61,7 +61,7 @@ std::string name_of_run(const fs::path& file) {
   return name;
 }
 
-/// Whether the first line that is not blank has a log's columns: a time, or its name, and enough cells.
+/// Whether the first line that is not blank is a row of an ARK log, or the names of its columns.
 bool looks_like_ark_log(const fs::path& file) {
   const std::string content = recorder::read_file(file);
   for (std::size_t at = 0; at < content.size();) {
@@ -113,7 +113,7 @@ std::string rows_of_ark_log(const fs::path& file) {
     const std::vector<std::string_view> cells = cells_of(line);
     double time_s = 0, x = 0, y = 0;
     std::uint32_t id = 0;
-    // Names of columns, above all rows.
+    // The line of column names above all rows.
     if (rows.empty() && !parse_finite(cells[kTime], time_s) && cells.size() >= kArkColumns &&
         !parse_finite(cells[kX], x))
       continue;

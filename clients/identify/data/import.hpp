@@ -1,10 +1,9 @@
-/// Other files that hold trajectories, turned into a data directory: `kilotwin identify` takes directories of them as they are.
-///   ARK logs     *.tsv, *.txt, *.log: tab-separated `t id colour x y orientation ...`, one file a run; a first line of names may
-///                stand above. x, y are pixels of ARK's mosaic, 2000 px over 2 m from the top left corner, so mm. The
-///                orientation is left out: ARK takes it from the motion of the last half second, so it says nothing that
-///                the positions do not, and lags behind a robot that turns.
-///   recordings   *.csv with the columns of `kilotwin export --trajectories`, one file a run
-/// A run has its file's name without the ending; a commands.csv beside them uses these names.
+/// Converts other trajectory files into a data directory. `kilotwin identify` accepts a directory of either kind:
+///   ARK logs     *.tsv, *.txt, *.log: tab-separated `t id colour x y orientation ...`, one file per run, with or without
+///                a line of names. x, y are pixels of ARK's mosaic: 2000 px over 2 m from the top left corner, hence mm.
+///                The orientation is ignored: ARK derives it from the motion of the last half second, so it lags in turns.
+///   recordings   *.csv with the columns of `kilotwin export --trajectories`, one file per run
+/// A run is named after its file, without the extension. A commands.csv in the same directory uses these names.
 #pragma once
 
 #include <filesystem>
@@ -18,20 +17,21 @@ namespace kilotwin::identify {
 /// Side of ARK's mosaic, px and mm.
 inline constexpr double kArkMosaic_mm = 2000;
 
-/// The directory's files that can be turned, by name; empty where there are none or it holds trajectories.csv[.gz] already.
+/// Files of the directory that can be converted, sorted. Empty if there are none, or if trajectories.csv[.gz]
+/// exists.
 [[nodiscard]] std::vector<std::filesystem::path> importable(const std::filesystem::path& directory);
 
-/// `run,robot,time_s,x_mm,y_mm` rows of one file, without a header. A last line that was cut off is passed over, as a log
-/// that is being written ends with one. Throws UserError with file, line and column.
+/// `run,robot,time_s,x_mm,y_mm` rows of one file, without a header. Ignores a truncated last line (a log still
+/// being written). Throws UserError with file, line and column.
 [[nodiscard]] std::string rows_of_ark_log(const std::filesystem::path& file);
-/// `run,robot,time_s,x_mm,y_mm,heading_rad` rows.
+/// `run,robot,time_s,x_mm,y_mm,heading_rad` rows of one file, without a header.
 [[nodiscard]] std::string rows_of_recording(const std::filesystem::path& file);
 
-/// Writes to/trajectories.csv, and copies commands.csv[.gz] where there is one. Throws UserError, also where ARK logs and
-/// recordings are mixed or two runs have the same name.
+/// Writes to/trajectories.csv and copies commands.csv[.gz] if present. Throws UserError on invalid files, on a
+/// mixture of ARK logs and recordings, and on two runs of one name.
 void import_set(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// A data directory as it is, or files that can be turned into one, which is then `converted`.
+/// Loads a data directory, or converts its files into `converted` first.
 [[nodiscard]] MeasuredSet load_or_import(const std::filesystem::path& directory,
                                          const std::filesystem::path& converted);
 

@@ -25,12 +25,12 @@ std::optional<fs::path> find_csv(const fs::path& directory, const char* stem) {
   return std::nullopt;
 }
 
-/// The tracks of a set while it is read.
+/// The tracks of a set while its files are read.
 class Builder {
  public:
   explicit Builder(MeasuredSet& set) : set_(set) {}
 
-  /// Null where there is none and `make` is false.
+  /// Null if the track is absent and `make` is false.
   Track* track(std::string_view run, std::uint32_t robot, bool make) {
     if (last_ != nullptr && last_->robot == robot && last_run_ == run) return last_;
     auto known = runs_.find(run);
@@ -93,13 +93,13 @@ void read_commands(const fs::path& file, Builder& builder) {
                     motion = csv.column("motion");
   while (csv.next()) {
     const CommandChange change{csv.number(time), motion_of(csv, motion)};
-    // Commands of a robot that was never seen tell nothing.
+    // Commands of a robot without positions are ignored.
     if (Track* const track = builder.track(csv.text(run), csv.whole(robot), false))
       track->commands.push_back(change);
   }
 }
 
-/// Ascending times, only what changes something, and a command from before the first sample on.
+/// Sorts the times, removes changes that repeat the command, and adds a command before the first sample.
 void tidy(Track& track, Motion at_first) {
   auto& commands = track.commands;
   std::stable_sort(commands.begin(), commands.end(),

@@ -1,5 +1,5 @@
-/// Measured trajectories and the commands that were given: what `kilotwin identify` reads (trajectories.csv[.gz],
-/// commands.csv[.gz]). Lengths mm, times s since the start of the run, angles rad anticlockwise from x.
+/// Measured trajectories and motion commands: trajectories.csv[.gz] and commands.csv[.gz]. Lengths mm, times s
+/// since the start of the run, angles rad anticlockwise from the x axis.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,16 @@
 
 namespace kilotwin::identify {
 
-/// What a robot is told to do; numbered as idl/effects.proto's Command.
+/// Motion command, numbered as Command in idl/effects.proto.
 enum class Motion : std::uint8_t { kStop = 0, kStraight = 1, kLeft = 2, kRight = 3 };
 [[nodiscard]] const char* name_of(Motion);
 
 struct Sample {
   double time_s, x_mm, y_mm;
-  double heading_rad;  ///< NaN where it was not measured
+  double heading_rad;  ///< NaN if not measured
 };
 
-/// Valid from time_s until the next.
+/// Valid from time_s until the next change.
 struct CommandChange {
   double time_s;
   Motion motion;
@@ -27,15 +27,16 @@ struct CommandChange {
 /// One robot in one run.
 struct Track {
   std::uint32_t robot = 0;
-  std::vector<Sample> samples;          ///< ascending times; equal times are possible (a faulty set)
-  std::vector<CommandChange> commands;  ///< ascending times, each differs from the one before; never empty
-  /// Not to be fitted to; it is still seen by its neighbours.
+  std::vector<Sample> samples;  ///< ascending times; equal times occur in faulty sets
+  /// ascending times, each motion differs from the previous one; never empty
+  std::vector<CommandChange> commands;
+  /// Excluded from the fit. Neighbours still see the robot.
   bool held_out = false;
 };
 
 struct Run {
   std::string name;
-  std::vector<Track> tracks;  ///< ascending robots, each once
+  std::vector<Track> tracks;  ///< ascending robot numbers, each once
 };
 
 struct MeasuredSet {
@@ -45,19 +46,19 @@ struct MeasuredSet {
 
   [[nodiscard]] std::size_t samples() const;
   [[nodiscard]] std::size_t tracks() const;
-  /// Ascending, each once.
+  /// All robot numbers, ascending.
   [[nodiscard]] std::vector<std::uint32_t> robots() const;
 };
 
-/// Whether the directory holds trajectories.
+/// Whether the directory holds trajectories.csv[.gz].
 [[nodiscard]] bool has_trajectories(const std::filesystem::path& directory);
 
-/// Reads DIR/trajectories.csv or .csv.gz and DIR/commands.csv or .csv.gz. Columns are found by their names, in any order;
-/// further columns are passed over. Rows may come in any order. Where there are no commands at all, robots are taken to go
-/// straight all the time; with commands, a robot rests before its first one. Throws UserError with file, line and column.
+/// Reads DIR/trajectories.csv[.gz] and DIR/commands.csv[.gz]. Columns are found by name, in any order; further
+/// columns are ignored. Rows may come in any order. Without any commands, robots drive straight all the time. With
+/// commands, a robot rests before its first one. Throws UserError with file, line and column.
 [[nodiscard]] MeasuredSet load_measured_set(const std::filesystem::path& directory);
 
-/// Writes both files, uncompressed, in the contract's form.
+/// Writes both files, uncompressed.
 void save_measured_set(const MeasuredSet&, const std::filesystem::path& directory);
 
 }  // namespace kilotwin::identify

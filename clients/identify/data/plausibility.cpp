@@ -12,14 +12,14 @@
 namespace kilotwin::identify {
 namespace {
 
-// No run of robots lasts as long: eleven days.
+// Longest plausible run: eleven days.
 constexpr double kLongest_s = 1e6;
 constexpr double kSlowestSampling_s = 60;
-// No arena is as large.
+// Largest plausible coordinate: one kilometre.
 constexpr double kFarthest_mm = 1e6;
-// Discs are 33 mm wide, so that two of them need more room than this.
+// Smallest plausible extent of all positions. Two discs of 33 mm need more.
 constexpr double kSmallestRoom_mm = 15;
-// Kilobots go 10 mm/s; nothing on two vibrating legs goes as fast as this, nor as slowly as that when all is well.
+// Kilobots drive at 10 mm/s. Bounds of a plausible median speed.
 constexpr double kFastest_mm_s = 150, kSlowest_mm_s = 0.1;
 constexpr double kLook_s = 5;
 
@@ -93,7 +93,7 @@ void demand_radians(const MeasuredSet& set, const std::string& from) {
       }
     }
   }
-  // Headings that go on counting beyond a turn are known too, but they do not end at 360.
+  // Headings may count on beyond a full turn, but then they do not end at 360.
   if (all > 10 && beyond * 3 > all && most > 90 && most < 361)
     throw UserError(fmt::format("{}: heading_rad is up to {:g}; give radians (not degrees)", from, most));
 }
@@ -154,7 +154,7 @@ void demand_longer_than(const MeasuredSet& set, double horizon_s, bool held_out_
   for (const Run& run : set.runs) {
     for (const Track& track : run.tracks) {
       if (track.samples.empty() || (held_out_only && !track.held_out)) continue;
-      // Predictions are for times from the horizon on, from what was seen the horizon before.
+      // A prediction needs samples one horizon before its time.
       if (track.samples.front().time_s <= track.samples.back().time_s - horizon_s)
         longest_s = std::max(longest_s, track.samples.back().time_s);
     }

@@ -1,4 +1,5 @@
-/// What of a set cannot be as it is meant: other units, commands for nobody, nobody who moves. Told in words before anything is fitted.
+/// Plausibility of a measured set: wrong units, commands without robots, robots without motion. Checked before the
+/// fit.
 #pragma once
 
 #include <string>
@@ -7,14 +8,15 @@
 
 namespace kilotwin::identify {
 
-/// Throws UserError, with what would be right, where
-///   - times are no seconds since the start of a run (an epoch, milliseconds, frames);
-///   - positions are no mm (metres, pixels), headings no radians;
-///   - nobody is told to move while it is seen, or nobody moves who is told to.
-/// `from` is the directory, as the error names it.
+/// Throws UserError, with the remedy, if
+///   - times are not seconds since the start of the run (an epoch, milliseconds, frames);
+///   - positions are not mm (metres, pixels), or headings not radians;
+///   - no robot is commanded to move while it is tracked, or no commanded robot moves.
+/// `from` is the directory, for the message.
 void demand_plausible(const MeasuredSet&, const std::string& from);
 
-/// Throws UserError where no track to be predicted lasts longer than the horizon. `held_out_only`: of those held out.
+/// Throws UserError if no track to be predicted is longer than the horizon. `held_out_only`: counts held-out
+/// tracks only.
 void demand_longer_than(const MeasuredSet&, double horizon_s, bool held_out_only, const std::string& from);
 
 }  // namespace kilotwin::identify

@@ -8,7 +8,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// In a picture that shows all larger or smaller, robots that are so near may touch.
+/// Contact range under an unknown camera scale, mm.
 constexpr double kMayTouch_mm = 1.15 * kTouch_mm;
 
 bool acts_on_speed(const Block& block) {
@@ -32,7 +32,7 @@ MotionModel Fitter::doubting(MotionModel model) const {
 }
 
 bool Fitter::holds_seem_elsewhere(const MotionModel& model) const {
-  // Noise that robots do not have unless they touch something, looked at where they do not.
+  // Larger wheel and heading noise in contact indicates contacts. This compares it with the noise of free robots.
   MotionModel trial = doubting(model);
   const double with_noise = log_likelihood(trial);
   fit_noise(trial);
@@ -83,9 +83,10 @@ bool Fitter::set_scale(MotionModel& model) const {
 }
 
 void Fitter::settle_scale(MotionModel& model) const {
-  // Where it is least surprising by the seed's lengths, beforehand normal each: a square in the factor.
+  // Prior: the speeds and the wheel base of the ARGoS paper, independent normal. The exponent is quadratic in the
+  // factor.
   const BaseParameters seed;
-  // An effect on speed leaves open at which value of its covariates robots have the seed's.
+  // A speed effect leaves open at which covariate values the nominal speed holds: relative standard deviation.
   constexpr double kByEffects = 0.5;
   const bool nominal = std::none_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
     return std::any_of(term.blocks.begin(), term.blocks.end(), acts_on_speed);

@@ -9,7 +9,8 @@
 namespace kilotwin::identify {
 namespace {
 
-/// By how much, along an axis, robots were moved while they touched others, from the first measurement of that to the last.
+/// Displacement along an axis during contacts between robots, from the first to the last measurement of each
+/// contact.
 struct Pushes {
   explicit Pushes(double tracker_mm2) : tracker_mm2_(tracker_mm2) {}
   double sum_mm2 = 0, time_s = 0;
@@ -25,7 +26,7 @@ struct Pushes {
       way_ += std::sqrt(innovation.weight) * innovation.difference.head<2>();
       way_s_ += touched_s;
     } else if (way_s_ > 0) {
-      // The tracker was off at either end.
+      // The tracker's variance enters at both ends.
       sum_mm2 += way_.squaredNorm() / 2 - 2 * tracker_mm2_;
       time_s += std::exchange(way_s_, 0);
       ++count;
@@ -54,9 +55,9 @@ void Fitter::look_for_walls(MotionModel& model) const {
 }
 
 void Fitter::find_walls(MotionModel& model) const {
-  // How far the tracked point may lie beyond the disc's centre, or before it.
+  // Largest distance between the tracked point and the disc centre.
   const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
-  // Where the tracked point was, by view and sample: not where a picture that is bent shows it.
+  // The tracked point with the camera distortion removed.
   const bool measures = model.measures();
   const auto place_of = [&](const TrackView& view, const Sample& s) {
     if (!measures) return s;
@@ -74,7 +75,7 @@ void Fitter::find_walls(MotionModel& model) const {
       Side{&Room::x_high_mm, &Sample::x_mm, 1}, Side{&Room::x_low_mm, &Sample::x_mm, -1},
       Side{&Room::y_high_mm, &Sample::y_mm, 1}, Side{&Room::y_low_mm, &Sample::y_mm, -1}};
   for (const Side& side : sides) {
-    // Where headings are measured, discs that stay at one line have shown most walls already.
+    // With headings, detected_walls() has found most walls already.
     if (set_.set().has_headings && std::isfinite(model.room.*side.wall)) continue;
     std::vector<double> places;
     for (const TrackView& view : set_.views())
@@ -83,7 +84,7 @@ void Fitter::find_walls(MotionModel& model) const {
     const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
     std::nth_element(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(rank), places.end());
     const double edge = places[rank];
-    // Those that came near; of many, some.
+    // Tracks that came near the side, at most kMost.
     constexpr std::size_t kMost = 16;
     std::vector<const TrackView*> near;
     for (const TrackView& view : set_.views()) {
@@ -96,7 +97,7 @@ void Fitter::find_walls(MotionModel& model) const {
     model.room.*side.wall = side.sign * std::numeric_limits<double>::infinity();
     if (near.empty()) continue;
     MotionModel best = model;
-    // A wall has to be worth more than chance and bad luck with a few outliers.
+    // Penalty of a wall, in log likelihood: covers chance and a few outliers.
     double best_value = with_touching(model, near) + 30;
     const auto try_at = [&](double wall) {
       MotionModel trial = model;
@@ -135,8 +136,8 @@ void Fitter::fit_touching(MotionModel& model) const {
     }
   };
   for (double Noise::*const part : {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s}) climb(part);
-  // A robot is pushed one way for as long as it touches: as noise without a memory that looks like less than it adds up to, and
-  // a turn, which does go on, would be blamed for the rest.
+  // A push keeps its direction during a contact. White noise fitted to single steps underestimates its sum, and
+  // the fit would attribute the rest to turns.
   if (const double lasting_mm2_s = lasting_push_mm2_s(model, tracks); lasting_mm2_s > model.noise.contact_mm2_s) {
     model.noise.contact_mm2_s = lasting_mm2_s;
     best = with_touching(model, tracks);
@@ -182,19 +183,20 @@ void Fitter::find_shape(MotionModel& model) const {
       c.model.room = room_of(set_, c.model);
     } else {
       find_walls(c.model);
-      // Of what may touch more often less is known: with noise that is not its own it would look worse than it is.
+      // A candidate with more contacts needs contact noise of its own for a fair comparison.
       fit_touching(c.model);
     }
     c.log_likelihood = with_touching(c.model, tracks);
     c.meetings = set_.meetings();
   };
   add(kAxleOffset_mm);
-  // Or the tracked point is the centre.
+  // Alternative: the tracked point is the disc centre.
   constexpr double kApart_mm = 3;
   if (std::abs(model.base.ahead_mm - kAxleOffset_mm) > kApart_mm) add(model.base.ahead_mm);
   const Candidate* best = &candidates.front();
   for (const Candidate& c : candidates) {
-    // Walls tell more than robots that met. Without walls the likelihood tells nothing: it would only count who is thought to touch.
+    // Walls are stronger evidence than encounters. Without walls the likelihood is no evidence, because it only
+    // depends on which samples count as contacts.
     constexpr double kSure = 50;
     const bool walls = c.model.room.any() || best->model.room.any();
     const double better = walls ? c.log_likelihood - best->log_likelihood : 0;
@@ -208,13 +210,13 @@ void Fitter::find_shape(MotionModel& model) const {
 
 void Fitter::fit_surroundings(MotionModel& model) const {
   if (model.doubts_rim) settle_doubts(model);
-  // With much noise at walls it would not matter where they are.
+  // Large contact noise would hide wrong positions of the walls.
   const Noise anew;
   for (double Noise::*const part :
        {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
     model.noise.*part = anew.*part;
   const bool headings = set_.set().has_headings;
-  // What a model lacked may have passed for a disc that lies elsewhere.
+  // A missing effect may have looked like a displaced disc centre.
   if (!headings) find_shape(model);
   for (int round = 0; round < (headings ? 1 : 2); ++round) {
     if (headings || round > 0) {
@@ -222,7 +224,7 @@ void Fitter::fit_surroundings(MotionModel& model) const {
       set_.find_centres(model, threads_);
     }
     if (model.measures() && set_scale(model)) set_.find_centres(model, threads_);
-    // In a picture that is bent robots seem to meet where they do not.
+    // Camera distortion shows false encounters and hides true ones.
     if (model.measures() && !model.doubts_rim)
       model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
     fit_touching(model);

@@ -1,4 +1,4 @@
-/// What of a measurement tells of the model, by what the robot touched since the one before.
+/// Gating of measurements after contacts: which parts of an innovation enter the likelihood.
 #pragma once
 
 #include <cmath>
@@ -9,8 +9,8 @@
 
 namespace kilotwin::identify {
 
-/// Others that are in the way hold a robot back and push it aside, but do not turn it by more than the noise of touching allows
-/// for: while it touches them, its heading tells how its wheels run. At walls, where robots stay for long, nothing is concluded.
+/// A robot in contact with another robot is slowed and displaced, but its heading still follows its wheels, within
+/// the contact noise: the fit uses the heading alone. Contacts with walls last long, and the fit uses nothing.
 class Touched {
  public:
   enum class Counts : std::uint8_t { kAll, kHeading, kNothing };
@@ -19,7 +19,7 @@ class Touched {
     wall_ = wall_ || record.at_wall;
     robot_ = robot_ || record.at_robot;
   }
-  /// Once for each measurement.
+  /// To be called once per measurement.
   [[nodiscard]] Counts update(const Innovation& innovation) {
     const bool wall = std::exchange(wall_, false), robot = std::exchange(robot_, false);
     if (wall || (robot && (innovation.size < 3 || innovation.lost))) return Counts::kNothing;
@@ -30,7 +30,7 @@ class Touched {
   bool wall_ = false, robot_ = false;
 };
 
-/// Of the measured heading alone.
+/// Log likelihood of the measured heading alone.
 [[nodiscard]] inline double heading_log_likelihood(const Innovation& innovation) {
   const double variance = innovation.covariance(2, 2);
   return -0.5 * (std::log(variance) + innovation.difference[2] * innovation.difference[2] / variance);

@@ -6,7 +6,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Logarithm of the sum of all weights.
+/// Logarithm of the sum of the hypotheses' weights.
 double total_of(const std::vector<Follower::Hypothesis>& hypotheses) {
   double best = -1e300, sum = 0;
   for (const auto& h : hypotheses) best = std::max(best, h.log_weight);
@@ -36,7 +36,7 @@ void Follower::take(const Sample& sample) {
     lost += 1;
   }
   log_likelihood_ += total_of(hypotheses_) - weight;
-  // Where it is is known, but not which way it points.
+  // Every hypothesis lost the track: the position is known, the heading is not.
   if (lost > 0 && lost == static_cast<double>(hypotheses_.size())) return start(sample);
   prune();
 }
@@ -60,7 +60,7 @@ void Follower::prune() {
   for (const Hypothesis& h : hypotheses_) best = std::max(best, h.log_weight);
   for (Hypothesis& h : hypotheses_) h.log_weight -= best;
   std::erase_if(hypotheses_, [](const Hypothesis& h) { return h.log_weight < -kHopeless; });
-  // Two that have become the same are one.
+  // Merges hypotheses that have converged to the same heading.
   for (std::size_t i = 0; i + 1 < hypotheses_.size(); ++i) {
     for (std::size_t j = i + 1; j < hypotheses_.size();) {
       const Belief& a = hypotheses_[i].filter.belief();

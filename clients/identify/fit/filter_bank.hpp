@@ -1,5 +1,5 @@
-/// A robot's filter while it is led along its track, with nothing of the future known; several filters while nobody knows which
-/// way the robot points.
+/// Causal state estimate of one robot: a bank of extended Kalman filters (a Gaussian sum), one per hypothesis of
+/// the initial heading. Without measured headings, 18 evenly spaced hypotheses start and are pruned and merged.
 #pragma once
 
 #include <vector>
@@ -10,13 +10,13 @@ namespace kilotwin::identify {
 
 class Follower {
  public:
-  /// Both must outlive it.
+  /// Both must outlive the bank.
   Follower(const MotionModel& model, const TrackView& view) : model_(model), view_(view) {}
 
-  /// Takes in all samples up to this time.
+  /// Processes all samples up to this time.
   void follow(double to_s);
   [[nodiscard]] bool started() const { return next_ > 0; }
-  /// Of the last sample that was taken in.
+  /// Time of the last processed sample, s.
   [[nodiscard]] double last_s() const { return view_.track->samples[next_ - 1].time_s; }
 
   struct Hypothesis {
@@ -25,7 +25,7 @@ class Follower {
   };
   [[nodiscard]] const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   [[nodiscard]] const TrackView& view() const { return view_; }
-  /// Of all that was taken in.
+  /// Of all processed samples.
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
  private:
@@ -40,7 +40,7 @@ class Follower {
   double log_likelihood_ = 0;
 };
 
-/// Each by all that was measured until then.
+/// Disc centres of a track at its sample times. Each uses the samples up to that time only.
 [[nodiscard]] Centres centres_of(const MotionModel&, const TrackView&);
 
 }  // namespace kilotwin::identify

@@ -1,4 +1,5 @@
-/// A filter led along a track: sub-steps between samples and at changes of command, a measurement at each sample.
+/// Runs a filter along a track: sub-steps between samples and at command changes, one measurement update per
+/// sample.
 #pragma once
 
 #include <algorithm>
@@ -9,14 +10,14 @@
 
 namespace kilotwin::identify {
 
-/// Calls each(time_s, h_s, commands at its start) for the sub-steps from one time to another.
+/// Calls each(time_s, h_s, command state at its start) for the sub-steps from `from_s` to `to_s`.
 template <class Each> void sub_steps(const CommandClock& clock, double from_s, double to_s, Each&& each) {
   double t = from_s;
   while (t < to_s - 1e-9) {
     const double end = std::min(to_s, clock.next_change_s(t));
     const double length = end - t;
     CommandState state = clock.at(t);
-    // At rest nothing changes.
+    // A robot at rest needs few sub-steps.
     const double longest = state.driven() ? kSubStep_s : 2.0;
     const int count = std::max(1, static_cast<int>(std::ceil(length / longest - 1e-9)));
     const double h = length / count;
@@ -28,18 +29,18 @@ template <class Each> void sub_steps(const CommandClock& clock, double from_s, d
   }
 }
 
-/// A track with what belongs to it.
+/// A track with what the filter needs.
 struct TrackView {
   const Track* track = nullptr;
-  std::uint32_t run = 0;     ///< place in the set
-  std::uint32_t number = 0;  ///< of the run, by which effects know it
-  std::size_t place = 0;     ///< in the run
+  std::uint32_t run = 0;     ///< index in the set
+  std::uint32_t number = 0;  ///< run number in effects
+  std::size_t place = 0;     ///< index of the track in its run
   const RunNeighbours* neighbours = nullptr;
   CommandClock clock;
   double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample
-  std::vector<bool> at_rim = {};                           ///< of what robots reached, at each sample
+  std::vector<bool> at_rim = {};  ///< whether each sample is at the boundary of visited places
 
-  /// What is known of an instant without knowing where the robot is.
+  /// The part of a situation that does not depend on the pose.
   [[nodiscard]] Situation at(double time_s) const {
     Situation s;
     s.time_s = time_s;
@@ -50,7 +51,7 @@ struct TrackView {
   }
 };
 
-/// Leads the filter from the first sample to the last. Calls visitor.start(filter), visitor.step(record),
+/// Runs the filter from the first sample to the last. Calls visitor.start(filter), visitor.step(record) and
 /// visitor.update(innovation, sample).
 template <class Visitor>
 void walk(TrackFilter& filter, const TrackView& view, std::size_t samples, Visitor&& visitor) {

@@ -35,8 +35,8 @@ void Fitter::fit_base(MotionModel& model) const {
   if (headings) {
     set_.find_headings(model, threads_);
   } else {
-    // In a room that robots are hardly ever free in, a tracked point and walls that do not belong together hold each other
-    // where they are: those that explain most to start with are taken, of either point that is likely to be tracked.
+    // In a small arena, a wrong tracked point and wrong walls can stabilise each other. The fit starts from both
+    // likely tracked points and keeps the one with the higher likelihood.
     const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
     const MotionModel given = model;
     double best = -1e300;
@@ -52,12 +52,12 @@ void Fitter::fit_base(MotionModel& model) const {
       model = start;
     }
     set_.find_headings(model, threads_);
-    // What is not known to be a push would pass for noise of the wheels.
+    // Contacts that are not recognised would look like wheel noise.
     fit_touching(model);
   }
   fit(model, 3);
   find_shape(model);
-  // Where headings are not measured, walls, centres and what touching does lean on each other.
+  // Without headings, walls, disc centres and contact noise depend on each other: alternate.
   constexpr int kMostRounds = 4;
   constexpr double kSettled = 20;
   double likelihood = -1e300;
@@ -77,13 +77,13 @@ void Fitter::fit_base(MotionModel& model) const {
 }
 
 void Fitter::fit(MotionModel& model, int passes) const {
-  // With a new map of the picture, all that was seen of walls and of who meets whom is to be seen anew.
+  // A new camera map changes the positions of walls and of encounters.
   const bool new_picture = !model.terms.empty() && is_map_of_picture(model.terms.back());
   if (passes > 1 && new_picture) straighten(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
     look_for_walls(model);
-    // What was noise to a model without its new terms is not, once they have their size.
+    // New terms explain part of the former noise once they have their amplitude.
     if (pass != 0 || passes == 1) fit_noise(model);
     step(model);
   }

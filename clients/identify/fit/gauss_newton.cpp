@@ -10,12 +10,12 @@
 namespace kilotwin::identify {
 namespace {
 
-/// The normal equations of a step: of the data, the base's prior and the terms'.
+/// The normal equations of a step: data, prior of the base parameters, prior of the terms.
 struct Equations {
   std::vector<Unit> units;
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
-  Eigen::VectorXd beforehand;  ///< precisions of the terms' coefficients
+  Eigen::VectorXd beforehand;  ///< prior precisions of the terms' coefficients
 };
 
 Equations equations_of(const Fitter& fitter, const MotionModel& model) {
@@ -37,8 +37,8 @@ Equations equations_of(const Fitter& fitter, const MotionModel& model) {
     first += count;
   }
   e.information.diagonal() += e.beforehand;
-  // Along the common scale of a picture, speeds and wheel base nothing changes but how wide the noise is, which a step does not
-  // see: it would go far for nothing.
+  // The likelihood is flat along the common scale of the camera map, the speeds and the wheel base. A step must
+  // not move along it, so that direction is removed.
   if (const Eigen::VectorXd by_scale = log_scale_by_coefficients(model); by_scale.size() > 0) {
     constexpr double kHeld = 1e-4;
     const Eigen::VectorXd row = by_scale / kHeld;
@@ -74,7 +74,7 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
     term.coefficients += step.segment(first, term.coefficients.size());
     first += term.coefficients.size();
   }
-  // A robot may be several units (tracks): its bias is their mean by precision.
+  // A robot may have several units (tracks). Its bias is their precision-weighted mean.
   std::map<std::uint32_t, std::pair<Eigen::Matrix2d, Eigen::Vector2d>> sums;
   for (const Unit& unit : units) {
     const RobotBias was = model.bias_of(unit.robot);
@@ -93,7 +93,7 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
     square += bias.mean_mm_s.squaredNorm() + bias.covariance.trace();
     count += 2;
   }
-  // The distribution of biases, held near the seed's where robots are few.
+  // Population distribution of biases, with a prior at the ARGoS paper's values for few robots.
   const BaseParameters seed;
   constexpr double kSeedRobots = 4;
   const double mean = sum / (count + kSeedRobots);
@@ -112,7 +112,7 @@ double Fitter::worth(const MotionModel& model) const {
 
 void Fitter::step(MotionModel& model) const {
   const Equations e = equations_of(*this, model);
-  // A step that makes things worse is held back first where the data say little, then everywhere.
+  // Damps a step that lowers the posterior: first the directions with little information, then the whole step.
   const MotionModel start = model;
   const bool pictured = start.measures() && start.room.any();
   const double before = worth(start);

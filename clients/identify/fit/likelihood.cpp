@@ -55,7 +55,7 @@ double Fitter::log_evidence(const MotionModel& model) const {
     value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
     first += term.precision.size();
   }
-  // Of the terms' coefficients, whatever the base parameters are.
+  // Marginal over the base parameters: their Schur complement.
   const Eigen::MatrixXd cross = information.topRightCorner(kBaseColumns, n);
   const Eigen::MatrixXd by = information.topLeftCorner<kBaseColumns, kBaseColumns>().ldlt().solve(cross);
   Eigen::MatrixXd posterior = information.bottomRightCorner(n, n) - cross.transpose() * by;

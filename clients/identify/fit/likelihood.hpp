@@ -1,4 +1,4 @@
-/// Log likelihood of what was measured, by the filter's innovations.
+/// Log likelihood of measurements, by the filter's innovations.
 #pragma once
 
 #include "clients/identify/fit/contact_gate.hpp"
@@ -6,11 +6,11 @@
 
 namespace kilotwin::identify {
 
-/// Sums it up along a track: a visitor of walk().
+/// Sums the log likelihood along a track: a visitor of run_filter().
 struct LogLikelihood {
   double sum = 0;
   Touched touched;
-  bool with_touching = false;  ///< what was measured after touching counts as well
+  bool with_touching = false;  ///< whether measurements after contacts count fully
 
   void start(const TrackFilter&) {}
   void step(const StepRecord& record) { touched.step(record); }
@@ -24,7 +24,7 @@ struct LogLikelihood {
   }
 };
 
-/// Of one track, its robot's bias being known.
+/// Log likelihood of one track, with the robot's bias fixed at its mean.
 [[nodiscard]] LogLikelihood likelihood_of(const MotionModel&, const TrackView&, bool with_touching = false);
 
 }  // namespace kilotwin::identify

@@ -6,15 +6,15 @@
 #include <functional>
 #include <thread>
 
-#include "clients/identify/fit/products.hpp"
 #include "clients/identify/fit/contact_gate.hpp"
+#include "clients/identify/fit/products.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
-constexpr Eigen::Index kBuffer = 96;  ///< rows of innovations that are summed at once
+constexpr Eigen::Index kBuffer = 96;  ///< innovation rows that are summed at once
 
-/// Derivatives of one track's filter by all columns, and the sums that come of them.
+/// Sensitivities of one track's filter to all columns, and the sums over its innovations.
 class Sensitivities {
  public:
   Sensitivities(const MotionModel& model, const std::vector<Block>& blocks, const LineariseOptions& options)
@@ -95,7 +95,7 @@ class Sensitivities {
         block.basis.evaluate(record.middle, 1, of_right_);
         right_values = of_right_;
       }
-      // Gains are factors: a term's own is not part of what its columns act on.
+      // Gains are factors: a term's columns do not act on the term's own gain.
       Wheels without = replaced;
       if (b < own_.size()) {
         const Eigen::Map<const Eigen::VectorXd> own(own_[b].coefficients, n);
@@ -143,7 +143,7 @@ class Sensitivities {
     if (heading_alone) log_likelihood += heading_log_likelihood(innovation);
     ++samples;
     if (innovation.weight < 1) ++outliers;
-    // Otherwise it starts anew from here.
+    // Otherwise the sensitivities start at zero again.
     if (innovation.lost || counts == Touched::Counts::kNothing) {
       lost += innovation.lost ? 1 : 0;
       place(sample, innovation);
@@ -175,7 +175,7 @@ class Sensitivities {
     filled_ = 0;
   }
 
-  /// Eliminates the biases, which are known to be `prior` before anything is measured.
+  /// Eliminates the biases (Schur complement) under the prior `prior`.
   void finish(Unit& unit, const Eigen::Vector2d& from_prior, double prior_precision) {
     flush();
     information_ = Eigen::MatrixXd(information_.selfadjointView<Eigen::Lower>());
@@ -211,7 +211,7 @@ class Sensitivities {
   std::vector<std::uint32_t> cluster_run;
 
  private:
-  /// What belongs to a block of the model.
+  /// Data of one block of the model.
   struct Own {
     const double* coefficients;
     bool replaced;
@@ -220,7 +220,8 @@ class Sensitivities {
     double left = 1, right = 1;
   };
 
-  /// The robot is where it was seen, whatever the columns are: what the picture adds there is taken off.
+  /// At the start the robot is at its measured position for any coefficients, so the measurement effect moves the
+  /// pose.
   void place(const Sample& sample, const Eigen::Vector3d& pose, const Eigen::Matrix2d& by_place) {
     seen_.setZero();
     add_measured(sample, pose);
@@ -233,7 +234,7 @@ class Sensitivities {
   void place(const Sample& sample, const Innovation& innovation) {
     place(sample, filter_->belief().mean.head<3>(), innovation.jacobian.topLeftCorner<2, 2>());
   }
-  /// Where a robot is that was pushed starts anew; how it points goes on.
+  /// After a contact with a robot the position restarts from the measurement. The heading continues.
   void add_heading(const Sample& sample, const Innovation& innovation) {
     const double spread = std::sqrt(innovation.covariance(2, 2));
     buffer_.row(filled_) = seen_.row(2) / spread;
@@ -297,7 +298,7 @@ class Sensitivities {
   std::uint32_t run_ = 0;
   double cluster_start_s_ = -1e300;
   const TrackFilter* filter_ = nullptr;
-  const Sample* first_ = nullptr;  ///< of the track
+  const Sample* first_ = nullptr;  ///< first sample of the track
   Situation last_;
   Touched touched_;
   bool measures_ = false;

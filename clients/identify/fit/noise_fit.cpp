@@ -12,7 +12,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Parts of Noise that are fitted, as logarithms: those that spread a robot's pose, then those of the tracker.
+/// Indices of the fitted variances, as logarithms: process noise first, then measurement noise.
 enum : Eigen::Index { kFactor, kWheel, kHeading, kDrift, kPosition, kMeasuredHeading, kNoises };
 constexpr std::size_t kSpreading = kPosition;
 using NoiseVector = Eigen::Matrix<double, kNoises, 1>;
@@ -22,7 +22,8 @@ NoiseVector logs_of(const Noise& n) {
   v << n.factor_s, n.wheel_mm2_s, n.heading_rad2_s, n.drift_mm2_s, n.position_mm2, n.heading_rad2;
   return v.array().log();
 }
-/// Below the lower bounds a noise is as good as none, above the upper ones nothing would be told from noise.
+/// Variances within bounds. Below the lower bound a variance has no influence; above the upper bound it hides
+/// everything.
 NoiseVector variances(const NoiseVector& logs) {
   constexpr std::array<double, kNoises> kLow = {1e-6, 1e-4, 1e-8, 1e-6, 1e-4, 1e-6},
                                         kHigh = {1, 100, 1, 100, 1e4, 10};
@@ -43,21 +44,21 @@ Noise with(Noise noise, const NoiseVector& v) {
   return noise;
 }
 
-/// From one measurement to the next, about the path of a filter.
+/// From one measurement to the next, linearised about the filter's path.
 struct Stretch {
   Stretch() {
     for (Eigen::Matrix3d& m : spread) m.setZero();
   }
   Eigen::Matrix3d transition = Eigen::Matrix3d::Identity();  ///< of the pose
-  /// What it is spread by, per unit of each noise, and by what is not fitted.
+  /// Process noise covariance per unit of each variance, and the part that is not fitted.
   std::array<Eigen::Matrix3d, kSpreading> spread;
   Eigen::Matrix3d more = Eigen::Matrix3d::Zero();
-  // The measurement at its end.
+  // The measurement at the end of the interval.
   int size = 0;
   Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();
-  /// From what the path promised, and what that moved the path by.
+  /// Innovation along the path, and the correction that it applied.
   Eigen::Vector3d difference = Eigen::Vector3d::Zero(), correction = Eigen::Vector3d::Zero();
-  bool counts = true;  ///< otherwise all begins anew here, with this covariance
+  bool counts = true;  ///< false: the recursion restarts here with this covariance
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
@@ -121,7 +122,7 @@ class Recorder {
 
 struct Path {
   Eigen::Matrix3d first;
-  double position_mm2;  ///< that is part of `first`
+  double position_mm2;  ///< part of `first`
   std::vector<Stretch> stretches;
 };
 
@@ -134,7 +135,7 @@ Path path_of(const MotionModel& model, const TrackView& view) {
   return {recorder.first, model.noise.position_mm2, std::move(recorder.stretches)};
 }
 
-/// Of all measurements of a path that count, with other noise.
+/// Log likelihood of a path's measurements under other variances.
 double log_likelihood(const Path& path, const NoiseVector& variance) {
   double sum = 0;
   Eigen::Matrix3d p = path.first;
@@ -171,14 +172,14 @@ double log_likelihood(const Path& path, const NoiseVector& variance) {
   return sum;
 }
 
-/// Noises beyond the data's reach are held near those of the start by a weak prior, so that the search has an end.
+/// Weak prior about the start: bounds the search where the data say nothing.
 double log_prior(const NoiseVector& logs) {
   constexpr double kWeak = 1.0 / (6 * 6);
   static const NoiseVector middle = logs_of(Noise{});
   return -0.5 * kWeak * (logs - middle).squaredNorm();
 }
 
-/// A quasi-Newton search (Broyden, Fletcher, Goldfarb and Shanno) on the logarithms of variances.
+/// Quasi-Newton maximisation (BFGS) over the logarithms of the variances.
 class Climb {
  public:
   Climb(const std::vector<Path>& paths, bool has_headings, std::uint32_t threads)
@@ -186,11 +187,11 @@ class Climb {
     for (const Path& path : paths) samples_ += path.stretches.size();
   }
 
-  /// Moves to the top; returns its height.
+  /// Moves to the maximum and returns the value there.
   double operator()(NoiseVector& at) const {
     double value = values({at}).front();
     NoiseVector gradient = gradient_at(at);
-    // A log variance is known to about sqrt(2 / n).
+    // A log variance from n samples has the standard deviation sqrt(2 / n).
     const double curvature = std::max<double>(10, 0.1 * static_cast<double>(samples_));
     using Square = Eigen::Matrix<double, kNoises, kNoises>;
     Square inverse = Square::Identity() / curvature;
@@ -212,7 +213,7 @@ class Climb {
       at += move;
       if (gained < 0.3) break;
       const NoiseVector next = gradient_at(at);
-      const NoiseVector change = gradient - next;  // of the negative
+      const NoiseVector change = gradient - next;  // of the negative objective
       const double along = change.dot(move);
       if (along > 1e-9) {
         const Square side = Square::Identity() - move * change.transpose() / along;
@@ -269,7 +270,7 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
                         std::uint32_t threads) {
   MotionModel model = start;
   constexpr int kMostRounds = 4;
-  constexpr double kSettled = 0.1;  // of a logarithm: the paths are those of noise like this
+  constexpr double kSettled = 0.1;  // in the logarithm; the paths are then consistent with the variances
   for (int round = 0; round < kMostRounds; ++round) {
     std::vector<Path> paths(tracks.size());
     in_parallel(tracks.size(), threads, [&](std::size_t i) { paths[i] = path_of(model, *tracks[i]); });
@@ -277,7 +278,7 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
     const NoiseVector before = logs_of(model.noise);
     NoiseVector at = before;
     const double value = climb(at);
-    // What once seemed to be no noise has no slope any more that would lead back; a new start shows whether it is some.
+    // A variance near zero has no gradient. A restart at a larger value tests whether it should be larger.
     constexpr double kNone_mm2 = 0.01, kNone_s = 1e-5;
     if (std::exp(at[kPosition]) < kNone_mm2 || std::exp(at[kFactor]) < kNone_s) {
       const NoiseVector middle = logs_of(Noise{});

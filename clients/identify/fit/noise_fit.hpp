@@ -1,5 +1,5 @@
-/// Noise by maximum likelihood: of the motion and of the tracker, apart. Filters are led along their tracks once; about those
-/// paths they are linear, so that other noises are tried by recursions over matrices that stay as they are.
+/// Maximum-likelihood estimate of process and measurement noise. The filters run once. About their paths the model
+/// is linear, so other variances only need a recursion over stored matrices.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace kilotwin::identify {
 
-/// The noise that makes these tracks most probable, walls' and contacts' as the model has them. Biases count as known.
+/// The noise of maximum likelihood. Contact noise stays as in the model. Biases count as known.
 [[nodiscard]] Noise most_likely_noise(const MotionModel&, const std::vector<const TrackView*>& tracks,
                                       bool has_headings, std::uint32_t threads);
 

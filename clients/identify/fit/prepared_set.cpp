@@ -4,11 +4,11 @@
 #include <cmath>
 #include <tuple>
 
+#include "clients/identify/fit/filter_bank.hpp"
 #include "clients/identify/fit/likelihood.hpp"
 #include "clients/identify/fit/linearisation.hpp"
 #include "clients/identify/model/camera_scale.hpp"
 #include "clients/identify/model/visited_boundary.hpp"
-#include "clients/identify/fit/filter_bank.hpp"
 
 namespace kilotwin::identify {
 
@@ -48,7 +48,7 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
   in_parallel(views_.size(), threads, [&](std::size_t v) { centres[v] = centres_of(model, views_[v]); });
   centres_.clear();
   for (std::size_t r = 0; r < neighbours_.size(); ++r) {
-    // Tracks that are too short to be followed are where they were seen.
+    // A track too short for the filter uses its measured positions.
     std::vector<Centres>& of_run = centres_.emplace_back();
     for (const Track& track : set_->runs[r].tracks) {
       Centres& own = of_run.emplace_back();
@@ -114,7 +114,7 @@ void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads)
       view.start_heading_sd_rad = std::sqrt(model.noise.heading_rad2);
       return;
     }
-    // As many samples as it takes to move a good way, and no more than these.
+    // Enough samples to cover a good distance, at most kMost.
     constexpr std::size_t kMost = 200;
     constexpr double kWay_mm = 60;
     std::size_t samples = 2;

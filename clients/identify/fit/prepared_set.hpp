@@ -1,4 +1,4 @@
-/// The tracks of a set with what belongs to each: commands, neighbours, where it started to point; ready to be walked along.
+/// The tracks of a set with what the filter needs: commands, neighbours, initial headings.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@ namespace kilotwin::identify {
 
 struct Pair;
 
-/// How often the nearest robot was so near that discs would overlap, and a little farther away.
+/// Counts of robots whose nearest neighbour overlaps them, and of those in a ring around that distance.
 struct Meetings {
   static constexpr double kRing_mm = 55;
-  /// Well within two radii, so that no lens makes robots that touch look as if they overlapped.
+  /// Smaller than a disc diameter, so that camera distortion does not make contacts look like overlaps.
   static constexpr double kInside_mm = 0.85 * kDiscs_mm;
-  /// Such a share within, and robots do not feel each other.
+  /// From this relative density of overlaps on, robots do not collide with each other.
   static constexpr double kUnhindered = 0.6;
   std::size_t within = 0, near = 0;
-  /// Of what there would be within if robots did not feel each other, by areas; 0.2 where few have met.
+  /// Density of overlaps relative to the density in the ring. Prior: 0.2, with the weight of ten counts.
   [[nodiscard]] double share_within() const {
     constexpr double kInner = kInside_mm * kInside_mm, kOuter = kRing_mm * kRing_mm - kTouch_mm * kTouch_mm;
     constexpr double kFew = 10;
@@ -27,42 +27,41 @@ struct Meetings {
   }
 };
 
-/// The tracks of a set, ready to be walked along.
+/// The tracks of a set, ready for the filter.
 class PreparedSet {
  public:
-  /// Runs are numbered from `first_number` on: no run of one set is one of another.
+  /// Runs get the numbers `first_number`, ... Run numbers of two sets must not overlap.
   explicit PreparedSet(const MeasuredSet&, std::uint32_t first_number = 0);
 
   [[nodiscard]] const MeasuredSet& set() const { return *set_; }
   [[nodiscard]] std::vector<TrackView>& views() { return views_; }
   [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
   [[nodiscard]] const RunNeighbours& neighbours(std::size_t run) const { return *neighbours_[run]; }
-  /// The tracks that may be fitted to, by unit: by robot, or each for itself where there are fewer than six robots.
+  /// The tracks of the fit, grouped into units: by robot, or one per track if there are fewer than six robots.
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
-  /// Looks again at where discs are, which is not where they are measured, for what robots see of each other.
+  /// Recomputes the disc centres, and with them the neighbour views.
   void find_centres(const MotionModel&, std::uint32_t threads);
-  /// What was found of tracks: where discs are, and headings at starts.
+  /// Estimates that belong to the tracks: disc centres and initial headings.
   struct Found {
-    std::vector<std::vector<Centres>> centres;          ///< by run; none: where they were measured
-    std::vector<std::pair<double, double>> starts_rad;  ///< of each view: the heading, and its standard deviation
+    std::vector<std::vector<Centres>> centres;          ///< by run; empty: measured positions
+    std::vector<std::pair<double, double>> starts_rad;  ///< by view: heading and its standard deviation
   };
   [[nodiscard]] Found found() const;
-  /// All as it was when that was found, but for what floors remember, which is by the model's cells.
+  /// Restores these estimates. Traffic grids are recomputed with the model's cells.
   void go_back(const Found&, const MotionModel&);
-  /// Looks again at what floors remember, in cells of the model's sizes.
+  /// Recomputes the traffic grids with the model's cells.
   void remember(const MotionModel&);
   [[nodiscard]] Meetings meetings() const;
-  /// Robots that came near each other, by where discs are.
+  /// Robots that came near each other, by disc centres.
   [[nodiscard]] std::vector<Pair> pairs() const;
-  /// Finds the heading at the start of each track: as measured, or by which of many would best explain what follows.
+  /// Estimates the initial heading of each track: the measured one, or the most likely of many hypotheses.
   void find_headings(const MotionModel&, std::uint32_t threads);
 
  private:
   const MeasuredSet* set_;
   std::uint32_t first_number_;
   std::vector<std::unique_ptr<RunNeighbours>> neighbours_;
-  std::vector<std::vector<Centres>>
-      centres_;  ///< by which neighbours were found last; none: where they were measured
+  std::vector<std::vector<Centres>> centres_;  ///< by run, as last estimated; empty: measured positions
   std::vector<TrackView> views_;
 };
 

@@ -10,7 +10,8 @@ namespace {
 constexpr Eigen::Index kLanes = 8, kStrip = 2 * kLanes, kColumns = 8;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 
-/// One strip of rows of `sums` by some of its columns, in registers: written out, or a compiler keeps them in memory.
+/// One strip of rows of `sums` by some columns, in registers. Unrolled by hand, since compilers keep the array in
+/// memory.
 template <Eigen::Index... column>
 inline __attribute__((always_inline)) void strip(const double* rows, Eigen::Index count, Eigen::Index n,
                                                  double* sums, const double* by,
@@ -51,7 +52,7 @@ inline __attribute__((always_inline)) void add(const double* rows, Eigen::Index 
   }
 }
 
-/// to = start + by[0] * from[0] + .. over `terms` rows of n numbers, `start` being `to` itself or 0.
+/// to = start + by[0] * from[0] + ... over `terms` rows of n numbers. `start` is `to` or 0.
 template <int terms, bool onto>
 inline __attribute__((always_inline)) void combine(const double* by, const double* from, Eigen::Index stride,
                                                    Eigen::Index n, double* to) {
@@ -75,7 +76,7 @@ inline __attribute__((always_inline)) void combine(const double* by, const doubl
 using Add = void (*)(const double*, Eigen::Index, Eigen::Index, double*);
 using Combine = void (*)(const double*, const double*, Eigen::Index, Eigen::Index, double*);
 
-/// The same sums by the instructions of a kind of processor.
+/// The kernels for one instruction set.
 struct Kernels {
   Add add;
   Combine put3, onto3, onto2, onto1;

@@ -1,4 +1,4 @@
-/// What the filter had to correct, sample by sample: disturbances of the motion, for plots.
+/// Filter corrections, sample by sample, as disturbances of the motion: data of the report's plots.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -7,7 +7,7 @@
 
 namespace kilotwin::identify {
 
-/// One correction of the pose, as speeds over the time since the sample before.
+/// One correction of the pose, divided by the time since the previous sample.
 struct Disturbance {
   double time_s, x_mm, y_mm, heading_rad;
   double since_command_s, motor_s, nearest_mm;
@@ -15,14 +15,14 @@ struct Disturbance {
   std::uint32_t track;
 };
 
-/// Of all tracks, while robots are driven and touch nothing.
+/// Of all tracks, for driven robots without contacts.
 [[nodiscard]] std::vector<Disturbance> disturbances_of(const MotionModel&, const PreparedSet&,
                                                        std::uint32_t threads);
 
-/// The report's covariate_plots (identify.hpp).
+/// covariate_plots of the result document (identify.hpp).
 [[nodiscard]] nlohmann::json covariate_plots(const std::vector<Disturbance>& before,
                                              const std::vector<Disturbance>& after);
-/// The report's maps.
+/// maps of the result document.
 [[nodiscard]] nlohmann::json maps(const std::vector<Disturbance>& before, const std::vector<Disturbance>& after);
 
 }  // namespace kilotwin::identify

@@ -7,9 +7,10 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Squared distances beyond which a measurement is an outlier: what normal noise exceeds once in about 1e5 times, of 2 and 3 numbers.
+/// Squared Mahalanobis distance of an outlier: the 1 - 1e-5 quantile of chi squared with 2 and 3 degrees of
+/// freedom.
 constexpr double kGate2 = 23, kGate3 = 25.9;
-/// So many far outliers in a row mean that the robot is elsewhere.
+/// Number of consecutive far outliers after which the track counts as lost.
 constexpr int kLostAfter = 4;
 constexpr double kFar = 60;
 
@@ -20,7 +21,7 @@ StepWays ways_of(const StepRecord& record, double wheel_base_mm) {
   const double h = record.h_s;
   const double world_x = record.rates.world_x_mm_s * h, world_y = record.rates.world_y_mm_s * h;
   const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 * h;
-  // A turn within the step also bends the rest of it.
+  // A turn within the step also changes the direction of the rest of the step.
   const double bend_x = -arc.along_y * forward / 2, bend_y = arc.along_x * forward / 2;
   StepWays ways;
   ways.by_wheel << arc.along_x / 2 - bend_x / wheel_base_mm, arc.along_x / 2 + bend_x / wheel_base_mm,  //
@@ -47,7 +48,7 @@ void TrackFilter::start(const Sample& sample, const Situation&, double heading_r
   const BaseParameters& base = model_->base;
   const double c = std::cos(heading_rad), s = std::sin(heading_rad);
   const double variance = heading_sd_rad * heading_sd_rad;
-  // The point is where it was seen; the reference point lies behind it, wherever that is.
+  // The tracked point is at the measurement. The reference point follows from the heading.
   Eigen::Vector3d by_heading(base.ahead_mm * s + base.left_mm * c, -base.ahead_mm * c + base.left_mm * s, 1);
   belief_.mean.head<3>() << sample.x_mm - base.ahead_mm * c + base.left_mm * s,
       sample.y_mm - base.ahead_mm * s - base.left_mm * c, heading_rad;
@@ -57,7 +58,7 @@ void TrackFilter::start(const Sample& sample, const Situation&, double heading_r
   belief_.covariance(0, 0) += model_->noise.position_mm2;
   belief_.covariance(1, 1) += model_->noise.position_mm2;
   if (measures_) {
-    // What the tracker adds is taken off.
+    // Removes the measurement effects by fixed-point iteration.
     const Situation at = situation(sample.time_s, CommandState{}, {});
     constexpr int kPasses = 6;
     for (int pass = 0; pass < kPasses; ++pass) {
@@ -98,7 +99,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   record.h_s = h_s;
   Eigen::Vector3d pose = belief_.mean.head<3>();
   if (!model_->terms.empty() && commands.driven()) {
-    // Half a step ahead by the base model, for what depends on the pose.
+    // Predicts half a step with the base model, for the covariates at the midpoint.
     Rates plain;
     const Eigen::Vector2d v = nominal_speeds(model_->base, commands.command) + belief_.mean.tail<2>();
     plain.left_mm_s = v[0];
@@ -109,7 +110,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   record.middle = situation(time_s + h_s / 2, pose, commands, near);
   record.middle.span_s = h_s;
   record.middle.commands.advance(h_s / 2);
-  // A robot at rest is pushed by others as well.
+  // Robots also push a robot at rest.
   record.at_robot = model_->contacts && near.nearest_mm < model_->touch_mm;
   record.at_wall =
       commands.driven() && (held_ || model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm));
@@ -125,7 +126,7 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
 void TrackFilter::hold_inside() {
   const Room& room = model_->room;
   const double ahead = model_->base.centre_mm;
-  // Few are near a wall.
+  // Early exit: few robots are near a wall.
   const StateCovariance& p = belief_.covariance;
   constexpr double kNear = 6;  // standard deviations
   const double reach = kNear * (std::sqrt(p(0, 0) + p(1, 1)) + std::abs(ahead) * std::sqrt(p(2, 2)));
@@ -139,8 +140,8 @@ void TrackFilter::hold_inside() {
   hold_behind(1, room.y_low_mm, -1);
 }
 
-/// A normal variable X of the centre becomes min(X, wall), whose first two moments are known; its covariance with any other
-/// normal variable is that of X times the chance of X < wall (Stein's lemma).
+/// Censoring: X ~ N becomes min(X, wall). Its first two moments are closed forms. Its covariance with any jointly
+/// normal variable is that of X times P(X < wall) (Stein's lemma).
 void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards) {
   if (std::isinf(wall_mm)) return;
   const double c = std::cos(belief_.mean[2]), s = std::sin(belief_.mean[2]);
@@ -164,7 +165,7 @@ void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards
   belief_.mean[axis] += outwards * (mean - beyond);
 }
 
-/// The covariance at the end of the step: what was uncertain moves along, and the noise of the step comes in.
+/// Covariance prediction: P = F P F' + Q.
 void TrackFilter::spread(const StepRecord& record) {
   const double h = record.h_s;
   const auto [by_heading, by_wheel] = ways_of(record, model_->base.wheel_base_mm);
@@ -178,7 +179,7 @@ void TrackFilter::spread(const StepRecord& record) {
     by_bias.col(1) = h * record.rates.right_gain * by_wheel.col(1);
     own[2] += noise.heading_rad2_s * h;
   }
-  // F P F^T, F being 1 but for these columns: rows first, then columns. Biases may be known, with zeros in P.
+  // F differs from the identity only in these columns: rows first, then columns. Known biases have zeros in P.
   const bool biased = p(3, 3) > 0 || p(4, 4) > 0;
   p.row(0) += by_heading[0] * p.row(2);
   p.row(1) += by_heading[1] * p.row(2);
@@ -204,7 +205,8 @@ void TrackFilter::step_mean(double time_s, double h_s, const CommandState& comma
   const StateCovariance p = belief_.covariance;
   look_ahead();
   const StepRecord record = step_freely(time_s, h_s, commands, near);
-  // With a normal heading of variance P, E[cos] = cos exp(-P / 2), and speeds that go with the heading shift it.
+  // For a normal heading of variance P, E[cos] = cos exp(-P / 2). The covariance of speed and heading shifts the
+  // mean.
   const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 + record.rates.ahead_mm_s;
   const double shrink = std::exp(-p(2, 2) / 2);
   const double together = (record.rates.left_gain * p(2, 3) + record.rates.right_gain * p(2, 4)) / 2;
@@ -225,7 +227,7 @@ Eigen::Matrix3d TrackFilter::jacobian(const Situation& at) const {
     h(1, 2) = base.ahead_mm * c - base.left_mm * s;
     return h;
   }
-  // Differences on one side: what trackers add bends far less within these steps.
+  // One-sided differences: measurement effects are nearly linear over these steps.
   const Eigen::Vector3d here = model_->measured(m[0], m[1], m[2], at);
   const double steps[] = {0.1, 0.1, 1e-4};
   for (int i = 0; i < 3; ++i) {
@@ -273,7 +275,7 @@ Innovation TrackFilter::update(const Sample& sample, const CommandState& command
   }
   out.log_likelihood = -0.5 * (std::log(s.determinant()) + out.size * std::log(factor) + out.distance2 / factor);
   if (outliers_ >= kLostAfter) {
-    // Wherever it was, it is here now; which way it points is less known than before, unless it is measured.
+    // Restart at the measured position. The heading is measured, or gets a larger variance.
     out.lost = true;
     constexpr double kLeast_rad = 0.4, kMost_rad = 1.8;
     const double known = std::clamp(3 * std::sqrt(belief_.covariance(2, 2)), kLeast_rad, kMost_rad);

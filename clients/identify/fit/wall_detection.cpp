@@ -9,23 +9,23 @@
 namespace kilotwin::identify {
 namespace {
 
-/// One coordinate of a disc, by track, while its robot goes straight.
+/// One coordinate of a disc centre while its robot drives straight.
 struct Place {
   double at_mm;
   std::size_t track;
 };
 
-/// How often, and how many robots, must have been at a line to make it a wall.
+/// Bounds for a wall: the number of positions and the number of tracks at a line.
 struct Evidence {
   std::size_t places, tracks;
 };
 
-/// The line at the upper end of a coordinate where robots stay; infinite where there is none.
+/// The upper wall along one coordinate: the line at which robots accumulate. Infinite if there is none.
 double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   if (places.size() < 500) return kNone;
   std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.at_mm > b.at_mm; });
-  // Outliers lie beyond walls too.
+  // Outliers may lie beyond the wall.
   const double edge = places[std::max<std::size_t>(3, places.size() / 2000)].at_mm;
   const double width = 2 + 3 * noise_mm;
   std::size_t at_edge = 0, before = 0;
@@ -43,7 +43,7 @@ double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
       break;
     }
   }
-  // Of a free robot's places no strip holds many times what the strips beside it hold.
+  // A wall concentrates positions in one strip. The positions of free robots vary slowly between strips.
   const bool crowded = static_cast<double>(at_edge) > 2 * (static_cast<double>(before) / 2 + 3);
   if (at_edge < fewest.places || tracks.size() < fewest.tracks || !crowded) return kNone;
   return sum / static_cast<double>(at_edge);
@@ -83,7 +83,7 @@ Room room_of(const PreparedSet& set, const MotionModel& model) {
                 -upper_wall(y_turned, noise, fewest), upper_wall(y, noise, fewest)};
   };
   const Room room = seen({25, 2});
-  // Where there are walls on most sides, there is one on the others.
+  // If three sides have walls, the fourth needs less evidence.
   constexpr std::ptrdiff_t kMostSides = 3;
   const std::array<double, 4> sides = {room.x_low_mm, room.x_high_mm, room.y_low_mm, room.y_high_mm};
   const bool closed =

@@ -7,9 +7,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "clients/identify/kilogrid/floor_validation.hpp"
 #include "clients/identify/kilogrid/floor_plots.hpp"
 #include "clients/identify/kilogrid/floor_search.hpp"
+#include "clients/identify/kilogrid/floor_validation.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::kilogrid {

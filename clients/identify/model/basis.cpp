@@ -16,7 +16,7 @@ double unit_of(double c, double low, double high, double warp) {
   return inside / (high - low);
 }
 
-/// cos(k a), k = 0..last, by the recurrence of Chebyshev in steps of four, so that none waits for the one before.
+/// cos(k a), k = 0..last, by Chebyshev's recurrence with stride four, so that four chains run in parallel.
 void cosines(double angle, std::uint32_t last, double* to) {
   const double c = std::cos(angle), c2 = 2 * c * c - 1, c4 = 2 * c2 * c2 - 1;
   const double start[] = {1, c, c2, c * (2 * c2 - 1), c4};
@@ -24,7 +24,7 @@ void cosines(double angle, std::uint32_t last, double* to) {
   for (std::uint32_t k = 5; k <= last; ++k) to[k] = 2 * c4 * to[k - 4] - (k < 8 ? to[8 - k] : to[k - 8]);
 }
 
-/// Legendre's polynomials P_k(at), k = 0..last.
+/// Legendre polynomials P_k(at), k = 0..last.
 void legendre(double at, std::uint32_t last, double* to) {
   to[0] = 1;
   to[1] = at;
@@ -91,14 +91,14 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
       return;
     case Shape::kAtLeast:
-      // Within a sub-step, for as much of it as lies after the point.
+      // Within a sub-step: the fraction of the sub-step after the point.
       for (std::size_t i = 0; i < points.size(); ++i) {
         to[i] = axis.of == Covariate::kTime && s.span_s > 0 ? std::clamp((c - points[i]) / s.span_s + 0.5, 0.0, 1.0)
                                                             : (c >= points[i] ? 1 : 0);
       }
       return;
     case Shape::kLevelling:
-      // Mostly there are none, or it has just begun.
+      // Most often there is none, or it has just begun.
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == 0 ? 0 : -std::expm1(-c / points[i]);
       return;
     case Shape::kExponential:
@@ -170,7 +170,7 @@ void Basis::evaluate(const Situation& s, std::size_t wheel, double* to) const {
     const std::size_t n = factor.size();
     KILOTWIN_DEMAND(have * n <= kMostColumns);
     factor.evaluate(s, wheel, of_factor.data());
-    // From the last, so that nothing is overwritten before it is read.
+    // From the last column on, so that no column is overwritten before it is read.
     for (std::size_t i = have; i-- > 0;)
       for (std::size_t j = n; j-- > 0;) to[i * n + j] = to[i] * of_factor[j];
     have *= n;

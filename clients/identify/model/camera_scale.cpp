@@ -10,17 +10,19 @@ namespace {
 
 using Shape = Factor::Shape;
 
-// What is looked at of distances, mm: two radii, and as far about them as any picture that is put straight is off.
+// Range of pair distances, mm: one disc diameter and the largest scale error of a camera map about it. Histogram
+// bin, mm.
 constexpr double kLow_mm = 24, kHigh_mm = 48, kBin_mm = 0.1;
 constexpr std::size_t kBins = 240;
-/// Discs are not round to less than this, and legs lean.
+/// Tolerance of the disc diameter, mm: discs are not exactly round, and legs lean.
 constexpr double kMade_mm = 0.3;
-/// Pairs are looked at so often.
+/// Sampling interval of pairs.
 constexpr double kEvery_s = 0.5;
 
 double below(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
 
-/// Shares of the bins among robots that pass each other, none nearer than `edge`, and those that stay there.
+/// Probability of each histogram bin: a mixture of robots that pass each other, none nearer than `edge`, and
+/// robots in contact.
 struct Shares {
   std::array<double, kBins> passing{}, staying{};
   Shares(double edge_mm, double sd_mm) {
@@ -37,7 +39,8 @@ struct Shares {
   }
 };
 
-/// Coefficients of the map's columns that are linear along its own axis, one for each of x and y; null where it has none.
+/// Coefficients of the camera map's columns that are linear along their own axis, for x and for y; null if the map
+/// lacks them.
 struct LinearMap {
   double *x = nullptr, *y = nullptr;
   const Factor* of = nullptr;
@@ -50,7 +53,7 @@ LinearMap linear_map_of(Term& term) {
     const auto n = static_cast<Eigen::Index>(block.basis.size());
     const bool x = block.target == Target::kMeasuredX, y = block.target == Target::kMeasuredY;
     if ((x || y) && block.basis.factors.size() == 1 && block.basis.factors.front().shape == Shape::kPolynomials2) {
-      // The first column is P1 of x, the second of y.
+      // The first column is P1(x), the second P1(y).
       const std::uint32_t wanted = x ? 0 : 1;
       for (Eigen::Index i = 0; i < n; ++i) {
         const std::uint32_t column = block.basis.chosen.empty() ? static_cast<std::uint32_t>(i)
@@ -105,18 +108,18 @@ std::optional<TouchingApart> touching_apart(const std::vector<Pair>& pairs) {
   if (meetings < kFewest) return std::nullopt;
   double all = 0;
   for (const double count : counts) all += count;
-  // Instants of one meeting count as one.
+  // Instants of one encounter count as one observation.
   const double weight = static_cast<double>(meetings) / all;
   const auto worth = [&](const Shares& shares, double staying) {
     double sum = 0;
     for (std::size_t i = 0; i < kBins; ++i)
       if (counts[i] > 0)
-        // Some are where no model has them.
+        // Floor of the probability: some pairs follow no model.
         sum += counts[i] *
                std::log(0.98 * ((1 - staying) * shares.passing[i] + staying * shares.staying[i]) + 0.02 / kBins);
     return weight * sum;
   };
-  // Nobody touches anybody.
+  // Null hypothesis: robots do not touch.
   const double nothing = worth(Shares(-100, 1), 0);
   struct Tried {
     double edge_mm, value;
@@ -179,7 +182,7 @@ double ScaleHold::log_length(const MotionModel& model) const {
 double ScaleHold::factor(const MotionModel& model) const { return std::exp(then_ - log_length(model)); }
 
 Room carried(const Room& room, const MotionModel& before, const MotionModel& after) {
-  // Of a side without a wall opposite, so much to either side of the middle of the picture.
+  // Half-length of the span used if the opposite side has no wall, from the middle of the image.
   constexpr double kSide_mm = 250;
   constexpr std::array<double, 5> kAlong = {0.1, 0.3, 0.5, 0.7, 0.9};
   const auto range = [&](double low, double high) {
@@ -190,7 +193,7 @@ Room carried(const Room& room, const MotionModel& before, const MotionModel& aft
   };
   const auto [x_low, x_high] = range(room.x_low_mm, room.x_high_mm);
   const auto [y_low, y_high] = range(room.y_low_mm, room.y_high_mm);
-  // Of centres, wherever the point that is tracked is thought to be.
+  // Compares disc centres, whichever point of the robot is tracked.
   const auto of_centres = [](MotionModel model) {
     model.base.ahead_mm = model.base.centre_mm = model.base.left_mm = 0;
     return model;
@@ -274,7 +277,7 @@ bool rescale(MotionModel& model, double factor) {
       first += n;
     }
   }
-  // The picture shows all as large as before.
+  // The camera image keeps its size.
   *map.x += (1 / factor - 1) * (map.of->high - map.of->low) / 2;
   *map.y += (1 / factor - 1) * (map.of->and_high - map.of->and_low) / 2;
   BaseParameters& base = scaled.base;
@@ -291,7 +294,7 @@ bool rescale(MotionModel& model, double factor) {
   wider(scaled.room.x_high_mm, middle_x);
   wider(scaled.room.y_low_mm, middle_y);
   wider(scaled.room.y_high_mm, middle_y);
-  // Not moved: who looks at a term goes on looking at it.
+  // Assigned in place: callers hold references to a term.
   model = scaled;
   return true;
 }

@@ -1,5 +1,5 @@
-/// How large a picture is that is put straight. Tracks alone do not tell: in a picture that shows all larger, robots are as much
-/// faster. Lengths that are known do: discs that touch are two radii apart.
+/// Scale of a camera whose distortion is fitted. Tracks leave the scale undetermined: a larger image means faster
+/// robots. Known lengths determine it: the centres of two robots in contact are one disc diameter (33 mm) apart.
 #pragma once
 
 #include <optional>
@@ -10,53 +10,55 @@
 
 namespace kilotwin::identify {
 
-/// How far apart the centres of robots are that touch.
+/// Distance between the centres of robots in contact, estimated from all pairs.
 struct TouchingApart {
-  double mm = 0, sd_mm = 0;  ///< of what touching is by chance and by how discs are made
-  std::size_t meetings = 0;  ///< of two robots in one run
+  double mm = 0, sd_mm = 0;  ///< mean and standard error, with the tolerance of disc diameters
+  std::size_t meetings = 0;  ///< number of encounters: two robots of one run, at one occasion
 };
 
-/// A pair of robots at an instant.
+/// Two robots at one instant.
 struct Pair {
   double apart_mm = 0;
-  std::size_t meeting = 0;    ///< by number: what one pair does within a while is no new evidence
-  double x_mm = 0, y_mm = 0;  ///< the middle between them
-  Situation at;               ///< when, and in which run
+  std::size_t meeting = 0;    ///< index of the encounter: instants of one encounter are not independent
+  double x_mm = 0, y_mm = 0;  ///< midpoint
+  Situation at;               ///< time and run
 };
 
-/// Where distances begin: robots stay at the distance at which they touch, and none come nearer. Nothing where it does not show.
+/// Estimates the contact distance as the lower edge of the distribution of pair distances, where robots in contact
+/// accumulate. Nothing if the data do not show an edge.
 [[nodiscard]] std::optional<TouchingApart> touching_apart(const std::vector<Pair>&);
 
-/// All pairs of a run that came near each other; `number` is that of the run.
+/// Appends all pairs of a run that came near each other; `number` is that of the run.
 void add_pairs(const RunNeighbours&, std::size_t robots, std::uint32_t number, std::vector<Pair>& to);
 
-/// Keeps the scale of a picture that is put straight while its map is fitted anew: places in the picture that lie as far from
-/// each other in the room as before, on the average.
+/// Constraint on the scale of a camera map during a refit: a set of spans in the image keeps its mean length in
+/// the world.
 class ScaleHold {
  public:
-  /// About where pairs met.
+  /// Spans around the places where pairs met. `relative_sd`: standard deviation of the constraint.
   ScaleHold(const MotionModel&, const std::vector<Pair>&, double relative_sd);
   [[nodiscard]] double relative_sd() const { return relative_sd_; }
-  /// So many times as long must all lengths in the room become.
+  /// Factor by which all lengths in the world must grow to restore the constraint.
   [[nodiscard]] double factor(const MotionModel&) const;
 
  private:
   struct Span {
     Situation at;
-    double x_mm[2], y_mm[2];  ///< of its ends, in the picture
+    double x_mm[2], y_mm[2];  ///< end points in the image
   };
-  [[nodiscard]] double log_length(const MotionModel&) const;  ///< mean of all
+  [[nodiscard]] double log_length(const MotionModel&) const;  ///< mean over all spans
   std::vector<Span> spans_;
   double then_ = 0, relative_sd_ = 0;
 };
 
-/// The walls of the model, where another picture of them has them: they are seen where they were seen before.
+/// Maps the walls of `before` into the camera model of `after`, so that the camera sees them at the same places.
 [[nodiscard]] Room carried(const Room&, const MotionModel& before, const MotionModel& after);
 
-/// The same model with all lengths in the room `factor` times as long, and the picture as it was, about the middle of the map
-/// of the picture. False, and the model as it was, where it has no map that could take it up.
+/// Scales all lengths in the world by `factor` about the middle of the camera map, and leaves the image unchanged.
+/// False, without a change, if the model has no camera map that can compensate for it.
 bool rescale(MotionModel&, double factor);
-/// By how much such a map makes the picture larger (logarithm of the scale) with each coefficient of all terms, in order; none where
+/// Derivative of the logarithm of the camera scale by each coefficient of all terms, in order. Empty if the model
+/// has no such map.
 /// it has no such map.
 [[nodiscard]] Eigen::VectorXd log_scale_by_coefficients(const MotionModel&);
 

@@ -1,5 +1,5 @@
-/// Where robots touch: walls, seen by where robots come to a stop, and each other. What happens to a robot there is nobody's
-/// model of a free robot: its way is uncertain while it touches, and nothing is concluded from it.
+/// Geometry of contacts: walls and discs. The free-motion model does not describe a robot in contact. The filter
+/// adds contact noise there, and the fit uses no other information from it.
 #pragma once
 
 #include <algorithm>
@@ -10,12 +10,12 @@
 
 namespace kilotwin::identify {
 
-/// Centres of discs stay within.
+/// Bounds of the disc centres, mm. Infinite: no wall on that side.
 struct Room {
   double x_low_mm = -std::numeric_limits<double>::infinity(), x_high_mm = std::numeric_limits<double>::infinity();
   double y_low_mm = -std::numeric_limits<double>::infinity(), y_high_mm = std::numeric_limits<double>::infinity();
 
-  /// Within so much of a wall, mm.
+  /// Whether the point is within `margin_mm` of a wall or beyond it.
   [[nodiscard]] bool at_wall(double x_mm, double y_mm, double margin_mm) const {
     return x_mm < x_low_mm + margin_mm || x_mm > x_high_mm - margin_mm || y_mm < y_low_mm + margin_mm ||
            y_mm > y_high_mm - margin_mm;
@@ -28,12 +28,12 @@ struct Room {
   [[nodiscard]] double inside_y(double y_mm) const { return std::clamp(y_mm, y_low_mm, y_high_mm); }
 };
 
-/// Two robots whose centres are this near may touch, mm: two radii of 16.5 mm, and what they move between looks.
+/// Robots with centres this close may be in contact, mm: one diameter of 33 mm, and the motion between samples.
 inline constexpr double kTouch_mm = 36;
 inline constexpr double kDiscs_mm = 33;
 inline constexpr double kWallMargin_mm = 4;
 
-/// Pushes overlapping discs apart, half the overlap each; whether any did. NaN: not there.
+/// Separates overlapping discs by half the overlap each. Returns whether any overlapped. NaN: the robot is absent.
 bool push_apart(std::vector<double>& x_mm, std::vector<double>& y_mm);
 
 }  // namespace kilotwin::identify

@@ -9,16 +9,17 @@ double wrapped_angle(double rad) { return std::remainder(rad, 2 * M_PI); }
 
 namespace {
 
-/// For which a motor has turned, or either: all of it, or what is not forgotten.
+/// Motor-on time of one motor (0, 1) or of either (2): total, or discounted with time constant kDecayTimes_s[decay
+/// - 1].
 double use_s(const CommandState& commands, std::size_t motor, std::uint8_t forget) {
   if (forget > 0) return commands.remembered_s(forget - 1u, motor);
   return motor < 2 ? commands.motor_s[motor] : commands.driven_s;
 }
 
-/// Whether it is not among what is added up beforehand.
+/// Whether the covariate needs the list of neighbours, since no precomputed sum covers it.
 bool is_listed(const Axis& axis) { return axis.focus > 0 || axis.within_mm > 0; }
 
-/// Neighbours added up by where they are, too. Where they are not listed, as if all lay in that direction.
+/// Directional sum over neighbours. Without a list, all neighbours count as if they lay in that direction.
 double toward(const Axis& axis, const Situation& s) {
   const NeighbourView& near = s.near;
   const bool count = axis.of == Covariate::kNeighbours;

@@ -1,4 +1,5 @@
-/// What effects look at: one robot at one instant, and numbers of it by the names that model files know.
+/// Covariates of effects: values of one robot at one instant, named as in model files. Lengths mm, times s, angles
+/// rad.
 #pragma once
 
 #include <array>
@@ -9,42 +10,44 @@
 
 namespace kilotwin::identify {
 
-/// Radii within which robots count as neighbours, mm, centre to centre: from touching to well within reach of a message.
+/// Neighbourhood radii, mm, centre to centre: from contact to about the radio range.
 inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,  80,  90,  100,
                                                               110, 120, 130, 140, 150, 175, 200};
 
-/// So many sizes of cells in which a floor may remember where robots went (MotionModel::cells).
+/// Number of grids of driven time per floor cell, each with its own cell size (MotionModel::cells).
 inline constexpr std::size_t kFloorCells = 6;
 
-/// One of the other robots, seen from one.
+/// One neighbour, relative to a robot.
 struct OtherRobot {
   float distance_mm = 0;               ///< centre to centre
-  float towards_x = 0, towards_y = 0;  ///< of length 1; 0 where it stands at the same place
+  float towards_x = 0, towards_y = 0;  ///< unit vector; 0 if both are at the same place
 };
-/// Others farther away are not listed.
+/// Radius of the list of neighbours, mm.
 inline constexpr double kListed_mm = 150;
 
-/// The other robots, seen from one, and what they left on the floor.
+/// The neighbours of one robot at one instant, and the traffic at its place.
 struct NeighbourView {
-  double nearest_mm = 1e9;                                    ///< centre to centre
-  double direction_rad = 0;                                   ///< to the nearest, from the x axis
-  std::array<float, kNeighbourRadii_mm.size()> count = {};    ///< within kNeighbourRadii_mm
-  std::array<float, kNeighbourRadii_mm.size()> density = {};  ///< sum of (1 - (distance / radius)^2)^2
-  std::array<float, kFloorCells> trodden_s = {};  ///< for which driven robots stood in its cell, itself included
-  /// Those within kListed_mm, one by one: of this list, from `first_listed` on. Null: they are not listed.
+  double nearest_mm = 1e9;                                  ///< centre to centre
+  double direction_rad = 0;                                 ///< direction of the nearest, from the x axis
+  std::array<float, kNeighbourRadii_mm.size()> count = {};  ///< number within each of kNeighbourRadii_mm
+  /// sum of (1 - (distance / radius)^2)^2 for each of kNeighbourRadii_mm
+  std::array<float, kNeighbourRadii_mm.size()> density = {};
+  /// driven time of all robots, itself included, in its cell of each grid, s
+  std::array<float, kFloorCells> trodden_s = {};
+  /// Neighbours within kListed_mm: `listed` entries of this list from `first_listed` on. Null: not listed.
   const std::vector<OtherRobot>* list = nullptr;
   std::uint32_t first_listed = 0, listed = 0;
 };
 
 struct Situation {
   double time_s = 0;
-  double x_mm = 0, y_mm = 0;  ///< of the disc's centre
+  double x_mm = 0, y_mm = 0;  ///< disc centre
   double heading_rad = 0;
   CommandState commands;
   NeighbourView near;
-  std::uint32_t robot = 0;  ///< its number
-  std::uint32_t run = 0;    ///< place in the set
-  double span_s = 0;        ///< of the sub-step of which this is the middle; 0: an instant
+  std::uint32_t robot = 0;  ///< robot number
+  std::uint32_t run = 0;    ///< index of the run
+  double span_s = 0;        ///< length of the sub-step whose midpoint this is; 0: an instant
 };
 
 enum class Covariate : std::uint8_t {
@@ -56,43 +59,44 @@ enum class Covariate : std::uint8_t {
   kHeading,
   kCommand,
   kSinceCommand,
-  kMotorTime,  ///< of the wheel's own motor
+  kMotorTime,  ///< motor-on time of the wheel's own motor
   kLeftMotorTime,
   kRightMotorTime,
   kDrivenTime,
-  kNeighbours,  ///< within radius
-  kNearest,     ///< at most radius
+  kNeighbours,  ///< number within the radius
+  kNearest,     ///< distance to the nearest, at most the radius
   kDensity,
-  kBearing,          ///< to the nearest, from the heading
-  kPreviousCommand,  ///< kNoCommand for the first
-  kPreviousLasted,   ///< s for which that lasted; 0 where there was none
+  kBearing,          ///< direction of the nearest, relative to the heading
+  kPreviousCommand,  ///< kNoCommand for the first command
+  kPreviousLasted,   ///< duration of the previous command, s; 0 if there was none
   kLastTurn,
-  kSinceRest,      ///< s since which it is driven without a rest
-  kUseDifference,  ///< s for which the right wheel's motor has turned longer than the left one's
-  kTrodden,        ///< time that driven robots stood in its cell of the floor
+  kSinceRest,      ///< time since the last rest, s
+  kUseDifference,  ///< motor-on time of the right wheel's motor minus that of the left one's, s
+  kTrodden,        ///< driven time of all robots in the floor cell, s
   kRobot,
   kRun,
 };
 
-/// What the previous command is where there was none: the simulator takes it for a stop.
+/// Value of kPreviousCommand under the first command. The simulator uses a stop there.
 inline constexpr double kNoCommand = 4;
 
 struct Axis {
   Covariate of = Covariate::kNothing;
-  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; of kTrodden, into MotionModel::cells
-  std::uint8_t forget = 0;  ///< with motor and driven times: 1 + index into kForget_s; 0: all counts
-  /// With kNeighbours and kDensity within at most kListed_mm: another robot counts ((1 + cos(bearing - toward)) / 2)^focus times.
+  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; for kTraffic, into MotionModel::cells
+  std::uint8_t forget = 0;  ///< for motor-on and driven times: 1 + index into kDecayTimes_s; 0: not discounted
+  /// For kNeighbours and kDensity up to kListed_mm: each neighbour has the weight ((1 + cos(bearing - toward)) /
+  /// 2)^focus.
   std::uint8_t focus = 0;
   std::int16_t toward_deg = 0;
-  /// With neighbours: a radius of its own in mm, at most kListed_mm; 0: that of kNeighbourRadii_mm.
+  /// For neighbours: a radius in mm, at most kListed_mm, in place of kNeighbourRadii_mm[radius]; 0: none.
   float within_mm = 0;
 
   bool operator==(const Axis&) const = default;
 };
 
-/// Of an axis of neighbours: robots farther away do not count.
+/// The radius of a neighbour covariate, mm.
 [[nodiscard]] double reach_mm(const Axis&);
-/// `wheel`: 0 left, 1 right; matters to kMotorTime alone.
+/// `wheel`: 0 left, 1 right; used by kMotorTime only.
 [[nodiscard]] double value_of(const Axis&, const Situation&, std::size_t wheel);
 [[nodiscard]] double wrapped_angle(double rad);
 

@@ -23,7 +23,7 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kCommand: return Function::COMMAND;
     case Covariate::kSinceCommand: return Function::TIME_SINCE_COMMAND;
     case Covariate::kMotorTime: return Function::MOTOR_TIME;
-    // The left motor drives the right-hand wheel.
+    // The left motor drives the right-hand wheel (idl/effects.proto names motors, this model names wheels).
     case Covariate::kLeftMotorTime: return Function::RIGHT_MOTOR_TIME;
     case Covariate::kRightMotorTime: return Function::LEFT_MOTOR_TIME;
     case Covariate::kDrivenTime: return Function::DRIVEN_TIME;
@@ -46,7 +46,7 @@ Function::Covariate covariate_of(Covariate c) {
 bool is_of_use(Covariate c) { return c >= Covariate::kMotorTime && c <= Covariate::kDrivenTime; }
 bool is_of_neighbours(Covariate c) { return c >= Covariate::kNeighbours && c <= Covariate::kBearing; }
 
-/// A situation in which one covariate, or two, have values; what else there is does not matter.
+/// A situation in which one or two covariates have given values. The other values do not matter.
 Situation with(const Axis& axis, double value, Situation s = {}) {
   switch (axis.of) {
     case Covariate::kTime: s.time_s = value; break;
@@ -97,7 +97,7 @@ void set_axis(Function& function, const Factor& factor) {
     function.set_forget_s(kForget_s[factor.axis.forget - 1u]);
 }
 
-/// The natural spline through the curve, with knots as dense as it bends.
+/// Natural cubic spline through the curve.
 void set_spline(Function& function, const Factor& factor, const Eigen::VectorXd& coefficients, double low,
                 double high, double warp, int knots) {
   proto::Spline& spline = *function.mutable_spline();
@@ -110,7 +110,7 @@ void set_spline(Function& function, const Factor& factor, const Eigen::VectorXd&
   }
 }
 
-/// The sum of a factor's columns by coefficients, as one function.
+/// The sum of a factor's columns, weighted with the coefficients, as one function.
 Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) {
   if (!factor.known.empty()) {
     Factor open = factor;
@@ -123,10 +123,10 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
   Function function;
   set_axis(function, factor);
   switch (factor.shape) {
-    // Through two points: beyond them, where there were no data, it stays as it is at the last.
+    // A spline through two points: constant beyond them, where there were no data.
     case Shape::kLinear: set_spline(function, factor, coefficients, factor.low, factor.high, 0, 2); break;
     case Shape::kCosines: {
-      // Eight knots a half-wave of the finest column that counts.
+      // Eight knots per half-wave of the highest column in use.
       Eigen::Index last = 0;
       for (Eigen::Index i = 0; i < coefficients.size(); ++i)
         if (coefficients[i] != 0) last = i;
@@ -225,7 +225,7 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
   return function;
 }
 
-/// Functions whose products, one list each, add up to the sum of a basis' columns by coefficients.
+/// Lists of functions. The sum over lists of the product of each list equals the basis' weighted sum of columns.
 std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factors, std::size_t from,
                                                const Eigen::VectorXd& coefficients) {
   if (from == factors.size()) {
@@ -234,7 +234,7 @@ std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factor
     return {{constant}};
   }
   const Factor& factor = factors[from];
-  // Amounts of a constant stay amounts, as those of the curve beside it.
+  // Amplitudes of a constant stay a product, like those of the curve beside it.
   const bool of_a_constant = factors.size() == 1 && !factor.known.empty();
   if (from + 1 == factors.size() && !of_a_constant) return {{function_of(factor, coefficients)}};
   std::vector<std::vector<Function>> all;
@@ -291,7 +291,7 @@ void set_target(Effect& effect, Target target) {
   }
 }
 
-/// What a small turn of the picture does to one axis of positions: x falls with y, y rises with x.
+/// Effect of a small rotation of the image on one axis: x' = x - turn y, y' = y + turn x.
 Effect turned_position(const Effect& turn, Target axis) {
   Effect effect = turn;
   set_target(effect, axis);

@@ -1,4 +1,4 @@
-/// Terms as records of effects, which the simulator runs.
+/// Terms of the fitted model as effect records (idl/effects.proto), which the simulator executes.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,16 +10,18 @@
 
 namespace kilotwin::identify {
 
-/// One record where the term is a function of one covariate or two; several, of which the effects add up, where it is more.
+/// One record per function of one or two covariates. Further structure becomes several records, whose effects add
+/// up.
 [[nodiscard]] std::vector<proto::Effect> effects_of_term(const Term&);
 
-/// "constant", "steps", "curve", "map", "table"... of its first block.
+/// Form of the first block: "constant", "linear", "curve", "map", "harmonic", "table", "steps", "exponential" or
+/// "product".
 [[nodiscard]] const char* form_of(const Term&);
 
-/// Of the arena field that holds what the floor remembers in cells of MotionModel::cells[cells].
+/// Name of the arena field that holds the driven time per cell of MotionModel::cells[cells].
 [[nodiscard]] std::string field_name(std::uint8_t cells);
 
-/// A number with seven digits.
+/// A number rounded to seven significant digits. 0 if not finite.
 [[nodiscard]] double rounded(double value);
 
 }  // namespace kilotwin::identify

@@ -81,7 +81,7 @@ const char* name_of(Function::Covariate of) {
   }
 }
 
-/// With a sign, three digits.
+/// A signed value with three digits.
 std::string amount(double value, Effect::Target target) {
   const Unit unit = unit_of(target);
   const double v = value * unit.factor, size = std::abs(v);
@@ -101,7 +101,7 @@ const char* command_name(double key) {
   return kNames[static_cast<std::size_t>(std::clamp(key, 0.0, 3.0))];
 }
 
-/// Ends of a curve, and what lies well beyond them between.
+/// The ends of a curve, and extremes between them.
 std::string of_curve(const std::vector<double>& at, const std::vector<double>& value, Effect::Target target,
                      Function::Covariate of) {
   const auto [low, high] = std::minmax_element(value.begin(), value.end());
@@ -193,7 +193,7 @@ std::string amounts_in_words(const Function& f) {
                      f.spline().value(last), place(f.spline().knot(last), f.of()));
 }
 
-/// What is shown of a cause of one curve times amounts: the curve, where the amount is 1.
+/// A curve times amplitudes, as shown: the curve at amplitude 1.
 struct Amounts {
   std::vector<Effect> curves;
   std::optional<Function> amounts;
@@ -210,7 +210,7 @@ Amounts without_amounts(const std::vector<Effect>& effects) {
   return out;
 }
 
-/// What tells a record from others of the same cause: "along y, going straight: ".
+/// What distinguishes a record from others of its term: "along y, going straight: ".
 std::string which_of(const Effect& effect) {
   std::vector<std::string> parts;
   if (effect.wheel() == Effect::LEFT_WHEEL) parts.emplace_back("left wheel");
@@ -220,7 +220,7 @@ std::string which_of(const Effect& effect) {
   if (effect.acts_on() == Effect::BODY_DRIFT || effect.acts_on() == Effect::MEASURED_BODY_OFFSET)
     parts.emplace_back(effect.direction_deg() == 90 ? "to the left" : "ahead");
   if (effect.during_size() == 1) parts.emplace_back(fmt::format("going {}", command_name(effect.during(0))));
-  // Others count most where they are there.
+  // With other factors in the product: the value at their full strength.
   for (const Function& f : effect.function()) {
     if (f.focus() > 0)
       parts.emplace_back(fmt::format("others {}", f.toward_deg() == 0               ? "ahead"
@@ -232,7 +232,7 @@ std::string which_of(const Effect& effect) {
 }
 
 bool of_place(Function::Covariate of) { return of == Function::X || of == Function::Y || of == Function::RADIUS; }
-/// Whether what an effect does depends on nothing but the place.
+/// Whether an effect depends on the position alone.
 bool is_of_place(const Effect& effect) {
   return effect.function_size() > 0 &&
          std::all_of(effect.function().begin(), effect.function().end(), [](const Function& f) {
@@ -243,10 +243,10 @@ bool is_map(const Effect& effect) {
   return is_of_place(effect) && (effect.function_size() > 1 || effect.function(0).has_spline_2d());
 }
 
-/// All records of one cause that do the same, each in its place, added up.
+/// The sum of all records of one term that act alike, on a raster over the arena.
 struct MapSum {
   std::vector<double> x_mm, y_mm;
-  std::vector<double> value;  ///< by y, then by x
+  std::vector<double> value;  ///< [y][x]
 
   [[nodiscard]] double quantile(double share) const {
     std::vector<double> sorted = value;
@@ -256,7 +256,7 @@ struct MapSum {
   }
 };
 
-/// The sum of these effects over the reach of their splines; empty where none has any.
+/// The sum of these effects over the range of their splines. Empty if none has a spline.
 MapSum sum_of(const std::vector<const Effect*>& effects) {
   double low_x = 1e300, high_x = -1e300, low_y = 1e300, high_y = -1e300;
   const auto reach = [&](Function::Covariate of, const auto& knots) {
@@ -302,7 +302,7 @@ MapSum sum_of(const std::vector<const Effect*>& effects) {
   return sum;
 }
 
-/// The effects of a cause that make up maps, those together that act alike; and all others.
+/// The records of a term: those that form maps, grouped by target, and all others.
 struct Sorted {
   std::vector<std::vector<const Effect*>> maps;
   std::vector<const Effect*> others;
@@ -341,7 +341,7 @@ std::string size_in_words(const std::vector<Effect>& effects) {
   for (const std::vector<const Effect*>& map : all.maps) {
     const MapSum sum = sum_of(map);
     if (sum.value.empty()) return "";
-    // Far corners, of which little is known, may be anything.
+    // Quantile that is cut off: map corners without data are arbitrary.
     constexpr double kTail = 0.02;
     const Effect::Target target = map.front()->acts_on();
     parts.push_back(fmt::format("{}between {} and {} over the arena", which_of(*map.front()),
@@ -382,7 +382,7 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
       curve["value"].push_back(f.spline().value(i) * acting.factor);
     }
     if (f.has_steps() && f.steps().at_size() > 0) {
-      // A staircase, a tenth of its length beyond its ends.
+      // Steps: a tenth of their range beyond both ends.
       const proto::Steps& steps = f.steps();
       const double first = steps.at(0), last = steps.at(steps.at_size() - 1);
       const double beyond = std::max(0.1 * (last - first), 1.0);

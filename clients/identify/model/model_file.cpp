@@ -38,7 +38,7 @@ proto::Model proto_of(const MotionModel& fitted) {
   motion.set_bias_mean_mm_s(rounded(fitted.base.bias_mean_mm_s));
   motion.set_bias_sd_mm_s(rounded(fitted.base.bias_sd_mm_s));
   motion.set_factor_variance_s(rounded(fitted.noise.factor_s));
-  motion.set_spin_up_s(0);  // part of the measured speeds
+  motion.set_spin_up_s(0);  // included in the fitted speeds
   for (const auto& [robot, bias] : fitted.robots) {
     proto::RobotModel& own = *model.add_robot();
     own.set_robot(robot);

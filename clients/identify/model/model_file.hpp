@@ -1,4 +1,4 @@
-/// The fitted model as a model file for the simulator.
+/// The fitted model as a model file for the simulator (idl/model.proto).
 #pragma once
 
 #include <string>
@@ -8,10 +8,11 @@
 
 namespace kilotwin::identify {
 
-/// Base parameters, biases and every term as records of effects; the tracked point and the tracker's noise as measured effects.
+/// Base parameters, biases, and every term as effect records. The tracked point and the tracker's noise become
+/// measurement effects.
 [[nodiscard]] proto::Model proto_of(const MotionModel&);
 
-/// As text, robots a line each, with a remark on top.
+/// Protobuf text, one line per robot, with a comment on top.
 [[nodiscard]] std::string text_of(const proto::Model&, const std::string& remark);
 
 }  // namespace kilotwin::identify

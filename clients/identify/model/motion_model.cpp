@@ -44,7 +44,7 @@ Eigen::Vector2d nominal_speeds(const BaseParameters& base, Motion motion) {
 }
 
 namespace {
-/// What a block's columns come to.
+/// Weighted sum of a block's columns.
 double sum_of(const std::array<double, kMostColumns>& columns, const Term& term, Eigen::Index first,
               Eigen::Index n) {
   return Eigen::Map<const Eigen::VectorXd>(columns.data(), n).dot(term.coefficients.segment(first, n));
@@ -157,7 +157,7 @@ Eigen::Vector3d MotionModel::measured(double x_mm, double y_mm, double heading_r
 Eigen::Vector3d MotionModel::pose_of(const Sample& sample, const Situation& at) const {
   const bool turned = !std::isnan(sample.heading_rad);
   Eigen::Vector3d pose(sample.x_mm, sample.y_mm, turned ? sample.heading_rad : 0);
-  // What the tracker does to a place changes little over a few mm.
+  // Fixed-point iteration: measurement effects vary little over a few mm.
   for (int pass = 0; pass < (measures() ? 6 : 2); ++pass) {
     const Eigen::Vector3d seen = measured(pose[0], pose[1], pose[2], at);
     pose[0] += sample.x_mm - seen[0];
@@ -170,7 +170,7 @@ Eigen::Vector3d MotionModel::pose_of(const Sample& sample, const Situation& at) 
 Arc arc_of(const Rates& r, double wheel_base_mm, double heading_rad, double h_s) {
   const double turn = (r.right_mm_s - r.left_mm_s) / wheel_base_mm + r.turn_rad_s;
   const double forward = (r.left_mm_s + r.right_mm_s) / 2 + r.ahead_mm_s;
-  // sin(half) / half, to the last digit where a robot turns by little, as in nearly all steps.
+  // sin(half) / half. The series is exact to the last digit at small angles, as in nearly all steps.
   const double half = turn * h_s / 2, half2 = half * half;
   constexpr double kLittle_rad = 0.06;
   const double shorter =

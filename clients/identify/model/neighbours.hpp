@@ -1,41 +1,41 @@
-/// The other robots as they were measured, between samples too.
+/// The measured positions of all robots of a run on a time raster, and the neighbours of each robot there.
 #pragma once
 
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "clients/identify/model/traffic_grid.hpp"
 #include "clients/identify/model/covariates.hpp"
+#include "clients/identify/model/traffic_grid.hpp"
 
 namespace kilotwin::identify {
 
-/// One robot among others, all at one instant. Robots whose x is NaN are not there. The others are added to the list, where
-/// there is one; it must outlive the view.
+/// The neighbours of one robot at one instant. x = NaN: the robot is absent. Appends the neighbours to `list` if
+/// given; the list must outlive the view.
 [[nodiscard]] NeighbourView view_of(std::size_t robot, std::span<const double> x_mm, std::span<const double> y_mm,
                                     std::vector<OtherRobot>* list = nullptr);
 
-/// Where the disc's centre of a track was when it was sampled.
+/// Disc centres of a track at its sample times, mm.
 struct Centres {
   std::vector<double> x_mm, y_mm;
 };
 
-/// What each track of a run sees of the others, on a raster of time.
+/// Neighbour views of all tracks of a run.
 class RunNeighbours {
  public:
   static constexpr double kRaster_s = 0.25;
-  /// A robot that was not measured for longer than this is not there, s.
+  /// A robot is absent in gaps longer than this, s.
   static constexpr double kGap_s = 4;
 
-  /// Where robots were measured; with `centres`, by track, where their discs were instead.
+  /// From measured positions, or from estimated disc centres by track.
   explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr);
   [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
-  /// Fills in what the floor remembers in these cells.
+  /// Computes the driven time per floor cell for these grids.
   void remember(const Run&, const std::array<FloorCells, kFloorCells>& cells);
 
-  /// Where the disc of a robot was at an instant of the raster.
+  /// Disc centre of a robot at one instant of the raster, mm.
   struct Spot {
-    double x_mm, y_mm;  ///< NaN: it was not there
+    double x_mm, y_mm;  ///< NaN: absent
     bool driven;
   };
   [[nodiscard]] std::size_t instants() const { return spots_.empty() ? 0 : instants_; }
@@ -49,9 +49,9 @@ class RunNeighbours {
  private:
   double start_s_ = 0;
   std::size_t instants_ = 0;
-  std::vector<NeighbourView> views_;  ///< by track, then by instant
-  std::vector<Spot> spots_;           ///< likewise
-  /// Of all views. It stays where it is when the run is moved.
+  std::vector<NeighbourView> views_;  ///< [track][instant]
+  std::vector<Spot> spots_;           ///< [track][instant]
+  /// Neighbours of all views. On the heap, so that views stay valid when the run moves.
   std::unique_ptr<std::vector<OtherRobot>> others_ = std::make_unique<std::vector<OtherRobot>>();
   NeighbourView nobody_;
 };

@@ -1,4 +1,4 @@
-/// A floor that remembers where driven robots went: in square cells, the time for which they stood there.
+/// Traffic on the floor: the time for which driven robots were in each square cell.
 #pragma once
 
 #include <algorithm>
@@ -8,14 +8,14 @@
 
 namespace kilotwin::identify {
 
-/// Square cells of a floor: their side, and where a corner of four of them lies.
+/// A grid of square cells: its cell size and the position of one cell corner, mm.
 struct FloorCells {
   double side_mm = 50, x_mm = 0, y_mm = 0;
 };
 
 class FloorMemory {
  public:
-  /// What is farther away than some metres belongs to the outermost cells.
+  /// Positions beyond kReach_mm belong to the outermost cells.
   explicit FloorMemory(const FloorCells& cells) : cells_(cells), half_(std::ceil(kReach_mm / cells.side_mm)) {
     const auto side = static_cast<std::size_t>(2 * half_);
     seconds_.assign(side * side, 0);

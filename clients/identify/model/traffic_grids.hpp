@@ -1,10 +1,10 @@
-/// What the floor remembers while nothing more is measured: in all cells that a model looks at.
+/// The traffic grids that a model uses, updated during a forecast.
 #pragma once
 
 #include <vector>
 
-#include "clients/identify/model/traffic_grid.hpp"
 #include "clients/identify/model/motion_model.hpp"
+#include "clients/identify/model/traffic_grid.hpp"
 
 namespace kilotwin::identify {
 
@@ -15,11 +15,11 @@ class Floors {
       if (model.looks_at({Covariate::kTrodden, c})) floors_.push_back({c, FloorMemory(model.cells[c])});
   }
   [[nodiscard]] bool any() const { return !floors_.empty(); }
-  /// A driven robot stood there for so long.
+  /// Adds the time of a driven robot at a place, s.
   void add(double x_mm, double y_mm, double seconds) {
     for (Floor& floor : floors_) floor.memory.add(x_mm, y_mm, seconds);
   }
-  /// What a robot finds there.
+  /// Sets the driven time of the cells at a place.
   void see(double x_mm, double y_mm, NeighbourView& view) const {
     for (const Floor& floor : floors_) view.trodden_s[floor.cells] = floor.memory.value_s(x_mm, y_mm);
   }

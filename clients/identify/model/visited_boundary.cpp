@@ -8,7 +8,8 @@ namespace {
 
 constexpr double kStrip_mm = 30;
 
-/// The value that a share of them exceeds, and at least so many: a tracker is sometimes wrong.
+/// The upper quantile: the value that `share` of the values exceed, and at least `fewest` of them. Trackers
+/// produce outliers.
 double near_the_end(std::vector<double>& values, std::size_t fewest, double share) {
   const std::size_t beyond = std::max(fewest, static_cast<std::size_t>(share * static_cast<double>(values.size())));
   const std::size_t rank = values.size() - 1 - std::min(beyond, values.size() - 1);
@@ -43,7 +44,8 @@ Rim::Rim(const MeasuredSet& set, double margin_mm)
     std::vector<double> farthest;
     for (std::vector<double>& strip : out)
       farthest.push_back(strip.empty() ? 0 : near_the_end(strip, 2, kOutliers));
-    // Where the rim is inclined, that is at the outer end of a strip: half of what it falls within the strip too far for its middle.
+    // Where the boundary is inclined, the quantile is that at the outer end of a strip: corrects by half of the
+    // fall within the strip.
     for (std::size_t i = 0; i < strips; ++i) {
       const std::size_t before = i > 0 ? i - 1 : i, after = std::min(i + 1, strips - 1);
       const double by_strip =

@@ -1,5 +1,5 @@
-/// The rim of what robots reached, as the tracker shows it: walls are somewhere along it, whatever the picture makes of straight
-/// lines, and round ones too.
+/// The boundary of all visited places, in measured coordinates. Under camera distortion straight walls look
+/// curved, so the fit first assumes possible walls anywhere along this boundary.
 #pragma once
 
 #include <array>
@@ -11,17 +11,17 @@ namespace kilotwin::identify {
 
 class Rim {
  public:
-  /// Of all places of the set; robots within `margin_mm` of the farthest may touch what holds them.
+  /// From all positions of the set. Within `margin_mm` of the boundary, a robot may be in contact with a wall.
   Rim(const MeasuredSet&, double margin_mm);
   [[nodiscard]] bool holds(double x_mm, double y_mm) const;
 
  private:
-  /// The farthest places on one side, by the coordinate along it.
+  /// The boundary on one side, as a function of the coordinate along the side.
   struct Side {
     bool of_x;
     double sign;
     double first_mm = 0;              ///< middle of the first strip
-    std::vector<double> farthest_mm;  ///< outwards, by strip
+    std::vector<double> farthest_mm;  ///< outermost coordinate of each strip
     [[nodiscard]] double at(double along_mm) const;
   };
   std::array<Side, 4> sides_;

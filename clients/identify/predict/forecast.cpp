@@ -13,7 +13,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Where a floor that is mapped finely changes from one place to the next.
+/// Places where a fine map of the floor changes steeply.
 class Edges {
  public:
   explicit Edges(const MotionModel& model) {
@@ -24,7 +24,7 @@ class Edges {
   }
   [[nodiscard]] bool any() const { return !maps_.empty(); }
   [[nodiscard]] bool near(double x_mm, double y_mm, double reach_mm) const {
-    constexpr double kMuch = 0.1;  // of a robot's speed
+    constexpr double kMuch = 0.1;  // relative to the robot's speed
     for (const Basis* const map : maps_) {
       double least = 1e300, most = -1e300;
       for (const auto& [x, y] : {std::pair{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
@@ -45,7 +45,7 @@ class Edges {
   std::vector<const Basis*> maps_;
 };
 
-/// Robots of a run that go on from an instant by their commands alone.
+/// Forecasts of the robots of one run, from an instant on by their commands alone.
 class Outlook {
  public:
   Outlook(const MotionModel& model, std::vector<Follower>& followers, const Floors& floors, double from_s,
@@ -74,7 +74,7 @@ class Outlook {
       start.now_s = robot.now_s;
     }
   }
-  /// Goes on to a time; all robots see each other on a raster.
+  /// Advances to a time. Robots see each other on a time raster.
   void go_to(double to_s) {
     constexpr double kRaster_s = 0.25;
     while (now_s_ < to_s - 1e-9) {
@@ -85,7 +85,8 @@ class Outlook {
     }
     advance(to_s);
   }
-  /// Draws futures of the robots that came near each other or an edge of the floor, or were uncertain enough to.
+  /// Replaces the forecasts of robots with contacts, steep maps or large uncertainty by means of Monte Carlo
+  /// rollouts.
   void draw_futures(double from_s, std::uint32_t count, bool all, std::array<std::uint32_t, 2> key) {
     std::vector<Starting> together;
     std::vector<std::size_t> who;
@@ -134,10 +135,10 @@ class Outlook {
     double now_s = 0;
     NeighbourView near;
     Starting start;
-    bool branches = false;  ///< what becomes of it is not what becomes of its mean
+    bool branches = false;  ///< the mean of the futures is not the future of the mean
     std::optional<Foreseen> foreseen;
   };
-  /// All look at each other and at the floor, on which they stay for `for_s`.
+  /// Updates neighbour views and traffic, for the next `for_s`.
   void see(double for_s) {
     if (!neighbours_) return;
     locate();
@@ -150,7 +151,7 @@ class Outlook {
       const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
       if (model_.contacts && robots_[r].near.nearest_mm < model_.touch_mm + std::min(uncertain, 20.0))
         robots_[r].branches = true;
-      // Where what the floor remembers changes from cell to cell, a robot's mean way is not the mean of its ways.
+      // With traffic grids, effects change from cell to cell: the mean path does not suffice.
       if (floors_.any()) robots_[r].branches = true;
       if (!robots_[r].branches) robots_[r].branches = edges_.near(x_[r], y_[r], std::clamp(uncertain, 6.0, 30.0));
       floors_.see(x_[r], y_[r], robots_[r].near);
@@ -181,7 +182,7 @@ class Outlook {
     if (model_.contacts) push();
   }
 
-  /// Robots that have come to overlap push each other away.
+  /// Separates overlapping robots.
   void push() {
     locate();
     const std::vector<double> x = x_, y = y_;
@@ -203,10 +204,10 @@ class Outlook {
   const Floors& floors_then_;
   std::vector<Robot> robots_;
   std::vector<double> x_, y_;
-  std::vector<OtherRobot> list_;  ///< of what robots see of each other
+  std::vector<OtherRobot> list_;  ///< neighbours of all robots
 };
 
-/// What the floor of a run remembers, by what has been measured so far.
+/// Traffic of a run, by the measurements so far.
 class Trodden {
  public:
   Trodden(const MotionModel& model, std::size_t robots) : known_(model), next_(robots, 0) {}
@@ -220,7 +221,7 @@ class Trodden {
         add(near->spot(place, i), known_);
     }
     Floors now = known_;
-    // Since they were seen last robots are thought to have stood there.
+    // From their last samples on, robots count as standing there.
     for (std::size_t f = 0; known_.any() && f < followers.size(); ++f) {
       if (!followers[f].started() || next_[f] == 0) continue;
       const auto [near, place] = of(followers[f]);
@@ -244,10 +245,10 @@ class Trodden {
     if (!std::isnan(spot.x_mm) && spot.driven) to.add(spot.x_mm, spot.y_mm, RunNeighbours::kRaster_s);
   }
   Floors known_;
-  std::vector<std::size_t> next_;  ///< instants that are known already
+  std::vector<std::size_t> next_;  ///< first instant that is not added yet
 };
 
-/// The end of a run is not told; it may last to the next frame, which need not have come.
+/// The end of a run is unknown. It may last until the next frame, which need not exist.
 double end_of(const std::vector<Sample>& samples) {
   constexpr double kFrames = 2;
   const double span_s = samples.back().time_s - samples.front().time_s;
@@ -276,7 +277,7 @@ bool measured_at(const Track& track, double time_s, Sample& out) {
 
 namespace {
 
-/// A run as one of the models that it may be of has it.
+/// A run under one of the models with different run amplitudes.
 struct RunOutlook {
   RunOutlook(const MotionModel& of, const std::vector<const TrackView*>& views, bool near)
       : model(of), neighbours(near), trodden(model, views.size()) {
@@ -292,7 +293,7 @@ struct RunOutlook {
     for (const Follower& follower : followers) sum += follower.log_likelihood();
     return sum;
   }
-  /// By track; NaN where there is nothing to be foretold.
+  /// By track. NaN: no forecast.
   std::vector<Predicted> at(double from_s, double time_s, std::uint32_t futures, bool all,
                             std::array<std::uint32_t, 2> key) {
     const Floors floors = trodden.at(from_s, followers);

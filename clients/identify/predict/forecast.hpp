@@ -1,4 +1,4 @@
-/// Predictions: from what was measured of a run up to an instant, where its robots will be seen some seconds later.
+/// Forecasts: positions of robots one horizon ahead, given the measurements of a run up to an instant.
 #pragma once
 
 #include <vector>
@@ -8,25 +8,26 @@
 namespace kilotwin::identify {
 
 struct Predicted {
-  std::uint32_t run;    ///< place in the set
-  std::uint32_t place;  ///< of the track in its run
+  std::uint32_t run;    ///< index in the set
+  std::uint32_t place;  ///< index of the track in its run
   double time_s;
   double x_mm, y_mm;
-  double spread_mm;  ///< its own idea of the root of the mean squared distance to what will be measured
+  double spread_mm;  ///< root mean square distance to the measurement that the filter itself expects
 };
 
 struct Asked {
   double first_s = 10, every_s = 5, horizon_s = 10;
-  /// So many joint futures of robots that may touch; 0: that of their means alone, for a quick look.
+  /// Number of joint Monte Carlo rollouts of robots that may touch; 0: mean paths only (fast).
   std::uint32_t futures = 0;
 };
 
-/// Predictions of all robots of the tracks (of those held out, with `held_out_only`) at first_s, first_s + every_s ... up to
-/// the last sample of each. All robots of a run go on together, so that effects of neighbours look ahead as well.
+/// Forecasts for the times first_s, first_s + every_s, ... up to the last sample of each track. Each uses
+/// measurements up to one horizon before, and commands after. `held_out_only`: held-out tracks only. All robots of
+/// a run advance together, so that neighbour effects act within the horizon.
 [[nodiscard]] std::vector<Predicted> predict(const MotionModel&, const PreparedSet&, const Asked&,
                                              bool held_out_only, std::uint32_t threads);
 
-/// What was measured at a time; false where nothing was within a hundredth of a second.
+/// The sample within 0.01 s of a time; false if there is none.
 [[nodiscard]] bool measured_at(const Track&, double time_s, Sample&);
 
 }  // namespace kilotwin::identify

@@ -9,7 +9,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Of each view of the set.
+/// One per view of the set.
 std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet& set, std::uint32_t threads) {
   set.find_headings(model, threads);
   std::vector<double> sums(set.views().size());

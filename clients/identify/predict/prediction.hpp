@@ -6,13 +6,13 @@
 
 namespace kilotwin::identify {
 
-/// Where a robot will be seen, `horizon_s` after all that was used of it.
+/// The predicted position of a robot at time_s, one horizon after the last measurement used.
 struct Prediction {
   std::string run;
   std::uint32_t robot;
   double time_s;
-  double before_x_mm, before_y_mm;  ///< by the base model
-  double after_x_mm, after_y_mm;    ///< by the model with effects
+  double before_x_mm, before_y_mm;  ///< base model
+  double after_x_mm, after_y_mm;    ///< model with effects
 };
 
 }  // namespace kilotwin::identify

@@ -20,7 +20,8 @@ Interval middle_95(std::vector<double> values) {
           values[static_cast<std::size_t>(std::lround(0.975 * last))]};
 }
 
-/// How often each of `count` things is drawn in `count` draws with replacement; once each where there is one alone.
+/// Bootstrap weights: how often each of `count` items occurs in `count` draws with replacement. A single item
+/// counts once.
 std::vector<double> drawn(const Random& random, std::size_t count, std::int64_t k, std::uint32_t what) {
   std::vector<double> times(count, count == 1 ? 1.0 : 0.0);
   for (std::uint32_t i = 0; count > 1 && i < count; ++i) {
@@ -30,13 +31,13 @@ std::vector<double> drawn(const Random& random, std::size_t count, std::int64_t 
   return times;
 }
 
-/// One prediction's error, turned into the body at the start.
+/// The error of one prediction, in the body frame at its start.
 struct Window {
   const Track* track;
   double ahead_mm, left_mm;
 };
 
-/// Whether two robots were told the same from one time to another, changes at most a little apart.
+/// Whether two robots had the same commands in a time interval, up to small shifts of the changes.
 bool told_the_same(const Track& a, const Track& b, double from_s, double to_s) {
   constexpr double kApart_s = 0.25;
   const auto changes = [&](const Track& track) {
@@ -118,14 +119,14 @@ std::optional<ErrorBounds> bounds_of(const MeasuredSet& set, const PredictionErr
 std::optional<Replicates> replicates_of(
     const std::vector<std::pair<const MeasuredSet*, const std::vector<Predicted>*>>& sets, double horizon_s) {
   constexpr std::size_t kFewest = 30;
-  // By robot and time, in ms.
+  // By robot and time, ms.
   std::map<std::pair<std::uint32_t, std::int64_t>, std::vector<Window>> at;
   for (const auto& [set, predictions] : sets) {
     for (const Predicted& p : *predictions) {
       const Track& track = set->runs[p.run].tracks[p.place];
       Sample end, start;
       if (!measured_at(track, p.time_s, end) || !measured_at(track, p.time_s - horizon_s, start)) continue;
-      // The heading may be rough: it turns what is left, not the way.
+      // A rough heading suffices: it rotates the error, not the path.
       const double heading =
           std::isnan(start.heading_rad) ? std::atan2(p.y_mm - start.y_mm, p.x_mm - start.x_mm) : start.heading_rad;
       const double dx = end.x_mm - p.x_mm, dy = end.y_mm - p.y_mm, c = std::cos(heading), s = std::sin(heading);
@@ -138,7 +139,7 @@ std::optional<Replicates> replicates_of(
   for (auto& [key, windows] : at) {
     const double time_s = static_cast<double>(key.second) / 1000;
     while (windows.size() > 1) {
-      // Those that were told what the first was told.
+      // Groups the windows that share the first window's commands.
       const Track& first = *windows.front().track;
       const auto rest = std::stable_partition(windows.begin(), windows.end(), [&](const Window& w) {
         return told_the_same(first, *w.track, time_s - horizon_s, time_s);

@@ -8,13 +8,13 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Robots that push each other slide along each other meanwhile: with steps twice as long, ones that touch for most of 10 s end up
-/// to 2 mm elsewhere.
+/// Step of joint rollouts. Robots in contact slide along each other; twice the step displaces them by up to 2 mm
+/// over 10 s.
 constexpr double kRaster_s = kSubStep_s;
-/// So often are all parted, of whom some are pushed into others.
+/// Sweeps over all pairs: separating one pair may make another overlap.
 constexpr int kPasses = 4;
 
-/// Standard normals, by Box and Muller's method.
+/// Standard normal numbers (Box-Muller) of a counter-based generator.
 class Normals {
  public:
   explicit Normals(std::array<std::uint32_t, 2> key) : key_(key) {}
@@ -53,7 +53,7 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
   std::vector<NeighbourView> nears(robots.size());
   std::vector<OtherRobot> list;
   for (std::uint32_t sample = 0; sample < count; ++sample) {
-    // Samples come in pairs that mirror each other.
+    // Antithetic pairs.
     const double mirror = sample % 2 == 0 ? 1 : -1;
     filters.clear();
     for (std::uint32_t r = 0; r < robots.size(); ++r) {

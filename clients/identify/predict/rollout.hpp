@@ -1,5 +1,5 @@
-/// Where robots that may touch come to be: the mean of many joint futures, drawn from what is believed of them. Two robots that
-/// meet head on slide past each other on either side; the future of their means would choose one.
+/// Monte Carlo rollouts of robots that may touch: the mean over joint futures sampled from the filters'
+/// distributions. Two robots that meet head-on pass on either side, which no single mean path represents.
 #pragma once
 
 #include <array>
@@ -10,20 +10,21 @@
 
 namespace kilotwin::identify {
 
-/// A robot at the instant from which nothing more is measured.
+/// A robot at the start of the forecast.
 struct Starting {
   const TrackView* view = nullptr;
-  std::vector<const TrackFilter*> filters;  ///< what may be true of it
-  std::vector<double> weights;              ///< of each, of sum 1
-  double now_s = 0;                         ///< of the filters
+  std::vector<const TrackFilter*> filters;  ///< one per heading hypothesis
+  std::vector<double> weights;              ///< of the hypotheses, with sum 1
+  double now_s = 0;                         ///< time of the filters
 };
 
-/// Of a measured position.
+/// Moments of a measured position.
 struct Foreseen {
   double x_mm = 0, y_mm = 0, square_mm2 = 0;  ///< mean, and mean squared distance from it
 };
 
-/// `neighbours`: whether effects look at neighbours; `floors` as they are at from_s. `key` tells what is drawn.
+/// `neighbours`: whether any effect uses neighbours. `grids`: the traffic at from_s. `key`: of the random
+/// generator.
 [[nodiscard]] std::vector<Foreseen> futures(const MotionModel&, const std::vector<Starting>&, const Floors& floors,
                                             double from_s, double to_s, std::uint32_t count, bool neighbours,
                                             std::array<std::uint32_t, 2> key);

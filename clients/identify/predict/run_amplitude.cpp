@@ -6,7 +6,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// The amounts of runs where a term is nothing but that: a table, in one column per run.
+/// The table of run amplitudes if the term is one column per run, else null.
 const Factor* runs_of(const Term& term) {
   if (term.blocks.size() != 1 || is_measured(term.blocks.front().target)) return nullptr;
   const Basis& basis = term.blocks.front().basis;
@@ -25,7 +25,7 @@ RunAmount::RunAmount(const MotionModel& model, std::uint32_t run) {
       continue;
     const auto count = static_cast<double>(term.coefficients.size());
     const double mean = term.coefficients.mean();
-    // The spread of a few runs is known roughly: Student's distribution.
+    // Few runs: a Student distribution with their mean and spread.
     const double degrees = std::max(count - 1, 1.0);
     const double square = (term.coefficients.array() - mean).square().sum() / degrees;
     const double sd = std::sqrt(square * (1 + 1 / count));
@@ -57,7 +57,7 @@ RunAmount::Between RunAmount::mean(const std::vector<double>& log_likelihood) co
     const std::size_t middle = std::clamp<std::size_t>(i, 1, value.size() - 2);
     return (value[middle - 1] - 2 * value[middle] + value[middle + 1]) / 2;
   };
-  // Much data leave less than the raster's width: between two of its points the logarithm bends as it does about them.
+  // Much data make the posterior narrower than the raster: interpolates the log likelihood quadratically.
   constexpr int kFine = 40;
   double sum = 0, mean = 0;
   for (std::size_t i = 0; i + 1 < value.size(); ++i) {

@@ -1,4 +1,5 @@
-/// What runs have of their own (fresh batteries, another floor): of a run that was not fitted to its own past tells how much of it.
+/// Amplitudes of runs (fresh batteries, another floor). The amplitude of a run outside the fit is inferred from
+/// its own past.
 #pragma once
 
 #include <vector>
@@ -9,18 +10,18 @@ namespace kilotwin::identify {
 
 class RunAmount {
  public:
-  /// Of a run by its number. Where the model has nothing that runs differ in, or the run was fitted to, one model: its own.
+  /// By run number. If the model has no run amplitudes, or the fit included the run: its one model.
   RunAmount(const MotionModel&, std::uint32_t run);
 
-  /// The model with each of a raster of amounts.
+  /// The model at each amplitude of a raster.
   [[nodiscard]] const std::vector<MotionModel>& models() const { return models_; }
 
-  /// Between which two models it lies, and how far from the first to the second.
+  /// Interpolation between two models of the raster.
   struct Between {
     std::size_t low = 0, high = 0;
     double part = 0;
   };
-  /// Its mean, by the log likelihood of all that was measured so far under each of the models.
+  /// The posterior mean amplitude, given the log likelihood of the run's past under each model.
   [[nodiscard]] Between mean(const std::vector<double>& log_likelihood) const;
 
  private:

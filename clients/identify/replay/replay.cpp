@@ -11,14 +11,14 @@
 namespace kilotwin::identify {
 namespace {
 
-/// The firmware's own tick, 32.768 ms.
+/// Clock ticks of one kilo_tick, 32.768 ms at 8 MHz.
 constexpr std::uint32_t kTickCycles = 1 << 18;
 constexpr double kTick_s = kTickCycles / 8e6;
-/// What both motors run at; the model's calibrated duty.
+/// Motor value while driven: the calibrated duty of the model.
 constexpr std::uint8_t kDuty = 70;
 constexpr double kRadius_mm = kDiscs_mm / 2;
 
-/// Robots are numbered by their places in the scene; what the model knows of them goes along.
+/// Robots get their index in the scene as number, with their parameters.
 proto::Model renumbered(const proto::Model& model, const Scene& scene) {
   std::map<std::uint32_t, std::uint32_t> place_of;
   for (std::uint32_t i = 0; i < scene.robots.size(); ++i) place_of[scene.robots[i].track->robot] = i;
@@ -48,7 +48,8 @@ proto::Model renumbered(const proto::Model& model, const Scene& scene) {
   return out;
 }
 
-/// A wall is a bar beyond the line at which centres of discs stop. `outwards`: 1 at the upper end of an axis, -1 at the lower.
+/// A wall as a bar beyond the line of the disc centres. `outwards`: 1 at the upper end of the axis, -1 at the
+/// lower.
 void add_wall(proto::Experiment& experiment, bool across_x, double line_mm, int outwards, double length_mm) {
   if (!std::isfinite(line_mm)) return;
   constexpr double kThick_mm = 200;
@@ -87,12 +88,12 @@ RunPlan plan_of(const Scene& scene, const proto::Model& numbered_otherwise, std:
     manifest.add_heading_rad(robot.heading_rad);
     reach_mm = std::max({reach_mm, std::abs(x_mm), std::abs(y_mm)});
   }
-  // Where no wall was seen there is room enough to go on.
+  // Sides without a wall are far away.
   const double half_mm = reach_mm + 5000, length_mm = 2 * half_mm;
   e.mutable_arena()->set_width_mm(2 * half_mm);
   e.mutable_arena()->set_height_mm(2 * half_mm);
   if (!scene.contacts) {
-    // The kinematic engine knows the arena's own walls alone, as far from the origin on either side.
+    // The kinematic engine only knows the arena's own walls, symmetric about the origin.
     const auto both = [](double low, double high) { return 2 * (std::max(-low, high) + kRadius_mm); };
     if (std::isfinite(room.x_low_mm + room.x_high_mm))
       e.mutable_arena()->set_width_mm(both(room.x_low_mm, room.x_high_mm));
@@ -107,14 +108,14 @@ RunPlan plan_of(const Scene& scene, const proto::Model& numbered_otherwise, std:
   return RunPlan(std::move(manifest));
 }
 
-/// The motors of the scene's robots, by what they were told.
+/// Motor frames of the scene's robots, from their commands.
 class Motors {
  public:
   explicit Motors(const Scene& scene) : scene_(scene), next_(scene.robots.size(), 0) {
     frame_.motor_left.assign(scene.robots.size(), 0);
     frame_.motor_right = frame_.spin_up = frame_.motor_left;
   }
-  /// For the tick that begins at a time; a change in its first half holds from its beginning.
+  /// For the tick that starts at a time. A command change in the first half of the tick holds for the whole tick.
   const ActuationFrame& at(Tick tick, double time_s) {
     frame_.tick = tick;
     const double middle_s = time_s + kTick_s / 2;
@@ -132,20 +133,20 @@ class Motors {
 
  private:
   const Scene& scene_;
-  std::vector<std::size_t> next_;  ///< commands of each that have begun
+  std::vector<std::size_t> next_;  ///< number of commands of each robot that have begun
   ActuationFrame frame_;
 };
 
-/// The tracker: looks at each robot at the times of its samples.
+/// The simulated tracker: measures each robot at its sample times.
 class Tracker {
  public:
   Tracker(const Scene& scene, const RunPlan& plan)
       : scene_(scene), measurement_(plan), next_(scene.robots.size(), 0), out_(scene.robots.size()) {
-    // What was before the start of the run was not simulated.
+    // Skips samples before the start of the run.
     for (std::size_t r = 0; r < next_.size(); ++r)
       while (next_[r] < samples(r).size() && samples(r)[next_[r]].time_s < 0) ++next_[r];
   }
-  /// All samples within the tick that begins at a time; on the way from `now` to `then`.
+  /// Measures all samples within the tick that starts at a time, by interpolation from `now` to `then`.
   void look(double time_s, const BodyFrame& now, const BodyFrame& then, const ActuationFrame& motors) {
     for (find_due(time_s + kTick_s); !due_.empty(); find_due(time_s + kTick_s)) {
       between_ = now;
@@ -177,7 +178,7 @@ class Tracker {
   [[nodiscard]] const std::vector<Sample>& samples(std::size_t robot) const {
     return scene_.robots[robot].track->samples;
   }
-  /// Robots with a sample before a time, which was not looked at.
+  /// Finds the robots with a sample before a time.
   void find_due(double before_s) {
     due_.clear();
     for (std::size_t r = 0; r < next_.size(); ++r)
@@ -211,7 +212,7 @@ Scene scene_of(const MotionModel& model, const PreparedSet& set, std::size_t run
   for (const TrackView& view : set.views()) {
     if (view.run != run) continue;
     const Sample& first = view.track->samples.front();
-    // Where it must be for the tracker to see it there, pointing as it was found to.
+    // The pose whose measurement is the first sample, at the estimated heading.
     const bool turned = TrackFilter::has_heading(first);
     Sample seen = first;
     if (!turned)

@@ -1,5 +1,5 @@
-/// Measured runs once more, in the simulator: robots of a written model start where measured ones were seen first, are told the
-/// same, and are looked at by the simulator's tracker at the same times. The walls are those that the measured robots showed.
+/// Simulation of measured runs with the fitted model. Robots start at the first measured poses and follow the
+/// recorded commands; the simulated tracker samples them at the measured times. Walls are those of the fit.
 #pragma once
 
 #include <cstdint>
@@ -10,32 +10,32 @@
 
 namespace kilotwin::identify {
 
-/// Of one run, as the simulator is to play it.
+/// One run as the simulator executes it.
 struct Scene {
   struct Robot {
-    const Track* track = nullptr;                ///< what it is told, and when it is looked at
-    double x_mm = 0, y_mm = 0, heading_rad = 0;  ///< of the disc's centre, at the first sample
+    const Track* track = nullptr;                ///< its commands and sample times
+    double x_mm = 0, y_mm = 0, heading_rad = 0;  ///< disc centre at the first sample
   };
   Room room;
-  bool contacts = true;   ///< robots push each other: the planar engine; else the kinematic one
-  std::uint32_t run = 0;  ///< the covariate RUN
+  bool contacts = true;   ///< true: the planar engine, robots collide; false: the kinematic engine
+  std::uint32_t run = 0;  ///< value of the covariate RUN
   std::vector<Robot> robots;
 
-  /// Of the last sample.
+  /// Time of the last sample, s.
   [[nodiscard]] double duration_s() const;
 };
 
-/// The scene of a run; headings at the start as PreparedSet::find_headings left them.
+/// The scene of a run. Initial headings: as PreparedSet::find_headings left them.
 [[nodiscard]] Scene scene_of(const MotionModel&, const PreparedSet&, std::size_t run);
 
-/// What the tracker sees of each robot of the scene, at the times of its samples; headings where they were measured. A robot
-/// rests until its first sample. The same for the same arguments.
+/// Samples of each robot at its measured times, with headings if they were measured. A robot rests until its first
+/// sample. Deterministic in its arguments.
 [[nodiscard]] std::vector<std::vector<Sample>> play(const Scene&, const proto::Model&, std::uint64_t seed);
 
-/// Robots times ticks that play() steps through: what it costs.
+/// Robots times ticks of a simulation: its cost.
 [[nodiscard]] double robot_ticks(const Scene&);
 
-/// Runs longer than this are not played, s.
+/// Longest run that is simulated, s.
 inline constexpr double kLongestPlay_s = 1e5;
 
 }  // namespace kilotwin::identify

@@ -15,13 +15,13 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMostSeeds = 8, kFewestSeeds = 2;
-/// Robots times ticks that all simulations of a model may take: some ten seconds of one core.
+/// Bound on robots times ticks over all simulations of a model: about ten seconds of one core.
 constexpr double kMostRobotTicks = 3e7;
-/// Fewer units than this cannot show a chance below kSurprise: exchanging some is as good as exchanging the others.
+/// With fewer units, the smallest p of the permutation test exceeds kSurprise.
 constexpr std::size_t kFewestUnits = 8;
 constexpr double kSurprise = 0.01;
 
-/// What depends on each other: tracks of a robot where there are enough robots, else each track is a unit.
+/// Exchangeable units of the permutation test: all tracks of a robot, or single tracks if there are few robots.
 struct Units {
   explicit Units(const std::vector<std::uint32_t>& robot_of_track) {
     std::vector<std::uint32_t> robots = robot_of_track;
@@ -39,16 +39,16 @@ struct Units {
   std::vector<std::size_t> of_track;
 };
 
-/// By statistic, then by unit.
+/// [statistic][unit]
 using Tallies = std::vector<std::vector<Tally>>;
 
-/// A run that is compared, and where it is played.
+/// A run to compare, and its scenes.
 struct Played {
   Scene base, full;
-  std::vector<std::size_t> compared;  ///< places in the scene
+  std::vector<std::size_t> compared;  ///< indices in the scene
 };
 
-/// Adds up the tracks of a run that are compared; `track` counts them over all runs.
+/// Adds the tallies of a run's compared tracks; `track` counts tracks over all runs.
 void add_run(const Run& run, const std::vector<std::size_t>& compared, const TrackStatistics& statistics,
              const Units& units, std::size_t& track, Tallies& to) {
   const RunNeighbours neighbours(run);
@@ -59,7 +59,7 @@ void add_run(const Run& run, const std::vector<std::size_t>& compared, const Tra
   }
 }
 
-/// The run of a scene as measured; with other samples where there are some.
+/// The run of a scene as measured, or with the given samples.
 Run run_of(const Scene& scene, std::vector<std::vector<Sample>> samples) {
   Run run;
   for (std::size_t r = 0; r < scene.robots.size(); ++r) {
@@ -69,7 +69,8 @@ Run run_of(const Scene& scene, std::vector<std::vector<Sample>> samples) {
   return run;
 }
 
-/// Simulated robots that touched others for longer count as much as the measured ones all the same.
+/// Scales simulated tallies to the weights of the measured ones: exclusion of contacts leaves different amounts of
+/// data.
 void weigh_as(const Tallies& measured, Tallies& simulated) {
   for (std::size_t s = 0; s < measured.size(); ++s) {
     for (std::size_t u = 0; u < measured[s].size(); ++u) {
@@ -92,7 +93,7 @@ json means_of(const Tally& tally) {
   return out;
 }
 
-/// A statistic's plot, of sums over all robots.
+/// Plot data of a statistic, summed over all robots.
 void add_plot(json& out, const Statistic& statistic, const Tally& measured, const Tally& base, const Tally& full) {
   switch (statistic.kind) {
     case Statistic::Kind::kHistogram:
@@ -176,7 +177,7 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
   Tallies measured = none;
   std::size_t track = 0;
   for (const Played& p : played) add_run(run_of(p.full, {}), p.compared, statistics, units, track, measured);
-  // Of the base model with each seed, then of the full one; without effects they are one.
+  // Base model with each seed first, then the full model. Without effects both are one.
   const std::size_t first_full = full.fitted.terms.empty() ? 0 : seeds;
   std::vector<Tallies> simulated(first_full + seeds, none);
   in_parallel(simulated.size(), threads, [&](std::size_t k) {
@@ -202,7 +203,7 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
       return compare(statistic, measured[s], all);
     };
     const Comparison is = of(first_full), was = first_full == 0 ? is : of(0);
-    const double scale = statistic.kind == Statistic::Kind::kSquares ? 100 : 1;  // of the logarithm: per cent
+    const double scale = statistic.kind == Statistic::Kind::kSquares ? 100 : 1;  // logarithms in per cent
     entries[s] = {{"name", statistic.name},
                   {"unit", statistic.distance_unit},
                   {"distance", scale * is.distance},

@@ -1,5 +1,5 @@
-/// A second look at a written model, by nothing that fitted it: the simulator plays the measured runs again, and what its robots
-/// look like is compared with what the measured ones look like.
+/// Posterior predictive check of a written model: the simulator repeats the measured runs, and summary statistics
+/// of simulated and measured tracks are compared.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -15,12 +15,12 @@ struct WrittenModel {
   const proto::Model& written;
 };
 
-/// Tracks of `set`, of those held out with `held_out_only`, beside tracks of the written models. Headings at starts are found
-/// first. Gives
-///   simulated      {engine, seeds, robots, runs, unit, statistics [{name, unit, distance, by_chance_95, p, agrees, base_distance,
-///                  base_p}], agrees, in_words}; `agrees` is null where too few robots were seen to tell
-///   distributions, msd, speed_over_time   for plots (identify.hpp)
-/// Empty where the runs are too long to be played, or show nothing.
+/// Compares the tracks of `set` (with `held_out_only`: its held-out tracks) with simulations of both models.
+/// Estimates initial headings first. Returns
+///   simulated      {engine, seeds, robots, runs, unit, statistics [{name, unit, distance, by_chance_95, p, agrees,
+///                  base_distance, base_p}], agrees, in_words}; `agrees` is null with too few robots
+///   distributions, msd, speed_over_time   plot data (identify.hpp)
+/// Empty if the runs are too long to simulate or yield no statistic.
 [[nodiscard]] nlohmann::json simulated_check(const WrittenModel& base, const WrittenModel& full, PreparedSet& set,
                                              bool held_out_only, std::uint32_t threads);
 

@@ -12,9 +12,9 @@ namespace {
 
 constexpr std::size_t kBins = 36, kTimeBins = 12;
 constexpr double kWallBins_mm = 20;
-/// Nearer to where walls stop it than this a robot is at the wall, mm.
+/// A robot this close to a wall counts as at the wall, mm.
 constexpr double kAtWall_mm = 8;
-/// Without headings the turn between two ways is seen where both are longer than this, mm.
+/// Without headings, a turn is measured between two displacements longer than this, mm.
 constexpr double kShortestWay_mm = 6;
 constexpr std::uint32_t kExchanges = 999;
 constexpr std::size_t kWindowsPerLag = 40;
@@ -33,7 +33,7 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
-/// What lies beyond the edges counts in the outermost bins.
+/// Values beyond the edges count in the outermost bins.
 void count(const Statistic& statistic, Tally& tally, double value) {
   const auto n = static_cast<double>(statistic.bins());
   const double part = (value - statistic.at.front()) / (statistic.at.back() - statistic.at.front()) * n;
@@ -66,7 +66,7 @@ void TrackStatistics::stretches(const Track& track, const RunNeighbours* neighbo
                                 Speed&& speed, Turn&& turn) const {
   const std::vector<Sample>& samples = track.samples;
   const CommandClock clock(track);
-  double way_rad = 0, way_end_s = -1;  // direction of the way before, and its end, where it was long enough
+  double way_rad = 0, way_end_s = -1;  // direction and end of the previous displacement if it was long enough
   for (std::size_t i = 0; i + 1 < samples.size();) {
     const Sample& from = samples[i];
     std::size_t j = i + 1;
@@ -76,7 +76,7 @@ void TrackStatistics::stretches(const Track& track, const RunNeighbours* neighbo
     const double change_s = clock.next_change_s(from.time_s);
     const double lasts_s = to.time_s - from.time_s;
     if (change_s < to.time_s - 1e-6) {
-      // Go on with the first sample under the next command.
+      // Continues with the first sample under the next command.
       while (i < samples.size() && samples[i].time_s < change_s) ++i;
       way_end_s = -1;
       continue;
@@ -245,7 +245,7 @@ double distance(const Statistic& statistic, const Tally& a, const Tally& b) {
 Comparison compare(const Statistic& statistic, const std::vector<Tally>& measured,
                    const std::vector<std::vector<Tally>>& simulated) {
   const Random random(20180729);
-  // With the units of which a bit is set on the other side.
+  // Distance after the marked units have exchanged their labels.
   const auto apart = [&](const std::vector<bool>& exchanged) {
     double sum = 0;
     for (const std::vector<Tally>& simulation : simulated) {

@@ -1,52 +1,53 @@
-/// What tracks look like, whatever made them: distributions of speed and turning of robots that are driven and touch nothing, of
-/// the distance from walls, mean speed over the run, mean square displacement. Two sets of tracks under the same commands, seen at the same times, are told apart by them.
+/// Summary statistics of tracks: distributions of speed and turn rate of driven robots without contacts, distance
+/// from walls, mean speed over the run, mean square displacement. They compare two sets of tracks with the same
+/// commands and sample times.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "clients/identify/data/measured_set.hpp"
-#include "clients/identify/model/neighbours.hpp"
 #include "clients/identify/model/contact_geometry.hpp"
+#include "clients/identify/model/neighbours.hpp"
 
 namespace kilotwin::identify {
 
 struct Statistic {
   enum class Kind : std::uint8_t {
     kHistogram,  ///< counts between edges
-    kMeans,      ///< means at places
+    kMeans,      ///< means at points
     kSquares,    ///< means that are compared by their ratio
   };
   Kind kind;
   std::string name, unit;
-  std::vector<double> at;  ///< edges (histogram), or the places of the bins
+  std::vector<double> at;  ///< bin edges (histogram), or the points
   std::string distance_unit;
 
   [[nodiscard]] std::size_t bins() const { return kind == Kind::kHistogram ? at.size() - 1 : at.size(); }
 };
 
-/// Sums of one statistic over tracks, bin by bin; they add up.
+/// Sums of one statistic over tracks, per bin. Tallies add up.
 struct Tally {
-  std::vector<double> sum, weight;  ///< kHistogram: weights alone
+  std::vector<double> sum, weight;  ///< kHistogram uses the weights only
 
   void add(const Tally&);
   void scale(double by);
   [[nodiscard]] double total() const;
 };
 
-/// The statistics with bins that suit a set of tracks. Only those that these tracks can fill.
+/// The statistics that a set of tracks supports, with suitable bins.
 class TrackStatistics {
  public:
-  /// Of `tracks` of robots that walk in `room`, seen at a point so far from the middle of their discs.
+  /// `off_centre_mm`: distance of the tracked point from the disc centre.
   TrackStatistics(const std::vector<const Track*>& tracks, const Room& room, double off_centre_mm);
 
   [[nodiscard]] const std::vector<Statistic>& list() const { return list_; }
-  /// One per statistic, of the track at this place of a run.
+  /// One tally per statistic, for the track at index `place` of a run.
   [[nodiscard]] std::vector<Tally> tally(const Track&, const RunNeighbours&, std::size_t place) const;
 
  private:
-  /// Calls speed(middle time, mm/s) and turn(rad/s) for stretches under one command, while driven; where neighbours are given,
-  /// of robots that touch nothing.
+  /// Calls speed(midpoint s, mm/s) and turn(rad/s) for motion segments of driven robots. With neighbours: segments
+  /// without contacts only.
   template <class Speed, class Turn>
   void stretches(const Track&, const RunNeighbours*, std::size_t place, Speed&&, Turn&&) const;
   [[nodiscard]] bool touches(const Sample& from, const Sample& to, const RunNeighbours&, std::size_t place) const;
@@ -59,19 +60,19 @@ class TrackStatistics {
   std::vector<Statistic> list_;
 };
 
-/// How far two tallies of a statistic are apart: the mean shift between histograms (of Wasserstein), in their unit; the mean
-/// absolute difference of means; of squares the mean absolute logarithm of the ratio. 0 where either is empty.
+/// Distance between two tallies. Histograms: the 1-Wasserstein distance, in their unit. Means: the mean absolute
+/// difference. Mean squares: the mean absolute logarithm of the ratio. 0 if either is empty.
 [[nodiscard]] double distance(const Statistic&, const Tally&, const Tally&);
 
-/// Whether measured robots differ from simulated ones by more than chance.
+/// Result of a permutation test of measured against simulated tracks.
 struct Comparison {
   double distance = 0;      ///< mean over the simulations
-  double by_chance_95 = 0;  ///< 95 % of distances are below it where only chance differs
-  double p = 1;             ///< the chance of as large a distance
+  double by_chance_95 = 0;  ///< 0.95 quantile under the null hypothesis
+  double p = 1;             ///< p value
 };
 
-/// By exchanging measured and simulated ones unit by unit at random: tracks of one unit depend on each other, units do not.
-/// `measured` has a tally per unit, `simulated` the same for each simulation.
+/// Permutation test: exchanges the labels measured and simulated at random, per unit, because tracks of one unit
+/// depend on each other. `measured` has one tally per unit, `simulated` one per simulation and unit.
 [[nodiscard]] Comparison compare(const Statistic&, const std::vector<Tally>& measured,
                                  const std::vector<std::vector<Tally>>& simulated);
 

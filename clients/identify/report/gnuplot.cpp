@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
-#include "core/os/process.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
+#include "core/os/process.hpp"
 
 namespace kilotwin::identify {
 namespace fs = std::filesystem;
@@ -32,7 +32,8 @@ class Scratch {
   fs::path path_;
 };
 
-// What all plots share: a plain frame, ink that prints, colours that colour-blind eyes tell apart (line types by number).
+// Style of all plots: thin frame, print-safe ink, line types with colours that colour-blind readers can
+// distinguish.
 constexpr const char* kStyle = R"(set encoding utf8
 set border 3 lc rgb '#8896a4' lw 1
 set tics nomirror out scale 0.6 textcolor rgb '#3b4754'
@@ -80,7 +81,7 @@ std::vector<Gnuplot::Drawn> Gnuplot::draw() const {
   const bool good = run(all).status == 0;
   for (std::size_t k = 0; k < plots_.size(); ++k) {
     if (!good) {
-      // gnuplot stops at the first plot that it cannot draw; one by one, the others are saved.
+      // gnuplot stops at the first plot it cannot draw. The others are then drawn one by one.
       const behaviours::ProcessResult result = run(script(k, file(k)));
       if (result.status != 0) {
         drawn[k].error = result.errors;
@@ -93,7 +94,7 @@ std::vector<Gnuplot::Drawn> Gnuplot::draw() const {
 }
 
 std::string gnuplot_text(std::string_view text) {
-  // Single quotes take everything but themselves as it is; enhanced text has a markup of its own.
+  // Within single quotes only the quote itself needs escaping for gnuplot. Enhanced text has markup of its own.
   std::string out = "'";
   for (const char c : text) {
     if (c == '\n' || c == '\r')

@@ -1,4 +1,4 @@
-/// Plots by gnuplot, as SVG.
+/// SVG plots drawn by gnuplot.
 #pragma once
 
 #include <string>
@@ -7,16 +7,16 @@
 
 namespace kilotwin::identify {
 
-/// Plots that are drawn together, by one process.
+/// Plots that one gnuplot process draws.
 class Gnuplot {
  public:
-  /// Adds a plot of `commands`, width x height px; returns its number. Data go into the commands as data blocks.
+  /// Adds a plot of width x height px and returns its number. `commands` contain the data as data blocks.
   std::size_t add(int width_px, int height_px, std::string commands);
   struct Drawn {
-    std::string svg;    ///< empty where it could not be drawn
-    std::string error;  ///< why
+    std::string svg;    ///< empty if the plot failed
+    std::string error;  ///< the reason
   };
-  /// By number. Throws RunError where gnuplot is missing.
+  /// One entry per plot. Throws RunError if gnuplot is missing.
   [[nodiscard]] std::vector<Drawn> draw() const;
   [[nodiscard]] std::size_t size() const { return plots_.size(); }
 
@@ -30,7 +30,7 @@ class Gnuplot {
   std::vector<Plot> plots_;
 };
 
-/// A text for gnuplot, in quotes: nothing in it is taken as a command or as markup.
+/// A quoted gnuplot string. Commands and markup in it have no effect.
 [[nodiscard]] std::string gnuplot_text(std::string_view text);
 
 }  // namespace kilotwin::identify

@@ -13,9 +13,9 @@ namespace {
 
 using nlohmann::json;
 
-// Positions are interpolated over gaps up to this.
+// Longest gap over which positions are interpolated.
 constexpr double kGap_s = 2.5;
-// A robot that is predicted to go less has no way along which to look.
+// A predicted displacement shorter than this has no usable direction.
 constexpr double kLeastWay_mm = 5;
 constexpr double kNearby_mm = 100;
 constexpr std::size_t kBins = 14, kFewestInBin = 8;
@@ -38,19 +38,19 @@ std::optional<Place> seen_at(const Track& track, double time_s) {
   return Place{before.x_mm + u * (after->x_mm - before.x_mm), before.y_mm + u * (after->y_mm - before.y_mm)};
 }
 
-/// What is looked at in residuals, and their directions.
+/// Components of a residual.
 enum Target : std::uint8_t { kAhead, kLeft, kX, kY, kTargets };
 constexpr std::array<const char*, kTargets> kTargetNames = {"ahead", "left", "residual_x", "residual_y"};
 
 struct Window {
   std::uint32_t robot;
   Place halfway;
-  bool has_way;  // whether kAhead and kLeft mean anything
+  bool has_way;  // whether kAhead and kLeft are defined
   std::array<double, kTargets> before, after;
   std::map<std::string, double> covariates;
 };
 
-/// Seconds for which a robot was told to move until time_s.
+/// Driven time of a robot until time_s, s.
 double driven_s(const Track& track, double time_s) {
   double sum = 0;
   for (std::size_t k = 0; k < track.commands.size(); ++k) {
@@ -95,10 +95,10 @@ std::optional<Window> window_of(const Run& run, const Track& track, const Predic
 
 struct Bins {
   std::vector<double> at, before, before_se, after;
-  double strength = 0;  // sum of squares of means over their standard errors, over the number of bins
+  double strength = 0;  // mean over the bins of (mean / standard error)^2
 };
 
-/// Means over bins of about as many windows each; whole numbers up to 60 of them have bins of their own.
+/// Means over bins with about equal numbers of windows. Integer values below 60 have one bin each.
 Bins bins_of(const std::vector<Window>& windows, const std::string& covariate, Target target, double overlap) {
   std::vector<std::pair<double, const Window*>> sorted;
   for (const Window& w : windows) {
@@ -251,7 +251,7 @@ json residual_parts(const MeasuredSet& set, const std::vector<Prediction>& predi
     if (const auto window = window_of(*at->second.first, *at->second.second, p, horizon_s))
       windows.push_back(*window);
   }
-  // Predictions are 5 s apart: of `horizon_s / 5` that overlap, each says a part of its own.
+  // Predictions are 5 s apart, so horizon_s / 5 of them overlap: the factor of the variance.
   const double overlap = std::max(1.0, horizon_s / 5);
   return {
       {"robots", robots(windows)}, {"maps", maps(windows)}, {"covariate_plots", covariate_plots(windows, overlap)}};

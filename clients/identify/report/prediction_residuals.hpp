@@ -1,4 +1,4 @@
-/// Residuals of predictions, measured minus predicted: by robot, over the arena, and over what they may depend on.
+/// Residuals of predictions, measured minus predicted: by robot, over the arena, and over covariates.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,13 +9,14 @@
 
 namespace kilotwin::identify {
 
-/// The parts `robots`, `maps` and `covariate_plots` of the document (identify.hpp), of predictions `horizon_s` ahead:
+/// The entries `robots`, `maps` and `covariate_plots` of the document (identify.hpp) for predictions with horizon
+/// `horizon_s`, s:
 ///   robots           rms residual before and after, by robot
-///   maps             mean residual along x and y, by where the robot was halfway
-///   covariate_plots  for each covariate the residual that depends on it most: ahead and to the left, seen along the way
-///                    that the base model predicts, or along x and y of the room
-/// Measured positions are interpolated between samples at most 2.5 s apart; predictions without any are left out. Standard
-/// errors allow for windows that overlap.
+///   maps             mean residual along x and y, by the robot's position at half the horizon
+///   covariate_plots  for each covariate, the residual component that depends on it most: ahead and left of the
+///                    displacement that the base model predicts, or x and y in the world frame
+/// Measured positions are interpolated over gaps up to 2.5 s; predictions without a measurement are left out. The
+/// standard errors account for overlapping windows.
 [[nodiscard]] nlohmann::json residual_parts(const MeasuredSet&, const std::vector<Prediction>&, double horizon_s);
 
 }  // namespace kilotwin::identify

@@ -61,7 +61,7 @@ std::string fault_list(const json& contract) {
   return out.empty() ? "" : "<ul class=\"faults\">" + out + "</ul>\n";
 }
 
-/// Keys and figures of an object, as a table in two columns.
+/// The numbers of an object as a table of two columns.
 std::string figures_of(const json& object) {
   if (!object.is_object() || object.empty()) return "";
   html::Table table({"", ""});
@@ -76,7 +76,7 @@ std::string figures_of(const json& object) {
   return table.text("facts");
 }
 
-/// How errors and floor were estimated, as markup.
+/// How the errors and the noise floor were estimated, as markup.
 std::string better_lead(const json& contract) {
   std::string out;
   if (const std::string how = text(part(contract, "improvement"), "bounds_how"); !how.empty())
@@ -94,7 +94,7 @@ std::string better_lead(const json& contract) {
   return out;
 }
 
-/// Tables that the document brings along, each a section of its own.
+/// Further tables of the document, one section each.
 std::string given_tables(const json& tables) {
   std::string out;
   for (const json& given : tables) {
@@ -136,7 +136,7 @@ std::string report_html(const json& document) {
   }
   const std::string robots =
       figures.place(plot_robots(gnuplot, part(document, "robots")), "Each robot's error, largest first");
-  // A row of its own where there are many.
+  // A full-width plot if there are many robots.
   const json& all_robots = part(document, "robots");
   const bool many = all_robots.is_array() && all_robots.size() > 24;
   if (!many) better += robots;

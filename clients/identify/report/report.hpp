@@ -1,4 +1,4 @@
-/// The report: one HTML file that needs nothing else, for a person who has a minute, and for paper.
+/// The report: one self-contained HTML file, readable in a minute, printable.
 #pragma once
 
 #include <filesystem>
@@ -7,11 +7,11 @@
 
 namespace kilotwin::identify {
 
-/// Tells what the document holds (identify.hpp lists its keys): what was wrong, why, by how much it is better. Parts that
-/// the document lacks are left out. Plots are drawn by gnuplot; throws RunError where it is missing.
+/// Renders the document (identify.hpp lists its keys). Absent entries are left out. gnuplot draws the plots.
+/// Throws RunError if it is missing.
 [[nodiscard]] std::string report_html(const nlohmann::json& document);
 
-/// Writes it. Throws RunError.
+/// Writes the report. Throws RunError.
 void write_report(const nlohmann::json& document, const std::filesystem::path& file);
 
 }  // namespace kilotwin::identify

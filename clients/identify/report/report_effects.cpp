@@ -30,7 +30,7 @@ bool shares_covariate(const json& effect, const std::string& covariate) {
   return false;
 }
 
-/// Sum of squares of a plot's means over their standard errors, and how many there are.
+/// Sum over a plot's bins of (mean / standard error)^2, and the number of bins.
 std::pair<double, double> pattern_of(const json& plot, const char* when) {
   const json &mean = part(plot, when), &se = part(plot, "before_se");
   double sum = 0, bins = 0;
@@ -43,7 +43,8 @@ std::pair<double, double> pattern_of(const json& plot, const char* when) {
   return {sum, bins};
 }
 
-/// The plot in which an effect shows best: over its covariate, with the effect drawn in, the strongest against its errors.
+/// The plot that shows an effect best: over its covariate, with the fitted curve, with the largest mean relative
+/// to its standard error.
 const json* plot_for(const json& effect, const json& plots) {
   const json* best = nullptr;
   double best_strength = 0;
@@ -162,7 +163,7 @@ std::string ambiguous_list(const json& contract) {
 std::string traced(const json& contract, const json& covariate_plots, Figures& figures) {
   if (!covariate_plots.is_array()) return "";
   const json& effects = part(contract, "effects");
-  // Strongest first; those below are as good as flat.
+  // Strongest first. Weaker plots show no pattern.
   constexpr double kPattern = 4;
   constexpr std::size_t kMostShown = 8;
   std::vector<std::pair<double, const json*>> order;

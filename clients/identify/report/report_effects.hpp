@@ -1,4 +1,4 @@
-/// What was found, what was tried beside it, and what cannot be told apart: parts of the report as markup.
+/// Accepted effects, rejected hypotheses and ambiguous effects: sections of the report as markup.
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@
 
 namespace kilotwin::identify::report {
 
-/// A card per effect, with the plots in which it shows best.
+/// A card per effect, with the plots that show it best.
 [[nodiscard]] std::string cards(const json& contract, const json& document, Figures&);
 [[nodiscard]] std::string effects_table(const json& contract);
 [[nodiscard]] std::string rejected_table(const json& contract);
 [[nodiscard]] std::string ambiguous_list(const json& contract);
-/// Residuals over covariates: those of what was found and those that leave a pattern; the others to unfold.
+/// Residuals over covariates: those of accepted effects and those with a remaining pattern. The others are folded.
 [[nodiscard]] std::string traced(const json& contract, const json& covariate_plots, Figures&);
 
 }  // namespace kilotwin::identify::report

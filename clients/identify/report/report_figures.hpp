@@ -1,4 +1,4 @@
-/// Plots of the report, and where on the page they stand.
+/// Plots of the report and their places on the page.
 #pragma once
 
 #include <fmt/format.h>
@@ -12,13 +12,13 @@
 
 namespace kilotwin::identify::report {
 
-/// Plots in the order of the page; the page is put together before they are drawn.
+/// Plots in page order. The page is composed before the plots are drawn.
 class Figures {
  public:
   explicit Figures(Gnuplot& plots) : plots_(plots) {}
   Gnuplot& plots() { return plots_; }
 
-  /// Where the plot will stand; empty where there is none.
+  /// Markup for a plot; empty if there is none.
   std::string place(PlotNumber number, const std::string& caption, const char* kind = "") {
     if (!number) return "";
     return fmt::format("<figure{}>{}{}</figure>\n", *kind == 0 ? "" : fmt::format(" class=\"{}\"", kind),
@@ -32,7 +32,7 @@ class Figures {
     if (after) out += mark(*after, caption + ", after");
     return out + "<figcaption>" + html::escaped(caption) + "</figcaption></figure>\n";
   }
-  /// The page with all plots in it.
+  /// The page with all plots inserted.
   std::string filled(std::string page) const {
     const std::vector<Gnuplot::Drawn> drawn = plots_.draw();
     for (const auto& [number, alt] : alts_) {
@@ -54,7 +54,7 @@ class Figures {
   std::map<std::size_t, std::string> alts_;
 };
 
-/// A part of the page; nothing where its body is empty. `lead` and `body` are markup.
+/// A section of the page; empty if its body is empty. `lead` and `body` are markup.
 [[nodiscard]] inline std::string section(const char* id, const char* title, const std::string& lead,
                                          const std::string& body) {
   if (body.empty()) return "";

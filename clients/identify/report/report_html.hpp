@@ -1,4 +1,4 @@
-/// Pieces of the report's page.
+/// HTML elements of the report.
 #pragma once
 
 #include <cstddef>
@@ -8,21 +8,21 @@
 
 namespace kilotwin::identify::html {
 
-/// Text without markup; what is no UTF-8 is replaced.
+/// Escaped text. Invalid UTF-8 is replaced.
 [[nodiscard]] std::string escaped(std::string_view text);
 
 /// "bias_sd_mm_s" as "bias sd, mm/s".
 [[nodiscard]] std::string with_unit(std::string_view name);
 
-/// What stands for a plot until it is drawn. No text that was escaped holds it.
+/// Placeholder of a plot until it is drawn. Escaped text cannot contain it.
 [[nodiscard]] std::string mark_of(std::size_t plot);
-/// A picture within the page itself.
+/// An inline image.
 [[nodiscard]] std::string image(std::string_view svg, std::string_view alt);
 
 class Table {
  public:
   explicit Table(std::vector<std::string> heads) : heads_(std::move(heads)) {}
-  /// Cells are markup, one per head.
+  /// Cells are markup, one per column.
   void row(const std::vector<std::string>& cells);
   [[nodiscard]] std::string text(std::string_view kind = "") const;
 
@@ -31,7 +31,7 @@ class Table {
   std::string rows_;
 };
 
-/// The whole document around `body`, with its style.
+/// The whole document around `body`, with its style sheet.
 [[nodiscard]] std::string page(std::string_view title, std::string_view body);
 
 }  // namespace kilotwin::identify::html

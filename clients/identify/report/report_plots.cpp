@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// No figure of a robot in a room is as large; axes have no room for it.
+// Larger values are no measurement and would break the axes.
 constexpr double kAbsurd = 1e12;
 constexpr int kHalf_px = 460, kLow_px = 280, kFlat_px = 210;
 
@@ -49,7 +49,7 @@ bool any_finite(const std::vector<double>& values) {
   return std::any_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
 }
 
-/// A data block of columns; what is not finite is left empty. Columns are as long as the first.
+/// A gnuplot data block of columns of equal length. Values that are not finite are left empty.
 std::string block(const char* name, const std::vector<std::vector<double>>& columns) {
   std::string out = fmt::format("${} << EOD\n", name);
   for (std::size_t row = 0; row < columns[0].size(); ++row) {
@@ -67,7 +67,7 @@ std::string axis(const char* which, const std::string& name, const std::string& 
                      gnuplot_text(unit.empty() ? words_of(name) : words_of(name) + ", " + unit));
 }
 
-/// A grid of values: rows are y.
+/// Values on a grid, [y][x].
 struct Grid {
   std::vector<double> x, y;
   std::vector<std::vector<double>> value;
@@ -85,7 +85,7 @@ Grid grid_of(const json& map, const char* when) {
   return grid;
 }
 
-/// What 98 % of the map's values are below, of all times.
+/// The 98th percentile of the absolute values of all its times.
 double reach(const json& map) {
   std::vector<double> all;
   for (const char* when : {"before", "after", "effect"}) {
@@ -101,7 +101,7 @@ double reach(const json& map) {
   return *at;
 }
 
-/// A round distance between ticks, about four over a length.
+/// A round tick interval, about four per length.
 double tick_step(double length) {
   const double rough = length / 4, power = std::pow(10, std::floor(std::log10(rough))), lead = rough / power;
   return power * (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10);
@@ -207,7 +207,7 @@ PlotNumber plot_arrows(Gnuplot& plots, const json& map_x, const json& map_y, con
   if (!x.good() || !y.good() || x.x != y.x || x.y != y.y) return std::nullopt;
   const double most = std::max(reach(map_x), reach(map_y));
   if (!(most > 0)) return std::nullopt;
-  // The longest arrows span a cell and a bit.
+  // The longest arrows span slightly more than a cell.
   const double scale = 1.1 * (x.x[1] - x.x[0]) / most;
   std::vector<std::vector<double>> columns(5);
   for (std::size_t row = 0; row < x.y.size(); ++row) {
@@ -244,7 +244,7 @@ PlotNumber plot_map(Gnuplot& plots, const json& map, const char* when, const std
     }
   }
   if (columns[0].empty()) return std::nullopt;
-  // A little wider than the cells, so that no seams show.
+  // Slightly wider than the cells, to avoid gaps between them.
   const double half_x = 0.505 * (grid.x[1] - grid.x[0]), half_y = 0.505 * (grid.y[1] - grid.y[0]);
   std::string commands = block("d", columns) + map_frame(grid);
   commands += fmt::format(
@@ -379,7 +379,8 @@ PlotNumber plot_robots(Gnuplot& plots, const json& robots) {
       "set xlabel 'robot'\nset ylabel 'rms error, mm'\nset yrange [0:*]\nset xrange [-0.7:{}]\nset grid noxtics\n",
       static_cast<double>(rows.size()) - 0.3);
   if (rows.size() <= 60) {
-    commands += rows.size() <= 12 ? "set xtics (" : "set xtics font ',7' (";  // names side by side, also long ones
+    // labels side by side, even long ones
+    commands += rows.size() <= 12 ? "set xtics (" : "set xtics font ',7' (";
     for (std::size_t k = 0; k < rows.size(); ++k)
       commands += fmt::format("{}{} {}", k == 0 ? "" : ", ", gnuplot_text(rows[k].name), k);
     commands += ")\n";

@@ -1,5 +1,5 @@
-/// The report's plots, each from a part of the document (identify.hpp tells its keys). A part that is missing, empty or
-/// not of that form gives no plot.
+/// The report's plots, each from one entry of the document (identify.hpp lists its keys). An entry that is absent,
+/// empty or malformed gives no plot.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,28 +11,28 @@ namespace kilotwin::identify {
 
 using PlotNumber = std::optional<std::size_t>;
 
-/// Error over how far ahead: before, after, floor.
+/// Error over the horizon: before, after, noise floor.
 PlotNumber plot_horizon(Gnuplot&, const nlohmann::json& horizon);
-/// One residual over one covariate: before, after, and the effect as it was added.
+/// One residual over one covariate: before, after, and the fitted effect.
 PlotNumber plot_covariate(Gnuplot&, const nlohmann::json& plot);
-/// Two residuals of the same kind, along x and y, as arrows over the arena; `when`: "before" or "after".
+/// Two residual components along x and y as arrows over the arena; `when`: "before" or "after".
 PlotNumber plot_arrows(Gnuplot&, const nlohmann::json& map_x, const nlohmann::json& map_y, const char* when);
-/// One residual over the arena in colours; both times in the same ones. Without a title: when.
+/// One residual over the arena in colours, with the same scale before and after. Default title: `when`.
 PlotNumber plot_map(Gnuplot&, const nlohmann::json& map, const char* when, const std::string& title = "");
-/// One distribution, simulated over measured.
+/// One distribution, simulated and measured.
 PlotNumber plot_distribution(Gnuplot&, const nlohmann::json& distribution);
-/// Mean speed over the run, simulated over measured.
+/// Mean speed over the run, simulated and measured.
 PlotNumber plot_speed_over_time(Gnuplot&, const nlohmann::json& speeds);
-/// An effect as it is in the model, over its covariate.
+/// A fitted effect over its covariate.
 PlotNumber plot_effect(Gnuplot&, const nlohmann::json& curve);
 PlotNumber plot_effect_map(Gnuplot&, const nlohmann::json& map);
 PlotNumber plot_msd(Gnuplot&, const nlohmann::json& msd);
-/// The error as effects were added, one after the other.
+/// The error after each accepted effect.
 PlotNumber plot_steps(Gnuplot&, const nlohmann::json& steps, double floor_mm);
-/// Each robot's error before and after.
+/// The error of each robot before and after.
 PlotNumber plot_robots(Gnuplot&, const nlohmann::json& robots);
 
-/// A covariate, target or unit as a person reads it.
+/// Readable name of a covariate, target or unit.
 [[nodiscard]] std::string words_of(const std::string& name);
 
 }  // namespace kilotwin::identify

@@ -11,7 +11,7 @@ namespace {
 
 using html::escaped;
 
-/// Distances of one model: "0.12 mm/s".
+/// A distance with its unit: "0.12 mm/s".
 std::string with_unit(std::optional<double> value, const std::string& unit) {
   return unit.empty() || !value ? figure(value) : figure(value) + " " + escaped(unit);
 }

@@ -1,4 +1,4 @@
-/// Simulated beside measured robots: a part of the report as markup.
+/// The simulation check: a section of the report as markup.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace kilotwin::identify::report {
 
-/// How the check was made and what came of it; empty where there was none.
+/// Method and result; empty if there was no check.
 [[nodiscard]] std::string simulated_lead(const json& contract);
 /// The table of distances, and plots.
 [[nodiscard]] std::string simulated_body(const json& contract, const json& document, Figures&);

@@ -12,7 +12,7 @@ namespace {
 
 using html::escaped;
 
-/// How much of what a model can take away at all was taken away: errors add as squares.
+/// Share of the explainable mean square error that the model removes: (before^2 - after^2) / (before^2 - floor^2).
 std::optional<double> share_explained(const Errors& e) {
   if (!e.before || !e.after || !e.floor) return std::nullopt;
   const double could = *e.before * *e.before - *e.floor * *e.floor;

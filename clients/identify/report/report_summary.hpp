@@ -1,4 +1,4 @@
-/// The top of the report: what was wrong and by how much it is better, in a headline, a few sentences and bars.
+/// Summary of the report: headline, a few sentences, and error bars.
 #pragma once
 
 #include <string>
@@ -7,18 +7,18 @@
 
 namespace kilotwin::identify::report {
 
-/// Root mean squares, mm.
+/// Root mean square errors, mm.
 struct Errors {
   std::optional<double> before, after, floor;
 };
 [[nodiscard]] Errors errors_of(const json& contract);
 
-// All as markup.
+// All functions return markup.
 [[nodiscard]] std::string headline(const json& contract);
 [[nodiscard]] std::string verdict(const json& contract);
 /// The errors as bars, with their confidence intervals.
 [[nodiscard]] std::string bars(const json& contract);
-/// Bars of any measure, as the document gives them: as long as they are above `from`.
+/// Bars of any quantity of the document. A bar starts at `from`.
 [[nodiscard]] std::string given_bars(const json& bars);
 
 }  // namespace kilotwin::identify::report

@@ -16,7 +16,7 @@ using html::escaped;
 
 const json kNothing;
 
-/// A cause as what "it depends on ..." goes on with.
+/// A covariate as the object of "depends on ...".
 std::string phrase_of(const std::string& covariate) {
   static const std::map<std::string, std::string> kPhrases = {{"time", "how late it is in the run"},
                                                               {"position", "where they are"},

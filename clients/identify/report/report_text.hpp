@@ -1,4 +1,4 @@
-/// Words and numbers of the report, from parts of the document that may be missing or of another form.
+/// Texts and numbers of the report. Entries of the document may be absent or malformed.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,22 +9,22 @@ namespace kilotwin::identify::report {
 
 using nlohmann::json;
 
-/// A part of an object; null where there is none.
+/// An entry of an object; null if absent.
 [[nodiscard]] const json& part(const json& from, const char* key);
 [[nodiscard]] std::string text(const json& from, const char* key);
 [[nodiscard]] std::optional<double> number(const json& from, const char* key);
 
-/// Three digits; a dash where there is none.
+/// Three digits; a dash if absent.
 [[nodiscard]] std::string figure(std::optional<double> value);
 [[nodiscard]] std::string percent(std::optional<double> share);
-/// A probability as markup, as a power of ten where it is small.
+/// A probability as markup; small ones as a power of ten.
 [[nodiscard]] std::string chance(std::optional<double> log10_p);
 
-/// What an effect depends on, as what "it depends on ..." goes on with.
+/// The covariates of an effect as the object of "depends on ...".
 [[nodiscard]] std::string covariates_of(const json& effect);
-/// Whether it is the tracker's.
+/// Whether the effect acts on the measurement.
 [[nodiscard]] bool is_measurement(const json& effect);
-/// What it acts on, as markup.
+/// The target of an effect, as markup.
 [[nodiscard]] std::string acts_on_of(const json& effect);
 
 }  // namespace kilotwin::identify::report

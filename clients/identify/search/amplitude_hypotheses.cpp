@@ -8,7 +8,7 @@ namespace {
 
 using Shape = Factor::Shape;
 
-/// As names of effects have a covariate, and as result.json has it.
+/// Name of a covariate in effect names and in result.json.
 std::pair<std::string, std::string> of_words(Covariate covariate) {
   switch (covariate) {
     case Covariate::kTime: return {"time", "time"};
@@ -31,8 +31,8 @@ std::pair<std::string, std::string> of_words(Covariate covariate) {
   }
 }
 
-/// What is known by one covariate may grow or shrink with time, be larger in some places, or as the robot points. What is known
-/// comes first, so that it is written once.
+/// The amplitude of a known curve over one covariate may depend on time, place or heading. The known factor comes
+/// first, so that it is written once.
 void of_known_and_more(DictionaryMaker& make, const Extent& extent, const Acting& acting, const Basis& known,
                        std::uint8_t during) {
   if (&acting == &kWorld || known.factors.empty()) return;
@@ -77,7 +77,7 @@ void hypotheses_of_found(DictionaryMaker& make, const Extent& extent, const std:
     const auto amounts = [&](Covariate covariate, const std::vector<double>& keys) {
       Basis basis = known;
       basis.factors.insert(basis.factors.begin(), keyed(Shape::kTable, covariate, keys));
-      // Of a drift the amounts along x and along y are of one shape only where it has but one.
+      // The amplitudes of a drift along x and along y share one shape only for a single-component curve.
       if (acting == &kWorld && !of.empty()) return;
       std::vector<std::string> all = words;
       all.push_back(of_words(covariate).second);

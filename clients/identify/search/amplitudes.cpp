@@ -9,18 +9,18 @@ namespace kilotwin::identify {
 namespace {
 
 constexpr int kMostTurns = 3;
-/// A gain in log likelihood for which curve and amounts are not fitted in turn once more.
+/// Convergence: gain in log likelihood of one more alternation.
 constexpr double kSettled = 2;
-/// One term of which the curve is known has far fewer freedoms than two: so much less likely it may be.
+/// The merged term has far fewer degrees of freedom, so its log likelihood may be lower by this much.
 constexpr double kAsGood = 10;
 
-/// Whether one factor is the other as a curve that is known.
+/// Whether `known` is `open` with fixed coefficients.
 bool is_known_of(const Factor& known, const Factor& open) {
   return known.shape == open.shape && known.axis == open.axis && known.low == open.low && known.high == open.high &&
          known.count == open.count && known.points == open.points;
 }
 
-/// The term whose curve the amounts of `amounts` are of.
+/// Index of the term whose curve these amplitudes multiply.
 std::optional<std::size_t> source_of(const MotionModel& model, const Term& amounts) {
   const Block& block = amounts.blocks.front();
   if (block.basis.factors.size() != 2) return std::nullopt;
@@ -36,8 +36,8 @@ std::optional<std::size_t> source_of(const MotionModel& model, const Term& amoun
   return std::nullopt;
 }
 
-/// Amounts of keys are told relative to their mean, which is that of a robot that nobody has seen. Where they have next to none, the
-/// largest is 1.
+/// Normalises amplitudes to a mean of 1, which is the amplitude of an unseen robot. If the mean is near 0, the
+/// largest becomes 1.
 void about_the_mean(Term& term) {
   Factor& amounts = term.blocks.front().basis.factors.front();
   if (amounts.shape != Factor::Shape::kTable) return;
@@ -55,7 +55,7 @@ void about_the_mean(Term& term) {
   term.precision /= unit * unit;
 }
 
-/// Leaves out what acts on anything else.
+/// Removes blocks with other targets.
 void keep_target(Term& term, Target target) {
   std::vector<Block> blocks;
   std::vector<Eigen::Index> columns;
@@ -72,22 +72,22 @@ void keep_target(Term& term, Target target) {
   term.precision = Eigen::VectorXd(term.precision(columns));
 }
 
-/// The last term of a model while its curve and its amounts are fitted in turn.
+/// The merged term during the alternating fit.
 class CurveTimesAmounts {
  public:
-  /// In place of the term `source`, whose curve it is, and of the last, which are amounts of it.
+  /// Replaces the term `source`, which has the curve, and the last term, which has the amplitudes.
   CurveTimesAmounts(const Fitter& fitter, MotionModel& model, std::size_t source)
       : fitter_(fitter), model_(model), found_(model.terms.back()) {
     const Basis& basis = found_.blocks.front().basis;
     open_ = basis.factors[0].known.empty() ? 0 : 1;
-    // Everything has the curve once, but for what was found of its amount. What was left out of the amounts' columns is none.
+    // The curve enters with amplitude 1. Amplitude columns that were pruned are 0.
     amounts_ = basis.factors[open_];
     amounts_.known.assign(amounts_.columns(), 0);
     amounts_.plus = 1;
     add(found_.coefficients);
     Term one = model.terms[source];
     one.name = found_.name;
-    // What else it seemed to do may have come of amounts that differ.
+    // Further targets may have been artefacts of different amplitudes.
     keep_target(one, found_.blocks.front().target);
     for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amounts_);
     model.terms.pop_back();
@@ -101,7 +101,7 @@ class CurveTimesAmounts {
     in_turns();
     refine(fitter_, model_, model_.terms.size() - 1);
     likelihood_ = fitter_.log_likelihood(model_);
-    // The curve may have got a constant part, which the amounts had to do without.
+    // The curve may have received a constant part, which the amplitudes lacked.
     in_turns();
     in_turn(true);
     about_the_mean(model_.terms.back());
@@ -117,7 +117,8 @@ class CurveTimesAmounts {
   void in_turns() {
     for (int turns = 0; turns < kMostTurns && in_turn(false); ++turns) {}
   }
-  /// Changes of the amounts with the curve known, then all else with the amounts known. Whether something is gained.
+  /// Updates the amplitudes with the curve fixed, then the rest with the amplitudes fixed. Returns whether the
+  /// likelihood rose.
   bool in_turn(bool with_smoothness) {
     const MotionModel before = model_;
     const Factor known = amounts_;
@@ -151,7 +152,7 @@ class CurveTimesAmounts {
   const Fitter& fitter_;
   MotionModel& model_;
   Term found_;
-  std::size_t open_ = 0;  ///< of the found term's factors the one that is not the curve
+  std::size_t open_ = 0;  ///< index of the factor in the found term that is not the curve
   Factor amounts_;
   double likelihood_ = 0;
 };

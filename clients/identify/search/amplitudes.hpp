@@ -1,4 +1,5 @@
-/// Causes of which some robots, commands, times or places show more than others: one curve, times amounts.
+/// Effects of different strength for different robots, commands, times or places: a common curve times an
+/// amplitude.
 #pragma once
 
 #include <optional>
@@ -7,13 +8,13 @@
 
 namespace kilotwin::identify {
 
-/// Where the last term holds amounts of a curve that another term found (`hypotheses_of_found`): both become one,
-/// the last, if the data are as probable by that. The curve is then fitted with every amount known, since what all show in
-/// the mean blurs it; then the amounts with the curve known; and so on until nothing is gained. Returns the place that
-/// the other had, or nothing, with the model as it was.
+/// If the last term holds amplitudes of another term's curve (add_amplitude_hypotheses), merges both into one
+/// term, the last, unless the likelihood falls. Alternates two fits until they converge: the curve with the
+/// amplitudes fixed, then the amplitudes with the curve fixed. Returns the former index of the other term, or
+/// nothing, with the model unchanged.
 [[nodiscard]] std::optional<std::size_t> join_amounts(const Fitter&, MotionModel&);
 
-/// Whether a term is built on a curve that another has.
+/// Whether a term multiplies a curve that another term has fitted.
 [[nodiscard]] bool rests_on_another(const Term&);
 
 }  // namespace kilotwin::identify

@@ -10,25 +10,25 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Shift, turn and scale of the picture; then what the drive may have done: ahead, aside and turn of each driven robot's own.
+/// Shift, rotation and scale of the image, then the motion of each driven robot: ahead, sideways, turn.
 constexpr int kOwn = 3, kAll = Jump::kNumbers + kOwn;
 using Columns = Eigen::Matrix<double, 3, kAll>;
 using Normal = Eigen::Matrix<double, kAll, kAll>;
 using Numbers = Eigen::Matrix<double, kAll, 1>;
 
-/// A turn or a change of scale is counted in what it does so far from the middle of the picture.
+/// Lever arm that converts rotations and scale changes to mm.
 constexpr double kArm_mm = 300;
-/// Beforehand nothing is larger than this.
+/// Largest plausible shift.
 constexpr double kLargest_mm = 100, kLargest_rad = 1;
-/// In half chi squared: no track counts for more, for or against.
+/// Bound on the contribution of one track, in half chi squared.
 constexpr double kMostOfATrack = 5;
-/// Chance makes 25 in one of 1e5 sets; the other bound is on what the picture seems to do at other instants.
+/// Chance exceeds kCertain in one of 1e5 sets. kBeyondUsual: bound relative to other instants of the set.
 constexpr double kCertain = 25, kBeyondUsual = 18;
-/// By which a push explains more before a jump is taken for one.
+/// The push must explain this much more to be preferred to a camera shift.
 constexpr double kClear = 2;
 constexpr int kMostJumps = 8, kMostLooks = 40;
 
-/// What the filter had to correct when a robot was seen.
+/// The innovation of one robot at one instant.
 struct Surprise {
   double from_s, to_s;
   Eigen::Vector3d whitened;
@@ -37,7 +37,7 @@ struct Surprise {
 };
 struct Surprises {
   std::uint32_t run = 0;
-  std::vector<Surprise> of;  ///< ascending, with gaps where the filter was astray
+  std::vector<Surprise> of;  ///< ascending, with gaps where the track was lost
 };
 
 struct Recorder {
@@ -53,10 +53,10 @@ struct Recorder {
     s.from_s = last_s;
     s.to_s = last_s = sample.time_s;
     s.driven = std::exchange(driven, false);
-    // What a filter has not believed it meets again with the next sample: that is no surprise of that instant.
+    // An outlier that the filter rejected reappears in the next innovation. That one is not new information.
     const bool again = std::exchange(after_outlier, innovation.weight < 1);
     if (innovation.lost || again || s.to_s <= s.from_s) return;
-    // As it was expected to be; the filter's own doubts about outliers are taken back.
+    // Innovation covariance without the inflation for outliers.
     const Eigen::Matrix3d root = Eigen::Matrix3d(
         (innovation.covariance * innovation.weight).llt().matrixL().solve(Eigen::Matrix3d::Identity()));
     const double seen_x = sample.x_mm - innovation.difference[0], seen_y = sample.y_mm - innovation.difference[1];
@@ -99,15 +99,15 @@ std::vector<Surprises> surprises_of(const Fitter& fitter, const MotionModel& mod
   return all;
 }
 
-/// Which columns may explain something: the picture's, the push of those that are driven, the drive's own.
+/// Competing explanations: each robot's own motion only, a camera shift, a push of the driven robots.
 enum class Story { kOwnAlone, kPicture, kPush };
 
-/// What all that saw an instant say of it.
+/// Joint innovations of all robots at one instant.
 class Instant {
  public:
   explicit Instant(std::vector<const Surprise*> seen) : seen_(std::move(seen)) {}
 
-  /// By least squares, outliers counting less.
+  /// Robust least squares.
   [[nodiscard]] Numbers fit(Story story, Normal* information = nullptr) const {
     Numbers at = Numbers::Zero();
     for (int pass = 0; pass < 4; ++pass) {
@@ -126,7 +126,7 @@ class Instant {
     }
     return at;
   }
-  /// By how much one story explains more than another.
+  /// Gain in log likelihood of one explanation over another.
   [[nodiscard]] double gain(Story story, const Numbers& at, Story than, const Numbers& than_at) const {
     double sum = 0;
     for (const Surprise* s : seen_) {
@@ -153,7 +153,7 @@ class Instant {
   std::vector<const Surprise*> seen_;
 };
 
-/// All instants on a raster finer than the samples, of one run or of all.
+/// All instants of one run, or of all runs, on a raster finer than the samples.
 class Scan {
  public:
   Scan(const std::vector<Surprises>& all, std::optional<std::uint32_t> run) : run_(run) {
@@ -190,7 +190,7 @@ Candidate candidate_at(const Scan& scan, double time_s) {
           information.inverse().topLeftCorner<4, 4>()};
 }
 
-/// The variance that sizes have at most instants beyond what they should have.
+/// Variance of shifts at most instants, beyond their expected variance.
 Eigen::Vector4d usual_excess(const std::vector<Candidate>& all) {
   Eigen::Vector4d excess;
   for (int i = 0; i < 4; ++i) {
@@ -208,8 +208,8 @@ Eigen::Vector4d usual_excess(const std::vector<Candidate>& all) {
   return excess;
 }
 
-/// Whether frames well before or well after show much of the same: then everything goes on moving, as in a wind. Just after a
-/// jump the filter is still on its way.
+/// Whether frames well before or after the instant also move: then the displacement is gradual, as by wind. Just
+/// after a shift the filter has not converged.
 bool lasts(const Scan& scan, const Candidate& found, double frame_s) {
   const Eigen::Matrix4d information = found.covariance.inverse();
   const Eigen::Vector4d along = information * found.size;
@@ -223,7 +223,7 @@ bool lasts(const Scan& scan, const Candidate& found, double frame_s) {
   return share(-6, -2) > kMuch || share(4, 8) > kMuch;
 }
 
-/// The middle of all instants between frames that say the same.
+/// Midpoint of the instants between two frames that give the same result.
 double middle_of(const Scan& scan, const Candidate& found, double step_s) {
   double low = found.time_s, high = found.time_s;
   constexpr int kFine = 10;
@@ -269,12 +269,12 @@ std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model, do
     if (count < kFewest) return std::nullopt;
     std::vector<Candidate> of(count);
     in_parallel(count, fitter.threads(), [&](std::size_t i) {
-      // A little beside the middle between frames, so that regular ones are not met.
+      // Off the midpoint between frames, so that the raster does not coincide with regular frames.
       of[i] = candidate_at(scan, from_s + (static_cast<double>(i) + 0.47) * step_s);
     });
     const Eigen::Vector4d excess = usual_excess(of);
     for (const Candidate& c : of) {
-      // With hardly a frame before it or after it, a jump is but a picture that was off.
+      // A shift needs a few frames on both sides. Otherwise it is an outlier frame.
       constexpr double kFrames = 3;
       if (c.time_s < from_s + kFrames * frame_s || c.time_s > to_s - kFrames * frame_s) continue;
       if (c.gain < std::max(kCertain, least_gain)) continue;
@@ -311,7 +311,7 @@ namespace {
 constexpr std::array kTargets = {Target::kMeasuredX, Target::kMeasuredY, Target::kMeasuredTurn,
                                  Target::kMeasuredScale};
 
-/// Jumps at their times, those of all runs first, then run by run.
+/// Shifts as steps in time: those of all runs first, then run by run.
 Term term_of(const std::vector<Jump>& jumps, const std::array<bool, 4>& acting) {
   std::vector<std::optional<std::uint32_t>> scopes;
   for (const Jump& jump : jumps)
@@ -359,7 +359,7 @@ std::vector<Jump> add_jumps(const Fitter& fitter, MotionModel& model, double lea
   for (bool fitted = false; static_cast<int>(jumps.size()) < kMostJumps;) {
     const std::optional<Jump> found = find_jump(fitter, model, least_gain);
     if (!found) {
-      // What was noise to a model that knew of no jumps is not, and may have hidden smaller ones.
+      // Noise that was fitted without shifts is too large and may hide smaller ones.
       if (jumps.empty() || fitted) break;
       fitter.fit(model, 2);
       fitted = true;
@@ -368,7 +368,7 @@ std::vector<Jump> add_jumps(const Fitter& fitter, MotionModel& model, double lea
     jumps.push_back(*found);
     MotionModel with = model;
     with.terms.resize(place);
-    // A shift always; turns and changes of scale where some instant shows them.
+    // Displacement always; rotation and scale only if some shift needs them.
     std::array<bool, 4> acting{true, true, false, false};
     for (const Jump& jump : jumps)
       for (Eigen::Index t = 2; t < 4; ++t)

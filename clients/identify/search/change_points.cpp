@@ -16,7 +16,7 @@ using Shape = Factor::Shape;
 constexpr std::size_t kMostPoints = 150, kMostSteps = 12;
 constexpr double kLeastGain = 2;
 
-/// Columns of steps at chosen points of a block, one set after the other of all targets.
+/// Step columns at chosen points of a block, repeated for each target.
 Block stepping(const Block& like, const std::vector<double>& points) {
   Factor f;
   f.shape = Shape::kAtLeast;
@@ -37,7 +37,7 @@ struct Picked {
   std::vector<Eigen::Index> columns;
 };
 
-/// Steps at some of the points, all targets of one size each.
+/// Selection of steps among candidate points. All targets share one prior scale.
 class StepChoice {
  public:
   StepChoice(const Beside& data, std::size_t points, std::size_t targets)
@@ -56,7 +56,7 @@ class StepChoice {
     }
     const Eigen::MatrixXd information = data_.information(out.columns, out.columns);
     const Eigen::VectorXd score = data_.score(out.columns);
-    // One size for all, by the golden rule of thumb: of a few, the one that fits best.
+    // Maximises the evidence over a few prior scales.
     out.evidence = -1e300;
     for (double size = size_; size < 4000 * size_; size *= 3) {
       const Eigen::VectorXd sd = Eigen::VectorXd::Constant(score.size(), size);
@@ -67,7 +67,7 @@ class StepChoice {
     }
     return out;
   }
-  /// The points that are best added to some that are chosen, a step or two that make a pulse, and what they gain less their price.
+  /// The best addition, one step or a pulse of two, and its gain minus its price.
   std::pair<std::vector<std::size_t>, double> best_addition(const Picked& picked, double price) const {
     std::pair<std::vector<std::size_t>, double> best{{}, 0};
     std::vector<double> sizes;
@@ -77,7 +77,7 @@ class StepChoice {
       sizes = {picked.sd[0]};
     }
     for (const double size : sizes) {
-      // What is left of all beside those that are chosen.
+      // Residual information and score, given the chosen steps.
       Eigen::MatrixXd left = data_.information;
       Eigen::VectorXd score = data_.score;
       if (!picked.columns.empty()) {
@@ -119,15 +119,15 @@ class StepChoice {
   double size_ = 1;
 };
 
-/// Steps of one kind of effect, in place of a term or beside it.
+/// Steps with one kind of target, in place of a term or added to it.
 struct Steps {
   std::vector<Block> kinds;
   bool beside = false;
   std::vector<double> at_s;
-  double gain = 0;  ///< log evidence over the term as it is, less the price of choosing
+  double gain = 0;  ///< log evidence over the present term, minus the price of the choice
 };
 
-/// The steps at points of a raster that are worth their price.
+/// Selects the steps on a raster whose gain exceeds their price.
 void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t place,
                   const std::vector<double>& points, Steps& steps) {
   const Term& term = model.terms[place];
@@ -157,7 +157,7 @@ void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t pl
   steps.gain = picked.evidence - price * static_cast<double>(picked.points.size()) - had;
 }
 
-/// What a curve over time has gained by many columns beside what it explains: half the log determinant of its posterior.
+/// Complexity of a curve: half the log determinant of its posterior precision relative to the prior.
 double bends(const Fitter& fitter, const MotionModel& model, std::size_t place) {
   const Linear l = linear(fitter, model, place, {});
   const Beside now = beside(l, l.score_without(model.terms[place].coefficients), l.of_term());
@@ -165,13 +165,13 @@ double bends(const Fitter& fitter, const MotionModel& model, std::size_t place) 
   return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
 }
 
-/// Puts the steps into the model, at times found on ever finer rasters. False: they came to be in disorder.
+/// Adds the steps to the model and refines their times on finer rasters. False if their order changes.
 bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, const Steps& steps, double apart_s) {
   constexpr int kSide = 6, kRaster = 2 * kSide + 1;
   const std::size_t home = place;
   std::vector<double> at = steps.at_s;
   if (steps.beside) {
-    // A term of their own, which is joined to the other afterwards.
+    // A temporary term, merged into the other afterwards.
     model.terms.push_back({model.terms[place].name, {}, {}, {}});
     place = model.terms.size() - 1;
   }
@@ -217,7 +217,7 @@ bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, cons
   return true;
 }
 
-/// What goes on as time does: of the run, or while motors turn.
+/// Run time, or a motor-on time.
 bool goes_on(const Axis& axis) {
   switch (axis.of) {
     case Covariate::kTime:
@@ -237,7 +237,7 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
   std::vector<Block> kinds;
   for (const Block& block : model.terms[place].blocks) {
     if (block.basis.factors.size() != 1) return name;
-    // Jumps of the picture that are more than a shift are found by themselves.
+    // Rotations and scale changes of the image belong to calibration_shifts.hpp.
     if (block.target == Target::kMeasuredTurn || block.target == Target::kMeasuredScale) return name;
     const Factor& f = block.basis.factors.front();
     if (!goes_on(f.axis) || f.shape != Shape::kCosines) return name;
@@ -251,7 +251,7 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
   for (double at = apart_s; at < duration_s - apart_s / 2 && points.size() < kMostPoints; at += apart_s)
     points.push_back(at);
   std::vector<Steps> forms = {{kinds, false, {}, 0}, {kinds, true, {}, 0}};
-  // What jumps in the room and what jumps in the picture look alike until the instant is known.
+  // A displacement in the world and one of the camera look alike until the instant is known.
   const Basis basis = kinds.front().basis;
   const std::vector<Block> room = {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}},
                            picture = {{Target::kMeasuredX, basis, kAlways}, {Target::kMeasuredY, basis, kAlways}};
@@ -260,7 +260,7 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
              in_picture = acts_on == Target::kMeasuredX;
   const bool by_the_clock = basis.factors.front().axis.of == Covariate::kTime;
   if (by_the_clock && (in_room || in_picture)) forms.push_back({in_room ? picture : room, false, {}, 0});
-  // On the raster an instant is only roughly known: what it is worth shows once it is found.
+  // On the raster the gain is approximate. The decision follows after the refinement.
   MotionModel best = model;
   double best_worth = 0;
   for (std::size_t f = 0; f < forms.size(); ++f) {
@@ -274,12 +274,12 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
     if (other) trial.terms[place].name = in_room ? "camera-by-time" : "drift-by-time";
     fitter.fit(trial, 2);
     if (form.beside) settle(fitter, trial, place);
-    // A step costs the choice of its instant, and its sizes; a curve goes for what it bends.
+    // Price of a step: the choice of its time, and its size. Price of a curve: its complexity.
     const double price = std::log(static_cast<double>(points.size())) + 3 * static_cast<double>(form.kinds.size());
     const double curve = form.beside ? 0 : bends(fitter, model, place);
     const double worth = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
                          price * static_cast<double>(form.at_s.size());
-    // What is as likely to be the one as the other stays what it was found as.
+    // Without clear evidence the target stays.
     constexpr double kSurelyOther = 3;
     if (worth <= best_worth + (other ? kSurelyOther : 0)) continue;
     best_worth = worth;

@@ -1,4 +1,4 @@
-/// Where a cause acts from one instant to the next.
+/// Change points: effects that start or end at an instant.
 #pragma once
 
 #include <string>
@@ -7,8 +7,9 @@
 
 namespace kilotwin::identify {
 
-/// Puts steps at times of their own, of the run or for which motors have turned, in place of a curve over such time, or beside it, where that is more probable. A drift in the
-/// room may turn out to be a shift of the picture, or the other way round. Returns the name of the term as it then is.
+/// Replaces a curve over run time or motor-on time by steps at fitted change points, or adds steps to it, if the
+/// evidence rises. A drift in the world may turn out to be a shift of the camera, or the reverse. Returns the name
+/// of the resulting term.
 std::string find_steps(const Fitter&, MotionModel&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -7,7 +7,7 @@ namespace {
 
 using Shape = Factor::Shape;
 
-/// How long it did what came before: whatever it does now, or going straight. Turns that lasted go on turning.
+/// Duration of the previous command: after any command, or when driving straight (long turns persist).
 void of_lasting(DictionaryMaker& make, const Extent& extent, std::uint8_t straight_only) {
   constexpr Eigen::Index kCurve = 3;
   Factor lasted = over(Shape::kCosines, Covariate::kPreviousLasted, 0, extent.since_s, kCurve);
@@ -50,7 +50,7 @@ void hypotheses_of_commands(DictionaryMaker& make, const Extent& extent) {
     for (Eigen::Index i = 0; i < n; ++i)
       make.add("speed-by-command", {"command"}, kSpeed.in_words, {base + i}, static_cast<double>(n) * 2);
   }
-  // Robots that are told to stop may creep on.
+  // Robots at rest may creep.
   if (extent.has_stop) {
     constexpr std::uint8_t kAtRest = 1;
     const auto ahead = make.put(Target::kAhead, {}, kAtRest), aside = make.put(Target::kSideways, {}, kAtRest),
@@ -58,7 +58,7 @@ void hypotheses_of_commands(DictionaryMaker& make, const Extent& extent) {
     make.add("creep-by-command", {"command"}, "motion at rest", {ahead}, 2);
     make.add("creep-by-command", {"command"}, "motion at rest", {ahead, aside, turning}, 2);
   }
-  // A tracker that lags sees moving robots where they were.
+  // A tracker with latency measures moving robots at earlier positions.
   if (moving.size() > 1) {
     const auto ahead = make.put(Target::kMeasuredAhead, which);
     make.add("camera-by-command", {"measurement", "command"}, kCamera.in_words, some({ahead}, 0, n));
@@ -91,7 +91,7 @@ void hypotheses_of_history(DictionaryMaker& make, const Extent& extent) {
   since.warp = 1;
   const Factor which = keyed(Shape::kTable, Covariate::kPreviousCommand, before);
   for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
-    // Slip in constant amounts alone.
+    // Sideways slip: constants only.
     const Eigen::Index curve = acting == &kSlip ? 1 : kCurve;
     const Basis basis = curve > 1 ? Basis{{which, since}} : Basis{{which}};
     const auto driven = make.put(*acting, basis), straight = make.put(*acting, basis, kStraightOnly);
@@ -143,7 +143,7 @@ void hypotheses_of_lately(DictionaryMaker& make, const Extent& extent) {
                right = make.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kRightMotorTime, f, 1)}});
     make.add(kTurning, "turns-of-late", {"history"}, {left, right}, kChoices);
   }
-  // Since it rested, as a battery sags that recovers at once.
+  // Time since the last rest: a battery that sags and recovers at once.
   if (extent.has_stop) {
     Factor unbroken = over(Shape::kCosines, Covariate::kSinceRest, 0, extent.since_rest_s, 6);
     unbroken.warp = 1;
@@ -154,7 +154,7 @@ void hypotheses_of_lately(DictionaryMaker& make, const Extent& extent) {
   const Basis wound{
       {over(Shape::kCosines, Covariate::kUseDifference, -extent.difference_s, extent.difference_s, 6)}};
   make.curve(kTurning, "turns-so-far", {"motor_time", "history"}, wound, {1, 3, 6}, false);
-  // All that it has turned, as a cable winds up.
+  // Accumulated turns: a cable winds up.
   const auto left = make.put(Target::kTurn,
                              Basis{{over(Shape::kLinear, Covariate::kLeftMotorTime, 0, extent.motor_s, 1)}}),
              right = make.put(Target::kTurn,

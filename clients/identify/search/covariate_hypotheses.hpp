@@ -1,5 +1,5 @@
-/// The hypotheses of each covariate or group of covariates. Who calls them calls them in one order: where two explain as much,
-/// the first is taken.
+/// The hypotheses by covariate. The order of the calls is fixed: of two hypotheses with equal evidence, the first
+/// is chosen.
 #pragma once
 
 #include <vector>
@@ -8,42 +8,42 @@
 
 namespace kilotwin::identify {
 
-// Time and place (hypotheses_of_time_and_place.cpp).
+// Time and place (time_place_hypotheses.cpp).
 
-/// Returns the places of a drift's first columns, along x and along y.
+/// Returns the first columns of the drift along x and along y.
 std::vector<Eigen::Index> hypotheses_of_time(DictionaryMaker&, const Extent&);
-/// Returns the same.
+/// Returns the first columns of the drift along x and along y.
 std::vector<Eigen::Index> hypotheses_of_place(DictionaryMaker&, const Extent&);
 void hypotheses_of_heading(DictionaryMaker&, const Extent&);
-/// A constant drift, alone and beside drifts in time and in place.
+/// A constant drift, alone and together with drifts over time and over place.
 void hypotheses_of_drift(DictionaryMaker&, const Extent&, const std::vector<Eigen::Index>& in_time,
                          const std::vector<Eigen::Index>& in_place);
 
-// What robots are told and were told (hypotheses_of_commands.cpp).
+// Commands and their history (command_hypotheses.cpp).
 
-/// How long motors ran.
+/// Total motor-on time.
 void hypotheses_of_use(DictionaryMaker&, const Extent&);
 void hypotheses_of_commands(DictionaryMaker&, const Extent&);
-/// What came before: in constant amounts or in curves since the command, whatever it does now, and going straight.
+/// The previous command: constants, or curves of the time since the change, under any command and under straight.
 void hypotheses_of_history(DictionaryMaker&, const Extent&);
-/// What motors did lately, which fades: they warm up and cool down, recover, turned more to one side than to the other.
+/// Discounted motor-on time: motors warm up and cool down, batteries recover, turns accumulate to one side.
 void hypotheses_of_lately(DictionaryMaker&, const Extent&);
 
-// Others (hypotheses_of_neighbours.cpp).
+// Neighbours and traffic (neighbour_hypotheses.cpp).
 
 void hypotheses_of_neighbours(DictionaryMaker&, const Extent&);
-/// Floors that remember who trod on them.
+/// Driven time per floor cell.
 void hypotheses_of_floor(DictionaryMaker&);
 
-// Which robot, which run (hypotheses_of_robots.cpp).
+// Robots and runs (robot_hypotheses.cpp).
 
 void hypotheses_of_robots(DictionaryMaker&, const Extent&);
-/// What is set up anew for each run. A shift or turn of all that is measured shows nowhere.
+/// Differences between runs. Constant displacements and rotations of the image are not identifiable.
 void hypotheses_of_runs(DictionaryMaker&, const Extent&);
 
-// What is found already (hypotheses_of_found.cpp).
+// Amplitudes of accepted effects (amplitude_hypotheses.cpp).
 
-/// What is larger for some than for others: an amount for each robot, and for each command.
+/// Amplitudes per robot, per command, over time, place and heading.
 void hypotheses_of_found(DictionaryMaker&, const Extent&, const std::vector<Term>& found);
 
 }  // namespace kilotwin::identify

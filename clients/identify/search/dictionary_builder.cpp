@@ -9,7 +9,7 @@ namespace {
 
 using Shape = Factor::Shape;
 
-/// What is natural to a target: an effect of that size would be seen by the naked eye.
+/// Natural size of a target: an effect visible to the naked eye.
 double natural(Target target) {
   switch (target) {
     case Target::kGain:

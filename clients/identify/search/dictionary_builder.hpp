@@ -1,4 +1,4 @@
-/// Fills a dictionary: columns of bases for what effects act on, and hypotheses that choose among them.
+/// Builds a dictionary: basis columns for each target, and hypotheses that select columns.
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@
 
 namespace kilotwin::identify {
 
-/// What an effect acts on.
+/// A group of targets that effects act on together.
 struct Acting {
-  const char* name;      ///< as names of effects begin
-  const char* in_words;  ///< as result.json has it
+  const char* name;      ///< prefix of effect names
+  const char* in_words;  ///< text in result.json
   std::vector<Target> targets;
-  std::vector<std::string> words;  ///< covariates that the target itself brings
+  std::vector<std::string> words;  ///< covariates that the target implies
 };
 
 inline const Acting kSpeed{"speed", "speed of the wheels", {Target::kGain}, {}};
@@ -22,19 +22,19 @@ inline const Acting kSlip{"slip", "sideways slip", {Target::kSideways}, {}};
 inline const Acting kWorld{"drift", "drift in the room", {Target::kWorldX, Target::kWorldY}, {"world_frame"}};
 inline const Acting kCamera{
     "camera", "measured position", {Target::kMeasuredX, Target::kMeasuredY}, {"measurement"}};
-/// Turn and scale of the picture, each as of one camera.
+/// Rotation and scale of the image, as a single camera produces them.
 inline const Acting kPicture{
     "camera", "measured position", {Target::kMeasuredTurn, Target::kMeasuredScale}, {"measurement"}};
 inline const Acting kCompass{"compass", "measured heading", {Target::kMeasuredHeading}, {"measurement"}};
 
 /// A factor of `count` columns over a range of a covariate.
 [[nodiscard]] Factor over(Factor::Shape, Covariate of, double low, double high, std::uint32_t count);
-/// A factor with a column for each of some values of a covariate.
+/// A factor with one column per point.
 [[nodiscard]] Factor keyed(Factor::Shape, Covariate of, std::vector<double> points);
-/// Waves over the place, up to an order in all.
+/// Products of cosines over x and y up to a total order.
 [[nodiscard]] Factor plane(const Extent&, std::uint32_t order);
 
-/// Columns first .. first + count - 1 of each of several bases, which are known by the places of their first columns.
+/// Columns first .. first + count - 1 of each of several bases, given by their first columns.
 [[nodiscard]] std::vector<Eigen::Index> some(const std::vector<Eigen::Index>& bases, Eigen::Index first,
                                              Eigen::Index count);
 
@@ -42,22 +42,24 @@ class DictionaryMaker {
  public:
   explicit DictionaryMaker(Dictionary& dictionary) : dictionary_(dictionary) {}
 
-  /// Puts columns into the dictionary; returns the place of the first. What is measured is so whatever a robot is told.
+  /// Adds columns to the dictionary and returns the index of the first. Measurement effects act under every
+  /// command.
   Eigen::Index put(Target, Basis, std::uint8_t during = kDriven);
-  /// For each target the same; returns the places of their first columns.
+  /// The same for each target of a group; returns the indices of their first columns.
   std::vector<Eigen::Index> put(const Acting&, const Basis&, std::uint8_t during = kDriven);
 
-  /// A hypothesis, with `choices` hypotheses of its family (all of one name are one) tried beside it, itself counted.
+  /// Adds a hypothesis. `choices`: number of hypotheses of its family, itself included. One name is one family.
   void add(const std::string& name, std::vector<std::string> covariates, const std::string& acts_on,
            std::vector<Eigen::Index> columns, double choices = 1);
-  /// The same, its name being "<what it acts on>-by-<of>".
+  /// The same with the name "<target>-by-<of>".
   void add(const Acting&, const std::string& of, std::vector<std::string> covariates,
            std::vector<Eigen::Index> columns, double choices = 1);
-  /// The smooth curve with ever more columns, and, with `windows`, waves of one kind. Returns as put().
+  /// Hypotheses with a smooth curve of increasing order. With `windows`: also single frequencies. Returns as
+  /// put().
   std::vector<Eigen::Index> curve(const Acting&, const std::string& of, const std::vector<std::string>& covariates,
                                   const Basis&, const std::vector<Eigen::Index>& sizes, bool windows);
 
-  /// Once, after all has been put.
+  /// To be called once, after all columns.
   void finish();
 
  private:

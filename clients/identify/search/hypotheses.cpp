@@ -29,7 +29,7 @@ Extent extent_of(const PreparedSet& set) {
     };
     note(last);
     for (const CommandChange& change : view.track->commands) {
-      // As the command before ended.
+      // At the end of the previous command.
       note(view.clock.at(std::nextafter(change.time_s, -1.0)));
       e.has_stop = e.has_stop || (change.motion == Motion::kStop && change.time_s > 0);
       e.has_straight = e.has_straight || change.motion == Motion::kStraight;

@@ -1,43 +1,43 @@
-/// A model and blocks of columns beside it or in place of one of its terms, linearised about the model: what refinements of a
-/// term are weighed on.
+/// Quadratic approximation of the log likelihood about a model, with further blocks added to the model or in place
+/// of one of its terms. Shape refinement and model comparison use it.
 #pragma once
 
 #include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
 
-/// All that a model has, and more blocks after it.
+/// Information and score of the model's columns and of further blocks.
 struct Linear {
   std::vector<Unit> units;
   Eigen::MatrixXd information;
-  Eigen::VectorXd score;              ///< with the prior of what the model has, but for the term
-  Eigen::VectorXd prior;              ///< precision of the columns of the model, but for the term's
-  Eigen::Index first = 0, count = 0;  ///< the columns of the term that is looked at
-  Eigen::Index own = 0;               ///< columns of the model; those of the other blocks come after them
+  Eigen::VectorXd score;              ///< prior included, except that of the replaced term
+  Eigen::VectorXd prior;              ///< prior precision of the model's columns, except those of the replaced term
+  Eigen::Index first = 0, count = 0;  ///< columns of the replaced term
+  Eigen::Index own = 0;               ///< number of the model's columns; those of the further blocks follow
 
-  /// Columns of the model but for the term's.
+  /// The model's columns except the replaced term's.
   [[nodiscard]] std::vector<Eigen::Index> others() const;
-  /// Columns of the other blocks.
+  /// Columns of the further blocks.
   [[nodiscard]] std::vector<Eigen::Index> more() const;
-  /// Columns of the term.
+  /// Columns of the replaced term.
   [[nodiscard]] std::vector<Eigen::Index> of_term() const;
-  /// The score where the term's coefficients were 0.
+  /// The score at coefficients 0 of the replaced term.
   [[nodiscard]] Eigen::VectorXd score_without(const Eigen::VectorXd& coefficients) const;
 };
 
-/// The other blocks stand in place of the term; with `beside`, beside it.
+/// `beside`: the blocks are added to the term instead of replacing it.
 [[nodiscard]] Linear linear(const Fitter&, const MotionModel&, std::size_t term, const std::vector<Block>& more,
                             bool beside = false);
 
-/// Information and score of some columns beside the model's own but for the term's.
+/// Information and score of some columns after the elimination of the nuisance columns (Schur complement).
 struct Beside {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
 };
 [[nodiscard]] Beside beside(const Linear&, const Eigen::VectorXd& score, const std::vector<Eigen::Index>& columns);
 
-/// Puts blocks in place of the term's, whose columns are `columns` with these standard deviations beforehand: all moves with
-/// them as the linearised data have it. `score` is that without the term.
+/// Replaces the term's blocks. `columns` are those of the new blocks, `sd` their prior standard deviations,
+/// `score` the score without the term. All other parameters move to the maximum of the quadratic approximation.
 void exchange(MotionModel&, std::size_t term, const Linear&, const std::vector<Block>&,
               const Eigen::VectorXd& score, const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd);
 

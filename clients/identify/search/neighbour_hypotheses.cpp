@@ -9,7 +9,7 @@ using Shape = Factor::Shape;
 
 void hypotheses_of_neighbours(DictionaryMaker& make, const Extent& extent) {
   if (!extent.neighbours) return;
-  // 70, 100 and 150 mm; which it is exactly is found when the effect gets its shape.
+  // Radii 70, 100 and 150 mm. The shape refinement fits the radius.
   constexpr std::uint8_t kSought[] = {3, 6, 11};
   const auto with_radius = [](Factor f, std::uint8_t radius) {
     f.axis.radius = radius;
@@ -30,7 +30,7 @@ void hypotheses_of_neighbours(DictionaryMaker& make, const Extent& extent) {
     const auto forward = make.put(Target::kAhead, Basis{{falling, bearing}});
     make.add("speed-by-neighbours", {"neighbours"}, kSpeed.in_words, {forward, forward + 2}, 6);
   }
-  // Wherever the nearest is.
+  // For any direction of the nearest.
   const Factor close = with_radius(over(Shape::kTaper, Covariate::kNearest, 0, kNeighbourRadii_mm[6], 2), 6);
   const auto spun = make.put(kTurning, Basis{{close}});
   make.add(kTurning, "neighbours", {"neighbours"}, some(spun, 0, 2), 6);

@@ -12,19 +12,19 @@ namespace {
 
 using Shape = Factor::Shape;
 
-/// Log evidence that one more form must bring, besides the price of choosing it.
+/// Least gain in log evidence of one more form, in addition to the choice penalty.
 constexpr double kWorth = 8;
 constexpr std::size_t kMostForms = 5;
-/// So many of them at first: what is found far from where data were linearised is known roughly.
+/// Forms chosen in the first round: the quadratic approximation is inaccurate far from its centre.
 constexpr std::size_t kFirstForms = 2;
 constexpr std::size_t kMostCounted = 6;
 
-/// Places in kNeighbourRadii_mm of 50, 70, 80, 100, 120 and 150 mm: within which robots are added up by their directions.
+/// Indices in kNeighbourRadii_mm (50, 70, 80, 100, 120, 150 mm) of directional sums.
 constexpr std::array<std::uint8_t, 6> kDirected = {1, 3, 4, 6, 8, 11};
-/// In such powers of what falls from 1 in a direction to 0 opposite: from half a circle of them to a beam of some 45 degrees.
+/// Exponents of the directional weight: from a half circle to a beam of about 45 degrees.
 constexpr std::array<std::uint8_t, 2> kFoci = {1, 4};
 
-/// By neighbours alone.
+/// Whether a block depends on neighbours only.
 bool is_of_neighbours(const Block& block) {
   const auto neighbours = [](const Factor& f) {
     return f.known.empty() && (f.axis.of == Covariate::kNeighbours || f.axis.of == Covariate::kNearest ||
@@ -36,7 +36,7 @@ bool is_of_neighbours(const Block& block) {
          !factors.empty() && std::all_of(factors.begin(), factors.end(), neighbours);
 }
 
-/// The largest density within each radius that the data have, but for one look in a thousand.
+/// The 99.9th percentile of the density within each radius.
 std::array<double, kNeighbourRadii_mm.size()> densities(const PreparedSet& set) {
   std::array<std::vector<float>, kNeighbourRadii_mm.size()> all;
   constexpr double kEvery_s = 3;
@@ -62,8 +62,8 @@ Axis toward(Covariate of, std::uint8_t radius, std::uint8_t focus, int degrees) 
   return axis;
 }
 
-/// What levels off stays sensible among more neighbours than there were where nothing touched. Among none it is nothing: a constant
-/// would be shared with the speeds, which tells nothing apart and leads fits away.
+/// A saturating function extrapolates sensibly to more neighbours. It is 0 without neighbours: a constant would be
+/// confounded with the base speeds.
 Factor levelling(Axis axis) {
   Factor f;
   f.shape = Shape::kLevelling;
@@ -72,10 +72,10 @@ Factor levelling(Axis axis) {
   return f;
 }
 
-/// One shape that an effect may have, alone or with others.
+/// One candidate shape.
 using Form = std::vector<Block>;
 
-/// The nearest by how far and where it is.
+/// Distance and direction of the nearest.
 Basis nearest(std::uint8_t radius, std::uint32_t distances, std::uint32_t waves) {
   Factor near, bearing;
   near.shape = Shape::kTaper;
@@ -111,14 +111,14 @@ std::vector<Form> forms_of_speed(const PreparedSet& set, std::uint8_t during) {
     near.count = 4;
     if (r > 0) add(near);
   }
-  // Of all that lie ahead, or behind.
+  // Directional sums: ahead, or behind.
   for (const std::uint8_t r : kDirected) {
     if (most[r] < 0.05) continue;
     for (const Covariate of : {Covariate::kNeighbours, Covariate::kDensity})
       for (const std::uint8_t focus : kFoci)
         for (const int degrees : {0, 180}) add(levelling(toward(of, r, focus, degrees)));
   }
-  // By where the nearest is as well: ahead, at a side, behind. Of 60, 80 and 110 mm.
+  // Distance and direction of the nearest within 60, 80 and 110 mm.
   for (const std::uint8_t r : std::array<std::uint8_t, 3>{2, 4, 7}) {
     forms.push_back({{Target::kGain, nearest(r, 2, 2), during}});
     forms.push_back({{Target::kAhead, nearest(r, 2, 1), during}});
@@ -126,7 +126,7 @@ std::vector<Form> forms_of_speed(const PreparedSet& set, std::uint8_t during) {
   return forms;
 }
 
-/// Of what turns robots or pushes them aside.
+/// Forms of effects that turn robots or push them sideways.
 std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t during) {
   std::vector<Form> forms;
   const auto most = densities(set);
@@ -148,7 +148,7 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
   for (const std::uint8_t r : kDirected) {
     if (most[r] < 0.05) continue;
     for (const Covariate of : {Covariate::kNeighbours, Covariate::kDensity}) {
-      // At its sides and before and behind it: the waves of one, and of two and three turns about it.
+      // Angular harmonics one to three of the nearest's direction.
       if (turns)
         add(of, r, 1, {-90, 90});
       else
@@ -158,7 +158,7 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
     Form by_nearest, of_all;
     for (const Target target : targets) {
       by_nearest.push_back({target, nearest(r, 3, 2), during});
-      // Wherever they are.
+      // For any direction.
       of_all.push_back({target, linear({Covariate::kDensity, r}), during});
     }
     forms.push_back(std::move(by_nearest));
@@ -167,7 +167,7 @@ std::vector<Form> forms_of_push(const PreparedSet& set, bool turns, std::uint8_t
   return forms;
 }
 
-/// The same forms with radii of their own near by.
+/// The same forms with continuous radii around the present ones.
 std::vector<Form> with_radii_about(const std::vector<Form>& forms) {
   constexpr int kAbout_mm = 9;
   std::vector<Form> out;
@@ -189,7 +189,7 @@ std::vector<Form> with_radii_about(const std::vector<Form>& forms) {
   return out;
 }
 
-/// Some of the forms, and the standard deviations of their columns beforehand.
+/// Selected forms, and the prior standard deviations of their columns.
 struct Chosen {
   std::vector<std::size_t> forms;
   std::vector<Eigen::Index> columns;
@@ -219,7 +219,7 @@ class Choice {
     Chosen chosen;
     const double price = std::log(static_cast<double>(columns_.size()));
     while (chosen.forms.size() < most_forms) {
-      // What is left of all beside those that are chosen.
+      // Residual information and score, given the selected forms.
       Eigen::MatrixXd left = data_.information;
       Eigen::VectorXd score = data_.score;
       if (!chosen.columns.empty()) {
@@ -259,7 +259,7 @@ class Choice {
  private:
   const Beside& data_;
   std::vector<std::vector<Eigen::Index>> columns_;
-  std::vector<Eigen::VectorXd> sd_;  ///< of the columns of a form, to be scaled
+  std::vector<Eigen::VectorXd> sd_;  ///< of the columns of a form, before scaling
 };
 
 }  // namespace
@@ -272,7 +272,7 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
       pushes ? forms_of_push(fitter.set(), had.front().target == Target::kTurn, had.front().during)
              : forms_of_speed(fitter.set(), had.front().during);
   double likelihood = fitter.log_likelihood(model);
-  // In place of the term, some of the forms, if they explain more by so much.
+  // Replaces the term by some of the forms if the gain exceeds `worth`.
   const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double worth) {
     std::vector<Block> all;
     for (const Form& form : of) all.insert(all.end(), form.begin(), form.end());
@@ -301,7 +301,7 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
   };
   const std::vector<Form> first = try_forms(forms, kFirstForms, 0);
   if (first.empty()) return false;
-  // What seemed to be noise, and where robots were thought to be, changes with the first choice.
+  // Noise and disc centres change with the first choice.
   fitter.fit_surroundings(model);
   likelihood = fitter.log_likelihood(model);
   const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms, kWorth);

@@ -1,13 +1,13 @@
-/// The shape of an effect of neighbours on speed: how near they count, and how many of them how much.
+/// Shape of an effect of neighbours: its range and its dependence on their number and direction.
 #pragma once
 
 #include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
 
-/// Puts, in place of a term by which neighbours change the speed, those of many forms that make the data most probable:
-/// tables of how many there are within a radius, sums over all of them that fall off with the distance, curves of the
-/// distance to the nearest. False, and nothing done, where the term is of another kind.
+/// Replaces a term over neighbours by the combination of forms with the highest evidence: tables of the number
+/// within a radius, sums with weights that fall with the distance, curves of the distance of the nearest. Returns
+/// false, without a change, for other terms.
 bool shape_neighbours(const Fitter&, MotionModel&, std::size_t term);
 
 }  // namespace kilotwin::identify

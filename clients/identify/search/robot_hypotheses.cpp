@@ -18,7 +18,7 @@ void hypotheses_of_robots(DictionaryMaker& make, const Extent& extent) {
   const auto slopes = make.put(kSpeed, Basis{{keyed(Shape::kTable, Covariate::kRobot, keys),
                                               over(Shape::kLinear, Covariate::kTime, 0, extent.duration_s, 1)}});
   make.add(kSpeed, "robot-and-time", {"robot", "time"}, some(slopes, 0, n));
-  // A leg that is bent, a marker that was put on askew.
+  // A bent leg, a rotated marker.
   const Basis each{{keyed(Shape::kTable, Covariate::kRobot, keys)}};
   make.add(kSlip, "robot", {"robot"}, some(make.put(kSlip, each), 0, n));
   if (extent.headings) make.add(kCompass, "robot", {"robot"}, some(make.put(kCompass, each), 0, n));
@@ -34,7 +34,7 @@ void hypotheses_of_runs(DictionaryMaker& make, const Extent& extent) {
   const auto n = static_cast<Eigen::Index>(extent.runs.size());
   const auto scale = make.put(Target::kMeasuredScale, which);
   make.add("camera-by-run", {"measurement"}, kCamera.in_words, some({scale}, 0, n));
-  // Robots may as well have been slower: turns tell the one from the other.
+  // Speed of a run, as an alternative to the camera scale: turns separate the two.
   make.add(kSpeed, "run", {"history"}, some(make.put(kSpeed, which), 0, n));
   if (extent.headings) make.add(kCompass, "run", {}, some(make.put(kCompass, which), 0, n));
 }

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kFolds = 6;
 
-/// log10 of the upper tail of the chi-squared distribution: by the continued fraction of the incomplete gamma function, or
-/// its series.
+/// log10 of the upper tail of chi squared, by the continued fraction or the series of the incomplete gamma
+/// function.
 double log10_tail(double statistic, double degrees) {
   const double a = degrees / 2, x = std::max(statistic, 0.0) / 2;
   if (x <= 0) return 0;
@@ -57,8 +57,8 @@ bool of_robots(const Hypothesis& h) {
   return std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
 }
 
-/// The sum of squares of the scores of all stretches, what those of one robot have in common taken off: what is each
-/// robot's own makes its stretches alike, not noisy. 0 where robots have too few stretches to tell.
+/// Sum of squared cluster scores about the mean of each unit. An effect of one robot makes its clusters alike;
+/// that is signal, not noise. 0 if the units have too few clusters.
 double within_units(const Eigen::MatrixXd& scores, const std::vector<std::size_t>& unit) {
   constexpr double kFewest = 30;
   double sum = 0, freedom = 0;
@@ -76,7 +76,7 @@ double within_units(const Eigen::MatrixXd& scores, const std::vector<std::size_t
   return freedom < kFewest ? 0 : sum;
 }
 
-/// The same where the stretches of a group, of a run, do not lie side by side.
+/// The same for groups whose clusters are not adjacent.
 double within_groups(const Eigen::MatrixXd& scores, const std::vector<std::size_t>& group) {
   std::vector<Eigen::Index> order(group.size());
   std::iota(order.begin(), order.end(), 0);
@@ -121,7 +121,7 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
     const std::size_t fold = u % by_unit_.score.size();
     by_unit_.information[fold] += units[u].information;
     by_unit_.score[fold] += units[u].score;
-    // Stretches are about as long as each other, and tell about as much.
+    // Clusters have about equal length and information.
     const Eigen::Index stretches = units[u].cluster_scores.cols();
     std::array<double, kFolds> share{};
     for (Eigen::Index k = 0; k < stretches; ++k) {
@@ -138,7 +138,7 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
     clusters_.middleCols(next, units[u].cluster_scores.cols()) = units[u].cluster_scores;
     next += units[u].cluster_scores.cols();
   }
-  // The prior of the model's own columns.
+  // Prior precision of the model's columns.
   Eigen::MatrixXd base = Eigen::MatrixXd::Zero(all, all);
   Eigen::VectorXd from = Eigen::VectorXd::Zero(all);
   fitter.add_base_prior(model, base, from);
@@ -154,7 +154,7 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
   score_ += from;
 }
 
-/// Columns beside the model's own (but for one term, which is taken out): what is left of them, in all folds.
+/// Information and score of columns, reduced by the model's columns except one term's, for all folds.
 Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_stretch) const {
   const Folds& folds = by_stretch ? by_stretch_ : by_unit_;
   std::vector<Eigen::Index> nuisance;
@@ -203,14 +203,15 @@ Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int wit
   return out;
 }
 
-/// With coefficients b ~ N(0, (t scale)^2): log of the marginal likelihood over that of b = 0, at the best t, and the held-out gain there.
+/// For coefficients b ~ N(0, (t scale)^2): log evidence over b = 0 at the best t, and the cross-validated gain
+/// there.
 Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, double log_choices) const {
   Finding found;
   const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced.information * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
   const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(0);
   Eigen::VectorXd along = eigen.eigenvectors().transpose() * scale.cwiseProduct(reduced.score);
-  // What the data say nothing about is known to no more than rounding.
+  // Directions without information carry rounding errors only.
   for (Eigen::Index i = 0; i < values.size(); ++i)
     if (values[i] < std::max(1e-7 * values.maxCoeff(), 1.0)) along[i] = 0;
   double best = 0, best_t = 0;
@@ -229,7 +230,7 @@ Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, doub
   found.relative_scale = best_t;
   found.evidence = best - log_choices - 1;  // 1: the price of choosing t
   found.degrees = static_cast<int>((values.array() > 1e-9 * values.maxCoeff()).count());
-  // Held out.
+  // Cross-validation.
   const Eigen::VectorXd precision = (best_t * scale).cwiseAbs2().cwiseInverse();
   for (std::size_t f = 0; f < reduced.fold_information.size(); ++f) {
     Eigen::MatrixXd rest = reduced.information - reduced.fold_information[f];
@@ -259,7 +260,7 @@ Finding Scores::weigh_term(int term) const {
 }
 
 Scores::Outcome Scores::test(std::uint64_t seed) const {
-  // All of the dictionary at once, beside the model.
+  // The whole dictionary at once, reduced by the model.
   std::vector<Eigen::Index> columns, nuisance;
   for (Eigen::Index c = own_; c < information_.rows(); ++c) columns.push_back(c);
   for (Eigen::Index i = 0; i < own_; ++i) nuisance.push_back(i);
@@ -293,7 +294,7 @@ Scores::Outcome Scores::test(std::uint64_t seed) const {
     const Eigen::MatrixXd scaled = scale.asDiagonal() * pick(beside, own_columns, own_columns) * scale.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
     const double top = eigen.eigenvalues().maxCoeff();
-    // What the data say nothing about, or what the model has already, is left out.
+    // Drops directions without information, and those that the model already contains.
     std::vector<Eigen::Index> kept;
     for (Eigen::Index i = 0; i < eigen.eigenvalues().size(); ++i)
       if (eigen.eigenvalues()[i] > std::max(1e-7 * top, 1.0)) kept.push_back(i);
@@ -312,7 +313,7 @@ Scores::Outcome Scores::test(std::uint64_t seed) const {
     const Eigen::VectorXd statistics = (whiten * flips).colwise().squaredNorm();
     const double dispersion = std::max(1.0, statistics.mean() / degrees);
     double own_dispersion = dispersion;
-    // What robots, or runs, have of their own is not noise either.
+    // Differences between robots or runs are signal for such hypotheses, not noise.
     const bool robots = of_robots(dictionary_.hypotheses[h]);
     if (robots || looks_at_runs(dictionary_.term_of(dictionary_.hypotheses[h], 1))) {
       Eigen::MatrixXd scores(scale.size(), cluster.cols());
@@ -326,7 +327,7 @@ Scores::Outcome Scores::test(std::uint64_t seed) const {
     for (Eigen::Index f = 0; f < kFlips; ++f)
       worst(f) = std::min(worst(f), log10_tail(statistics[f] / dispersion, degrees));
   }
-  // The smallest p of many is distributed as Gumbel's law has it, on a logarithmic scale.
+  // The minimum over many p values follows a Gumbel distribution on the log scale.
   const double mean = worst.mean();
   const double sd = std::sqrt((worst.array() - mean).square().mean());
   const double gumbel = -std::log(-std::log1p(-kFamilyAlarm));

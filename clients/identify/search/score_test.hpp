@@ -1,72 +1,74 @@
-/// Which hypothesis explains what a model leaves. All are judged at once, on the score and information of their columns
-/// beyond what the model's own columns can explain (linearise.hpp):
-///   - a score test each; how surprising the most surprising of them is under no effect is found by flipping the signs of
-///     whole stretches of tracks at random, which leaves the dependence of samples within them and among hypotheses as it is;
-///   - the log marginal likelihood of each, with the size of the effect that fits best: many columns have to earn their place;
-///   - the gain in log likelihood on robots that the coefficients were not fitted to.
+/// Score test of all hypotheses on the innovations of the fitted model. Scores U and information I of the
+/// hypotheses' columns are reduced by the model's own columns (linearisation.hpp). For each hypothesis:
+///   - the statistic U' I^-1 U, with a threshold for the minimal p over all hypotheses. The null distribution follows from
+///     sign flips of whole clusters, which preserve the dependence within clusters and between hypotheses;
+///   - the log evidence, maximised over the scale of the prior: the integral over the coefficients penalises columns;
+///   - the cross-validated gain in log likelihood, on robots outside the estimate of the coefficients.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "clients/identify/search/hypotheses.hpp"
 #include "clients/identify/fit/fitter.hpp"
+#include "clients/identify/search/hypotheses.hpp"
 
 namespace kilotwin::identify {
 
-/// How one hypothesis did.
+/// Result of one hypothesis.
 struct Finding {
   std::size_t hypothesis = 0;
   double statistic = 0, log10_p = 0;  ///< of the score test alone
   int degrees = 0;
-  double evidence = 0;        ///< log marginal likelihood over that of no effect, less the price of choosing it
-  double relative_scale = 0;  ///< of its coefficients, at which that is largest
-  double held_out = 0;        ///< gain in log likelihood on robots left out
+  double evidence = 0;        ///< log marginal likelihood over the null model, minus the choice penalty
+  double relative_scale = 0;  ///< scale of the prior at which the evidence is largest
+  double held_out = 0;        ///< cross-validated gain in log likelihood
 };
 
-/// Scores of all columns of a dictionary beside a model.
+/// Score test of all columns of a dictionary, given a model.
 class Scores {
  public:
-  /// `units` were linearised with the model's own blocks first and those of the dictionary after them.
+  /// `units`: linearised with the model's blocks first and the dictionary's after them.
   Scores(const Fitter&, const MotionModel&, const std::vector<Unit>& units, const Dictionary&);
 
   struct Outcome {
-    std::vector<Finding> findings;  ///< of all hypotheses, in their order
+    std::vector<Finding> findings;  ///< one per hypothesis, in order
     double threshold_log10_p =
-        0;  ///< the most surprising of all falls below it with kFamilyAlarm where there is no effect
+        0;  ///< under the null hypothesis the smallest log10 p falls below it with probability kFamilyAlarm
   };
-  /// As seen beside all of the model.
+  /// Tests the dictionary in addition to all terms of the model.
   [[nodiscard]] Outcome test(std::uint64_t seed) const;
-  /// Evidence and held-out gain of a hypothesis with one of the model's terms taken out; `term` < 0: with none taken out.
+  /// Evidence and cross-validated gain of a hypothesis if one term of the model is removed; below 0: none is
+  /// removed.
   [[nodiscard]] Finding weigh(const Hypothesis&, int without_term) const;
-  /// The same of the term itself.
+  /// The same for a term of the model itself.
   [[nodiscard]] Finding weigh_term(int term) const;
 
-  /// The chance of finding anything at all in a set without an effect.
+  /// Family-wise error rate: probability of any detection in a set without an effect.
   static constexpr double kFamilyAlarm = 0.003;
 
  private:
-  struct Beside;  // information and scores of columns beside all others
+  struct Beside;  // information and scores reduced by all other columns
   struct Reduced;
   [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_stretch) const;
   [[nodiscard]] Finding weigh(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 
   const MotionModel& model_;
   const Dictionary& dictionary_;
-  Eigen::Index own_;  ///< columns of base and terms
+  Eigen::Index own_;  ///< number of columns of base parameters and terms
   Eigen::MatrixXd information_;
   Eigen::VectorXd score_;
-  Eigen::VectorXd prior_;  ///< diagonal of the model's own prior information, on own columns
-  /// Parts of the data that are left out in turn.
+  Eigen::VectorXd prior_;  ///< diagonal of the prior precision of these columns
+  /// Folds of the cross-validation.
   struct Folds {
     std::vector<Eigen::MatrixXd> information;
     std::vector<Eigen::VectorXd> score;
     Folds(std::size_t count, Eigen::Index columns);
   };
   Folds by_unit_{0, 0};
-  /// Stretches of every robot's tracks: for what is each robot's own, of which robots left out tell nothing.
+  /// Folds of time intervals within each robot's tracks: for effects of single robots, which other robots cannot
+  /// predict.
   Folds by_stretch_{0, 0};
-  Eigen::MatrixXd clusters_;  ///< scores of all columns, a column per cluster
+  Eigen::MatrixXd clusters_;  ///< scores of all columns, one column per cluster
   std::vector<std::size_t> cluster_unit_, cluster_run_;
 };
 

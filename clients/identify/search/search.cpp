@@ -7,32 +7,34 @@
 #include <set>
 
 #include "clients/identify/search/amplitudes.hpp"
-#include "clients/identify/search/total_variation_map.hpp"
 #include "clients/identify/search/calibration_shifts.hpp"
-#include "clients/identify/search/traffic_shape.hpp"
+#include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/neighbour_shape.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/simplification.hpp"
-#include "clients/identify/search/change_points.hpp"
 #include "clients/identify/search/target_extension.hpp"
+#include "clients/identify/search/total_variation_map.hpp"
+#include "clients/identify/search/traffic_shape.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
 constexpr int kMostRounds = 7;
-/// Hypotheses of which so many (as a logarithm) are tried, single steps and pulses, do not challenge others.
+/// Hypotheses with more alternatives (as a logarithm) than this, single steps and pulses, are no alternatives in
+/// an exchange.
 constexpr double kManyChoices = 2.5;
 constexpr std::uint64_t kSeed = 20180729;
-/// Look-alikes whose evidence lies closer than this (a Bayes factor of 20) are not told apart.
+/// Effects with log evidence closer than this (a Bayes factor of 20) count as ambiguous.
 constexpr double kClose = 3;
-/// What another cause in a term's place must reach in log likelihood: with few columns, and with the shape that the data support.
+/// Largest loss of log likelihood in an exchange: with few columns, and with the refined shape.
 constexpr double kMostByShape = 200, kAsGood = 10;
-/// Whatever explained nearly as much, in the few columns that causes are compared by, may be the cause once it has its own shape.
+/// Hypotheses with this share of the best evidence are kept as alternatives: the order may change after shape
+/// refinement.
 constexpr double kContender = 0.97;
 constexpr const char* kPictureForDrift = "camera-by-time for drift-by-time";
-/// No form fits a cause exactly. What is left of all that was found, by this share of what that explains, is no other cause.
+/// No form is exact. A hypothesis that explains less than this share of the total gain counts as a remnant.
 constexpr double kRemnant = 0.003;
-/// As many samples as hypotheses are tested on; there are no more surprises in more.
+/// Largest number of samples in the test. More add cost and no power that is needed.
 constexpr std::size_t kEnoughSamples = 130000;
 
 class Loop {
@@ -46,7 +48,7 @@ class Loop {
     std::size_t samples = 0;
     for (const auto& unit : units_)
       for (const TrackView* view : unit) samples += view->track->samples.size();
-    // Of a large set a part of every robot's tracks, or of the robots.
+    // A large set: uses every n-th robot.
     const std::size_t every = samples / kEnoughSamples + 1;
     if (every > 1) {
       std::vector<std::vector<const TrackView*>> part;
@@ -71,7 +73,7 @@ class Loop {
         if (contended(hypothesis(*best).name)) continue;
         note_contenders(*best, outcome);
         add(*best, outcome.threshold_log10_p);
-        // What promised to explain much must do so.
+        // The likelihood must rise by a part of the predicted gain.
         if (fitter_.log_likelihood_of_all(out_.model) < likelihood + 3) {
           restore(before);
           failed_.insert(hypothesis(*best).name);
@@ -120,7 +122,8 @@ class Loop {
     return h.covariates.size() == 2 &&
            std::find(h.covariates.begin(), h.covariates.end(), "robot") != h.covariates.end();
   }
-  /// Of robots that differ and of something that acts on all, each by itself, where either is good: what both may explain together.
+  /// Evidence of the two single effects (of robots, and of the other covariate) if either is significant: the
+  /// alternative to their combination.
   double parts_evidence(const Hypothesis& pair, const Scores::Outcome& outcome) const {
     double sum = 0;
     bool any = false;
@@ -141,12 +144,12 @@ class Loop {
   }
   const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
 
-  /// Log likelihood that all that was found has gained.
+  /// Gain in log likelihood of all accepted effects.
   [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.model) - base_likelihood_; }
 
-  /// Whether the picture jumps, which is then part of the model.
+  /// Adds calibration shifts of the camera. Returns whether there were any.
   bool add_picture_jumps() {
-    // What a drift that begins or ends suddenly has too round a curve for looks like jumps.
+    // A smooth curve of a drift with sudden ends leaves residuals that look like shifts.
     if (std::any_of(out_.model.terms.begin(), out_.model.terms.end(),
                     [](const Term& term) { return term.name == "drift-by-time"; }))
       return false;
@@ -158,7 +161,7 @@ class Loop {
     for (const Jump& jump : jumps) {
       finding.evidence += jump.gain;
       finding.degrees += Jump::kNumbers;
-      // Half chi squared of four numbers, at one of some thousand instants.
+      // p of half chi squared with four degrees of freedom, over some thousand instants.
       constexpr double kInstants = 5000;
       finding.log10_p =
           std::min(finding.log10_p, (std::log1p(jump.gain) - jump.gain + std::log(kInstants)) / std::log(10.0));
@@ -174,7 +177,7 @@ class Loop {
     const Hypothesis& h = hypothesis(found);
     Term term = dictionary_.term_of(h, found.relative_scale);
     const Reason reason{h.covariates, h.acts_on, found, threshold};
-    // More of what is there already may be one thing in a richer form.
+    // A further term of an accepted effect may belong to a richer shape of it.
     for (std::size_t t = 0; t < out_.model.terms.size(); ++t) {
       if (out_.model.terms[t].name != h.name) continue;
       if (reshaped(t, found.evidence)) {
@@ -200,7 +203,7 @@ class Loop {
     if (!joined()) shape(out_.model.terms.size() - 1);
   }
 
-  /// Whether a term, its shape chosen anew beside what was found since, explains most of what more of it promises.
+  /// Refines the shape of a term. Returns whether that recovers most of the expected gain of a further term.
   bool reshaped(std::size_t place, double promised) {
     constexpr double kMost = 0.5;
     const Kept before = keep();
@@ -212,7 +215,7 @@ class Loop {
     return false;
   }
 
-  /// Whether the last term, amounts of what another found, became one with that.
+  /// Whether the last term, amplitudes of an accepted curve, was merged with it.
   bool joined() {
     const std::optional<std::size_t> curve = join_amounts(fitter_, out_.model);
     if (!curve) return false;
@@ -221,7 +224,7 @@ class Loop {
     return true;
   }
 
-  /// Gives a term the form that the data support.
+  /// Refines the shape of a term.
   void shape(std::size_t place) {
     if (!shape_neighbours(fitter_, out_.model, place) && !shape_memory(fitter_, out_.model, place))
       refine(fitter_, out_.model, place);
@@ -236,12 +239,12 @@ class Loop {
     sharpen(fitter_, out_.model, place);
     widen(fitter_, out_.model, place);
   }
-  /// A picture that moves looks like robots that drift, but for those at rest and for where walls are.
+  /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
   void try_picture() {
     const auto drift = std::find_if(out_.model.terms.begin(), out_.model.terms.end(),
                                     [](const Term& term) { return term.name == "drift-by-time"; });
     if (drift == out_.model.terms.end() || failed_.contains(kPictureForDrift)) return;
-    // Once: steps of the picture may be taken for drifts again.
+    // Once only: otherwise the search could alternate between both.
     failed_.insert(kPictureForDrift);
     const auto place = static_cast<std::size_t>(drift - out_.model.terms.begin());
     const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
@@ -262,7 +265,8 @@ class Loop {
       return;
     exchanged(place, *best, best_finding);
   }
-  /// Whether a term was put out, or gave its place to another, so that all is to be looked at once more.
+  /// Backward elimination and exchange. Returns whether a term was removed or replaced, so that the search must
+  /// continue.
   bool defend() {
     if (defences_++ >= 3) return false;
     for (int t = 0; t < static_cast<int>(out_.model.terms.size()); ++t) {
@@ -273,7 +277,7 @@ class Loop {
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
-        // Amounts of a curve that a term has found: in its place they would have the curve for nothing.
+        // Amplitudes of this term's curve are no alternative: they contain the curve.
         if (rests_on_another(dictionary_.term_of(h, 1))) continue;
         const Finding other = scores_->weigh(h, t);
         if (best == nullptr || other.evidence > best_finding.evidence) {
@@ -289,14 +293,14 @@ class Loop {
     }
     return false;
   }
-  /// Puts another cause in the place of a term. What is weighed far from where the data were linearised may promise too much:
-  /// where it explains less after all, everything is as it was.
+  /// Exchanges a term for another hypothesis. The quadratic approximation may overestimate its evidence: restores
+  /// the state if the likelihood falls.
   bool exchanged(std::size_t place, const Hypothesis& other, Finding finding) {
     const Kept before = keep();
-    // Where robots are held tells what moves: they, or the picture of them.
+    // Contacts show whether the robots move or the camera does.
     const auto of_picture = [&] { return is_measured(out_.model.terms[place].blocks.front().target); };
     const bool was_of_picture = of_picture();
-    // By where discs lay then.
+    // With the disc centres of the state before.
     const double likelihood = fitter_.log_likelihood(out_.model),
                  likelihood_of_all = fitter_.log_likelihood_of_all(out_.model);
     finding.log10_p = out_.reasons[place].finding.log10_p;
@@ -308,7 +312,7 @@ class Loop {
       fitter_.fit_surroundings(out_.model);
       if (fitter_.log_likelihood_of_all(out_.model) > likelihood_of_all - kAsGood) return true;
     } else {
-      // The shape that it is given then explains more, but not all of what is lacking.
+      // Shape refinement can recover a part of the difference only.
       if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
         shape(place);
         if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
@@ -318,7 +322,7 @@ class Loop {
     failed_.insert(other.name + " for " + out_.model.terms[place].name);
     return false;
   }
-  /// The search as it stands, with what tracks were prepared with: where discs lie, headings at starts.
+  /// State of the search, with the estimates that belong to the tracks.
   struct Kept {
     Search found;
     PreparedSet::Found tracks;
@@ -328,7 +332,7 @@ class Loop {
     out_ = kept.found;
     fitter_.set().go_back(kept.tracks, out_.model);
   }
-  /// Whether a term is but the constant part of what another does.
+  /// Whether a term is the constant part of another one.
   static bool is_constant_of(const Term& term, const Term& other) {
     return std::all_of(term.blocks.begin(), term.blocks.end(), [&](const Block& block) {
       return block.basis.factors.empty() &&
@@ -337,8 +341,8 @@ class Loop {
              });
     });
   }
-  /// The last term may be what those before it were taken for, unless it explains far less. Each is taken out, and the last given
-  /// the shape that it has without it.
+  /// A new effect may explain what earlier terms were accepted for, unless it has far less evidence. Tries to
+  /// remove each earlier term, with the shape of the new one refined.
   void reconsider() {
     if (rests_on_another(out_.model.terms.back())) return;
     constexpr double kFarLess = 0.1;
@@ -348,7 +352,7 @@ class Loop {
       if ((!far_less || is_constant_of(earlier, last)) && earlier.name != last.name) dropped(t, true);
     }
   }
-  /// Takes a term out, but for one without which the data are less probable after all.
+  /// Removes a term unless the evidence falls.
   bool dropped(std::size_t t, bool shape_last) {
     const Kept before = keep();
     const double evidence = fitter_.log_evidence(out_.model);
@@ -375,7 +379,8 @@ class Loop {
       if (out_.rejected.size() == 12) break;
     }
   }
-  /// Whether a cause that nearly was chosen in place of the one found last, and now shows beside it, explains more in its place.
+  /// Whether an alternative to the last accepted effect, which is now significant beside it, has more evidence in
+  /// its place.
   bool contended(const std::string& name) {
     const auto c = contest_.contenders.find(name);
     if (c == contest_.contenders.end() || out_.model.terms.size() != contest_.before.found.model.terms.size() + 1 ||
@@ -426,19 +431,19 @@ class Loop {
   const Fitter& fitter_;
   const std::function<void(double, const std::string&)>& progress_;
   const Extent extent_;
-  Dictionary dictionary_;  ///< what is tried beside the model
+  Dictionary dictionary_;  ///< hypotheses in addition to the model
   std::vector<std::vector<const TrackView*>> units_;
   std::optional<Scores> scores_;
   Search out_;
   double base_likelihood_ = 0;
-  /// What might have been chosen in place of the cause that was found last.
+  /// Alternatives to the effect that was accepted last.
   struct Contest {
     Kept before;
     std::string chosen;
     std::map<std::string, std::pair<Term, Reason>> contenders;  ///< by name
   };
   Contest contest_;
-  std::set<std::string> failed_;  ///< hypotheses that did not keep what they promised
+  std::set<std::string> failed_;  ///< hypotheses that failed after the refit
   int defences_ = 0, round_ = 0;
 };
 

@@ -1,5 +1,5 @@
-/// The loop: fit, look at what is left, add its cause, until nothing is left that could not be chance; then let every cause
-/// defend its place against all others.
+/// Forward selection with backward elimination: fit, test all hypotheses on the residuals, add the one with the
+/// highest evidence, refit; when nothing is significant, test every accepted effect against its alternatives.
 #pragma once
 
 #include <functional>
@@ -18,10 +18,10 @@ struct Reason {
   double threshold_log10_p = 0;
 };
 
-/// A cause that this data cannot tell from another.
+/// An effect that these data cannot separate from an alternative.
 struct Ambiguity {
   std::string found, instead;
-  std::vector<std::string> found_covariates, covariates;  ///< of the one and of the other
+  std::vector<std::string> found_covariates, covariates;  ///< of the effect and of the alternative
   double evidence_difference = 0;
 };
 
@@ -39,13 +39,13 @@ struct Step {
 
 struct Search {
   MotionModel model;
-  std::vector<Reason> reasons;  ///< of the model's terms
+  std::vector<Reason> reasons;  ///< one per term of the model
   std::vector<Ambiguity> ambiguous;
-  std::vector<Rejected> rejected;  ///< the most surprising of what is not in the model
+  std::vector<Rejected> rejected;  ///< the most significant hypotheses that are not in the model
   std::vector<Step> steps;
 };
 
-/// Starts from a fitted base model. `progress` gets 0..1.
+/// Starts from a fitted base model. `progress` gets 0..1 and the present step.
 [[nodiscard]] Search search(const Fitter&, const MotionModel& base,
                             const std::function<void(double, const std::string&)>& progress);
 

@@ -12,9 +12,9 @@ namespace {
 using Shape = Factor::Shape;
 
 constexpr int kMostPasses = 5;
-/// A gain in log likelihood for which no further pass is made.
+/// Convergence: gain in log likelihood of one more pass.
 constexpr double kSettled = 1;
-/// A column that prior and data together leave this little of is not kept: its sd times the root of its information.
+/// Pruning threshold of a column: its prior sd times the root of its information.
 constexpr double kFaint = 0.03;
 
 Factor richer(Factor f) {
@@ -46,7 +46,7 @@ Factor richer(Factor f) {
     case Shape::kExponential: f.points = {0.25, 0.5, 1, 2, 4, 8}; break;
     case Shape::kAtLeast:
       if (f.axis.of != Covariate::kTime) break;
-      // Where the steps really are is found afterwards.
+      // change_points.hpp finds the times of steps.
       f.shape = Shape::kCosines;
       f.low = 0;
       f.high = f.points.back() + f.points.front();
@@ -62,7 +62,7 @@ Factor richer(Factor f) {
   return f;
 }
 
-/// What lies beyond a map's order, along one axis.
+/// Columns beyond a map's order, along one axis.
 Basis along(Basis basis, bool second) {
   Factor& f = *basis.only_open();
   const Factor map = f;
@@ -77,7 +77,7 @@ Basis along(Basis basis, bool second) {
   return basis;
 }
 
-/// A table times something else, with the keys alone that some chosen column has.
+/// A table times another factor, with only the keys that occur in a chosen column.
 Basis with_chosen_keys(Basis basis) {
   if (basis.factors.size() != 2 || basis.only_open() != nullptr || basis.factors.front().shape != Shape::kTable ||
       basis.chosen.empty())
@@ -94,7 +94,7 @@ Basis with_chosen_keys(Basis basis) {
   return basis;
 }
 
-/// Products have as many cosines as there is room for; each robot by itself few.
+/// Limits the number of cosines in products.
 void shorten(Basis& basis) {
   if (basis.only_open() != nullptr || basis.factors.size() < 2) return;
   constexpr std::uint32_t kOfARobot = 6;
@@ -103,37 +103,37 @@ void shorten(Basis& basis) {
     if (factor.shape != Shape::kCosines || !factor.known.empty()) continue;
     const auto room = static_cast<std::uint32_t>(kMostColumns * factor.count / basis.size());
     factor.count = std::clamp(of_robots ? std::min(room, kOfARobot) : room, 1u, factor.count);
-    // What a robot has throughout goes along.
+    // Includes the constant of each robot.
     if (of_robots) factor.first = 0;
   }
 }
 
-/// Known amounts by which a curve or a map is multiplied.
+/// Fixed amplitudes that multiply a curve or a map.
 const Factor* amounts_of(const Basis& basis) {
   const bool any = basis.factors.size() == 2 && basis.only_open() == &basis.factors[1];
   return any ? &basis.factors.front() : nullptr;
 }
 
-/// Of a drift or slip a constant part shows, which no bias of a robot's wheels takes up, and so does one of which some show more than
-/// others: it belongs to a cause's own shape.
+/// Whether a constant is identifiable: for drift and slip, since biases cannot absorb it, and for effects with
+/// amplitudes.
 bool has_constant_part(const Block& block) {
   const Target target = block.target;
   return target == Target::kWorldX || target == Target::kWorldY || target == Target::kSideways ||
          (!is_measured(target) && amounts_of(block.basis) != nullptr);
 }
 
-/// One curve over time, or one over anything else: its column of frequency 0 is the constant.
+/// A single curve. Its column of frequency 0 is the constant.
 bool is_curve(const Basis& basis) {
   const Factor* const open = basis.only_open();
   return open != nullptr && open->shape == Shape::kCosines;
 }
 
-/// The same everywhere, but for known amounts.
+/// Constant, up to fixed amplitudes.
 bool is_constant(const Basis& basis) {
   return std::all_of(basis.factors.begin(), basis.factors.end(), [](const Factor& f) { return !f.known.empty(); });
 }
 
-/// Whether a block holds what a map beside it, refined before, had no columns for: it gets such blocks again.
+/// Whether a block holds columns beyond a map's order, added by an earlier refinement. It is then rebuilt.
 bool lies_beyond_map(const Block& block, const std::vector<Block>& blocks) {
   const Factor* const open = block.basis.only_open();
   return open != nullptr && open->shape == Shape::kCosines && open->first > 1 &&
@@ -147,7 +147,7 @@ bool lies_beyond_map(const Block& block, const std::vector<Block>& blocks) {
 std::vector<Block> richer(const Term& term) {
   std::vector<Block> blocks;
   for (const Block& block : term.blocks) {
-    // Beside a shape, a constant is part of it.
+    // A constant block beside a shape is part of that shape.
     if (is_constant(block.basis) && std::any_of(term.blocks.begin(), term.blocks.end(), [&](const Block& other) {
           return other.target == block.target && other.during == block.during && has_constant_part(other) &&
                  is_curve(other.basis);
@@ -160,12 +160,12 @@ std::vector<Block> richer(const Term& term) {
     for (Factor& factor : rich.basis.factors) factor = richer(factor);
     if (has_constant_part(block) && is_curve(rich.basis)) rich.basis.only_open()->first = 0;
     shorten(rich.basis);
-    // Pictures creep; what makes them jump is found elsewhere.
+    // Camera drift is slow. calibration_shifts.hpp finds shifts.
     constexpr std::uint32_t kCreep = 24;
     if (is_measured(block.target))
       for (Factor& f : rich.basis.factors)
         if (f.shape == Shape::kCosines && f.axis.of == Covariate::kTime) f.count = std::min(f.count, kCreep);
-    // Too many columns: as they were.
+    // Too many columns: keeps the present basis.
     if (rich.basis.size() > kMostColumns) rich.basis = block.basis;
     blocks.push_back(rich);
     if (const Factor* const open = rich.basis.only_open(); open != nullptr && open->shape == Shape::kCosines2) {
@@ -176,7 +176,7 @@ std::vector<Block> richer(const Term& term) {
       }
     }
   }
-  // A map has no constant column: where it needs one, it gets one beside it.
+  // Maps have no constant column. If needed, a constant block is added.
   const std::vector<Block> shaped = blocks;
   for (const Block& block : shaped) {
     const Factor* const open = block.basis.only_open();
@@ -211,7 +211,7 @@ bool paired(Target a, Target b) {
   return pair(a) == pair(b);
 }
 
-/// The columns of a term's blocks, those of a kind together.
+/// Column groups of the blocks, by kind.
 std::vector<ColumnGroup> groups_of(const std::vector<Block>& blocks) {
   std::vector<ColumnGroup> groups;
   std::vector<std::size_t> first_block;
@@ -234,7 +234,7 @@ std::vector<ColumnGroup> groups_of(const std::vector<Block>& blocks) {
   return groups;
 }
 
-/// Leaves out the columns that cannot matter.
+/// Removes columns without influence.
 void prune(Term& term, const Eigen::VectorXd& information) {
   std::vector<Block> blocks;
   std::vector<double> coefficients, precision;
@@ -301,7 +301,7 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
     const double before = best;
     for (std::size_t g = 0; g < groups.size(); ++g) {
       if (smoothness[g].size == 0) {
-        // From what one column could tell of its size, up.
+        // Starts at the scale that a single column can resolve.
         double smallest = 1e300;
         for (const Eigen::Index c : groups[g].columns)
           if (information(c, c) > 0) smallest = std::min(smallest, 1 / std::sqrt(information(c, c)));
@@ -325,7 +325,7 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
             trial = was;
             trial.decay = std::clamp(trial.decay * by, 0.6, 12.0);
             better = try_it(g, trial) || better;
-            // A smaller knee at the same height of the tail.
+            // A smaller knee with the same tail.
             trial = was;
             trial.knee = std::clamp(trial.knee * by, 0.3, 60.0);
             trial.size *= std::pow(by, -trial.decay);
@@ -344,7 +344,7 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
 
 namespace {
 
-/// With `rich` blocks in place of the term's, or, where there are none, those that it has.
+/// Uses the `rich` blocks in place of the term's, or the term's own if there are none.
 void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, const std::vector<Block>& rich) {
   const std::vector<ColumnGroup> groups = groups_of(rich.empty() ? model.terms[place].blocks : rich);
   std::vector<Smoothness> smoothness;
@@ -358,7 +358,7 @@ void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, c
     const std::vector<Eigen::Index> columns = anew ? l.more() : l.of_term();
     const Beside data = beside(l, at_zero, columns);
     choose_smoothness(data.information, data.score, groups, smoothness, sd);
-    // What has no size beforehand is as good as held at 0.
+    // A prior sd near 0 fixes the column at 0.
     const Eigen::VectorXd held = sd.cwiseMax(1e-6 * std::max(sd.maxCoeff(), 1e-6));
     if (anew) {
       exchange(model, place, l, rich, at_zero, columns, held);

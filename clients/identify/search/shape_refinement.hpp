@@ -1,38 +1,37 @@
-/// Gives a cause that was found with few columns the shape that the data support: many columns, of which the prior lets
-/// only so much bend as makes the data most probable.
+/// Refinement of an effect's shape: many columns with a smoothness prior, whose hyperparameters maximise the
+/// evidence (empirical Bayes).
 #pragma once
 
 #include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
 
-/// How large and how rough the functions of a group of columns are beforehand: a column with roughness k has the variance
-/// size^2 (1 + (k / knee)^2)^-decay.
+/// Prior of a group of columns: a column of roughness k has the variance size^2 (1 + (k / knee)^2)^-decay.
 struct Smoothness {
   double size = 1, knee = 4, decay = 2;
 
   [[nodiscard]] double sd(double roughness) const;
 };
 
-/// Log marginal likelihood of coefficients that have these standard deviations beforehand, over that of none, from the
-/// information and the score at 0.
+/// Log evidence of coefficients b ~ N(0, sd^2) over b = 0, from information and score at 0 (Laplace
+/// approximation).
 [[nodiscard]] double log_evidence(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
                                   const Eigen::VectorXd& sd);
 
-/// Columns that belong to one group, and how rough each is.
+/// Columns that share their hyperparameters, and the roughness of each.
 struct ColumnGroup {
   std::vector<Eigen::Index> columns;
   std::vector<double> roughness;
 };
-/// The smoothness of every group that makes the data most probable; `sd` gets the standard deviations of all columns.
-/// Returns the log evidence.
+/// Maximises the evidence over the hyperparameters of every group. Returns it, and the standard deviations of all
+/// columns in `sd`.
 double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
                          const std::vector<ColumnGroup>& groups, std::vector<Smoothness>& smoothness,
                          Eigen::VectorXd& sd);
 
-/// Puts rich bases in place of those of a term, and fits all of the model until it stays as it is.
+/// Replaces the term's bases by rich ones and refits the model until it converges.
 void refine(const Fitter&, MotionModel&, std::size_t term);
-/// The same with the bases that it has.
+/// Refits the term with its present bases.
 void settle(const Fitter&, MotionModel&, std::size_t term);
 
 }  // namespace kilotwin::identify

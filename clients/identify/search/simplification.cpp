@@ -13,20 +13,20 @@ namespace {
 using Shape = Factor::Shape;
 
 constexpr int kScales = 12, kSteps = 30, kHarmonics = 3;
-/// How much less log evidence than the curve's a simple form may have.
+/// Largest loss of log evidence of a simple form.
 constexpr double kAsGood = 1;
-/// The same before all is fitted again, and of all the evidence that there is: scales and steps lie on a coarse raster, and where
-/// speeds change with the form, data that were linearised know it roughly.
+/// The same before the refit, absolute and as a share of the evidence: parameters lie on a coarse raster, and the
+/// quadratic approximation is rough.
 constexpr double kRoughly = 40, kRoughShare = 0.04;
 
-/// One form for all blocks of a term.
+/// One simple form for all blocks of a term.
 struct Form {
   Basis basis;
-  double log_choices = 0;  ///< of how many like it are tried
-  Eigen::Index first = 0;  ///< of its columns among those of all forms
+  double log_choices = 0;  ///< log of the number of alternatives
+  Eigen::Index first = 0;  ///< first column among those of all forms
 };
 
-/// The one curve over one covariate that all blocks are; null where they are something else.
+/// The common curve over one covariate of all blocks; null if there is none.
 const Factor* curve_of(const Term& term) {
   const Factor* curve = nullptr;
   for (const Block& block : term.blocks) {
@@ -55,7 +55,7 @@ Form form(const Factor& like, Shape shape, double choices, std::vector<double> p
 
 std::vector<Form> forms_of(const Factor& curve, Target target) {
   std::vector<Form> forms;
-  // Of speed a constant is no effect.
+  // A constant gain is not identifiable: base speeds absorb it.
   if (target != Target::kGain && target != Target::kGainLeft && target != Target::kGainRight) forms.push_back({});
   if (curve.shape == Shape::kHarmonics) {
     for (std::uint32_t k = 1; k <= kHarmonics; ++k)
@@ -67,7 +67,7 @@ std::vector<Form> forms_of(const Factor& curve, Target target) {
   const bool place = curve.axis.of == Covariate::kX || curve.axis.of == Covariate::kY;
   for (int i = 0; i < kScales && !place; ++i)
     forms.push_back(form(curve, Shape::kExponential, kScales, {range * std::pow(0.66, i)}));
-  // Instants are found elsewhere.
+  // change_points.hpp handles time.
   if (curve.axis.of == Covariate::kTime) return forms;
   for (int i = 1; i < kSteps; ++i)
     forms.push_back(form(curve, Shape::kAtLeast, kSteps, {curve.low + range * i / kSteps}));
@@ -99,7 +99,7 @@ Chosen best_of(const std::vector<Form>& forms, const Beside& data, std::size_t b
   return best;
 }
 
-/// Blocks of all forms, each with all of the term's targets; gives the forms their columns.
+/// Blocks of all forms for all targets of the term. Assigns the forms their columns.
 std::vector<Block> blocks_of(std::vector<Form>& forms, const Term& term) {
   std::vector<Block> blocks;
   Eigen::Index next = 0;
@@ -113,7 +113,7 @@ std::vector<Block> blocks_of(std::vector<Form>& forms, const Term& term) {
   return blocks;
 }
 
-/// Puts the best of some forms in place of the term, where it has about as much evidence, or in any case. False: it has not.
+/// Replaces the term by the best form if its evidence suffices, or in any case. Returns false if it does not.
 bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::vector<Form>& forms,
               bool in_any_case) {
   const Term& term = model.terms[place];
@@ -132,7 +132,7 @@ bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::
   return true;
 }
 
-/// What the freedom to bend costs a term: half the log determinant of what data and prior know over what the prior does.
+/// Complexity of a term: half the log determinant of its posterior precision relative to the prior.
 double cost_of(const Fitter& fitter, const MotionModel& model, std::size_t place) {
   const Linear l = linear(fitter, model, place, {});
   const Beside now = beside(l, l.score, l.of_term());
@@ -151,7 +151,7 @@ bool simplify(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const std::vector<Factor>& factors = simple.terms[place].blocks.front().basis.factors;
   if (!factors.empty() &&
       (factors.front().shape == Shape::kExponential || factors.front().shape == Shape::kAtLeast)) {
-    // On a finer raster about it.
+    // A finer raster around the optimum.
     const Factor found = factors.front();
     std::vector<Form> finer;
     for (int i = -6; i <= 6; ++i) {

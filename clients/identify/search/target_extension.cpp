@@ -11,11 +11,11 @@ namespace {
 
 using Shape = Factor::Shape;
 
-/// Log evidence that one more thing that a cause does must bring.
+/// Least gain in log evidence of one more target.
 constexpr double kWorth = 10;
 constexpr int kMostWidened = 3;
 
-/// The same covariates with fewer columns: for what is only to be found.
+/// The same covariates with fewer columns, which suffice for detection.
 Basis modest(Basis basis) {
   for (Factor& f : basis.factors) {
     if (f.shape == Shape::kAtLeast || f.shape == Shape::kTable || !f.known.empty()) continue;
@@ -31,7 +31,7 @@ Basis modest(Basis basis) {
     if (f.shape == Shape::kPolynomials2) f.count = std::min<std::uint32_t>(f.count, 4);
     if (f.shape == Shape::kHarmonics) f.count = std::min<std::uint32_t>(f.count, 4);
   }
-  // Of products a few columns.
+  // Fewer columns for products.
   constexpr std::size_t kMost = 40;
   if (basis.factors.size() > 1 && basis.chosen.empty()) {
     for (Factor& f : basis.factors)
@@ -41,7 +41,7 @@ Basis modest(Basis basis) {
   return basis;
 }
 
-/// One more thing that a cause may do.
+/// One further target of an effect.
 struct Widening {
   std::vector<Block> blocks;
   [[nodiscard]] Eigen::Index size() const {
@@ -59,7 +59,7 @@ bool acts(const Term& term, Target target, std::uint8_t during) {
 
 bool is_world(Target t) { return t == Target::kWorldX || t == Target::kWorldY; }
 
-/// What all robots have on one side alone no mean of their biases takes up: it would pass for biases that differ.
+/// A one-sided effect of all robots is confounded with the mean of their biases, so it needs a constant.
 bool is_one_sided(Target t) { return t == Target::kGainLeft || t == Target::kGainRight || t == Target::kTurn; }
 
 void with_constant(Basis& basis) {
@@ -76,7 +76,7 @@ std::vector<Widening> widenings_of(const Term& term, bool headings) {
     if (headings && !acts(term, Target::kMeasuredHeading, kAlways))
       all.push_back({{{Target::kMeasuredHeading, basis, kAlways}}});
     if (basis.looks_at(Covariate::kX) || first.target != Target::kMeasuredX) return all;
-    // A picture that moves aside may turn and grow as well.
+    // A camera that shifts may also rotate and change its scale.
     for (const Target target : {Target::kMeasuredTurn, Target::kMeasuredScale})
       if (!acts(term, target, kAlways)) all.push_back({{{target, basis, kAlways}}});
     return all;

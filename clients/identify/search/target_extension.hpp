@@ -1,12 +1,12 @@
-/// What a cause does besides what it was found by.
+/// Further targets of an accepted effect.
 #pragma once
 
 #include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
 
-/// Lets a term act on more of what its kind of effect acts on (the wheels, the turn rate, slip, robots at rest, the measured
-/// heading), as long as the data become more probable by it.
+/// Lets a term also act on related targets (one wheel, turn rate, slip, robots at rest, measured heading), as long
+/// as the evidence rises.
 void widen(const Fitter&, MotionModel&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -14,7 +14,7 @@ std::vector<Eigen::Index> hypotheses_of_time(DictionaryMaker& make, const Extent
   make.curve(kSpeed, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
   make.curve(kTurning, "time", {"time"}, smooth(12), {1, 3, 12}, true);
   const auto drift = make.curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
-  // The picture may creep aside, turn and grow, each by itself or all at once.
+  // The camera may drift, rotate and change its scale, separately or together.
   const auto aside = make.put(kCamera, smooth(16));
   const auto turned = make.put(kPicture, smooth(8));
   for (const Eigen::Index n : {1, 3, 8, 16}) make.add(kCamera, "time", {"time"}, some(aside, 0, n));
@@ -25,7 +25,7 @@ std::vector<Eigen::Index> hypotheses_of_time(DictionaryMaker& make, const Extent
     make.add(kCamera, "time", {"time"}, all);
   }
   if (extent.headings) make.curve(kCompass, "time", {"time"}, smooth(6), {1, 3, 6}, false);
-  // Steps, and pulses between two of them.
+  // Steps, and pulses between two steps.
   constexpr int kSteps = 40;
   std::vector<double> at;
   for (int i = 1; i < kSteps; ++i) at.push_back(extent.duration_s * i / kSteps);
@@ -57,7 +57,8 @@ std::vector<Eigen::Index> hypotheses_of_place(DictionaryMaker& make, const Exten
   map(kTurning, 3);
   const auto drift = map(kWorld, 5);
   map(kCamera, 5);
-  // Lenses and tilts bend the picture most at its rim, where waves are flat. What they bend may be wider than what is seen.
+  // Lenses and tilts distort most at the border, where cosines are flat: polynomials. Their range may exceed the
+  // visited area.
   Factor bent = plane(extent, 5);
   bent.shape = Shape::kPolynomials2;
   const double beyond_x = 0.15 * (bent.high - bent.low), beyond_y = 0.15 * (bent.and_high - bent.and_low);
@@ -69,7 +70,7 @@ std::vector<Eigen::Index> hypotheses_of_place(DictionaryMaker& make, const Exten
   for (Eigen::Index o = 1; o <= 5; ++o)
     make.add(kCamera, "position", {"position"}, some(lens, 0, (o + 1) * (o + 2) / 2 - 1));
   if (extent.headings) map(kCompass, 2);
-  // Stripes are finer than what a map of the plane resolves: pictures put together, boards of a floor.
+  // Stripes finer than the maps resolve: mosaic seams, floor boards.
   const auto stripes = [&](const Acting& acting, Covariate of, double low, double high, std::uint32_t count) {
     const auto bases = make.put(acting, Basis{{over(Shape::kCosines, of, low, high, count)}});
     for (Eigen::Index size = count / 2; size <= count; size += count / 2)
@@ -94,7 +95,7 @@ void hypotheses_of_drift(DictionaryMaker& make, const Extent& extent, const std:
                          const std::vector<Eigen::Index>& in_place) {
   const auto constant = make.put(kWorld, Basis{});
   make.add("drift", {"world_frame"}, kWorld.in_words, some(constant, 0, 1));
-  // A drift that changes has a mean as well.
+  // A drift that varies also has a mean.
   const auto and_constant = [&](std::vector<Eigen::Index> columns) {
     for (const Eigen::Index c : constant) columns.push_back(c);
     return columns;

@@ -15,10 +15,10 @@ namespace {
 using Shape = Factor::Shape;
 
 constexpr std::size_t kFolds = 4;
-/// Log likelihood of robots left out that a fine map must bring.
+/// Least cross-validated gain in log likelihood.
 constexpr double kWorth = 15;
 
-/// Regresses innovations on the values at the nodes near a robot's way.
+/// Normal equations of the nodes near a robot's path, from the innovations.
 class FineSums {
  public:
   FineSums(const MotionModel& model, const Block& map, NormalEquations& to) : model_(model), map_(map), to_(to) {}
@@ -116,7 +116,7 @@ bool is_map_of_speed(const Block& block) {
   return of_place && (f.shape == Shape::kCosines2 || f.shape == Shape::kCosines);
 }
 
-/// The place where robots were, in cells as fine as samples are dense.
+/// The visited area, with cells as fine as the samples are dense.
 NodeGrid grid_of(const PreparedSet& set) {
   double x_low = 1e300, x_high = -1e300, y_low = 1e300, y_high = -1e300;
   std::vector<double> xs, ys;
@@ -188,7 +188,7 @@ Term with_map(const Term& term, const NodeGrid& grid, const Eigen::VectorXd& f) 
   return out;
 }
 
-/// What the smooth maps of a term come to at the nodes.
+/// Sum of the term's smooth maps at the nodes.
 Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid) {
   Eigen::VectorXd f(static_cast<Eigen::Index>(grid.nodes()));
   std::array<double, kMostColumns> values;
@@ -213,14 +213,14 @@ Eigen::VectorXd sampled(const Term& term, const NodeGrid& grid) {
   return f;
 }
 
-/// A map as it is fitted.
+/// A fitted map.
 struct Fitted {
   NodeGrid grid;
   Eigen::VectorXd f;
   Variation by;
 };
 
-/// Weights are tried in units of this: the root of what the data know of a node.
+/// Unit of the penalty weight: the root of the information per node.
 double unit_of_weight(const NormalEquations& all) {
   double sum = 0, count = 0;
   const Eigen::VectorXd rows = all.times(Eigen::VectorXd::Ones(all.score.size()));
@@ -232,7 +232,7 @@ double unit_of_weight(const NormalEquations& all) {
   return std::sqrt(sum / std::max(count, 1.0));
 }
 
-/// The variation with which robots left out are foretold best, and by how much better than by the map as it is.
+/// The penalty with the largest cross-validated likelihood, and its gain over the present map.
 double choose(const std::vector<NormalEquations>& folds, const NormalEquations& all,
               const std::vector<Variation>& tried, std::uint32_t threads, Fitted& map) {
   std::vector<double> gains(tried.size() * folds.size());
@@ -254,7 +254,7 @@ double choose(const std::vector<NormalEquations>& folds, const NormalEquations& 
   return best;
 }
 
-/// Twice as many nodes along each axis, with the values of the coarser grid between them.
+/// Doubles the resolution by interpolation.
 void halve(Fitted& map) {
   const Block coarse = block_of(map.grid, map.f);
   map.grid.pitch_mm /= 2;
@@ -295,7 +295,7 @@ void sharpen(const Fitter& fitter, MotionModel& model, std::size_t place) {
     if (folds.size() < 2) return;
     NormalEquations all(map.grid);
     for (const NormalEquations& fold : folds) all.add(fold, 1);
-    // With the first map in, what is noise and what is not is better known.
+    // The noise is refitted with the first map.
     if (pass != 1) {
       const double unit = unit_of_weight(all);
       std::vector<Variation> tried;

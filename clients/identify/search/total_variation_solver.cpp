@@ -6,7 +6,7 @@
 namespace kilotwin::identify {
 
 double Variation::stiffness(double square) const {
-  constexpr double kUsual = 0.03;  // a slope, from node to node, that costs alike with all powers
+  constexpr double kUsual = 0.03;  // slope between nodes at which all powers have the same penalty
   return weight / kUsual * std::pow((square + soft * soft) / (kUsual * kUsual), power / 2 - 1);
 }
 

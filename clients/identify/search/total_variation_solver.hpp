@@ -1,5 +1,4 @@
-/// Solves for a map over the plane given at the nodes of a fine grid: normal equations that join each node with those around it,
-/// edges kept sharp.
+/// Solver for a map on a grid under a total variation prior. Its normal equations couple neighbouring nodes only.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,11 +7,11 @@
 
 namespace kilotwin::identify {
 
-/// Nodes farther than this from where a robot is do not matter any more to what is seen of it, in cells.
+/// Nodes farther than this from a robot, in cells, do not affect its measurements.
 inline constexpr int kReach = 1;
-inline constexpr int kAcross = 4 * kReach + 3;  ///< nodes that have to do with one, along an axis
+inline constexpr int kAcross = 4 * kReach + 3;  ///< coupled nodes along an axis
 
-/// Nodes at equal distances along x and y, the first at (x_mm, y_mm).
+/// Equidistant nodes, the first at (x_mm, y_mm).
 struct NodeGrid {
   int columns = 0, rows = 0;
   double x_mm = 0, y_mm = 0, pitch_mm = 1;
@@ -25,7 +24,7 @@ struct NodeGrid {
   }
 };
 
-/// Information and score of the values at all nodes: of each node with those at most kAcross / 2 nodes away along each axis.
+/// Score of all nodes, and information between nodes at most kAcross / 2 apart along each axis.
 struct NormalEquations {
   explicit NormalEquations(const NodeGrid& of_grid)
       : grid(of_grid),
@@ -36,30 +35,30 @@ struct NormalEquations {
   std::vector<float> information;
   Eigen::VectorXd score;
 
-  /// The information of a node with those around it, kAcross * kAcross numbers by rows, itself in the middle.
+  /// The information row of a node: kAcross * kAcross numbers by rows, the node itself in the middle.
   float* of(int i, int j) { return information.data() + grid.at(i, j) * kAcross * kAcross; }
-  /// Adds those of other data, or with a factor of -1 takes them off.
+  /// Adds `factor` times the equations of other data.
   void add(const NormalEquations& other, double factor);
-  /// The information times a vector over the nodes.
+  /// Product of the information matrix with a vector over the nodes.
   [[nodiscard]] Eigen::VectorXd times(const Eigen::VectorXd&) const;
 };
 
-/// What is held against a map beforehand: in proportion to weight, the sum over nodes of (|slope|^2 + soft^2)^(power / 2). With a
-/// power of 1 that is its total variation; with a smaller one few large steps cost less than many small ones.
+/// Penalty of a map: weight times the sum over nodes of (|slope|^2 + soft^2)^(power / 2). Power 1 is total
+/// variation; a smaller power favours few large steps over many small ones.
 struct Variation {
   double weight = 1, soft = 0.01, power = 1;
 
-  /// Of the square of a slope in the quadratic form that touches the sum there.
+  /// Weight of a squared slope in the quadratic majoriser at that slope.
   [[nodiscard]] double stiffness(double square) const;
 };
 
-/// Rounds of weighing slopes anew, and at most so many steps of conjugate gradients in each.
+/// Rounds of reweighting, and the most steps of conjugate gradients in each.
 struct Effort {
   int rounds, steps;
 };
 
-/// The map f that maximises score (f - f0) - (f - f0) information (f - f0) / 2 less the variation, f0 being `from`: weights of
-/// slopes in turn with conjugate gradients.
+/// Maximises score (f - f0) - (f - f0)' information (f - f0) / 2 - penalty(f) with f0 = `from`: iteratively
+/// reweighted least squares with conjugate gradients.
 [[nodiscard]] Eigen::VectorXd solve(const NormalEquations& data, const Eigen::VectorXd& from, const Variation&,
                                     const Effort&);
 

@@ -10,13 +10,13 @@
 namespace kilotwin::identify {
 namespace {
 
-/// How much faster a robot was between two measurements than the model has it, relative, and the precision of that.
+/// Relative speed residual between two measurements, and its precision.
 struct Residual {
   double from_s, to_s;
   double score, information;
 };
 
-/// The residuals of one track, each as if the model were right before.
+/// Residuals of one track. Each assumes that the model was right before.
 class SpeedResiduals {
  public:
   SpeedResiduals(const MotionModel& model, std::uint8_t during) : model_(model), during_(during) {}
@@ -55,7 +55,7 @@ class SpeedResiduals {
   bool empty_ = true;
 };
 
-/// A robot at an instant: where it stood, and what is known of its speed then.
+/// A robot at an instant: position and speed residual.
 struct Visit {
   float x_mm, y_mm;
   float score, information;
@@ -63,7 +63,7 @@ struct Visit {
 };
 using Instant = std::vector<Visit>;
 
-/// By run, then by instant; of long sets the beginning of every run.
+/// [run][instant]. Long sets: the beginning of every run.
 std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionModel& model, std::uint8_t during) {
   const PreparedSet& set = fitter.set();
   const std::vector<TrackView>& views = set.views();
@@ -76,7 +76,7 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionMo
     SpeedResiduals sums(model, during);
     walk(filter, views[v], views[v].track->samples.size(), sums);
     residuals[v] = std::move(sums.all);
-    // Robots differ as it is.
+    // Removes the mean of each robot.
     double score = 0, information = 0;
     for (const Residual& r : residuals[v]) score += r.score, information += r.information;
     for (Residual& r : residuals[v]) r.score -= r.information * score / information;
@@ -88,7 +88,7 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionMo
     const std::size_t tracks = set.set().runs[r].tracks.size();
     if (tracks == 0) continue;
     runs[r].resize(std::min(near.instants(), kMost / runs.size() / tracks));
-    // Residuals by track, then by instant.
+    // [track][instant].
     std::vector<std::vector<std::pair<float, float>>> known(tracks);
     for (std::size_t v = 0; v < views.size(); ++v) {
       if (views[v].run != r) continue;
@@ -118,7 +118,7 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionMo
   return runs;
 }
 
-/// Classes of the time that robots stood somewhere, ever wider.
+/// Classes of driven time per cell, with increasing width.
 class Classes {
  public:
   static constexpr std::size_t kCount = 16;
@@ -137,7 +137,7 @@ class Classes {
   std::array<std::uint8_t, 512> of_;
 };
 
-/// What a speed by class of the time in the cell explains, as half a sum of squares.
+/// Half the sum of squares that a speed per class explains.
 double explained(const std::vector<std::vector<Instant>>& runs, const FloorCells& cells) {
   static const Classes classes;
   std::array<double, Classes::kCount> score{}, information{};
@@ -165,13 +165,13 @@ struct Weighed {
   double value = -1;
 };
 
-/// Goes uphill along each axis with ever shorter steps.
+/// Coordinate ascent with decreasing steps.
 Weighed climbed(const std::vector<std::vector<Instant>>& runs, Weighed best, double extent_mm) {
-  constexpr double kFinest = 0.004;  // of a cell's side
+  constexpr double kFinest = 0.004;  // relative to the cell side
   for (double step = 0.16; step > kFinest; step /= 2) {
     for (bool better = true; better;) {
       better = false;
-      // A side changes by as much as moves cells at the end of the room by such a part of theirs.
+      // A step in the cell side displaces the outermost cells by that share of their side.
       const double side = best.cells.side_mm, move = step * side;
       for (const auto& [by_side, by_x, by_y] :
            {std::array{move * side / extent_mm, 0.0, 0.0}, {0.0, move, 0.0}, {0.0, 0.0, move}}) {
@@ -188,7 +188,7 @@ Weighed climbed(const std::vector<std::vector<Instant>>& runs, Weighed best, dou
       }
     }
   }
-  // Of the corners, one that lies next to the middle of the room.
+  // The cell corner nearest to the origin.
   best.cells.x_mm = std::remainder(best.cells.x_mm, best.cells.side_mm);
   best.cells.y_mm = std::remainder(best.cells.y_mm, best.cells.side_mm);
   return best;
@@ -206,7 +206,8 @@ FloorCells find_cells(const Fitter& fitter, const MotionModel& model, const Floo
   const auto most = away.end() - 1 - static_cast<std::ptrdiff_t>(away.size() / 50);
   std::nth_element(away.begin(), most, away.end());
   const double extent_mm = std::max<double>(*most, from.side_mm);
-  // Sides so close to each other that cells at the end of the room are right, at corners a third of a cell apart.
+  // Grid of the global search: sides so dense that the outermost cells still match, corners a third of a cell
+  // apart.
   constexpr double kSmallest_mm = 14, kLargest_mm = 150;
   constexpr int kCorners = 3;
   std::vector<Weighed> all{{from, 0}};

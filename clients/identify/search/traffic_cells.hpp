@@ -1,12 +1,12 @@
-/// Where the cells lie in which a floor remembers: their side and their corner.
+/// Cell size and position of a traffic grid.
 #pragma once
 
 #include "clients/identify/fit/fitter.hpp"
 
 namespace kilotwin::identify {
 
-/// The cells in which the time that driven robots stood tells most of how fast robots of this model were, starting from some.
-/// The model says nothing of what the floor remembers. Looked at are robots that do what `during` has.
+/// The grid whose driven time per cell explains most of the speed residuals, by a local search from `from`. The
+/// model must not use traffic itself. Uses robots under the commands `during`.
 [[nodiscard]] FloorCells find_cells(const Fitter&, const MotionModel&, const FloorCells& from, std::uint8_t during);
 
 }  // namespace kilotwin::identify

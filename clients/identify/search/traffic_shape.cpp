@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "clients/identify/search/local_quadratic.hpp"
-#include "clients/identify/search/traffic_cells.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/search/traffic_cells.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -20,15 +20,15 @@ Block curve_of(const Block& like, std::uint8_t cells, std::vector<double> points
   return {like.target, Basis{{f}}, like.during};
 }
 
-/// Forms of the effect, by the time that robots stood there: smooth ones, and steps, of which some are chosen.
+/// Candidate forms over the driven time per cell: smooth curves, and steps of which some are selected.
 struct Form {
   std::vector<Block> blocks;
-  std::vector<Eigen::Index> columns;  ///< of those that were weighed
+  std::vector<Eigen::Index> columns;  ///< of those that were evaluated
   Eigen::VectorXd sd;
   double evidence = -1e300;
 };
 
-/// One standard deviation for all columns, the best.
+/// Evidence at the best common prior standard deviation.
 void weigh(const Beside& data, const std::vector<Eigen::Index>& columns, Form& form) {
   const Eigen::MatrixXd information = data.information(columns, columns);
   const Eigen::VectorXd score = data.score(columns);
@@ -43,7 +43,7 @@ void weigh(const Beside& data, const std::vector<Eigen::Index>& columns, Form& f
   }
 }
 
-/// Steps are added one by one, while each earns what choosing it costs.
+/// Forward selection of steps while the gain exceeds the choice penalty.
 Form some_steps(const Beside& data, Eigen::Index first, const Block& steps) {
   constexpr std::size_t kMostSteps = 5;
   const std::vector<double>& points = steps.basis.factors.front().points;
@@ -96,18 +96,18 @@ bool shape_memory(const Fitter& fitter, MotionModel& model, std::size_t place) {
       !term.blocks.front().basis.looks_at(Covariate::kTrodden))
     return false;
   const Block like = term.blocks.front();
-  // Cells of its own are free to be used, but for those that other terms look at.
+  // A free grid slot: none that other terms use.
   for (std::size_t t = 0; t < model.terms.size(); ++t)
     for (const Block& block : model.terms[t].blocks)
       if (t != place && block.basis.looks_at(Covariate::kTrodden)) return false;
-  // What the term looks at now stays: it is put into cells of its own, which are the last. Others are tried as the first.
+  // The term's present grid moves to the last slot. Candidates use the first.
   constexpr std::uint8_t kOwn = kFloorCells - 1, kTried = 0;
   const std::uint8_t found = like.basis.factors.front().axis.radius;
   model.cells[kOwn] = model.cells[found];
   model.terms[place].blocks.front().basis.factors.front().axis.radius = kOwn;
   const std::vector<double> scales = {0.5, 1, 2, 4, 8, 16, 32, 64},
                             steps = {0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 13, 16, 20, 26, 32, 40, 50, 64};
-  // With the right cells it is better known where robots were, and what is noise.
+  // The right cells improve positions and noise.
   constexpr int kRounds = 2;
   for (int round = 0; round < kRounds; ++round) {
     MotionModel without = model;

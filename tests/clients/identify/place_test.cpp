@@ -5,12 +5,12 @@
 #include <cmath>
 #include <functional>
 
-#include "clients/identify/search/total_variation_map.hpp"
-#include "clients/identify/search/traffic_shape.hpp"
-#include "clients/identify/search/neighbour_shape.hpp"
-#include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/model_file.hpp"
+#include "clients/identify/search/neighbour_shape.hpp"
+#include "clients/identify/search/shape_refinement.hpp"
+#include "clients/identify/search/total_variation_map.hpp"
+#include "clients/identify/search/traffic_shape.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::identify {

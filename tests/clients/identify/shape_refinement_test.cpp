@@ -8,8 +8,8 @@
 #include <functional>
 
 #include "clients/identify/search/amplitudes.hpp"
-#include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/change_points.hpp"
+#include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/target_extension.hpp"
 #include "core/random/random.hpp"
 

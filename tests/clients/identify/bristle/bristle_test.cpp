@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <set>
 
-#include "clients/identify/bristle/identify_bristle.hpp"
 #include "clients/identify/bristle/bristle_model.hpp"
+#include "clients/identify/bristle/identify_bristle.hpp"
 #include "clients/identify/bristle/velocity_circle.hpp"
 
 namespace kilotwin::bristle {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "clients/identify/kilogrid/floor_statistics.hpp"
 #include "clients/identify/kilogrid/fast_swarm.hpp"
+#include "clients/identify/kilogrid/floor_statistics.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {

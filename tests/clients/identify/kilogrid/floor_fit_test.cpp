@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/identify/kilogrid/fast_swarm.hpp"
 #include "clients/identify/kilogrid/floor_selection.hpp"
 #include "clients/identify/kilogrid/floor_sensitivity.hpp"
-#include "clients/identify/kilogrid/fast_swarm.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
