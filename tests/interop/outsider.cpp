@@ -1,5 +1,5 @@
 // Joins a run of tests/interop/outsider.txtpb with eProsima Fast DDS. Of Kilotwin it has idl/public.idl alone: names of
-// topics and QoS are those of docs/join.md, written down once more.
+// topics and QoS are those of docs/how-to/join.md, written down once more.
 // Usage: outsider DOMAIN. Prints a line for each thing proven.
 // Exit status 0: all were; 1: one was not; 2: bad arguments.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
