@@ -80,6 +80,9 @@ class LeftOut(unittest.TestCase):
         self.assertEqual(lengths("# A heading\n\n| a | b |\n|---|---|\n| c | d |\n\n---\n<!-- not\ncounted -->\n"
                                  "![a picture of robots](a.svg)\n\nOne.\n"), [1])
 
+    def test_tags(self):
+        self.assertEqual(lengths('- <a id="two-words"></a>**term**: what it is.'), [4])
+
     def test_link_targets(self):
         self.assertEqual(lengths("See [the two words](docs/very/long.md#and-more) there."), [5])
 

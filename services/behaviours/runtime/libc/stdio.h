@@ -1,4 +1,4 @@
-/* Formatted text as avr-libc has it. What a robot prints goes to its log (docs/programs.md): standard output and standard
+/* Formatted text as avr-libc has it. What a robot prints goes to its log (docs/reference/programs.md): standard output and standard
  * error alike, and besides to the function of a stream of the program's own. Robots have no files: fopen() finds none. */
 #ifndef KILOTWIN_STDIO_H
 #define KILOTWIN_STDIO_H
