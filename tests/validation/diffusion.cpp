@@ -7,7 +7,7 @@
 namespace kilotwin::validation {
 namespace {
 
-/// Within this part of the peer's figure.
+/// Largest relative deviation from ARGoS.
 constexpr double kAgreement = 0.1;
 
 Figure msd_at(const std::vector<Recorded>& swarms, double time_s) {
@@ -55,11 +55,11 @@ void validate_diffusion(Runs& runs, Verdicts& verdicts, Effort effort) {
   for (const ReferencePoint& point : kDiffusionRing) {
     // Few runs tell the late crowd alone, and their own spread is allowed for.
     if (effort.quick && point.time_s < 100) continue;
-    verdicts.near_in_parts(fmt::format("peer, {:.0f} s", point.time_s), "mm^2", msd_at(crowd, point.time_s),
+    verdicts.near_in_parts(fmt::format("ARGoS, {:.0f} s", point.time_s), "mm^2", msd_at(crowd, point.time_s),
                            {point.value, point.error}, kAgreement, effort.quick ? 3 : 0);
   }
   for (const ReferencePoint& point : kDiffusionFar) {
-    verdicts.near_in_parts(fmt::format("without contact: peer, robots far apart, {:.0f} s", point.time_s), "mm^2",
+    verdicts.near_in_parts(fmt::format("without contact: ARGoS, robots far apart, {:.0f} s", point.time_s), "mm^2",
                            msd_at(free, point.time_s), {point.value, point.error}, kAgreement,
                            effort.quick ? 3 : 0);
   }
@@ -77,8 +77,8 @@ void validate_diffusion(Runs& runs, Verdicts& verdicts, Effort effort) {
   plot.x_unit = "s";
   plot.y_name = "mean square displacement";
   plot.y_unit = "mm\u00b2";
-  plot.series = {curve("contact", crowd), points("peer (ARGoS)", kDiffusionRing), curve("no contact", free),
-                 points("peer, far apart", kDiffusionFar)};
+  plot.series = {curve("contact", crowd), points("ARGoS", kDiffusionRing), curve("no contact", free),
+                 points("ARGoS, far apart", kDiffusionFar)};
   recorder::write_plot(plot, effort.plots / "validation-diffusion.svg");
 }
 

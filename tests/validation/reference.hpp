@@ -1,6 +1,6 @@
-/// Figures of the peer that the seed validated on real robots: ARGoS 421bd763 with its Kilobot plugin 381db2a, dynamics2d,
-/// 31 ticks per second, bias N(0.015, 1.86) mm/s, f = 1. Runs of it were made for this project; these are a few of their
-/// rows, and all of them stand in diffusion_msd.csv and straight_msd.csv of the reference data.
+/// Mean square displacements of ARGoS with its Kilobot plugin, which the ARGoS paper (Pinciroli et al., ANTS 2018) validated on
+/// real robots: ARGoS 421bd763, plugin 381db2a, dynamics2d, 31 ticks per second, bias N(0.015, 1.86) mm/s, f = 1. The runs were
+/// made for this project.
 #pragma once
 
 #include <array>

@@ -22,7 +22,7 @@ std::string seeds(int count) { return fmt::format("1..{}", count); }
 
 void validate_bias(Runs& runs, Verdicts& verdicts, Effort effort) {
   const StraightTheory model;
-  verdicts.section("wheel biases of 120 robots by the seed's estimator (6 displacements of 10 s): straight.txtpb");
+  verdicts.section("wheel biases of 120 robots by the estimator of the ARGoS paper: straight.txtpb");
   const std::vector<Recorded> swarms =
       runs.sweep(runs.source("experiments/straight.txtpb"),
                  {"--robots", "120", "--duration", "62", "--seeds", seeds(effort.quick ? 2 : 20)});
@@ -76,15 +76,15 @@ void validate_straight(Runs& runs, Verdicts& verdicts, Effort effort) {
   for (const ReferencePoint& point : kStraightNoise) {
     double exact_s = 0;
     const Figure measured = measured_at(point.time_s, exact_s);
-    // The peer's robots set out late; the closed form takes our figure to the same time.
+    // ARGoS' robots start late; the closed form scales our figure to the same time.
     const double scale = model.msd_mm2(point.time_s - kStraightLag_s) / model.msd_mm2(exact_s);
-    verdicts.near_in_errors(fmt::format("peer (1000 robots), {:.0f} s", point.time_s), "mm^2",
+    verdicts.near_in_errors(fmt::format("ARGoS (1000 robots), {:.0f} s", point.time_s), "mm^2",
                             {measured.value * scale, measured.error * scale}, {point.value, point.error}, 3);
   }
   if (!effort.plots.empty()) {
     recorder::Plot plot;
     plot.title = "600 robots drive straight on";
-    plot.subtitle = "their wheel biases bend their ways; bars: standard error of the mean";
+    plot.subtitle = "wheel biases bend their paths; bars: standard error of the mean";
     plot.x_name = "time";
     plot.x_unit = "s";
     plot.y_name = "mean square displacement";
@@ -93,7 +93,7 @@ void validate_straight(Runs& runs, Verdicts& verdicts, Effort effort) {
     plot.series[0].name = "closed form";
     plot.series[0].points = false;
     plot.series[1].name = "simulated";
-    plot.series[2].name = "peer (ARGoS)";
+    plot.series[2].name = "ARGoS";
     plot.series[1].line = plot.series[2].line = false;
     const auto put = [&plot](std::size_t series, double time_s, Figure figure) {
       plot.series[series].x.push_back(time_s);

@@ -1,4 +1,4 @@
-/// What is known in closed form of robots that drive straight on, each with constant biases of its wheels.
+/// Closed form of the mean square displacement of robots that drive straight, each with constant biases of its wheels.
 ///
 /// With wheel speeds v0 + b_left and v0 + b_right, b ~ N(mean, sd) and independent, wheels B apart, the speed of the
 /// reference point v = v0 + (b_left + b_right) / 2 and the turn rate w = (b_right - b_left) / B are independent:
@@ -31,7 +31,7 @@ struct WheelBias {
   double left_mm_s, right_mm_s;
 };
 
-/// The seed's estimator (section 2.2): the displacement over each `interval_s` is a chord; its arc, by the turn of the
+/// The estimator of the ARGoS paper (section 2.2): the displacement over each `interval_s` is a chord; its arc, by the turn of the
 /// heading, gives speed and turn rate, the differential drive both wheels' speeds, and these less the nominal speed the
 /// biases; their mean over the intervals is returned. The heading must be known often enough to be unwrapped.
 [[nodiscard]] WheelBias estimate_bias(const Track&, const StraightTheory&, double interval_s, int intervals);

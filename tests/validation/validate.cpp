@@ -1,7 +1,8 @@
 // Prints what was measured beside what was expected, and ends with status 1 where anything misses.
-// Usage: validate [--quick] [--plots DIR] [NAME]...
+// Usage: validate [--quick] [--plots DIR] [--results FILE.md] [NAME]...
 #include <fmt/format.h>
 
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,7 @@ constexpr Validation kValidations[] = {{"bias", validate_bias},
 int usage() {
   std::string names;
   for (const Validation& v : kValidations) names += fmt::format(" {}", v.name);
-  say("usage: validate [--quick] [--plots DIR] [NAME]...; names:" + names);
+  say("usage: validate [--quick] [--plots DIR] [--results FILE.md] [NAME]...; names:" + names);
   return 2;
 }
 
@@ -37,6 +38,7 @@ int usage() {
 int main(int argc, char** argv) {
   Effort effort;
   std::vector<std::string> wanted;
+  std::string results;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--quick") {
@@ -45,6 +47,10 @@ int main(int argc, char** argv) {
     }
     if (word == "--plots" && i + 1 < argc) {
       effort.plots = argv[++i];
+      continue;
+    }
+    if (word == "--results" && i + 1 < argc) {
+      results = argv[++i];
       continue;
     }
     bool known = false;
@@ -60,7 +66,9 @@ int main(int argc, char** argv) {
       for (const std::string& name : wanted) chosen = chosen || name == v.name;
       if (chosen) v.run(runs, verdicts, effort);
     }
-    fmt::print("\n{} of {} figures as expected\n", verdicts.rows() - verdicts.misses(), verdicts.rows());
+    const std::string end = fmt::format("\n{} of {} figures as expected\n", verdicts.rows() - verdicts.misses(), verdicts.rows());
+    fmt::print("{}", end);
+    if (!results.empty()) std::ofstream{results} << verdicts.markdown() << end;
     return verdicts.misses() == 0 ? 0 : 1;
   } catch (const std::exception& error) {
     say(fmt::format("validate: {}", error.what()));

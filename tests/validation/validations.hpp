@@ -12,11 +12,11 @@ struct Effort {
   std::filesystem::path plots;  ///< folder for pictures of the figures; empty: none
 };
 
-/// The seed's estimator gives back the wheel biases that robots were given.
+/// The estimator of the ARGoS paper returns the wheel biases that robots were given.
 void validate_bias(Runs&, Verdicts&, Effort);
-/// The mean square displacement of robots that drive straight on: closed form and peer.
+/// The mean square displacement of robots that drive straight on: closed form and ARGoS.
 void validate_straight(Runs&, Verdicts&, Effort);
-/// The mean square displacement of a dense crowd that walks at random: peer, with and without contact.
+/// The mean square displacement of a dense crowd that walks at random: ARGoS, with and without contact.
 void validate_diffusion(Runs&, Verdicts&, Effort);
 /// How many robots it takes to push a box.
 void validate_box(Runs&, Verdicts&, Effort);

@@ -20,6 +20,7 @@ double together(Figure a, Figure b) { return std::sqrt(a.error * a.error + b.err
 void Verdicts::section(const std::string& title) {
   fmt::print("\n{}\n{:<58} {:>20} {:>20} {:>18}  verdict\n", title, "", "measured", "expected", "tolerance");
   std::fflush(stdout);
+  markdown_ += fmt::format("\n## {}\n\n| figure | measured | expected | tolerance | verdict |\n|---|---|---|---|---|\n", title);
 }
 
 void Verdicts::row(const std::string& what, const std::string& unit, Figure measured, const std::string& expected,
@@ -29,6 +30,8 @@ void Verdicts::row(const std::string& what, const std::string& unit, Figure meas
   fmt::print("  {:<56} {:>20} {:>20} {:>18}  {}\n", unit.empty() ? what : what + ", " + unit, text_of(measured),
              expected, tolerance, good ? "good" : "MISS");
   std::fflush(stdout);
+  markdown_ += fmt::format("| {} | {} | {} | {} | {} |\n", unit.empty() ? what : what + ", " + unit, text_of(measured),
+                           expected, tolerance, good ? "good" : "MISS");
 }
 
 void Verdicts::near(const std::string& what, const std::string& unit, Figure measured, Figure expected,

@@ -30,6 +30,8 @@ class Verdicts {
   /// What could not be looked at, and why. No miss.
   void absent(const std::string& what, const std::string& why);
 
+  /// All sections and rows so far as Markdown tables.
+  [[nodiscard]] const std::string& markdown() const { return markdown_; }
   [[nodiscard]] std::size_t misses() const { return misses_; }
   [[nodiscard]] std::size_t rows() const { return rows_; }
 
@@ -38,6 +40,7 @@ class Verdicts {
            const std::string& tolerance, bool good);
 
   std::size_t misses_ = 0, rows_ = 0;
+  std::string markdown_;
 };
 
 }  // namespace kilotwin::validation
