@@ -2,7 +2,9 @@
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
+#include <regex>
 #include <set>
 #include <stdexcept>
 
@@ -55,6 +57,34 @@ TEST(ReferencePages, SchemaPagesHaveARowForEveryField) {
     }
   }
   EXPECT_GT(found.size(), 30u);
+}
+
+/// Whether a path of a page leads somewhere: "core/os" and "core/os/files.hpp" exist, "core/os/files.*" has some ending.
+bool exists(const std::string& path) {
+  namespace fs = std::filesystem;
+  if (!path.ends_with(".*")) return fs::exists(kSources / path);
+  const fs::path stem = kSources / path.substr(0, path.size() - 2);
+  if (!fs::exists(stem.parent_path())) return false;
+  for (const fs::directory_entry& entry : fs::directory_iterator(stem.parent_path()))
+    if (entry.path().stem() == stem.filename()) return true;
+  return false;
+}
+
+/// Pages name files as `core/os/files.hpp`; such a file must be there.
+TEST(Pages, EveryPathInACodeSpanExists) {
+  static const std::regex span{
+      "`((?:core|services|clients|idl|tests|docs|scripts|bench|experiments|behaviours|deploy|cmake)/[A-Za-z0-9_./*-]*)`"};
+  std::vector<std::filesystem::path> pages{kSources / "ARCHITECTURE.md"};
+  for (const char* folder : {"docs/explanation", "docs/reference", "docs/results"})
+    for (const auto& entry : std::filesystem::directory_iterator(kSources / folder))
+      if (entry.path().extension() == ".md") pages.push_back(entry.path());
+  std::size_t checked = 0;
+  for (const std::filesystem::path& page : pages) {
+    const std::string text = read_text(page);
+    for (std::sregex_iterator at{text.begin(), text.end(), span}, end; at != end; ++at, ++checked)
+      EXPECT_TRUE(exists((*at)[1])) << page.filename() << " names " << (*at)[1];
+  }
+  EXPECT_GT(checked, 100u);
 }
 
 /// The examples of a page are indented blocks; those under "## Examples" are whole experiments.
