@@ -1,21 +1,24 @@
-#include "clients/cli/doctor_command.hpp"
-
+// `kilotwin doctor`: what on this machine would keep an experiment from running, and the remedy.
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <thread>
 
-#include "services/behaviours/compiler.hpp"
+#include "clients/cli/commands.hpp"
 #include "core/base/error.hpp"
 #include "core/dds/dds.hpp"
 #include "core/federation/topics.hpp"
+#include "services/behaviours/compiler.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -147,9 +150,8 @@ Finding check_avr() {
           "apt-get install gcc-avr avr-libc binutils-avr"};
 }
 
-}  // namespace
-
-int doctor_command(std::optional<std::uint32_t> domain) {
+/// Prints one line per check.
+int examine(std::optional<std::uint32_t> domain) {
   const std::function<Finding()> checks[] = {
       check_machine, check_compiler, [&] { return check_dds(domain); }, check_address_space, check_receive_buffer,
       check_files,   check_avr};
@@ -162,7 +164,17 @@ int doctor_command(std::optional<std::uint32_t> domain) {
   }
   fmt::print("{}\n",
              healthy ? "experiments will run here" : "experiments will not run here until the above is mended");
-  return healthy ? 0 : 1;
+  return healthy ? kDone : kFailed;
+}
+
+}  // namespace
+
+Command add_doctor(CLI::App& program) {
+  const auto domain = std::make_shared<std::optional<std::uint32_t>>();
+  CLI::App& app = *program.add_subcommand(
+      "doctor", "find what on this machine would keep an experiment from running, and the remedy");
+  app.add_option("--domain", *domain, "DDS domain to try (default: a free one)");
+  return {&app, [domain] { return examine(*domain); }};
 }
 
 }  // namespace kilotwin::cli

@@ -4,8 +4,8 @@
 #include <google/protobuf/text_format.h>
 
 #include "clients/recorder/file.hpp"
-#include "core/plan/plan.hpp"
 #include "core/model/robot_parameters.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {
 namespace {

@@ -1,11 +1,14 @@
-#include "clients/cli/identify_command.hpp"
-
+// `kilotwin identify`: a model, its evaluation and a report from measured data.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <memory>
 #include <optional>
 
+#include "clients/cli/commands.hpp"
 #include "clients/cli/other_data.hpp"
+#include "clients/cli/output.hpp"
 #include "clients/cli/work_progress.hpp"
 #include "clients/identify/data/data_faults.hpp"
 #include "clients/identify/data/import.hpp"
@@ -22,6 +25,14 @@ namespace kilotwin::cli {
 namespace fs = std::filesystem;
 namespace {
 
+struct IdentifyArguments {
+  fs::path train, test;
+  Output output;
+  double horizon_s = 10;
+  std::uint32_t threads = 2;
+  bool quiet = false;
+};
+
 std::string csv_of(const std::vector<identify::Prediction>& predictions) {
   std::string text = "run,robot,time_s,before_x_mm,before_y_mm,after_x_mm,after_y_mm\n";
   for (const identify::Prediction& p : predictions) {
@@ -31,24 +42,18 @@ std::string csv_of(const std::vector<identify::Prediction>& predictions) {
   return text;
 }
 
-void make_directory(const fs::path& directory) {
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (error || !fs::is_directory(directory))
-    throw UserError(fmt::format("--out {}: is no directory and cannot be made one", directory.string()));
-}
-
-/// For trajectories. `faults` receives what was excluded.
-identify::Identified identify_trajectories(const IdentifyArguments& arguments, const identify::Options& options,
+/// For trajectories. `out`: gets imported data as trajectories. `faults` receives what was excluded.
+identify::Identified identify_trajectories(const IdentifyArguments& arguments, const fs::path& out,
+                                           const identify::Options& options,
                                            std::vector<identify::DataFault>& faults) {
-  identify::MeasuredSet train = identify::load_or_import(arguments.train, arguments.out / "imported-train");
+  identify::MeasuredSet train = identify::load_or_import(arguments.train, out / "imported-train");
   identify::demand_plausible(train, arguments.train.string());
   options.progress(0, "faults of the data");
   // No robot can produce these samples: they are excluded before the fit.
   faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;
   if (!arguments.test.empty()) {
-    test = identify::load_or_import(arguments.test, arguments.out / "imported-test");
+    test = identify::load_or_import(arguments.test, out / "imported-test");
     identify::demand_plausible(*test, arguments.test.string());
     identify::demand_longer_than(*test, arguments.horizon_s, false, arguments.test.string());
   } else {
@@ -68,11 +73,49 @@ identify::Identified identify_trajectories(const IdentifyArguments& arguments, c
   return found;
 }
 
-}  // namespace
+/// Removes what it was given, unless kept: a command that fails leaves nothing behind.
+class Unfinished {
+ public:
+  explicit Unfinished(fs::path directory) : directory_(std::move(directory)) {}
+  ~Unfinished() {
+    std::error_code ignored;
+    if (!kept_) fs::remove_all(directory_, ignored);
+  }
+  Unfinished(const Unfinished&) = delete;
+  void keep() { kept_ = true; }
 
-int identify_command(const IdentifyArguments& arguments) {
+ private:
+  fs::path directory_;
+  bool kept_ = false;
+};
+
+void print_results(const IdentifyArguments& arguments, const identify::Identified& found,
+                   const std::vector<identify::DataFault>& faults) {
+  const auto& result = found.document.at("contract");
+  if (found.document.contains("summary")) {
+    for (const auto& line : found.document.at("summary")) fmt::print("{}\n", line.get<std::string>());
+  } else {
+    const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
+    fmt::print(
+        "error of predictions {:g} s ahead: {:.2f} mm with the base model, {:.2f} mm with the effects, {:.2f} mm "
+        "at "
+        "best\n",
+        arguments.horizon_s, number("before"), number("after"), result.at("noise_floor_mm").get<double>());
+  }
+  for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
+  for (const auto& effect : result.at("effects"))
+    fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());
+  if (result.at("effects").empty()) fmt::print("no effect found: the base model explains these data\n");
+}
+
+int identify_data(const IdentifyArguments& arguments) {
   if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
-  make_directory(arguments.out);
+  warn_beyond_cores("--threads", arguments.threads);
+  demand_known_data("--train", arguments.train);
+  if (!arguments.test.empty()) demand_known_data("--test", arguments.test);
+  const fs::path fallback = "identified";
+  const fs::path out = make_plain_output(arguments.output, fallback, {arguments.train, arguments.test});
+  Unfinished unfinished(out);
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
@@ -83,37 +126,46 @@ int identify_command(const IdentifyArguments& arguments) {
   std::vector<identify::DataFault> faults;
   identify::Identified found;
   if (std::optional<identify::Identified> other =
-          identify_other_data(arguments.train, arguments.test, arguments.out, options)) {
+          identify_other_data(arguments.train, arguments.test, out, options)) {
     found = std::move(*other);
   } else {
-    found = identify_trajectories(arguments, options, faults);
+    found = identify_trajectories(arguments, out, options, faults);
   }
 
   progress->show(0.97, "drawing the report");
-  recorder::write_file(
-      arguments.out / "model.txtpb",
-      identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
-  recorder::write_file(arguments.out / "result.json", found.document.at("contract").dump(2) + "\n");
-  recorder::write_file(arguments.out / "predictions.csv", csv_of(found.predictions));
-  identify::write_report(found.document, arguments.out / "report.html");
+  recorder::write_file(out / "model.txtpb", identify::text_of(found.model, fmt::format("Identified from {}.",
+                                                                                       arguments.train.string())));
+  recorder::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
+  recorder::write_file(out / "predictions.csv", csv_of(found.predictions));
+  identify::write_report(found.document, out / "report.html");
+  unfinished.keep();
   progress->show(1, "done");
   progress.reset();
   if (!arguments.quiet) {
-    const auto& result = found.document.at("contract");
-    if (found.document.contains("summary")) {
-      for (const auto& line : found.document.at("summary")) fmt::print("{}\n", line.get<std::string>());
-    } else {
-      const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
-      fmt::print("error {:.2f} mm before, {:.2f} mm after, {:.2f} mm at best, {:g} s ahead\n", number("before"),
-                 number("after"), result.at("noise_floor_mm").get<double>(), arguments.horizon_s);
-    }
-    for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
-    for (const auto& effect : result.at("effects"))
-      fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());
-    if (result.at("effects").empty()) fmt::print("no effect found: the base model explains this data\n");
-    fmt::print("{}\n", arguments.out.string());
+    print_results(arguments, found, faults);
+    fmt::print("results {}: report.html, model.txtpb, result.json, predictions.csv\n",
+               place_in_words(out, arguments.output, fallback));
   }
-  return 0;
+  return kDone;
+}
+
+}  // namespace
+
+Command add_identify(CLI::App& program) {
+  const auto arguments = std::make_shared<IdentifyArguments>();
+  CLI::App& app =
+      *program.add_subcommand("identify", "fit the model to measured data and find effects that it lacks");
+  app.add_option("--train", arguments->train, "directory of measured data to fit to")->required();
+  app.add_option("--test", arguments->test,
+                 "directory of measured data to predict, never fitted to (default: a part of --train is held out)");
+  add_output_options(app, arguments->output, "identified, with a number added if it exists");
+  app.add_option("--horizon", arguments->horizon_s, "time from the last measurement used to a prediction, s")
+      ->capture_default_str();
+  app.add_option("--threads", arguments->threads, "threads to work on")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
+  return {&app, [arguments] { return identify_data(*arguments); }};
 }
 
 }  // namespace kilotwin::cli

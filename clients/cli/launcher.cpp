@@ -14,13 +14,13 @@
 #include <optional>
 #include <thread>
 
-#include "services/behaviours/running_note.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/cli/recovery.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
-#include "core/os/interrupt.hpp"
 #include "core/federation/session.hpp"
+#include "core/os/interrupt.hpp"
+#include "services/behaviours/running_note.hpp"
 
 namespace kilotwin::cli {
 namespace {

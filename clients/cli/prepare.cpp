@@ -6,18 +6,19 @@
 #include <charconv>
 #include <fstream>
 #include <random>
+#include <set>
 
-#include "services/behaviours/compiler.hpp"
-#include "core/os/files.hpp"
-#include "services/behaviours/sha256.hpp"
-#include "services/comm/firmware/flash_image.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/experiment/layout.hpp"
-#include "core/plan/plan.hpp"
 #include "core/experiment/surroundings.hpp"
 #include "core/federation/checkpoint.hpp"
+#include "core/os/files.hpp"
+#include "core/plan/plan.hpp"
+#include "services/behaviours/compiler.hpp"
+#include "services/behaviours/sha256.hpp"
+#include "services/comm/firmware/flash_image.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -50,9 +51,11 @@ behaviours::CompiledProgram checked_firmware(const fs::path& file) {
   return {file, behaviours::sha256_hex(*octets), {}};
 }
 
-/// Compiles each distinct program once and tells every group which one is its own.
-void build_programs(const LoadedExperiment& loaded, const RunArguments& arguments, proto::Manifest& manifest,
-                    std::vector<fs::path>& objects) {
+/// Compiles each distinct program once and tells every group which one is its own. Returns the compiled files, in the
+/// manifest's order.
+std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunArguments& arguments,
+                                     proto::Manifest& manifest, Notes notes) {
+  std::vector<fs::path> objects;
   for (const proto::RobotGroup& group : loaded.experiment.robots()) {
     if (group.body() == proto::RobotGroup::TRACKED) {
       manifest.add_group_program(kNoProgram);
@@ -68,7 +71,9 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
     const behaviours::CompiledProgram compiled = is_linked     ? checked_firmware(sources.front())
                                                  : group.avr() ? behaviours::compile_firmware(sources, options)
                                                                : behaviours::compile(sources, options);
-    for (const std::string& note : compiled.notes) say("note: " + note);
+    if (notes == Notes::kSaid) {
+      for (const std::string& note : compiled.notes) say("note: " + note);
+    }
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;
     if (index == manifest.program_size()) {
@@ -79,6 +84,23 @@ void build_programs(const LoadedExperiment& loaded, const RunArguments& argument
       objects.push_back(compiled.file);
     }
     manifest.add_group_program(static_cast<std::uint32_t>(index));
+  }
+  return objects;
+}
+
+/// Copies what the programs were compiled from, for readers. Two files of one name from different folders both stay: the
+/// second is NAME-2. Throws filesystem_error.
+void copy_sources(const LoadedExperiment& loaded, const fs::path& to) {
+  std::set<fs::path> copied;
+  for (const proto::RobotGroup& group : loaded.experiment.robots()) {
+    for (const std::string& name : group.behaviour()) {
+      const fs::path source = fs::weakly_canonical(loaded.resolve(name));
+      if (!copied.insert(source).second) continue;
+      fs::path copy = to / source.filename();
+      for (int number = 2; fs::exists(copy); ++number)
+        copy = to / fmt::format("{}-{}{}", source.stem().string(), number, source.extension().string());
+      fs::copy_file(source, copy);
+    }
   }
 }
 
@@ -175,12 +197,10 @@ LoadedExperiment load_with_overrides(const RunArguments& arguments) {
   return loaded;
 }
 
-Prepared prepare(const RunArguments& arguments) {
-  const LoadedExperiment loaded = load_with_overrides(arguments);
-  if (arguments.mode == "federated" && !arguments.prepare) check_processes(loaded.experiment.deployment());
+Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, Notes notes) {
   const PlacedRobots placed = place_robots(loaded);
-
-  proto::Manifest manifest;
+  Resolved resolved;
+  proto::Manifest& manifest = resolved.manifest;
   manifest.set_format(1);
   manifest.set_run(new_run_id());
   *manifest.mutable_experiment() = with_counts(loaded, placed);
@@ -194,8 +214,14 @@ Prepared prepare(const RunArguments& arguments) {
   manifest.set_mode(arguments.mode);
   manifest.set_pace(parse_pace(arguments.pace));
   manifest.set_resumed(!arguments.resume.empty());
-  std::vector<fs::path> objects;
-  build_programs(loaded, arguments, manifest, objects);
+  resolved.objects = build_programs(loaded, arguments, manifest, notes);
+  return resolved;
+}
+
+Prepared prepare(const RunArguments& arguments) {
+  const LoadedExperiment loaded = load_with_overrides(arguments);
+  if (arguments.mode == "federated" && !arguments.prepare) check_processes(loaded.experiment.deployment());
+  auto [manifest, objects] = resolve(loaded, arguments, Notes::kSaid);
   fs::path checkpoint;
   if (manifest.resumed()) {
     checkpoint = checkpoint_directory(arguments.resume);
@@ -208,20 +234,18 @@ Prepared prepare(const RunArguments& arguments) {
   }
 
   const proto::Experiment& experiment = manifest.experiment();
-  auto directory = recorder::RunDirectory::create(
-      arguments.out.empty() ? recorder::RunDirectory::default_path(experiment.name(), experiment.seed())
-                            : arguments.out);
+  std::vector<fs::path> inputs{arguments.experiment, arguments.model, arguments.resume};
+  for (const proto::RobotGroup& group : loaded.experiment.robots()) {
+    for (const std::string& source : group.behaviour()) inputs.push_back(loaded.resolve(source));
+  }
+  auto directory = make_output(arguments.output,
+                               recorder::RunDirectory::default_path(experiment.name(), experiment.seed()), inputs);
   try {
     for (int i = 0; i < manifest.program_size(); ++i) {
       fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i)),
                     fs::copy_options::overwrite_existing);
     }
-    for (const proto::RobotGroup& group : loaded.experiment.robots()) {
-      for (const std::string& source : group.behaviour()) {
-        fs::copy_file(loaded.resolve(source), directory.programs() / fs::path(source).filename(),
-                      fs::copy_options::overwrite_existing);
-      }
-    }
+    copy_sources(loaded, directory.programs());
     if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
     recorder::write_file(directory.experiment(), experiment_as_run(loaded, manifest, directory));
     recorder::write_file(directory.manifest(), manifest.SerializeAsString());

@@ -11,12 +11,23 @@ namespace kilotwin::cli {
 /// The experiment with all overrides applied. Throws UserError.
 [[nodiscard]] LoadedExperiment load_with_overrides(const RunArguments& arguments);
 
+/// Whether the compiler's notes on programs are shown.
+enum class Notes { kSaid, kSilent };
+
+struct Resolved {
+  proto::Manifest manifest;
+  std::vector<std::filesystem::path> objects;  ///< the compiled programs, in the manifest's order
+};
+/// Checks everything that can be checked before a run: places robots, reads images and EEPROMs, compiles programs (once:
+/// results are cached). Writes nothing. Throws UserError with the place of the first error.
+[[nodiscard]] Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, Notes notes);
+
 struct Prepared {
   recorder::RunDirectory directory;
   proto::Manifest manifest;
 };
 
-/// Checks everything, compiles the programs and writes the run directory. Nothing is left behind where it throws
+/// Resolves the experiment and writes the run directory. Nothing is left behind where it throws
 /// (UserError for bad input).
 [[nodiscard]] Prepared prepare(const RunArguments& arguments);
 

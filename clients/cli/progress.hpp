@@ -4,8 +4,8 @@
 #include <chrono>
 #include <string>
 
-#include "core/plan/plan.hpp"
 #include "core/federation/run_observer.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {
 

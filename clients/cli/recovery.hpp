@@ -9,11 +9,11 @@
 #include <span>
 #include <vector>
 
-#include "services/behaviours/running_note.hpp"
 #include "clients/recorder/run_directory.hpp"
-#include "core/plan/plan.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/schedule.hpp"
+#include "core/plan/plan.hpp"
+#include "services/behaviours/running_note.hpp"
 
 namespace kilotwin::cli {
 

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <memory>
 
-#include "services/behaviours/program_set.hpp"
+#include "clients/cli/commands.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/cli/run_recorder.hpp"
@@ -14,6 +16,7 @@
 #include "core/base/say.hpp"
 #include "core/federation/frame_check.hpp"
 #include "core/os/interrupt.hpp"
+#include "services/behaviours/program_set.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -107,6 +110,19 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   if (!quiet)
     fmt::print("verified: {} ticks, every state hash agrees ({:016x})\n", verifier.verified(), totals.state_hash);
   return 0;
+}
+
+Command add_replay(CLI::App& program) {
+  struct Arguments {
+    std::filesystem::path run;
+    bool verify = false, quiet = false;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App& app = *program.add_subcommand("replay", "step a recorded run again and compare it with the recording");
+  app.add_option("RUN", arguments->run, "run directory")->required();
+  app.add_flag("--verify", arguments->verify, "compare every tick's state hash")->required();
+  app.add_flag("--quiet", arguments->quiet, "no progress and no result on the screen");
+  return {&app, [arguments] { return replay_command(arguments->run, arguments->quiet); }};
 }
 
 }  // namespace kilotwin::cli

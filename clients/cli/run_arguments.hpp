@@ -1,4 +1,4 @@
-/// What `kilotwin run` was asked for; also what `sweep` and `check` share with it.
+/// The options that choose an experiment and change it, which `run`, `check` and `sweep` share, and those of `run` alone.
 #pragma once
 
 #include <cstdint>
@@ -6,6 +6,12 @@
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "clients/cli/output.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace kilotwin::cli {
 
@@ -27,8 +33,11 @@ struct RunArguments {
   std::filesystem::path resume;  ///< a run, or one of its checkpoints; empty: from tick 0
   bool prepare = false;          ///< write the run directory and stop
   std::optional<std::uint32_t> domain;
-  std::filesystem::path out;
+  Output output;
   bool quiet = false;  ///< no progress, no summary on the screen
 };
+
+/// The experiment, and what replaces parts of it in `run`, `check` and `sweep`.
+void add_experiment_options(CLI::App& app, RunArguments& arguments);
 
 }  // namespace kilotwin::cli

@@ -1,19 +1,25 @@
-#include "clients/cli/run_command.hpp"
-
+// `kilotwin run`: an experiment from its file to its summary.
 #include <fmt/format.h>
 #include <sys/wait.h>
 
-#include "services/behaviours/program_set.hpp"
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <limits>
+#include <memory>
+
+#include "clients/cli/commands.hpp"
 #include "clients/cli/launcher.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/cli/recovery.hpp"
+#include "clients/cli/run_arguments.hpp"
 #include "clients/cli/run_recorder.hpp"
 #include "clients/cli/worker.hpp"
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
 #include "core/dds/dds.hpp"
 #include "core/os/interrupt.hpp"
+#include "services/behaviours/program_set.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -92,9 +98,8 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
   }
 }
 
-}  // namespace
-
-int run_command(const RunArguments& arguments, double start_monotonic_s) {
+int run(const RunArguments& arguments, double started_s) {
+  if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
   // The domain is claimed before anything is written, so that one in use leaves nothing behind.
   std::optional<dds::DomainClaim> claim;
   if (arguments.mode == "federated" && !arguments.prepare) {
@@ -104,21 +109,66 @@ int run_command(const RunArguments& arguments, double start_monotonic_s) {
   const RunPlan plan(prepared.manifest);
   if (arguments.prepare) {
     fmt::print("{}", prepared_text(plan, prepared.directory));
-    return 0;
+    return kDone;
   }
   catch_interrupts();
   if (arguments.mode == "local") {
-    if (const auto status = run_locally(prepared.manifest, prepared.directory, arguments, start_monotonic_s))
+    if (const auto status = run_locally(prepared.manifest, prepared.directory, arguments, started_s))
       return *status;
   } else {
-    const int status = launch(plan, prepared.directory, {claim->domain(), start_monotonic_s, !arguments.quiet});
+    const int status = launch(plan, prepared.directory, {claim->domain(), started_s, !arguments.quiet});
     if (status != 0) return status;
   }
   if (!arguments.quiet) {
-    fmt::print("{}", recorder::summary_text(recorder::read_summary(prepared.directory.summary()),
-                                            prepared.directory.path()));
+    const recorder::Summary summary = recorder::read_summary(prepared.directory.summary());
+    fmt::print("{}", recorder::summary_text(summary, place_in_words(prepared.directory.path(), arguments.output,
+                                                                    recorder::RunDirectory::default_path(
+                                                                        summary.name, summary.seed))));
   }
-  return 0;
+  return kDone;
+}
+
+/// A seed is decimal, whatever zeros are before it; what does not fit would be another seed than the one asked for.
+std::string decimal_seed(std::string& text) {
+  std::uint64_t seed = 0;
+  const char* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, seed);
+  if (error != std::errc() || end != last) {
+    return fmt::format("\"{}\" is no seed; give a whole number, 0..{}", text,
+                       std::numeric_limits<std::uint64_t>::max());
+  }
+  text = std::to_string(seed);
+  return {};
+}
+
+}  // namespace
+
+Command add_run(CLI::App& program, double started_s) {
+  const auto arguments = std::make_shared<RunArguments>();
+  CLI::App& app = *program.add_subcommand("run", "run an experiment to its end");
+  add_experiment_options(app, *arguments);
+  app.add_option("--mode", arguments->mode, "federated: services as processes over DDS; local: all in one process")
+      ->check(CLI::IsMember({"local", "federated"}))
+      ->capture_default_str();
+  app.add_option("--partitions", arguments->partitions, "COLUMNSxROWS: physics partitions");
+  app.add_option("--hosts", arguments->hosts, "behaviours hosts; each runs the programs of a share of the robots");
+  app.add_option("--threads", arguments->threads, "threads of a local run")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  app.add_option("--seed", arguments->seed, "seed of all random numbers")
+      ->transform(CLI::Validator(decimal_seed, "UINT"));
+  app.add_option("--set", arguments->set, "FIELD=VALUE, for example robots[0].layout.grid.pitch_mm=33")
+      ->allow_extra_args(false);
+  app.add_option("--pace", arguments->pace, "max, or simulated time over wall time: 1 is real time")
+      ->capture_default_str();
+  app.add_option("--checkpoint-every", arguments->checkpoint_every_s, "simulated time between checkpoints, s");
+  app.add_option("--resume", arguments->resume, "start from the newest checkpoint of that run");
+  app.add_flag("--prepare", arguments->prepare,
+               "write the run directory, print the commands that start the services by hand, and stop");
+  app.add_option("--domain", arguments->domain, "DDS domain (default: a free one)");
+  add_output_options(app, arguments->output, "runs/NAME-SEED, with a number added if it exists");
+  app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
+  return {&app, [arguments, started_s] { return run(*arguments, started_s); }};
 }
 
 }  // namespace kilotwin::cli

@@ -11,9 +11,9 @@
 #include "clients/recorder/summary.hpp"
 #include "clients/recorder/writer.hpp"
 #include "core/effects/measurement.hpp"
-#include "core/plan/plan.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/run_observer.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {
 

@@ -1,24 +1,38 @@
-#include "clients/cli/service_command.hpp"
-
+// `kilotwin service`: one service in the foreground.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
 #include <thread>
 
-#include "services/behaviours/behaviours_service.hpp"
+#include "clients/cli/commands.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_recorder.hpp"
-#include "services/comm/firmware/firmware_swarm.hpp"
 #include "core/base/error.hpp"
 #include "core/os/interrupt.hpp"
 #include "services/ark/station_service.hpp"
+#include "services/behaviours/behaviours_service.hpp"
+#include "services/comm/firmware/firmware_swarm.hpp"
 #include "services/comm/radio_service.hpp"
 #include "services/physics/physics_service.hpp"
 
 namespace kilotwin::cli {
 namespace {
+
+struct ServiceArguments {
+  std::string service;        ///< physics, comm, station, behaviours
+  std::filesystem::path run;  ///< a directory that `run --prepare` wrote
+  std::string partition;      ///< physics: "C,R"
+  std::string share;          ///< behaviours: "I/N"
+  dds::Transport transport;
+  double started_s = 0;  ///< when the run was asked for, steady clock; for start_s
+};
 
 /// "A<separator>B" with two numbers.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> two_numbers(const std::string& text, char separator) {
@@ -64,15 +78,12 @@ int run_station(const RunPlan& plan, const ServiceContext& context, const record
   throw RunError(totals.failure);
 }
 
-}  // namespace
-
-int service_command(const ServiceArguments& arguments) {
-  const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+int serve(const ServiceArguments& arguments) {
   catch_interrupts();
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
   const RunPlan plan(read_manifest(directory));
   ServiceContext context;
-  context.transport = {arguments.domain, arguments.peers};
+  context.transport = arguments.transport;
   context.run_directory = directory.path();
   Beginning beginning = beginning_of(plan, directory);
   context.resumed = std::move(beginning.resumed);
@@ -86,10 +97,42 @@ int service_command(const ServiceArguments& arguments) {
   } else if (arguments.service == "behaviours") {
     behaviours::run_service(plan, parse_share(arguments.share, plan.hosts), context);
   } else {
-    return run_station(plan, context, directory,
-                       arguments.start_monotonic_s > 0 ? arguments.start_monotonic_s : now_s);
+    return run_station(plan, context, directory, arguments.started_s);
   }
-  return 0;
+  return kDone;
+}
+
+/// The contract calls the radio comm, and everything else calls it radio: both are taken. Returns what is wrong.
+std::string service_name(std::string& name) {
+  if (name == "radio") name = "comm";
+  for (const char* known : {"physics", "comm", "station", "behaviours"}) {
+    if (name == known) return {};
+  }
+  return fmt::format("there is no service \"{}\"; give physics, comm (the radio), station or behaviours", name);
+}
+
+}  // namespace
+
+Command add_service(CLI::App& program, double started_s) {
+  const auto arguments = std::make_shared<ServiceArguments>();
+  arguments->started_s = started_s;
+  CLI::App& app =
+      *program.add_subcommand("service", "run one service in the foreground, for runs over several machines");
+  app.add_option("SERVICE", arguments->service, "physics, comm (the radio), station or behaviours")
+      ->required()
+      ->transform(CLI::Validator(service_name, ""));
+  app.add_option("--run", arguments->run, "directory that `kilotwin run --prepare` wrote")->required();
+  app.add_option("--partition", arguments->partition, "physics: COLUMN,ROW, counted from 0 at the bottom left");
+  app.add_option("--share", arguments->share, "behaviours: I/N, counted from 1");
+  app.add_option("--domain", arguments->transport.domain, "DDS domain, the same for all services of a run")
+      ->check(CLI::Range(0u, dds::kLastDomain))
+      ->capture_default_str();
+  app.add_option("--peer", arguments->transport.peers,
+                 "address of a machine that takes part; give each of them, this machine too (default: all on this "
+                 "machine)")
+      ->allow_extra_args(false);
+  app.add_option("--start-monotonic", arguments->started_s, "when the run was asked for")->group("");
+  return {&app, [arguments] { return serve(*arguments); }};
 }
 
 }  // namespace kilotwin::cli

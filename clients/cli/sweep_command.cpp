@@ -1,11 +1,14 @@
-#include "clients/cli/sweep_command.hpp"
-
+// `kilotwin sweep`: many local runs on all cores, a table and curves with standard errors, and plots.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <memory>
 #include <thread>
 
+#include "clients/cli/commands.hpp"
 #include "clients/cli/prepare.hpp"
+#include "clients/cli/run_arguments.hpp"
 #include "clients/cli/sweep_points.hpp"
 #include "clients/cli/sweep_report.hpp"
 #include "clients/cli/sweep_runs.hpp"
@@ -13,7 +16,6 @@
 #include "clients/recorder/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
-#include "core/experiment/validate.hpp"
 #include "core/os/interrupt.hpp"
 
 namespace kilotwin::cli {
@@ -21,7 +23,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of failed runs, so many are told about one by one.
+struct SweepArguments {
+  RunArguments run;              ///< what all runs share; its output is the sweep's
+  std::string seeds;             ///< "A..B", or one number; empty: the experiment's own
+  std::vector<std::string> set;  ///< FIELD=V1,V2,... or FIELD=A..B: one run per value, all combinations
+  /// The observable that plots show: clients/recorder/observables.hpp; empty: pushed where there are movable bodies, else msd.
+  std::string plot;
+  std::uint32_t jobs = 0;  ///< runs at a time; 0: one per core
+};
+
+/// Failed runs that are reported one by one; the others are counted.
 constexpr std::size_t kMostComplaints = 5;
 
 recorder::Observable observable_of(const std::string& name) {
@@ -54,9 +65,9 @@ std::vector<std::string> words_of(const SweepArguments& arguments, const SweepPo
   return words;
 }
 
-}  // namespace
-
-int sweep_command(const SweepArguments& arguments) {
+int sweep(const SweepArguments& arguments) {
+  const std::uint32_t cores = std::max(1u, std::thread::hardware_concurrency());
+  warn_beyond_cores("--jobs", arguments.jobs);
   const std::vector<SweepPoint> points = sweep_points(arguments.set);
   recorder::Observable plotted = recorder::Observable::kMsd;
   if (!arguments.plot.empty()) plotted = observable_of(arguments.plot);
@@ -72,16 +83,14 @@ int sweep_command(const SweepArguments& arguments) {
     RunArguments one = arguments.run;
     one.set = point;
     const LoadedExperiment loaded = load_with_overrides(one);
-    validate(loaded);
+    static_cast<void>(resolve(loaded, one, Notes::kSilent));
     name = loaded.experiment.name();
     if (arguments.plot.empty() && loaded.experiment.movable_size() > 0) plotted = recorder::Observable::kPushed;
     own_seeds.push_back(loaded.experiment.seed());
   }
-  const auto directory =
-      recorder::RunDirectory::create(arguments.out.empty() ? fs::path("runs") / (name + "-sweep") : arguments.out)
-          .path();
-  std::error_code ignored;
-  fs::remove(directory / "programs", ignored);  // each run has its own
+  const fs::path fallback = fs::path("runs") / (name + "-sweep");
+  const fs::path directory = make_plain_output(
+      arguments.run.output, fallback, {arguments.run.experiment, arguments.run.model, arguments.run.behaviour});
   std::vector<SweepRun> runs;
   for (std::size_t point = 0; point < points.size(); ++point) {
     for (const std::uint64_t seed : seeds.empty() ? std::vector{own_seeds[point]} : seeds) {
@@ -101,7 +110,6 @@ int sweep_command(const SweepArguments& arguments) {
     say(fmt::format("kilotwin: {} with seed {} failed: {}", point.empty() ? name : label(point), run.seed, why));
   };
   catch_interrupts();
-  const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
   const bool all = run_all(runs, arguments.jobs > 0 ? arguments.jobs : cores, [&](const SweepRun& run) {
     if (!run.well) return complain(run, last_words(run));
     try {
@@ -122,9 +130,29 @@ int sweep_command(const SweepArguments& arguments) {
     recorder::write_plot(report.response(), directory / "response.svg");
     plots += " and " + (directory / "response.svg").string();
   }
-  fmt::print("{}table  {}\ncurves {}\nplot   {}\n", report.table(), (directory / "sweep.csv").string(),
-             (directory / "curves.csv").string(), plots);
-  return failed == 0 && all ? 0 : 1;
+  fmt::print("{}table   {}\ncurves  {}\nplot    {}\nresults {}\n", report.table(),
+             (directory / "sweep.csv").string(), (directory / "curves.csv").string(), plots,
+             place_in_words(directory, arguments.run.output, fallback));
+  return failed == 0 && all ? kDone : kFailed;
+}
+
+}  // namespace
+
+Command add_sweep(CLI::App& program) {
+  const auto arguments = std::make_shared<SweepArguments>();
+  CLI::App& app =
+      *program.add_subcommand("sweep", "run many variants on all cores; write a table, curves and plots");
+  add_experiment_options(app, arguments->run);
+  app.add_option("--seeds", arguments->seeds, "FIRST..LAST: every variant runs with each of these seeds");
+  app.add_option("--set", arguments->set,
+                 "FIELD=V1,V2,... or FIELD=A..B: the values of a field; several --set give all combinations")
+      ->allow_extra_args(false);
+  app.add_option("--plot", arguments->plot,
+                 "what the plots show: msd, displacement, spread, nearest, polarisation or pushed (default: pushed "
+                 "where there are movable bodies, else msd)");
+  app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)");
+  add_output_options(app, arguments->run.output, "runs/NAME-sweep, with a number added if it exists");
+  return {&app, [arguments] { return sweep(*arguments); }};
 }
 
 }  // namespace kilotwin::cli

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <iterator>
 #include <system_error>
 
 #include "clients/recorder/file.hpp"
@@ -34,13 +36,39 @@ bool claim(const fs::path& directory) {
   return false;
 }
 
+/// Whether Kilotwin has written the directory: a run, a sweep of runs, or what `identify` found.
+bool is_result(const fs::path& directory) {
+  constexpr const char* kMarks[] = {"manifest.pb", "programs", "sweep.csv", "result.json"};
+  std::error_code ignored;
+  const auto marked = [&](const fs::path& place) {
+    return std::any_of(std::begin(kMarks), std::end(kMarks),
+                       [&](const char* mark) { return fs::exists(place / mark, ignored); });
+  };
+  if (marked(directory)) return true;
+  const fs::directory_iterator entries(directory, ignored);
+  return std::any_of(begin(entries), end(entries), [&](const fs::directory_entry& e) { return marked(e.path()); });
+}
+
+void remove_results(const fs::path& directory) {
+  std::error_code error;
+  if (fs::is_empty(directory, error) || error) return;
+  if (!is_result(directory)) {
+    throw UserError(
+        fmt::format("{}: --force replaces only what kilotwin has written, and this is something else; give "
+                    "another --out",
+                    directory.string()));
+  }
+  fs::remove_all(directory, error);
+  if (error) throw RunError(fmt::format("{}: cannot be removed: {}", directory.string(), error.message()));
+}
+
 }  // namespace
 
 fs::path RunDirectory::default_path(std::string_view name, std::uint64_t seed) {
   return fs::path("runs") / fmt::format("{}-{}", name, seed);
 }
 
-RunDirectory RunDirectory::create(const fs::path& wanted) {
+RunDirectory RunDirectory::create(const fs::path& wanted, Existing existing) {
   if (wanted.empty()) throw UserError("--out: an empty path; expected a directory to write the run to");
   fs::path stem = wanted.lexically_normal();
   if (!stem.has_filename()) stem = stem.parent_path();  // "out/" is "out"
@@ -53,6 +81,7 @@ RunDirectory RunDirectory::create(const fs::path& wanted) {
     throw RunError(fmt::format("{}: cannot be created: {}; choose another place with --out",
                                stem.parent_path().string(), error.message()));
   }
+  if (existing == Existing::kReplace && fs::is_directory(stem, error)) remove_results(stem);
   fs::path directory = stem;
   for (std::uint64_t number = 2;; ++number) {
     if (fs::exists(directory, error) && !fs::is_directory(directory, error)) {
@@ -60,6 +89,9 @@ RunDirectory RunDirectory::create(const fs::path& wanted) {
         throw UserError(fmt::format("{}: is a file; expected a directory to write the run to", stem.string()));
     } else if (claim(directory)) {
       return RunDirectory(directory);
+    } else if (existing != Existing::kNumber) {
+      throw UserError(
+          fmt::format("{}: exists and is not empty; give another --out, or --force to replace it", stem.string()));
     }
     directory = stem;
     directory += fmt::format("-{}", number);

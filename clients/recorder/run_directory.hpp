@@ -20,11 +20,15 @@ namespace kilotwin::recorder {
 
 class RunDirectory {
  public:
-  /// Makes a directory for a new run, and `programs` in it, without touching what is there: `wanted` where it does
-  /// not exist or is empty, else the first of wanted-2, wanted-3... that does not exist or is empty. Of several
-  /// that start at the same time each gets its own. Throws RunError where none can be made, UserError where
-  /// `wanted` is a file.
-  [[nodiscard]] static RunDirectory create(const std::filesystem::path& wanted);
+  /// What create() does where the directory that is wanted exists and is not empty.
+  enum class Existing {
+    kNumber,   ///< it takes the first of wanted-2, wanted-3... that does not exist or is empty
+    kRefuse,   ///< it throws UserError
+    kReplace,  ///< it removes the directory first, where Kilotwin has written it, else it throws UserError
+  };
+  /// Makes a directory for new results, and `programs` in it. Of several that start at the same time each gets its own.
+  /// Throws RunError where none can be made, UserError where `wanted` is a file.
+  [[nodiscard]] static RunDirectory create(const std::filesystem::path& wanted, Existing = Existing::kNumber);
   /// runs/NAME-SEED, which create() takes where the user names none.
   [[nodiscard]] static std::filesystem::path default_path(std::string_view name, std::uint64_t seed);
 

@@ -165,7 +165,7 @@ Summary read_summary(const std::filesystem::path& file) {
   }
 }
 
-std::string summary_text(const Summary& s, const std::filesystem::path& directory) {
+std::string summary_text(const Summary& s, const std::string& place) {
   std::string text;
   const auto line = [&text](std::string_view label, const std::string& rest) {
     text += fmt::format("  {:<10}{}\n", label, rest);
@@ -205,7 +205,7 @@ std::string summary_text(const Summary& s, const std::filesystem::path& director
   line("used",
        fmt::format("{} s of CPU time, {} MiB of memory", short_number(s.cpu_s), short_number(s.peak_memory_mib)));
   line("hash", fmt::format("{:016x}", s.state_hash));
-  line("results", fmt::format("{}: summary.json, picture.svg, recording.ktrec", directory.string()));
+  line("results", fmt::format("{}: summary.json, picture.svg, recording.ktrec", place));
   return text;
 }
 

@@ -63,6 +63,7 @@ void write_summary(const Summary& summary, const std::filesystem::path& file);
 [[nodiscard]] Summary read_summary(const std::filesystem::path& file);
 
 /// 8 to 12 lines that tell what happened and where the results are.
-[[nodiscard]] std::string summary_text(const Summary& summary, const std::filesystem::path& directory);
+/// `place`: the directory of the results, in words.
+[[nodiscard]] std::string summary_text(const Summary& summary, const std::string& place);
 
 }  // namespace kilotwin::recorder

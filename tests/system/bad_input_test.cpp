@@ -59,6 +59,29 @@ TEST_F(BadInput, InAProgramGivesTheCompilersOwnMessage) {
   EXPECT_EQ(kilotwin({"build", scratch / "broken.c"}, scratch).status, 2);
 }
 
+TEST_F(BadInput, CheckCompilesEveryProgram) {
+  write(scratch / "broken.c", "#include <kilolib.h>\nvoid setup(void) {\n  int x = y;\n}\n");
+  const std::string two_groups =
+      experiment("robots { count: 3 " + behaviour() +
+                 "}\nrobots { count: 3 behaviour: \"broken.c\" layout { grid { pitch_mm: 50 "
+                 "} x_mm: 200 } }\n");
+  expect_in("broken.c:3:11: error: ", refusal({"check", two_groups}));
+  expect_in("broken.c:3:11: error: ", refusal({"sweep", two_groups, "--seeds", "1..2"}));
+}
+
+TEST_F(BadInput, WithoutTrajectoriesNamesWhatIsThereAndWhatIsExpected) {
+  fs::create_directory(scratch / "data");
+  const auto of = [&](const std::string& path) { return refusal({"identify", "--train", scratch / path}); };
+  expect_in("is an empty directory; expected trajectories.csv", of("data"));
+  write(scratch / "data/tracks.csv", "x,y\n1,2\n");
+  const std::string other = of("data");
+  expect_in("holds tracks.csv with the columns \"x,y\"", other);
+  expect_in("run,robot,time_s,x_mm,y_mm", other);
+  expect_in("is a file with the columns \"x,y\"; expected a directory", of("data/tracks.csv"));
+  expect_in("does not exist", of("nowhere"));
+  EXPECT_FALSE(fs::exists(scratch / "identified")) << "left behind";
+}
+
 TEST_F(BadInput, InArguments) {
   const std::string good = experiment("robots { count: 3 " + behaviour() + "}\n");
   expect_in("--partitions", refusal({"run", good, "--partitions", "2"}));
@@ -83,6 +106,8 @@ TEST_F(BadInput, ThatIsNoRecording) {
   fs::create_directory(scratch / "empty");
   expect_in("empty", refusal({"replay", scratch / "empty", "--verify"}));
   expect_in("empty", refusal({"service", "comm", "--run", scratch / "empty"}));
+  expect_in("empty", refusal({"service", "radio", "--run", scratch / "empty"}));
+  expect_in("physics, comm (the radio)", kilotwin({"service", "--help"}, scratch).out);
 }
 
 TEST_F(BadInput, ADomainInUseByAnotherRun) {

@@ -216,7 +216,8 @@ TEST_F(Commands, DoctorFindsThisMachineFit) {
 }
 
 TEST_F(Commands, HelpIsEverywhere) {
-  for (const char* command : {"run", "service", "sweep", "check", "build", "export", "replay", "doctor"}) {
+  for (const char* command :
+       {"run", "service", "sweep", "check", "build", "export", "replay", "identify", "config", "doctor"}) {
     const Outcome outcome = kilotwin({command, "--help"}, scratch);
     EXPECT_EQ(outcome.status, 0) << command;
     EXPECT_GT(outcome.out.size(), 50u) << command;

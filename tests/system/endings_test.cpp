@@ -192,14 +192,5 @@ TEST_F(Endings, AServiceThatStandsStillIsNamed) {
   expect_usable_recording();
 }
 
-TEST_F(Endings, ASecondRunLeavesTheFirstAlone) {
-  const Words words{"run", source("experiments/disperse.txtpb"), "--duration", "1", "--mode", "local", "--quiet"};
-  ASSERT_EQ(kilotwin(words, scratch).status, 0);
-  const std::string before = read(scratch / "runs/disperse-1/summary.json");
-  ASSERT_EQ(kilotwin(words, scratch).status, 0);
-  EXPECT_EQ(read(scratch / "runs/disperse-1/summary.json"), before);
-  EXPECT_TRUE(fs::exists(scratch / "runs/disperse-1-2/summary.json"));
-}
-
 }  // namespace
 }  // namespace kilotwin::test

@@ -46,6 +46,30 @@ TEST(RunDirectory, NeverTakesWhatIsThere) {
   EXPECT_EQ(content(scratch / "run-4"), "a file");
 }
 
+TEST(RunDirectory, RefusesAnExistingDirectoryThatIsNotEmpty) {
+  const Scratch scratch;
+  using Existing = RunDirectory::Existing;
+  fs::create_directory(scratch / "run");  // empty: free to take
+  EXPECT_EQ(RunDirectory::create(scratch / "run", Existing::kRefuse).path(), scratch / "run");
+  EXPECT_THROW((void)RunDirectory::create(scratch / "run", Existing::kRefuse), UserError);
+  EXPECT_FALSE(fs::exists(scratch / "run-2"));
+}
+
+TEST(RunDirectory, ReplacesOnlyWhatKilotwinHasWritten) {
+  const Scratch scratch;
+  using Existing = RunDirectory::Existing;
+  put_content(RunDirectory::create(scratch / "run").path() / "summary.json", "old");
+  EXPECT_EQ(RunDirectory::create(scratch / "run", Existing::kReplace).path(), scratch / "run");
+  EXPECT_FALSE(fs::exists(scratch / "run/summary.json"));
+  static_cast<void>(RunDirectory::create(scratch / "sweep/0000-1"));
+  EXPECT_EQ(RunDirectory::create(scratch / "sweep", Existing::kReplace).path(), scratch / "sweep");
+  EXPECT_FALSE(fs::exists(scratch / "sweep/0000-1"));
+  fs::create_directory(scratch / "papers");
+  put_content(scratch / "papers/thesis.tex", "years of work");
+  EXPECT_THROW((void)RunDirectory::create(scratch / "papers", Existing::kReplace), UserError);
+  EXPECT_EQ(content(scratch / "papers/thesis.tex"), "years of work");
+}
+
 TEST(RunDirectory, RefusesAFileAndAFolderThatCannotBeMade) {
   const Scratch scratch;
   put_content(scratch / "file", "x");

@@ -1,0 +1,75 @@
+// `kilotwin build`: compiles a behaviour for simulation, or checks that it fits the real robot.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "clients/cli/commands.hpp"
+#include "core/base/error.hpp"
+#include "core/base/say.hpp"
+#include "services/behaviours/compiler.hpp"
+#include "services/behaviours/robot_warnings.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct BuildArguments {
+  std::vector<fs::path> sources;
+  fs::path out;
+  std::vector<std::string> define;
+  bool avr = false;
+};
+
+void write_program(const fs::path& compiled, const fs::path& out) {
+  std::error_code error;
+  fs::copy_file(compiled, out, fs::copy_options::overwrite_existing, error);
+  if (error) throw UserError(fmt::format("{}: cannot be written: {}", out.string(), error.message()));
+  fmt::print("{}\n", out.string());
+}
+
+int build_for_robot(const BuildArguments& arguments, const behaviours::CompileOptions& options) {
+  if (!arguments.out.empty())
+    write_program(behaviours::compile_firmware(arguments.sources, options).file, arguments.out);
+  constexpr double kFlash = 32768, kRam = 2048;
+  const behaviours::AvrSize size = behaviours::compile_for_avr(arguments.sources, options);
+  fmt::print(
+      "ATmega328P: {} octets of flash ({:.1f} % of 32 KiB), {} octets of RAM ({:.1f} % of 2 KiB), without "
+      "kilolib and the stack\n",
+      size.flash_octets, 100 * size.flash_octets / kFlash, size.ram_octets, 100 * size.ram_octets / kRam);
+  return kDone;
+}
+
+int build(const BuildArguments& arguments) {
+  behaviours::CompileOptions options;
+  options.defines = arguments.define;
+  if (arguments.avr) return build_for_robot(arguments, options);
+  const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
+  for (const std::string& note : compiled.notes) say("note: " + note);
+  if (arguments.sources.front().extension() != ".so") {
+    for (const std::string& warning : behaviours::robot_warnings(arguments.sources, options)) say(warning);
+  }
+  write_program(compiled.file, arguments.out.empty() ? fs::path(arguments.sources.front().stem().string() + ".so")
+                                                     : arguments.out);
+  return kDone;
+}
+
+}  // namespace
+
+Command add_build(CLI::App& program) {
+  const auto arguments = std::make_shared<BuildArguments>();
+  CLI::App& app =
+      *program.add_subcommand("build", "compile a behaviour for simulation, or check it for the real robot");
+  app.add_option("PROGRAM", arguments->sources, "C sources of one program")->required();
+  app.add_option("-o", arguments->out, "file to write (default: PROGRAM.so in this directory)");
+  app.add_option("--define", arguments->define, "NAME=VALUE: a macro")->allow_extra_args(false);
+  app.add_flag(
+      "--avr", arguments->avr,
+      "compile for the ATmega328P and print flash and RAM; with -o, also link firmware (.elf) with a kilolib "
+      "that runs on the robot");
+  return {&app, [arguments] { return build(*arguments); }};
+}
+
+}  // namespace kilotwin::cli

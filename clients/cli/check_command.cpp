@@ -1,0 +1,27 @@
+// `kilotwin check`: everything that would keep an experiment from running.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "clients/cli/commands.hpp"
+#include "clients/cli/prepare.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+int check(const RunArguments& arguments) {
+  static_cast<void>(resolve(load_with_overrides(arguments), arguments, Notes::kSilent));
+  return kDone;
+}
+
+}  // namespace
+
+Command add_check(CLI::App& program) {
+  const auto arguments = std::make_shared<RunArguments>();
+  CLI::App& app = *program.add_subcommand(
+      "check", "check an experiment and compile its programs; print nothing when all is right");
+  add_experiment_options(app, *arguments);
+  app.add_option("--set", arguments->set, "FIELD=VALUE")->allow_extra_args(false);
+  return {&app, [arguments] { return check(*arguments); }};
+}
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,33 @@
+/// The commands of `kilotwin`. Each function adds its command and the command's options to the program's parser; its
+/// file has the same name. ARCHITECTURE.md says what the commands call.
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace kilotwin::cli {
+
+/// Exit statuses: docs and scripts rely on them.
+inline constexpr int kDone = 0, kFailed = 1, kBadInput = 2;
+
+struct Command {
+  CLI::App* parser = nullptr;  ///< belongs to the program's parser
+  std::function<int()> work;   ///< returns the exit status; throws UserError and RunError
+};
+
+/// `started_s`: when the program was started, steady clock, s.
+[[nodiscard]] Command add_run(CLI::App& program, double started_s);
+[[nodiscard]] Command add_check(CLI::App& program);
+[[nodiscard]] Command add_build(CLI::App& program);
+[[nodiscard]] Command add_sweep(CLI::App& program);
+[[nodiscard]] Command add_export(CLI::App& program);
+[[nodiscard]] Command add_replay(CLI::App& program);
+[[nodiscard]] Command add_identify(CLI::App& program);
+[[nodiscard]] Command add_service(CLI::App& program, double started_s);
+[[nodiscard]] Command add_config(CLI::App& program);
+[[nodiscard]] Command add_doctor(CLI::App& program);
+
+}  // namespace kilotwin::cli

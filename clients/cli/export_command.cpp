@@ -1,0 +1,82 @@
+// `kilotwin export`: tables from a recorded run.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "clients/cli/commands.hpp"
+#include "clients/cli/export_model.hpp"
+#include "clients/cli/prepare.hpp"
+#include "clients/identify/kilogrid/export_cells.hpp"
+#include "clients/recorder/export.hpp"
+#include "core/base/error.hpp"
+#include "core/base/say.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+struct ExportArguments {
+  std::filesystem::path run, trajectories, bodies, messages, radio, cells, model;
+  double every_s = 1;
+  bool measured = false;
+};
+
+int export_run(const ExportArguments& arguments) {
+  const bool rows_wanted = !arguments.trajectories.empty() || !arguments.bodies.empty() ||
+                           !arguments.messages.empty() || !arguments.radio.empty() || !arguments.cells.empty();
+  if (!rows_wanted && arguments.model.empty()) {
+    throw UserError(
+        "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv, "
+        "--radio FILE.csv, --cells FILE.csv, --model FILE.txtpb or several");
+  }
+  if (!arguments.model.empty()) {
+    const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
+    fmt::print("{}: {} robots\n", arguments.model.string(), export_model(read_manifest(run), arguments.model));
+    if (!rows_wanted) return kDone;
+  }
+  const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kRecording);
+  const auto each = [&](const std::filesystem::path& csv, auto&& write) {
+    if (csv.empty()) return;
+    recorder::Reader reader(directory.recording());
+    const std::uint64_t rows = write(reader, csv);
+    if (!reader.warning().empty()) say("kilotwin: " + reader.warning());
+    fmt::print("{}: {} rows\n", csv.string(), rows);
+  };
+  each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) {
+    return recorder::export_trajectories(reader, csv, arguments.every_s,
+                                         arguments.measured ? recorder::Poses::kMeasured : recorder::Poses::kTrue);
+  });
+  each(arguments.bodies, [&](recorder::Reader& reader, const auto& csv) {
+    return recorder::export_bodies(reader, csv, arguments.every_s);
+  });
+  each(arguments.messages,
+       [&](recorder::Reader& reader, const auto& csv) { return recorder::export_messages(reader, csv); });
+  each(arguments.radio,
+       [&](recorder::Reader& reader, const auto& csv) { return recorder::export_radio(reader, csv); });
+  each(arguments.cells,
+       [&](recorder::Reader& reader, const auto& csv) { return kilogrid::export_cells(reader, csv); });
+  return kDone;
+}
+
+}  // namespace
+
+Command add_export(CLI::App& program) {
+  const auto arguments = std::make_shared<ExportArguments>();
+  CLI::App& app = *program.add_subcommand("export", "write CSV files from a recorded run");
+  app.add_option("RUN", arguments->run, "run directory or recording")->required();
+  app.add_option("--trajectories", arguments->trajectories, "columns time_s,robot,x_mm,y_mm,heading_rad,led");
+  app.add_option("--bodies", arguments->bodies, "movable bodies: columns time_s,body,x_mm,y_mm,heading_rad");
+  app.add_option("--messages", arguments->messages, "columns receiver,sender,count");
+  app.add_option("--radio", arguments->radio, "columns robot,attempted,sent,received,collided,backed_off");
+  app.add_option("--cells", arguments->cells,
+                 "positions as a floor of 50 mm cells measures them: columns time_s,robot,x_mm,y_mm");
+  app.add_option("--every", arguments->every_s, "time between a robot's rows, s")->capture_default_str();
+  app.add_flag("--measured", arguments->measured,
+               "trajectories as the tracker sees them: with the model's measurement effects");
+  app.add_option("--model", arguments->model,
+                 "the model as it ran, with each robot's own parameters; `run --model` reads it");
+  return {&app, [arguments] { return export_run(*arguments); }};
+}
+
+}  // namespace kilotwin::cli
