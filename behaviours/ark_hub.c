@@ -1,5 +1,5 @@
-/* Towards the hub: the base station's virtual sensor tells each robot whether it is inside the hub and in which direction
- * the hub lies, degrees anticlockwise from its heading. LED: green inside, blue on the way, off while it knows nothing.
+/* Towards the hub. The station's virtual sensor tells each robot whether it is inside the hub and in which direction the hub
+ * lies, in degrees anticlockwise from the robot's heading. LED: green inside, blue on the way, off until the first reading.
  *
  * A message of type 0 holds three robots' readings of 10 bits id, 4 bits type and 10 bits data:
  *   data[3i] = id >> 2, data[3i + 1] = (id & 3) << 6 | type << 2 | data >> 8, data[3i + 2] = data & 255 */

@@ -1,5 +1,5 @@
-/* A square by delays: no clock is read; the program waits while messages go on arriving.
- * LED: the number of messages heard, in the colour of its two lowest bits. */
+/* Walks a square, timed by delay() alone; messages arrive during the delays.
+ * LED: the colour shows the two lowest bits of the number of received messages. */
 #include <kilolib.h>
 #include <util/delay.h>
 

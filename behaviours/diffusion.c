@@ -1,5 +1,5 @@
-/* Diffusion: an isotropic random walk. Straight on for ten seconds, then left or right, by a coin, for up to four seconds,
- * which at 0.8 rad/s is about half a circle; and again.
+/* Diffusion: an isotropic random walk. Straight on for ten seconds, then a turn to a random side for up to four seconds, which at
+ * 0.8 rad/s is about half a circle; then the next leg.
  * LED: green straight on, blue to the left, red to the right. */
 #include <kilolib.h>
 

@@ -1,5 +1,5 @@
 /* Disperse: robots walk at random while a neighbour is near and stand still when alone, so that a cluster spreads out.
- * LED: green alone, red while it walks away from a neighbour. */
+ * LED: green alone, red near a neighbour. */
 #include <kilolib.h>
 
 #define NEAR_MM 60
@@ -28,7 +28,7 @@ static void move(enum motion next) {
   }
 }
 
-/* A new leg every one to two seconds: straight on half of the time, else a turn to either side. */
+/* A leg lasts one to two seconds: straight on with probability 1/2, else a turn to a random side. */
 static void walk_at_random(void) {
   if (motion != STOP && kilo_ticks < motion_until) return;
   const uint8_t choice = rand_soft();

@@ -1,6 +1,6 @@
-/* Edge following: robot 0 walks along the edge of a group that stands still, by the distance of the nearest neighbour alone:
- * it turns away while that is near and towards it while it is far, and so keeps the group on its left.
- * LED of the walker: red near, green far, blue when it hears nobody and waits. The group is white. */
+/* Edge following: robot 0 walks along the edge of a group that stands still, using only the distance to the nearest neighbour.
+ * It turns away while that neighbour is near and towards it while it is far, and so keeps the group on its left.
+ * LED of the walker: red near, green far, blue while it hears no robot and waits. The group is white. */
 #include <kilolib.h>
 
 #define WALKER 0
@@ -34,7 +34,7 @@ static void receive(message_t* message, distance_measurement_t* strength) {
 
 static message_t* send(void) { return kilo_uid == WALKER ? 0 : &hello; }
 
-/* Forgets whom it has not heard for a while; the least distance of the others. */
+/* Forgets neighbours that it has not heard for a while. Returns the least distance of the others. */
 static uint8_t nearest(void) {
   uint8_t least = NOBODY;
   for (uint8_t i = 0; i < count;) {

@@ -1,8 +1,9 @@
-/* Foraging with the ARK base station: from a field of food to the home and back. The station's virtual sensors tell each robot
- * where its goal lies, in the packed messages that ark_hub.c describes:
+/* Foraging with the ARK station: from the food to the home and back. The station's virtual sensors tell each robot where its goal
+ * lies, in the packed messages that ark_hub.c describes:
  *   type 0       it is inside its goal
- *   type 1..13   it is outside, the more the farther; data is the bearing of the goal, degrees anticlockwise from its heading
- *   type 14      it changes its goal: data 0 to the home (it carries food now), 1 to the food (it has put it down)
+ *   type 1..13   it is outside, and a higher type is farther away; data is the bearing of the goal, in degrees anticlockwise
+ *                from its heading
+ *   type 14      it changes its goal: data 0 to the home (it now carries food), 1 to the food (it has put its food down)
  *   type 15      there is no food left
  * Inside its goal it stops and asks for the change by its blue LED. Without a bearing it walks at random.
  * LED: red while it carries food, green on its way to the food, blue while it asks, off when there is none left. */
@@ -40,7 +41,7 @@ static void sense(uint8_t type, uint16_t data) {
     asks = 1;
     has_bearing = 0;
   } else if (type == SWAP) {
-    /* The station repeats itself; a robot changes once. */
+    /* The station repeats its message; the robot changes its goal once. */
     if (ever_swapped && kilo_ticks - swapped_at < SWAP_LOCK_TICKS) return;
     ever_swapped = 1;
     swapped_at = kilo_ticks;

@@ -1,6 +1,6 @@
-/* Gradient: every robot learns how many hops it is away from robot 0, the source: one more than the least that it hears. What
- * has not been confirmed for a while is forgotten, so that the gradient heals when robots leave.
- * LED: white at the source, then red, yellow, green, cyan, blue, magenta, and from the start again; off while unknown. */
+/* Gradient: every robot learns its distance in hops from robot 0, the source: one more than the least distance that it hears. A
+ * distance that no neighbour confirms for a while is forgotten, so that the gradient heals when robots leave.
+ * LED: white at the source, then red, yellow, green, cyan, blue, magenta, and again from red; off while unknown. */
 #include <kilolib.h>
 
 #define SOURCE 0
@@ -27,7 +27,7 @@ static void receive(message_t* message, distance_measurement_t* strength) {
   tell();
 }
 
-/* Who knows nothing says nothing. */
+/* A robot without a distance sends nothing. */
 static message_t* send(void) { return hops == UNKNOWN ? 0 : &out; }
 
 static void show(void) {

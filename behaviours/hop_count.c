@@ -1,6 +1,6 @@
-/* Hop count: robot 0 sends out a numbered wave every eight seconds. Whoever hears a new wave notes over how many hops it came,
- * flashes for a second, and passes it on; what it hears of the same wave later it leaves alone.
- * LED: off; during the flash green for an odd number of hops, blue for an even one. */
+/* Hop count: robot 0 sends a numbered wave every eight seconds. A robot that hears a new wave stores the number of hops it took,
+ * flashes for a second and passes the wave on. It ignores the same wave when it hears it again.
+ * LED: off; during the flash green for an odd number of hops, blue for an even number. */
 #include <kilolib.h>
 
 #define ORIGIN 0

@@ -1,5 +1,5 @@
-/* A grid of robots that measure who hears whom. Each offers its own id again and again, for 150*32 of its own kilo_ticks,
- * waiting TAU_S * 32 kilo_ticks after each message that left; 0: it always has one to send.
+/* A grid of robots that measures which robot hears which. Each robot sends its id again and again, for 150 * 32 of its own
+ * kilo_ticks. After each message it waits TAU_S * 32 kilo_ticks; with TAU_S 0 it always has a message to send.
  * LED: green while it takes part, off when it is done. */
 #include <kilolib.h>
 

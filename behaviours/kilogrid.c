@@ -1,25 +1,25 @@
-/* The random walk of robots on an instrumented floor (experiments/kilogrid.txtpb): straight on for |N(15, 1.5)| s, a turn of
- * |N(0.5, 3)| s to either side, both in whole seconds; and turning away from walls. Cells on the floor's rim say that they are
- * a wall, some arriving every second; here they say it by light, which grows towards their middle. A robot that notices one turns to
- * either side, the other way every 7.5 s, until four readings in a row are weaker than the four before; then it goes straight. One
- * second without a reading ends that, and the walk goes on with its next step.
+/* The random walk of robots on a Kilogrid (experiments/kilogrid.txtpb): straight on for |N(15, 1.5)| s, then a turn of
+ * |N(0.5, 3)| s to either side, both in whole seconds. Robots also turn away from walls. On the real floor, cells on the rim send
+ * wall messages, some of which arrive. Here the cells emit light instead, which grows towards the middle of a cell. A robot that
+ * notices a wall turns, and changes its side every 7.5 s. It goes straight when four readings in a row are weaker than the four
+ * before. After one second without a reading it continues the walk with the next step.
  * LED: green straight on, blue to the left, red to the right; brighter beside a wall. */
 #include <kilolib.h>
 
 #ifndef WALL_RANGE_MM
-#define WALL_RANGE_MM 42 /* how far from its middle a cell of the rim is noticed */
+#define WALL_RANGE_MM 42 /* range from the middle of a rim cell within which robots notice it */
 #endif
 #ifndef WALL_HEARD
-#define WALL_HEARD 20 /* of its messages arrive in 10 s */
+#define WALL_HEARD 20 /* number of its messages that arrive in 10 s */
 #endif
-/* The floor's light: 1000 counts in the middle of a cell of the rim, 10 less for each mm from it. */
+/* The floor's light: 1000 counts in the middle of a rim cell, 10 less for each mm of distance. */
 #define NOTICED (1000 - 10 * WALL_RANGE_MM)
 
-/* As the walk and the avoidance count seconds, in kilo_ticks. */
+/* Periods of the walk and of the wall avoidance, in kilo_ticks. */
 #define WALK_TICKS 31
 #define WALL_TICKS 32
 #define LISTEN_TICKS 4
-/* Chance of a message to arrive in that time, in 256ths: 0.131 s is 859 / 65536 of 10 s. */
+/* Probability that a message arrives in that time, in 256ths: 0.131 s is 859 / 65536 of 10 s. */
 #define HEARD (WALL_HEARD * 859L / 256)
 #define LONGEST_TURN_TICKS (7500 / 32)
 #define READINGS 4
@@ -50,7 +50,7 @@ static void move(enum motion next) {
 
 static enum motion either_side(void) { return rand_soft() & 0x80 ? LEFT : RIGHT; }
 
-/* Nearly normal, mean 0, in 1/256 of the standard deviation: twelve uniform numbers. */
+/* An approximately normal number with mean 0, in 1/256 of the standard deviation: the sum of twelve uniform numbers. */
 static int16_t normal(void) {
   int16_t n = -6 * 255;
   uint8_t i;
@@ -58,7 +58,7 @@ static int16_t normal(void) {
   return n;
 }
 
-/* Whole seconds of |mean + sd n|, both in 1/256 s. */
+/* |mean + sd n| in whole seconds; mean and sd are in 1/256 s. */
 static uint32_t draw(int32_t mean, int32_t sd) {
   int32_t time = mean + sd * normal() / 256;
   if (time < 0) time = -time;

@@ -1,6 +1,6 @@
-/* Majority vote: every robot holds one of two opinions and tells it. Every few seconds, each at its own pace, it counts what it
- * has heard since, its own opinion included, and goes over to the majority; a tie changes nothing.
- * SHARE robots of ten begin with red (kilotwin run --define SHARE=4). LED: the opinion, red or blue. */
+/* Majority vote: every robot holds one of two opinions and sends it. Every few seconds, at its own period, a robot counts the
+ * opinions that it has heard since the last count and its own, and adopts the majority. A tie changes nothing.
+ * SHARE of ten robots begin with red (kilotwin run --define SHARE=4). LED: the opinion, red or blue. */
 #include <kilolib.h>
 
 #ifndef SHARE

@@ -1,7 +1,7 @@
-/* Orbit: robot 0 is the star, which stands still and shines white; all others are planets that circle it anticlockwise, led
- * by its distance alone. A planet always turns: about its right leg, and so to the right and outwards, while the star is
- * near, about its left leg, to the left and inwards, while it is far. Both pivots carry it forward.
- * LED of a planet: red near, green far, blue when it hears no star and waits. */
+/* Orbit: robot 0 is the star, which stands still and shines white; all others are planets that circle it anticlockwise,
+ * using only the distance. A planet always turns. While the star is near, it pivots about its right leg, to the right and
+ * outwards; while the star is far, it pivots about its left leg, to the left and inwards. Both pivots carry it forward.
+ * LED of a planet: red near, green far, blue while it does not hear the star and waits. */
 #include <kilolib.h>
 
 #define STAR 0
@@ -29,7 +29,7 @@ static void receive(message_t* message, distance_measurement_t* strength) {
   heard_at = kilo_ticks;
 }
 
-/* Planets are silent, so that the star has the air for itself. */
+/* Planets do not send, so that no message collides with those of the star. */
 static message_t* send(void) { return kilo_uid == STAR ? &light : 0; }
 
 static void setup(void) {

@@ -1,18 +1,18 @@
-/* Phototaxis: towards the light with one sensor. The robot pivots about one leg; as soon as its light has fallen clearly below
- * the best of this pivot it changes to the other leg. Each pivot carries it forward, and so it winds its way to the light.
+/* Phototaxis: towards the light with one sensor. The robot pivots about one leg. When the light has fallen clearly below the
+ * maximum of this pivot, it changes to the other leg. Each pivot carries it forward, along a winding path to the light.
  * LED: red on the left pivot, green on the right one. */
 #include <kilolib.h>
 
 #define SAMPLES 8
 #define SMOOTHING 8                       /* loops over which readings are averaged */
-#define FALL 24                           /* the light has fallen by this part of the best of this pivot */
+#define FALL 24                           /* the light has fallen by 1/24 of the maximum of this pivot */
 #define LONGEST_TICKS (6 * TICKS_PER_SEC) /* half a turn or so: no pivot lasts longer */
 
 static uint16_t best, smooth; /* sums of readings */
 static uint8_t left;
 static uint32_t pivot_began_at;
 
-/* The sum of some readings; the sensor cannot be read while a message arrives and then says -1. */
+/* The sum of some readings. While a message arrives, the sensor cannot be read and returns -1. */
 static uint16_t light(void) {
   uint16_t sum = 0;
   uint8_t count = 0;

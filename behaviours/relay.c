@@ -1,7 +1,7 @@
-/* Relay: a baton goes round robots 0, 1, 2 ... in the order of their ids, with every kind of waiting. Who holds the baton shines
- * for half a second (delay), waits for a full second of its clock (busy), and then passes the baton on until it hears that the
- * next one holds it (busy, on a variable that the reception sets).
- * ROBOTS tells how many there are (kilotwin run --define ROBOTS=5). LED: red with the baton, green while it passes it on. */
+/* Relay: a baton goes round robots 0, 1, 2 ... in the order of their ids, with every kind of waiting. The robot with the baton
+ * shines for half a second (delay), waits for a full second of its clock (a busy loop), and then passes the baton on until it
+ * hears that the next robot holds it (a busy loop on a variable that the reception callback sets).
+ * ROBOTS is the number of robots (kilotwin run --define ROBOTS=5). LED: red with the baton, green while it passes it on. */
 #include <kilolib.h>
 
 #ifndef ROBOTS
@@ -16,7 +16,7 @@ static void receive(message_t* message, distance_measurement_t* strength) {
   if (message->type == NORMAL) holder = message->data[0];
 }
 
-/* Says who holds the baton: the next one while it is passed on, oneself before. */
+/* Sends the holder of the baton: the next robot while it is passed on, this robot before. */
 static message_t* send(void) {
   if (holder != kilo_uid && !passes) return 0;
   out.type = NORMAL;

@@ -1,4 +1,4 @@
-/* Straight: on and on at the calibrated duties. LED: green. */
+/* Drives straight on at the calibrated duties. LED: green. */
 #include <kilolib.h>
 
 static void setup(void) {

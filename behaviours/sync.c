@@ -1,5 +1,5 @@
-/* Synchronise: every robot flashes once per period, like a firefly, and tells where in its period it is. It moves its own
- * flash towards what it hears, a quarter of the difference at a time, until all flash together.
+/* Synchronise: every robot flashes once per period, like a firefly, and sends its phase. For each phase that it hears, it corrects
+ * its own by a quarter of the difference, until all robots flash together.
  * LED: white during the flash, else off. */
 #include <kilolib.h>
 
@@ -11,7 +11,7 @@ static uint32_t period_began_at;
 
 static uint8_t phase(void) { return (kilo_ticks - period_began_at) % PERIOD; }
 
-/* The way round the circle from own phase to the other's, -PERIOD / 2 .. PERIOD / 2. */
+/* The difference from the own phase to the other's, on the circle: -PERIOD / 2 .. PERIOD / 2. */
 static int8_t ahead(uint8_t other) {
   int16_t difference = (int16_t)other - phase();
   if (difference > PERIOD / 2) difference -= PERIOD;
@@ -23,14 +23,14 @@ static void receive(message_t* message, distance_measurement_t* strength) {
   (void)strength;
   if (message->type != NORMAL) return;
   const int8_t difference = ahead(message->data[0]);
-  /* Towards the other, at least by one tick where they differ by more than a tick. */
+  /* At least one tick if the phases differ by more than a tick. */
   int8_t step = difference / 4;
   if (step == 0 && difference > 1) step = 1;
   if (step == 0 && difference < -1) step = -1;
   period_began_at -= step;
 }
 
-/* Asked when the message leaves, so the phase is that of this moment. */
+/* The phase is read when the message leaves. */
 static message_t* send(void) {
   out.type = NORMAL;
   out.data[0] = phase();

@@ -1,4 +1,4 @@
-/* Walk: straight on for ten seconds, two seconds to the left, and again. */
+/* Walks straight on for ten seconds, turns left for two seconds, and repeats. */
 #include <kilolib.h>
 
 #define STRAIGHT_TICKS (10 * TICKS_PER_SEC)
