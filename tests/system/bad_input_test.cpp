@@ -1,4 +1,4 @@
-// Bad input ends in one clear line on stderr and status 2, and leaves nothing behind.
+// Bad input gives one clear line on stderr and status 2, and leaves no files.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ class BadInput : public testing::Test {
     return scratch / "e.txtpb";
   }
   std::string behaviour() const { return "behaviour: \"" + source("behaviours/blink.c") + "\" "; }
-  /// The one line that the program says about it.
+  /// The one line on stderr.
   std::string refusal(const Words& words) {
     const Outcome outcome = kilotwin(words, scratch);
     EXPECT_EQ(outcome.status, 2) << outcome.err;
@@ -33,7 +33,7 @@ class BadInput : public testing::Test {
   Scratch scratch;
 };
 
-TEST_F(BadInput, InTheExperimentNamesItsPlace) {
+TEST_F(BadInput, InTheExperimentIsReportedWithItsPlace) {
   expect_in("e.txtpb:2:1: ", refusal_of("seed: 1\nsede: 2\n"));
   expect_in("e.txtpb:1:", refusal_of("duration_s: \"long\"\n"));
   expect_in("e.txtpb:1:", refusal_of("robots { count: 0 " + behaviour() + "}\n"));
@@ -48,7 +48,7 @@ TEST_F(BadInput, InTheExperimentNamesItsPlace) {
   expect_in("nowhere.txtpb", refusal({"run", scratch / "nowhere.txtpb"}));
 }
 
-TEST_F(BadInput, InAProgramGivesTheCompilersOwnMessage) {
+TEST_F(BadInput, InAProgramIsReportedInTheCompilersWords) {
   write(scratch / "broken.c", "#include <kilolib.h>\nvoid setup(void) {\n  int x = y;\n}\n");
   const Outcome outcome =
       kilotwin({"run", experiment("robots { count: 3 behaviour: \"broken.c\" }\n"), "--mode", "local"}, scratch);
@@ -100,7 +100,7 @@ TEST_F(BadInput, InArguments) {
                                        "arena.width_mm=100000", "--set", "arena.height_mm=100000"}));
 }
 
-TEST_F(BadInput, ThatIsNoRecording) {
+TEST_F(BadInput, ThatIsNotARecording) {
   write(scratch / "x", "not a recording at all");
   expect_in("not a Kilotwin recording", refusal({"export", scratch / "x", "--trajectories", scratch / "t.csv"}));
   fs::create_directory(scratch / "empty");
@@ -127,7 +127,7 @@ TEST_F(BadInput, ADomainInUseByServicesStartedByHand) {
   expect_in("in use by another run", outcome.err);
 }
 
-TEST_F(BadInput, APartitionOrShareThatIsNone) {
+TEST_F(BadInput, APartitionOrShareOutsideTheRun) {
   ASSERT_EQ(kilotwin({"run", experiment("robots { count: 3 " + behaviour() + "}\n"), "--prepare", "--out",
                       scratch / "run"},
                      scratch)

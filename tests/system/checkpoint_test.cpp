@@ -1,4 +1,4 @@
-// What N partitions and hosts saved, M others go on from, to the same end.
+// A run continues from its checkpoint on another number of partitions and hosts, with the same result.
 #include <gtest/gtest.h>
 
 #include "tests/system/program.hpp"
@@ -6,7 +6,6 @@
 namespace kilotwin::test {
 namespace {
 
-/// Programs that keep state in globals, on the stack (delay) and in flight on the radio.
 class Checkpoints : public testing::Test {
  protected:
   Words experiment(const Words& more) const {
@@ -21,7 +20,7 @@ TEST_F(Checkpoints, SavedOn2x2AreResumedOn1x1InEitherMode) {
   const auto whole = run(experiment({"--mode", "local"}), scratch, "whole");
   const auto saving =
       run(experiment({"--partitions", "2x2", "--hosts", "2", "--checkpoint-every", "5"}), scratch, "saving");
-  EXPECT_EQ(saving.state_hash, whole.state_hash) << "saving changes nothing";
+  EXPECT_EQ(saving.state_hash, whole.state_hash) << "saving does not change the result";
 
   const auto local =
       run(experiment({"--mode", "local", "--partitions", "1x1", "--resume", scratch / "saving"}), scratch, "local");
@@ -39,8 +38,8 @@ TEST_F(Checkpoints, OfALocalRunAreResumedFederated) {
   EXPECT_EQ(resumed.state_hash, whole.state_hash);
 }
 
-TEST_F(Checkpoints, OfARunThatIsFarAheadOfItsBooksHoldTheChain) {
-  // One robot takes thousands of ticks a second: the state hash of a checkpoint's tick is known well after it, or before.
+TEST_F(Checkpoints, HoldTheHashChainAlsoWhenTheStationLagsBehind) {
+  // A run of one robot does thousands of ticks a second, so the station gets the hash of a checkpoint's tick long after the tick.
   const Words words{source("experiments/disperse.txtpb"), "--robots", "1", "--partitions", "1x1"};
   const auto with = [&](const Words& more) {
     Words all = words;
@@ -70,7 +69,7 @@ TEST_F(Checkpoints, BeyondTheEndAreRefused) {
   EXPECT_NE(outcome.err.find("--duration"), std::string::npos) << outcome.err;
 }
 
-TEST_F(Checkpoints, KeepTheStacksOfProgramsThatBlock) {
+TEST_F(Checkpoints, HoldTheStacksOfProgramsThatBlock) {
   const Words blocking{"--behaviour", source("behaviours/delay_walk.c")};
   const auto with = [&](Words more) {
     more.insert(more.end(), blocking.begin(), blocking.end());
@@ -92,7 +91,7 @@ TEST_F(Checkpoints, OfAnotherExperimentAreRefused) {
   EXPECT_NE(outcome.err.find("another experiment"), std::string::npos) << outcome.err;
 }
 
-TEST_F(Checkpoints, OfARunWithoutAnyAreAskedForInVain) {
+TEST_F(Checkpoints, OfARunWithoutAnyAreRefused) {
   run(experiment({"--mode", "local"}), scratch, "none");
   Words words = experiment({"--mode", "local", "--resume", scratch / "none"});
   words.insert(words.begin(), "run");

@@ -1,4 +1,4 @@
-// The commands of the contract, each from its arguments to its files.
+// Every command, from its arguments to its files.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ class Commands : public testing::Test {
   Scratch scratch;
 };
 
-TEST_F(Commands, CheckIsSilentWhenAllIsRight) {
+TEST_F(Commands, CheckPrintsNothingForValidExperiments) {
   for (const auto& entry : fs::directory_iterator(source("experiments"))) {
     if (entry.path().extension() != ".txtpb") continue;
     const Outcome outcome = kilotwin({"check", entry.path().string()}, scratch);
@@ -31,7 +31,7 @@ TEST_F(Commands, CheckIsSilentWhenAllIsRight) {
   }
 }
 
-TEST_F(Commands, RunWritesWhatTheContractNames) {
+TEST_F(Commands, RunWritesTheFilesOfTheContract) {
   run(small(), scratch, "run");
   const auto summary = nlohmann::json::parse(read(scratch / "run/summary.json"));
   for (const char* field : {"name", "seed", "mode", "partitions", "robots", "ticks", "simulated_s", "start_s",
@@ -70,10 +70,10 @@ TEST_F(Commands, MessagesOfAFederatedRunAreThoseOfALocalOne) {
   EXPECT_EQ(read(scratch / "local.csv"), read(scratch / "federated.csv"));
 }
 
-TEST_F(Commands, ReplayVerifiesAndFindsWhatDiffers) {
+TEST_F(Commands, ReplayVerifiesAndFindsTheFirstDifference) {
   run(small(), scratch, "run");
   EXPECT_EQ(kilotwin({"replay", scratch / "run", "--verify"}, scratch).status, 0);
-  // Another recording beside the same manifest: the first state hash differs already.
+  // With the recording of another run, the first state hash differs.
   run(small({"--seed", "2"}), scratch, "other");
   fs::copy_file(scratch / "other/recording.ktrec", scratch / "run/recording.ktrec",
                 fs::copy_options::overwrite_existing);
@@ -82,7 +82,7 @@ TEST_F(Commands, ReplayVerifiesAndFindsWhatDiffers) {
   EXPECT_NE(differs.err.find("first tick that differs"), std::string::npos) << differs.err;
 }
 
-TEST_F(Commands, ACutRecordingIsReadUpToTheCut) {
+TEST_F(Commands, ATruncatedRecordingIsReadUpToItsEnd) {
   run(small(), scratch, "run");
   const std::string file = scratch / "run/recording.ktrec";
   fs::resize_file(file, fs::file_size(file) * 2 / 3);
@@ -102,7 +102,7 @@ TEST_F(Commands, BuildForTheRealRobotPrintsSizes) {
   const Outcome outcome = kilotwin({"build", source("behaviours/disperse.c"), "--avr"}, scratch);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("ATmega328P"), std::string::npos) << outcome.out;
-  // Two files share 1000 octets that neither initialises.
+  // Two files share an uninitialised array of 1000 octets.
   write(scratch / "a.c", "char shared[1000];\nvoid other(void);\nint main(void) { other(); return 0; }\n");
   write(scratch / "b.c", "char shared[1000];\nvoid other(void) { shared[0] = 1; }\n");
   EXPECT_NE(kilotwin({"build", scratch / "a.c", scratch / "b.c", "--avr"}, scratch).out.find(" 1000 octets of RAM"),
@@ -174,8 +174,8 @@ TEST_F(Commands, SweepOverARangeOfNumbersPlotsTheResponse) {
   EXPECT_EQ(kilotwin({"sweep", source("experiments/diffusion.txtpb"), "--plot", "speed"}, scratch).status, 2);
 }
 
-TEST_F(Commands, AnInterruptedSweepTellsOfTheRunsThatWereDone) {
-  // The first runs are short, those after them would take minutes.
+TEST_F(Commands, AnInterruptedSweepReportsTheRunsThatEnded) {
+  // The first runs are short, the later ones would take minutes.
   Process sweep({program(), "sweep", source("experiments/diffusion.txtpb"), "--set", "duration_s=1,1000000",
                  "--seeds", "1..2", "--jobs", "2", "--out", scratch / "sweep"},
                 scratch.path());
@@ -224,7 +224,7 @@ TEST_F(Commands, HelpIsEverywhere) {
   }
 }
 
-TEST_F(Commands, AFailingRobotCostsNobodyElse) {
+TEST_F(Commands, AFailingRobotFailsAlone) {
   write(scratch / "p.c",
         "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 7 && kilo_ticks > 30) "
         "*(volatile int *)0 = 1; }\n"

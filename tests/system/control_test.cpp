@@ -1,4 +1,4 @@
-// Outsiders steer a run and watch it over the public topics, as any vendor's DDS may.
+// Other programs control a run and observe it over the public topics.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -96,7 +96,7 @@ TEST_F(Control, PausesStepsContinuesAndStops) {
   ask(kilotwin_open_STOP_RUN);
   const Outcome outcome = process_->wait(30);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  // All of it is in the recording, and steps again to the same hashes.
+  // The recording holds all requests, and its replay gives the same hashes.
   EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
   const auto summary = recorder::read_summary(scratch_.path() / "run/summary.json");
   const auto resumed = run({source("experiments/disperse.txtpb"), "--robots", "20", "--mode", "local", "--resume",
@@ -106,7 +106,7 @@ TEST_F(Control, PausesStepsContinuesAndStops) {
   EXPECT_EQ(resumed.resumed_from_tick, at + 6);
 }
 
-TEST_F(Control, OverheadPacketsFromOutsideAreStampedRecordedAndReplayed) {
+TEST_F(Control, ExternalOverheadPacketsAreStampedRecordedAndReplayed) {
   start();
   PublicOverheadPacket packet{};
   std::string("test").copy(packet.client, sizeof packet.client - 1);
@@ -131,23 +131,23 @@ TEST_F(Control, OverheadPacketsFromOutsideAreStampedRecordedAndReplayed) {
 }
 
 TEST_F(Control, MetricsOfAnotherRunEndTheRunInOneLine) {
-  dds::Writer<WireMetrics> metrics(participant_, topics::metrics());
+  dds::Writer<WireMetrics> writer(participant_, topics::metrics());
   start({"--quiet"});
-  ASSERT_TRUE(eventually([&] { return metrics.readers() > 0; }));
+  ASSERT_TRUE(eventually([&] { return writer.readers() > 0; }));
   std::uint64_t part = 1;
   WireMetrics metrics{};
   metrics.run = latest().run;
   metrics.first_tick = 1'000'000'000'000;
   metrics.hash_parts._length = metrics.hash_parts._maximum = 1;
   metrics.hash_parts._buffer = &part;
-  metrics.write(metrics);
+  writer.write(metrics);
   const Outcome outcome = process_->wait(30);
   EXPECT_EQ(outcome.status, 1);
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  EXPECT_NE(outcome.err.find("a metrics does not fit the run"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("a metrics sample does not fit the run"), std::string::npos) << outcome.err;
 }
 
-TEST_F(Control, RobotsAreTracedForWhoListens) {
+TEST_F(Control, RobotStatesArePublished) {
   std::array<std::atomic<int>, 20> seen{};
   const dds::Reader<PublicRobotState> robots(participant_, topics::robots(),
                                              [&](const PublicRobotState& sample, dds::SampleState state) {
@@ -160,7 +160,7 @@ TEST_F(Control, RobotsAreTracedForWhoListens) {
   EXPECT_EQ(process_->wait(30).status, 0);
 }
 
-TEST_F(Control, ATrackedRobotIsWhereTheTrackerSawIt) {
+TEST_F(Control, ATrackedRobotIsAtThePoseOfTheTracker) {
   write(scratch_ / "hybrid.txtpb",
         "arena { width_mm: 600 height_mm: 600 }\n"
         "robots { count: 4 behaviour: \"" +
@@ -185,7 +185,7 @@ TEST_F(Control, ATrackedRobotIsWhereTheTrackerSawIt) {
   ASSERT_TRUE(eventually([&] { return poses.readers() > 0 && latest().phase == kilotwin_open_RUNNING; }));
   PublicTrackedPose pose{};
   pose.robot = 4;
-  pose.x_mm = -150;  // over two partition borders at once
+  pose.x_mm = -150;  // across two partition borders at once
   pose.y_mm = -120;
   pose.heading_rad = 1;
   poses.write(pose);

@@ -1,4 +1,4 @@
-// However a run ends, nothing stays behind, and what was recorded is of use.
+// However a run ends, no process stays behind, and its recording is usable.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A run at real time's pace, so that it lasts until the test ends it.
+/// A run at real-time pace, which lasts until the test ends it.
 class Endings : public testing::Test {
  protected:
   Words long_run(const Words& more = {}) const {
@@ -56,7 +56,7 @@ class Endings : public testing::Test {
     const Outcome replayed = kilotwin({"replay", scratch / "run", "--verify"}, scratch);
     EXPECT_EQ(replayed.status, 0) << replayed.err;
   }
-  /// pid of the service whose command line has `word`.
+  /// The process of the service whose command line has `word`.
   pid_t service(const std::string& word) const {
     for (const pid_t id : processes_with(scratch / "run")) {
       const std::string line = read("/proc/" + std::to_string(id) + "/cmdline");
@@ -95,11 +95,11 @@ TEST_F(Endings, InterruptsDoNotWaitForASlowPace) {
   const double asked_at_s = now_s();
   process.signal(SIGINT);
   EXPECT_EQ(process.wait(20).status, 1);
-  EXPECT_LT(now_s() - asked_at_s, 3) << "before the launcher would use force";
+  EXPECT_LT(now_s() - asked_at_s, 3) << "before the launcher kills services";
   EXPECT_TRUE(fs::exists(scratch / "run/summary.json"));
 }
 
-TEST_F(Endings, AnEndlessLoopEndsItsRobotAndNobodyElse) {
+TEST_F(Endings, AnEndlessLoopFailsItsRobotAlone) {
   write(scratch / "hangs.c",
         "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 3 && kilo_ticks > 30) for "
         "(;;) {} }\n"
@@ -127,8 +127,8 @@ TEST_F(Endings, AServiceStartedTwiceLeavesTheRunAlone) {
   expect_usable_recording();
 }
 
-TEST_F(Endings, AFullDiskIsNamedInOneLine) {
-  // A limit on the size of files fails writing as a full disk does; the program is compiled before, without it.
+TEST_F(Endings, AFullDiskIsReportedInOneLine) {
+  // A limit on file sizes makes writing fail as a full disk does. The program is compiled before the limit applies.
   ASSERT_EQ(kilotwin({"build", source("behaviours/disperse.c"), "-o", scratch / "warm.so"}, scratch).status, 0);
   Words words = long_run({"--quiet", "--set", "recording.every_s=0.04"});
   words[6] = "max";
@@ -150,7 +150,7 @@ TEST_F(Endings, AnInterruptEndsALocalRunInOrder) {
   expect_usable_recording();
 }
 
-TEST_F(Endings, AKilledLauncherTakesItsServicesAlong) {
+TEST_F(Endings, AKilledLauncherEndsItsServices) {
   Process process(long_run(), scratch.path());
   ASSERT_TRUE(recorded(5));
   process.signal(SIGKILL);
@@ -159,7 +159,7 @@ TEST_F(Endings, AKilledLauncherTakesItsServicesAlong) {
   expect_usable_recording();
 }
 
-TEST_F(Endings, AKilledServiceIsNamedInOneLine) {
+TEST_F(Endings, AKilledServiceIsReportedInOneLine) {
   for (const std::string victim : {"physics", "comm", "behaviours", "station"}) {
     fs::remove_all(scratch / "run");
     Process process(long_run(), scratch.path());
@@ -167,7 +167,7 @@ TEST_F(Endings, AKilledServiceIsNamedInOneLine) {
     const pid_t id = service(victim);
     ASSERT_GT(id, 0) << victim;
     kill(id, SIGKILL);
-    EXPECT_TRUE(process.says("killed", 3)) << "named within 3 s";
+    EXPECT_TRUE(process.says("killed", 3)) << "reported within 3 s";
     const Outcome outcome = process.wait(20);
     EXPECT_EQ(outcome.status, 1);
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
@@ -178,13 +178,13 @@ TEST_F(Endings, AKilledServiceIsNamedInOneLine) {
   }
 }
 
-TEST_F(Endings, AServiceThatStandsStillIsNamed) {
+TEST_F(Endings, AStoppedServiceIsReported) {
   Process process(long_run(), scratch.path());
   ASSERT_TRUE(recorded(5));
   const pid_t id = service("comm");
   ASSERT_GT(id, 0);
   kill(id, SIGSTOP);
-  EXPECT_TRUE(process.says("radio was lost", 3)) << "named within 3 s";
+  EXPECT_TRUE(process.says("radio was lost", 3)) << "reported within 3 s";
   const Outcome outcome = process.wait(30);
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.err.find("radio was lost"), std::string::npos) << outcome.err;

@@ -1,4 +1,4 @@
-// The crown jewel: one state hash, however a run is divided, whichever way it is run.
+// Determinism: one state hash for every partition grid, number of hosts, number of threads and mode.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -10,8 +10,8 @@
 namespace kilotwin::test {
 namespace {
 
-/// The state hash of disperse with 100 robots and 10 s. Whoever changes a model changes this value, knowingly; it is the
-/// same for every compiler, optimisation level and sanitizer.
+/// The state hash of disperse with 100 robots and 10 s. It changes only with a change of a model, and is the same for every
+/// compiler, optimisation level and sanitizer.
 constexpr std::uint64_t kGolden = 0xad091ef4a79041e3;
 
 Words disperse(const Words& more) {
@@ -57,7 +57,7 @@ TEST(Hashes, AreThoseOfServicesStartedByHand) {
   Words words = disperse({"--partitions", "2x1", "--hosts", "2", "--prepare", "--out", directory});
   words.insert(words.begin(), "run");
   ASSERT_EQ(kilotwin(words, scratch).status, 0);
-  // A free domain: one that a claim of this test's own has found and freed.
+  // A free domain: a claim of this test has found it and has ended.
   const std::string domain = std::to_string(dds::DomainClaim::any().domain());
   const auto service = [&](Words more) {
     Words all{program(), "service"};
@@ -66,7 +66,7 @@ TEST(Hashes, AreThoseOfServicesStartedByHand) {
     return std::make_unique<Process>(all, scratch.path());
   };
   std::vector<std::unique_ptr<Process>> services;
-  // In an order that nobody would choose.
+  // In an order that differs from the launcher's.
   services.push_back(service({"behaviours", "--share", "2/2"}));
   services.push_back(service({"physics", "--partition", "1,0"}));
   services.push_back(service({"station"}));
@@ -80,7 +80,7 @@ TEST(Hashes, AreThoseOfServicesStartedByHand) {
   EXPECT_EQ(recorder::read_summary(directory + "/summary.json").state_hash, kGolden);
 }
 
-/// Nine robots push a box, and the box a cylinder, over borders of all grids below.
+/// Nine robots push a box, and the box pushes a cylinder, across the borders of all grids below.
 std::string moving_bodies(const Scratch& scratch, const std::string& mass_g) {
   const std::string file = scratch / ("bodies-" + mass_g + ".txtpb");
   std::ofstream(file) << "duration_s: 12 seed: 3 arena { width_mm: 900 height_mm: 700 } "
@@ -93,7 +93,7 @@ std::string moving_bodies(const Scratch& scratch, const std::string& mass_g) {
   return file;
 }
 
-TEST(Hashes, AreOneWithBodiesThatMoveOverBorders) {
+TEST(Hashes, AreOneWithBodiesThatCrossBorders) {
   const Scratch scratch;
   const std::string experiment = moving_bodies(scratch, "18");
   int runs = 0;
@@ -110,8 +110,8 @@ TEST(Hashes, AreOneWithBodiesThatMoveOverBorders) {
   }
 }
 
-// ODE's results are a function of the experiment and the partition grid; which threads and processes compute them is not
-// seen. The crowd is tight, so that both of its solvers work, on two threads at a time.
+// The ODE engine's results depend on the experiment and the partition grid, not on threads or processes. The crowd is dense, so
+// that both of the engine's solvers work, on two threads at a time.
 TEST(Hashes, OfTheOdeEngineAreTheSameInThreadsAndProcesses) {
   const Scratch scratch;
   const auto with = [&](const Words& more, const std::string& name) {

@@ -1,4 +1,5 @@
-// Models as files: what a run exports makes the same run again, effects cross processes, and what is measured is not what is.
+// Model files: an exported model gives the same run again, effects work across processes, and measurement effects change only
+// what the tracker sees.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +11,7 @@
 namespace kilotwin::test {
 namespace {
 
-/// Effects that remember, that look at neighbours and places, and that a tracker sees.
+/// Effects with memory, of neighbours, of positions, and on the measurement.
 const char* const kModel =
     "effect { name: 'tired' acts_on: WHEEL_GAIN function { of: MOTOR_TIME linear { slope: -0.005 } } }\n"
     "effect { name: 'wander' acts_on: TURN_RATE function { noise { sd: 0.05 correlation_s: 5 } } }\n"
@@ -37,14 +38,14 @@ class Model : public testing::Test {
   Scratch scratch;
 };
 
-TEST_F(Model, WhatARunExportsMakesTheSameRunAgain) {
+TEST_F(Model, AnExportedModelGivesTheSameRunAgain) {
   const Words local{"--mode", "local", "--set", "motion.factor_variance_s=0.001", "--model", model()};
   const auto first = run(disperse(local), scratch, "first");
   const Outcome exported = kilotwin({"export", scratch / "first", "--model", scratch / "m.txtpb"}, scratch);
   ASSERT_EQ(exported.status, 0) << exported.err;
   const auto again = run(disperse({"--mode", "local", "--model", scratch / "m.txtpb"}), scratch, "again");
   EXPECT_EQ(again.state_hash, first.state_hash);
-  // Robots keep their biases where the seed changes: then the export says the same of them.
+  // With another seed, an exported model keeps each robot's biases: a second export is the same.
   run(disperse({"--mode", "local", "--seed", "5", "--model", scratch / "m.txtpb"}), scratch, "other");
   ASSERT_EQ(kilotwin({"export", scratch / "other", "--model", scratch / "n.txtpb"}, scratch).status, 0);
   const auto robots = [&](const std::string& file) {
@@ -55,7 +56,7 @@ TEST_F(Model, WhatARunExportsMakesTheSameRunAgain) {
   EXPECT_NE(run(disperse({"--mode", "local"}), scratch, "plain").state_hash, first.state_hash);
 }
 
-TEST_F(Model, EffectsGiveOneHashHoweverARunIsDivided) {
+TEST_F(Model, EffectsGiveOneHashForEveryDivision) {
   const std::string file = model();
   const auto hash = [&](const Words& words, const std::string& name) {
     return run(disperse(words), scratch, name).state_hash;
@@ -65,7 +66,7 @@ TEST_F(Model, EffectsGiveOneHashHoweverARunIsDivided) {
                  "threads"),
             local);
   EXPECT_EQ(hash({"--model", file, "--partitions", "2x2", "--hosts", "2"}, "federated"), local);
-  // A checkpoint of 2x1 goes on as 1x2.
+  // A run on 1x2 partitions continues from a checkpoint of 2x1.
   run({source("experiments/disperse.txtpb"), "--duration", "5", "--robots", "60", "--model", file, "--partitions",
        "2x1", "--checkpoint-every", "4"},
       scratch, "half");

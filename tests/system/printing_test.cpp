@@ -1,4 +1,4 @@
-// What robots print lies in the run directory, the same however the run is divided.
+// The run directory holds what robots print, the same for every division of the run.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -1,4 +1,4 @@
-/// The program as a test runs it: started, watched, ended.
+/// Runs the program for a test.
 #pragma once
 
 #include <sys/types.h>
@@ -18,7 +18,7 @@ struct Outcome {
   std::string out, err;
 };
 
-/// A process of ours that ends with the object.
+/// A process that ends with the object.
 class Process {
  public:
   /// Starts `words`; output goes to files in `scratch`.
@@ -27,10 +27,10 @@ class Process {
   Process(const Process&) = delete;
   [[nodiscard]] pid_t id() const { return process_; }
   void signal(int number) const;
-  /// Waits for its end; kills it after `seconds`, a bound against hanging.
+  /// Waits for its end. Kills it after `seconds`, a bound against hanging.
   Outcome wait(double seconds = 120);
   [[nodiscard]] bool running();
-  /// Whether it writes `text` to stderr within `seconds`, which is what it promises.
+  /// Whether it writes `text` to stderr within `seconds`.
   [[nodiscard]] bool says(const std::string& text, double seconds) const;
 
  private:
@@ -40,7 +40,7 @@ class Process {
   int wait_status_ = 0;
 };
 
-/// A directory of its own for each test.
+/// A temporary directory.
 class Scratch {
  public:
   Scratch();
@@ -52,7 +52,7 @@ class Scratch {
   std::filesystem::path path_;
 };
 
-/// `kilotwin WORDS...`, to its end.
+/// Runs `kilotwin WORDS...` to its end.
 Outcome kilotwin(const Words& words, const Scratch& scratch);
 /// Path of the program.
 std::string program();
@@ -60,9 +60,9 @@ std::string program();
 std::string source(const std::string& name);
 std::string read(const std::filesystem::path& file);
 void write(const std::filesystem::path& file, const std::string& text);
-/// Runs an experiment with --quiet and returns its summary; fails the test where it does not end with status 0.
+/// Runs an experiment with --quiet and returns its summary. Fails the test unless the status is 0.
 recorder::Summary run(Words words, const Scratch& scratch, const std::string& name);
-/// Processes whose command line mentions `text`.
+/// Processes whose command line contains `text`.
 std::vector<pid_t> processes_with(const std::string& text);
 /// Polls until `condition` holds; false after `seconds`, a bound against hanging.
 template <class Condition> bool eventually(Condition condition, double seconds = 30);

@@ -1,5 +1,5 @@
-// A program that brings down its host costs its own robot: the run goes on from its last checkpoint
-// without it, and comes to the same end, in either mode.
+// A program that crashes its behaviours host fails its own robot alone: the run continues from its last checkpoint with that
+// robot failed, and gives the same result in both modes.
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -14,8 +14,8 @@ namespace {
 
 class Recoveries : public testing::Test {
  protected:
-  /// A program of which those robots do `deed` when their clocks show 60; all wait in delays and in loops.
-  std::string behaviour(const std::string& name, const std::string& deed,
+  /// A program whose robots `who` do `action` when their clocks show 60; all robots wait in delays and in loops.
+  std::string behaviour(const std::string& name, const std::string& action,
                         const std::string& who = "kilo_uid == 3") const {
     std::ofstream(scratch / (name + ".c"))
         << "#include <kilolib.h>\n"
@@ -25,12 +25,12 @@ class Recoveries : public testing::Test {
            "static void setup(void) { m.crc = message_crc(&m); }\n"
            "static void loop(void) { uint8_t h = heard; if (kilo_uid % 2) while (heard == h); else delay(70);\n"
            "  set_color(heard); set_motors(heard, 70); }\n"
-           "static void deed(void) { "
-        << deed
+           "static void act(void) { "
+        << action
         << " }\n"
            "static void wait(void) { if ("
         << who
-        << ") { if (kilo_ticks >= 60) deed(); } else loop(); }\n"
+        << ") { if (kilo_ticks >= 60) act(); } else loop(); }\n"
            "int main(void) { kilo_init(); kilo_message_rx = rx; kilo_message_tx = tx; kilo_start(setup, wait); }\n";
     return scratch / (name + ".c");
   }
@@ -48,12 +48,12 @@ class Recoveries : public testing::Test {
   Scratch scratch;
 };
 
-/// By system calls, gettid and tkill, as no wild pointer finds its host for certain.
+/// By the system calls gettid and tkill: a wild pointer does not hit the host for certain.
 constexpr const char* kKillHost =
     "long p; __asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(186) : \"rcx\", \"r11\", \"memory\");\n"
     "__asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(200), \"D\"(p), \"S\"(6) : \"rcx\", \"r11\", \"memory\");";
 
-TEST_F(Recoveries, AHostBroughtDownCostsTheCulpritAlone) {
+TEST_F(Recoveries, ACrashedHostFailsTheRobotThatCausedItAlone) {
   const std::string kills = behaviour("kills", kKillHost), faults = behaviour("faults", "*(volatile int*)8 = 1;");
   const auto failed = outcome("failed", faults, {"--mode", "local"});
   EXPECT_EQ(failed.robots_failed, 1u);
@@ -79,7 +79,7 @@ TEST_F(Recoveries, AHostBroughtDownCostsTheCulpritAlone) {
     EXPECT_EQ(recovered.ticks, failed.ticks);
     EXPECT_EQ(recovered.messages.sent, failed.messages.sent);
     EXPECT_EQ(recovered.moved_mm.mean, failed.moved_mm.mean);
-    // Its clock shows 60 at about 2 s.
+    // The robot's clock shows 60 at about 2 s.
     EXPECT_EQ(recovered.recovered_from_tick, from_checkpoint ? 48 : 0);
     EXPECT_FALSE(std::filesystem::exists(scratch / name + std::string("/recovered")));
     // One recording, from beginning to end.
@@ -90,7 +90,7 @@ TEST_F(Recoveries, AHostBroughtDownCostsTheCulpritAlone) {
   }
 }
 
-TEST_F(Recoveries, SeveralCulpritsFallOneAfterAnother) {
+TEST_F(Recoveries, SeveralFaultyRobotsFailOneAfterAnother) {
   const std::string when = "static uint8_t n; if (++n < kilo_uid * 8) return; ";
   const auto failed =
       outcome("failed", behaviour("faults", when + "*(volatile int*)8 = 1;", "kilo_uid < 4"), {"--mode", "local"});
@@ -109,7 +109,7 @@ TEST_F(Recoveries, SeveralCulpritsFallOneAfterAnother) {
   }
 }
 
-TEST_F(Recoveries, ARunThatWasResumedGoesOnFromThereOrFromLater) {
+TEST_F(Recoveries, AResumedRunContinuesFromItsNewestCheckpoint) {
   const auto failed = outcome("failed", behaviour("faults", "*(volatile int*)8 = 1;"), {"--mode", "local"});
   const std::string kills = behaviour("kills", kKillHost);
   Words words{"run",
@@ -139,8 +139,8 @@ TEST_F(Recoveries, ARunThatWasResumedGoesOnFromThereOrFromLater) {
   EXPECT_EQ(kilotwin({"replay", scratch / "later", "--verify"}, scratch).status, 0);
 }
 
-TEST_F(Recoveries, WhatCameFromOutsideComesAgain) {
-  // The packet makes the culprit act; it is stamped for a tick before that, and nobody sends it twice.
+TEST_F(Recoveries, ExternalInputIsRepeated) {
+  // The packet makes the faulty robot act. It is stamped for an earlier tick, and the test sends it once.
   std::ofstream(scratch / "told.c")
       << "#include <kilolib.h>\nstatic uint32_t told; static uint8_t heard;\n"
          "static void rx(message_t* r, distance_measurement_t* d) { ++heard; if (r->type == 7) told = kilo_ticks; "
@@ -182,7 +182,7 @@ TEST_F(Recoveries, WhatCameFromOutsideComesAgain) {
   }
 }
 
-TEST_F(Recoveries, AWorkerThatIsKilledIsNobodysFault) {
+TEST_F(Recoveries, AKilledWorkerFailsNoRobot) {
   Process process({program(), "run", source("experiments/disperse.txtpb"), "--mode", "local", "--duration", "600",
                    "--pace", "1", "--out", scratch / "run"},
                   scratch.path());

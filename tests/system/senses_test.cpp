@@ -1,4 +1,4 @@
-// Light, shadows, batteries and EEPROMs in whole runs: one hash however a run is divided, and refusals in one line.
+// Light, shadows, batteries and EEPROMs in whole runs: one hash for every division, and one line for bad input.
 #include <gtest/gtest.h>
 #include <png.h>
 
@@ -12,7 +12,7 @@ namespace {
 class Senses : public testing::Test {
  protected:
   Senses() {
-    // A picture that is bright on the right.
+    // The picture is bright on the right.
     std::string pixels;
     for (int i = 0; i < 64 * 16; ++i) pixels += static_cast<char>(4 * (i % 64));
     png_image image{};
@@ -25,7 +25,7 @@ class Senses : public testing::Test {
     std::string eeprom(1024, '\xff');
     eeprom[0x0C] = eeprom[0x14] = 90;
     write(scratch.path() / "eeproms/7.eeprom", eeprom);
-    // Readings decide on motors and colours; the nth robot writes to its EEPROM now and then.
+    // Readings set motors and colours; every nth robot writes to its EEPROM.
     write(scratch.path() / "seek.c",
           "#include <kilolib.h>\n#include <avr/eeprom.h>\n"
           "static int16_t before; static message_t m; static message_t* tx(void) { return &m; }\n"
@@ -58,7 +58,7 @@ class Senses : public testing::Test {
   Scratch scratch;
 };
 
-TEST_F(Senses, GiveOneHashHoweverARunIsDivided) {
+TEST_F(Senses, GiveOneHashForEveryDivision) {
   const auto whole =
       run(experiment({"--mode", "local", "--partitions", "1x1", "--checkpoint-every", "5"}), scratch, "whole");
   EXPECT_EQ(run(experiment({"--mode", "local", "--partitions", "3x2", "--hosts", "3", "--threads", "4"}), scratch,
@@ -71,14 +71,14 @@ TEST_F(Senses, GiveOneHashHoweverARunIsDivided) {
       run(experiment({"--partitions", "2x1", "--hosts", "3", "--resume", scratch / "whole"}), scratch, "resumed")
           .state_hash,
       whole.state_hash);
-  // Robots that brought or wrote an EEPROM leave it, in either mode.
+  // The run directory gets the EEPROM of each robot that had or wrote one, in either mode.
   for (const char* const robot : {"7", "0", "55"}) {
     const std::string file = std::string("/eeprom/") + robot + ".eeprom";
     EXPECT_EQ(read(scratch / ("whole" + file)).size(), 1024u) << robot;
     EXPECT_EQ(read(scratch / ("whole" + file)), read(scratch / ("federated" + file)));
   }
   EXPECT_FALSE(std::filesystem::exists(scratch / "whole/eeprom/1.eeprom"));
-  // The run directory holds what it needs to run again.
+  // The experiment as run starts again from the run directory alone.
   Words again{"run", scratch / "whole/experiment.txtpb", "--mode", "local", "--quiet", "--out", scratch / "again"};
   const Outcome outcome = kilotwin(again, scratch);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
@@ -86,7 +86,7 @@ TEST_F(Senses, GiveOneHashHoweverARunIsDivided) {
   EXPECT_EQ(kilotwin({"replay", scratch / "whole", "--verify"}, scratch).status, 0);
 }
 
-TEST_F(Senses, MatterToTheResult) {
+TEST_F(Senses, ChangeTheResult) {
   const auto with = run(experiment({"--mode", "local", "--duration", "5"}), scratch, "with");
   for (const char* const change :
        {"light.shadows=false", "light.source[0].circle.period_s=8", "light.image.white=301", "battery.motor_mA=17",
@@ -97,7 +97,7 @@ TEST_F(Senses, MatterToTheResult) {
   }
 }
 
-TEST_F(Senses, RefuseWhatTheyCannotRead) {
+TEST_F(Senses, RefuseFilesThatCannotBeRead) {
   const auto refused = [&](const Words& set, const std::string& why) {
     Words words{"run", scratch / "senses.txtpb", "--mode", "local", "--out", scratch / "none"};
     for (const std::string& one : set) words.insert(words.end(), {"--set", one});
