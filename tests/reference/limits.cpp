@@ -45,8 +45,8 @@ std::string limits_table() {
   row("obstacles", number(kMostObstacles), "core/experiment/limits.hpp");
   row("effects of a model", number(kMostEffects), "core/experiment/limits.hpp");
   row("arena fields of a model", number(kMostFields), "core/experiment/limits.hpp");
-  row("robots, where the station runs a virtual environment (ARK's messages carry 10-bit ids)", number(kMostArkRobots),
-      "core/experiment/limits.hpp");
+  row("robots, where the station runs a virtual environment (ARK's messages carry 10-bit ids)",
+      number(kMostArkRobots), "core/experiment/limits.hpp");
   row("simulated time of a run", range_of("Experiment.duration_s"), "core/experiment/fields.cpp");
   row("physics partitions along x", range_of("Deployment.partition_columns"), "core/experiment/fields.cpp");
   row("physics partitions along y", range_of("Deployment.partition_rows"), "core/experiment/fields.cpp");

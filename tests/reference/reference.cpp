@@ -13,7 +13,8 @@ int main(int argc, char** argv) {
   using namespace kilotwin;
   const bool check = argc == 2 && std::strcmp(argv[1], "--check") == 0;
   if (argc > 1 && !check) {
-    say("usage: reference [--check]; it rewrites the generated regions of docs/reference, or names pages that differ");
+    say("usage: reference [--check]; it rewrites the generated regions of docs/reference, or names pages that "
+        "differ");
     return 2;
   }
   try {

@@ -41,8 +41,8 @@ TEST(ReferencePages, ARegionIsMadeAnewAndTheRestIsKept) {
 
 /// Every field of every message that an experiment can hold has a row on one of the two pages.
 TEST(ReferencePages, SchemaPagesHaveARowForEveryField) {
-  const std::string pages = read_text(kSources / "docs/reference/experiment.md") +
-                            read_text(kSources / "docs/reference/model.md");
+  const std::string pages =
+      read_text(kSources / "docs/reference/experiment.md") + read_text(kSources / "docs/reference/model.md");
   std::vector<const google::protobuf::Descriptor*> found{proto::Experiment::descriptor()};
   std::set<const google::protobuf::Descriptor*> seen{found.front()};
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -73,7 +73,8 @@ bool exists(const std::string& path) {
 /// Pages name files as `core/os/files.hpp`; such a file must be there.
 TEST(Pages, EveryPathInACodeSpanExists) {
   static const std::regex span{
-      "`((?:core|services|clients|idl|tests|docs|scripts|bench|experiments|behaviours|deploy|cmake)/[A-Za-z0-9_./*-]*)`"};
+      "`((?:core|services|clients|idl|tests|docs|scripts|bench|experiments|behaviours|deploy|cmake)/[A-Za-z0-9_./"
+      "*-]*)`"};
   std::vector<std::filesystem::path> pages{kSources / "ARCHITECTURE.md"};
   for (const char* folder : {"docs/explanation", "docs/reference", "docs/results"})
     for (const auto& entry : std::filesystem::directory_iterator(kSources / folder))

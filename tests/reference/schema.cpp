@@ -49,14 +49,14 @@ class Schema {
 };
 
 /// The comment of a descriptor: what stands before it, then what stands behind it. A line's first space is left out.
-template <typename Descriptor>
-std::string comment_of(const Descriptor& descriptor) {
+template <typename Descriptor> std::string comment_of(const Descriptor& descriptor) {
   pb::SourceLocation location;
   if (!descriptor.GetSourceLocation(&location)) return {};
   std::string text;
   for (const std::string* part : {&location.leading_comments, &location.trailing_comments}) {
     std::istringstream lines{*part};
-    for (std::string line; std::getline(lines, line);) text += (line.starts_with(' ') ? line.substr(1) : line) + "\n";
+    for (std::string line; std::getline(lines, line);)
+      text += (line.starts_with(' ') ? line.substr(1) : line) + "\n";
   }
   return text;
 }
@@ -68,8 +68,7 @@ std::string with_links(const std::string& text) {
 }
 
 /// The comment as one table cell.
-template <typename Descriptor>
-std::string cell_of(const Descriptor& descriptor) {
+template <typename Descriptor> std::string cell_of(const Descriptor& descriptor) {
   std::string cell;
   for (const char c : comment_of(descriptor)) {
     const char plain = c == '\n' ? ' ' : c;
@@ -98,8 +97,7 @@ std::string page_of(const pb::FileDescriptor& file) {
   return file.name() == "experiment.proto" ? "experiment.md" : "model.md";
 }
 
-template <typename Type>
-std::string link_to(const Type& type, const pb::FileDescriptor& from) {
+template <typename Type> std::string link_to(const Type& type, const pb::FileDescriptor& from) {
   const std::string page = page_of(*type.file()) == page_of(from) ? "" : page_of(*type.file());
   return fmt::format("[{}]({}#{})", type.name(), page, anchor(type.name()));
 }
@@ -160,7 +158,8 @@ std::string sections(const Schema& schema, const std::string& root) {
     for (int f = 0; f < found[i]->field_count(); ++f) {
       const FieldDescriptor& field = *found[i]->field(f);
       if (const pb::Descriptor* below = field.message_type();
-          below != nullptr && page_of(*below->file()) == page_of(*found.front()->file()) && seen.insert(below).second)
+          below != nullptr && page_of(*below->file()) == page_of(*found.front()->file()) &&
+          seen.insert(below).second)
         found.push_back(below);
       if (const pb::EnumDescriptor* below = field.enum_type();
           below != nullptr && has_table(*below) && page_of(*below->file()) == page_of(*found.front()->file()) &&
@@ -173,7 +172,11 @@ std::string sections(const Schema& schema, const std::string& root) {
 
 }  // namespace
 
-std::string experiment_schema(const std::filesystem::path& descriptors) { return sections(Schema{descriptors}, "Experiment"); }
-std::string model_schema(const std::filesystem::path& descriptors) { return sections(Schema{descriptors}, "Model"); }
+std::string experiment_schema(const std::filesystem::path& descriptors) {
+  return sections(Schema{descriptors}, "Experiment");
+}
+std::string model_schema(const std::filesystem::path& descriptors) {
+  return sections(Schema{descriptors}, "Model");
+}
 
 }  // namespace kilotwin::reference

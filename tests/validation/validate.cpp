@@ -66,7 +66,8 @@ int main(int argc, char** argv) {
       for (const std::string& name : wanted) chosen = chosen || name == v.name;
       if (chosen) v.run(runs, verdicts, effort);
     }
-    const std::string end = fmt::format("\n{} of {} figures as expected\n", verdicts.rows() - verdicts.misses(), verdicts.rows());
+    const std::string end =
+        fmt::format("\n{} of {} figures as expected\n", verdicts.rows() - verdicts.misses(), verdicts.rows());
     fmt::print("{}", end);
     if (!results.empty()) std::ofstream{results} << verdicts.markdown() << end;
     return verdicts.misses() == 0 ? 0 : 1;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 
@@ -20,7 +21,10 @@ double together(Figure a, Figure b) { return std::sqrt(a.error * a.error + b.err
 void Verdicts::section(const std::string& title) {
   fmt::print("\n{}\n{:<58} {:>20} {:>20} {:>18}  verdict\n", title, "", "measured", "expected", "tolerance");
   std::fflush(stdout);
-  markdown_ += fmt::format("\n## {}\n\n| figure | measured | expected | tolerance | verdict |\n|---|---|---|---|---|\n", title);
+  std::string heading = title;
+  heading[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(heading[0])));
+  markdown_ += fmt::format(
+      "\n## {}\n\n| figure | measured | expected | tolerance | verdict |\n|---|---|---|---|---|\n", heading);
 }
 
 void Verdicts::row(const std::string& what, const std::string& unit, Figure measured, const std::string& expected,
@@ -30,8 +34,8 @@ void Verdicts::row(const std::string& what, const std::string& unit, Figure meas
   fmt::print("  {:<56} {:>20} {:>20} {:>18}  {}\n", unit.empty() ? what : what + ", " + unit, text_of(measured),
              expected, tolerance, good ? "good" : "MISS");
   std::fflush(stdout);
-  markdown_ += fmt::format("| {} | {} | {} | {} | {} |\n", unit.empty() ? what : what + ", " + unit, text_of(measured),
-                           expected, tolerance, good ? "good" : "MISS");
+  markdown_ += fmt::format("| {} | {} | {} | {} | {} |\n", unit.empty() ? what : what + ", " + unit,
+                           text_of(measured), expected, tolerance, good ? "good" : "MISS");
 }
 
 void Verdicts::near(const std::string& what, const std::string& unit, Figure measured, Figure expected,
