@@ -35,6 +35,10 @@ def pages_of_repository():
     return [ROOT / name for name in sorted(names) if (ROOT / name).is_file()]
 
 
+def name_of(page):
+    return page.relative_to(ROOT) if page.is_relative_to(ROOT) else page
+
+
 def fenced_blocks(text):
     """Yields (line number, [words after the fence], content) per fenced block and per comment `run:`."""
     lines = text.splitlines()
@@ -68,6 +72,9 @@ def script_of(page, text):
         script.append(commands)
 
     for line, words, content in fenced_blocks(text):
+        unknown = [word for word in words[1:] if not re.fullmatch(r"run|model|raw|fragment|(file|needs)=\S+", word)]
+        if unknown:
+            step(line, f"echo {shlex.quote(f'unknown word {unknown[0]} after the backticks')} >&2; exit 2")
         options = dict(word.split("=", 1) for word in words if "=" in word)
         language = words[0] if words else ""
         if "file" in options:
@@ -117,7 +124,7 @@ def check_shown_fields(kilotwin, page, text, folder):
 
 def run_page(kilotwin, page):
     text = page.read_text(encoding="utf-8")
-    name = page.relative_to(ROOT)
+    name = name_of(page)
     with tempfile.TemporaryDirectory(prefix="kilotwin-page-") as scratch:
         folder = pathlib.Path(scratch)
         (folder / "home").mkdir()
@@ -161,7 +168,7 @@ def links(pages):
         shown = re.sub(r"`[^`\n]*`", "", shown)
         for found in re.finditer(r"\]\(([^)\s]+)\)", shown):
             target = found.group(1)
-            where = f"{page.relative_to(ROOT)}:{shown.count(chr(10), 0, found.start()) + 1}"
+            where = f"{name_of(page)}:{shown.count(chr(10), 0, found.start()) + 1}"
             if re.match(r"[a-z]+:", target):
                 continue
             path, _, anchor = target.partition("#")
@@ -196,7 +203,7 @@ def options(kilotwin, pages):
             known |= set(re.findall(r"(?<![\w-])--[a-z][\w-]*", script.read_text(encoding="utf-8", errors="replace")))
     complaints = []
     for page in pages:
-        name = page.relative_to(ROOT)
+        name = name_of(page)
         for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
             for found in re.finditer(r"(?:^|[\s`(/])kilotwin ([a-z]+)((?: +[^\s`|&;#)]+)*)", line):
                 command, rest = found.groups()
