@@ -62,9 +62,9 @@ Command add_build(CLI::App& program) {
   const auto arguments = std::make_shared<BuildArguments>();
   CLI::App& app =
       *program.add_subcommand("build", "compile a behaviour for simulation, or check it for the real robot");
-  app.add_option("PROGRAM", arguments->sources, "C sources of one program")->required();
-  app.add_option("-o", arguments->out, "file to write (default: PROGRAM.so in this directory)");
-  app.add_option("--define", arguments->define, "NAME=VALUE: a macro")->allow_extra_args(false);
+  app.add_option("PROGRAM", arguments->sources, "C sources of one program")->required()->type_name("");
+  app.add_option("-o", arguments->out, "file to write (default: PROGRAM.so in this directory)")->type_name("FILE");
+  app.add_option("--define", arguments->define, "a macro")->allow_extra_args(false)->type_name("NAME=VALUE");
   app.add_flag(
       "--avr", arguments->avr,
       "compile for the ATmega328P and print flash and RAM; with -o, also link firmware (.elf) with a kilolib "

@@ -20,7 +20,9 @@ Command add_check(CLI::App& program) {
   CLI::App& app = *program.add_subcommand(
       "check", "check an experiment and compile its programs; print nothing when all is right");
   add_experiment_options(app, *arguments);
-  app.add_option("--set", arguments->set, "FIELD=VALUE")->allow_extra_args(false);
+  app.add_option("--set", arguments->set, "sets a field of the experiment")
+      ->allow_extra_args(false)
+      ->type_name("FIELD=VALUE");
   return {&app, [arguments] { return check(*arguments); }};
 }
 

@@ -16,7 +16,8 @@ Command add_config(CLI::App& program) {
   app.add_option(
          "--peer", transport->peers,
          "address of a machine of the run; give each of them, this machine too (default: all on this machine)")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->type_name("ADDRESS");
   app.footer(
       "Use: CYCLONEDDS_URI=\"$(kilotwin config)\" ./your_program. The configuration is the same for all domains.");
   return {&app, [transport] {

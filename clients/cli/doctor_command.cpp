@@ -173,7 +173,7 @@ Command add_doctor(CLI::App& program) {
   const auto domain = std::make_shared<std::optional<std::uint32_t>>();
   CLI::App& app = *program.add_subcommand(
       "doctor", "find what on this machine would keep an experiment from running, and the remedy");
-  app.add_option("--domain", *domain, "DDS domain to try (default: a free one)");
+  app.add_option("--domain", *domain, "DDS domain to try (default: a free one)")->type_name("N");
   return {&app, [domain] { return examine(*domain); }};
 }
 

@@ -64,18 +64,26 @@ int export_run(const ExportArguments& arguments) {
 Command add_export(CLI::App& program) {
   const auto arguments = std::make_shared<ExportArguments>();
   CLI::App& app = *program.add_subcommand("export", "write CSV files from a recorded run");
-  app.add_option("RUN", arguments->run, "run directory or recording")->required();
-  app.add_option("--trajectories", arguments->trajectories, "columns time_s,robot,x_mm,y_mm,heading_rad,led");
-  app.add_option("--bodies", arguments->bodies, "movable bodies: columns time_s,body,x_mm,y_mm,heading_rad");
-  app.add_option("--messages", arguments->messages, "columns receiver,sender,count");
-  app.add_option("--radio", arguments->radio, "columns robot,attempted,sent,received,collided,backed_off");
+  app.add_option("RUN", arguments->run, "run directory or recording")->required()->type_name("");
+  app.add_option("--trajectories", arguments->trajectories, "columns time_s,robot,x_mm,y_mm,heading_rad,led")
+      ->type_name("FILE");
+  app.add_option("--bodies", arguments->bodies, "movable bodies: columns time_s,body,x_mm,y_mm,heading_rad")
+      ->type_name("FILE");
+  app.add_option("--messages", arguments->messages, "columns receiver,sender,count")->type_name("FILE");
+  app.add_option("--radio", arguments->radio, "columns robot,attempted,sent,received,collided,backed_off")
+      ->type_name("FILE");
   app.add_option("--cells", arguments->cells,
-                 "positions as a floor of 50 mm cells measures them: columns time_s,robot,x_mm,y_mm");
-  app.add_option("--every", arguments->every_s, "time between a robot's rows, s")->capture_default_str();
+                 "positions as a floor of 50 mm cells measures them: columns time_s,robot,x_mm,y_mm")
+      ->type_name("FILE");
+  app.add_option("--every", arguments->every_s, "time between a robot's rows, s")
+      ->capture_default_str()
+      ->type_name("SECONDS");
   app.add_flag("--measured", arguments->measured,
                "trajectories as the tracker sees them: with the model's measurement effects");
   app.add_option("--model", arguments->model,
-                 "the model as it ran, with each robot's own parameters; `run --model` reads it");
+                 "the model as it ran, with each robot's own parameters; `run --model` reads it")
+      ->type_name("FILE");
+  app.footer("Example: kilotwin export runs/disperse-1 --trajectories poses.csv");
   return {&app, [arguments] { return export_run(*arguments); }};
 }
 

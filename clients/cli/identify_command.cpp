@@ -9,7 +9,7 @@
 #include "clients/cli/commands.hpp"
 #include "clients/cli/other_data.hpp"
 #include "clients/cli/output.hpp"
-#include "clients/cli/work_progress.hpp"
+#include "clients/cli/progress.hpp"
 #include "clients/identify/data/data_faults.hpp"
 #include "clients/identify/data/import.hpp"
 #include "clients/identify/data/plausibility.hpp"
@@ -119,10 +119,12 @@ int identify_data(const IdentifyArguments& arguments) {
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
-  std::optional<WorkProgress> progress(std::in_place, !arguments.quiet);
+  std::optional<Progress> progress(std::in_place, !arguments.quiet);
   // Reading takes the first 2 %, drawing the last 3 %.
-  options.progress = [&](double share, const std::string& what) { progress->show(0.02 + 0.95 * share, what); };
-  progress->show(0, "reading " + arguments.train.string());
+  options.progress = [&](double share, const std::string& what) {
+    progress->show(0.02 + 0.95 * share, what, what);
+  };
+  progress->show(0, "reading " + arguments.train.string(), "reading");
   std::vector<identify::DataFault> faults;
   identify::Identified found;
   if (std::optional<identify::Identified> other =
@@ -132,14 +134,13 @@ int identify_data(const IdentifyArguments& arguments) {
     found = identify_trajectories(arguments, out, options, faults);
   }
 
-  progress->show(0.97, "drawing the report");
+  progress->show(0.97, "drawing the report", "drawing");
   recorder::write_file(out / "model.txtpb", identify::text_of(found.model, fmt::format("Identified from {}.",
                                                                                        arguments.train.string())));
   recorder::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
   recorder::write_file(out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.document, out / "report.html");
   unfinished.keep();
-  progress->show(1, "done");
   progress.reset();
   if (!arguments.quiet) {
     print_results(arguments, found, faults);
@@ -155,16 +156,22 @@ Command add_identify(CLI::App& program) {
   const auto arguments = std::make_shared<IdentifyArguments>();
   CLI::App& app =
       *program.add_subcommand("identify", "fit the model to measured data and find effects that it lacks");
-  app.add_option("--train", arguments->train, "directory of measured data to fit to")->required();
+  app.add_option("--train", arguments->train, "directory of measured data to fit to")->required()->type_name("DIR");
   app.add_option("--test", arguments->test,
-                 "directory of measured data to predict, never fitted to (default: a part of --train is held out)");
+                 "directory of measured data to predict, never fitted to (default: a part of --train is held out)")
+      ->type_name("DIR");
   add_output_options(app, arguments->output, "identified, with a number added if it exists");
   app.add_option("--horizon", arguments->horizon_s, "time from the last measurement used to a prediction, s")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->type_name("SECONDS");
   app.add_option("--threads", arguments->threads, "threads to work on")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+      ->check(CLI::Range(1, 256).description(""))
+      ->capture_default_str()
+      ->type_name("N");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
+  app.footer(
+      "Example: kilotwin identify --train measured --out found. measured/ holds trajectories.csv with the columns "
+      "run,robot,time_s,x_mm,y_mm.");
   return {&app, [arguments] { return identify_data(*arguments); }};
 }
 

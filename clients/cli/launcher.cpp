@@ -41,7 +41,7 @@ struct Child {
   std::optional<HostId> host;  ///< of behaviours
 };
 
-/// The last line that a service wrote, without its "kilotwin: " prefix. By descriptor: the file may have been removed.
+/// The last line of a service's log, without time stamp, name, level and the prefix "kilotwin: ". By descriptor: the file may have been removed.
 std::string last_line(int log) {
   char tail[4096];
   struct stat status {};
@@ -51,6 +51,7 @@ std::string last_line(int log) {
   std::string_view text(tail, static_cast<std::size_t>(std::max<ssize_t>(0, octets)));
   text = text.substr(0, text.find_last_not_of('\n') + 1);
   if (const std::size_t before = text.rfind('\n'); before != std::string_view::npos) text.remove_prefix(before + 1);
+  text = error_text(text);
   constexpr std::string_view kPrefix = "kilotwin: ";
   if (text.starts_with(kPrefix)) text.remove_prefix(kPrefix.size());
   return std::string(text);
@@ -199,7 +200,8 @@ class Launcher {
     }
     progress_.clear();
     if (culprit_ == nullptr && interrupted_) {
-      say(fmt::format("kilotwin: interrupted; what was recorded so far is in {}", directory_.path().string()));
+      say_error(
+          fmt::format("kilotwin: interrupted; what was recorded so far is in {}", directory_.path().string()));
       return 1;
     }
     // Bad input is bad input whoever of several finds it first, and whoever leaves first because of it.
@@ -216,21 +218,21 @@ class Launcher {
     const std::string so_far = "what was recorded so far is in " + directory_.path().string();
     status_ = 1;
     if (WIFSIGNALED(culprit_->status)) {
-      say(fmt::format("kilotwin: {} (process {}) was killed by signal {}; {}", culprit_->name, culprit_->process,
-                      WTERMSIG(culprit_->status), so_far));
+      say_error(fmt::format("kilotwin: {} (process {}) was killed by signal {}; {}", culprit_->name,
+                            culprit_->process, WTERMSIG(culprit_->status), so_far));
       return;
     }
     const std::string line = last_line(culprit_->log);
     if (WEXITSTATUS(culprit_->status) == 2) {
       status_ = 2;
-      return say(line);
+      return say_error(line);
     }
     const std::lock_guard lock(mutex_);
     const std::string why = !told_.empty()
                                 ? told_
                                 : fmt::format("{}: {}", culprit_->name,
                                               line.empty() ? "failed without a word; is the disk full?" : line);
-    say(fmt::format("kilotwin: {}; {}", why, so_far));
+    say_error(fmt::format("kilotwin: {}; {}", why, so_far));
   }
 
   /// Ends every child, by force if need be.

@@ -47,7 +47,7 @@ int main_of(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return program.exit(success);
   } catch (const CLI::ParseError& error) {
-    say(complaint(program, error, argc, argv));
+    say_error(complaint(program, error, argc, argv));
     return kBadInput;
   }
   for (const Command& command : commands) {
@@ -68,10 +68,10 @@ int main(int argc, char** argv) {
   try {
     return cli::main_of(argc, argv);
   } catch (const UserError& error) {
-    say(error.what());
+    say_error(error.what());
     return cli::kBadInput;
   } catch (const std::exception& error) {
-    say(fmt::format("kilotwin: {}", error.what()));
+    say_error(fmt::format("kilotwin: {}", error.what()));
     return cli::kFailed;
   }
 }

@@ -23,7 +23,8 @@ bool lies_in(const fs::path& input, const fs::path& directory) {
 }  // namespace
 
 void add_output_options(CLI::App& app, Output& output, const std::string& fallback) {
-  app.add_option("--out", output.out, "directory to write to, new or empty (default: " + fallback + ")");
+  app.add_option("--out", output.out, "directory to write to, new or empty (default: " + fallback + ")")
+      ->type_name("DIR");
   app.add_flag("--force", output.force, "replace the directory where it exists");
 }
 
@@ -57,8 +58,8 @@ std::string place_in_words(const fs::path& used, const Output& output, const fs:
 void warn_beyond_cores(const std::string& option, std::uint32_t count) {
   const unsigned cores = std::thread::hardware_concurrency();
   if (cores == 0 || count <= cores) return;
-  say(fmt::format("kilotwin: {} {}: this machine has {} cores; more than {} only take turns, which is slower",
-                  option, count, cores, cores));
+  warn(fmt::format("kilotwin: {} {}: this machine has {} cores; more than {} only take turns, which is slower",
+                   option, count, cores, cores));
 }
 
 }  // namespace kilotwin::cli

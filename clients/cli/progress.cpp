@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "core/base/say.hpp"
@@ -11,32 +12,84 @@
 namespace kilotwin::cli {
 namespace {
 constexpr int kBarWidth = 24;
-constexpr auto kBarPeriod = std::chrono::milliseconds(200);
-constexpr auto kLinePeriod = std::chrono::seconds(5);
+constexpr std::size_t kLongest = 100;
+constexpr auto kBarPeriod = std::chrono::milliseconds(200), kLinePeriod = std::chrono::milliseconds(5000);
 }  // namespace
 
-ProgressBar::ProgressBar(const RunPlan& plan, bool shown)
-    : tick_length_(plan.tick_length),
-      last_(plan.last_tick),
-      robots_(plan.robots()),
-      shown_(shown),
+Progress::Progress(bool shown)
+    : shown_(shown),
       terminal_(isatty(STDERR_FILENO) == 1),
-      next_(std::chrono::steady_clock::now() +
-            (terminal_ ? std::chrono::milliseconds(0) : std::chrono::milliseconds(kLinePeriod))) {}
+      start_(Clock::now()),
+      next_(start_ + (terminal_ ? std::chrono::milliseconds(0) : kLinePeriod)) {}
 
-ProgressBar::~ProgressBar() { clear(); }
-
-std::string ProgressBar::line(const RunProgress& progress, bool bar) const {
-  const double simulated_s = tick_length_.seconds_at(progress.now);
-  const double end_s = tick_length_.seconds_at(last_);
-  std::string text;
-  if (bar) {
-    const double part = end_s > 0 ? std::clamp(simulated_s / end_s, 0.0, 1.0) : 1.0;
-    const int filled = static_cast<int>(part * kBarWidth);
-    text = fmt::format("[{}{}] ", std::string(static_cast<std::size_t>(filled), '#'),
-                       std::string(static_cast<std::size_t>(kBarWidth - filled), '.'));
+Progress::~Progress() {
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
   }
-  text += fmt::format("{:.1f} of {:.1f} s", simulated_s, end_s);
+  changed_.notify_all();
+  if (watcher_.joinable()) watcher_.join();
+  clear();
+}
+
+std::string Progress::line(double share, double seconds, const std::string& what, bool bar) {
+  const double part = std::clamp(share, 0.0, 1.0);
+  const int filled = static_cast<int>(part * kBarWidth), whole = static_cast<int>(seconds);
+  return fmt::format("{}{:3.0f} %  {}:{:02}  {}",
+                     bar ? fmt::format("[{:#>{}}{:.>{}}] ", "", filled, "", kBarWidth - filled) : "",
+                     std::floor(100 * part), whole / 60, whole % 60, what.substr(0, kLongest));
+}
+
+bool Progress::due() {
+  if (!shown_) return false;
+  const std::lock_guard lock(mutex_);
+  return time_for_another();
+}
+
+void Progress::show(double share, const std::string& what, const std::string& part) {
+  if (!shown_) return;
+  const std::lock_guard lock(mutex_);
+  if (!part.empty() && !watcher_.joinable()) watcher_ = std::thread([this] { watch(); });
+  // Estimates of the work left may be revised; a share that was shown as done stays done.
+  share_ = std::max(share_, share);
+  const bool another_part = part != part_;
+  what_ = what;
+  part_ = part;
+  if (another_part || time_for_another()) print();
+}
+
+void Progress::clear() {
+  const std::lock_guard lock(mutex_);
+  if (on_screen_) std::fputs("\r\x1b[K", stderr);
+  on_screen_ = false;
+}
+
+void Progress::watch() {
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, terminal_ ? std::chrono::milliseconds(1000) : kLinePeriod,
+                            [this] { return ends_; })) {
+    if (!what_.empty() && (!terminal_ || on_screen_) && time_for_another()) print();
+  }
+}
+
+void Progress::print() {
+  const auto now = Clock::now();
+  next_ = now + (terminal_ ? kBarPeriod : kLinePeriod);
+  const std::string text = line(share_, std::chrono::duration<double>(now - start_).count(), what_, terminal_);
+  if (terminal_) {
+    std::fputs(("\r\x1b[K" + text).c_str(), stderr);
+    on_screen_ = true;
+  } else {
+    say(text);
+  }
+}
+
+ProgressBar::ProgressBar(const RunPlan& plan, bool shown)
+    : tick_length_(plan.tick_length), last_(plan.last_tick), robots_(plan.robots()), progress_(shown) {}
+
+std::string ProgressBar::text(const RunProgress& progress) const {
+  const double simulated_s = tick_length_.seconds_at(progress.now);
+  std::string text = fmt::format("{:.1f} of {:.1f} s", simulated_s, tick_length_.seconds_at(last_));
   const double stepped_s = simulated_s - tick_length_.seconds_at(std::max(first_, Tick{0}));
   if (progress.wall_s > 0) text += fmt::format(", {:.1f} x real time", stepped_s / progress.wall_s);
   text += fmt::format(", {} robots, {} messages sent, {} received", robots_, progress.sent, progress.received);
@@ -48,20 +101,9 @@ std::string ProgressBar::line(const RunProgress& progress, bool bar) const {
 
 void ProgressBar::show(const RunProgress& progress) {
   if (first_ < Tick{0}) first_ = progress.now;
-  const auto now = std::chrono::steady_clock::now();
-  if (!shown_ || now < next_) return;
-  next_ = now + (terminal_ ? std::chrono::milliseconds(kBarPeriod) : std::chrono::milliseconds(kLinePeriod));
-  if (terminal_) {
-    std::fputs(("\r\x1b[K" + line(progress, true)).c_str(), stderr);
-    on_screen_ = true;
-  } else {
-    say(line(progress, false));
-  }
-}
-
-void ProgressBar::clear() {
-  if (on_screen_) std::fputs("\r\x1b[K", stderr);
-  on_screen_ = false;
+  if (!progress_.due()) return;
+  const double end_s = tick_length_.seconds_at(last_);
+  progress_.show(end_s > 0 ? tick_length_.seconds_at(progress.now) / end_s : 1, text(progress));
 }
 
 }  // namespace kilotwin::cli

@@ -119,7 +119,7 @@ Command add_replay(CLI::App& program) {
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App& app = *program.add_subcommand("replay", "step a recorded run again and compare it with the recording");
-  app.add_option("RUN", arguments->run, "run directory")->required();
+  app.add_option("RUN", arguments->run, "run directory")->required()->type_name("");
   app.add_flag("--verify", arguments->verify, "compare every tick's state hash")->required();
   app.add_flag("--quiet", arguments->quiet, "no progress and no result on the screen");
   return {&app, [arguments] { return replay_command(arguments->run, arguments->quiet); }};

@@ -34,9 +34,10 @@ std::string quoted(const std::string& word) {
 }
 
 std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& directory) {
-  std::string text =
-      fmt::format("prepared {}; start these, on any machine that has this directory, with the same --domain:\n",
-                  directory.path().string());
+  std::string text = fmt::format(
+      "prepared {}; start these services with the same --domain N, on several machines also with --peer ADDRESS of "
+      "each:\n",
+      directory.path().string());
   const std::string run = quoted(directory.path().string());
   for (std::uint32_t p = 0; p < plan.grid.size(); ++p) {
     text += fmt::format("  kilotwin service physics --run {} --partition {},{}\n", run, p % plan.grid.columns(),
@@ -148,24 +149,34 @@ Command add_run(CLI::App& program, double started_s) {
   CLI::App& app = *program.add_subcommand("run", "run an experiment to its end");
   add_experiment_options(app, *arguments);
   app.add_option("--mode", arguments->mode, "federated: services as processes over DDS; local: all in one process")
-      ->check(CLI::IsMember({"local", "federated"}))
-      ->capture_default_str();
-  app.add_option("--partitions", arguments->partitions, "COLUMNSxROWS: physics partitions");
-  app.add_option("--hosts", arguments->hosts, "behaviours hosts; each runs the programs of a share of the robots");
+      ->check(CLI::IsMember({"local", "federated"}).description(""))
+      ->capture_default_str()
+      ->type_name("MODE");
+  app.add_option("--partitions", arguments->partitions, "columns and rows of physics partitions, such as 2x1")
+      ->type_name("CxR");
+  app.add_option("--hosts", arguments->hosts, "behaviours hosts; each runs the programs of a share of the robots")
+      ->type_name("N");
   app.add_option("--threads", arguments->threads, "threads of a local run")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+      ->check(CLI::Range(1, 256).description(""))
+      ->capture_default_str()
+      ->type_name("N");
   app.add_option("--seed", arguments->seed, "seed of all random numbers")
-      ->transform(CLI::Validator(decimal_seed, "UINT"));
-  app.add_option("--set", arguments->set, "FIELD=VALUE, for example robots[0].layout.grid.pitch_mm=33")
-      ->allow_extra_args(false);
+      ->transform(CLI::Validator(decimal_seed, ""))
+      ->type_name("N");
+  app.add_option("--set", arguments->set,
+                 "sets a field of the experiment, for example robots[0].layout.grid.pitch_mm=33")
+      ->allow_extra_args(false)
+      ->type_name("FIELD=VALUE");
   app.add_option("--pace", arguments->pace, "max, or simulated time over wall time: 1 is real time")
-      ->capture_default_str();
-  app.add_option("--checkpoint-every", arguments->checkpoint_every_s, "simulated time between checkpoints, s");
-  app.add_option("--resume", arguments->resume, "start from the newest checkpoint of that run");
+      ->capture_default_str()
+      ->type_name("FACTOR");
+  app.add_option("--checkpoint-every", arguments->checkpoint_every_s, "simulated time between checkpoints, s")
+      ->type_name("SECONDS");
+  app.add_option("--resume", arguments->resume, "start from the newest checkpoint of that run")->type_name("RUN");
   app.add_flag("--prepare", arguments->prepare,
                "write the run directory, print the commands that start the services by hand, and stop");
-  app.add_option("--domain", arguments->domain, "DDS domain (default: a free one)");
+  app.add_option("--domain", arguments->domain, "DDS domain (default: a free one)")->type_name("N");
+  app.footer("Example: kilotwin run experiments/disperse.txtpb --seed 2 --out here");
   add_output_options(app, arguments->output, "runs/NAME-SEED, with a number added if it exists");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
   return {&app, [arguments, started_s] { return run(*arguments, started_s); }};

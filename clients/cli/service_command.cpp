@@ -15,6 +15,7 @@
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_recorder.hpp"
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
 #include "core/os/interrupt.hpp"
 #include "services/ark/station_service.hpp"
 #include "services/behaviours/behaviours_service.hpp"
@@ -67,15 +68,20 @@ HostId parse_share(const std::string& text, std::uint32_t hosts) {
   return HostId{share->first - 1};
 }
 
-int run_station(const RunPlan& plan, const ServiceContext& context, const recorder::RunDirectory& directory,
-                double started_s) {
+void run_station(const RunPlan& plan, const ServiceContext& context, const recorder::RunDirectory& directory,
+                 double started_s) {
   RunRecorder run_recorder(plan, directory, context.resumed, {});
   const RunTotals totals = ark::run_service(plan, context, run_recorder);
   const double first_tick_s =
       std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
   run_recorder.finish(totals, first_tick_s > 0 ? first_tick_s - started_s : 0);
-  if (totals.failure.empty()) return 0;
-  throw RunError(totals.failure);
+  if (!totals.failure.empty()) throw RunError(totals.failure);
+}
+
+/// From now on every line of this process goes to the federate's log.
+void begin_log(const RunPlan& plan, FederateId self, const dds::Transport& transport) {
+  log_as(plan.name(self));
+  say(fmt::format("starts: run {}, seed {}, domain {}", plan.experiment().name(), plan.seed(), transport.domain));
 }
 
 int serve(const ServiceArguments& arguments) {
@@ -90,15 +96,22 @@ int serve(const ServiceArguments& arguments) {
   context.inputs = std::move(beginning.inputs);
 
   if (arguments.service == "physics") {
-    physics::run_service(plan, parse_partition(arguments.partition, plan.grid), context);
+    const PartitionId partition = parse_partition(arguments.partition, plan.grid);
+    begin_log(plan, plan.physics(partition), arguments.transport);
+    physics::run_service(plan, partition, context);
   } else if (arguments.service == "comm") {
+    begin_log(plan, plan.radio(), arguments.transport);
     const std::uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
     comm::run_service(plan, context, firmware::make_firmware_robots(plan, directory.path(), threads, true));
   } else if (arguments.service == "behaviours") {
-    behaviours::run_service(plan, parse_share(arguments.share, plan.hosts), context);
+    const HostId host = parse_share(arguments.share, plan.hosts);
+    begin_log(plan, plan.behaviours(host), arguments.transport);
+    behaviours::run_service(plan, host, context);
   } else {
-    return run_station(plan, context, directory, arguments.started_s);
+    begin_log(plan, plan.station(), arguments.transport);
+    run_station(plan, context, directory, arguments.started_s);
   }
+  say("ends: the run is over");
   return kDone;
 }
 
@@ -120,17 +133,23 @@ Command add_service(CLI::App& program, double started_s) {
       *program.add_subcommand("service", "run one service in the foreground, for runs over several machines");
   app.add_option("SERVICE", arguments->service, "physics, comm (the radio), station or behaviours")
       ->required()
-      ->transform(CLI::Validator(service_name, ""));
-  app.add_option("--run", arguments->run, "directory that `kilotwin run --prepare` wrote")->required();
-  app.add_option("--partition", arguments->partition, "physics: COLUMN,ROW, counted from 0 at the bottom left");
-  app.add_option("--share", arguments->share, "behaviours: I/N, counted from 1");
+      ->transform(CLI::Validator(service_name, ""))
+      ->type_name("");
+  app.add_option("--run", arguments->run, "directory that `kilotwin run --prepare` wrote")
+      ->required()
+      ->type_name("DIR");
+  app.add_option("--partition", arguments->partition, "physics: column and row, counted from 0 at the bottom left")
+      ->type_name("C,R");
+  app.add_option("--share", arguments->share, "behaviours: host I of N, counted from 1")->type_name("I/N");
   app.add_option("--domain", arguments->transport.domain, "DDS domain, the same for all services of a run")
-      ->check(CLI::Range(0u, dds::kLastDomain))
-      ->capture_default_str();
+      ->check(CLI::Range(0u, dds::kLastDomain).description(""))
+      ->capture_default_str()
+      ->type_name("N");
   app.add_option("--peer", arguments->transport.peers,
                  "address of a machine that takes part; give each of them, this machine too (default: all on this "
                  "machine)")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->type_name("ADDRESS");
   app.add_option("--start-monotonic", arguments->started_s, "when the run was asked for")->group("");
   return {&app, [arguments] { return serve(*arguments); }};
 }

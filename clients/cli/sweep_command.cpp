@@ -143,15 +143,18 @@ Command add_sweep(CLI::App& program) {
   CLI::App& app =
       *program.add_subcommand("sweep", "run many variants on all cores; write a table, curves and plots");
   add_experiment_options(app, arguments->run);
-  app.add_option("--seeds", arguments->seeds, "FIRST..LAST: every variant runs with each of these seeds");
+  app.add_option("--seeds", arguments->seeds, "every variant runs with each of these seeds")->type_name("A..B");
   app.add_option("--set", arguments->set,
-                 "FIELD=V1,V2,... or FIELD=A..B: the values of a field; several --set give all combinations")
-      ->allow_extra_args(false);
+                 "V1,V2,... or A..B: the values of a field; several --set give all combinations")
+      ->allow_extra_args(false)
+      ->type_name("FIELD=VALUES");
   app.add_option("--plot", arguments->plot,
                  "what the plots show: msd, displacement, spread, nearest, polarisation or pushed (default: pushed "
-                 "where there are movable bodies, else msd)");
-  app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)");
+                 "where there are movable bodies, else msd)")
+      ->type_name("OBSERVABLE");
+  app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)")->type_name("N");
   add_output_options(app, arguments->run.output, "runs/NAME-sweep, with a number added if it exists");
+  app.footer("Example: kilotwin sweep experiments/disperse.txtpb --seeds 1..20 --set motion.noise=true,false");
   return {&app, [arguments] { return sweep(*arguments); }};
 }
 

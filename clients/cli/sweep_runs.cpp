@@ -8,12 +8,12 @@
 
 #include <chrono>
 #include <csignal>
-#include <cstdio>
 #include <fstream>
 #include <map>
 #include <optional>
 #include <thread>
 
+#include "clients/cli/progress.hpp"
 #include "core/base/error.hpp"
 #include "core/os/interrupt.hpp"
 
@@ -47,27 +47,14 @@ pid_t start(std::vector<std::string> words, const std::filesystem::path& log_fil
   return process;
 }
 
-/// "N of M runs done" and the time left, on a terminal.
-class Progress {
- public:
-  explicit Progress(std::size_t runs) : runs_(runs), shown_(isatty(STDERR_FILENO) == 1), begun_(Clock::now()) {}
-  ~Progress() {
-    if (shown_) std::fputs("\r\x1b[K", stderr);
-  }
-  void show(std::size_t done) const {
-    if (!shown_) return;
-    const double wall_s = std::chrono::duration<double>(Clock::now() - begun_).count();
-    std::fputs(fmt::format("\r\x1b[K{} of {} runs done, {:.0f} s left", done, runs_,
-                           wall_s / static_cast<double>(done) * static_cast<double>(runs_ - done))
-                   .c_str(),
-               stderr);
-  }
-
- private:
-  std::size_t runs_;
-  bool shown_;
-  Clock::time_point begun_;
-};
+/// "N of M runs done", and the time left.
+std::string progress_text(std::size_t done, std::size_t runs, Clock::time_point begun) {
+  std::string text = fmt::format("{} of {} runs done", done, runs);
+  const double wall_s = std::chrono::duration<double>(Clock::now() - begun).count();
+  if (done > 0)
+    text += fmt::format(", {:.0f} s left", wall_s / static_cast<double>(done) * static_cast<double>(runs - done));
+  return text;
+}
 
 }  // namespace
 
@@ -75,7 +62,8 @@ bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time,
              const std::function<void(const SweepRun&)>& ended) {
   std::map<pid_t, SweepRun*> running;
   std::size_t next = 0, done = 0;
-  const Progress progress(runs.size());
+  Progress progress(true);
+  const auto begun = Clock::now();
   std::optional<Clock::time_point> patience;  // with runs that were told to end
   const auto tell = [&running](int signal) {
     for (const auto& [process, run] : running) kill(process, signal);
@@ -92,6 +80,10 @@ bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time,
       ++next;
     }
     if (running.empty()) return done == runs.size();
+    if (progress.due()) {
+      progress.show(static_cast<double>(done) / static_cast<double>(runs.size()),
+                    progress_text(done, runs.size(), begun));
+    }
     int status = 0;
     const auto found = running.find(waitpid(-1, &status, WNOHANG));
     if (found == running.end()) {
@@ -107,8 +99,9 @@ bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time,
     running.erase(found);
     if (interrupted() != 0) continue;  // how a run ends that was told to says nothing of it
     run.well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    progress.clear();
     ended(run);
-    progress.show(++done);
+    ++done;
   }
 }
 

@@ -1,13 +1,50 @@
 #include "core/base/say.hpp"
 
-#include <cstdio>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
 
 namespace kilotwin {
+namespace {
 
-void say(const std::string& line) {
-  // One call, so that lines of several threads or processes do not mix.
-  const std::string whole = line + '\n';
-  static_cast<void>(std::fwrite(whole.data(), 1, whole.size(), stderr));
+constexpr std::string_view kProgram = "kilotwin: ";
+
+/// Not spdlog's default logger, which writes to stdout. Lines of several threads or processes do not mix: each is one write.
+spdlog::logger& logger() {
+  static spdlog::logger lines = [] {
+    spdlog::logger made("", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+    made.set_pattern("%v");
+    return made;
+  }();
+  return lines;
+}
+
+std::string federate;
+
+void write(spdlog::level::level_enum level, std::string_view line) {
+  if (!federate.empty() && line.starts_with(kProgram)) line.remove_prefix(kProgram.size());
+  logger().log(level, spdlog::string_view_t(line.data(), line.size()));
+}
+
+}  // namespace
+
+void say(const std::string& line) { write(spdlog::level::info, line); }
+void warn(const std::string& line) { write(spdlog::level::warn, line); }
+void say_error(const std::string& line) { write(spdlog::level::err, line); }
+
+void log_as(const std::string& name) {
+  federate = name;
+  logger().set_pattern("[%Y-%m-%dT%H:%M:%S.%eZ] [" + name + "] [%l] %v", spdlog::pattern_time_type::utc);
+}
+
+std::string_view error_text(std::string_view line) {
+  std::string_view rest = line, level;
+  for (int part = 0; part < 3; ++part) {
+    const std::size_t end = rest.find("] ");
+    if (!rest.starts_with('[') || end == std::string_view::npos) return line;
+    level = rest.substr(1, end - 1);
+    rest.remove_prefix(end + 2);
+  }
+  return level == "error" ? rest : std::string_view();
 }
 
 }  // namespace kilotwin

@@ -50,11 +50,11 @@ void Watchdog::watch() {
       if (looks < kNamed) continue;
       if (looks == kNamed) say(fmt::format("the program of robot {} has not returned for over 1 s", robot));
       if (interrupted() != 0) {
-        say(fmt::format("kilotwin: interrupted while the program of robot {} did not return", robot));
+        say_error(fmt::format("kilotwin: interrupted while the program of robot {} did not return", robot));
         std::_Exit(1);
       }
       if (looks == kLost) {
-        say(fmt::format("kilotwin: the program of robot {} does not return", robot));
+        say_error(fmt::format("kilotwin: the program of robot {} does not return", robot));
         std::abort();
       }
     }

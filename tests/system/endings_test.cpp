@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <regex>
 
 #include "clients/recorder/reader.hpp"
 #include "tests/system/program.hpp"
@@ -171,7 +172,7 @@ TEST_F(Endings, AKilledServiceIsReportedInOneLine) {
     const Outcome outcome = process.wait(20);
     EXPECT_EQ(outcome.status, 1);
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-    EXPECT_NE(outcome.err.find(victim), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find(victim == "comm" ? "radio" : victim), std::string::npos) << outcome.err;
     EXPECT_NE(outcome.err.find("killed"), std::string::npos) << outcome.err;
     expect_nothing_left();
     expect_usable_recording();
@@ -190,6 +191,21 @@ TEST_F(Endings, AStoppedServiceIsReported) {
   EXPECT_NE(outcome.err.find("radio was lost"), std::string::npos) << outcome.err;
   expect_nothing_left();
   expect_usable_recording();
+}
+
+TEST_F(Endings, ServiceLogsHaveTimeStampsFederatesAndLevels) {
+  write(
+      scratch / "faults.c",
+      "#include <kilolib.h>\nvoid setup(void) {}\nvoid loop(void) { if (kilo_uid == 3) *(volatile int *)0 = 1; }\n"
+      "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  run({source("experiments/disperse.txtpb"), "--robots", "4", "--duration", "1", "--partitions", "1x1", "--hosts",
+       "1", "--behaviour", scratch / "faults.c"},
+      scratch, "run");
+  const std::string log = read(scratch / "run/logs/behaviours-1-1.log");
+  EXPECT_TRUE(std::regex_search(
+      log, std::regex(R"(^\[\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z\] \[behaviours 1/1\] \[info\] starts: run disperse)")))
+      << log;
+  EXPECT_NE(log.find("Z] [behaviours 1/1] [info] robot 3 failed"), std::string::npos) << log;
 }
 
 }  // namespace

@@ -69,7 +69,9 @@ TEST_F(Output, IsNotReplacedWhereItHoldsOtherFilesOrTheInput) {
   EXPECT_EQ(read(scratch / "papers/thesis.tex"), "years of work");
   ASSERT_EQ(brief_run({"--out", scratch / "run", "--checkpoint-every", "0.3"}).status, 0);
   const Outcome resumed =
-      brief_run({"--resume", scratch / "run", "--duration", "2", "--out", scratch / "run", "--force"});
+      kilotwin({"run", source("experiments/disperse.txtpb"), "--duration", "2", "--robots", "4", "--mode", "local",
+                "--resume", scratch / "run", "--out", scratch / "run", "--force"},
+               scratch);
   EXPECT_EQ(resumed.status, 2) << resumed.err;
   EXPECT_NE(resumed.err.find("which this command reads"), std::string::npos) << resumed.err;
   EXPECT_TRUE(fs::exists(scratch / "run/checkpoints"));
