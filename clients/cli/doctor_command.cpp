@@ -26,13 +26,13 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// What a check found. A remedy makes it a warning, or, with `fatal`, a failure.
+/// The result of a check. With a remedy it is a warning, or, with `fatal`, a failure.
 struct Finding {
   std::string found, remedy;
   bool fatal = false;
 };
 
-/// A scratch directory that goes away.
+/// A temporary directory.
 class Scratch {
  public:
   Scratch() {
@@ -71,7 +71,7 @@ Finding check_compiler() {
   }
 }
 
-/// Two participants as two services would have them, one sample from one to the other.
+/// Sends a sample through a writer and a reader like those of services.
 Finding check_dds(std::optional<std::uint32_t> wanted) {
   try {
     const dds::DomainClaim claim = wanted ? dds::DomainClaim::exactly(*wanted) : dds::DomainClaim::any();

@@ -73,7 +73,7 @@ identify::Identified identify_trajectories(const IdentifyArguments& arguments, c
   return found;
 }
 
-/// Removes what it was given, unless kept: a command that fails leaves nothing behind.
+/// Removes the directory unless it is kept: a command that fails leaves no files.
 class Unfinished {
  public:
   explicit Unfinished(fs::path directory) : directory_(std::move(directory)) {}

@@ -1,5 +1,5 @@
-/// Starts the services of a federated run as processes of this machine, shows how the run goes, and sees to it that none is
-/// left behind. It has no part in the run: what it starts could as well be started by hand.
+/// Starts the services of a federated run as processes of this machine, shows the progress of the run, and ends all services.
+/// It takes no part in the run: the services could as well be started by hand.
 #pragma once
 
 #include "clients/cli/prepare.hpp"
@@ -13,8 +13,8 @@ struct LaunchOptions {
   bool show_progress = true;
 };
 
-/// Returns the exit status when all services have left. The first service that was lost or failed is named on stderr as soon
-/// as it is known. Throws RunError where a service cannot be started.
+/// Returns the exit status when all services have ended. Reports the first service that was lost or failed on stderr, at once.
+/// Throws RunError if a service cannot be started.
 int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options);
 
 }  // namespace kilotwin::cli

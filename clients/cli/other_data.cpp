@@ -68,6 +68,12 @@ void demand_known_data(const std::string& option, const fs::path& data) {
   if (identify::has_trajectories(data) || !identify::importable(data).empty() || kilogrid::has_floor_runs(data) ||
       bristle::has_ridden_runs(data) || has_radio_runs(data))
     return;
+  if (fs::exists(data / "recording.ktrec", ignored)) {
+    throw UserError(
+        fmt::format("{} {}: is a run; write its poses into a directory of data first: kilotwin export {} "
+                    "--trajectories DIR/FILE.csv",
+                    option, data.string(), data.string()));
+  }
   throw UserError(
       fmt::format("{} {}: {}; expected {}, or ARK logs (*.tsv, *.txt, *.log), or files of kilotwin "
                   "export --trajectories",

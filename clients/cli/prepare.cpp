@@ -36,14 +36,14 @@ double parse_pace(const std::string& text) {
   return factor;
 }
 
-/// Ids of runs only have to differ; results do not depend on them.
+/// Run ids must differ; results do not depend on them.
 std::uint64_t new_run_id() {
   std::random_device device;
   const std::uint64_t id = static_cast<std::uint64_t>(device()) << 32 | device();
   return id != 0 ? id : 1;
 }
 
-/// Firmware runs as it is. Throws UserError where the file is none.
+/// Reads and checks firmware, which runs unchanged. Throws UserError if the file is not firmware.
 behaviours::CompiledProgram checked_firmware(const fs::path& file) {
   const auto octets = behaviours::read_file(file);
   if (!octets) throw UserError(file.string() + ": cannot be read; give an .elf or .hex file");
@@ -51,8 +51,7 @@ behaviours::CompiledProgram checked_firmware(const fs::path& file) {
   return {file, behaviours::sha256_hex(*octets), {}};
 }
 
-/// Compiles each distinct program once and tells every group which one is its own. Returns the compiled files, in the
-/// manifest's order.
+/// Compiles each distinct program once and records each group's program. Returns the compiled files, in the manifest's order.
 std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunArguments& arguments,
                                      proto::Manifest& manifest, Notes notes) {
   std::vector<fs::path> objects;
@@ -88,8 +87,8 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
   return objects;
 }
 
-/// Copies what the programs were compiled from, for readers. Two files of one name from different folders both stay: the
-/// second is NAME-2. Throws filesystem_error.
+/// Copies the source files of the programs, for readers. Of two files with the same name from different folders, the second is
+/// called NAME-2. Throws filesystem_error.
 void copy_sources(const LoadedExperiment& loaded, const fs::path& to) {
   std::set<fs::path> copied;
   for (const proto::RobotGroup& group : loaded.experiment.robots()) {
@@ -104,8 +103,8 @@ void copy_sources(const LoadedExperiment& loaded, const fs::path& to) {
   }
 }
 
-/// The experiment with all overrides, such that it runs again from where it lies: with the programs as they were compiled
-/// and copies of the files of poses. Throws filesystem_error.
+/// The experiment with all overrides, such that it runs again from the run directory: with the compiled programs and copies of
+/// its other files. Throws filesystem_error.
 std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manifest& manifest,
                               const recorder::RunDirectory& directory) {
   proto::Experiment experiment = manifest.experiment();
@@ -144,8 +143,8 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
   return text + fields;
 }
 
-/// One process per service has room on a machine only as far as DDS numbers them (core/dds/dds.cpp); the launcher and
-/// whoever watches take part as well.
+/// The number of processes on one machine is limited by the participant indices of DDS (core/dds/dds.cpp); the launcher and
+/// observers take part as well.
 void check_processes(const proto::Deployment& deployment) {
   constexpr std::uint32_t kMost = 110;
   const std::uint32_t partitions = deployment.partition_columns() * deployment.partition_rows();

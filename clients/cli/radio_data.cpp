@@ -61,7 +61,8 @@ json table_of_errors(const json& steps) {
           {"lead",
            "Sent: messages of a robot, simulated less measured. Near, far: largest error of the share received, up "
            "to 105 "
-           "mm and beyond 125 mm. Silent: of the share of pairs that hear nothing. Runs: of the spread from run to "
+           "mm and beyond 125 mm. Silent: error of the share of pairs without a received message. Runs: error of "
+           "the spread from run to "
            "run. "
            "Deficit: log-likelihood of the counts below what the other runs' own means reach, per pair and run."},
           {"head", {"with", "set", "sent", "near", "far", "silent", "runs", "deficit, nat"}},
@@ -143,9 +144,11 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   }
   const auto of = [](const json& summary, const char* error) { return summary.at(error).get<double>(); };
   const std::string verdict = fmt::format(
-      "Messages counted on runs that nothing was fitted to are {:.2f} nat per pair and run less likely in the "
-      "seed's model "
-      "than by the means of the other runs, and {:.2f} with all effects. The largest error of the share received "
+      "On held-out runs, the log-likelihood of the message counts per pair and run lies {:.2f} nat below that of "
+      "the "
+      "other runs' means with the ARGoS paper's model, and {:.2f} nat below with all effects. The largest error of "
+      "the "
+      "share received "
       "is {:.3f} "
       "up to 105 mm ({:.3f} before) and {:.3f} beyond 125 mm ({:.3f} before).",
       of(before, "deficit"), of(after, "deficit"), of(after, "near_worst"), of(before, "near_worst"),
@@ -154,7 +157,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   result.document["verdict"] = verdict;
   result.document["summary"] = {verdict};
   result.document["bars"] = {
-      {{"kind", "before"}, {"name", "the seed's model"}, {"value", of(before, "deficit")}, {"unit", "nat"}},
+      {{"kind", "before"}, {"name", "the ARGoS paper's model"}, {"value", of(before, "deficit")}, {"unit", "nat"}},
       {{"kind", "after"}, {"name", "with effects"}, {"value", of(after, "deficit")}, {"unit", "nat"}}};
   result.document["tables"] = {table_of_errors(steps), table_of_population(fitted.at("population"))};
   result.document["set"] = {{"has_headings", false}, {"has_commands", false}};

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 fs::path place_of(const recorder::RunDirectory& directory) { return directory.path() / "recovered"; }
 
-/// The last tick up to which the state hashes were recorded; -1 where none was.
+/// The last tick with a recorded state hash; -1 if there is none.
 Tick last_recorded(const fs::path& recording) {
   Tick last{-1};
   try {
@@ -29,12 +29,12 @@ Tick last_recorded(const fs::path& recording) {
       if (record->has_hash()) last = Tick{record->hash().first_tick() + record->hash().chain_size() - 1};
     }
   } catch (const UserError&) {
-    // It broke before anything was recorded.
+    // The attempt broke before anything was recorded.
   }
   return last;
 }
 
-/// Removes checkpoints after `latest`, and incomplete ones; the newest that is left, if any.
+/// Removes incomplete checkpoints and those after `latest`. Returns the newest of the others, if any.
 std::optional<CheckpointDirectory> newest_until(const recorder::RunDirectory& directory, Tick latest) {
   std::optional<CheckpointDirectory> found;
   std::error_code ignored;
@@ -47,12 +47,12 @@ std::optional<CheckpointDirectory> newest_until(const recorder::RunDirectory& di
   return found;
 }
 
-/// Puts checkpoint and recording where the next attempt looks for them. Returns where it starts.
+/// Moves checkpoint and recording to RUN/recovered. Returns the start of the next attempt in words.
 std::string keep(const recorder::RunDirectory& directory, const proto::Manifest& manifest, Tick latest,
                  TickLength tick_length) {
   const fs::path place = place_of(directory);
   const auto checkpoint = newest_until(directory, std::min(latest, last_recorded(directory.recording())));
-  // The last attempt may itself have started from here; a newer checkpoint takes the place of that.
+  // A newer checkpoint replaces the one from which the last attempt started.
   if (checkpoint) {
     fs::remove_all(place);
     fs::copy(checkpoint->path, place);
@@ -92,17 +92,17 @@ void recover(const recorder::RunDirectory& directory, proto::Manifest& manifest,
   }
   if (running.size() == 1) {
     const behaviours::Culprit& culprit = running.front();
-    say(fmt::format(
-        "the program of robot {} has brought down its host at {:.3f} s; the run goes on from {} with that robot "
-        "failed",
-        culprit.robot, tick_length.seconds_at(culprit.tick), from));
+    say(
+        fmt::format("the program of robot {} crashed its behaviours host at {:.3f} s; the run continues from {} "
+                    "with that robot "
+                    "failed",
+                    culprit.robot, tick_length.seconds_at(culprit.tick), from));
     proto::ProgramFailure& failure = *manifest.add_program_failure();
     failure.set_robot(culprit.robot);
     failure.set_tick(culprit.tick.count());
   } else {
-    say(fmt::format(
-        "one of {} programs that ran at {:.3f} s has brought down the run; it goes on from {} on one thread",
-        running.size(), tick_length.seconds_at(latest), from));
+    say(fmt::format("one of {} programs that ran at {:.3f} s crashed the run; it continues from {} on one thread",
+                    running.size(), tick_length.seconds_at(latest), from));
   }
   manifest.set_run(manifest.run() + 1 == 0 ? 1 : manifest.run() + 1);
   recorder::write_file(directory.manifest(), manifest.SerializeAsString());

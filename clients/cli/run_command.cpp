@@ -24,7 +24,7 @@
 namespace kilotwin::cli {
 namespace {
 
-/// As a shell takes it for one word.
+/// The word, quoted for a shell.
 std::string quoted(const std::string& word) {
   constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+,:=@%";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
@@ -72,8 +72,8 @@ void run_in_this_process(const RunPlan& plan, const recorder::RunDirectory& dire
   }
 }
 
-/// Returns in the process where the run came to its end, with nothing, and in the one that waited for that, with the exit
-/// status.
+/// Returns twice: nothing in the worker process, which has done the run, and the exit status in the process that waited for
+/// the worker.
 std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDirectory& directory,
                                const RunArguments& arguments, double started_s) {
   std::uint32_t threads = std::max(1u, arguments.threads);
@@ -85,7 +85,7 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
       forget_attempts(directory);
       return std::nullopt;
     }
-    if (WIFEXITED(*status)) return WEXITSTATUS(*status);  // it has said what there was to say
+    if (WIFEXITED(*status)) return WEXITSTATUS(*status);  // the worker has reported its error
     std::vector<behaviours::Culprit> running;
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       if (const auto culprit = behaviours::take_note(directory.path(), HostId{h})) running.push_back(*culprit);
@@ -101,7 +101,7 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
 
 int run(const RunArguments& arguments, double started_s) {
   if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
-  // The domain is claimed before anything is written, so that one in use leaves nothing behind.
+  // The domain is claimed before anything is written: a refused run leaves no files.
   std::optional<dds::DomainClaim> claim;
   if (arguments.mode == "federated" && !arguments.prepare) {
     claim.emplace(arguments.domain ? dds::DomainClaim::exactly(*arguments.domain) : dds::DomainClaim::any());
@@ -129,7 +129,7 @@ int run(const RunArguments& arguments, double started_s) {
   return kDone;
 }
 
-/// A seed is decimal, whatever zeros are before it; what does not fit would be another seed than the one asked for.
+/// A seed is decimal, also with leading zeros. A number that does not fit is refused, as it would become another seed.
 std::string decimal_seed(std::string& text) {
   std::uint64_t seed = 0;
   const char* const last = text.data() + text.size();

@@ -76,7 +76,7 @@ int sweep(const SweepArguments& arguments) {
   if (points.size() * std::max<std::size_t>(1, seeds.size()) > kMostSweepRuns)
     throw UserError(
         fmt::format("{} points with {} seeds are more than {} runs", points.size(), seeds.size(), kMostSweepRuns));
-  // Every point is checked before the first run, so that a wrong value costs nothing.
+  // Every point is checked before the first run starts.
   std::string name;
   std::vector<std::uint64_t> own_seeds;
   for (const SweepPoint& point : points) {

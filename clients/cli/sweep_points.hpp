@@ -1,4 +1,4 @@
-/// What a sweep runs: combinations of swept values, and seeds.
+/// The runs of a sweep: combinations of swept values, and seeds.
 #pragma once
 
 #include <cstddef>

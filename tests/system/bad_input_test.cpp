@@ -79,6 +79,8 @@ TEST_F(BadInput, WithoutTrajectoriesNamesWhatIsThereAndWhatIsExpected) {
   expect_in("run,robot,time_s,x_mm,y_mm", other);
   expect_in("is a file with the columns \"x,y\"; expected a directory", of("data/tracks.csv"));
   expect_in("does not exist", of("nowhere"));
+  write(scratch / "data/recording.ktrec", "");
+  expect_in("is a run; write its poses", of("data"));
   EXPECT_FALSE(fs::exists(scratch / "identified")) << "left behind";
 }
 
