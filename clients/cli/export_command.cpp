@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -35,13 +36,19 @@ int export_run(const ExportArguments& arguments) {
     fmt::print("{}: {} robots\n", arguments.model.string(), export_model(read_manifest(run), arguments.model));
     if (!rows_wanted) return kDone;
   }
+  const auto tables = {&arguments.trajectories, &arguments.bodies, &arguments.messages, &arguments.radio,
+                       &arguments.cells};
+  if (std::count_if(tables.begin(), tables.end(), [](const auto* table) { return *table == "-"; }) > 1)
+    throw UserError("export: two tables to standard output; give a file for all but one");
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kRecording);
+  bool damaged = false;
   const auto each = [&](const std::filesystem::path& csv, auto&& write) {
     if (csv.empty()) return;
     recorder::Reader reader(directory.recording());
     const std::uint64_t rows = write(reader, csv);
     if (!reader.warning().empty()) say("kilotwin: " + reader.warning());
-    fmt::print("{}: {} rows\n", csv.string(), rows);
+    damaged = damaged || reader.damaged();
+    if (csv != "-") fmt::print("{}: {} rows\n", csv.string(), rows);
   };
   each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) {
     return recorder::export_trajectories(reader, csv, arguments.every_s,
@@ -56,20 +63,21 @@ int export_run(const ExportArguments& arguments) {
        [&](recorder::Reader& reader, const auto& csv) { return recorder::export_radio(reader, csv); });
   each(arguments.cells,
        [&](recorder::Reader& reader, const auto& csv) { return kilogrid::export_cells(reader, csv); });
-  return kDone;
+  // The tables hold what lies before the damage.
+  return damaged ? kFailed : kDone;
 }
 
 }  // namespace
 
 Command add_export(CLI::App& program) {
   const auto arguments = std::make_shared<ExportArguments>();
-  CLI::App& app = *program.add_subcommand("export", "write CSV files from a recorded run");
+  CLI::App& app = *program.add_subcommand("export", "write tables (CSV) from a recorded run; FILE.csv.gz is gzipped, - is standard output");
   app.add_option("RUN", arguments->run, "run directory or recording")->required()->type_name("");
-  app.add_option("--trajectories", arguments->trajectories, "columns time_s,robot,x_mm,y_mm,heading_rad,led")
+  app.add_option("--trajectories", arguments->trajectories, fmt::format("columns {}", recorder::kTrajectoryColumns))
       ->type_name("FILE");
   app.add_option("--bodies", arguments->bodies, "movable bodies: columns time_s,body,x_mm,y_mm,heading_rad")
       ->type_name("FILE");
-  app.add_option("--messages", arguments->messages, "columns receiver,sender,count")->type_name("FILE");
+  app.add_option("--messages", arguments->messages, fmt::format("columns {}", recorder::kMessageColumns))->type_name("FILE");
   app.add_option("--radio", arguments->radio, "columns robot,attempted,sent,received,collided,backed_off")
       ->type_name("FILE");
   app.add_option("--cells", arguments->cells,

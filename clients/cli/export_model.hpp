@@ -8,7 +8,8 @@
 
 namespace kilotwin::cli {
 
-/// Writes the motion parameters, the effects and the parameters of every robot, drawn ones included. Returns the number of
+/// Writes the parameters of motion, and of the radio's propagation where the experiment uses that, with all defaults; the
+/// effects; and the parameters of every robot, drawn ones included. Returns the number of
 /// robots. Throws RunError where the file cannot be written.
 std::uint32_t export_model(const proto::Manifest&, const std::filesystem::path& file);
 

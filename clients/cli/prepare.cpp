@@ -25,13 +25,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Simulated over wall time. At the slowest a tick takes minutes.
+constexpr double kSlowestPace = 1e-4, kFastestPace = 1e9;
+/// Of a robot from the origin: arenas are at most 1e6 wide.
+constexpr double kFarthest_mm = 1e7;
+
 double parse_pace(const std::string& text) {
   if (text == "max") return 0;
   double factor = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), factor);
-  if (error != std::errc() || end != text.data() + text.size() || !(factor > 0) || !(factor < 1e9)) {
+  if (error != std::errc() || end != text.data() + text.size() || !(factor >= kSlowestPace) ||
+      !(factor <= kFastestPace)) {
     throw UserError(
-        fmt::format("--pace: \"{}\" is no pace; give max, or a factor above 0 such as 1 for real time", text));
+        fmt::format("--pace: \"{}\" is no pace; give max, or a factor from {:g} to {:g} such as 1 for real time", text,
+                    kSlowestPace, kFastestPace));
   }
   return factor;
 }
@@ -247,7 +254,8 @@ Prepared prepare(const RunArguments& arguments) {
     copy_sources(loaded, directory.programs());
     if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
     recorder::write_file(directory.experiment(), experiment_as_run(loaded, manifest, directory));
-    recorder::write_file(directory.manifest(), manifest.SerializeAsString());
+    recorder::write_provenance(recorder::provenance_of_this_process(), directory.provenance());
+    directory.write_manifest(manifest);
   } catch (const std::exception& error) {
     std::error_code ignored;
     fs::remove_all(directory.path(), ignored);
@@ -260,10 +268,24 @@ Prepared prepare(const RunArguments& arguments) {
 }
 
 proto::Manifest read_manifest(const recorder::RunDirectory& directory) {
-  proto::Manifest manifest;
-  if (!manifest.ParseFromString(recorder::read_file(directory.manifest()))) {
-    throw UserError(fmt::format("{}: damaged; prepare the run again", directory.manifest().string()));
-  }
+  proto::Manifest manifest = directory.read_manifest();
+  const std::string file = directory.manifest().string();
+  validate_values({manifest.experiment(), file, SourceLocations(file)});
+  const auto require = [&](bool right, std::string_view what) {
+    if (!right) throw UserError(fmt::format("{}: {}; prepare the run again", file, what));
+  };
+  const auto within = [](const google::protobuf::RepeatedField<double>& values, double bound) {
+    return std::all_of(values.begin(), values.end(), [bound](double value) { return std::abs(value) <= bound; });
+  };
+  require(manifest.x_mm_size() >= 1 && static_cast<std::uint32_t>(manifest.x_mm_size()) <= kMostRobots,
+          "the number of robots is out of range");
+  require(within(manifest.x_mm(), kFarthest_mm) && within(manifest.y_mm(), kFarthest_mm) &&
+              within(manifest.heading_rad(), 2 * kPi),
+          "an initial pose is out of range");
+  require(manifest.experiment().deployment().hosts() <= static_cast<std::uint32_t>(manifest.x_mm_size()),
+          "there are more hosts than robots");
+  require(manifest.pace() == 0 || (manifest.pace() >= kSlowestPace && manifest.pace() <= kFastestPace),
+          "the pace is out of range");
   return manifest;
 }
 

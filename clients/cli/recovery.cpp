@@ -7,7 +7,6 @@
 #include <csignal>
 
 #include "clients/cli/run_recorder.hpp"
-#include "clients/recorder/file.hpp"
 #include "clients/recorder/reader.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -105,7 +104,7 @@ void recover(const recorder::RunDirectory& directory, proto::Manifest& manifest,
                     running.size(), tick_length.seconds_at(latest), from));
   }
   manifest.set_run(manifest.run() + 1 == 0 ? 1 : manifest.run() + 1);
-  recorder::write_file(directory.manifest(), manifest.SerializeAsString());
+  directory.write_manifest(manifest);
 }
 
 fs::path earlier_recording(const recorder::RunDirectory& directory) {

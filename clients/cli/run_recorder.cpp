@@ -31,15 +31,7 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       writer_(directory.recording(), header_),
       when_(plan.tick_length, plan.experiment().recording().every_s()),
       on_idle_(std::move(on_idle)),
-      x_mm_(plan.robots()),
-      y_mm_(plan.robots()),
-      heading_rad_(plan.robots()),
-      led_(plan.robots()),
-      life_cycle_(plan.robots()),
-      movable_x_mm_(plan.movables()),
-      movable_y_mm_(plan.movables()),
-      movable_heading_rad_(plan.movables()),
-      measurement_(plan) {
+      state_(plan) {
   if (const auto earlier = earlier_recording(directory); !earlier.empty())
     take_over(earlier, resumed ? resumed->tick : Tick{0});
 }
@@ -82,28 +74,10 @@ void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
   if (any_state_ && tick < next_ && !last) return;
   any_state_ = true;
   next_ = when_.at_or_after(tick + 1);
-  for (const BodyFrame* frame : bodies) {
-    for (std::size_t i = 0; i < frame->robot.size(); ++i) {
-      const std::uint32_t robot = frame->robot[i];
-      x_mm_[robot] = frame->x_mm[i];
-      y_mm_[robot] = frame->y_mm[i];
-      heading_rad_[robot] = frame->heading_rad[i];
-    }
-    const MovableColumns& movable = frame->movable;
-    for (std::size_t i = 0; i < movable.body.size(); ++i) {
-      movable_x_mm_[movable.body[i]] = movable.x_mm[i];
-      movable_y_mm_[movable.body[i]] = movable.y_mm[i];
-      movable_heading_rad_[movable.body[i]] = movable.heading_rad[i];
-    }
-  }
-  for (const ActuationFrame* frame : actuation) {
-    std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
-    std::copy(frame->life_cycle.begin(), frame->life_cycle.end(), life_cycle_.begin() + frame->first_robot);
-  }
-  if (measurement_.any()) measurement_.measure(tick, bodies, actuation, measured_);
-  writer_.state({tick, x_mm_, y_mm_, heading_rad_, led_, life_cycle_, movable_x_mm_, movable_y_mm_,
-                 movable_heading_rad_, measured_.x_mm, measured_.y_mm, measured_.heading_rad});
-  displacement_.add(x_mm_, y_mm_);
+  state_.gather(tick, bodies, actuation);
+  const recorder::StateView view = state_.view();
+  writer_.state(view);
+  displacement_.add(view.x_mm, view.y_mm);
 }
 
 void RunRecorder::hash(Tick tick, std::uint64_t chain) { writer_.hash(tick, chain); }
@@ -116,7 +90,7 @@ void RunRecorder::input(const Directive& directive) {
 void RunRecorder::saved() { writer_.flush(); }
 
 void RunRecorder::idle(const RunProgress& progress) {
-  // Nobody says twice what came from outside.
+  // An external input cannot be repeated: it must survive the end of this process.
   if (std::exchange(inputs_wait_, false))
     writer_.flush();
   else
@@ -182,6 +156,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   costs.station = cost(Work::kStation);
   costs.exchange = cost(Work::kExchange);
   costs.recording = cost(Work::kRecording);
+  summary.provenance = recorder::read_provenance(directory_.provenance()).value_or(recorder::Provenance{});
   recorder::write_summary(summary, directory_.summary());
   if (any_state_) {
     recorder::Reader recording(directory_.recording());

@@ -6,11 +6,11 @@
 #include <memory>
 #include <optional>
 
+#include "clients/cli/recorded_state.hpp"
 #include "clients/recorder/run_directory.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "clients/recorder/summary.hpp"
 #include "clients/recorder/writer.hpp"
-#include "core/effects/measurement.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/run_observer.hpp"
 #include "core/plan/plan.hpp"
@@ -45,11 +45,7 @@ class RunRecorder : public RunObserver {
   recorder::RecordingSchedule when_;
   recorder::DisplacementObserver displacement_;
   std::function<void(const RunProgress&)> on_idle_;
-  std::vector<double> x_mm_, y_mm_, heading_rad_;
-  std::vector<std::uint8_t> led_, life_cycle_;
-  std::vector<double> movable_x_mm_, movable_y_mm_, movable_heading_rad_;
-  Measurement measurement_;
-  MeasuredPoses measured_;
+  RecordedState state_;
   Tick next_{0};
   Tick recovered_from_{0};
   bool any_state_ = false;

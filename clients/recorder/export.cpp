@@ -3,18 +3,45 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
+#include "core/base/ids.hpp"
+#include "core/csv/csv_writer.hpp"
 
 namespace kilotwin::recorder {
 namespace {
 
-constexpr std::size_t kWriteAbove_bytes = 1 << 20;
+/// Of one robot's row behind its time: its number, pose and LED.
+constexpr std::size_t kLongestNumbers = 84;
+
+std::string state_name(std::uint8_t life_cycle) {
+  switch (static_cast<LifeCycle>(life_cycle)) {
+    case LifeCycle::kSleeping: return "sleeping";
+    case LifeCycle::kIdle: return "idle";
+    case LifeCycle::kBattery: return "battery";
+    case LifeCycle::kSetup: return "setup";
+    case LifeCycle::kRunning: return "running";
+    case LifeCycle::kCharging: return "charging";
+    case LifeCycle::kMoving: return "moving";
+    case LifeCycle::kFlat: return "flat";
+    case LifeCycle::kFailed: return "failed";
+  }
+  return fmt::format("{}", life_cycle);
+}
+
+/// ",GROUP," per robot; groups are numbered as the experiment lists them.
+std::vector<std::string> group_cells(const proto::RecordingHeader& header) {
+  std::vector<std::string> cells;
+  for (int group = 0; group < header.group_robots_size(); ++group)
+    cells.insert(cells.end(), header.group_robots(group), fmt::format(",{},", group));
+  cells.resize(header.robots(), ",0,");
+  return cells;
+}
 
 /// Appends "-12.3450": value (|value| < 1e9) rounded to `decimals` places. Never "-0.0000".
 template <int decimals> char* put_fixed(char* to, double value) {
@@ -64,24 +91,19 @@ void check_interval(const Reader& recording, const RecordingSchedule& wanted, do
     const Tick tick = wanted.tick(number);
     if (recorded.at_or_after(tick) - tick <= 1) continue;
     throw UserError(fmt::format(
-        "--every {:.10g}: no multiple of the recorded interval; {} holds a state every {:.10g} s, so take {}",
+        "--every {:.10g}: not a multiple of the recorded interval; {} holds a state every {:.10g} s, so take {}",
         every_s, recording.path().string(), recorded_s, suggested_interval(recorded_s, every_s)));
   }
 }
 
-std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, const std::string& time,
-                          Poses which) {
-  const bool measured = which == Poses::kMeasured && state.measured_x_mm_size() == state.x_mm_size() &&
-                        state.measured_y_mm_size() == state.x_mm_size() &&
-                        state.measured_heading_rad_size() == state.x_mm_size();
-  constexpr std::size_t kLongestNumbers = 80;
+std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, const std::string& time, Poses which,
+                          const std::vector<std::string>& groups, const std::array<std::string, 256>& states) {
+  const bool measured = which == Poses::kMeasured && state.measured_x_mm_size() == state.x_mm_size();
   const auto robots = static_cast<std::size_t>(state.x_mm_size());
-  const std::size_t start = text.size();
-  text.resize(start + robots * (time.size() + kLongestNumbers));
-  char* to = text.data() + start;
   for (std::size_t i = 0; i < robots; ++i) {
     const int at = static_cast<int>(i);
-    to = std::copy(time.begin(), time.end(), to);
+    char numbers[kLongestNumbers];
+    char* to = numbers;
     *to++ = ',';
     to = std::to_chars(to, to + 12, i).ptr;
     *to++ = ',';
@@ -90,12 +112,17 @@ std::uint64_t append_rows(std::string& text, const proto::StateRecord& state, co
     to = put_fixed<4>(to, measured ? state.measured_y_mm(at) : state.y_mm(at));
     *to++ = ',';
     to = put_fixed<6>(to, measured ? state.measured_heading_rad(at) : state.heading_rad(at));
-    *to++ = ',';
     const auto led = static_cast<unsigned char>(state.led()[i]);
-    for (int channel = 0; channel < 3; ++channel) *to++ = static_cast<char>('0' + (led >> 2 * channel & 3));
-    *to++ = '\n';
+    for (int channel = 0; channel < 3; ++channel) {
+      *to++ = ',';
+      *to++ = static_cast<char>('0' + (led >> 2 * channel & 3));
+    }
+    text += time;
+    text.append(numbers, static_cast<std::size_t>(to - numbers));
+    text += groups[i];
+    text += states[static_cast<unsigned char>(state.life_cycle()[i])];
+    text += '\n';
   }
-  text.resize(static_cast<std::size_t>(to - text.data()));
   return robots;
 }
 
@@ -121,15 +148,14 @@ std::uint64_t export_states(Reader& recording, const std::filesystem::path& csv,
   }
   const RecordingSchedule wanted(recording.tick_length(), every_s);
   check_interval(recording, wanted, every_s);
-  OutputFile output(csv, OutputFile::Existing::kReplace);
-  output.buffer() = columns;
+  CsvWriter output(csv, columns);
   Tick next = wanted.at_or_after(Tick{recording.header().first_tick()});
   std::uint64_t rows = 0;
   while (const proto::StateRecord* state = recording.next_state()) {
     const Tick tick{state->tick()};
     if (tick < next) continue;
-    rows += append(output.buffer(), *state, exact_seconds(tick, recording.tick_length()));
-    output.flush_if_above(kWriteAbove_bytes);
+    rows += append(output.rows(), *state, exact_seconds(tick, recording.tick_length()));
+    output.flush_if_long();
     next = wanted.at_or_after(tick + 1);
   }
   output.close();
@@ -140,9 +166,12 @@ std::uint64_t export_states(Reader& recording, const std::filesystem::path& csv,
 
 std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s,
                                   Poses which) {
-  return export_states(recording, csv, every_s, "time_s,robot,x_mm,y_mm,heading_rad,led\n",
-                       [which](std::string& text, const proto::StateRecord& state, const std::string& time) {
-                         return append_rows(text, state, time, which);
+  const std::vector<std::string> groups = group_cells(recording.header());
+  std::array<std::string, 256> states;
+  for (std::size_t code = 0; code < states.size(); ++code) states[code] = state_name(static_cast<std::uint8_t>(code));
+  return export_states(recording, csv, every_s, kTrajectoryColumns.data(),
+                       [&](std::string& text, const proto::StateRecord& state, const std::string& time) {
+                         return append_rows(text, state, time, which, groups, states);
                        });
 }
 
@@ -150,7 +179,7 @@ std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& csv,
   if (recording.header().movable_size() == 0) {
     throw UserError(fmt::format("{}: no movable bodies; the experiment names none", recording.path().string()));
   }
-  return export_states(recording, csv, every_s, "time_s,body,x_mm,y_mm,heading_rad\n", append_body_rows);
+  return export_states(recording, csv, every_s, "time_s,body,x_mm,y_mm,heading_rad", append_body_rows);
 }
 
 std::uint64_t export_messages(Reader& recording, const std::filesystem::path& csv) {
@@ -175,14 +204,13 @@ std::uint64_t export_messages(Reader& recording, const std::filesystem::path& cs
   // Of several counts of a pair the last one holds: equal pairs keep their order, and the last is printed.
   const auto pair = [](const Row& row) { return std::pair(row.receiver, row.sender); };
   std::stable_sort(rows.begin(), rows.end(), [&](const Row& a, const Row& b) { return pair(a) < pair(b); });
-  OutputFile output(csv, OutputFile::Existing::kReplace);
-  output.buffer() = "receiver,sender,count\n";
+  CsvWriter output(csv, kMessageColumns);
   std::uint64_t written = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + 1 < rows.size() && pair(rows[i]) == pair(rows[i + 1])) continue;
-    fmt::format_to(std::back_inserter(output.buffer()), "{},{},{}\n", rows[i].receiver, rows[i].sender,
-                   rows[i].count);
-    output.flush_if_above(kWriteAbove_bytes);
+    fmt::format_to(std::back_inserter(output.rows()), "{},{},{},{}\n", rows[i].receiver, rows[i].sender,
+                   rows[i].count, rows[i].receiver == rows[i].sender ? 1 : 0);
+    output.flush_if_long();
     ++written;
   }
   output.close();
@@ -202,12 +230,11 @@ std::uint64_t export_radio(Reader& recording, const std::filesystem::path& csv) 
         fmt::format("{}: no counts of the robots' radios; the run did not come to the end where it writes them",
                     recording.path().string()));
   }
-  OutputFile output(csv, OutputFile::Existing::kReplace);
-  output.buffer() = "robot,attempted,sent,received,collided,backed_off\n";
+  CsvWriter output(csv, "robot,attempted,sent,received,collided,backed_off");
   for (int i = 0; i < radio.attempted_size(); ++i) {
-    fmt::format_to(std::back_inserter(output.buffer()), "{},{},{},{},{},{}\n", i, radio.attempted(i), radio.sent(i),
+    fmt::format_to(std::back_inserter(output.rows()), "{},{},{},{},{},{}\n", i, radio.attempted(i), radio.sent(i),
                    radio.received(i), radio.collided(i), radio.backed_off(i));
-    output.flush_if_above(kWriteAbove_bytes);
+    output.flush_if_long();
   }
   output.close();
   return static_cast<std::uint64_t>(radio.attempted_size());

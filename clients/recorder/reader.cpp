@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -50,11 +51,18 @@ bool valid_world(const proto::RecordingHeader& header) {
   return true;
 }
 
+/// Whether the groups hold all robots; recordings that know of no groups have none.
+bool valid_groups(const proto::RecordingHeader& header) {
+  const auto& groups = header.group_robots();
+  return groups.empty() || std::accumulate(groups.begin(), groups.end(), std::uint64_t{0}) == header.robots();
+}
+
 /// Whether the fields have the ranges of idl/experiment.proto.
 bool valid(const proto::RecordingHeader& header) {
   return in_range(header.tick_cycles(), 1 << 15, 1 << 20) && in_range(header.robots(), 1, kMostRobots) &&
          in_range(header.every_s(), 1e-3, 1e9) && in_range(header.arena_width_mm(), 1, 1e6) &&
-         in_range(header.arena_height_mm(), 1, 1e6) && valid_tick(header.first_tick()) && valid_world(header);
+         in_range(header.arena_height_mm(), 1, 1e6) && valid_tick(header.first_tick()) && valid_groups(header) &&
+         valid_world(header);
 }
 
 }  // namespace
@@ -74,13 +82,17 @@ Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
   if (descriptor_ < 0) throw unreadable(system_reason());
   try {
     if (!read_record() || !record_.has_header()) {
+      if (begins_as_format_1()) {
+        throw foreign(fmt::format("it has format 1 of an older version, this one reads format {}; run the experiment again",
+                                  kRecordingFormat));
+      }
+      if (damaged_) throw foreign("damaged at byte 0, or another file; expected the recording.ktrec of a run directory");
       throw foreign(about.st_size == 0 ? "it is empty; expected the recording.ktrec of a run directory"
                                        : "expected the recording.ktrec of a run directory");
     }
     header_ = std::move(*record_.mutable_header());
-    if (header_.format() > kRecordingFormat) {
-      throw foreign(fmt::format("format {} of a newer version, this one reads format {}", header_.format(),
-                                kRecordingFormat));
+    if (header_.format() != kRecordingFormat) {
+      throw foreign(fmt::format("it has format {}, this program reads format {}", header_.format(), kRecordingFormat));
     }
     if (!valid(header_)) throw foreign("its header has values that no run has");
   } catch (...) {
@@ -95,13 +107,28 @@ Reader::~Reader() { ::close(descriptor_); }
 
 void Reader::rewind() {
   offset_ = records_from_;
-  ended_ = false;
+  ended_ = damaged_ = false;
   warning_.clear();
   last_state_ = header_.first_tick() - 1;
 }
 
 void Reader::warn(std::string_view what) {
   warning_ = fmt::format("{}: {} at byte {}; read up to there", file_.string(), what, offset_);
+}
+
+void Reader::warn_of_damage(std::string_view what) {
+  damaged_ = true;
+  warn(what.empty() ? "damaged" : fmt::format("damaged: {}", what));
+}
+
+/// Whether the file begins with a length and the CRC of a record of that length, as format 1 did.
+bool Reader::begins_as_format_1() {
+  constexpr std::size_t kPrefix_bytes = 8;
+  offset_ = 0;
+  if (!fill(kPrefix_bytes)) return false;
+  const std::uint32_t length = get_u32(waiting()), crc = get_u32(waiting().subspan(4));
+  if (length == 0 || length > kLongestRecord_bytes || !fill(kPrefix_bytes + length)) return false;
+  return ::crc32_z(0, waiting().data() + kPrefix_bytes, length) == crc;
 }
 
 std::span<const std::uint8_t> Reader::waiting() const {
@@ -138,14 +165,17 @@ bool Reader::fill(std::size_t bytes) {
 /// whole frame's.
 bool Reader::read_record() {
   warning_.clear();
+  damaged_ = false;
   if (!fill(kFramePrefix_bytes)) {
     if (fill(1)) warn("cut off");
     return false;
   }
   const std::uint32_t length = get_u32(waiting());
   const std::uint32_t crc = get_u32(waiting().subspan(4));
-  if (length == 0 || length > kLongestRecord_bytes) {
-    warn("damaged");
+  // A length is believed only with its own checksum: a changed one would else look like a file that was cut off.
+  if (::crc32_z(0, waiting().data(), 8) != get_u32(waiting().subspan(8)) || length == 0 ||
+      length > kLongestRecord_bytes) {
+    warn_of_damage();
     return false;
   }
   if (!fill(kFramePrefix_bytes + length)) {
@@ -153,10 +183,10 @@ bool Reader::read_record() {
     return false;
   }
   const std::span<const std::uint8_t> body = waiting().subspan(kFramePrefix_bytes, length);
-  const google::protobuf::LogSilencer quiet;  // of text that is none it would tell on stderr
+  const google::protobuf::LogSilencer quiet;  // protobuf would report text that is not UTF-8 on stderr
   if (::crc32_z(0, body.data(), body.size()) != crc ||
       !record_.ParseFromArray(body.data(), static_cast<int>(length))) {
-    warn("damaged");
+    warn_of_damage();
     return false;
   }
   offset_ += kFramePrefix_bytes + length;
@@ -179,18 +209,25 @@ const char* Reader::defect_of_record() const {
           state.movable_heading_rad_size() != movables) {
         return "a state of another number of movable bodies";
       }
+      const int measured = state.measured_x_mm_size();
+      if ((measured != 0 && measured != robots) || state.measured_y_mm_size() != measured ||
+          state.measured_heading_rad_size() != measured) {
+        return "a state with measured poses of another number of robots";
+      }
       if (!valid_tick(state.tick()) || state.tick() <= last_state_) return "a state out of order";
       if (!all_within(state.x_mm(), kFarthest_mm) || !all_within(state.y_mm(), kFarthest_mm) ||
           !all_within(state.heading_rad(), 2 * kPi) || !all_within(state.movable_x_mm(), kFarthest_mm) ||
-          !all_within(state.movable_y_mm(), kFarthest_mm) || !all_within(state.movable_heading_rad(), 2 * kPi)) {
-        return "a state with a pose that is none";
+          !all_within(state.movable_y_mm(), kFarthest_mm) || !all_within(state.movable_heading_rad(), 2 * kPi) ||
+          !all_within(state.measured_x_mm(), kFarthest_mm) || !all_within(state.measured_y_mm(), kFarthest_mm) ||
+          !all_within(state.measured_heading_rad(), 2 * kPi)) {
+        return "a state with a pose out of range";
       }
       return nullptr;
     }
     case proto::Record::kHash:
-      return valid_tick(record_.hash().first_tick()) ? nullptr : "hashes of ticks that are none";
+      return valid_tick(record_.hash().first_tick()) ? nullptr : "hashes of ticks out of range";
     case proto::Record::kInput:
-      return valid_tick(record_.input().tick()) ? nullptr : "an input at a tick that is none";
+      return valid_tick(record_.input().tick()) ? nullptr : "an input at a tick out of range";
     case proto::Record::kMessages: {
       const proto::MessagesRecord& messages = record_.messages();
       const auto known = [&](std::uint32_t robot) { return robot < header_.robots(); };
@@ -198,7 +235,7 @@ const char* Reader::defect_of_record() const {
                          messages.sender_size() == messages.count_size() &&
                          std::all_of(messages.receiver().begin(), messages.receiver().end(), known) &&
                          std::all_of(messages.sender().begin(), messages.sender().end(), known);
-      return right ? nullptr : "messages of robots that are none";
+      return right ? nullptr : "messages of robots that do not exist";
     }
     case proto::Record::kRadio: {
       const proto::RadioRecord& radio = record_.radio();
@@ -207,7 +244,7 @@ const char* Reader::defect_of_record() const {
                          radio.backed_off_size() == robots;
       return right ? nullptr : "counts of another number of robots";
     }
-    case proto::Record::kEnd: return valid_tick(record_.end().tick()) ? nullptr : "an end at a tick that is none";
+    case proto::Record::kEnd: return valid_tick(record_.end().tick()) ? nullptr : "an end at a tick out of range";
     case proto::Record::KIND_NOT_SET: return nullptr;
   }
   return nullptr;
@@ -219,7 +256,7 @@ const proto::Record* Reader::next() {
     if (!read_record()) return nullptr;
     if (const char* const defect = defect_of_record()) {
       offset_ = start;
-      warn(fmt::format("damaged: {}", defect));
+      warn_of_damage(defect);
       return nullptr;
     }
     if (record_.kind_case() == proto::Record::KIND_NOT_SET) continue;  // of a kind that this version does not know

@@ -1,5 +1,5 @@
-/// Reader: the records of a recording, in order; also of one that still grows, of one that was cut off, and of any
-/// bytes at all: what it hands out has been checked.
+/// Reader: the records of a recording, in order. It checks every record before it hands it out, so that it also reads
+/// recordings that still grow, that were cut off, or that are damaged.
 #pragma once
 
 #include <cstdint>
@@ -39,12 +39,15 @@ class Reader {
   /// To the first record after the header again.
   void rewind();
 
-  /// After next() gave nullptr: whether the run's own end was reached. Without it and without a warning, the run
+  /// After next() gave nullptr: whether the end mark of the run was reached. Without it and without a warning, the run
   /// was killed, or goes on.
   [[nodiscard]] bool ended() const { return ended_; }
   /// After next() gave nullptr: empty, or one line that tells where and how the file breaks off:
   /// "FILE: cut off at byte N; read up to there".
   [[nodiscard]] const std::string& warning() const { return warning_; }
+  /// After next() gave nullptr: whether the warning is about bytes that changed since they were written. A file that is
+  /// merely cut off is not damaged: a run that is killed leaves one.
+  [[nodiscard]] bool damaged() const { return damaged_; }
 
  private:
   [[nodiscard]] bool fill(std::size_t bytes);
@@ -52,13 +55,15 @@ class Reader {
   [[nodiscard]] const char* defect_of_record() const;
   [[nodiscard]] std::span<const std::uint8_t> waiting() const;
   void warn(std::string_view what);
+  void warn_of_damage(std::string_view what = {});
+  [[nodiscard]] bool begins_as_format_1();
 
   std::filesystem::path file_;
   int descriptor_ = -1;
   proto::RecordingHeader header_;
   proto::Record record_;
   std::string warning_;
-  bool ended_ = false;
+  bool ended_ = false, damaged_ = false;
   std::uint64_t offset_ = 0;         // of the next frame in the file
   std::uint64_t records_from_ = 0;   // offset of the first frame after the header
   std::int64_t last_state_ = 0;      // tick of the last state handed out

@@ -12,9 +12,10 @@
 
 namespace kilotwin::recorder {
 
-inline constexpr std::uint32_t kRecordingFormat = 1;
-/// Length and CRC in front of each record.
-inline constexpr std::size_t kFramePrefix_bytes = 8;
+/// Format 1 had no checksum of a frame's length.
+inline constexpr std::uint32_t kRecordingFormat = 2;
+/// In front of each record: its length, its CRC, and the CRC of these two.
+inline constexpr std::size_t kFramePrefix_bytes = 12;
 /// No record is longer: a state of 100,000 robots takes 2.6 MB, and protobuf ends at 2 GiB.
 inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
 
@@ -38,6 +39,7 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   *header.mutable_obstacle() = experiment.obstacle();
   *header.mutable_movable() = experiment.movable();
   if (experiment.has_light()) *header.mutable_light() = experiment.light();
+  for (const proto::RobotGroup& group : experiment.robots()) header.add_group_robots(group.count());
   header.set_messages(experiment.recording().messages());
   header.set_first_tick(first_tick.count());
   header.set_first_hash(first_hash);

@@ -10,11 +10,15 @@
 
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
+#include "core/os/checksummed_file.hpp"
 
 namespace kilotwin::recorder {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Format 1 had no checksums.
+constexpr FileKind kManifestFile{"KTWNMANI", 2, "the manifest of a run", "prepare the run again"};
 
 /// Whether the directory is this run's from now on. The mark is `programs`, which only one of several can make, so
 /// that also an empty directory that was there before goes to one run alone.
@@ -119,6 +123,17 @@ RunDirectory RunDirectory::open(const fs::path& run, Needs needs) {
   return opened;
 }
 
-fs::path RunDirectory::checkpoint(Tick tick) const { return checkpoints() / fmt::format("{:012}", tick.count()); }
+void RunDirectory::write_manifest(const proto::Manifest& given) const {
+  write_checksummed(manifest(), kManifestFile, given.SerializeAsString());
+}
+
+proto::Manifest RunDirectory::read_manifest() const {
+  proto::Manifest read;
+  if (!read.ParseFromString(read_checksummed(manifest(), kManifestFile))) {
+    throw UserError(fmt::format("{}: is not {} that this program wrote; {}", manifest().string(),
+                                kManifestFile.name, kManifestFile.remedy));
+  }
+  return read;
+}
 
 }  // namespace kilotwin::recorder

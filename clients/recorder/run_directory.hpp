@@ -1,8 +1,9 @@
 /// RunDirectory: where the files of one run lie.
-///   manifest.pb      the experiment as resolved, for machines: kilotwin.proto.Manifest
+///   manifest.pb      the experiment as resolved, for machines: idl/manifest.proto
 ///   experiment.txtpb the experiment as run; it runs again from there
 ///   programs/        the behaviours as built, SHA256.so, and firmware as it was given, SHA256.elf or .hex
 ///   recording.ktrec  what happened: idl/recording.proto
+///   provenance.json  by what, when and where the run was prepared: clients/recorder/provenance.hpp
 ///   summary.json     clients/recorder/summary.hpp
 ///   picture.svg      clients/recorder/picture.hpp
 ///   checkpoints/     one directory per checkpoint, named by its tick
@@ -45,11 +46,14 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path program(const proto::Program& program) const {
     return programs() / program_file(program);
   }
+  [[nodiscard]] std::filesystem::path provenance() const { return directory_ / "provenance.json"; }
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }
-  [[nodiscard]] std::filesystem::path checkpoints() const { return directory_ / "checkpoints"; }
-  /// Names sort as the ticks do.
-  [[nodiscard]] std::filesystem::path checkpoint(Tick tick) const;
+
+  /// Throws RunError where it cannot be written.
+  void write_manifest(const proto::Manifest& manifest) const;
+  /// Throws UserError that names the file, and the place where it is damaged.
+  [[nodiscard]] proto::Manifest read_manifest() const;
 
  private:
   explicit RunDirectory(std::filesystem::path directory)

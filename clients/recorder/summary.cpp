@@ -119,6 +119,12 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
                                       {"station", s.cost_ns_per_robot_tick.station},
                                       {"exchange", s.cost_ns_per_robot_tick.exchange},
                                       {"recording", s.cost_ns_per_robot_tick.recording}}},
+      {"version", s.provenance.version},
+      {"build", s.provenance.build},
+      {"date", s.provenance.date},
+      {"command_line", s.provenance.command_line},
+      {"host", s.provenance.host},
+      {"cores", s.provenance.cores},
   };
   write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
@@ -158,6 +164,9 @@ Summary read_summary(const std::filesystem::path& file) {
     s.cost_ns_per_robot_tick = {cost.value("behaviours", 0.0), cost.value("physics", 0.0),
                                 cost.value("radio", 0.0),      cost.value("station", 0.0),
                                 cost.value("exchange", 0.0),   cost.value("recording", 0.0)};
+    s.provenance = {json.value("version", ""), json.value("build", ""),
+                    json.value("date", ""),    json.value("command_line", std::vector<std::string>{}),
+                    json.value("host", ""),    json.value("cores", 0u)};
     return s;
   } catch (const std::exception& error) {
     throw UserError(fmt::format("{}: not a summary; expected the summary.json of a run directory ({})",

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "clients/recorder/provenance.hpp"
 #include "core/federation/run_observer.hpp"
 
 namespace kilotwin::recorder {
@@ -39,6 +40,7 @@ struct Summary {
     Spread attempted, sent, received, collided, backed_off;
     void add(const RadioCount& radio);
   } per_robot;
+  Provenance provenance;
   std::uint32_t robots_failed = 0;
   std::uint32_t recoveries = 0;
   /// Distance between a robot's first and last recorded place.

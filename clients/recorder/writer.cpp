@@ -61,6 +61,7 @@ void Writer::append(const proto::Record& record) {
   record.SerializeWithCachedSizesToArray(body);
   put_u32(frame, static_cast<std::uint32_t>(length));
   put_u32(frame + 4, static_cast<std::uint32_t>(::crc32_z(0, body, length)));
+  put_u32(frame + 8, static_cast<std::uint32_t>(::crc32_z(0, reinterpret_cast<std::uint8_t*>(frame), 8)));
   bytes_ += kFramePrefix_bytes + length;
 }
 

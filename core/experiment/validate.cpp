@@ -360,7 +360,7 @@ void validate_total(const LoadedExperiment& loaded, std::uint64_t robots) {
   }
 }
 
-void validate_fields(const LoadedExperiment& loaded) {
+void validate_values(const LoadedExperiment& loaded) {
   const proto::Experiment& experiment = loaded.experiment;
   RangeCheck{loaded.locations}.check(experiment);
   check_name(loaded);
@@ -384,6 +384,11 @@ void validate_fields(const LoadedExperiment& loaded) {
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",
                                              experiment.robots_size(), kMostGroups));
   }
+}
+
+void validate_fields(const LoadedExperiment& loaded) {
+  validate_values(loaded);
+  const proto::Experiment& experiment = loaded.experiment;
   std::uint64_t total = 0;
   bool known = true;
   for (int g = 0; g < experiment.robots_size(); ++g) {

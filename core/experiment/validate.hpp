@@ -13,6 +13,8 @@ void validate(const LoadedExperiment& loaded);
 
 /// All that can be checked before robots are placed.
 void validate_fields(const LoadedExperiment& loaded);
+/// The part of it that reads no other file: also for an experiment out of a manifest.
+void validate_values(const LoadedExperiment& loaded);
 /// The part of it that is about `effect` and `field`, whose numbers are in their ranges.
 void validate_effects(const LoadedExperiment& loaded);
 /// The infrared channel: what the table of ranges cannot say.

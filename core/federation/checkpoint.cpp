@@ -3,22 +3,23 @@
 #include <fmt/format.h>
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
-#include <fstream>
 #include <system_error>
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/os/checksummed_file.hpp"
 
 namespace kilotwin {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint32_t kFormat = 1;
+/// Format 1 had no checksums.
+constexpr std::uint32_t kFormat = 2;
+constexpr FileKind kPartFile{"KTWNCHKP", kFormat, "a part of a checkpoint", "resume from another checkpoint"};
 
 std::string deterministic_bytes(const google::protobuf::Message& message) {
   std::string bytes;
@@ -52,11 +53,10 @@ std::vector<fs::path> part_files(const fs::path& directory) {
 }
 
 proto::CheckpointPart read_part(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
   proto::CheckpointPart part;
-  if (!stream || !part.ParseFromIstream(&stream) || part.header().format() != kFormat) {
-    throw UserError(fmt::format("{}: not a part of a checkpoint that this program wrote; resume from another one",
-                                file.string()));
+  if (!part.ParseFromString(read_checksummed(file, kPartFile)) || part.header().format() != kFormat) {
+    throw UserError(fmt::format("{}: is not {} that this program wrote; {}", file.string(), kPartFile.name,
+                                kPartFile.remedy));
   }
   return part;
 }
@@ -110,21 +110,9 @@ void write_checkpoint_part(const fs::path& run_directory, const RunPlan& plan, T
   header.set_experiment_hash(resumable_hash(plan.manifest));
 
   const fs::path directory = checkpoint_directory(run_directory, tick);
-  const fs::path file = directory / fmt::format("{:04}.part", id.value());
-  const fs::path unfinished = directory / fmt::format("{:04}.{}", id.value(), getpid());
   std::error_code ignored;
   fs::create_directories(directory, ignored);
-  {
-    std::ofstream stream(unfinished, std::ios::binary);
-    if (!part.SerializeToOstream(&stream) || !stream.flush()) {
-      fs::remove(unfinished, ignored);
-      throw RunError(fmt::format("{}: the checkpoint cannot be written", file.string()));
-    }
-  }
-  std::error_code error;
-  fs::rename(unfinished, file, error);
-  if (error)
-    throw RunError(fmt::format("{}: the checkpoint cannot be written: {}", file.string(), error.message()));
+  write_checksummed(directory / fmt::format("{:04}.part", id.value()), kPartFile, part.SerializeAsString());
 }
 
 std::vector<CheckpointDirectory> checkpoint_directories(const fs::path& run_directory) {

@@ -51,9 +51,40 @@ TEST_F(Commands, ExportWritesTrajectoriesAndMessages) {
       {"export", scratch / "run", "--trajectories", scratch / "t.csv", "--messages", scratch / "m.csv"}, scratch);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const std::string trajectories = read(scratch / "t.csv");
-  EXPECT_EQ(trajectories.substr(0, trajectories.find('\n')), "time_s,robot,x_mm,y_mm,heading_rad,led");
+  EXPECT_EQ(trajectories.substr(0, trajectories.find('\n')),
+            "time_s,robot,x_mm,y_mm,heading_rad,led_r,led_g,led_b,group,state");
   EXPECT_EQ(std::count(trajectories.begin(), trajectories.end(), '\n'), 1 + 20 * 4);
-  EXPECT_EQ(read(scratch / "m.csv").substr(0, 22), "receiver,sender,count\n");
+  const std::string messages = read(scratch / "m.csv");
+  EXPECT_EQ(messages.substr(0, messages.find('\n')), "receiver,sender,count,sent_if_receiver_is_sender");
+}
+
+TEST_F(Commands, ExportWritesGzipAndToStandardOutput) {
+  run(small(), scratch, "run");
+  ASSERT_EQ(kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv"}, scratch).status, 0);
+  ASSERT_EQ(kilotwin({"export", scratch / "run", "--trajectories", scratch / "t.csv.gz"}, scratch).status, 0);
+  EXPECT_EQ(read(scratch / "t.csv.gz").substr(0, 2), "\x1f\x8b");
+  const Outcome piped = kilotwin({"export", scratch / "run", "--trajectories", "-"}, scratch);
+  EXPECT_EQ(piped.status, 0) << piped.err;
+  EXPECT_EQ(piped.out, read(scratch / "t.csv"));
+  EXPECT_FALSE(fs::exists("-"));
+  const Outcome two = kilotwin({"export", scratch / "run", "--trajectories", "-", "--radio", "-"}, scratch);
+  EXPECT_EQ(two.status, 2);
+  EXPECT_NE(two.err.find("standard output"), std::string::npos) << two.err;
+}
+
+TEST_F(Commands, ARunSaysByWhatWhenAndWhereItWasMade) {
+  run(small({"--seed", "4"}), scratch, "run");
+  const auto summary = nlohmann::json::parse(read(scratch / "run/summary.json"));
+  for (const char* field : {"version", "build", "host", "date"}) EXPECT_FALSE(summary[field].get<std::string>().empty());
+  EXPECT_GE(summary["cores"].get<int>(), 1);
+  const std::string date = summary["date"];
+  ASSERT_EQ(date.size(), 20u) << date;
+  EXPECT_EQ(date[10], 'T');
+  EXPECT_EQ(date.back(), 'Z');
+  const auto words = summary["command_line"].get<Words>();
+  ASSERT_GT(words.size(), 3u);
+  EXPECT_EQ(words[1], "run");
+  EXPECT_NE(std::find(words.begin(), words.end(), "--seed"), words.end());
 }
 
 TEST_F(Commands, MessagesOfAFederatedRunAreThoseOfALocalOne) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "clients/identify/data/csv_reader.hpp"
 #include "core/base/error.hpp"
+#include "core/csv/csv_reader.hpp"
 
 namespace kilotwin::bristle {
 namespace fs = std::filesystem;
@@ -33,7 +33,7 @@ bool has_ridden_runs(const fs::path& directory) {
   for (const fs::path& file : files) {
     const std::string name = file.filename().string();
     if (name.starts_with("trajectories.") || name.starts_with("commands.")) return false;
-    const identify::CsvReader reader(file);
+    const CsvReader reader(file);
     for (const char* column : kColumns) {
       if (!reader.find_column(column)) return false;
     }
@@ -44,7 +44,7 @@ bool has_ridden_runs(const fs::path& directory) {
 std::vector<RiddenRun> read_ridden_runs(const fs::path& directory) {
   std::map<std::string, RiddenRun> runs;
   for (const fs::path& file : files_of(directory)) {
-    identify::CsvReader reader(file);
+    CsvReader reader(file);
     std::size_t at[6];
     for (std::size_t c = 0; c < 6; ++c) at[c] = reader.column(kColumns[c]);
     while (reader.next()) {

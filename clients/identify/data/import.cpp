@@ -3,42 +3,29 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
 #include <string_view>
 
-#include "clients/identify/data/csv_reader.hpp"
 #include "clients/identify/data/measured_set.hpp"
 #include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
+#include "core/csv/csv_reader.hpp"
+#include "core/csv/csv_writer.hpp"
 
 namespace kilotwin::identify {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::string_view kRecordingHeader = "time_s,robot,x_mm,y_mm,heading_rad";
+constexpr std::array<std::string_view, 5> kRecordingColumns = {"time_s", "robot", "x_mm", "y_mm", "heading_rad"};
 // Columns of an ARK log that are read, and the fewest columns that a log has.
 constexpr std::size_t kTime = 0, kId = 1, kX = 3, kY = 4, kArkColumns = 6;
 
 bool is_ark_log(const fs::path& file) {
   const std::string ending = file.extension().string();
   return ending == ".tsv" || ending == ".txt" || ending == ".log";
-}
-
-std::string_view without_return(std::string_view line) {
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  return line;
-}
-
-std::vector<std::string_view> cells_of(std::string_view line) {
-  std::vector<std::string_view> cells;
-  for (std::size_t at = 0;;) {
-    const std::size_t end = std::min(line.find('\t', at), line.size());
-    cells.push_back(line.substr(at, end - at));
-    if (end == line.size()) return cells;
-    at = end + 1;
-  }
 }
 
 template <class Number> bool parse(std::string_view cell, Number& value) {
@@ -53,32 +40,39 @@ bool parse_finite(std::string_view cell, double& value) {
   return parse(cell, value) && std::isfinite(value) && std::abs(value) < 1e9;
 }
 
-std::string name_of_run(const fs::path& file) {
-  std::string name = file.stem().string();
-  for (char& c : name) {
-    if (c == ',' || c == '"' || c == '\n' || c == '\r') c = '-';
-  }
-  return name;
+bool is_table(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.ends_with(".csv") || name.ends_with(".csv.gz");
 }
 
-/// Whether the first line that is not blank is a row of an ARK log, or the names of its columns.
+std::string name_of_run(const fs::path& file) {
+  return (file.extension() == ".gz" ? file.stem() : file).stem().string();
+}
+
+/// ARK logs have no header, and their last row may be cut off.
+constexpr CsvLayout kArkLayout{'\t', false, false};
+
+/// Whether the first row is a row of an ARK log, or the names of its columns.
 bool looks_like_ark_log(const fs::path& file) {
-  const std::string content = recorder::read_file(file);
-  for (std::size_t at = 0; at < content.size();) {
-    const std::size_t end = std::min(content.find('\n', at), content.size());
-    const std::string_view line = without_return(std::string_view(content).substr(at, end - at));
-    at = end + 1;
-    if (line.find_first_not_of(" \t") == std::string_view::npos) continue;
-    const std::vector<std::string_view> cells = cells_of(line);
+  try {
+    CsvReader csv(file, kArkLayout);
     double time_s = 0;
-    return cells.size() >= kArkColumns && (parse_finite(cells[kTime], time_s) || cells[kTime] == "t");
+    return csv.next() && csv.cells() >= kArkColumns &&
+           (parse_finite(csv.text(kTime), time_s) || csv.text(kTime) == "t");
+  } catch (const UserError&) {
+    return false;  // text of another kind
   }
-  return false;
 }
 
 bool looks_like_recording(const fs::path& file) {
-  const std::string content = recorder::read_file(file);
-  return std::string_view(content).starts_with(kRecordingHeader);
+  try {
+    const CsvReader csv(file);
+    return std::all_of(kRecordingColumns.begin(), kRecordingColumns.end(),
+                       [&](std::string_view name) { return csv.find_column(name).has_value(); }) &&
+           !csv.find_column("run");
+  } catch (const UserError&) {
+    return false;
+  }
 }
 
 }  // namespace
@@ -89,9 +83,9 @@ std::vector<fs::path> importable(const fs::path& directory) {
   if (!fs::is_directory(directory, error) || has_trajectories(directory)) return files;
   for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
     const fs::path& file = entry.path();
-    if (!entry.is_regular_file(error) || file.stem() == "commands") continue;
+    if (!entry.is_regular_file(error) || name_of_run(file) == "commands") continue;
     if ((is_ark_log(file) && looks_like_ark_log(file)) ||
-        (file.extension() == ".csv" && looks_like_recording(file)))
+        (is_table(file) && looks_like_recording(file)))
       files.push_back(file);
   }
   std::sort(files.begin(), files.end());
@@ -99,38 +93,28 @@ std::vector<fs::path> importable(const fs::path& directory) {
 }
 
 std::string rows_of_ark_log(const fs::path& file) {
-  const std::string content = recorder::read_file(file);
-  const std::string run = name_of_run(file);
+  CsvReader csv(file, kArkLayout);
+  const std::string run = csv_cell(name_of_run(file));
   std::string rows;
-  std::size_t number = 0;
-  for (std::size_t at = 0; at < content.size();) {
-    const std::size_t end = std::min(content.find('\n', at), content.size());
-    const bool cut_off = end == content.size();
-    const std::string_view line = without_return(std::string_view(content).substr(at, end - at));
-    at = end + 1;
-    ++number;
-    if (line.find_first_not_of(" \t") == std::string_view::npos) continue;
-    const std::vector<std::string_view> cells = cells_of(line);
+  while (csv.next()) {
     double time_s = 0, x = 0, y = 0;
     std::uint32_t id = 0;
     // The line of column names above all rows.
-    if (rows.empty() && !parse_finite(cells[kTime], time_s) && cells.size() >= kArkColumns &&
-        !parse_finite(cells[kX], x))
+    if (rows.empty() && csv.cells() >= kArkColumns && !parse_finite(csv.text(kTime), time_s) &&
+        !parse_finite(csv.text(kX), x))
       continue;
-    const auto complain = [&](std::size_t column, const std::string& what) {
-      throw UserError(fmt::format("{}:{}:{}: {}", file.string(), number,
-                                  column < cells.size() ? cells[column].data() - line.data() + 1 : 1, what));
-    };
-    if (cells.size() < kArkColumns) {
-      if (cut_off) break;
-      complain(0, fmt::format("{} cells, separated by tabs; an ARK log has t, id, colour, x, y, orientation",
-                              cells.size()));
+    if (csv.cells() < kArkColumns) {
+      if (csv.cut_off()) break;
+      csv.complain(0, fmt::format("{} cells, separated by tabs; an ARK log has t, id, colour, x, y, orientation",
+                                  csv.cells()));
     }
-    if (!parse_finite(cells[kTime], time_s))
-      complain(kTime, fmt::format("time is \"{}\"; give seconds", cells[kTime]));
-    if (!parse(cells[kId], id)) complain(kId, fmt::format("id is \"{}\"; give a whole number", cells[kId]));
-    if (!parse_finite(cells[kX], x)) complain(kX, fmt::format("x is \"{}\"; give pixels", cells[kX]));
-    if (!parse_finite(cells[kY], y)) complain(kY, fmt::format("y is \"{}\"; give pixels", cells[kY]));
+    const auto complain = [&](std::size_t column, const char* what, const char* right) {
+      csv.complain(column, fmt::format("{} is \"{}\"; give {}", what, csv.text(column), right));
+    };
+    if (!parse_finite(csv.text(kTime), time_s)) complain(kTime, "time", "seconds");
+    if (!parse(csv.text(kId), id)) complain(kId, "id", "a whole number");
+    if (!parse_finite(csv.text(kX), x)) complain(kX, "x", "pixels");
+    if (!parse_finite(csv.text(kY), y)) complain(kY, "y", "pixels");
     rows += fmt::format("{},{},{:.10g},{:.10g},{:.10g}\n", run, id, time_s, x - 0.5 * kArkMosaic_mm,
                         0.5 * kArkMosaic_mm - y);
   }
@@ -144,7 +128,7 @@ std::string rows_of_recording(const fs::path& file) {
   CsvReader csv(file);
   const std::size_t time = csv.column("time_s"), robot = csv.column("robot"), x = csv.column("x_mm"),
                     y = csv.column("y_mm"), heading = csv.column("heading_rad");
-  const std::string run = name_of_run(file);
+  const std::string run = csv_cell(name_of_run(file));
   std::string rows;
   while (csv.next()) {
     rows += fmt::format("{},{},{:.10g},{:.10g},{:.10g},{:.10g}\n", run, csv.whole(robot), csv.number(time),

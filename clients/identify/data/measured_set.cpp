@@ -4,16 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 
-#include "clients/identify/data/csv_reader.hpp"
-#include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
+#include "core/csv/csv_reader.hpp"
+#include "core/csv/csv_writer.hpp"
 
 namespace kilotwin::identify {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr std::string_view kTrajectoryColumns = "run,robot,time_s,x_mm,y_mm[,heading_rad]";
 constexpr const char* kNames[] = {"stop", "straight", "left", "right"};
 
 std::optional<fs::path> find_csv(const fs::path& directory, const char* stem) {
@@ -70,8 +72,33 @@ Motion motion_of(const CsvReader& csv, std::size_t column) {
   csv.complain(column, fmt::format("motion is \"{}\"; give stop, straight, left or right", csv.text(column)));
 }
 
+void require_trajectory_columns(const CsvReader& csv) {
+  csv.require({"run", "robot", "time_s", "x_mm", "y_mm"}, kTrajectoryColumns);
+}
+
+/// Why a directory without trajectories.csv cannot be read: by the first table in it, where it holds one.
+[[noreturn]] void refuse(const fs::path& directory) {
+  std::error_code error;
+  if (fs::is_regular_file(directory, error)) {
+    throw UserError(
+        fmt::format("{}: is a file; give the directory that holds trajectories.csv", directory.string()));
+  }
+  std::vector<fs::path> tables;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("commands.") && (name.ends_with(".csv") || name.ends_with(".csv.gz")))
+      tables.push_back(entry.path());
+  }
+  std::sort(tables.begin(), tables.end());
+  for (const fs::path& table : tables) require_trajectory_columns(CsvReader(table));
+  throw UserError(fmt::format("{}: holds no trajectories.csv or trajectories.csv.gz with {}{}", directory.string(),
+                              kTrajectoryColumns,
+                              tables.empty() ? "" : "; rename " + tables.front().filename().string()));
+}
+
 void read_trajectories(const fs::path& file, MeasuredSet& set, Builder& builder) {
   CsvReader csv(file);
+  require_trajectory_columns(csv);
   const std::size_t run = csv.column("run"), robot = csv.column("robot"), time = csv.column("time_s"),
                     x = csv.column("x_mm"), y = csv.column("y_mm");
   const auto heading = csv.find_column("heading_rad");
@@ -89,6 +116,7 @@ void read_trajectories(const fs::path& file, MeasuredSet& set, Builder& builder)
 
 void read_commands(const fs::path& file, Builder& builder) {
   CsvReader csv(file);
+  csv.require({"run", "robot", "time_s", "motion"}, "run,robot,time_s,motion");
   const std::size_t run = csv.column("run"), robot = csv.column("robot"), time = csv.column("time_s"),
                     motion = csv.column("motion");
   while (csv.next()) {
@@ -142,11 +170,7 @@ bool has_trajectories(const fs::path& directory) { return find_csv(directory, "t
 
 MeasuredSet load_measured_set(const fs::path& directory) {
   const auto trajectories = find_csv(directory, "trajectories");
-  if (!trajectories) {
-    throw UserError(fmt::format(
-        "{}: holds no trajectories.csv or trajectories.csv.gz (run,robot,time_s,x_mm,y_mm[,heading_rad])",
-        directory.string()));
-  }
+  if (!trajectories) refuse(directory);
   MeasuredSet set;
   Builder builder(set);
   read_trajectories(*trajectories, set, builder);
@@ -164,26 +188,31 @@ MeasuredSet load_measured_set(const fs::path& directory) {
 void save_measured_set(const MeasuredSet& set, const fs::path& directory) {
   std::error_code ignored;
   fs::create_directories(directory, ignored);
-  std::string trajectories =
-      set.has_headings ? "run,robot,time_s,x_mm,y_mm,heading_rad\n" : "run,robot,time_s,x_mm,y_mm\n";
-  std::string commands = "run,robot,time_s,motion\n";
+  CsvWriter trajectories(directory / "trajectories.csv", set.has_headings ? "run,robot,time_s,x_mm,y_mm,heading_rad"
+                                                                          : "run,robot,time_s,x_mm,y_mm");
+  std::string commands;
   for (const Run& run : set.runs) {
+    const std::string name = csv_cell(run.name);
     for (const Track& track : run.tracks) {
       for (const Sample& s : track.samples) {
-        trajectories += fmt::format("{},{},{:.4f},{:.4f},{:.4f}", run.name, track.robot, s.time_s, s.x_mm, s.y_mm);
-        if (set.has_headings)
-          trajectories += std::isnan(s.heading_rad) ? "," : fmt::format(",{:.5f}", s.heading_rad);
-        trajectories += '\n';
+        std::string& rows = trajectories.rows();
+        fmt::format_to(std::back_inserter(rows), "{},{},{:.4f},{:.4f},{:.4f}", name, track.robot, s.time_s, s.x_mm,
+                       s.y_mm);
+        if (set.has_headings) rows += std::isnan(s.heading_rad) ? "," : fmt::format(",{:.5f}", s.heading_rad);
+        rows += '\n';
+        trajectories.flush_if_long();
       }
       for (const CommandChange& c : track.commands) {
         if (c.time_s > -1e299 || c.motion != Motion::kStop)
-          commands +=
-              fmt::format("{},{},{:.4f},{}\n", run.name, track.robot, std::max(c.time_s, -1e6), name_of(c.motion));
+          commands += fmt::format("{},{},{:.4f},{}\n", name, track.robot, std::max(c.time_s, -1e6), name_of(c.motion));
       }
     }
   }
-  recorder::write_file(directory / "trajectories.csv", trajectories);
-  if (set.has_commands) recorder::write_file(directory / "commands.csv", commands);
+  trajectories.close();
+  if (!set.has_commands) return;
+  CsvWriter writer(directory / "commands.csv", "run,robot,time_s,motion");
+  writer.rows() += commands;
+  writer.close();
 }
 
 }  // namespace kilotwin::identify

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "clients/identify/kilogrid/floor_swarm.hpp"
-#include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
 #include "core/base/time.hpp"
+#include "core/csv/csv_writer.hpp"
 
 namespace kilotwin::kilogrid {
 
@@ -52,10 +52,13 @@ std::uint64_t export_cells(recorder::Reader& recording, const std::filesystem::p
       rows.push_back({track.time_s[i], track.robot, track.x_mm[i], track.y_mm[i]});
   }
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.time_s < b.time_s; });
-  std::string text = "time_s,robot,x_mm,y_mm\n";
-  for (const Row& row : rows)
-    fmt::format_to(std::back_inserter(text), "{:g},{},{:g},{:g}\n", row.time_s, row.robot, row.x_mm, row.y_mm);
-  recorder::write_file(csv, text);
+  CsvWriter writer(csv, "time_s,robot,x_mm,y_mm");
+  for (const Row& row : rows) {
+    fmt::format_to(std::back_inserter(writer.rows()), "{:g},{},{:g},{:g}\n", row.time_s, row.robot, row.x_mm,
+                   row.y_mm);
+    writer.flush_if_long();
+  }
+  writer.close();
   return rows.size();
 }
 

@@ -1,15 +1,13 @@
 #include "clients/identify/kilogrid/floor_log.hpp"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <cmath>
 #include <map>
-#include <memory>
 
-#include "core/base/error.hpp"
+#include "core/csv/csv_reader.hpp"
 
 namespace kilotwin::kilogrid {
 namespace fs = std::filesystem;
@@ -17,6 +15,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kHeader = "time_s,robot,x_mm,y_mm";
+constexpr std::array<std::string_view, 4> kColumns = {"time_s", "robot", "x_mm", "y_mm"};
+constexpr std::uint32_t kHighestRobot = 1'000'000;
 /// No Kilobot gets that far in that time, whatever cell hears it: two cells and 20 mm/s.
 constexpr double kReach_mm = 150, kReach_s = 3;
 constexpr double kMostJumps = 0.02;  ///< share of steps; the rest are slips of single rows
@@ -27,32 +27,10 @@ bool is_run_file(const fs::path& file) {
   return name.ends_with(".csv") || name.ends_with(".csv.gz");
 }
 
-/// The text of a file, compressed or not.
-std::string text_of(const fs::path& file, std::size_t most = SIZE_MAX) {
-  const std::unique_ptr<gzFile_s, int (*)(gzFile)> in(gzopen(file.c_str(), "rb"), gzclose);
-  if (!in) throw UserError(fmt::format("{}: it cannot be read", file.string()));
-  std::string text;
-  char block[1 << 16];
-  while (text.size() < most) {
-    const int got = gzread(in.get(), block, sizeof block);
-    if (got < 0) throw UserError(fmt::format("{}: it is not a whole compressed file", file.string()));
-    if (got == 0) break;
-    text.append(block, static_cast<std::size_t>(got));
-  }
-  return text;
-}
-
-/// Takes one number and what follows it.
-double take_number(const char*& at, const char* end, char after, const std::string& name, std::size_t line) {
-  double value = 0;
-  const auto [rest, error] = std::from_chars(at, end, value);
-  const bool last = after == '\n';
-  if (error != std::errc{} || !std::isfinite(value) || (last ? rest != end : rest == end || *rest != after)) {
-    throw UserError(
-        fmt::format("{}:{}:1: it is not a row of the floor; each is time_s,robot,x_mm,y_mm", name, line));
-  }
-  at = last ? rest : rest + 1;
-  return value;
+bool has_floor_columns(const CsvReader& csv) {
+  return std::all_of(kColumns.begin(), kColumns.end(),
+                     [&](std::string_view name) { return csv.find_column(name).has_value(); }) &&
+         !csv.find_column("run") && !csv.find_column("heading_rad");
 }
 
 /// Why no single robot can have made the track; empty: one can.
@@ -85,37 +63,24 @@ void drop_slips(FloorTrack& track) {
   track = std::move(kept);
 }
 
-}  // namespace
-
-FloorRun parse_floor_run(const std::string& text, const std::string& name, const Floor& floor) {
+FloorRun read_floor_run(CsvReader csv, const std::string& name, const Floor& floor) {
   std::map<std::uint32_t, FloorTrack> tracks;
   FloorRun run{name, 0, {}, {}};
-  std::size_t begin = 0, line = 0;
-  while (begin < text.size()) {
-    std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::size_t next = end + 1;
-    if (end > begin && text[end - 1] == '\r') --end;
-    const char *at = text.data() + begin, *const stop = text.data() + end;
-    begin = next;
-    ++line;
-    if (at == stop) continue;
-    if (line == 1) {
-      if (std::string_view(at, stop) != kHeader)
-        throw UserError(
-            fmt::format("{}:1:1: it does not begin with the columns of a floor; write {}", name, kHeader));
-      continue;
-    }
-    const double time_s = take_number(at, stop, ',', name, line), robot = take_number(at, stop, ',', name, line),
-                 x_mm = take_number(at, stop, ',', name, line), y_mm = take_number(at, stop, '\n', name, line);
-    const bool inside = x_mm > 0 && x_mm < floor.width_mm && y_mm > 0 && y_mm < floor.height_mm;
-    if (time_s < 0 || robot < 0 || robot > 1e6 || robot != std::floor(robot) || !inside) {
-      throw UserError(
-          fmt::format("{}:{}:1: no robot can be there; times are at least 0, x within {} mm, y within {} mm", name,
-                      line, floor.width_mm, floor.height_mm));
-    }
-    FloorTrack& track = tracks[static_cast<std::uint32_t>(robot)];
-    if (!track.time_s.empty() && track.time_s.back() > time_s)
-      throw UserError(fmt::format("{}:{}:1: time goes back; sort the rows by time", name, line));
+  csv.require({kColumns[0], kColumns[1], kColumns[2], kColumns[3]}, kHeader);
+  const std::size_t time = csv.column("time_s"), id = csv.column("robot"), x = csv.column("x_mm"),
+                    y = csv.column("y_mm");
+  while (csv.next()) {
+    const double time_s = csv.number(time), x_mm = csv.number(x), y_mm = csv.number(y);
+    const std::uint32_t robot = csv.whole(id);
+    const auto check = [&](std::size_t column, bool right, const std::string& expected) {
+      if (!right) csv.complain(column, fmt::format("{} is {}; {}", csv.columns()[column], csv.text(column), expected));
+    };
+    check(time, time_s >= 0, "times are at least 0");
+    check(id, robot <= kHighestRobot, fmt::format("robots are 0..{}", kHighestRobot));
+    check(x, x_mm > 0 && x_mm < floor.width_mm, fmt::format("on this floor x is within 0..{} mm", floor.width_mm));
+    check(y, y_mm > 0 && y_mm < floor.height_mm, fmt::format("on this floor y is within 0..{} mm", floor.height_mm));
+    FloorTrack& track = tracks[robot];
+    check(time, track.time_s.empty() || track.time_s.back() <= time_s, "an earlier row is later; sort the rows by time");
     track.time_s.push_back(time_s);
     track.x_mm.push_back(x_mm);
     track.y_mm.push_back(y_mm);
@@ -133,12 +98,18 @@ FloorRun parse_floor_run(const std::string& text, const std::string& name, const
   return run;
 }
 
+}  // namespace
+
+FloorRun parse_floor_run(const std::string& text, const std::string& name, const Floor& floor) {
+  return read_floor_run(CsvReader(name, text), name, floor);
+}
+
 bool has_floor_runs(const fs::path& directory) {
   bool any = false;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
     if (!is_run_file(entry.path())) continue;
-    if (!text_of(entry.path(), kHeader.size() + 1).starts_with(kHeader)) return false;
+    if (!has_floor_columns(CsvReader(entry.path()))) return false;
     any = true;
   }
   return any;
@@ -152,7 +123,7 @@ std::vector<FloorRun> read_floor_runs(const fs::path& directory, const Floor& fl
   std::sort(files.begin(), files.end());
   std::vector<FloorRun> runs;
   for (const fs::path& file : files) {
-    runs.push_back(parse_floor_run(text_of(file), file.string(), floor));
+    runs.push_back(read_floor_run(CsvReader(file), file.string(), floor));
     const std::string name = file.filename().string();
     runs.back().name = name.substr(0, name.find(".csv"));
   }

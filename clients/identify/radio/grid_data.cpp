@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <map>
-#include <sstream>
 
 #include "core/base/error.hpp"
+#include "core/csv/csv_reader.hpp"
 
 namespace kilotwin::radio_fit {
 namespace {
@@ -22,25 +21,17 @@ constexpr double kTouchingPitch_mm = 33, kPitch_mm = 50;
 constexpr int kMostRobots = 1000;
 
 GridRun read_run(const fs::path& file) {
-  std::ifstream in(file);
-  if (!in)
-    throw UserError(fmt::format("{}: cannot be read; give a directory with comm_tau*_run*.dat", file.string()));
+  CsvReader counts(file, {' ', false, false});
   GridRun run;
   run.name = file.stem().string();
   std::vector<std::vector<double>> rows;
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    std::istringstream words(line);
-    std::vector<double> row;
-    for (std::string word; words >> word;) {
-      double value = 0;
-      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-      if (error != std::errc{} || end != word.data() + word.size() || value < 0 || value > 1e9)
-        throw UserError(fmt::format("{}:{}: \"{}\" is no count; expected whitespace-separated counts",
-                                    file.string(), number, word));
-      row.push_back(value);
+  while (counts.next()) {
+    std::vector<double>& row = rows.emplace_back();
+    for (std::size_t i = 0; i < counts.cells(); ++i) {
+      row.push_back(counts.number(i));
+      if (row.back() < 0 || row.back() > 1e9)
+        counts.complain(i, fmt::format("\"{}\" is no count; give 0..1e9", counts.text(i)));
     }
-    if (!row.empty()) rows.push_back(std::move(row));
   }
   std::size_t width = 0;
   for (const auto& row : rows) width = std::max(width, row.size());

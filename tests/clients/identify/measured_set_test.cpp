@@ -85,11 +85,13 @@ TEST_F(MeasuredSetFiles, SavedAndLoadedIsTheSame) {
 TEST_F(MeasuredSetFiles, WhatIsWrongIsNamedWithItsPlace) {
   EXPECT_NE(complaint().find("trajectories.csv"), std::string::npos);
   write("trajectories.csv", "run,robot,time_s,x_mm\n");
-  EXPECT_EQ(complaint().substr(0, 50), "trajectories.csv:1:1: there is no column \"y_mm\"; t");
+  EXPECT_EQ(complaint(),
+            "trajectories.csv:1:1: the column y_mm is missing, the header has run, robot, time_s, x_mm; write "
+            "run,robot,time_s,x_mm,y_mm[,heading_rad]");
   write("trajectories.csv", "run,robot,time_s,x_mm,y_mm\n");
   EXPECT_NE(complaint().find("no rows"), std::string::npos);
   write("trajectories.csv", "run,robot,time_s,x_mm,y_mm\na,1,0,1\n");
-  EXPECT_EQ(complaint(), "trajectories.csv:2:1: has 4 cells; the first line names 5");
+  EXPECT_EQ(complaint(), "trajectories.csv:2:8: the row has 4 cells; the header names 5");
   write("trajectories.csv", "run,robot,time_s,x_mm,y_mm\na,1,0,1,2\na,1,0.5,1e,2\n");
   EXPECT_EQ(complaint(), "trajectories.csv:3:9: x_mm is \"1e\"; give a number");
   write("trajectories.csv", "run,robot,time_s,x_mm,y_mm\na,-1,0,1,2\n");
@@ -97,6 +99,25 @@ TEST_F(MeasuredSetFiles, WhatIsWrongIsNamedWithItsPlace) {
   write("trajectories.csv", "run,robot,time_s,x_mm,y_mm\na,1,0,1,2\n");
   write("commands.csv", "run,robot,time_s,motion\na,1,0,forward\n");
   EXPECT_EQ(complaint(), "commands.csv:2:7: motion is \"forward\"; give stop, straight, left or right");
+}
+
+TEST_F(MeasuredSetFiles, ATableUnderAnotherNameIsNamedWithTheColumnsThatItLacks) {
+  write("data.csv", "x,y\n1,2\n");
+  EXPECT_EQ(complaint(),
+            "data.csv:1:1: the columns run, robot, time_s, x_mm, y_mm are missing, the header has x, y; write "
+            "run,robot,time_s,x_mm,y_mm[,heading_rad]");
+  write("data.csv", "run,robot,time_s,x_mm,y_mm\na,1,0,1,2\n");
+  EXPECT_NE(complaint().find("rename data.csv"), std::string::npos) << complaint();
+}
+
+TEST_F(MeasuredSetFiles, QuotesTabsMarksAndLineEndsAreRead) {
+  write("trajectories.csv",
+        "\xef\xbb\xbfrun\trobot\ttime_s\tx_mm\ty_mm\r\n\"first, \"\"long\"\"\"\t3\t0\t1\t2\r\n");
+  const MeasuredSet set = load_measured_set(directory);
+  ASSERT_EQ(set.samples(), 1u);
+  EXPECT_EQ(set.runs[0].name, "first, \"long\"");
+  save_measured_set(set, directory / "again");
+  EXPECT_EQ(load_measured_set(directory / "again").runs[0].name, "first, \"long\"");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "core/csv/csv_reader.hpp"
 #include "tests/clients/recorder/synthetic.hpp"
 
 namespace kilotwin::recorder {
@@ -36,16 +37,16 @@ TEST(Export, TrajectoriesByTimeAndRobot) {
   EXPECT_EQ(export_trajectories(reader, scratch / "t.csv"), 9u);
   EXPECT_EQ(lines_of(scratch / "t.csv"),
             (std::vector<std::string>{
-                "time_s,robot,x_mm,y_mm,heading_rad,led",
-                "0,0,0.0000,0.0000,0.000000,000",
-                "0,1,10.0000,-5.0000,0.100000,100",
-                "0,2,20.0000,-10.0000,0.200000,200",
-                "1.015808,0,15.5000,0.0000,0.000000,000",  // tick 31 is the first at or after 1 s
-                "1.015808,1,25.5000,2.7500,0.100000,100",
-                "1.015808,2,35.5000,5.5000,0.200000,200",
-                "2.031616,0,31.0000,0.0000,0.000000,000",
-                "2.031616,1,41.0000,10.5000,0.100000,100",
-                "2.031616,2,51.0000,21.0000,0.200000,200",
+                std::string(kTrajectoryColumns),
+                "0,0,0.0000,0.0000,0.000000,0,0,0,0,running",
+                "0,1,10.0000,-5.0000,0.100000,1,0,0,0,running",
+                "0,2,20.0000,-10.0000,0.200000,2,0,0,0,failed",
+                "1.015808,0,15.5000,0.0000,0.000000,0,0,0,0,running",  // tick 31 is the first at or after 1 s
+                "1.015808,1,25.5000,2.7500,0.100000,1,0,0,0,running",
+                "1.015808,2,35.5000,5.5000,0.200000,2,0,0,0,failed",
+                "2.031616,0,31.0000,0.0000,0.000000,0,0,0,0,running",
+                "2.031616,1,41.0000,10.5000,0.100000,1,0,0,0,running",
+                "2.031616,2,51.0000,21.0000,0.200000,2,0,0,0,failed",
             }));
 }
 
@@ -63,8 +64,8 @@ TEST(Export, NumbersAreRoundedAndNeverMinusZero) {
   export_trajectories(reader, scratch / "t.csv");
   EXPECT_EQ(
       lines_of(scratch / "t.csv"),
-      (std::vector<std::string>{"time_s,robot,x_mm,y_mm,heading_rad,led", "0,0,0.0000,-0.5000,-3.141593,333",
-                                "0,1,0.0001,1000000.0000,3.141593,123", "0,2,-1234.5679,1000.0000,0.000000,333"}));
+      (std::vector<std::string>{std::string(kTrajectoryColumns), "0,0,0.0000,-0.5000,-3.141593,3,3,3,0,running",
+                                "0,1,0.0001,1000000.0000,3.141593,1,2,3,0,running", "0,2,-1234.5679,1000.0000,0.000000,3,3,3,0,running"}));
 }
 
 TEST(Export, WantedTimesTakeTheFirstStateAtOrAfter) {
@@ -145,7 +146,7 @@ TEST(Export, MessagesByReceiverAndSender) {
   write_synthetic(scratch / "r.ktrec", synthetic_header(2), 10);
   Reader reader(scratch / "r.ktrec");
   EXPECT_EQ(export_messages(reader, scratch / "m.csv"), 3u);
-  EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count\n0,0,9\n0,1,4\n1,0,7\n");
+  EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count,sent_if_receiver_is_sender\n0,0,9,1\n0,1,4,0\n1,0,7,0\n");
 }
 
 TEST(Export, LaterCountsOfAPairTakeThePlaceOfEarlier) {
@@ -163,7 +164,7 @@ TEST(Export, LaterCountsOfAPairTakeThePlaceOfEarlier) {
   }
   Reader reader(scratch / "r.ktrec");
   export_messages(reader, scratch / "m.csv");
-  EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count\n0,1,8\n0,2,6\n");
+  EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count,sent_if_receiver_is_sender\n0,1,8,0\n0,2,6,0\n");
 }
 
 TEST(Export, MessagesThatWereNotRecordedAreAskedFor) {
@@ -179,6 +180,45 @@ TEST(Export, MessagesThatWereNotRecordedAreAskedFor) {
     EXPECT_EQ(error.what(),
               (scratch / "r.ktrec").string() + ": no message counts; run again with --set recording.messages=true");
   }
+}
+
+TEST(Export, GroupsAndStatesAreNamed) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(3);
+  header.add_group_robots(2);
+  header.add_group_robots(1);
+  {
+    Writer writer(scratch / "r.ktrec", header);
+    const std::vector<double> zeros(3, 0);
+    const std::vector<std::uint8_t> led{0, 3, 12}, life{0, 254, 77};
+    writer.state({Tick{0}, zeros, zeros, zeros, led, life});
+    writer.end(Tick{0}, 0);
+  }
+  Reader reader(scratch / "r.ktrec");
+  export_trajectories(reader, scratch / "t.csv");
+  EXPECT_EQ(lines_of(scratch / "t.csv"),
+            (std::vector<std::string>{std::string(kTrajectoryColumns), "0,0,0.0000,0.0000,0.000000,0,0,0,0,sleeping",
+                                      "0,1,0.0000,0.0000,0.000000,3,0,0,0,flat",
+                                      "0,2,0.0000,0.0000,0.000000,0,3,0,1,77"}));
+}
+
+TEST(Export, TablesWhoseNameEndsInGzAreGzipped) {
+  const Scratch scratch;
+  write_synthetic(scratch / "r.ktrec", synthetic_header(50), 400);
+  Reader reader(scratch / "r.ktrec");
+  export_trajectories(reader, scratch / "t.csv");
+  reader.rewind();
+  export_trajectories(reader, scratch / "t.csv.gz");
+  EXPECT_TRUE(content(scratch / "t.csv.gz").starts_with("\x1f\x8b"));
+  CsvReader plain(scratch / "t.csv"), packed(scratch / "t.csv.gz");
+  ASSERT_EQ(plain.columns(), packed.columns());
+  std::size_t rows = 0;
+  for (; plain.next(); ++rows) {
+    ASSERT_TRUE(packed.next());
+    for (std::size_t i = 0; i < plain.cells(); ++i) ASSERT_EQ(plain.text(i), packed.text(i));
+  }
+  EXPECT_FALSE(packed.next());
+  EXPECT_GT(rows, 500u);
 }
 
 }  // namespace

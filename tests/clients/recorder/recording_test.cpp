@@ -146,6 +146,7 @@ TEST(Recording, TailCutAtEachByteIsReadUpToTheLastWholeFrame) {
     while (ends[whole + 1] <= length) ++whole;
     ASSERT_EQ(records, whole);
     EXPECT_FALSE(reader.ended());
+    EXPECT_FALSE(reader.damaged());
     if (ends[whole] == length) {
       EXPECT_EQ(reader.warning(), "");
     } else {
@@ -175,6 +176,7 @@ TEST(Recording, EachFlippedBitIsNoticed) {
     std::size_t before = 0;
     while (ends[before + 1] <= bit / 8) ++before;
     ASSERT_EQ(records, before) << "bit " << bit;
+    EXPECT_TRUE(reader.damaged()) << "bit " << bit;
     EXPECT_NE(reader.warning().find("at byte " + std::to_string(ends[before])), std::string::npos)
         << reader.warning();
   }
@@ -269,13 +271,13 @@ TEST(Recording, WrongStatesUnderARightChecksumAreRefused) {
   wrong = right;
   wrong.mutable_state()->set_tick(5);
   wrong.mutable_state()->set_y_mm(1, std::nan(""));
-  EXPECT_NE(warning_with(wrong).find("pose that is none"), std::string::npos);
+  EXPECT_NE(warning_with(wrong).find("pose out of range"), std::string::npos);
   EXPECT_NE(warning_with(header).find("second header"), std::string::npos);
   proto::Record messages;
   messages.mutable_messages()->add_receiver(2);
   messages.mutable_messages()->add_sender(0);
   messages.mutable_messages()->add_count(1);
-  EXPECT_NE(warning_with(messages).find("robots that are none"), std::string::npos);
+  EXPECT_NE(warning_with(messages).find("robots that do not exist"), std::string::npos);
 }
 
 TEST(Recording, RecordsOfUnknownKindsArePassedOver) {
@@ -308,10 +310,16 @@ TEST(Recording, OtherFilesAreToldInOneLine) {
   EXPECT_NE(error_of("/dev/zero").find(": not a Kilotwin recording; "), std::string::npos);
   proto::Record newer;
   *newer.mutable_header() = synthetic_header(2);
-  newer.mutable_header()->set_format(2);
+  newer.mutable_header()->set_format(3);
   put_content(file, framed(newer.SerializeAsString()));
-  EXPECT_EQ(error_of(file),
-            file.string() + ": not a Kilotwin recording; format 2 of a newer version, this one reads format 1");
+  EXPECT_EQ(error_of(file), file.string() + ": not a Kilotwin recording; it has format 3, this program reads format 2");
+  // Format 1: length and CRC, no checksum of them.
+  std::string older = framed(newer.SerializeAsString());
+  older.erase(8, 4);
+  put_content(file, older);
+  EXPECT_EQ(error_of(file), file.string() +
+                                ": not a Kilotwin recording; it has format 1 of an older version, this one reads format "
+                                "2; run the experiment again");
 }
 
 TEST(Recording, IsReadWhileItGrows) {

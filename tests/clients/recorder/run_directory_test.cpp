@@ -31,7 +31,6 @@ TEST(RunDirectory, NamesItsFiles) {
   EXPECT_EQ(run.recording(), run.path() / "recording.ktrec");
   EXPECT_EQ(run.summary(), run.path() / "summary.json");
   EXPECT_EQ(run.picture(), run.path() / "picture.svg");
-  EXPECT_EQ(run.checkpoint(Tick{1832}), run.path() / "checkpoints/000000001832");
   EXPECT_EQ(RunDirectory::default_path("disperse", 3), "runs/disperse-3");
 }
 

@@ -68,7 +68,10 @@ TEST(Summary, HasTheFieldsOfTheContract) {
   EXPECT_EQ(json["resumed_from_tick"], 500);
   EXPECT_EQ(json["moved_mm"], (nlohmann::json{{"mean", 12.5}, {"max", 99.0}}));
   EXPECT_EQ(json["recovered_from_tick"], 400);
-  EXPECT_EQ(json.size(), 22u);
+  EXPECT_EQ(json["version"], "0.1.0");
+  EXPECT_EQ(json["command_line"], (std::vector<std::string>{"kilotwin", "run", "a b.txtpb"}));
+  EXPECT_EQ(json["cores"], 2);
+  EXPECT_EQ(json.size(), 28u);
 }
 
 TEST(Summary, ComesBackAsItWasWritten) {

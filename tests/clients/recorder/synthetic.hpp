@@ -117,15 +117,18 @@ inline void write_synthetic(const std::filesystem::path& file, const proto::Reco
   writer.end(Tick{ticks}, synthetic_hash(ticks));
 }
 
-/// The bytes of a record with its length and CRC.
+/// A frame: the record behind its length and checksums.
 inline std::string framed(const std::string& record) {
   const auto length = static_cast<std::uint32_t>(record.size());
   const auto crc = static_cast<std::uint32_t>(
       ::crc32_z(0, reinterpret_cast<const unsigned char*>(record.data()), record.size()));
   std::string out;
-  for (const std::uint32_t word : {length, crc}) {
+  const auto put = [&out](std::uint32_t word) {
     for (int i = 0; i < 4; ++i) out += static_cast<char>(word >> 8 * i & 0xff);
-  }
+  };
+  put(length);
+  put(crc);
+  put(static_cast<std::uint32_t>(::crc32_z(0, reinterpret_cast<const unsigned char*>(out.data()), out.size())));
   return out + record;
 }
 

@@ -1,0 +1,28 @@
+/// By what, when and where a run was prepared: provenance.json of a run directory. No result depends on it.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace kilotwin::recorder {
+
+struct Provenance {
+  std::string version;                    ///< of the program
+  std::string build;                      ///< identity of the build
+  std::string date;                       ///< UTC, ISO 8601: 2026-11-22T21:25:00Z
+  std::vector<std::string> command_line;  ///< word by word, the program first
+  std::string host;                       ///< the machine's name
+  unsigned cores = 0;                     ///< that the machine offers
+};
+
+/// Of what this process makes now.
+[[nodiscard]] Provenance provenance_of_this_process();
+
+/// Throws RunError.
+void write_provenance(const Provenance& provenance, const std::filesystem::path& file);
+/// Nothing where there is no such file. Throws UserError where it is of another kind.
+[[nodiscard]] std::optional<Provenance> read_provenance(const std::filesystem::path& file);
+
+}  // namespace kilotwin::recorder

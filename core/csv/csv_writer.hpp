@@ -1,0 +1,41 @@
+/// CsvWriter: a table as text (RFC 4180, rows end in LF), to a file, a gzipped file (.gz) or standard output (-).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace kilotwin {
+
+/// `text` as a cell: in quotes where it holds a comma, a quote, a line end, or blanks at an end.
+[[nodiscard]] std::string csv_cell(std::string_view text);
+
+class CsvWriter {
+ public:
+  /// Creates or replaces the file and writes the header, "time_s,robot". Throws RunError.
+  CsvWriter(std::filesystem::path file, std::string_view header);
+  ~CsvWriter();
+  CsvWriter(const CsvWriter&) = delete;
+  CsvWriter& operator=(const CsvWriter&) = delete;
+
+  /// Where rows are appended, each with its line end.
+  [[nodiscard]] std::string& rows() { return rows_; }
+  /// Writes what waits where that is much. Throws RunError.
+  void flush_if_long();
+  /// Writes all and closes the file. Only then it is whole. Throws RunError.
+  void close();
+
+ private:
+  struct Gzip;
+  void flush();
+  [[noreturn]] void fail(const char* what, int error) const;
+
+  std::filesystem::path file_;
+  int descriptor_ = -1;
+  std::unique_ptr<Gzip> gzip_;
+  std::string rows_;
+};
+
+}  // namespace kilotwin
