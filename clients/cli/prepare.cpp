@@ -3,16 +3,22 @@
 #include <fmt/format.h>
 #include <google/protobuf/text_format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <random>
 #include <set>
 
 #include "clients/recorder/file.hpp"
+#include "clients/recorder/provenance.hpp"
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/base/say.hpp"
 #include "core/experiment/layout.hpp"
+#include "core/experiment/limits.hpp"
 #include "core/experiment/surroundings.hpp"
+#include "core/experiment/validate.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/os/files.hpp"
 #include "core/plan/plan.hpp"

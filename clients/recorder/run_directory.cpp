@@ -1,6 +1,7 @@
 #include "clients/recorder/run_directory.hpp"
 
 #include <fmt/format.h>
+#include <google/protobuf/stubs/logging.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -129,6 +130,7 @@ void RunDirectory::write_manifest(const proto::Manifest& given) const {
 
 proto::Manifest RunDirectory::read_manifest() const {
   proto::Manifest read;
+  const google::protobuf::LogSilencer quiet;  // protobuf would report text that is not UTF-8 on stderr
   if (!read.ParseFromString(read_checksummed(manifest(), kManifestFile))) {
     throw UserError(fmt::format("{}: is not {} that this program wrote; {}", manifest().string(),
                                 kManifestFile.name, kManifestFile.remedy));

@@ -34,6 +34,7 @@ Summary example() {
   s.recoveries = 2;
   s.moved_mm = {12.5, 99};
   s.cost_ns_per_robot_tick = {300, 200, 500, 1, 100, 10};
+  s.provenance = {"0.1.0", "0.1.0-0123", "2026-11-22T21:25:00Z", {"kilotwin", "run", "a b.txtpb"}, "lab", 2};
   return s;
 }
 
