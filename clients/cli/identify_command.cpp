@@ -48,7 +48,7 @@ identify::Identified identify_trajectories(const IdentifyArguments& arguments, c
                                            std::vector<identify::DataFault>& faults) {
   identify::MeasuredSet train = identify::load_or_import(arguments.train, out / "imported-train");
   identify::demand_plausible(train, arguments.train.string());
-  options.progress(0, "faults of the data");
+  options.progress(0, "checking for faults of the data");
   // No robot can produce these samples: they are excluded before the fit.
   faults = identify::exclude_faults(train);
   std::optional<identify::MeasuredSet> test;

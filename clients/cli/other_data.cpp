@@ -86,22 +86,23 @@ std::optional<identify::Identified> identify_other_data(const fs::path& train, c
   if (identify::has_trajectories(train) || !identify::importable(train).empty()) return std::nullopt;
   const auto same_kind = [&](bool is, const char* kind) {
     if (!test.empty() && !is)
-      throw UserError(fmt::format("--test {}: it does not hold {}, as --train does", test.string(), kind));
+      throw UserError(
+          fmt::format("--test {}: does not hold {}; give the same kind of data as --train", test.string(), kind));
   };
   if (kilogrid::has_floor_runs(train)) {
-    same_kind(test.empty() || kilogrid::has_floor_runs(test), "runs of a floor");
+    same_kind(test.empty() || kilogrid::has_floor_runs(test), "Kilogrid runs");
     return kilogrid::identify_floor(
         kilogrid::read_floor_runs(train),
         test.empty() ? std::vector<kilogrid::FloorRun>{} : kilogrid::read_floor_runs(test), options);
   }
-  if (bristle::has_ridden_runs(train)) {
-    same_kind(test.empty() || bristle::has_ridden_runs(test), "runs of robots that are always on");
-    return bristle::identify_ridden(
-        bristle::read_ridden_runs(train),
-        test.empty() ? std::vector<bristle::RiddenRun>{} : bristle::read_ridden_runs(test), options);
+  if (bristle::has_bristle_runs(train)) {
+    same_kind(test.empty() || bristle::has_bristle_runs(test), "bristle plate tracks");
+    return bristle::identify_bristle(
+        bristle::read_bristle_runs(train),
+        test.empty() ? std::vector<bristle::BristleRun>{} : bristle::read_bristle_runs(test), options);
   }
   if (has_radio_runs(train)) {
-    same_kind(test.empty() || has_radio_runs(test), "runs of radio messages");
+    same_kind(test.empty() || has_radio_runs(test), "radio counts (comm_tau*_run*.dat)");
     return identify_radio_runs(train, test, out, options);
   }
   return std::nullopt;

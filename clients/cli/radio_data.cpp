@@ -24,7 +24,7 @@ std::string text_of(const fs::path& file) {
   std::ifstream in(file);
   std::ostringstream text;
   text << in.rdbuf();
-  if (!in) throw RunError(fmt::format("{}: it cannot be read", file.string()));
+  if (!in) throw RunError(fmt::format("{}: cannot be read", file.string()));
   return text.str();
 }
 
@@ -56,17 +56,16 @@ json table_of_errors(const json& steps) {
                       figure(e.at("near_worst")), figure(e.at("far_worst")), figure(e.at("silent_error")),
                       figure(e.at("run_spread_error")), figure(e.at("deficit"))});
   }
-  return {{"id", "errors"},
-          {"title", "Errors on runs held out, as the model grew"},
-          {"lead",
-           "Sent: messages of a robot, simulated less measured. Near, far: largest error of the share received, up "
-           "to 105 "
-           "mm and beyond 125 mm. Silent: error of the share of pairs without a received message. Runs: error of "
-           "the spread from run to "
-           "run. "
-           "Deficit: log-likelihood of the counts below what the other runs' own means reach, per pair and run."},
-          {"head", {"with", "set", "sent", "near", "far", "silent", "runs", "deficit, nat"}},
-          {"rows", rows}};
+  return {
+      {"id", "errors"},
+      {"title", "Errors on held-out runs, effect by effect"},
+      {"lead",
+       "Sent: messages per robot, simulated minus measured. Near, far: largest error of the reception share, up to "
+       "105 mm and beyond 125 mm. Silent: error of the share of pairs without reception. Runs: error of the "
+       "standard deviation between runs. Deficit: log-likelihood of the counts below that of the training runs' "
+       "means, per pair and run."},
+      {"head", {"with", "set", "sent", "near", "far", "silent", "runs", "deficit, nat"}},
+      {"rows", rows}};
 }
 
 /// Predictive check on new robots: does the measured set look like a sample of the fitted population?
@@ -77,14 +76,15 @@ json table_of_population(const json& population) {
                     figure(c.at("median")),
                     fmt::format("{:.2f} to {:.2f}{}", c.at("low").get<double>(), c.at("high").get<double>(),
                                 c.at("inside").get<bool>() ? "" : ", outside")});
-  return {{"id", "population"},
-          {"title", "Swarms of other robots"},
-          {"lead",
-           "The share of messages received over distance, measured on runs held out, and of swarms drawn from the "
-           "fitted "
-           "population."},
-          {"head", {"set", "distance, mm", "measured", "median swarm", "95 % of swarms"}},
-          {"rows", rows}};
+  return {
+      {"id", "population"},
+      {"title", "Predictive check: new robots"},
+      {"lead",
+       "Reception share over distance: measured on held-out runs, and simulated for random swarms of the fitted "
+       "
+       "population."},
+      {"head", {"set", "distance, mm", "measured", "median swarm", "95 % of swarms"}},
+      {"rows", rows}};
 }
 
 }  // namespace
@@ -114,7 +114,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   const json fitted = json::parse(text_of(fit.out / "result.json"));
   identify::Identified result;
   if (!google::protobuf::TextFormat::ParseFromString(text_of(fit.out / "model.txtpb"), &result.model))
-    throw RunError(fmt::format("{}: it is no model", (fit.out / "model.txtpb").string()));
+    throw RunError(fmt::format("{}: is not a model", (fit.out / "model.txtpb").string()));
   const json& steps = fitted.at("effects");
   // The first step is the ARGoS model.
   json effects = json::array();
@@ -122,7 +122,7 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
     const json& step = steps[s];
     const double before = mean_of(steps[s - 1], "deficit"), after = mean_of(step, "deficit");
     json facts = {{"deficit", fmt::format("{:.3f} nat before, {:.3f} nat with it", before, after)}};
-    if (const std::string what = step.at("evidence").value("what", ""); !what.empty()) facts["in the data"] = what;
+    if (const std::string what = step.at("evidence").value("what", ""); !what.empty()) facts["evidence"] = what;
     effects.push_back({{"name", step.at("name")},
                        {"covariates", step.at("covariates")},
                        {"acts_on", "radio"},
@@ -144,16 +144,13 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   }
   const auto of = [](const json& summary, const char* error) { return summary.at(error).get<double>(); };
   const std::string verdict = fmt::format(
-      "On held-out runs, the log-likelihood of the message counts per pair and run lies {:.2f} nat below that of "
-      "the "
-      "other runs' means with the ARGoS paper's model, and {:.2f} nat below with all effects. The largest error of "
-      "the "
-      "share received "
-      "is {:.3f} "
-      "up to 105 mm ({:.3f} before) and {:.3f} beyond 125 mm ({:.3f} before).",
+      "On held-out runs, the log-likelihood of the counts is {:.2f} nat per pair and run below that of the "
+      "training "
+      "runs' means in the ARGoS paper's model, and {:.2f} nat below with all effects. The largest error of the reception "
+      "share is {:.3f} up to 105 mm ({:.3f} before) and {:.3f} beyond 125 mm ({:.3f} before).",
       of(before, "deficit"), of(after, "deficit"), of(after, "near_worst"), of(before, "near_worst"),
       of(after, "far_worst"), of(before, "far_worst"));
-  result.document["headline"] = "Who hears whom: the radio of these robots";
+  result.document["headline"] = "Radio model of these robots";
   result.document["verdict"] = verdict;
   result.document["summary"] = {verdict};
   result.document["bars"] = {

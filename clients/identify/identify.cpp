@@ -42,7 +42,7 @@ json improvement_of(const PredictionErrors& before, const PredictionErrors& afte
     out["low_mm"] = bounds->less_by.low_mm;
     out["high_mm"] = bounds->less_by.high_mm;
     out["bounds_how"] =
-        fmt::format("95 %, by drawing {}anew{}", bounds->runs > 1 ? "robots and runs " : "robots ",
+        fmt::format("95 %, by a bootstrap over {}{}", bounds->runs > 1 ? "robots and runs" : "robots",
                     bounds->runs > 1 ? fmt::format(", {} robots and {} runs", bounds->robots, bounds->runs)
                                      : fmt::format(": {} robots in one run", bounds->robots));
   }
@@ -56,19 +56,19 @@ std::string experiment_for(const std::vector<std::string>& found, const std::vec
            (std::find(instead.begin(), instead.end(), word) != instead.end());
   };
   if (only_one("motor_time"))
-    return "let some robots rest for the first half of a run, then drive: use and clock differ";
-  if (only_one("time_since_command")) return "give motions of very different lengths in random order";
+    return "let some robots rest for the first half of a run: motor-on time and run time then differ";
+  if (only_one("time_since_command")) return "command motions of very different durations in random order";
   if (only_one("measurement"))
-    return "turn the camera by 90 degrees, or shift it, between two runs: what is the camera's moves along";
-  if (only_one("robot")) return "exchange the places of fast and slow robots between runs";
-  if (only_one("neighbours")) return "repeat a run with every robot alone";
+    return "rotate or shift the camera between two runs: effects of the camera move with it";
+  if (only_one("robot")) return "exchange the start positions of fast and slow robots between runs";
+  if (only_one("neighbours")) return "repeat a run with each robot alone";
   if (only_one("position"))
-    return "start the same robots from other places, and turn the arrangement by 90 degrees";
+    return "start the same robots from other positions, and rotate the placement by 90 degrees";
   if (only_one("world_frame") || only_one("heading"))
-    return "repeat the commands with all robots turned by 90 degrees";
-  if (only_one("time")) return "start the same commands later after switching on";
+    return "repeat the commands with all robots rotated by 90 degrees";
+  if (only_one("time")) return "start the same commands later after power-on";
   if (only_one("history") || only_one("command"))
-    return "give left and right turns in random order before equal stretches straight on";
+    return "command left and right turns in random order before straight segments of equal length";
   return "repeat the runs with more robots, or for longer";
 }
 
@@ -108,7 +108,7 @@ json effects_of(const Search& found, const std::vector<Without>& without, double
           {{"log10_p", reason.finding.log10_p},
            {"threshold_log10_p", reason.threshold_log10_p},
            {"p_family",
-            std::min(1.0, Scores::kFamilyAlarm *
+            std::min(1.0, ScoreTest::kFamilyAlarm *
                               std::pow(10.0, std::max(-300.0, reason.finding.log10_p - reason.threshold_log10_p)))},
            {"log_likelihood_gain", reason.finding.evidence},
            {"held_out_gain", without[t].gain.nat},
@@ -174,7 +174,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   const auto started = std::chrono::steady_clock::now();
   PreparedSet prepared(train);
   if (prepared.units().empty())
-    throw UserError("no robot was measured twice in a run that may be fitted to; there is nothing to identify");
+    throw UserError("no track of the training runs has two samples; give longer tracks");
   std::optional<PreparedSet> other;
   if (test != nullptr) other.emplace(*test, static_cast<std::uint32_t>(train.runs.size()));
   PreparedSet& judged = other ? *other : prepared;
@@ -190,18 +190,18 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
 
   Search found;
   found.model = before;
-  if (options.trace) {
+  if (options.find_effects) {
     found = search(fitter, before,
                    [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); });
   }
-  const Asked asked{10, 5, options.horizon_s};
+  const ForecastTimes forecast_times{10, 5, options.horizon_s};
   // A term stays only if it reduces the error at the prediction horizon. A small p one step ahead does not
   // suffice.
   const auto fitted_mm = [&](const MotionModel& model) {
-    return errors_of(train, predict(model, prepared, asked, false, options.threads)).rmse_mm();
+    return errors_of(train, forecast(model, prepared, forecast_times, false, options.threads)).rmse_mm();
   };
   if (!found.model.terms.empty()) {
-    say_progress(0.86, "what each effect is worth");
+    say_progress(0.86, "evaluating each effect");
     double with_mm = fitted_mm(found.model);
     for (std::size_t t = found.model.terms.size(); t-- > 0;) {
       MotionModel without = found.model;
@@ -210,8 +210,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
       const double without_mm = fitted_mm(without);
       // Measurement effects rarely change predicted positions, so they need not reduce the error. They must not
       // raise it.
-      const bool picture = is_measured(found.model.terms[t].blocks.front().target);
-      if (without_mm > with_mm * (picture ? 0.9995 : 1.0005)) continue;
+      const bool on_measurement = is_measured(found.model.terms[t].blocks.front().target);
+      if (without_mm > with_mm * (on_measurement ? 0.9995 : 1.0005)) continue;
       found.model = without;
       found.reasons.erase(found.reasons.begin() + static_cast<std::ptrdiff_t>(t));
       with_mm = without_mm;
@@ -222,20 +222,20 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   json document;
 
   say_progress(0.9, "predictions");
-  Asked final = asked;
-  final.futures = 64;
-  const std::vector<Predicted> predicted_before = predict(before, judged, final, held_out_only, options.threads);
-  const std::vector<Predicted> predicted_after = predict(after, judged, final, held_out_only, options.threads);
+  ForecastTimes final = forecast_times;
+  final.rollouts = 64;
+  const std::vector<Forecast> forecast_before = forecast(before, judged, final, held_out_only, options.threads);
+  const std::vector<Forecast> forecast_after = forecast(after, judged, final, held_out_only, options.threads);
 
   Identified out;
-  for (std::size_t i = 0; i < predicted_before.size(); ++i) {
-    const Predicted &b = predicted_before[i], &a = predicted_after[i];
+  for (std::size_t i = 0; i < forecast_before.size(); ++i) {
+    const Forecast &b = forecast_before[i], &a = forecast_after[i];
     KILOTWIN_DEMAND(b.run == a.run && b.place == a.place && b.time_s == a.time_s);
     const Run& run = judged.set().runs[b.run];
     out.predictions.push_back({run.name, run.tracks[b.place].robot, b.time_s, b.x_mm, b.y_mm, a.x_mm, a.y_mm});
   }
-  const PredictionErrors errors_before = errors_of(judged.set(), predicted_before),
-                         errors_after = errors_of(judged.set(), predicted_after);
+  const PredictionErrors errors_before = errors_of(judged.set(), forecast_before),
+                         errors_after = errors_of(judged.set(), forecast_after);
   const std::optional<ErrorBounds> bounds = bounds_of(judged.set(), errors_before, errors_after);
   json& contract = document["contract"];
   contract["before"] = summary_of(errors_before, bounds, &ErrorBounds::before);
@@ -243,12 +243,13 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   contract["improvement"] = improvement_of(errors_before, errors_after, bounds);
   contract["noise_floor_mm"] = errors_after.expected_mm();
   contract["noise_floor_how"] =
-      "what the model with its effects expects of itself: the spread of the filter at the start, the noise of the "
-      "motion over the horizon, and the tracker's noise, all estimated from the innovations one step ahead";
+      "the error that the model with effects predicts for itself: filter uncertainty at the start, process noise "
+      "over the "
+      "horizon and tracker noise, all estimated from one-step innovations";
   {
-    const std::vector<Predicted> fitted = predict(after, prepared, asked, false, options.threads);
-    std::vector<std::pair<const MeasuredSet*, const std::vector<Predicted>*>> all{{&train, &fitted}};
-    if (other) all.emplace_back(test, &predicted_after);
+    const std::vector<Forecast> fitted = forecast(after, prepared, forecast_times, false, options.threads);
+    std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>> all{{&train, &fitted}};
+    if (other) all.emplace_back(test, &forecast_after);
     if (const std::optional<Replicates> again = replicates_of(all, options.horizon_s)) {
       contract["replicates"] = {{"floor_mm", again->floor_mm},
                                 {"repeatable_mm", again->repeatable_mm},
@@ -263,7 +264,7 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
     less.terms.erase(less.terms.begin() + static_cast<std::ptrdiff_t>(t));
     fitter.fit(less, 1);
     without.push_back(
-        {errors_of(judged.set(), predict(less, judged, asked, held_out_only, options.threads)).rmse_mm(),
+        {errors_of(judged.set(), forecast(less, judged, forecast_times, held_out_only, options.threads)).rmse_mm(),
          held_out_gain(after, less, judged, held_out_only, options.threads)});
   }
   contract["effects"] = effects_of(found, without, errors_before.rmse_mm(), errors_after.rmse_mm());
@@ -306,8 +307,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   // Lines that disc centres do not cross. A side without an entry has no wall.
   contract["walls"] = json::object();
   for (const auto& [side, at_mm] :
-       {std::pair{"x_low_mm", after.room.x_low_mm}, std::pair{"x_high_mm", after.room.x_high_mm},
-        std::pair{"y_low_mm", after.room.y_low_mm}, std::pair{"y_high_mm", after.room.y_high_mm}}) {
+       {std::pair{"x_low_mm", after.walls.x_low_mm}, std::pair{"x_high_mm", after.walls.x_high_mm},
+        std::pair{"y_low_mm", after.walls.y_low_mm}, std::pair{"y_high_mm", after.walls.y_high_mm}}) {
     if (std::isfinite(at_mm)) contract["walls"][side] = at_mm;
   }
   document["set"] = describe_set(train, test, held_out_only);
@@ -338,10 +339,11 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   say_progress(0.92, "errors over the horizon");
   json& curve = document["horizon"];
   for (const double ahead_s : {1.0, 2.0, 5.0, 10.0, 15.0, 20.0}) {
-    const Asked at{20, 10, ahead_s};
+    const ForecastTimes at{20, 10, ahead_s};
     const PredictionErrors was =
-        errors_of(judged.set(), predict(before, judged, at, held_out_only, options.threads));
-    const PredictionErrors is = errors_of(judged.set(), predict(after, judged, at, held_out_only, options.threads));
+        errors_of(judged.set(), forecast(before, judged, at, held_out_only, options.threads));
+    const PredictionErrors is =
+        errors_of(judged.set(), forecast(after, judged, at, held_out_only, options.threads));
     curve["at_s"].push_back(ahead_s);
     curve["before_mm"].push_back(was.rmse_mm());
     curve["after_mm"].push_back(is.rmse_mm());
@@ -352,10 +354,10 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   document["covariate_plots"] = covariate_plots(left_before, left_after);
   document["maps"] = maps(left_before, left_after);
   out.model = proto_of(after);
-  say_progress(0.95, "the written model in the simulator");
+  say_progress(0.95, "simulation check");
   const proto::Model written_before = proto_of(before);
-  const json simulated = simulated_check({before, written_before}, {after, out.model}, other ? *other : prepared,
-                                         held_out_only, options.threads);
+  const json simulated = simulation_check({before, written_before}, {after, out.model}, other ? *other : prepared,
+                                          held_out_only, options.threads);
   for (const auto& [part, content] : simulated.items()) (part == "simulated" ? contract : document)[part] = content;
   document["seconds"]["all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   out.document = std::move(document);

@@ -46,7 +46,7 @@ namespace kilotwin::identify {
 struct Options {
   double horizon_s = 10;
   std::uint32_t threads = 2;
-  bool trace = true;  ///< false: the base model only
+  bool find_effects = true;  ///< false: the base model only
   /// Progress, 0..1, and the present step.
   std::function<void(double, const std::string&)> progress;
 };

@@ -1,4 +1,4 @@
-// Faults of the data are found, named and excluded; where there are none, none is found.
+// Faults of the data are found, named and excluded. No false alarms.
 #include "clients/identify/data/data_faults.hpp"
 
 #include <gtest/gtest.h>
@@ -53,8 +53,8 @@ std::vector<DataFault> only(const std::vector<DataFault>& faults, Kind kind) {
   return out;
 }
 
-TEST(DataFaults, NoneIsFoundWhereNoneIs) {
-  // 300 sets of all kinds without any fault: with a false alarm rate of 1 % three would be expected.
+TEST(DataFaults, NoFalseAlarms) {
+  // 300 sets of all kinds without a fault: a false alarm rate of 1 % would give three.
   std::size_t alarms = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     MeasuredSet set = set_of(truth::nothing_to_find(seed), seed);
@@ -67,7 +67,7 @@ TEST(DataFaults, NoneIsFoundWhereNoneIs) {
 }
 
 TEST(DataFaults, EffectsAreNoFaults) {
-  // Bumps of the camera and of the table make robots jump, crowds stop them, lenses bend their paths.
+  // Pushes displace robots, crowds stop them, lenses distort their paths: no faults.
   for (const std::string& name : truth::scenario_names()) {
     const truth::Scene scene = truth::scenario(name);
     if (!scene.faults.empty()) continue;
@@ -159,12 +159,13 @@ TEST(DataFaults, Outliers) {
   ASSERT_EQ(faults.size(), 1U);
   EXPECT_EQ(faults[0].run, "0");
   EXPECT_FALSE(faults[0].robot.has_value());
-  // Those nearer than a robot can go within two frames cannot be told: 15 to 20 mm of 15 to 300, and at tracks' ends.
+  // Outliers nearer than a robot moves within two frames are not detectable: 15 to 20 mm of 15 to 300, and at the
+  // ends of tracks.
   EXPECT_GT(static_cast<double>(faults[0].excluded), 0.85 * static_cast<double>(wrong));
   EXPECT_LE(faults[0].excluded, wrong);
 }
 
-TEST(DataFaults, ATrackerThatHolds) {
+TEST(DataFaults, AFrozenTracker) {
   MeasuredSet set = set_of(truth::scenario("frozen"));
   const auto faults = exclude_faults(set);
   ASSERT_EQ(faults.size(), 2U);

@@ -1,9 +1,8 @@
-// Judges `kilotwin identify`: plays the scenes of tests/identify/truth, has each identified, and prints the errors before and
-// after beside those of an oracle, whether causes were named, and what was found where nothing is. Ends with status 1 where
-// anything misses.
+// Evaluates `kilotwin identify` on the scenes of tests/identify/truth. Prints prediction errors before and after
+// beside those of an oracle, correctly named effects, and false findings. Exit status 1 if a criterion fails.
 // Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S]
 //              [--nothing N] [--jobs N] [SCENE|nothing:SEED]...
-// --robots, --runs and --seconds stand in place of a scene's own number of robots, of training runs and their length.
+// --robots, --runs and --seconds override a scene's number of robots, number of training runs and their duration.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -30,7 +29,7 @@ namespace fs = std::filesystem;
 using namespace kilotwin::truth;
 
 constexpr double kHorizon_s = 10;
-// The share of data sets without an effect in which something may be found.
+// Largest share of data sets without an effect that may have a finding.
 constexpr double kFalseAlarms = 0.01;
 
 struct Arguments {
@@ -38,9 +37,9 @@ struct Arguments {
   std::uint64_t seed = 1;
   fs::path keep;
   bool small = false;
-  int robots = 0;      ///< 0: as many as the scene has
-  int runs = 0;        ///< to train on; 0: as many as the scene has
-  double seconds = 0;  ///< of training runs; 0: as long as the scene's
+  int robots = 0;      ///< 0: the scene's
+  int runs = 0;        ///< training runs; 0: the scene's
+  double seconds = 0;  ///< of training runs; 0: the scene's
   int nothing = 0;
   int jobs = 1;
   std::vector<std::string> scenes;
@@ -56,7 +55,7 @@ int usage() {
   return 2;
 }
 
-/// A directory that goes with the object, unless it is to be kept.
+/// A directory that is removed with the object, unless kept.
 class Folder {
  public:
   explicit Folder(const fs::path& keep) : path_(keep), kept_(!keep.empty()) {
@@ -77,7 +76,7 @@ class Folder {
   bool kept_;
 };
 
-/// Half the robots and two thirds of the time: for a quick look.
+/// Half of the robots and three quarters of the time: a quick check.
 Scene smaller(Scene scene) {
   scene.robots = std::max(8, scene.robots / 2);
   scene.width_mm *= 0.75;
@@ -87,7 +86,7 @@ Scene smaller(Scene scene) {
   return scene;
 }
 
-/// With so many robots as closely together, and training runs so long.
+/// Overrides robots (at equal density), runs and duration.
 Scene resized(Scene scene, int robots, int runs, double seconds) {
   if (robots > 0) {
     const double wider = std::sqrt(robots / static_cast<double>(scene.robots));
@@ -100,7 +99,7 @@ Scene resized(Scene scene, int robots, int runs, double seconds) {
   return scene;
 }
 
-/// A scene by its name; "nothing:N" is the small one without an effect of that seed.
+/// A scene by name; "nothing:N" is the small scene without effect for seed N.
 Scene scene_of(const std::string& name) {
   return name.rfind("nothing:", 0) == 0 ? nothing_to_find(std::stoull(name.substr(8))) : scenario(name);
 }
@@ -160,7 +159,7 @@ void print_row(const Verdict& v) {
   std::fflush(stdout);
 }
 
-/// Runs `job(i)` for 0..count-1 on so many threads.
+/// Runs `job(i)` for 0..count-1 on `threads` threads.
 template <class Job> void share_out(int count, int threads, Job job) {
   std::atomic<int> next = 0;
   std::vector<std::jthread> crew;
@@ -171,7 +170,7 @@ template <class Job> void share_out(int count, int threads, Job job) {
   }
 }
 
-/// Returns how many scenes miss.
+/// Returns the number of failed scenes.
 int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   int misses = 0;
   std::mutex printing;
@@ -193,7 +192,7 @@ int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   return misses;
 }
 
-/// Returns in how many sets without an effect something was found, or nothing could be judged.
+/// Returns the number of sets without effect that had a finding or failed.
 int judge_nothing(const Arguments& arguments, const fs::path& folder) {
   int alarms = 0;
   std::mutex printing;
@@ -255,7 +254,7 @@ int main(int argc, char** argv) {
     const Folder folder(arguments.keep);
     bool good = true;
     if (!arguments.scenes.empty()) good = judge_scenes(arguments, folder.path()) == 0;
-    // With so few sets that the bound is below one, none may sound.
+    // With few sets the bound is below one: then no finding is allowed.
     if (arguments.nothing > 0)
       good = judge_nothing(arguments, folder.path()) <= kFalseAlarms * arguments.nothing && good;
     return good ? 0 : 1;

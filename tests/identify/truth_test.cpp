@@ -1,4 +1,4 @@
-// The test data against closed forms: what judges must itself be right.
+// The test data against closed forms: the reference itself must be right.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@
 namespace kilotwin::truth {
 namespace {
 
-/// Robots that drive straight all the time, alone.
+/// Single robots that drive straight.
 Scene straight_ahead() {
   Scene s;
   s.robots = 200;
@@ -39,19 +39,19 @@ TEST(Truth, SameSeedSameBits) {
   EXPECT_NE(a.test[0].samples[0].point.x, c.test[0].samples[0].point.x);
 }
 
-TEST(Truth, TurnsAboutTheWheelThatStands) {
+TEST(Truth, TurnsAboutTheWheelAtRest) {
   Scene scene = straight_ahead();
   Situation now;
   now.motion = Motion::kLeft;
   const Stance after = moved(scene, {}, {{0, 0}, 0}, now, 0.1, {1, 1});
   EXPECT_NEAR(after.heading_rad, 2.0 / 25, 1e-12);
-  // The left wheel stays at (0, 12.5): the axle's middle goes round it at that distance.
+  // The left wheel stays at (0, 12.5): the axle centre circles around it.
   EXPECT_NEAR(after.axle.x, 12.5 * std::sin(0.08), 1e-7);
   EXPECT_NEAR(after.axle.y, 12.5 - 12.5 * std::cos(0.08), 1e-7);
 }
 
-TEST(Truth, NoiseSpreadsAsItMust) {
-  // After T the distance gone varies by v^2 s^2 h T / 2 and the heading by 2 v^2 s^2 h T / w^2, h the step.
+TEST(Truth, NoiseHasItsVariance) {
+  // After T the distance has the variance v^2 s^2 h T / 2 and the heading 2 v^2 s^2 h T / w^2; h: the step.
   Scene scene = straight_ahead();
   scene.tracker_sd_mm = scene.heading_sd_rad = 0;
   const Play played = play(scene, 11);
@@ -60,14 +60,14 @@ TEST(Truth, NoiseSpreadsAsItMust) {
     square += std::pow(std::remainder(marks[4].heading_rad - marks[0].heading_rad, 2 * 3.14159265358979), 2);
   }
   const double expected = 2 * 100 * scene.factor_sd * scene.factor_sd * scene.step_s * 20 / (25 * 25);
-  // 200 robots tell a variance to 10 %; three of these standard deviations.
+  // 200 robots estimate a variance to 10 %; three standard deviations.
   EXPECT_NEAR(square / 200 / expected, 1, 0.3);
 }
 
-TEST(Truth, TheOracleIsAsGoodAsOneCanBe) {
-  // A robot whose stance is known drives straight for T: its expected place is its mean course, and around it the error is
-  // that of the integrated noise: along T v^2 q / 2, across v^2 T^3 (2 v^2 q / w^2) / 3, with q = s^2 h, and the tracked
-  // point ahead of the axle by a swings a further a times the heading's error.
+TEST(Truth, TheOracleReachesTheTheoreticalError) {
+  // A robot with known pose drives straight for T. Its expected position is the mean path; the error is that of
+  // the integrated noise: along T v^2 q / 2, across v^2 T^3 (2 v^2 q / w^2) / 3, with q = s^2 h. The tracked point
+  // at distance a ahead adds a times the heading error.
   Scene scene = straight_ahead();
   scene.tracker_sd_mm = 0.01;
   scene.heading_sd_rad = 0.001;
@@ -78,11 +78,12 @@ TEST(Truth, TheOracleIsAsGoodAsOneCanBe) {
   const double turn = 2 * v * v * q / (25 * 25);
   const double across = v * v * T * T * T * turn / 3 + a * v * T * T * turn + a * a * T * turn;
   const double along = 0.5 * v * v * q * T;
-  // 1000 predictions, five of a robot overlapping by half, tell an RMSE to about 3 %; 1 % more for 60 samples.
+  // 1000 predictions, of which five per robot overlap by half, estimate an RMSE to about 3 %; 1 % more for 60
+  // samples.
   EXPECT_NEAR(rmse / std::sqrt(across + along), 1, 0.1);
 }
 
-TEST(Truth, DiscsNeverOverlapAndStayInTheRoom) {
+TEST(Truth, DiscsNeverOverlapAndStayInTheArena) {
   const Scene scene = scenario("nothing-crowded");
   const Play played = play(scene, 2);
   for (const auto& run : played.train) {
@@ -99,8 +100,8 @@ TEST(Truth, DiscsNeverOverlapAndStayInTheRoom) {
   }
 }
 
-TEST(Truth, EveryEffectShowsInWhatTheOracleKnows) {
-  // Whoever knows the effects predicts better than one who knows all the rest, in every scene that has any.
+TEST(Truth, KnowledgeOfEffectsImprovesTheOracle) {
+  // In every scene with an effect, knowledge of the effects reduces the error.
   for (const std::string& name : scenario_names()) {
     Scene scene = scenario(name);
     if (scene.effects.empty()) continue;

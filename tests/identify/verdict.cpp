@@ -50,7 +50,7 @@ const char* word(Fault::Kind kind) {
   return kWords[static_cast<std::size_t>(kind)];
 }
 
-/// Whether a fault found is this one: its kind, its run, and a robot that it concerns, where it concerns one.
+/// Whether a found fault matches: kind, run, and an affected robot if there is one.
 bool is(const Fault& fault, const json& found) {
   if (found.value("kind", "") != word(fault.kind)) return false;
   const json run = found.value("run", json());

@@ -1,4 +1,4 @@
-// The judge is judged: it lets pass what is right, and nothing else.
+// The evaluation accepts correct results only.
 #include "tests/identify/verdict.hpp"
 
 #include <fmt/format.h>
@@ -23,7 +23,7 @@ class VerdictTest : public testing::Test {
   }
   ~VerdictTest() override { std::filesystem::remove_all(out_); }
 
-  /// Predictions off by these lengths along y, and a result of this text.
+  /// Predictions displaced by these lengths along y, and a result with this text.
   Verdict of(const Scene& scene, double before_mm, double after_mm, const std::string& result,
              std::size_t leave_out = 0) {
     std::ofstream csv(out_ / "predictions.csv");

@@ -16,9 +16,9 @@ namespace {
 
 constexpr double kLine_s = 0.5, kEvery_s = 1, kFirst_s = 3, kNear_s = 0.1;
 constexpr std::size_t kFewest = 4;
-/// Instants that a run's own values are blended with: those of all runs.
+/// Weight of the population's values in a run's own estimates, in instants.
 constexpr double kPrior = 6;
-/// A run tells what carries it if it has that many velocities, and their directions have no mean beyond that.
+/// A run determines the drift only with this many velocities whose directions nearly average out.
 constexpr std::size_t kFewestOnCircle = 12;
 constexpr double kOneWay = 0.7;
 constexpr std::size_t kFewestRuns = 4;
@@ -33,7 +33,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The line through rows first..last at `at_s`: place and slope.
+/// Least-squares line through rows first..last: value at `at_s`, and slope.
 std::pair<double, double> line(const std::vector<double>& t, const std::vector<double>& v, std::size_t first,
                                std::size_t last, double at_s) {
   double mean_t = 0, mean_v = 0, tt = 0, tv = 0;
@@ -50,21 +50,21 @@ std::pair<double, double> line(const std::vector<double>& t, const std::vector<d
   return {mean_v + slope * (at_s - mean_t), slope};
 }
 
-double speed_of(const RideInstant& i) { return std::hypot(i.vx_mm_s, i.vy_mm_s); }
+double speed_of(const BristleInstant& i) { return std::hypot(i.vx_mm_s, i.vy_mm_s); }
 
 struct RobotWay {
   std::size_t run;
-  std::complex<double> way, forward;  ///< front and back not told apart
+  std::complex<double> way, forward;  ///< unit vectors; forward: along the heading axis, without sign
   double speed;
 };
 
-/// The drift, in speeds, that leaves least of ways across headings: once with each run left out, as what runs say (jackknife
-/// pseudo-values).
-void carried_across(const std::vector<RobotWay>& all, std::vector<double>& xs, std::vector<double>& ys) {
+/// The drift, relative to speed, that minimises the velocity across the heading. Jackknife pseudo-values: one
+/// estimate per omitted run.
+void drift_across_headings(const std::vector<RobotWay>& all, std::vector<double>& xs, std::vector<double>& ys) {
   const auto fit = [&](std::size_t without) {
-    // The third: by how much the axis of headings is off, which goes with the side to which the robot drives.
+    // The third parameter is the offset of the heading axis; its sign follows the driving direction.
     Eigen::Vector3d left = Eigen::Vector3d::Zero();
-    constexpr double kLimit = 0.3;  // of the speed: beyond it the heading is wrong
+    constexpr double kLimit = 0.3;  // relative to the speed; larger values mean a wrong heading
     for (int iteration = 0; iteration < 10; ++iteration) {
       Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
       Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -93,7 +93,7 @@ void carried_across(const std::vector<RobotWay>& all, std::vector<double>& xs, s
   }
 }
 
-/// The chance that the mean of pairs is as far from 0 as it is, were the truth 0 (Hotelling; F with 2 and n - 2 degrees).
+/// p value of a zero mean of pairs (Hotelling's T^2: F with 2 and n - 2 degrees of freedom).
 double chance_of_mean(const std::vector<double>& xs, const std::vector<double>& ys) {
   const auto n = static_cast<Eigen::Index>(xs.size());
   if (n < 5) return 1;
@@ -109,8 +109,8 @@ double chance_of_mean(const std::vector<double>& xs, const std::vector<double>& 
   return std::pow(1 + 2 * f / (count - 2), -(count - 2) / 2);
 }
 
-/// Values of one run so far, blended with those of all runs.
-struct OwnPast {
+/// Estimates of one run from its past, shrunk towards the population.
+struct RunEstimates {
   std::vector<double> speeds;
   std::vector<std::complex<double>> ways;
   VelocityCircle circle;
@@ -119,15 +119,15 @@ struct OwnPast {
   std::complex<double> last_way = 0;
   double last_time_s = -std::numeric_limits<double>::infinity();
 
-  void add(const RideInstant& now, const RideModel& all, const RideEffects& effects) {
+  void add(const BristleInstant& now, const BristleModel& all, const BristleEffects& effects) {
     const std::complex<double> way(now.vx_mm_s, now.vy_mm_s);
     speeds.push_back(std::abs(way));
     if (speeds.size() > 20) speeds.erase(speeds.begin());
     ways.push_back(way);
-    circle = circle_through(ways, {all.drift_x, all.drift_y}, kPrior);
-    const bool carried = effects[static_cast<std::size_t>(RideEffect::kDrift)];
-    // Twice the angle: front and back are one.
-    mount += unit(2 * (std::arg(own_way(way, carried)) + now.axis_rad - all.sense_rad));
+    circle = fit_circle(ways, {all.drift_x, all.drift_y}, kPrior);
+    const bool drifting = effects[static_cast<std::size_t>(BristleEffect::kDrift)];
+    // Doubled angle: an axis has no sign.
+    mount += unit(2 * (std::arg(own_velocity(way, drifting)) + now.axis_rad - all.sense_rad));
     if (now.time_s - last_time_s < 1.5 * kEvery_s) {
       const double turned = std::arg(way * std::conj(last_way));
       if (std::abs(turned) < 1.2) {
@@ -138,33 +138,33 @@ struct OwnPast {
     last_way = way;
     last_time_s = now.time_s;
   }
-  /// Of a way, what is not the table's.
-  [[nodiscard]] std::complex<double> own_way(std::complex<double> way, bool carried) const {
-    return carried ? way - circle.drift * circle.speed_mm_s : way;
+  /// A velocity without the drift.
+  [[nodiscard]] std::complex<double> own_velocity(std::complex<double> way, bool drifting) const {
+    return drifting ? way - circle.drift * circle.speed_mm_s : way;
   }
-  [[nodiscard]] double own_speed(bool carried) const { return carried ? circle.speed_mm_s : median(speeds); }
+  [[nodiscard]] double own_speed(bool drifting) const { return drifting ? circle.speed_mm_s : median(speeds); }
   [[nodiscard]] double own_mount() const { return std::arg(mount + kPrior) / 2; }
   [[nodiscard]] double own_turn() const { return turn / (turns + kPrior); }
-  /// Where it goes, if nothing carries it.
-  [[nodiscard]] std::complex<double> direction(const RideInstant& now, const RideModel& all,
-                                               const RideEffects& on) const {
-    const auto has = [&](RideEffect effect) { return on[static_cast<std::size_t>(effect)]; };
-    const double measured = has(RideEffect::kAxis) ? now.axis_rad : now.heading_rad;
-    double heading = has(RideEffect::kSense) ? all.sense_rad - measured : measured;
-    if (has(RideEffect::kMount)) heading += own_mount();
+  /// Direction of motion without drift.
+  [[nodiscard]] std::complex<double> direction(const BristleInstant& now, const BristleModel& all,
+                                               const BristleEffects& on) const {
+    const auto has = [&](BristleEffect effect) { return on[static_cast<std::size_t>(effect)]; };
+    const double measured = has(BristleEffect::kAxis) ? now.axis_rad : now.heading_rad;
+    double heading = has(BristleEffect::kSense) ? all.sense_rad - measured : measured;
+    if (has(BristleEffect::kMount)) heading += own_mount();
     std::complex<double> forward = unit(heading);
-    const std::complex<double> way = own_way({now.vx_mm_s, now.vy_mm_s}, has(RideEffect::kDrift));
-    if (has(RideEffect::kAxis) && (way * std::conj(forward)).real() < 0) forward = -forward;
+    const std::complex<double> way = own_velocity({now.vx_mm_s, now.vy_mm_s}, has(BristleEffect::kDrift));
+    if (has(BristleEffect::kAxis) && (way * std::conj(forward)).real() < 0) forward = -forward;
     return forward;
   }
 };
 
 }  // namespace
 
-std::vector<RideInstant> instants_of(const std::vector<RiddenRun>& runs, double horizon_s) {
-  std::vector<RideInstant> all;
+std::vector<BristleInstant> instants_of(const std::vector<BristleRun>& runs, double horizon_s) {
+  std::vector<BristleInstant> all;
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    const RiddenRun& run = runs[r];
+    const BristleRun& run = runs[r];
     if (run.size() < 2) continue;
     for (double now_s = run.time_s.front() + kFirst_s; now_s + horizon_s < run.time_s.back(); now_s += kEvery_s) {
       const auto row = [&](double t) {
@@ -191,10 +191,10 @@ std::vector<RideInstant> instants_of(const std::vector<RiddenRun>& runs, double 
   return all;
 }
 
-RideModel::RideModel(const std::vector<RideInstant>& train) {
+BristleModel::BristleModel(const std::vector<BristleInstant>& train) {
   std::vector<double> speeds;
   std::complex<double> same = 0, turned = 0, same_axis = 0, turned_axis = 0;
-  for (const RideInstant& i : train) {
+  for (const BristleInstant& i : train) {
     const double way = std::atan2(i.vy_mm_s, i.vx_mm_s);
     speeds.push_back(speed_of(i));
     same += unit(way - i.heading_rad);
@@ -208,26 +208,26 @@ RideModel::RideModel(const std::vector<RideInstant>& train) {
   aligned_turned = std::abs(turned) / n;
   aligned_axis = std::abs(turned_axis) / n;
   sense_rad = std::arg(turned);
-  // What carries robots: the median over runs that went in many directions. Each run is one measurement.
+  // Drift: the median over runs whose directions average out. Each run is one observation.
   std::map<std::size_t, std::vector<std::complex<double>>> ways_of;
-  for (const RideInstant& i : train) ways_of[i.run].emplace_back(i.vx_mm_s, i.vy_mm_s);
+  for (const BristleInstant& i : train) ways_of[i.run].emplace_back(i.vx_mm_s, i.vy_mm_s);
   std::vector<double> xs, ys;
   for (const auto& [run, ways] : ways_of) {
-    const VelocityCircle circle = circle_through(ways, 0, 0.5);
-    if (ways.size() < kFewestOnCircle || circle.one_way > kOneWay || std::abs(circle.drift) > 1) continue;
+    const VelocityCircle circle = fit_circle(ways, 0, 0.5);
+    if (ways.size() < kFewestOnCircle || circle.prior_share > kOneWay || std::abs(circle.drift) > 1) continue;
     xs.push_back(circle.drift.real());
     ys.push_back(circle.drift.imag());
   }
   const bool across = xs.size() < kFewestRuns;
   if (across) {
-    // Runs that went one way each: what carries them shows across their headings.
+    // Runs with one direction each: their drift shows across the heading.
     std::vector<RobotWay> all;
-    for (const RideInstant& i : train) {
+    for (const BristleInstant& i : train) {
       std::vector<double> own;
       for (const std::complex<double>& way : ways_of[i.run]) own.push_back(std::abs(way));
       all.push_back({i.run, {i.vx_mm_s, i.vy_mm_s}, unit(sense_rad - i.axis_rad), median(own)});
     }
-    carried_across(all, xs, ys);
+    drift_across_headings(all, xs, ys);
   }
   drift_runs = xs.size();
   if (xs.empty()) return;
@@ -242,44 +242,44 @@ RideModel::RideModel(const std::vector<RideInstant>& train) {
   const auto runs = static_cast<double>(xs.size());
   drift_sd = xs.size() > 1 ? std::sqrt(spread / 2 / (runs - 1)) : 0;
   drift_p = chance_of_mean(xs, ys);
-  // Per axis; the standard error of a median is 1.25 that of a mean.
+  // Per axis. The standard error of a median is 1.25 times that of a mean.
   drift_se = xs.size() > 1 ? (across ? 1 : 1.25) * std::sqrt(spread / 2 / (runs - 1) / runs) : 1;
 }
 
-std::vector<RideModel::Place> RideModel::predict(const std::vector<RideInstant>& instants, double horizon_s,
-                                                 const RideEffects& on) const {
-  const auto has = [&](RideEffect effect) { return on[static_cast<std::size_t>(effect)]; };
+std::vector<BristleModel::Place> BristleModel::predict(const std::vector<BristleInstant>& instants,
+                                                       double horizon_s, const BristleEffects& on) const {
+  const auto has = [&](BristleEffect effect) { return on[static_cast<std::size_t>(effect)]; };
   std::vector<Place> places;
-  OwnPast past;
+  RunEstimates past;
   std::size_t run = SIZE_MAX;
-  for (const RideInstant& now : instants) {
+  for (const BristleInstant& now : instants) {
     if (now.run != run) past = {};
     run = now.run;
     past.add(now, *this, on);
-    const double speed = has(RideEffect::kSpeed) ? past.own_speed(has(RideEffect::kDrift)) : speed_mm_s;
+    const double speed = has(BristleEffect::kSpeed) ? past.own_speed(has(BristleEffect::kDrift)) : speed_mm_s;
     std::complex<double> way = speed * horizon_s * past.direction(now, *this, on);
-    if (has(RideEffect::kTurn)) {
+    if (has(BristleEffect::kTurn)) {
       // Along an arc.
       const double turn = past.own_turn() * horizon_s;
       if (std::abs(turn) > 1e-6) way *= (unit(turn) - 1.0) / (kI * turn);
     }
-    if (has(RideEffect::kDrift)) way += speed * horizon_s * past.circle.drift;
+    if (has(BristleEffect::kDrift)) way += speed * horizon_s * past.circle.drift;
     places.push_back({now.x_mm + way.real(), now.y_mm + way.imag()});
   }
   return places;
 }
 
-std::vector<RideSummary> summaries_of(const RideModel& model, const std::vector<RiddenRun>& runs,
-                                      const std::vector<RideInstant>& instants) {
-  RideEffects all;
+std::vector<BristleSummary> summaries_of(const BristleModel& model, const std::vector<BristleRun>& runs,
+                                         const std::vector<BristleInstant>& instants) {
+  BristleEffects all;
   all.fill(true);
-  std::vector<OwnPast> pasts(runs.size());
+  std::vector<RunEstimates> pasts(runs.size());
   std::vector<std::vector<double>> speeds(runs.size());
-  for (const RideInstant& now : instants) {
+  for (const BristleInstant& now : instants) {
     pasts[now.run].add(now, model, all);
     speeds[now.run].push_back(speed_of(now));
   }
-  std::vector<RideSummary> summaries;
+  std::vector<BristleSummary> summaries;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     if (speeds[r].empty()) continue;
     const VelocityCircle& circle = pasts[r].circle;

@@ -1,4 +1,4 @@
-/// How a robot that is always on goes, and what a base model without knowledge of the table and the tracker leaves out.
+/// Motion of robots with constantly driven motors on a bristle plate, and effects of table and tracker on it.
 #pragma once
 
 #include <array>
@@ -9,60 +9,62 @@
 
 namespace kilotwin::bristle {
 
-/// What may be added to the base model, which goes straight where the tracker says it heads, all runs at one speed.
-enum class RideEffect : std::uint8_t {
-  kSense,  ///< the tracker counts headings the other way round, and from another axis
-  kMount,  ///< ... and from an axis of each robot's own
-  kAxis,   ///< it takes the front for the back at times
-  kSpeed,  ///< each run has a speed of its own
-  kDrift,  ///< something carries the robot along an axis of the room, in proportion to its speed
-  kTurn,   ///< each run has a turn rate of its own
+/// Effects that may be added to the base model. The base model drives straight along the measured heading, with
+/// one speed for all runs.
+enum class BristleEffect : std::uint8_t {
+  kSense,  ///< the tracker's headings run clockwise and have an offset
+  kMount,  ///< the offset differs between robots
+  kAxis,   ///< the tracker sometimes confuses front and back
+  kSpeed,  ///< speed per run
+  kDrift,  ///< drift along an axis of the world, proportional to the speed
+  kTurn,   ///< turn rate per run
 };
-inline constexpr std::size_t kRideEffects = 6;
-using RideEffects = std::array<bool, kRideEffects>;
+inline constexpr std::size_t kBristleEffects = 6;
+using BristleEffects = std::array<bool, kBristleEffects>;
 
-/// What is known of a run at one instant, from its past alone, and where it was a horizon later.
-struct RideInstant {
+/// Observations of a run at one instant, from its past only, and the position one horizon later.
+struct BristleInstant {
   std::size_t run;                      ///< index
-  double time_s;                        ///< of what is predicted
+  double time_s;                        ///< of the prediction
   double x_mm, y_mm, vx_mm_s, vy_mm_s;  ///< by a line through the last half second
-  double heading_rad;                   ///< as measured: mean over it
-  double axis_rad;                      ///< the same, front and back not told apart
+  double heading_rad;                   ///< as measured, mean over half a second
+  double axis_rad;                      ///< axis of the heading, without sign
   double later_x_mm, later_y_mm;
 };
 
-class RideModel {
+class BristleModel {
  public:
-  /// Fits what is common to all runs to instants of runs. Each run's own values come from its past.
-  explicit RideModel(const std::vector<RideInstant>& train);
+  /// Fits the population parameters. Parameters of single runs follow from their past.
+  explicit BristleModel(const std::vector<BristleInstant>& train);
 
   struct Place {
     double x_mm, y_mm;
   };
-  /// Predictions for instants, which stand in order of time within each run.
-  [[nodiscard]] std::vector<Place> predict(const std::vector<RideInstant>&, double horizon_s,
-                                           const RideEffects&) const;
+  /// Predictions for instants, which must ascend in time within each run.
+  [[nodiscard]] std::vector<Place> predict(const std::vector<BristleInstant>&, double horizon_s,
+                                           const BristleEffects&) const;
 
   double speed_mm_s = 0;            ///< median
   double sense_rad = 0;             ///< heading = sense_rad - measured heading
-  double drift_x = 0, drift_y = 0;  ///< of the speed, in the median over runs that went in many directions
-  double drift_se = 1;              ///< of either, by the spread of these runs
+  double drift_x = 0, drift_y = 0;  ///< relative to the speed; median over runs whose directions average out
+  double drift_se = 1;              ///< per axis, by the spread of these runs
   std::size_t drift_runs = 0;
-  double drift_sd = 0;  ///< between runs, of either
-  double drift_p = 1;   ///< chance of a mean as far from 0 over these runs, were it 0 (Hotelling)
+  double drift_sd = 0;  ///< between runs, per axis
+  double drift_p = 1;   ///< p value of zero mean drift over these runs (Hotelling)
   double aligned = 0,
-         aligned_turned = 0;  ///< 0..1: how well the way goes with the heading as measured, and the other way round
-  double aligned_axis = 0;    ///< the same where front and back are not told apart
+         /// 0..1: alignment of the motion with the measured heading, and with the reversed sense of rotation
+      aligned_turned = 0;
+  double aligned_axis = 0;  ///< the same for the axis without sign
 };
 
-[[nodiscard]] std::vector<RideInstant> instants_of(const std::vector<RiddenRun>&, double horizon_s);
+[[nodiscard]] std::vector<BristleInstant> instants_of(const std::vector<BristleRun>&, double horizon_s);
 
-/// What a run says of itself: for the table of runs.
-struct RideSummary {
+/// Estimates of one run, for the table of runs.
+struct BristleSummary {
   std::string run;
   double speed_mm_s, drift_x_mm_s, drift_y_mm_s, turn_rad_s, mount_rad;
 };
-[[nodiscard]] std::vector<RideSummary> summaries_of(const RideModel&, const std::vector<RiddenRun>&,
-                                                    const std::vector<RideInstant>&);
+[[nodiscard]] std::vector<BristleSummary> summaries_of(const BristleModel&, const std::vector<BristleRun>&,
+                                                       const std::vector<BristleInstant>&);
 
 }  // namespace kilotwin::bristle

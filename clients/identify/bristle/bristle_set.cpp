@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kColumns[] = {"run", "robot", "time_s", "x_mm", "y_mm", "heading_rad"};
-/// Faster than any of them was seen to go, mm/s, and what a frame adds.
+/// Largest plausible speed, mm/s, slack per frame, and the gap after which any position is plausible.
 constexpr double kFastest_mm_s = 700, kSlack_mm = 5, kForgotten_s = 1;
 
 std::vector<fs::path> files_of(const fs::path& directory) {
@@ -28,7 +28,7 @@ std::vector<fs::path> files_of(const fs::path& directory) {
 
 }  // namespace
 
-bool has_ridden_runs(const fs::path& directory) {
+bool has_bristle_runs(const fs::path& directory) {
   const std::vector<fs::path> files = files_of(directory);
   for (const fs::path& file : files) {
     const std::string name = file.filename().string();
@@ -41,34 +41,34 @@ bool has_ridden_runs(const fs::path& directory) {
   return !files.empty();
 }
 
-std::vector<RiddenRun> read_ridden_runs(const fs::path& directory) {
-  std::map<std::string, RiddenRun> runs;
+std::vector<BristleRun> read_bristle_runs(const fs::path& directory) {
+  std::map<std::string, BristleRun> runs;
   for (const fs::path& file : files_of(directory)) {
     CsvReader reader(file);
     std::size_t at[6];
     for (std::size_t c = 0; c < 6; ++c) at[c] = reader.column(kColumns[c]);
     while (reader.next()) {
-      RiddenRun& run = runs[std::string(reader.text(at[0]))];
+      BristleRun& run = runs[std::string(reader.text(at[0]))];
       run.robot = reader.whole(at[1]);
       const double time_s = reader.number(at[2]);
       if (!run.time_s.empty() && time_s <= run.time_s.back())
-        reader.complain(at[2], "time does not go on within the run; sort the rows of a run by time");
+        reader.complain(at[2], "the time is not after that of the previous row; sort the rows of a run by time");
       run.time_s.push_back(time_s);
       run.x_mm.push_back(reader.number(at[3]));
       run.y_mm.push_back(reader.number(at[4]));
       run.heading_rad.push_back(reader.number(at[5]));
     }
   }
-  std::vector<RiddenRun> all;
+  std::vector<BristleRun> all;
   for (auto& [name, run] : runs) {
     run.name = name;
-    drop_jumps(run);
+    drop_implausible_rows(run);
     all.push_back(std::move(run));
   }
   return all;
 }
 
-void drop_jumps(RiddenRun& run) {
+void drop_implausible_rows(BristleRun& run) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < run.size(); ++i) {
     if (kept > 0) {

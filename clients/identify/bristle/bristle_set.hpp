@@ -1,6 +1,6 @@
-/// Tracks of robots whose motors are always on and that no program steers, such as a Kilobot that rides a bristle plate: files
-/// `NAME.csv` or `NAME.csv.gz` with the columns run, robot, time_s, x_mm, y_mm, heading_rad and no commands. Each run has its own
-/// power and its own table.
+/// Bristle plate tracks: robots with constantly driven motors and without commands, such as a Kilobot on a bristle
+/// plate. Files `NAME.csv` or `NAME.csv.gz` with the columns run, robot, time_s, x_mm, y_mm, heading_rad. Each run
+/// has its own power and table.
 #pragma once
 
 #include <cstdint>
@@ -10,20 +10,20 @@
 
 namespace kilotwin::bristle {
 
-struct RiddenRun {
+struct BristleRun {
   std::string name;
   std::uint32_t robot = 0;
-  std::vector<double> time_s, x_mm, y_mm, heading_rad;  ///< heading as the tracker says it
-  std::size_t dropped = 0;                              ///< rows that lay where the robot cannot have been
+  std::vector<double> time_s, x_mm, y_mm, heading_rad;  ///< heading as the tracker reports it
+  std::size_t dropped = 0;                              ///< rows with implausible positions
 
   [[nodiscard]] std::size_t size() const { return time_s.size(); }
 };
 
-/// Whether the directory holds such files and nothing else that is a CSV file.
-[[nodiscard]] bool has_ridden_runs(const std::filesystem::path& directory);
+/// Whether all CSV files of the directory are of this kind.
+[[nodiscard]] bool has_bristle_runs(const std::filesystem::path& directory);
 /// All runs of all files, by name. Throws UserError with file, line and column.
-[[nodiscard]] std::vector<RiddenRun> read_ridden_runs(const std::filesystem::path& directory);
-/// Takes out rows to which the robot would have had to jump.
-void drop_jumps(RiddenRun&);
+[[nodiscard]] std::vector<BristleRun> read_bristle_runs(const std::filesystem::path& directory);
+/// Removes rows with positions that no robot can reach.
+void drop_implausible_rows(BristleRun&);
 
 }  // namespace kilotwin::bristle

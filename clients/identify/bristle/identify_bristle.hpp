@@ -1,5 +1,5 @@
-/// The measured-data loop for robots that are always on: which of a few effects their tracks show, and by how much the error on
-/// runs held out falls. Writes the document of identify/identify.hpp.
+/// Identification from bristle plate tracks: selects effects of table and tracker, and evaluates predictions on
+/// held-out runs. Returns the document of clients/identify/identify.hpp.
 #pragma once
 
 #include "clients/identify/bristle/bristle_set.hpp"
@@ -7,8 +7,8 @@
 
 namespace kilotwin::bristle {
 
-/// `test` empty: every fourth run of `train` is held out.
-[[nodiscard]] identify::Identified identify_ridden(std::vector<RiddenRun> train, std::vector<RiddenRun> test,
-                                                   const identify::Options&);
+/// `test` empty: holds out every fourth run of `train`.
+[[nodiscard]] identify::Identified identify_bristle(std::vector<BristleRun> train, std::vector<BristleRun> test,
+                                                    const identify::Options&);
 
 }  // namespace kilotwin::bristle

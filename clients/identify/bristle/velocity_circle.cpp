@@ -16,20 +16,20 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-VelocityCircle circle_through(std::span<const std::complex<double>> velocities, std::complex<double> believed,
-                              double instants) {
+VelocityCircle fit_circle(std::span<const std::complex<double>> velocities, std::complex<double> prior_drift,
+                          double instants) {
   VelocityCircle circle;
-  if (velocities.empty()) return {believed, 0, 1};
+  if (velocities.empty()) return {prior_drift, 0, 1};
   std::vector<double> sizes, off(velocities.size());
   std::complex<double> directions = 0;
   for (const std::complex<double>& v : velocities) {
     sizes.push_back(std::abs(v));
     if (std::abs(v) > 0) directions += v / std::abs(v);
   }
-  circle.one_way = std::abs(directions) / static_cast<double>(velocities.size());
+  circle.prior_share = std::abs(directions) / static_cast<double>(velocities.size());
   double radius = std::max(median(sizes), 1e-9);
-  std::complex<double> centre = believed * radius;
-  // Gauss-Newton on the distances from the circle, weights falling beyond 1.5 standard deviations (Huber).
+  std::complex<double> centre = prior_drift * radius;
+  // Gauss-Newton on the distances from the circle, with Huber weights beyond 1.5 standard deviations.
   constexpr int kIterations = 15;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     for (std::size_t i = 0; i < velocities.size(); ++i)
@@ -45,8 +45,8 @@ VelocityCircle circle_through(std::span<const std::complex<double>> velocities, 
       normal += weight * slope * slope.transpose();
       gradient += weight * residual * slope;
     }
-    // Each velocity of a full circle says half about either coordinate of the centre.
-    const std::complex<double> off_belief = centre - believed * radius;
+    // On a full circle each velocity contributes half an observation of each centre coordinate.
+    const std::complex<double> off_belief = centre - prior_drift * radius;
     normal(0, 0) += instants / 2;
     normal(1, 1) += instants / 2;
     gradient(0) += instants / 2 * off_belief.real();

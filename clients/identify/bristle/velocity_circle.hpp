@@ -1,5 +1,5 @@
-/// What carries a robot that turns about: its velocities lie on a circle, whose radius is its own speed and whose centre is what
-/// it is carried by. No heading is needed for it.
+/// Drift of a turning robot: its velocities form a circle. The radius is its own speed, the centre is the drift.
+/// Headings are not needed.
 #pragma once
 
 #include <complex>
@@ -10,12 +10,11 @@ namespace kilotwin::bristle {
 struct VelocityCircle {
   std::complex<double> drift = 0;  ///< the centre, in radii
   double speed_mm_s = 0;           ///< the radius
-  double one_way =
-      1;  ///< 0: it went in all directions alike; 1: in one only, and the drift is what was believed before
+  double prior_share = 1;  ///< 0: directions cover the circle; 1: a single direction, so the drift is the prior's
 };
 
-/// Through velocities in mm/s, outliers counting less. `believed`: the drift that `instants` further velocities would say.
-[[nodiscard]] VelocityCircle circle_through(std::span<const std::complex<double>> velocities,
-                                            std::complex<double> believed, double instants);
+/// Robust circle fit through velocities in mm/s. `believed`: prior drift with the weight of `instants` velocities.
+[[nodiscard]] VelocityCircle fit_circle(std::span<const std::complex<double>> velocities,
+                                        std::complex<double> prior_drift, double instants);
 
 }  // namespace kilotwin::bristle

@@ -14,23 +14,23 @@ void CommandState::advance(double by_s) {
   since_rest_s = driven() ? since_rest_s + by_s : 0;
 }
 
-double CommandState::remembered_s(std::size_t forget, std::size_t motor) const {
-  const double span_s = kForget_s[forget], kept = std::exp(-since_s / span_s);
+double CommandState::discounted_s(std::size_t decay_index, std::size_t motor) const {
+  const double span_s = kDecayTimes_s[decay_index], kept = std::exp(-since_s / span_s);
   const bool on = motor == 0 ? left_on() : motor == 1 ? right_on() : driven();
-  return left_s[forget][motor] * kept + (on ? span_s * (1 - kept) : 0);
+  return initial_discounted_s[decay_index][motor] * kept + (on ? span_s * (1 - kept) : 0);
 }
 
 CommandClock::CommandClock(const Track& track) {
   CommandState state;
-  auto left = state.left_s;
+  auto left = state.initial_discounted_s;
   double now_s = 0;
   for (const CommandChange& change : track.commands) {
     const double at_s = std::max(change.time_s, 0.0);
     if (!starts_s_.empty()) state.advance(at_s - now_s);
     now_s = at_s;
-    for (std::size_t f = 0; f < kForget_s.size(); ++f)
-      for (std::size_t motor = 0; motor < 3; ++motor) left[f][motor] = state.remembered_s(f, motor);
-    state.left_s = left;
+    for (std::size_t f = 0; f < kDecayTimes_s.size(); ++f)
+      for (std::size_t motor = 0; motor < 3; ++motor) left[f][motor] = state.discounted_s(f, motor);
+    state.initial_discounted_s = left;
     state.first = starts_s_.empty() || starts_s_.front() == at_s;
     state.previous_lasted_s = state.first ? 0 : state.since_s;
     state.previous = state.command;

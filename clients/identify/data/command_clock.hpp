@@ -11,7 +11,7 @@ namespace kilotwin::identify {
 
 /// Time constants, s, of exponentially discounted motor-on time (a motor that cools down, a battery that
 /// recovers): weight exp(-age / constant).
-inline constexpr std::array<double, 4> kForget_s = {5, 15, 40, 120};
+inline constexpr std::array<double, 4> kDecayTimes_s = {5, 15, 40, 120};
 
 /// The command of a robot at an instant, and its history.
 struct CommandState {
@@ -23,15 +23,15 @@ struct CommandState {
   double driven_s = 0;                     ///< time for which either motor was on
   double since_rest_s = 0;                 ///< time for which either motor was on without a rest of both
   /// Discounted motor-on times [time constant][left, right, either] at the start of the command.
-  std::array<std::array<double, 3>, kForget_s.size()> left_s = {};
+  std::array<std::array<double, 3>, kDecayTimes_s.size()> initial_discounted_s = {};
 
   [[nodiscard]] bool driven() const { return command != Motion::kStop; }
   [[nodiscard]] bool left_on() const { return command == Motion::kStraight || command == Motion::kRight; }
   [[nodiscard]] bool right_on() const { return command == Motion::kStraight || command == Motion::kLeft; }
   /// Advances by `by_s` under the same command.
   void advance(double by_s);
-  /// Discounted motor-on time, s, for kForget_s[forget] and a motor: 0 left, 1 right, 2 either.
-  [[nodiscard]] double remembered_s(std::size_t forget, std::size_t motor) const;
+  /// Discounted motor-on time, s, for kDecayTimes_s[forget] and a motor: 0 left, 1 right, 2 either.
+  [[nodiscard]] double discounted_s(std::size_t decay_index, std::size_t motor) const;
 };
 
 /// The commands of a track as a piecewise constant function of time.

@@ -19,21 +19,22 @@ constexpr double kStep_s = 0.4;
 // segments, total gain, and shift of the run's end.
 constexpr double kClockGainShare = 0.08, kClockGain = 60, kClockShift_s = 3;
 // Upper bound on the robots of a run whose tracks are used to estimate its clock rate.
-constexpr std::size_t kWitnesses = 16;
+constexpr std::size_t kClockTracks = 16;
 
-struct Witness {
+struct ClockTrack {
   const Track* track;
-  std::vector<Deed> deeds;
+  std::vector<MotionSegment> segments;
 };
 
 /// Log-likelihood of all motion segments before `until_s` (stamped time) if stamped time is `rate` times true
 /// time.
-double of_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told, double rate, double until_s) {
+double of_rate(const std::vector<ClockTrack>& clock_tracks, const CommandResponse& response, double rate,
+               double until_s) {
   double sum = 0;
-  for (const Witness& w : witnesses) {
-    for (const Deed& deed : w.deeds) {
-      if (deed.time_s > until_s) break;
-      sum += told.log_likelihood(deed, told_at(*w.track, deed.time_s / rate));
+  for (const ClockTrack& w : clock_tracks) {
+    for (const MotionSegment& segment : w.segments) {
+      if (segment.time_s > until_s) break;
+      sum += response.log_likelihood(segment, command_at(*w.track, segment.time_s / rate));
     }
   }
   return sum;
@@ -41,13 +42,13 @@ double of_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told, d
 
 /// Maximum-likelihood clock rate: a coarse grid over the beginning of the run, then finer grids over longer
 /// intervals.
-double best_rate(const std::vector<Witness>& witnesses, const ToldAndDone& told, double end_s) {
+double best_rate(const std::vector<ClockTrack>& clock_tracks, const CommandResponse& response, double end_s) {
   double low = kSlowestClock, high = kFastestClock, best = 1;
   for (double until_s = std::min(60.0, end_s);; until_s = std::min(2 * until_s, end_s)) {
     const double step = kStep_s / until_s;
     double best_sum = -1e300;
     for (double rate = low; rate <= high + 0.5 * step; rate += step) {
-      const double sum = of_rate(witnesses, told, rate, until_s);
+      const double sum = of_rate(clock_tracks, response, rate, until_s);
       if (sum > best_sum) {
         best_sum = sum;
         best = rate;
@@ -77,27 +78,28 @@ struct Gain {
 };
 
 /// Gain in log-likelihood of each motion segment if `track` followed the commands of `other`.
-std::vector<Gain> gains(const std::vector<Deed>& deeds, const Track& track, const Track& other,
-                        const ToldAndDone& told) {
+std::vector<Gain> gains(const std::vector<MotionSegment>& segments, const Track& track, const Track& other,
+                        const CommandResponse& response) {
   std::vector<Gain> out;
-  for (const Deed& deed : deeds) {
-    const Motion own = told_at(track, deed.time_s), others = told_at(other, deed.time_s);
-    const double gain = own == others ? 0 : told.log_likelihood(deed, others) - told.log_likelihood(deed, own);
-    out.push_back({deed.time_s, gain});
+  for (const MotionSegment& segment : segments) {
+    const Motion own = command_at(track, segment.time_s), others = command_at(other, segment.time_s);
+    const double gain =
+        own == others ? 0 : response.log_likelihood(segment, others) - response.log_likelihood(segment, own);
+    out.push_back({segment.time_s, gain});
   }
   return out;
 }
 
-struct Stretch {
+struct TimeInterval {
   double gain = 0, from_s = 0, to_s = 0;
   std::size_t count = 0;
 };
 
 /// The time interval with the largest total gain (maximum subarray).
-Stretch best_stretch(std::vector<Gain> of_both) {
+TimeInterval best_interval(std::vector<Gain> of_both) {
   std::stable_sort(of_both.begin(), of_both.end(),
                    [](const Gain& a, const Gain& b) { return a.time_s < b.time_s; });
-  Stretch best, now;
+  TimeInterval best, now;
   for (const Gain& g : of_both) {
     if (now.gain <= 0) now = {0, g.time_s, g.time_s, 0};
     now.gain += g.gain;
@@ -148,14 +150,14 @@ double gain_between(const std::vector<Gain>& gains, double from_s, double to_s) 
 }
 
 /// Numbers exchanged during a run, detected by position.
-void exclude_exchanges(Run& run, const ToldAndDone& told, std::vector<DataFault>& faults) {
+void exclude_exchanges(Run& run, const CommandResponse& response, std::vector<DataFault>& faults) {
   for (std::size_t a = 0; a < run.tracks.size(); ++a) {
     for (std::size_t b = a + 1; b < run.tracks.size(); ++b) {
       Track &first = run.tracks[a], &second = run.tracks[b];
       std::vector<double> times = exchanges(first, second);
       if (times.empty()) continue;
-      std::vector<Gain> both = gains(deeds_of(first), first, second, told);
-      const std::vector<Gain> of_second = gains(deeds_of(second), second, first, told);
+      std::vector<Gain> both = gains(segments_of(first), first, second, response);
+      const std::vector<Gain> of_second = gains(segments_of(second), second, first, response);
       both.insert(both.end(), of_second.begin(), of_second.end());
       // Every second interval is wrong: the intervals whose likelihood rises by the exchange. If the commands are
       // not informative, the second, the fourth...
@@ -180,18 +182,18 @@ void exclude_exchanges(Run& run, const ToldAndDone& told, std::vector<DataFault>
 /// Gain of each track of a run, over its best interval, by the commands of each other track.
 class OthersCommands {
  public:
-  OthersCommands(const Run& run, const ToldAndDone& told) : run_(run), told_(told) {
-    for (const Track& track : run.tracks) deeds_.push_back(deeds_of(track));
+  OthersCommands(const Run& run, const CommandResponse& response) : run_(run), response_(response) {
+    for (const Track& track : run.tracks) segments_.push_back(segments_of(track));
     gains_.assign(run.tracks.size(), std::vector<double>(run.tracks.size()));
     for (std::size_t a = 0; a < run.tracks.size(); ++a) look_at(a);
   }
   /// Recomputes the gains of a track after samples were excluded.
   void look_again(std::size_t a) {
-    deeds_[a] = deeds_of(run_.tracks[a]);
+    segments_[a] = segments_of(run_.tracks[a]);
     look_at(a);
   }
   [[nodiscard]] std::vector<Gain> of(std::size_t a, std::size_t b) const {
-    return gains(deeds_[a], run_.tracks[a], run_.tracks[b], told_);
+    return gains(segments_[a], run_.tracks[a], run_.tracks[b], response_);
   }
   /// Whether track `a` follows the commands of `b`, and those of no third robot.
   [[nodiscard]] bool is_like(std::size_t a, std::size_t b) const {
@@ -204,20 +206,20 @@ class OthersCommands {
  private:
   void look_at(std::size_t a) {
     for (std::size_t b = 0; b < gains_.size(); ++b)
-      if (b != a) gains_[a][b] = best_stretch(of(a, b)).gain;
+      if (b != a) gains_[a][b] = best_interval(of(a, b)).gain;
   }
 
   const Run& run_;
-  const ToldAndDone& told_;
-  std::vector<std::vector<Deed>> deeds_;
+  const CommandResponse& response_;
+  std::vector<std::vector<MotionSegment>> segments_;
   std::vector<std::vector<double>> gains_;  ///< [track][track whose commands are used]
 };
 
 /// Numbers exchanged from the start or during a gap, detected by the commands.
-void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFault>& faults) {
-  OthersCommands others(run, told);
+void exclude_by_commands(Run& run, const CommandResponse& response, std::vector<DataFault>& faults) {
+  OthersCommands others(run, response);
   while (true) {
-    Stretch best;
+    TimeInterval best;
     std::size_t first = 0, second = 0;
     for (std::size_t a = 0; a < run.tracks.size(); ++a) {
       for (std::size_t b = a + 1; b < run.tracks.size(); ++b) {
@@ -226,11 +228,11 @@ void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFaul
         std::vector<Gain> both = others.of(a, b);
         const std::vector<Gain> of_b = others.of(b, a);
         both.insert(both.end(), of_b.begin(), of_b.end());
-        const Stretch stretch = best_stretch(std::move(both));
-        if (stretch.count < kFewestSwapped || stretch.gain < kSwapGainEach * static_cast<double>(stretch.count))
+        const TimeInterval interval = best_interval(std::move(both));
+        if (interval.count < kFewestSwapped || interval.gain < kSwapGainEach * static_cast<double>(interval.count))
           continue;
-        if (stretch.gain <= std::max(best.gain, kSwapGain)) continue;
-        best = stretch;
+        if (interval.gain <= std::max(best.gain, kSwapGain)) continue;
+        best = interval;
         first = a;
         second = b;
       }
@@ -251,25 +253,25 @@ void exclude_by_commands(Run& run, const ToldAndDone& told, std::vector<DataFaul
 }  // namespace
 
 void exclude_wrong_clocks(MeasuredSet& set, std::vector<DataFault>& faults) {
-  const ToldAndDone told(set);
-  if (!told.tells()) return;
+  const CommandResponse response(set);
+  if (!response.distinguishes_commands()) return;
   for (Run& run : set.runs) {
-    std::vector<Witness> witnesses;
+    std::vector<ClockTrack> clock_tracks;
     double begin_s = 1e300, end_s = 0;
-    std::size_t deeds = 0, samples = 0;
+    std::size_t segments = 0, samples = 0;
     for (const Track& track : run.tracks) {
       samples += track.samples.size();
-      if (track.commands.size() < 4 || witnesses.size() == kWitnesses) continue;
-      witnesses.push_back({&track, deeds_of(track)});
-      deeds += witnesses.back().deeds.size();
+      if (track.commands.size() < 4 || clock_tracks.size() == kClockTracks) continue;
+      clock_tracks.push_back({&track, segments_of(track)});
+      segments += clock_tracks.back().segments.size();
       if (track.samples.empty()) continue;
       begin_s = std::min(begin_s, track.samples.front().time_s);
       end_s = std::max(end_s, track.samples.back().time_s);
     }
-    if (deeds < 100 || end_s < 20) continue;
-    const double rate = best_rate(witnesses, told, end_s);
-    const double gain = of_rate(witnesses, told, rate, end_s) - of_rate(witnesses, told, 1, end_s);
-    if (gain < kClockGain || gain < kClockGainShare * static_cast<double>(deeds) ||
+    if (segments < 100 || end_s < 20) continue;
+    const double rate = best_rate(clock_tracks, response, end_s);
+    const double gain = of_rate(clock_tracks, response, rate, end_s) - of_rate(clock_tracks, response, 1, end_s);
+    if (gain < kClockGain || gain < kClockGainShare * static_cast<double>(segments) ||
         std::abs(rate - 1) * end_s < kClockShift_s)
       continue;
     faults.push_back(
@@ -279,10 +281,10 @@ void exclude_wrong_clocks(MeasuredSet& set, std::vector<DataFault>& faults) {
 }
 
 void exclude_swapped(MeasuredSet& set, std::vector<DataFault>& faults) {
-  const ToldAndDone told(set);
+  const CommandResponse response(set);
   for (Run& run : set.runs) {
-    exclude_exchanges(run, told, faults);
-    if (told.tells()) exclude_by_commands(run, told, faults);
+    exclude_exchanges(run, response, faults);
+    if (response.distinguishes_commands()) exclude_by_commands(run, response, faults);
   }
 }
 

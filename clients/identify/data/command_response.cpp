@@ -7,7 +7,7 @@ namespace kilotwin::identify {
 namespace {
 
 // Shortest segment. Shorter ones are dominated by tracker noise.
-constexpr double kDeed_s = 0.9;
+constexpr double kSegment_s = 0.9;
 // Longest segment. Longer ones mix several motions.
 constexpr double kLongest_s = 3;
 constexpr std::size_t kFewest = 30;
@@ -28,21 +28,21 @@ template <class Spread> Spread spread_of(std::vector<double> values, double leas
 
 }  // namespace
 
-Motion told_at(const Track& track, double time_s) {
+Motion command_at(const Track& track, double time_s) {
   const auto after = std::upper_bound(track.commands.begin(), track.commands.end(), time_s,
                                       [](double t, const CommandChange& c) { return t < c.time_s; });
   return after == track.commands.begin() ? Motion::kStop : std::prev(after)->motion;
 }
 
-std::vector<Deed> deeds_of(const Track& track) {
-  std::vector<Deed> deeds;
+std::vector<MotionSegment> segments_of(const Track& track) {
+  std::vector<MotionSegment> segments;
   struct Leg {
     double from_s, to_s, x, y;  // x, y: velocity, mm/s
   };
   std::vector<Leg> legs;
   const Sample* from = nullptr;
   for (const Sample& to : track.samples) {
-    if (from != nullptr && to.time_s - from->time_s < kDeed_s) continue;
+    if (from != nullptr && to.time_s - from->time_s < kSegment_s) continue;
     if (from != nullptr && to.time_s - from->time_s <= kLongest_s) {
       const double dt = to.time_s - from->time_s;
       legs.push_back({from->time_s, to.time_s, (to.x_mm - from->x_mm) / dt, (to.y_mm - from->y_mm) / dt});
@@ -53,20 +53,20 @@ std::vector<Deed> deeds_of(const Track& track) {
     const Leg &before = legs[k - 1], &leg = legs[k], &after = legs[k + 1];
     if (before.to_s != leg.from_s || leg.to_s != after.from_s) continue;
     const double curve = 0.5 * (before.x * leg.y - before.y * leg.x + leg.x * after.y - leg.y * after.x);
-    deeds.push_back({0.5 * (leg.from_s + leg.to_s), std::hypot(leg.x, leg.y), curve});
+    segments.push_back({0.5 * (leg.from_s + leg.to_s), std::hypot(leg.x, leg.y), curve});
   }
-  return deeds;
+  return segments;
 }
 
-ToldAndDone::ToldAndDone(const MeasuredSet& set) {
+CommandResponse::CommandResponse(const MeasuredSet& set) {
   if (!set.has_commands) return;
   std::array<std::vector<double>, 4> speeds, curves;
   for (const Run& run : set.runs) {
     for (const Track& track : run.tracks) {
-      for (const Deed& deed : deeds_of(track)) {
-        const auto m = static_cast<std::size_t>(told_at(track, deed.time_s));
-        speeds[m].push_back(deed.speed_mm_s);
-        curves[m].push_back(deed.curve_mm2_s2);
+      for (const MotionSegment& segment : segments_of(track)) {
+        const auto m = static_cast<std::size_t>(command_at(track, segment.time_s));
+        speeds[m].push_back(segment.speed_mm_s);
+        curves[m].push_back(segment.curve_mm2_s2);
       }
     }
   }
@@ -78,17 +78,17 @@ ToldAndDone::ToldAndDone(const MeasuredSet& set) {
     speed_[m] = spread_of<Spread>(speeds[m], 0.5);
     curve_[m] = spread_of<Spread>(curves[m], 5);
   }
-  tells_ = known >= 2;
+  distinguishes_commands_ = known >= 2;
 }
 
-double ToldAndDone::log_likelihood(const Deed& deed, Motion motion) const {
+double CommandResponse::log_likelihood(const MotionSegment& segment, Motion motion) const {
   const auto m = static_cast<std::size_t>(motion);
   if (!known_[m]) return 0;
   const auto of = [](double value, const Spread& spread) {
     const double z = std::min(std::abs(value - spread.middle) / spread.sd, kMostSds);
     return -0.5 * z * z;
   };
-  return of(deed.speed_mm_s, speed_[m]) - std::log(speed_[m].sd) + of(deed.curve_mm2_s2, curve_[m]) -
+  return of(segment.speed_mm_s, speed_[m]) - std::log(speed_[m].sd) + of(segment.curve_mm2_s2, curve_[m]) -
          std::log(curve_[m].sd);
 }
 

@@ -11,23 +11,23 @@
 namespace kilotwin::identify {
 
 /// Motion between two positions about one second apart, under one command.
-struct Deed {
+struct MotionSegment {
   double time_s;  ///< midpoint
   double speed_mm_s;
   double curve_mm2_s2;  ///< cross product of the velocities before and after, mm^2/s^2; positive: a left turn
 };
 
-[[nodiscard]] std::vector<Deed> deeds_of(const Track&);
+[[nodiscard]] std::vector<MotionSegment> segments_of(const Track&);
 
-class ToldAndDone {
+class CommandResponse {
  public:
   /// Estimates the distributions. Ignores short tracks and tracks without commands.
-  explicit ToldAndDone(const MeasuredSet&);
+  explicit CommandResponse(const MeasuredSet&);
 
   /// Log-likelihood of a segment under a command, up to a constant. Bounded below, because robots get stuck.
-  [[nodiscard]] double log_likelihood(const Deed&, Motion) const;
+  [[nodiscard]] double log_likelihood(const MotionSegment&, Motion) const;
   /// Whether the distributions differ between commands.
-  [[nodiscard]] bool tells() const { return tells_; }
+  [[nodiscard]] bool distinguishes_commands() const { return distinguishes_commands_; }
 
  private:
   struct Spread {
@@ -35,10 +35,10 @@ class ToldAndDone {
   };
   std::array<Spread, 4> speed_, curve_;
   std::array<bool, 4> known_{};
-  bool tells_ = false;
+  bool distinguishes_commands_ = false;
 };
 
 /// The command of a track at a time.
-[[nodiscard]] Motion told_at(const Track&, double time_s);
+[[nodiscard]] Motion command_at(const Track&, double time_s);
 
 }  // namespace kilotwin::identify

@@ -44,7 +44,7 @@ constexpr double kShareCommon = 0.5;
 
 struct Common {
   std::size_t count = 0, together = 0;
-  std::vector<double> apart_mm;
+  std::vector<double> distance_mm;
 };
 
 Common compare(const Track& a, const Track& b) {
@@ -55,8 +55,8 @@ Common compare(const Track& a, const Track& b) {
     if (j == b.samples.size()) break;
     if (b.samples[j].time_s > sample.time_s + 1e-6) continue;
     ++common.count;
-    common.apart_mm.push_back(distance(sample, b.samples[j]));
-    if (common.apart_mm.back() < kOneRobot_mm) ++common.together;
+    common.distance_mm.push_back(distance(sample, b.samples[j]));
+    if (common.distance_mm.back() < kOneRobot_mm) ++common.together;
   }
   return common;
 }
@@ -81,7 +81,7 @@ void exclude_duplicates(MeasuredSet& set, std::vector<DataFault>& faults) {
         Track& copy = run.tracks[first ? a : b];
         const Track& origin = run.tracks[first ? b : a];
         faults.push_back({DataFault::Kind::kDuplicate, run.name, copy.robot, origin.robot,
-                          copy.samples.front().time_s, copy.samples.back().time_s, median(common.apart_mm),
+                          copy.samples.front().time_s, copy.samples.back().time_s, median(common.distance_mm),
                           copy.samples.size()});
         copy.samples.clear();
       }
@@ -106,8 +106,8 @@ double repeats_at_rest(const MeasuredSet& set) {
   for (const Run& run : set.runs) {
     for (const Track& track : run.tracks) {
       for (std::size_t k = 1; k < track.samples.size(); ++k) {
-        if (told_at(track, track.samples[k - 1].time_s) != Motion::kStop ||
-            told_at(track, track.samples[k].time_s) != Motion::kStop)
+        if (command_at(track, track.samples[k - 1].time_s) != Motion::kStop ||
+            command_at(track, track.samples[k].time_s) != Motion::kStop)
           continue;
         ++rest;
         if (same_place(track.samples[k - 1], track.samples[k])) ++same;
@@ -119,7 +119,7 @@ double repeats_at_rest(const MeasuredSet& set) {
 
 /// Share of all steps that repeat the position, where a repeat of more than kFrozen_s counts once: the rate of
 /// repeats by rounding.
-double lone_repeats(const MeasuredSet& set) {
+double isolated_repeats(const MeasuredSet& set) {
   std::size_t steps = 0, same = 0;
   for (const Run& run : set.runs) {
     for (const Track& track : run.tracks) {
@@ -139,23 +139,23 @@ double lone_repeats(const MeasuredSet& set) {
 }  // namespace
 
 void exclude_frozen(MeasuredSet& set, std::vector<DataFault>& faults) {
-  if (repeats_at_rest(set) > kRepeats || lone_repeats(set) > kRepeats) return;
+  if (repeats_at_rest(set) > kRepeats || isolated_repeats(set) > kRepeats) return;
   for (Run& run : set.runs) {
     for (Track& track : run.tracks) {
       std::vector<bool> out(track.samples.size());
       std::size_t end = 0;
-      const auto stretch = [&](std::size_t begin) {
+      const auto frozen_s = [&](std::size_t begin) {
         end = begin + 1;
         double driven_s = 0;
         while (end < track.samples.size() && same_place(track.samples[begin], track.samples[end])) {
           const double from_s = track.samples[end - 1].time_s, to_s = track.samples[end].time_s;
-          if (told_at(track, 0.5 * (from_s + to_s)) != Motion::kStop) driven_s += to_s - from_s;
+          if (command_at(track, 0.5 * (from_s + to_s)) != Motion::kStop) driven_s += to_s - from_s;
           ++end;
         }
         return driven_s;
       };
       for (std::size_t begin = 0; begin < track.samples.size(); begin = end) {
-        if (stretch(begin) < kFrozen_s || end - begin < kFewestFrozen) continue;
+        if (frozen_s(begin) < kFrozen_s || end - begin < kFewestFrozen) continue;
         // The first sample of the interval is valid.
         for (std::size_t k = begin + 1; k < end; ++k) out[k] = true;
         faults.push_back({DataFault::Kind::kFrozen, run.name, track.robot, std::nullopt,
@@ -293,29 +293,27 @@ std::string DataFault::in_words() const {
   switch (kind) {
     case Kind::kOutliers:
       return fmt::format(
-          "Run {}: {} position{} of {} up to {:.0f} mm away from where {} before and after; excluded.", run,
+          "Run {}: {} outlier{} of {}, up to {:.0f} mm away from where {} before and after. Excluded.", run,
           excluded, excluded == 1 ? "" : "s", who, strength, robot ? "it was" : "they were");
     case Kind::kFrozen:
       return fmt::format(
-          "Run {}: the tracker held {} at one place from {:.1f} to {:.1f} s, to the last digit, while it was told "
-          "to move; {} positions excluded.",
+          "Run {}: the position of {} is frozen from {:.1f} to {:.1f} s, to the last digit, while it was commanded "
+          "to move. {} positions excluded.",
           run, who, from_s, to_s, excluded);
     case Kind::kDuplicate:
       return fmt::format(
-          "Run {}: robot {} is robot {} tracked twice, {:.1f} mm apart, where discs are 33 mm wide; its {} "
+          "Run {}: robot {} is a second track of robot {}, at {:.1f} mm (discs are 33 mm wide). Its {} "
           "positions excluded.",
           run, *robot, *other, strength, excluded);
     case Kind::kSwapped:
       return fmt::format(
-          "Run {}: robots {} and {} carry each other's number, by where they are or by what they do, from {:.1f} "
-          "to {:.1f} "
-          "s: log-likelihood of "
-          "their commands exchanged +{:.0f}; {} positions excluded.",
+          "Run {}: the numbers of robots {} and {} are swapped from {:.1f} to {:.1f} s: exchanging their commands "
+          "raises the log-likelihood by {:.0f}. {} positions excluded.",
           run, *robot, *other, from_s, to_s, strength, excluded);
     case Kind::kClock:
       return fmt::format(
-          "Run {}: robots follow their commands when the tracker's times are divided by {:.4f}: its clock is "
-          "wrong; the run's {} positions excluded.",
+          "Run {}: the tracker's clock is wrong: robots follow their commands if its times are divided by {:.4f}. "
+          "The run's {} positions are excluded.",
           run, strength, excluded);
   }
   return {};

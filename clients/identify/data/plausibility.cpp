@@ -51,10 +51,10 @@ void demand_seconds(const MeasuredSet& set, const std::string& from) {
   if (steps.size() < 5) return;
   const double step = median(steps);
   if (step > kSlowestSampling_s)
-    throw UserError(
-        fmt::format("{}: robots are seen every {:g} s; give time_s in seconds (not milliseconds or frames), and a "
-                    "sample a second or so",
-                    from, step));
+    throw UserError(fmt::format(
+        "{}: the sampling interval is {:g} s; give time_s in seconds (not milliseconds or frames), about one "
+        "sample per second",
+        from, step));
 }
 
 void demand_millimetres(const MeasuredSet& set, const std::string& from) {
@@ -122,20 +122,20 @@ void demand_motion(const MeasuredSet& set, const std::string& from) {
     }
   }
   if (!driven)
-    throw UserError(
-        fmt::format("{}: no robot is told to move while it is seen; let commands.csv name the runs and robots of "
-                    "trajectories.csv, or leave it out where robots always go straight",
-                    from));
+    throw UserError(fmt::format(
+        "{}: no tracked robot is commanded to move; use the runs and robots of trajectories.csv in commands.csv, "
+        "or omit it if robots always drive straight",
+        from));
   if (speeds.size() < 5) return;
   const double speed = median(speeds);
   if (speed > kFastest_mm_s)
-    throw UserError(
-        fmt::format("{}: robots go {:.3g} mm/s; Kilobots go some 10 mm/s: give x_mm and y_mm in mm (not pixels), "
-                    "time_s in seconds",
-                    from, speed));
+    throw UserError(fmt::format(
+        "{}: robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm in mm (not pixels), "
+        "time_s in seconds",
+        from, speed));
   if (speed < kSlowest_mm_s)
     throw UserError(
-        fmt::format("{}: robots that are told to move go {:.3g} mm/s; Kilobots go some 10 mm/s: give x_mm and y_mm "
+        fmt::format("{}: commanded robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm "
                     "in mm (not metres), time_s in seconds (not milliseconds)",
                     from, speed));
 }
@@ -160,10 +160,10 @@ void demand_longer_than(const MeasuredSet& set, double horizon_s, bool held_out_
     }
   }
   if (longest_s >= horizon_s) return;
-  throw UserError(fmt::format(
-      "{}: no robot is seen for as long as the horizon of {:g} s; give a shorter one with --horizon, or "
-      "longer runs",
-      from, horizon_s));
+  throw UserError(
+      fmt::format("{}: no track is as long as the horizon of {:g} s; give a shorter one with --horizon, or "
+                  "longer runs",
+                  from, horizon_s));
 }
 
 }  // namespace kilotwin::identify

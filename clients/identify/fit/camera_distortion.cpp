@@ -9,7 +9,7 @@ namespace kilotwin::identify {
 namespace {
 
 /// Contact range under an unknown camera scale, mm.
-constexpr double kMayTouch_mm = 1.15 * kTouch_mm;
+constexpr double kUncertainContact_mm = 1.15 * kContactRange_mm;
 
 bool acts_on_speed(const Block& block) {
   switch (block.target) {
@@ -24,16 +24,16 @@ bool acts_on_speed(const Block& block) {
 
 }  // namespace
 
-MotionModel Fitter::doubting(MotionModel model) const {
-  model.touch_mm = std::max(model.touch_mm, kMayTouch_mm);
+MotionModel Fitter::with_uncertain_walls(MotionModel model) const {
+  model.contact_range_mm = std::max(model.contact_range_mm, kUncertainContact_mm);
   model.contacts = true;
-  model.doubts_rim = true;
+  model.walls_uncertain = true;
   return model;
 }
 
-bool Fitter::holds_seem_elsewhere(const MotionModel& model) const {
+bool Fitter::contacts_contradict_geometry(const MotionModel& model) const {
   // Larger wheel and heading noise in contact indicates contacts. This compares it with the noise of free robots.
-  MotionModel trial = doubting(model);
+  MotionModel trial = with_uncertain_walls(model);
   const double with_noise = log_likelihood(trial);
   fit_noise(trial);
   std::size_t samples = 0;
@@ -42,50 +42,50 @@ bool Fitter::holds_seem_elsewhere(const MotionModel& model) const {
   return log_likelihood(trial) > with_noise + kSure + kEach * static_cast<double>(samples);
 }
 
-void Fitter::straighten(MotionModel& model) const {
+void Fitter::fit_camera_distortion(MotionModel& model) const {
   const MotionModel before = model;
-  model = doubting(model);
-  model.room = {};
+  model = with_uncertain_walls(model);
+  model.walls = {};
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
     fit_noise(model);
     step(model);
   }
-  model.room = carried(before.room, before, model);
-  settle_doubts(model);
+  model.walls = carried(before.walls, before, model);
+  resolve_walls(model);
 }
 
-void Fitter::settle_doubts(MotionModel& model) const {
+void Fitter::resolve_walls(MotionModel& model) const {
   MotionModel trial = model;
-  trial.doubts_rim = false;
-  trial.touch_mm = touching_mm(trial.base, set_.set().has_headings);
+  trial.walls_uncertain = false;
+  trial.contact_range_mm = contact_range_of(trial.base, set_.set().has_headings);
   set_.find_centres(trial, threads_);
-  trial.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
-  look_for_walls(trial);
-  if (!set_.set().has_headings) find_walls(trial);
+  trial.contacts = set_.encounters().overlap_density() < Encounters::kNoCollisions;
+  update_walls(trial);
+  if (!set_.set().has_headings) fit_walls(trial);
   fit_noise(trial);
   if (log_likelihood_of_all(trial) > log_likelihood_of_all(model)) model = trial;
 }
 
-bool Fitter::set_scale(MotionModel& model) const {
+bool Fitter::correct_camera_scale(MotionModel& model) const {
   constexpr double kNear = 0.15, kSame = 0.001;
-  const std::vector<Pair> pairs = set_.pairs();
-  const std::optional<TouchingApart> apart = touching_apart(pairs);
-  hold_.reset();
-  if (!apart || std::abs(apart->mm / kDiscs_mm - 1) > kNear) return false;
-  const double factor = kDiscs_mm / apart->mm;
+  const std::vector<RobotPair> pairs = set_.pairs();
+  const std::optional<ContactDistance> apart = contact_distance(pairs);
+  scale_constraint_.reset();
+  if (!apart || std::abs(apart->mm / kDiscDiameter_mm - 1) > kNear) return false;
+  const double factor = kDiscDiameter_mm / apart->mm;
   if (!rescale(model, factor)) return false;
-  std::vector<Pair> met;
-  for (Pair pair : pairs)
-    if (std::abs(pair.apart_mm - apart->mm) < 2) met.push_back(pair);
-  hold_ = std::make_shared<const ScaleHold>(model, met, apart->sd_mm / kDiscs_mm);
+  std::vector<RobotPair> met;
+  for (RobotPair pair : pairs)
+    if (std::abs(pair.distance_mm - apart->mm) < 2) met.push_back(pair);
+  scale_constraint_ = std::make_shared<const ScaleConstraint>(model, met, apart->sd_mm / kDiscDiameter_mm);
   return std::abs(factor - 1) > kSame;
 }
 
-void Fitter::settle_scale(MotionModel& model) const {
+void Fitter::choose_camera_scale(MotionModel& model) const {
   // Prior: the speeds and the wheel base of the ARGoS paper, independent normal. The exponent is quadratic in the
   // factor.
-  const BaseParameters seed;
+  const BaseParameters defaults;
   // A speed effect leaves open at which covariate values the nominal speed holds: relative standard deviation.
   constexpr double kByEffects = 0.5;
   const bool nominal = std::none_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
@@ -94,18 +94,18 @@ void Fitter::settle_scale(MotionModel& model) const {
   const auto speed_sd = [&](double sd, double value) { return nominal ? sd : std::hypot(sd, kByEffects * value); };
   double by_seed = 0, precision = 0;
   for (const auto& [value, expected, sd] :
-       {std::array{model.base.straight_mm_s, seed.straight_mm_s,
-                   speed_sd(prior_.straight_mm_s, seed.straight_mm_s)},
-        std::array{model.base.turn_mm_s, seed.turn_mm_s, speed_sd(prior_.turn_mm_s, seed.turn_mm_s)},
-        std::array{model.base.wheel_base_mm, seed.wheel_base_mm, prior_.wheel_base_mm}}) {
+       {std::array{model.base.straight_mm_s, defaults.straight_mm_s,
+                   speed_sd(prior_.straight_mm_s, defaults.straight_mm_s)},
+        std::array{model.base.turn_mm_s, defaults.turn_mm_s, speed_sd(prior_.turn_mm_s, defaults.turn_mm_s)},
+        std::array{model.base.wheel_base_mm, defaults.wheel_base_mm, prior_.wheel_base_mm}}) {
     by_seed += value * expected / (sd * sd);
     precision += value * value / (sd * sd);
   }
   if (by_seed <= 0) return;
   double log_factor = precision * std::log(by_seed / precision);
-  if (hold_) {
-    const double sure = 1 / (hold_->relative_sd() * hold_->relative_sd());
-    log_factor += sure * std::log(hold_->factor(model));
+  if (scale_constraint_) {
+    const double sure = 1 / (scale_constraint_->relative_sd() * scale_constraint_->relative_sd());
+    log_factor += sure * std::log(scale_constraint_->factor(model));
     precision += sure;
   }
   rescale(model, std::exp(log_factor / precision));

@@ -11,20 +11,20 @@ namespace {
 
 /// Displacement along an axis during contacts between robots, from the first to the last measurement of each
 /// contact.
-struct Pushes {
-  explicit Pushes(double tracker_mm2) : tracker_mm2_(tracker_mm2) {}
+struct ContactPushes {
+  explicit ContactPushes(double tracker_mm2) : tracker_mm2_(tracker_mm2) {}
   double sum_mm2 = 0, time_s = 0;
   std::size_t count = 0;
 
   void start(const TrackFilter&) {}
   void step(const StepRecord& record) {
-    if (record.at_robot) touched_s_ += record.h_s;
+    if (record.at_robot) contact_s_ += record.h_s;
   }
   void update(const Innovation& innovation, const Sample&) {
-    const double touched_s = std::exchange(touched_s_, 0);
-    if (touched_s > 0 && !innovation.lost) {
+    const double contact_s = std::exchange(contact_s_, 0);
+    if (contact_s > 0 && !innovation.lost) {
       way_ += std::sqrt(innovation.weight) * innovation.difference.head<2>();
-      way_s_ += touched_s;
+      way_s_ += contact_s;
     } else if (way_s_ > 0) {
       // The tracker's variance enters at both ends.
       sum_mm2 += way_.squaredNorm() / 2 - 2 * tracker_mm2_;
@@ -35,26 +35,26 @@ struct Pushes {
   }
 
  private:
-  double tracker_mm2_, touched_s_ = 0, way_s_ = 0;
+  double tracker_mm2_, contact_s_ = 0, way_s_ = 0;
   Eigen::Vector2d way_ = Eigen::Vector2d::Zero();
 };
 
 }  // namespace
 
-double touching_mm(const BaseParameters& base, bool headings) {
+double contact_range_of(const BaseParameters& base, bool headings) {
   constexpr double kMostly = 0.75;
-  return kTouch_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
+  return kContactRange_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
 }
 
-void Fitter::look_for_walls(MotionModel& model) const {
+void Fitter::update_walls(MotionModel& model) const {
   if (!set_.set().has_headings) return;
-  const Room known = model.room;
-  model.room = room_of(set_, model);
-  for (double Room::*const side : {&Room::x_low_mm, &Room::x_high_mm, &Room::y_low_mm, &Room::y_high_mm})
-    if (std::isinf(model.room.*side)) model.room.*side = known.*side;
+  const Walls known = model.walls;
+  model.walls = detected_walls(set_, model);
+  for (double Walls::*const side : {&Walls::x_low_mm, &Walls::x_high_mm, &Walls::y_low_mm, &Walls::y_high_mm})
+    if (std::isinf(model.walls.*side)) model.walls.*side = known.*side;
 }
 
-void Fitter::find_walls(MotionModel& model) const {
+void Fitter::fit_walls(MotionModel& model) const {
   // Largest distance between the tracked point and the disc centre.
   const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
   // The tracked point with the camera distortion removed.
@@ -67,16 +67,16 @@ void Fitter::find_walls(MotionModel& model) const {
                   pose[1] + model.base.ahead_mm * n + model.base.left_mm * c, pose[2]};
   };
   struct Side {
-    double Room::*wall;
+    double Walls::*wall;
     double Sample::*along;
     double sign;
   };
   const std::array<Side, 4> sides = {
-      Side{&Room::x_high_mm, &Sample::x_mm, 1}, Side{&Room::x_low_mm, &Sample::x_mm, -1},
-      Side{&Room::y_high_mm, &Sample::y_mm, 1}, Side{&Room::y_low_mm, &Sample::y_mm, -1}};
+      Side{&Walls::x_high_mm, &Sample::x_mm, 1}, Side{&Walls::x_low_mm, &Sample::x_mm, -1},
+      Side{&Walls::y_high_mm, &Sample::y_mm, 1}, Side{&Walls::y_low_mm, &Sample::y_mm, -1}};
   for (const Side& side : sides) {
     // With headings, detected_walls() has found most walls already.
-    if (set_.set().has_headings && std::isfinite(model.room.*side.wall)) continue;
+    if (set_.set().has_headings && std::isfinite(model.walls.*side.wall)) continue;
     std::vector<double> places;
     for (const TrackView& view : set_.views())
       for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
@@ -94,30 +94,30 @@ void Fitter::find_walls(MotionModel& model) const {
           [&](const Sample& s) { return std::abs(side.sign * place_of(view, s).*side.along - edge) < reach + 5; });
       if (there > 5) near.push_back(&view);
     }
-    model.room.*side.wall = side.sign * std::numeric_limits<double>::infinity();
+    model.walls.*side.wall = side.sign * std::numeric_limits<double>::infinity();
     if (near.empty()) continue;
     MotionModel best = model;
     // Penalty of a wall, in log likelihood: covers chance and a few outliers.
-    double best_value = with_touching(model, near) + 30;
+    double best_value = log_likelihood_with_contacts(model, near) + 30;
     const auto try_at = [&](double wall) {
       MotionModel trial = model;
-      trial.room.*side.wall = side.sign * wall;
-      const double value = with_touching(trial, near);
+      trial.walls.*side.wall = side.sign * wall;
+      const double value = log_likelihood_with_contacts(trial, near);
       if (value <= best_value) return;
       best_value = value;
       best = trial;
     };
     for (double wall = edge - 2; wall <= edge + reach + 2; wall += 2) try_at(wall);
-    const double found = side.sign * best.room.*side.wall;
+    const double found = side.sign * best.walls.*side.wall;
     if (std::isinf(found)) continue;
     for (const double by : {-1.0, 1.0, -0.5, 0.5}) try_at(found + by);
     model = best;
   }
 }
 
-void Fitter::fit_touching(MotionModel& model) const {
+void Fitter::fit_contact_noise(MotionModel& model) const {
   const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
-  double best = with_touching(model, tracks);
+  double best = log_likelihood_with_contacts(model, tracks);
   const auto climb = [&](double Noise::*part) {
     const double start = model.noise.*part;
     for (const double factor : {4.0, 0.25}) {
@@ -126,7 +126,7 @@ void Fitter::fit_touching(MotionModel& model) const {
         MotionModel trial = model;
         trial.noise.*part *= factor;
         if (trial.noise.*part < 1e-6 || trial.noise.*part > 1e3) break;
-        const double value = with_touching(trial, tracks);
+        const double value = log_likelihood_with_contacts(trial, tracks);
         better = value > best + 0.5;
         if (!better) break;
         best = value;
@@ -138,24 +138,25 @@ void Fitter::fit_touching(MotionModel& model) const {
   for (double Noise::*const part : {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s}) climb(part);
   // A push keeps its direction during a contact. White noise fitted to single steps underestimates its sum, and
   // the fit would attribute the rest to turns.
-  if (const double lasting_mm2_s = lasting_push_mm2_s(model, tracks); lasting_mm2_s > model.noise.contact_mm2_s) {
-    model.noise.contact_mm2_s = lasting_mm2_s;
-    best = with_touching(model, tracks);
+  if (const double persistent_mm2_s = persistent_push_mm2_s(model, tracks);
+      persistent_mm2_s > model.noise.contact_mm2_s) {
+    model.noise.contact_mm2_s = persistent_mm2_s;
+    best = log_likelihood_with_contacts(model, tracks);
   }
   climb(&Noise::contact_rad2_s);
 }
 
-double Fitter::lasting_push_mm2_s(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
-  std::vector<Pushes> pushes(tracks.size(), Pushes(model.noise.position_mm2));
+double Fitter::persistent_push_mm2_s(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
+  std::vector<ContactPushes> pushes(tracks.size(), ContactPushes(model.noise.position_mm2));
   in_parallel(tracks.size(), threads_, [&](std::size_t i) {
     RobotBias bias = model.bias_of(tracks[i]->track->robot);
     bias.covariance.setZero();
     TrackFilter filter(model, bias, tracks[i]->track->robot, tracks[i]->number);
-    walk(filter, *tracks[i], tracks[i]->track->samples.size(), pushes[i]);
+    run_filter(filter, *tracks[i], tracks[i]->track->samples.size(), pushes[i]);
   });
   std::size_t count = 0;
   double sum_mm2 = 0, time_s = 0;
-  for (const Pushes& p : pushes) {
+  for (const ContactPushes& p : pushes) {
     count += p.count;
     sum_mm2 += p.sum_mm2;
     time_s += p.time_s;
@@ -165,29 +166,29 @@ double Fitter::lasting_push_mm2_s(const MotionModel& model, const std::vector<co
   return count < kFew ? 0 : std::min(sum_mm2 / time_s, kMost_mm2_s);
 }
 
-void Fitter::find_shape(MotionModel& model) const {
+void Fitter::fit_disc_centre(MotionModel& model) const {
   const bool headings = set_.set().has_headings;
   const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
   struct Candidate {
     MotionModel model;
     double log_likelihood = 0;
-    Meetings meetings;
+    Encounters encounters;
   };
   std::vector<Candidate> candidates;
   const auto add = [&](double centre_mm) {
     Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
     c.model.base.centre_mm = centre_mm;
-    c.model.touch_mm = touching_mm(c.model.base, headings);
+    c.model.contact_range_mm = contact_range_of(c.model.base, headings);
     set_.find_centres(c.model, threads_);
     if (headings) {
-      c.model.room = room_of(set_, c.model);
+      c.model.walls = detected_walls(set_, c.model);
     } else {
-      find_walls(c.model);
+      fit_walls(c.model);
       // A candidate with more contacts needs contact noise of its own for a fair comparison.
-      fit_touching(c.model);
+      fit_contact_noise(c.model);
     }
-    c.log_likelihood = with_touching(c.model, tracks);
-    c.meetings = set_.meetings();
+    c.log_likelihood = log_likelihood_with_contacts(c.model, tracks);
+    c.encounters = set_.encounters();
   };
   add(kAxleOffset_mm);
   // Alternative: the tracked point is the disc centre.
@@ -198,18 +199,19 @@ void Fitter::find_shape(MotionModel& model) const {
     // Walls are stronger evidence than encounters. Without walls the likelihood is no evidence, because it only
     // depends on which samples count as contacts.
     constexpr double kSure = 50;
-    const bool walls = c.model.room.any() || best->model.room.any();
+    const bool walls = c.model.walls.any() || best->model.walls.any();
     const double better = walls ? c.log_likelihood - best->log_likelihood : 0;
-    if (better > kSure || (better > -kSure && c.meetings.share_within() < 0.5 * best->meetings.share_within()))
+    if (better > kSure ||
+        (better > -kSure && c.encounters.overlap_density() < 0.5 * best->encounters.overlap_density()))
       best = &c;
   }
   model = best->model;
-  model.contacts = best->meetings.share_within() < Meetings::kUnhindered;
+  model.contacts = best->encounters.overlap_density() < Encounters::kNoCollisions;
   if (best != &candidates.back()) set_.find_centres(model, threads_);
 }
 
-void Fitter::fit_surroundings(MotionModel& model) const {
-  if (model.doubts_rim) settle_doubts(model);
+void Fitter::fit_contacts(MotionModel& model) const {
+  if (model.walls_uncertain) resolve_walls(model);
   // Large contact noise would hide wrong positions of the walls.
   const Noise anew;
   for (double Noise::*const part :
@@ -217,17 +219,17 @@ void Fitter::fit_surroundings(MotionModel& model) const {
     model.noise.*part = anew.*part;
   const bool headings = set_.set().has_headings;
   // A missing effect may have looked like a displaced disc centre.
-  if (!headings) find_shape(model);
+  if (!headings) fit_disc_centre(model);
   for (int round = 0; round < (headings ? 1 : 2); ++round) {
     if (headings || round > 0) {
-      find_walls(model);
+      fit_walls(model);
       set_.find_centres(model, threads_);
     }
-    if (model.measures() && set_scale(model)) set_.find_centres(model, threads_);
+    if (model.measures() && correct_camera_scale(model)) set_.find_centres(model, threads_);
     // Camera distortion shows false encounters and hides true ones.
-    if (model.measures() && !model.doubts_rim)
-      model.contacts = set_.meetings().share_within() < Meetings::kUnhindered;
-    fit_touching(model);
+    if (model.measures() && !model.walls_uncertain)
+      model.contacts = set_.encounters().overlap_density() < Encounters::kNoCollisions;
+    fit_contact_noise(model);
     fit(model, 1);
   }
 }

@@ -11,7 +11,7 @@ namespace kilotwin::identify {
 
 /// A robot in contact with another robot is slowed and displaced, but its heading still follows its wheels, within
 /// the contact noise: the fit uses the heading alone. Contacts with walls last long, and the fit uses nothing.
-class Touched {
+class ContactGate {
  public:
   enum class Counts : std::uint8_t { kAll, kHeading, kNothing };
 

@@ -7,7 +7,7 @@ namespace kilotwin::identify {
 namespace {
 
 /// Logarithm of the sum of the hypotheses' weights.
-double total_of(const std::vector<Follower::Hypothesis>& hypotheses) {
+double total_of(const std::vector<FilterBank::Hypothesis>& hypotheses) {
   double best = -1e300, sum = 0;
   for (const auto& h : hypotheses) best = std::max(best, h.log_weight);
   for (const auto& h : hypotheses) sum += std::exp(h.log_weight - best);
@@ -16,12 +16,12 @@ double total_of(const std::vector<Follower::Hypothesis>& hypotheses) {
 
 }  // namespace
 
-void Follower::follow(double to_s) {
+void FilterBank::advance_to(double to_s) {
   const std::vector<Sample>& samples = view_.track->samples;
   for (; next_ < samples.size() && samples[next_].time_s <= to_s + 1e-6; ++next_) take(samples[next_]);
 }
 
-void Follower::take(const Sample& sample) {
+void FilterBank::take(const Sample& sample) {
   if (next_ == 0) return start(sample);
   const double from_s = last_s(), weight = total_of(hypotheses_);
   double lost = 0;
@@ -41,7 +41,7 @@ void Follower::take(const Sample& sample) {
   prune();
 }
 
-void Follower::start(const Sample& sample) {
+void FilterBank::start(const Sample& sample) {
   RobotBias bias = model_.bias_of(view_.track->robot);
   hypotheses_.clear();
   const auto add = [&](double heading, double sd) {
@@ -54,7 +54,7 @@ void Follower::start(const Sample& sample) {
   for (int i = 0; i < kHeadings; ++i) add(2 * M_PI * i / kHeadings, M_PI / kHeadings);
 }
 
-void Follower::prune() {
+void FilterBank::prune() {
   constexpr double kHopeless = 20;
   double best = -1e300;
   for (const Hypothesis& h : hypotheses_) best = std::max(best, h.log_weight);
@@ -80,11 +80,11 @@ void Follower::prune() {
 
 Centres centres_of(const MotionModel& model, const TrackView& view) {
   Centres centres;
-  Follower follower(model, view);
+  FilterBank bank(model, view);
   for (const Sample& sample : view.track->samples) {
-    follower.follow(sample.time_s);
+    bank.advance_to(sample.time_s);
     double sum = 0, x = 0, y = 0;
-    for (const Follower::Hypothesis& h : follower.hypotheses()) {
+    for (const FilterBank::Hypothesis& h : bank.hypotheses()) {
       const double weight = std::exp(h.log_weight);
       sum += weight;
       x += weight * h.filter.belief().centre_x_mm();

@@ -8,13 +8,13 @@
 
 namespace kilotwin::identify {
 
-class Follower {
+class FilterBank {
  public:
   /// Both must outlive the bank.
-  Follower(const MotionModel& model, const TrackView& view) : model_(model), view_(view) {}
+  FilterBank(const MotionModel& model, const TrackView& view) : model_(model), view_(view) {}
 
   /// Processes all samples up to this time.
-  void follow(double to_s);
+  void advance_to(double to_s);
   [[nodiscard]] bool started() const { return next_ > 0; }
   /// Time of the last processed sample, s.
   [[nodiscard]] double last_s() const { return view_.track->samples[next_ - 1].time_s; }

@@ -38,7 +38,7 @@ struct TrackView {
   const RunNeighbours* neighbours = nullptr;
   CommandClock clock;
   double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample
-  std::vector<bool> at_rim = {};  ///< whether each sample is at the boundary of visited places
+  std::vector<bool> at_boundary = {};  ///< whether each sample is at the boundary of visited places
 
   /// The part of a situation that does not depend on the pose.
   [[nodiscard]] Situation at(double time_s) const {
@@ -54,12 +54,12 @@ struct TrackView {
 /// Runs the filter from the first sample to the last. Calls visitor.start(filter), visitor.step(record) and
 /// visitor.update(innovation, sample).
 template <class Visitor>
-void walk(TrackFilter& filter, const TrackView& view, std::size_t samples, Visitor&& visitor) {
+void run_filter(TrackFilter& filter, const TrackView& view, std::size_t samples, Visitor&& visitor) {
   const std::vector<Sample>& all = view.track->samples;
   filter.start(all.front(), {}, view.start_heading_rad, view.start_heading_sd_rad);
   visitor.start(filter);
   for (std::size_t i = 1; i < std::min(samples, all.size()); ++i) {
-    filter.at_rim(view.at_rim[i - 1] || view.at_rim[i]);
+    filter.at_boundary(view.at_boundary[i - 1] || view.at_boundary[i]);
     sub_steps(view.clock, all[i - 1].time_s, all[i].time_s, [&](double t, double h, const CommandState& commands) {
       visitor.step(filter.step(t, h, commands, view.neighbours->view(view.place, t + h / 2)));
     });

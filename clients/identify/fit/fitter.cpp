@@ -43,46 +43,46 @@ void Fitter::fit_base(MotionModel& model) const {
     for (const double ahead_mm : {0.0, given.base.ahead_mm}) {
       MotionModel start = given;
       start.base.ahead_mm = ahead_mm;
-      start.touch_mm = touching_mm(start.base, headings);
+      start.contact_range_mm = contact_range_of(start.base, headings);
       set_.find_headings(start, threads_);
-      find_walls(start);
-      const double value = with_touching(start, tracks);
+      fit_walls(start);
+      const double value = log_likelihood_with_contacts(start, tracks);
       if (value <= best) continue;
       best = value;
       model = start;
     }
     set_.find_headings(model, threads_);
     // Contacts that are not recognised would look like wheel noise.
-    fit_touching(model);
+    fit_contact_noise(model);
   }
   fit(model, 3);
-  find_shape(model);
+  fit_disc_centre(model);
   // Without headings, walls, disc centres and contact noise depend on each other: alternate.
   constexpr int kMostRounds = 4;
   constexpr double kSettled = 20;
   double likelihood = -1e300;
   for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
-    if (headings || round > 0) find_walls(model);
+    if (headings || round > 0) fit_walls(model);
     if (round > 0) set_.find_centres(model, threads_);
-    fit_touching(model);
+    fit_contact_noise(model);
     fit(model, 2);
     const double found = log_likelihood(model);
     if (found < likelihood + kSettled) break;
     likelihood = found;
   }
-  if (holds_seem_elsewhere(model)) {
-    model = doubting(model);
+  if (contacts_contradict_geometry(model)) {
+    model = with_uncertain_walls(model);
     fit(model, 2);
   }
 }
 
 void Fitter::fit(MotionModel& model, int passes) const {
   // A new camera map changes the positions of walls and of encounters.
-  const bool new_picture = !model.terms.empty() && is_map_of_picture(model.terms.back());
-  if (passes > 1 && new_picture) straighten(model);
+  const bool new_camera_map = !model.terms.empty() && is_camera_map(model.terms.back());
+  if (passes > 1 && new_camera_map) fit_camera_distortion(model);
   for (int pass = 0; pass < passes; ++pass) {
     set_.find_headings(model, threads_);
-    look_for_walls(model);
+    update_walls(model);
     // New terms explain part of the former noise once they have their amplitude.
     if (pass != 0 || passes == 1) fit_noise(model);
     step(model);

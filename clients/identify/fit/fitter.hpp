@@ -12,7 +12,7 @@
 
 namespace kilotwin::identify {
 
-class ScaleHold;
+class ScaleConstraint;
 
 /// Prior standard deviations of the base parameters, about the values of the ARGoS paper.
 struct BasePrior {
@@ -30,18 +30,18 @@ class Fitter {
   /// Fits everything from default values: base model, walls, disc centre, contact noise.
   void fit_base(MotionModel&) const;
   /// Refits walls, disc centre and contact noise. New effects may explain what looked like contacts.
-  void fit_surroundings(MotionModel&) const;
+  void fit_contacts(MotionModel&) const;
   /// Refits base parameters, biases, noise and coefficients. A fitted model needs few passes.
   void fit(MotionModel&, int passes) const;
   /// Refits the noise, on a subset of the tracks.
   void fit_noise(MotionModel&) const;
   /// Refits the contact noise, on a subset of the tracks.
-  void fit_touching(MotionModel&) const;
+  void fit_contact_noise(MotionModel&) const;
   /// Chooses the disc centre, which is what collides, and whether robots collide with each other. Refits the
   /// walls.
-  void find_shape(MotionModel&) const;
+  void fit_disc_centre(MotionModel&) const;
   /// Fits walls by likelihood. Without headings, positions alone do not show them.
-  void find_walls(MotionModel&) const;
+  void fit_walls(MotionModel&) const;
   /// Log likelihood of the tracks of the fit, without measurements after contacts.
   [[nodiscard]] double log_likelihood(const MotionModel&) const;
   /// The same with measurements after contacts: for models that differ in the contacts.
@@ -64,37 +64,37 @@ class Fitter {
   void step(MotionModel&) const;
   /// Fits a map of camera distortion without information from contacts. Under distortion walls are not straight,
   /// and encounters are shown in wrong places.
-  void straighten(MotionModel&) const;
+  void fit_camera_distortion(MotionModel&) const;
   /// The model with possible walls along the whole boundary of visited places, and a larger contact range.
-  [[nodiscard]] MotionModel doubting(MotionModel) const;
+  [[nodiscard]] MotionModel with_uncertain_walls(MotionModel) const;
   /// Whether contacts occur away from the model's walls and discs, which indicates distortion.
-  [[nodiscard]] bool holds_seem_elsewhere(const MotionModel&) const;
+  [[nodiscard]] bool contacts_contradict_geometry(const MotionModel&) const;
   /// Returns to explicit walls and the normal contact range if they now explain the contacts.
-  void settle_doubts(MotionModel&) const;
+  void resolve_walls(MotionModel&) const;
   /// Updates walls from positions where driven robots accumulate. Needs headings.
-  void look_for_walls(MotionModel&) const;
+  void update_walls(MotionModel&) const;
   /// Log posterior: log likelihood plus log prior of the coefficients.
-  [[nodiscard]] double worth(const MotionModel&) const;
+  [[nodiscard]] double log_posterior(const MotionModel&) const;
   /// Corrects the camera scale by the contact distance. Returns whether it changed.
-  bool set_scale(MotionModel&) const;
+  bool correct_camera_scale(MotionModel&) const;
   /// Sets the common scale of camera map, speeds and wheel base to its posterior mode. The likelihood is flat
   /// along it, so Gauss-Newton steps would drift.
-  void settle_scale(MotionModel&) const;
+  void choose_camera_scale(MotionModel&) const;
   /// Tracks spread over the set, up to this number of samples.
   [[nodiscard]] std::vector<const TrackView*> some_tracks(std::size_t samples) const;
-  [[nodiscard]] double with_touching(const MotionModel&, const std::vector<const TrackView*>&) const;
+  [[nodiscard]] double log_likelihood_with_contacts(const MotionModel&, const std::vector<const TrackView*>&) const;
   /// Variance per second of the displacement by pushes of other robots; 0 if there are few contacts.
-  [[nodiscard]] double lasting_push_mm2_s(const MotionModel&, const std::vector<const TrackView*>&) const;
+  [[nodiscard]] double persistent_push_mm2_s(const MotionModel&, const std::vector<const TrackView*>&) const;
 
   PreparedSet& set_;
   std::uint32_t threads_;
   BasePrior prior_;
   /// Spans at places of contact, which fix the camera scale.
-  mutable std::shared_ptr<const ScaleHold> hold_;
+  mutable std::shared_ptr<const ScaleConstraint> scale_constraint_;
 };
 
 /// Contact range, mm. Without headings it allows for the unknown direction of the disc centre.
-[[nodiscard]] double touching_mm(const BaseParameters&, bool headings);
+[[nodiscard]] double contact_range_of(const BaseParameters&, bool headings);
 
 /// The blocks of all terms, in order.
 [[nodiscard]] std::vector<Block> blocks_of(const MotionModel&);

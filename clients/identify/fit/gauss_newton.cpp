@@ -15,7 +15,7 @@ struct Equations {
   std::vector<Unit> units;
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
-  Eigen::VectorXd beforehand;  ///< prior precisions of the terms' coefficients
+  Eigen::VectorXd prior_precision;  ///< prior precisions of the terms' coefficients
 };
 
 Equations equations_of(const Fitter& fitter, const MotionModel& model) {
@@ -23,7 +23,7 @@ Equations equations_of(const Fitter& fitter, const MotionModel& model) {
   e.units = linearise(model, fitter.set().units(), blocks_of(model), {100, fitter.threads()});
   const Eigen::Index n = e.units.front().information.rows();
   e.information = Eigen::MatrixXd::Zero(n, n);
-  e.score = e.beforehand = Eigen::VectorXd::Zero(n);
+  e.score = e.prior_precision = Eigen::VectorXd::Zero(n);
   for (const Unit& unit : e.units) {
     e.information += unit.information;
     e.score += unit.score;
@@ -32,11 +32,11 @@ Equations equations_of(const Fitter& fitter, const MotionModel& model) {
   Eigen::Index first = kBaseColumns;
   for (const Term& term : model.terms) {
     const Eigen::Index count = term.coefficients.size();
-    e.beforehand.segment(first, count) = term.precision;
+    e.prior_precision.segment(first, count) = term.precision;
     e.score.segment(first, count) -= term.precision.cwiseProduct(term.coefficients);
     first += count;
   }
-  e.information.diagonal() += e.beforehand;
+  e.information.diagonal() += e.prior_precision;
   // The likelihood is flat along the common scale of the camera map, the speeds and the wheel base. A step must
   // not move along it, so that direction is removed.
   if (const Eigen::VectorXd by_scale = log_scale_by_coefficients(model); by_scale.size() > 0) {
@@ -50,16 +50,16 @@ Equations equations_of(const Fitter& fitter, const MotionModel& model) {
 }  // namespace
 
 void Fitter::add_base_prior(const MotionModel& model, Eigen::MatrixXd& information, Eigen::VectorXd& score) const {
-  const BaseParameters seed;
+  const BaseParameters defaults;
   const auto add = [&](Eigen::Index i, double from, double sd) {
     information(i, i) += 1 / (sd * sd);
     score[i] += from / (sd * sd);
   };
-  add(kStraightSpeed, seed.straight_mm_s - model.base.straight_mm_s, prior_.straight_mm_s);
-  add(kTurnSpeed, seed.turn_mm_s - model.base.turn_mm_s, prior_.turn_mm_s);
-  add(kWheelBase, seed.wheel_base_mm - model.base.wheel_base_mm, prior_.wheel_base_mm);
-  add(kAheadPoint, seed.ahead_mm - model.base.ahead_mm, prior_.point_mm);
-  add(kLeftPoint, seed.left_mm - model.base.left_mm, prior_.point_mm / 4);
+  add(kStraightSpeed, defaults.straight_mm_s - model.base.straight_mm_s, prior_.straight_mm_s);
+  add(kTurnSpeed, defaults.turn_mm_s - model.base.turn_mm_s, prior_.turn_mm_s);
+  add(kWheelBase, defaults.wheel_base_mm - model.base.wheel_base_mm, prior_.wheel_base_mm);
+  add(kAheadPoint, defaults.ahead_mm - model.base.ahead_mm, prior_.point_mm);
+  add(kLeftPoint, defaults.left_mm - model.base.left_mm, prior_.point_mm / 4);
 }
 
 void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eigen::VectorXd& step) {
@@ -94,17 +94,17 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
     count += 2;
   }
   // Population distribution of biases, with a prior at the ARGoS paper's values for few robots.
-  const BaseParameters seed;
+  const BaseParameters defaults;
   constexpr double kSeedRobots = 4;
   const double mean = sum / (count + kSeedRobots);
-  const double variance =
-      (square - 2 * mean * sum + count * mean * mean + kSeedRobots * seed.bias_sd_mm_s * seed.bias_sd_mm_s) /
-      (count + kSeedRobots);
+  const double variance = (square - 2 * mean * sum + count * mean * mean +
+                           kSeedRobots * defaults.bias_sd_mm_s * defaults.bias_sd_mm_s) /
+                          (count + kSeedRobots);
   model.base.bias_mean_mm_s = mean;
   model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
 }
 
-double Fitter::worth(const MotionModel& model) const {
+double Fitter::log_posterior(const MotionModel& model) const {
   double value = log_likelihood(model);
   for (const Term& term : model.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
   return value;
@@ -114,8 +114,8 @@ void Fitter::step(MotionModel& model) const {
   const Equations e = equations_of(*this, model);
   // Damps a step that lowers the posterior: first the directions with little information, then the whole step.
   const MotionModel start = model;
-  const bool pictured = start.measures() && start.room.any();
-  const double before = worth(start);
+  const bool camera_fitted = start.measures() && start.walls.any();
+  const double before = log_posterior(start);
   struct Trial {
     double firmness, length;
   };
@@ -123,15 +123,15 @@ void Fitter::step(MotionModel& model) const {
   bool better = false;
   for (const Trial& trial : kTrials) {
     Eigen::MatrixXd held = e.information;
-    held.diagonal() += trial.firmness * e.beforehand;
+    held.diagonal() += trial.firmness * e.prior_precision;
     model = start;
     apply(model, e.units, trial.length * held.ldlt().solve(e.score));
-    if (pictured) model.room = carried(start.room, start, model);
-    better = worth(model) > before - 2;
+    if (camera_fitted) model.walls = carried(start.walls, start, model);
+    better = log_posterior(model) > before - 2;
     if (better) break;
   }
   if (!better) model = start;
-  if (model.measures()) settle_scale(model);
+  if (model.measures()) choose_camera_scale(model);
 }
 
 }  // namespace kilotwin::identify

@@ -8,17 +8,18 @@
 
 namespace kilotwin::identify {
 
-LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, bool with_touching) {
+LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, bool include_contacts) {
   RobotBias bias = model.bias_of(view.track->robot);
   bias.covariance.setZero();
   TrackFilter filter(model, bias, view.track->robot, view.number);
   LogLikelihood likelihood;
-  likelihood.with_touching = with_touching;
-  walk(filter, view, view.track->samples.size(), likelihood);
+  likelihood.include_contacts = include_contacts;
+  run_filter(filter, view, view.track->samples.size(), likelihood);
   return likelihood;
 }
 
-double Fitter::with_touching(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
+double Fitter::log_likelihood_with_contacts(const MotionModel& model,
+                                            const std::vector<const TrackView*>& tracks) const {
   std::vector<double> sums(tracks.size());
   in_parallel(tracks.size(), threads_,
               [&](std::size_t i) { sums[i] = likelihood_of(model, *tracks[i], true).sum; });
@@ -36,7 +37,7 @@ double Fitter::log_likelihood(const MotionModel& model) const {
 }
 
 double Fitter::log_likelihood_of_all(const MotionModel& model) const {
-  return with_touching(model, some_tracks(std::numeric_limits<std::size_t>::max()));
+  return log_likelihood_with_contacts(model, some_tracks(std::numeric_limits<std::size_t>::max()));
 }
 
 double Fitter::log_evidence(const MotionModel& model) const {

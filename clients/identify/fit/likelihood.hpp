@@ -9,22 +9,22 @@ namespace kilotwin::identify {
 /// Sums the log likelihood along a track: a visitor of run_filter().
 struct LogLikelihood {
   double sum = 0;
-  Touched touched;
-  bool with_touching = false;  ///< whether measurements after contacts count fully
+  ContactGate gate;
+  bool include_contacts = false;  ///< whether measurements after contacts count fully
 
   void start(const TrackFilter&) {}
-  void step(const StepRecord& record) { touched.step(record); }
+  void step(const StepRecord& record) { gate.step(record); }
   void update(const Innovation& innovation, const Sample&) {
     constexpr double kLeast = -1e3;
-    const Touched::Counts counts = touched.update(innovation);
-    if (counts == Touched::Counts::kAll || with_touching)
+    const ContactGate::Counts counts = gate.update(innovation);
+    if (counts == ContactGate::Counts::kAll || include_contacts)
       sum += std::max(innovation.log_likelihood, kLeast);
-    else if (counts == Touched::Counts::kHeading)
+    else if (counts == ContactGate::Counts::kHeading)
       sum += std::max(heading_log_likelihood(innovation), kLeast);
   }
 };
 
 /// Log likelihood of one track, with the robot's bias fixed at its mean.
-[[nodiscard]] LogLikelihood likelihood_of(const MotionModel&, const TrackView&, bool with_touching = false);
+[[nodiscard]] LogLikelihood likelihood_of(const MotionModel&, const TrackView&, bool include_contacts = false);
 
 }  // namespace kilotwin::identify

@@ -62,7 +62,7 @@ class Sensitivities {
     const double by_heading_x = -(arc.dy_mm - r.world_y_mm_s * h), by_heading_y = arc.dx_mm - r.world_x_mm_s * h;
     add_row({by_heading_x, by_heading_y, 0}, pose_.row(2).data(), all_, pose_, 0);
     last_ = record.middle;
-    touched_.step(record);
+    in_contact_.step(record);
     const double forward = (r.left_mm_s + r.right_mm_s) / 2 * h;
     const Eigen::Vector3d turn = h * Eigen::Vector3d(-arc.along_y * forward / 2, arc.along_x * forward / 2, 1);
     const Eigen::Vector3d ahead = h * Eigen::Vector3d(arc.along_x, arc.along_y, 0);
@@ -137,14 +137,14 @@ class Sensitivities {
     }
   }
   void update(const Innovation& innovation, const Sample& sample) {
-    const Touched::Counts counts = touched_.update(innovation);
-    const bool heading_alone = counts == Touched::Counts::kHeading;
-    if (counts == Touched::Counts::kAll) log_likelihood += innovation.log_likelihood;
-    if (heading_alone) log_likelihood += heading_log_likelihood(innovation);
+    const ContactGate::Counts counts = in_contact_.update(innovation);
+    const bool heading_only = counts == ContactGate::Counts::kHeading;
+    if (counts == ContactGate::Counts::kAll) log_likelihood += innovation.log_likelihood;
+    if (heading_only) log_likelihood += heading_log_likelihood(innovation);
     ++samples;
     if (innovation.weight < 1) ++outliers;
     // Otherwise the sensitivities start at zero again.
-    if (innovation.lost || counts == Touched::Counts::kNothing) {
+    if (innovation.lost || counts == ContactGate::Counts::kNothing) {
       lost += innovation.lost ? 1 : 0;
       place(sample, innovation);
       return;
@@ -158,7 +158,7 @@ class Sensitivities {
     put_combined(innovation.jacobian, pose_, 3, seen_.data());
     add_measured(sample, innovation.pose);
     if (filled_ + 3 > kBuffer) flush();
-    if (heading_alone) return add_heading(sample, innovation);
+    if (heading_only) return add_heading(sample, innovation);
     if (innovation.size == 2) seen_.row(2).setZero();
     const Eigen::LLT<Eigen::Matrix3d> root(innovation.covariance);
     const Eigen::Matrix3d whiten = root.matrixL().solve(Eigen::Matrix3d::Identity());
@@ -300,7 +300,7 @@ class Sensitivities {
   const TrackFilter* filter_ = nullptr;
   const Sample* first_ = nullptr;  ///< first sample of the track
   Situation last_;
-  Touched touched_;
+  ContactGate in_contact_;
   bool measures_ = false;
   double of_left_[kMostColumns], of_right_[kMostColumns];
 };
@@ -331,7 +331,7 @@ std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vec
       fixed.covariance.setZero();
       TrackFilter filter(model, fixed, view->track->robot, view->number);
       sums.begin_track(*view);
-      walk(filter, *view, view->track->samples.size(), sums);
+      run_filter(filter, *view, view->track->samples.size(), sums);
       sums.flush();
     }
     const double sd = model.base.bias_sd_mm_s;

@@ -45,8 +45,8 @@ Noise with(Noise noise, const NoiseVector& v) {
 }
 
 /// From one measurement to the next, linearised about the filter's path.
-struct Stretch {
-  Stretch() {
+struct FilterInterval {
+  FilterInterval() {
     for (Eigen::Matrix3d& m : spread) m.setZero();
   }
   Eigen::Matrix3d transition = Eigen::Matrix3d::Identity();  ///< of the pose
@@ -66,7 +66,7 @@ class Recorder {
  public:
   explicit Recorder(double wheel_base_mm) : wheel_base_mm_(wheel_base_mm) {}
   Eigen::Matrix3d first;  ///< covariance of the pose at the first sample
-  std::vector<Stretch> stretches;
+  std::vector<FilterInterval> stretches;
 
   void start(const TrackFilter& filter) {
     filter_ = &filter;
@@ -74,8 +74,8 @@ class Recorder {
     begin();
   }
   void step(const StepRecord& record) {
-    touched_ = touched_ || record.touching();
-    const StepWays ways = ways_of(record, wheel_base_mm_);
+    in_contact_ = in_contact_ || record.in_contact();
+    const StepJacobian ways = step_jacobian(record, wheel_base_mm_);
     const auto carry = [&](Eigen::Matrix3d& m) {
       m.row(0) += ways.by_heading[0] * m.row(2);
       m.row(1) += ways.by_heading[1] * m.row(2);
@@ -103,7 +103,7 @@ class Recorder {
     now_.jacobian = innovation.jacobian;
     now_.difference = innovation.difference;
     now_.correction = innovation.gain.topRows<3>() * innovation.difference;
-    now_.counts = !innovation.lost && !touched_;
+    now_.counts = !innovation.lost && !in_contact_;
     now_.covariance = filter_->belief().covariance.topLeftCorner<3, 3>();
     stretches.push_back(now_);
     begin();
@@ -111,19 +111,19 @@ class Recorder {
 
  private:
   void begin() {
-    now_ = Stretch();
-    touched_ = false;
+    now_ = FilterInterval();
+    in_contact_ = false;
   }
   const double wheel_base_mm_;
   const TrackFilter* filter_ = nullptr;
-  Stretch now_;
-  bool touched_ = false;
+  FilterInterval now_;
+  bool in_contact_ = false;
 };
 
 struct Path {
   Eigen::Matrix3d first;
   double position_mm2;  ///< part of `first`
-  std::vector<Stretch> stretches;
+  std::vector<FilterInterval> stretches;
 };
 
 Path path_of(const MotionModel& model, const TrackView& view) {
@@ -131,7 +131,7 @@ Path path_of(const MotionModel& model, const TrackView& view) {
   bias.covariance.setZero();
   TrackFilter filter(model, bias, view.track->robot, view.number);
   Recorder recorder(model.base.wheel_base_mm);
-  walk(filter, view, view.track->samples.size(), recorder);
+  run_filter(filter, view, view.track->samples.size(), recorder);
   return {recorder.first, model.noise.position_mm2, std::move(recorder.stretches)};
 }
 
@@ -142,7 +142,7 @@ double log_likelihood(const Path& path, const NoiseVector& variance) {
   p(0, 0) += variance[kPosition] - path.position_mm2;
   p(1, 1) += variance[kPosition] - path.position_mm2;
   Eigen::Vector3d off = Eigen::Vector3d::Zero();  // of the mean from the path
-  for (const Stretch& s : path.stretches) {
+  for (const FilterInterval& s : path.stretches) {
     if (!s.counts) {
       p = s.covariance;
       off.setZero();

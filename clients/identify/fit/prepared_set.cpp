@@ -16,7 +16,7 @@ PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
     : set_(&set), first_number_(first_number) {
   for (std::size_t r = 0; r < set.runs.size(); ++r) {
     neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
-    neighbours_.back()->remember(set.runs[r], MotionModel{}.cells);
+    neighbours_.back()->update_traffic(set.runs[r], MotionModel{}.cells);
     for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
       const Track& track = set.runs[r].tracks[t];
       if (track.samples.size() < 2) continue;
@@ -25,9 +25,9 @@ PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
     }
   }
   constexpr double kMargin_mm = 12;
-  const Rim rim(set, kMargin_mm);
+  const VisitedBoundary boundary(set, kMargin_mm);
   for (TrackView& view : views_)
-    for (const Sample& s : view.track->samples) view.at_rim.push_back(rim.holds(s.x_mm, s.y_mm));
+    for (const Sample& s : view.track->samples) view.at_boundary.push_back(boundary.is_near(s.x_mm, s.y_mm));
 }
 
 std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
@@ -60,46 +60,46 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
     for (std::size_t v = 0; v < views_.size(); ++v)
       if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
     *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
-    neighbours_[r]->remember(set_->runs[r], model.cells);
+    neighbours_[r]->update_traffic(set_->runs[r], model.cells);
   }
 }
 
-PreparedSet::Found PreparedSet::found() const {
-  Found found{centres_, {}};
+PreparedSet::TrackEstimates PreparedSet::estimates() const {
+  TrackEstimates found{centres_, {}};
   for (const TrackView& view : views_)
     found.starts_rad.emplace_back(view.start_heading_rad, view.start_heading_sd_rad);
   return found;
 }
 
-void PreparedSet::go_back(const Found& found, const MotionModel& model) {
+void PreparedSet::restore(const TrackEstimates& found, const MotionModel& model) {
   centres_ = found.centres;
   for (std::size_t r = 0; r < neighbours_.size(); ++r) {
     *neighbours_[r] = centres_.empty() ? RunNeighbours(set_->runs[r]) : RunNeighbours(set_->runs[r], &centres_[r]);
-    neighbours_[r]->remember(set_->runs[r], model.cells);
+    neighbours_[r]->update_traffic(set_->runs[r], model.cells);
   }
   for (std::size_t v = 0; v < views_.size(); ++v)
     std::tie(views_[v].start_heading_rad, views_[v].start_heading_sd_rad) = found.starts_rad[v];
 }
 
-void PreparedSet::remember(const MotionModel& model) {
-  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->remember(set_->runs[r], model.cells);
+void PreparedSet::update_traffic(const MotionModel& model) {
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->update_traffic(set_->runs[r], model.cells);
 }
 
-Meetings PreparedSet::meetings() const {
-  Meetings sum;
+Encounters PreparedSet::encounters() const {
+  Encounters sum;
   constexpr double kEvery_s = 1;
   for (const TrackView& view : views_) {
     for (double t = view.track->samples.front().time_s; t < view.track->samples.back().time_s; t += kEvery_s) {
       const double nearest = view.neighbours->view(view.place, t).nearest_mm;
-      if (nearest < Meetings::kInside_mm) ++sum.within;
-      if (nearest > kTouch_mm && nearest < Meetings::kRing_mm) ++sum.near;
+      if (nearest < Encounters::kInside_mm) ++sum.within;
+      if (nearest > kContactRange_mm && nearest < Encounters::kRing_mm) ++sum.near;
     }
   }
   return sum;
 }
 
-std::vector<Pair> PreparedSet::pairs() const {
-  std::vector<Pair> pairs;
+std::vector<RobotPair> PreparedSet::pairs() const {
+  std::vector<RobotPair> pairs;
   for (std::size_t r = 0; r < neighbours_.size(); ++r)
     add_pairs(*neighbours_[r], set_->runs[r].tracks.size(), first_number_ + static_cast<std::uint32_t>(r), pairs);
   return pairs;
@@ -127,7 +127,7 @@ void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads)
       view.start_heading_sd_rad = sd;
       TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.number);
       LogLikelihood likelihood;
-      walk(filter, view, samples + 1, likelihood);
+      run_filter(filter, view, samples + 1, likelihood);
       return likelihood.sum;
     };
     double best = 0, best_value = -1e300;

@@ -9,19 +9,20 @@
 
 namespace kilotwin::identify {
 
-struct Pair;
+struct RobotPair;
 
 /// Counts of robots whose nearest neighbour overlaps them, and of those in a ring around that distance.
-struct Meetings {
+struct Encounters {
   static constexpr double kRing_mm = 55;
   /// Smaller than a disc diameter, so that camera distortion does not make contacts look like overlaps.
-  static constexpr double kInside_mm = 0.85 * kDiscs_mm;
+  static constexpr double kInside_mm = 0.85 * kDiscDiameter_mm;
   /// From this relative density of overlaps on, robots do not collide with each other.
-  static constexpr double kUnhindered = 0.6;
+  static constexpr double kNoCollisions = 0.6;
   std::size_t within = 0, near = 0;
   /// Density of overlaps relative to the density in the ring. Prior: 0.2, with the weight of ten counts.
-  [[nodiscard]] double share_within() const {
-    constexpr double kInner = kInside_mm * kInside_mm, kOuter = kRing_mm * kRing_mm - kTouch_mm * kTouch_mm;
+  [[nodiscard]] double overlap_density() const {
+    constexpr double kInner = kInside_mm * kInside_mm,
+                     kOuter = kRing_mm * kRing_mm - kContactRange_mm * kContactRange_mm;
     constexpr double kFew = 10;
     return (static_cast<double>(within) + 0.2 * kFew) / (static_cast<double>(near) * kInner / kOuter + kFew);
   }
@@ -42,18 +43,18 @@ class PreparedSet {
   /// Recomputes the disc centres, and with them the neighbour views.
   void find_centres(const MotionModel&, std::uint32_t threads);
   /// Estimates that belong to the tracks: disc centres and initial headings.
-  struct Found {
+  struct TrackEstimates {
     std::vector<std::vector<Centres>> centres;          ///< by run; empty: measured positions
     std::vector<std::pair<double, double>> starts_rad;  ///< by view: heading and its standard deviation
   };
-  [[nodiscard]] Found found() const;
+  [[nodiscard]] TrackEstimates estimates() const;
   /// Restores these estimates. Traffic grids are recomputed with the model's cells.
-  void go_back(const Found&, const MotionModel&);
+  void restore(const TrackEstimates&, const MotionModel&);
   /// Recomputes the traffic grids with the model's cells.
-  void remember(const MotionModel&);
-  [[nodiscard]] Meetings meetings() const;
+  void update_traffic(const MotionModel&);
+  [[nodiscard]] Encounters encounters() const;
   /// Robots that came near each other, by disc centres.
-  [[nodiscard]] std::vector<Pair> pairs() const;
+  [[nodiscard]] std::vector<RobotPair> pairs() const;
   /// Estimates the initial heading of each track: the measured one, or the most likely of many hypotheses.
   void find_headings(const MotionModel&, std::uint32_t threads);
 

@@ -17,13 +17,13 @@ class Corrections {
   void step(const StepRecord& record) {
     last_ = record.middle;
     all_driven_ = all_driven_ && record.middle.commands.driven();
-    touched_ = touched_ || record.touching();
+    in_contact_ = in_contact_ || record.in_contact();
     length_s_ += record.h_s;
   }
   void update(const Innovation& innovation, const Sample& sample) {
     const double length_s = std::exchange(length_s_, 0);
-    const bool counts = std::exchange(all_driven_, true) && !std::exchange(touched_, false) && !innovation.lost &&
-                        innovation.weight == 1 && length_s > 0;
+    const bool counts = std::exchange(all_driven_, true) && !std::exchange(in_contact_, false) &&
+                        !innovation.lost && innovation.weight == 1 && length_s > 0;
     if (!counts) return;
     const Eigen::Vector3d moved = innovation.gain.topRows<3>() * innovation.difference / length_s;
     const double c = std::cos(last_.heading_rad), s = std::sin(last_.heading_rad);
@@ -38,7 +38,7 @@ class Corrections {
   std::vector<Disturbance>& to_;
   Situation last_;
   double length_s_ = 0;
-  bool all_driven_ = true, touched_ = false;
+  bool all_driven_ = true, in_contact_ = false;
 };
 
 double bounded_quantile(std::vector<double> values, double part) {
@@ -64,7 +64,7 @@ std::vector<Disturbance> disturbances_of(const MotionModel& model, const Prepare
     bias.covariance.setZero();
     TrackFilter filter(model, bias, view.track->robot, view.number);
     Corrections corrections(static_cast<std::uint32_t>(v), parts[v]);
-    walk(filter, view, view.track->samples.size(), corrections);
+    run_filter(filter, view, view.track->samples.size(), corrections);
   });
   std::vector<Disturbance> all;
   for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());

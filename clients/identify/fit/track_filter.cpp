@@ -16,14 +16,14 @@ constexpr double kFar = 60;
 
 }  // namespace
 
-StepWays ways_of(const StepRecord& record, double wheel_base_mm) {
+StepJacobian step_jacobian(const StepRecord& record, double wheel_base_mm) {
   const Arc& arc = record.arc;
   const double h = record.h_s;
   const double world_x = record.rates.world_x_mm_s * h, world_y = record.rates.world_y_mm_s * h;
   const double forward = (record.rates.left_mm_s + record.rates.right_mm_s) / 2 * h;
   // A turn within the step also changes the direction of the rest of the step.
   const double bend_x = -arc.along_y * forward / 2, bend_y = arc.along_x * forward / 2;
-  StepWays ways;
+  StepJacobian ways;
   ways.by_wheel << arc.along_x / 2 - bend_x / wheel_base_mm, arc.along_x / 2 + bend_x / wheel_base_mm,  //
       arc.along_y / 2 - bend_y / wheel_base_mm, arc.along_y / 2 + bend_y / wheel_base_mm,               //
       -1 / wheel_base_mm, 1 / wheel_base_mm;
@@ -89,7 +89,7 @@ Situation TrackFilter::situation(double time_s, const Eigen::Vector3d& pose, con
 
 StepRecord TrackFilter::step(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
   const StepRecord record = step_freely(time_s, h_s, commands, near);
-  hold_inside();
+  apply_walls();
   return record;
 }
 
@@ -111,38 +111,38 @@ StepRecord TrackFilter::step_freely(double time_s, double h_s, const CommandStat
   record.middle.span_s = h_s;
   record.middle.commands.advance(h_s / 2);
   // Robots also push a robot at rest.
-  record.at_robot = model_->contacts && near.nearest_mm < model_->touch_mm;
-  record.at_wall =
-      commands.driven() && (held_ || model_->room.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm));
+  record.at_robot = model_->contacts && near.nearest_mm < model_->contact_range_mm;
+  record.at_wall = commands.driven() &&
+                   (at_boundary_ || model_->walls.at_wall(record.middle.x_mm, record.middle.y_mm, kWallMargin_mm));
   record.rates = model_->rates(record.middle, belief_.mean.tail<2>());
   record.arc = arc_of(record.rates, model_->base.wheel_base_mm, belief_.mean[2], h_s);
-  spread(record);
+  propagate_covariance(record);
   belief_.mean[0] += record.arc.dx_mm;
   belief_.mean[1] += record.arc.dy_mm;
   belief_.mean[2] += record.arc.dheading_rad;
   return record;
 }
 
-void TrackFilter::hold_inside() {
-  const Room& room = model_->room;
+void TrackFilter::apply_walls() {
+  const Walls& walls = model_->walls;
   const double ahead = model_->base.centre_mm;
   // Early exit: few robots are near a wall.
   const StateCovariance& p = belief_.covariance;
   constexpr double kNear = 6;  // standard deviations
   const double reach = kNear * (std::sqrt(p(0, 0) + p(1, 1)) + std::abs(ahead) * std::sqrt(p(2, 2)));
-  if (!room.at_wall(belief_.mean[0], belief_.mean[1], reach + std::abs(ahead))) return;
+  if (!walls.at_wall(belief_.mean[0], belief_.mean[1], reach + std::abs(ahead))) return;
   const Eigen::Vector2d by_heading(-ahead * std::sin(belief_.mean[2]), ahead * std::cos(belief_.mean[2]));
   const Eigen::Vector2d centre(belief_.mean[0] + by_heading[1], belief_.mean[1] - by_heading[0]);
-  if (!room.at_wall(centre[0], centre[1], reach)) return;
-  hold_behind(0, room.x_high_mm, 1);
-  hold_behind(0, room.x_low_mm, -1);
-  hold_behind(1, room.y_high_mm, 1);
-  hold_behind(1, room.y_low_mm, -1);
+  if (!walls.at_wall(centre[0], centre[1], reach)) return;
+  apply_wall(0, walls.x_high_mm, 1);
+  apply_wall(0, walls.x_low_mm, -1);
+  apply_wall(1, walls.y_high_mm, 1);
+  apply_wall(1, walls.y_low_mm, -1);
 }
 
 /// Censoring: X ~ N becomes min(X, wall). Its first two moments are closed forms. Its covariance with any jointly
 /// normal variable is that of X times P(X < wall) (Stein's lemma).
-void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards) {
+void TrackFilter::apply_wall(Eigen::Index axis, double wall_mm, double outwards) {
   if (std::isinf(wall_mm)) return;
   const double c = std::cos(belief_.mean[2]), s = std::sin(belief_.mean[2]);
   const double by_heading = axis == 0 ? -model_->base.centre_mm * s : model_->base.centre_mm * c;
@@ -166,9 +166,9 @@ void TrackFilter::hold_behind(Eigen::Index axis, double wall_mm, double outwards
 }
 
 /// Covariance prediction: P = F P F' + Q.
-void TrackFilter::spread(const StepRecord& record) {
+void TrackFilter::propagate_covariance(const StepRecord& record) {
   const double h = record.h_s;
-  const auto [by_heading, by_wheel] = ways_of(record, model_->base.wheel_base_mm);
+  const auto [by_heading, by_wheel] = step_jacobian(record, model_->base.wheel_base_mm);
   StateCovariance& p = belief_.covariance;
   const Noise& noise = model_->noise;
   Eigen::Vector3d own = Eigen::Vector3d::Constant(noise.drift_mm2_s * h);
@@ -193,7 +193,7 @@ void TrackFilter::spread(const StepRecord& record) {
                                  h * (noise.factor_s * right * right + noise.wheel_mm2_s));
     p.topLeftCorner<3, 3>() += by_wheel * wheels.asDiagonal() * by_wheel.transpose();
   }
-  if (!looking_ahead_) {
+  if (!forecasting_) {
     if (record.at_wall) own += h * Eigen::Vector3d(noise.wall_mm2_s, noise.wall_mm2_s, noise.wall_rad2_s);
     if (record.at_robot) own += h * Eigen::Vector3d(noise.contact_mm2_s, noise.contact_mm2_s, noise.contact_rad2_s);
   }
@@ -203,7 +203,7 @@ void TrackFilter::spread(const StepRecord& record) {
 void TrackFilter::step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near) {
   const State before = belief_.mean;
   const StateCovariance p = belief_.covariance;
-  look_ahead();
+  begin_forecast();
   const StepRecord record = step_freely(time_s, h_s, commands, near);
   // For a normal heading of variance P, E[cos] = cos exp(-P / 2). The covariance of speed and heading shifts the
   // mean.
@@ -214,7 +214,7 @@ void TrackFilter::step_mean(double time_s, double h_s, const CommandState& comma
   const Rates& r = record.rates;
   belief_.mean[0] = before[0] + h_s * (forward * cx - together * cy - r.sideways_mm_s * cy + r.world_x_mm_s);
   belief_.mean[1] = before[1] + h_s * (forward * cy + together * cx + r.sideways_mm_s * cx + r.world_y_mm_s);
-  hold_inside();
+  apply_walls();
 }
 
 Eigen::Matrix3d TrackFilter::jacobian(const Situation& at) const {
@@ -242,7 +242,7 @@ Eigen::Vector3d TrackFilter::expected(double time_s, const CommandState& command
   return model_->measured(belief_.mean[0], belief_.mean[1], belief_.mean[2], situation(time_s, commands, {}));
 }
 
-double TrackFilter::expected_spread_mm2(double time_s, const CommandState& commands) const {
+double TrackFilter::predicted_variance_mm2(double time_s, const CommandState& commands) const {
   const Eigen::Matrix3d h = jacobian(situation(time_s, commands, {}));
   const Eigen::Matrix3d s = h * belief_.covariance.topLeftCorner<3, 3>() * h.transpose();
   return s(0, 0) + s(1, 1);

@@ -33,15 +33,15 @@ struct StepRecord {
   Arc arc;
   double h_s = 0;
   bool at_wall = false, at_robot = false;  ///< whether it may have been in contact
-  [[nodiscard]] bool touching() const { return at_wall || at_robot; }
+  [[nodiscard]] bool in_contact() const { return at_wall || at_robot; }
 };
 
 /// Jacobian of the pose at the end of a sub-step by the initial heading and by the paths of the wheels.
-struct StepWays {
+struct StepJacobian {
   Eigen::Vector2d by_heading;  ///< of x and y
   Eigen::Matrix<double, 3, 2> by_wheel;
 };
-[[nodiscard]] StepWays ways_of(const StepRecord&, double wheel_base_mm);
+[[nodiscard]] StepJacobian step_jacobian(const StepRecord&, double wheel_base_mm);
 
 /// Factor of the innovation covariance for a squared Mahalanobis distance and 2 or 3 numbers. Above 1: an outlier.
 [[nodiscard]] double outlier_factor(double distance2, int size);
@@ -77,36 +77,36 @@ class TrackFilter {
   /// forecasts.
   void step_mean(double time_s, double h_s, const CommandState& commands, const NeighbourView& near);
   /// Starts a forecast: no further measurements, and no contact noise. The caller handles contacts.
-  void look_ahead() { looking_ahead_ = true; }
+  void begin_forecast() { forecasting_ = true; }
   /// For the next steps: whether the robot is at the boundary of visited places.
-  void at_rim(bool at_rim) { held_ = at_rim && model_->doubts_rim; }
+  void at_boundary(bool at_boundary) { at_boundary_ = at_boundary && model_->walls_uncertain; }
   Innovation update(const Sample&, const CommandState& commands);
 
   [[nodiscard]] const Belief& belief() const { return belief_; }
   [[nodiscard]] Belief& belief() { return belief_; }
-  /// Predicted measurement, and the trace of its position covariance without tracker noise, mm^2.
+  /// Forecast measurement, and the trace of its position covariance without tracker noise, mm^2.
   [[nodiscard]] Eigen::Vector3d expected(double time_s, const CommandState& commands) const;
-  [[nodiscard]] double expected_spread_mm2(double time_s, const CommandState& commands) const;
+  [[nodiscard]] double predicted_variance_mm2(double time_s, const CommandState& commands) const;
 
  private:
   /// A sub-step without walls.
   StepRecord step_freely(double time_s, double h_s, const CommandState&, const NeighbourView&);
   /// Applies the walls to the distribution of the disc centre.
-  void hold_inside();
-  void hold_behind(Eigen::Index axis, double wall_mm, double outwards);
+  void apply_walls();
+  void apply_wall(Eigen::Index axis, double wall_mm, double outwards);
   [[nodiscard]] Situation situation(double time_s, const CommandState&, const NeighbourView&) const;
   [[nodiscard]] Situation situation(double time_s, const Eigen::Vector3d& pose, const CommandState&,
                                     const NeighbourView&) const;
   [[nodiscard]] Eigen::Matrix3d jacobian(const Situation&) const;
-  void spread(const StepRecord&);
+  void propagate_covariance(const StepRecord&);
 
   const MotionModel* model_;
   Belief belief_;
   Situation place_;   ///< robot and run
   int outliers_ = 0;  ///< in a row
   bool measures_;
-  bool looking_ahead_ = false;
-  bool held_ = false;
+  bool forecasting_ = false;
+  bool at_boundary_ = false;
 };
 
 }  // namespace kilotwin::identify

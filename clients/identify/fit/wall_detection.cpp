@@ -51,7 +51,7 @@ double upper_wall(std::vector<Place> places, double noise_mm, Evidence fewest) {
 
 }  // namespace
 
-Room room_of(const PreparedSet& set, const MotionModel& model) {
+Walls detected_walls(const PreparedSet& set, const MotionModel& model) {
   std::vector<Place> x, y;
   const bool measures = model.measures();
   const double ahead = model.base.centre_mm - model.base.ahead_mm;
@@ -79,16 +79,16 @@ Room room_of(const PreparedSet& set, const MotionModel& model) {
   };
   const std::vector<Place> x_turned = turned(x), y_turned = turned(y);
   const auto seen = [&](Evidence fewest) {
-    return Room{-upper_wall(x_turned, noise, fewest), upper_wall(x, noise, fewest),
-                -upper_wall(y_turned, noise, fewest), upper_wall(y, noise, fewest)};
+    return Walls{-upper_wall(x_turned, noise, fewest), upper_wall(x, noise, fewest),
+                 -upper_wall(y_turned, noise, fewest), upper_wall(y, noise, fewest)};
   };
-  const Room room = seen({25, 2});
+  const Walls walls = seen({25, 2});
   // If three sides have walls, the fourth needs less evidence.
   constexpr std::ptrdiff_t kMostSides = 3;
-  const std::array<double, 4> sides = {room.x_low_mm, room.x_high_mm, room.y_low_mm, room.y_high_mm};
+  const std::array<double, 4> sides = {walls.x_low_mm, walls.x_high_mm, walls.y_low_mm, walls.y_high_mm};
   const bool closed =
       std::count_if(sides.begin(), sides.end(), [](double s) { return std::isfinite(s); }) >= kMostSides;
-  return closed ? seen({8, 1}) : room;
+  return closed ? seen({8, 1}) : walls;
 }
 
 }  // namespace kilotwin::identify

@@ -6,6 +6,6 @@
 namespace kilotwin::identify {
 
 /// A side has a wall if driven robots accumulate at a line, some of them for seconds, and none is beyond it.
-[[nodiscard]] Room room_of(const PreparedSet&, const MotionModel&);
+[[nodiscard]] Walls detected_walls(const PreparedSet&, const MotionModel&);
 
 }  // namespace kilotwin::identify

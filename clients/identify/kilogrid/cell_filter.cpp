@@ -10,25 +10,25 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-constexpr double kStep_s = LoneRobot::kStep_s;
+constexpr double kStep_s = SingleRobot::kStep_s;
 constexpr double kEvery_s = 5, kFirst_s = 10;
-/// Of a report to come from anywhere: what the kernel does not know.
+/// Probability of a report from anywhere, outside the reception model.
 constexpr double kAstray = 2e-4;
-/// How far copies of a particle part, and how many of them get a new heading.
+/// Jitter of resampled particles, and the share that gets a new heading.
 constexpr double kPart_mm = 4, kPart_rad = 0.15, kTurned = 0.1;
 
-/// Numbers that a robot may have in the model, where it knows them apart.
+/// Largest robot number that the model may distinguish.
 constexpr std::uint64_t kNumbers = 100;
-/// What is kept of what lasts for a robot, where a particle is copied: no single draw is all that is left of it after a while.
+/// Correlation of persistent properties when a particle is copied. It prevents degeneracy to a single draw.
 constexpr double kKeep = 0.97;
 
-/// A floor whose cells hear a robot, as the filter believes it.
+/// Reception of a robot by the floor, as the filter assumes it.
 class Hearing {
  public:
   Hearing(const Floor& floor, const FloorRadio& radio) : floor_(floor), radio_(radio) {}
 
-  /// Of a report of the robot at this place to come from the cell.
-  [[nodiscard]] double chance_of(const LoneState& p, double cell_x_mm, double cell_y_mm) const {
+  /// Probability that the report of a robot comes from this cell.
+  [[nodiscard]] double chance_of(const RobotState& p, double cell_x_mm, double cell_y_mm) const {
     const double cell = floor_.cell_mm;
     const auto column = static_cast<int>(p.x_mm / cell), row = static_cast<int>(p.y_mm / cell);
     const int columns = static_cast<int>(floor_.width_mm / cell), rows = static_cast<int>(floor_.height_mm / cell);
@@ -41,9 +41,9 @@ class Hearing {
   }
 
  private:
-  [[nodiscard]] double kernel(const LoneState& p, double x_mm, double y_mm) const {
+  [[nodiscard]] double kernel(const RobotState& p, double x_mm, double y_mm) const {
     const double dx = p.x_mm - x_mm, dy = p.y_mm - y_mm;
-    // Wider than the floor's own: the filter's steps are coarse.
+    // Wider than the true range: the filter's time steps are coarse.
     const double over = (std::sqrt(dx * dx + dy * dy) - radio_.range_mm) / (radio_.blur_mm + 3);
     return 1 / (1 + kt_exp(std::min(over, 50.0)));
   }
@@ -52,28 +52,29 @@ class Hearing {
   const FloorRadio& radio_;
 };
 
-/// A robot that may be the one that was heard in this cell.
-LoneState start_near(const LoneRobot& robot, const Floor& floor, double x_mm, double y_mm, Dice& dice) {
+/// A robot that may have caused a report of this cell.
+RobotState start_near(const SingleRobot& robot, const Floor& floor, double x_mm, double y_mm, Dice& dice) {
   const auto number = static_cast<std::uint32_t>(dice.bits() % kNumbers);
   const double x = x_mm + 2 * floor.cell_mm * (dice.uniform() - 0.5),
                y = y_mm + 2 * floor.cell_mm * (dice.uniform() - 0.5);
   return robot.start(number, x, y, (2 * dice.uniform() - 1) * kPi, dice);
 }
 
-/// Draws as many particles as there are, each as often as its weight says.
-void resample(const LoneRobot& robot, std::vector<LoneState>& particles, std::vector<double>& weights, Dice& dice) {
+/// Multinomial resampling by weight.
+void resample(const SingleRobot& robot, std::vector<RobotState>& particles, std::vector<double>& weights,
+              Dice& dice) {
   const std::size_t n = particles.size();
-  std::vector<LoneState> kept;
+  std::vector<RobotState> kept;
   kept.reserve(n);
   double at = dice.uniform() / static_cast<double>(n), below = weights[0];
   for (std::size_t i = 0, j = 0; i < n; ++i, at += 1 / static_cast<double>(n)) {
     while (at > below && j + 1 < n) below += weights[++j];
     kept.push_back(particles[j]);
-    LoneState& p = kept.back();
+    RobotState& p = kept.back();
     p.program.reseed(dice.bits());
     robot.renew(p, kKeep, dice);
     if (dice.uniform() > kKeep) p.number = static_cast<std::uint32_t>(dice.bits() % kNumbers);
-    // Copies part, and some turn as the robot may just have: what the program does is not known.
+    // Copies diffuse, and some turn: the program's state is unknown.
     p.x_mm += kPart_mm * dice.normal();
     p.y_mm += kPart_mm * dice.normal();
     p.heading_rad = wrapped(dice.uniform() < kTurned ? (2 * dice.uniform() - 1) * kPi
@@ -89,9 +90,9 @@ CellFilterResult filter_cells(const FloorTrack& track, const Floor& floor, const
                               double horizon_s, std::size_t count, std::uint64_t seed) {
   CellFilterResult result;
   Dice dice(seed);
-  const LoneRobot robot(floor, settings);
+  const SingleRobot robot(floor, settings);
   const Hearing hearing(floor, settings.radio);
-  std::vector<LoneState> particles;
+  std::vector<RobotState> particles;
   for (std::size_t i = 0; i < count; ++i)
     particles.push_back(start_near(robot, floor, track.x_mm.front(), track.y_mm.front(), dice));
   std::vector<double> weights(count, 1 / static_cast<double>(count));
@@ -107,7 +108,7 @@ CellFilterResult filter_cells(const FloorTrack& track, const Floor& floor, const
              std::abs(track.time_s[heard_next + 1] - target_s) <= std::abs(track.time_s[heard_next] - target_s))
         ++heard_next;
       if (std::abs(track.time_s[heard_next] - target_s) > 1) continue;
-      std::vector<LoneState> ahead = particles;
+      std::vector<RobotState> ahead = particles;
       const auto last = static_cast<std::int64_t>(target_s / kStep_s);
       CellPrediction prediction{target_s, 0, 0, track.x_mm[heard_next], track.y_mm[heard_next]};
       for (std::size_t i = 0; i < count; ++i) {
@@ -117,7 +118,7 @@ CellFilterResult filter_cells(const FloorTrack& track, const Floor& floor, const
       }
       result.predictions.push_back(prediction);
     }
-    for (LoneState& p : particles) robot.step(p, k, dice);
+    for (RobotState& p : particles) robot.step(p, k, dice);
     for (; next < track.size() && track.time_s[next] <= now_s + kStep_s; ++next) {
       double all = 0, squares = 0;
       for (std::size_t i = 0; i < count; ++i)
@@ -125,8 +126,8 @@ CellFilterResult filter_cells(const FloorTrack& track, const Floor& floor, const
       result.log_likelihood += kt_log(all);
       ++result.reports;
       if (all < 3 * kAstray) {
-        // Nobody is where the robot was heard: begin again there.
-        for (LoneState& p : particles) p = start_near(robot, floor, track.x_mm[next], track.y_mm[next], dice);
+        // No particle explains the report: restarts there.
+        for (RobotState& p : particles) p = start_near(robot, floor, track.x_mm[next], track.y_mm[next], dice);
         std::fill(weights.begin(), weights.end(), 1 / static_cast<double>(count));
         continue;
       }
@@ -141,7 +142,7 @@ CellFilterResult filter_cells(const FloorTrack& track, const Floor& floor, const
 }
 
 double cell_noise_mm(const Floor& floor, const FloorRadio& radio) {
-  // Over distances from a cell's middle, each with the area that belongs to it.
+  // Integrates over the distance from a cell centre, weighted by area.
   double squares = 0, all = 0;
   for (double d = 0.5; d < 3 * floor.cell_mm; ++d) {
     const double weight = d / (1 + std::exp((d - radio.range_mm) / radio.blur_mm));

@@ -20,13 +20,13 @@ std::uint64_t export_cells(recorder::Reader& recording, const std::filesystem::p
   const auto whole = [&](double mm) { return std::fmod(mm, 2 * floor.cell_mm) == 0 && mm > 0; };
   if (!whole(floor.width_mm) || !whole(floor.height_mm)) {
     throw UserError(
-        fmt::format("{}: an arena of {:g} x {:g} mm has no floor of cells; its sides must be multiples of {:g} mm",
+        fmt::format("{}: the arena is {:g} x {:g} mm; a Kilogrid export needs sides that are multiples of {:g} mm",
                     recording.path().string(), floor.width_mm, floor.height_mm, 2 * floor.cell_mm));
   }
   constexpr double kMost_s = 2;
   if (header.every_s() > kMost_s) {
     throw UserError(fmt::format(
-        "{}: recorded every {:g} s; a floor hears robots every 2 s, run again with recording.every_s at most that",
+        "{}: recorded every {:g} s; cells report every 2 s, so set recording.every_s to 2 or less and run again",
         recording.path().string(), header.every_s()));
   }
   const TickLength tick(header.tick_cycles());

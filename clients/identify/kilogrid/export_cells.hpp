@@ -1,4 +1,4 @@
-/// A recorded run as an instrumented floor would have written it down.
+/// A recorded run as Kilogrid cell reports.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,10 @@
 
 namespace kilotwin::kilogrid {
 
-/// time_s,robot,x_mm,y_mm by time, then by robot: the cells that heard each robot, as the floor of docs/explanation/floors.md hears them. The floor
-/// covers the arena; chance follows the run's seed. Returns the number of rows. Throws UserError where the arena is no whole
-/// number of modules of 100 mm, or the run was recorded less often than every 2 s, and RunError where the file cannot be written.
+/// Writes time_s,robot,x_mm,y_mm by time, then by robot: the cells that receive each robot (FloorReporter). The
+/// floor covers the arena. Random reception depends on the run's seed. Returns the number of rows. Throws
+/// UserError if the arena is not a whole number of 100 mm modules or the recording interval exceeds 2 s, and
+/// RunError if the file cannot be written.
 std::uint64_t export_cells(recorder::Reader&, const std::filesystem::path& csv);
 
 }  // namespace kilotwin::kilogrid

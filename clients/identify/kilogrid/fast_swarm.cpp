@@ -17,11 +17,11 @@ struct Place {
 
 constexpr double kTouch_mm = 2 * kRobotRadius_mm;
 
-/// Robots in order of y, for pairs that are near. Stays nearly sorted from step to step.
+/// Robots sorted by y, to find close pairs. The order changes little between steps.
 class NearPairs {
  public:
   explicit NearPairs(std::size_t robots) : order_(robots) { std::iota(order_.begin(), order_.end(), 0u); }
-  void sort(const std::vector<LoneState>& robots) {
+  void sort(const std::vector<RobotState>& robots) {
     for (std::size_t i = 1; i < order_.size(); ++i) {
       const std::uint32_t robot = order_[i];
       std::size_t j = i;
@@ -29,12 +29,12 @@ class NearPairs {
       order_[j] = robot;
     }
   }
-  /// Calls use(a, b, square of their distance) for pairs within `reach_mm`.
-  template <class Use> void each(std::vector<LoneState>& robots, double reach_mm, Use&& use) const {
+  /// Calls use(a, b, squared distance) for pairs within `reach_mm`.
+  template <class Use> void each(std::vector<RobotState>& robots, double reach_mm, Use&& use) const {
     for (std::size_t i = 0; i < order_.size(); ++i) {
-      LoneState& a = robots[order_[i]];
+      RobotState& a = robots[order_[i]];
       for (std::size_t j = i + 1; j < order_.size(); ++j) {
-        LoneState& b = robots[order_[j]];
+        RobotState& b = robots[order_[j]];
         const double dy = b.y_mm - a.y_mm, dx = b.x_mm - a.x_mm;
         if (dy > reach_mm) break;
         const double square = dx * dx + dy * dy;
@@ -47,10 +47,10 @@ class NearPairs {
   std::vector<std::uint32_t> order_;
 };
 
-/// Overlapping discs part along the line between them, and as far as dry friction holds their rims they do not slide: both
-/// slip on the ground alike.
-void touch(LoneState& a, LoneState& b, const Place& a_before, const Place& b_before, double square,
-           double friction) {
+/// Separates overlapping discs along their normal. Static friction between the discs prevents tangential slip;
+/// both slip on the floor equally.
+void resolve_contact(RobotState& a, RobotState& b, const Place& a_before, const Place& b_before, double square,
+                     double friction) {
   const double distance = std::sqrt(std::max(square, 1e-12)), overlap = kTouch_mm - distance;
   const double nx = (b.x_mm - a.x_mm) / distance, ny = (b.y_mm - a.y_mm) / distance;
   const double slide = ((b.y_mm - b_before.y_mm) - (a.y_mm - a_before.y_mm)) * nx -
@@ -65,12 +65,12 @@ void touch(LoneState& a, LoneState& b, const Place& a_before, const Place& b_bef
 
 }  // namespace
 
-FloorRun simulate_quickly(const FloorScene& scene, const Floor& floor, const FloorSettings& settings,
-                          std::uint64_t seed) {
+FloorRun simulate_fast(const FloorScene& scene, const Floor& floor, const FloorSettings& settings,
+                       std::uint64_t seed) {
   Dice dice(seed * 2 + 1);
-  const LoneRobot model(floor, settings);
-  std::vector<LoneState> robots;
-  // Each robot has its own, so that runs of other parameters with the same seed have the same robots for as long as can be.
+  const SingleRobot model(floor, settings);
+  std::vector<RobotState> robots;
+  // One random sequence per robot, so that runs with other parameters and the same seed keep the same robots.
   std::vector<Dice> own;
   for (std::size_t i = 0; i < scene.x_mm.size(); ++i) {
     own.emplace_back(dice.bits());
@@ -81,20 +81,20 @@ FloorRun simulate_quickly(const FloorScene& scene, const Floor& floor, const Flo
   NearPairs pairs(robots.size());
   std::vector<double> neighbours(robots.size(), 0);
   std::vector<Place> before(robots.size());
-  const auto steps = static_cast<std::int64_t>(scene.duration_s / LoneRobot::kStep_s);
+  const auto steps = static_cast<std::int64_t>(scene.duration_s / SingleRobot::kStep_s);
   const double friction = proto::Physics().rim_friction();
   constexpr int kPasses = 2;
   for (std::int64_t k = 0; k < steps; ++k) {
     pairs.sort(robots);
-    if (model.crowd_radius_mm() > 0) {
+    if (model.neighbour_radius_mm() > 0) {
       std::fill(neighbours.begin(), neighbours.end(), 0);
-      pairs.each(robots, model.crowd_radius_mm(), [&](std::uint32_t a, std::uint32_t b, double) {
+      pairs.each(robots, model.neighbour_radius_mm(), [&](std::uint32_t a, std::uint32_t b, double) {
         ++neighbours[a];
         ++neighbours[b];
       });
     }
     for (std::size_t i = 0; i < robots.size(); ++i) {
-      reporter.see(static_cast<std::uint32_t>(i), static_cast<double>(k) * LoneRobot::kStep_s, robots[i].x_mm,
+      reporter.see(static_cast<std::uint32_t>(i), static_cast<double>(k) * SingleRobot::kStep_s, robots[i].x_mm,
                    robots[i].y_mm);
       before[i] = {robots[i].x_mm, robots[i].y_mm};
       model.step(robots[i], k, own[i], neighbours[i]);
@@ -102,7 +102,7 @@ FloorRun simulate_quickly(const FloorScene& scene, const Floor& floor, const Flo
     for (int pass = 0; pass < kPasses; ++pass) {
       pairs.sort(robots);
       pairs.each(robots, kTouch_mm, [&](std::uint32_t a, std::uint32_t b, double square) {
-        touch(robots[a], robots[b], before[a], before[b], square, friction);
+        resolve_contact(robots[a], robots[b], before[a], before[b], square, friction);
         model.keep_inside(robots[a]);
         model.keep_inside(robots[b]);
       });

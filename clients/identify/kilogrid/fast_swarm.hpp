@@ -1,6 +1,7 @@
-/// Robots on the floor in steps of half a second: six times as fast as the engine, for fits that need hundreds of runs.
-/// Discs that overlap after a step are pushed apart and do not slide along each other. A crowd goes some 6 % faster than in
-/// the engine: what is taken from these runs is how models differ; how good one is, the engine says.
+/// Fast simulation of a swarm on the floor with steps of half a second, six times as fast as the engine, for fits
+/// that need hundreds of runs. Overlapping discs are separated without tangential slip. Crowds move about 6 %
+/// faster than in the engine, so the fit takes differences between models from it, and absolute values from the
+/// engine.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 
 namespace kilotwin::kilogrid {
 
-/// One run of the model. The same bits for the same arguments.
-[[nodiscard]] FloorRun simulate_quickly(const FloorScene&, const Floor&, const FloorSettings&, std::uint64_t seed);
+/// One run of the model. Deterministic in its arguments.
+[[nodiscard]] FloorRun simulate_fast(const FloorScene&, const Floor&, const FloorSettings&, std::uint64_t seed);
 
 }  // namespace kilotwin::kilogrid

@@ -1,4 +1,4 @@
-/// Places of robots in blocks of time: means over what cells heard, which blur and jump.
+/// Positions in time blocks: means over cell reports, which are coarse and noisy.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace kilotwin::kilogrid {
 
-/// Mean places in successive blocks of time, per robot; NaN where it was heard less than twice.
+/// Mean positions in successive time blocks per robot. NaN: fewer than two reports.
 struct FloorBlocks {
   static constexpr double kBlock_s = 10;
   std::vector<std::vector<double>> x_mm, y_mm;  ///< [robot][block]
@@ -17,7 +17,7 @@ struct FloorBlocks {
 };
 [[nodiscard]] FloorBlocks blocks_of(const FloorRun&);
 
-/// The distance from the nearest wall.
+/// Distance from the nearest wall, mm.
 [[nodiscard]] double wall_distance_mm(const Floor&, double x_mm, double y_mm);
 
 }  // namespace kilotwin::kilogrid

@@ -11,11 +11,11 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Samples as rows, standardised by those that are learned from.
+/// Samples as rows, standardised by the training set.
 struct Samples {
   Eigen::MatrixXd x;
   Eigen::VectorXd y;               ///< 0 or 1
-  std::vector<std::size_t> robot;  ///< of each row, those of both classes counted on
+  std::vector<std::size_t> robot;  ///< of each row; robots of both classes are numbered consecutively
   std::size_t robots = 0;
 };
 
@@ -43,13 +43,13 @@ Samples samples_of(const std::vector<TrackWindow>& a, const std::vector<TrackWin
   return samples;
 }
 
-/// Classes count alike, however many windows each has.
+/// Both classes have equal total weight.
 Eigen::VectorXd class_weights(const Eigen::VectorXd& y) {
   const double ones = y.sum(), all = static_cast<double>(y.size());
   return y.unaryExpr([&](double label) { return label > 0.5 ? 0.5 * all / ones : 0.5 * all / (all - ones); });
 }
 
-/// Logistic regression on the features and their squares and products, with a ridge.
+/// Ridge logistic regression on the features, their squares and products.
 class Logistic {
  public:
   explicit Logistic(const Samples& s) : mean_(s.x.colwise().mean()) {
@@ -68,7 +68,7 @@ class Logistic {
       weights_ += hessian.ldlt().solve(gradient);
     }
   }
-  [[nodiscard]] Eigen::VectorXd judge(const Eigen::MatrixXd& x) const { return terms(x) * weights_; }
+  [[nodiscard]] Eigen::VectorXd validate(const Eigen::MatrixXd& x) const { return terms(x) * weights_; }
 
  private:
   [[nodiscard]] Eigen::MatrixXd terms(const Eigen::MatrixXd& x) const {
@@ -88,7 +88,7 @@ class Logistic {
   Eigen::VectorXd weights_;
 };
 
-/// Boosted stumps: each a threshold on one feature, of its deciles, added with half of its best weight.
+/// Boosted decision stumps: thresholds at deciles of single features, with shrinkage one half.
 class Boosted {
  public:
   explicit Boosted(const Samples& s) {
@@ -142,7 +142,7 @@ class Boosted {
       for (Eigen::Index i = 0; i < rows; ++i) margin(i) += s.x(i, best.feature) <= best.at ? best.low : best.high;
     }
   }
-  [[nodiscard]] Eigen::VectorXd judge(const Eigen::MatrixXd& x) const {
+  [[nodiscard]] Eigen::VectorXd validate(const Eigen::MatrixXd& x) const {
     Eigen::VectorXd margin = Eigen::VectorXd::Zero(x.rows());
     for (const Stump& stump : stumps_) {
       for (Eigen::Index i = 0; i < x.rows(); ++i)
@@ -159,7 +159,7 @@ class Boosted {
   std::vector<Stump> stumps_;
 };
 
-/// Scores of windows, in order, with what their robots' weights make of the area.
+/// Sorted scores of windows, with weights per robot for the bootstrap.
 class Judgement {
  public:
   Judgement(const Eigen::VectorXd& scores, const Samples& s) : robots_(s.robots) {
@@ -168,7 +168,7 @@ class Judgement {
     std::sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) { return a.score < b.score; });
   }
   [[nodiscard]] double area() const { return area(std::vector<double>(robots_, 1)); }
-  /// Each robot drawn as often as chance has it.
+  /// One bootstrap sample over robots.
   [[nodiscard]] double area(Dice& dice) const {
     std::vector<double> weight(robots_, 0);
     for (std::size_t i = 0; i < robots_; ++i) ++weight[dice.bits() % robots_];
@@ -181,7 +181,7 @@ class Judgement {
     std::size_t robot;
     bool positive;
   };
-  /// The share of pairs in order, ties half.
+  /// Share of pairs in the right order; ties count one half.
   [[nodiscard]] double area(const std::vector<double>& weight) const {
     double below = 0, positives = 0, right = 0;
     for (std::size_t i = 0; i < rows_.size();) {
@@ -200,7 +200,7 @@ class Judgement {
   std::size_t robots_;
 };
 
-/// The mean area of both halves, and its standard error.
+/// Mean area of both folds, and its standard error.
 std::pair<double, double> area_of(const std::vector<Judgement>& halves) {
   constexpr int kResamples = 200;
   Dice dice(1);
@@ -229,7 +229,7 @@ double area_under_curve(const std::vector<double>& negatives, const std::vector<
   return right / (static_cast<double>(negatives.size()) * static_cast<double>(positives.size()));
 }
 
-TellApart tell_apart(const std::vector<TrackWindow>& a, const std::vector<TrackWindow>& b) {
+ClassifierResult classifier_test(const std::vector<TrackWindow>& a, const std::vector<TrackWindow>& b) {
   std::vector<Judgement> logistic, boosted;
   for (const std::size_t half : {std::size_t{0}, std::size_t{1}}) {
     const Samples learned = samples_of(a, b, half), judged = samples_of(a, b, 1 - half);
@@ -237,10 +237,10 @@ TellApart tell_apart(const std::vector<TrackWindow>& a, const std::vector<TrackW
     if (ones < 1 || ones >= static_cast<double>(learned.y.size()) || others < 1 ||
         others >= static_cast<double>(judged.y.size()))
       return {};
-    logistic.emplace_back(Logistic(learned).judge(judged.x), judged);
-    boosted.emplace_back(Boosted(learned).judge(judged.x), judged);
+    logistic.emplace_back(Logistic(learned).validate(judged.x), judged);
+    boosted.emplace_back(Boosted(learned).validate(judged.x), judged);
   }
-  TellApart t;
+  ClassifierResult t;
   std::tie(t.logistic, t.logistic_sd) = area_of(logistic);
   std::tie(t.boosted, t.boosted_sd) = area_of(boosted);
   return t;

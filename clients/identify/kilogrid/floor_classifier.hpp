@@ -1,5 +1,5 @@
-/// Can runs be told apart? Windows of robots' tracks as features, two classifiers, and how well they do on robots that they
-/// have not seen: the area under the curve, 0.5 where they guess.
+/// Classifier two-sample test between runs (Lopez-Paz, Oquab 2017): features of track windows, two classifiers,
+/// and the area under the ROC curve on unseen robots; 0.5 is chance level.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,18 @@
 
 namespace kilotwin::kilogrid {
 
-/// The area under the curve of a score: the share of pairs of one of each class that it orders rightly, ties half.
+/// Area under the ROC curve: the share of (negative, positive) pairs in the right order; ties count one half.
 [[nodiscard]] double area_under_curve(const std::vector<double>& of_negatives,
                                       const std::vector<double>& of_positives);
 
-struct TellApart {
+struct ClassifierResult {
   double logistic = 0.5, boosted = 0.5;
-  double logistic_sd = 0, boosted_sd = 0;  ///< standard errors over robots, by resampling them
+  double logistic_sd = 0, boosted_sd = 0;  ///< standard errors by a bootstrap over robots
   [[nodiscard]] double best() const { return logistic > boosted ? logistic : boosted; }
   [[nodiscard]] double best_sd() const { return logistic > boosted ? logistic_sd : boosted_sd; }
 };
-/// Cross-validated over robots: in turn each half of the robots of both runs is learned from, the other half judged.
-[[nodiscard]] TellApart tell_apart(const std::vector<TrackWindow>& a, const std::vector<TrackWindow>& b);
+/// Two-fold cross-validation over robots.
+[[nodiscard]] ClassifierResult classifier_test(const std::vector<TrackWindow>& a,
+                                               const std::vector<TrackWindow>& b);
 
 }  // namespace kilotwin::kilogrid

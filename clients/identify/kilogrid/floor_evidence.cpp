@@ -7,16 +7,17 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Part of a statistic's variance that is taken for its own. It keeps combinations of statistics that hardly vary among robots
-/// from counting for more than a model that is right but for small things can bear. Of 0, 0.2, 0.5, 0.8 and 1 (no correlations) a
-/// half told planted causes best from what they are confused with (tests/clients/identify/kilogrid/floor_alarms.cpp).
+/// Share of each statistic's variance treated as independent: regularises the correlation matrix, so that
+/// combinations with small variance do not dominate. Of 0, 0.2, 0.5, 0.8 and 1 (no correlations), 0.5 separated
+/// planted effects best from similar ones (tests/clients/identify/kilogrid/floor_alarms.cpp).
 constexpr double kOwn = 0.5;
-/// Single statistics that no parameter can reach must not pull at all of them: they count less beyond so many tolerances.
+/// Robust weights: deviations beyond this many tolerances count less, since no parameter may reach such a
+/// statistic.
 constexpr double kFar = 6;
 
-/// Chance of more than x of a chi-square with n degrees of freedom.
+/// Upper tail of chi squared with n degrees of freedom.
 double beyond(std::size_t n, double x) {
-  // Up from one or two degrees of freedom, by twos.
+  // Recursion upwards in steps of two from one or two degrees of freedom.
   double tail = n % 2 == 1 ? std::erfc(std::sqrt(x / 2)) : std::exp(-x / 2);
   double term = n % 2 == 1 ? std::sqrt(2 * x / 3.141592653589793) * std::exp(-x / 2) : x / 2 * std::exp(-x / 2);
   for (std::size_t k = n % 2 == 1 ? 1 : 2; k < n; k += 2) {
@@ -26,7 +27,7 @@ double beyond(std::size_t n, double x) {
   return tail;
 }
 
-/// Each robot's part in the deviations of a set's statistics, such that their squares add up to 1.
+/// Each robot's contribution to the deviations of a set's statistics, normalised to sum of squares 1.
 Eigen::MatrixXd parts_of(const FloorSet& set) {
   const auto statistics = static_cast<Eigen::Index>(statistic_count());
   std::size_t robots = 0;
@@ -60,8 +61,8 @@ Eigen::MatrixXd correlation_of(std::span<const FloorSet> sets) {
   return Eigen::MatrixXd(sum.selfadjointView<Eigen::Lower>()) / static_cast<double>(sets.size());
 }
 
-FloorGap::FloorGap(const FloorSet& measured, const FloorStatistics& simulated, const Eigen::MatrixXd& slopes,
-                   const Eigen::MatrixXd& correlation) {
+FloorMisfit::FloorMisfit(const FloorSet& measured, const FloorStatistics& simulated, const Eigen::MatrixXd& slopes,
+                         const Eigen::MatrixXd& correlation) {
   const auto statistics = static_cast<Eigen::Index>(statistic_count());
   Eigen::MatrixXd covariance = (1 - kOwn) * correlation;
   Eigen::VectorXd off = Eigen::VectorXd::Zero(statistics);
@@ -88,15 +89,15 @@ FloorGap::FloorGap(const FloorSet& measured, const FloorStatistics& simulated, c
   const Eigen::VectorXd r = roots.matrixL().solve(off);
   const Eigen::MatrixXd a = roots.matrixL().solve(scaled);
   curve = a.transpose() * a;
-  pull = a.transpose() * r;
+  gradient = a.transpose() * r;
   misfit = r.squaredNorm();
 }
 
-Eigen::VectorXd FloorGap::best_steps(const std::vector<bool>& in_use, const FloorBox& box) const {
-  // Coordinate descent: small, and it keeps to the box. A parameter that nothing depends on stays where it is.
+Eigen::VectorXd FloorMisfit::best_steps(const std::vector<bool>& in_use, const FloorBox& box) const {
+  // Coordinate descent with box constraints. A small ridge keeps parameters without influence.
   constexpr double kStay = 0.3;
-  const Eigen::Index parameters = pull.size();
-  Eigen::VectorXd steps = Eigen::VectorXd::Zero(parameters), slope = pull;
+  const Eigen::Index parameters = gradient.size();
+  Eigen::VectorXd steps = Eigen::VectorXd::Zero(parameters), slope = gradient;
   for (int sweep = 0; sweep < 300; ++sweep) {
     double farthest = 0;
     for (Eigen::Index p = 0; p < parameters; ++p) {
@@ -113,17 +114,18 @@ Eigen::VectorXd FloorGap::best_steps(const std::vector<bool>& in_use, const Floo
   return steps;
 }
 
-double FloorGap::at(const Eigen::VectorXd& steps) const {
-  return misfit + 2 * pull.dot(steps) + steps.dot(curve * steps);
+double FloorMisfit::at(const Eigen::VectorXd& steps) const {
+  return misfit + 2 * gradient.dot(steps) + steps.dot(curve * steps);
 }
 
-std::vector<double> FloorChance::scales_of(const std::vector<std::vector<double>>& gains, std::size_t but) const {
-  // A candidate's scale from its own gains and, as if there were so many more, from those of all.
+std::vector<double> NullDistribution::scales_of(const std::vector<std::vector<double>>& gains,
+                                                std::size_t but) const {
+  // Shrinks a candidate's scale towards the mean scale of all candidates, with this many pseudo-observations.
   constexpr double kOthers = 5;
   std::vector<double> sum(switches_.size(), 0), count(switches_.size(), 0);
   for (std::size_t b = 0; b < gains.size(); ++b) {
     for (std::size_t c = 0; c < switches_.size(); ++c) {
-      // Where the parameter cannot go below 0, half of the gains are none.
+      // A parameter at its lower bound has zero gain in half of the sets.
       if (b == but || !(gains[b][c] > 0)) continue;
       sum[c] += gains[b][c] / static_cast<double>(switches_[c]);
       ++count[c];
@@ -137,13 +139,14 @@ std::vector<double> FloorChance::scales_of(const std::vector<std::vector<double>
   return scales;
 }
 
-FloorChance::FloorChance(const std::vector<std::vector<double>>& gains, const std::vector<std::size_t>& switches)
+NullDistribution::NullDistribution(const std::vector<std::vector<double>>& gains,
+                                   const std::vector<std::size_t>& switches)
     : switches_(switches) {
-  // The largest of many has an extreme-value distribution; of logarithms of probabilities its spread is that of a standard
-  // one, so that some sets tell it better than they would alone. Each set is weighed with scales from the others, as a
-  // measured one is.
+  // The maximum over candidates follows an extreme-value distribution. The spread of log p is shrunk towards the
+  // theoretical value, since there are few sets. Each set uses scales estimated from the others, as the measured
+  // set does.
   constexpr double kSpread = 1.2825, kLikeKnown = 10;
-  // 1 % are beyond 3.14, (4.600 - 0.577) / 1.2825; the rest is for what so few sets do not tell of the scales.
+  // Theoretical 0.99 quantile: (4.600 - 0.577) / 1.2825 = 3.14. The margin covers the uncertainty of the scales.
   constexpr double kQuantile = 3.5;
   const auto sets = static_cast<double>(gains.size());
   double mean = 0, square = 0;
@@ -161,14 +164,14 @@ FloorChance::FloorChance(const std::vector<std::vector<double>>& gains, const st
   scale_ = scales_of(gains, gains.size());
 }
 
-double FloorChance::evidence(std::size_t candidate, double gain) const {
+double NullDistribution::evidence(std::size_t candidate, double gain) const {
   if (!(gain > 0)) return 0;
-  constexpr double kFarOut = 600;  // where the logarithm is half of it, nearly
+  constexpr double kFarOut = 600;  // there the asymptotic form holds
   const double x = gain / scale_[candidate];
   return x > kFarOut ? x / 2 : -std::log(beyond(switches_[candidate], x));
 }
 
-double FloorChance::gain_of(std::size_t candidate, double of) const {
+double NullDistribution::gain_of(std::size_t candidate, double of) const {
   double low = 0, high = 1e3 * scale_[candidate];
   for (int i = 0; i < 60; ++i) {
     const double middle = (low + high) / 2;

@@ -1,5 +1,5 @@
-/// Whether an effect is beyond chance: what it removes of the misfit, against what it removes of sets that were simulated
-/// without it. Numbers of one set go together, so the misfit is taken with their correlations.
+/// Significance of an effect: its reduction of the misfit, compared with sets simulated without it. Statistics are
+/// correlated, so the misfit uses their correlation matrix.
 #pragma once
 
 #include <Eigen/Dense>
@@ -10,43 +10,44 @@
 
 namespace kilotwin::kilogrid {
 
-/// How far simulated statistics are from measured ones, as a quadratic function of steps of the parameters.
-struct FloorGap {
-  Eigen::MatrixXd curve;  ///< per pair of parameters
-  Eigen::VectorXd pull;
-  double misfit = 0;  ///< where the model stands
+/// Misfit between simulated and measured statistics as a quadratic function of parameter steps.
+struct FloorMisfit {
+  Eigen::MatrixXd curve;  ///< Hessian: parameters x parameters
+  Eigen::VectorXd gradient;
+  double misfit = 0;  ///< at the model's parameters
   std::size_t numbers = 0;
 
-  /// `correlation` of statistics in sets like these.
-  FloorGap(const FloorSet& measured, const FloorStatistics& simulated, const Eigen::MatrixXd& slopes,
-           const Eigen::MatrixXd& correlation);
-  /// The steps that lower it most, of parameters in use and within the box.
+  /// `correlation`: of the statistics over robots.
+  FloorMisfit(const FloorSet& measured, const FloorStatistics& simulated, const Eigen::MatrixXd& slopes,
+              const Eigen::MatrixXd& correlation);
+  /// Minimises the misfit over the parameters in use, within the box.
   [[nodiscard]] Eigen::VectorXd best_steps(const std::vector<bool>& in_use, const FloorBox&) const;
   [[nodiscard]] double at(const Eigen::VectorXd& steps) const;
 };
 
-/// Correlations of statistics over robots of simulated sets, each set's about its own means. Statistics that are not known have none.
+/// Correlations of statistics over robots of simulated sets, each about its set's means. Unknown statistics are
+/// uncorrelated.
 [[nodiscard]] Eigen::MatrixXd correlation_of(std::span<const FloorSet> sets);
 
-/// What candidates remove of sets without any of them: how much is by chance.
-class FloorChance {
+/// Null distribution of the misfit reductions of candidates.
+class NullDistribution {
  public:
-  /// `gains`: [set][candidate]; `switches`: of each candidate, the numbers that were free.
-  FloorChance(const std::vector<std::vector<double>>& gains, const std::vector<std::size_t>& switches);
+  /// `gains`: [set][candidate], of sets without an effect. `switches`: free parameters of each candidate.
+  NullDistribution(const std::vector<std::vector<double>>& gains, const std::vector<std::size_t>& switches);
 
-  /// How unlikely so much is by chance for this candidate: the negative logarithm of the probability.
+  /// Negative logarithm of the p value of a gain.
   [[nodiscard]] double evidence(std::size_t candidate, double gain) const;
-  /// What the largest of all candidates' is beyond in one of 100 sets without an effect.
+  /// 0.99 quantile, over sets without an effect, of the largest evidence of all candidates.
   [[nodiscard]] double bound() const { return bound_; }
-  /// The gain that has this evidence.
+  /// The gain with this evidence.
   [[nodiscard]] double gain_of(std::size_t candidate, double evidence) const;
 
  private:
-  /// From all sets but one.
+  /// Scales from all sets except one.
   [[nodiscard]] std::vector<double> scales_of(const std::vector<std::vector<double>>& gains, std::size_t but) const;
 
   std::vector<std::size_t> switches_;
-  std::vector<double> scale_;  ///< of the chi-square distribution that a candidate's gains have
+  std::vector<double> scale_;  ///< of the scaled chi-square distribution of a candidate's gains
   double bound_ = 0;
 };
 

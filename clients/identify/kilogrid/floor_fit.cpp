@@ -12,16 +12,16 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Runs of the design are cut to that: what parameters change shows soon.
+/// Length of design runs: effects of parameters appear early.
 constexpr double kExplored_s = 1500;
 
-/// Single statistics that no parameter can reach must not pull at all of them: weights fall beyond three tolerances.
+/// Robust weights that fall beyond three tolerances, since no parameter may reach such a statistic.
 Eigen::VectorXd weights_of(const Eigen::VectorXd& off) {
   return off.unaryExpr([](double r) { return std::abs(r) < 3 ? 1.0 : 3 / std::abs(r); });
 }
 
-/// What counts how much as parameters are fitted: what windows of tracks say counts most, since that is what is seen
-/// when runs are told apart. Which effects there are is decided with all alike.
+/// Weights of the statistics in the fit: window features count most, because the classifier test uses them. The
+/// selection of effects uses equal weights.
 const Eigen::VectorXd& importance() {
   static const Eigen::VectorXd all = [] {
     constexpr double kWindows = 2.5;
@@ -36,13 +36,13 @@ const Eigen::VectorXd& importance() {
   return all;
 }
 
-/// How far off a model is, in numbers that do not go together: statistics in tolerances, those of windows parted from each other by
-/// their correlations over robots. So their sum of squares is what tells windows apart when all are seen together.
+/// Metric of the misfit: statistics in tolerances; window features are decorrelated over robots, so their sum of
+/// squares measures how well windows can be classified.
 class Metric {
  public:
   Metric(const FloorTarget& target, const FloorSet& simulated)
       : target_(target), parts_(correlation_of({&simulated, 1})) {
-    // As where effects are weighed: half of each variance is left to the number alone.
+    // The same regularisation as in floor_evidence.cpp.
     constexpr double kOwn = 0.5;
     parts_ *= 1 - kOwn;
     for (Eigen::Index s = 0; s < parts_.rows(); ++s) {
@@ -54,7 +54,7 @@ class Metric {
     }
     roots_.compute(parts_);
   }
-  /// In which numbers are off, of a model that says that.
+  /// Deviations of a model in this metric.
   [[nodiscard]] Eigen::VectorXd off(const FloorStatistics& at) const {
     Eigen::VectorXd v = Eigen::VectorXd::Zero(parts_.rows());
     for (Eigen::Index s = 0; s < v.size(); ++s) {
@@ -71,7 +71,7 @@ class Metric {
     }
     return roots_.matrixL().solve(of);
   }
-  /// The misfit as steps lower it: what is far off counts by its size, not by its square.
+  /// Robust misfit: large deviations count linearly.
   [[nodiscard]] double misfit(const FloorStatistics& at) const {
     const Eigen::VectorXd off = this->off(at);
     return (importance().array() * weights_of(off).array() * off.array().square()).sum();
@@ -91,27 +91,27 @@ class Metric {
   Eigen::LLT<Eigen::MatrixXd> roots_;
 };
 
-/// Numbers as a linear function of the parameters around a model: off + slopes * steps.
+/// Linear surrogate of the statistics around a model: off + slopes * steps.
 struct Surrogate {
   Eigen::VectorXd off;
-  Eigen::MatrixXd slopes;  ///< per number and parameter
+  Eigen::MatrixXd slopes;  ///< statistics x parameters
 };
 
-/// Steps within the box that lower the misfit most.
+/// Minimises the misfit of the surrogate within the box.
 Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
   const Eigen::Index columns = surrogate.slopes.cols();
   Eigen::VectorXd steps = Eigen::VectorXd::Zero(columns);
   const Eigen::VectorXd weights = weights_of(surrogate.off).cwiseProduct(importance());
-  // Coordinate descent: small, and it keeps to the box. Parameters that the misfit hardly depends on stay.
+  // Coordinate descent with box constraints. Parameters without influence stay.
   Eigen::VectorXd residual = surrogate.off;
   constexpr double kStay = 3;
   for (int sweep = 0; sweep < 300; ++sweep) {
     for (Eigen::Index p = 0; p < columns; ++p) {
       const auto slope = surrogate.slopes.col(p);
       const double curve = (weights.array() * slope.array().square()).sum() + kStay;
-      const double pull = (weights.array() * slope.array() * residual.array()).sum() + kStay * steps(p);
+      const double gradient = (weights.array() * slope.array() * residual.array()).sum() + kStay * steps(p);
       const auto q = static_cast<std::size_t>(p);
-      const double to = std::clamp(steps(p) - pull / curve, box.least[q], box.most[q]);
+      const double to = std::clamp(steps(p) - gradient / curve, box.least[q], box.most[q]);
       residual += (to - steps(p)) * slope;
       steps(p) = to;
     }
@@ -119,10 +119,10 @@ Eigen::VectorXd best_steps(const Surrogate& surrogate, const FloorBox& box) {
   return steps;
 }
 
-/// How often measured runs are simulated to say where a model stands.
+/// Number of simulations per measured run that determine a model's misfit.
 constexpr int kEngineRuns = 1, kQuickRuns = 2;
 
-/// What one says more than the other, less what chance makes of it.
+/// Differences of two sets of statistics, with the expected noise removed.
 std::vector<double> differences(const FloorStatistics& one, const FloorStatistics& other) {
   std::vector<double> more(one.value.size(), 0);
   for (std::size_t s = 0; s < more.size(); ++s) {
@@ -133,30 +133,30 @@ std::vector<double> differences(const FloorStatistics& one, const FloorStatistic
   return more;
 }
 
-/// What a model's runs say: with the same chance for all models, so that misfits differ by what the models differ.
+/// Simulated statistics of a model, with common random numbers.
 using Said = std::function<FloorStatistics(const FloorModel&)>;
 
-/// Steps of a model, each to where the runs around it say that the misfit is least.
-class Approach {
+/// Trust-region iterations on the surrogate.
+class TrustRegion {
  public:
-  Approach(const FloorTarget& target, const Metric& metric, double width, double longest_s, std::uint64_t seed,
-           const FloorProgress& progress)
+  TrustRegion(const FloorTarget& target, const Metric& metric, double width, double longest_s, std::uint64_t seed,
+              const FloorProgress& progress)
       : target_(target), metric_(metric), width_(width), longest_s_(longest_s), seed_(seed), progress_(progress) {}
 
-  /// One step; the model stays where it is if that is best. Returns the misfit then.
+  /// One iteration. Keeps the model if it is not improved. Returns the misfit.
   double step(FloorModel& model, const Said& said_by) {
     const std::size_t parameters = model.values.size(), runs = target_.scenes().size();
     const std::vector<bool> all(parameters, true);
     const FloorStatistics at = said_by(model);
     const double misfit = metric_.misfit(at);
-    // Four for each parameter: with less, what chance makes of the slopes leads steps astray. Later those from before count, too:
-    // points stay as wide apart as they were, and what chance makes of slopes falls as they become more.
+    // Four simulations per parameter at first: fewer make the slopes too noisy. Later rounds reuse earlier
+    // simulations, so two suffice.
     add_points(points_, model, target_, all, (rounds_ == 0 ? 4 : 2) * parameters + 12, width_, longest_s_,
                seed_ * 10 + rounds_);
     ++rounds_;
     const Surrogate surrogate{metric_.off(at), metric_.slopes(at, slopes_of(points_, model, all, runs, width_))};
     const FloorModel before = model;
-    // A step that leads away was too long for the surrogate; it is made shorter.
+    // A step that raises the misfit left the trust region: shrinks it.
     constexpr double kShorter = 0.4;
     constexpr int kTries = 2;
     for (int attempt = 0; attempt < kTries; ++attempt) {
@@ -178,22 +178,22 @@ class Approach {
   std::uint64_t seed_, rounds_ = 0;
   const FloorProgress& progress_;
   FloorPoints points_;
-  double most_ = 1.5;  ///< of a step, in widths
+  double most_ = 1.5;  ///< trust region radius, in parameter scales
 };
 
-/// Runs of the model as a set, for how their numbers go together.
+/// Simulated runs of the model as a set, for the correlations.
 FloorSet quick_set(const FloorTarget& target, const FloorModel& model, std::uint64_t seed) {
   return FloorSet(simulated_sums(target, model.settings(), seed * 7 + 3, kQuickRuns, Simulator::kQuick));
 }
 
-/// From coarse to fine by quick runs alone, of the first `longest_s` of each measured run. Returns the misfit there.
-double approach_coarsely(FloorModel& model, const FloorTarget& begun, double width, int rounds, double longest_s,
-                         std::uint64_t seed, const FloorProgress& progress) {
+/// Coarse-to-fine fit with fast runs of the first `longest_s` of each measured run. Returns the misfit.
+double fit_coarsely(FloorModel& model, const FloorTarget& begun, double width, int rounds, double longest_s,
+                    std::uint64_t seed, const FloorProgress& progress) {
   const auto said_by = [&](const FloorModel& of) {
     return simulated_statistics(begun, of.settings(), seed * 7 + 2, kQuickRuns, Simulator::kQuick);
   };
   const Metric metric(begun, quick_set(begun, model, seed));
-  Approach approach(begun, metric, width, longest_s, seed, progress);
+  TrustRegion approach(begun, metric, width, longest_s, seed, progress);
   double misfit = 0;
   for (int round = 0; round < rounds; ++round) misfit = approach.step(model, said_by);
   return misfit;
@@ -210,9 +210,10 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   FloorModel best = model;
   double least = std::numeric_limits<double>::infinity(), misfit = 0;
   const Metric metric(target, quick_set(target, model, seed));
-  Approach approach(target, metric, width, kExplored_s, seed, progress);
+  TrustRegion approach(target, metric, width, kExplored_s, seed, progress);
   for (int round = 0;; ++round) {
-    // Quick runs say where to go, brought near to the engine's by what these differ by here; the engine says what was best.
+    // Fast runs give the steps, corrected by their difference from the engine at this model. The engine ranks the
+    // results.
     const FloorStatistics engine = simulated_statistics(target, model.settings(), seed * 7 + 1, kEngineRuns);
     const double here = metric.misfit(engine);
     progress(fmt::format("misfit {:.0f} by the engine", here));
@@ -233,9 +234,9 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
   return misfit;
 }
 
-void fit_from_afar(FloorModel& model, const FloorTarget& target, std::uint64_t seed,
-                   const FloorProgress& progress) {
-  // Where the misfit has several hollows, slopes over wide steps lead to deep ones. What is wide is seen in short runs.
+void fit_from_far_start(FloorModel& model, const FloorTarget& target, std::uint64_t seed,
+                        const FloorProgress& progress) {
+  // The misfit has several local minima. Slopes over wide steps lead to deep ones; short runs suffice for them.
   struct Stage {
     double width, longest_s;
     int rounds;
@@ -244,7 +245,7 @@ void fit_from_afar(FloorModel& model, const FloorTarget& target, std::uint64_t s
   const std::vector<Stage> stages =
       fitted_before ? std::vector<Stage>{{2, 800, 2}} : std::vector<Stage>{{4, 500, 3}, {2, 800, 2}};
   std::vector<FloorModel> starts{model};
-  // From where the search once began, too, but for effects: hollows differ with them.
+  // Also restarts from the initial values of the base, because effects move the minima.
   starts.push_back(model);
   for (std::size_t p = 0; p < model.terms[0].parameters.size(); ++p)
     starts.back().values[p] = model.terms[0].parameters[p].start;
@@ -256,8 +257,8 @@ void fit_from_afar(FloorModel& model, const FloorTarget& target, std::uint64_t s
     start.later = target.later();
     double misfit = 0;
     for (std::size_t i = 0; i < begun.size(); ++i)
-      misfit = approach_coarsely(start, begun[i], stages[i].width, stages[i].rounds, stages[i].longest_s,
-                                 seed * 3 + i, progress);
+      misfit = fit_coarsely(start, begun[i], stages[i].width, stages[i].rounds, stages[i].longest_s, seed * 3 + i,
+                            progress);
     if (misfit >= least) continue;
     least = misfit;
     model = start;

@@ -1,4 +1,5 @@
-/// A model of the floor fitted by simulation: the statistics of simulated runs are brought near those of measured ones.
+/// Fit by simulation (simulated method of moments): matches the statistics of simulated runs to those of measured
+/// runs.
 #pragma once
 
 #include <functional>
@@ -11,11 +12,11 @@ namespace kilotwin::kilogrid {
 
 using FloorProgress = std::function<void(const std::string&)>;
 
-/// Regresses the statistics on all parameters over a design of simulated runs, and goes to where they fit best, `rounds` times;
-/// where that was best stays. Returns the misfit there.
+/// Regresses the statistics on all parameters over a design of simulated runs and moves to the minimum, `rounds`
+/// times. Keeps the best model. Returns its misfit.
 double fit(FloorModel&, const FloorTarget&, int rounds, double width, std::uint64_t seed, const FloorProgress&);
 
-/// Before that, for starts that may be far off: over wide steps first, by short quick runs.
-void fit_from_afar(FloorModel&, const FloorTarget&, std::uint64_t seed, const FloorProgress&);
+/// Initial fit for a start far from the optimum: wide steps with short fast runs.
+void fit_from_far_start(FloorModel&, const FloorTarget&, std::uint64_t seed, const FloorProgress&);
 
 }  // namespace kilotwin::kilogrid

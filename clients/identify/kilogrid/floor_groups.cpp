@@ -45,8 +45,8 @@ std::vector<StatisticGroup> make_groups() {
   std::vector<int> lags_s;
   for (const int lag : kLags) lags_s.push_back(lag * 10);
   add("step", "history", each(kSteps_mm, "from {} mm in 10 s"));
-  add("msd", "history", each(lags_s, "root mean square way in {} s, mm"));
-  add("step-by-wall", "position", each(kWalls_mm, "mean step from {} mm off the wall, mm"));
+  add("msd", "history", each(lags_s, "root mean square displacement in {} s, mm"));
+  add("step-by-wall", "position", each(kWalls_mm, "mean step from {} mm wall distance, mm"));
   add("occupancy", "position", counted(kRings, "ring {}"));
   add("step-by-time", "time", counted(kTimeBins, "mean step in 5 minutes {}, mm"));
   add("turn", "history", counted(kTurns, "eighth {} of 0..pi"));
@@ -57,12 +57,12 @@ std::vector<StatisticGroup> make_groups() {
   add("step-by-neighbours", "neighbours", counted(kNeighbours, "{} within 100 mm"));
   add("step-by-direction", "world_frame", counted(kSectors, "eighth {} of the compass"));
   add("step-by-place", "position", counted(kColumns * kRows, "place {}"));
-  add("occupancy-of-the-rim", "position", counted(kRimParts, "part {}"));
+  add("occupancy-of-the-rim", "position", counted(kBoundarySections, "part {}"));
   add("drift", "world_frame", {"x", "y"});
   add("reports", "measurement",
-      {"blocks unheard", "heard again after 2 s", "heard twice at once", "cell as before", "next to it",
-       "blocks unheard, between robots", "as many cells on as before", "blocks without any report",
-       "unheard after such a block"});
+      {"blocks without reports", "report again after 2 s", "two reports at once", "same cell", "adjacent cell",
+       "blocks without reports, between robots", "same polling advance", "blocks without any report",
+       "no report after such a block"});
   add("stays-beside-walls", "position", each(kStays, "stays of {} blocks or more, in 1000"));
   add("middle-by-time", "time", counted(kMiddleBins, "share in the middle in 10 minutes {}"));
   add("extent", "robot", {"mean", "between robots", "in halves"});
@@ -72,8 +72,8 @@ std::vector<StatisticGroup> make_groups() {
   add("way-to-the-middle-along-y", "position", counted(kToMiddle, "in 100 s from fifth {}, of the middle, mm"));
   std::vector<int> lasting_s;
   for (const int lag : kLasting) lasting_s.push_back(lag * 10);
-  add("speed-lasts", "history", each(lasting_s, "steps' product after {} s"));
-  add("turning-lasts", "history", each(lasting_s, "turns' product after {} s"));
+  add("speed-lasts", "history", each(lasting_s, "product of steps, lag {} s"));
+  add("turning-lasts", "history", each(lasting_s, "product of turns, lag {} s"));
   const std::vector<std::string>& features = feature_names();
   for (std::size_t f = 0; f < kFeatures.size(); ++f)
     add("windows: " + features[f], "history", each(kFeatures[f].edges, "from {}"));

@@ -1,4 +1,4 @@
-/// Which numbers there are: what each group of them is over, in order.
+/// Definition of the statistics: the bins of each group, in order.
 #pragma once
 
 #include <array>
@@ -21,11 +21,11 @@ inline constexpr std::array kWallRuns = {1, 2, 3, 4, 6, 9, 12};
 inline constexpr std::array kStays = {1, 2, 3, 5, 10, 20, 40, 80};
 inline constexpr std::size_t kColumns = 4, kRows = 8;
 inline constexpr std::size_t kAcross = 10, kToMiddle = 5;
-inline constexpr std::size_t kWay = 10;  ///< blocks, over which robots go to the middle
+inline constexpr std::size_t kWay = 10;  ///< lag in blocks for motion towards the middle
 inline constexpr std::array kLasting = {1, 2, 5, 10, 20, 60};
 
-/// Of a feature of track windows: lower edges of the bins of its distribution, the first open to below; and what makes it
-/// about 0 and 1 wide where features are multiplied.
+/// Bin edges of a track window feature (the first bin is open below), and location and scale for products of
+/// features.
 struct FeatureScale {
   std::vector<double> edges;
   double middle, width;
@@ -47,7 +47,7 @@ enum Group : std::size_t {
   kCrowd,
   kDirection,
   kPlace,
-  kRim,
+  kBoundary,
   kDrift,
   kReports,
   kStay,
@@ -59,7 +59,7 @@ enum Group : std::size_t {
   kInwardY,
   kSpeedLasts,
   kTurnLasts,
-  kWindows,  ///< the first of one group per feature
+  kWindows,  ///< first of one group per feature
   kPairs = kWindows + 12,
 };
 

@@ -17,9 +17,9 @@ namespace {
 constexpr std::string_view kHeader = "time_s,robot,x_mm,y_mm";
 constexpr std::array<std::string_view, 4> kColumns = {"time_s", "robot", "x_mm", "y_mm"};
 constexpr std::uint32_t kHighestRobot = 1'000'000;
-/// No Kilobot gets that far in that time, whatever cell hears it: two cells and 20 mm/s.
+/// Largest plausible displacement between cells: two cells and 20 mm/s.
 constexpr double kReach_mm = 150, kReach_s = 3;
-constexpr double kMostJumps = 0.02;  ///< share of steps; the rest are slips of single rows
+constexpr double kMostWrongRows = 0.02;  ///< share of steps; fewer count as single erroneous rows
 constexpr std::size_t kFewestReports = 60;
 
 bool is_run_file(const fs::path& file) {
@@ -33,20 +33,20 @@ bool has_floor_columns(const CsvReader& csv) {
          !csv.find_column("run") && !csv.find_column("heading_rad");
 }
 
-/// Why no single robot can have made the track; empty: one can.
+/// Why no single robot can have produced the track; empty if one can.
 std::string fault_of(const FloorTrack& track) {
-  if (track.size() < kFewestReports) return fmt::format("heard {} times only", track.size());
-  std::size_t jumps = 0;
+  if (track.size() < kFewestReports) return fmt::format("only {} reports", track.size());
+  std::size_t wrong_rows = 0;
   for (std::size_t i = 1; i < track.size(); ++i) {
     const double way_mm = std::hypot(track.x_mm[i] - track.x_mm[i - 1], track.y_mm[i] - track.y_mm[i - 1]);
-    jumps += track.time_s[i] - track.time_s[i - 1] <= kReach_s && way_mm > kReach_mm ? 1u : 0u;
+    wrong_rows += track.time_s[i] - track.time_s[i - 1] <= kReach_s && way_mm > kReach_mm ? 1u : 0u;
   }
-  const double share = static_cast<double>(jumps) / static_cast<double>(track.size());
-  return share > kMostJumps ? fmt::format("in two places at once in {:.0f} % of its rows", 100 * share)
-                            : std::string();
+  const double share = static_cast<double>(wrong_rows) / static_cast<double>(track.size());
+  return share > kMostWrongRows ? fmt::format("in two places at once in {:.0f} % of its rows", 100 * share)
+                                : std::string();
 }
 
-/// Rows that lie far from both their neighbours in time are not of this robot.
+/// Removes rows far from both neighbours in time.
 void drop_slips(FloorTrack& track) {
   FloorTrack kept{track.robot, {}, {}, {}};
   const auto far = [&](std::size_t a, std::size_t b) {

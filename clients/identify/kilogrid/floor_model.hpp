@@ -1,5 +1,5 @@
-/// Models of how robots move on the floor, as numbers that can be fitted: the base model, and one term per effect that may
-/// be added to it. What a term says is a record of the model file, so the engine needs to know of none of them.
+/// Parametric models of motion on the floor: a base model, and one term per possible effect. Terms are written as
+/// effect records of the model file, so the engine supports all of them.
 #pragma once
 
 #include <array>
@@ -16,12 +16,12 @@ namespace kilotwin::kilogrid {
 
 struct FloorParameter {
   std::string name;
-  double start;        ///< where the search begins
-  double least, most;  ///< it stays within
-  double width;        ///< of one step of the search
+  double start;        ///< initial value
+  double least, most;  ///< range
+  double width;        ///< scale of one step of the fit
 };
 
-/// All that a run of the swarm is made from.
+/// All inputs of a simulated run.
 struct FloorSettings {
   proto::Model model;
   WalkTimes times;
@@ -30,38 +30,38 @@ struct FloorSettings {
 
 struct FloorTerm {
   std::string name;
-  std::vector<std::string> covariates;  ///< of the contract
+  std::vector<std::string> covariates;  ///< names of result.json
   std::string acts_on;                  ///< as in the model file
-  std::string about;                    ///< in words, with places {0} {1} {2} for its parameters, as of fmt
-  std::string experiment;               ///< that would tell it from what looks alike; empty: nothing does
+  std::string about;                    ///< description with fmt placeholders {0} {1} {2} for the parameters
+  std::string experiment;               ///< an experiment that separates it from similar effects; empty: none known
   std::vector<FloorParameter> parameters;
-  /// The parameters that switch it: at 0 the term does nothing. The others are shapes.
+  /// The first parameters are amplitudes: at 0 the term has no effect. The others are shape parameters.
   std::size_t switches = 1;
   std::function<void(std::span<const double>, FloorSettings&)> apply;
 };
 
-/// The base model of the seed, and what cells hear: always there.
+/// The base model of the ARGoS paper and the reception of cells. Always included.
 [[nodiscard]] FloorTerm base_term();
-/// Effects that may be added, one per covariate and shape that the floor can tell.
+/// Candidate effects: one per covariate and shape that these data can resolve.
 [[nodiscard]] std::vector<FloorTerm> candidate_terms(const Floor&);
 
-/// The terms in use, with a value for every parameter.
+/// The terms in use with their parameter values.
 struct FloorModel {
   std::vector<FloorTerm> terms;  ///< the first is the base
   std::vector<double> values;
-  /// Speed beside the wall, within kBeside_mm of it, times what it is in the open: by part of the rim. Effect "wall", in as
-  /// many records as there are walls. Found by a rule of its own, as is the order in which modules listen to their cells.
+  /// Speed beside the walls relative to the open floor, per boundary section, within kBeside_mm. Effect "wall",
+  /// one record per wall. Fitted by its own procedure, like the polling order of modules.
   static constexpr double kBeside_mm = 50;
-  std::optional<std::array<double, kRimParts>> wall;
+  std::optional<std::array<double, kBoundarySections>> wall;
   std::array<double, 4> later = FloorRadio().later;
 
   void add(const FloorTerm& term);
-  /// Index of the first parameter of a term.
+  /// Index of a term's first parameter.
   [[nodiscard]] std::size_t first_of(std::size_t term) const;
   [[nodiscard]] std::vector<FloorParameter> parameters() const;
   [[nodiscard]] FloorSettings settings() const { return settings(values); }
   [[nodiscard]] FloorSettings settings(std::span<const double> values) const;
-  /// Without one of its terms.
+  /// The model without one term.
   [[nodiscard]] FloorModel without(std::size_t term) const;
 };
 

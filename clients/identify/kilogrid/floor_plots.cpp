@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What simulated runs leave of the measured speed over one covariate, in mm/s, as the report shows it.
+/// Residual speed of simulated runs over one covariate, mm/s.
 json plot_of(const char* name, const char* covariate, const char* unit, const std::vector<double>& at,
              const FloorTarget& target, const FloorStatistics& before, const FloorStatistics& after) {
   const StatisticGroup& group = statistic_group(name);
@@ -65,7 +65,7 @@ json map_of(const FloorTarget& target, const FloorStatistics& before, const Floo
   return map;
 }
 
-/// A row of shares as a distribution of 10 000.
+/// Shares as a histogram of 10 000 counts.
 json distribution_of(const char* name, const char* title, const char* unit, const std::vector<double>& edges,
                      const FloorTarget& target, const FloorStatistics& simulated) {
   const StatisticGroup& group = statistic_group(name);
@@ -91,7 +91,7 @@ json numbers(const std::vector<double>& values, const StatisticGroup& group, boo
 
 json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before, const FloorStatistics& after) {
   json rows = json::array();
-  // A number of the statistics, as it is read.
+  // One row of the table.
   const auto row = [&](const std::string& what, const char* format, const auto& read) {
     rows.push_back({what, fmt::format(fmt::runtime(format), read(held_out.statistics().value)),
                     fmt::format(fmt::runtime(format), read(before.value)),
@@ -109,10 +109,10 @@ json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before,
   };
   const std::array lags_s = {10, 20, 50, 100, 200, 300, 600};
   for (std::size_t i = 0; i < lags_s.size(); ++i) {
-    row(fmt::format("root mean square way in {} s, mm", lags_s[i]), "{:.0f}",
+    row(fmt::format("root mean square displacement in {} s, mm", lags_s[i]), "{:.0f}",
         [&, i](const auto& v) { return std::sqrt(value("msd", i)(v)); });
   }
-  // Between robots, about the mean of all; halves of a run tell what lasts.
+  // Spread between robots about the common mean. The product of two half runs isolates the persistent part.
   const auto add_own = [&](const char* group, double about, double scale, const std::string& name,
                            const char* format) {
     const auto off = [=](const auto& v) { return value(group, 0)(v) - about; };
@@ -120,31 +120,30 @@ json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before,
     const auto variance = [=](const auto& v, std::size_t i) { return value(group, i)(v) - off(v) * off(v); };
     row(name + ": standard deviation between robots", format,
         [=](const auto& v) { return std::sqrt(std::max(variance(v, 1), 0.0)) * scale; });
-    row(name + ": correlation of a robot's first and second half of the run", "{:.2f}",
+    row(name + ": correlation between the halves of a run", "{:.2f}",
         [=](const auto& v) { return variance(v, 2) / variance(v, 1); });
   };
   constexpr double kPerSecond = 1 / FloorBlocks::kBlock_s, kAboutSpeed_mm = 75;
-  add_own("speed", kAboutSpeed_mm, kPerSecond, "speed in the open, mm/s", "{:.2f}");
-  add_own("turn-bias", 0, kPerSecond, "turning to one side, rad/s", "{:+.4f}");
-  row("standing still in the open: episodes of 10 s or more, in 1000 blocks", "{:.1f}",
-      value("still-in-the-open", 0));
+  add_own("speed", kAboutSpeed_mm, kPerSecond, "speed on the open floor, mm/s", "{:.2f}");
+  add_own("turn-bias", 0, kPerSecond, "mean turn rate, rad/s", "{:+.4f}");
+  row("rest on the open floor: episodes of 10 s or more per 1000 blocks", "{:.1f}", value("still-in-the-open", 0));
   row("... of 30 s or more", "{:.2f}", value("still-in-the-open", 2));
-  row("standing still beside walls: episodes of 10 s or more, in 1000 blocks", "{:.0f}",
-      value("still-beside-walls", 0));
+  row("rest beside walls: episodes of 10 s or more per 1000 blocks", "{:.0f}", value("still-beside-walls", 0));
   row("... of 40 s or more", "{:.1f}", value("still-beside-walls", 3));
-  row("stays beside a wall of 200 s or more, in 1000 blocks", "{:.2f}", value("stays-beside-walls", 5));
+  row("stays beside a wall of 200 s or more per 1000 blocks", "{:.2f}", value("stays-beside-walls", 5));
   row("share of time within 50 mm of a wall", "{:.3f}", value("occupancy", 0));
   row("share of time within 100 mm of a wall", "{:.3f}", share_of("occupancy", 0, 2));
-  row("speed after 45 minutes, of that in the first 10", "{:.3f}", [&](const auto& v) {
+  row("speed after 45 minutes, relative to the first 10", "{:.3f}", [&](const auto& v) {
     const auto of = share_of("step-by-time", 9, 11), at = share_of("step-by-time", 0, 2);
     return of(v) / at(v);
   });
   row("share of blocks of 10 s without a report", "{:.3f}", value("reports", 7));
   return {{"id", "motion"},
-          {"title", "How robots move, measured and simulated"},
+          {"title", "Statistics of motion, measured and simulated"},
           {"lead",
-           "On runs held out. All from cells alike: mean places in blocks of 10 s, in which steps below 16 mm are "
-           "standing still; in the open is 150 mm off the walls."},
+           "Held-out runs. All statistics use cell reports: mean positions in blocks of 10 s. A step below 16 mm "
+           "counts "
+           "as rest. Open floor: at least 150 mm from the walls."},
           {"head", {"", "measured", "base model", "with effects"}},
           {"rows", rows}};
 }
@@ -168,9 +167,9 @@ void add_plots(json& document, const FloorTarget& held_out, const FloorStatistic
       plot_of("step-by-direction", "heading", "rad", middles(-7 * pi / 8, pi / 4, 8), held_out, before, after)};
   document["maps"] = {map_of(held_out, before, after)};
   document["distributions"] = {
-      distribution_of("step", "way in 10 s", "mm",
+      distribution_of("step", "displacement in 10 s", "mm",
                       {0, 8, 16, 24, 32, 40, 50, 60, 70, 80, 90, 100, 110, 120, 150, 200}, held_out, after),
-      distribution_of("turn", "turn between two ways of 10 s", "rad", middles(0, pi / 8, 9), held_out, after)};
+      distribution_of("turn", "turn between displacements of 10 s", "rad", middles(0, pi / 8, 9), held_out, after)};
 }
 
 }  // namespace kilotwin::kilogrid

@@ -1,4 +1,4 @@
-/// Statistics of the floor as the report draws them: the keys are those of clients/identify/identify.hpp.
+/// Statistics of the floor as plot data and tables. Keys as in clients/identify/identify.hpp.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,12 +8,12 @@
 
 namespace kilotwin::kilogrid {
 
-/// A group's row of values, null where there are none; roots of them where they are squares.
+/// The values of a group, null if unknown; `root`: their square roots.
 [[nodiscard]] nlohmann::json numbers(const std::vector<double>& values, const StatisticGroup&, bool root);
-/// What a reader asks first of how robots move: measured on runs held out, and simulated. A table of the report.
+/// A table of the main statistics of motion: measured on held-out runs, and simulated.
 [[nodiscard]] nlohmann::json table_of_motion(const FloorTarget& held_out, const FloorStatistics& before,
                                              const FloorStatistics& after);
-/// covariate_plots, maps, distributions and msd: on runs held out, of the base model and of the one with effects.
+/// covariate_plots, maps, distributions and msd on held-out runs, for the base model and the model with effects.
 void add_plots(nlohmann::json& document, const FloorTarget& held_out, const FloorStatistics& before,
                const FloorStatistics& after);
 

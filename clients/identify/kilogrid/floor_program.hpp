@@ -1,10 +1,10 @@
-/// The program that the robots of the floor run, as far as it moves them: a random walk, and turning away from walls.
-/// behaviours/kilogrid.c is the same for robots of an experiment.
+/// The robots' program on the floor: a random walk with wall avoidance. behaviours/kilogrid.c is the same program
+/// for experiments.
 ///
-/// The walk goes straight for |N(15, 1.5)| s and turns for |N(0.5, 3)| s to either side, both cut to whole seconds. Cells on
-/// the floor's rim send a message every half second; a robot that receives one turns to either side until four
-/// readings in a row are weaker than the four before, then goes straight; 1 s without a message ends it. It then does
-/// what the walk would have done meanwhile, and until the walk's next step keeps its motors as they are.
+/// The walk drives straight for |N(15, 1.5)| s and turns for |N(0.5, 3)| s to a random side, both truncated to
+/// whole seconds. Cells at the boundary send a message every half second. A robot that receives one turns to a
+/// random side until four successive readings are weaker than the four before, and then drives straight. After 1 s
+/// without a message the avoidance ends. The robot then keeps its motors until the walk's next transition.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace kilotwin::kilogrid {
 
-/// Random numbers for what is not part of a run's own result: splitmix64, the same on any machine.
+/// Random numbers for analyses: splitmix64, the same on any machine.
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : state_(seed) {}
@@ -28,22 +28,22 @@ struct WalkTimes {
   double straight_mean_s = 15, straight_sd_s = 1.5, turn_mean_s = 0.5, turn_sd_s = 3;
 };
 
-/// As commands of the contract: 1 straight, 2 left, 3 right.
+/// Numbered as commands: 1 straight, 2 left, 3 right.
 enum class Motion : std::uint8_t { kStop = 0, kStraight = 1, kLeft = 2, kRight = 3 };
 
 class FloorProgram {
  public:
-  /// Kilo_ticks that the program takes for a second, for times of the walk and of the avoidance.
+  /// Kilo_ticks per program second, in the walk and in the avoidance.
   static constexpr std::int64_t kWalkTicks = 31, kWallTicks = 32;
 
   FloorProgram(const WalkTimes& times, std::uint64_t seed) : times_(times), dice_(seed) {}
 
-  /// A cell of the rim was received; the stronger, the nearer.
+  /// A message of a boundary cell; `strength` falls with the distance.
   void hear_wall(std::int64_t kilo_ticks, double strength);
-  /// One call of the loop. Returns what the motors do then.
+  /// One call of loop(). Returns the motion that follows.
   Motion loop(std::int64_t kilo_ticks);
   [[nodiscard]] bool avoiding() const { return avoiding_; }
-  /// From here on with other random numbers.
+  /// Continues with another random sequence.
   void reseed(std::uint64_t seed) { dice_ = Dice(seed); }
 
  private:
@@ -54,7 +54,7 @@ class FloorProgram {
   void walk(std::int64_t now);
   void avoid(std::int64_t now);
   void forget_readings();
-  /// Whole seconds of |N(mean, sd)|, in kilo_ticks.
+  /// |N(mean, sd)| truncated to whole seconds, in kilo_ticks.
   std::int64_t draw(double mean_s, double sd_s);
 
   WalkTimes times_;

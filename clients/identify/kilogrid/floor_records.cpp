@@ -53,9 +53,9 @@ void add_beside(Effect& effect, const Side& side, double value) {
   beside.add_value(side.above ? value : 0);
 }
 
-void add_walls(FloorSettings& settings, const Floor& floor, const std::array<double, kRimParts>& wall) {
-  std::array<double, kRimParts> gain;
-  for (std::size_t i = 0; i < kRimParts; ++i) gain[i] = wall[i] - 1;
+void add_walls(FloorSettings& settings, const Floor& floor, const std::array<double, kBoundarySections>& wall) {
+  std::array<double, kBoundarySections> gain;
+  for (std::size_t i = 0; i < kBoundarySections; ++i) gain[i] = wall[i] - 1;
   const std::span<const double> all(gain);
   std::vector<double> top(all.begin() + 12, all.begin() + 16), left(all.begin() + 16, all.end());
   std::reverse(top.begin(), top.end());

@@ -1,4 +1,4 @@
-/// Records of the model file, as the floor's effects write them.
+/// Effect records of the model file for effects on the floor.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@ namespace kilotwin::kilogrid {
 proto::Effect& add_effect(FloorSettings&, const char* name, proto::Effect::Target);
 proto::Function& add_function(proto::Effect&, proto::Function::Covariate of);
 
-/// Beside one wall: `across` is the axis that leads to it, `at_mm` where it begins.
+/// The region beside one wall: `across` is the axis normal to it, `at_mm` its inner edge.
 struct Side {
   const char* name;
   proto::Function::Covariate across;
@@ -20,9 +20,9 @@ struct Side {
 
 [[nodiscard]] std::array<Side, 4> sides_of(const Floor&);
 
-/// A factor of `value` there, of 0 elsewhere.
+/// A factor that is `value` in the region and 0 elsewhere.
 void add_beside(proto::Effect&, const Side&, double value);
-/// Gains beside all walls: by part of the rim, anticlockwise from the corner at the origin: 4 along x, 8 along y.
-void add_walls(FloorSettings&, const Floor&, const std::array<double, kRimParts>& wall);
+/// Gains beside all walls per boundary section, anticlockwise from the origin: 4 along x, 8 along y.
+void add_walls(FloorSettings&, const Floor&, const std::array<double, kBoundarySections>& wall);
 
 }  // namespace kilotwin::kilogrid

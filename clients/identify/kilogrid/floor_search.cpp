@@ -34,10 +34,10 @@ class Search {
   }
 
  private:
-  /// The effect with the most evidence beside those that are there, fitted with them. False where none is beyond chance.
+  /// Adds the effect with the most evidence and refits. False if none is significant.
   bool add_one() {
     const std::uint64_t round = found_.gains.size();
-    const Choice choice = choose(found_.model, candidates_, target_, 50 + round, progress_);
+    const Selection choice = choose(found_.model, candidates_, target_, 50 + round, progress_);
     found_.rejected.clear();
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       const FloorTerm& candidate = candidates_[c];
@@ -50,7 +50,7 @@ class Search {
     add(candidates_[choice.best], score.values);
     found_.gains.push_back({candidates_[choice.best].name, score.gain, score.needed});
     candidates_.erase(candidates_.begin() + static_cast<std::ptrdiff_t>(choice.best));
-    fit_from_afar(found_.model, target_, 100 + round, progress_);
+    fit_from_far_start(found_.model, target_, 100 + round, progress_);
     fit(found_.model, target_, 2, 0.8, 100 + round, progress_);
     note_(found_.gains.back().name, found_.model);
     return true;
@@ -61,7 +61,7 @@ class Search {
     std::copy(values.begin(), values.end(), found_.model.values.end() - static_cast<std::ptrdiff_t>(values.size()));
   }
 
-  /// Effects that came before others, asked once more: each against a model that was fitted without it.
+  /// Backward elimination: tests each earlier effect against a model fitted without it.
   void prune() {
     const std::size_t terms = found_.model.terms.size() - 1;
     if (terms < 2) return;
@@ -69,12 +69,11 @@ class Search {
       FloorModel less = found_.model.without(e + 1);
       const FloorTerm term = found_.model.terms[e + 1];
       fit(less, target_, 1, 0.7, 200 + e, progress_);
-      const Choice choice = choose(less, {term}, target_, 70 + e, progress_);
+      const Selection choice = choose(less, {term}, target_, 70 + e, progress_);
       EffectGain& gain = found_.gains[e];
       gain = {term.name, choice.scores[0].gain, choice.scores[0].needed};
       if (choice.found()) continue;
-      found_.rejected.push_back(
-          {gain, term.covariates, term.acts_on, "beside the other effects the model fits as well without it"});
+      found_.rejected.push_back({gain, term.covariates, term.acts_on, "not significant given the other effects"});
       found_.model = less;
       found_.gains.erase(found_.gains.begin() + static_cast<std::ptrdiff_t>(e));
     }
@@ -83,10 +82,9 @@ class Search {
 
   void reject(EffectGain gain, std::vector<std::string> covariates, std::string acts_on) {
     const std::string why =
-        gain.gain <= 0
-            ? "would not lower the misfit"
-            : fmt::format("would lower the misfit by {:.0f}; {:.0f} is beyond chance{}", gain.gain, gain.needed,
-                          gain.gain > gain.needed ? ", but not that of runs that it is not learned from" : "");
+        gain.gain <= 0 ? "does not lower the misfit"
+                       : fmt::format("lowers the misfit by {:.0f}; significance bound {:.0f}{}", gain.gain,
+                                     gain.needed, gain.gain > gain.needed ? "; no gain on held-out runs" : "");
     found_.rejected.push_back({std::move(gain), std::move(covariates), std::move(acts_on), why});
   }
 

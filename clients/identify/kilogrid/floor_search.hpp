@@ -1,5 +1,5 @@
-/// The search for what a model of the floor lacks: one effect after the other, each beyond chance beside those before it, and
-/// each asked once more when the others are there.
+/// Forward selection of effects on the floor with backward elimination: each effect must be significant given the
+/// others.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@ namespace kilotwin::kilogrid {
 
 inline constexpr const char* kWallEffect = "wall";
 
-/// What an effect removed of the misfit when it was asked for last, and what would have been beyond chance.
+/// Misfit reduction of an effect at its last test, and its significance bound.
 struct EffectGain {
   std::string name;
   double gain = 0, needed = 0;
@@ -26,14 +26,14 @@ struct RejectedEffect {
 
 struct FloorFound {
   FloorModel model;
-  std::vector<EffectGain> gains;  ///< of the model's terms but the base, then of the walls if it has them
+  std::vector<EffectGain> gains;  ///< of the model's terms except the base, then of the walls if present
   std::vector<RejectedEffect> rejected;
 };
 
-/// Called with what was added, and the model with it.
+/// Called after each addition with the term's name and the model.
 using FloorNote = std::function<void(const std::string& added, const FloorModel&)>;
 
-/// From a base model that is fitted. `progress`: with the part of the search that is done.
+/// Starts from a fitted base model. `progress` receives the completed share of the search.
 [[nodiscard]] FloorFound search_effects(const FloorModel& base, const FloorTarget&,
                                         const std::vector<FloorTerm>& candidates,
                                         const std::function<void(double part, const std::string&)>& progress,

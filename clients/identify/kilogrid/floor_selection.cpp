@@ -15,7 +15,7 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Sets simulated without an effect; and how often the engine simulates the measured runs, to be compared with them.
+/// Number of simulated sets without an effect, and of engine simulations per measured run.
 constexpr int kSets = 16, kRepeats = 2;
 constexpr double kWhole_s = std::numeric_limits<double>::infinity();
 
@@ -28,7 +28,7 @@ std::vector<FloorSet> sets_of(const FloorModel& model, const FloorTarget& target
   return sets;
 }
 
-/// What other sets than this one say together, as many as the engine's repeats.
+/// Pooled statistics of sets other than this one, as many as the engine's repeats.
 FloorStatistics others_than(const std::vector<FloorSet>& sets, std::size_t set) {
   std::vector<std::vector<RobotSums>> others;
   for (std::size_t k = 1; k <= std::size_t{kRepeats}; ++k) {
@@ -37,7 +37,7 @@ FloorStatistics others_than(const std::vector<FloorSet>& sets, std::size_t set) 
   return pooled(others);
 }
 
-/// Parameters of the model and of its candidates, as those that are in use.
+/// Parameters of the model and of the candidates, as masks.
 class Candidates {
  public:
   Candidates(const FloorModel& model, const std::vector<FloorTerm>& candidates)
@@ -61,7 +61,7 @@ class Candidates {
     std::fill_n(use.begin() + static_cast<std::ptrdiff_t>(first_of(c)), candidates_[c].switches, true);
     return use;
   }
-  /// Candidates are off; what switches them on is varied, not their shapes.
+  /// Indices of the candidates' amplitudes. Their shape parameters stay fixed in the test.
   [[nodiscard]] std::vector<std::size_t> switches() const {
     std::vector<std::size_t> at;
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
@@ -76,26 +76,26 @@ class Candidates {
   std::size_t in_model_, terms_;
 };
 
-/// What candidates remove of a set's misfit.
+/// Misfit reductions of all candidates on one set.
 struct Gains {
-  double without = 0;      ///< misfit, refitted
-  double with_all = 0;     ///< that no candidate explains
-  std::vector<double> of;  ///< each candidate
+  double without = 0;      ///< misfit after a refit without candidates
+  double with_all = 0;     ///< misfit after a refit with all candidates
+  std::vector<double> of;  ///< per candidate
 
-  Gains(const FloorGap& gap, const Candidates& candidates, std::size_t count, const FloorBox& box)
+  Gains(const FloorMisfit& gap, const Candidates& candidates, std::size_t count, const FloorBox& box)
       : without(gap.at(gap.best_steps(candidates.model_only(), box))),
         with_all(gap.at(gap.best_steps(candidates.with_all(), box))) {
     for (std::size_t c = 0; c < count; ++c) of.push_back(without - gap.at(gap.best_steps(candidates.with(c), box)));
   }
 };
 
-/// What a candidate removes of `other`, learned from `own`.
-double gain_of_other(const FloorGap& own, const FloorGap& other, const Candidates& of, std::size_t c,
+/// Misfit reduction of a candidate on `other`, with parameters estimated on `own`.
+double gain_of_other(const FloorMisfit& own, const FloorMisfit& other, const Candidates& of, std::size_t c,
                      const FloorBox& box) {
   return other.at(own.best_steps(of.model_only(), box)) - other.at(own.best_steps(of.with(c), box));
 }
 
-/// Of the model's parameters a step of one width, of candidates' two: those are off, and may be far from it.
+/// Model parameters may move by one scale, candidates by two, since they start at 0.
 FloorBox box_of(const FloorModel& all, std::size_t in_model) {
   FloorBox box = box_around(all, 1, 1);
   const FloorBox wide = box_around(all, 1, 2);
@@ -108,7 +108,7 @@ FloorBox box_of(const FloorModel& all, std::size_t in_model) {
 
 }  // namespace
 
-bool CandidateScore::helps_others() const {
+bool CandidateScore::helps_held_out() const {
   if (by_run.empty()) return true;
   double sum = 0;
   std::size_t against = 0;
@@ -119,8 +119,8 @@ bool CandidateScore::helps_others() const {
   return sum > 0 && against <= by_run.size() / 4;
 }
 
-bool CandidateScore::helps_all_alike() const {
-  // One-sided, of 2 to 9 degrees of freedom; more are as good as nine.
+bool CandidateScore::consistent_over_runs() const {
+  // One-sided 1 % quantiles of Student's t for 2 to 9 degrees of freedom; more use the last.
   constexpr std::array kStudent = {6.965, 4.541, 3.747, 3.365, 3.143, 2.998, 2.896, 2.821};
   if (by_run.size() < 3) return false;
   const auto count = static_cast<double>(by_run.size());
@@ -134,9 +134,9 @@ bool CandidateScore::helps_all_alike() const {
          kStudent[std::min(by_run.size() - 3, kStudent.size() - 1)] * std::sqrt(squares / (count - 1) / count);
 }
 
-Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates, const FloorTarget& target,
-              std::uint64_t seed, const FloorProgress& progress) {
-  Choice choice;
+Selection choose(const FloorModel& model, const std::vector<FloorTerm>& candidates, const FloorTarget& target,
+                 std::uint64_t seed, const FloorProgress& progress) {
+  Selection choice;
   if (candidates.empty()) return choice;
   const Candidates of(model, candidates);
   const std::size_t runs = target.scenes().size();
@@ -152,7 +152,7 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
 
   std::vector<std::optional<Gains>> made(sets.size());
   in_parallel(target.threads(), sets.size(), [&](std::size_t b) {
-    made[b].emplace(FloorGap(sets[b], others_than(sets, b), slopes, correlation), of, candidates.size(), box);
+    made[b].emplace(FloorMisfit(sets[b], others_than(sets, b), slopes, correlation), of, candidates.size(), box);
   });
   double all_by_chance = 0;
   std::vector<std::vector<double>> by_chance;
@@ -163,18 +163,18 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
   }
   std::vector<std::size_t> switches;
   for (const FloorTerm& candidate : candidates) switches.push_back(candidate.switches);
-  const FloorChance chance(by_chance, switches);
+  const NullDistribution chance(by_chance, switches);
   choice.bound = chance.bound();
 
-  const FloorGap gap(target.set(), here([](std::size_t) { return true; }), slopes, correlation);
+  const FloorMisfit gap(target.set(), here([](std::size_t) { return true; }), slopes, correlation);
   const Gains gains(gap, of, candidates.size(), box);
   choice.numbers = gap.numbers;
   choice.misfit = gains.without;
-  // What all candidates together do not explain counts as if chance were so much larger, as an analysis of variance takes its
-  // errors from what its largest model leaves.
+  // Misfit beyond all candidates inflates the null distribution, as the residual variance of the largest model
+  // does in an analysis of variance.
   choice.unexplained = std::max(1.0, gains.with_all / all_by_chance);
-  // Each run and all but it: what is learned from these must help with it.
-  std::vector<FloorGap> alone, others;
+  // Leave-one-run-out cross-validation.
+  std::vector<FloorMisfit> alone, others;
   constexpr std::size_t kFewestRuns = 3;
   for (std::size_t r = 0; runs >= kFewestRuns && r < runs; ++r) {
     std::vector<std::vector<RobotSums>> rest = target.set().runs;
@@ -187,7 +187,7 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
   std::string tried;
   const auto better = [&](const CandidateScore& a, const CandidateScore& b) {
     if (a.beyond(choice.bound) != b.beyond(choice.bound)) return a.beyond(choice.bound);
-    return a.helps_others() != b.helps_others() ? a.helps_others() : a.evidence > b.evidence;
+    return a.helps_held_out() != b.helps_held_out() ? a.helps_held_out() : a.evidence > b.evidence;
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     const Eigen::VectorXd steps = gap.best_steps(of.with(c), box);
@@ -199,10 +199,10 @@ Choice choose(const FloorModel& model, const std::vector<FloorTerm>& candidates,
                              {},
                              {first, first + static_cast<std::ptrdiff_t>(candidates[c].parameters.size())}});
     CandidateScore& score = choice.scores.back();
-    score.by_chance_alone = chance.evidence(c, gains.of[c]);
+    score.uncorrected_evidence = chance.evidence(c, gains.of[c]);
     for (std::size_t r = 0; r < alone.size(); ++r)
       score.by_run.push_back(gain_of_other(others[r], alone[r], of, c, box));
-    if (score.helps_all_alike()) score.needed = chance.gain_of(c, choice.bound);
+    if (score.consistent_over_runs()) score.needed = chance.gain_of(c, choice.bound);
     if (better(score, choice.scores[choice.best])) choice.best = c;
     tried += fmt::format(" {} {:.0f}/{:.0f}", candidates[c].name, score.gain, score.needed);
     for (std::size_t r = 0; r < score.by_run.size(); ++r)

@@ -1,4 +1,4 @@
-/// Which effect a model of the floor lacks most, and whether that is beyond chance.
+/// Selection of the most significant missing effect.
 #pragma once
 
 #include <functional>
@@ -9,43 +9,42 @@
 
 namespace kilotwin::kilogrid {
 
-/// What the neighbourhood of a model says about a candidate.
+/// Test of one candidate, by a linearisation about the model.
 struct CandidateScore {
-  double gain = 0;      ///< by how much it would lower the misfit, with the model refitted
-  double needed = 0;    ///< that much is beyond chance
-  double evidence = 0;  ///< negative logarithm of the chance of such a gain
-  std::vector<double>
-      by_run;  ///< what it removes of each run's misfit, learned from the others; empty of fewer than three
+  double gain = 0;             ///< reduction of the misfit after a refit
+  double needed = 0;           ///< significance bound of the gain
+  double evidence = 0;         ///< negative logarithm of the p value
+  std::vector<double> by_run;  ///< cross-validated reduction of each run's misfit; empty with fewer than three runs
   std::vector<double> values;  ///< of its parameters
 
-  double by_chance_alone = 0;  ///< evidence, as if the model left nothing but chance beside it
+  double uncorrected_evidence = 0;  ///< evidence without the correction for unexplained misfit
 
-  /// Whether it helps with runs that it was not learned from: all together, and each but one of four.
-  [[nodiscard]] bool helps_others() const;
-  /// Whether it helps with each of them, alike: by a mean that is beyond what they differ by (Student, 1 %).
-  [[nodiscard]] bool helps_all_alike() const;
-  /// What the model leaves unexplained may look like an effect, so that counts as chance; but not where runs agree.
+  /// Whether it reduces the misfit of held-out runs: in total, and in at least three of four runs.
+  [[nodiscard]] bool helps_held_out() const;
+  /// Whether it reduces the misfit of each held-out run consistently: Student's t test over runs, 1 %.
+  [[nodiscard]] bool consistent_over_runs() const;
+  /// Unexplained misfit inflates the null distribution, unless the runs agree on the effect.
   [[nodiscard]] bool beyond(double bound) const {
-    return (evidence > bound && helps_others()) || (by_chance_alone > bound && helps_all_alike());
+    return (evidence > bound && helps_held_out()) || (uncorrected_evidence > bound && consistent_over_runs());
   }
 };
 
-struct Choice {
-  std::vector<CandidateScore> scores;  ///< of each candidate
+struct Selection {
+  std::vector<CandidateScore> scores;  ///< one per candidate
   std::size_t best =
-      0;              ///< with the most evidence, of those that are beyond chance, else that help with other runs
-  double bound = 0;   ///< of evidence: the largest of all is beyond it in one of 100 sets without an effect
-  double misfit = 0;  ///< where the model stands, refitted, with correlations
-  double by_chance = 0;     ///< that of sets that the model made
-  double unexplained = 1;   ///< what is left with all candidates, in what is left of those sets
-  std::size_t numbers = 0;  ///< that it is of
+      0;              ///< the most evidence among significant candidates, else among those that help held-out runs
+  double bound = 0;   ///< 0.99 quantile of the largest evidence in sets without an effect
+  double misfit = 0;  ///< of the refitted model, with correlations
+  double by_chance = 0;     ///< misfit of sets simulated by the model
+  double unexplained = 1;   ///< misfit beyond all candidates, relative to simulated sets
+  std::size_t numbers = 0;  ///< number of statistics in the misfit
 
   [[nodiscard]] bool found() const { return !scores.empty() && scores[best].beyond(bound); }
 };
 
-/// Weighs each candidate that the model lacks against sets simulated by the model: as many runs and robots as measured, from
-/// the same places, as long.
-[[nodiscard]] Choice choose(const FloorModel&, const std::vector<FloorTerm>& candidates, const FloorTarget&,
-                            std::uint64_t seed, const FloorProgress&);
+/// Tests each candidate against sets simulated by the model, with the measured numbers of runs and robots, initial
+/// positions and durations.
+[[nodiscard]] Selection choose(const FloorModel&, const std::vector<FloorTerm>& candidates, const FloorTarget&,
+                               std::uint64_t seed, const FloorProgress&);
 
 }  // namespace kilotwin::kilogrid

@@ -8,7 +8,7 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Where a model of some parameters stands on a design of runs, in steps: each parameter balanced between up and down.
+/// Experimental design: steps of the parameters, balanced in sign per parameter.
 std::vector<std::vector<double>> design_of(std::size_t parameters, std::size_t points, Dice& dice) {
   std::vector<std::vector<double>> design(points, std::vector<double>(parameters, 0));
   for (std::size_t p = 0; p < parameters; ++p) {
@@ -21,8 +21,8 @@ std::vector<std::vector<double>> design_of(std::size_t parameters, std::size_t p
   return design;
 }
 
-/// A slope with this variance, less what chance makes of it. Many statistics do not depend on a parameter; what chance makes of
-/// those would only dampen steps.
+/// Shrinks a slope by its variance. Most statistics do not depend on a given parameter; the noise of their slopes
+/// would shorten steps.
 double beyond_chance(double slope, double variance, double times = 1) {
   return slope * std::max(0.0, 1 - times * variance / std::max(slope * slope, 1e-30));
 }
@@ -31,13 +31,13 @@ std::vector<RobotSums> sums_at(const FloorTarget& target, const FloorSettings& s
                                double longest_s, std::uint64_t seed) {
   FloorScene scene = target.scenes()[which];
   scene.duration_s = std::min(scene.duration_s, longest_s);
-  return robot_sums(simulate_quickly(scene, target.floor(), settings, seed), target.floor());
+  return robot_sums(simulate_fast(scene, target.floor(), settings, seed), target.floor());
 }
 
-/// Regression of one statistic over the points at which it is known.
+/// Regression of one statistic over the simulations where it is known.
 class Lines {
  public:
-  /// `x`: a column per run, then the parameters'; `moving`: of those, how many are not 0 throughout. Rows count by `weight`.
+  /// `x`: one column per run, then the parameters; `moving`: number of varied parameters. Rows have weights.
   Lines(Eigen::MatrixXd x, Eigen::VectorXd weight, Eigen::Index scenes, std::size_t moving)
       : x_(std::move(x)),
         weight_(std::move(weight)),
@@ -45,7 +45,7 @@ class Lines {
         fitted_(scenes + static_cast<Eigen::Index>(moving)),
         all_(x_, weight_, scenes) {}
 
-  /// Slopes less what chance makes of them; none where too little is known.
+  /// Shrunken slopes; 0 with too little data.
   Eigen::VectorXd slopes(const std::vector<double>& y) const {
     const auto rows = static_cast<Eigen::Index>(y.size()), columns = x_.cols() - scenes_;
     const auto known =
@@ -66,9 +66,9 @@ class Lines {
 
  private:
   struct Normal {
-    Eigen::MatrixXd inverse, variance;  ///< variance: of what is fitted, in that of a point
+    Eigen::MatrixXd inverse, variance;  ///< variance: of the estimates, for unit residual variance
     Normal(const Eigen::MatrixXd& x, const Eigen::VectorXd& weight, Eigen::Index scenes) {
-      // A little ridge: a parameter at the end of its range moves to one side only, and a run may lack the statistic.
+      // A small ridge: a parameter at its bound moves to one side only, and a statistic may be unknown in a run.
       Eigen::MatrixXd normal = x.transpose() * weight.asDiagonal() * x;
       normal.diagonal().head(scenes).array() += 1e-6;
       normal.diagonal().tail(x.cols() - scenes).array() += 0.02 * weight.sum();
@@ -79,10 +79,10 @@ class Lines {
   Eigen::VectorXd line(const Eigen::MatrixXd& x, const Eigen::VectorXd& weight, const Normal& normal,
                        const Eigen::VectorXd& y) const {
     const Eigen::VectorXd fitted = normal.inverse * (x.transpose() * weight.cwiseProduct(y));
-    // As many points as the weights are worth.
-    const double worth = weight.sum() * weight.sum() / weight.squaredNorm();
-    const double spare = std::max(worth - static_cast<double>(fitted_), 0.1 * worth);
-    const double variance = (y - x * fitted).cwiseAbs2().dot(weight) / weight.sum() * worth / spare;
+    // Effective number of simulations (Kish).
+    const double effective = weight.sum() * weight.sum() / weight.squaredNorm();
+    const double spare = std::max(effective - static_cast<double>(fitted_), 0.1 * effective);
+    const double variance = (y - x * fitted).cwiseAbs2().dot(weight) / weight.sum() * effective / spare;
     Eigen::VectorXd slopes(x.cols() - scenes_);
     for (Eigen::Index p = 0; p < slopes.size(); ++p)
       slopes(p) = beyond_chance(fitted(scenes_ + p), variance * normal.variance(scenes_ + p, scenes_ + p));
@@ -95,7 +95,7 @@ class Lines {
   Normal all_;
 };
 
-/// Adds to a mean over robots, with what each contributes to its deviation.
+/// Pooled mean over robots, with each robot's contribution to its deviation.
 struct Pooled {
   std::vector<double> sum, weight;
   explicit Pooled(std::size_t n) : sum(n, 0), weight(n, 0) {}
@@ -159,7 +159,7 @@ void add_points(FloorPoints& points, const FloorModel& model, const FloorTarget&
 Eigen::MatrixXd slopes_of(const FloorPoints& points, const FloorModel& model, const std::vector<bool>& moves,
                           std::size_t runs, double width) {
   const std::vector<FloorParameter> parameters = model.parameters();
-  // Each run has a column of its own, for what it has begun with and for its random numbers.
+  // One intercept per measured run: its initial state and random numbers.
   const auto rows = static_cast<Eigen::Index>(points.run.size()),
              columns = static_cast<Eigen::Index>(parameters.size()), scenes = static_cast<Eigen::Index>(runs);
   const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
@@ -170,10 +170,10 @@ Eigen::MatrixXd slopes_of(const FloorPoints& points, const FloorModel& model, co
     x(i, static_cast<Eigen::Index>(points.run[k])) = 1;
     for (Eigen::Index p = 0; p < columns; ++p) {
       const auto q = static_cast<std::size_t>(p);
-      // What was really done, within the parameter's range.
+      // The step actually taken within the parameter's range.
       x(i, scenes + p) = (points.values[k][q] - model.values[q]) / (width * parameters[q].width);
     }
-    // Points of a design within the width have a mean square of a third; what is farther off bends away.
+    // A design within the width has mean square one third. Farther simulations are nonlinear: smaller weight.
     const double far =
         3 * x.row(i).tail(columns).squaredNorm() / static_cast<double>(std::max<std::size_t>(moving, 1));
     weight(i) = std::exp(-std::max(far - 1, 0.0) / 2);
@@ -192,7 +192,7 @@ Eigen::MatrixXd slopes_around(const FloorModel& model, const FloorTarget& target
                               double width, double longest_s, std::uint64_t seed) {
   const auto moving = static_cast<std::size_t>(std::count(moves.begin(), moves.end(), true));
   FloorPoints points;
-  // Three for each: with less, what chance makes of the slopes leads steps astray.
+  // Three simulations per parameter: fewer make the slopes too noisy.
   add_points(points, model, target, moves, 3 * moving + 12, width, longest_s, seed);
   return slopes_of(points, model, moves, target.scenes().size(), width);
 }
@@ -200,7 +200,7 @@ Eigen::MatrixXd slopes_around(const FloorModel& model, const FloorTarget& target
 void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, const FloorTarget& target,
                             const std::vector<std::size_t>& switches, double longest_s, std::uint64_t seed) {
   const std::vector<FloorParameter> parameters = model.parameters();
-  // So much tells a switch's slopes: of all runs that were measured, those of small sets again with other numbers.
+  // Simulated robot time for one amplitude's slopes. Small sets are repeated with other seeds.
   constexpr double kRobotTime_s = 6e5;
   double robot_time_s = 0;
   for (const FloorScene& scene : target.scenes())
@@ -216,7 +216,7 @@ void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, co
   for (const auto& run : none) without.add(run);
   in_parallel(target.threads(), switches.size(), [&](std::size_t k) {
     const std::size_t p = switches[k];
-    // What goes both ways is nearly linear, so that a longer step tells more; what only grows need not be.
+    // Two-sided amplitudes are nearly linear, so a longer step has a better ratio of signal to noise.
     std::vector<double> values = model.values;
     values[p] = std::min(values[p] + (parameters[p].least < 0 ? 2 : 1) * parameters[p].width, parameters[p].most);
     const double widths = (values[p] - model.values[p]) / parameters[p].width;
@@ -227,7 +227,7 @@ void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, co
       with.add(on.back());
     }
     for (std::size_t s = 0; s < statistics; ++s) {
-      // Robots with the same numbers differ by what is switched: so chance is what these differences spread by.
+      // With common random numbers, the spread of the paired differences is the noise.
       double chance = 0;
       for (std::size_t i = 0; i < runs; ++i) {
         for (std::size_t r = 0; r < on[i].size(); ++r) {
@@ -237,7 +237,7 @@ void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, co
       }
       const double slope = (with.mean(s) - without.mean(s)) / widths;
       chance /= widths * widths;
-      // Hundreds of slopes that are chance would together hide the few that are not.
+      // Stronger shrinkage: hundreds of noisy slopes would hide the few real ones.
       constexpr double kTimes = 2;
       if (!std::isfinite(slope + chance)) continue;
       slopes(static_cast<Eigen::Index>(s), static_cast<Eigen::Index>(p)) = beyond_chance(slope, chance, kTimes);

@@ -1,5 +1,5 @@
-/// How the statistics of a model of the floor change with its parameters: by quick simulations around it, all with the same random
-/// numbers, so that robots differ by the parameter and not by chance.
+/// Sensitivities of the statistics to the parameters, by fast simulations around the model with common random
+/// numbers.
 #pragma once
 
 #include <Eigen/Dense>
@@ -10,33 +10,34 @@
 
 namespace kilotwin::kilogrid {
 
-/// What steps may be, in widths of the parameters: within `most` and within what each may be.
+/// Bounds of a step, in parameter scales: at most `most`, and within each parameter's range.
 struct FloorBox {
   std::vector<double> least, most;
 };
 [[nodiscard]] FloorBox box_around(const FloorModel&, double width, double most);
 
-/// Values `steps` away from those of the model, each within its range.
+/// Parameter values `steps` away from the model's, within their ranges.
 [[nodiscard]] std::vector<double> moved(const FloorModel&, const std::vector<double>& steps, double width);
 
-/// What quick runs of models around one said: kept, so that where the search has been counts again as long as it is near.
+/// Fast simulations around a model. They are kept, since earlier ones near the model remain informative.
 struct FloorPoints {
-  std::vector<std::vector<double>> values;  ///< of all parameters
-  std::vector<std::size_t> run;             ///< of the measured ones
+  std::vector<std::vector<double>> values;  ///< all parameters
+  std::vector<std::size_t> run;             ///< index of the measured run
   std::vector<std::vector<double>> said;    ///< statistics
 };
-/// `points` more, within `width` widths of the model, of one run each in turn, not longer than `longest_s`.
+/// Adds `points` simulations within `width` scales of the model, over the runs in turn, up to `longest_s` each.
 void add_points(FloorPoints&, const FloorModel&, const FloorTarget&, const std::vector<bool>& moves,
                 std::size_t points, double width, double longest_s, std::uint64_t seed);
-/// Per statistic and parameter, of a step of `width` widths: by regression over points, those beyond it by less the farther they are.
+/// [statistic][parameter], for a step of `width` scales: weighted regression over the simulations; weights fall
+/// with the distance.
 [[nodiscard]] Eigen::MatrixXd slopes_of(const FloorPoints&, const FloorModel&, const std::vector<bool>& moves,
                                         std::size_t runs, double width);
 
-/// The same of points of its own. Parameters that `moves` leaves out have slopes of 0.
+/// The same from new simulations. Parameters outside `moves` get 0.
 [[nodiscard]] Eigen::MatrixXd slopes_around(const FloorModel&, const FloorTarget&, const std::vector<bool>& moves,
                                             double width, double longest_s, std::uint64_t seed);
 
-/// Into `slopes`: of parameters that are 0 in the model, each by itself, against none in the same runs.
+/// Adds to `slopes` the parameters at 0, each on its own, relative to the model without it, in the same runs.
 void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel&, const FloorTarget&,
                             const std::vector<std::size_t>& switches, double longest_s, std::uint64_t seed);
 

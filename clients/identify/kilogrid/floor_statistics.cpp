@@ -15,21 +15,21 @@ namespace {
 using namespace groups;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kOpen_mm = 150;   ///< from walls: no cell of the rim is heard there
-constexpr double kBeside_mm = 60;  ///< a wall
-constexpr double kAlong_mm = 75;   ///< the rim
-constexpr double kStill_mm = 16;   ///< in a block: less than what cells blur
-constexpr double kMoving_mm = 40;  ///< in a block: the direction is known
+constexpr double kOpen_mm = 150;   ///< distance from walls: no boundary cell is received there
+constexpr double kBeside_mm = 60;  ///< distance of "beside a wall"
+constexpr double kAlong_mm = 75;   ///< distance of "along the boundary"
+constexpr double kStill_mm = 16;   ///< displacement per block: less than the cell resolution
+constexpr double kMoving_mm = 40;  ///< displacement per block: the direction is known
 constexpr double kTimeBin_s = 300;
-constexpr double kFewestRobots = 4;        ///< that a mean is taken of, counted by their weights
-constexpr std::size_t kExtentFeature = 8;  ///< of a track window, taken in 100 mm
+constexpr double kFewestRobots = 4;        ///< effective number of robots of a mean
+constexpr std::size_t kExtentFeature = 8;  ///< index of the extent feature, in units of 100 mm
 constexpr double kExtentScale_mm = 100;
-constexpr double kMiddle_mm = 300;  ///< from walls
+constexpr double kMiddle_mm = 300;  ///< distance from walls
 constexpr double kNear_mm = 100;
-constexpr double kAboutSpeed_mm = 75;  ///< a usual step
-constexpr double kGentle_rad = 1.2;    ///< turns of a straight robot with a bias, not of the walk
+constexpr double kAboutSpeed_mm = 75;  ///< typical displacement per block
+constexpr double kGentle_rad = 1.2;    ///< turns by bias while driving straight, not by the walk
 
-/// Adds up what one robot contributes.
+/// Accumulates the contribution of one robot.
 class Sums {
  public:
   Sums() : sums_{std::vector<double>(statistic_count(), 0), std::vector<double>(statistic_count(), 0)} {}
@@ -38,7 +38,7 @@ class Sums {
     sums_.sum[at] += value * weight;
     sums_.weight[at] += weight;
   }
-  /// Counts what falls into bin `hit` of `bins`.
+  /// Counts an event in bin `hit` of `bins`.
   void count(Group group, std::size_t hit, std::size_t bins) {
     for (std::size_t i = 0; i < bins; ++i) add(group, i, i == hit ? 1 : 0);
   }
@@ -48,7 +48,7 @@ class Sums {
   RobotSums sums_;
 };
 
-/// The last bin whose lower edge is not above `value`.
+/// The last bin with a lower edge at most `value`.
 template <std::size_t N> std::size_t bin_of(const std::array<double, N>& edges, double value) {
   return static_cast<std::size_t>(std::upper_bound(edges.begin(), edges.end(), value) - edges.begin()) - 1;
 }
@@ -65,7 +65,7 @@ struct Mean {
   [[nodiscard]] double value() const { return sum / count; }
 };
 
-/// Two halves of a run tell what lasts from what is chance: their product has the variance of what lasts.
+/// The product of two halves of a run estimates the variance of the persistent part, without noise.
 void add_halves(Sums& sums, Group group, const std::array<Mean, 2>& halves, double about, double enough = 10) {
   if (halves[0].count < enough || halves[1].count < enough) return;
   const double a = halves[0].value() - about, b = halves[1].value() - about;
@@ -97,8 +97,8 @@ class Motions {
           t < kMiddleBins)
         sums.add(kMiddle, t, wall_mm > kMiddle_mm ? 1 : 0);
       sums.count(kRing, part_of(wall_mm, floor_.width_mm / 2, kRings), kRings);
-      for (std::size_t i = 0; i < kRimParts; ++i)
-        sums.add(kRim, i, wall_mm < kAlong_mm && rim_part(floor_, x_[k], y_[k]) == i ? 1 : 0);
+      for (std::size_t i = 0; i < kBoundarySections; ++i)
+        sums.add(kBoundary, i, wall_mm < kAlong_mm && boundary_section(floor_, x_[k], y_[k]) == i ? 1 : 0);
       sums.add(kDrift, 0, steps_[k].real());
       sums.add(kDrift, 1, steps_[k].imag());
       if (wall_mm < kOpen_mm) continue;
@@ -133,7 +133,7 @@ class Motions {
  private:
   [[nodiscard]] bool known(std::size_t k) const { return !std::isnan(steps_[k].real()); }
 
-  /// How far it goes towards the middle line of the floor, from how far off.
+  /// Motion towards the middle line of the floor, by distance from it.
   void add_inward(Sums& sums, Group group, const std::vector<double>& at, std::size_t k, double whole_mm) {
     if (k + kWay >= at.size() || std::isnan(at[k + kWay])) return;
     const double off = at[k] - whole_mm / 2, way = at[k + kWay] - at[k];
@@ -160,7 +160,7 @@ class Motions {
     }
   }
 
-  /// Episodes of blocks in which the robot hardly moved, per 1000 blocks spent there; unheard blocks are passed over.
+  /// Episodes of rest per 1000 blocks, by length. Blocks without reports are skipped.
   template <class Lengths, class Where>
   void add_still(Sums& sums, Group group, const Lengths& lengths, Where&& where) {
     int run = 0;
@@ -183,7 +183,7 @@ class Motions {
     }
   }
 
-  /// Stays beside a wall, per 1000 blocks; unheard blocks are passed over.
+  /// Stays beside a wall, per 1000 blocks. Blocks without reports are skipped.
   void add_stays(Sums& sums) {
     int stay = 0;
     double blocks = 0;
@@ -212,7 +212,7 @@ class Motions {
   std::vector<std::complex<double>> steps_;
 };
 
-/// Of reports to three cells of one module, each 2 s after the other: whether the module went on by as many cells again.
+/// For three successive reports of one module, 2 s apart: whether its polling advanced by the same number twice.
 void add_pace(Sums& sums, const FloorTrack& track, double cell_mm) {
   const auto cell = [&](std::size_t i) {
     return std::pair{static_cast<int>(track.x_mm[i] / cell_mm), static_cast<int>(track.y_mm[i] / cell_mm)};
@@ -244,7 +244,7 @@ void add_reports(Sums& sums, const FloorTrack& track, const std::vector<double>&
     unheard.add(std::isnan(x) ? 1 : 0);
   }
   sums.add(kReports, 5, unheard.value() * unheard.value());
-  std::optional<std::size_t> first;  // of the reports at the time before
+  std::optional<std::size_t> first;  // first of the reports at the previous time
   for (std::size_t i = 0; i < track.size();) {
     std::size_t end = i;
     while (end < track.size() && track.time_s[end] == track.time_s[i]) ++end;
@@ -264,7 +264,7 @@ void add_reports(Sums& sums, const FloorTrack& track, const std::vector<double>&
   }
 }
 
-/// What a classifier sees, and how its numbers go together.
+/// Histogram of the classifier's features and of their products.
 void add_window(Sums& sums, const std::vector<double>& feature) {
   std::array<double, kFeatures.size()> scaled;
   for (std::size_t f = 0; f < kFeatures.size(); ++f) {
@@ -280,14 +280,14 @@ void add_window(Sums& sums, const std::vector<double>& feature) {
   }
 }
 
-/// How many others were within reach in each block.
+/// Number of neighbours within range in each block.
 std::vector<std::vector<std::size_t>> count_neighbours(const FloorBlocks& blocks) {
   std::vector<std::vector<std::size_t>> all(blocks.robots(), std::vector<std::size_t>(blocks.blocks, 0));
   for (std::size_t k = 0; k < blocks.blocks; ++k) {
     for (std::size_t a = 0; a < blocks.robots(); ++a) {
       for (std::size_t b = a + 1; b < blocks.robots(); ++b) {
         const double dx = blocks.x_mm[a][k] - blocks.x_mm[b][k], dy = blocks.y_mm[a][k] - blocks.y_mm[b][k];
-        if (!(dx * dx + dy * dy < kNear_mm * kNear_mm)) continue;  // also where one is not known
+        if (!(dx * dx + dy * dy < kNear_mm * kNear_mm)) continue;  // also false if a position is unknown
         ++all[a][k];
         ++all[b][k];
       }
@@ -331,7 +331,7 @@ FloorStatistics statistics_of(std::span<const RobotSums> robots) {
       weight += robot.weight[s];
       squares += robot.weight[s] * robot.weight[s];
     }
-    // A mean of a few robots says nothing of its own uncertainty.
+    // The variance of a mean over few robots is unreliable.
     const bool known = squares > 0 && weight * weight >= kFewestRobots * squares;
     const double mean = known ? sum / weight : kNan;
     for (const RobotSums& robot : robots) {

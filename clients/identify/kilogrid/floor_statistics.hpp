@@ -1,6 +1,6 @@
-/// What can be said of how robots moved, from the cells in which they were heard. Everything is a mean of robots' own sums,
-/// so that its uncertainty over robots is known, and is computed in the same way from measured and from simulated runs:
-/// what cells blur and lose is in both.
+/// Summary statistics of motion from cell reports. Each is a mean over robots of per-robot sums, which gives its
+/// standard error. Measured and simulated runs use the same computation, so coarse cells and lost reports affect
+/// both alike.
 #pragma once
 
 #include <array>
@@ -13,30 +13,30 @@
 
 namespace kilotwin::kilogrid {
 
-/// A row of numbers that belong together.
+/// Statistics that belong together: one curve or histogram.
 struct StatisticGroup {
-  std::string name;       ///< "msd"
-  std::string covariate;  ///< of the contract, that the numbers are over
+  std::string name;       ///< for example "msd"
+  std::string covariate;  ///< abscissa, a name of result.json
   std::vector<std::string> labels;
-  std::size_t first = 0;  ///< index of the first in all
+  std::size_t first = 0;  ///< index of its first statistic
 
   [[nodiscard]] std::size_t size() const { return labels.size(); }
 };
 [[nodiscard]] const std::vector<StatisticGroup>& statistic_groups();
 [[nodiscard]] std::size_t statistic_count();
 
-/// A robot's share of each: its sum and how much that counts.
+/// A robot's contribution to each statistic: sum and weight.
 struct RobotSums {
   std::vector<double> sum, weight;
 };
-/// The group of that name; it must be there.
+/// The group of that name, which must exist.
 [[nodiscard]] const StatisticGroup& statistic_group(std::string_view name);
-/// Per robot of the run.
+/// One per robot of the run.
 [[nodiscard]] std::vector<RobotSums> robot_sums(const FloorRun&, const Floor&);
 
-/// Means over robots of several runs, and the variance of each mean by the spread of the robots.
+/// Means over the robots of several runs, and their variances by the spread between robots.
 struct FloorStatistics {
-  std::vector<double> value, variance;  ///< NaN where there is nothing to take the mean of
+  std::vector<double> value, variance;  ///< NaN if unknown
 };
 [[nodiscard]] FloorStatistics statistics_of(std::span<const RobotSums> robots);
 

@@ -11,10 +11,10 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Kilo_ticks per tick of the engine: the longest tick there is.
+/// Kilo_ticks per engine tick: the longest tick allowed.
 constexpr std::int64_t kKiloTicks = 4;
 constexpr std::uint32_t kTickCycles = kKiloTicks << 18;
-/// Spread of robots' clocks.
+/// Relative spread of robot clocks.
 constexpr double kClock_sd = 0.005;
 constexpr std::uint8_t kDuty = 70;
 constexpr double kRadius_mm = kRobotRadius_mm;
@@ -46,17 +46,17 @@ RunPlan plan_of(const FloorScene& scene, const Floor& floor, const proto::Model&
 
 }  // namespace
 
-std::size_t rim_part(const Floor& floor, double x_mm, double y_mm) {
+std::size_t boundary_section(const Floor& floor, double x_mm, double y_mm) {
   const double w = floor.width_mm, h = floor.height_mm;
   const double distance[] = {y_mm, w - x_mm, h - y_mm, x_mm};
   const double along[] = {x_mm, w + y_mm, w + h + (w - x_mm), 2 * w + h + (h - y_mm)};
   const auto side =
       static_cast<std::size_t>(std::min_element(std::begin(distance), std::end(distance)) - std::begin(distance));
-  const double part = std::max(along[side], 0.0) / (2 * (w + h)) * static_cast<double>(kRimParts);
-  return std::min(static_cast<std::size_t>(part), kRimParts - 1);
+  const double part = std::max(along[side], 0.0) / (2 * (w + h)) * static_cast<double>(kBoundarySections);
+  return std::min(static_cast<std::size_t>(part), kBoundarySections - 1);
 }
 
-double rim_cell_distance_mm(const Floor& floor, double x_mm, double y_mm) {
+double boundary_cell_distance_mm(const Floor& floor, double x_mm, double y_mm) {
   const double half = floor.cell_mm / 2, w = floor.width_mm, h = floor.height_mm;
   const auto middle = [&](double v, double end) {
     return (std::floor(std::clamp(v, half, end - half) / floor.cell_mm) + 0.5) * floor.cell_mm;
@@ -76,7 +76,7 @@ FloorReporter::FloorReporter(const Floor& floor, const FloorRadio& radio, std::u
     every_s_.push_back(radio.report_every_s * (1 + kClock_sd * dice_.normal()));
     next_s_.push_back(every_s_.back() * dice_.uniform());
     heard_.push_back(std::clamp(radio.heard + radio.heard_sd * dice_.normal(), 0.05, 1.0));
-    // Nobody talks from the start: all are heard within seconds.
+    // No bursts at the start: all robots are reported within seconds.
     talking_.push_back(false);
     change_s_.push_back(-radio.silent_s * kt_log(dice_.uniform()));
     phase_.push_back(static_cast<std::uint32_t>(dice_.bits() >> 62));
@@ -109,7 +109,7 @@ void FloorReporter::see(std::uint32_t robot, double time_s, double x_mm, double 
   FloorTrack& track = tracks_[robot];
   for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows - 1); ++r) {
     for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns - 1); ++c) {
-      // Each module began with a cell of its own.
+      // Each module starts polling at a random cell.
       const auto cell =
           static_cast<int>(phase_[robot] + off + Dice(static_cast<std::uint64_t>(r * columns + c)).bits() % 4) % 4;
       const double cell_x_mm = (2 * c + (cell & 1) + 0.5) * floor_.cell_mm,
@@ -138,7 +138,7 @@ FloorScene scene_of(const FloorRun& run, const Floor& floor, std::uint64_t seed)
   const auto within = [](double v, double end) { return std::clamp(v, kRadius_mm, end - kRadius_mm); };
   for (const FloorTrack& track : run.tracks) {
     double x_mm = 0, y_mm = 0;
-    // Places farther and farther from the cell, until one is free.
+    // Searches for a free position at growing distances from the cell.
     for (int attempt = 0; attempt < 10000; ++attempt) {
       const double spread_mm = floor.cell_mm * (1 + 0.02 * attempt);
       x_mm = within(track.x_mm.front() + spread_mm * (dice.uniform() - 0.5), floor.width_mm);
@@ -179,10 +179,10 @@ FloorRun simulate(const FloorScene& scene, const Floor& floor, const proto::Mode
       const std::uint32_t robot = bodies.robot[i];
       const double x_mm = bodies.x_mm[i] + floor.width_mm / 2, y_mm = bodies.y_mm[i] + floor.height_mm / 2;
       if (dice.uniform() < radio.wall_heard * tick_s) {
-        const double rim_mm = rim_cell_distance_mm(floor, x_mm, y_mm);
-        const bool may_be_heard = rim_mm < radio.wall_range_mm + 4 * radio.wall_noise;
-        const double reading_mm = may_be_heard ? rim_mm + radio.wall_noise * dice.normal() : rim_mm;
-        // The program compares readings; where they begin does not matter as long as they are positive.
+        const double boundary_mm = boundary_cell_distance_mm(floor, x_mm, y_mm);
+        const bool may_be_heard = boundary_mm < radio.wall_range_mm + 4 * radio.wall_noise;
+        const double reading_mm = may_be_heard ? boundary_mm + radio.wall_noise * dice.normal() : boundary_mm;
+        // The program compares readings only, so the offset is arbitrary.
         constexpr double kStrongest = 1000;
         if (reading_mm < radio.wall_range_mm) programs[robot].hear_wall(kilo_ticks, kStrongest - reading_mm);
       }

@@ -12,15 +12,15 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// No statistic is taken for more exact than that share of it: the program, the cells and the walls are idealised.
+/// Smallest relative tolerance of a statistic: program, cells and walls are idealised.
 constexpr double kExact = 0.02;
-/// Mean square of how far a run is from the others, beyond which it is unlike them: of eight measured days seven have 0.3 to
-/// 2, one has 3.5; runs of one model have less than 1.
+/// Bound of the mean squared distance of an unlike run. Seven of eight measured days have 0.3 to 2, one has 3.5;
+/// runs of one model have less than 1.
 constexpr double kUnlike = 3;
 constexpr std::size_t kFewestToCompare = 4;
 
-/// The order in which modules listen to their cells, from successive reports to two cells of one module: where nothing
-/// favours an order, as many go from one to the other as back.
+/// Polling order of modules, from transitions between successive reports of two cells of a module. Without an
+/// order, both directions are equally frequent.
 std::array<double, 4> order_of_listening(const std::vector<FloorRun>& runs, const Floor& floor) {
   std::array<std::array<double, 4>, 4> count{};
   for (const FloorRun& run : runs) {
@@ -37,7 +37,7 @@ std::array<double, 4> order_of_listening(const std::vector<FloorRun>& runs, cons
       }
     }
   }
-  // Neighbouring pairs are 01, 23 along x and 02, 13 along y; the diagonal ones are 12 and 03.
+  // Neighbouring pairs are 01, 23 along x and 02, 13 along y; diagonal pairs are 12 and 03.
   const double by_1 = count[0][1] + count[2][3], by_3 = count[1][0] + count[3][2];
   const double by_2 = (count[0][2] + count[2][0] + count[1][3] + count[3][1]) / 2;
   const double all = by_1 + by_2 + by_3;
@@ -49,7 +49,8 @@ struct Unlike {
   double square, others;
 };
 
-/// How far a run's statistic is from the mean of the others', squared, by what the others and its own robots differ among each other.
+/// Squared distance of a run's statistic from the mean of the others, relative to the spread between runs and
+/// between robots.
 Unlike unlike_of(const std::vector<FloorStatistics>& runs, std::size_t run, std::size_t s) {
   double sum = 0, squares = 0, count = 0;
   for (std::size_t r = 0; r < runs.size(); ++r) {
@@ -192,7 +193,7 @@ std::vector<std::vector<RobotSums>> simulated_sums(const FloorTarget& target, co
   std::vector<std::vector<RobotSums>> sums(scenes * static_cast<std::size_t>(repeats));
   in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
     const FloorScene& scene = target.scenes()[i % scenes];
-    const FloorRun run = by == Simulator::kQuick ? simulate_quickly(scene, target.floor(), settings, seed * 100 + i)
+    const FloorRun run = by == Simulator::kQuick ? simulate_fast(scene, target.floor(), settings, seed * 100 + i)
                                                  : simulate(scene, target.floor(), settings.model, settings.times,
                                                             settings.radio, seed * 100 + i);
     sums[i] = robot_sums(run, target.floor());

@@ -24,8 +24,9 @@ void set_episodes(Function& function, std::span<const double> v) {
   episodes.set_tail(v[2]);
 }
 
-/// Every robot's own value, as a table: of its normal number z. Successive robots are spread evenly over the distribution, so that
-/// any swarm has nearly the whole of it; `step` tells tables apart that must not go together.
+/// A table of values per robot, from a normal score z. Successive robots cover the distribution evenly (a
+/// low-discrepancy sequence with increment `step`), so small swarms represent it. Independent tables use different
+/// steps.
 void add_table_of_robots(Effect& effect, double step, const std::function<double(double z)>& value) {
   constexpr std::uint32_t kRobots = 256;
   proto::Table& table = *add_function(effect, Function::ROBOT).mutable_table();
@@ -44,7 +45,7 @@ void add_speeds(FloorSettings& settings, double sd, double skew) {
   });
 }
 
-/// Speeds going straight, distributed as z + skew (z^2 - 1): what turns robots stays as it is, their biases too.
+/// Straight speeds distributed as z + skew (z^2 - 1). Turning speeds and biases stay.
 void add_straight_speeds(FloorSettings& settings, double sd_mm_s, double skew) {
   constexpr double kGolden = 0.6180339887498949;
   Effect& effect = add_effect(settings, "straight-speed-of-robots", Effect::WHEEL_OFFSET);
@@ -118,25 +119,25 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"speed-of-robots",
                    {"robot"},
                    "WHEEL_GAIN",
-                   "every robot has a speed of its own: they spread by {0:.2f} of the mean, skewed by {1:+.2f}",
+                   "speed differs between robots: relative standard deviation {0:.2f}, skewness {1:+.2f}",
                    "",
                    {{"sd", 0, 0, 0.5, 0.25}, {"skew", 0, -0.6, 0.6, 0.2}},
                    1,
                    [](std::span<const double> v, FloorSettings& s) { add_speeds(s, v[0], v[1]); }});
-  terms.push_back({"straight-speed-of-robots",
-                   {"robot", "command"},
-                   "WHEEL_OFFSET",
-                   "every robot has a speed of its own as it goes straight, but not as it turns: they spread by "
-                   "{0:.1f} mm/s, skewed by {1:+.2f}",
-                   "",
-                   {{"sd_mm_s", 0, 0, 6, 2.5}, {"skew", -0.2, -0.6, 0.6, 0.2}},
-                   1,
-                   [](std::span<const double> v, FloorSettings& s) { add_straight_speeds(s, v[0], v[1]); }});
+  terms.push_back(
+      {"straight-speed-of-robots",
+       {"robot", "command"},
+       "WHEEL_OFFSET",
+       "straight speed differs between robots, turning speed does not: standard deviation {0:.1f} mm/s, "
+       "skewness {1:+.2f}",
+       "",
+       {{"sd_mm_s", 0, 0, 6, 2.5}, {"skew", -0.2, -0.6, 0.6, 0.2}},
+       1,
+       [](std::span<const double> v, FloorSettings& s) { add_straight_speeds(s, v[0], v[1]); }});
   terms.push_back({"turning-of-robots",
                    {"robot"},
                    "TURN_RATE",
-                   "every robot turns by itself at a rate of its own: they spread by {0:.3f} rad/s, a few by far "
-                   "more (tail {1:.2f})",
+                   "turn rate differs between robots: standard deviation {0:.3f} rad/s, heavy tail {1:.2f}",
                    "",
                    {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"tail", 0.1, 0, 0.5, 0.1}},
                    1,
@@ -144,7 +145,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"wandering-turn",
                    {"history"},
                    "TURN_RATE",
-                   "robots turn by themselves, by {0:.3f} rad/s (standard deviation), which lasts {1:.0f} s",
+                   "turn rate noise of {0:.3f} rad/s (standard deviation), correlated over {1:.0f} s",
                    "",
                    {{"sd_rad_s", 0, 0, 0.4, 0.05}, {"correlation_s", 200, 5, 3000, 100}},
                    1,
@@ -154,7 +155,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"wandering-speed",
                    {"history"},
                    "BODY_DRIFT",
-                   "a robot's speed wanders by {0:.2f} mm/s (standard deviation), which lasts {1:.0f} s",
+                   "speed noise of {0:.2f} mm/s (standard deviation), correlated over {1:.0f} s",
                    "",
                    {{"sd_mm_s", 0, 0, 5, 1}, {"correlation_s", 300, 5, 3000, 150}},
                    1,
@@ -164,7 +165,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"stalls",
                    {"history"},
                    "WHEEL_GAIN",
-                   "robots stall {0:.1f} times an hour, longer than t with the chance (1 + t / {1:.1f} s)^-{2:.2f}",
+                   "robots stall {0:.1f} times per hour, P(duration > t) = (1 + t / {1:.1f} s)^-{2:.2f}",
                    "",
                    {{"per_hour", 0, 0, 240, 25}, {"scale_s", 8, 1, 120, 4}, {"tail", 1.8, 1.1, 6, 0.3}},
                    1,
@@ -176,9 +177,9 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"stuck-beside-walls",
                    {"position", "history"},
                    "WHEEL_GAIN",
-                   "within 50 mm of a wall robots get stuck, {0:.1f} times an hour and wall, longer than t with "
-                   "the chance (1 + t / {1:.0f} s)^-{2:.2f}",
-                   "film robots that stand beside a wall: their motors push in vain, or rest",
+                   "within 50 mm of a wall robots stall {0:.1f} times per hour and wall, P(duration > t) = "
+                   "(1 + t / {1:.0f} s)^-{2:.2f}",
+                   "film robots at rest beside a wall: the motors are on, or off",
                    {{"per_hour", 0, 0, 120, 12}, {"scale_s", 40, 2, 300, 15}, {"tail", 1.2, 0.3, 5, 0.25}},
                    1,
                    [floor](std::span<const double> v, FloorSettings& s) {
@@ -193,9 +194,8 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
       {"slowing",
        {"time"},
        "WHEEL_GAIN",
-       "speeds fall with time, by {0:.2f} of themselves in an hour",
-       "the clock and the motors' own time are one here, since motors never rest: let some robots rest for half of "
-       "a run",
+       "speed falls by a share of {0:.2f} per hour",
+       "run time and motor-on time coincide, since motors never rest: let some robots rest for half of a run",
        {{"per_hour", 0, -1, 2, 0.3}},
        1,
        [](std::span<const double> v, FloorSettings& s) {
@@ -209,7 +209,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"crowd",
                    {"neighbours"},
                    "WHEEL_GAIN",
-                   "in a crowd wheels change their speed, at most by {0:+.2f}, with others within {1:.0f} mm",
+                   "neighbours within {1:.0f} mm change the wheel gain by up to {0:+.2f}",
                    "",
                    {{"gain", 0, -0.95, 1, 0.3}, {"radius_mm", 50, 34, 120, 10}},
                    1,
@@ -221,37 +221,36 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
                      function.mutable_exponential()->set_at_infinity(v[0]);
                      function.mutable_exponential()->set_scale(1);
                    }});
-  terms.push_back(
-      {"middle",
-       {"position"},
-       "WHEEL_GAIN",
-       "in the middle of the floor wheels change their speed by {0:+.2f}, falling to nothing at the walls",
-       "",
-       {{"gain", 0, -0.9, 0.9, 0.25}},
-       1,
-       [floor](std::span<const double> v, FloorSettings& s) {
-         Effect& effect = add_effect(s, "middle", Effect::WHEEL_GAIN);
-         add_harmonic(add_function(effect, Function::X), v[0], 0, 2 * floor.width_mm);
-         add_harmonic(add_function(effect, Function::Y), 1, 0, 2 * floor.height_mm);
-       }});
-  terms.push_back({"slope-of-speed",
+  terms.push_back({"middle",
                    {"position"},
                    "WHEEL_GAIN",
-                   "speed changes over the floor: by {0:+.2f} at the right end and {1:+.2f} at the upper end, the "
-                   "other way at the others",
+                   "the wheel gain changes by {0:+.2f} in the middle of the floor, falling to 0 at the walls",
                    "",
-                   {{"x", 0, -0.6, 0.6, 0.2}, {"y", 0, -0.6, 0.6, 0.2}},
-                   2,
+                   {{"gain", 0, -0.9, 0.9, 0.25}},
+                   1,
                    [floor](std::span<const double> v, FloorSettings& s) {
-                     add_harmonic(add_function(add_effect(s, "slope-x", Effect::WHEEL_GAIN), Function::X), 0, v[0],
-                                  2 * floor.width_mm);
-                     add_harmonic(add_function(add_effect(s, "slope-y", Effect::WHEEL_GAIN), Function::Y), 0, v[1],
-                                  2 * floor.height_mm);
+                     Effect& effect = add_effect(s, "middle", Effect::WHEEL_GAIN);
+                     add_harmonic(add_function(effect, Function::X), v[0], 0, 2 * floor.width_mm);
+                     add_harmonic(add_function(effect, Function::Y), 1, 0, 2 * floor.height_mm);
                    }});
+  terms.push_back(
+      {"slope-of-speed",
+       {"position"},
+       "WHEEL_GAIN",
+       "speed changes linearly over the floor: by {0:+.2f} at the right end and {1:+.2f} at the upper end",
+       "",
+       {{"x", 0, -0.6, 0.6, 0.2}, {"y", 0, -0.6, 0.6, 0.2}},
+       2,
+       [floor](std::span<const double> v, FloorSettings& s) {
+         add_harmonic(add_function(add_effect(s, "slope-x", Effect::WHEEL_GAIN), Function::X), 0, v[0],
+                      2 * floor.width_mm);
+         add_harmonic(add_function(add_effect(s, "slope-y", Effect::WHEEL_GAIN), Function::Y), 0, v[1],
+                      2 * floor.height_mm);
+       }});
   terms.push_back({"grain",
                    {"heading", "world_frame"},
                    "WHEEL_GAIN",
-                   "speed depends on the direction as a grain makes it, by {0:+.3f} and {1:+.3f}",
+                   "speed depends on the heading (second harmonic), by {0:+.3f} and {1:+.3f}",
                    "",
                    {{"cosine", 0, -0.5, 0.5, 0.1}, {"sine", 0, -0.5, 0.5, 0.1}},
                    2,
@@ -263,7 +262,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
       {"drift",
        {"world_frame"},
        "WORLD_DRIFT",
-       "robots drift in the room, by {0:+.2f} and {1:+.2f} mm/s along x and y",
+       "robots drift by {0:+.2f} and {1:+.2f} mm/s along x and y",
        "",
        {{"x_mm_s", 0, -3, 3, 0.8}, {"y_mm_s", 0, -3, 3, 0.8}},
        2,
@@ -278,9 +277,8 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
        {"position", "world_frame"},
        "WORLD_DRIFT",
        "robots drift towards the middle lines of the floor, by {0:+.2f} mm/s beside the walls along x and {1:+.2f} "
-       "along y, by less the nearer to the middle",
-       "turn the floor's level by a spirit level, or film robots at rest on it that are tapped: robots that slide "
-       "do so, robots that turn to the middle do not",
+       "along y, falling to 0 in the middle",
+       "level the floor with a spirit level, or tap robots at rest on it: a slope makes them slide",
        {{"x_mm_s", 0, -2, 2, 0.3}, {"y_mm_s", 0, -2, 2, 0.3}},
        2,
        [floor](std::span<const double> v, FloorSettings& s) {
@@ -293,7 +291,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"slow-start",
                    {"time_since_command"},
                    "WHEEL_GAIN",
-                   "after a command wheels begin with a change of {0:+.2f}, which fades in {1:.1f} s",
+                   "after a command the wheel gain starts with a change of {0:+.2f}, which decays within {1:.1f} s",
                    "",
                    {{"gain", 0, -0.95, 0.95, 0.4}, {"scale_s", 2, 0.2, 15, 1}},
                    1,
@@ -308,7 +306,7 @@ std::vector<FloorTerm> candidate_terms(const Floor& floor) {
   terms.push_back({"pull",
                    {},
                    "TURN_RATE",
-                   "robots that go straight turn by {0:+.3f} rad/s on average",
+                   "robots that drive straight turn by {0:+.3f} rad/s on average",
                    "",
                    {{"rad_s", 0, -0.2, 0.2, 0.04}},
                    1,

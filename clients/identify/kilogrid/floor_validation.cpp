@@ -10,14 +10,14 @@ namespace {
 
 using nlohmann::json;
 
-/// Robots and time that predictions are made for: some of each run held out.
+/// Robots per held-out run with predictions, and particles.
 constexpr std::size_t kPredictedRobots = 6, kParticles = 80;
 constexpr double kPredicted_s = 900;
 
-/// A mean of areas, with its standard error.
+/// Mean area with its standard error.
 struct MeanArea {
   double sum = 0, variance = 0, count = 0;
-  void add(const TellApart& t) {
+  void add(const ClassifierResult& t) {
     sum += t.best();
     variance += t.best_sd() * t.best_sd();
     ++count;
@@ -38,9 +38,9 @@ double area_of_feature(const std::vector<TrackWindow>& a, const std::vector<Trac
 
 }  // namespace
 
-Judged judge(const std::vector<FloorRun>& runs, const Floor& floor, const FloorSettings& settings, double horizon_s,
-             std::vector<Predicted>* all) {
-  Judged judged;
+Validation validate(const std::vector<FloorRun>& runs, const Floor& floor, const FloorSettings& settings,
+                    double horizon_s, std::vector<Predicted>* all) {
+  Validation judged;
   for (const FloorRun& run : runs) {
     const std::size_t stride = std::max<std::size_t>(run.tracks.size() / kPredictedRobots, 1);
     for (std::size_t i = stride / 2; i < run.tracks.size(); i += stride) {
@@ -67,7 +67,7 @@ Judged judge(const std::vector<FloorRun>& runs, const Floor& floor, const FloorS
   return judged;
 }
 
-json summary_of(const Judged& judged) {
+json summary_of(const Validation& judged) {
   const auto n = static_cast<double>(std::max<std::size_t>(judged.rows, 1));
   const double mean = judged.sum / n;
   double spread = 0;
@@ -92,10 +92,10 @@ json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& u
   for (const FloorRun& run : simulate_scenes(held_out, before, 901)) by_before.push_back(windows_of(run, floor));
   for (const FloorRun& run : simulate_scenes(held_out, after, 902)) by_after.push_back(windows_of(run, floor));
 
-  // Pairs of measured runs first, then each run held out with what was simulated for it.
+  // Pairs of measured runs first, then each held-out run with its simulation.
   struct Pair {
     const std::vector<TrackWindow>*a, *b;
-    TellApart told = {};
+    ClassifierResult result = {};
   };
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < measured.size(); ++i) {
@@ -105,19 +105,19 @@ json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& u
   for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_before[i]});
   for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_after[i]});
   in_parallel(held_out.threads(), pairs.size(),
-              [&](std::size_t i) { pairs[i].told = tell_apart(*pairs[i].a, *pairs[i].b); });
+              [&](std::size_t i) { pairs[i].result = classifier_test(*pairs[i].a, *pairs[i].b); });
 
   MeanArea all_days, days_alike, mean_before, mean_after;
   const std::size_t like_others = runs + alike.size();
   for (std::size_t i = 0, p = 0; i < measured.size(); ++i) {
     for (std::size_t j = i + 1; j < measured.size(); ++j, ++p) {
-      all_days.add(pairs[p].told);
-      if (i < runs && j < like_others) days_alike.add(pairs[p].told);
+      all_days.add(pairs[p].result);
+      if (i < runs && j < like_others) days_alike.add(pairs[p].result);
     }
   }
   json each = json::array(), features = json::array();
   for (std::size_t i = 0; i < runs; ++i) {
-    const TellApart &b = pairs[days + i].told, &a = pairs[days + runs + i].told;
+    const ClassifierResult &b = pairs[days + i].result, &a = pairs[days + runs + i].result;
     mean_before.add(b);
     mean_after.add(a);
     each.push_back({{"run", test[i].name},

@@ -1,5 +1,4 @@
-/// How good a model of the floor is, on runs that it was not fitted to: cells predicted, and simulated runs that pass for
-/// measured ones.
+/// Validation on held-out runs: cell predictions, and the classifier two-sample test.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -12,7 +11,7 @@
 
 namespace kilotwin::kilogrid {
 
-struct Judged {
+struct Validation {
   double sum = 0, log_likelihood = 0;
   std::size_t rows = 0, reports = 0;
   std::vector<std::pair<double, double>> by_robot;  ///< squared errors, rows
@@ -26,14 +25,15 @@ struct Predicted {
   CellPrediction at;
 };
 
-/// Predictions for some robots of each run, in its first part; appended to `all` if there is one.
-[[nodiscard]] Judged judge(const std::vector<FloorRun>& runs, const Floor&, const FloorSettings&, double horizon_s,
-                           std::vector<Predicted>* all);
-/// rmse_mm with 95 % over robots, rows, log_likelihood_per_report.
-[[nodiscard]] nlohmann::json summary_of(const Judged&);
+/// Predictions for some robots of each run, in its first part; appended to `all` if given.
+[[nodiscard]] Validation validate(const std::vector<FloorRun>& runs, const Floor&, const FloorSettings&,
+                                  double horizon_s, std::vector<Predicted>* all);
+/// rmse_mm with its 95 % interval over robots, rows, log_likelihood_per_report.
+[[nodiscard]] nlohmann::json summary_of(const Validation&);
 
-/// How well a classifier tells simulated runs from measured ones on the runs held out, and measured ones of other days
-/// from each other: areas under the curve with 95 % over robots, and what each feature tells by itself. `alike`: runs learned from that are like the others.
+/// Areas under the ROC curve, with 95 % intervals over robots: simulated against measured held-out runs, and
+/// measured runs of different days against each other; also for each single feature. `alike`: training runs that
+/// resemble the others.
 [[nodiscard]] nlohmann::json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& unlike,
                                       const std::vector<FloorRun>& test, const FloorTarget& held_out,
                                       const FloorSettings& before, const FloorSettings& after);

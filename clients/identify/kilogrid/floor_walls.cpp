@@ -13,7 +13,7 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Statistics of a model's runs; the number tells one simulation from the other.
+/// Statistics of simulated runs; the number selects the random sequence.
 using Simulate = std::function<FloorStatistics(const FloorModel&, std::uint64_t)>;
 
 struct Fitted {
@@ -23,14 +23,14 @@ struct Fitted {
 
 Fitted fitted(FloorModel model, const FloorSet& set, int rounds, const Simulate& simulate) {
   const StatisticGroup& group = statistic_group("occupancy-of-the-rim");
-  // Robots stay the longer, the slower they are; a few blocks more or less say nothing.
+  // Slower robots stay longer. A few blocks carry no information.
   constexpr double kSome = 1e-3, kPower = 0.8, kSlowest = 0.02, kFastest = 1.2;
   FloorStatistics at = simulate(model, 0);
   const double before = set.misfit(at);
   Fitted best{model, before, std::numeric_limits<double>::infinity()};
   if (!model.wall) model.wall.emplace().fill(1);
   for (int round = 0; round < rounds; ++round) {
-    for (std::size_t i = 0; i < kRimParts; ++i) {
+    for (std::size_t i = 0; i < kBoundarySections; ++i) {
       const double ratio = (at.value[group.first + i] + kSome) / (set.statistics.value[group.first + i] + kSome);
       (*model.wall)[i] = std::clamp((*model.wall)[i] * std::pow(ratio, kPower), kSlowest, kFastest);
     }
@@ -40,20 +40,20 @@ Fitted fitted(FloorModel model, const FloorSet& set, int rounds, const Simulate&
   return best;
 }
 
-/// Sets that the model itself made.
-struct ByChance {
-  double bound;   ///< what walls remove of all but 1 % of these
-  double misfit;  ///< that is left
+/// Null distribution from sets simulated by the model.
+struct NullWalls {
+  double bound;   ///< 0.99 quantile of the reduction by walls
+  double misfit;  ///< remaining misfit
 };
-ByChance by_chance(const FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed) {
+NullWalls by_chance(const FloorModel& model, const FloorTarget& target, int rounds, std::uint64_t seed) {
   constexpr std::size_t kSets = 10;
   const auto sums = [&](const FloorModel& of, std::uint64_t number) {
     std::vector<std::vector<RobotSums>> runs;
     const FloorSettings settings = of.settings();
     for (std::size_t i = 0; i < target.scenes().size(); ++i)
-      runs.push_back(robot_sums(
-          simulate_quickly(target.scenes()[i], target.floor(), settings, seed * 10000 + number * 100 + i),
-          target.floor()));
+      runs.push_back(
+          robot_sums(simulate_fast(target.scenes()[i], target.floor(), settings, seed * 10000 + number * 100 + i),
+                     target.floor()));
     return FloorSet(std::move(runs));
   };
   std::vector<double> gains(kSets), left(kSets);
@@ -71,7 +71,7 @@ ByChance by_chance(const FloorModel& model, const FloorTarget& target, int round
     mean += gain / kSets;
     square += gain * gain / kSets;
   }
-  // Of a sum of many numbers: Student's t of nine degrees of freedom at 1 %.
+  // The sum of many statistics is nearly normal: Student's t with nine degrees of freedom, 1 %.
   constexpr double kQuantile = 2.821;
   const double variance = std::max(square - mean * mean, 0.0) * kSets / (kSets - 1);
   return {mean + kQuantile * std::sqrt(variance * (1 + 1.0 / kSets)), misfit};
@@ -87,8 +87,8 @@ WallGain fit_walls(FloorModel& model, const FloorTarget& target, int rounds, std
   progress(fmt::format("beside walls: misfit {:.0f} -> {:.0f}", walls.before, walls.after));
   WallGain gain{walls.before - walls.after, 0};
   if (gain.gain <= 0) return gain;
-  // As for other effects: what stays unexplained counts as if chance were so much larger.
-  const ByChance chance = by_chance(model, target, rounds, seed);
+  // Unexplained misfit inflates the null distribution, as for other effects.
+  const NullWalls chance = by_chance(model, target, rounds, seed);
   gain.needed = std::max(chance.bound, 0.0) * std::max(1.0, walls.after / chance.misfit);
   if (gain.found()) model = walls.model;
   return gain;

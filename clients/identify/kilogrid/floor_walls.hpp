@@ -1,17 +1,17 @@
-/// The effect of walls, part by part of the rim: slower where robots were measured to stay longer than they do in the model.
+/// The effect of walls per boundary section: slower where measured robots stay longer than simulated ones.
 #pragma once
 
 #include "clients/identify/kilogrid/floor_fit.hpp"
 
 namespace kilotwin::kilogrid {
 
-/// What the walls remove of the misfit, and how much of that is beyond chance.
+/// Misfit reduction by the walls, and its significance bound.
 struct WallGain {
   double gain = 0, needed = 0;
   [[nodiscard]] bool found() const { return gain > needed; }
 };
 
-/// Fits the walls; they stay in the model where they remove more than of all but 1 % of sets without them.
+/// Fits the walls. They stay in the model if the reduction exceeds its 0.99 quantile in sets without walls.
 WallGain fit_walls(FloorModel&, const FloorTarget&, int rounds, std::uint64_t seed, const FloorProgress&);
 
 }  // namespace kilotwin::kilogrid

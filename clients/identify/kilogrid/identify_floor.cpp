@@ -29,11 +29,12 @@ std::string words_of_wall(const FloorModel& model) {
   const auto& wall = *model.wall;
   const auto [slowest, fastest] = std::minmax_element(wall.begin(), wall.end());
   return fmt::format(
-      "within {:.0f} mm of the wall robots go at {:.2f} to {:.2f} of their speed, by where along the rim",
+      "within {:.0f} mm of a wall robots drive at {:.2f} to {:.2f} of their speed, depending on the boundary "
+      "section",
       FloorModel::kBeside_mm, *slowest, *fastest);
 }
 
-/// The effects that are in the model, as what can be left out: terms, and the walls as the last.
+/// The model without one of its effects: terms first, the walls last.
 FloorModel without(const FloorModel& model, std::size_t effect) {
   if (effect + 1 < model.terms.size()) return model.without(effect + 1);
   FloorModel less = model;
@@ -65,7 +66,7 @@ json faults_of(const std::vector<FloorRun>& train, const std::vector<FloorRun>& 
   return faults;
 }
 
-/// What the report says in place of errors of trajectories.
+/// Texts of the report in place of trajectory errors.
 void add_words(json& document, const json& classifier) {
   const auto area = [&](const char* of, const char* what) { return classifier.at(of).at(what).get<double>(); };
   const auto bar = [&](const char* kind, const char* name, const char* of) {
@@ -80,30 +81,29 @@ void add_words(json& document, const json& classifier) {
   document["bars"] = {bar("before", "base model", "before"), bar("after", "with effects", "after"),
                       bar("floor", "measured days", "measured_days")};
   document["verdict"] = fmt::format(
-      "A classifier is shown windows of 200 s of robots, measured on days held out and simulated. Where it can "
-      "only guess, "
-      "the area under its curve is 0.5. The base model's robots it tells with {:.3f}, those of the model with "
+      "Classifier two-sample test: measured (held-out days) against simulated windows of 200 s. The area under the "
+      "ROC curve is 0.5 at chance level. It is {:.3f} for the base model and, for the model with "
       "effects "
-      "with {:.3f} ({:.3f} to {:.3f}). Measured days are told from each other with {:.3f}.",
+      "with {:.3f} ({:.3f} to {:.3f}). Measured days against each other: {:.3f}.",
       area("before", "area"), area("after", "area"), area("after", "low"), area("after", "high"),
       area("measured_days", "area"));
-  document["summary"] = {fmt::format(
-      "area under the curve of a classifier, simulated against measured runs held out: {:.3f} before, {:.3f} after "
-      "({:.3f} to {:.3f}); measured days against each other {:.3f}",
-      area("before", "area"), area("after", "area"), area("after", "low"), area("after", "high"),
-      area("measured_days", "area"))};
+  document["summary"] = {
+      fmt::format("area under the ROC curve, simulated against measured held-out runs: {:.3f} before, {:.3f} after "
+                  "({:.3f} to {:.3f}); measured days against each other {:.3f}",
+                  area("before", "area"), area("after", "area"), area("after", "low"), area("after", "high"),
+                  area("measured_days", "area"))};
   json rows = json::array();
   for (const json& feature : classifier.at("features"))
     rows.push_back({feature.at("name"), fmt::format("{:.3f}", feature.at("before").get<double>()),
                     fmt::format("{:.3f}", feature.at("after").get<double>())});
-  document["tables"].push_back(
-      {{"id", "features"},
-       {"title", "What still tells simulated robots from measured ones"},
-       {"lead",
-        "Areas under the curve of each feature of a window alone, on runs held out: 0.5 tells nothing, above it "
-        "the feature is larger in simulated runs, below it smaller."},
-       {"head", {"feature of 200 s", "base model", "with effects"}},
-       {"rows", rows}});
+  document["tables"].push_back({{"id", "features"},
+                                {"title", "Differences between simulated and measured robots"},
+                                {"lead",
+                                 "Area under the ROC curve of each single feature on held-out runs: 0.5 is chance "
+                                 "level. Above it, the feature "
+                                 "is larger in simulated runs, below it smaller."},
+                                {"head", {"feature of 200 s", "base model", "with effects"}},
+                                {"rows", rows}});
 }
 
 }  // namespace
@@ -117,13 +117,13 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
     train = std::move(kept);
   }
   if (train.empty() || test.empty() || train.front().tracks.empty())
-    throw UserError("a floor's runs are learned from and judged by others; give at least two, or --test DIR");
+    throw UserError("one run cannot be held out; give at least two runs, or --test DIR");
   double part = 0;
   const FloorProgress progress = [&](const std::string& what) {
     if (options.progress) options.progress(part, what);
   };
   const Floor floor;
-  // A day unlike the others is named, and not learned from: what was different about it need not come again.
+  // An unlike day is reported and excluded from the fit: its conditions need not recur.
   std::vector<FloorRun> alike, unlike;
   json faults = faults_of(train, test);
   const std::vector<UnlikeRun> unlikes = unlike_runs(train, floor);
@@ -131,11 +131,12 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
     const auto is = std::find_if(unlikes.begin(), unlikes.end(), [&](const UnlikeRun& u) { return u.run == r; });
     (is == unlikes.end() ? alike : unlike).push_back(train[r]);
     if (is == unlikes.end()) continue;
-    faults.push_back({{"kind", "unlike"},
-                      {"run", train[r].name},
-                      {"in_words", fmt::format("{}: robots did not do what they did in the other runs ({}: {:.3g} "
-                                               "against {:.3g}); it is not learned from",
-                                               train[r].name, is->worst, is->value, is->others)}});
+    faults.push_back(
+        {{"kind", "unlike"},
+         {"run", train[r].name},
+         {"in_words", fmt::format("{}: the robots behaved differently from those of the other runs ({}: {:.3g} "
+                                  "against {:.3g}); the run is excluded from the fit",
+                                  train[r].name, is->worst, is->value, is->others)}});
     progress(fmt::format("{} is unlike the other runs", train[r].name));
   }
   const FloorTarget learned(alike, floor, options.threads), held_out(test, floor, options.threads);
@@ -143,20 +144,20 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   const auto note = [&](const std::string& added, const FloorModel& model) {
     const double misfit = held_out.misfit(simulated_statistics(held_out, model.settings(), 4711));
     steps.push_back({{"added", added}, {"held_out_misfit", misfit}});
-    progress(fmt::format("{}: misfit on runs held out {:.0f} of {} statistics", added, misfit, held_out.size()));
+    progress(fmt::format("{}: misfit on held-out runs {:.0f}, {} statistics", added, misfit, held_out.size()));
   };
 
   FloorModel model;
   model.add(base_term());
   part = 0.02;
-  fit_from_afar(model, learned, 1, progress);
+  fit_from_far_start(model, learned, 1, progress);
   fit(model, learned, 2, 1, 1, progress);
   const FloorModel base = model;
   note("base", model);
 
   json effects = json::array(), rejected = json::array(), ambiguous = json::array();
   std::vector<EffectGain> gains;
-  if (options.trace) {
+  if (options.find_effects) {
     const double from = 0.15, to = 0.85;
     FloorFound found = search_effects(
         base, learned, candidate_terms(floor),
@@ -179,8 +180,8 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   part = 0.85;
   progress("predictions");
   std::vector<Predicted> by_base, by_model;
-  const Judged before = judge(test, floor, base.settings(), options.horizon_s, &by_base),
-               after = judge(test, floor, model.settings(), options.horizon_s, &by_model);
+  const Validation before = validate(test, floor, base.settings(), options.horizon_s, &by_base),
+                   after = validate(test, floor, model.settings(), options.horizon_s, &by_model);
   const FloorStatistics out_before = simulated_statistics(held_out, base.settings(), 78, 2),
                         out_after = simulated_statistics(held_out, model.settings(), 79, 2);
   const double misfit_before = held_out.misfit(out_before), misfit_after = held_out.misfit(out_after);
@@ -188,7 +189,7 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
     const FloorModel less = without(model, e);
     const bool is_wall = name_of(model, e) == kWallEffect;
     const double misfit = held_out.misfit(simulated_statistics(held_out, less.settings(), 79));
-    const Judged lesser = judge(test, floor, less.settings(), options.horizon_s, nullptr);
+    const Validation lesser = validate(test, floor, less.settings(), options.horizon_s, nullptr);
     json parameters;
     if (is_wall) {
       parameters = {{"form", "steps"}, {"beside_mm", FloorModel::kBeside_mm}, {"part_of_speed", *model.wall}};
@@ -215,20 +216,21 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
          {"rmse_without_mm", lesser.rmse_mm()},
          {"share_removed", (misfit - misfit_after) / std::max(misfit_before - misfit_after, 1e-9)},
          {"facts",
-          {{"misfit of runs learned from",
-            fmt::format("lowered by {:.0f}; {:.0f} is beyond chance", gains[e].gain, gains[e].needed)},
-           {"misfit on runs held out", fmt::format("{:.0f} without it, {:.0f} with it", misfit, misfit_after)},
+          {{"misfit of training runs",
+            fmt::format("lowered by {:.0f}; significance bound {:.0f}", gains[e].gain, gains[e].needed)},
+           {"misfit on held-out runs", fmt::format("{:.0f} without it, {:.0f} with it", misfit, misfit_after)},
            {"cells 10 s ahead",
             fmt::format("{:.1f} mm without it, {:.1f} mm with it", lesser.rmse_mm(), after.rmse_mm())},
-           {"likelihood of cells", fmt::format("{:+.0f} nat with it, to a filter that follows one robot",
+           {"likelihood of cells", fmt::format("{:+.0f} nat with it, for single-robot filters",
                                                after.log_likelihood - lesser.log_likelihood)}}},
          {"in_words", is_wall ? words_of_wall(model) : words_of(model, e + 1)}});
     progress(fmt::format("{}: misfit {:.0f} without it, {:.0f} with it", name_of(model, e), misfit, misfit_after));
   }
   if (model.wall)
-    ambiguous.push_back({{"found", kWallEffect},
-                         {"instead", "messages of the rim that make robots turn away for longer at some places"},
-                         {"experiment", "let robots drive along the wall with the rim's messages switched off"}});
+    ambiguous.push_back(
+        {{"found", kWallEffect},
+         {"instead", "boundary messages that make robots turn away for longer in some places"},
+         {"experiment", "let robots drive along the wall with the boundary messages switched off"}});
   std::stable_sort(effects.begin(), effects.end(),
                    [](const json& a, const json& b) { return a["share_removed"] > b["share_removed"]; });
 
@@ -260,19 +262,20 @@ Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> tes
   summary_before["misfit"] = misfit_before;
   summary_after["misfit"] = misfit_after;
   json& contract = result.document["contract"];
-  contract = {{"before", summary_before},
-              {"after", summary_after},
-              {"noise_floor_mm", cell_noise_mm(floor, settings.radio)},
-              {"noise_floor_how",
-               "how far robots are from the middle of cells that hear them: what the place itself, known exactly, "
-               "would leave"},
-              {"horizon_s", options.horizon_s},
-              {"effects", effects},
-              {"rejected", rejected},
-              {"ambiguous", ambiguous},
-              {"faults", faults},
-              {"statistics", statistics},
-              {"classifier", classify(alike, unlike, test, held_out, base.settings(), settings)}};
+  contract = {
+      {"before", summary_before},
+      {"after", summary_after},
+      {"noise_floor_mm", cell_noise_mm(floor, settings.radio)},
+      {"noise_floor_how",
+       "root mean square distance between robots and the centres of the cells that report them: the error of "
+       "exactly known positions"},
+      {"horizon_s", options.horizon_s},
+      {"effects", effects},
+      {"rejected", rejected},
+      {"ambiguous", ambiguous},
+      {"faults", faults},
+      {"statistics", statistics},
+      {"classifier", classify(alike, unlike, test, held_out, base.settings(), settings)}};
   result.document["tables"] = {table_of_motion(held_out, out_before, out_after)};
   add_words(result.document, contract.at("classifier"));
   const auto parameters = base_term().parameters;

@@ -1,6 +1,6 @@
-/// The measured-data loop for runs of an instrumented floor: the base model fitted by simulation, effects added one after the
-/// other and kept where runs that were held out agree, and judged three times: by statistics of held-out runs, by predictions and
-/// likelihood of cells, and by whether a classifier can tell simulated from measured runs.
+/// Identification from Kilogrid runs: the base model is fitted by simulation, then effects are selected one by
+/// one. Validation on held-out runs uses statistics, cell predictions and their likelihood, and a classifier
+/// two-sample test.
 #pragma once
 
 #include <vector>
@@ -10,10 +10,11 @@
 
 namespace kilotwin::kilogrid {
 
-/// `test` empty: every third run of `train` is held out. Writes the document of identify/identify.hpp, with these beside it:
-///   contract.statistics  [{name, covariate, labels, measured, tolerance, before, after}] of the runs held out
-///   contract.classifier  {measured, before, after, runs [..]}: areas under the curve, 0.5 where runs cannot be told apart
-///   contract.floor       what cells hear, and robots of the rim: nuisances that were fitted as well
+/// `test` empty: holds out every third run of `train`. Returns the document of clients/identify/identify.hpp with
+/// further keys:
+///   contract.statistics  [{name, covariate, labels, measured, tolerance, before, after}] of held-out runs
+///   contract.classifier  {measured, before, after, runs [..]}: areas under the ROC curve, 0.5 is chance level
+///   contract.floor       nuisance parameters: reception of cells, robots at the boundary
 [[nodiscard]] identify::Identified identify_floor(std::vector<FloorRun> train, std::vector<FloorRun> test,
                                                   const identify::Options&);
 

@@ -10,7 +10,7 @@ namespace kilotwin::kilogrid {
 
 using proto::Effect, proto::Function;
 
-LoneRobot::LoneRobot(const Floor& floor, const FloorSettings& settings) : floor_(floor), settings_(settings) {
+SingleRobot::SingleRobot(const Floor& floor, const FloorSettings& settings) : floor_(floor), settings_(settings) {
   for (const Effect& effect : settings.model.effect()) {
     Term term{
         effect.acts_on(), effect.wheel() != Effect::RIGHT_WHEEL, effect.wheel() != Effect::LEFT_WHEEL, 1, 0, 0, {}};
@@ -33,25 +33,26 @@ LoneRobot::LoneRobot(const Floor& floor, const FloorSettings& settings) : floor_
                     f.episodes().tail(),
                     f.episodes().longest_s()};
       if (factor.is_noise || factor.is_episodes) factor.slot = slots_++;
-      if (f.of() == Function::DENSITY) crowd_radius_mm_ = f.radius_mm();
+      if (f.of() == Function::DENSITY) neighbour_radius_mm_ = f.radius_mm();
       term.factors.push_back(std::move(factor));
     }
     terms_.push_back(std::move(term));
   }
 }
 
-LoneState LoneRobot::start(std::uint32_t number, double x_mm, double y_mm, double heading_rad, Dice& dice) const {
+RobotState SingleRobot::start(std::uint32_t number, double x_mm, double y_mm, double heading_rad,
+                              Dice& dice) const {
   const double sd = settings_.model.motion().bias_sd_mm_s();
-  LoneState state{number,
-                  x_mm,
-                  y_mm,
-                  heading_rad,
-                  sd * dice.normal(),
-                  sd * dice.normal(),
-                  0,
-                  Motion::kStop,
-                  FloorProgram(settings_.times, dice.bits()),
-                  std::vector<double>(slots_, 0)};
+  RobotState state{number,
+                   x_mm,
+                   y_mm,
+                   heading_rad,
+                   sd * dice.normal(),
+                   sd * dice.normal(),
+                   0,
+                   Motion::kStop,
+                   FloorProgram(settings_.times, dice.bits()),
+                   std::vector<double>(slots_, 0)};
   for (const Term& term : terms_) {
     for (const Factor& factor : term.factors) {
       if (factor.is_noise) state.memory[*factor.slot] = dice.normal();
@@ -62,7 +63,7 @@ LoneState LoneRobot::start(std::uint32_t number, double x_mm, double y_mm, doubl
   return state;
 }
 
-void LoneRobot::renew(LoneState& state, double keep, Dice& dice) const {
+void SingleRobot::renew(RobotState& state, double keep, Dice& dice) const {
   const double fresh = std::sqrt(1 - keep * keep), sd = settings_.model.motion().bias_sd_mm_s();
   state.bias_left_mm_s = keep * state.bias_left_mm_s + fresh * sd * dice.normal();
   state.bias_right_mm_s = keep * state.bias_right_mm_s + fresh * sd * dice.normal();
@@ -73,18 +74,18 @@ void LoneRobot::renew(LoneState& state, double keep, Dice& dice) const {
   }
 }
 
-void LoneRobot::keep_inside(LoneState& state) const {
+void SingleRobot::keep_inside(RobotState& state) const {
   state.x_mm = std::clamp(state.x_mm, kRobotRadius_mm, floor_.width_mm - kRobotRadius_mm);
   state.y_mm = std::clamp(state.y_mm, kRobotRadius_mm, floor_.height_mm - kRobotRadius_mm);
 }
 
-LoneRobot::Driven LoneRobot::run_program(LoneState& state, std::int64_t kilo_ticks, Dice& dice) const {
+SingleRobot::Driven SingleRobot::run_program(RobotState& state, std::int64_t kilo_ticks, Dice& dice) const {
   // As often as in the engine: turns may be shorter than a step.
   constexpr std::int64_t kEvery = 4;  // kilo_ticks
   constexpr double kPart = static_cast<double>(kEvery) / kStepTicks;
   const FloorRadio& radio = settings_.radio;
   const double heard = radio.wall_heard * kStep_s * kPart;
-  // No cell of the rim is nearer than its middle is from the wall.
+  // Boundary cell centres have at least this distance from the wall.
   const double wall_mm = std::min(std::min(state.x_mm, floor_.width_mm - state.x_mm),
                                   std::min(state.y_mm, floor_.height_mm - state.y_mm));
   const double farthest_mm = radio.wall_range_mm + 4 * radio.wall_noise;
@@ -93,8 +94,8 @@ LoneRobot::Driven LoneRobot::run_program(LoneState& state, std::int64_t kilo_tic
   Driven driven;
   for (std::int64_t t = 0; t < kStepTicks; t += kEvery) {
     if (may_hear && dice.uniform() < heard) {
-      if (reading_mm < 0) reading_mm = rim_cell_distance_mm(floor_, state.x_mm, state.y_mm);
-      // The program compares readings; where they begin does not matter as long as they are positive.
+      if (reading_mm < 0) reading_mm = boundary_cell_distance_mm(floor_, state.x_mm, state.y_mm);
+      // The program compares readings only, so the offset is arbitrary.
       constexpr double kStrongest = 1000;
       const double noisy_mm = reading_mm < farthest_mm ? reading_mm + radio.wall_noise * dice.normal() : reading_mm;
       if (noisy_mm < radio.wall_range_mm) state.program.hear_wall(kilo_ticks + t, kStrongest - noisy_mm);
@@ -109,7 +110,7 @@ LoneRobot::Driven LoneRobot::run_program(LoneState& state, std::int64_t kilo_tic
   return driven;
 }
 
-void LoneRobot::step(LoneState& state, std::int64_t k, Dice& dice, double neighbours) const {
+void SingleRobot::step(RobotState& state, std::int64_t k, Dice& dice, double neighbours) const {
   const Driven driven = run_program(state, k * kStepTicks, dice);
   if (state.motion == Motion::kStop) return remember(state, dice);
   const proto::Motion& base = settings_.model.motion();
@@ -151,7 +152,8 @@ void LoneRobot::step(LoneState& state, std::int64_t k, Dice& dice, double neighb
   left = left * left_gain + left_more;
   right = right * right_gain + right_more;
   const double turn_rad = (right - left) / base.wheel_base_mm() * kStep_s;
-  // Half of the turn before and half after the way: good to the second order; the reference point lies behind the centre.
+  // Second-order midpoint step: half of the turn before the displacement, half after. The reference point lies
+  // behind the centre.
   double s, c, s1, c1, s2, c2;
   kt_sincos(state.heading_rad, &s, &c);
   kt_sincos(state.heading_rad + turn_rad / 2, &s1, &c1);
@@ -164,8 +166,8 @@ void LoneRobot::step(LoneState& state, std::int64_t k, Dice& dice, double neighb
   remember(state, dice);
 }
 
-double LoneRobot::covariate(Function::Covariate of, const LoneState& state, double time_s,
-                            double neighbours) const {
+double SingleRobot::covariate(Function::Covariate of, const RobotState& state, double time_s,
+                              double neighbours) const {
   const double x = state.x_mm - floor_.width_mm / 2, y = state.y_mm - floor_.height_mm / 2;
   switch (of) {
     case Function::TIME:
@@ -183,8 +185,8 @@ double LoneRobot::covariate(Function::Covariate of, const LoneState& state, doub
   }
 }
 
-double LoneRobot::value_of(const Term& term, const LoneState& state, double time_s, double neighbours,
-                           Dice& dice) const {
+double SingleRobot::value_of(const Term& term, const RobotState& state, double time_s, double neighbours,
+                             Dice& dice) const {
   if ((term.commands & 1u << static_cast<unsigned>(state.motion)) == 0) return 0;
   double value = 1;
   for (const Factor& factor : term.factors) {
@@ -198,7 +200,7 @@ double LoneRobot::value_of(const Term& term, const LoneState& state, double time
   return value;
 }
 
-void LoneRobot::remember(LoneState& state, Dice& dice) const {
+void SingleRobot::remember(RobotState& state, Dice& dice) const {
   for (const Term& term : terms_) {
     for (const Factor& factor : term.factors) {
       if (!factor.slot) continue;

@@ -13,9 +13,9 @@ constexpr double kStill_mm = 16, kMoving_mm = 40, kBeside_mm = 60;
 }  // namespace
 
 const std::vector<std::string>& feature_names() {
-  static const std::vector<std::string> names = {"mean step", "spread of steps", "still",         "still in a row",
-                                                 "mean turn", "sharp turns",     "side of turns", "way in the end",
-                                                 "extent",    "beside a wall",   "wall distance", "unheard"};
+  static const std::vector<std::string> names = {
+      "mean step",     "spread of steps",  "still",  "longest rest",  "mean turn",     "sharp turns",
+      "side of turns", "net displacement", "extent", "beside a wall", "wall distance", "without reports"};
   return names;
 }
 

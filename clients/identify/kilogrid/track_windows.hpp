@@ -1,4 +1,4 @@
-/// Windows of time of single robots, as numbers that say how the robot moved: what a classifier sees of it.
+/// Features of robots' tracks in time windows, for the classifier.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +9,13 @@
 
 namespace kilotwin::kilogrid {
 
-/// Features of one robot within one window of time.
+/// Features of one robot in one window.
 struct TrackWindow {
   std::size_t robot;  ///< index in the run
   std::vector<double> feature;
 };
 [[nodiscard]] const std::vector<std::string>& feature_names();
-/// Windows of 200 s, one after the other, in which the robot was heard in at least half of the blocks.
+/// Successive windows of 200 s with reports in at least half of the blocks.
 [[nodiscard]] std::vector<TrackWindow> windows_of(const FloorBlocks&, const Floor&);
 [[nodiscard]] std::vector<TrackWindow> windows_of(const FloorRun&, const Floor&);
 

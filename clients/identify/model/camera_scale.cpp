@@ -69,10 +69,10 @@ LinearMap linear_map_of(Term& term) {
 
 }  // namespace
 
-void add_pairs(const RunNeighbours& run, std::size_t robots, std::uint32_t number, std::vector<Pair>& to) {
+void add_pairs(const RunNeighbours& run, std::size_t robots, std::uint32_t number, std::vector<RobotPair>& to) {
   constexpr double kAnew_s = 5;
   const auto stride = static_cast<std::size_t>(kEvery_s / RunNeighbours::kRaster_s);
-  std::size_t meeting = to.empty() ? 0 : to.back().meeting;
+  std::size_t encounter = to.empty() ? 0 : to.back().encounter;
   for (std::size_t a = 0; a < robots; ++a) {
     for (std::size_t b = a + 1; b < robots; ++b) {
       double last_s = -1e300;
@@ -80,11 +80,11 @@ void add_pairs(const RunNeighbours& run, std::size_t robots, std::uint32_t numbe
         const RunNeighbours::Spot &one = run.spot(a, i), &other = run.spot(b, i);
         const double apart = std::hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm);
         if (!(apart > kLow_mm && apart < kHigh_mm)) continue;
-        if (run.time_s(i) > last_s + kAnew_s) ++meeting;
+        if (run.time_s(i) > last_s + kAnew_s) ++encounter;
         last_s = run.time_s(i);
-        Pair& pair = to.emplace_back();
-        pair.apart_mm = apart;
-        pair.meeting = meeting;
+        RobotPair& pair = to.emplace_back();
+        pair.distance_mm = apart;
+        pair.encounter = encounter;
         pair.x_mm = (one.x_mm + other.x_mm) / 2;
         pair.y_mm = (one.y_mm + other.y_mm) / 2;
         pair.at.time_s = last_s;
@@ -94,23 +94,23 @@ void add_pairs(const RunNeighbours& run, std::size_t robots, std::uint32_t numbe
   }
 }
 
-std::optional<TouchingApart> touching_apart(const std::vector<Pair>& pairs) {
+std::optional<ContactDistance> contact_distance(const std::vector<RobotPair>& pairs) {
   constexpr std::size_t kFewest = 12;
   std::array<double, kBins> counts{};
-  std::size_t meetings = 0, last = 0;
-  for (const Pair& pair : pairs) {
-    const double at = (pair.apart_mm - kLow_mm) / kBin_mm;
+  std::size_t encounters = 0, last = 0;
+  for (const RobotPair& pair : pairs) {
+    const double at = (pair.distance_mm - kLow_mm) / kBin_mm;
     if (!(at >= 0 && at < kBins)) continue;
     counts[static_cast<std::size_t>(at)] += 1;
-    if (pair.meeting != last) ++meetings;
-    last = pair.meeting;
+    if (pair.encounter != last) ++encounters;
+    last = pair.encounter;
   }
-  if (meetings < kFewest) return std::nullopt;
+  if (encounters < kFewest) return std::nullopt;
   double all = 0;
   for (const double count : counts) all += count;
   // Instants of one encounter count as one observation.
-  const double weight = static_cast<double>(meetings) / all;
-  const auto worth = [&](const Shares& shares, double staying) {
+  const double weight = static_cast<double>(encounters) / all;
+  const auto log_likelihood = [&](const Shares& shares, double staying) {
     double sum = 0;
     for (std::size_t i = 0; i < kBins; ++i)
       if (counts[i] > 0)
@@ -120,7 +120,7 @@ std::optional<TouchingApart> touching_apart(const std::vector<Pair>& pairs) {
     return weight * sum;
   };
   // Null hypothesis: robots do not touch.
-  const double nothing = worth(Shares(-100, 1), 0);
+  const double nothing = log_likelihood(Shares(-100, 1), 0);
   struct Tried {
     double edge_mm, value;
   };
@@ -129,7 +129,8 @@ std::optional<TouchingApart> touching_apart(const std::vector<Pair>& pairs) {
     double best = -1e300;
     for (const double sd : {0.3, 0.5, 0.8, 1.2, 1.8, 2.7}) {
       const Shares shares(edge, sd);
-      for (const double staying : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85}) best = std::max(best, worth(shares, staying));
+      for (const double staying : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85})
+        best = std::max(best, log_likelihood(shares, staying));
     }
     tried.push_back({edge, best});
   }
@@ -145,10 +146,11 @@ std::optional<TouchingApart> touching_apart(const std::vector<Pair>& pairs) {
     square += chance * t.edge_mm * t.edge_mm;
   }
   mean /= sum;
-  return TouchingApart{mean, std::sqrt(std::max(0.0, square / sum - mean * mean) + kMade_mm * kMade_mm), meetings};
+  return ContactDistance{mean, std::sqrt(std::max(0.0, square / sum - mean * mean) + kMade_mm * kMade_mm),
+                         encounters};
 }
 
-ScaleHold::ScaleHold(const MotionModel& model, const std::vector<Pair>& pairs, double relative_sd)
+ScaleConstraint::ScaleConstraint(const MotionModel& model, const std::vector<RobotPair>& pairs, double relative_sd)
     : relative_sd_(relative_sd) {
   constexpr std::size_t kMost = 300;
   const std::size_t every = pairs.size() / kMost + 1;
@@ -157,7 +159,7 @@ ScaleHold::ScaleHold(const MotionModel& model, const std::vector<Pair>& pairs, d
       Span& span = spans_.emplace_back();
       span.at = pairs[i].at;
       for (const int end : {0, 1}) {
-        const double off = (end - 0.5) * kDiscs_mm;
+        const double off = (end - 0.5) * kDiscDiameter_mm;
         const Eigen::Vector3d seen =
             model.measured(pairs[i].x_mm + (along_x ? off : 0), pairs[i].y_mm + (along_x ? 0 : off), 0, span.at);
         span.x_mm[end] = seen[0];
@@ -168,7 +170,7 @@ ScaleHold::ScaleHold(const MotionModel& model, const std::vector<Pair>& pairs, d
   then_ = log_length(model);
 }
 
-double ScaleHold::log_length(const MotionModel& model) const {
+double ScaleConstraint::log_length(const MotionModel& model) const {
   double sum = 0;
   for (const Span& span : spans_) {
     Eigen::Vector3d ends[2];
@@ -179,9 +181,9 @@ double ScaleHold::log_length(const MotionModel& model) const {
   return spans_.empty() ? 0 : sum / static_cast<double>(spans_.size());
 }
 
-double ScaleHold::factor(const MotionModel& model) const { return std::exp(then_ - log_length(model)); }
+double ScaleConstraint::factor(const MotionModel& model) const { return std::exp(then_ - log_length(model)); }
 
-Room carried(const Room& room, const MotionModel& before, const MotionModel& after) {
+Walls carried(const Walls& walls, const MotionModel& before, const MotionModel& after) {
   // Half-length of the span used if the opposite side has no wall, from the middle of the image.
   constexpr double kSide_mm = 250;
   constexpr std::array<double, 5> kAlong = {0.1, 0.3, 0.5, 0.7, 0.9};
@@ -191,8 +193,8 @@ Room carried(const Room& room, const MotionModel& before, const MotionModel& aft
     if (std::isfinite(high)) return std::pair{high - 2 * kSide_mm, high};
     return std::pair{-kSide_mm, kSide_mm};
   };
-  const auto [x_low, x_high] = range(room.x_low_mm, room.x_high_mm);
-  const auto [y_low, y_high] = range(room.y_low_mm, room.y_high_mm);
+  const auto [x_low, x_high] = range(walls.x_low_mm, walls.x_high_mm);
+  const auto [y_low, y_high] = range(walls.y_low_mm, walls.y_high_mm);
   // Compares disc centres, whichever point of the robot is tracked.
   const auto of_centres = [](MotionModel model) {
     model.base.ahead_mm = model.base.centre_mm = model.base.left_mm = 0;
@@ -204,20 +206,20 @@ Room carried(const Room& room, const MotionModel& before, const MotionModel& aft
     const Eigen::Vector3d seen = then.measured(x_mm, y_mm, 0, at);
     return Eigen::Vector2d(now.pose_of({0, seen[0], seen[1], std::nan("")}, at).head<2>());
   };
-  Room out = room;
-  const auto carry = [&](double Room::*side, bool of_x) {
-    if (std::isinf(room.*side)) return;
+  Walls out = walls;
+  const auto carry = [&](double Walls::*side, bool of_x) {
+    if (std::isinf(walls.*side)) return;
     double sum = 0;
     for (const double part : kAlong) {
       const double along = of_x ? y_low + part * (y_high - y_low) : x_low + part * (x_high - x_low);
-      sum += of_x ? moved(room.*side, along)[0] : moved(along, room.*side)[1];
+      sum += of_x ? moved(walls.*side, along)[0] : moved(along, walls.*side)[1];
     }
     out.*side = sum / static_cast<double>(kAlong.size());
   };
-  carry(&Room::x_low_mm, true);
-  carry(&Room::x_high_mm, true);
-  carry(&Room::y_low_mm, false);
-  carry(&Room::y_high_mm, false);
+  carry(&Walls::x_low_mm, true);
+  carry(&Walls::x_high_mm, true);
+  carry(&Walls::y_low_mm, false);
+  carry(&Walls::y_high_mm, false);
   return out;
 }
 
@@ -290,10 +292,10 @@ bool rescale(MotionModel& model, double factor) {
   }
   scaled.noise.wheel_mm2_s *= factor * factor;
   scaled.noise.drift_mm2_s *= factor * factor;
-  wider(scaled.room.x_low_mm, middle_x);
-  wider(scaled.room.x_high_mm, middle_x);
-  wider(scaled.room.y_low_mm, middle_y);
-  wider(scaled.room.y_high_mm, middle_y);
+  wider(scaled.walls.x_low_mm, middle_x);
+  wider(scaled.walls.x_high_mm, middle_x);
+  wider(scaled.walls.y_low_mm, middle_y);
+  wider(scaled.walls.y_high_mm, middle_y);
   // Assigned in place: callers hold references to a term.
   model = scaled;
   return true;

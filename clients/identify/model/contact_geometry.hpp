@@ -11,7 +11,7 @@
 namespace kilotwin::identify {
 
 /// Bounds of the disc centres, mm. Infinite: no wall on that side.
-struct Room {
+struct Walls {
   double x_low_mm = -std::numeric_limits<double>::infinity(), x_high_mm = std::numeric_limits<double>::infinity();
   double y_low_mm = -std::numeric_limits<double>::infinity(), y_high_mm = std::numeric_limits<double>::infinity();
 
@@ -29,8 +29,8 @@ struct Room {
 };
 
 /// Robots with centres this close may be in contact, mm: one diameter of 33 mm, and the motion between samples.
-inline constexpr double kTouch_mm = 36;
-inline constexpr double kDiscs_mm = 33;
+inline constexpr double kContactRange_mm = 36;
+inline constexpr double kDiscDiameter_mm = 33;
 inline constexpr double kWallMargin_mm = 4;
 
 /// Separates overlapping discs by half the overlap each. Returns whether any overlapped. NaN: the robot is absent.

@@ -11,8 +11,8 @@ namespace {
 
 /// Motor-on time of one motor (0, 1) or of either (2): total, or discounted with time constant kDecayTimes_s[decay
 /// - 1].
-double use_s(const CommandState& commands, std::size_t motor, std::uint8_t forget) {
-  if (forget > 0) return commands.remembered_s(forget - 1u, motor);
+double motor_on_s(const CommandState& commands, std::size_t motor, std::uint8_t decay_index) {
+  if (decay_index > 0) return commands.discounted_s(decay_index - 1u, motor);
   return motor < 2 ? commands.motor_s[motor] : commands.driven_s;
 }
 
@@ -55,10 +55,10 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
     case Covariate::kHeading: return s.heading_rad;
     case Covariate::kCommand: return static_cast<double>(s.commands.command);
     case Covariate::kSinceCommand: return s.commands.since_s;
-    case Covariate::kMotorTime: return use_s(s.commands, wheel, axis.forget);
-    case Covariate::kLeftMotorTime: return use_s(s.commands, 0, axis.forget);
-    case Covariate::kRightMotorTime: return use_s(s.commands, 1, axis.forget);
-    case Covariate::kDrivenTime: return use_s(s.commands, 2, axis.forget);
+    case Covariate::kMotorTime: return motor_on_s(s.commands, wheel, axis.decay_index);
+    case Covariate::kLeftMotorTime: return motor_on_s(s.commands, 0, axis.decay_index);
+    case Covariate::kRightMotorTime: return motor_on_s(s.commands, 1, axis.decay_index);
+    case Covariate::kDrivenTime: return motor_on_s(s.commands, 2, axis.decay_index);
     case Covariate::kNeighbours: return is_listed(axis) ? toward(axis, s) : s.near.count[axis.radius];
     case Covariate::kNearest: return std::min(s.near.nearest_mm, reach_mm(axis));
     case Covariate::kDensity: return is_listed(axis) ? toward(axis, s) : s.near.density[axis.radius];
@@ -68,9 +68,9 @@ double value_of(const Axis& axis, const Situation& s, std::size_t wheel) {
       return s.commands.first ? kNoCommand : static_cast<double>(s.commands.previous);
     case Covariate::kPreviousLasted: return s.commands.previous_lasted_s;
     case Covariate::kSinceRest: return s.commands.since_rest_s;
-    case Covariate::kUseDifference: return s.commands.motor_s[1] - s.commands.motor_s[0];
+    case Covariate::kMotorTimeDifference: return s.commands.motor_s[1] - s.commands.motor_s[0];
     case Covariate::kLastTurn: return static_cast<double>(s.commands.last_turn);
-    case Covariate::kTrodden: return s.near.trodden_s[axis.radius];
+    case Covariate::kTraffic: return s.near.traffic_s[axis.radius];
     case Covariate::kRobot: return s.robot;
     case Covariate::kRun: return s.run;
   }

@@ -15,7 +15,7 @@ inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,
                                                               110, 120, 130, 140, 150, 175, 200};
 
 /// Number of grids of driven time per floor cell, each with its own cell size (MotionModel::cells).
-inline constexpr std::size_t kFloorCells = 6;
+inline constexpr std::size_t kTrafficGrids = 6;
 
 /// One neighbour, relative to a robot.
 struct OtherRobot {
@@ -33,7 +33,7 @@ struct NeighbourView {
   /// sum of (1 - (distance / radius)^2)^2 for each of kNeighbourRadii_mm
   std::array<float, kNeighbourRadii_mm.size()> density = {};
   /// driven time of all robots, itself included, in its cell of each grid, s
-  std::array<float, kFloorCells> trodden_s = {};
+  std::array<float, kTrafficGrids> traffic_s = {};
   /// Neighbours within kListed_mm: `listed` entries of this list from `first_listed` on. Null: not listed.
   const std::vector<OtherRobot>* list = nullptr;
   std::uint32_t first_listed = 0, listed = 0;
@@ -70,9 +70,9 @@ enum class Covariate : std::uint8_t {
   kPreviousCommand,  ///< kNoCommand for the first command
   kPreviousLasted,   ///< duration of the previous command, s; 0 if there was none
   kLastTurn,
-  kSinceRest,      ///< time since the last rest, s
-  kUseDifference,  ///< motor-on time of the right wheel's motor minus that of the left one's, s
-  kTrodden,        ///< driven time of all robots in the floor cell, s
+  kSinceRest,            ///< time since the last rest, s
+  kMotorTimeDifference,  ///< motor-on time of the right wheel's motor minus that of the left one's, s
+  kTraffic,              ///< driven time of all robots in the floor cell, s
   kRobot,
   kRun,
 };
@@ -82,8 +82,8 @@ inline constexpr double kNoCommand = 4;
 
 struct Axis {
   Covariate of = Covariate::kNothing;
-  std::uint8_t radius = 0;  ///< index into kNeighbourRadii_mm; for kTraffic, into MotionModel::cells
-  std::uint8_t forget = 0;  ///< for motor-on and driven times: 1 + index into kDecayTimes_s; 0: not discounted
+  std::uint8_t radius = 0;       ///< index into kNeighbourRadii_mm; for kTraffic, into MotionModel::cells
+  std::uint8_t decay_index = 0;  ///< for motor-on and driven times: 1 + index into kDecayTimes_s; 0: not discounted
   /// For kNeighbours and kDensity up to kListed_mm: each neighbour has the weight ((1 + cos(bearing - toward)) /
   /// 2)^focus.
   std::uint8_t focus = 0;

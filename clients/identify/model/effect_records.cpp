@@ -34,16 +34,16 @@ Function::Covariate covariate_of(Covariate c) {
     case Covariate::kPreviousCommand: return Function::PREVIOUS_COMMAND;
     case Covariate::kPreviousLasted: return Function::PREVIOUS_LASTED;
     case Covariate::kSinceRest: return Function::SINCE_REST;
-    case Covariate::kUseDifference: return Function::MOTOR_TIME_DIFFERENCE;
+    case Covariate::kMotorTimeDifference: return Function::MOTOR_TIME_DIFFERENCE;
     case Covariate::kLastTurn: return Function::LAST_TURN;
-    case Covariate::kTrodden: return Function::PLACE;
+    case Covariate::kTraffic: return Function::PLACE;
     case Covariate::kRobot: return Function::ROBOT;
     case Covariate::kRun: return Function::RUN;
   }
   return Function::NOTHING;
 }
 
-bool is_of_use(Covariate c) { return c >= Covariate::kMotorTime && c <= Covariate::kDrivenTime; }
+bool is_motor_time(Covariate c) { return c >= Covariate::kMotorTime && c <= Covariate::kDrivenTime; }
 bool is_of_neighbours(Covariate c) { return c >= Covariate::kNeighbours && c <= Covariate::kBearing; }
 
 /// A situation in which one or two covariates have given values. The other values do not matter.
@@ -57,7 +57,7 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kSinceCommand: s.commands.since_s = value; break;
     case Covariate::kPreviousLasted: s.commands.previous_lasted_s = value; break;
     case Covariate::kSinceRest: s.commands.since_rest_s = value; break;
-    case Covariate::kUseDifference: s.commands.motor_s = {0, value}; break;
+    case Covariate::kMotorTimeDifference: s.commands.motor_s = {0, value}; break;
     case Covariate::kNeighbours: s.near.count[axis.radius] = static_cast<float>(value); break;
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
@@ -65,11 +65,11 @@ Situation with(const Axis& axis, double value, Situation s = {}) {
     case Covariate::kDrivenTime:
       s.commands.motor_s = {value, value};
       s.commands.driven_s = value;
-      if (axis.forget > 0) s.commands.left_s[axis.forget - 1u] = {value, value, value};
+      if (axis.decay_index > 0) s.commands.initial_discounted_s[axis.decay_index - 1u] = {value, value, value};
       break;
     case Covariate::kNearest: s.near.nearest_mm = value; break;
     case Covariate::kDensity: s.near.density[axis.radius] = static_cast<float>(value); break;
-    case Covariate::kTrodden: s.near.trodden_s[axis.radius] = static_cast<float>(value); break;
+    case Covariate::kTraffic: s.near.traffic_s[axis.radius] = static_cast<float>(value); break;
     case Covariate::kBearing:
       s.near.nearest_mm = 0;
       s.near.direction_rad = value;
@@ -92,9 +92,9 @@ void set_axis(Function& function, const Factor& factor) {
     function.set_focus(factor.axis.focus);
     if (factor.axis.toward_deg != 0) function.set_toward_deg(factor.axis.toward_deg);
   }
-  if (factor.axis.of == Covariate::kTrodden) function.set_field(field_name(factor.axis.radius));
-  if (is_of_use(factor.axis.of) && factor.axis.forget > 0)
-    function.set_forget_s(kForget_s[factor.axis.forget - 1u]);
+  if (factor.axis.of == Covariate::kTraffic) function.set_field(field_name(factor.axis.radius));
+  if (is_motor_time(factor.axis.of) && factor.axis.decay_index > 0)
+    function.set_forget_s(kDecayTimes_s[factor.axis.decay_index - 1u]);
 }
 
 /// Natural cubic spline through the curve.
@@ -303,7 +303,7 @@ Effect turned_position(const Effect& turn, Target axis) {
 
 }  // namespace
 
-std::string field_name(std::uint8_t cells) { return fmt::format("trodden-{}", cells); }
+std::string field_name(std::uint8_t cells) { return fmt::format("traffic-{}", cells); }
 
 double rounded(double value) {
   if (!std::isfinite(value)) return 0;

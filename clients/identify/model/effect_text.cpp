@@ -62,11 +62,11 @@ const char* name_of(Function::Covariate of) {
   switch (of) {
     case Function::TIME: return "time";
     case Function::TIME_SINCE_COMMAND: return "time_since_command";
-    case Function::PREVIOUS_LASTED: return "how long the command before lasted";
+    case Function::PREVIOUS_LASTED: return "duration of the previous command";
     case Function::MOTOR_TIME: return "motor_time";
     case Function::DRIVEN_TIME: return "driven_time";
-    case Function::SINCE_REST: return "time since it rested";
-    case Function::MOTOR_TIME_DIFFERENCE: return "left motor's time less the right one's";
+    case Function::SINCE_REST: return "time since the last rest";
+    case Function::MOTOR_TIME_DIFFERENCE: return "motor-on time, left minus right";
     case Function::X: return "x";
     case Function::Y: return "y";
     case Function::RADIUS: return "radius";
@@ -75,14 +75,14 @@ const char* name_of(Function::Covariate of) {
     case Function::HEADING: return "heading";
     case Function::NEIGHBOURS: return "neighbours";
     case Function::DENSITY: return "density";
-    case Function::PLACE: return "time robots stood there";
+    case Function::PLACE: return "driven time in the floor cell";
     case Function::ROBOT: return "robot";
     default: return "covariate";
   }
 }
 
 /// A signed value with three digits.
-std::string amount(double value, Effect::Target target) {
+std::string signed_size(double value, Effect::Target target) {
   const Unit unit = unit_of(target);
   const double v = value * unit.factor, size = std::abs(v);
   const int digits = size > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 5) : 0;
@@ -114,7 +114,7 @@ std::string of_curve(const std::vector<double>& at, const std::vector<double>& v
   std::sort(places.begin(), places.end());
   std::vector<std::string> parts;
   for (const std::size_t i : places)
-    parts.push_back(fmt::format("{} at {}", amount(value[i], target), place(at[i], of)));
+    parts.push_back(fmt::format("{} at {}", signed_size(value[i], target), place(at[i], of)));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
@@ -128,42 +128,42 @@ std::string of_table(const proto::Table& table, Effect::Target target, Function:
           : of == Function::PREVIOUS_COMMAND ? fmt::format("after {}", command_name(table.key(i)))
           : of == Function::LAST_TURN        ? fmt::format("after a turn {}", command_name(table.key(i)))
                                              : fmt::format("at {}", table.key(i));
-      parts.push_back(fmt::format("{} {}", amount(table.value(i), target), when));
+      parts.push_back(fmt::format("{} {}", signed_size(table.value(i), target), when));
     }
     return fmt::format("{}", fmt::join(parts, ", "));
   }
   const auto [low, high] = std::minmax_element(table.value().begin(), table.value().end());
   const auto key = [&](auto at) { return table.key(static_cast<int>(at - table.value().begin())); };
-  return fmt::format("from {} ({}) to {} ({})", amount(*low, target), place(key(low), of), amount(*high, target),
-                     place(key(high), of));
+  return fmt::format("from {} ({}) to {} ({})", signed_size(*low, target), place(key(low), of),
+                     signed_size(*high, target), place(key(high), of));
 }
 
 std::string of_function(const Function& f, Effect::Target target) {
   switch (f.shape_case()) {
-    case Function::kConstant: return amount(f.constant(), target);
+    case Function::kConstant: return signed_size(f.constant(), target);
     case Function::kSpline:
       return of_curve({f.spline().knot().begin(), f.spline().knot().end()},
                       {f.spline().value().begin(), f.spline().value().end()}, target, f.of());
     case Function::kSpline2D: {
       const auto [low, high] = std::minmax_element(f.spline_2d().value().begin(), f.spline_2d().value().end());
-      return fmt::format("between {} and {} over the arena", amount(*low, target), amount(*high, target));
+      return fmt::format("between {} and {} over the arena", signed_size(*low, target), signed_size(*high, target));
     }
     case Function::kExponential:
-      return fmt::format("{} at first, fading within {}", amount(f.exponential().at_zero(), target),
+      return fmt::format("{} initially, decaying within {}", signed_size(f.exponential().at_zero(), target),
                          place(f.exponential().scale(), f.of()));
     case Function::kHarmonic: {
       const double size = std::hypot(f.harmonic().cosine(), f.harmonic().sine());
       const double most =
           std::atan2(f.harmonic().sine(), f.harmonic().cosine()) * f.harmonic().period() / (2 * M_PI);
-      const std::string up_to = amount(size, target).substr(1);
-      if (unit_of(f.of()).factor != 1) return fmt::format("up to {}, most at {}", up_to, place(most, f.of()));
+      const std::string up_to = signed_size(size, target).substr(1);
+      if (unit_of(f.of()).factor != 1) return fmt::format("up to {}, maximal at {}", up_to, place(most, f.of()));
       return fmt::format("up to {}, with a period of {}", up_to, place(f.harmonic().period(), f.of()));
     }
     case Function::kSteps: {
       std::vector<std::string> parts;
       for (int i = 0; i < std::min(f.steps().at_size(), 3); ++i)
-        parts.push_back(
-            fmt::format("{} from {} on", amount(f.steps().value(i + 1), target), place(f.steps().at(i), f.of())));
+        parts.push_back(fmt::format("{} from {} on", signed_size(f.steps().value(i + 1), target),
+                                    place(f.steps().at(i), f.of())));
       return fmt::format("{}", fmt::join(parts, ", "));
     }
     case Function::kTable: return of_table(f.table(), target, f.of());
@@ -172,7 +172,7 @@ std::string of_function(const Function& f, Effect::Target target) {
 }
 
 /// "times 0.2 (robot 3) to 1.9 (robot 17)".
-std::string amounts_in_words(const Function& f) {
+std::string amplitudes_in_words(const Function& f) {
   if (f.has_table() && f.table().value_size() > 0) {
     const proto::Table& table = f.table();
     if (f.of() == Function::COMMAND) {
@@ -187,25 +187,25 @@ std::string amounts_in_words(const Function& f) {
     };
     return fmt::format("times {:.2f} ({}) to {:.2f} ({})", *low, key(low), *high, key(high));
   }
-  if (!f.has_spline() || f.spline().knot_size() == 0) return "times what the other depends on";
+  if (!f.has_spline() || f.spline().knot_size() == 0) return "with varying amplitude";
   const int last = f.spline().knot_size() - 1;
   return fmt::format("times {:.2f} at {} to {:.2f} at {}", f.spline().value(0), place(f.spline().knot(0), f.of()),
                      f.spline().value(last), place(f.spline().knot(last), f.of()));
 }
 
 /// A curve times amplitudes, as shown: the curve at amplitude 1.
-struct Amounts {
+struct Amplitudes {
   std::vector<Effect> curves;
-  std::optional<Function> amounts;
+  std::optional<Function> amplitudes;
 };
-Amounts without_amounts(const std::vector<Effect>& effects) {
-  Amounts out{effects, {}};
+Amplitudes without_amplitudes(const std::vector<Effect>& effects) {
+  Amplitudes out{effects, {}};
   const auto alike = [&](const Effect& effect) {
     return effect.function_size() > 1 &&
            effect.function(0).SerializeAsString() == effects.front().function(0).SerializeAsString();
   };
   if (effects.empty() || !std::all_of(effects.begin(), effects.end(), alike)) return out;
-  out.amounts = effects.front().function(0);
+  out.amplitudes = effects.front().function(0);
   for (Effect& effect : out.curves) effect.mutable_function()->DeleteSubrange(0, 1);
   return out;
 }
@@ -336,7 +336,7 @@ Sorted sorted(const std::vector<Effect>& effects) {
 std::string size_in_words(const std::vector<Effect>& effects) {
   constexpr std::size_t kMost = 3;
   std::vector<std::string> parts;
-  const Amounts shown = without_amounts(effects);
+  const Amplitudes shown = without_amplitudes(effects);
   const Sorted all = sorted(shown.curves);
   for (const std::vector<const Effect*>& map : all.maps) {
     const MapSum sum = sum_of(map);
@@ -345,7 +345,8 @@ std::string size_in_words(const std::vector<Effect>& effects) {
     constexpr double kTail = 0.02;
     const Effect::Target target = map.front()->acts_on();
     parts.push_back(fmt::format("{}between {} and {} over the arena", which_of(*map.front()),
-                                amount(sum.quantile(kTail), target), amount(sum.quantile(1 - kTail), target)));
+                                signed_size(sum.quantile(kTail), target),
+                                signed_size(sum.quantile(1 - kTail), target)));
     if (parts.size() == kMost) break;
   }
   for (const Effect* one : all.others) {
@@ -356,13 +357,13 @@ std::string size_in_words(const std::vector<Effect>& effects) {
     if (size.empty()) return "";
     parts.push_back(which_of(effect) + size);
   }
-  if (shown.amounts && !parts.empty()) parts.push_back(amounts_in_words(*shown.amounts));
+  if (shown.amplitudes && !parts.empty()) parts.push_back(amplitudes_in_words(*shown.amplitudes));
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
 nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& effects) {
   nlohmann::json all = nlohmann::json::array();
-  const Amounts shown = without_amounts(effects);
+  const Amplitudes shown = without_amplitudes(effects);
   for (const Effect* one : sorted(shown.curves).others) {
     const Effect& effect = *one;
     if (effect.function_size() != 1 || !(effect.function(0).has_spline() || effect.function(0).has_steps()))
@@ -404,7 +405,7 @@ nlohmann::json curves_of(const std::string& name, const std::vector<Effect>& eff
 
 nlohmann::json maps_of(const std::string& name, const std::vector<Effect>& effects) {
   nlohmann::json all = nlohmann::json::array();
-  const Amounts shown = without_amounts(effects);
+  const Amplitudes shown = without_amplitudes(effects);
   for (const std::vector<const Effect*>& map : sorted(shown.curves).maps) {
     const MapSum sum = sum_of(map);
     if (sum.value.empty()) continue;

@@ -57,8 +57,8 @@ proto::Model proto_of(const MotionModel& fitted) {
   add_noise(model, "tracker-x", proto::Effect::MEASURED_OFFSET, 0, std::sqrt(fitted.noise.position_mm2));
   add_noise(model, "tracker-y", proto::Effect::MEASURED_OFFSET, 90, std::sqrt(fitted.noise.position_mm2));
   add_noise(model, "tracker-heading", proto::Effect::MEASURED_HEADING, 0, std::sqrt(fitted.noise.heading_rad2));
-  for (std::uint8_t c = 0; c < kFloorCells; ++c) {
-    if (!fitted.looks_at({Covariate::kTrodden, c})) continue;
+  for (std::uint8_t c = 0; c < kTrafficGrids; ++c) {
+    if (!fitted.looks_at({Covariate::kTraffic, c})) continue;
     proto::ArenaField& field = *model.add_field();
     field.set_name(field_name(c));
     field.set_counts(proto::ArenaField::DRIVEN_TIME);

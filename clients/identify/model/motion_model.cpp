@@ -15,7 +15,7 @@ Factor known_curve(const Term& term, std::size_t factor) {
   return curve;
 }
 
-bool is_map_of_picture(const Term& term) {
+bool is_camera_map(const Term& term) {
   return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
     const auto of_place = [](Covariate c) { return c == Covariate::kX || c == Covariate::kY; };
     return is_measured(block.target) &&

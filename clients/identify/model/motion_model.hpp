@@ -87,7 +87,7 @@ struct Term {
 /// index of the open factor; any others are known.
 [[nodiscard]] Factor known_curve(const Term&, std::size_t factor);
 /// Whether the term is a map of camera distortion.
-[[nodiscard]] bool is_map_of_picture(const Term&);
+[[nodiscard]] bool is_camera_map(const Term&);
 
 /// Speeds of a robot at one instant.
 struct Rates {
@@ -102,14 +102,14 @@ struct Rates {
 struct MotionModel {
   BaseParameters base;
   Noise noise;
-  Room room;
+  Walls walls;
   bool contacts = true;  ///< whether robots collide with each other
   /// Whether walls may be anywhere along the boundary of visited places. `walls` is then not used for contacts.
-  bool doubts_rim = false;
+  bool walls_uncertain = false;
   /// Robots with estimated centres this close may be in contact, mm.
-  double touch_mm = kTouch_mm;
+  double contact_range_mm = kContactRange_mm;
   /// Grids of driven time per floor cell.
-  std::array<FloorCells, kFloorCells> cells = {FloorCells{20}, {28}, {39}, {55}, {78}, {110}};
+  std::array<GridCells, kTrafficGrids> cells = {GridCells{20}, {28}, {39}, {55}, {78}, {110}};
   std::vector<Term> terms;
   std::map<std::uint32_t, RobotBias> robots;
 

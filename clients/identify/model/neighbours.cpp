@@ -90,17 +90,17 @@ RunNeighbours::RunNeighbours(const Run& run, const std::vector<Centres>* centres
   }
 }
 
-void RunNeighbours::remember(const Run& run, const std::array<FloorCells, kFloorCells>& cells) {
-  for (std::size_t c = 0; c < kFloorCells; ++c) {
-    FloorMemory memory(cells[c]);
+void RunNeighbours::update_traffic(const Run& run, const std::array<GridCells, kTrafficGrids>& cells) {
+  for (std::size_t c = 0; c < kTrafficGrids; ++c) {
+    TrafficGrid traffic(cells[c]);
     for (std::size_t i = 0; i < instants(); ++i) {
       for (std::size_t r = 0; r < run.tracks.size(); ++r) {
         const Spot& s = spot(r, i);
-        if (!std::isnan(s.x_mm)) views_[r * instants_ + i].trodden_s[c] = memory.value_s(s.x_mm, s.y_mm);
+        if (!std::isnan(s.x_mm)) views_[r * instants_ + i].traffic_s[c] = traffic.value_s(s.x_mm, s.y_mm);
       }
       for (std::size_t r = 0; r < run.tracks.size(); ++r) {
         const Spot& s = spot(r, i);
-        if (!std::isnan(s.x_mm) && s.driven) memory.add(s.x_mm, s.y_mm, kRaster_s);
+        if (!std::isnan(s.x_mm) && s.driven) traffic.add(s.x_mm, s.y_mm, kRaster_s);
       }
     }
   }

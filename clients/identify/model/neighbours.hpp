@@ -31,7 +31,7 @@ class RunNeighbours {
   explicit RunNeighbours(const Run&, const std::vector<Centres>* centres = nullptr);
   [[nodiscard]] const NeighbourView& view(std::size_t track, double time_s) const;
   /// Computes the driven time per floor cell for these grids.
-  void remember(const Run&, const std::array<FloorCells, kFloorCells>& cells);
+  void update_traffic(const Run&, const std::array<GridCells, kTrafficGrids>& cells);
 
   /// Disc centre of a robot at one instant of the raster, mm.
   struct Spot {

@@ -9,14 +9,14 @@
 namespace kilotwin::identify {
 
 /// A grid of square cells: its cell size and the position of one cell corner, mm.
-struct FloorCells {
+struct GridCells {
   double side_mm = 50, x_mm = 0, y_mm = 0;
 };
 
-class FloorMemory {
+class TrafficGrid {
  public:
   /// Positions beyond kReach_mm belong to the outermost cells.
-  explicit FloorMemory(const FloorCells& cells) : cells_(cells), half_(std::ceil(kReach_mm / cells.side_mm)) {
+  explicit TrafficGrid(const GridCells& cells) : cells_(cells), half_(std::ceil(kReach_mm / cells.side_mm)) {
     const auto side = static_cast<std::size_t>(2 * half_);
     seconds_.assign(side * side, 0);
   }
@@ -31,7 +31,7 @@ class FloorMemory {
     };
     return index(y_mm - cells_.y_mm) * static_cast<std::size_t>(2 * half_) + index(x_mm - cells_.x_mm);
   }
-  FloorCells cells_;
+  GridCells cells_;
   double half_;
   std::vector<float> seconds_;
 };

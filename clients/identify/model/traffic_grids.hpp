@@ -8,28 +8,28 @@
 
 namespace kilotwin::identify {
 
-class Floors {
+class TrafficGrids {
  public:
-  explicit Floors(const MotionModel& model) {
-    for (std::uint8_t c = 0; c < kFloorCells; ++c)
-      if (model.looks_at({Covariate::kTrodden, c})) floors_.push_back({c, FloorMemory(model.cells[c])});
+  explicit TrafficGrids(const MotionModel& model) {
+    for (std::uint8_t c = 0; c < kTrafficGrids; ++c)
+      if (model.looks_at({Covariate::kTraffic, c})) grids_.push_back({c, TrafficGrid(model.cells[c])});
   }
-  [[nodiscard]] bool any() const { return !floors_.empty(); }
+  [[nodiscard]] bool any() const { return !grids_.empty(); }
   /// Adds the time of a driven robot at a place, s.
   void add(double x_mm, double y_mm, double seconds) {
-    for (Floor& floor : floors_) floor.memory.add(x_mm, y_mm, seconds);
+    for (Grid& grid : grids_) grid.traffic.add(x_mm, y_mm, seconds);
   }
   /// Sets the driven time of the cells at a place.
   void see(double x_mm, double y_mm, NeighbourView& view) const {
-    for (const Floor& floor : floors_) view.trodden_s[floor.cells] = floor.memory.value_s(x_mm, y_mm);
+    for (const Grid& grid : grids_) view.traffic_s[grid.cells] = grid.traffic.value_s(x_mm, y_mm);
   }
 
  private:
-  struct Floor {
+  struct Grid {
     std::uint8_t cells;
-    FloorMemory memory;
+    TrafficGrid traffic;
   };
-  std::vector<Floor> floors_;
+  std::vector<Grid> grids_;
 };
 
 }  // namespace kilotwin::identify

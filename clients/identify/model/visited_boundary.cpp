@@ -19,7 +19,7 @@ double near_the_end(std::vector<double>& values, std::size_t fewest, double shar
 
 }  // namespace
 
-Rim::Rim(const MeasuredSet& set, double margin_mm)
+VisitedBoundary::VisitedBoundary(const MeasuredSet& set, double margin_mm)
     : sides_{Side{true, 1, 0, {}}, Side{true, -1, 0, {}}, Side{false, 1, 0, {}}, Side{false, -1, 0, {}}},
       margin_mm_(margin_mm) {
   for (Side& side : sides_) {
@@ -55,7 +55,7 @@ Rim::Rim(const MeasuredSet& set, double margin_mm)
   }
 }
 
-double Rim::Side::at(double along_mm) const {
+double VisitedBoundary::Side::at(double along_mm) const {
   const double place = (along_mm - first_mm) / kStrip_mm;
   const double last = static_cast<double>(farthest_mm.size()) - 1;
   const double below = std::clamp(std::floor(place), 0.0, last), above = std::min(below + 1, last);
@@ -64,7 +64,7 @@ double Rim::Side::at(double along_mm) const {
          part * farthest_mm[static_cast<std::size_t>(above)];
 }
 
-bool Rim::holds(double x_mm, double y_mm) const {
+bool VisitedBoundary::is_near(double x_mm, double y_mm) const {
   return std::any_of(sides_.begin(), sides_.end(), [&](const Side& side) {
     if (side.farthest_mm.empty()) return false;
     const double out = side.sign * (side.of_x ? x_mm : y_mm);

@@ -9,11 +9,11 @@
 
 namespace kilotwin::identify {
 
-class Rim {
+class VisitedBoundary {
  public:
   /// From all positions of the set. Within `margin_mm` of the boundary, a robot may be in contact with a wall.
-  Rim(const MeasuredSet&, double margin_mm);
-  [[nodiscard]] bool holds(double x_mm, double y_mm) const;
+  VisitedBoundary(const MeasuredSet&, double margin_mm);
+  [[nodiscard]] bool is_near(double x_mm, double y_mm) const;
 
  private:
   /// The boundary on one side, as a function of the coordinate along the side.

@@ -46,36 +46,36 @@ class Edges {
 };
 
 /// Forecasts of the robots of one run, from an instant on by their commands alone.
-class Outlook {
+class JointForecast {
  public:
-  Outlook(const MotionModel& model, std::vector<Follower>& followers, const Floors& floors, double from_s,
-          bool neighbours)
+  JointForecast(const MotionModel& model, std::vector<FilterBank>& banks, const TrafficGrids& grids, double from_s,
+                bool neighbours)
       : model_(model),
         neighbours_(neighbours),
         now_s_(from_s),
         edges_(model),
-        floors_(floors),
-        floors_then_(floors) {
-    for (Follower& follower : followers) {
+        grids_(grids),
+        initial_grids_(grids) {
+    for (FilterBank& bank : banks) {
       Robot& robot = robots_.emplace_back();
-      robot.view = &follower.view();
-      if (!follower.started()) continue;
+      robot.view = &bank.view();
+      if (!bank.started()) continue;
       double sum = 0;
-      for (const auto& h : follower.hypotheses()) sum += std::exp(h.log_weight);
-      for (const auto& h : follower.hypotheses()) {
+      for (const auto& h : bank.hypotheses()) sum += std::exp(h.log_weight);
+      for (const auto& h : bank.hypotheses()) {
         robot.filters.push_back(h.filter);
         robot.weights.push_back(std::exp(h.log_weight) / sum);
       }
-      robot.now_s = follower.last_s();
-      Starting& start = robot.start;
+      robot.now_s = bank.last_s();
+      RolloutStart& start = robot.start;
       start.view = robot.view;
       start.weights = robot.weights;
-      for (const auto& h : follower.hypotheses()) start.filters.push_back(&h.filter);
+      for (const auto& h : bank.hypotheses()) start.filters.push_back(&h.filter);
       start.now_s = robot.now_s;
     }
   }
   /// Advances to a time. Robots see each other on a time raster.
-  void go_to(double to_s) {
+  void advance_to(double to_s) {
     constexpr double kRaster_s = 0.25;
     while (now_s_ < to_s - 1e-9) {
       const double next = neighbours_ ? std::min(to_s, now_s_ + kRaster_s) : to_s;
@@ -87,29 +87,30 @@ class Outlook {
   }
   /// Replaces the forecasts of robots with contacts, steep maps or large uncertainty by means of Monte Carlo
   /// rollouts.
-  void draw_futures(double from_s, std::uint32_t count, bool all, std::array<std::uint32_t, 2> key) {
-    std::vector<Starting> together;
+  void draw_rollouts(double from_s, std::uint32_t count, bool all, std::array<std::uint32_t, 2> key) {
+    std::vector<RolloutStart> together;
     std::vector<std::size_t> who;
     bool any = false;
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       if (robots_[r].filters.empty()) continue;
-      any = any || robots_[r].branches;
-      if (!all && !robots_[r].branches) continue;
+      any = any || robots_[r].needs_rollout;
+      if (!all && !robots_[r].needs_rollout) continue;
       together.push_back(robots_[r].start);
       who.push_back(r);
     }
     if (!any) return;
-    const std::vector<Foreseen> seen = futures(model_, together, floors_then_, from_s, now_s_, count, all, key);
+    const std::vector<RolloutMoments> seen =
+        rollouts(model_, together, initial_grids_, from_s, now_s_, count, all, key);
     for (std::size_t i = 0; i < who.size(); ++i)
-      if (robots_[who[i]].branches) robots_[who[i]].foreseen = seen[i];
+      if (robots_[who[i]].needs_rollout) robots_[who[i]].moments = seen[i];
   }
-  bool expected(std::size_t place, Predicted& out) const {
+  bool expected(std::size_t place, Forecast& out) const {
     const Robot& robot = robots_[place];
     if (robot.filters.empty()) return false;
-    if (robot.foreseen) {
-      out.x_mm = robot.foreseen->x_mm;
-      out.y_mm = robot.foreseen->y_mm;
-      out.spread_mm = std::sqrt(robot.foreseen->square_mm2 + 2 * model_.noise.position_mm2);
+    if (robot.moments) {
+      out.x_mm = robot.moments->x_mm;
+      out.y_mm = robot.moments->y_mm;
+      out.expected_error_mm = std::sqrt(robot.moments->square_mm2 + 2 * model_.noise.position_mm2);
       return true;
     }
     const CommandState commands = robot.view->clock.at(now_s_ - 1e-9);
@@ -119,11 +120,12 @@ class Outlook {
       x += robot.weights[i] * seen[0];
       y += robot.weights[i] * seen[1];
       square += robot.weights[i] * seen.head<2>().squaredNorm();
-      spread += robot.weights[i] * robot.filters[i].expected_spread_mm2(now_s_, commands);
+      spread += robot.weights[i] * robot.filters[i].predicted_variance_mm2(now_s_, commands);
     }
     out.x_mm = x;
     out.y_mm = y;
-    out.spread_mm = std::sqrt(spread + std::max(0.0, square - x * x - y * y) + 2 * model_.noise.position_mm2);
+    out.expected_error_mm =
+        std::sqrt(spread + std::max(0.0, square - x * x - y * y) + 2 * model_.noise.position_mm2);
     return true;
   }
 
@@ -134,9 +136,9 @@ class Outlook {
     std::vector<double> weights;
     double now_s = 0;
     NeighbourView near;
-    Starting start;
-    bool branches = false;  ///< the mean of the futures is not the future of the mean
-    std::optional<Foreseen> foreseen;
+    RolloutStart start;
+    bool needs_rollout = false;  ///< the mean of the futures is not the future of the mean
+    std::optional<RolloutMoments> moments;
   };
   /// Updates neighbour views and traffic, for the next `for_s`.
   void see(double for_s) {
@@ -149,15 +151,16 @@ class Outlook {
       robots_[r].near = view_of(r, x_, y_, &list_);
       const StateCovariance& p = robots_[r].filters.front().belief().covariance;
       const double uncertain = 1.5 * std::sqrt(p(0, 0) + p(1, 1));
-      if (model_.contacts && robots_[r].near.nearest_mm < model_.touch_mm + std::min(uncertain, 20.0))
-        robots_[r].branches = true;
+      if (model_.contacts && robots_[r].near.nearest_mm < model_.contact_range_mm + std::min(uncertain, 20.0))
+        robots_[r].needs_rollout = true;
       // With traffic grids, effects change from cell to cell: the mean path does not suffice.
-      if (floors_.any()) robots_[r].branches = true;
-      if (!robots_[r].branches) robots_[r].branches = edges_.near(x_[r], y_[r], std::clamp(uncertain, 6.0, 30.0));
-      floors_.see(x_[r], y_[r], robots_[r].near);
+      if (grids_.any()) robots_[r].needs_rollout = true;
+      if (!robots_[r].needs_rollout)
+        robots_[r].needs_rollout = edges_.near(x_[r], y_[r], std::clamp(uncertain, 6.0, 30.0));
+      grids_.see(x_[r], y_[r], robots_[r].near);
     }
-    for (std::size_t r = 0; floors_.any() && r < robots_.size(); ++r)
-      if (!std::isnan(x_[r]) && robots_[r].view->clock.at(now_s_).driven()) floors_.add(x_[r], y_[r], for_s);
+    for (std::size_t r = 0; grids_.any() && r < robots_.size(); ++r)
+      if (!std::isnan(x_[r]) && robots_[r].view->clock.at(now_s_).driven()) grids_.add(x_[r], y_[r], for_s);
   }
   void locate() {
     x_.assign(robots_.size(), std::nan(""));
@@ -190,8 +193,8 @@ class Outlook {
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       if (std::isnan(x[r]) || (x_[r] == x[r] && y_[r] == y[r])) continue;
       for (TrackFilter& filter : robots_[r].filters) {
-        filter.belief().mean[0] += model_.room.inside_x(x_[r]) - x[r];
-        filter.belief().mean[1] += model_.room.inside_y(y_[r]) - y[r];
+        filter.belief().mean[0] += model_.walls.inside_x(x_[r]) - x[r];
+        filter.belief().mean[1] += model_.walls.inside_y(y_[r]) - y[r];
       }
     }
   }
@@ -200,34 +203,34 @@ class Outlook {
   const bool neighbours_;
   double now_s_;
   const Edges edges_;
-  Floors floors_;
-  const Floors& floors_then_;
+  TrafficGrids grids_;
+  const TrafficGrids& initial_grids_;
   std::vector<Robot> robots_;
   std::vector<double> x_, y_;
   std::vector<OtherRobot> list_;  ///< neighbours of all robots
 };
 
 /// Traffic of a run, by the measurements so far.
-class Trodden {
+class TrafficRecord {
  public:
-  Trodden(const MotionModel& model, std::size_t robots) : known_(model), next_(robots, 0) {}
+  TrafficRecord(const MotionModel& model, std::size_t robots) : known_(model), next_(robots, 0) {}
 
-  [[nodiscard]] Floors at(double now_s, const std::vector<Follower>& followers) {
-    for (std::size_t f = 0; known_.any() && f < followers.size(); ++f) {
-      if (!followers[f].started()) continue;
-      const auto [near, place] = of(followers[f]);
-      for (std::size_t& i = next_[f];
-           i < near->instants() && is_before(near->time_s(i), followers[f].last_s(), now_s); ++i)
+  [[nodiscard]] TrafficGrids at(double now_s, const std::vector<FilterBank>& banks) {
+    for (std::size_t f = 0; known_.any() && f < banks.size(); ++f) {
+      if (!banks[f].started()) continue;
+      const auto [near, place] = of(banks[f]);
+      for (std::size_t& i = next_[f]; i < near->instants() && is_before(near->time_s(i), banks[f].last_s(), now_s);
+           ++i)
         add(near->spot(place, i), known_);
     }
-    Floors now = known_;
+    TrafficGrids now = known_;
     // From their last samples on, robots count as standing there.
-    for (std::size_t f = 0; known_.any() && f < followers.size(); ++f) {
-      if (!followers[f].started() || next_[f] == 0) continue;
-      const auto [near, place] = of(followers[f]);
+    for (std::size_t f = 0; known_.any() && f < banks.size(); ++f) {
+      if (!banks[f].started() || next_[f] == 0) continue;
+      const auto [near, place] = of(banks[f]);
       RunNeighbours::Spot last = near->spot(place, next_[f] - 1);
       for (std::size_t i = next_[f]; i < near->instants() && near->time_s(i) < now_s - 1e-6; ++i) {
-        last.driven = followers[f].view().clock.at(near->time_s(i) + 1e-9).driven();
+        last.driven = banks[f].view().clock.at(near->time_s(i) + 1e-9).driven();
         add(last, now);
       }
     }
@@ -235,16 +238,16 @@ class Trodden {
   }
 
  private:
-  static std::pair<const RunNeighbours*, std::size_t> of(const Follower& follower) {
-    return {follower.view().neighbours, follower.view().place};
+  static std::pair<const RunNeighbours*, std::size_t> of(const FilterBank& bank) {
+    return {bank.view().neighbours, bank.view().place};
   }
   static bool is_before(double time_s, double seen_s, double now_s) {
     return time_s <= seen_s + 1e-6 && time_s < now_s - 1e-6;
   }
-  static void add(const RunNeighbours::Spot& spot, Floors& to) {
+  static void add(const RunNeighbours::Spot& spot, TrafficGrids& to) {
     if (!std::isnan(spot.x_mm) && spot.driven) to.add(spot.x_mm, spot.y_mm, RunNeighbours::kRaster_s);
   }
-  Floors known_;
+  TrafficGrids known_;
   std::vector<std::size_t> next_;  ///< first instant that is not added yet
 };
 
@@ -278,34 +281,34 @@ bool measured_at(const Track& track, double time_s, Sample& out) {
 namespace {
 
 /// A run under one of the models with different run amplitudes.
-struct RunOutlook {
-  RunOutlook(const MotionModel& of, const std::vector<const TrackView*>& views, bool near)
-      : model(of), neighbours(near), trodden(model, views.size()) {
-    followers.reserve(views.size());
-    for (const TrackView* view : views) followers.emplace_back(model, *view);
+struct RunForecast {
+  RunForecast(const MotionModel& of, const std::vector<const TrackView*>& views, bool near)
+      : model(of), neighbours(near), traffic(model, views.size()) {
+    banks.reserve(views.size());
+    for (const TrackView* view : views) banks.emplace_back(model, *view);
   }
-  RunOutlook(const RunOutlook&) = delete;
-  void follow(double to_s) {
-    for (Follower& follower : followers) follower.follow(to_s);
+  RunForecast(const RunForecast&) = delete;
+  void advance_to(double to_s) {
+    for (FilterBank& bank : banks) bank.advance_to(to_s);
   }
   [[nodiscard]] double log_likelihood() const {
     double sum = 0;
-    for (const Follower& follower : followers) sum += follower.log_likelihood();
+    for (const FilterBank& bank : banks) sum += bank.log_likelihood();
     return sum;
   }
   /// By track. NaN: no forecast.
-  std::vector<Predicted> at(double from_s, double time_s, std::uint32_t futures, bool all,
-                            std::array<std::uint32_t, 2> key) {
-    const Floors floors = trodden.at(from_s, followers);
-    Outlook outlook(model, followers, floors, from_s, neighbours);
-    outlook.go_to(time_s);
-    if (futures > 0 && (model.contacts || floors.any() || Edges(model).any()))
-      outlook.draw_futures(from_s, futures, all, key);
-    std::vector<Predicted> out;
-    for (std::size_t i = 0; i < followers.size(); ++i) {
-      const TrackView& view = followers[i].view();
-      Predicted p{view.run, static_cast<std::uint32_t>(view.place), time_s, 0, 0, 0};
-      if (!outlook.expected(i, p)) p.x_mm = std::nan("");
+  std::vector<Forecast> at(double from_s, double time_s, std::uint32_t rollouts, bool all,
+                           std::array<std::uint32_t, 2> key) {
+    const TrafficGrids grids = traffic.at(from_s, banks);
+    JointForecast joint(model, banks, grids, from_s, neighbours);
+    joint.advance_to(time_s);
+    if (rollouts > 0 && (model.contacts || grids.any() || Edges(model).any()))
+      joint.draw_rollouts(from_s, rollouts, all, key);
+    std::vector<Forecast> out;
+    for (std::size_t i = 0; i < banks.size(); ++i) {
+      const TrackView& view = banks[i].view();
+      Forecast p{view.run, static_cast<std::uint32_t>(view.place), time_s, 0, 0, 0};
+      if (!joint.expected(i, p)) p.x_mm = std::nan("");
       out.push_back(p);
     }
     return out;
@@ -313,18 +316,19 @@ struct RunOutlook {
 
   const MotionModel model;
   const bool neighbours;
-  std::vector<Follower> followers;
-  Trodden trodden;
+  std::vector<FilterBank> banks;
+  TrafficRecord traffic;
 };
 
 }  // namespace
 
-std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set, const Asked& asked,
-                               bool held_out_only, std::uint32_t threads) {
+std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set,
+                               const ForecastTimes& forecast_times, bool held_out_only, std::uint32_t threads) {
   const std::vector<Run>& runs = set.set().runs;
-  std::vector<std::vector<Predicted>> by_run(runs.size());
+  std::vector<std::vector<Forecast>> by_run(runs.size());
   const bool effects_of_neighbours = looks_at_neighbours(model),
-             neighbours = effects_of_neighbours || model.contacts || Floors(model).any() || Edges(model).any();
+             neighbours =
+                 effects_of_neighbours || model.contacts || TrafficGrids(model).any() || Edges(model).any();
   in_parallel(runs.size(), threads, [&](std::size_t run) {
     std::vector<const TrackView*> views;
     double last_s = 0;
@@ -337,29 +341,32 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
       last_s = std::max(last_s, end_of(view.track->samples));
     }
     if (!wanted) return;
-    const RunAmount amount(model, views.front()->number);
-    std::deque<RunOutlook> outlooks;
-    for (const MotionModel& one : amount.models()) outlooks.emplace_back(one, views, neighbours);
-    const double first_s = std::max(asked.first_s, std::ceil(asked.horizon_s / asked.every_s) * asked.every_s);
+    const RunAmplitude amplitude(model, views.front()->number);
+    std::deque<RunForecast> run_forecasts;
+    for (const MotionModel& one : amplitude.models()) run_forecasts.emplace_back(one, views, neighbours);
+    const double first_s =
+        std::max(forecast_times.first_s,
+                 std::ceil(forecast_times.horizon_s / forecast_times.every_s) * forecast_times.every_s);
     for (int k = 0;; ++k) {
-      const double time_s = first_s + k * asked.every_s;
+      const double time_s = first_s + k * forecast_times.every_s;
       if (time_s > last_s + 1e-6) break;
-      const double from_s = time_s - asked.horizon_s;
+      const double from_s = time_s - forecast_times.horizon_s;
       std::vector<double> log_likelihood;
-      for (RunOutlook& outlook : outlooks) {
-        outlook.follow(from_s);
-        log_likelihood.push_back(outlook.log_likelihood());
+      for (RunForecast& run_forecast : run_forecasts) {
+        run_forecast.advance_to(from_s);
+        log_likelihood.push_back(run_forecast.log_likelihood());
       }
-      const RunAmount::Between between = outlooks.size() > 1 ? amount.mean(log_likelihood) : RunAmount::Between{};
-      const auto foretold = [&](std::size_t i) {
-        return outlooks[i].at(from_s, time_s, asked.futures, effects_of_neighbours,
-                              {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(k)});
+      const RunAmplitude::Between between =
+          run_forecasts.size() > 1 ? amplitude.mean(log_likelihood) : RunAmplitude::Between{};
+      const auto forecast_by = [&](std::size_t i) {
+        return run_forecasts[i].at(from_s, time_s, forecast_times.rollouts, effects_of_neighbours,
+                                   {static_cast<std::uint32_t>(run), static_cast<std::uint32_t>(k)});
       };
-      std::vector<Predicted> seen = foretold(between.low);
+      std::vector<Forecast> seen = forecast_by(between.low);
       if (between.high != between.low) {
-        const std::vector<Predicted> high = foretold(between.high);
+        const std::vector<Forecast> high = forecast_by(between.high);
         for (std::size_t i = 0; i < seen.size(); ++i) {
-          for (double Predicted::*const number : {&Predicted::x_mm, &Predicted::y_mm, &Predicted::spread_mm})
+          for (double Forecast::*const number : {&Forecast::x_mm, &Forecast::y_mm, &Forecast::expected_error_mm})
             seen[i].*number += between.part * (high[i].*number - seen[i].*number);
         }
       }
@@ -368,7 +375,7 @@ std::vector<Predicted> predict(const MotionModel& model, const PreparedSet& set,
           by_run[run].push_back(seen[i]);
     }
   });
-  std::vector<Predicted> all;
+  std::vector<Forecast> all;
   for (const auto& part : by_run) all.insert(all.end(), part.begin(), part.end());
   return all;
 }

@@ -7,24 +7,24 @@
 
 namespace kilotwin::identify {
 
-struct Predicted {
+struct Forecast {
   std::uint32_t run;    ///< index in the set
   std::uint32_t place;  ///< index of the track in its run
   double time_s;
   double x_mm, y_mm;
-  double spread_mm;  ///< root mean square distance to the measurement that the filter itself expects
+  double expected_error_mm;  ///< root mean square distance to the measurement that the filter itself expects
 };
 
-struct Asked {
+struct ForecastTimes {
   double first_s = 10, every_s = 5, horizon_s = 10;
   /// Number of joint Monte Carlo rollouts of robots that may touch; 0: mean paths only (fast).
-  std::uint32_t futures = 0;
+  std::uint32_t rollouts = 0;
 };
 
 /// Forecasts for the times first_s, first_s + every_s, ... up to the last sample of each track. Each uses
 /// measurements up to one horizon before, and commands after. `held_out_only`: held-out tracks only. All robots of
 /// a run advance together, so that neighbour effects act within the horizon.
-[[nodiscard]] std::vector<Predicted> predict(const MotionModel&, const PreparedSet&, const Asked&,
+[[nodiscard]] std::vector<Forecast> forecast(const MotionModel&, const PreparedSet&, const ForecastTimes&,
                                              bool held_out_only, std::uint32_t threads);
 
 /// The sample within 0.01 s of a time; false if there is none.

@@ -17,8 +17,8 @@ std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet& set, 
     const TrackView& view = set.views()[v];
     TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.number);
     LogLikelihood likelihood;
-    likelihood.with_touching = true;
-    walk(filter, view, view.track->samples.size(), likelihood);
+    likelihood.include_contacts = true;
+    run_filter(filter, view, view.track->samples.size(), likelihood);
     sums[v] = likelihood.sum;
   });
   return sums;

@@ -38,7 +38,7 @@ struct Window {
 };
 
 /// Whether two robots had the same commands in a time interval, up to small shifts of the changes.
-bool told_the_same(const Track& a, const Track& b, double from_s, double to_s) {
+bool same_commands(const Track& a, const Track& b, double from_s, double to_s) {
   constexpr double kApart_s = 0.25;
   const auto changes = [&](const Track& track) {
     std::vector<CommandChange> out;
@@ -62,9 +62,9 @@ bool told_the_same(const Track& a, const Track& b, double from_s, double to_s) {
 double PredictionErrors::rmse_mm() const { return root_mean(sum_mm2, rows); }
 double PredictionErrors::expected_mm() const { return root_mean(expected_mm2, rows); }
 
-PredictionErrors errors_of(const MeasuredSet& set, const std::vector<Predicted>& predictions) {
+PredictionErrors errors_of(const MeasuredSet& set, const std::vector<Forecast>& predictions) {
   PredictionErrors errors;
-  for (const Predicted& p : predictions) {
+  for (const Forecast& p : predictions) {
     Sample seen;
     if (!measured_at(set.runs[p.run].tracks[p.place], p.time_s, seen)) continue;
     const double dx = seen.x_mm - p.x_mm, dy = seen.y_mm - p.y_mm, square = dx * dx + dy * dy;
@@ -72,7 +72,7 @@ PredictionErrors errors_of(const MeasuredSet& set, const std::vector<Predicted>&
     track.sum_mm2 += square;
     track.rows += 1;
     errors.sum_mm2 += square;
-    errors.expected_mm2 += p.spread_mm * p.spread_mm;
+    errors.expected_mm2 += p.expected_error_mm * p.expected_error_mm;
     ++errors.rows;
   }
   return errors;
@@ -117,12 +117,12 @@ std::optional<ErrorBounds> bounds_of(const MeasuredSet& set, const PredictionErr
 }
 
 std::optional<Replicates> replicates_of(
-    const std::vector<std::pair<const MeasuredSet*, const std::vector<Predicted>*>>& sets, double horizon_s) {
+    const std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>>& sets, double horizon_s) {
   constexpr std::size_t kFewest = 30;
   // By robot and time, ms.
   std::map<std::pair<std::uint32_t, std::int64_t>, std::vector<Window>> at;
   for (const auto& [set, predictions] : sets) {
-    for (const Predicted& p : *predictions) {
+    for (const Forecast& p : *predictions) {
       const Track& track = set->runs[p.run].tracks[p.place];
       Sample end, start;
       if (!measured_at(track, p.time_s, end) || !measured_at(track, p.time_s - horizon_s, start)) continue;
@@ -142,7 +142,7 @@ std::optional<Replicates> replicates_of(
       // Groups the windows that share the first window's commands.
       const Track& first = *windows.front().track;
       const auto rest = std::stable_partition(windows.begin(), windows.end(), [&](const Window& w) {
-        return told_the_same(first, *w.track, time_s - horizon_s, time_s);
+        return same_commands(first, *w.track, time_s - horizon_s, time_s);
       });
       const auto count = static_cast<double>(rest - windows.begin());
       double ahead = 0, left = 0, square = 0;

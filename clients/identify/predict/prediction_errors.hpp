@@ -26,7 +26,7 @@ struct PredictionErrors {
   [[nodiscard]] double expected_mm() const;
 };
 
-[[nodiscard]] PredictionErrors errors_of(const MeasuredSet&, const std::vector<Predicted>&);
+[[nodiscard]] PredictionErrors errors_of(const MeasuredSet&, const std::vector<Forecast>&);
 
 /// 95 % confidence interval, mm.
 struct Interval {
@@ -55,6 +55,6 @@ struct Replicates {
 /// horizon before. Their errors are compared in the body frame at the start. `sets`: each with its forecasts.
 /// Nothing if there are too few.
 [[nodiscard]] std::optional<Replicates> replicates_of(
-    const std::vector<std::pair<const MeasuredSet*, const std::vector<Predicted>*>>& sets, double horizon_s);
+    const std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>>& sets, double horizon_s);
 
 }  // namespace kilotwin::identify

@@ -43,11 +43,11 @@ class Normals {
 
 }  // namespace
 
-std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starting>& robots,
-                              const Floors& floors_then, double from_s, double to_s, std::uint32_t count,
-                              bool neighbours, std::array<std::uint32_t, 2> key) {
+std::vector<RolloutMoments> rollouts(const MotionModel& model, const std::vector<RolloutStart>& robots,
+                                     const TrafficGrids& initial_grids, double from_s, double to_s,
+                                     std::uint32_t count, bool neighbours, std::array<std::uint32_t, 2> key) {
   const Normals normals(key);
-  std::vector<Foreseen> out(robots.size());
+  std::vector<RolloutMoments> out(robots.size());
   std::vector<double> x(robots.size()), y(robots.size());
   std::vector<TrackFilter> filters;
   std::vector<NeighbourView> nears(robots.size());
@@ -62,7 +62,7 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
       while (chosen + 1 < robots[r].filters.size() && left > robots[r].weights[chosen])
         left -= robots[r].weights[chosen++];
       TrackFilter& filter = filters.emplace_back(*robots[r].filters[chosen]);
-      filter.look_ahead();
+      filter.begin_forecast();
       Belief& belief = filter.belief();
       const Eigen::LDLT<StateCovariance> root(belief.covariance);
       const State scaled = root.vectorD().cwiseMax(0).cwiseSqrt().cwiseProduct(normals.draw<5>(sample / 2, r, 0));
@@ -70,7 +70,7 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
       belief.covariance.setZero();
     }
     double now_s = from_s;
-    Floors floors = floors_then;
+    TrafficGrids grids = initial_grids;
     for (std::uint32_t step = 1; now_s < to_s - 1e-9; ++step) {
       const double next_s = std::min(to_s, now_s + kRaster_s);
       for (std::size_t r = 0; r < robots.size(); ++r) {
@@ -80,10 +80,10 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
       list.clear();
       for (std::size_t r = 0; r < robots.size(); ++r) {
         nears[r] = neighbours ? view_of(r, x, y, &list) : NeighbourView{};
-        floors.see(x[r], y[r], nears[r]);
+        grids.see(x[r], y[r], nears[r]);
       }
-      for (std::size_t r = 0; floors.any() && r < robots.size(); ++r)
-        if (robots[r].view->clock.at(now_s).driven()) floors.add(x[r], y[r], next_s - now_s);
+      for (std::size_t r = 0; grids.any() && r < robots.size(); ++r)
+        if (robots[r].view->clock.at(now_s).driven()) grids.add(x[r], y[r], next_s - now_s);
       for (std::uint32_t r = 0; r < robots.size(); ++r) {
         const NeighbourView& near = nears[r];
         const double start_s = step == 1 ? robots[r].now_s : now_s;
@@ -104,8 +104,8 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
       for (int pass = 0; pass < kPasses; ++pass) {
         const bool pushed = model.contacts && push_apart(x, y);
         for (std::size_t r = 0; r < robots.size(); ++r) {
-          x[r] = model.room.inside_x(x[r]);
-          y[r] = model.room.inside_y(y[r]);
+          x[r] = model.walls.inside_x(x[r]);
+          y[r] = model.walls.inside_y(y[r]);
         }
         if (!pushed) break;
       }
@@ -122,7 +122,7 @@ std::vector<Foreseen> futures(const MotionModel& model, const std::vector<Starti
       out[r].square_mm2 += seen.head<2>().squaredNorm();
     }
   }
-  for (Foreseen& f : out) {
+  for (RolloutMoments& f : out) {
     f.x_mm /= count;
     f.y_mm /= count;
     f.square_mm2 = std::max(0.0, f.square_mm2 / count - f.x_mm * f.x_mm - f.y_mm * f.y_mm);

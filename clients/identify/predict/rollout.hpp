@@ -11,7 +11,7 @@
 namespace kilotwin::identify {
 
 /// A robot at the start of the forecast.
-struct Starting {
+struct RolloutStart {
   const TrackView* view = nullptr;
   std::vector<const TrackFilter*> filters;  ///< one per heading hypothesis
   std::vector<double> weights;              ///< of the hypotheses, with sum 1
@@ -19,14 +19,15 @@ struct Starting {
 };
 
 /// Moments of a measured position.
-struct Foreseen {
+struct RolloutMoments {
   double x_mm = 0, y_mm = 0, square_mm2 = 0;  ///< mean, and mean squared distance from it
 };
 
 /// `neighbours`: whether any effect uses neighbours. `grids`: the traffic at from_s. `key`: of the random
 /// generator.
-[[nodiscard]] std::vector<Foreseen> futures(const MotionModel&, const std::vector<Starting>&, const Floors& floors,
-                                            double from_s, double to_s, std::uint32_t count, bool neighbours,
-                                            std::array<std::uint32_t, 2> key);
+[[nodiscard]] std::vector<RolloutMoments> rollouts(const MotionModel&, const std::vector<RolloutStart>&,
+                                                   const TrafficGrids& grids, double from_s, double to_s,
+                                                   std::uint32_t count, bool neighbours,
+                                                   std::array<std::uint32_t, 2> key);
 
 }  // namespace kilotwin::identify

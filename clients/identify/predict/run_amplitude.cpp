@@ -17,7 +17,7 @@ const Factor* runs_of(const Term& term) {
 
 }  // namespace
 
-RunAmount::RunAmount(const MotionModel& model, std::uint32_t run) {
+RunAmplitude::RunAmplitude(const MotionModel& model, std::uint32_t run) {
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const Term& term = model.terms[t];
     const Factor* const known = runs_of(term);
@@ -48,7 +48,7 @@ RunAmount::RunAmount(const MotionModel& model, std::uint32_t run) {
   log_prior_.push_back(0);
 }
 
-RunAmount::Between RunAmount::mean(const std::vector<double>& log_likelihood) const {
+RunAmplitude::Between RunAmplitude::mean(const std::vector<double>& log_likelihood) const {
   if (models_.size() < 3) return {};
   std::vector<double> value = log_likelihood;
   for (std::size_t i = 0; i < value.size(); ++i) value[i] += log_prior_[i];

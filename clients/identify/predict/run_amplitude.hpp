@@ -8,10 +8,10 @@
 
 namespace kilotwin::identify {
 
-class RunAmount {
+class RunAmplitude {
  public:
   /// By run number. If the model has no run amplitudes, or the fit included the run: its one model.
-  RunAmount(const MotionModel&, std::uint32_t run);
+  RunAmplitude(const MotionModel&, std::uint32_t run);
 
   /// The model at each amplitude of a raster.
   [[nodiscard]] const std::vector<MotionModel>& models() const { return models_; }

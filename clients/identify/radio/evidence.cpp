@@ -14,13 +14,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kShuffles = 100;
-/// From this share on a link is on.
+/// From this reception share on a link counts as on.
 constexpr double kHeard = 0.3;
 
 struct Residuals {
   VectorXd value;
-  MatrixXd bearing, laying, bodies, robots, robot_bearings;  ///< regressors
-  std::vector<std::pair<int, int>> of;  ///< sender, receiver; robots of all sets counted through
+  MatrixXd bearing, placement, bodies, robots, robot_bearings;  ///< regressors
+  std::vector<std::pair<int, int>> of;  ///< sender, receiver; robots of all sets are numbered consecutively
 };
 
 Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
@@ -49,7 +49,7 @@ Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
   const auto count = static_cast<Eigen::Index>(value.size());
   result.value = Eigen::Map<VectorXd>(value.data(), count);
   result.bearing = MatrixXd::Zero(count, 2 * kHarmonics);
-  result.laying = MatrixXd::Zero(count, 2 * kHarmonics * static_cast<Eigen::Index>(sets.size()));
+  result.placement = MatrixXd::Zero(count, 2 * kHarmonics * static_cast<Eigen::Index>(sets.size()));
   result.bodies = Eigen::Map<VectorXd>(bodies.data(), count);
   result.bodies.array() -= result.bodies.mean();
   result.robots = MatrixXd::Zero(count, 2 * first);
@@ -59,8 +59,8 @@ Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
     const auto [sender, receiver] = result.of[static_cast<std::size_t>(r)];
     const auto first_of_set = 2 * kHarmonics * static_cast<Eigen::Index>(set_of[static_cast<std::size_t>(r)]);
     for (int n = 1; n <= kHarmonics; ++n) {
-      result.bearing(r, 2 * n - 2) = result.laying(r, first_of_set + 2 * n - 2) = std::cos(n * angle);
-      result.bearing(r, 2 * n - 1) = result.laying(r, first_of_set + 2 * n - 1) = std::sin(n * angle);
+      result.bearing(r, 2 * n - 2) = result.placement(r, first_of_set + 2 * n - 2) = std::cos(n * angle);
+      result.bearing(r, 2 * n - 1) = result.placement(r, first_of_set + 2 * n - 1) = std::sin(n * angle);
     }
     result.robots(r, sender) = result.robots(r, first + receiver) = 1;
     result.robot_bearings(r, 2 * sender) = result.robot_bearings(r, 2 * (first + receiver)) = std::cos(angle);
@@ -70,10 +70,10 @@ Residuals residuals(const std::vector<GridSet>& sets, const LinkModel& model) {
   return result;
 }
 
-/// Share of the variance that a least-squares fit explains, and that of shuffled values.
+/// Share of the variance that a least-squares fit explains, and the same for permuted values.
 Evidence explained(std::string what, const MatrixXd& regressors, const VectorXd& value) {
   const VectorXd centred = value.array() - value.mean();
-  // A little ridge, as regressors may depend on each other.
+  // A small ridge: regressors may be collinear.
   const MatrixXd normal =
       regressors.transpose() * regressors + 1e-6 * MatrixXd::Identity(regressors.cols(), regressors.cols());
   const Eigen::LDLT<MatrixXd> solver(normal);
@@ -106,35 +106,34 @@ double correlation(const VectorXd& a, const VectorXd& b) {
 
 Evidence bearing_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
   const Residuals r = residuals(sets, model);
-  return explained("residuals follow the bearing from sender to receiver, alike in all sets (8 harmonics)",
+  return explained("residuals depend on the bearing from sender to receiver, equally in all sets (8 harmonics)",
                    r.bearing, r.value);
 }
 
-Evidence laying_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
+Evidence placement_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
   const Residuals r = residuals(sets, model);
-  return explained("residuals follow the bearing from sender to receiver, each set in its own way", r.laying,
+  return explained("residuals depend on the bearing from sender to receiver, differently per set", r.placement,
                    r.value);
 }
 
 Evidence body_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
   const Residuals r = residuals(sets, model);
-  return explained("residuals follow how much of the line lies within other robots", r.bodies, r.value);
+  return explained("residuals depend on the length of the line covered by other robots", r.bodies, r.value);
 }
 
 Evidence robot_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
   const Residuals r = residuals(sets, model);
-  return explained("residuals share a part by sender and one by receiver", r.robots, r.value);
+  return explained("residuals have a component per sender and one per receiver", r.robots, r.value);
 }
 
 Evidence robot_bearing_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
   const Residuals r = residuals(sets, model);
-  return explained("residuals of a robot follow the bearing, each robot's in its own way", r.robot_bearings,
-                   r.value);
+  return explained("residuals depend on the bearing, differently per robot", r.robot_bearings, r.value);
 }
 
 Evidence pair_evidence(const std::vector<GridSet>& sets, const LinkModel& model) {
   const Residuals a = residuals(half_of(sets, false), model), b = residuals(half_of(sets, true), model);
-  Evidence evidence{"residuals of a link recur from run to run (correlation of two halves of the runs)",
+  Evidence evidence{"residuals of a link repeat between runs (correlation of two halves of the runs)",
                     correlation(a.value, b.value), 0, 1 / std::sqrt(static_cast<double>(a.value.size()))};
   return evidence;
 }
@@ -163,12 +162,11 @@ Evidence hidden_terminal_evidence(const std::vector<GridSet>& sets) {
   }
   const auto count = static_cast<Eigen::Index>(loss.size());
   const VectorXd a = Eigen::Map<VectorXd>(loss.data(), count), b = Eigen::Map<VectorXd>(hidden.data(), count);
-  return {
-      "what is lost up to 105 mm follows how many robots the receiver hears and the sender does not (correlation)",
-      correlation(a, b), 0, 1 / std::sqrt(static_cast<double>(count))};
+  return {"loss up to 105 mm depends on the number of hidden robots, received by the receiver only (correlation)",
+          correlation(a, b), 0, 1 / std::sqrt(static_cast<double>(count))};
 }
 
-Evidence notice_evidence(const std::vector<GridSet>& sets) {
+Evidence hidden_sender_evidence(const std::vector<GridSet>& sets) {
   std::vector<std::array<double, 5>> rows;
   std::vector<double> loss;
   for (const GridSet& set : sets) {
@@ -204,10 +202,8 @@ Evidence notice_evidence(const std::vector<GridSet>& sets) {
   const VectorXd cost = inverse * x.transpose() * y;
   const double variance = (y - x * cost).squaredNorm() / static_cast<double>(x.rows());
   return {
-      fmt::format(
-          "a hidden sender that is heard in other runs costs {:.4f} of the packets, one that never is {:.4f}; the "
-          "difference",
-          cost(4), cost(3)),
+      fmt::format("loss per hidden sender: {:.4f} if it is received in other runs, {:.4f} if never; the difference",
+                  cost(4), cost(3)),
       cost(3) - cost(4), 0, std::sqrt(variance * (inverse(3, 3) + inverse(4, 4) - 2 * inverse(3, 4)))};
 }
 
@@ -215,8 +211,8 @@ Evidence oscillator_evidence(const std::vector<GridSet>& sets) {
   const bool several = sets.size() > 1 && sets[0].robots() == sets[1].robots();
   const VectorXd a = mean_sent(several ? sets[0] : half_of(sets, false)[0]);
   const VectorXd b = mean_sent(several ? sets[1] : half_of(sets, true)[0]);
-  return {std::string("robots that send less than others do so in both ") +
-              (several ? "sets" : "halves of the runs") + " (correlation)",
+  return {std::string("the same robots send less in both ") + (several ? "sets" : "halves of the runs") +
+              " (correlation)",
           correlation(a, b), 0, 1 / std::sqrt(static_cast<double>(a.size()))};
 }
 

@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The sets were laid with robots touching where nobody pauses, and 50 mm apart else: with both, reception ends at the same
-/// distance, 130..150 mm.
+/// Pitches of the known sets: robots in contact without pauses (33 mm), else 50 mm. With these, reception ends at
+/// the same distance, 130..150 mm.
 constexpr double kTouchingPitch_mm = 33, kPitch_mm = 50;
 constexpr int kMostRobots = 1000;
 
@@ -35,7 +35,7 @@ GridRun read_run(const fs::path& file) {
   }
   std::size_t width = 0;
   for (const auto& row : rows) width = std::max(width, row.size());
-  // The receiver's own id stands first, where rows are one longer than the swarm, a square number.
+  // If rows have one number more than the swarm (a square number), the first is the receiver's id.
   const auto square = [](std::size_t n) {
     const auto side = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(n))));
     return side * side == n;
@@ -48,7 +48,7 @@ GridRun read_run(const fs::path& file) {
   const auto n = static_cast<Eigen::Index>(robots);
   run.counts = Eigen::MatrixXd::Constant(n, n, -1);
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    if (rows[r].size() != width) continue;  // a cut line
+    if (rows[r].size() != width) continue;  // a truncated line
     const auto receiver = ids ? static_cast<Eigen::Index>(rows[r][0]) : static_cast<Eigen::Index>(r);
     if (receiver >= n) continue;
     for (Eigen::Index j = 0; j < n; ++j)

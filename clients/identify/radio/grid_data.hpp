@@ -1,5 +1,5 @@
-/// Measured grids of robots that all send: how often each heard each other. The files are those of the seed's experiment
-/// (its figure 2): one row per receiver, counts from sender 0 on, the diagonal being what it sent with success.
+/// Measured reception counts of robots on a grid that all transmit (ARGoS paper, Fig. 2). One row per receiver,
+/// counts from sender 0 on; the diagonal is the number of successful transmissions.
 #pragma once
 
 #include <Eigen/Dense>
@@ -9,37 +9,37 @@
 
 namespace kilotwin::radio_fit {
 
-/// One run. Entry (i, j) of a matrix is of receiver i and sender j; below 0 where the row is missing.
+/// One run. Entry (i, j): receiver i, sender j; below 0 if the row is missing.
 struct GridRun {
   std::string name;
   Eigen::MatrixXd counts;
 
   [[nodiscard]] double sent(Eigen::Index robot) const { return counts(robot, robot); }
-  /// Share of j's messages that i received, at most 1; below 0 where it is not known.
+  /// Share of j's messages that i received, at most 1; below 0 if unknown.
   [[nodiscard]] double share(Eigen::Index i, Eigen::Index j) const;
 };
 
-/// Runs of one arrangement.
+/// Runs of one placement.
 struct GridSet {
-  std::string name;  ///< "tau000"
-  double tau_s = 0;  ///< pause after a success
+  std::string name;  ///< for example "tau000"
+  double tau_s = 0;  ///< pause after a successful transmission
   double pitch_mm = 0;
   std::vector<GridRun> runs;
 
   [[nodiscard]] int robots() const { return static_cast<int>(runs.front().counts.rows()); }
   [[nodiscard]] int side() const;
-  /// Place of a robot; rows go down, as the ids do.
+  /// Position of a robot. Rows run downwards, like the ids.
   [[nodiscard]] Eigen::Vector2d place_mm(int robot) const;
   [[nodiscard]] double distance_mm(int a, int b) const { return (place_mm(a) - place_mm(b)).norm(); }
 };
 
-/// What each robot sent, mean over the runs.
+/// Number of messages sent per robot, mean over the runs.
 [[nodiscard]] Eigen::VectorXd mean_sent(const GridSet& set);
 
-/// Reads comm_tauT_runN.dat of a directory, the sets by ascending tau. Throws UserError: "FILE:LINE: what is wrong".
+/// Reads comm_tauT_runN.dat of a directory, by ascending tau. Throws UserError "FILE:LINE: what is wrong".
 [[nodiscard]] std::vector<GridSet> read_grids(const std::filesystem::path& directory);
 
-/// Of each set the runs with even, or odd, numbers in the order of their names.
+/// The runs at even, or odd, positions of each set.
 [[nodiscard]] std::vector<GridSet> half_of(const std::vector<GridSet>& sets, bool odd);
 
 }  // namespace kilotwin::radio_fit

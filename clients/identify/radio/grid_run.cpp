@@ -5,11 +5,11 @@
 namespace kilotwin::radio_fit {
 namespace {
 
-/// kilo_tx_period as the firmware sets it.
+/// kilo_tx_period of the firmware.
 constexpr std::uint16_t kTxPeriod = 3906;
 /// TAU_S is in units of 32 kilo_ticks.
 constexpr double kTicksPerTau = 32;
-/// The overhead controller calls RUN for 0.25 s, as in experiments: for so long it talks over the robots.
+/// The overhead controller sends RUN for 0.25 s, as in experiments, and jams the robots meanwhile.
 constexpr std::int64_t kCall_ticks = 8;
 
 RunPlan plan_of(const GridSet& set, const proto::Radio& radio, std::uint64_t seed) {

@@ -16,31 +16,32 @@ using Eigen::VectorXd;
 constexpr double kDecay_db_per_mm = 0.139;
 constexpr double kReference_mm = 132;
 constexpr int kRounds = 7, kMostSteps = 12;
-/// Hardly any link is on beyond.
+/// Beyond this distance hardly any link is on.
 constexpr double kFittedTo_mm = 190;
-/// From this share on, what is missing was lost to collisions.
+/// From this reception share on, losses are collisions.
 constexpr double kOn = 0.6;
-/// Prior of what is common to all robots, dB: wide.
+/// Wide prior of common parameters, dB.
 constexpr double kCommon_sd_db = 6;
-/// Prior of the first harmonic of the pattern, dB; of the n-th, 1/n of it.
+/// Prior of the pattern's first harmonic, dB; the n-th has 1/n of it.
 constexpr double kPattern_sd_db = 6;
 
-/// A link of a set that may be on or off.
+/// A link of a set in one observation.
 struct Row {
   std::size_t set;
   int sender, receiver;
-  double distance_mm, bearing_rad;  ///< from the sender to the receiver; all robots face along x
+  double distance_mm, bearing_rad;  ///< from sender to receiver; all robots face along x
   double bodies, on, runs;
 };
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x * std::numbers::sqrt2 / 2); }
 double normal_pdf(double x) { return std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi); }
 
-/// A term of the margins: effects of the same spread, independent of each other. `design` has a column for each.
+/// A random effect of the margins: independent coefficients with one variance. One column of `design` per
+/// coefficient.
 struct Group {
   MatrixXd design, covariance;  ///< covariance: design design^T
   double sd_db = 0.5;
-  bool fixed = false;  ///< its spread is given
+  bool fixed = false;  ///< the variance is given
 };
 
 class Fit {
@@ -58,7 +59,7 @@ class Fit {
     MatrixXd covariance = design * design.transpose();
     groups_.push_back({std::move(design), std::move(covariance), sd_db, fixed});
   }
-  double settle(bool spreads);
+  double find_mode(bool spreads);
   [[nodiscard]] VectorXd variances() const;
   [[nodiscard]] VectorXd offsets() const;
 
@@ -105,7 +106,7 @@ void Fit::build() {
              }),
         kPattern_sd_db, true);
   }
-  if (terms_ >= Terms::kLaying) {
+  if (terms_ >= Terms::kPlacement) {
     add(each(2 * kHarmonics * static_cast<Eigen::Index>(sets_.size()),
              [](const Row& x, auto row) {
                const auto first = 2 * kHarmonics * static_cast<Eigen::Index>(x.set);
@@ -157,9 +158,9 @@ VectorXd Fit::offsets() const {
   return result;
 }
 
-/// Newton's method to the mode of the margins (Rasmussen and Williams, algorithm 3.1). Returns the log marginal likelihood;
-/// `spreads`: one step of expectation-maximisation for the spreads of the groups.
-double Fit::settle(bool spreads) {
+/// Newton's method for the mode of the margins (Rasmussen and Williams, algorithm 3.1). Returns the log marginal
+/// likelihood. `spreads`: also one step of expectation maximisation for the variances.
+double Fit::find_mode(bool spreads) {
   const auto count = static_cast<Eigen::Index>(rows_.size());
   MatrixXd covariance = MatrixXd::Zero(count, count);
   for (const Group& group : groups_) covariance += group.sd_db * group.sd_db * group.covariance;
@@ -208,7 +209,7 @@ double Fit::settle(bool spreads) {
     for (Group& group : groups_) {
       if (group.fixed) continue;
       const double variance = group.sd_db * group.sd_db;
-      // Columns that no row has keep their prior, and tell nothing.
+      // Columns without data keep their prior and carry no information.
       const double effects = (group.design.cwiseAbs().colwise().sum().array() > 0).cast<double>().sum();
       const double known = variance * variance * dual_.dot(group.covariance * dual_);
       const double unknown = variance * (effects - variance * group.covariance.cwiseProduct(precision).sum());
@@ -218,7 +219,7 @@ double Fit::settle(bool spreads) {
   return marginal;
 }
 
-/// Of the margins, dB^2, given the data.
+/// Posterior variances of the margins, dB^2.
 VectorXd Fit::variances() const {
   const auto count = static_cast<Eigen::Index>(rows_.size());
   MatrixXd covariance = MatrixXd::Zero(count, count);
@@ -231,18 +232,18 @@ VectorXd Fit::variances() const {
 }
 
 LinkModel Fit::run() {
-  // Without terms that are drawn there is nothing to iterate but the noise of runs.
+  // Without random effects only the noise of runs needs iterations.
   const int rounds = terms_ >= Terms::kRobots ? kRounds : 3;
   double factor = 1.6;
   for (int round = 0; round < rounds; ++round) {
-    settle(true);
+    find_mode(true);
     if (round % 2 != 0) continue;
-    double best = settle(false);
+    double best = find_mode(false);
     for (double& sd : run_sd_) {
       const double before = sd;
       for (const double tried : {before / factor, before * factor}) {
         sd = tried;
-        const double value = settle(false);
+        const double value = find_mode(false);
         if (value > best) {
           best = value;
           break;
@@ -252,7 +253,7 @@ LinkModel Fit::run() {
     }
     factor = std::sqrt(factor);
   }
-  settle(false);
+  find_mode(false);
 
   LinkModel model;
   model.terms = terms_;
@@ -266,8 +267,8 @@ LinkModel Fit::run() {
     for (std::size_t n = 0; n < model.pattern_db.size(); ++n) model.pattern_db[n] /= static_cast<double>(n / 2 + 1);
     ++next;
   }
-  const std::size_t laying = next;
-  if (terms_ >= Terms::kLaying) model.laying_sd_db = groups_[next++].sd_db;
+  const std::size_t placement = next;
+  if (terms_ >= Terms::kPlacement) model.laying_sd_db = groups_[next++].sd_db;
   if (terms_ >= Terms::kBodies) model.body_loss_db = effects[next++](0);
   const Eigen::Index robots = sets_.front().robots();
   for (std::size_t q = 0; q < sets_.size(); ++q) {
@@ -275,8 +276,8 @@ LinkModel Fit::run() {
     swarm.set = sets_[q].name;
     swarm.run_sd_db = run_sd_[q];
     swarm.pattern_db = model.pattern_db;
-    for (std::size_t n = 0; n < swarm.pattern_db.size() && terms_ >= Terms::kLaying; ++n)
-      swarm.pattern_db[n] += effects[laying](static_cast<Eigen::Index>(q * swarm.pattern_db.size() + n)) /
+    for (std::size_t n = 0; n < swarm.pattern_db.size() && terms_ >= Terms::kPlacement; ++n)
+      swarm.pattern_db[n] += effects[placement](static_cast<Eigen::Index>(q * swarm.pattern_db.size() + n)) /
                              static_cast<double>(n / 2 + 1);
     const Eigen::Index first = static_cast<Eigen::Index>(q) * robots;
     swarm.power_db = swarm.sensitivity_db = VectorXd::Zero(robots);
@@ -300,8 +301,8 @@ LinkModel Fit::run() {
     LinkModel::Swarm& swarm = model.swarms[row.set];
     const auto at = static_cast<Eigen::Index>(r);
     swarm.margin_db(row.receiver, row.sender) = margin_(at);
-    // A margin that is not known well means chances nearer to even: the one that gives them, with the noise of runs alone.
-    // Where everybody is heard, the model's distances know better.
+    // Uncertainty of a margin moves its probability towards one half: the equivalent margin with the noise of runs
+    // only. Between close robots the model's mean is used.
     const double wider = std::sqrt(1 + variance(at) / (swarm.run_sd_db * swarm.run_sd_db));
     const double even = row.distance_mm > kSurelyHeard_mm ? margin_(at) * (1 / wider - 1) : 0;
     if (terms_ >= Terms::kPairs) {
@@ -329,7 +330,7 @@ LinkModel Fit::run() {
 
 Eigen::MatrixXd on_share(const GridSet& set) {
   const Eigen::Index robots = set.robots();
-  // What a link that is on still loses to collisions: as those that are always on.
+  // Collision loss of links that are on, taken from links that are always on.
   double heard = 0, near = 0;
   for (const GridRun& run : set.runs) {
     for (int i = 0; i < robots; ++i) {
@@ -347,7 +348,7 @@ Eigen::MatrixXd on_share(const GridSet& set) {
       for (Eigen::Index j = 0; j < robots; ++j) {
         const double share = run.share(i, j);
         if (share < 0) continue;
-        // A link is on or off; only few are heard in a part of a run.
+        // A link is on or off; few are received in a part of a run.
         on(i, j) += share >= kOn ? 1 : share / heard;
         known(i, j) += 1;
       }

@@ -1,6 +1,6 @@
-/// Who hears whom, estimated from runs: the terms of the propagation model as a Gaussian prior over the margins of all links, a
-/// link being on in a run where its margin and that run's noise are above 0 (probit). Spreads by expectation-maximisation
-/// about the mode (Laplace's approximation).
+/// Link model: a Gaussian prior over the margins of all links with a probit observation model. A link is on in a
+/// run if margin plus the run's noise exceeds 0. Variances by expectation maximisation about the mode (Laplace
+/// approximation).
 #pragma once
 
 #include <Eigen/Dense>
@@ -12,8 +12,8 @@
 
 namespace kilotwin::radio_fit {
 
-/// Which terms the model has; each includes the ones above it.
-enum class Terms { kDistance, kPattern, kLaying, kBodies, kRobots, kBearings, kPairs };
+/// Nested models: each includes the previous terms.
+enum class Terms { kDistance, kPattern, kPlacement, kBodies, kRobots, kBearings, kPairs };
 
 struct LinkModel {
   Terms terms = Terms::kDistance;
@@ -22,42 +22,42 @@ struct LinkModel {
   double body_loss_db = 0, laying_sd_db = 0;
   double power_sd_db = 0, sensitivity_sd_db = 0, power_bearing_sd_db = 0, sensitivity_bearing_sd_db = 0;
   double pair_sd_db = 0, link_sd_db = 0;
-  /// Of one set: its robots and links, and what changes from run to run.
+  /// Robots and links of one set, and the noise of its runs.
   struct Swarm {
     std::string set;
     double run_sd_db = 1;
-    std::vector<double> pattern_db;  ///< the common one and what is this set's own
+    std::vector<double> pattern_db;  ///< common pattern plus the set's own
     Eigen::VectorXd power_db, sensitivity_db;
     Eigen::MatrixXd power_bearing_db, sensitivity_bearing_db;  ///< robots x 2: ahead, left
-    Eigen::MatrixXd link_db;                                   ///< receiver, sender
-    Eigen::MatrixXd margin_db;                                 ///< likewise: all terms together
+    Eigen::MatrixXd link_db;                                   ///< receiver x sender
+    Eigen::MatrixXd margin_db;                                 ///< receiver x sender: sum of all terms
   };
   std::vector<Swarm> swarms;
 
-  /// What is not of links.
+  /// Parameters other than links.
   struct Timing {
     double packet_sd_db = 0.15, notice_db = 0, oscillator_sd = 0.005;
-    Eigen::VectorXd oscillator;  ///< per robot, where known; else empty
+    Eigen::VectorXd oscillator;  ///< per robot if known, else empty
   };
 
-  /// For the runs of one set, with its robots.
+  /// Radio model for a set, with its robots.
   [[nodiscard]] proto::Radio radio(const Swarm& swarm, const Timing& timing) const;
-  /// Robots and links drawn; what changes from run to run is as in `swarm`.
+  /// Radio model with random robots and links. The noise of runs is that of `swarm`.
   [[nodiscard]] proto::Radio population(const Swarm& swarm, const Timing& timing) const;
 };
 
 /// Harmonics of the pattern.
 inline constexpr int kHarmonics = 8;
-/// Distances between which links are neither all heard nor all silent, and from which on links are fitted to, mm.
+/// Distances, mm: below the first all links are on, beyond the second none is; links are fitted from the third on.
 inline constexpr double kSurelyHeard_mm = 105, kNeverHeard_mm = 200, kFitted_mm = 95;
 
-/// How much of the line between two robots lies within others, in diameters.
+/// Length of the line between two robots that other robots cover, in diameters.
 [[nodiscard]] double bodies_between(const GridSet& set, int a, int b);
 
-/// Share of the runs in which each link was on, receiver by sender; below 0 where nothing is known.
+/// Share of runs in which each link was on, receiver x sender; below 0 if unknown.
 [[nodiscard]] Eigen::MatrixXd on_share(const GridSet& set);
 
-/// Range, pattern and spreads are common to the sets; robots, links and the noise of runs are each set's own.
+/// Range, pattern and variances are common to all sets. Robots, links and noise of runs belong to each set.
 [[nodiscard]] LinkModel fit_links(const std::vector<GridSet>& sets, Terms terms);
 
 }  // namespace kilotwin::radio_fit

@@ -29,7 +29,7 @@ constexpr double kSixteenTicks_s = 16 * 0.032768;
 constexpr std::uint64_t kFirstSeed = 1000, kFirstSwarm = 5000;
 constexpr double kFar_mm = 125;
 
-/// One effect, added to those before it.
+/// One effect, in addition to the previous ones.
 struct Step {
   std::string name, added;
   std::vector<std::string> covariates;
@@ -65,7 +65,7 @@ class Loop {
   void add_links();
   void add_packets();
   void add_oscillators();
-  void add_notice();
+  void add_carrier_sense();
   void fit_oscillators(int rounds);
   void fit_wander();
   [[nodiscard]] LinkModel::Timing drawn() const;
@@ -85,7 +85,8 @@ class Loop {
 };
 
 std::string text_of(const Evidence& e) {
-  return fmt::format("{}: {:.2f}, by chance {:.2f} +- {:.2f}", e.what, e.explained, e.by_chance, e.by_chance_sd);
+  return fmt::format("{}: {:.2f}, {:.2f} +- {:.2f} under permutation", e.what, e.explained, e.by_chance,
+                     e.by_chance_sd);
 }
 
 Json json_of(const Evidence& e) {
@@ -113,7 +114,7 @@ Radios Loop::fitted(const LinkModel& model) const {
   return radios;
 }
 
-/// Mean difference of reception up to 105 mm, over the sets.
+/// Mean difference of reception up to 105 mm over the sets.
 double near_error(const std::vector<GridSet>& sets, const proto::Radio& radio) {
   double sum = 0;
   for (const GridSet& set : sets)
@@ -139,7 +140,7 @@ void Loop::add_simple() {
     radio.mutable_simple()->set_contention(contention);
   };
   tune();
-  add({"the seed's model",
+  add({"ARGoS model",
        fmt::format("2 Hz, sending error 0.008, range {:.0f} mm, contention {:.2f}: tuned to the mean "
                    "reception",
                    distance.range_mm, radio.simple().contention()),
@@ -152,7 +153,7 @@ void Loop::add_simple() {
   for (const GridSet& set : train_) sent += statistics(set).sent / static_cast<double>(train_.size());
   radio.mutable_simple()->set_interval_s(kSixteenTicks_s);
   tune();
-  add({"own clock",
+  add({"clock per robot",
        fmt::format("a message every 16 kilo_ticks (contention {:.2f})", radio.simple().contention()),
        {"time"},
        fmt::format("robots send {:.1f} in 4800 of their kilo_ticks, at most 301: one in {:.2f}", sent, 4800 / sent),
@@ -163,7 +164,7 @@ void Loop::add_simple() {
   disc.set_model(proto::Radio::DISC);
   disc.set_range_mm(distance.range_mm);
   const Evidence hidden = hidden_terminal_evidence(train_);
-  add({"packets in time",
+  add({"packet timing",
        "packets of 4.371 ms, carrier sense from the start pulse, collisions where two overlap; nothing is tuned",
        {"neighbours"},
        text_of(hidden),
@@ -198,7 +199,7 @@ void Loop::add_links() {
        {}},
       fitted(model_));
 
-  // What the data show beside the model so far, then the model with it.
+  // Evidence in the residuals for the next effect, then the model with it.
   const auto step = [&](const char* name, auto evidence_of, Terms terms, auto words,
                         std::vector<std::string> covariates) {
     const Evidence evidence = evidence_of(train_, model_);
@@ -206,13 +207,9 @@ void Loop::add_links() {
     add({name, words(), std::move(covariates), text_of(evidence), json_of(evidence), {}}, fitted(model_));
   };
   step("bearing", bearing_evidence, Terms::kPattern,
-       [&] { return std::string("power of all robots over the bearing, 8 harmonics"); }, {"heading"});
-  step("laying", laying_evidence, Terms::kLaying,
-       [&] {
-         return fmt::format("a pattern of each set's own, as robots lie and face, sd {:.2f} dB",
-                            model_.laying_sd_db);
-       },
-       {"heading"});
+       [&] { return std::string("common transmit pattern over the bearing, 8 harmonics"); }, {"heading"});
+  step("placement", placement_evidence, Terms::kPlacement,
+       [&] { return fmt::format("a pattern per placement, sd {:.2f} dB", model_.laying_sd_db); }, {"heading"});
   step("bodies in between", body_evidence, Terms::kBodies,
        [&] { return fmt::format("{:.2f} dB for each", model_.body_loss_db); }, {"neighbours"});
   step("robots", robot_evidence, Terms::kRobots,
@@ -229,13 +226,13 @@ void Loop::add_links() {
        {"robot", "heading"});
   step("pairs", pair_evidence, Terms::kPairs,
        [&] {
-         return fmt::format("what a pair has, sd {:.2f} dB, and each direction of it, {:.2f} dB", model_.pair_sd_db,
+         return fmt::format("per pair, sd {:.2f} dB, and per direction, {:.2f} dB", model_.pair_sd_db,
                             model_.link_sd_db);
        },
        {"robot", "neighbours"});
 }
 
-/// Packets of one run differ: how many links are heard in part says by how much.
+/// Loss of single packets: from the number of links with partial reception.
 void Loop::add_packets() {
   const auto partial = [&](double sd_db) {
     timing_.packet_sd_db = sd_db;
@@ -256,7 +253,7 @@ void Loop::add_packets() {
     chosen = sd_db;
   }
   timing_.packet_sd_db = chosen;
-  add({"packets of a run",
+  add({"packet noise",
        fmt::format("noise from packet to packet, sd {:.2f} dB", chosen),
        {"time"},
        fmt::format("of (link, run) of 125..200 mm {:.3f} are heard in part; simulated with 0.15 dB {:.3f}, with "
@@ -267,9 +264,10 @@ void Loop::add_packets() {
       fitted(model_));
 }
 
-/// A robot whose clock is fast runs into those before it, again and again, and waits: what it sends tells its rate.
+/// A robot with a fast clock meets ongoing transmissions more often and waits: its number of messages determines
+/// its rate.
 void Loop::fit_oscillators(int rounds) {
-  // A message less in 300 for 1/300 of the rate, where robots queue; where they do not, less. Steps below 1 converge.
+  // One message in 300 corresponds to 1/300 of the rate under saturation, less otherwise. Steps below 1 converge.
   constexpr double kStep = 0.7 / 300;
   Eigen::VectorXd& rate = timing_.oscillator;
   for (int round = 0; round < rounds; ++round) {
@@ -288,7 +286,7 @@ void Loop::fit_oscillators(int rounds) {
   }
 }
 
-/// Rates are not the same in every run: the spread with which the fitted runs are likeliest.
+/// Clock rates vary between runs: the maximum-likelihood spread.
 void Loop::fit_wander() {
   double best = -1e9, chosen = 0;
   for (const double sd : {0.0, 0.0005, 0.001, 0.002, 0.003, 0.004, 0.005}) {
@@ -323,9 +321,9 @@ void Loop::add_oscillators() {
       fitted(model_));
 }
 
-/// What is too weak to be read is noticed all the same, so that robots wait for those whom they do not receive.
-void Loop::add_notice() {
-  const Evidence notice = notice_evidence(train_);
+/// Carrier sense at levels below reception: robots wait for senders that they cannot receive.
+void Loop::add_carrier_sense() {
+  const Evidence notice = hidden_sender_evidence(train_);
   double best = 1e9, chosen = 0;
   for (const double notice_db : {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0}) {
     timing_.notice_db = notice_db;
@@ -342,8 +340,8 @@ void Loop::add_notice() {
   }
   timing_.notice_db = chosen;
   fit_oscillators(3);
-  add({"noticed, not heard",
-       fmt::format("signals are noticed down to {:.2f} dB below what is heard", chosen),
+  add({"carrier sense below reception",
+       fmt::format("carrier sense detects signals down to {:.2f} dB below the reception level", chosen),
        {"neighbours"},
        text_of(notice),
        json_of(notice),
@@ -351,7 +349,7 @@ void Loop::add_notice() {
       fitted(model_));
 }
 
-/// With clocks drawn, too: own rates and what changes from run to run, together.
+/// With random clocks: own rates and variation between runs.
 LinkModel::Timing Loop::drawn() const {
   LinkModel::Timing timing = timing_;
   const double own = timing.oscillator.squaredNorm() / static_cast<double>(timing.oscillator.size());
@@ -360,7 +358,7 @@ LinkModel::Timing Loop::drawn() const {
   return timing;
 }
 
-/// Swarms of other robots than those measured: does what was measured look like one of them?
+/// Predictive check with new robots: is the measured set typical of the population?
 void Loop::draw_population() {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     const proto::Radio radio = model_.population(model_.swarms[q], drawn());
@@ -407,11 +405,11 @@ void Loop::write_models() const {
     google::protobuf::TextFormat::PrintToString(model, &text);
     write_text(options_.out / name, "# " + about + "\n" + text);
   };
-  // Laid once and left alone, robots differ less from run to run: the least of the sets.
+  // Undisturbed placements vary least between runs: uses the smallest noise of the sets.
   const auto steadiest = std::min_element(model_.swarms.begin(), model_.swarms.end(),
                                           [](const auto& a, const auto& b) { return a.run_sd_db < b.run_sd_db; });
   write(model_.population(*steadiest, drawn()), "model.txtpb",
-        "Range, pattern and spreads, fitted to all sets; robots and pairs are drawn.");
+        "Range, pattern and variances, fitted to all sets; robots and pairs are random.");
   for (std::size_t q = 0; q < train_.size(); ++q) {
     write(model_.radio(model_.swarms[q], timing_), "model-" + train_[q].name + ".txtpb",
           "The same with the robots and pairs of " + train_[q].name + ".");
@@ -434,7 +432,7 @@ void Loop::write_result() const {
   Json result;
   result["effects"] = Json::array();
   std::string table =
-      "| effect | in the data | added | set | sent | near | far | silent | senders | runs | likelihood | deficit "
+      "| effect | evidence | added | set | sent | near | far | silent | senders | runs | likelihood | deficit "
       "|\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const Step& step : steps_) {
@@ -454,13 +452,13 @@ void Loop::write_result() const {
                                      {"parameters", Json{{"added", step.added}}},
                                      {"errors", errors}});
   }
-  // What the fitted runs themselves would be as a prediction: no model of theirs can be expected to do better.
+  // Reference: the training runs as a prediction. No model of these robots can be expected to do better.
   for (std::size_t q = 0; q < train_.size(); ++q) {
     const Errors e = compare(test_[q], train_[q], train_[q]);
     result["fitted_runs_themselves"][train_[q].name] = json_of(e);
     table +=
         fmt::format("| {} | | | {} | {:+.1f} | {:.3f} | {:.3f} | {:+.3f} | {:+.3f} | {:+.3f} | {:.2f} | {:.2f} |\n",
-                    q == 0 ? "the fitted runs themselves" : "", train_[q].name, e.sent, e.near_worst, e.far_worst,
+                    q == 0 ? "training runs as prediction" : "", train_[q].name, e.sent, e.near_worst, e.far_worst,
                     e.silent, e.sender_spread, e.run_spread, e.log_likelihood, e.deficit);
   }
   Json shared{{"range_mm", model_.range_mm},
@@ -513,11 +511,10 @@ void Loop::write_figures() const {
   for (std::size_t q = 0; q < train_.size(); ++q) {
     recorder::Plot plot;
     plot.title = fmt::format("Reception over distance, {}", train_[q].name);
-    plot.subtitle =
-        fmt::format("{} runs that were not fitted to; {} simulated ones", test_[q].runs.size(), options_.runs);
+    plot.subtitle = fmt::format("{} held-out runs; {} simulated runs", test_[q].runs.size(), options_.runs);
     plot.x_name = "distance";
     plot.x_unit = "mm";
-    plot.y_name = "share of messages received";
+    plot.y_name = "reception share";
     const auto series = [&](const std::string& name, const Statistics& s) {
       recorder::PlotSeries& line = plot.series.emplace_back();
       line.name = name;
@@ -534,8 +531,8 @@ void Loop::write_figures() const {
     recorder::write_plot(plot, options_.out / ("reception-" + train_[q].name + ".svg"));
   }
   recorder::Plot plot;
-  plot.title = "What each effect brings";
-  plot.subtitle = "log-likelihood of runs that were not fitted to, below what the fitted runs' own means reach";
+  plot.title = "Gain of each effect";
+  plot.subtitle = "log-likelihood of held-out runs, below that of the training runs' means";
   plot.x_name = "effect";
   plot.y_name = "deficit per pair and run";
   plot.y_unit = "nat";
@@ -560,7 +557,7 @@ void Loop::go() {
   add_links();
   add_packets();
   add_oscillators();
-  add_notice();
+  add_carrier_sense();
   draw_population();
   write_models();
   write_result();

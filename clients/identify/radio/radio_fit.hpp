@@ -1,5 +1,5 @@
-/// The loop on measured grids of robots: from the seed's model of the radio to the full one, effect by effect, each with what
-/// in the data points to it and the errors on runs that were not fitted to.
+/// Fit of the radio model to measured grids: from the ARGoS model to the full one, effect by effect, with the
+/// evidence in the residuals and the errors on held-out runs.
 #pragma once
 
 #include <filesystem>
@@ -10,16 +10,17 @@ namespace kilotwin::radio_fit {
 
 struct FitOptions {
   std::filesystem::path train,
-      test;  ///< directories of comm_tau*_run*.dat; test empty: every other run of each set is held out
+      test;  ///< directories of comm_tau*_run*.dat; test empty: holds out every other run of each set
   std::filesystem::path out;
-  bool swap = false;  ///< fit to the half that is else held out, and test on the other
-  int runs = 40;      ///< simulated for each effect and set
-  int swarms = 200;   ///< drawn from the fitted population
-  /// Gets how far the work is, 0..1, and what each effect showed; none: that is said on the screen.
+  bool swap = false;  ///< exchanges training and held-out half
+  int runs = 40;      ///< simulated runs per effect and set
+  int swarms = 200;   ///< random swarms of the fitted population
+  /// Receives progress, 0..1, and the result of each effect; none: they are printed.
   std::function<void(double, const std::string&)> progress = {};
 };
 
-/// Writes model.txtpb (range, pattern and spreads), model-SET.txtpb (with that set's 25 robots), result.json, effects.md (the
+/// Writes model.txtpb (range, pattern, variances), model-SET.txtpb (with the robots of that set), result.json,
+/// effects.md (table) and figures. Throws UserError on unreadable data.
 /// table) and figures. Throws UserError where the data cannot be read.
 void fit_radio(const FitOptions& options);
 

@@ -1,4 +1,4 @@
-// The loop on measured grids of robots, as a program of its own.
+// The radio fit as a program of its own.
 #include <CLI/CLI.hpp>
 
 #include "clients/identify/radio/radio_fit.hpp"
@@ -7,15 +7,15 @@
 
 int main(int argc, char** argv) {
   using namespace kilotwin;
-  CLI::App app{"Fits the model of the radio to measured grids of robots (comm_tau*_run*.dat)"};
+  CLI::App app{"Fits the radio model to measured grids of robots (comm_tau*_run*.dat)"};
   radio_fit::FitOptions options;
-  app.add_option("--train", options.train, "directory of runs to fit to")->required();
-  app.add_option("--test", options.test, "directory of runs to test on; none: every other run of --train");
+  app.add_option("--train", options.train, "directory of training runs")->required();
+  app.add_option("--test", options.test, "directory of test runs; none: every other run of --train");
   app.add_option("--out", options.out, "directory for model.txtpb, result.json, effects.md and figures")
       ->required();
-  app.add_flag("--swap", options.swap, "fit to the half of the runs that is else held out");
-  app.add_option("--runs", options.runs, "simulated for each effect and set")->check(CLI::Range(4, 10000));
-  app.add_option("--swarms", options.swarms, "drawn from the fitted population")->check(CLI::Range(1, 10000));
+  app.add_flag("--swap", options.swap, "exchange training and held-out half");
+  app.add_option("--runs", options.runs, "simulated runs per effect and set")->check(CLI::Range(4, 10000));
+  app.add_option("--swarms", options.swarms, "random swarms of the fitted population")->check(CLI::Range(1, 10000));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

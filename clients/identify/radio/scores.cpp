@@ -11,12 +11,12 @@ namespace kilotwin::radio_fit {
 namespace {
 
 constexpr double kSilent = 0.02, kWhole = 0.6, kFar_mm = 125;
-/// A pair's mean and dispersion come from a few runs: so many runs' worth of its displacement class are added.
+/// Shrinks a pair's mean and dispersion towards its displacement class, with the weight of this many runs.
 constexpr double kPriorRuns = 0.5;
 
 double log_beta(double a, double b) { return std::lgamma(a) + std::lgamma(b) - std::lgamma(a + b); }
 
-/// Without the binomial coefficient, which is the same for all models.
+/// Log beta-binomial probability without the binomial coefficient, which is common to all models.
 double log_beta_binomial(double count, double of, double mean, double dispersion) {
   mean = std::clamp(mean, 1e-3, 1 - 1e-3);
   dispersion = std::clamp(dispersion, 1e-4, 0.98);

@@ -16,7 +16,7 @@ constexpr std::uint32_t kTickCycles = 1 << 18;
 constexpr double kTick_s = kTickCycles / 8e6;
 /// Motor value while driven: the calibrated duty of the model.
 constexpr std::uint8_t kDuty = 70;
-constexpr double kRadius_mm = kDiscs_mm / 2;
+constexpr double kRadius_mm = kDiscDiameter_mm / 2;
 
 /// Robots get their index in the scene as number, with their parameters.
 proto::Model renumbered(const proto::Model& model, const Scene& scene) {
@@ -77,12 +77,12 @@ RunPlan plan_of(const Scene& scene, const proto::Model& numbered_otherwise, std:
   e.add_robots()->set_count(static_cast<std::uint32_t>(scene.robots.size()));
   manifest.add_program()->set_path("replay");
   manifest.add_group_program(0);
-  const Room& room = scene.room;
+  const Walls& walls = scene.walls;
   double reach_mm = 0;
-  for (const double end : {room.x_low_mm, room.x_high_mm, room.y_low_mm, room.y_high_mm})
+  for (const double end : {walls.x_low_mm, walls.x_high_mm, walls.y_low_mm, walls.y_high_mm})
     if (std::isfinite(end)) reach_mm = std::max(reach_mm, std::abs(end));
   for (const Scene::Robot& robot : scene.robots) {
-    const double x_mm = room.inside_x(robot.x_mm), y_mm = room.inside_y(robot.y_mm);
+    const double x_mm = walls.inside_x(robot.x_mm), y_mm = walls.inside_y(robot.y_mm);
     manifest.add_x_mm(x_mm);
     manifest.add_y_mm(y_mm);
     manifest.add_heading_rad(robot.heading_rad);
@@ -95,16 +95,16 @@ RunPlan plan_of(const Scene& scene, const proto::Model& numbered_otherwise, std:
   if (!scene.contacts) {
     // The kinematic engine only knows the arena's own walls, symmetric about the origin.
     const auto both = [](double low, double high) { return 2 * (std::max(-low, high) + kRadius_mm); };
-    if (std::isfinite(room.x_low_mm + room.x_high_mm))
-      e.mutable_arena()->set_width_mm(both(room.x_low_mm, room.x_high_mm));
-    if (std::isfinite(room.y_low_mm + room.y_high_mm))
-      e.mutable_arena()->set_height_mm(both(room.y_low_mm, room.y_high_mm));
+    if (std::isfinite(walls.x_low_mm + walls.x_high_mm))
+      e.mutable_arena()->set_width_mm(both(walls.x_low_mm, walls.x_high_mm));
+    if (std::isfinite(walls.y_low_mm + walls.y_high_mm))
+      e.mutable_arena()->set_height_mm(both(walls.y_low_mm, walls.y_high_mm));
     return RunPlan(std::move(manifest));
   }
-  add_wall(e, true, room.x_low_mm, -1, length_mm);
-  add_wall(e, true, room.x_high_mm, 1, length_mm);
-  add_wall(e, false, room.y_low_mm, -1, length_mm);
-  add_wall(e, false, room.y_high_mm, 1, length_mm);
+  add_wall(e, true, walls.x_low_mm, -1, length_mm);
+  add_wall(e, true, walls.x_high_mm, 1, length_mm);
+  add_wall(e, false, walls.y_low_mm, -1, length_mm);
+  add_wall(e, false, walls.y_high_mm, 1, length_mm);
   return RunPlan(std::move(manifest));
 }
 
@@ -207,7 +207,7 @@ double robot_ticks(const Scene& scene) {
 
 Scene scene_of(const MotionModel& model, const PreparedSet& set, std::size_t run) {
   Scene scene;
-  scene.room = model.room;
+  scene.walls = model.walls;
   scene.contacts = model.contacts;
   for (const TrackView& view : set.views()) {
     if (view.run != run) continue;

@@ -16,7 +16,7 @@ struct Scene {
     const Track* track = nullptr;                ///< its commands and sample times
     double x_mm = 0, y_mm = 0, heading_rad = 0;  ///< disc centre at the first sample
   };
-  Room room;
+  Walls walls;
   bool contacts = true;   ///< true: the planar engine, robots collide; false: the kinematic engine
   std::uint32_t run = 0;  ///< value of the covariate RUN
   std::vector<Robot> robots;

@@ -71,7 +71,7 @@ Run run_of(const Scene& scene, std::vector<std::vector<Sample>> samples) {
 
 /// Scales simulated tallies to the weights of the measured ones: exclusion of contacts leaves different amounts of
 /// data.
-void weigh_as(const Tallies& measured, Tallies& simulated) {
+void match_weights(const Tallies& measured, Tallies& simulated) {
   for (std::size_t s = 0; s < measured.size(); ++s) {
     for (std::size_t u = 0; u < measured[s].size(); ++u) {
       const double own = simulated[s][u].total();
@@ -120,30 +120,29 @@ void add_plot(json& out, const Statistic& statistic, const Tally& measured, cons
   }
 }
 
-std::string words_of(const json& statistics, bool told, const char* unit) {
-  if (!told) return fmt::format("Too few {}s were seen to tell whether simulated ones differ.", unit);
+std::string words_of(const json& statistics, bool decidable, const char* unit) {
+  if (!decidable) return fmt::format("Too few {}s for the permutation test.", unit);
   std::vector<std::string> differ, differed;
   for (const json& s : statistics) {
     if (!s["agrees"].get<bool>()) differ.push_back(s["name"]);
     if (s["base_p"].get<double>() < kSurprise) differed.push_back(s["name"]);
   }
-  std::string out =
-      differ.empty()
-          ? "Simulated robots of this model are not told from measured ones by any of these"
-          : fmt::format("Simulated robots of this model differ from measured ones in {}", fmt::join(differ, ", "));
-  out += differed.empty() ? "; nor are those of the base model."
+  std::string out = differ.empty() ? "Simulations of this model agree with the measured tracks in all of these"
+                                   : fmt::format("Simulations of this model differ from the measured tracks in {}",
+                                                 fmt::join(differ, ", "));
+  out += differed.empty() ? "; so do those of the base model."
                           : fmt::format("; those of the base model differ in {}.", fmt::join(differed, ", "));
   if (!differ.empty() && differed.empty())
     out = fmt::format(
-        "Simulated robots of this model differ from measured ones in {}; those of the base model do not.",
+        "Simulations of this model differ from the measured tracks in {}; those of the base model do not.",
         fmt::join(differ, ", "));
   return out;
 }
 
 }  // namespace
 
-json simulated_check(const WrittenModel& base, const WrittenModel& full, PreparedSet& set, bool held_out_only,
-                     std::uint32_t threads) {
+json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet& set, bool held_out_only,
+                      std::uint32_t threads) {
   set.find_headings(full.fitted, threads);
   const std::size_t runs = set.set().runs.size();
   std::vector<Played> played;
@@ -165,7 +164,7 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
     played.push_back(std::move(p));
   }
   const BaseParameters& b = full.fitted.base;
-  const TrackStatistics statistics(tracks, full.fitted.room, std::hypot(b.ahead_mm - b.centre_mm, b.left_mm));
+  const TrackStatistics statistics(tracks, full.fitted.walls, std::hypot(b.ahead_mm - b.centre_mm, b.left_mm));
   if (statistics.list().empty() || cost * kFewestSeeds > kMostRobotTicks) return json::object();
   const auto seeds =
       static_cast<std::size_t>(std::clamp(kMostRobotTicks / cost, double{kFewestSeeds}, double{kMostSeeds}));
@@ -188,11 +187,11 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
       const Run run = run_of(scene, play(scene, written, 1 + k % seeds + p * 1000));
       add_run(run, played[p].compared, statistics, units, at, simulated[k]);
     }
-    weigh_as(measured, simulated[k]);
+    match_weights(measured, simulated[k]);
   });
 
   json out, list = json::array();
-  const bool told = units.count >= kFewestUnits;
+  const bool decidable = units.count >= kFewestUnits;
   bool agrees = true;
   std::vector<json> entries(statistics.list().size());
   in_parallel(entries.size(), threads, [&](std::size_t s) {
@@ -209,14 +208,14 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
                   {"distance", scale * is.distance},
                   {"by_chance_95", scale * is.by_chance_95},
                   {"p", is.p},
-                  {"agrees", told ? json(is.p >= kSurprise) : json()},
+                  {"agrees", decidable ? json(is.p >= kSurprise) : json()},
                   {"base_distance", scale * was.distance},
                   {"base_p", was.p}};
   });
   for (std::size_t s = 0; s < entries.size(); ++s) {
     const Statistic& statistic = statistics.list()[s];
     list.push_back(entries[s]);
-    if (told) agrees = agrees && entries[s]["agrees"].get<bool>();
+    if (decidable) agrees = agrees && entries[s]["agrees"].get<bool>();
     const auto sum = [&](std::size_t first) {
       Tally all = sum_of(statistic, simulated[first][s]);
       for (std::size_t k = first + 1; k < first + seeds; ++k) all.add(sum_of(statistic, simulated[k][s]));
@@ -231,8 +230,8 @@ json simulated_check(const WrittenModel& base, const WrittenModel& full, Prepare
                       {"units", units.count},
                       {"unit", unit},
                       {"statistics", list},
-                      {"agrees", told ? json(agrees) : json()},
-                      {"in_words", words_of(list, told, unit)}};
+                      {"agrees", decidable ? json(agrees) : json()},
+                      {"in_words", words_of(list, decidable, unit)}};
   return out;
 }
 

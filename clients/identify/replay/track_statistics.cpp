@@ -62,15 +62,15 @@ void Tally::scale(double by) {
 double Tally::total() const { return std::accumulate(weight.begin(), weight.end(), 0.0); }
 
 template <class Speed, class Turn>
-void TrackStatistics::stretches(const Track& track, const RunNeighbours* neighbours, std::size_t place,
-                                Speed&& speed, Turn&& turn) const {
+void TrackStatistics::motion_segments(const Track& track, const RunNeighbours* neighbours, std::size_t place,
+                                      Speed&& speed, Turn&& turn) const {
   const std::vector<Sample>& samples = track.samples;
   const CommandClock clock(track);
   double way_rad = 0, way_end_s = -1;  // direction and end of the previous displacement if it was long enough
   for (std::size_t i = 0; i + 1 < samples.size();) {
     const Sample& from = samples[i];
     std::size_t j = i + 1;
-    while (j < samples.size() && samples[j].time_s < from.time_s + stretch_s_ - 0.01) ++j;
+    while (j < samples.size() && samples[j].time_s < from.time_s + segment_s_ - 0.01) ++j;
     if (j == samples.size()) break;
     const Sample& to = samples[j];
     const double change_s = clock.next_change_s(from.time_s);
@@ -82,8 +82,8 @@ void TrackStatistics::stretches(const Track& track, const RunNeighbours* neighbo
       continue;
     }
     i = j;
-    if (!clock.at(from.time_s).driven() || lasts_s > 1.5 * stretch_s_ ||
-        (neighbours != nullptr && touches(from, to, *neighbours, place))) {
+    if (!clock.at(from.time_s).driven() || lasts_s > 1.5 * segment_s_ ||
+        (neighbours != nullptr && in_contact(from, to, *neighbours, place))) {
       way_end_s = -1;
       continue;
     }
@@ -104,24 +104,24 @@ void TrackStatistics::stretches(const Track& track, const RunNeighbours* neighbo
   }
 }
 
-bool TrackStatistics::touches(const Sample& from, const Sample& to, const RunNeighbours& neighbours,
-                              std::size_t place) const {
+bool TrackStatistics::in_contact(const Sample& from, const Sample& to, const RunNeighbours& neighbours,
+                                 std::size_t place) const {
   for (const Sample* s : {&from, &to})
-    if (room_.at_wall(s->x_mm, s->y_mm, kAtWall_mm + off_centre_mm_)) return true;
+    if (walls_.at_wall(s->x_mm, s->y_mm, kAtWall_mm + off_centre_mm_)) return true;
   for (double t = from.time_s; t <= to.time_s; t += RunNeighbours::kRaster_s)
-    if (neighbours.view(place, t).nearest_mm < kTouch_mm + 2 * off_centre_mm_) return true;
+    if (neighbours.view(place, t).nearest_mm < kContactRange_mm + 2 * off_centre_mm_) return true;
   return false;
 }
 
 double TrackStatistics::wall_distance_mm(const Sample& s) const {
-  return std::max(0.0, std::min({s.x_mm - room_.x_low_mm, room_.x_high_mm - s.x_mm, s.y_mm - room_.y_low_mm,
-                                 room_.y_high_mm - s.y_mm}));
+  return std::max(0.0, std::min({s.x_mm - walls_.x_low_mm, walls_.x_high_mm - s.x_mm, s.y_mm - walls_.y_low_mm,
+                                 walls_.y_high_mm - s.y_mm}));
 }
 
-TrackStatistics::TrackStatistics(const std::vector<const Track*>& tracks, const Room& room, double off_centre_mm)
-    : room_(room),
-      has_walls_(std::isfinite(room.x_low_mm) || std::isfinite(room.x_high_mm) || std::isfinite(room.y_low_mm) ||
-                 std::isfinite(room.y_high_mm)),
+TrackStatistics::TrackStatistics(const std::vector<const Track*>& tracks, const Walls& walls, double off_centre_mm)
+    : walls_(walls),
+      has_walls_(std::isfinite(walls.x_low_mm) || std::isfinite(walls.x_high_mm) || std::isfinite(walls.y_low_mm) ||
+                 std::isfinite(walls.y_high_mm)),
       off_centre_mm_(off_centre_mm) {
   std::vector<double> steps;
   first_s_ = 1e300;
@@ -133,10 +133,10 @@ TrackStatistics::TrackStatistics(const std::vector<const Track*>& tracks, const 
     first_s_ = std::min(first_s_, track->samples.front().time_s);
     last_s_ = std::max(last_s_, track->samples.back().time_s);
   }
-  stretch_s_ = std::max(stretch_s_, quantile(steps, 0.5));
+  segment_s_ = std::max(segment_s_, quantile(steps, 0.5));
   std::vector<double> speeds, turns;
   for (const Track* track : tracks) {
-    stretches(
+    motion_segments(
         *track, nullptr, 0, [&](double, double v) { speeds.push_back(v); },
         [&](double w) { turns.push_back(std::abs(w)); });
   }
@@ -181,7 +181,7 @@ std::vector<Tally> TrackStatistics::tally(const Track& track, const RunNeighbour
   const auto of = [&](const Tally* tally) -> const Statistic& {
     return list_[static_cast<std::size_t>(tally - tallies.data())];
   };
-  stretches(
+  motion_segments(
       track, &neighbours, place,
       [&](double time_s, double v) {
         if (speed != nullptr) count(of(speed), *speed, v);
@@ -246,7 +246,7 @@ Comparison compare(const Statistic& statistic, const std::vector<Tally>& measure
                    const std::vector<std::vector<Tally>>& simulated) {
   const Random random(20180729);
   // Distance after the marked units have exchanged their labels.
-  const auto apart = [&](const std::vector<bool>& exchanged) {
+  const auto permuted_distance = [&](const std::vector<bool>& exchanged) {
     double sum = 0;
     for (const std::vector<Tally>& simulation : simulated) {
       Tally a{std::vector<double>(statistic.bins()), std::vector<double>(statistic.bins())}, b = a;
@@ -260,17 +260,17 @@ Comparison compare(const Statistic& statistic, const std::vector<Tally>& measure
   };
   std::vector<bool> exchanged(measured.size(), false);
   Comparison out;
-  out.distance = apart(exchanged);
-  std::vector<double> by_chance;
-  std::uint32_t as_far = 0;
+  out.distance = permuted_distance(exchanged);
+  std::vector<double> null_distances;
+  std::uint32_t exceedances = 0;
   for (std::uint32_t k = 0; k < kExchanges; ++k) {
     for (std::uint32_t u = 0; u < measured.size(); ++u)
       exchanged[u] = random.uniform(Stream::kLayout, u, Tick{k}, 0) < 0.5;
-    by_chance.push_back(apart(exchanged));
-    if (by_chance.back() >= out.distance * (1 - 1e-12)) ++as_far;
+    null_distances.push_back(permuted_distance(exchanged));
+    if (null_distances.back() >= out.distance * (1 - 1e-12)) ++exceedances;
   }
-  out.by_chance_95 = quantile(by_chance, 0.95);
-  out.p = (1.0 + as_far) / (1.0 + kExchanges);
+  out.by_chance_95 = quantile(null_distances, 0.95);
+  out.p = (1.0 + exceedances) / (1.0 + kExchanges);
   return out;
 }
 

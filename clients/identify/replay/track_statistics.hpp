@@ -39,7 +39,7 @@ struct Tally {
 class TrackStatistics {
  public:
   /// `off_centre_mm`: distance of the tracked point from the disc centre.
-  TrackStatistics(const std::vector<const Track*>& tracks, const Room& room, double off_centre_mm);
+  TrackStatistics(const std::vector<const Track*>& tracks, const Walls& walls, double off_centre_mm);
 
   [[nodiscard]] const std::vector<Statistic>& list() const { return list_; }
   /// One tally per statistic, for the track at index `place` of a run.
@@ -49,14 +49,15 @@ class TrackStatistics {
   /// Calls speed(midpoint s, mm/s) and turn(rad/s) for motion segments of driven robots. With neighbours: segments
   /// without contacts only.
   template <class Speed, class Turn>
-  void stretches(const Track&, const RunNeighbours*, std::size_t place, Speed&&, Turn&&) const;
-  [[nodiscard]] bool touches(const Sample& from, const Sample& to, const RunNeighbours&, std::size_t place) const;
+  void motion_segments(const Track&, const RunNeighbours*, std::size_t place, Speed&&, Turn&&) const;
+  [[nodiscard]] bool in_contact(const Sample& from, const Sample& to, const RunNeighbours&,
+                                std::size_t place) const;
   [[nodiscard]] double wall_distance_mm(const Sample&) const;
 
-  Room room_;
+  Walls walls_;
   bool has_walls_;
   double off_centre_mm_;
-  double stretch_s_ = 2, first_s_ = 0, last_s_ = 0;
+  double segment_s_ = 2, first_s_ = 0, last_s_ = 0;
   std::vector<Statistic> list_;
 };
 

@@ -43,12 +43,12 @@ std::string maps(const json& all, Figures& figures) {
         done.insert(stem + "_y");
         out += figures.pair(plot_arrows(figures.plots(), *x, *y, "before"),
                             plot_arrows(figures.plots(), *x, *y, "after"),
-                            fmt::format("What is left in the {}, over the arena", words_of(stem)));
+                            fmt::format("Residual {} over the arena", words_of(stem)));
         continue;
       }
     }
     out += figures.pair(plot_map(figures.plots(), map, "before"), plot_map(figures.plots(), map, "after"),
-                        fmt::format("What is left in the {}, over the arena", words_of(target)));
+                        fmt::format("Residual {} over the arena", words_of(target)));
   }
   return out;
 }
@@ -80,15 +80,15 @@ std::string figures_of(const json& object) {
 std::string better_lead(const json& contract) {
   std::string out;
   if (const std::string how = text(part(contract, "improvement"), "bounds_how"); !how.empty())
-    out += "Bounds: " + escaped(how) + ". ";
+    out += "Intervals: " + escaped(how) + ". ";
   if (const std::string how = text(contract, "noise_floor_how"); !how.empty())
-    out += "The floor: " + escaped(how) + ".";
+    out += "Noise floor: " + escaped(how) + ".";
   const json& again = part(contract, "replicates");
   if (const auto floor = number(again, "floor_mm")) {
     out += fmt::format(
-        " Where robots were told the same in several runs ({} times), what did not repeat is <b>{} mm</b>: no "
-        "model of "
-        "robot, time and command foresees it; what did repeat, and is left, is {} mm.",
+        " Replicates: the same commands were repeated in several runs ({} groups). The error that differs between "
+        "repetitions is <b>{} mm</b>; no model of robot, time and command can predict it. The remaining repeatable "
+        "error is {} mm.",
         text(again, "groups"), figure(floor), figure(number(again, "repeatable_mm")));
   }
   return out;
@@ -125,44 +125,43 @@ std::string report_html(const json& document) {
       text(document, "headline").empty() ? headline(contract) : escaped(text(document, "headline")),
       text(document, "verdict").empty() ? verdict(contract) : escaped(text(document, "verdict")),
       part(document, "bars").is_array() ? given_bars(part(document, "bars")) : bars(contract));
-  page += section("why", "Why", "", cards(contract, document, figures));
+  page += section("why", "Effects", "", cards(contract, document, figures));
   const std::size_t effects = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
   const Errors errors = errors_of(contract);
-  std::string better = figures.place(plot_horizon(gnuplot, part(document, "horizon")),
-                                     "Error over how far ahead robots are predicted");
+  std::string better =
+      figures.place(plot_horizon(gnuplot, part(document, "horizon")), "Prediction error over the horizon");
   if (effects > 0) {
     better += figures.place(plot_steps(gnuplot, part(document, "steps"), errors.floor.value_or(std::nan(""))),
-                            "Error as the model grew, one effect at a time; dashed: the floor");
+                            "Error after each accepted effect; dashed: noise floor");
   }
   const std::string robots =
-      figures.place(plot_robots(gnuplot, part(document, "robots")), "Each robot's error, largest first");
+      figures.place(plot_robots(gnuplot, part(document, "robots")), "Error per robot, largest first");
   // A full-width plot if there are many robots.
   const json& all_robots = part(document, "robots");
   const bool many = all_robots.is_array() && all_robots.size() > 24;
   if (!many) better += robots;
   if (!better.empty()) better = "<div class=\"grid\">" + better + "</div>\n";
   if (many) better += robots;
-  page += section("better", "By how much it is better", better_lead(contract), better);
+  page += section("better", "Improvement", better_lead(contract), better);
   page += given_tables(part(document, "tables"));
-  page +=
-      section("faults", "Faults of the data",
-              "Excluded before anything was fitted. They are slips of the measurement, and no property of robots.",
-              fault_list(contract));
-  page +=
-      section("maps", "Where",
-              "Residuals over the arena, before and after, in the same colours. A good model leaves no pattern.",
-              maps(part(document, "maps"), figures));
-  page += section("simulated", "Simulated beside measured", simulated_lead(contract),
-                  simulated_body(contract, document, figures));
+  page += section("faults", "Faults of the data",
+                  "Excluded before the fit. These are faults of the measurement, not properties of the robots.",
+                  fault_list(contract));
   page += section(
-      "traced", "What residuals depend on",
-      "Means of what the models leave, with two standard errors. A good model leaves none beside the line at 0.",
-      traced(contract, plots, figures));
-  page += section("table", "The effects and their evidence", "", effects_table(contract));
-  page += section("ambiguous", "What these data cannot tell apart", "", ambiguous_list(contract));
-  page += section("rejected", "Tried and rejected",
-                  "The strongest of what was tried and is not beyond chance, many trials allowed for.",
-                  rejected_table(contract));
+      "maps", "Residual maps",
+      "Residuals over the arena, before and after, on the same colour scale. A good model leaves no pattern.",
+      maps(part(document, "maps"), figures));
+  page += section("simulated", "Simulation check", simulated_lead(contract),
+                  simulated_body(contract, document, figures));
+  page += section("traced", "Residuals over covariates",
+                  "Mean residuals with two standard errors. A good model leaves means near 0.",
+                  covariate_section(contract, plots, figures));
+  page += section("table", "Effects and their evidence", "", effects_table(contract));
+  page += section("ambiguous", "Ambiguous effects", "", ambiguous_list(contract));
+  page +=
+      section("rejected", "Rejected hypotheses",
+              "The most significant hypotheses that were not accepted. The thresholds correct for multiple tests.",
+              rejected_table(contract));
   std::string model;
   for (const auto& [key, title] : {std::pair{"base", "Drive"}, {"noise", "Noise"}}) {
     const std::string table = figures_of(part(contract, key));
@@ -170,9 +169,9 @@ std::string report_html(const json& document) {
   }
   if (const std::string table = figures_of(part(document, "set")); !table.empty())
     model += "<div><h3>Data</h3>" + table + "</div>\n";
-  page += section("model", "The base model and the data", "",
-                  model.empty() ? "" : "<div class=\"thirds\">" + model + "</div>");
-  return html::page("Kilotwin: what these robots' motion depends on", figures.filled(std::move(page)));
+  page +=
+      section("model", "Base model and data", "", model.empty() ? "" : "<div class=\"thirds\">" + model + "</div>");
+  return html::page("Kilotwin: identification report", figures.filled(std::move(page)));
 }
 
 void write_report(const json& document, const std::filesystem::path& file) {

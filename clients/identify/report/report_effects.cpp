@@ -81,27 +81,27 @@ std::string cards(const json& contract, const json& document, Figures& figures) 
         out += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(name), escaped(value.get<std::string>()));
     } else {
       if (number(effect, "share_removed"))
-        fact("takes away", percent(number(effect, "share_removed")) + " of the squared error");
+        fact("removes", percent(number(effect, "share_removed")) + " of the mean square error");
       if (number(effect, "rmse_without_mm"))
-        fact("without it", "the error is " + figure(number(effect, "rmse_without_mm")) + " mm");
+        fact("without it", "error " + figure(number(effect, "rmse_without_mm")) + " mm");
       const auto family = number(evidence, "p_family");
       const auto log10_p = family ? std::log10(std::max(*family, 1e-300)) : number(evidence, "log10_p");
-      if (log10_p) fact("by chance", chance(log10_p));
+      if (log10_p) fact("p value", chance(log10_p));
     }
     out += "</dl></div>";
     out += "<div>";
     std::string plots;
     for (const json& map : part(document, "effect_maps")) {
       if (text(map, "name") == text(effect, "name") && !text(effect, "name").empty())
-        plots += figures.place(plot_effect_map(figures.plots(), map), "The effect, as it is in the model");
+        plots += figures.place(plot_effect_map(figures.plots(), map), "The fitted effect");
     }
     for (const json& curve : part(document, "effect_curves")) {
       if (text(curve, "name") == text(effect, "name") && !text(effect, "name").empty())
-        plots += figures.place(plot_effect(figures.plots(), curve), "The effect, as it is in the model");
+        plots += figures.place(plot_effect(figures.plots(), curve), "The fitted effect");
     }
     const json* plot = covariate_plots.is_array() && plots.empty() ? plot_for(effect, covariate_plots) : nullptr;
     if (plot != nullptr && shown.insert(plot).second)
-      plots += figures.place(plot_covariate(figures.plots(), *plot), "What it left in the residuals");
+      plots += figures.place(plot_covariate(figures.plots(), *plot), "Residuals without the effect");
     out += plots;
     out += "</div></article>\n";
   }
@@ -111,8 +111,8 @@ std::string cards(const json& contract, const json& document, Figures& figures) 
 std::string effects_table(const json& contract) {
   const json& effects = part(contract, "effects");
   if (!effects.is_array() || effects.empty()) return "";
-  html::Table table({"effect", "depends on", "acts on", "form", "by chance", "gain in log-likelihood",
-                     "on data held out", "error without it, mm", "share"});
+  html::Table table({"effect", "depends on", "acts on", "form", "p value", "gain in log-likelihood",
+                     "held-out gain", "error without it, mm", "share of mean square error"});
   for (const json& effect : effects) {
     const json& evidence = part(effect, "evidence");
     const auto held = number(evidence, "held_out_gain"), se = number(evidence, "held_out_gain_se");
@@ -132,15 +132,15 @@ std::string rejected_table(const json& contract) {
   if (!rejected.is_array() || rejected.empty()) return "";
   const bool reasons =
       std::any_of(rejected.begin(), rejected.end(), [](const json& tried) { return !text(tried, "why").empty(); });
-  std::vector<std::string> heads = {"tried", "depends on", "acts on", "chance of as much", "needed"};
-  if (reasons) heads.emplace_back("why not");
+  std::vector<std::string> heads = {"hypothesis", "depends on", "acts on", "p value", "threshold"};
+  if (reasons) heads.emplace_back("reason");
   html::Table table(std::move(heads));
   for (const json& tried : rejected) {
     const json& found = part(contract, "effects");
     const bool more = std::any_of(found.begin(), found.end(), [&](const json& effect) {
       return !text(effect, "name").empty() && text(effect, "name") == text(tried, "name");
     });
-    std::vector<std::string> cells = {(more ? "more of " : "") + escaped(text(tried, "name")),
+    std::vector<std::string> cells = {(more ? "further term of " : "") + escaped(text(tried, "name")),
                                       escaped(covariates_of(tried)), acts_on_of(tried),
                                       chance(number(tried, "log10_p")), chance(number(tried, "threshold_log10_p"))};
     if (reasons) cells.push_back(escaped(text(tried, "why")));
@@ -152,15 +152,16 @@ std::string rejected_table(const json& contract) {
 std::string ambiguous_list(const json& contract) {
   std::string out;
   for (const json& pair : part(contract, "ambiguous")) {
-    out += fmt::format(
-        "<li>Found: <b>{}</b>. <b>{}</b> would explain the data about as well (log-likelihood {} lower). {}</li>\n",
-        escaped(text(pair, "found")), escaped(text(pair, "instead")),
-        figure(number(pair, "log_likelihood_difference")), escaped(text(pair, "experiment")));
+    const std::string experiment = text(pair, "experiment");
+    out += fmt::format("<li>Accepted: <b>{}</b>. Alternative: <b>{}</b> (log-likelihood {} lower).{}</li>\n",
+                       escaped(text(pair, "found")), escaped(text(pair, "instead")),
+                       figure(number(pair, "log_likelihood_difference")),
+                       experiment.empty() ? "" : " To separate them: " + escaped(experiment) + ".");
   }
   return out.empty() ? "" : "<ul>" + out + "</ul>\n";
 }
 
-std::string traced(const json& contract, const json& covariate_plots, Figures& figures) {
+std::string covariate_section(const json& contract, const json& covariate_plots, Figures& figures) {
   if (!covariate_plots.is_array()) return "";
   const json& effects = part(contract, "effects");
   // Strongest first. Weaker plots show no pattern.
@@ -187,8 +188,7 @@ std::string traced(const json& contract, const json& covariate_plots, Figures& f
   }
   std::string out = shown.empty() ? "" : "<div class=\"grid\">" + shown + "</div>\n";
   if (!folded.empty())
-    out += "<details><summary>The others, in which less is seen</summary><div class=\"grid\">" + folded +
-           "</div></details>\n";
+    out += "<details><summary>Other covariates</summary><div class=\"grid\">" + folded + "</div></details>\n";
   return out;
 }
 

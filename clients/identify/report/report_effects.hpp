@@ -14,6 +14,6 @@ namespace kilotwin::identify::report {
 [[nodiscard]] std::string rejected_table(const json& contract);
 [[nodiscard]] std::string ambiguous_list(const json& contract);
 /// Residuals over covariates: those of accepted effects and those with a remaining pattern. The others are folded.
-[[nodiscard]] std::string traced(const json& contract, const json& covariate_plots, Figures&);
+[[nodiscard]] std::string covariate_section(const json& contract, const json& covariate_plots, Figures&);
 
 }  // namespace kilotwin::identify::report

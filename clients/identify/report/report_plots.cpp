@@ -127,20 +127,20 @@ std::string words_of(const std::string& name) {
                                                             {"TURN_RATE", "turning"},
                                                             {"BODY_DRIFT", "drift"},
                                                             {"WORLD_DRIFT", "drift"},
-                                                            {"MEASURED_OFFSET", "the tracker's error"},
+                                                            {"MEASURED_OFFSET", "measurement error"},
                                                             {"MEASURED_BODY_OFFSET", "tracked point"},
-                                                            {"MEASURED_SCALE", "the tracker's scale"},
-                                                            {"MEASURED_HEADING", "the tracker's error"},
+                                                            {"MEASURED_SCALE", "camera scale"},
+                                                            {"MEASURED_HEADING", "measurement error"},
                                                             {"nearest", "distance to the nearest robot"},
                                                             {"bearing", "direction to the nearest robot"},
                                                             {"left", "residual to the left"},
                                                             {"residual", "predicted position"},
                                                             {"residual_x", "residual along x"},
                                                             {"residual_y", "residual along y"},
-                                                            {"driven_time", "time for which it was driven"},
-                                                            {"radius", "distance from the middle"},
-                                                            {"forward", "speed ahead"},
-                                                            {"sideways", "slip sideways"},
+                                                            {"driven_time", "driven time"},
+                                                            {"radius", "distance from the centre"},
+                                                            {"forward", "forward speed"},
+                                                            {"sideways", "sideways slip"},
                                                             {"turn", "turning"},
                                                             {"world_x", "drift along x"},
                                                             {"world_y", "drift along y"},
@@ -152,12 +152,12 @@ std::string words_of(const std::string& name) {
                                                             {"position", "place"},
                                                             {"command", "command"},
                                                             {"time_since_command", "time since the command"},
-                                                            {"motor_time", "motor's own running time"},
+                                                            {"motor_time", "motor-on time"},
                                                             {"neighbours", "neighbours"},
-                                                            {"world_frame", "direction in the room"},
-                                                            {"measurement", "the tracker"},
+                                                            {"world_frame", "world frame"},
+                                                            {"measurement", "measurement"},
                                                             {"robot", "robot"},
-                                                            {"history", "what was before"},
+                                                            {"history", "history"},
                                                             {"heading", "heading"}};
   const auto at = kWords.find(name);
   if (at != kWords.end()) return at->second;
@@ -176,7 +176,7 @@ PlotNumber plot_horizon(Gnuplot& plots, const json& horizon) {
       "key top left\n";
   commands +=
       "plot $d using 1:2 with linespoints lt 1 title 'before', $d using 1:3 with linespoints lt 2 title 'after'";
-  if (any_finite(floor)) commands += ", $d using 1:4 with lines lt 3 title 'floor'";
+  if (any_finite(floor)) commands += ", $d using 1:4 with lines lt 3 title 'noise floor'";
   return plots.add(kHalf_px, kLow_px, commands);
 }
 
@@ -198,7 +198,7 @@ PlotNumber plot_covariate(Gnuplot& plots, const json& plot) {
       "graph 0.12, graph 0.14\n";
   commands += "plot $d using 1:2:3:4 with yerrorbars lt 1 lw 1.2 dt solid ps 0.45 title 'before'";
   if (any_finite(after)) commands += ", $d using 1:5 with points lt 2 title 'after'";
-  if (any_finite(fitted)) commands += ", $d using 1:6 with lines lt 4 title 'as added'";
+  if (any_finite(fitted)) commands += ", $d using 1:6 with lines lt 4 title 'fitted effect'";
   return plots.add(kHalf_px, kLow_px, commands);
 }
 

@@ -19,8 +19,8 @@ std::string with_unit(std::optional<double> value, const std::string& unit) {
 std::string table_of(const json& simulated) {
   const json& statistics = part(simulated, "statistics");
   if (!statistics.is_array() || statistics.empty()) return "";
-  html::Table table({"", "this model differs by", "chance alone: up to", "chance of as much", "verdict",
-                     "the base model differs by"});
+  html::Table table(
+      {"statistic", "distance", "95 % under the null", "p value", "result", "distance of the base model"});
   for (const json& s : statistics) {
     const json& agrees = part(s, "agrees");
     const auto p = number(s, "p");
@@ -40,14 +40,13 @@ std::string table_of(const json& simulated) {
 std::string simulated_lead(const json& contract) {
   const json& simulated = part(contract, "simulated");
   std::string out =
-      "A second, independent check: the model that was written, run in the simulator. Robots start where the "
-      "measured "
-      "ones were seen first, and are told the same.";
+      "An independent check: the simulator runs the written model. Robots start at the first measured poses and "
+      "follow the recorded commands.";
   if (const auto seeds = number(simulated, "seeds")) {
     out += fmt::format(
-        " {:.0f} simulations by the {} engine. What differs by chance is seen by exchanging simulated and measured "
-        "{}s "
-        "at random. Speed and turning are of those that touch nothing. <b>{}</b>",
+        " {:.0f} simulations with the {} engine. Distances between histograms are 1-Wasserstein distances. "
+        "Significance: a permutation test with labels permuted per {}. Speed and turn rate exclude contacts. "
+        "<b>{}</b>",
         *seeds, escaped(text(simulated, "engine")), escaped(text(simulated, "unit")),
         escaped(text(simulated, "in_words")));
   }

@@ -28,54 +28,51 @@ Errors errors_of(const json& contract) {
 }
 
 std::string headline(const json& contract) {
-  std::vector<std::string> causes;
+  std::vector<std::string> phrases;
   bool tracker = false;
   for (const json& effect : part(contract, "effects")) {
     if (is_measurement(effect)) {
       tracker = true;
       continue;
     }
-    const std::string cause = "<em>" + escaped(covariates_of(effect)) + "</em>";
-    if (std::find(causes.begin(), causes.end(), cause) == causes.end()) causes.push_back(cause);
+    const std::string phrase = "<em>" + escaped(covariates_of(effect)) + "</em>";
+    if (std::find(phrases.begin(), phrases.end(), phrase) == phrases.end()) phrases.push_back(phrase);
   }
-  const char* const kSeen = "<em>the tracker</em> does not see them where they are";
-  if (causes.empty() && !tracker) return "The base model explains these robots";
-  if (causes.empty()) return fmt::format("These robots do what the base model says, but {}", kSeen);
-  std::string because = causes[0];
-  if (causes.size() == 2) because += ", and on " + causes[1];
-  if (causes.size() > 2) because += ", on " + causes[1] + " and more";
-  return fmt::format("These robots differ from the base model: what they do depends on {}{}", because,
-                     tracker ? fmt::format("; and {}", kSeen) : "");
+  const char* const kSeen = "<em>the measurement</em> has effects of its own";
+  if (phrases.empty() && !tracker) return "The base model explains these data";
+  if (phrases.empty()) return fmt::format("The base model explains the motion, but {}", kSeen);
+  std::string because = phrases[0];
+  if (phrases.size() == 2) because += " and " + phrases[1];
+  if (phrases.size() > 2) because += ", " + phrases[1] + " and others";
+  return fmt::format("The motion deviates from the base model: it depends on {}{}", because,
+                     tracker ? fmt::format("; {}", kSeen) : "");
 }
 
 std::string verdict(const json& contract) {
   const Errors e = errors_of(contract);
   const std::string ahead = fmt::format("{:g}", number(contract, "horizon_s").value_or(10));
   std::string out = fmt::format(
-      "Predicted {} s ahead, on data that nothing was fitted to, robots were <b>{} mm</b> away from where the base "
-      "model had them",
+      "On held-out data, with a horizon of {} s, the base model has a prediction error of <b>{} mm</b> (root mean "
+      "square)",
       ahead, figure(e.before));
   const std::size_t count = part(contract, "effects").is_array() ? part(contract, "effects").size() : 0;
   if (count == 0) {
-    out += ". No effect of anything that was tried is beyond chance.";
+    out += ". No tested effect is significant.";
     if (e.floor && e.before && *e.before > 1.15 * *e.floor)
-      out += " What is left beyond the best that is possible depends on nothing that was tried.";
+      out += " The error above the noise floor depends on no tested covariate.";
   } else {
-    out += fmt::format("; with {} in the model, <b>{} mm</b>.",
+    out += fmt::format("; with {} in the model the error is <b>{} mm</b>.",
                        count == 1 ? "one effect" : fmt::format("{} effects", count), figure(e.after));
     const json& less = part(contract, "improvement");
     if (number(less, "low_mm"))
-      out += fmt::format(" It is smaller by {} to {} mm (95 %).", figure(number(less, "low_mm")),
+      out += fmt::format(" The reduction is {} to {} mm (95 %).", figure(number(less, "low_mm")),
                          figure(number(less, "high_mm")));
   }
   if (e.floor && e.after && *e.after <= *e.floor) {
-    out += fmt::format(
-        " That is as good as any model can be expected to be with these robots and this tracker (about <b>{} "
-        "mm</b>).",
-        figure(e.floor));
-  } else if (e.floor) {
-    out += fmt::format(" The best that any model can do with these robots and this tracker is about <b>{} mm</b>.",
+    out += fmt::format(" That is at the noise floor of these robots and this tracker (about <b>{} mm</b>).",
                        figure(e.floor));
+  } else if (e.floor) {
+    out += fmt::format(" The noise floor of these robots and this tracker is about <b>{} mm</b>.", figure(e.floor));
   }
   const json& simulated = part(contract, "simulated");
   if (part(simulated, "agrees").is_boolean()) {
@@ -84,18 +81,19 @@ std::string verdict(const json& contract) {
       ++all;
       if (part(s, "agrees") == json(false)) ++differ;
     }
-    out += differ == 0 ? " <a href=\"#simulated\">Simulated</a> by the written model, robots are not told from the "
-                         "measured ones."
-                       : fmt::format(
-                             " <a href=\"#simulated\">Simulated</a> by the written model, robots differ from the "
-                             "measured ones in {} of {} respects.",
-                             differ, all);
+    out += differ == 0
+               ? " <a href=\"#simulated\">Simulations</a> of the written model agree with the measured "
+                 "tracks."
+               : fmt::format(
+                     " <a href=\"#simulated\">Simulations</a> of the written model differ from the measured "
+                     "tracks in {} of {} statistics.",
+                     differ, all);
   }
   const json& faults = part(contract, "faults");
   if (const auto share = share_explained(e); share && count > 0)
-    out += fmt::format(" {} of what could be explained is explained.", percent(share));
+    out += fmt::format(" The model removes {} of the explainable mean square error.", percent(share));
   if (faults.is_array() && !faults.empty()) {
-    out += fmt::format(" The data have <a href=\"#faults\">{}</a>, which {} excluded.",
+    out += fmt::format(" The data have <a href=\"#faults\">{}</a>, which {} excluded from the fit.",
                        faults.size() == 1 ? "a fault" : fmt::format("{} faults", faults.size()),
                        faults.size() == 1 ? "was" : "were");
   }
@@ -120,7 +118,7 @@ std::string bars(const json& contract) {
   };
   std::string out = "<div class=\"bars\">\n" + bar("before", "before", *e.before, part(contract, "before")) +
                     bar("after", "after", *e.after, part(contract, "after"));
-  if (e.floor) out += bar("floor", "floor", *e.floor, json());
+  if (e.floor) out += bar("floor", "noise floor", *e.floor, json());
   return out + "</div>\n";
 }
 

@@ -18,17 +18,17 @@ const json kNothing;
 
 /// A covariate as the object of "depends on ...".
 std::string phrase_of(const std::string& covariate) {
-  static const std::map<std::string, std::string> kPhrases = {{"time", "how late it is in the run"},
-                                                              {"position", "where they are"},
-                                                              {"heading", "where they point to"},
-                                                              {"command", "what they are told"},
-                                                              {"time_since_command", "how long ago they were told"},
-                                                              {"motor_time", "how long each motor has run"},
-                                                              {"neighbours", "who is near by"},
-                                                              {"world_frame", "a direction in the room"},
-                                                              {"measurement", "the tracker"},
-                                                              {"robot", "which robot it is"},
-                                                              {"history", "what was before"}};
+  static const std::map<std::string, std::string> kPhrases = {{"time", "time in the run"},
+                                                              {"position", "position"},
+                                                              {"heading", "heading"},
+                                                              {"command", "command"},
+                                                              {"time_since_command", "time since the command"},
+                                                              {"motor_time", "motor-on time"},
+                                                              {"neighbours", "neighbours"},
+                                                              {"world_frame", "world frame"},
+                                                              {"measurement", "camera or tracker"},
+                                                              {"robot", "robot"},
+                                                              {"history", "history"}};
   const auto at = kPhrases.find(covariate);
   return at == kPhrases.end() ? words_of(covariate) : at->second;
 }
@@ -74,7 +74,7 @@ std::string covariates_of(const json& effect) {
   for (const json& covariate : part(effect, "covariates")) {
     if (covariate.is_string()) out += (out.empty() ? "" : " and ") + phrase_of(covariate.get<std::string>());
   }
-  return out.empty() ? "nothing: it is the same everywhere" : out;
+  return out.empty() ? "no covariate (constant)" : out;
 }
 
 bool is_measurement(const json& effect) {
@@ -84,16 +84,15 @@ bool is_measurement(const json& effect) {
 }
 
 std::string acts_on_of(const json& effect) {
-  static const std::map<std::string, std::string> kWords = {
-      {"WHEEL_GAIN", "wheel speeds, in proportion"},
-      {"WHEEL_OFFSET", "wheel speeds"},
-      {"TURN_RATE", "turning"},
-      {"BODY_DRIFT", "slip of the body"},
-      {"WORLD_DRIFT", "drift in the room"},
-      {"MEASURED_OFFSET", "what the tracker sees"},
-      {"MEASURED_BODY_OFFSET", "the point that the tracker sees"},
-      {"MEASURED_SCALE", "what the tracker sees, in proportion"},
-      {"MEASURED_HEADING", "headings that the tracker sees"}};
+  static const std::map<std::string, std::string> kWords = {{"WHEEL_GAIN", "wheel speeds (gain)"},
+                                                            {"WHEEL_OFFSET", "wheel speeds (offset)"},
+                                                            {"TURN_RATE", "turn rate"},
+                                                            {"BODY_DRIFT", "drift in the body frame"},
+                                                            {"WORLD_DRIFT", "drift in the world frame"},
+                                                            {"MEASURED_OFFSET", "measured position"},
+                                                            {"MEASURED_BODY_OFFSET", "tracked point"},
+                                                            {"MEASURED_SCALE", "camera scale"},
+                                                            {"MEASURED_HEADING", "measured heading"}};
   const std::string name = text(effect, "acts_on");
   const auto at = kWords.find(name);
   return at == kWords.end() ? escaped(words_of(name)) : at->second;

@@ -21,8 +21,8 @@ bool is_known_of(const Factor& known, const Factor& open) {
 }
 
 /// Index of the term whose curve these amplitudes multiply.
-std::optional<std::size_t> source_of(const MotionModel& model, const Term& amounts) {
-  const Block& block = amounts.blocks.front();
+std::optional<std::size_t> source_of(const MotionModel& model, const Term& amplitudes) {
+  const Block& block = amplitudes.blocks.front();
   if (block.basis.factors.size() != 2) return std::nullopt;
   const auto known = std::find_if(block.basis.factors.begin(), block.basis.factors.end(),
                                   [](const Factor& f) { return !f.known.empty(); });
@@ -39,15 +39,16 @@ std::optional<std::size_t> source_of(const MotionModel& model, const Term& amoun
 /// Normalises amplitudes to a mean of 1, which is the amplitude of an unseen robot. If the mean is near 0, the
 /// largest becomes 1.
 void about_the_mean(Term& term) {
-  Factor& amounts = term.blocks.front().basis.factors.front();
-  if (amounts.shape != Factor::Shape::kTable) return;
-  const Eigen::Map<Eigen::ArrayXd> each(amounts.known.data(), static_cast<Eigen::Index>(amounts.known.size()));
-  const double mean = amounts.plus + each.mean(), most = (amounts.plus + each).abs().maxCoeff();
+  Factor& amplitudes = term.blocks.front().basis.factors.front();
+  if (amplitudes.shape != Factor::Shape::kTable) return;
+  const Eigen::Map<Eigen::ArrayXd> each(amplitudes.known.data(),
+                                        static_cast<Eigen::Index>(amplitudes.known.size()));
+  const double mean = amplitudes.plus + each.mean(), most = (amplitudes.plus + each).abs().maxCoeff();
   if (most == 0) return;
   constexpr double kNextToNone = 0.2;
   const double unit = std::abs(mean) > kNextToNone * most ? mean : most;
-  const Eigen::ArrayXd about = (amounts.plus + each - mean) / unit;
-  Factor scaled = amounts;
+  const Eigen::ArrayXd about = (amplitudes.plus + each - mean) / unit;
+  Factor scaled = amplitudes;
   scaled.plus = mean / unit;
   scaled.known.assign(about.begin(), about.end());
   for (Block& block : term.blocks) block.basis.factors.front() = scaled;
@@ -73,23 +74,23 @@ void keep_target(Term& term, Target target) {
 }
 
 /// The merged term during the alternating fit.
-class CurveTimesAmounts {
+class CurveTimesAmplitudes {
  public:
   /// Replaces the term `source`, which has the curve, and the last term, which has the amplitudes.
-  CurveTimesAmounts(const Fitter& fitter, MotionModel& model, std::size_t source)
+  CurveTimesAmplitudes(const Fitter& fitter, MotionModel& model, std::size_t source)
       : fitter_(fitter), model_(model), found_(model.terms.back()) {
     const Basis& basis = found_.blocks.front().basis;
     open_ = basis.factors[0].known.empty() ? 0 : 1;
     // The curve enters with amplitude 1. Amplitude columns that were pruned are 0.
-    amounts_ = basis.factors[open_];
-    amounts_.known.assign(amounts_.columns(), 0);
-    amounts_.plus = 1;
+    amplitudes_ = basis.factors[open_];
+    amplitudes_.known.assign(amplitudes_.columns(), 0);
+    amplitudes_.plus = 1;
     add(found_.coefficients);
     Term one = model.terms[source];
     one.name = found_.name;
     // Further targets may have been artefacts of different amplitudes.
     keep_target(one, found_.blocks.front().target);
-    for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amounts_);
+    for (Block& block : one.blocks) block.basis.factors.insert(block.basis.factors.begin(), amplitudes_);
     model.terms.pop_back();
     model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(source));
     model.terms.push_back(std::move(one));
@@ -99,7 +100,7 @@ class CurveTimesAmounts {
     fitter_.fit(model_, 2);
     likelihood_ = fitter_.log_likelihood(model_);
     in_turns();
-    refine(fitter_, model_, model_.terms.size() - 1);
+    refine_curves(fitter_, model_, model_.terms.size() - 1);
     likelihood_ = fitter_.log_likelihood(model_);
     // The curve may have received a constant part, which the amplitudes lacked.
     in_turns();
@@ -112,7 +113,7 @@ class CurveTimesAmounts {
   void add(const Eigen::VectorXd& coefficients) {
     const Basis& basis = found_.blocks.front().basis;
     for (std::size_t i = 0; i < basis.size(); ++i)
-      amounts_.known[basis.chosen.empty() ? i : basis.chosen[i]] += coefficients[static_cast<Eigen::Index>(i)];
+      amplitudes_.known[basis.chosen.empty() ? i : basis.chosen[i]] += coefficients[static_cast<Eigen::Index>(i)];
   }
   void in_turns() {
     for (int turns = 0; turns < kMostTurns && in_turn(false); ++turns) {}
@@ -121,7 +122,7 @@ class CurveTimesAmounts {
   /// likelihood rose.
   bool in_turn(bool with_smoothness) {
     const MotionModel before = model_;
-    const Factor known = amounts_;
+    const Factor known = amplitudes_;
     Term changes = found_;
     changes.blocks.resize(1);
     Basis& basis = changes.blocks.front().basis;
@@ -133,16 +134,16 @@ class CurveTimesAmounts {
     fitter_.fit(model_, 1);
     add(model_.terms.back().coefficients);
     model_.terms.pop_back();
-    for (Block& block : model_.terms.back().blocks) block.basis.factors.front() = amounts_;
+    for (Block& block : model_.terms.back().blocks) block.basis.factors.front() = amplitudes_;
     if (with_smoothness) {
-      settle(fitter_, model_, model_.terms.size() - 1);
+      refit(fitter_, model_, model_.terms.size() - 1);
     } else {
       fitter_.fit(model_, 1);
     }
     const double now = fitter_.log_likelihood(model_), gained = now - likelihood_;
     if (gained < 0) {
       model_ = before;
-      amounts_ = known;
+      amplitudes_ = known;
     } else {
       likelihood_ = now;
     }
@@ -153,30 +154,30 @@ class CurveTimesAmounts {
   MotionModel& model_;
   Term found_;
   std::size_t open_ = 0;  ///< index of the factor in the found term that is not the curve
-  Factor amounts_;
+  Factor amplitudes_;
   double likelihood_ = 0;
 };
 
 }  // namespace
 
-std::optional<std::size_t> join_amounts(const Fitter& fitter, MotionModel& model) {
+std::optional<std::size_t> merge_amplitudes(const Fitter& fitter, MotionModel& model) {
   const std::optional<std::size_t> source = source_of(model, model.terms.back());
   if (!source) return std::nullopt;
   const MotionModel was = model;
-  const PreparedSet::Found tracks = fitter.set().found();
+  const PreparedSet::TrackEstimates tracks = fitter.set().estimates();
   const double likelihood = fitter.log_likelihood(was);
-  CurveTimesAmounts one(fitter, model, *source);
+  CurveTimesAmplitudes one(fitter, model, *source);
   one.fit();
   if (one.log_likelihood() > likelihood - kAsGood) {
-    widen(fitter, model, model.terms.size() - 1);
+    extend_targets(fitter, model, model.terms.size() - 1);
     return source;
   }
   model = was;
-  fitter.set().go_back(tracks, model);
+  fitter.set().restore(tracks, model);
   return std::nullopt;
 }
 
-bool rests_on_another(const Term& term) {
+bool multiplies_known_curve(const Term& term) {
   return std::any_of(term.blocks.begin(), term.blocks.end(), [](const Block& block) {
     return std::any_of(block.basis.factors.begin(), block.basis.factors.end(),
                        [](const Factor& factor) { return !factor.known.empty() && factor.plus == 0; });

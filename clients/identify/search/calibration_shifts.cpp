@@ -11,7 +11,7 @@ namespace kilotwin::identify {
 namespace {
 
 /// Shift, rotation and scale of the image, then the motion of each driven robot: ahead, sideways, turn.
-constexpr int kOwn = 3, kAll = Jump::kNumbers + kOwn;
+constexpr int kOwn = 3, kAll = CalibrationShift::kNumbers + kOwn;
 using Columns = Eigen::Matrix<double, 3, kAll>;
 using Normal = Eigen::Matrix<double, kAll, kAll>;
 using Numbers = Eigen::Matrix<double, kAll, 1>;
@@ -26,30 +26,30 @@ constexpr double kMostOfATrack = 5;
 constexpr double kCertain = 25, kBeyondUsual = 18;
 /// The push must explain this much more to be preferred to a camera shift.
 constexpr double kClear = 2;
-constexpr int kMostJumps = 8, kMostLooks = 40;
+constexpr int kMostShifts = 8, kMostLooks = 40;
 
 /// The innovation of one robot at one instant.
-struct Surprise {
+struct InstantInnovation {
   double from_s, to_s;
   Eigen::Vector3d whitened;
   Columns columns;  ///< whitened
   bool driven;
 };
-struct Surprises {
+struct TrackInnovations {
   std::uint32_t run = 0;
-  std::vector<Surprise> of;  ///< ascending, with gaps where the track was lost
+  std::vector<InstantInnovation> of;  ///< ascending, with gaps where the track was lost
 };
 
 struct Recorder {
   const MotionModel& model;
-  Surprises& out;
+  TrackInnovations& out;
   double last_s = 0;
   bool driven = false, after_outlier = false;
 
   void start(const TrackFilter&) {}
   void step(const StepRecord& record) { driven = driven || record.middle.commands.driven(); }
   void update(const Innovation& innovation, const Sample& sample) {
-    Surprise s;
+    InstantInnovation s;
     s.from_s = last_s;
     s.to_s = last_s = sample.time_s;
     s.driven = std::exchange(driven, false);
@@ -82,11 +82,11 @@ struct Recorder {
   }
 };
 
-std::vector<Surprises> surprises_of(const Fitter& fitter, const MotionModel& model) {
+std::vector<TrackInnovations> innovations_of(const Fitter& fitter, const MotionModel& model) {
   std::vector<const TrackView*> views;
   for (const TrackView& view : fitter.set().views())
     if (!view.track->held_out) views.push_back(&view);
-  std::vector<Surprises> all(views.size());
+  std::vector<TrackInnovations> all(views.size());
   in_parallel(views.size(), fitter.threads(), [&](std::size_t i) {
     const TrackView& view = *views[i];
     RobotBias bias = model.bias_of(view.track->robot);
@@ -94,27 +94,27 @@ std::vector<Surprises> surprises_of(const Fitter& fitter, const MotionModel& mod
     TrackFilter filter(model, bias, view.track->robot, view.number);
     all[i].run = view.number;
     Recorder recorder{model, all[i], view.track->samples.front().time_s};
-    walk(filter, view, view.track->samples.size(), recorder);
+    run_filter(filter, view, view.track->samples.size(), recorder);
   });
   return all;
 }
 
 /// Competing explanations: each robot's own motion only, a camera shift, a push of the driven robots.
-enum class Story { kOwnAlone, kPicture, kPush };
+enum class Explanation { kRobotsOnly, kCamera, kPush };
 
 /// Joint innovations of all robots at one instant.
 class Instant {
  public:
-  explicit Instant(std::vector<const Surprise*> seen) : seen_(std::move(seen)) {}
+  explicit Instant(std::vector<const InstantInnovation*> seen) : seen_(std::move(seen)) {}
 
   /// Robust least squares.
-  [[nodiscard]] Numbers fit(Story story, Normal* information = nullptr) const {
+  [[nodiscard]] Numbers fit(Explanation explanation, Normal* information = nullptr) const {
     Numbers at = Numbers::Zero();
     for (int pass = 0; pass < 4; ++pass) {
       Normal normal = prior();
       Numbers score = Numbers::Zero();
-      for (const Surprise* s : seen_) {
-        const Columns columns = allowed(*s, story);
+      for (const InstantInnovation* s : seen_) {
+        const Columns columns = allowed(*s, explanation);
         const double far = (s->whitened - columns * at).squaredNorm();
         constexpr double kGate = 12;
         const double weight = far > kGate ? kGate / far : 1;
@@ -127,10 +127,11 @@ class Instant {
     return at;
   }
   /// Gain in log likelihood of one explanation over another.
-  [[nodiscard]] double gain(Story story, const Numbers& at, Story than, const Numbers& than_at) const {
+  [[nodiscard]] double gain(Explanation explanation, const Numbers& at, Explanation than,
+                            const Numbers& than_at) const {
     double sum = 0;
-    for (const Surprise* s : seen_) {
-      const double with = (s->whitened - allowed(*s, story) * at).squaredNorm(),
+    for (const InstantInnovation* s : seen_) {
+      const double with = (s->whitened - allowed(*s, explanation) * at).squaredNorm(),
                    without = (s->whitened - allowed(*s, than) * than_at).squaredNorm();
       sum += std::clamp((without - with) / 2, -kMostOfATrack, kMostOfATrack);
     }
@@ -144,27 +145,28 @@ class Instant {
     precision << kMm, kMm, kMm, kMm, kMm, kMm, 1 / (kLargest_rad * kLargest_rad);
     return precision.asDiagonal();
   }
-  static Columns allowed(const Surprise& s, Story story) {
+  static Columns allowed(const InstantInnovation& s, Explanation explanation) {
     Columns columns = s.columns;
-    if (story == Story::kOwnAlone || (story == Story::kPush && !s.driven)) columns.leftCols<4>().setZero();
-    if (story == Story::kPush) columns.middleCols<2>(2).setZero();
+    if (explanation == Explanation::kRobotsOnly || (explanation == Explanation::kPush && !s.driven))
+      columns.leftCols<4>().setZero();
+    if (explanation == Explanation::kPush) columns.middleCols<2>(2).setZero();
     return columns;
   }
-  std::vector<const Surprise*> seen_;
+  std::vector<const InstantInnovation*> seen_;
 };
 
 /// All instants of one run, or of all runs, on a raster finer than the samples.
 class Scan {
  public:
-  Scan(const std::vector<Surprises>& all, std::optional<std::uint32_t> run) : run_(run) {
-    for (const Surprises& track : all)
+  Scan(const std::vector<TrackInnovations>& all, std::optional<std::uint32_t> run) : run_(run) {
+    for (const TrackInnovations& track : all)
       if (!run || track.run == *run) tracks_.push_back(&track);
   }
   [[nodiscard]] Instant at(double time_s) const {
-    std::vector<const Surprise*> seen;
-    for (const Surprises* track : tracks_) {
+    std::vector<const InstantInnovation*> seen;
+    for (const TrackInnovations* track : tracks_) {
       const auto end = std::lower_bound(track->of.begin(), track->of.end(), time_s,
-                                        [](const Surprise& s, double t) { return s.to_s < t; });
+                                        [](const InstantInnovation& s, double t) { return s.to_s < t; });
       if (end != track->of.end() && end->from_s < time_s) seen.push_back(&*end);
     }
     return Instant(std::move(seen));
@@ -172,7 +174,7 @@ class Scan {
   [[nodiscard]] std::optional<std::uint32_t> run() const { return run_; }
 
  private:
-  std::vector<const Surprises*> tracks_;
+  std::vector<const TrackInnovations*> tracks_;
   std::optional<std::uint32_t> run_;
 };
 
@@ -185,8 +187,9 @@ struct Candidate {
 Candidate candidate_at(const Scan& scan, double time_s) {
   const Instant instant = scan.at(time_s);
   Normal information;
-  const Numbers own = instant.fit(Story::kOwnAlone), picture = instant.fit(Story::kPicture, &information);
-  return {time_s, instant.gain(Story::kPicture, picture, Story::kOwnAlone, own), picture.head<4>(),
+  const Numbers own = instant.fit(Explanation::kRobotsOnly),
+                picture = instant.fit(Explanation::kCamera, &information);
+  return {time_s, instant.gain(Explanation::kCamera, picture, Explanation::kRobotsOnly, own), picture.head<4>(),
           information.inverse().topLeftCorner<4, 4>()};
 }
 
@@ -237,14 +240,15 @@ double middle_of(const Scan& scan, const Candidate& found, double step_s) {
 
 }  // namespace
 
-std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model, double least_gain) {
-  const std::vector<Surprises> all = surprises_of(fitter, model);
+std::optional<CalibrationShift> find_calibration_shift(const Fitter& fitter, const MotionModel& model,
+                                                       double least_gain) {
+  const std::vector<TrackInnovations> all = innovations_of(fitter, model);
   std::vector<std::uint32_t> runs;
   std::vector<double> steps;
   double from_s = 1e300, to_s = -1e300;
-  for (const Surprises& track : all) {
+  for (const TrackInnovations& track : all) {
     if (std::find(runs.begin(), runs.end(), track.run) == runs.end()) runs.push_back(track.run);
-    for (const Surprise& s : track.of) steps.push_back(s.to_s - s.from_s);
+    for (const InstantInnovation& s : track.of) steps.push_back(s.to_s - s.from_s);
     if (track.of.empty()) continue;
     from_s = std::min(from_s, track.of.front().from_s);
     to_s = std::max(to_s, track.of.back().to_s);
@@ -288,20 +292,20 @@ std::optional<Jump> find_jump(const Fitter& fitter, const MotionModel& model, do
     const auto& [scan, found] = looks[i];
     if (lasts(*scan, found, frame_s)) continue;
     const Instant instant = scan->at(found.time_s);
-    const Numbers picture = instant.fit(Story::kPicture), push = instant.fit(Story::kPush),
-                  own = instant.fit(Story::kOwnAlone);
-    const double as_push = instant.gain(Story::kPush, push, Story::kOwnAlone, own);
-    if (instant.gain(Story::kPush, push, Story::kPicture, picture) > kClear) continue;
-    Jump jump;
-    jump.time_s = middle_of(*scan, found, step_s);
-    jump.run = scan->run();
-    jump.size = found.size;
-    jump.size.tail<2>() /= kArm_mm;
-    jump.sd = found.covariance.diagonal().cwiseSqrt();
-    jump.sd.tail<2>() /= kArm_mm;
-    jump.gain = found.gain;
-    jump.gain_as_push = as_push;
-    return jump;
+    const Numbers picture = instant.fit(Explanation::kCamera), push = instant.fit(Explanation::kPush),
+                  own = instant.fit(Explanation::kRobotsOnly);
+    const double as_push = instant.gain(Explanation::kPush, push, Explanation::kRobotsOnly, own);
+    if (instant.gain(Explanation::kPush, push, Explanation::kCamera, picture) > kClear) continue;
+    CalibrationShift shift;
+    shift.time_s = middle_of(*scan, found, step_s);
+    shift.run = scan->run();
+    shift.size = found.size;
+    shift.size.tail<2>() /= kArm_mm;
+    shift.sd = found.covariance.diagonal().cwiseSqrt();
+    shift.sd.tail<2>() /= kArm_mm;
+    shift.gain = found.gain;
+    shift.gain_as_push = as_push;
+    return shift;
   }
   return std::nullopt;
 }
@@ -312,21 +316,22 @@ constexpr std::array kTargets = {Target::kMeasuredX, Target::kMeasuredY, Target:
                                  Target::kMeasuredScale};
 
 /// Shifts as steps in time: those of all runs first, then run by run.
-Term term_of(const std::vector<Jump>& jumps, const std::array<bool, 4>& acting) {
+Term term_of(const std::vector<CalibrationShift>& shifts, const std::array<bool, 4>& components) {
   std::vector<std::optional<std::uint32_t>> scopes;
-  for (const Jump& jump : jumps)
-    if (std::find(scopes.begin(), scopes.end(), jump.run) == scopes.end()) scopes.push_back(jump.run);
-  Term term{kJumpsName, {}, {}, {}};
+  for (const CalibrationShift& shift : shifts)
+    if (std::find(scopes.begin(), scopes.end(), shift.run) == scopes.end()) scopes.push_back(shift.run);
+  Term term{kCalibrationShiftsName, {}, {}, {}};
   std::vector<double> coefficients, precision;
   for (const auto& scope : scopes) {
-    std::vector<const Jump*> own;
-    for (const Jump& jump : jumps)
-      if (jump.run == scope) own.push_back(&jump);
-    std::sort(own.begin(), own.end(), [](const Jump* a, const Jump* b) { return a->time_s < b->time_s; });
+    std::vector<const CalibrationShift*> own;
+    for (const CalibrationShift& shift : shifts)
+      if (shift.run == scope) own.push_back(&shift);
+    std::sort(own.begin(), own.end(),
+              [](const CalibrationShift* a, const CalibrationShift* b) { return a->time_s < b->time_s; });
     Factor steps;
     steps.shape = Factor::Shape::kAtLeast;
     steps.axis.of = Covariate::kTime;
-    for (const Jump* jump : own) steps.points.push_back(jump->time_s);
+    for (const CalibrationShift* shift : own) steps.points.push_back(shift->time_s);
     Basis basis{{steps}};
     if (scope) {
       Factor which;
@@ -336,10 +341,10 @@ Term term_of(const std::vector<Jump>& jumps, const std::array<bool, 4>& acting) 
       basis.factors.insert(basis.factors.begin(), which);
     }
     for (std::size_t t = 0; t < kTargets.size(); ++t) {
-      if (!acting[t]) continue;
+      if (!components[t]) continue;
       term.blocks.push_back({kTargets[t], basis, kAlways});
-      for (const Jump* jump : own) {
-        coefficients.push_back(jump->size[static_cast<Eigen::Index>(t)]);
+      for (const CalibrationShift* shift : own) {
+        coefficients.push_back(shift->size[static_cast<Eigen::Index>(t)]);
         const double sd = t < 2 ? 50 : 0.2;
         precision.push_back(1 / (sd * sd));
       }
@@ -353,32 +358,32 @@ Term term_of(const std::vector<Jump>& jumps, const std::array<bool, 4>& acting) 
 
 }  // namespace
 
-std::vector<Jump> add_jumps(const Fitter& fitter, MotionModel& model, double least_gain) {
+std::vector<CalibrationShift> add_calibration_shifts(const Fitter& fitter, MotionModel& model, double least_gain) {
   const std::size_t place = model.terms.size();
-  std::vector<Jump> jumps;
-  for (bool fitted = false; static_cast<int>(jumps.size()) < kMostJumps;) {
-    const std::optional<Jump> found = find_jump(fitter, model, least_gain);
+  std::vector<CalibrationShift> shifts;
+  for (bool fitted = false; static_cast<int>(shifts.size()) < kMostShifts;) {
+    const std::optional<CalibrationShift> found = find_calibration_shift(fitter, model, least_gain);
     if (!found) {
       // Noise that was fitted without shifts is too large and may hide smaller ones.
-      if (jumps.empty() || fitted) break;
+      if (shifts.empty() || fitted) break;
       fitter.fit(model, 2);
       fitted = true;
       continue;
     }
-    jumps.push_back(*found);
+    shifts.push_back(*found);
     MotionModel with = model;
     with.terms.resize(place);
     // Displacement always; rotation and scale only if some shift needs them.
-    std::array<bool, 4> acting{true, true, false, false};
-    for (const Jump& jump : jumps)
+    std::array<bool, 4> components{true, true, false, false};
+    for (const CalibrationShift& shift : shifts)
       for (Eigen::Index t = 2; t < 4; ++t)
-        acting[static_cast<std::size_t>(t)] =
-            acting[static_cast<std::size_t>(t)] || std::abs(jump.size[t]) > 4 * jump.sd[t];
-    with.terms.push_back(term_of(jumps, acting));
+        components[static_cast<std::size_t>(t)] =
+            components[static_cast<std::size_t>(t)] || std::abs(shift.size[t]) > 4 * shift.sd[t];
+    with.terms.push_back(term_of(shifts, components));
     model = with;
     fitted = false;
   }
-  return jumps;
+  return shifts;
 }
 
 }  // namespace kilotwin::identify

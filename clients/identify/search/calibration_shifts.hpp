@@ -12,7 +12,7 @@
 namespace kilotwin::identify {
 
 /// One calibration shift and its uncertainty.
-struct Jump {
+struct CalibrationShift {
   static constexpr int kNumbers = 4;  ///< shift along x and y (mm), rotation (rad), relative scale
   double time_s = 0;
   std::optional<std::uint32_t> run;  ///< run number in effects; nothing: at the same time in all runs
@@ -24,13 +24,14 @@ struct Jump {
 
 /// The most significant calibration shift in the tracks of the fit, with at least this gain. Nothing if none is
 /// significant: false alarms occur in far fewer than one of a thousand sets.
-[[nodiscard]] std::optional<Jump> find_jump(const Fitter&, const MotionModel&, double least_gain = 0);
+[[nodiscard]] std::optional<CalibrationShift> find_calibration_shift(const Fitter&, const MotionModel&,
+                                                                     double least_gain = 0);
 
-/// Adds all calibration shifts to the model as one term of steps, and fits it. Pushes of driven robots are left to
+/// Adds all calibration shifts to the model as one term of steps, and fits it. ContactPushes of driven robots are left to
 /// other hypotheses, and so are displacements that last several frames. Returns the shifts. If there are none, the
 /// model is unchanged.
-std::vector<Jump> add_jumps(const Fitter&, MotionModel&, double least_gain = 0);
+std::vector<CalibrationShift> add_calibration_shifts(const Fitter&, MotionModel&, double least_gain = 0);
 
-inline constexpr const char* kJumpsName = "camera-jumps";
+inline constexpr const char* kCalibrationShiftsName = "camera-shifts";
 
 }  // namespace kilotwin::identify

@@ -40,10 +40,10 @@ struct Picked {
 /// Selection of steps among candidate points. All targets share one prior scale.
 class StepChoice {
  public:
-  StepChoice(const Beside& data, std::size_t points, std::size_t targets)
+  StepChoice(const ReducedColumns& data, std::size_t points, std::size_t targets)
       : data_(data), points_(points), targets_(targets) {}
 
-  Picked weigh(const std::vector<std::size_t>& points) const {
+  Picked evaluate(const std::vector<std::size_t>& points) const {
     Picked out;
     out.points = points;
     ColumnGroup group;
@@ -95,12 +95,12 @@ class StepChoice {
             columns.push_back(static_cast<Eigen::Index>(t * points_ + p));
             if (width > 0) columns.push_back(static_cast<Eigen::Index>(t * points_ + p + width));
           }
-          const double worth =
+          const double gain =
               log_evidence(left(columns, columns), score(columns),
                            Eigen::VectorXd::Constant(static_cast<Eigen::Index>(columns.size()), size)) -
               price * (width > 0 ? 2 : 1);
-          if (worth <= best.second) continue;
-          best = {{p}, worth};
+          if (gain <= best.second) continue;
+          best = {{p}, gain};
           if (width > 0) best.first.push_back(p + width);
         }
       }
@@ -114,7 +114,7 @@ class StepChoice {
   }
 
  private:
-  const Beside& data_;
+  const ReducedColumns& data_;
   std::size_t points_, targets_;
   double size_ = 1;
 };
@@ -131,26 +131,26 @@ struct Steps {
 void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t place,
                   const std::vector<double>& points, Steps& steps) {
   const Term& term = model.terms[place];
-  const Linear l =
-      linear(fitter, model, steps.beside ? model.terms.size() : place, stepping(steps.kinds, points), steps.beside);
+  const LocalQuadratic l = local_quadratic(fitter, model, steps.beside ? model.terms.size() : place,
+                                           stepping(steps.kinds, points), steps.beside);
   double had = 0;
   Eigen::VectorXd score = l.score;
   if (!steps.beside) {
     score = l.score_without(term.coefficients);
-    const Beside now = beside(l, score, l.of_term());
+    const ReducedColumns now = reduced_columns(l, score, l.term_columns());
     had = log_evidence(now.information, now.score, term.precision.cwiseInverse().cwiseSqrt());
   }
-  const Beside data = beside(l, score, l.more());
+  const ReducedColumns data = reduced_columns(l, score, l.added_columns());
   StepChoice choice(data, points.size(), steps.kinds.size());
   choice.set_smallest_size();
   const double price = std::log(static_cast<double>(points.size()));
   Picked picked;
   while (picked.points.size() < kMostSteps) {
-    const auto [added, worth] = choice.best_addition(picked, price);
-    if (added.empty() || worth < kLeastGain) break;
+    const auto [added, gain] = choice.best_addition(picked, price);
+    if (added.empty() || gain < kLeastGain) break;
     std::vector<std::size_t> with = picked.points;
     with.insert(with.end(), added.begin(), added.end());
-    picked = choice.weigh(with);
+    picked = choice.evaluate(with);
   }
   for (const std::size_t p : picked.points) steps.at_s.push_back(points[p]);
   std::sort(steps.at_s.begin(), steps.at_s.end());
@@ -159,8 +159,8 @@ void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t pl
 
 /// Complexity of a curve: half the log determinant of its posterior precision relative to the prior.
 double bends(const Fitter& fitter, const MotionModel& model, std::size_t place) {
-  const Linear l = linear(fitter, model, place, {});
-  const Beside now = beside(l, l.score_without(model.terms[place].coefficients), l.of_term());
+  const LocalQuadratic l = local_quadratic(fitter, model, place, {});
+  const ReducedColumns now = reduced_columns(l, l.score_without(model.terms[place].coefficients), l.term_columns());
   const Eigen::VectorXd sd = model.terms[place].precision.cwiseInverse().cwiseSqrt();
   return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
 }
@@ -180,20 +180,20 @@ bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, cons
     for (const double t : at)
       for (int i = -kSide; i <= kSide; ++i) raster.push_back(t + i * fine_s);
     if (raster.size() > kMostColumns) return false;
-    const Linear l = linear(fitter, model, place, stepping(steps.kinds, raster));
+    const LocalQuadratic l = local_quadratic(fitter, model, place, stepping(steps.kinds, raster));
     const Eigen::VectorXd score = l.score_without(model.terms[place].coefficients);
-    const Beside data = beside(l, score, l.more());
+    const ReducedColumns data = reduced_columns(l, score, l.added_columns());
     StepChoice choice(data, raster.size(), steps.kinds.size());
     choice.set_smallest_size();
     std::vector<std::size_t> chosen;
     for (std::size_t k = 0; k < at.size(); ++k) chosen.push_back(kRaster * k + kSide);
-    Picked best = choice.weigh(chosen);
+    Picked best = choice.evaluate(chosen);
     for (int sweep = 0; sweep < 3; ++sweep) {
       for (std::size_t k = 0; k < at.size(); ++k) {
         for (std::size_t i = 0; i < kRaster; ++i) {
           std::vector<std::size_t> other = best.points;
           other[k] = kRaster * k + i;
-          Picked found = choice.weigh(other);
+          Picked found = choice.evaluate(other);
           if (found.evidence > best.evidence) best = std::move(found);
         }
       }
@@ -202,7 +202,7 @@ bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, cons
     if (!std::is_sorted(at.begin(), at.end())) return false;
     std::vector<Eigen::Index> columns;
     for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
-    exchange(model, place, l, stepping(steps.kinds, at), score, columns, best.sd);
+    replace_blocks(model, place, l, stepping(steps.kinds, at), score, columns, best.sd);
   }
   if (!steps.beside) return true;
   const Term own = model.terms.back();
@@ -224,14 +224,14 @@ bool goes_on(const Axis& axis) {
     case Covariate::kMotorTime:
     case Covariate::kLeftMotorTime:
     case Covariate::kRightMotorTime:
-    case Covariate::kDrivenTime: return axis.forget == 0;
+    case Covariate::kDrivenTime: return axis.decay_index == 0;
     default: return false;
   }
 }
 
 }  // namespace
 
-std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t place) {
+std::string find_change_points(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const std::string name = model.terms[place].name;
   double duration_s = 0;
   std::vector<Block> kinds;
@@ -253,16 +253,16 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
   std::vector<Steps> forms = {{kinds, false, {}, 0}, {kinds, true, {}, 0}};
   // A displacement in the world and one of the camera look alike until the instant is known.
   const Basis basis = kinds.front().basis;
-  const std::vector<Block> room = {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}},
+  const std::vector<Block> walls = {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}},
                            picture = {{Target::kMeasuredX, basis, kAlways}, {Target::kMeasuredY, basis, kAlways}};
   const Target acts_on = kinds.front().target;
-  const bool in_room = acts_on == Target::kWorldX || acts_on == Target::kWorldY,
-             in_picture = acts_on == Target::kMeasuredX;
+  const bool in_world = acts_on == Target::kWorldX || acts_on == Target::kWorldY,
+             in_image = acts_on == Target::kMeasuredX;
   const bool by_the_clock = basis.factors.front().axis.of == Covariate::kTime;
-  if (by_the_clock && (in_room || in_picture)) forms.push_back({in_room ? picture : room, false, {}, 0});
+  if (by_the_clock && (in_world || in_image)) forms.push_back({in_world ? picture : walls, false, {}, 0});
   // On the raster the gain is approximate. The decision follows after the refinement.
   MotionModel best = model;
-  double best_worth = 0;
+  double best_gain = 0;
   for (std::size_t f = 0; f < forms.size(); ++f) {
     Steps& form = forms[f];
     constexpr double kBetter = 2;
@@ -271,18 +271,18 @@ std::string find_steps(const Fitter& fitter, MotionModel& model, std::size_t pla
     if (form.at_s.empty() || (form.gain < kBetter && !other)) continue;
     MotionModel trial = model;
     if (!put_steps(fitter, trial, place, form, apart_s)) continue;
-    if (other) trial.terms[place].name = in_room ? "camera-by-time" : "drift-by-time";
+    if (other) trial.terms[place].name = in_world ? "camera-by-time" : "drift-by-time";
     fitter.fit(trial, 2);
-    if (form.beside) settle(fitter, trial, place);
+    if (form.beside) refit(fitter, trial, place);
     // Price of a step: the choice of its time, and its size. Price of a curve: its complexity.
     const double price = std::log(static_cast<double>(points.size())) + 3 * static_cast<double>(form.kinds.size());
     const double curve = form.beside ? 0 : bends(fitter, model, place);
-    const double worth = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
-                         price * static_cast<double>(form.at_s.size());
+    const double gain = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
+                        price * static_cast<double>(form.at_s.size());
     // Without clear evidence the target stays.
     constexpr double kSurelyOther = 3;
-    if (worth <= best_worth + (other ? kSurelyOther : 0)) continue;
-    best_worth = worth;
+    if (gain <= best_gain + (other ? kSurelyOther : 0)) continue;
+    best_gain = gain;
     best = trial;
   }
   model = best;

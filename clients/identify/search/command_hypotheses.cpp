@@ -8,7 +8,7 @@ namespace {
 using Shape = Factor::Shape;
 
 /// Duration of the previous command: after any command, or when driving straight (long turns persist).
-void of_lasting(DictionaryMaker& make, const Extent& extent, std::uint8_t straight_only) {
+void add_duration_hypotheses(DictionaryBuilder& make, const Extent& extent, std::uint8_t straight_only) {
   constexpr Eigen::Index kCurve = 3;
   Factor lasted = over(Shape::kCosines, Covariate::kPreviousLasted, 0, extent.since_s, kCurve);
   lasted.warp = 1;
@@ -26,24 +26,24 @@ void of_lasting(DictionaryMaker& make, const Extent& extent, std::uint8_t straig
 
 }  // namespace
 
-void hypotheses_of_use(DictionaryMaker& make, const Extent& extent) {
+void add_motor_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const Basis motor{{over(Shape::kCosines, Covariate::kMotorTime, 0, extent.motor_s, 8)}};
   make.curve(kSpeed, "motor-time", {"motor_time"}, motor, {1, 3, 8}, false);
   const Basis driven{{over(Shape::kCosines, Covariate::kDrivenTime, 0, extent.driven_s, 6)}};
   make.curve(kTurning, "driven-time", {"motor_time"}, driven, {1, 3, 6}, false);
 }
 
-void hypotheses_of_commands(DictionaryMaker& make, const Extent& extent) {
+void add_command_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   std::vector<double> moving;
   if (extent.has_straight) moving.push_back(1);
   if (extent.has_turns) moving.insert(moving.end(), {2, 3});
   const Basis which{{keyed(Shape::kTable, Covariate::kCommand, moving)}};
   const auto n = static_cast<Eigen::Index>(moving.size());
-  for (const Acting* acting : {&kSpeed, &kTurning, &kSlip}) {
-    const auto bases = make.put(*acting, which);
+  for (const TargetGroup* group : {&kSpeed, &kTurning, &kSlip}) {
+    const auto bases = make.put(*group, which);
     for (Eigen::Index i = 0; i < n; ++i)
-      make.add(*acting, "command", {"command"}, some(bases, i, 1), static_cast<double>(n));
-    make.add(*acting, "command", {"command"}, some(bases, 0, n));
+      make.add(*group, "command", {"command"}, some(bases, i, 1), static_cast<double>(n));
+    make.add(*group, "command", {"command"}, some(bases, 0, n));
   }
   for (const Target wheel : {Target::kGainLeft, Target::kGainRight}) {
     const auto base = make.put(wheel, which);
@@ -72,12 +72,12 @@ void hypotheses_of_commands(DictionaryMaker& make, const Extent& extent) {
   if (n == 1) return;
   since.count = 3;
   const Basis each{{keyed(Shape::kTable, Covariate::kCommand, moving), since}};
-  for (const Acting* acting : {&kSpeed, &kTurning})
-    make.add(*acting, "command-and-time-since-command", {"command", "time_since_command"},
-             some(make.put(*acting, each), 0, 3 * n));
+  for (const TargetGroup* group : {&kSpeed, &kTurning})
+    make.add(*group, "command-and-time-since-command", {"command", "time_since_command"},
+             some(make.put(*group, each), 0, 3 * n));
 }
 
-void hypotheses_of_history(DictionaryMaker& make, const Extent& extent) {
+void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   if (!extent.has_turns && !extent.has_stop) return;
   constexpr std::uint8_t kStraightOnly = 1u << 1;
   constexpr Eigen::Index kCurve = 4;
@@ -90,11 +90,11 @@ void hypotheses_of_history(DictionaryMaker& make, const Extent& extent) {
   since.first = 0;
   since.warp = 1;
   const Factor which = keyed(Shape::kTable, Covariate::kPreviousCommand, before);
-  for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
+  for (const TargetGroup* group : {&kTurning, &kSpeed, &kSlip}) {
     // Sideways slip: constants only.
-    const Eigen::Index curve = acting == &kSlip ? 1 : kCurve;
+    const Eigen::Index curve = group == &kSlip ? 1 : kCurve;
     const Basis basis = curve > 1 ? Basis{{which, since}} : Basis{{which}};
-    const auto driven = make.put(*acting, basis), straight = make.put(*acting, basis, kStraightOnly);
+    const auto driven = make.put(*group, basis), straight = make.put(*group, basis, kStraightOnly);
     const auto after = [&](std::vector<Eigen::Index> bases, Eigen::Index from, Eigen::Index to) {
       for (const Eigen::Index size :
            curve > 1 ? std::vector<Eigen::Index>{1, curve} : std::vector<Eigen::Index>{1}) {
@@ -103,7 +103,7 @@ void hypotheses_of_history(DictionaryMaker& make, const Extent& extent) {
           for (const Eigen::Index c : some(bases, key * curve, size)) columns.push_back(c);
         std::vector<std::string> words{"history"};
         if (size > 1) words.emplace_back("time_since_command");
-        make.add(*acting, "previous-command", words, columns, 4);
+        make.add(*group, "previous-command", words, columns, 4);
       }
     };
     for (const auto& bases : {driven, straight, std::vector<Eigen::Index>{driven[0], straight[0]}}) {
@@ -115,23 +115,23 @@ void hypotheses_of_history(DictionaryMaker& make, const Extent& extent) {
       after(bases, 0, keys);
     }
   }
-  of_lasting(make, extent, kStraightOnly);
+  add_duration_hypotheses(make, extent, kStraightOnly);
   if (!extent.has_turns) return;
   const Factor last = keyed(Shape::kTable, Covariate::kLastTurn, {2, 3});
-  for (const Acting* acting : {&kTurning, &kSpeed, &kSlip}) {
-    const auto turned = make.put(*acting, Basis{{last}}, kStraightOnly);
-    make.add(*acting, "last-turn", {"history"}, some(turned, 0, 2));
+  for (const TargetGroup* group : {&kTurning, &kSpeed, &kSlip}) {
+    const auto turned = make.put(*group, Basis{{last}}, kStraightOnly);
+    make.add(*group, "last-turn", {"history"}, some(turned, 0, 2));
   }
 }
 
-void hypotheses_of_lately(DictionaryMaker& make, const Extent& extent) {
-  const auto lately = [&](Shape shape, Covariate of, std::size_t forget, std::uint32_t count) {
-    Factor f = over(shape, of, 0, std::min(kForget_s[forget], extent.driven_s), count);
-    f.axis.forget = static_cast<std::uint8_t>(forget + 1);
+void add_discounted_motor_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
+  const auto lately = [&](Shape shape, Covariate of, std::size_t decay_index, std::uint32_t count) {
+    Factor f = over(shape, of, 0, std::min(kDecayTimes_s[decay_index], extent.driven_s), count);
+    f.axis.decay_index = static_cast<std::uint8_t>(decay_index + 1);
     return f;
   };
-  constexpr auto kChoices = static_cast<double>(kForget_s.size());
-  for (std::size_t f = 0; f < kForget_s.size(); ++f) {
+  constexpr auto kChoices = static_cast<double>(kDecayTimes_s.size());
+  for (std::size_t f = 0; f < kDecayTimes_s.size(); ++f) {
     for (const Covariate of : {Covariate::kMotorTime, Covariate::kDrivenTime}) {
       const auto bases = make.put(kSpeed, Basis{{lately(Shape::kCosines, of, f, 3)}});
       for (const Eigen::Index size : {1, 3})
@@ -147,12 +147,12 @@ void hypotheses_of_lately(DictionaryMaker& make, const Extent& extent) {
   if (extent.has_stop) {
     Factor unbroken = over(Shape::kCosines, Covariate::kSinceRest, 0, extent.since_rest_s, 6);
     unbroken.warp = 1;
-    for (const Acting* acting : {&kSpeed, &kTurning})
-      make.curve(*acting, "time-since-rest", {"motor_time", "history"}, Basis{{unbroken}}, {1, 3, 6}, false);
+    for (const TargetGroup* group : {&kSpeed, &kTurning})
+      make.curve(*group, "time-since-rest", {"motor_time", "history"}, Basis{{unbroken}}, {1, 3, 6}, false);
   }
   if (!extent.has_turns) return;
   const Basis wound{
-      {over(Shape::kCosines, Covariate::kUseDifference, -extent.difference_s, extent.difference_s, 6)}};
+      {over(Shape::kCosines, Covariate::kMotorTimeDifference, -extent.difference_s, extent.difference_s, 6)}};
   make.curve(kTurning, "turns-so-far", {"motor_time", "history"}, wound, {1, 3, 6}, false);
   // Accumulated turns: a cable winds up.
   const auto left = make.put(Target::kTurn,

@@ -66,7 +66,7 @@ std::vector<Eigen::Index> some(const std::vector<Eigen::Index>& bases, Eigen::In
   return columns;
 }
 
-Eigen::Index DictionaryMaker::put(Target target, Basis basis, std::uint8_t during) {
+Eigen::Index DictionaryBuilder::put(Target target, Basis basis, std::uint8_t during) {
   const Eigen::Index first = columns_;
   const std::vector<double> rough = basis.roughness();
   for (const double r : rough) scales_.push_back(natural(target) * std::pow(r, -1.5));
@@ -75,13 +75,14 @@ Eigen::Index DictionaryMaker::put(Target target, Basis basis, std::uint8_t durin
   return first;
 }
 
-std::vector<Eigen::Index> DictionaryMaker::put(const Acting& acting, const Basis& basis, std::uint8_t during) {
+std::vector<Eigen::Index> DictionaryBuilder::put(const TargetGroup& group, const Basis& basis,
+                                                 std::uint8_t during) {
   std::vector<Eigen::Index> bases;
-  for (const Target target : acting.targets) bases.push_back(put(target, basis, during));
+  for (const Target target : group.targets) bases.push_back(put(target, basis, during));
   return bases;
 }
 
-std::uint32_t DictionaryMaker::family(const std::string& name) {
+std::uint32_t DictionaryBuilder::family(const std::string& name) {
   auto& families = dictionary_.families;
   const auto known = std::find(families.begin(), families.end(), name);
   if (known != families.end()) return static_cast<std::uint32_t>(known - families.begin());
@@ -89,32 +90,32 @@ std::uint32_t DictionaryMaker::family(const std::string& name) {
   return static_cast<std::uint32_t>(families.size() - 1);
 }
 
-void DictionaryMaker::add(const std::string& name, std::vector<std::string> covariates, const std::string& acts_on,
-                          std::vector<Eigen::Index> columns, double choices) {
+void DictionaryBuilder::add(const std::string& name, std::vector<std::string> covariates,
+                            const std::string& acts_on, std::vector<Eigen::Index> columns, double choices) {
   std::sort(columns.begin(), columns.end());
   dictionary_.hypotheses.push_back(
       {name, std::move(covariates), acts_on, std::move(columns), family(name), std::log(choices)});
 }
 
-void DictionaryMaker::add(const Acting& acting, const std::string& of, std::vector<std::string> words,
-                          std::vector<Eigen::Index> columns, double choices) {
-  words.insert(words.begin(), acting.words.begin(), acting.words.end());
-  add(std::string(acting.name) + "-by-" + of, std::move(words), acting.in_words, std::move(columns), choices);
+void DictionaryBuilder::add(const TargetGroup& group, const std::string& of, std::vector<std::string> words,
+                            std::vector<Eigen::Index> columns, double choices) {
+  words.insert(words.begin(), group.words.begin(), group.words.end());
+  add(std::string(group.name) + "-by-" + of, std::move(words), group.in_words, std::move(columns), choices);
 }
 
-std::vector<Eigen::Index> DictionaryMaker::curve(const Acting& acting, const std::string& of,
-                                                 const std::vector<std::string>& words, const Basis& basis,
-                                                 const std::vector<Eigen::Index>& sizes, bool windows) {
-  const auto bases = put(acting, basis);
+std::vector<Eigen::Index> DictionaryBuilder::curve(const TargetGroup& group, const std::string& of,
+                                                   const std::vector<std::string>& words, const Basis& basis,
+                                                   const std::vector<Eigen::Index>& sizes, bool windows) {
+  const auto bases = put(group, basis);
   const auto n = static_cast<Eigen::Index>(basis.size());
   for (const Eigen::Index size : sizes)
-    if (size <= n) add(acting, of, words, some(bases, 0, size));
+    if (size <= n) add(group, of, words, some(bases, 0, size));
   for (Eigen::Index first = 4; windows && first + 4 <= n; first += 2)
-    add(acting, of, words, some(bases, first, 4), static_cast<double>(n) / 2);
+    add(group, of, words, some(bases, first, 4), static_cast<double>(n) / 2);
   return bases;
 }
 
-void DictionaryMaker::finish() {
+void DictionaryBuilder::finish() {
   dictionary_.scale = Eigen::Map<Eigen::VectorXd>(scales_.data(), static_cast<Eigen::Index>(scales_.size()));
 }
 

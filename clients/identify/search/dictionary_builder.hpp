@@ -9,23 +9,24 @@
 namespace kilotwin::identify {
 
 /// A group of targets that effects act on together.
-struct Acting {
+struct TargetGroup {
   const char* name;      ///< prefix of effect names
   const char* in_words;  ///< text in result.json
   std::vector<Target> targets;
   std::vector<std::string> words;  ///< covariates that the target implies
 };
 
-inline const Acting kSpeed{"speed", "speed of the wheels", {Target::kGain}, {}};
-inline const Acting kTurning{"turning", "turn rate", {Target::kTurn}, {}};
-inline const Acting kSlip{"slip", "sideways slip", {Target::kSideways}, {}};
-inline const Acting kWorld{"drift", "drift in the room", {Target::kWorldX, Target::kWorldY}, {"world_frame"}};
-inline const Acting kCamera{
+inline const TargetGroup kSpeed{"speed", "wheel speeds", {Target::kGain}, {}};
+inline const TargetGroup kTurning{"turning", "turn rate", {Target::kTurn}, {}};
+inline const TargetGroup kSlip{"slip", "sideways slip", {Target::kSideways}, {}};
+inline const TargetGroup kWorld{
+    "drift", "drift in the world frame", {Target::kWorldX, Target::kWorldY}, {"world_frame"}};
+inline const TargetGroup kCamera{
     "camera", "measured position", {Target::kMeasuredX, Target::kMeasuredY}, {"measurement"}};
 /// Rotation and scale of the image, as a single camera produces them.
-inline const Acting kPicture{
+inline const TargetGroup kCameraPose{
     "camera", "measured position", {Target::kMeasuredTurn, Target::kMeasuredScale}, {"measurement"}};
-inline const Acting kCompass{"compass", "measured heading", {Target::kMeasuredHeading}, {"measurement"}};
+inline const TargetGroup kCompass{"compass", "measured heading", {Target::kMeasuredHeading}, {"measurement"}};
 
 /// A factor of `count` columns over a range of a covariate.
 [[nodiscard]] Factor over(Factor::Shape, Covariate of, double low, double high, std::uint32_t count);
@@ -38,26 +39,27 @@ inline const Acting kCompass{"compass", "measured heading", {Target::kMeasuredHe
 [[nodiscard]] std::vector<Eigen::Index> some(const std::vector<Eigen::Index>& bases, Eigen::Index first,
                                              Eigen::Index count);
 
-class DictionaryMaker {
+class DictionaryBuilder {
  public:
-  explicit DictionaryMaker(Dictionary& dictionary) : dictionary_(dictionary) {}
+  explicit DictionaryBuilder(Dictionary& dictionary) : dictionary_(dictionary) {}
 
   /// Adds columns to the dictionary and returns the index of the first. Measurement effects act under every
   /// command.
   Eigen::Index put(Target, Basis, std::uint8_t during = kDriven);
   /// The same for each target of a group; returns the indices of their first columns.
-  std::vector<Eigen::Index> put(const Acting&, const Basis&, std::uint8_t during = kDriven);
+  std::vector<Eigen::Index> put(const TargetGroup&, const Basis&, std::uint8_t during = kDriven);
 
   /// Adds a hypothesis. `choices`: number of hypotheses of its family, itself included. One name is one family.
   void add(const std::string& name, std::vector<std::string> covariates, const std::string& acts_on,
            std::vector<Eigen::Index> columns, double choices = 1);
   /// The same with the name "<target>-by-<of>".
-  void add(const Acting&, const std::string& of, std::vector<std::string> covariates,
+  void add(const TargetGroup&, const std::string& of, std::vector<std::string> covariates,
            std::vector<Eigen::Index> columns, double choices = 1);
   /// Hypotheses with a smooth curve of increasing order. With `windows`: also single frequencies. Returns as
   /// put().
-  std::vector<Eigen::Index> curve(const Acting&, const std::string& of, const std::vector<std::string>& covariates,
-                                  const Basis&, const std::vector<Eigen::Index>& sizes, bool windows);
+  std::vector<Eigen::Index> curve(const TargetGroup&, const std::string& of,
+                                  const std::vector<std::string>& covariates, const Basis&,
+                                  const std::vector<Eigen::Index>& sizes, bool windows);
 
   /// To be called once, after all columns.
   void finish();

@@ -55,20 +55,20 @@ Extent extent_of(const PreparedSet& set) {
 
 Dictionary dictionary_of(const Extent& extent, const std::vector<Term>& found) {
   Dictionary dictionary;
-  DictionaryMaker make(dictionary);
-  const auto drift_in_time = hypotheses_of_time(make, extent);
-  hypotheses_of_use(make, extent);
-  const auto drift_in_place = hypotheses_of_place(make, extent);
-  hypotheses_of_heading(make, extent);
-  hypotheses_of_drift(make, extent, drift_in_time, drift_in_place);
-  hypotheses_of_commands(make, extent);
-  hypotheses_of_neighbours(make, extent);
-  hypotheses_of_history(make, extent);
-  hypotheses_of_floor(make);
-  hypotheses_of_lately(make, extent);
-  hypotheses_of_robots(make, extent);
-  hypotheses_of_runs(make, extent);
-  hypotheses_of_found(make, extent, found);
+  DictionaryBuilder make(dictionary);
+  const auto drift_in_time = add_time_hypotheses(make, extent);
+  add_motor_time_hypotheses(make, extent);
+  const auto drift_in_place = add_place_hypotheses(make, extent);
+  add_heading_hypotheses(make, extent);
+  add_drift_hypotheses(make, extent, drift_in_time, drift_in_place);
+  add_command_hypotheses(make, extent);
+  add_neighbour_hypotheses(make, extent);
+  add_history_hypotheses(make, extent);
+  add_traffic_hypotheses(make);
+  add_discounted_motor_time_hypotheses(make, extent);
+  add_robot_hypotheses(make, extent);
+  add_run_hypotheses(make, extent);
+  add_amplitude_hypotheses(make, extent, found);
   make.finish();
   return dictionary;
 }

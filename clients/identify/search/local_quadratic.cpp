@@ -6,11 +6,11 @@
 
 namespace kilotwin::identify {
 
-Linear linear(const Fitter& fitter, const MotionModel& model, std::size_t term, const std::vector<Block>& more,
-              bool beside) {
+LocalQuadratic local_quadratic(const Fitter& fitter, const MotionModel& model, std::size_t term,
+                               const std::vector<Block>& more, bool beside) {
   std::vector<Block> blocks = blocks_of(model);
   blocks.insert(blocks.end(), more.begin(), more.end());
-  Linear out;
+  LocalQuadratic out;
   out.units =
       linearise(model, fitter.set().units(), blocks, {100, fitter.threads(), beside ? -1 : static_cast<int>(term)});
   const Eigen::Index all = out.units.front().information.rows();
@@ -39,31 +39,32 @@ Linear linear(const Fitter& fitter, const MotionModel& model, std::size_t term, 
   return out;
 }
 
-std::vector<Eigen::Index> Linear::others() const {
+std::vector<Eigen::Index> LocalQuadratic::other_columns() const {
   std::vector<Eigen::Index> others;
   for (Eigen::Index i = 0; i < own; ++i)
     if (i < first || i >= first + count) others.push_back(i);
   return others;
 }
 
-std::vector<Eigen::Index> Linear::more() const {
+std::vector<Eigen::Index> LocalQuadratic::added_columns() const {
   std::vector<Eigen::Index> columns;
   for (Eigen::Index i = own; i < information.rows(); ++i) columns.push_back(i);
   return columns;
 }
 
-std::vector<Eigen::Index> Linear::of_term() const {
+std::vector<Eigen::Index> LocalQuadratic::term_columns() const {
   std::vector<Eigen::Index> columns;
   for (Eigen::Index i = first; i < first + count; ++i) columns.push_back(i);
   return columns;
 }
 
-Eigen::VectorXd Linear::score_without(const Eigen::VectorXd& coefficients) const {
+Eigen::VectorXd LocalQuadratic::score_without(const Eigen::VectorXd& coefficients) const {
   return score + information.middleCols(first, count) * coefficients;
 }
 
-Beside beside(const Linear& l, const Eigen::VectorXd& at_zero, const std::vector<Eigen::Index>& columns) {
-  const std::vector<Eigen::Index> others = l.others();
+ReducedColumns reduced_columns(const LocalQuadratic& l, const Eigen::VectorXd& at_zero,
+                               const std::vector<Eigen::Index>& columns) {
+  const std::vector<Eigen::Index> others = l.other_columns();
   Eigen::MatrixXd own = l.information(others, others);
   own.diagonal() += l.prior(others);
   const Eigen::MatrixXd cross = l.information(others, columns);
@@ -72,10 +73,11 @@ Beside beside(const Linear& l, const Eigen::VectorXd& at_zero, const std::vector
           at_zero(columns) - by.transpose() * at_zero(others)};
 }
 
-void exchange(MotionModel& model, std::size_t place, const Linear& l, const std::vector<Block>& blocks,
-              const Eigen::VectorXd& at_zero, const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd) {
+void replace_blocks(MotionModel& model, std::size_t place, const LocalQuadratic& l,
+                    const std::vector<Block>& blocks, const Eigen::VectorXd& at_zero,
+                    const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd) {
   Term& term = model.terms[place];
-  std::vector<Eigen::Index> moved = l.others();
+  std::vector<Eigen::Index> moved = l.other_columns();
   moved.insert(moved.end(), columns.begin(), columns.end());
   Eigen::MatrixXd own = l.information(moved, moved);
   Eigen::VectorXd precision = Eigen::VectorXd::Zero(l.information.rows());
@@ -91,7 +93,8 @@ void exchange(MotionModel& model, std::size_t place, const Linear& l, const std:
   term.blocks = blocks;
   term.coefficients = step(columns);
   term.precision = precision(columns);
-  if (model.room.any() && (before.measures() || model.measures())) model.room = carried(model.room, before, model);
+  if (model.walls.any() && (before.measures() || model.measures()))
+    model.walls = carried(model.walls, before, model);
 }
 
 }  // namespace kilotwin::identify

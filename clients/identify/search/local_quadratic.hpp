@@ -7,7 +7,7 @@
 namespace kilotwin::identify {
 
 /// Information and score of the model's columns and of further blocks.
-struct Linear {
+struct LocalQuadratic {
   std::vector<Unit> units;
   Eigen::MatrixXd information;
   Eigen::VectorXd score;              ///< prior included, except that of the replaced term
@@ -16,29 +16,31 @@ struct Linear {
   Eigen::Index own = 0;               ///< number of the model's columns; those of the further blocks follow
 
   /// The model's columns except the replaced term's.
-  [[nodiscard]] std::vector<Eigen::Index> others() const;
+  [[nodiscard]] std::vector<Eigen::Index> other_columns() const;
   /// Columns of the further blocks.
-  [[nodiscard]] std::vector<Eigen::Index> more() const;
+  [[nodiscard]] std::vector<Eigen::Index> added_columns() const;
   /// Columns of the replaced term.
-  [[nodiscard]] std::vector<Eigen::Index> of_term() const;
+  [[nodiscard]] std::vector<Eigen::Index> term_columns() const;
   /// The score at coefficients 0 of the replaced term.
   [[nodiscard]] Eigen::VectorXd score_without(const Eigen::VectorXd& coefficients) const;
 };
 
 /// `beside`: the blocks are added to the term instead of replacing it.
-[[nodiscard]] Linear linear(const Fitter&, const MotionModel&, std::size_t term, const std::vector<Block>& more,
-                            bool beside = false);
+[[nodiscard]] LocalQuadratic local_quadratic(const Fitter&, const MotionModel&, std::size_t term,
+                                             const std::vector<Block>& more, bool beside = false);
 
 /// Information and score of some columns after the elimination of the nuisance columns (Schur complement).
-struct Beside {
+struct ReducedColumns {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
 };
-[[nodiscard]] Beside beside(const Linear&, const Eigen::VectorXd& score, const std::vector<Eigen::Index>& columns);
+[[nodiscard]] ReducedColumns reduced_columns(const LocalQuadratic&, const Eigen::VectorXd& score,
+                                             const std::vector<Eigen::Index>& columns);
 
 /// Replaces the term's blocks. `columns` are those of the new blocks, `sd` their prior standard deviations,
 /// `score` the score without the term. All other parameters move to the maximum of the quadratic approximation.
-void exchange(MotionModel&, std::size_t term, const Linear&, const std::vector<Block>&,
-              const Eigen::VectorXd& score, const std::vector<Eigen::Index>& columns, const Eigen::VectorXd& sd);
+void replace_blocks(MotionModel&, std::size_t term, const LocalQuadratic&, const std::vector<Block>&,
+                    const Eigen::VectorXd& score, const std::vector<Eigen::Index>& columns,
+                    const Eigen::VectorXd& sd);
 
 }  // namespace kilotwin::identify

@@ -7,7 +7,7 @@ using Shape = Factor::Shape;
 
 }  // namespace
 
-void hypotheses_of_neighbours(DictionaryMaker& make, const Extent& extent) {
+void add_neighbour_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   if (!extent.neighbours) return;
   // Radii 70, 100 and 150 mm. The shape refinement fits the radius.
   constexpr std::uint8_t kSought[] = {3, 6, 11};
@@ -22,10 +22,10 @@ void hypotheses_of_neighbours(DictionaryMaker& make, const Extent& extent) {
     for (const Eigen::Index n : {1, 3}) make.add(kSpeed, "neighbours", {"neighbours"}, some(bases, 0, n), 6);
     const Factor falling = with_radius(over(Shape::kTaper, Covariate::kNearest, 0, reach, 2), r);
     const Factor bearing = with_radius(over(Shape::kHarmonics, Covariate::kBearing, 0, 1, 1), r);
-    for (const Acting* acting : {&kTurning, &kSlip}) {
-      const auto aside = make.put(*acting, Basis{{falling, bearing}});
-      make.add(*acting, "neighbours", {"neighbours"}, {aside[0] + 1}, 6);
-      make.add(*acting, "neighbours", {"neighbours"}, {aside[0] + 1, aside[0] + 3}, 6);
+    for (const TargetGroup* group : {&kTurning, &kSlip}) {
+      const auto aside = make.put(*group, Basis{{falling, bearing}});
+      make.add(*group, "neighbours", {"neighbours"}, {aside[0] + 1}, 6);
+      make.add(*group, "neighbours", {"neighbours"}, {aside[0] + 1, aside[0] + 3}, 6);
     }
     const auto forward = make.put(Target::kAhead, Basis{{falling, bearing}});
     make.add("speed-by-neighbours", {"neighbours"}, kSpeed.in_words, {forward, forward + 2}, 6);
@@ -44,12 +44,12 @@ void hypotheses_of_neighbours(DictionaryMaker& make, const Extent& extent) {
   }
 }
 
-void hypotheses_of_floor(DictionaryMaker& make) {
-  for (std::uint8_t cells = 0; cells < kFloorCells; ++cells) {
-    Factor f = keyed(Shape::kExponential, Covariate::kTrodden, {2, 8, 32});
+void add_traffic_hypotheses(DictionaryBuilder& make) {
+  for (std::uint8_t cells = 0; cells < kTrafficGrids; ++cells) {
+    Factor f = keyed(Shape::kExponential, Covariate::kTraffic, {2, 8, 32});
     f.axis.radius = cells;
     const auto bases = make.put(kSpeed, Basis{{f}});
-    make.add(kSpeed, "trodden", {"history", "position"}, some(bases, 0, 3), kFloorCells);
+    make.add(kSpeed, "traffic", {"history", "position"}, some(bases, 0, 3), kTrafficGrids);
   }
 }
 

@@ -13,7 +13,7 @@ namespace {
 using Shape = Factor::Shape;
 
 /// Least gain in log evidence of one more form, in addition to the choice penalty.
-constexpr double kWorth = 8;
+constexpr double kLeastEvidence = 8;
 constexpr std::size_t kMostForms = 5;
 /// Forms chosen in the first round: the quadratic approximation is inaccurate far from its centre.
 constexpr std::size_t kFirstForms = 2;
@@ -199,7 +199,7 @@ struct Chosen {
 
 class Choice {
  public:
-  Choice(const Beside& data, const std::vector<Form>& forms) : data_(data) {
+  Choice(const ReducedColumns& data, const std::vector<Form>& forms) : data_(data) {
     Eigen::Index next = 0;
     for (const Form& form : forms) {
       std::vector<Eigen::Index> columns;
@@ -245,7 +245,7 @@ class Choice {
           best_sd = size * sd_[f];
         }
       }
-      if (best < kWorth + price) break;
+      if (best < kLeastEvidence + price) break;
       chosen.forms.push_back(best_form);
       chosen.columns.insert(chosen.columns.end(), columns_[best_form].begin(), columns_[best_form].end());
       const Eigen::Index had = chosen.sd.size();
@@ -257,14 +257,14 @@ class Choice {
   }
 
  private:
-  const Beside& data_;
+  const ReducedColumns& data_;
   std::vector<std::vector<Eigen::Index>> columns_;
   std::vector<Eigen::VectorXd> sd_;  ///< of the columns of a form, before scaling
 };
 
 }  // namespace
 
-bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t place) {
+bool refine_neighbour_shape(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const std::vector<Block>& had = model.terms[place].blocks;
   if (had.empty() || !std::all_of(had.begin(), had.end(), is_of_neighbours)) return false;
   const bool pushes = had.front().target == Target::kTurn || had.front().target == Target::kSideways;
@@ -272,14 +272,14 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
       pushes ? forms_of_push(fitter.set(), had.front().target == Target::kTurn, had.front().during)
              : forms_of_speed(fitter.set(), had.front().during);
   double likelihood = fitter.log_likelihood(model);
-  // Replaces the term by some of the forms if the gain exceeds `worth`.
-  const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double worth) {
+  // Replaces the term by some of the forms if the gain exceeds `least_gain`.
+  const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double least_gain) {
     std::vector<Block> all;
     for (const Form& form : of) all.insert(all.end(), form.begin(), form.end());
     MotionModel trial = model;
-    const Linear l = linear(fitter, trial, place, all);
+    const LocalQuadratic l = local_quadratic(fitter, trial, place, all);
     const Eigen::VectorXd at_zero = l.score_without(trial.terms[place].coefficients);
-    const Beside data = beside(l, at_zero, l.more());
+    const ReducedColumns data = reduced_columns(l, at_zero, l.added_columns());
     const Chosen chosen = Choice(data, of).choose(most);
     std::vector<Form> found;
     std::vector<Block> blocks;
@@ -290,11 +290,11 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
     if (found.empty()) return found;
     std::vector<Eigen::Index> columns;
     for (const Eigen::Index c : chosen.columns) columns.push_back(l.own + c);
-    exchange(trial, place, l, blocks, at_zero, columns, chosen.sd);
+    replace_blocks(trial, place, l, blocks, at_zero, columns, chosen.sd);
     fitter.fit(trial, 1);
-    settle(fitter, trial, place);
+    refit(fitter, trial, place);
     const double reached = fitter.log_likelihood(trial);
-    if (reached < likelihood + worth) return std::vector<Form>{};
+    if (reached < likelihood + least_gain) return std::vector<Form>{};
     model = trial;
     likelihood = reached;
     return found;
@@ -302,11 +302,11 @@ bool shape_neighbours(const Fitter& fitter, MotionModel& model, std::size_t plac
   const std::vector<Form> first = try_forms(forms, kFirstForms, 0);
   if (first.empty()) return false;
   // Noise and disc centres change with the first choice.
-  fitter.fit_surroundings(model);
+  fitter.fit_contacts(model);
   likelihood = fitter.log_likelihood(model);
-  const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms, kWorth);
+  const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms, kLeastEvidence);
   forms.insert(forms.end(), finer.begin(), finer.end());
-  try_forms(forms, kMostForms, kWorth);
+  try_forms(forms, kMostForms, kLeastEvidence);
   return true;
 }
 

@@ -7,7 +7,7 @@ using Shape = Factor::Shape;
 
 }  // namespace
 
-void hypotheses_of_robots(DictionaryMaker& make, const Extent& extent) {
+void add_robot_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   constexpr std::size_t kMost = 120;
   if (extent.robots.size() < 2 || extent.robots.size() > kMost) return;
   std::vector<double> keys(extent.robots.begin(), extent.robots.end());
@@ -27,7 +27,7 @@ void hypotheses_of_robots(DictionaryMaker& make, const Extent& extent) {
   make.add("camera-by-robot", {"measurement", "robot"}, kCamera.in_words, some({ahead, left}, 0, n));
 }
 
-void hypotheses_of_runs(DictionaryMaker& make, const Extent& extent) {
+void add_run_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   constexpr std::size_t kMost = 40;
   if (extent.runs.size() < 2 || extent.runs.size() > kMost) return;
   const Basis which{{keyed(Shape::kTable, Covariate::kRun, {extent.runs.begin(), extent.runs.end()})}};

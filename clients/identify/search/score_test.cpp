@@ -94,25 +94,25 @@ bool looks_at_runs(const Term& term) {
 
 }  // namespace
 
-struct Scores::Reduced {
+struct ScoreTest::Reduced {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
   std::vector<Eigen::MatrixXd> fold_information;
   std::vector<Eigen::VectorXd> fold_score;
 };
 
-Scores::Folds::Folds(std::size_t count, Eigen::Index columns)
+ScoreTest::Folds::Folds(std::size_t count, Eigen::Index columns)
     : information(count, Eigen::MatrixXd::Zero(columns, columns)), score(count, Eigen::VectorXd::Zero(columns)) {}
 
-Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector<Unit>& units,
-               const Dictionary& dictionary)
+ScoreTest::ScoreTest(const Fitter& fitter, const MotionModel& model, const std::vector<Unit>& units,
+                     const Dictionary& dictionary)
     : model_(model), dictionary_(dictionary) {
   const Eigen::Index all = units.front().information.rows();
   own_ = all - dictionary.columns();
   information_ = Eigen::MatrixXd::Zero(all, all);
   score_ = Eigen::VectorXd::Zero(all);
   by_unit_ = Folds(std::min(kFolds, units.size()), all);
-  by_stretch_ = Folds(kFolds, all);
+  by_cluster_ = Folds(kFolds, all);
   Eigen::Index clusters = 0;
   for (const Unit& unit : units) clusters += unit.cluster_scores.cols();
   clusters_.resize(all, clusters);
@@ -126,11 +126,11 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
     std::array<double, kFolds> share{};
     for (Eigen::Index k = 0; k < stretches; ++k) {
       const std::size_t of = (static_cast<std::size_t>(k) + u) % kFolds;
-      by_stretch_.score[of] += units[u].cluster_scores.col(k);
+      by_cluster_.score[of] += units[u].cluster_scores.col(k);
       share[of] += 1 / static_cast<double>(stretches);
     }
     for (std::size_t f = 0; f < kFolds; ++f)
-      if (share[f] > 0) by_stretch_.information[f] += share[f] * units[u].information;
+      if (share[f] > 0) by_cluster_.information[f] += share[f] * units[u].information;
     information_ += units[u].information;
     score_ += units[u].score;
     cluster_unit_.insert(cluster_unit_.end(), static_cast<std::size_t>(units[u].cluster_scores.cols()), u);
@@ -155,8 +155,9 @@ Scores::Scores(const Fitter& fitter, const MotionModel& model, const std::vector
 }
 
 /// Information and score of columns, reduced by the model's columns except one term's, for all folds.
-Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_stretch) const {
-  const Folds& folds = by_stretch ? by_stretch_ : by_unit_;
+ScoreTest::Reduced ScoreTest::reduce(const std::vector<Eigen::Index>& columns, int without_term,
+                                     bool by_cluster) const {
+  const Folds& folds = by_cluster ? by_cluster_ : by_unit_;
   std::vector<Eigen::Index> nuisance;
   for (Eigen::Index i = 0; i < kBaseColumns; ++i) nuisance.push_back(i);
   Eigen::VectorXd taken_out = Eigen::VectorXd::Zero(information_.rows());
@@ -205,7 +206,7 @@ Scores::Reduced Scores::reduce(const std::vector<Eigen::Index>& columns, int wit
 
 /// For coefficients b ~ N(0, (t scale)^2): log evidence over b = 0 at the best t, and the cross-validated gain
 /// there.
-Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, double log_choices) const {
+Finding ScoreTest::evidence_of(const Reduced& reduced, const Eigen::VectorXd& scale, double log_choices) const {
   Finding found;
   const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced.information * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
@@ -241,14 +242,14 @@ Finding Scores::weigh(const Reduced& reduced, const Eigen::VectorXd& scale, doub
   return found;
 }
 
-Finding Scores::weigh(const Hypothesis& hypothesis, int without_term) const {
+Finding ScoreTest::evidence_of(const Hypothesis& hypothesis, int without_term) const {
   std::vector<Eigen::Index> columns;
   for (const Eigen::Index c : hypothesis.columns) columns.push_back(own_ + c);
-  return weigh(reduce(columns, without_term, of_robots(hypothesis)), pick(dictionary_.scale, hypothesis.columns),
-               hypothesis.log_choices);
+  return evidence_of(reduce(columns, without_term, of_robots(hypothesis)),
+                     pick(dictionary_.scale, hypothesis.columns), hypothesis.log_choices);
 }
 
-Finding Scores::weigh_term(int term) const {
+Finding ScoreTest::evidence_of_term(int term) const {
   Eigen::Index first = kBaseColumns;
   for (int t = 0; t < term; ++t) first += model_.terms[static_cast<std::size_t>(t)].coefficients.size();
   const Term& own = model_.terms[static_cast<std::size_t>(term)];
@@ -256,10 +257,10 @@ Finding Scores::weigh_term(int term) const {
   for (Eigen::Index i = 0; i < own.coefficients.size(); ++i) columns.push_back(first + i);
   const bool of_each = std::any_of(own.blocks.begin(), own.blocks.end(),
                                    [](const Block& block) { return block.basis.looks_at(Covariate::kRobot); });
-  return weigh(reduce(columns, term, of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
+  return evidence_of(reduce(columns, term, of_each), own.precision.cwiseInverse().cwiseSqrt(), 0);
 }
 
-Scores::Outcome Scores::test(std::uint64_t seed) const {
+ScoreTest::Outcome ScoreTest::test(std::uint64_t seed) const {
   // The whole dictionary at once, reduced by the model.
   std::vector<Eigen::Index> columns, nuisance;
   for (Eigen::Index c = own_; c < information_.rows(); ++c) columns.push_back(c);
@@ -334,10 +335,10 @@ Scores::Outcome Scores::test(std::uint64_t seed) const {
   out.threshold_log10_p = mean - std::max(sd, 0.4) * std::sqrt(6.0) / M_PI * (gumbel - 0.5772);
   for (Finding& finding : out.findings) {
     if (finding.log10_p > out.threshold_log10_p) continue;
-    const Finding weighed = weigh(dictionary_.hypotheses[finding.hypothesis], -1);
-    finding.evidence = weighed.evidence;
-    finding.relative_scale = weighed.relative_scale;
-    finding.held_out = weighed.held_out;
+    const Finding result = evidence_of(dictionary_.hypotheses[finding.hypothesis], -1);
+    finding.evidence = result.evidence;
+    finding.relative_scale = result.relative_scale;
+    finding.held_out = result.held_out;
   }
   return out;
 }

@@ -1,4 +1,4 @@
-/// Score test of all hypotheses on the innovations of the fitted model. Scores U and information I of the
+/// Score test of all hypotheses on the innovations of the fitted model. ScoreTest U and information I of the
 /// hypotheses' columns are reduced by the model's own columns (linearisation.hpp). For each hypothesis:
 ///   - the statistic U' I^-1 U, with a threshold for the minimal p over all hypotheses. The null distribution follows from
 ///     sign flips of whole clusters, which preserve the dependence within clusters and between hypotheses;
@@ -25,10 +25,10 @@ struct Finding {
 };
 
 /// Score test of all columns of a dictionary, given a model.
-class Scores {
+class ScoreTest {
  public:
   /// `units`: linearised with the model's blocks first and the dictionary's after them.
-  Scores(const Fitter&, const MotionModel&, const std::vector<Unit>& units, const Dictionary&);
+  ScoreTest(const Fitter&, const MotionModel&, const std::vector<Unit>& units, const Dictionary&);
 
   struct Outcome {
     std::vector<Finding> findings;  ///< one per hypothesis, in order
@@ -39,9 +39,9 @@ class Scores {
   [[nodiscard]] Outcome test(std::uint64_t seed) const;
   /// Evidence and cross-validated gain of a hypothesis if one term of the model is removed; below 0: none is
   /// removed.
-  [[nodiscard]] Finding weigh(const Hypothesis&, int without_term) const;
+  [[nodiscard]] Finding evidence_of(const Hypothesis&, int without_term) const;
   /// The same for a term of the model itself.
-  [[nodiscard]] Finding weigh_term(int term) const;
+  [[nodiscard]] Finding evidence_of_term(int term) const;
 
   /// Family-wise error rate: probability of any detection in a set without an effect.
   static constexpr double kFamilyAlarm = 0.003;
@@ -49,8 +49,8 @@ class Scores {
  private:
   struct Beside;  // information and scores reduced by all other columns
   struct Reduced;
-  [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_stretch) const;
-  [[nodiscard]] Finding weigh(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
+  [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_cluster) const;
+  [[nodiscard]] Finding evidence_of(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
 
   const MotionModel& model_;
   const Dictionary& dictionary_;
@@ -67,7 +67,7 @@ class Scores {
   Folds by_unit_{0, 0};
   /// Folds of time intervals within each robot's tracks: for effects of single robots, which other robots cannot
   /// predict.
-  Folds by_stretch_{0, 0};
+  Folds by_cluster_{0, 0};
   Eigen::MatrixXd clusters_;  ///< scores of all columns, one column per cluster
   std::vector<std::size_t> cluster_unit_, cluster_run_;
 };

@@ -30,8 +30,8 @@ constexpr double kClose = 3;
 constexpr double kMostByShape = 200, kAsGood = 10;
 /// Hypotheses with this share of the best evidence are kept as alternatives: the order may change after shape
 /// refinement.
-constexpr double kContender = 0.97;
-constexpr const char* kPictureForDrift = "camera-by-time for drift-by-time";
+constexpr double kAlternativeShare = 0.97;
+constexpr const char* kCameraForDrift = "camera-by-time for drift-by-time";
 /// No form is exact. A hypothesis that explains less than this share of the total gain counts as a remnant.
 constexpr double kRemnant = 0.003;
 /// Largest number of samples in the test. More add cost and no power that is needed.
@@ -60,35 +60,35 @@ class Loop {
   Search run() {
     for (int round = 0; round < kMostRounds; ++round) {
       round_ = round;
-      say("looking for causes");
-      if (add_picture_jumps()) continue;
-      measure();
-      const Scores::Outcome outcome = scores_->test(kSeed + static_cast<std::uint64_t>(round));
+      say("testing hypotheses");
+      if (accept_calibration_shifts()) continue;
+      score_dictionary();
+      const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round));
       note_rejected(outcome);
       const Finding* const best = best_of(outcome, kRemnant * explained());
       if (best != nullptr) {
-        const Kept before = keep();
+        const SavedState before = save();
         const double likelihood = fitter_.log_likelihood_of_all(out_.model);
         note_ambiguous(*best, outcome);
-        if (contended(hypothesis(*best).name)) continue;
-        note_contenders(*best, outcome);
+        if (replaced_by_alternative(hypothesis(*best).name)) continue;
+        note_alternatives(*best, outcome);
         add(*best, outcome.threshold_log10_p);
         // The likelihood must rise by a part of the predicted gain.
         if (fitter_.log_likelihood_of_all(out_.model) < likelihood + 3) {
           restore(before);
           failed_.insert(hypothesis(*best).name);
         } else {
-          say("is all of it needed");
-          reconsider();
-          fitter_.fit_surroundings(out_.model);
-          try_picture();
+          say("backward elimination");
+          eliminate_earlier();
+          fitter_.fit_contacts(out_.model);
+          try_camera_motion();
         }
         continue;
       }
-      say("is it something else");
-      if (!defend()) break;
+      say("testing alternatives");
+      if (!eliminate()) break;
     }
-    say("simplest forms");
+    say("simplifying shapes");
     for (std::size_t t = 0; t < out_.model.terms.size(); ++t) simplify(fitter_, out_.model, t);
     return std::move(out_);
   }
@@ -97,17 +97,17 @@ class Loop {
   void say(const char* doing) const {
     std::string text = doing;
     for (const Term& term : out_.model.terms)
-      text += (&term == &out_.model.terms.front() ? "; found " : ", ") + term.name;
+      text += (&term == &out_.model.terms.front() ? "; accepted: " : ", ") + term.name;
     progress_(0.9 * round_ / kMostRounds, text);
   }
-  void measure() {
+  void score_dictionary() {
     dictionary_ = dictionary_of(extent_, out_.model.terms);
     std::vector<Block> blocks = blocks_of(out_.model);
     blocks.insert(blocks.end(), dictionary_.blocks.begin(), dictionary_.blocks.end());
     const std::vector<Unit> units = linearise(out_.model, units_, blocks, {100, fitter_.threads()});
-    scores_.emplace(fitter_, out_.model, units, dictionary_);
+    score_test_.emplace(fitter_, out_.model, units, dictionary_);
   }
-  const Finding* best_of(const Scores::Outcome& outcome, double least_evidence) const {
+  const Finding* best_of(const ScoreTest::Outcome& outcome, double least_evidence) const {
     const Finding* best = nullptr;
     for (const Finding& f : outcome.findings) {
       if (!good(f, outcome.threshold_log10_p) || f.evidence < least_evidence ||
@@ -124,7 +124,7 @@ class Loop {
   }
   /// Evidence of the two single effects (of robots, and of the other covariate) if either is significant: the
   /// alternative to their combination.
-  double parts_evidence(const Hypothesis& pair, const Scores::Outcome& outcome) const {
+  double parts_evidence(const Hypothesis& pair, const ScoreTest::Outcome& outcome) const {
     double sum = 0;
     bool any = false;
     for (const std::string& part : pair.covariates) {
@@ -148,29 +148,30 @@ class Loop {
   [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.model) - base_likelihood_; }
 
   /// Adds calibration shifts of the camera. Returns whether there were any.
-  bool add_picture_jumps() {
+  bool accept_calibration_shifts() {
     // A smooth curve of a drift with sudden ends leaves residuals that look like shifts.
     if (std::any_of(out_.model.terms.begin(), out_.model.terms.end(),
                     [](const Term& term) { return term.name == "drift-by-time"; }))
       return false;
-    const std::vector<Jump> jumps = add_jumps(fitter_, out_.model, kRemnant * explained());
-    if (jumps.empty()) return false;
-    fitter_.fit_surroundings(out_.model);
+    const std::vector<CalibrationShift> shifts =
+        add_calibration_shifts(fitter_, out_.model, kRemnant * explained());
+    if (shifts.empty()) return false;
+    fitter_.fit_contacts(out_.model);
     Finding finding;
     bool pushed = true;
-    for (const Jump& jump : jumps) {
-      finding.evidence += jump.gain;
-      finding.degrees += Jump::kNumbers;
+    for (const CalibrationShift& shift : shifts) {
+      finding.evidence += shift.gain;
+      finding.degrees += CalibrationShift::kNumbers;
       // p of half chi squared with four degrees of freedom, over some thousand instants.
       constexpr double kInstants = 5000;
       finding.log10_p =
-          std::min(finding.log10_p, (std::log1p(jump.gain) - jump.gain + std::log(kInstants)) / std::log(10.0));
-      pushed = pushed && std::abs(jump.gain - jump.gain_as_push) < kClose;
+          std::min(finding.log10_p, (std::log1p(shift.gain) - shift.gain + std::log(kInstants)) / std::log(10.0));
+      pushed = pushed && std::abs(shift.gain - shift.gain_as_push) < kClose;
     }
-    const std::vector<std::string> covariates{"measurement", "time"}, room{"world_frame", "time"};
-    out_.reasons.push_back({covariates, "measured position", finding, std::log10(Scores::kFamilyAlarm)});
-    if (pushed) out_.ambiguous.push_back({kJumpsName, "drift-by-time", covariates, room, 0});
-    out_.steps.push_back({kJumpsName, finding.evidence});
+    const std::vector<std::string> covariates{"measurement", "time"}, world{"world_frame", "time"};
+    out_.reasons.push_back({covariates, "measured position", finding, std::log10(ScoreTest::kFamilyAlarm)});
+    if (pushed) out_.ambiguous.push_back({kCalibrationShiftsName, "drift-by-time", covariates, world, 0});
+    out_.steps.push_back({kCalibrationShiftsName, finding.evidence});
     return true;
   }
   void add(const Finding& found, double threshold) {
@@ -180,18 +181,18 @@ class Loop {
     // A further term of an accepted effect may belong to a richer shape of it.
     for (std::size_t t = 0; t < out_.model.terms.size(); ++t) {
       if (out_.model.terms[t].name != h.name) continue;
-      if (reshaped(t, found.evidence)) {
+      if (recovered_by_refinement(t, found.evidence)) {
         out_.steps.push_back({h.name, found.held_out});
         return;
       }
-      const Finding instead = scores_->weigh(h, static_cast<int>(t));
-      const Finding own = scores_->weigh_term(static_cast<int>(t));
+      const Finding instead = score_test_->evidence_of(h, static_cast<int>(t));
+      const Finding own = score_test_->evidence_of_term(static_cast<int>(t));
       if (instead.evidence < own.evidence + found.evidence - 2) continue;
       out_.model.terms[t] = dictionary_.term_of(h, instead.relative_scale);
       out_.reasons[t].finding = instead;
       out_.reasons[t].finding.log10_p = std::min(reason.finding.log10_p, out_.reasons[t].finding.log10_p);
       fitter_.fit(out_.model, 2);
-      shape(t);
+      refine_shape(t);
       out_.steps.push_back({h.name, found.held_out});
       return;
     }
@@ -200,24 +201,24 @@ class Loop {
     say("fitting");
     fitter_.fit(out_.model, 2);
     out_.steps.push_back({h.name, found.held_out});
-    if (!joined()) shape(out_.model.terms.size() - 1);
+    if (!merged()) refine_shape(out_.model.terms.size() - 1);
   }
 
   /// Refines the shape of a term. Returns whether that recovers most of the expected gain of a further term.
-  bool reshaped(std::size_t place, double promised) {
+  bool recovered_by_refinement(std::size_t place, double expected_gain) {
     constexpr double kMost = 0.5;
-    const Kept before = keep();
+    const SavedState before = save();
     const double likelihood = fitter_.log_likelihood(out_.model);
     say("fitting");
-    shape(place);
-    if (fitter_.log_likelihood(out_.model) > likelihood + kMost * promised) return true;
+    refine_shape(place);
+    if (fitter_.log_likelihood(out_.model) > likelihood + kMost * expected_gain) return true;
     restore(before);
     return false;
   }
 
   /// Whether the last term, amplitudes of an accepted curve, was merged with it.
-  bool joined() {
-    const std::optional<std::size_t> curve = join_amounts(fitter_, out_.model);
+  bool merged() {
+    const std::optional<std::size_t> curve = merge_amplitudes(fitter_, out_.model);
     if (!curve) return false;
     out_.reasons.back().finding.evidence += out_.reasons[*curve].finding.evidence;
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));
@@ -225,10 +226,10 @@ class Loop {
   }
 
   /// Refines the shape of a term.
-  void shape(std::size_t place) {
-    if (!shape_neighbours(fitter_, out_.model, place) && !shape_memory(fitter_, out_.model, place))
-      refine(fitter_, out_.model, place);
-    const std::string before = out_.model.terms[place].name, name = find_steps(fitter_, out_.model, place);
+  void refine_shape(std::size_t place) {
+    if (!refine_neighbour_shape(fitter_, out_.model, place) && !refine_traffic_shape(fitter_, out_.model, place))
+      refine_curves(fitter_, out_.model, place);
+    const std::string before = out_.model.terms[place].name, name = find_change_points(fitter_, out_.model, place);
     if (name != before) {
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.name != name) continue;
@@ -236,50 +237,51 @@ class Loop {
         out_.reasons[place].acts_on = h.acts_on;
       }
     }
-    sharpen(fitter_, out_.model, place);
-    widen(fitter_, out_.model, place);
+    fit_total_variation_map(fitter_, out_.model, place);
+    extend_targets(fitter_, out_.model, place);
   }
   /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
-  void try_picture() {
+  void try_camera_motion() {
     const auto drift = std::find_if(out_.model.terms.begin(), out_.model.terms.end(),
                                     [](const Term& term) { return term.name == "drift-by-time"; });
-    if (drift == out_.model.terms.end() || failed_.contains(kPictureForDrift)) return;
+    if (drift == out_.model.terms.end() || failed_.contains(kCameraForDrift)) return;
     // Once only: otherwise the search could alternate between both.
-    failed_.insert(kPictureForDrift);
+    failed_.insert(kCameraForDrift);
     const auto place = static_cast<std::size_t>(drift - out_.model.terms.begin());
     const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
                                      [](const Block& block) { return (block.during & ~kDriven) != 0; });
-    measure();
+    score_dictionary();
     const Hypothesis* best = nullptr;
     Finding best_finding;
     for (const Hypothesis& h : dictionary_.hypotheses) {
       if (h.name != "camera-by-time") continue;
-      const Finding finding = scores_->weigh(h, static_cast<int>(place));
+      const Finding finding = score_test_->evidence_of(h, static_cast<int>(place));
       if (best != nullptr && finding.evidence <= best_finding.evidence) continue;
       best = &h;
       best_finding = finding;
     }
     constexpr double kAlike = 0.8;
     if (best == nullptr ||
-        (!at_rest && best_finding.evidence < kAlike * scores_->weigh_term(static_cast<int>(place)).evidence))
+        (!at_rest &&
+         best_finding.evidence < kAlike * score_test_->evidence_of_term(static_cast<int>(place)).evidence))
       return;
-    exchanged(place, *best, best_finding);
+    exchanged_for(place, *best, best_finding);
   }
   /// Backward elimination and exchange. Returns whether a term was removed or replaced, so that the search must
   /// continue.
-  bool defend() {
-    if (defences_++ >= 3) return false;
+  bool eliminate() {
+    if (eliminations_++ >= 3) return false;
     for (int t = 0; t < static_cast<int>(out_.model.terms.size()); ++t) {
       const auto place = static_cast<std::size_t>(t);
-      const Finding own = scores_->weigh_term(t);
-      if (own.held_out < 2 && dropped(place, false)) return true;
+      const Finding own = score_test_->evidence_of_term(t);
+      if (own.held_out < 2 && removed(place, false)) return true;
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
         // Amplitudes of this term's curve are no alternative: they contain the curve.
-        if (rests_on_another(dictionary_.term_of(h, 1))) continue;
-        const Finding other = scores_->weigh(h, t);
+        if (multiplies_known_curve(dictionary_.term_of(h, 1))) continue;
+        const Finding other = score_test_->evidence_of(h, t);
         if (best == nullptr || other.evidence > best_finding.evidence) {
           best = &h;
           best_finding = other;
@@ -289,17 +291,17 @@ class Loop {
           best_finding.evidence <= own.evidence + std::max(kClose, kRemnant * own.evidence) ||
           failed_.contains(best->name + " for " + out_.model.terms[place].name))
         continue;
-      if (exchanged(place, *best, best_finding)) return true;
+      if (exchanged_for(place, *best, best_finding)) return true;
     }
     return false;
   }
   /// Exchanges a term for another hypothesis. The quadratic approximation may overestimate its evidence: restores
   /// the state if the likelihood falls.
-  bool exchanged(std::size_t place, const Hypothesis& other, Finding finding) {
-    const Kept before = keep();
+  bool exchanged_for(std::size_t place, const Hypothesis& other, Finding finding) {
+    const SavedState before = save();
     // Contacts show whether the robots move or the camera does.
-    const auto of_picture = [&] { return is_measured(out_.model.terms[place].blocks.front().target); };
-    const bool was_of_picture = of_picture();
+    const auto acts_on_camera = [&] { return is_measured(out_.model.terms[place].blocks.front().target); };
+    const bool was_on_camera = acts_on_camera();
     // With the disc centres of the state before.
     const double likelihood = fitter_.log_likelihood(out_.model),
                  likelihood_of_all = fitter_.log_likelihood_of_all(out_.model);
@@ -307,14 +309,14 @@ class Loop {
     out_.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
     out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
     fitter_.fit(out_.model, 2);
-    if (was_of_picture != of_picture()) {
-      shape(place);
-      fitter_.fit_surroundings(out_.model);
+    if (was_on_camera != acts_on_camera()) {
+      refine_shape(place);
+      fitter_.fit_contacts(out_.model);
       if (fitter_.log_likelihood_of_all(out_.model) > likelihood_of_all - kAsGood) return true;
     } else {
       // Shape refinement can recover a part of the difference only.
       if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
-        shape(place);
+        refine_shape(place);
         if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
       }
     }
@@ -323,14 +325,14 @@ class Loop {
     return false;
   }
   /// State of the search, with the estimates that belong to the tracks.
-  struct Kept {
+  struct SavedState {
     Search found;
-    PreparedSet::Found tracks;
+    PreparedSet::TrackEstimates tracks;
   };
-  [[nodiscard]] Kept keep() const { return {out_, fitter_.set().found()}; }
-  void restore(const Kept& kept) {
-    out_ = kept.found;
-    fitter_.set().go_back(kept.tracks, out_.model);
+  [[nodiscard]] SavedState save() const { return {out_, fitter_.set().estimates()}; }
+  void restore(const SavedState& saved) {
+    out_ = saved.found;
+    fitter_.set().restore(saved.tracks, out_.model);
   }
   /// Whether a term is the constant part of another one.
   static bool is_constant_of(const Term& term, const Term& other) {
@@ -343,28 +345,28 @@ class Loop {
   }
   /// A new effect may explain what earlier terms were accepted for, unless it has far less evidence. Tries to
   /// remove each earlier term, with the shape of the new one refined.
-  void reconsider() {
-    if (rests_on_another(out_.model.terms.back())) return;
+  void eliminate_earlier() {
+    if (multiplies_known_curve(out_.model.terms.back())) return;
     constexpr double kFarLess = 0.1;
     for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;) {
       const Term &earlier = out_.model.terms[t], &last = out_.model.terms.back();
       const bool far_less = out_.reasons.back().finding.evidence < kFarLess * out_.reasons[t].finding.evidence;
-      if ((!far_less || is_constant_of(earlier, last)) && earlier.name != last.name) dropped(t, true);
+      if ((!far_less || is_constant_of(earlier, last)) && earlier.name != last.name) removed(t, true);
     }
   }
   /// Removes a term unless the evidence falls.
-  bool dropped(std::size_t t, bool shape_last) {
-    const Kept before = keep();
+  bool removed(std::size_t t, bool shape_last) {
+    const SavedState before = save();
     const double evidence = fitter_.log_evidence(out_.model);
     out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
     fitter_.fit(out_.model, shape_last ? 2 : 1);
-    if (shape_last) shape(out_.model.terms.size() - 1);
+    if (shape_last) refine_shape(out_.model.terms.size() - 1);
     if (fitter_.log_evidence(out_.model) > evidence - kClose) return true;
     restore(before);
     return false;
   }
-  void note_rejected(const Scores::Outcome& outcome) {
+  void note_rejected(const ScoreTest::Outcome& outcome) {
     out_.rejected.clear();
     std::vector<const Finding*> order;
     for (const Finding& f : outcome.findings) order.push_back(&f);
@@ -381,40 +383,41 @@ class Loop {
   }
   /// Whether an alternative to the last accepted effect, which is now significant beside it, has more evidence in
   /// its place.
-  bool contended(const std::string& name) {
-    const auto c = contest_.contenders.find(name);
-    if (c == contest_.contenders.end() || out_.model.terms.size() != contest_.before.found.model.terms.size() + 1 ||
-        out_.model.terms.back().name != contest_.chosen)
+  bool replaced_by_alternative(const std::string& name) {
+    const auto c = alternatives_.by_name.find(name);
+    if (c == alternatives_.by_name.end() ||
+        out_.model.terms.size() != alternatives_.before.found.model.terms.size() + 1 ||
+        out_.model.terms.back().name != alternatives_.chosen)
       return false;
     const auto [term, reason] = c->second;
-    contest_.contenders.erase(c);
-    const Kept now = keep();
+    alternatives_.by_name.erase(c);
+    const SavedState now = save();
     const double evidence = fitter_.log_evidence(now.found.model);
-    restore(contest_.before);
+    restore(alternatives_.before);
     out_.model.terms.push_back(term);
     out_.reasons.push_back(reason);
     say("fitting");
     fitter_.fit(out_.model, 2);
-    shape(out_.model.terms.size() - 1);
-    fitter_.fit_surroundings(out_.model);
+    refine_shape(out_.model.terms.size() - 1);
+    fitter_.fit_contacts(out_.model);
     out_.steps.push_back({term.name, reason.finding.held_out});
     if (fitter_.log_evidence(out_.model) > evidence) return true;
     restore(now);
     return false;
   }
-  void note_contenders(const Finding& best, const Scores::Outcome& outcome) {
+  void note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome) {
     const std::string& chosen = hypothesis(best).name;
-    contest_ = {keep(), chosen, {}};
+    alternatives_ = {save(), chosen, {}};
     std::map<std::string, double> most;
     for (const Finding& f : outcome.findings) {
       const Hypothesis& h = hypothesis(f);
-      if (f.evidence < std::max(kContender * best.evidence, most[h.name]) || h.name == chosen) continue;
+      if (f.evidence < std::max(kAlternativeShare * best.evidence, most[h.name]) || h.name == chosen) continue;
       most[h.name] = f.evidence;
-      contest_.contenders[h.name] = {dictionary_.term_of(h, f.relative_scale),
-                                     {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+      alternatives_.by_name[h.name] = {dictionary_.term_of(h, f.relative_scale),
+                                       {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
     }
   }
-  void note_ambiguous(const Finding& best, const Scores::Outcome& outcome) {
+  void note_ambiguous(const Finding& best, const ScoreTest::Outcome& outcome) {
     const Hypothesis& chosen = hypothesis(best);
     for (const Finding& f : outcome.findings) {
       const Hypothesis& other = hypothesis(f);
@@ -433,18 +436,18 @@ class Loop {
   const Extent extent_;
   Dictionary dictionary_;  ///< hypotheses in addition to the model
   std::vector<std::vector<const TrackView*>> units_;
-  std::optional<Scores> scores_;
+  std::optional<ScoreTest> score_test_;
   Search out_;
   double base_likelihood_ = 0;
   /// Alternatives to the effect that was accepted last.
-  struct Contest {
-    Kept before;
+  struct Alternatives {
+    SavedState before;
     std::string chosen;
-    std::map<std::string, std::pair<Term, Reason>> contenders;  ///< by name
+    std::map<std::string, std::pair<Term, Reason>> by_name;  ///< by name
   };
-  Contest contest_;
+  Alternatives alternatives_;
   std::set<std::string> failed_;  ///< hypotheses that failed after the refit
-  int defences_ = 0, round_ = 0;
+  int eliminations_ = 0, round_ = 0;
 };
 
 }  // namespace

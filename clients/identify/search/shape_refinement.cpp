@@ -101,15 +101,15 @@ void shorten(Basis& basis) {
   const bool of_robots = basis.looks_at(Covariate::kRobot);
   for (Factor& factor : basis.factors) {
     if (factor.shape != Shape::kCosines || !factor.known.empty()) continue;
-    const auto room = static_cast<std::uint32_t>(kMostColumns * factor.count / basis.size());
-    factor.count = std::clamp(of_robots ? std::min(room, kOfARobot) : room, 1u, factor.count);
+    const auto walls = static_cast<std::uint32_t>(kMostColumns * factor.count / basis.size());
+    factor.count = std::clamp(of_robots ? std::min(walls, kOfARobot) : walls, 1u, factor.count);
     // Includes the constant of each robot.
     if (of_robots) factor.first = 0;
   }
 }
 
 /// Fixed amplitudes that multiply a curve or a map.
-const Factor* amounts_of(const Basis& basis) {
+const Factor* amplitudes_of(const Basis& basis) {
   const bool any = basis.factors.size() == 2 && basis.only_open() == &basis.factors[1];
   return any ? &basis.factors.front() : nullptr;
 }
@@ -119,7 +119,7 @@ const Factor* amounts_of(const Basis& basis) {
 bool has_constant_part(const Block& block) {
   const Target target = block.target;
   return target == Target::kWorldX || target == Target::kWorldY || target == Target::kSideways ||
-         (!is_measured(target) && amounts_of(block.basis) != nullptr);
+         (!is_measured(target) && amplitudes_of(block.basis) != nullptr);
 }
 
 /// A single curve. Its column of frequency 0 is the constant.
@@ -161,10 +161,10 @@ std::vector<Block> richer(const Term& term) {
     if (has_constant_part(block) && is_curve(rich.basis)) rich.basis.only_open()->first = 0;
     shorten(rich.basis);
     // Camera drift is slow. calibration_shifts.hpp finds shifts.
-    constexpr std::uint32_t kCreep = 24;
+    constexpr std::uint32_t kDrift = 24;
     if (is_measured(block.target))
       for (Factor& f : rich.basis.factors)
-        if (f.shape == Shape::kCosines && f.axis.of == Covariate::kTime) f.count = std::min(f.count, kCreep);
+        if (f.shape == Shape::kCosines && f.axis.of == Covariate::kTime) f.count = std::min(f.count, kDrift);
     // Too many columns: keeps the present basis.
     if (rich.basis.size() > kMostColumns) rich.basis = block.basis;
     blocks.push_back(rich);
@@ -182,7 +182,7 @@ std::vector<Block> richer(const Term& term) {
     const Factor* const open = block.basis.only_open();
     if (!has_constant_part(block) || open == nullptr || !open->of_two()) continue;
     Block constant{block.target, {}, block.during};
-    if (const Factor* const amounts = amounts_of(block.basis)) constant.basis.factors = {*amounts};
+    if (const Factor* const amplitudes = amplitudes_of(block.basis)) constant.basis.factors = {*amplitudes};
     if (std::none_of(blocks.begin(), blocks.end(), [&](const Block& b) {
           return is_constant(b.basis) && b.target == constant.target && b.during == constant.during;
         }))
@@ -352,16 +352,16 @@ void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, c
   double likelihood = -1e300;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const bool anew = pass == 0 && !rich.empty();
-    const Linear l = linear(fitter, model, place, anew ? rich : std::vector<Block>{});
+    const LocalQuadratic l = local_quadratic(fitter, model, place, anew ? rich : std::vector<Block>{});
     Term& term = model.terms[place];
     const Eigen::VectorXd at_zero = l.score_without(term.coefficients);
-    const std::vector<Eigen::Index> columns = anew ? l.more() : l.of_term();
-    const Beside data = beside(l, at_zero, columns);
+    const std::vector<Eigen::Index> columns = anew ? l.added_columns() : l.term_columns();
+    const ReducedColumns data = reduced_columns(l, at_zero, columns);
     choose_smoothness(data.information, data.score, groups, smoothness, sd);
     // A prior sd near 0 fixes the column at 0.
     const Eigen::VectorXd held = sd.cwiseMax(1e-6 * std::max(sd.maxCoeff(), 1e-6));
     if (anew) {
-      exchange(model, place, l, rich, at_zero, columns, held);
+      replace_blocks(model, place, l, rich, at_zero, columns, held);
     } else {
       term.precision = held.array().square().inverse();
     }
@@ -377,10 +377,10 @@ void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, c
 
 }  // namespace
 
-void refine(const Fitter& fitter, MotionModel& model, std::size_t place) {
+void refine_curves(const Fitter& fitter, MotionModel& model, std::size_t place) {
   fit_smoothly(fitter, model, place, richer(model.terms[place]));
 }
 
-void settle(const Fitter& fitter, MotionModel& model, std::size_t place) { fit_smoothly(fitter, model, place, {}); }
+void refit(const Fitter& fitter, MotionModel& model, std::size_t place) { fit_smoothly(fitter, model, place, {}); }
 
 }  // namespace kilotwin::identify

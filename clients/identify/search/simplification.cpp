@@ -81,7 +81,7 @@ struct Chosen {
   std::vector<Eigen::Index> columns;  ///< among those of all forms
 };
 
-Chosen best_of(const std::vector<Form>& forms, const Beside& data, std::size_t blocks) {
+Chosen best_of(const std::vector<Form>& forms, const ReducedColumns& data, std::size_t blocks) {
   Chosen best;
   for (const Form& one : forms) {
     std::vector<Eigen::Index> columns(one.basis.size() * blocks);
@@ -117,25 +117,25 @@ std::vector<Block> blocks_of(std::vector<Form>& forms, const Term& term) {
 bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::vector<Form>& forms,
               bool in_any_case) {
   const Term& term = model.terms[place];
-  const Linear l = linear(fitter, model, place, blocks_of(forms, term));
+  const LocalQuadratic l = local_quadratic(fitter, model, place, blocks_of(forms, term));
   const Eigen::VectorXd score = l.score_without(term.coefficients);
-  const Beside now = beside(l, score, l.of_term());
+  const ReducedColumns now = reduced_columns(l, score, l.term_columns());
   const double had = log_evidence(now.information, now.score, term.precision.cwiseInverse().cwiseSqrt());
-  const Chosen best = best_of(forms, beside(l, score, l.more()), term.blocks.size());
+  const Chosen best = best_of(forms, reduced_columns(l, score, l.added_columns()), term.blocks.size());
   if (best.form == nullptr) return false;
   if (!in_any_case && best.evidence < had - kRoughly - kRoughShare * std::abs(had)) return false;
   std::vector<Eigen::Index> columns;
   for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
   std::vector<Block> blocks;
   for (const Block& block : term.blocks) blocks.push_back({block.target, best.form->basis, block.during});
-  exchange(model, place, l, blocks, score, columns, best.sd);
+  replace_blocks(model, place, l, blocks, score, columns, best.sd);
   return true;
 }
 
 /// Complexity of a term: half the log determinant of its posterior precision relative to the prior.
 double cost_of(const Fitter& fitter, const MotionModel& model, std::size_t place) {
-  const Linear l = linear(fitter, model, place, {});
-  const Beside now = beside(l, l.score, l.of_term());
+  const LocalQuadratic l = local_quadratic(fitter, model, place, {});
+  const ReducedColumns now = reduced_columns(l, l.score, l.term_columns());
   const Eigen::VectorXd sd = model.terms[place].precision.cwiseInverse().cwiseSqrt();
   return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
 }

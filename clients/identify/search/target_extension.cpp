@@ -12,8 +12,8 @@ namespace {
 using Shape = Factor::Shape;
 
 /// Least gain in log evidence of one more target.
-constexpr double kWorth = 10;
-constexpr int kMostWidened = 3;
+constexpr double kLeastEvidence = 10;
+constexpr int kMostExtensions = 3;
 
 /// The same covariates with fewer columns, which suffice for detection.
 Basis modest(Basis basis) {
@@ -42,7 +42,7 @@ Basis modest(Basis basis) {
 }
 
 /// One further target of an effect.
-struct Widening {
+struct Extension {
   std::vector<Block> blocks;
   [[nodiscard]] Eigen::Index size() const {
     Eigen::Index n = 0;
@@ -68,10 +68,10 @@ void with_constant(Basis& basis) {
     basis.factors.front().first = 0;
 }
 
-std::vector<Widening> widenings_of(const Term& term, bool headings) {
+std::vector<Extension> extensions_of(const Term& term, bool headings) {
   const Block& first = term.blocks.front();
   const Basis basis = modest(first.basis);
-  std::vector<Widening> all;
+  std::vector<Extension> all;
   if (is_measured(first.target)) {
     if (headings && !acts(term, Target::kMeasuredHeading, kAlways))
       all.push_back({{{Target::kMeasuredHeading, basis, kAlways}}});
@@ -93,7 +93,7 @@ std::vector<Widening> widenings_of(const Term& term, bool headings) {
     if (target == Target::kGain &&
         (acts(term, Target::kGainLeft, kDriven) || acts(term, Target::kGainRight, kDriven)))
       continue;
-    Widening& more = all.emplace_back(Widening{{{target, basis, first.during}}});
+    Extension& more = all.emplace_back(Extension{{{target, basis, first.during}}});
     if (is_one_sided(target)) with_constant(more.blocks.front().basis);
   }
   return all;
@@ -101,22 +101,22 @@ std::vector<Widening> widenings_of(const Term& term, bool headings) {
 
 }  // namespace
 
-void widen(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  for (int widened = 0; widened < kMostWidened; ++widened) {
-    const std::vector<Widening> all = widenings_of(model.terms[place], fitter.set().set().has_headings);
+void extend_targets(const Fitter& fitter, MotionModel& model, std::size_t place) {
+  for (int extended = 0; extended < kMostExtensions; ++extended) {
+    const std::vector<Extension> all = extensions_of(model.terms[place], fitter.set().set().has_headings);
     if (all.empty()) return;
     std::vector<Block> blocks;
-    for (const Widening& w : all) blocks.insert(blocks.end(), w.blocks.begin(), w.blocks.end());
-    const Linear l = linear(fitter, model, model.terms.size(), blocks, true);
-    double best = kWorth;
-    const Widening* chosen = nullptr;
+    for (const Extension& w : all) blocks.insert(blocks.end(), w.blocks.begin(), w.blocks.end());
+    const LocalQuadratic l = local_quadratic(fitter, model, model.terms.size(), blocks, true);
+    double best = kLeastEvidence;
+    const Extension* chosen = nullptr;
     Eigen::VectorXd chosen_sd;
     Eigen::Index next = l.own;
-    for (const Widening& w : all) {
+    for (const Extension& w : all) {
       std::vector<Eigen::Index> columns(static_cast<std::size_t>(w.size()));
       std::iota(columns.begin(), columns.end(), next);
       next += w.size();
-      const Beside data = beside(l, l.score, columns);
+      const ReducedColumns data = reduced_columns(l, l.score, columns);
       ColumnGroup group;
       for (const Block& block : w.blocks)
         for (const double rough : block.basis.roughness()) {
@@ -142,7 +142,7 @@ void widen(const Fitter& fitter, MotionModel& model, std::size_t place) {
     term.precision.conservativeResize(had + chosen->size());
     term.precision.tail(chosen->size()) = chosen_sd.array().square().inverse();
     fitter.fit(model, 2);
-    if (fitter.log_likelihood(model) > likelihood + kWorth) continue;
+    if (fitter.log_likelihood(model) > likelihood + kLeastEvidence) continue;
     model = was;
     return;
   }

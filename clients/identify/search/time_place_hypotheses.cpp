@@ -7,7 +7,7 @@ using Shape = Factor::Shape;
 
 }  // namespace
 
-std::vector<Eigen::Index> hypotheses_of_time(DictionaryMaker& make, const Extent& extent) {
+std::vector<Eigen::Index> add_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const auto smooth = [&](std::uint32_t count) {
     return Basis{{over(Shape::kCosines, Covariate::kTime, 0, extent.duration_s, count)}};
   };
@@ -16,7 +16,7 @@ std::vector<Eigen::Index> hypotheses_of_time(DictionaryMaker& make, const Extent
   const auto drift = make.curve(kWorld, "time", {"time"}, smooth(32), {1, 3, 8, 16, 32}, true);
   // The camera may drift, rotate and change its scale, separately or together.
   const auto aside = make.put(kCamera, smooth(16));
-  const auto turned = make.put(kPicture, smooth(8));
+  const auto turned = make.put(kCameraPose, smooth(8));
   for (const Eigen::Index n : {1, 3, 8, 16}) make.add(kCamera, "time", {"time"}, some(aside, 0, n));
   for (const Eigen::Index n : {1, 3, 8}) {
     auto all = some(turned, 0, n);
@@ -31,26 +31,26 @@ std::vector<Eigen::Index> hypotheses_of_time(DictionaryMaker& make, const Extent
   for (int i = 1; i < kSteps; ++i) at.push_back(extent.duration_s * i / kSteps);
   const Basis steps{{keyed(Shape::kAtLeast, Covariate::kTime, at)}};
   const auto n = static_cast<Eigen::Index>(at.size());
-  for (const Acting* acting : {&kSpeed, &kWorld}) {
-    const auto bases = make.put(*acting, steps);
-    for (Eigen::Index i = 0; i < n; ++i) make.add(*acting, "time", {"time"}, some(bases, i, 1), kSteps);
+  for (const TargetGroup* group : {&kSpeed, &kWorld}) {
+    const auto bases = make.put(*group, steps);
+    for (Eigen::Index i = 0; i < n; ++i) make.add(*group, "time", {"time"}, some(bases, i, 1), kSteps);
     for (Eigen::Index width : {1, 2, 4, 8, 16}) {
       for (Eigen::Index i = 0; i + width < n; ++i) {
         auto columns = some(bases, i, 1);
         for (const Eigen::Index c : some(bases, i + width, 1)) columns.push_back(c);
-        make.add(*acting, "time", {"time"}, columns, kSteps * 5.0);
+        make.add(*group, "time", {"time"}, columns, kSteps * 5.0);
       }
     }
-    make.add(*acting, "time", {"time"}, some(bases, 0, n));
+    make.add(*group, "time", {"time"}, some(bases, 0, n));
   }
   return drift;
 }
 
-std::vector<Eigen::Index> hypotheses_of_place(DictionaryMaker& make, const Extent& extent) {
-  const auto map = [&](const Acting& acting, std::uint32_t order) {
-    const auto bases = make.put(acting, Basis{{plane(extent, order)}});
+std::vector<Eigen::Index> add_place_hypotheses(DictionaryBuilder& make, const Extent& extent) {
+  const auto map = [&](const TargetGroup& group, std::uint32_t order) {
+    const auto bases = make.put(group, Basis{{plane(extent, order)}});
     for (std::uint32_t o = 1; o <= order; ++o)
-      make.add(acting, "position", {"position"}, some(bases, 0, (o + 1) * (o + 2) / 2 - 1));
+      make.add(group, "position", {"position"}, some(bases, 0, (o + 1) * (o + 2) / 2 - 1));
     return bases;
   };
   map(kSpeed, 8);
@@ -71,19 +71,19 @@ std::vector<Eigen::Index> hypotheses_of_place(DictionaryMaker& make, const Exten
     make.add(kCamera, "position", {"position"}, some(lens, 0, (o + 1) * (o + 2) / 2 - 1));
   if (extent.headings) map(kCompass, 2);
   // Stripes finer than the maps resolve: mosaic seams, floor boards.
-  const auto stripes = [&](const Acting& acting, Covariate of, double low, double high, std::uint32_t count) {
-    const auto bases = make.put(acting, Basis{{over(Shape::kCosines, of, low, high, count)}});
+  const auto stripes = [&](const TargetGroup& group, Covariate of, double low, double high, std::uint32_t count) {
+    const auto bases = make.put(group, Basis{{over(Shape::kCosines, of, low, high, count)}});
     for (Eigen::Index size = count / 2; size <= count; size += count / 2)
-      make.add(acting, "position", {"position"}, some(bases, 0, size));
+      make.add(group, "position", {"position"}, some(bases, 0, size));
   };
-  for (const auto& [acting, count] : {std::pair{&kCamera, 24u}, {&kSpeed, 16u}}) {
-    stripes(*acting, Covariate::kX, extent.x_low_mm, extent.x_high_mm, count);
-    stripes(*acting, Covariate::kY, extent.y_low_mm, extent.y_high_mm, count);
+  for (const auto& [group, count] : {std::pair{&kCamera, 24u}, {&kSpeed, 16u}}) {
+    stripes(*group, Covariate::kX, extent.x_low_mm, extent.x_high_mm, count);
+    stripes(*group, Covariate::kY, extent.y_low_mm, extent.y_high_mm, count);
   }
   return drift;
 }
 
-void hypotheses_of_heading(DictionaryMaker& make, const Extent& extent) {
+void add_heading_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const Basis round{{over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 4)}};
   make.curve(kSpeed, "heading", {"heading"}, round, {2, 4, 8}, false);
   make.curve(kTurning, "heading", {"heading"}, round, {2, 4, 8}, false);
@@ -91,8 +91,8 @@ void hypotheses_of_heading(DictionaryMaker& make, const Extent& extent) {
   if (extent.headings) make.curve(kCompass, "heading", {"heading"}, round, {2, 4}, false);
 }
 
-void hypotheses_of_drift(DictionaryMaker& make, const Extent& extent, const std::vector<Eigen::Index>& in_time,
-                         const std::vector<Eigen::Index>& in_place) {
+void add_drift_hypotheses(DictionaryBuilder& make, const Extent& extent, const std::vector<Eigen::Index>& in_time,
+                          const std::vector<Eigen::Index>& in_place) {
   const auto constant = make.put(kWorld, Basis{});
   make.add("drift", {"world_frame"}, kWorld.in_words, some(constant, 0, 1));
   // A drift that varies also has a mean.

@@ -16,7 +16,7 @@ using Shape = Factor::Shape;
 
 constexpr std::size_t kFolds = 4;
 /// Least cross-validated gain in log likelihood.
-constexpr double kWorth = 15;
+constexpr double kLeastEvidence = 15;
 
 /// Normal equations of the nodes near a robot's path, from the innovations.
 class FineSums {
@@ -26,9 +26,9 @@ class FineSums {
   void start(const TrackFilter&) { active_.clear(); }
   void step(const StepRecord& record) {
     const Rates& r = record.rates;
-    const StepWays ways = ways_of(record, model_.base.wheel_base_mm);
+    const StepJacobian ways = step_jacobian(record, model_.base.wheel_base_mm);
     for (Active& a : active_) a.pose.head<2>() += ways.by_heading * a.pose[2];
-    touched_ = touched_ || record.touching();
+    in_contact_ = in_contact_ || record.in_contact();
     const int command = static_cast<int>(record.middle.commands.command);
     if (!record.middle.commands.driven() || (map_.during >> command & 1) == 0) return;
     double own = 0;
@@ -48,7 +48,7 @@ class FineSums {
     add(i_ + 1, j_ + 1, x * y * force);
   }
   void update(const Innovation& innovation, const Sample&) {
-    if (std::exchange(touched_, false) || innovation.lost) {
+    if (std::exchange(in_contact_, false) || innovation.lost) {
       active_.clear();
       return;
     }
@@ -88,7 +88,7 @@ class FineSums {
   NormalEquations& to_;
   std::vector<Active> active_;
   int i_ = 0, j_ = 0;
-  bool touched_ = false;
+  bool in_contact_ = false;
 };
 
 std::vector<NormalEquations> sums_of(const Fitter& fitter, const MotionModel& model, const Block& map,
@@ -102,7 +102,7 @@ std::vector<NormalEquations> sums_of(const Fitter& fitter, const MotionModel& mo
         RobotBias bias = model.bias_of(view->track->robot);
         bias.covariance.setZero();
         TrackFilter filter(model, bias, view->track->robot, view->number);
-        walk(filter, *view, view->track->samples.size(), sums);
+        run_filter(filter, *view, view->track->samples.size(), sums);
       }
     }
   });
@@ -273,7 +273,7 @@ void halve(Fitted& map) {
 
 }  // namespace
 
-void sharpen(const Fitter& fitter, MotionModel& model, std::size_t place) {
+void fit_total_variation_map(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const std::vector<Block>& had = model.terms[place].blocks;
   if (std::none_of(had.begin(), had.end(), is_map_of_speed)) return;
   Fitted map;
@@ -308,7 +308,7 @@ void sharpen(const Fitter& fitter, MotionModel& model, std::size_t place) {
         if (pass == 0) try_it(weight, 0.04, 1);
       }
       const double gain = choose(folds, all, tried, fitter.threads(), map);
-      if (pass == 0 && gain < kWorth) return;
+      if (pass == 0 && gain < kLeastEvidence) return;
     }
     map.f = solve(all, map.f, map.by, {6, 30});
     MotionModel next = trial;
@@ -318,7 +318,7 @@ void sharpen(const Fitter& fitter, MotionModel& model, std::size_t place) {
     next.terms[place].blocks.front() = block_of(map.grid, map.f);
     next.terms[place].coefficients[0] = 1;
     const double found = fitter.log_likelihood(next);
-    if (found < likelihood + kWorth) break;
+    if (found < likelihood + kLeastEvidence) break;
     likelihood = found;
     trial = next;
     model = trial;

@@ -23,18 +23,18 @@ class SpeedResiduals {
 
   void start(const TrackFilter&) { pose_.setZero(); }
   void step(const StepRecord& record) {
-    touched_.step(record);
+    in_contact_.step(record);
     if (empty_) from_s_ = record.middle.time_s - record.h_s / 2;
     empty_ = false;
     const Rates& r = record.rates;
-    const StepWays ways = ways_of(record, model_.base.wheel_base_mm);
+    const StepJacobian ways = step_jacobian(record, model_.base.wheel_base_mm);
     pose_.head<2>() += ways.by_heading * pose_[2];
     if ((during_ >> static_cast<int>(record.middle.commands.command) & 1) == 0) return;
     pose_ += record.h_s * ways.by_wheel *
              Eigen::Vector2d(r.left_base_mm_s * r.left_gain, r.right_base_mm_s * r.right_gain);
   }
   void update(const Innovation& innovation, const Sample& sample) {
-    if (touched_.update(innovation) == Touched::Counts::kAll && !innovation.lost && !pose_.isZero(0)) {
+    if (in_contact_.update(innovation) == ContactGate::Counts::kAll && !innovation.lost && !pose_.isZero(0)) {
       Eigen::Matrix3d jacobian = innovation.jacobian;
       if (innovation.size == 2) jacobian.row(2).setZero();
       const Eigen::Vector3d seen = jacobian * pose_;
@@ -50,7 +50,7 @@ class SpeedResiduals {
   const MotionModel& model_;
   const std::uint8_t during_;
   Eigen::Vector3d pose_ = Eigen::Vector3d::Zero();
-  Touched touched_;
+  ContactGate in_contact_;
   double from_s_ = 0;
   bool empty_ = true;
 };
@@ -74,7 +74,7 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionMo
     bias.covariance.setZero();
     TrackFilter filter(model, bias, views[v].track->robot, views[v].number);
     SpeedResiduals sums(model, during);
-    walk(filter, views[v], views[v].track->samples.size(), sums);
+    run_filter(filter, views[v], views[v].track->samples.size(), sums);
     residuals[v] = std::move(sums.all);
     // Removes the mean of each robot.
     double score = 0, information = 0;
@@ -138,20 +138,20 @@ class Classes {
 };
 
 /// Half the sum of squares that a speed per class explains.
-double explained(const std::vector<std::vector<Instant>>& runs, const FloorCells& cells) {
+double explained(const std::vector<std::vector<Instant>>& runs, const GridCells& cells) {
   static const Classes classes;
   std::array<double, Classes::kCount> score{}, information{};
   for (const std::vector<Instant>& run : runs) {
-    FloorMemory memory(cells);
+    TrafficGrid traffic(cells);
     for (const Instant& instant : run) {
       for (const Visit& v : instant) {
         if (v.information == 0) continue;
-        const std::size_t c = classes.of(memory.value_s(v.x_mm, v.y_mm));
+        const std::size_t c = classes.of(traffic.value_s(v.x_mm, v.y_mm));
         score[c] += v.score;
         information[c] += v.information;
       }
       for (const Visit& v : instant)
-        if (v.driven) memory.add(v.x_mm, v.y_mm, RunNeighbours::kRaster_s);
+        if (v.driven) traffic.add(v.x_mm, v.y_mm, RunNeighbours::kRaster_s);
     }
   }
   double sum = 0;
@@ -160,13 +160,13 @@ double explained(const std::vector<std::vector<Instant>>& runs, const FloorCells
   return sum;
 }
 
-struct Weighed {
-  FloorCells cells;
+struct RatedCells {
+  GridCells cells;
   double value = -1;
 };
 
 /// Coordinate ascent with decreasing steps.
-Weighed climbed(const std::vector<std::vector<Instant>>& runs, Weighed best, double extent_mm) {
+RatedCells climbed(const std::vector<std::vector<Instant>>& runs, RatedCells best, double extent_mm) {
   constexpr double kFinest = 0.004;  // relative to the cell side
   for (double step = 0.16; step > kFinest; step /= 2) {
     for (bool better = true; better;) {
@@ -176,7 +176,7 @@ Weighed climbed(const std::vector<std::vector<Instant>>& runs, Weighed best, dou
       for (const auto& [by_side, by_x, by_y] :
            {std::array{move * side / extent_mm, 0.0, 0.0}, {0.0, move, 0.0}, {0.0, 0.0, move}}) {
         for (const double sign : {1.0, -1.0}) {
-          Weighed trial;
+          RatedCells trial;
           trial.cells = {best.cells.side_mm + sign * by_side, best.cells.x_mm + sign * by_x,
                          best.cells.y_mm + sign * by_y};
           trial.value = explained(runs, trial.cells);
@@ -196,7 +196,8 @@ Weighed climbed(const std::vector<std::vector<Instant>>& runs, Weighed best, dou
 
 }  // namespace
 
-FloorCells find_cells(const Fitter& fitter, const MotionModel& model, const FloorCells& from, std::uint8_t during) {
+GridCells fit_grid_cells(const Fitter& fitter, const MotionModel& model, const GridCells& from,
+                         std::uint8_t during) {
   const std::vector<std::vector<Instant>> runs = visits_of(fitter, model, during);
   std::vector<float> away;
   for (const auto& run : runs)
@@ -210,17 +211,18 @@ FloorCells find_cells(const Fitter& fitter, const MotionModel& model, const Floo
   // apart.
   constexpr double kSmallest_mm = 14, kLargest_mm = 150;
   constexpr int kCorners = 3;
-  std::vector<Weighed> all{{from, 0}};
+  std::vector<RatedCells> all{{from, 0}};
   for (double side = kSmallest_mm; side < kLargest_mm; side *= 1 + 0.3 * side / extent_mm)
     for (int i = 0; i < kCorners; ++i)
       for (int j = 0; j < kCorners; ++j) all.push_back({{side, side * i / kCorners, side * j / kCorners}, 0});
   in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i].value = explained(runs, all[i].cells); });
-  std::stable_sort(all.begin(), all.end(), [](const Weighed& a, const Weighed& b) { return a.value > b.value; });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const RatedCells& a, const RatedCells& b) { return a.value > b.value; });
   constexpr std::size_t kClimbed = 6;
   all.resize(std::min(all.size(), kClimbed));
   in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i] = climbed(runs, all[i], extent_mm); });
   return std::max_element(all.begin(), all.end(),
-                          [](const Weighed& a, const Weighed& b) { return a.value < b.value; })
+                          [](const RatedCells& a, const RatedCells& b) { return a.value < b.value; })
       ->cells;
 }
 

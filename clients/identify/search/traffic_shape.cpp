@@ -15,7 +15,7 @@ using Shape = Factor::Shape;
 Block curve_of(const Block& like, std::uint8_t cells, std::vector<double> points) {
   Factor f;
   f.shape = Shape::kExponential;
-  f.axis = {Covariate::kTrodden, cells};
+  f.axis = {Covariate::kTraffic, cells};
   f.points = std::move(points);
   return {like.target, Basis{{f}}, like.during};
 }
@@ -29,7 +29,7 @@ struct Form {
 };
 
 /// Evidence at the best common prior standard deviation.
-void weigh(const Beside& data, const std::vector<Eigen::Index>& columns, Form& form) {
+void evaluate(const ReducedColumns& data, const std::vector<Eigen::Index>& columns, Form& form) {
   const Eigen::MatrixXd information = data.information(columns, columns);
   const Eigen::VectorXd score = data.score(columns);
   form.columns = columns;
@@ -44,7 +44,7 @@ void weigh(const Beside& data, const std::vector<Eigen::Index>& columns, Form& f
 }
 
 /// Forward selection of steps while the gain exceeds the choice penalty.
-Form some_steps(const Beside& data, Eigen::Index first, const Block& steps) {
+Form some_steps(const ReducedColumns& data, Eigen::Index first, const Block& steps) {
   constexpr std::size_t kMostSteps = 5;
   const std::vector<double>& points = steps.basis.factors.front().points;
   const double price = std::log(static_cast<double>(points.size()));
@@ -59,7 +59,7 @@ Form some_steps(const Beside& data, Eigen::Index first, const Block& steps) {
       for (const std::size_t c : chosen) columns.push_back(first + static_cast<Eigen::Index>(c));
       columns.push_back(first + static_cast<Eigen::Index>(p));
       Form trial;
-      weigh(data, columns, trial);
+      evaluate(data, columns, trial);
       trial.evidence -= price * static_cast<double>(columns.size());
       if (trial.evidence <= next.evidence) continue;
       next = trial;
@@ -90,18 +90,18 @@ Block of_form(const Block& like, Shape shape, std::uint8_t cells, std::vector<do
 
 }  // namespace
 
-bool shape_memory(const Fitter& fitter, MotionModel& model, std::size_t place) {
+bool refine_traffic_shape(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const Term& term = model.terms[place];
   if (term.blocks.size() != 1 || term.blocks.front().basis.factors.size() != 1 ||
-      !term.blocks.front().basis.looks_at(Covariate::kTrodden))
+      !term.blocks.front().basis.looks_at(Covariate::kTraffic))
     return false;
   const Block like = term.blocks.front();
   // A free grid slot: none that other terms use.
   for (std::size_t t = 0; t < model.terms.size(); ++t)
     for (const Block& block : model.terms[t].blocks)
-      if (t != place && block.basis.looks_at(Covariate::kTrodden)) return false;
+      if (t != place && block.basis.looks_at(Covariate::kTraffic)) return false;
   // The term's present grid moves to the last slot. Candidates use the first.
-  constexpr std::uint8_t kOwn = kFloorCells - 1, kTried = 0;
+  constexpr std::uint8_t kOwn = kTrafficGrids - 1, kTried = 0;
   const std::uint8_t found = like.basis.factors.front().axis.radius;
   model.cells[kOwn] = model.cells[found];
   model.terms[place].blocks.front().basis.factors.front().axis.radius = kOwn;
@@ -112,33 +112,33 @@ bool shape_memory(const Fitter& fitter, MotionModel& model, std::size_t place) {
   for (int round = 0; round < kRounds; ++round) {
     MotionModel without = model;
     without.terms[place].coefficients.setZero();
-    const FloorCells cells = find_cells(fitter, without, model.cells[kOwn], like.during);
+    const GridCells cells = fit_grid_cells(fitter, without, model.cells[kOwn], like.during);
     MotionModel next = model;
     next.cells[kTried] = cells;
-    fitter.set().remember(next);
+    fitter.set().update_traffic(next);
     const Block smooth = of_form(like, Shape::kExponential, kTried, scales),
                 stepping = of_form(like, Shape::kAtLeast, kTried, steps);
-    const Linear l = linear(fitter, next, place, {smooth, stepping});
+    const LocalQuadratic l = local_quadratic(fitter, next, place, {smooth, stepping});
     const Eigen::VectorXd at_zero = l.score_without(next.terms[place].coefficients);
-    const Beside data = beside(l, at_zero, l.more());
+    const ReducedColumns data = reduced_columns(l, at_zero, l.added_columns());
     const auto n = static_cast<Eigen::Index>(scales.size());
     Form best;
     std::vector<Eigen::Index> columns;
     for (Eigen::Index c = 0; c < n; ++c) columns.push_back(c);
-    weigh(data, columns, best);
+    evaluate(data, columns, best);
     best.blocks = {smooth};
     Form other = some_steps(data, n, stepping);
     if (other.evidence > best.evidence) best = std::move(other);
     for (Block& block : best.blocks) block.basis.factors.front().axis.radius = kOwn;
     for (Eigen::Index& c : best.columns) c += l.own;
-    exchange(next, place, l, best.blocks, at_zero, best.columns, best.sd);
+    replace_blocks(next, place, l, best.blocks, at_zero, best.columns, best.sd);
     next.cells[kOwn] = cells;
     next.cells[kTried] = model.cells[kTried];
     model = next;
-    fitter.set().remember(model);
+    fitter.set().update_traffic(model);
     fitter.fit(model, 1);
   }
-  settle(fitter, model, place);
+  refit(fitter, model, place);
   return true;
 }
 

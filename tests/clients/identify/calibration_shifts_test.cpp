@@ -1,4 +1,5 @@
-// Jumps of the picture: found where they are and as large as they are, in all runs or in one; nowhere else.
+// Calibration shifts of the camera: found at their times and with their sizes, in all runs or in one; no false
+// alarms.
 #include "clients/identify/search/calibration_shifts.hpp"
 
 #include <gtest/gtest.h>
@@ -13,8 +14,8 @@ namespace {
 
 constexpr std::uint32_t kRobots = 8, kRuns = 2;
 
-/// Robots in a room without walls that go straight, turn and rest by turns, with noise of wheels and tracker. `push` is what
-/// happens to each in the room, `seen` what the tracker makes of a sample.
+/// Robots without walls that drive straight, turn and rest, with wheel and tracker noise. `push` displaces robots
+/// in the world, `seen` maps true poses to measured samples.
 MeasuredSet played(std::uint64_t seed, const std::function<double(double time_s, bool driven)>& push_x_mm_s,
                    const std::function<void(std::uint32_t run, Sample&)>& seen) {
   const Random random(seed);
@@ -78,37 +79,37 @@ void shift_and_turn(Sample& s, double x_mm, double turn_rad) {
 
 struct Found {
   MotionModel model;
-  std::vector<Jump> jumps;
+  std::vector<CalibrationShift> shifts;
 };
 Found found_in(const MeasuredSet& set) {
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   Found found;
   fitter.fit_base(found.model);
-  found.jumps = add_jumps(fitter, found.model);
+  found.shifts = add_calibration_shifts(fitter, found.model);
   return found;
 }
 
-TEST(Jumps, NoneWhereTheCameraStands) {
+TEST(CalibrationShifts, NoneWithAFixedCamera) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
-    EXPECT_TRUE(found_in(played(seed, no_push, [](std::uint32_t, Sample&) {})).jumps.empty()) << seed;
+    EXPECT_TRUE(found_in(played(seed, no_push, [](std::uint32_t, Sample&) {})).shifts.empty()) << seed;
 }
 
-TEST(Jumps, AreFoundWhereAndAsLargeAsTheyAre) {
+TEST(CalibrationShifts, TimesAndSizesAreRecovered) {
   const Found found = found_in(played(4, no_push, [](std::uint32_t, Sample& s) {
     if (s.time_s >= 22.7 && s.time_s < 41.3) shift_and_turn(s, 4, 0.02);
   }));
-  ASSERT_EQ(found.jumps.size(), 2u);
-  for (const Jump& jump : found.jumps) {
-    const bool first = jump.time_s < 30;
-    EXPECT_FALSE(jump.run);
-    EXPECT_NEAR(jump.time_s, first ? 22.7 : 41.3, 0.3);
+  ASSERT_EQ(found.shifts.size(), 2u);
+  for (const CalibrationShift& shift : found.shifts) {
+    const bool first = shift.time_s < 30;
+    EXPECT_FALSE(shift.run);
+    EXPECT_NEAR(shift.time_s, first ? 22.7 : 41.3, 0.3);
     const double sign = first ? 1 : -1;
-    EXPECT_NEAR(jump.size[0], sign * 4, 5 * jump.sd[0] + 0.1);
-    EXPECT_NEAR(jump.size[2], sign * 0.02, 5 * jump.sd[2] + 1e-3);
-    EXPECT_NEAR(jump.size[3], 0, 5 * jump.sd[3] + 1e-3);
+    EXPECT_NEAR(shift.size[0], sign * 4, 5 * shift.sd[0] + 0.1);
+    EXPECT_NEAR(shift.size[2], sign * 0.02, 5 * shift.sd[2] + 1e-3);
+    EXPECT_NEAR(shift.size[3], 0, 5 * shift.sd[3] + 1e-3);
   }
-  // What the fitted model sees of a robot at rest jumps as it did.
+  // The fitted model predicts the shift of a robot at rest.
   Situation at;
   at.time_s = 30;
   const Eigen::Vector3d during = found.model.measured(100, 0, 0, at);
@@ -119,23 +120,23 @@ TEST(Jumps, AreFoundWhereAndAsLargeAsTheyAre) {
   EXPECT_NEAR(during[2] - before[2], 0.02, 0.003);
 }
 
-TEST(Jumps, OfOneRunAreOfThatRun) {
+TEST(CalibrationShifts, AShiftInOneRunBelongsToThatRun) {
   const Found found = found_in(played(5, no_push, [](std::uint32_t run, Sample& s) {
     if (run == 1 && s.time_s >= 31.2) shift_and_turn(s, -7, 0);
   }));
-  ASSERT_EQ(found.jumps.size(), 1u);
-  ASSERT_TRUE(found.jumps[0].run);
-  EXPECT_EQ(*found.jumps[0].run, 1u);
+  ASSERT_EQ(found.shifts.size(), 1u);
+  ASSERT_TRUE(found.shifts[0].run);
+  EXPECT_EQ(*found.shifts[0].run, 1u);
   Situation at;
   at.time_s = 50;
   for (at.run = 0; at.run < 3; ++at.run)
     EXPECT_NEAR(found.model.measured(0, 0, 0, at)[0] - found.model.base.ahead_mm, at.run == 1 ? -7 : 0, 0.6);
 }
 
-// Robots at rest tell them apart: a bump of the table moves those that stand on running motors alone.
-TEST(Jumps, APushOfDrivenRobotsIsNone) {
+// Robots at rest separate the two: a push displaces driven robots only.
+TEST(CalibrationShifts, APushOfDrivenRobotsIsNoShift) {
   const auto push = [](double t, bool driven) { return driven && t >= 30.1 && t < 30.3 ? 40.0 : 0.0; };
-  EXPECT_TRUE(found_in(played(6, push, [](std::uint32_t, Sample&) {})).jumps.empty());
+  EXPECT_TRUE(found_in(played(6, push, [](std::uint32_t, Sample&) {})).shifts.empty());
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Pictures that are bent: that what holds robots is not where it seems to be is noticed, and settled once a map puts the picture
-// straight.
+// Camera distortion: contacts away from the fitted walls are noticed, and the walls are straight again once a map
+// removes the distortion.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,16 +10,16 @@
 namespace kilotwin::identify {
 namespace {
 
-constexpr double kWide_mm = 220, kHigh_mm = 180;  ///< half the room's sides, as centres of discs reach them
+constexpr double kWide_mm = 220, kHigh_mm = 180;  ///< half the sides of the area of disc centres
 constexpr double kBarrel = 0.15;
 
-/// A point at the corner is seen nearer by `bent`.
+/// Shrinks the image by `bent` at the corners.
 Eigen::Vector2d seen(double x_mm, double y_mm, double bent) {
   const double square = (x_mm * x_mm + y_mm * y_mm) / (kWide_mm * kWide_mm + kHigh_mm * kHigh_mm);
   return (1 - bent * square) * Eigen::Vector2d(x_mm, y_mm);
 }
 
-/// Ghosts in a room whose walls hold them, by arcs of 50 ms, seen through a lens.
+/// Robots without mutual collisions between walls, simulated with arcs of 50 ms, seen through a lens.
 MeasuredSet behind_walls(double bent) {
   const Random random(21);
   const double dt = 0.05, factor_s = 0.001, tracker_mm = 0.3, tracker_rad = 0.03, duration_s = 150;
@@ -62,8 +62,8 @@ MeasuredSet behind_walls(double bent) {
   return set;
 }
 
-/// A map of the picture that is not fitted yet.
-Term map_of_the_picture() {
+/// A camera map with coefficients 0.
+Term camera_map() {
   Factor plane;
   plane.shape = Factor::Shape::kPolynomials2;
   plane.axis.of = Covariate::kX;
@@ -81,36 +81,36 @@ Term map_of_the_picture() {
           Eigen::VectorXd::Constant(columns, 1 / (30.0 * 30.0))};
 }
 
-TEST(BentPicture, WallsOfAStraightPictureAreNotDoubted) {
+TEST(CameraDistortion, WallsAreCertainWithoutDistortion) {
   const MeasuredSet set = behind_walls(0);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model;
   fitter.fit_base(model);
-  EXPECT_FALSE(model.doubts_rim);
-  EXPECT_NEAR(model.room.x_high_mm, kWide_mm, 3);
-  EXPECT_NEAR(model.room.y_low_mm, -kHigh_mm, 3);
-  // Whoever doubts them all the same takes them for walls again.
-  model.doubts_rim = true;
-  fitter.fit_surroundings(model);
-  EXPECT_FALSE(model.doubts_rim);
-  EXPECT_NEAR(model.room.x_high_mm, kWide_mm, 3);
+  EXPECT_FALSE(model.walls_uncertain);
+  EXPECT_NEAR(model.walls.x_high_mm, kWide_mm, 3);
+  EXPECT_NEAR(model.walls.y_low_mm, -kHigh_mm, 3);
+  // After a forced doubt the walls are accepted again.
+  model.walls_uncertain = true;
+  fitter.fit_contacts(model);
+  EXPECT_FALSE(model.walls_uncertain);
+  EXPECT_NEAR(model.walls.x_high_mm, kWide_mm, 3);
 }
 
-TEST(BentPicture, WallsAreDoubtedUntilAMapPutsThemStraight) {
+TEST(CameraDistortion, WallsAreUncertainUntilAMapRemovesTheDistortion) {
   const MeasuredSet set = behind_walls(kBarrel);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model;
   fitter.fit_base(model);
-  ASSERT_TRUE(model.doubts_rim);
-  model.terms.push_back(map_of_the_picture());
+  ASSERT_TRUE(model.walls_uncertain);
+  model.terms.push_back(camera_map());
   fitter.fit(model, 2);
-  EXPECT_FALSE(model.doubts_rim);
-  // Walls in the room; how large all is, only what robots are known to be like tells.
-  EXPECT_NEAR((model.room.x_high_mm - model.room.x_low_mm) / (model.room.y_high_mm - model.room.y_low_mm),
+  EXPECT_FALSE(model.walls_uncertain);
+  // Walls in the world. The scale follows from the priors of the speeds only.
+  EXPECT_NEAR((model.walls.x_high_mm - model.walls.x_low_mm) / (model.walls.y_high_mm - model.walls.y_low_mm),
               kWide_mm / kHigh_mm, 0.02);
-  EXPECT_NEAR(model.room.x_high_mm - model.room.x_low_mm, 2 * kWide_mm, 20);
+  EXPECT_NEAR(model.walls.x_high_mm - model.walls.x_low_mm, 2 * kWide_mm, 20);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The scale of a picture that is put straight: told by robots that touch, kept while its map is fitted, and all lengths with it.
+// Camera scale: estimated by contacts, kept during the fit of a map, and consistent for all lengths.
 #include "clients/identify/model/camera_scale.hpp"
 
 #include <gtest/gtest.h>
@@ -11,30 +11,30 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Distances of robots that pass each other outside `edge_mm`, every other of them staying there for a while.
-std::vector<Pair> met(double edge_mm, double sd_mm, std::uint64_t seed, bool touching) {
+/// Distances of robots that pass each other outside `edge_mm`; every other pair stays in contact for a while.
+std::vector<RobotPair> met(double edge_mm, double sd_mm, std::uint64_t seed, bool touching) {
   const Random random(seed);
-  std::vector<Pair> pairs;
-  for (std::uint32_t meeting = 1; meeting <= 200; ++meeting) {
+  std::vector<RobotPair> pairs;
+  for (std::uint32_t encounter = 1; encounter <= 200; ++encounter) {
     for (std::uint32_t i = 0; i < 4; ++i) {
-      const double u = random.uniform(Stream::kLayout, meeting, Tick{i}, 0);
-      // Robots are as likely at any place of a ring.
+      const double u = random.uniform(Stream::kLayout, encounter, Tick{i}, 0);
+      // Uniform density in a ring.
       const double least = touching ? edge_mm : 20.0;
       const double passing = std::sqrt(least * least + u * (48.0 * 48 - least * least));
-      const bool stays = touching && meeting % 2 == 0;
-      Pair& pair = pairs.emplace_back();
-      pair.apart_mm =
-          (stays ? edge_mm : passing) + sd_mm * random.normal(Stream::kMeasurementNoise, meeting, Tick{i}, 0);
-      pair.meeting = meeting;
+      const bool stays = touching && encounter % 2 == 0;
+      RobotPair& pair = pairs.emplace_back();
+      pair.distance_mm =
+          (stays ? edge_mm : passing) + sd_mm * random.normal(Stream::kMeasurementNoise, encounter, Tick{i}, 0);
+      pair.encounter = encounter;
     }
   }
   return pairs;
 }
 
-/// A model whose picture is bent by a map.
+/// A model with a camera map.
 MotionModel bent() {
   MotionModel model;
-  model.room = {-400, 380, -300, 310};
+  model.walls = {-400, 380, -300, 310};
   Factor plane;
   plane.shape = Factor::Shape::kPolynomials2;
   plane.axis.of = Covariate::kX;
@@ -53,10 +53,10 @@ MotionModel bent() {
   return model;
 }
 
-TEST(PictureScale, TouchingShowsWhereDistancesBegin) {
+TEST(CameraScale, ContactsDetermineTheContactDistance) {
   for (const double edge : {31.0, 33.0, 35.5}) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      const auto found = touching_apart(met(edge, 0.6, seed, true));
+      const auto found = contact_distance(met(edge, 0.6, seed, true));
       ASSERT_TRUE(found.has_value());
       EXPECT_NEAR(found->mm, edge, 3 * found->sd_mm);
       EXPECT_LT(found->sd_mm, 0.6);
@@ -64,19 +64,19 @@ TEST(PictureScale, TouchingShowsWhereDistancesBegin) {
   }
 }
 
-TEST(PictureScale, RobotsThatPassThroughEachOtherShowNone) {
+TEST(CameraScale, RobotsWithoutCollisionsDetermineNone) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
-    EXPECT_FALSE(touching_apart(met(33, 0.6, seed, false)).has_value()) << seed;
+    EXPECT_FALSE(contact_distance(met(33, 0.6, seed, false)).has_value()) << seed;
 }
 
-TEST(PictureScale, AllLengthsGoTogether) {
+TEST(CameraScale, AllLengthsScaleTogether) {
   const MotionModel model = bent();
   MotionModel larger = model;
   ASSERT_TRUE(rescale(larger, 1.06));
   EXPECT_NEAR(larger.base.straight_mm_s, 1.06 * model.base.straight_mm_s, 1e-12);
   EXPECT_NEAR(larger.base.wheel_base_mm, 1.06 * model.base.wheel_base_mm, 1e-12);
-  EXPECT_NEAR(larger.room.x_high_mm - larger.room.x_low_mm, 1.06 * 780, 1e-9);
-  // A point of a robot is seen where it was seen: all is farther from the middle of the map, at (10, -5).
+  EXPECT_NEAR(larger.walls.x_high_mm - larger.walls.x_low_mm, 1.06 * 780, 1e-9);
+  // The measurement of a robot's point stays; positions scale about the middle of the map, (10, -5).
   Situation at;
   const double centre = model.base.centre_mm, ahead = model.base.ahead_mm;
   for (const double x : {-350.0, 20.0, 300.0}) {
@@ -84,48 +84,48 @@ TEST(PictureScale, AllLengthsGoTogether) {
       const Eigen::Vector3d before = model.measured(x - centre, y, 0, at);
       const double wide_x = 10 + 1.06 * (x - 10), wide_y = -5 + 1.06 * (y + 5);
       const Eigen::Vector3d after = larger.measured(wide_x - centre, wide_y, 0, at);
-      // The tracked point is farther from the centre as well.
+      // The offset of the tracked point scales too.
       EXPECT_NEAR(after[0] - (larger.base.ahead_mm - centre), before[0] - (ahead - centre), 1e-9);
       EXPECT_NEAR(after[1], before[1], 1e-9);
     }
   }
 }
 
-TEST(PictureScale, WithoutAMapNothingIsScaled) {
+TEST(CameraScale, WithoutAMapNothingIsScaled) {
   MotionModel model;
   EXPECT_FALSE(rescale(model, 1.1));
   EXPECT_EQ(model.base.straight_mm_s, BaseParameters{}.straight_mm_s);
 }
 
-TEST(PictureScale, IsKeptWhereMetRobotsAreAsFarApart) {
+TEST(CameraScale, TheConstraintKeepsMeanLengths) {
   const MotionModel model = bent();
-  std::vector<Pair> pairs = met(33, 0.6, 1, true);
+  std::vector<RobotPair> pairs = met(33, 0.6, 1, true);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     pairs[i].x_mm = -300 + 40.0 * static_cast<double>(i % 16);
     pairs[i].y_mm = -250 + 33.0 * static_cast<double>(i % 15);
   }
-  const ScaleHold hold(model, pairs, 0.01);
+  const ScaleConstraint hold(model, pairs, 0.01);
   EXPECT_NEAR(hold.factor(model), 1, 1e-9);
   MotionModel larger = model;
   ASSERT_TRUE(rescale(larger, 1.04));
   EXPECT_NEAR(hold.factor(larger), 1 / 1.04, 1e-3);
 }
 
-TEST(PictureScale, WallsGoWhereTheyAreSeen) {
+TEST(CameraScale, WallsKeepTheirPlacesInTheImage) {
   MotionModel flat = bent();
   flat.terms.front().coefficients.setZero();
   MotionModel larger = flat;
   ASSERT_TRUE(rescale(larger, 1.05));
-  const Room room = carried(flat.room, flat, larger);
-  EXPECT_NEAR(room.x_high_mm, larger.room.x_high_mm, 0.01);
-  EXPECT_NEAR(room.y_low_mm, larger.room.y_low_mm, 0.01);
-  flat.room.x_low_mm = -INFINITY;
-  EXPECT_TRUE(std::isinf(carried(flat.room, flat, larger).x_low_mm));
+  const Walls walls = carried(flat.walls, flat, larger);
+  EXPECT_NEAR(walls.x_high_mm, larger.walls.x_high_mm, 0.01);
+  EXPECT_NEAR(walls.y_low_mm, larger.walls.y_low_mm, 0.01);
+  flat.walls.x_low_mm = -INFINITY;
+  EXPECT_TRUE(std::isinf(carried(flat.walls, flat, larger).x_low_mm));
 }
 
-TEST(PictureScale, OnlyTheLinearColumnsOfAMapMakeThePictureLarger) {
+TEST(CameraScale, OnlyLinearColumnsChangeTheScale) {
   EXPECT_EQ(log_scale_by_coefficients(MotionModel{}).size(), 0);
-  // Another term before it, and a map that has lost some of its columns.
+  // With another term before it, and a map with pruned columns.
   MotionModel model = bent();
   Factor clock;
   clock.axis.of = Covariate::kTime;
@@ -142,7 +142,7 @@ TEST(PictureScale, OnlyTheLinearColumnsOfAMapMakeThePictureLarger) {
   map.precision = Eigen::VectorXd::Ones(5);
   const Eigen::VectorXd by = log_scale_by_coefficients(model);
   ASSERT_EQ(by.size(), 8);
-  // What rescale() does to the coefficients makes the picture smaller by as much as the room gets larger, to first order.
+  // First order: the change of the coefficients by rescale() shrinks the image as the world grows.
   const double factor = 1.001;
   MotionModel larger = model;
   ASSERT_TRUE(rescale(larger, factor));
@@ -150,15 +150,15 @@ TEST(PictureScale, OnlyTheLinearColumnsOfAMapMakeThePictureLarger) {
   change.tail(5) = larger.terms.back().coefficients - map.coefficients;
   EXPECT_NEAR(by.dot(change), 1 - factor, 2e-6);
   EXPECT_EQ((by.array() != 0).count(), 2);
-  // Larger by 1 % along x alone is larger by half of that in all.
+  // 1 % along x alone is half a per cent in scale.
   Eigen::VectorXd wider = Eigen::VectorXd::Zero(8);
   wider[3] = 0.01 * (520 + 500) / 2;
   EXPECT_NEAR(by.dot(wider), 0.005, 1e-12);
 }
 
-/// A shift of the whole picture moves all that is seen and where robots are thought to have started, a turn of it how they
-/// pointed as well: neither shows anywhere.
-TEST(PictureScale, AShiftOrATurnOfThePictureTellsNothing) {
+/// A constant shift or rotation of the image changes all measurements and initial poses alike, so it has no
+/// likelihood gain.
+TEST(CameraScale, ConstantShiftAndRotationAreNotIdentifiable) {
   MeasuredSet set;
   set.has_commands = set.has_headings = true;
   auto& run = set.runs.emplace_back();
@@ -169,7 +169,7 @@ TEST(PictureScale, AShiftOrATurnOfThePictureTellsNothing) {
     for (int i = 0; i < 40; ++i)
       track.samples.push_back({0.5 * i, 5.0 * i + 0.3 * (i % 3), 200.0 * robot + 0.2 * (i % 4), 0.01 * (i % 2)});
   }
-  // Tracked is the point that robots turn about: a start is freed of a turn as if all of a robot were where it was seen.
+  // The tracked point is the turning centre, so that a rotation changes initial poses exactly.
   MotionModel model;
   model.base.ahead_mm = 0;
   PreparedSet prepared(set);
@@ -185,9 +185,9 @@ TEST(PictureScale, AShiftOrATurnOfThePictureTellsNothing) {
   for (const Unit& unit : linearise(model, prepared.units(), blocks, {100, 1})) information += unit.information;
   const auto known = [&](Eigen::Index block) { return information(kBaseColumns + block, kBaseColumns + block); };
   EXPECT_NEAR(known(0), 0, 1e-9);
-  // But for what the filter believes of its surprises, which do not turn.
+  // Except for the filter's outlier weights, which do not rotate.
   EXPECT_LT(0.1 * 0.1 * known(1), 0.01);
-  // That it bends by 30 mm over the way would be seen, and a compass that is off by 0.1 rad: robots do not go where they point.
+  // A distortion of 30 mm and a heading offset of 0.1 rad do have a likelihood gain: motion and heading disagree.
   EXPECT_GT(30 * 30 * known(2), 1);
   EXPECT_GT(0.1 * 0.1 * known(3), 1);
 }

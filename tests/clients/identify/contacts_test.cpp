@@ -1,4 +1,4 @@
-// What is concluded from robots that touch each other, and where such robots come to be.
+// Inference with contacts between robots, and forecasts of robots in contact.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSlow = 0.6;
 
-/// Pairs of robots. The second of each rests; the first leans against it and turns on the spot, at kSlow of its speed.
+/// Pairs of robots. One rests; the other leans against it and turns on the spot with gain kSlow.
 MeasuredSet held_fast(bool headings) {
   const Random random(4);
   const double dt = 0.5, tracker_mm = 0.3, tracker_rad = 0.03;
@@ -40,7 +40,7 @@ MeasuredSet held_fast(bool headings) {
   return set;
 }
 
-/// How fast robots are beside others, by a fit to that; they are as fast as they are told to be elsewhere.
+/// Fitted gain near other robots; elsewhere the gain is 1.
 double gain_beside_others(bool headings) {
   const MeasuredSet set = held_fast(headings);
   PreparedSet prepared(set);
@@ -61,13 +61,13 @@ double gain_beside_others(bool headings) {
   return model.rates(s, {0, 0}).right_gain * model.base.turn_mm_s / model.base.wheel_base_mm / 0.8;
 }
 
-TEST(Contacts, HeadingsTellHowWheelsRunBesideOthers) { EXPECT_NEAR(gain_beside_others(true), kSlow, 0.03); }
+TEST(Contacts, HeadingsDetermineTheGainInContact) { EXPECT_NEAR(gain_beside_others(true), kSlow, 0.03); }
 
-TEST(Contacts, NothingIsConcludedFromPositionsBesideOthers) { EXPECT_NEAR(gain_beside_others(false), 1, 1e-6); }
+TEST(Contacts, PositionsInContactCarryNoInformation) { EXPECT_NEAR(gain_beside_others(false), 1, 1e-6); }
 
-TEST(Contacts, TheLikelihoodOfAllHoldsWhatRobotsDoThatTouch) {
-  // Without headings nothing is concluded from who touches, and here all do, all the time. Where a wheel that runs would have
-  // moved them, they are held: touching must be allowed to do much.
+TEST(Contacts, TheFullLikelihoodIncludesContacts) {
+  // Without headings, contacts yield no information, and here all robots are in contact. Large contact noise must
+  // explain that driven robots do not move.
   MeasuredSet set = held_fast(false);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
@@ -76,12 +76,12 @@ TEST(Contacts, TheLikelihoodOfAllHoldsWhatRobotsDoThatTouch) {
   EXPECT_EQ(fitter.log_likelihood(much), 0);
   EXPECT_EQ(fitter.log_likelihood(little), 0);
   EXPECT_GT(fitter.log_likelihood_of_all(much), fitter.log_likelihood_of_all(little) + 100);
-  // Where nobody can touch anybody both are the same.
+  // Without contacts both likelihoods are equal.
   MotionModel none = much;
   none.contacts = false;
   EXPECT_NEAR(fitter.log_likelihood_of_all(none), fitter.log_likelihood(none), 1e-6);
   EXPECT_NE(fitter.log_likelihood(none), 0);
-  // Tracks that are held out are in neither.
+  // Held-out tracks enter neither.
   const double before = fitter.log_likelihood_of_all(much);
   for (Track& track : set.runs.front().tracks) track.held_out = track.robot >= 8;
   const double half = fitter.log_likelihood_of_all(much);
@@ -90,8 +90,8 @@ TEST(Contacts, TheLikelihoodOfAllHoldsWhatRobotsDoThatTouch) {
   EXPECT_NEAR(half / before, 0.5, 0.1);
 }
 
-TEST(Contacts, ARobotThatPushesOthersComesAsFarAsWithShortSteps) {
-  // One drives against two that rest, the second of them aside.
+TEST(Contacts, RolloutsConvergeInTheStep) {
+  // One robot pushes two at rest, the second one off-centre.
   const double dt = 0.01, duration_s = 8;
   std::vector<double> x{0, 36, 70}, y{0, 5, -6};
   for (double t = 0; t < duration_s - dt / 2; t += dt) {
@@ -116,23 +116,24 @@ TEST(Contacts, ARobotThatPushesOthersComesAsFarAsWithShortSteps) {
     filters.emplace_back(model, none, track.robot, 0);
     filters.back().start(track.samples.front(), {}, 0, 1e-6);
   }
-  std::vector<Starting> robots;
+  std::vector<RolloutStart> robots;
   for (std::size_t r = 0; r < 3; ++r) robots.push_back({&views[r], {&filters[r]}, {1.0}, 0});
-  const std::vector<Foreseen> seen = futures(model, robots, Floors(model), 0, duration_s, 4, false, {1, 2});
+  const std::vector<RolloutMoments> seen =
+      rollouts(model, robots, TrafficGrids(model), 0, duration_s, 4, false, {1, 2});
   for (std::size_t r = 0; r < 3; ++r) {
     EXPECT_NEAR(seen[r].x_mm, x[r], 1.0);
     EXPECT_NEAR(seen[r].y_mm, y[r], 1.0);
   }
 }
 
-TEST(Contacts, WhetherDiscsOverlappedIsTold) {
+TEST(Contacts, PushApartReportsOverlaps) {
   std::vector<double> x{0, 40, 70}, y{0, 0, 0};
   EXPECT_TRUE(push_apart(x, y));
   EXPECT_NEAR(x[2] - x[1], 33, 1e-9);
   EXPECT_FALSE(push_apart(x, y));
 }
 
-TEST(Contacts, WhatWasFoundOfTracksIsAsItWas) {
+TEST(Contacts, TrackEstimatesAreRestored) {
   const MeasuredSet set = held_fast(false);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
@@ -140,8 +141,8 @@ TEST(Contacts, WhatWasFoundOfTracksIsAsItWas) {
   prepared.find_centres(model, 2);
   prepared.find_headings(model, 2);
   const double likelihood = fitter.log_likelihood_of_all(model);
-  const PreparedSet::Found found = prepared.found();
-  // In a picture that is larger discs lie elsewhere, and robots began otherwise.
+  const PreparedSet::TrackEstimates found = prepared.estimates();
+  // Another camera scale changes disc centres and initial headings.
   MotionModel larger = model;
   larger.terms.push_back({"camera",
                           {{Target::kMeasuredScale, {}}},
@@ -150,7 +151,7 @@ TEST(Contacts, WhatWasFoundOfTracksIsAsItWas) {
   prepared.find_centres(larger, 2);
   prepared.find_headings(larger, 2);
   EXPECT_GT(std::abs(fitter.log_likelihood_of_all(model) - likelihood), 1);
-  prepared.go_back(found, model);
+  prepared.restore(found, model);
   EXPECT_EQ(fitter.log_likelihood_of_all(model), likelihood);
 }
 

@@ -1,4 +1,4 @@
-// What a model is worth where nothing was fitted: more than another by what is seen, in nats that add up over tracks.
+// Held-out gain: the log-likelihood ratio on held-out tracks, in nats, additive over tracks.
 #include "clients/identify/predict/held_out_gain.hpp"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@ namespace {
 constexpr double kSpeed_mm_s = 12, kTracker_mm = 0.7, kEvery_s = 0.5;
 constexpr int kSamples = 40;
 
-/// Robots that go straight on at 12 mm/s; every second one is held out.
+/// Robots that drive straight at 12 mm/s. Every other one is held out.
 MeasuredSet straight_on(std::uint32_t robots) {
   const Random random(8);
   MeasuredSet set;
@@ -46,7 +46,7 @@ MotionModel at_speed(double straight_mm_s) {
   return model;
 }
 
-TEST(HeldOutGain, IsWhatIsSeenOfTheBetterModel) {
+TEST(HeldOutGain, IsTheLogLikelihoodRatio) {
   const MeasuredSet set = straight_on(8);
   PreparedSet prepared(set);
   const MotionModel right = at_speed(kSpeed_mm_s), wrong = at_speed(kSpeed_mm_s - 1);
@@ -59,7 +59,7 @@ TEST(HeldOutGain, IsWhatIsSeenOfTheBetterModel) {
   EXPECT_EQ(held_out_gain(right, right, prepared, false, 1).nat, 0);
 }
 
-TEST(HeldOutGain, TracksThatWereFittedDoNotCount) {
+TEST(HeldOutGain, TrainingTracksDoNotCount) {
   MeasuredSet set = straight_on(8);
   const MotionModel right = at_speed(kSpeed_mm_s), wrong = at_speed(kSpeed_mm_s - 1);
   const auto gain = [&](bool held_out_only) {

@@ -1,4 +1,4 @@
-// What effects know of the past of a robot, and how causes that act more on some are tried.
+// Covariates of a robot's history, and hypotheses about amplitudes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,14 +10,14 @@
 namespace kilotwin::identify {
 namespace {
 
-Track told(std::vector<CommandChange> commands) {
+Track commanded(std::vector<CommandChange> commands) {
   Track track;
   commands.insert(commands.begin(), {-1e300, Motion::kStop});
   track.commands = std::move(commands);
   return track;
 }
 
-TEST(History, MotorsForgetAsTheSumOverTheirPastSays) {
+TEST(History, DiscountedMotorTimeIsTheIntegralOverThePast) {
   const Random random(5);
   std::vector<CommandChange> commands;
   double at_s = 0;
@@ -25,26 +25,26 @@ TEST(History, MotorsForgetAsTheSumOverTheirPastSays) {
     commands.push_back({at_s, static_cast<Motion>((i * 7 + i * i) % 4)});
     at_s += 0.5 + 9 * random.uniform(Stream::kLayout, 1, Tick{0}, i);
   }
-  const CommandClock clock(told(commands));
+  const CommandClock clock(commanded(commands));
   constexpr double kStep_s = 1e-3;
-  std::array<std::array<double, 3>, kForget_s.size()> sums{};
+  std::array<std::array<double, 3>, kDecayTimes_s.size()> sums{};
   double now_s = 0;
   for (int i = 0; now_s < 90; ++i) {
     const CommandState state = clock.at(now_s + kStep_s / 2);
-    for (std::size_t f = 0; f < kForget_s.size(); ++f) {
+    for (std::size_t f = 0; f < kDecayTimes_s.size(); ++f) {
       const std::array<bool, 3> on = {state.left_on(), state.right_on(), state.driven()};
       for (std::size_t m = 0; m < 3; ++m)
-        sums[f][m] = sums[f][m] * std::exp(-kStep_s / kForget_s[f]) + (on[m] ? kStep_s : 0);
+        sums[f][m] = sums[f][m] * std::exp(-kStep_s / kDecayTimes_s[f]) + (on[m] ? kStep_s : 0);
     }
     now_s = (i + 1) * kStep_s;
     if (i % 7919 != 0) continue;
-    for (std::size_t f = 0; f < kForget_s.size(); ++f)
-      for (std::size_t m = 0; m < 3; ++m) EXPECT_NEAR(clock.at(now_s).remembered_s(f, m), sums[f][m], 0.01);
+    for (std::size_t f = 0; f < kDecayTimes_s.size(); ++f)
+      for (std::size_t m = 0; m < 3; ++m) EXPECT_NEAR(clock.at(now_s).discounted_s(f, m), sums[f][m], 0.01);
   }
 }
 
-TEST(History, HowLongTheCommandBeforeLastedIsKnown) {
-  const CommandClock clock(told({{1, Motion::kStraight}, {4.5, Motion::kStop}, {6, Motion::kLeft}}));
+TEST(History, DurationOfThePreviousCommand) {
+  const CommandClock clock(commanded({{1, Motion::kStraight}, {4.5, Motion::kStop}, {6, Motion::kLeft}}));
   for (const auto& [time_s, lasted_s] :
        {std::pair{0.5, 0.0}, {2.0, 1.0}, {5.0, 3.5}, {5.9, 3.5}, {7.0, 1.5}, {60.0, 1.5}}) {
     Situation s;
@@ -53,9 +53,9 @@ TEST(History, HowLongTheCommandBeforeLastedIsKnown) {
   }
 }
 
-TEST(History, ARestBeginsTheTimeSinceItAnew) {
+TEST(History, ARestResetsTheTimeSinceIt) {
   const CommandClock clock(
-      told({{1, Motion::kStraight}, {4.5, Motion::kLeft}, {6, Motion::kStop}, {9, Motion::kRight}}));
+      commanded({{1, Motion::kStraight}, {4.5, Motion::kLeft}, {6, Motion::kStop}, {9, Motion::kRight}}));
   for (const auto& [time_s, since_s, difference_s] : {std::tuple{0.5, 0.0, 0.0},
                                                       {2.0, 1.0, 0.0},
                                                       {5.0, 4.0, 0.5},
@@ -66,12 +66,12 @@ TEST(History, ARestBeginsTheTimeSinceItAnew) {
     Situation s;
     s.commands = clock.at(time_s);
     EXPECT_DOUBLE_EQ(value_of({Covariate::kSinceRest}, s, 0), since_s) << time_s;
-    EXPECT_DOUBLE_EQ(value_of({Covariate::kUseDifference}, s, 0), difference_s) << time_s;
+    EXPECT_DOUBLE_EQ(value_of({Covariate::kMotorTimeDifference}, s, 0), difference_s) << time_s;
   }
 }
 
-TEST(History, NothingComesBeforeTheFirstCommand) {
-  const CommandClock clock(told({{0, Motion::kStraight}, {4, Motion::kStop}, {6, Motion::kLeft}}));
+TEST(History, TheFirstCommandHasNoPredecessor) {
+  const CommandClock clock(commanded({{0, Motion::kStraight}, {4, Motion::kStop}, {6, Motion::kLeft}}));
   const Axis previous{Covariate::kPreviousCommand};
   const auto at = [&](double time_s) {
     Situation s;
@@ -81,8 +81,8 @@ TEST(History, NothingComesBeforeTheFirstCommand) {
   EXPECT_EQ(at(1), kNoCommand);
   EXPECT_EQ(at(5), static_cast<double>(Motion::kStraight));
   EXPECT_EQ(at(7), static_cast<double>(Motion::kStop));
-  // Who rests at first comes from a stop afterwards.
-  const CommandClock rested(told({{2, Motion::kStraight}}));
+  // A robot that rests at first has stop as previous command.
+  const CommandClock rested(commanded({{2, Motion::kStraight}}));
   Situation s;
   s.commands = rested.at(3);
   EXPECT_EQ(value_of(previous, s, 0), static_cast<double>(Motion::kStop));
@@ -110,7 +110,7 @@ TEST(History, AKnownCurveIsTheSumOfItsColumns) {
   }
 }
 
-TEST(History, WhatIsFoundInPlaceIsTriedWithTimeAsWell) {
+TEST(History, AnEffectOfPositionIsAlsoTestedOverTime) {
   Extent extent;
   extent.duration_s = 200;
   extent.x_low_mm = extent.y_low_mm = -100;
@@ -134,7 +134,7 @@ TEST(History, WhatIsFoundInPlaceIsTriedWithTimeAsWell) {
     return std::find_if(with.hypotheses.rbegin(), with.hypotheses.rend(),
                         [&](const Hypothesis& h) { return h.name == name; });
   };
-  // As robots point, too.
+  // Also over the heading.
   ASSERT_NE(last_of("speed-by-position-and-heading"), with.hypotheses.rend());
   EXPECT_EQ(last_of("speed-by-position-and-heading")->columns.size(), 4u);
   ASSERT_NE(last_of("speed-by-time-and-position"), with.hypotheses.rend());
@@ -153,7 +153,7 @@ TEST(History, WhatIsFoundInPlaceIsTriedWithTimeAsWell) {
     EXPECT_NEAR(values[k], there * std::cos(M_PI * static_cast<double>(k + 1) * 0.25), 1e-12);
 }
 
-TEST(History, ADriftOverTimeOrPlaceHasItsMean) {
+TEST(History, ADriftOverTimeOrPlaceHasAConstantPart) {
   Extent extent;
   extent.has_straight = true;
   extent.robots = {1};
@@ -171,7 +171,7 @@ TEST(History, ADriftOverTimeOrPlaceHasItsMean) {
   }
 }
 
-TEST(History, WhatIsFoundIsTriedWithAnAmountForEachRobotAndCommand) {
+TEST(History, AnEffectIsTestedWithAmplitudesPerRobotAndCommand) {
   Extent extent;
   extent.duration_s = 100;
   extent.has_straight = extent.has_turns = extent.has_stop = true;
@@ -187,7 +187,7 @@ TEST(History, WhatIsFoundIsTriedWithAnAmountForEachRobotAndCommand) {
   battery.coefficients = Eigen::Vector2d(-0.2, 0.05);
   battery.precision = Eigen::Vector2d(1, 1);
   const Dictionary without = dictionary_of(extent), with = dictionary_of(extent, {battery});
-  // An amount for each robot, for each command, for nine waves over the plane and for two of the heading.
+  // Amplitudes per robot, per command, for nine cosines over the plane and two harmonics of the heading.
   EXPECT_EQ(with.columns(), without.columns() + 3 + 3 + 9 + 4);
   for (const auto& [covariate, word] : {std::pair{Covariate::kRobot, "robot"}, {Covariate::kCommand, "command"}}) {
     const Hypothesis* found = nullptr;

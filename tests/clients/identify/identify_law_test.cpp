@@ -1,4 +1,5 @@
-// The laws of the identification: exact arcs, parameters recovered from what they made, causes named, nothing found in nothing.
+// Laws of the identification: exact arcs, recovered parameters, the right covariates, no effects in data without
+// effects.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +18,8 @@ struct World {
   bool headings = true;
 };
 
-/// Always the same robots; they walk about, far from each other, by the model of docs/explanation/motion.md in steps of 20 ms.
+/// The same robots in all sets, far from each other, simulated with the model of docs/explanation/motion.md in
+/// steps of 20 ms.
 MeasuredSet played(const World& world, std::uint64_t seed, std::uint32_t robots, std::uint32_t runs,
                    double duration_s) {
   const Random random(seed), robots_own(7);
@@ -108,13 +110,13 @@ TEST(Identify, ParametersAreRecovered) {
   fitter.fit(model, 4);
   EXPECT_NEAR(std::sqrt(model.noise.position_mm2), world.tracker_mm, 0.05);
   EXPECT_NEAR(std::sqrt(model.noise.heading_rad2), world.tracker_rad, 0.003);
-  // Biases that are fitted too take some of it: over eight seeds it came out at 0.87 of the truth, with a spread of 0.09.
+  // Fitted biases absorb a part: 0.87 of the truth over eight seeds, standard deviation 0.09.
   EXPECT_NEAR(model.noise.factor_s / world.factor_s, 0.87, 0.27);
   EXPECT_NEAR(model.base.ahead_mm, 9.2, 0.2);
-  // Only ratios of speeds and wheel base show in headings; their common scale is less sure.
+  // Headings determine ratios of speeds and wheel base. Their common scale is less certain.
   EXPECT_NEAR(model.base.turn_mm_s / model.base.wheel_base_mm, 0.8, 0.03);
   EXPECT_NEAR(model.base.straight_mm_s, 10, 1.2);
-  // Speeds of each robot straight on, with its biases.
+  // Straight speed of each robot, biases included.
   const Random random(7);
   for (const auto& [robot, bias] : model.robots) {
     const double left = 10 + 1.5 * random.normal(Stream::kWheelBias, robot, Tick{0}, 0);
@@ -122,7 +124,7 @@ TEST(Identify, ParametersAreRecovered) {
   }
 }
 
-TEST(Identify, NothingIsFoundWhereNothingIs) {
+TEST(Identify, NoEffectInDataWithoutEffects) {
   const MeasuredSet train = played({}, 11, 8, 2, 100), test = played({}, 12, 8, 1, 60);
   const Identified found = identify(train, &test, {});
   const auto& result = found.document.at("contract");
@@ -132,7 +134,7 @@ TEST(Identify, NothingIsFoundWhereNothingIs) {
               0.35 * result.at("noise_floor_mm").get<double>());
 }
 
-TEST(Identify, SlowingByTheClockIsNamed) {
+TEST(Identify, SlowingOverTimeIsAttributedToTime) {
   World world;
   world.slowing_s = 150;
   const MeasuredSet train = played(world, 21, 8, 2, 100), test = played(world, 22, 8, 1, 60);
@@ -146,7 +148,7 @@ TEST(Identify, SlowingByTheClockIsNamed) {
   EXPECT_TRUE(written);
 }
 
-TEST(Identify, TermsAreWrittenAsTheyAre) {
+TEST(Identify, WrittenEffectsEqualTerms) {
   Factor steps;
   steps.shape = Factor::Shape::kAtLeast;
   steps.axis.of = Covariate::kTime;

@@ -1,4 +1,4 @@
-// ARK logs and our own recordings as data directories.
+// Import of ARK logs and of exported recordings.
 #include "clients/identify/data/import.hpp"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ class ImportTest : public testing::Test {
     import_set(folder_ / "from", folder_ / "to");
     return load_measured_set(folder_ / "to");
   }
-  /// What the import complains of.
+  /// The message of the import's error.
   std::string complaint() {
     try {
       import_set(folder_ / "from", folder_ / "to");
@@ -146,7 +146,7 @@ TEST_F(ImportTest, WhateverIsInAFileItIsReadOrComplainedOf) {
     try {
       const std::string rows =
           is_ark ? rows_of_ark_log(folder_ / "from" / name) : rows_of_recording(folder_ / "from" / name);
-      // Whatever passes is a data directory's rows.
+      // Whatever is accepted yields valid rows.
       recorder::write_file(
           folder_ / "to" / "trajectories.csv",
           (is_ark ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + rows);

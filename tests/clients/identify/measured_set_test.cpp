@@ -1,4 +1,4 @@
-// What is read is what was written, in any order of rows and columns; what is wrong is named with its place.
+// Reading returns what was written, in any order of rows and columns. Errors name the place.
 #include "clients/identify/data/measured_set.hpp"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ TEST_F(MeasuredSetFiles, RowsAndColumnsMayStandInAnyOrder) {
   EXPECT_EQ(track.samples[0].heading_rad, -0.25);
   EXPECT_TRUE(std::isnan(track.samples[1].heading_rad));
   EXPECT_EQ(track.samples[1].y_mm, 4);
-  ASSERT_EQ(track.commands.size(), 3u);  // at rest, straight, left
+  ASSERT_EQ(track.commands.size(), 3u);  // stop, straight, left
   EXPECT_EQ(track.commands[1].motion, Motion::kStraight);
   EXPECT_EQ(track.commands[2].time_s, 2);
   EXPECT_TRUE(set.has_headings && set.has_commands);

@@ -1,5 +1,5 @@
-// What is written is what was fitted: for every target and form of an effect, robots of the written model, run by the simulator's
-// engine and seen by its tracker, go where the fitted model says.
+// Model files equal fitted models: for every target and form of an effect, the engine and its tracker reproduce
+// the fitted model.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -42,7 +42,7 @@ std::vector<Form> forms() {
   map.and_axis.of = Covariate::kY;
   map.and_low = -250;
   map.and_high = 250;
-  // Between nodes the engine bends where the fitted map is linear, but for what is linear anyway.
+  // Maps are compared where spline and bilinear interpolation agree: linear functions.
   Factor grid = map;
   grid.shape = Shape::kGrid;
   grid.count = 7;
@@ -55,9 +55,9 @@ std::vector<Form> forms() {
   const Factor previous = over(Shape::kTable, Covariate::kPreviousCommand, 0, 1, 1, {2, 3});
   Factor since = late;
   since.first = 0;
-  const auto of_late = [](Covariate of, std::uint8_t forget) {
+  const auto of_late = [](Covariate of, std::uint8_t decay_index) {
     Factor f = over(Shape::kLinear, of, 0, 5, 1);
-    f.axis.forget = forget;
+    f.axis.decay_index = decay_index;
     return f;
   };
   Factor behind = over(Shape::kLevelling, Covariate::kDensity, 0, 1, 1, {0.3, 1});
@@ -72,9 +72,9 @@ std::vector<Form> forms() {
   };
   Factor known = over(Shape::kCosines, Covariate::kTime, 0, 18, 3);
   known.known = {0.7, 0, -0.4};
-  Factor amounts = over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5});
-  amounts.known = {0.6, -0.9};
-  amounts.plus = 1;
+  Factor amplitudes = over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5});
+  amplitudes.known = {0.6, -0.9};
+  amplitudes.plus = 1;
   Factor growing = known;
   growing.plus = 0.5;
   return {
@@ -94,7 +94,7 @@ std::vector<Form> forms() {
       {"previous command", {{previous}}},
       {"previous lasted", {{over(Shape::kCosines, Covariate::kPreviousLasted, 0, 3, 3)}}},
       {"since rest", {{over(Shape::kCosines, Covariate::kSinceRest, 0, 8, 3)}}},
-      {"difference of use", {{over(Shape::kCosines, Covariate::kUseDifference, -5, 5, 3)}}},
+      {"difference of use", {{over(Shape::kCosines, Covariate::kMotorTimeDifference, -5, 5, 3)}}},
       {"last turn", {{over(Shape::kTable, Covariate::kLastTurn, 0, 1, 1, {2, 3})}}},
       {"robot", {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5, 7, 9})}}},
       {"steps", {{over(Shape::kAtLeast, Covariate::kTime, 0, 1, 1, {4, 9})}}},
@@ -119,8 +119,8 @@ std::vector<Form> forms() {
       {"right motor", {{of_late(Covariate::kRightMotorTime, 0)}}},
       {"driven of late", {{of_late(Covariate::kDrivenTime, 3)}}},
       {"amounts of a curve", {{over(Shape::kTable, Covariate::kCommand, 0, 1, 1, {1, 2}), known}}},
-      {"robots' known amounts of a curve", {{amounts, over(Shape::kCosines, Covariate::kTime, 0, 18, 4)}}},
-      {"robots' known amounts of a constant", {{amounts}}},
+      {"robots' known amounts of a curve", {{amplitudes, over(Shape::kCosines, Covariate::kTime, 0, 18, 4)}}},
+      {"robots' known amounts of a constant", {{amplitudes}}},
       {"a known curve times harmonics", {{growing, over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
       {"robots in time",
        {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
@@ -134,7 +134,7 @@ const char* name_of(Target target) {
   return kNames[static_cast<std::size_t>(target)];
 }
 
-/// Of the size that such an effect may have.
+/// A typical size of an effect on this target.
 double size_of(Target target) {
   switch (target) {
     case Target::kGain:
@@ -168,7 +168,7 @@ class WrittenModel : public testing::Test {
       Track& track = set_.runs[0].tracks.emplace_back();
       track.robot = 3 + 2 * robot;
       track.commands.push_back({-1e300, Motion::kStop});
-      // Changes at the starts of ticks: the engine knows no others.
+      // Commands change at tick boundaries, since the engine knows no other times.
       std::int64_t tick = 0;
       for (std::uint32_t i = 0; static_cast<double>(tick) * kTick_s < kDuration_s; ++i) {
         const auto motion = static_cast<Motion>((i + robot) % 4 == 3 ? 0 : 1 + (i * (robot + 1)) % 3);
@@ -184,7 +184,7 @@ class WrittenModel : public testing::Test {
     model_.contacts = false;
   }
 
-  /// Where the tracker sees robots by the fitted model, stepped tick by tick.
+  /// Measured positions by the fitted model, tick by tick.
   [[nodiscard]] std::vector<std::vector<Sample>> expected(const Scene& scene) const {
     struct State {
       double x, y, heading;
@@ -215,7 +215,7 @@ class WrittenModel : public testing::Test {
                   view_of(r, x, y, &list_),
                   scene.robots[r].track->robot,
                   0};
-        // At the start of a tick what has run is what ran before it.
+        // At the start of a tick, motor-on times exclude this tick.
         all[r].commands.since_s = std::max(0.0, all[r].commands.since_s - within_s);
       }
       return all;
@@ -248,7 +248,7 @@ class WrittenModel : public testing::Test {
 
   MeasuredSet set_;
   MotionModel model_;
-  mutable std::vector<OtherRobot> list_;  ///< of what robots see of each other at an instant
+  mutable std::vector<OtherRobot> list_;  ///< neighbours at one instant
 };
 
 TEST_F(WrittenModel, GoesWhereTheFittedOneSays) {

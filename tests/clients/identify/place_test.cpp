@@ -1,5 +1,5 @@
-// What depends on places and on neighbours is found in the shape it has: an edge of the floor, a radius within which robots count,
-// the cells in which a floor remembers.
+// Effects of position, neighbours and traffic are recovered in their shape: sharp edges, neighbourhood radii,
+// traffic cells.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,18 +17,18 @@ namespace kilotwin::identify {
 namespace {
 
 using Shape = Factor::Shape;
-/// As no set begins with.
-const FloorCells kCells{43, 15, -12};
+/// Differs from all initial grids.
+const GridCells kCells{43, 15, -12};
 
-/// What a robot's speed may depend on.
+/// Covariates of a robot's speed in these tests.
 struct Around {
   std::size_t robot;
-  const std::vector<double>&x_mm, &y_mm;  ///< of all
-  double trodden_s;                       ///< in its cell
+  const std::vector<double>&x_mm, &y_mm;  ///< of all robots
+  double traffic_s;                       ///< driven time in its cell
   double heading_rad;
 };
 using Gain = std::function<double(const Around&)>;
-/// Other robots within a radius: each by its distance and the cosine of its bearing.
+/// Neighbours within a radius: distance and cosine of the bearing of each.
 double sum_of_others(const Around& a, double radius_mm, const std::function<double(double, double)>& each) {
   double sum = 0;
   for (std::size_t i = 0; i < a.x_mm.size(); ++i) {
@@ -39,9 +39,9 @@ double sum_of_others(const Around& a, double radius_mm, const std::function<doub
   return sum;
 }
 
-/// Ghosts that walk through each other, by arcs of 50 ms.
+/// Robots without mutual collisions, simulated with arcs of 50 ms.
 MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, double duration_s,
-                   const FloorCells& cells = kCells) {
+                   const GridCells& cells = kCells) {
   const Random random(seed);
   const double dt = 0.05, factor_s = 0.001, tracker_mm = 0.3, tracker_rad = 0.03;
   MeasuredSet set;
@@ -57,7 +57,7 @@ MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, d
     y[r] = 90.0 * (r / 4) - 90;
     heading[r] = 1.7 * r;
   }
-  FloorMemory memory(cells);
+  TrafficGrid traffic(cells);
   for (int k = 0; k * dt <= duration_s; ++k) {
     const double t = k * dt;
     for (std::uint32_t r = 0; r < robots; ++r) {
@@ -77,7 +77,7 @@ MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, d
         track.commands.push_back({t, straight ? Motion::kStraight : draw < 0.5 ? Motion::kLeft : Motion::kRight});
         next_s[r] = t + (straight ? 3 + 6 * draw : 1 + 2 * draw);
       }
-      const double speed = gain({r, disc_x, disc_y, memory.value_s(disc_x[r], disc_y[r]), heading[r]});
+      const double speed = gain({r, disc_x, disc_y, traffic.value_s(disc_x[r], disc_y[r]), heading[r]});
       const Eigen::Vector2d v = speed * nominal_speeds(BaseParameters{}, track.commands.back().motion);
       const double sd = std::sqrt(factor_s / dt);
       Rates rates;
@@ -88,7 +88,7 @@ MeasuredSet played(const Gain& gain, std::uint64_t seed, std::uint32_t robots, d
       y[r] += arc.dy_mm;
       heading[r] += arc.dheading_rad;
     }
-    for (std::uint32_t r = 0; r < robots; ++r) memory.add(disc_x[r], disc_y[r], dt);
+    for (std::uint32_t r = 0; r < robots; ++r) traffic.add(disc_x[r], disc_y[r], dt);
   }
   return set;
 }
@@ -102,7 +102,7 @@ Term unfitted(Factor factor) {
           Eigen::VectorXd::Constant(columns, 1)};
 }
 
-/// The model without effects, fitted; nothing touches.
+/// The fitted model without effects and without contacts.
 MotionModel fitted(const Fitter& fitter) {
   MotionModel model;
   model.contacts = false;
@@ -132,7 +132,7 @@ Factor map_of_the_floor(std::uint32_t order) {
 }
 
 TEST(Place, AnEdgeOfTheFloorStaysSharp) {
-  // Half the floor is slow, along a line that follows no axis.
+  // Half of the floor is slow; the edge is oblique.
   const auto side = [](double x, double y) { return x + 0.5 * y - 15; };
   const MeasuredSet set =
       played([&](const Around& a) { return side(a.x_mm[a.robot], a.y_mm[a.robot]) > 0 ? 0.5 : 1.0; }, 5, 12, 300);
@@ -142,9 +142,9 @@ TEST(Place, AnEdgeOfTheFloorStaysSharp) {
   model.terms.push_back(unfitted(map_of_the_floor(5)));
   fitter.fit(model, 2);
   const double smooth = fitter.log_likelihood(model);
-  sharpen(fitter, model, 0);
+  fit_total_variation_map(fitter, model, 0);
   EXPECT_GT(fitter.log_likelihood(model), smooth + 50);
-  // 25 mm from the edge, on both of its sides, speeds are what they are far from it.
+  // At 25 mm from the edge the map has its plateau values on both sides.
   const double along = std::hypot(1, 0.5);
   for (const double y : {-60.0, 0.0, 60.0}) {
     const double edge = 15 - 0.5 * y;
@@ -154,18 +154,18 @@ TEST(Place, AnEdgeOfTheFloorStaysSharp) {
   }
 }
 
-TEST(Place, NothingIsSharpenedWhereTheFloorIsSmooth) {
+TEST(Place, ASmoothMapStaysSmooth) {
   const MeasuredSet set = played([](const Around& a) { return 1 + 0.001 * a.x_mm[a.robot]; }, 6, 12, 150);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model = fitted(fitter);
   model.terms.push_back(unfitted(map_of_the_floor(3)));
   fitter.fit(model, 2);
-  sharpen(fitter, model, 0);
+  fit_total_variation_map(fitter, model, 0);
   EXPECT_EQ(model.terms[0].blocks.front().basis.factors.front().shape, Shape::kCosines2);
 }
 
-TEST(Place, RobotsCountWithinTheRadiusTheyDo) {
+TEST(Place, TheNeighbourhoodRadiusIsRecovered) {
   const MeasuredSet set = played(
       [](const Around& a) {
         int count = 0;
@@ -184,7 +184,7 @@ TEST(Place, RobotsCountWithinTheRadiusTheyDo) {
   density.count = 3;
   model.terms.push_back(unfitted(density));
   fitter.fit(model, 2);
-  ASSERT_TRUE(shape_neighbours(fitter, model, 0));
+  ASSERT_TRUE(refine_neighbour_shape(fitter, model, 0));
   const auto gain = [&](std::initializer_list<double> x_mm) {
     std::vector<double> x{0}, y(x_mm.size() + 1, 0);
     x.insert(x.end(), x_mm);
@@ -200,8 +200,8 @@ TEST(Place, RobotsCountWithinTheRadiusTheyDo) {
   EXPECT_NEAR(gain({70, -95, 80}) / alone, 0.6, 0.07);
 }
 
-TEST(Place, RobotsCountByWhereTheyAre) {
-  // Slow behind all that are ahead, however many: of the nearest alone that shows in part.
+TEST(Place, TheDirectionOfNeighboursIsRecovered) {
+  // Slow behind any number of robots ahead. The nearest alone explains a part only.
   const MeasuredSet set = played(
       [](const Around& a) {
         return 1 / (1 + 0.7 * sum_of_others(a, 110, [](double, double cosine) { return std::max(0.0, cosine); }));
@@ -217,7 +217,7 @@ TEST(Place, RobotsCountByWhereTheyAre) {
   near.count = 3;
   model.terms.push_back(unfitted(near));
   fitter.fit(model, 2);
-  ASSERT_TRUE(shape_neighbours(fitter, model, 0));
+  ASSERT_TRUE(refine_neighbour_shape(fitter, model, 0));
   std::vector<OtherRobot> list;
   const auto gain = [&](std::initializer_list<double> x_mm, double heading_rad) {
     std::vector<double> x{0}, y(x_mm.size() + 1, 0);
@@ -236,54 +236,54 @@ TEST(Place, RobotsCountByWhereTheyAre) {
   EXPECT_NEAR(gain({60, 90}, 0) / alone, 1 / 2.4, 0.06);
 }
 
-TEST(Place, AFloorRemembersInItsCells) {
-  FloorMemory memory({30, 0, 0});
-  memory.add(31, -1, 2);
-  memory.add(59, -29, 0.5);
-  EXPECT_FLOAT_EQ(memory.value_s(45, -15), 2.5F);
-  EXPECT_FLOAT_EQ(memory.value_s(29, -15), 0);
-  EXPECT_FLOAT_EQ(memory.value_s(45, 1), 0);
-  // Far away all places are one.
-  memory.add(1e6, 1e6, 1);
-  EXPECT_FLOAT_EQ(memory.value_s(2e6, 3e6), 1);
-  // A corner elsewhere.
-  FloorMemory moved({30, 10, -5});
+TEST(Place, TrafficCountsPerCell) {
+  TrafficGrid traffic({30, 0, 0});
+  traffic.add(31, -1, 2);
+  traffic.add(59, -29, 0.5);
+  EXPECT_FLOAT_EQ(traffic.value_s(45, -15), 2.5F);
+  EXPECT_FLOAT_EQ(traffic.value_s(29, -15), 0);
+  EXPECT_FLOAT_EQ(traffic.value_s(45, 1), 0);
+  // Positions far outside share one cell.
+  traffic.add(1e6, 1e6, 1);
+  EXPECT_FLOAT_EQ(traffic.value_s(2e6, 3e6), 1);
+  // Another corner.
+  TrafficGrid moved({30, 10, -5});
   moved.add(11, -4, 1);
   EXPECT_FLOAT_EQ(moved.value_s(39, 24), 1);
   EXPECT_FLOAT_EQ(moved.value_s(9, 24), 0);
 }
 
-/// How far apart two corners are, of cells that repeat.
+/// Distance between two corners modulo the cell size.
 double off(double a_mm, double b_mm, double side_mm) { return std::abs(std::remainder(a_mm - b_mm, side_mm)); }
 
-/// A fitted model of a floor that remembers, by the cells of that number.
+/// A fitted model with a traffic effect in the grid of that index.
 MotionModel remembering(const Fitter& fitter, std::uint8_t cells) {
   MotionModel model = fitted(fitter);
   Factor trodden;
   trodden.shape = Shape::kExponential;
-  trodden.axis = {Covariate::kTrodden, cells};
+  trodden.axis = {Covariate::kTraffic, cells};
   trodden.points = {2, 8, 32};
   model.terms.push_back(unfitted(trodden));
   fitter.fit(model, 2);
   return model;
 }
 
-TEST(Place, TheCellsOfTheFloorAreFound) {
+TEST(Place, TrafficCellsAreRecovered) {
   const MeasuredSet set =
-      played([](const Around& a) { return 1 - 0.5 * a.trodden_s / (a.trodden_s + 4); }, 8, 12, 150);
+      played([](const Around& a) { return 1 - 0.5 * a.traffic_s / (a.traffic_s + 4); }, 8, 12, 150);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model = remembering(fitter, 2);
-  ASSERT_TRUE(shape_memory(fitter, model, 0));
+  ASSERT_TRUE(refine_traffic_shape(fitter, model, 0));
   const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
-  const FloorCells& cells = model.cells[axis.radius];
+  const GridCells& cells = model.cells[axis.radius];
   EXPECT_NEAR(cells.side_mm, kCells.side_mm, 0.7);
   EXPECT_LT(off(cells.x_mm, kCells.x_mm, kCells.side_mm), 3);
   EXPECT_LT(off(cells.y_mm, kCells.y_mm, kCells.side_mm), 3);
   Situation fresh = driven_at(0, 0), worn = fresh;
-  worn.near.trodden_s[axis.radius] = 12;
+  worn.near.traffic_s[axis.radius] = 12;
   EXPECT_NEAR(gain_of(model, worn) / gain_of(model, fresh), 1 - 0.5 * 12 / 16, 0.05);
-  // As it is written.
+  // The written effect.
   const proto::Model written = proto_of(model);
   ASSERT_EQ(written.field_size(), 1);
   EXPECT_EQ(written.field(0).name(), field_name(axis.radius));
@@ -295,21 +295,21 @@ TEST(Place, TheCellsOfTheFloorAreFound) {
   }));
 }
 
-TEST(Place, AFloorThatIsPressedDownAtOnceIsFound) {
-  const FloorCells small{24, 7, -9};
-  const MeasuredSet set = played([](const Around& a) { return a.trodden_s > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
+TEST(Place, AStepInTrafficIsRecovered) {
+  const GridCells small{24, 7, -9};
+  const MeasuredSet set = played([](const Around& a) { return a.traffic_s > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
   MotionModel model = remembering(fitter, 0);
-  ASSERT_TRUE(shape_memory(fitter, model, 0));
+  ASSERT_TRUE(refine_traffic_shape(fitter, model, 0));
   const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
-  const FloorCells& cells = model.cells[axis.radius];
+  const GridCells& cells = model.cells[axis.radius];
   EXPECT_NEAR(cells.side_mm, small.side_mm, 0.3);
   EXPECT_LT(off(cells.x_mm, small.x_mm, small.side_mm), 2);
   EXPECT_LT(off(cells.y_mm, small.y_mm, small.side_mm), 2);
   const auto gain_after = [&](double seconds) {
     Situation s = driven_at(0, 0);
-    s.near.trodden_s[axis.radius] = static_cast<float>(seconds);
+    s.near.traffic_s[axis.radius] = static_cast<float>(seconds);
     return gain_of(model, s);
   };
   for (const double seconds : {4.0, 10.0, 20.0}) EXPECT_NEAR(gain_after(seconds) / gain_after(0.25), 0.7, 0.06);

@@ -1,4 +1,4 @@
-// What data cannot be is said, with what would be right; what they can be passes.
+// Implausible data are reported with the remedy. Plausible data pass.
 #include "clients/identify/data/plausibility.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Four robots, straight on at 10 mm/s, seen twice a second for 30 s.
+/// Four robots that drive straight at 10 mm/s, two samples per second for 30 s.
 MeasuredSet good() {
   MeasuredSet set;
   set.has_commands = set.has_headings = true;
@@ -42,12 +42,12 @@ std::string complaint(const std::function<void(Sample&)>& change) {
 
 TEST(Plausible, GoodDataPass) {
   EXPECT_EQ(complaint([](Sample&) {}), "");
-  // Headings that count on beyond a turn; no headings.
+  // Headings that count beyond a full turn; sets without headings.
   EXPECT_EQ(complaint([](Sample& s) { s.heading_rad += 2 * M_PI * std::floor(s.time_s / 5); }), "");
   EXPECT_EQ(complaint([](Sample& s) { s.heading_rad = std::nan(""); }), "");
 }
 
-TEST(Plausible, OtherUnitsAreNamed) {
+TEST(Plausible, WrongUnitsAreReported) {
   const auto says = [](const std::function<void(Sample&)>& change, const char* what) {
     const std::string text = complaint(change);
     EXPECT_NE(text.find(what), std::string::npos) << text;
@@ -63,16 +63,16 @@ TEST(Plausible, OtherUnitsAreNamed) {
   says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "told to move");
 }
 
-TEST(Plausible, CommandsForNobodyAreNamed) {
+TEST(Plausible, CommandsWithoutRobotsAreReported) {
   MeasuredSet set = good();
   for (Track& track : set.runs[0].tracks) track.commands = {{-1e300, Motion::kStop}};
   EXPECT_THROW(demand_plausible(set, "DIR"), UserError);
-  // One robot that moves is enough.
+  // One moving robot suffices.
   set.runs[0].tracks[2].commands.push_back({20, Motion::kStraight});
   EXPECT_NO_THROW(demand_plausible(set, "DIR"));
 }
 
-TEST(Plausible, RunsShorterThanTheHorizonAreNamed) {
+TEST(Plausible, RunsShorterThanTheHorizonAreReported) {
   MeasuredSet set = good();
   EXPECT_NO_THROW(demand_longer_than(set, 30, false, "DIR"));
   EXPECT_THROW(demand_longer_than(set, 31, false, "DIR"), UserError);

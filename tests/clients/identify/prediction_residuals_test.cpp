@@ -8,8 +8,8 @@
 namespace kilotwin::identify {
 namespace {
 
-/// Four robots on straight ways at 10 mm/s in different directions; predictions after are right, those before lag by 4 mm and
-/// lie `aside_per_mm` x to the left of the way.
+/// Four robots on straight paths at 10 mm/s in different directions. The `after` predictions are exact; the
+/// `before` predictions lag by 4 mm and lie `aside_per_mm` x to the left.
 struct Case {
   MeasuredSet set;
   std::vector<Prediction> predictions;
@@ -44,7 +44,7 @@ const nlohmann::json* plot_over(const nlohmann::json& parts, const std::string& 
   return nullptr;
 }
 
-TEST(Residuals, OfRobotsAreTheirErrors) {
+TEST(Residuals, PerRobotTheyAreRmsErrors) {
   const Case c(0);
   const auto parts = residual_parts(c.set, c.predictions, 10);
   ASSERT_EQ(parts["robots"].size(), 4U);
@@ -54,12 +54,12 @@ TEST(Residuals, OfRobotsAreTheirErrors) {
   }
 }
 
-TEST(Residuals, DependOnWhatTheyDependOn) {
+TEST(Residuals, CovariatePlotsShowTheDependence) {
   const Case c(0.005);
   const auto parts = residual_parts(c.set, c.predictions, 10);
   const auto* plot = plot_over(parts, "x");
   ASSERT_NE(plot, nullptr);
-  // It is a constant 4 mm ahead; to the left it is -0.005 x.
+  // Ahead it is constant, 4 mm; to the left it is -0.005 x.
   for (std::size_t k = 0; k < (*plot)["at"].size(); ++k) {
     const double x = (*plot)["at"][k].get<double>(), residual = (*plot)["before"][k].get<double>();
     EXPECT_NEAR((*plot)["after"][k].get<double>(), 0, 1e-9);
@@ -72,7 +72,7 @@ TEST(Residuals, DependOnWhatTheyDependOn) {
   EXPECT_NE(plot_over(parts, "robot"), nullptr);
 }
 
-TEST(Residuals, MapsHoldMeansWhereThereAreEnough) {
+TEST(Residuals, MapsNeedEnoughSamplesPerCell) {
   const Case c(0);
   const auto maps = residual_parts(c.set, c.predictions, 10)["maps"];
   ASSERT_EQ(maps.size(), 2U);
@@ -92,7 +92,7 @@ TEST(Residuals, MapsHoldMeansWhereThereAreEnough) {
   EXPECT_EQ(windows, 2 * 4 * 19U);
 }
 
-TEST(Residuals, WhatWasNotSeenIsLeftOut) {
+TEST(Residuals, PredictionsWithoutMeasurementAreLeftOut) {
   Case c(0);
   c.set.runs[0].tracks[0].samples.resize(30);
   c.predictions.push_back({"a", 1, 50, std::nan(""), 0, 0, 0});

@@ -1,4 +1,4 @@
-// Sums of products are those of the plain loop, to the bit, for all sizes about those of registers.
+// Products equal those of the plain loop bit by bit, for all sizes around those of registers.
 #include <gtest/gtest.h>
 
 #include "clients/identify/fit/products.hpp"
@@ -7,7 +7,7 @@
 namespace kilotwin::identify {
 namespace {
 
-TEST(Products, AreThoseOfThePlainLoop) {
+TEST(Products, EqualThePlainLoop) {
   std::uint32_t drawn = 0;
   const auto draw = [&] {
     return static_cast<double>(philox4x32({++drawn, 0, 0, 0}, {1, 2})[0]) / 4294967296.0 - 0.5;
@@ -27,7 +27,7 @@ TEST(Products, AreThoseOfThePlainLoop) {
   }
 }
 
-TEST(Products, OfThreeRowsAreThoseOfThePlainLoop) {
+TEST(Products, OfThreeRowsEqualThePlainLoop) {
   std::uint32_t drawn = 0;
   const auto draw = [&] {
     return static_cast<double>(philox4x32({++drawn, 0, 0, 0}, {3, 4})[0]) / 4294967296.0 - 0.5;

@@ -1,4 +1,4 @@
-// The report shows what the document holds, whatever that is.
+// The report renders any document.
 #include "clients/identify/report/report.hpp"
 
 #include <gtest/gtest.h>
@@ -56,7 +56,7 @@ std::size_t count(const std::string& text, const std::string& what) {
   return n;
 }
 
-/// Whether a parser takes it without an error, but for elements of HTML 5 that it does not know.
+/// Whether the XML parser accepts it, apart from unknown HTML 5 elements.
 bool parses(const std::string& page) {
   htmlParserCtxtPtr context = htmlNewParserCtxt();
   const htmlDocPtr tree =
@@ -71,7 +71,7 @@ bool parses(const std::string& page) {
   return good;
 }
 
-TEST(Report, TellsWhatTheDocumentHolds) {
+TEST(Report, ShowsTheDocument) {
   const std::string page = report_html(full_document());
   EXPECT_TRUE(parses(page));
   for (const char* said :
@@ -80,12 +80,12 @@ TEST(Report, TellsWhatTheDocumentHolds) {
         "Let some rest.", "grain", "id=\"maps\"", "id=\"simulated\"", "wheel base, mm", "83 %"}) {
     EXPECT_NE(page.find(said), std::string::npos) << said;
   }
-  // A card's plot, horizon, steps, robots, two maps and two of arrows, one over a covariate, one distribution, MSD.
+  // Plots: one card, horizon, steps, robots, two maps and two arrow maps, one covariate, one distribution, MSD.
   EXPECT_EQ(count(page, "<img "), 11U);
   EXPECT_EQ(count(page, "<plot "), 0U);
 }
 
-TEST(Report, NeedsNothingElse) {
+TEST(Report, IsSelfContained) {
   const std::string page = report_html(full_document());
   EXPECT_EQ(count(page, "src="), count(page, "src=\"data:image/svg+xml;base64,"));
   EXPECT_EQ(count(page, "<script"), 0U);
@@ -93,7 +93,7 @@ TEST(Report, NeedsNothingElse) {
   EXPECT_EQ(count(page, "http"), 0U);
 }
 
-TEST(Report, SaysSoWhereNothingWasFound) {
+TEST(Report, SaysThatThereIsNoEffect) {
   json document = full_document();
   document["contract"]["effects"] = json::array();
   const std::string page = report_html(document);
@@ -101,13 +101,13 @@ TEST(Report, SaysSoWhereNothingWasFound) {
   EXPECT_EQ(page.find("id=\"why\""), std::string::npos);
 }
 
-TEST(Report, SaysWhereItIsTheTrackerAlone) {
+TEST(Report, SaysThatOnlyTheMeasurementHasEffects) {
   json document = full_document();
   document["contract"]["effects"].erase(0);
   EXPECT_NE(report_html(document).find("These robots do what the base model says, but"), std::string::npos);
 }
 
-TEST(Report, TakesNoTextForMarkupOrCommands) {
+TEST(Report, EscapesMarkupAndCommands) {
   json document = full_document();
   const std::filesystem::path trap = std::filesystem::path(testing::TempDir()) / "report-trap";
   std::filesystem::remove(trap);
@@ -132,7 +132,7 @@ TEST(Report, AnEmptyDocumentGivesAPage) {
   EXPECT_TRUE(parses(report_html(json())));
 }
 
-/// Replaces something somewhere by something else.
+/// Replaces a random entry by another value.
 void mutate(json& value, std::mt19937& dice) {
   const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(dice() % n); };
   if (value.is_structured() && !value.empty() && pick(8) != 0) {
@@ -159,7 +159,7 @@ void mutate(json& value, std::mt19937& dice) {
   value = others[pick(std::size(others))];
 }
 
-TEST(Report, AnythingElseGivesAPageToo) {
+TEST(Report, AMalformedDocumentGivesAPage) {
   std::mt19937 dice(7);
   for (int i = 0; i < 15; ++i) {
     json document = full_document();
@@ -168,7 +168,7 @@ TEST(Report, AnythingElseGivesAPageToo) {
   }
 }
 
-TEST(Gnuplot, APlotThatCannotBeDrawnLeavesTheOthers) {
+TEST(Gnuplot, AFailedPlotLeavesTheOthers) {
   Gnuplot plots;
   plots.add(100, 100, "plot x");
   plots.add(100, 100, "plot nonsense(");

@@ -1,4 +1,4 @@
-// What a run that was not fitted to has of its own, told by its past.
+// The amplitude of a run outside the fit, inferred from its past.
 #include "clients/identify/predict/run_amplitude.hpp"
 
 #include <gtest/gtest.h>
@@ -28,32 +28,32 @@ double gain_of(const MotionModel& model, std::uint32_t run) {
   return model.rates(s, Eigen::Vector2d::Zero()).left_gain - 1;
 }
 
-TEST(RunAmount, ARunThatWasFittedToHasItsOwn) {
+TEST(RunAmplitude, ATrainingRunKeepsItsAmplitude) {
   const MotionModel model = with_speeds_of_runs({-0.1, 0.2, 0});
-  const RunAmount amount(model, 1);
-  ASSERT_EQ(amount.models().size(), 1u);
-  EXPECT_DOUBLE_EQ(gain_of(amount.models()[0], 1), 0.2);
-  EXPECT_EQ(RunAmount(MotionModel{}, 7).models().size(), 1u);
+  const RunAmplitude amplitude(model, 1);
+  ASSERT_EQ(amplitude.models().size(), 1u);
+  EXPECT_DOUBLE_EQ(gain_of(amplitude.models()[0], 1), 0.2);
+  EXPECT_EQ(RunAmplitude(MotionModel{}, 7).models().size(), 1u);
 }
 
-TEST(RunAmount, BeforeAnythingIsSeenItIsThatOfAllRuns) {
-  const RunAmount amount(with_speeds_of_runs({-0.1, 0.2, 0.05}), 9);
-  const std::vector<double> nothing(amount.models().size(), 0);
-  const RunAmount::Between mean = amount.mean(nothing);
-  const double low = gain_of(amount.models()[mean.low], 9), high = gain_of(amount.models()[mean.high], 9);
+TEST(RunAmplitude, ThePriorIsTheMeanOfAllRuns) {
+  const RunAmplitude amplitude(with_speeds_of_runs({-0.1, 0.2, 0.05}), 9);
+  const std::vector<double> nothing(amplitude.models().size(), 0);
+  const RunAmplitude::Between mean = amplitude.mean(nothing);
+  const double low = gain_of(amplitude.models()[mean.low], 9), high = gain_of(amplitude.models()[mean.high], 9);
   EXPECT_NEAR(low + mean.part * (high - low), 0.05, 1e-9);
 }
 
-TEST(RunAmount, WhatIsSeenTells) {
-  // Much finer than the raster, and beyond what other runs had.
-  const RunAmount amount(with_speeds_of_runs({-0.1, 0.2, 0.05, -0.03}), 9);
+TEST(RunAmplitude, ThePosteriorFollowsTheData) {
+  // A posterior much narrower than the raster, beyond the other runs' amplitudes.
+  const RunAmplitude amplitude(with_speeds_of_runs({-0.1, 0.2, 0.05, -0.03}), 9);
   for (const double truth : {-0.2, 0.013, 0.31}) {
     for (const double sd : {0.002, 0.02}) {
       std::vector<double> log_likelihood;
-      for (const MotionModel& model : amount.models())
+      for (const MotionModel& model : amplitude.models())
         log_likelihood.push_back(-0.5 * std::pow((gain_of(model, 9) - truth) / sd, 2));
-      const RunAmount::Between mean = amount.mean(log_likelihood);
-      const double low = gain_of(amount.models()[mean.low], 9), high = gain_of(amount.models()[mean.high], 9);
+      const RunAmplitude::Between mean = amplitude.mean(log_likelihood);
+      const double low = gain_of(amplitude.models()[mean.low], 9), high = gain_of(amplitude.models()[mean.high], 9);
       EXPECT_NEAR(low + mean.part * (high - low), truth, 0.3 * sd) << truth << " " << sd;
     }
   }

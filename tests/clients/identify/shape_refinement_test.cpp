@@ -1,4 +1,4 @@
-// Laws of the refinement: evidence in closed form, smoothness that fits the data, shapes and instants recovered.
+// Laws of the refinement: closed-form evidence, smoothness, recovered shapes and change points.
 #include "clients/identify/search/shape_refinement.hpp"
 
 #include <gtest/gtest.h>
@@ -16,17 +16,17 @@
 namespace kilotwin::identify {
 namespace {
 
-/// What acts on the robots of a set.
-struct Acting {
+/// Effects on the robots of a set.
+struct TargetGroup {
   std::function<double(double since_s)> gain = [](double) { return 1.0; };
   std::function<double(std::uint32_t robot, double time_s)> own_gain = [](std::uint32_t, double) { return 1.0; };
   std::function<double(double time_s)> drift_x_mm_s = [](double) { return 0.0; };
-  /// By how long the wheel's own motor has run.
+  /// Gain by the motor-on time of the wheel's own motor.
   std::function<double(double used_s)> left = [](double) { return 1.0; }, right = [](double) { return 1.0; };
 };
 
-/// Robots far from each other that go straight and turn by turns, by arcs of 20 ms, with noise of wheels and tracker.
-MeasuredSet played(const Acting& acting, std::uint64_t seed, std::uint32_t robots, double duration_s) {
+/// Distant robots that drive straight and turn alternately, with arcs of 20 ms, wheel and tracker noise.
+MeasuredSet played(const TargetGroup& acting, std::uint64_t seed, std::uint32_t robots, double duration_s) {
   const Random random(seed);
   const double dt = 0.02, factor_s = 0.001, tracker_mm = 0.5, tracker_rad = 0.03;
   MeasuredSet set;
@@ -90,7 +90,7 @@ Term unfitted(const std::string& name, std::vector<Block> blocks) {
   return {name, std::move(blocks), Eigen::VectorXd::Zero(columns), Eigen::VectorXd::Constant(columns, 0.01)};
 }
 
-TEST(Refine, EvidenceOfOneColumnIsInClosedForm) {
+TEST(ShapeRefinement, EvidenceOfOneColumnHasAClosedForm) {
   const double information = 7, score = 3, sd = 0.8;
   const Eigen::MatrixXd i = Eigen::MatrixXd::Constant(1, 1, information);
   const double expected =
@@ -99,8 +99,8 @@ TEST(Refine, EvidenceOfOneColumnIsInClosedForm) {
               1e-12);
 }
 
-TEST(Refine, SmoothnessFollowsTheData) {
-  // Twenty columns told apart by the data, the first four of which are there.
+TEST(ShapeRefinement, SmoothnessFollowsTheData) {
+  // Twenty orthogonal columns; the first four have an effect.
   const Eigen::MatrixXd information = 400 * Eigen::MatrixXd::Identity(20, 20);
   ColumnGroup group;
   Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(20);
@@ -114,14 +114,14 @@ TEST(Refine, SmoothnessFollowsTheData) {
   EXPECT_GT(choose_smoothness(information, information * coefficients, {group}, smoothness, sd), 500);
   EXPECT_GT(sd[0], 0.4);
   EXPECT_LT(sd[19], 0.05 * sd[0]);
-  // Nothing there, nothing chosen.
+  // No effect, nothing chosen.
   smoothness.clear();
   EXPECT_EQ(choose_smoothness(information, Eigen::VectorXd::Zero(20), {group}, smoothness, sd), 0);
   EXPECT_EQ(sd.maxCoeff(), 0);
 }
 
-TEST(Refine, ASharpShapeIsRecovered) {
-  Acting acting;
+TEST(ShapeRefinement, ASharpShapeIsRecovered) {
+  TargetGroup acting;
   acting.gain = [](double s) { return s < 0.8 ? 0.4 : std::min(1.0, 0.4 + 0.5 * (s - 0.8)); };
   const MeasuredSet set = played(acting, 5, 8, 120);
   PreparedSet prepared(set);
@@ -133,10 +133,10 @@ TEST(Refine, ASharpShapeIsRecovered) {
       unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
   fitter.fit(model, 2);
   const double coarse = fitter.log_likelihood(model);
-  refine(fitter, model, 0);
+  refine_curves(fitter, model, 0);
   EXPECT_GT(coarse, before + 100);
   EXPECT_GT(fitter.log_likelihood(model), coarse + 100);
-  // Its size shows against that of later times.
+  // Identifiable relative to later times.
   const auto gain_at = [&](double since_s) {
     Situation s;
     s.commands.command = Motion::kStraight;
@@ -147,8 +147,8 @@ TEST(Refine, ASharpShapeIsRecovered) {
   for (const double s : {0.4, 1.4, 2.5}) EXPECT_NEAR(gain_at(s) / late, acting.gain(s), 0.06) << s;
 }
 
-/// Speed by the time since the command, fitted as a curve of any shape, then simplified.
-MotionModel simplified(const Acting& acting, std::uint64_t seed, bool& simpler) {
+/// Speed by the time since the command, fitted as a free curve, then simplified.
+MotionModel simplified(const TargetGroup& acting, std::uint64_t seed, bool& simpler) {
   const MeasuredSet set = played(acting, seed, 6, 100);
   PreparedSet prepared(set);
   const Fitter fitter(prepared, 2);
@@ -157,13 +157,13 @@ MotionModel simplified(const Acting& acting, std::uint64_t seed, bool& simpler) 
   model.terms.push_back(
       unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
   fitter.fit(model, 2);
-  refine(fitter, model, 0);
+  refine_curves(fitter, model, 0);
   simpler = simplify(fitter, model, 0);
   return model;
 }
 
-TEST(Simplify, AnExponentialIsTakenForOne) {
-  Acting acting;
+TEST(Simplification, AnExponentialIsRecognised) {
+  TargetGroup acting;
   acting.gain = [](double s) { return 1 - 0.6 * std::exp(-s / 1.5); };
   bool simpler = false;
   const MotionModel model = simplified(acting, 6, simpler);
@@ -176,8 +176,8 @@ TEST(Simplify, AnExponentialIsTakenForOne) {
   EXPECT_NEAR(term.coefficients[0], -0.6, 0.06);
 }
 
-TEST(Simplify, AStepIsTakenForOne) {
-  Acting acting;
+TEST(Simplification, AStepIsRecognised) {
+  TargetGroup acting;
   acting.gain = [](double s) { return s < 2.2 ? 0.6 : 1.0; };
   bool simpler = false;
   const MotionModel model = simplified(acting, 7, simpler);
@@ -187,8 +187,8 @@ TEST(Simplify, AStepIsTakenForOne) {
   EXPECT_NEAR(factor.points[0], 2.2, 0.15);
 }
 
-TEST(Simplify, WhatHasNoSimpleFormStaysACurve) {
-  Acting acting;
+TEST(Simplification, ACurveWithoutSimpleFormStays) {
+  TargetGroup acting;
   acting.gain = [](double s) { return 1 - 0.5 * std::exp(-(s - 2) * (s - 2)); };
   bool simpler = false;
   const MotionModel model = simplified(acting, 8, simpler);
@@ -196,17 +196,17 @@ TEST(Simplify, WhatHasNoSimpleFormStaysACurve) {
   EXPECT_GT(model.terms[0].coefficients.size(), 3);
 }
 
-/// A smooth curve in 80 s of time, fitted and refined.
+/// A smooth curve over 80 s, fitted and refined.
 void add_drift_by_time(const Fitter& fitter, MotionModel& model) {
   const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
   model.terms.push_back(
       unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
   fitter.fit(model, 2);
-  refine(fitter, model, 0);
+  refine_curves(fitter, model, 0);
 }
 
-TEST(Refine, TheInstantOfAPulseIsFound) {
-  Acting acting;
+TEST(ChangePoints, TheTimeOfAPulseIsRecovered) {
+  TargetGroup acting;
   acting.drift_x_mm_s = [](double t) { return t >= 40.2 && t < 41 ? 15.0 : 0.0; };
   const MeasuredSet set = played(acting, 6, 8, 80);
   PreparedSet prepared(set);
@@ -214,28 +214,28 @@ TEST(Refine, TheInstantOfAPulseIsFound) {
   MotionModel model;
   fitter.fit_base(model);
   add_drift_by_time(fitter, model);
-  EXPECT_EQ(find_steps(fitter, model, 0), "drift-by-time");
+  EXPECT_EQ(find_change_points(fitter, model, 0), "drift-by-time");
   const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
   ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
   ASSERT_EQ(steps.points.size(), 2u);
-  // Samples lie half a second apart.
+  // The sampling interval is half a second.
   EXPECT_NEAR(steps.points[0], 40.2, 0.3);
   EXPECT_NEAR(steps.points[1], 41, 0.3);
-  // How far it moved the robots is surer than how fast.
+  // The displacement is better determined than the speed.
   EXPECT_NEAR(model.terms[0].coefficients[0] * (steps.points[1] - steps.points[0]), 12, 1);
 }
 
-/// A curve in the time that each motor has run, fitted and refined.
+/// A curve over the motor-on time, fitted and refined.
 void add_speed_by_motor_time(const Fitter& fitter, MotionModel& model, double longest_s) {
   const Basis basis{{cosines(Covariate::kMotorTime, longest_s, 8, 0)}};
   model.terms.push_back(unfitted("speed-by-motor-time", {{Target::kGain, basis, kDriven}}));
   fitter.fit(model, 2);
-  refine(fitter, model, 0);
+  refine_curves(fitter, model, 0);
 }
 
-/// What is found of motors by their use, before it is given its shape.
+/// An accepted effect of motor-on time before its refinement.
 struct FoundInUse {
-  FoundInUse(const Acting& acting, std::uint64_t seed) : set(played(acting, seed, 8, 80)) {
+  FoundInUse(const TargetGroup& acting, std::uint64_t seed) : set(played(acting, seed, 8, 80)) {
     fitter.fit_base(model);
     add_speed_by_motor_time(fitter, model, 75);
   }
@@ -245,11 +245,11 @@ struct FoundInUse {
   MotionModel model;
 };
 
-TEST(Refine, WhatEndsAtOnceWithUseIsAStep) {
-  Acting acting;
+TEST(ChangePoints, ASuddenChangeInMotorTimeIsAStep) {
+  TargetGroup acting;
   acting.left = acting.right = [](double used_s) { return used_s < 35 ? 1.0 : 0.7; };
   FoundInUse found(acting, 9);
-  EXPECT_EQ(find_steps(found.fitter, found.model, 0), "speed-by-motor-time");
+  EXPECT_EQ(find_change_points(found.fitter, found.model, 0), "speed-by-motor-time");
   const auto& blocks = found.model.terms[0].blocks;
   const Factor& steps = blocks.back().basis.factors[0];
   ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
@@ -258,12 +258,12 @@ TEST(Refine, WhatEndsAtOnceWithUseIsAStep) {
       std::any_of(steps.points.begin(), steps.points.end(), [](double at_s) { return std::abs(at_s - 35) < 0.5; }));
 }
 
-// Biases of robots, which have a mean for both wheels, would take up what the left ones do on the average.
-TEST(Widen, WhatLeftWheelsDoIsNoBias) {
-  Acting acting;
+// Biases absorb a mean over both wheels, but not that of the left wheels.
+TEST(TargetExtension, AnEffectOfLeftWheelsIsNoBias) {
+  TargetGroup acting;
   acting.left = [](double used_s) { return 1 - 0.4 * (1 - std::exp(-used_s / 20)); };
   FoundInUse found(acting, 10);
-  widen(found.fitter, found.model, 0);
+  extend_targets(found.fitter, found.model, 0);
   Situation at;
   at.commands.command = Motion::kStraight;
   const auto ratio = [&](double used_s) {
@@ -274,9 +274,9 @@ TEST(Widen, WhatLeftWheelsDoIsNoBias) {
   for (const double used_s : {5.0, 20.0, 50.0}) EXPECT_NEAR(ratio(used_s), acting.left(used_s), 0.05) << used_s;
 }
 
-// A shift that stays is as good as a push; one that is put right takes half as many steps as two pushes.
-TEST(Refine, AShiftOfThePictureIsNotADrift) {
-  Acting acting;
+// A permanent shift equals a push. A temporary shift needs half as many steps as two pushes.
+TEST(ChangePoints, ACameraShiftIsNoDrift) {
+  TargetGroup acting;
   MeasuredSet set = played(acting, 7, 8, 80);
   for (Track& track : set.runs[0].tracks)
     for (Sample& s : track.samples)
@@ -286,7 +286,7 @@ TEST(Refine, AShiftOfThePictureIsNotADrift) {
   MotionModel model;
   fitter.fit_base(model);
   add_drift_by_time(fitter, model);
-  EXPECT_EQ(find_steps(fitter, model, 0), "camera-by-time");
+  EXPECT_EQ(find_change_points(fitter, model, 0), "camera-by-time");
   EXPECT_EQ(model.terms[0].blocks[0].target, Target::kMeasuredX);
   const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
   double shift_mm = 0;
@@ -295,11 +295,11 @@ TEST(Refine, AShiftOfThePictureIsNotADrift) {
   EXPECT_NEAR(shift_mm, 6, 0.5);
 }
 
-TEST(Amounts, OfOneCurveThatSomeRobotsShowAndOthersDoNot) {
-  // Every second robot tires; what all show in the mean is half of that.
+TEST(Amplitudes, OfOneCurveDifferBetweenRobots) {
+  // Every other robot slows down; the mean over all is half of that.
   const double duration_s = 150;
   const auto tired = [&](double t) { return -0.5 * (t / duration_s) * (t / duration_s); };
-  Acting acting;
+  TargetGroup acting;
   acting.own_gain = [&](std::uint32_t robot, double t) { return 1 + (robot % 2 == 0 ? tired(t) : 0); };
   const std::uint32_t robots = 8;
   const MeasuredSet set = played(acting, 31, robots, duration_s);
@@ -310,8 +310,8 @@ TEST(Amounts, OfOneCurveThatSomeRobotsShowAndOthersDoNot) {
   const Basis curve{{cosines(Covariate::kTime, duration_s, 4, 0)}};
   model.terms.push_back(unfitted("speed-by-time", {{Target::kGain, curve}}));
   fitter.fit(model, 2);
-  // A term by itself is no amount of another.
-  EXPECT_EQ(join_amounts(fitter, model), std::nullopt);
+  // A single term has no amplitudes.
+  EXPECT_EQ(merge_amplitudes(fitter, model), std::nullopt);
   ASSERT_EQ(model.terms.size(), 1U);
   Factor known = curve.factors.front();
   known.known.assign(model.terms[0].coefficients.begin(), model.terms[0].coefficients.end());
@@ -319,24 +319,24 @@ TEST(Amounts, OfOneCurveThatSomeRobotsShowAndOthersDoNot) {
   each.shape = Factor::Shape::kTable;
   each.axis.of = Covariate::kRobot;
   for (std::uint32_t robot = 0; robot < robots; ++robot) each.points.push_back(robot);
-  Term amounts = unfitted("speed-by-robot-and-time", {{Target::kGain, Basis{{each, known}}}});
-  amounts.precision.setConstant(1);
-  model.terms.push_back(amounts);
+  Term amplitudes = unfitted("speed-by-robot-and-time", {{Target::kGain, Basis{{each, known}}}});
+  amplitudes.precision.setConstant(1);
+  model.terms.push_back(amplitudes);
   fitter.fit(model, 2);
   const double as_two = fitter.log_likelihood(model);
-  EXPECT_EQ(join_amounts(fitter, model), 0U);
+  EXPECT_EQ(merge_amplitudes(fitter, model), 0U);
   ASSERT_EQ(model.terms.size(), 1U);
   EXPECT_EQ(model.terms[0].name, "speed-by-robot-and-time");
   EXPECT_GT(fitter.log_likelihood(model), as_two - 10);
   const Block& block = model.terms[0].blocks.front();
   const Factor& shown = block.basis.factors.front();
   ASSERT_EQ(shown.known.size(), robots);
-  EXPECT_EQ(shown.plus, 1);  // the mean robot's, and that of one never seen
+  EXPECT_EQ(shown.plus, 1);  // amplitude of the mean robot and of an unseen one
   for (std::uint32_t robot = 0; robot < robots; ++robot)
     EXPECT_NEAR(shown.plus + shown.known[robot], robot % 2 == 0 ? 2 : 0, 0.25) << robot;
   std::vector<double> columns(kMostColumns);
   for (const double t : {20.0, 75.0, 130.0}) {
-    // Robots' biases take the curve's mean.
+    // Biases absorb the mean of the curve.
     const auto effect_at = [&](double time_s) {
       Situation s;
       s.time_s = time_s;

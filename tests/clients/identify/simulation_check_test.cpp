@@ -1,4 +1,4 @@
-// Runs of the simulator's own robots, played again: the model that made them is not told from them; without its effect it is.
+// The simulation check: the model that generated the tracks agrees; without its effect it does not.
 #include "clients/identify/replay/simulation_check.hpp"
 
 #include <gtest/gtest.h>
@@ -14,8 +14,8 @@
 namespace kilotwin::identify {
 namespace {
 
-/// What robots are told: straight on and turns in turn, of random lengths. Looked at twice a second, without samples as yet.
-MeasuredSet told(std::uint32_t robots, std::uint32_t runs, double duration_s, std::uint64_t seed) {
+/// Commands: straight and turns alternately, of random durations. Sample times twice a second, without positions.
+MeasuredSet commanded(std::uint32_t robots, std::uint32_t runs, double duration_s, std::uint64_t seed) {
   const Random random(seed);
   MeasuredSet set;
   set.has_commands = set.has_headings = true;
@@ -23,7 +23,7 @@ MeasuredSet told(std::uint32_t robots, std::uint32_t runs, double duration_s, st
     set.runs.push_back({"run" + std::to_string(run), {}});
     for (std::uint32_t robot = 0; robot < robots; ++robot) {
       Track& track = set.runs.back().tracks.emplace_back();
-      // Numbers with gaps: nobody counts robots from 0.
+      // Robot numbers have gaps.
       track.robot = 3 + 2 * robot;
       track.commands.push_back({-1e300, Motion::kStop});
       std::uint32_t draw = 0;
@@ -42,12 +42,12 @@ MeasuredSet told(std::uint32_t robots, std::uint32_t runs, double duration_s, st
   return set;
 }
 
-/// Robots slow down to 60 % of their speed, with a time constant of 40 s, in a model with all else that models have.
+/// A model with all base parameters, in which robots slow down to 60 % with a time constant of 40 s.
 MotionModel slowing(std::uint32_t robots, double share) {
   MotionModel model;
   model.noise.position_mm2 = 0.25;
   model.noise.heading_rad2 = 1e-3;
-  model.room = {-800, 800, -700, 700};
+  model.walls = {-800, 800, -700, 700};
   model.base.ahead_mm = kAxleOffset_mm - 4;
   const Random random(5);
   for (std::uint32_t robot = 0; robot < robots; ++robot) {
@@ -67,7 +67,7 @@ MotionModel slowing(std::uint32_t robots, double share) {
   return model;
 }
 
-/// The set with what robots of a model do.
+/// The set with tracks of robots of a model.
 void perform(MeasuredSet& set, const MotionModel& model, std::uint64_t seed) {
   PreparedSet prepared(set);
   prepared.find_headings(model, 1);
@@ -81,11 +81,11 @@ void perform(MeasuredSet& set, const MotionModel& model, std::uint64_t seed) {
 nlohmann::json checked(MeasuredSet& set, const MotionModel& base, const MotionModel& full) {
   PreparedSet prepared(set);
   const proto::Model written_base = proto_of(base), written_full = proto_of(full);
-  return simulated_check({base, written_base}, {full, written_full}, prepared, false, 2);
+  return simulation_check({base, written_base}, {full, written_full}, prepared, false, 2);
 }
 
-TEST(SimulatedCheck, TheModelThatMadeThemIsNotToldFromThem) {
-  MeasuredSet set = told(12, 2, 120, 3);
+TEST(SimulationCheck, TheGeneratingModelAgrees) {
+  MeasuredSet set = commanded(12, 2, 120, 3);
   const MotionModel truth = slowing(12, 0.4), without = slowing(12, 0);
   perform(set, truth, 77);
   const nlohmann::json found = checked(set, without, truth);
@@ -98,17 +98,17 @@ TEST(SimulatedCheck, TheModelThatMadeThemIsNotToldFromThem) {
       speed_differs = s.at("base_p") < 0.01 && s.at("base_distance") > 5 * s.at("distance").get<double>();
   EXPECT_TRUE(speed_differs) << result.dump(1);
   EXPECT_TRUE(found.contains("msd") && found.contains("distributions") && found.contains("speed_over_time"));
-  // The other way round it is the full model that differs.
+  // With exchanged roles the full model differs.
   EXPECT_FALSE(checked(set, truth, without).at("simulated").at("agrees").get<bool>());
 }
 
-TEST(SimulatedCheck, FalseAlarmsAreAsRareAsTheyShallBe) {
-  // Sets of the very model: a statistic differs by chance in 1 % of them. Of 24 sets with six statistics each 1.4 are expected to
-  // differ; more than 6 with a chance below 0.001.
+TEST(SimulationCheck, FalseAlarmRate) {
+  // Under the null hypothesis a statistic differs with probability 1 %: of 24 sets with six statistics, 1.4 on
+  // average; more than 6 with probability below 0.001.
   const MotionModel truth = slowing(8, 0.4);
   int alarms = 0;
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
-    MeasuredSet set = told(8, 1, 60, 100 + seed);
+    MeasuredSet set = commanded(8, 1, 60, 100 + seed);
     perform(set, truth, 1000 * seed + 500);
     const nlohmann::json found = checked(set, truth, truth);
     for (const auto& s : found.at("simulated").at("statistics")) alarms += s.at("p") < 0.01 ? 1 : 0;
@@ -116,15 +116,15 @@ TEST(SimulatedCheck, FalseAlarmsAreAsRareAsTheyShallBe) {
   EXPECT_LE(alarms, 6);
 }
 
-TEST(SimulatedCheck, IsTheSameEveryTime) {
-  MeasuredSet set = told(8, 1, 40, 9);
+TEST(SimulationCheck, IsDeterministic) {
+  MeasuredSet set = commanded(8, 1, 40, 9);
   const MotionModel truth = slowing(8, 0.4), without = slowing(8, 0);
   perform(set, truth, 7);
   EXPECT_EQ(checked(set, without, truth).dump(), checked(set, without, truth).dump());
 }
 
-TEST(Replay, RobotsStartWhereTheyWereSeen) {
-  MeasuredSet set = told(9, 1, 10, 4);
+TEST(Replay, RobotsStartAtTheirMeasuredPoses) {
+  MeasuredSet set = commanded(9, 1, 10, 4);
   MotionModel model = slowing(9, 0.4);
   model.noise.position_mm2 = 1e-8;
   model.noise.heading_rad2 = 1e-10;
@@ -138,13 +138,13 @@ TEST(Replay, RobotsStartWhereTheyWereSeen) {
     EXPECT_NEAR(seen[r][0].x_mm, first.x_mm, 0.01);
     EXPECT_NEAR(seen[r][0].y_mm, first.y_mm, 0.01);
     EXPECT_NEAR(wrapped_angle(seen[r][0].heading_rad - first.heading_rad), 0, 1e-3);
-    // Four mm behind the middle of the disc.
+    // Four mm behind the disc centre.
     EXPECT_NEAR(std::hypot(scene.robots[r].x_mm - first.x_mm, scene.robots[r].y_mm - first.y_mm), 4, 0.01);
   }
 }
 
-TEST(Replay, WallsHoldRobotsWhereTheyHeldMeasuredOnes) {
-  // A room that does not hold the origin.
+TEST(Replay, WallsStopRobotsAtTheFittedLines) {
+  // An arena that does not contain the origin.
   MeasuredSet set;
   set.has_commands = set.has_headings = true;
   set.runs.push_back({"r", {}});
@@ -156,7 +156,7 @@ TEST(Replay, WallsHoldRobotsWhereTheyHeldMeasuredOnes) {
     for (double t = 0; t <= 40; t += 1) track.samples.push_back({t, x[robot], y[robot], M_PI / 2 * robot});
   }
   MotionModel model;
-  model.room = {400, 800, 400, 640};
+  model.walls = {400, 800, 400, 640};
   model.noise.position_mm2 = 1e-8;
   model.base.bias_sd_mm_s = 0;
   PreparedSet prepared(set);
@@ -168,9 +168,9 @@ TEST(Replay, WallsHoldRobotsWhereTheyHeldMeasuredOnes) {
   EXPECT_NEAR(seen[3].back().y_mm, 400, 2);
 }
 
-TEST(TrackStatistics, DistancesAreThoseOfTheirLaws) {
+TEST(TrackStatistics, DistancesMatchTheirDefinitions) {
   const Statistic histogram{Statistic::Kind::kHistogram, "h", "", {0, 1, 2, 3}, ""};
-  // All mass one bin further: the mean shift is a bin.
+  // All mass one bin further: the 1-Wasserstein distance is one bin.
   EXPECT_DOUBLE_EQ(distance(histogram, {{0, 0, 0}, {4, 2, 0}}, {{0, 0, 0}, {0, 2, 1}}), 1);
   const Statistic means{Statistic::Kind::kMeans, "m", "", {0, 1}, ""};
   EXPECT_DOUBLE_EQ(distance(means, {{4, 6}, {2, 3}}, {{5, 3}, {1, 1}}), 2);

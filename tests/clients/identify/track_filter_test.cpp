@@ -1,4 +1,4 @@
-// Where a track starts: where the model sees the robot as it was measured.
+// Initial state of the filter: the predicted measurement equals the first sample.
 #include "clients/identify/fit/track_filter.hpp"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 namespace kilotwin::identify {
 namespace {
 
-/// A tracker whose picture is shifted, turned and too large, and whose compass is off by more in some directions than in others.
+/// A camera with shift, rotation and scale, and a heading error that depends on the heading.
 MotionModel through_a_bad_tracker() {
   MotionModel model;
   Factor round;
@@ -29,14 +29,14 @@ MotionModel through_a_bad_tracker() {
   return model;
 }
 
-TEST(TrackFilter, WhatTheTrackerAddsToTheFirstHeadingIsTakenOff) {
+TEST(TrackFilter, MeasurementEffectsAreRemovedFromTheFirstHeading) {
   const MotionModel model = through_a_bad_tracker();
   const RobotBias none{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
   for (double heading = -3; heading <= 3; heading += 0.75) {
     const Sample sample{2, 150 + 20 * heading, -90, heading};
     TrackFilter filter(model, none, 1, 0);
     filter.start(sample, {}, heading, 0.05);
-    // Far below any tracker's noise.
+    // Far below any tracker noise.
     const Eigen::Vector3d seen = filter.expected(sample.time_s, {});
     EXPECT_NEAR(seen[0], sample.x_mm, 0.01) << heading;
     EXPECT_NEAR(seen[1], sample.y_mm, 0.01) << heading;
@@ -45,7 +45,7 @@ TEST(TrackFilter, WhatTheTrackerAddsToTheFirstHeadingIsTakenOff) {
   }
 }
 
-TEST(TrackFilter, AHeadingThatWasNotMeasuredIsLeftAsItIsThoughtToBe) {
+TEST(TrackFilter, AnUnmeasuredHeadingKeepsItsInitialValue) {
   const MotionModel model = through_a_bad_tracker();
   const RobotBias none{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
   const Sample sample{2, 150, -90, std::nan("")};

@@ -1,4 +1,4 @@
-// The rim of what robots reached, in rooms whose walls are no lines.
+// The boundary of visited places with curved walls.
 #include "clients/identify/model/visited_boundary.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMargin_mm = 12;
 
-/// Robots everywhere in a room, a third of them at its walls; `shown` makes a picture of a place in the square from -1 to 1.
+/// Robots spread over an arena, one third at its walls; `shown` maps the square [-1, 1]^2 to the image.
 template <class Shown> MeasuredSet room_full_of_robots(Shown&& shown) {
   const Random random(5);
   MeasuredSet set;
@@ -28,21 +28,22 @@ template <class Shown> MeasuredSet room_full_of_robots(Shown&& shown) {
   return set;
 }
 
-/// All that is at a wall is held, and nothing that is farther from it than margin, strips and their slope account for.
+/// All places at a wall are near the boundary; none is that is farther away than margin, strips and their slope
+/// allow.
 template <class Shown> void expect_held_at_walls_only(Shown&& shown, double inside) {
-  const Rim rim(room_full_of_robots(shown), kMargin_mm);
+  const VisitedBoundary boundary(room_full_of_robots(shown), kMargin_mm);
   for (double along = -0.95; along <= 0.95; along += 0.05) {
     for (const double side : {-1.0, 1.0}) {
       const auto [x, y] = shown(side, along);
-      EXPECT_TRUE(rim.holds(x, y)) << along;
+      EXPECT_TRUE(boundary.is_near(x, y)) << along;
       const auto [p, q] = shown(along, side);
-      EXPECT_TRUE(rim.holds(p, q)) << along;
+      EXPECT_TRUE(boundary.is_near(p, q)) << along;
     }
   }
   for (double u = -inside; u <= inside; u += 0.1)
     for (double v = -inside; v <= inside; v += 0.1) {
       const auto [x, y] = shown(u, v);
-      EXPECT_FALSE(rim.holds(x, y)) << u << ' ' << v;
+      EXPECT_FALSE(boundary.is_near(x, y)) << u << ' ' << v;
     }
 }
 
@@ -50,11 +51,11 @@ struct Point {
   double x_mm, y_mm;
 };
 
-TEST(Rim, OfStraightWalls) {
+TEST(VisitedBoundary, StraightWalls) {
   expect_held_at_walls_only([](double u, double v) { return Point{500 * u + 30, 400 * v}; }, 0.96);
 }
 
-TEST(Rim, OfBarrelsAndPincushions) {
+TEST(VisitedBoundary, BarrelAndPincushionDistortion) {
   for (const double bent : {-0.15, 0.15})
     expect_held_at_walls_only(
         [bent](double u, double v) {
@@ -64,10 +65,10 @@ TEST(Rim, OfBarrelsAndPincushions) {
         0.85);
 }
 
-TEST(Rim, OfARoundRoom) {
+TEST(VisitedBoundary, ARoundArena) {
   expect_held_at_walls_only(
       [](double u, double v) {
-        // The square onto the disc.
+        // Maps the square to the disc.
         return Point{450 * u * std::sqrt(1 - v * v / 2), 450 * v * std::sqrt(1 - u * u / 2)};
       },
       0.8);

@@ -1,4 +1,4 @@
-/// Random numbers of the test data, apart from the project's own: the same on every compiler.
+/// Random numbers of the test data, independent of the project's; the same with every compiler.
 #pragma once
 
 #include <cmath>

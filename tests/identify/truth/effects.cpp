@@ -15,7 +15,7 @@ void slow_both(Push& push, double factor) {
 
 double square(double x) { return x * x; }
 
-/// Every other robot: `look` gets how far along x and y its disc lies from this one's, and its distance, mm.
+/// Calls `look` for every other robot with the offset of its disc along x and y and its distance, mm.
 template <class Look> void for_others(const Situation& at, const Look& look) {
   for (std::size_t i = 0; i < at.discs->size(); ++i) {
     if (static_cast<int>(i) == at.robot) continue;

@@ -1,5 +1,5 @@
-// Writes a set of test data for `kilotwin identify`: OUT/train and OUT/test as a lab would hand them over, and beside them what
-// is true of them, truth.json, and oracle.csv, the predictions of one who knows.
+// Writes a set of test data for `kilotwin identify`: OUT/train and OUT/test in the contract's form, truth.json
+// with the true values, and oracle.csv with the oracle's predictions.
 // Usage: kilotwin_truth SCENE|nothing:SEED|list [--seed N] [--out DIR] [--samples N]
 #include <fmt/format.h>
 

@@ -15,22 +15,22 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
-// Where headings are not measured, a robot starts with a guess for each of so many directions.
+// Number of heading hypotheses without measured headings.
 constexpr int kDirections = 18;
-// Guesses that are this much less likely than the best are dropped.
+// Hypotheses with a lower relative likelihood are pruned.
 constexpr double kHopeless = 25;
 
 Vector3d vector_of(const Stance& s) { return {s.axle.x, s.axle.y, s.heading_rad}; }
 Stance stance_of(const Vector3d& v) { return {{v.x(), v.y()}, v.z()}; }
 
-/// A normal distribution of the stance, and the logarithm of its weight.
+/// A Gaussian component of the pose distribution, and its log weight.
 struct Guess {
   Vector3d mean;
   Matrix3d covariance;
   double log_weight = 0;
 };
 
-/// What is known of one robot's stance: a few guesses, the best first.
+/// Distribution of one robot's pose: a Gaussian mixture, the most likely component first.
 class Belief {
  public:
   Belief(const Scene& scene, const Individual& individual) : scene_(scene), individual_(individual) {}
@@ -52,7 +52,7 @@ class Belief {
         less[k] -= nudge[k];
         state.col(k) = (step(more, {1, 1}) - step(less, {1, 1})) / (2 * nudge[k]);
       }
-      // A jump at an edge is no slope: the step is short, so that its slopes are near those of standing still.
+      // A small step, so that a discontinuity does not look like a slope.
       state = state.cwiseMin(Matrix3d::Identity() + Matrix3d::Constant(0.5 + 20 * dt));
       state = state.cwiseMax(Matrix3d::Identity() - Matrix3d::Constant(0.5 + 20 * dt));
       const Vector3d mean = step(guess.mean, {1, 1});
@@ -64,7 +64,7 @@ class Belief {
     }
   }
 
-  /// Pushed by another robot or a wall; by how much, depends on where exactly both are.
+  /// After a push by a robot or a wall: the displacement depends on the exact poses.
   void shift(Vec by) {
     const double spread = 0.3 * std::hypot(by.x, by.y);
     for (Guess& guess : guesses_) {
@@ -146,7 +146,7 @@ class Belief {
   std::vector<Guess> guesses_;
 };
 
-/// What is known of all robots of a run, as time goes on.
+/// Distributions of all robots of a run over time.
 class Watch {
  public:
   Watch(const Scene& scene, const std::vector<Individual>& individuals, const Run& run)
@@ -201,7 +201,7 @@ class Watch {
     look();
   }
 
-  /// Robots not seen yet are far away from everything, and from each other.
+  /// Robots without a sample are placed far away from everything.
   void look() {
     for (std::size_t i = 0; i < beliefs_.size(); ++i) {
       stances_[i] = beliefs_[i].known() ? beliefs_[i].best() : Stance{{1e6 + 1e3 * static_cast<double>(i), 1e6}, 0};

@@ -1,5 +1,5 @@
-/// The predictor that knows the truth: the scene with all of its effects, each robot's bias, the noise. What it cannot know
-/// is where a robot really is, and the noise to come.
+/// The oracle: a predictor that knows the scene with all effects, the biases and the noise levels. It does not
+/// know the true poses or the future noise.
 #pragma once
 
 #include "tests/identify/truth/scene.hpp"
@@ -10,12 +10,12 @@ struct Prediction {
   int run, robot;
   double time_s;
   Vec predicted;  // of the tracked point
-  Vec truth;      // what the tracker would have seen without noise
+  Vec truth;      // noise-free measurement
 };
 
-/// Predictions horizon_s ahead for 10, 15, 20... s of each robot, from what was measured until horizon_s before. A robot that
-/// was never seen by then has no row. Positions are averages over `samples` runs of all robots together, drawn from what
-/// is known at the start of the prediction: an error of 1/(2 samples) in their RMSE.
+/// Predictions horizon_s ahead for 10, 15, 20... s of each robot, from measurements until horizon_s before. Robots
+/// without a measurement by then have no row. Positions are means over `samples` joint rollouts of all robots,
+/// which adds a relative error of 1/(2 samples) to the RMSE.
 std::vector<Prediction> predict(const Scene& scene, const std::vector<Individual>& individuals, const Run& run,
                                 double horizon_s, int samples, std::uint64_t seed);
 

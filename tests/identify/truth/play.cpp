@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Times are stamped in whole milliseconds.
+/// Times are whole milliseconds.
 double stamped(double time_s) { return std::round(time_s * 1000) / 1000; }
 
 std::vector<Order> draw_orders(const Scene& scene, double duration_s, Dice& dice) {
@@ -36,7 +36,7 @@ std::vector<Order> draw_orders(const Scene& scene, double duration_s, Dice& dice
   return orders;
 }
 
-/// Places at random, discs apart.
+/// Random positions without overlaps.
 std::vector<Stance> draw_stances(const Scene& scene, Dice& dice) {
   const double width = scene.width_mm > 0 ? scene.width_mm - 80 : 900,
                height = scene.width_mm > 0 ? scene.height_mm - 80 : 900;

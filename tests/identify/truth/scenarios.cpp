@@ -9,9 +9,9 @@
 namespace kilotwin::truth {
 namespace {
 
-// Laboratories: who tracks what, how, and where.
+// Laboratories: tracker, sampling, drive and arena.
 
-/// Headings, a quiet tracker, discs' centres.
+/// Headings, low tracker noise, disc centres tracked.
 Scene tidy_lab() { return {}; }
 
 /// No headings; the tracker follows the point between the wheels.
@@ -34,7 +34,7 @@ Scene poor_lab() {
   return s;
 }
 
-/// A drive whose reference point is the disc's centre, no walls, little noise.
+/// A drive with its reference point at the disc centre, no walls, low noise.
 Scene plain_lab() {
   Scene s;
   s.disc_ahead_mm = s.tracked_ahead_mm = 0;
@@ -45,7 +45,7 @@ Scene plain_lab() {
   return s;
 }
 
-/// Many robots in a small room.
+/// Many robots in a small arena.
 Scene crowded_lab() {
   Scene s;
   s.robots = 24;
@@ -76,7 +76,7 @@ using Effects = std::vector<Effect>;
 using Faults = std::vector<Fault>;
 
 const Entry kEntries[] = {
-    // One per covariate, and what looks alike.
+    // One per covariate, and look-alikes.
     {"battery", "time: a battery by the clock", [] { return with(tidy_lab(), Effects{battery_by_the_clock()}); }},
     {"fatigue", "motor_time: each motor tires by its own use",
      [] { return with(blind_lab(), Effects{fatigue_of_motors()}); }},
@@ -149,7 +149,7 @@ const Entry kEntries[] = {
        s.spot_corner = {7, -6};
        return s;
      }},
-    // Two at once.
+    // Two effects at once.
     {"fatigue-lens", "motor_time and measurement",
      [] {
        return with(tidy_lab(), Effects{fatigue_of_motors(), lens()});
@@ -170,12 +170,12 @@ const Entry kEntries[] = {
      [] {
        return with(poor_lab(), Effects{battery_by_the_clock(), slow_robots()});
      }},
-    // Near the noise.
+    // Near the noise level.
     {"faint-grain", "heading, a fifth as strong", [] { return with(tidy_lab(), Effects{grain(0.2)}); }},
     {"faint-battery", "time, a fifth as strong",
      [] { return with(tidy_lab(), Effects{battery_by_the_clock(0.2)}); }},
     {"faint-tilt", "world_frame, a fifth as strong", [] { return with(blind_lab(), Effects{tilt(0.2)}); }},
-    // Nothing, in every laboratory.
+    // No effect, in every laboratory.
     {"nothing-tidy", "no effect", [] { return tidy_lab(); }},
     {"nothing-blind", "no effect", [] { return blind_lab(); }},
     {"nothing-poor", "no effect", [] { return poor_lab(); }},

@@ -1,4 +1,4 @@
-/// The scenes that judge the identification, by name.
+/// The scenes of the evaluation, by name.
 #pragma once
 
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace kilotwin::truth {
 
-/// One or more per covariate, look-alikes, two at once, near the noise, faults: all in the order of the table.
+/// At least one per covariate, look-alikes, combinations, weak effects, faults: in the order of the table.
 std::vector<std::string> scenario_names();
 
-/// Throws std::invalid_argument where there is none of that name.
+/// Throws std::invalid_argument for an unknown name.
 Scene scenario(const std::string& name);
 
-/// A small scene without any effect; everything else about it, from the tracker to the room, follows from `seed`.
+/// A small scene without effect. Everything else, from tracker to arena, depends on `seed`.
 Scene nothing_to_find(std::uint64_t seed);
 
 }  // namespace kilotwin::truth

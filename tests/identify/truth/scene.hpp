@@ -1,5 +1,5 @@
-/// A scene: all that is true of one set of test data. Scenes know nothing of how robots are simulated or identified elsewhere
-/// in the project; their effects are plain functions, of shapes that no list of effects can hold.
+/// A scene: the truth behind one set of test data. Independent of the project's simulator and identification: its
+/// effects are plain functions, with shapes that no effect record can represent exactly.
 /// Lengths mm, times s, angles rad; world frame: x right, y up, headings anticlockwise from x.
 #pragma once
 
@@ -17,67 +17,67 @@ struct Vec {
 
 enum class Motion { kStop, kStraight, kLeft, kRight };
 
-/// From time_s on, until the next order.
+/// Valid from time_s until the next order.
 struct Order {
   double time_s;
   Motion motion;
 };
 
-/// Left and right of something that each wheel has.
+/// A value per wheel.
 template <typename T> struct Wheels { T left{}, right{}; };
 
-/// What effects may look at: one robot at one instant.
+/// Inputs of effects: one robot at one instant.
 struct Situation {
   double time_s = 0;
   int run = 0;
   int robot = 0;
-  Vec disc;  // centre of the disc
+  Vec disc;  // disc centre
   double heading_rad = 0;
   Motion motion = Motion::kStop;
-  Motion before = Motion::kStop;  // the motion before this one; kStop for the first
+  Motion before = Motion::kStop;  // previous motion; kStop for the first
   double since_change_s = 0;
-  Wheels<double> driven_s;  // for which each wheel's motor has turned in this run; robots rest before it
-  double since_rest_s = 0;  // for which either motor has turned since both last rested
-  double trodden_s = 0;     // for which driven robots have stood on this spot of the floor in this run
+  Wheels<double> driven_s;                  // motor-on time of each wheel in this run; robots rest before it
+  double since_rest_s = 0;                  // time since the last rest of both motors
+  double trodden_s = 0;                     // driven time of all robots on this spot of the floor in this run
   const std::vector<Vec>* discs = nullptr;  // of all robots, this one included
   bool driven() const { return motion != Motion::kStop; }
 };
 
-/// What an effect does to a robot. All effects write into the same one.
+/// The action of effects on a robot. All effects write into the same object.
 struct Push {
-  Wheels<double> gain{1, 1};  // times f (v + b)
+  Wheels<double> gain{1, 1};  // factors of f (v + b)
   Wheels<double> offset_mm_s;
   Vec drift_mm_s;  // world frame
   Vec slip_mm_s;   // x ahead, y to the left
   double turn_rad_s = 0;
 };
 
-/// What the tracker sees before its noise.
+/// The noise-free measurement.
 struct View {
   Vec point;
   double heading_rad = 0;
 };
 
-using Covariates = std::vector<std::string>;  // by the names that result.json has for them
+using Covariates = std::vector<std::string>;  // names as in result.json
 
 struct Effect {
   std::string name;
-  std::string formula;  // in words and numbers, for truth.json
-  /// An effect found names this cause where its covariates contain all of one of these sets.
+  std::string formula;  // description for truth.json
+  /// An effect found names this one if its covariates contain all of one of these sets.
   std::vector<Covariates> named_by;
-  /// Covariates that would blame what only looks alike: an effect found must not rest on them.
+  /// Covariates of look-alikes: an effect found must not have them.
   Covariates mistaken_for;
   std::function<void(const Situation&, Push&)> push;  // either may be empty
   std::function<void(const Situation&, View&)> see;
 };
 
-/// What is wrong with the data themselves.
+/// A fault of the data.
 struct Fault {
   enum class Kind { kSwapped, kClock, kDuplicate, kOutliers, kFrozen };
   Kind kind;
   int run = 0;
   int robot = 0;
-  int other = 0;       // kSwapped: with whom; kDuplicate: the copy's number
+  int other = 0;       // kSwapped: the partner; kDuplicate: number of the copy
   double from_s = 0;   // kSwapped, kFrozen
   double until_s = 0;  // kFrozen
   double amount = 0;   // kClock: stamped over true time; kOutliers: share of positions
@@ -90,34 +90,34 @@ struct Scene {
   int train_runs = 3, test_runs = 2;
   double train_s = 200, test_s = 120;
 
-  // The room: walls at +-width/2, +-height/2 of discs' centres' reach; 0: none. Robots start on a grid in the middle.
+  // Arena: walls at +-width/2, +-height/2 for disc centres; 0: none. Robots start on a grid in the middle.
   double width_mm = 900, height_mm = 900;
   double start_pitch_mm = 90;
   bool contacts = true;
 
-  // The drive.
+  // Drive.
   double wheel_base_mm = 25;
-  double disc_ahead_mm = 9.2;     // centre of the disc from the point between the wheels
-  double tracked_ahead_mm = 9.2;  // the tracked point from there
+  double disc_ahead_mm = 9.2;     // disc centre ahead of the point between the wheels
+  double tracked_ahead_mm = 9.2;  // tracked point ahead of it
   double bias_mean_mm_s = 0.015, bias_sd_mm_s = 1.2;
   double factor_sd = 0.12;  // of f in a step
   double step_s = 0.1;
 
-  // The floor's spots: their side, and a corner of one.
+  // Spots of the floor: their side, and one corner.
   double spot_mm = 37;
   Vec spot_corner;
 
-  // Orders: a random walk of stretches, uniform in these ranges; left and right alike often.
+  // Orders: a random walk of motion segments, uniform in these ranges; left and right equally frequent.
   double straight_low_s = 3, straight_high_s = 12, turn_low_s = 0.5, turn_high_s = 5, stop_low_s = 1,
          stop_high_s = 6;
-  double stop_share = 0.15;  // of changes of motion that lead to a stop
+  double stop_share = 0.15;  // share of motion changes that lead to a stop
   double left_share = 0.5;
 
-  // The tracker.
+  // Tracker.
   double sample_s = 0.5;
   double jitter = 0;      // of the sampling interval, uniform; 0: regular
   double missing = 0.03;  // share of frames that lack a robot
-  double gap_share = 0;   // share of robots and runs that miss 10 s in a row
+  double gap_share = 0;   // share of (robot, run) with a gap of 10 s
   double tracker_sd_mm = 0.4;
   bool heading = true;
   double heading_sd_rad = 0.04;
@@ -126,7 +126,7 @@ struct Scene {
   std::vector<Fault> faults;  // in training runs
 };
 
-/// What differs from robot to robot, drawn once per scene and seed.
+/// Individual parameters of robots, fixed per scene and seed.
 struct Individual {
   Wheels<double> bias_mm_s;
 };
@@ -139,18 +139,18 @@ struct Sample {
   double heading_rad;
 };
 
-/// One run as it happened.
+/// The true course of one run.
 struct Run {
   int number = 0;
   double duration_s = 0;
   std::vector<std::vector<Order>> orders;  // by robot
   std::vector<Sample> samples;             // by robot, then time
-  /// What the tracker would have seen without noise at 0, 5, 10... s, by robot.
+  /// Noise-free measurements at 0, 5, 10... s, by robot.
   std::vector<std::vector<View>> marks;
 };
 constexpr double kMarkInterval_s = 5;
 
-/// A scene played with one seed.
+/// A scene simulated with one seed.
 struct Play {
   std::uint64_t seed = 0;
   std::vector<Individual> individuals;

@@ -7,10 +7,10 @@
 namespace kilotwin::truth {
 namespace {
 
-// The floor in spots over 3 m; beyond, the last spot counts.
+// Floor spots over 3 m; beyond, the last spot counts.
 constexpr double kFloor_mm = 3000;
 constexpr int kPasses = 4;
-// A robot further out is nowhere: no wall takes it back.
+// A robot farther away does not exist: no wall moves it back.
 constexpr double kFarAway_mm = 1e5;
 
 struct Rate {
@@ -18,7 +18,7 @@ struct Rate {
   double heading;
 };
 
-/// Speed of the stance when wheels run at `wheels`.
+/// Velocity of the pose for wheel speeds `wheels`.
 Rate rate_of(const Scene& scene, double heading, Wheels<double> wheels, const Push& push) {
   const double ahead = 0.5 * (wheels.left + wheels.right) + push.slip_mm_s.x, aside = push.slip_mm_s.y;
   const double c = std::cos(heading), s = std::sin(heading);
@@ -70,7 +70,7 @@ Stance moved(const Scene& scene, const Individual& individual, const Stance& sta
     wheels.right =
         factor.right * (nominal.right + individual.bias_mm_s.right) * push.gain.right + push.offset_mm_s.right;
   }
-  // Runge and Kutta's fourth order; effects stay as they are at the step's start.
+  // Fourth-order Runge-Kutta; effects are constant within a step.
   const auto at = [&](double heading) { return rate_of(scene, heading, wheels, push); };
   const Rate a = at(stance.heading_rad);
   const Rate b = at(stance.heading_rad + 0.5 * dt * a.heading);
@@ -209,7 +209,7 @@ void World::start_from(double time_s, const Memory& memory, const std::vector<St
 }
 
 void World::step(double dt, Dice* dice) {
-  // f is drawn per step; in shorter ones, cut by an order, it varies more, so that its integral does not depend on cuts.
+  // f is drawn per step; shorter steps have a larger variance, so that its integral does not depend on the cuts.
   const double sd = scene_.factor_sd * std::sqrt(scene_.step_s / dt);
   for (std::size_t i = 0; i < stances_.size(); ++i) {
     Wheels<double> factor{1, 1};

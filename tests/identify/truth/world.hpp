@@ -1,4 +1,4 @@
-/// How the robots of a scene move: differential drive, discs that push each other, walls, effects.
+/// Motion of the robots of a scene: differential drive, discs that push each other, walls, effects.
 #pragma once
 
 #include <vector>
@@ -10,43 +10,43 @@ namespace kilotwin::truth {
 
 constexpr double kDiscRadius_mm = 16.5;
 
-/// The point between the wheels, and where they point to.
+/// The point between the wheels, and the heading.
 struct Stance {
   Vec axle;
   double heading_rad = 0;
 };
 
-/// Speeds that the wheels are told to have.
+/// Commanded wheel speeds.
 Wheels<double> nominal_mm_s(Motion motion);
 
 Vec disc_of(const Scene& scene, const Stance& stance);
 
-/// What a tracker without noise sees of a robot in this situation.
+/// Noise-free measurement of a robot in this situation.
 View view_of(const Scene& scene, const Stance& stance, Situation situation);
 
-/// The robot alone for `dt`, with factors f of its two wheels.
+/// A single robot for `dt`, with factors f of its two wheels.
 Stance moved(const Scene& scene, const Individual& individual, const Stance& stance, Situation situation, double dt,
              Wheels<double> factor);
 
-/// Parts discs that overlap and takes them back behind the walls, `fixed` ones aside. Returns by how much each robot was
-/// moved, in `shift`.
+/// Separates overlapping discs and moves them back inside the walls, except `fixed` ones. Returns the
+/// displacements in `shift`.
 void part(const Scene& scene, std::vector<Stance>& stances, std::vector<Vec>& shift);
 
-/// What robots and the floor remember, apart from where robots are: known to whoever knows the orders and the tracks.
+/// State of robots and floor other than poses. It follows from orders and tracks.
 class Memory {
  public:
   Memory(const Scene& scene, int run, const std::vector<std::vector<Order>>& orders);
 
-  /// Goes to time_s, from the time before; discs are where robots were since.
+  /// Advances to time_s. `discs`: positions since the previous time.
   void go_to(double time_s, const std::vector<Vec>& discs);
-  /// The next time after now at which any robot's orders change; infinity where there is none.
+  /// The next change of any robot's order; infinity if there is none.
   double next_change_s() const;
-  /// Robot's situation now, at `disc`. `discs` must outlive it.
+  /// A robot's situation now, at `disc`. `discs` must outlive it.
   Situation situation(int robot, Vec disc, double heading_rad, const std::vector<Vec>& discs) const;
 
  private:
   struct Robot {
-    std::size_t next = 0;  // order that comes next
+    std::size_t next = 0;  // index of the next order
     Motion motion = Motion::kStop, before = Motion::kStop;
     double since_s = 0;
     Wheels<double> driven_s;
@@ -65,12 +65,12 @@ class Memory {
   std::vector<float> trodden_s_;  // by spot
 };
 
-/// All robots of a run together.
+/// All robots of a run.
 class World {
  public:
   World(const Scene& scene, const std::vector<Individual>& individuals, Memory memory, std::vector<Stance> stances);
 
-  /// Goes on to time_s, in steps of at most the scene's, with factors drawn from `dice`, or 1 without.
+  /// Advances to time_s, in steps of at most the scene's, with factors from `dice`, or 1 without.
   void go_to(double time_s, Dice* dice);
   double time_s() const { return time_s_; }
   const std::vector<Stance>& stances() const { return stances_; }

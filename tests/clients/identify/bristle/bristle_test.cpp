@@ -1,4 +1,4 @@
-// Robots that are always on: effects that were put into tracks are found, and none where there is none.
+// Bristle plate tracks: planted effects are recovered; no effects in data without effects.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace kilotwin::bristle {
 namespace {
 
-/// A small generator of the test's own.
+/// The test's own random numbers.
 class Noise {
  public:
   explicit Noise(std::uint64_t seed) : state_(seed * 2654435761u + 88172645463325252u) {}
@@ -38,11 +38,11 @@ struct Truth {
   double drift_x = 0, drift_y = 0, mount_rad = 0, turn_rad_s = 0;
 };
 
-std::vector<RiddenRun> runs_of(const Truth& truth, std::uint64_t seed, std::size_t count) {
-  std::vector<RiddenRun> runs;
+std::vector<BristleRun> runs_of(const Truth& truth, std::uint64_t seed, std::size_t count) {
+  std::vector<BristleRun> runs;
   for (std::size_t r = 0; r < count; ++r) {
     Noise noise(seed + r);
-    RiddenRun run;
+    BristleRun run;
     run.name = "run" + std::to_string(100 + r);
     const double speed = 80;
     double x = 0, y = 0, heading = 6 * noise.uniform();
@@ -76,15 +76,15 @@ identify::Options second() {
   return options;
 }
 
-TEST(Bristle, NothingIsFoundWhereNothingIs) {
+TEST(Bristle, NoEffectInDataWithoutEffects) {
   int alarms = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
-    alarms += found(identify_ridden(runs_of({}, 1000 * seed, 12), {}, second())).empty() ? 0 : 1;
+    alarms += found(identify_bristle(runs_of({}, 1000 * seed, 12), {}, second())).empty() ? 0 : 1;
   EXPECT_LE(alarms, 1);
 }
 
-TEST(Bristle, ATrackerThatCountsTheOtherWayRoundIsFound) {
-  const auto identified = identify_ridden(runs_of({.mirrored = true}, 50, 12), {}, second());
+TEST(Bristle, ClockwiseHeadingsAreDetected) {
+  const auto identified = identify_bristle(runs_of({.mirrored = true}, 50, 12), {}, second());
   EXPECT_TRUE(found(identified).contains("heading-sense"));
   const auto& contract = identified.document.at("contract");
   EXPECT_LT(contract.at("after").at("rmse_mm").get<double>(),
@@ -93,19 +93,19 @@ TEST(Bristle, ATrackerThatCountsTheOtherWayRoundIsFound) {
   EXPECT_NEAR(identified.model.effect(0).function(0).linear().at_zero(), 1.4, 0.1);
 }
 
-TEST(Bristle, FrontForBackIsFoundOnTopOfIt) {
-  const auto names = found(identify_ridden(runs_of({.mirrored = true, .flips = true}, 70, 12), {}, second()));
+TEST(Bristle, ConfusedFrontAndBackIsDetectedToo) {
+  const auto names = found(identify_bristle(runs_of({.mirrored = true, .flips = true}, 70, 12), {}, second()));
   EXPECT_TRUE(names.contains("heading-sense"));
   EXPECT_TRUE(names.contains("front-for-back"));
 }
 
-TEST(Bristle, AnInclineCarriesRobotsDownhill) {
+TEST(Bristle, AnInclineCausesADownhillDrift) {
   const auto identified =
-      identify_ridden(runs_of({.mirrored = true, .drift_x = -32, .drift_y = 8}, 90, 12), {}, second());
+      identify_bristle(runs_of({.mirrored = true, .drift_x = -32, .drift_y = 8}, 90, 12), {}, second());
   EXPECT_TRUE(found(identified).contains("downhill"));
   for (const auto& effect : identified.document.at("contract").at("effects")) {
     if (effect.at("name") != "downhill") continue;
-    // In parts of the speed of 80 mm/s. These robots hardly turn: it shows across their headings alone.
+    // Relative to the speed of 80 mm/s. These robots hardly turn: the drift only shows across their headings.
     const double se = effect.at("parameters").at("se").get<double>();
     EXPECT_LT(se, 0.07);
     EXPECT_NEAR(effect.at("parameters").at("x").get<double>(), -0.4, 3 * se);
@@ -114,58 +114,58 @@ TEST(Bristle, AnInclineCarriesRobotsDownhill) {
 }
 
 TEST(Bristle, TheSizeOfTheDriftDoesNotDependOnTheTrackersHeadings) {
-  const auto identified = identify_ridden(
+  const auto identified = identify_bristle(
       runs_of({.mirrored = true, .flips = true, .drift_x = 24, .drift_y = 24, .mount_rad = 0.4, .turn_rad_s = 0.15},
               110, 12),
       {}, second());
   for (const auto& effect : identified.document.at("contract").at("effects")) {
     if (effect.at("name") != "downhill") continue;
-    // Ways of half a second are chords of the arc: a hundredth short at most.
+    // Displacements in half a second are chords of the arc, at most 1 % short.
     EXPECT_NEAR(effect.at("parameters").at("x").get<double>(), 0.3, 0.01);
     EXPECT_NEAR(effect.at("parameters").at("y").get<double>(), 0.3, 0.01);
   }
   EXPECT_TRUE(found(identified).contains("downhill"));
 }
 
-TEST(VelocityCircle, IsExactOnACircleAndKeepsToWhatWasBelievedOnAPoint) {
+TEST(VelocityCircle, IsExactOnACircleAndKeepsThePriorOnAPoint) {
   std::vector<std::complex<double>> circle, point;
   for (int i = 0; i < 40; ++i) {
     circle.push_back(std::complex<double>(12, -5) + std::polar(50.0, 0.3 * i));
     point.push_back({60, 0});
   }
   circle[7] = {400, 0};  // an outlier
-  const VelocityCircle exact = circle_through(circle, 0, 0);
+  const VelocityCircle exact = fit_circle(circle, 0, 0);
   EXPECT_NEAR(exact.speed_mm_s, 50, 0.5);
   EXPECT_NEAR(exact.drift.real(), 12.0 / 50, 0.01);
   EXPECT_NEAR(exact.drift.imag(), -5.0 / 50, 0.01);
-  const VelocityCircle one_way = circle_through(point, 0.2, 6);
-  EXPECT_NEAR(one_way.one_way, 1, 1e-9);
-  EXPECT_NEAR(one_way.drift.real(), 0.2, 0.02);
-  EXPECT_NEAR(one_way.speed_mm_s, 50, 1);
+  const VelocityCircle prior_share = fit_circle(point, 0.2, 6);
+  EXPECT_NEAR(prior_share.prior_share, 1, 1e-9);
+  EXPECT_NEAR(prior_share.drift.real(), 0.2, 0.02);
+  EXPECT_NEAR(prior_share.speed_mm_s, 50, 1);
 }
 
-TEST(Bristle, JumpsAreTakenOut) {
-  RiddenRun run = runs_of({}, 1, 1)[0];
+TEST(Bristle, ImplausibleRowsAreRemoved) {
+  BristleRun run = runs_of({}, 1, 1)[0];
   run.x_mm[100] += 300;
   run.y_mm[101] -= 400;
-  drop_jumps(run);
+  drop_implausible_rows(run);
   EXPECT_EQ(run.dropped, 2u);
   EXPECT_EQ(run.size(), 898u);
 }
 
-TEST(Bristle, TheMeasuredRunsShowTheirTracker) {
+TEST(Bristle, TheMeasuredRunsShowTrackerEffects) {
   const std::filesystem::path data = std::filesystem::path(KILOTWIN_SOURCES) / "../shared/data/bristle";
   if (!std::filesystem::exists(data))
     GTEST_SKIP() << "there is no " << data << ": the measured runs are not part of the project";
-  ASSERT_TRUE(has_ridden_runs(data));
-  const auto identified = identify_ridden(read_ridden_runs(data), {}, second());
+  ASSERT_TRUE(has_bristle_runs(data));
+  const auto identified = identify_bristle(read_bristle_runs(data), {}, second());
   const auto names = found(identified);
   EXPECT_TRUE(names.contains("heading-sense"));
   EXPECT_TRUE(names.contains("front-for-back"));
   const auto& contract = identified.document.at("contract");
   EXPECT_LT(contract.at("after").at("rmse_mm").get<double>(),
             0.75 * contract.at("before").at("rmse_mm").get<double>());
-  // The runs differ by more than the effects do, so gains are counted run by run.
+  // Runs differ by more than the effects, so gains are counted per run.
   for (const auto& effect : contract.at("effects")) {
     const auto& evidence = effect.at("evidence");
     EXPECT_GT(evidence.at("held_out_gain").get<double>(), evidence.at("held_out_gain_se").get<double>())

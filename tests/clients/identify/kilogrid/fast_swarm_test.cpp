@@ -1,4 +1,4 @@
-// The quick swarm: it goes as the engine's does where robots are few, and nearly so in a crowd.
+// The fast swarm equals the engine's at low density, and nearly in a crowd.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,7 +9,7 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Robots in rows of eight, `apart_mm` from row to row.
+/// Robots in rows of eight, `apart_mm` between rows.
 FloorScene rows(std::uint32_t robots, double apart_mm, double duration_s) {
   FloorScene scene{"rows", duration_s, {}, {}};
   for (std::uint32_t i = 0; i < robots; ++i) {
@@ -35,18 +35,18 @@ Both play(const FloorScene& scene, const FloorSettings& settings, int repeats) {
   for (int r = 0; r < repeats; ++r) {
     const auto seed = static_cast<std::uint64_t>(r + 1);
     const auto a = robot_sums(simulate(scene, {}, settings.model, settings.times, settings.radio, seed), {}),
-               b = robot_sums(simulate_quickly(scene, {}, settings, seed + 100), {});
+               b = robot_sums(simulate_fast(scene, {}, settings, seed + 100), {});
     engine.insert(engine.end(), a.begin(), a.end());
     quick.insert(quick.end(), b.begin(), b.end());
   }
   return {statistics_of(engine), statistics_of(quick)};
 }
 
-TEST(QuickSwarm, TheSameArgumentsGiveTheSameRun) {
+TEST(FastSwarm, IsDeterministic) {
   const FloorScene scene = rows(24, 200, 200);
   const FloorSettings settings = settings_of(1.2);
-  const FloorRun a = simulate_quickly(scene, {}, settings, 5), b = simulate_quickly(scene, {}, settings, 5),
-                 c = simulate_quickly(scene, {}, settings, 6);
+  const FloorRun a = simulate_fast(scene, {}, settings, 5), b = simulate_fast(scene, {}, settings, 5),
+                 c = simulate_fast(scene, {}, settings, 6);
   ASSERT_EQ(a.tracks.size(), b.tracks.size());
   bool differs = a.tracks.size() != c.tracks.size();
   for (std::size_t i = 0; i < a.tracks.size(); ++i) {
@@ -57,21 +57,21 @@ TEST(QuickSwarm, TheSameArgumentsGiveTheSameRun) {
   EXPECT_TRUE(differs);
 }
 
-TEST(QuickSwarm, FewRobotsGoAsInTheEngine) {
+TEST(FastSwarm, FewRobotsMoveAsInTheEngine) {
   const Both both = play(rows(8, 0, 1500), settings_of(0.3), 4);
   for (const char* name : {"speed", "msd", "occupancy", "turn"}) {
     const StatisticGroup& group = statistic_group(name);
     const std::size_t count = std::string(name) == "speed" ? 1 : std::min<std::size_t>(group.size(), 5);
     for (std::size_t s = group.first; s < group.first + count; ++s) {
       const double chance = std::sqrt(both.engine.variance[s] + both.quick.variance[s]);
-      // Four standard errors, for some twenty numbers, and what meetings of eight robots make.
+      // Four standard errors for about twenty statistics, and the effect of few encounters.
       EXPECT_NEAR(both.quick.value[s], both.engine.value[s], 4 * chance + 0.03 * both.engine.value[s])
           << name << ' ' << group.labels[s - group.first];
     }
   }
 }
 
-TEST(QuickSwarm, ACrowdIsSlowerNearlyAsInTheEngine) {
+TEST(FastSwarm, ACrowdIsSlowerNearlyAsInTheEngine) {
   const FloorSettings settings = settings_of(1.2);
   const std::size_t speed = statistic_group("speed").first;
   const Both few = play(rows(8, 0, 1000), settings, 3), crowd = play(rows(96, 130, 1000), settings, 1);

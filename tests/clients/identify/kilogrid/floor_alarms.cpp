@@ -1,5 +1,6 @@
-// How often the search for effects on a floor finds one where there is none, and whether it names one that is there: on sets by
-// a generator of its own (plain_floor.hpp). floor_alarms SETS ROBOTS SECONDS RUNS [FIRST-SET] [CAUSE...]; without causes, all.
+// Rates of false alarms and of detections in the search for effects on a floor, on sets of an independent
+// generator (plain_floor.hpp). Usage: floor_alarms SETS ROBOTS SECONDS RUNS [FIRST-SET] [EFFECT...]; without
+// effects: all.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,13 +14,13 @@ namespace {
 
 using namespace kilotwin::kilogrid;
 
-struct Cause {
+struct PlantedEffect {
   test::Truth truth;
   const char* name;
-  std::vector<std::string> named;  ///< effects that say so
+  std::vector<std::string> named;  ///< accepted effects with the right covariate
 };
 
-const std::vector<Cause> kCauses = {
+const std::vector<PlantedEffect> kPlantedEffects = {
     {test::Truth::kNothing, "nothing", {}},
     {test::Truth::kTwoKindsOfRobots, "two-kinds", {"speed-of-robots"}},
     {test::Truth::kCaughtByWalls, "caught-by-walls", {"stuck-beside-walls", "wall"}},
@@ -34,7 +35,7 @@ const std::vector<Cause> kCauses = {
 FloorModel base_of(const FloorTarget& target, std::uint64_t seed) {
   FloorModel model;
   model.add(base_term());
-  fit_from_afar(model, target, seed, [](const std::string&) {});
+  fit_from_far_start(model, target, seed, [](const std::string&) {});
   fit(model, target, 2, 1, seed, [](const std::string&) {});
   return model;
 }
@@ -46,7 +47,7 @@ int main(int argc, char** argv) {
   const int sets = given(1, 12), robots = given(2, 40), seconds = given(3, 1500), runs = given(4, 3),
             begin = given(5, 0);
   const std::vector<std::string> wanted(argv + std::min(argc, 6), argv + argc);
-  for (const Cause& cause : kCauses) {
+  for (const PlantedEffect& cause : kPlantedEffects) {
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), cause.name) == wanted.end()) continue;
     for (int set = begin; set < begin + sets; ++set) {
       std::vector<FloorRun> played;
@@ -68,7 +69,7 @@ int main(int argc, char** argv) {
         line += fmt::format(" {} {:.0f}/{:.0f}", effect.name, effect.gain, effect.needed);
       }
       if (found.gains.empty()) line += " nothing";
-      // What came nearest of those that were not.
+      // The closest of the rejected candidates.
       const auto share = [](const RejectedEffect& e) { return e.gain.gain / std::max(e.gain.needed, 1e-9); };
       const auto next = std::max_element(found.rejected.begin(), found.rejected.end(),
                                          [&](const auto& a, const auto& b) { return share(a) < share(b); });

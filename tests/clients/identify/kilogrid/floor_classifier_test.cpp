@@ -1,4 +1,4 @@
-// Telling runs apart: the area under the curve in closed form, and what classifiers can and cannot see.
+// Classifier two-sample test: the area under the ROC curve in closed form, and the power of the classifiers.
 #include <gtest/gtest.h>
 
 #include "clients/identify/kilogrid/floor_classifier.hpp"
@@ -29,22 +29,22 @@ std::vector<TrackWindow> windows(double shift, double product, std::uint64_t see
   return all;
 }
 
-TEST(FloorClassifier, GuessesWhereThereIsNothingToSee) {
-  const TellApart t = tell_apart(windows(0, 0, 1), windows(0, 0, 2));
+TEST(FloorClassifier, IsAtChanceLevelWithoutADifference) {
+  const ClassifierResult t = classifier_test(windows(0, 0, 1), windows(0, 0, 2));
   EXPECT_NEAR(t.logistic, 0.5, 0.06);
   EXPECT_NEAR(t.boosted, 0.5, 0.06);
 }
 
-TEST(FloorClassifier, SeesAShiftAsWellAsAnybodyCan) {
+TEST(FloorClassifier, DetectsAShiftNearlyOptimally) {
   // Two normal distributions one standard deviation apart: 0.760.
-  const TellApart t = tell_apart(windows(0, 0, 3), windows(1, 0, 4));
+  const ClassifierResult t = classifier_test(windows(0, 0, 3), windows(1, 0, 4));
   EXPECT_NEAR(t.best(), 0.76, 0.06);
-  EXPECT_GT(t.logistic, 0.62);  // it has 91 terms to learn from few windows
+  EXPECT_GT(t.logistic, 0.62);  // it estimates 91 terms from few windows
 }
 
-TEST(FloorClassifier, TellsBroaderDistributionsToo) {
-  // The same means; one feature is broader.
-  EXPECT_GT(tell_apart(windows(0, 0, 5), windows(0, 2, 6)).best(), 0.6);
+TEST(FloorClassifier, DetectsALargerVariance) {
+  // Equal means; one feature has a larger variance.
+  EXPECT_GT(classifier_test(windows(0, 0, 5), windows(0, 2, 6)).best(), 0.6);
 }
 
 }  // namespace

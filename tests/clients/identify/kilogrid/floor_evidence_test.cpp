@@ -1,4 +1,4 @@
-// Evidence of effects on a floor: what is beyond chance is so in one of 100 sets, whatever candidates' scales are.
+// Significance of effects on a floor: the bound is exceeded in one of 100 sets, for any scales of the candidates.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,8 +9,8 @@
 namespace kilotwin::kilogrid {
 namespace {
 
-/// Fourteen candidates, each with gains of a scale of its own; the first ten have one number, the others two. The first two cannot go
-/// below 0, so that half of their gains are none.
+/// Fourteen candidates with gains of different scales; the first ten have one parameter, the others two. The first
+/// two are bounded at 0, so half of their gains are 0.
 constexpr std::size_t kCandidates = 14;
 std::vector<std::size_t> switches() {
   std::vector<std::size_t> of(kCandidates, 1);
@@ -27,14 +27,14 @@ std::vector<double> gains(std::mt19937_64& random) {
   return set;
 }
 
-TEST(FloorChance, OneSetOfAHundredIsBeyondTheBound) {
+TEST(NullDistribution, OneSetOfAHundredExceedsTheBound) {
   std::mt19937_64 random(3);
   constexpr int kBounds = 200, kTried = 50, kSets = 16;
   int beyond = 0;
   for (int k = 0; k < kBounds; ++k) {
     std::vector<std::vector<double>> sets;
     for (int b = 0; b < kSets; ++b) sets.push_back(gains(random));
-    const FloorChance chance(sets, switches());
+    const NullDistribution chance(sets, switches());
     for (int i = 0; i < kTried; ++i) {
       const std::vector<double> set = gains(random);
       double largest = 0;
@@ -42,14 +42,14 @@ TEST(FloorChance, OneSetOfAHundredIsBeyondTheBound) {
       beyond += largest > chance.bound() ? 1 : 0;
     }
   }
-  // Of 10000; a bound from 16 sets is itself uncertain, which makes rates differ from bound to bound.
+  // Of 10000. A bound from 16 sets is itself uncertain, so rates differ between bounds.
   EXPECT_LT(beyond, 150);
   EXPECT_GT(beyond, 20);
 }
 
-TEST(FloorChance, EvidenceIsTheLogarithmOfTheChance) {
-  // All gains 1 with one number: the scale is 1, and the chance of more than 3.841 is 5 %, of 5.991 with two the same.
-  const FloorChance chance(std::vector<std::vector<double>>(20, {1, 2}), {1, 2});
+TEST(NullDistribution, EvidenceIsTheNegativeLogarithmOfP) {
+  // All gains 1 with one parameter: scale 1. P(more than 3.841) is 5 %; with two parameters P(more than 5.991).
+  const NullDistribution chance(std::vector<std::vector<double>>(20, {1, 2}), {1, 2});
   EXPECT_NEAR(std::exp(-chance.evidence(0, 3.841)), 0.05, 1e-4);
   EXPECT_NEAR(std::exp(-chance.evidence(1, 5.991)), 0.05, 1e-4);
   EXPECT_EQ(chance.evidence(0, 0), 0);
@@ -59,8 +59,8 @@ TEST(FloorChance, EvidenceIsTheLogarithmOfTheChance) {
   }
 }
 
-TEST(FloorGap, StepsStayInTheBoxAndLowerTheMisfit) {
-  // Robots whose sums are independent: numbers' correlations are nearly none.
+TEST(FloorMisfit, StepsStayInTheBoxAndLowerTheMisfit) {
+  // Robots with independent sums: correlations near 0.
   std::mt19937_64 random(5);
   std::normal_distribution<> normal;
   const std::size_t n = statistic_count();
@@ -75,14 +75,15 @@ TEST(FloorGap, StepsStayInTheBoxAndLowerTheMisfit) {
   for (int b = 0; b < 8; ++b) simulated.push_back(set(0));
   const Eigen::MatrixXd correlation = correlation_of(simulated);
   EXPECT_NEAR(correlation(3, 3), 1, 1e-9);
-  EXPECT_LT(std::abs(correlation(3, 40)), 0.2);  // four standard errors of 480 robots
+  EXPECT_LT(std::abs(correlation(3, 40)), 0.2);  // four standard errors for 480 robots
 
-  // Every number is measured to be 0.5 higher, and two parameters raise all of them, the second not by more than a half.
+  // Every statistic is 0.5 higher in the measurement. Two parameters raise all of them; the second is bounded by
+  // one half.
   const auto count = static_cast<Eigen::Index>(n);
   Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(count, 2);
   slopes.col(0).head(count / 2).setConstant(0.25);
   slopes.col(1).tail(count - count / 2).setConstant(1);
-  const FloorGap gap(set(0.5), simulated[0].statistics, slopes, correlation);
+  const FloorMisfit gap(set(0.5), simulated[0].statistics, slopes, correlation);
   EXPECT_EQ(gap.numbers, n);
   const FloorBox box{{-1, -1}, {1, 0.2}};
   const Eigen::VectorXd one = gap.best_steps({true, false}, box), both = gap.best_steps({true, true}, box);

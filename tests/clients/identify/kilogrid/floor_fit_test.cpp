@@ -1,4 +1,4 @@
-// The fit by simulation: it recovers what made the data, and finds an effect that is there and none that is not.
+// Fit by simulation: recovers the generating parameters, detects a planted effect, and no other.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ FloorScene scene(std::uint32_t robots, double duration_s, int which) {
   return scene;
 }
 
-/// Runs of a model, as if they had been measured.
+/// Runs of a model in place of measured ones.
 std::vector<FloorRun> runs_of(const FloorModel& model, std::uint64_t seed) {
   std::vector<FloorRun> runs;
   for (int i = 0; i < 3; ++i) {
@@ -41,9 +41,9 @@ const FloorProgress kQuiet = [](const std::string& s) { puts(s.c_str()); };
 
 TEST(FloorFit, RecoversTheSpeedAndTheRange) {
   FloorModel truth = base_model();
-  truth.values[0] = 9;    // straight speed; the search begins at 11.3
-  truth.values[2] = 1.6;  // spread of the bias; at 1.2
-  truth.values[4] = 46;   // range; at 49
+  truth.values[0] = 9;    // straight speed; initial value 11.3
+  truth.values[2] = 1.6;  // spread of the bias; initial value 1.2
+  truth.values[4] = 46;   // range; initial value 49
   const FloorTarget target(runs_of(truth, 100), {});
   FloorModel model = base_model();
   const double before = target.misfit(simulated_statistics(target, model.settings(), 1));
@@ -53,23 +53,23 @@ TEST(FloorFit, RecoversTheSpeedAndTheRange) {
   EXPECT_NEAR(model.values[4], 46, 2.8);
 }
 
-TEST(FloorFit, FindsItsWayFromAfar) {
-  // Three to five widths from where the search begins, in parameters that stand in for each other.
+TEST(FloorFit, ConvergesFromAFarStart) {
+  // Three to five scales from the initial values, in parameters that partly compensate for each other.
   FloorModel truth = base_model();
-  truth.values[1] = 27;   // turning; the search begins at 19
-  truth.values[7] = 38;   // range of the walls; at 52
-  truth.values[8] = 1.5;  // their messages; at 3.5
-  truth.values[9] = 15;   // noise of these; at 4
+  truth.values[1] = 27;   // turning; initial value 19
+  truth.values[7] = 38;   // range of the walls; initial value 52
+  truth.values[8] = 1.5;  // rate of their messages; initial value 3.5
+  truth.values[9] = 15;   // noise of these; initial value 4
   const FloorTarget target(runs_of(truth, 500), {});
   const auto misfit = [&](const FloorModel& of) {
     return target.misfit(simulated_statistics(target, of.settings(), 1, 2));
   };
   FloorModel model = base_model();
   const double before = misfit(model);
-  fit_from_afar(model, target, 3, kQuiet);
+  fit_from_far_start(model, target, 3, kQuiet);
   const double after = misfit(model), best = misfit(truth);
   EXPECT_GT(before, 3 * best);
-  // Three quarters of the way to what the truth itself leaves; finer steps go the rest.
+  // Three quarters of the reduction to the misfit of the truth; finer steps complete it.
   EXPECT_LT(after - best, 0.25 * (before - best));
 }
 
@@ -88,7 +88,7 @@ TEST(FloorTarget, CutIsTheBeginningOfEachRun) {
   }
 }
 
-TEST(FloorTarget, PoolsTheRunsThatAreIn) {
+TEST(FloorTarget, PoolsTheSelectedRuns) {
   const FloorTarget target(runs_of(base_model(), 700), {});
   const auto& runs = target.set().runs;
   std::vector<RobotSums> first_and_last = runs[0];
@@ -100,7 +100,7 @@ TEST(FloorTarget, PoolsTheRunsThatAreIn) {
   EXPECT_NE(all.value[msd.first], some.value[msd.first]);
 }
 
-/// Some of the candidates: each costs simulations.
+/// A subset of the candidates: each costs simulations.
 std::vector<FloorTerm> some_candidates() {
   std::vector<FloorTerm> some;
   for (const FloorTerm& term : candidate_terms({})) {
@@ -109,31 +109,31 @@ std::vector<FloorTerm> some_candidates() {
   return some;
 }
 
-TEST(FloorChoice, FindsNothingInTheModelsOwnRuns) {
+TEST(FloorSelection, NoEffectInTheModelsOwnRuns) {
   const FloorModel truth = base_model();
   const FloorTarget without(runs_of(truth, 200), {});
-  const Choice choice = choose(truth, some_candidates(), without, 5, kQuiet);
+  const Selection choice = choose(truth, some_candidates(), without, 5, kQuiet);
   EXPECT_FALSE(choice.found());
-  // Sets that the model made are as far from it as others that it made: each has 320 numbers that go together, of which
-  // the sum of squares was seen to spread by a tenth.
+  // Sets simulated by the model deviate from it like other simulated sets: 320 correlated statistics, whose sum of
+  // squares varies by about a tenth.
   EXPECT_NEAR(choice.misfit / choice.by_chance, 1, 0.4);
   for (const CandidateScore& score : choice.scores) EXPECT_LT(score.gain, score.needed);
 }
 
-TEST(FloorChoice, FindsAnEffectThatIsThere) {
+TEST(FloorSelection, FindsAPlantedEffect) {
   FloorModel truth = base_model();
   const std::vector<FloorTerm> candidates = some_candidates();
   truth.add(candidates[0]);
-  truth.values[truth.values.size() - 2] = 0.4;  // spread of speeds; the last is the skew
+  truth.values[truth.values.size() - 2] = 0.4;  // spread of speeds; the last is the skewness
   const FloorTarget with(runs_of(truth, 300), {});
-  const Choice choice = choose(base_model(), candidates, with, 5, kQuiet);
+  const Selection choice = choose(base_model(), candidates, with, 5, kQuiet);
   ASSERT_TRUE(choice.found());
   EXPECT_EQ(candidates[choice.best].name, "speed-of-robots");
   EXPECT_GT(choice.scores[0].gain, choice.scores[0].needed);
   EXPECT_GT(choice.scores[0].values[0], 0.1);
 }
 
-TEST(FloorChoice, AnEffectOfOneRunAloneIsNotFound) {
+TEST(FloorSelection, AnEffectInOneRunOnlyIsNotAccepted) {
   const FloorModel base = base_model();
   const std::vector<FloorTerm> candidates = some_candidates();
   FloorModel odd = base;
@@ -141,16 +141,16 @@ TEST(FloorChoice, AnEffectOfOneRunAloneIsNotFound) {
   odd.values[odd.values.size() - 2] = 0.5;  // spread of speeds
   std::vector<FloorRun> runs = runs_of(base, 400);
   runs[1] = runs_of(odd, 400)[1];
-  const Choice choice = choose(base, candidates, FloorTarget(runs, {}), 5, kQuiet);
+  const Selection choice = choose(base, candidates, FloorTarget(runs, {}), 5, kQuiet);
   ASSERT_EQ(choice.scores[0].by_run.size(), 3u);
   EXPECT_FALSE(choice.found());
 }
 
-TEST(CandidateScore, HelpsOthersWithAllRunsButOneOfFourAndAltogether) {
+TEST(CandidateScore, HelpsHeldOutRunsInTotalAndInThreeOfFour) {
   const auto helps = [](std::vector<double> by_run) {
-    return CandidateScore{1, 1, 1, by_run, {}, 0}.helps_others();
+    return CandidateScore{1, 1, 1, by_run, {}, 0}.helps_held_out();
   };
-  EXPECT_TRUE(helps({}));  // of fewer than three runs nothing can be said
+  EXPECT_TRUE(helps({}));  // not defined for fewer than three runs
   EXPECT_TRUE(helps({3, 1, 2}));
   EXPECT_FALSE(helps({9, 9, -1}));
   EXPECT_TRUE(helps({3, 1, 2, -1}));
@@ -158,26 +158,26 @@ TEST(CandidateScore, HelpsOthersWithAllRunsButOneOfFourAndAltogether) {
   EXPECT_FALSE(helps({9, 9, -1, -1}));
 }
 
-TEST(CandidateScore, HelpsAllAlikeWhereTheMeanIsBeyondWhatRunsDifferBy) {
+TEST(CandidateScore, ConsistencyOverRunsIsATTest) {
   const auto alike = [](std::vector<double> by_run) {
-    return CandidateScore{1, 1, 1, by_run, {}, 0}.helps_all_alike();
+    return CandidateScore{1, 1, 1, by_run, {}, 0}.consistent_over_runs();
   };
   EXPECT_FALSE(alike({}));
   EXPECT_FALSE(alike({5, 5}));
-  // Student's t: 7.4, where 4.54 is beyond 1 % of four runs; then 2.7 and 3.2.
+  // Student's t: 7.4, above the 1 % bound of 4.54 for four runs; then 2.7 and 3.2.
   EXPECT_TRUE(alike({23, 36, 43, 28}));
   EXPECT_FALSE(alike({10, 2, 24, 25}));
   EXPECT_FALSE(alike({9, 30, 8, 19}));
-  // Three runs: 6.97 is asked for. These have 8.7 and 5.2.
+  // Three runs: the bound is 6.97. These have 8.7 and 5.2.
   EXPECT_TRUE(alike({4, 5, 6}));
   EXPECT_FALSE(alike({2, 3, 4}));
   EXPECT_FALSE(alike({30, 31, 32, -0.1}));
 }
 
-TEST(CandidateScore, WhatTheModelLeavesCountsUnlessRunsAgree) {
+TEST(CandidateScore, UnexplainedMisfitCountsUnlessRunsAgree) {
   const double bound = 10;
-  const auto beyond = [&](double evidence, double by_chance_alone, std::vector<double> by_run) {
-    return CandidateScore{1, 1, evidence, by_run, {}, by_chance_alone}.beyond(bound);
+  const auto beyond = [&](double evidence, double uncorrected_evidence, std::vector<double> by_run) {
+    return CandidateScore{1, 1, evidence, by_run, {}, uncorrected_evidence}.beyond(bound);
   };
   EXPECT_TRUE(beyond(11, 40, {9, 30, 8, 19}));
   EXPECT_FALSE(beyond(9, 40, {9, 30, 8, 19}));
@@ -186,7 +186,7 @@ TEST(CandidateScore, WhatTheModelLeavesCountsUnlessRunsAgree) {
   EXPECT_FALSE(beyond(11, 40, {23, 36, -43, -28}));
 }
 
-TEST(FloorSlopes, AreThoseOfThePointsThatAreNear) {
+TEST(FloorSensitivity, FollowsTheNearPoints) {
   FloorModel model = base_model();
   std::vector<bool> moves(model.values.size(), false);
   moves[0] = moves[4] = true;
@@ -194,7 +194,7 @@ TEST(FloorSlopes, AreThoseOfThePointsThatAreNear) {
   FloorPoints points;
   Dice dice(3);
   for (std::size_t i = 0; i < 400; ++i) {
-    // Every second point is far off, where the statistics bend away.
+    // Every second point is far away, where the statistics are nonlinear.
     const double reach = i % 2 == 0 ? 1 : 6;
     std::vector<double> at = model.values, steps(2);
     for (std::size_t p = 0; p < 2; ++p) {
@@ -209,8 +209,8 @@ TEST(FloorSlopes, AreThoseOfThePointsThatAreNear) {
     points.said.push_back(said);
   }
   const Eigen::MatrixXd slopes = slopes_of(points, model, moves, 3, 1);
-  // Two hundred points that are near, with a mean square of a third, and a ridge of 2 % on them: 0.02 for chance and 6 % for the ridge;
-  // of the others a tenth are near enough to count a little.
+  // Two hundred near points with mean square one third and a ridge of 2 %: 0.02 for noise and 6 % for the ridge. A
+  // tenth of the others is near enough to contribute.
   EXPECT_NEAR(slopes(0, 0), 2, 0.35);
   EXPECT_NEAR(slopes(0, 4), -1, 0.2);
   EXPECT_EQ(slopes(1, 0), 0);
@@ -221,14 +221,13 @@ const FloorTerm& term_of(const std::vector<FloorTerm>& terms, const std::string&
   return *std::find_if(terms.begin(), terms.end(), [&](const FloorTerm& t) { return t.name == name; });
 }
 
-TEST(FloorModel, ADriftToTheMiddleTakesRobotsThereAlongItsAxis) {
+TEST(FloorModel, ADriftToTheMiddleActsAlongItsAxis) {
   const std::vector<FloorTerm> candidates = candidate_terms({});
   FloorModel model = base_model();
   const auto said = [&](const FloorModel& of) {
     std::vector<RobotSums> all;
     for (int i = 0; i < 4; ++i) {
-      const FloorRun run =
-          simulate_quickly(scene(40, 1500, i), {}, of.settings(), 20 + static_cast<std::uint64_t>(i));
+      const FloorRun run = simulate_fast(scene(40, 1500, i), {}, of.settings(), 20 + static_cast<std::uint64_t>(i));
       for (RobotSums& robot : robot_sums(run, {})) all.push_back(std::move(robot));
     }
     return statistics_of(all);
@@ -241,7 +240,8 @@ TEST(FloorModel, ADriftToTheMiddleTakesRobotsThereAlongItsAxis) {
     const std::size_t s = statistic_group(group).first + i;
     return (drift.value[s] - none.value[s]) / std::sqrt(drift.variance[s] + none.variance[s]);
   };
-  // In standard errors: the middle two tenths of the floor's width hold more, the outer ones less; nothing along the other axis.
+  // In standard errors: the middle two tenths of the width hold more robots, the outer ones fewer; no change along
+  // the other axis.
   EXPECT_GT(more("occupancy-along-x", 4), 3);
   EXPECT_GT(more("occupancy-along-x", 5), 3);
   EXPECT_LT(more("occupancy-along-x", 1), -2);
@@ -253,8 +253,8 @@ TEST(FloorModel, ADriftToTheMiddleTakesRobotsThereAlongItsAxis) {
 TEST(FloorModel, WallsAreRecordsThatActBesideThem) {
   FloorModel model = base_model();
   model.wall.emplace().fill(1);
-  (*model.wall)[0] = 0.25;  // the lower wall, at its left end
-  (*model.wall)[11] = 0.5;  // the right one, at its top
+  (*model.wall)[0] = 0.25;  // lower wall, left end
+  (*model.wall)[11] = 0.5;  // right wall, top
   const FloorSettings settings = model.settings();
   ASSERT_EQ(settings.model.effect_size(), 4);
   EXPECT_EQ(settings.model.effect(0).name(), "wall-bottom");
@@ -263,7 +263,7 @@ TEST(FloorModel, WallsAreRecordsThatActBesideThem) {
   EXPECT_EQ(settings.model.effect(1).function(0).steps().at(0), 500 - FloorModel::kBeside_mm);
 }
 
-TEST(FloorModel, SpeedsOfTheirOwnGoingStraightLeaveTurnsAsTheyAre) {
+TEST(FloorModel, IndividualStraightSpeedsKeepTurns) {
   const std::vector<FloorTerm> candidates = candidate_terms({});
   FloorModel model = base_model();
   model.values[2] = model.values[3] = 0;  // no bias, no noise
@@ -280,7 +280,7 @@ TEST(FloorModel, SpeedsOfTheirOwnGoingStraightLeaveTurnsAsTheyAre) {
   for (const double value : table.value()) {
     sum += value;
     squares += value * value;
-    EXPECT_GT(settings.model.motion().straight_speed_mm_s() + value, 0);  // nobody goes backwards
+    EXPECT_GT(settings.model.motion().straight_speed_mm_s() + value, 0);  // no negative speeds
   }
   const double count = table.value_size();
   EXPECT_NEAR(sum / count, 0, 0.1);

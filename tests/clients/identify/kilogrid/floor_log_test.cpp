@@ -1,4 +1,4 @@
-// Reading what a floor wrote down: rows, faults of the data, errors with their place.
+// Reading Kilogrid logs: rows, faults of the data, errors with their place.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -20,7 +20,7 @@ std::string error_of(const std::string& text) {
   return "";
 }
 
-/// A robot that stays in one cell, heard every 2 s.
+/// A robot that stays in one cell, with a report every 2 s.
 std::string still(std::uint32_t robot, double x_mm, double y_mm, int rows) {
   std::string text;
   for (int i = 0; i < rows; ++i)
@@ -43,7 +43,7 @@ TEST(FloorLog, RowsBecomeTracksOfRobots) {
   EXPECT_TRUE(run.faults.empty());
 }
 
-TEST(FloorLog, WhatNoRobotCanDoIsNamedAndLeftOut) {
+TEST(FloorLog, ImplausibleRobotsAreReportedAndExcluded) {
   std::string rows;
   for (int i = 0; i < 200; ++i)
     rows +=
@@ -57,7 +57,7 @@ TEST(FloorLog, WhatNoRobotCanDoIsNamedAndLeftOut) {
   EXPECT_EQ(seldom.faults[0].reason, "heard 20 times only");
 }
 
-TEST(FloorLog, ASlipIsTakenOutAndTheRobotKept) {
+TEST(FloorLog, ASingleWrongRowIsRemoved) {
   std::string rows;
   for (int i = 0; i < 200; ++i) rows += std::to_string(2 * i) + ",1," + (i == 50 ? "925,1925" : "75,75") + "\n";
   const FloorRun run = parse_floor_run(kHeader + rows, "f.csv");
@@ -77,8 +77,8 @@ TEST(FloorLog, ErrorsNameFileAndLine) {
             "f.csv:2:5: x_mm is 1025; on this floor x is within 0..1000 mm");
 }
 
-TEST(FloorLog, NoTextMakesItFail) {
-  // Whatever is cut from or put into a file, reading it ends with runs or with an error that names it.
+TEST(FloorLog, AnyTextGivesRunsOrAnError) {
+  // Any mutation of a file gives runs or an error that names it.
   const std::string good = kHeader + still(4, 125, 525, 80);
   std::uint64_t state = 5;
   const auto below = [&](std::size_t n) {

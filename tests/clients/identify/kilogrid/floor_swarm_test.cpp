@@ -1,4 +1,4 @@
-// The robots' program, the floor that hears them, and the swarm: laws that each follows.
+// Laws of the robots' program, the floor's reports and the swarm.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,10 +33,10 @@ TEST(FloorProgram, GoesStraightAndTurnsForWholeSeconds) {
     since = k;
   }
   ASSERT_GT(straights, 4000);
-  // Cutting to whole seconds takes half a second of 15; three standard errors.
+  // Truncation to whole seconds removes half a second of 15; three standard errors.
   EXPECT_NEAR(straight / straights / FloorProgram::kWalkTicks, 14.5, 3 * 1.53 / std::sqrt(straights) + 0.1);
   EXPECT_NEAR(left / all, 0.5, 3 * 0.5 / std::sqrt(all));
-  // |N(0.5, 3)| below a whole number of seconds: differences of the normal distribution.
+  // P(|N(0.5, 3)| below a whole number of seconds), by differences of the normal distribution.
   const auto below = [](double s) {
     return 0.5 * (std::erf((s - 0.5) / 3 / std::sqrt(2)) - std::erf((-s - 0.5) / 3 / std::sqrt(2)));
   };
@@ -56,7 +56,7 @@ TEST(FloorProgram, TurnsAtAWallAndLeavesItASecondAfterTheLastMessage) {
   const std::int64_t heard = k;
   while (program.avoiding()) (void)program.loop(++k);
   EXPECT_EQ(k - heard, FloorProgram::kWallTicks + 1);
-  EXPECT_EQ(program.loop(++k), turning);  // until the walk's next step
+  EXPECT_EQ(program.loop(++k), turning);  // until the walk's next transition
 }
 
 TEST(FloorProgram, GoesAwayOnceReadingsGetWeaker) {
@@ -77,8 +77,8 @@ TEST(FloorProgram, GoesAwayOnceReadingsGetWeaker) {
   EXPECT_NE(program.loop(k + 1), Motion::kStraight);
 }
 
-TEST(FloorReporter, HearsAsOftenAsItsRangeSays) {
-  // A robot at random places: a cell in range is listened to a quarter of the time.
+TEST(FloorReporter, ReportsAtTheRateOfItsRange) {
+  // A robot at random positions: a cell in range is polled a quarter of the time.
   const Floor floor;
   FloorRadio radio;
   radio.heard = 0.6;
@@ -96,8 +96,8 @@ TEST(FloorReporter, HearsAsOftenAsItsRangeSays) {
   EXPECT_NEAR(static_cast<double>(run.tracks[0].size()), expected, 0.03 * expected);
 }
 
-TEST(FloorReporter, ARobotAtRestIsHeardByCellsInTurn) {
-  // In the middle of a module, in reach of its four cells; every report is heard.
+TEST(FloorReporter, CellsReportARobotAtRestInTurn) {
+  // In the middle of a module, in range of its four cells; every report is received.
   FloorRadio radio;
   radio.heard = 1;
   radio.heard_sd = 0;
@@ -122,7 +122,7 @@ TEST(FloorReporter, ARobotAtRestIsHeardByCellsInTurn) {
   }
 }
 
-TEST(FloorReporter, AllAreHeardAtTheStart) {  // in the middle of a module
+TEST(FloorReporter, AllRobotsAreReportedAtTheStart) {  // in the middle of a module
   FloorRadio radio;
   radio.while_talking = 0;
   constexpr std::uint32_t kRobots = 200;
@@ -130,11 +130,11 @@ TEST(FloorReporter, AllAreHeardAtTheStart) {  // in the middle of a module
   for (int i = 0; i < 60; ++i) {
     for (std::uint32_t robot = 0; robot < kRobots; ++robot) reporter.see(robot, i * 0.5, 450, 950);
   }
-  // Some begin to talk within half a minute, with the chance 30 / 300.
+  // Some bursts start within half a minute, with probability 30 / 300.
   EXPECT_GT(reporter.take("", 30).tracks.size(), 0.97 * kRobots);
 }
 
-TEST(FloorReporter, CellsThatHearAreNear) {
+TEST(FloorReporter, ReportingCellsAreNear) {
   const Floor floor;
   FloorRadio radio;
   radio.blur_mm = 0.1;
@@ -146,16 +146,16 @@ TEST(FloorReporter, CellsThatHearAreNear) {
     EXPECT_LT(std::hypot(run.tracks[0].x_mm[i] - 510, run.tracks[0].y_mm[i] - 1010), radio.range_mm + 3);
 }
 
-TEST(FloorSwarm, TheRimIsFoundFromAnyPlace) {
+TEST(FloorSwarm, TheNearestBoundarySectionIsFound) {
   const Floor floor;
-  EXPECT_NEAR(rim_cell_distance_mm(floor, 25, 1025), 0, 1e-12);
-  EXPECT_NEAR(rim_cell_distance_mm(floor, 65, 1025), 40, 1e-12);
-  EXPECT_NEAR(rim_cell_distance_mm(floor, 500, 1990), std::hypot(25, 15), 1e-12);
-  EXPECT_EQ(rim_part(floor, 10, 5), 0u);
-  EXPECT_EQ(rim_part(floor, 990, 15), 4u);
-  EXPECT_EQ(rim_part(floor, 990, 1985), 11u);
-  EXPECT_EQ(rim_part(floor, 15, 1990), 15u);
-  EXPECT_EQ(rim_part(floor, 5, 15), 23u);
+  EXPECT_NEAR(boundary_cell_distance_mm(floor, 25, 1025), 0, 1e-12);
+  EXPECT_NEAR(boundary_cell_distance_mm(floor, 65, 1025), 40, 1e-12);
+  EXPECT_NEAR(boundary_cell_distance_mm(floor, 500, 1990), std::hypot(25, 15), 1e-12);
+  EXPECT_EQ(boundary_section(floor, 10, 5), 0u);
+  EXPECT_EQ(boundary_section(floor, 990, 15), 4u);
+  EXPECT_EQ(boundary_section(floor, 990, 1985), 11u);
+  EXPECT_EQ(boundary_section(floor, 15, 1990), 15u);
+  EXPECT_EQ(boundary_section(floor, 5, 15), 23u);
 }
 
 FloorScene scene_of_grid(std::uint32_t robots, double duration_s) {
@@ -167,7 +167,7 @@ FloorScene scene_of_grid(std::uint32_t robots, double duration_s) {
   return scene;
 }
 
-TEST(FloorSwarm, TheSameArgumentsGiveTheSameRun) {
+TEST(FloorSwarm, IsDeterministic) {
   proto::Model model;
   const FloorScene scene = scene_of_grid(20, 200);
   const FloorRun a = simulate(scene, {}, model, {}, {}, 5), b = simulate(scene, {}, model, {}, {}, 5),
@@ -182,8 +182,9 @@ TEST(FloorSwarm, TheSameArgumentsGiveTheSameRun) {
   EXPECT_TRUE(differs);
 }
 
-TEST(FloorStatistics, AStraightWayIsAsLongAsItIs) {
-  // Four robots at 6 mm/s along y, seen without blur: 60 mm in 10 s, 120 in 20. No mean is taken of fewer.
+TEST(FloorStatistics, DisplacementsOfStraightTracks) {
+  // Four robots at 6 mm/s along y, without blur: 60 mm in 10 s, 120 mm in 20 s. Four is the least number for a
+  // mean.
   FloorRun run{"r", 250, {}, {}};
   FloorTrack track;
   for (int t = 0; t < 250; ++t) {
@@ -202,7 +203,7 @@ TEST(FloorStatistics, AStraightWayIsAsLongAsItIs) {
   EXPECT_NEAR(s.value[statistic_group("step").first + 7], 1, 1e-12);  // from 60 mm
 }
 
-TEST(CellFilter, TheLikelihoodFindsTheSpeedThatMadeTheCells) {
+TEST(CellFilter, TheLikelihoodIsLargestAtTheTrueSpeed) {
   const Floor floor;
   FloorSettings settings;
   settings.model.mutable_motion()->set_straight_speed_mm_s(9);
@@ -225,7 +226,7 @@ TEST(CellFilter, TheLikelihoodFindsTheSpeedThatMadeTheCells) {
   }
 }
 
-TEST(CellFilter, FollowsARobotBetterThanItsLastReport) {
+TEST(CellFilter, PredictsBetterThanTheLastReport) {
   const Floor floor;
   FloorSettings settings;
   settings.model.mutable_motion()->set_bias_sd_mm_s(0.8);

@@ -14,7 +14,7 @@ struct Point {
   double x, y, heading, left_bias, right_bias, factor, heard, report_s, clock;
   int motion = 0;                                             // 1 straight, 2 left, 3 right
   double until_s = -1, wall_until_s = -1, turn_until_s = -1;  // of the walk, of the avoidance
-  int walk = 0, avoid = 0;  // 0 begin, 1 straight or turning, 2 turning or escaping
+  int walk = 0, avoid = 0;  // 0 start, 1 straight or turning, 2 turning or escaping
   bool avoiding = false;
   double sum = 0, reading = 0, before = 0;
   int readings = 0;
@@ -51,7 +51,7 @@ class Play {
       if (truth_ == Truth::kSlowInCrowds) count_near();
       for (std::size_t i = 0; i < points_.size(); ++i) {
         Point& p = points_[i];
-        hear_rim(p, now_s);
+        hear_boundary(p, now_s);
         p.avoiding ? avoid(p, now_s) : stroll(p, now_s);
         move(p, now_s);
         report(p, now_s, run_.tracks[i]);
@@ -64,7 +64,7 @@ class Play {
  private:
   double uniform() { return std::uniform_real_distribution<>(0, 1)(chance_); }
   double normal() { return std::normal_distribution<>(0, 1)(chance_); }
-  /// Whole seconds of |N(mean, sd)|; the program counts 31 of its ticks for one.
+  /// Whole seconds of |N(mean, sd)|; the program counts 31 ticks per second.
   double seconds(double mean, double sd) { return std::floor(std::abs(mean + sd * normal())) * 31 * 0.032768; }
 
   void stroll(Point& p, double now_s) {
@@ -80,7 +80,7 @@ class Play {
     }
   }
 
-  void hear_rim(Point& p, double now_s) {
+  void hear_boundary(Point& p, double now_s) {
     if (uniform() > 1.5 * kStep_s) return;
     const auto middle = [](double v, double end) {
       return (std::floor(std::clamp(v, 1.0, end - 1) / kCell) + 0.5) * kCell;
@@ -126,7 +126,7 @@ class Play {
     }
   }
 
-  /// Robots are solid: two that overlap give way to each other.
+  /// Robots are solid: overlapping robots are separated.
   void part() {
     for (std::size_t i = 0; i < points_.size(); ++i) {
       for (std::size_t k = 0; k < i; ++k) {
@@ -202,7 +202,7 @@ class Play {
     p.report_s += p.clock;
     for (int column = 0; column < 10; ++column) {
       for (int row = 0; row < 20; ++row) {
-        // One of the four cells of a module listens.
+        // One of the four cells of a module is polled.
         const auto cell = static_cast<int>(4 * uniform()) % 4;
         const double x = (2 * column + cell % 2 + 0.5) * kCell, y = (2 * row + cell / 2 + 0.5) * kCell;
         if (std::abs(x - p.x) > 80 || std::abs(y - p.y) > 80) continue;

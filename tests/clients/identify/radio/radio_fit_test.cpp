@@ -1,4 +1,4 @@
-// Reading measured grids, simulating them, and finding again what they were simulated with.
+// Reading measured grids, simulating them, and recovering the parameters of simulated grids.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,20 +29,20 @@ proto::Radio lone_radio() {
   return radio;
 }
 
-/// Out of each other's range every robot sends what a lone one does: one message in 16 of its 4800 kilo_ticks.
-TEST(GridRun, LoneRobotsSend300) {
+/// Out of range of each other, robots send one message per 16 of their 4800 kilo_ticks.
+TEST(GridRun, IsolatedRobotsSend300) {
   const GridRun run = simulate(grid(4, 0, 500), lone_radio(), 3);
   for (int i = 0; i < 4; ++i) EXPECT_EQ(run.sent(i), 300);
   EXPECT_EQ(run.counts.sum(), 4 * 300);
 }
 
-/// A pause beyond the firmware's own period makes itself felt, one below it does not.
+/// A pause matters only if it exceeds the firmware's own period.
 TEST(GridRun, PausesAfterSuccess) {
   EXPECT_EQ(simulate(grid(4, 0.25, 500), lone_radio(), 3).sent(0), 300);
   EXPECT_LT(simulate(grid(4, 1, 500), lone_radio(), 3).sent(0), 160);
 }
 
-TEST(GridData, ReadsBothFormsAndSkipsCutLines) {
+TEST(GridData, ReadsBothFormsAndSkipsTruncatedLines) {
   const std::filesystem::path directory = std::filesystem::path(::testing::TempDir()) / "grids";
   std::filesystem::create_directories(directory);
   std::ofstream(directory / "comm_tau000_run000.dat") << "0 9 1 2 3\n1 4 9 5 6\n2 7 8 9 1\n3 1 1 1 9\n";
@@ -63,8 +63,8 @@ TEST(GridData, ReadsBothFormsAndSkipsCutLines) {
   EXPECT_THROW(static_cast<void>(read_grids(directory)), UserError);
 }
 
-/// The likelihood of data is greatest under the model that made them.
-TEST(Scores, PreferTheModelThatMadeTheData) {
+/// The likelihood is largest under the generating model.
+TEST(Scores, PreferTheGeneratingModel) {
   proto::Radio near = lone_radio(), far = lone_radio();
   near.set_range_mm(60);
   far.set_range_mm(110);
@@ -74,13 +74,13 @@ TEST(Scores, PreferTheModelThatMadeTheData) {
   EXPECT_GT(log_likelihood(data, same), log_likelihood(data, other) + 1);
   const Errors errors = compare(data, same, same);
   EXPECT_NEAR(errors.sent, 0, 1);
-  EXPECT_LT(errors.near_worst, 0.06);  // of few runs
+  EXPECT_LT(errors.near_worst, 0.06);  // few runs
   EXPECT_EQ(errors.deficit, 0);
 }
 
-/// Margins and one deaf robot are found again. Range and pattern are told apart by their priors alone: on a grid of few bearings
-/// a pattern can make up for the range.
-TEST(LinkFit, FindsWhatItWasMadeWith) {
+/// Margins and one deaf robot are recovered. Range and pattern are identified by their priors only: on a grid with
+/// few bearings they are confounded.
+TEST(LinkFit, RecoversItsParameters) {
   proto::Radio radio;
   radio.set_model(proto::Radio::PROPAGATION);
   radio.set_range_mm(128);
