@@ -97,15 +97,14 @@ void print_results(const IdentifyArguments& arguments, const identify::Identifie
   } else {
     const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
     fmt::print(
-        "error of predictions {:g} s ahead: {:.2f} mm with the base model, {:.2f} mm with the effects, {:.2f} mm "
-        "at "
-        "best\n",
+        "prediction error, horizon {:g} s: {:.2f} mm with the base model, {:.2f} mm with effects; noise floor {:.2f} "
+        "mm\n",
         arguments.horizon_s, number("before"), number("after"), result.at("noise_floor_mm").get<double>());
   }
   for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
   for (const auto& effect : result.at("effects"))
     fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());
-  if (result.at("effects").empty()) fmt::print("no effect found: the base model explains these data\n");
+  if (result.at("effects").empty()) fmt::print("no significant effect: the base model explains these data\n");
 }
 
 int identify_data(const IdentifyArguments& arguments) {

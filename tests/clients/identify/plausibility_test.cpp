@@ -60,7 +60,7 @@ TEST(Plausible, WrongUnitsAreReported) {
   says([](Sample& s) { s.x_mm *= 40, s.y_mm *= 40; }, "not pixels");
   says([](Sample& s) { s.x_mm = 1e300; }, "give mm");
   says([](Sample& s) { s.heading_rad = s.heading_rad * 180 / M_PI + 180; }, "not degrees");
-  says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "told to move");
+  says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "commanded robots drive");
 }
 
 TEST(Plausible, CommandsWithoutRobotsAreReported) {

@@ -75,7 +75,7 @@ TEST(Report, ShowsTheDocument) {
   const std::string page = report_html(full_document());
   EXPECT_TRUE(parses(page));
   for (const char* said :
-       {"how late it is in the run", "the tracker", "16.3 mm", "3.52 mm", "3.38 mm",
+       {"time in the run", "the measurement", "16.3 mm", "3.52 mm", "3.38 mm",
         "Wheels run slower the later it is.", "10<sup>−200</sup>", "Robots 3 and 9 carry each other",
         "Let some rest.", "grain", "id=\"maps\"", "id=\"simulated\"", "wheel base, mm", "83 %"}) {
     EXPECT_NE(page.find(said), std::string::npos) << said;
@@ -97,14 +97,14 @@ TEST(Report, SaysThatThereIsNoEffect) {
   json document = full_document();
   document["contract"]["effects"] = json::array();
   const std::string page = report_html(document);
-  EXPECT_NE(page.find("The base model explains these robots"), std::string::npos);
+  EXPECT_NE(page.find("The base model explains these data"), std::string::npos);
   EXPECT_EQ(page.find("id=\"why\""), std::string::npos);
 }
 
 TEST(Report, SaysThatOnlyTheMeasurementHasEffects) {
   json document = full_document();
   document["contract"]["effects"].erase(0);
-  EXPECT_NE(report_html(document).find("These robots do what the base model says, but"), std::string::npos);
+  EXPECT_NE(report_html(document).find("The base model explains the motion, but"), std::string::npos);
 }
 
 TEST(Report, EscapesMarkupAndCommands) {
