@@ -97,7 +97,8 @@ void print_results(const IdentifyArguments& arguments, const identify::Identifie
   } else {
     const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
     fmt::print(
-        "prediction error, horizon {:g} s: {:.2f} mm with the base model, {:.2f} mm with effects; noise floor {:.2f} "
+        "prediction error, horizon {:g} s: {:.2f} mm with the base model, {:.2f} mm with effects; noise floor "
+        "{:.2f} "
         "mm\n",
         arguments.horizon_s, number("before"), number("after"), result.at("noise_floor_mm").get<double>());
   }

@@ -66,7 +66,7 @@ void demand_known_data(const std::string& option, const fs::path& data) {
         "{} {}: is a file{}; expected a directory that holds {}", option, data.string(),
         data.extension() == ".csv" ? fmt::format(" with the columns \"{}\"", columns_of(data)) : "", kExpected));
   if (identify::has_trajectories(data) || !identify::importable(data).empty() || kilogrid::has_floor_runs(data) ||
-      bristle::has_ridden_runs(data) || has_radio_runs(data))
+      bristle::has_bristle_runs(data) || has_radio_runs(data))
     return;
   if (fs::exists(data / "recording.ktrec", ignored)) {
     throw UserError(

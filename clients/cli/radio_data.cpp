@@ -81,7 +81,6 @@ json table_of_population(const json& population) {
       {"title", "Predictive check: new robots"},
       {"lead",
        "Reception share over distance: measured on held-out runs, and simulated for random swarms of the fitted "
-       "
        "population."},
       {"head", {"set", "distance, mm", "measured", "median swarm", "95 % of swarms"}},
       {"rows", rows}};

@@ -84,7 +84,7 @@ class TrackFilter {
 
   [[nodiscard]] const Belief& belief() const { return belief_; }
   [[nodiscard]] Belief& belief() { return belief_; }
-  /// Forecast measurement, and the trace of its position covariance without tracker noise, mm^2.
+  /// The predicted measurement, and the trace of its position covariance without tracker noise, mm^2.
   [[nodiscard]] Eigen::Vector3d expected(double time_s, const CommandState& commands) const;
   [[nodiscard]] double predicted_variance_mm2(double time_s, const CommandState& commands) const;
 

@@ -69,7 +69,7 @@ std::string cards(const json& contract, const json& document, Figures& figures) 
     const json& evidence = part(effect, "evidence");
     std::string words = text(effect, "in_words");
     if (words.empty()) words = fmt::format("{} depends on {}.", acts_on_of(effect), covariates_of(effect));
-    out += "<article class=\"cause\"><div>";
+    out += "<article class=\"effect\"><div>";
     out += fmt::format("<h3>{}</h3><p>{}</p>", escaped(covariates_of(effect)), escaped(words));
     out += "<dl>";
     const auto fact = [&](const char* name, const std::string& value) {

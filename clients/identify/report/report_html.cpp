@@ -34,7 +34,7 @@ h1 em { font-style: normal; color: var(--after); }
 h2 { font-size: 1.25rem; margin: 2.6rem 0 0.4rem; padding-top: 0.9rem; border-top: 1px solid var(--line); }
 h3 { font-size: 1.05rem; margin: 0 0 0.3rem; }
 a { color: inherit; }
-h3::first-letter, .what::first-letter, .cause p::first-letter { text-transform: uppercase; }
+h3::first-letter, .what::first-letter, .effect p::first-letter { text-transform: uppercase; }
 .kicker { margin: 0; color: var(--faint); font-size: 0.85rem; letter-spacing: 0.03em; }
 .verdict { font-size: 1.1rem; max-width: 50rem; margin: 0 0 1.2rem; }
 .lead { color: var(--faint); max-width: 50rem; margin: 0 0 0.8rem; }
@@ -44,9 +44,9 @@ h3::first-letter, .what::first-letter, .cause p::first-letter { text-transform: 
 .fill { display: block; height: 100%; border-radius: 3px; }
 .fill.before { background: var(--before); } .fill.after { background: var(--after); } .fill.floor { background: #b6c0ca; }
 small { color: var(--faint); font-size: 0.85rem; }
-.cause { display: grid; grid-template-columns: 1fr 460px; gap: 1.5rem; align-items: start; padding: 0.9rem 0; }
-.cause + .cause { border-top: 1px dotted var(--line); }
-.cause p { margin: 0 0 0.6rem; }
+.effect { display: grid; grid-template-columns: 1fr 460px; gap: 1.5rem; align-items: start; padding: 0.9rem 0; }
+.effect + .effect { border-top: 1px dotted var(--line); }
+.effect p { margin: 0 0 0.6rem; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 0.1rem 0.9rem; margin: 0; font-size: 0.92rem; }
 dt { color: var(--faint); } dd { margin: 0; }
 figure { margin: 0 0 1rem; }
@@ -63,13 +63,13 @@ td { border-bottom: 1px solid #eef1f4; padding: 0.3rem 0.8rem 0.3rem 0; vertical
 table.facts thead { display: none; } table.facts td:last-child { text-align: right; padding-right: 0; }
 details summary { cursor: pointer; color: var(--faint); margin: 0.4rem 0; }
 .faults b { text-transform: capitalize; margin-right: 0.3em; }
-@media screen and (max-width: 56rem) { .cause, .grid, .thirds, figure.pair { grid-template-columns: 1fr; } .bar { grid-template-columns: 5.5rem 1fr; } .bar .value { grid-column: 2; } }
+@media screen and (max-width: 56rem) { .effect, .grid, .thirds, figure.pair { grid-template-columns: 1fr; } .bar { grid-template-columns: 5.5rem 1fr; } .bar .value { grid-column: 2; } }
 @page { size: A4; margin: 14mm 13mm; }
 @media print {
   body { padding: 0; max-width: none; font-size: 10pt; }
   h1 { font-size: 16pt; } .verdict { font-size: 11pt; } h2 { font-size: 12.5pt; margin-top: 1.2rem; break-after: avoid; } .lead { break-after: avoid; break-inside: avoid; }
-  .cause { grid-template-columns: 1fr 9cm; } .bar { grid-template-columns: 5rem 1fr 15rem; }
-  figure, .cause, tr, .bars, .thirds > div { break-inside: avoid; }
+  .effect { grid-template-columns: 1fr 9cm; } .bar { grid-template-columns: 5rem 1fr 15rem; }
+  figure, .effect, tr, .bars, .thirds > div { break-inside: avoid; }
   .grid, figure.pair { grid-template-columns: 1fr 1fr; }
   .thirds { grid-template-columns: repeat(3, 1fr); } table { font-size: 8pt; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }

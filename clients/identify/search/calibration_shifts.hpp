@@ -27,7 +27,7 @@ struct CalibrationShift {
 [[nodiscard]] std::optional<CalibrationShift> find_calibration_shift(const Fitter&, const MotionModel&,
                                                                      double least_gain = 0);
 
-/// Adds all calibration shifts to the model as one term of steps, and fits it. ContactPushes of driven robots are left to
+/// Adds all calibration shifts to the model as one term of steps, and fits it. Pushes of driven robots are left to
 /// other hypotheses, and so are displacements that last several frames. Returns the shifts. If there are none, the
 /// model is unchanged.
 std::vector<CalibrationShift> add_calibration_shifts(const Fitter&, MotionModel&, double least_gain = 0);

@@ -1,4 +1,4 @@
-/// Score test of all hypotheses on the innovations of the fitted model. ScoreTest U and information I of the
+/// Score test of all hypotheses on the innovations of the fitted model. Scores U and information I of the
 /// hypotheses' columns are reduced by the model's own columns (linearisation.hpp). For each hypothesis:
 ///   - the statistic U' I^-1 U, with a threshold for the minimal p over all hypotheses. The null distribution follows from
 ///     sign flips of whole clusters, which preserve the dependence within clusters and between hypotheses;
@@ -47,7 +47,6 @@ class ScoreTest {
   static constexpr double kFamilyAlarm = 0.003;
 
  private:
-  struct Beside;  // information and scores reduced by all other columns
   struct Reduced;
   [[nodiscard]] Reduced reduce(const std::vector<Eigen::Index>& columns, int without_term, bool by_cluster) const;
   [[nodiscard]] Finding evidence_of(const Reduced&, const Eigen::VectorXd& scale, double log_choices) const;
