@@ -124,13 +124,13 @@ std::string words_of(const std::string& name) {
   static const std::map<std::string, std::string> kWords = {{"ahead", "residual ahead"},
                                                             {"WHEEL_GAIN", "change of speed"},
                                                             {"WHEEL_OFFSET", "change of speed"},
-                                                            {"TURN_RATE", "turning"},
+                                                            {"TURN_RATE", "turn rate"},
                                                             {"BODY_DRIFT", "drift"},
                                                             {"WORLD_DRIFT", "drift"},
-                                                            {"MEASURED_OFFSET", "measurement error"},
+                                                            {"MEASURED_OFFSET", "offset"},
                                                             {"MEASURED_BODY_OFFSET", "tracked point"},
                                                             {"MEASURED_SCALE", "camera scale"},
-                                                            {"MEASURED_HEADING", "measurement error"},
+                                                            {"MEASURED_HEADING", "heading offset"},
                                                             {"nearest", "distance to the nearest robot"},
                                                             {"bearing", "direction to the nearest robot"},
                                                             {"left", "residual to the left"},
@@ -141,7 +141,7 @@ std::string words_of(const std::string& name) {
                                                             {"radius", "distance from the centre"},
                                                             {"forward", "forward speed"},
                                                             {"sideways", "sideways slip"},
-                                                            {"turn", "turning"},
+                                                            {"turn", "turn rate"},
                                                             {"world_x", "drift along x"},
                                                             {"world_y", "drift along y"},
                                                             {"measured_x", "measured position along x"},
@@ -172,7 +172,7 @@ PlotNumber plot_horizon(Gnuplot& plots, const json& horizon) {
   if (at.size() < 2 || !any_finite(before)) return std::nullopt;
   std::string commands = block("d", {at, before, after, floor});
   commands +=
-      "set xlabel 'predicted so far ahead, s'\nset ylabel 'rms error, mm'\nset xrange [0:*]\nset yrange [0:*]\nset "
+      "set xlabel 'horizon, s'\nset ylabel 'rms error, mm'\nset xrange [0:*]\nset yrange [0:*]\nset "
       "key top left\n";
   commands +=
       "plot $d using 1:2 with linespoints lt 1 title 'before', $d using 1:3 with linespoints lt 2 title 'after'";

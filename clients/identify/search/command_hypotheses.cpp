@@ -135,13 +135,13 @@ void add_discounted_motor_time_hypotheses(DictionaryBuilder& make, const Extent&
     for (const Covariate of : {Covariate::kMotorTime, Covariate::kDrivenTime}) {
       const auto bases = make.put(kSpeed, Basis{{lately(Shape::kCosines, of, f, 3)}});
       for (const Eigen::Index size : {1, 3})
-        make.add(kSpeed, of == Covariate::kMotorTime ? "motor-time-of-late" : "driven-time-of-late",
+        make.add(kSpeed, of == Covariate::kMotorTime ? "discounted-motor-time" : "discounted-driven-time",
                  {"motor_time", "history"}, some(bases, 0, size), kChoices);
     }
     if (!extent.has_turns) continue;
     const auto left = make.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kLeftMotorTime, f, 1)}}),
                right = make.put(Target::kTurn, Basis{{lately(Shape::kLinear, Covariate::kRightMotorTime, f, 1)}});
-    make.add(kTurning, "turns-of-late", {"history"}, {left, right}, kChoices);
+    make.add(kTurning, "discounted-turns", {"history"}, {left, right}, kChoices);
   }
   // Time since the last rest: a battery that sags and recovers at once.
   if (extent.has_stop) {

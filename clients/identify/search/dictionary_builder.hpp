@@ -16,7 +16,7 @@ struct TargetGroup {
   std::vector<std::string> words;  ///< covariates that the target implies
 };
 
-inline const TargetGroup kSpeed{"speed", "wheel speeds", {Target::kGain}, {}};
+inline const TargetGroup kSpeed{"speed", "wheel speed", {Target::kGain}, {}};
 inline const TargetGroup kTurning{"turning", "turn rate", {Target::kTurn}, {}};
 inline const TargetGroup kSlip{"slip", "sideways slip", {Target::kSideways}, {}};
 inline const TargetGroup kWorld{
