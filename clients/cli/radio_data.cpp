@@ -145,7 +145,8 @@ identify::Identified identify_radio_runs(const fs::path& train, const fs::path& 
   const std::string verdict = fmt::format(
       "On held-out runs, the log-likelihood of the counts is {:.2f} nat per pair and run below that of the "
       "training "
-      "runs' means in the ARGoS paper's model, and {:.2f} nat below with all effects. The largest error of the reception "
+      "runs' means in the ARGoS paper's model, and {:.2f} nat below with all effects. The largest error of the "
+      "reception "
       "share is {:.3f} up to 105 mm ({:.3f} before) and {:.3f} beyond 125 mm ({:.3f} before).",
       of(before, "deficit"), of(after, "deficit"), of(after, "near_worst"), of(before, "near_worst"),
       of(after, "far_worst"), of(before, "far_worst"));

@@ -216,7 +216,7 @@ double fit(FloorModel& model, const FloorTarget& target, int rounds, double widt
     // results.
     const FloorStatistics engine = simulated_statistics(target, model.settings(), seed * 7 + 1, kEngineRuns);
     const double here = metric.misfit(engine);
-    progress(fmt::format("misfit {:.0f} by the engine", here));
+    progress(fmt::format("misfit {:.0f} in the engine", here));
     if (here < least) {
       least = here;
       best = model;

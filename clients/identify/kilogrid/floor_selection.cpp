@@ -210,8 +210,8 @@ Selection choose(const FloorModel& model, const std::vector<FloorTerm>& candidat
     if (!score.by_run.empty()) tried += ")";
   }
   progress(fmt::format(
-      "of {:.0f} ({:.0f} by chance, {} numbers, unexplained {:.1f} times) would remove, of what is beyond "
-      "chance (of each run, by the others):{}",
+      "misfit {:.0f} ({:.0f} in simulated sets, {} statistics, unexplained factor {:.1f}); reduction/bound "
+      "(reduction per held-out run):{}",
       choice.misfit, choice.by_chance, choice.numbers, choice.unexplained, tried));
   return choice;
 }

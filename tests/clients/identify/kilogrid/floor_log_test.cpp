@@ -54,7 +54,7 @@ TEST(FloorLog, ImplausibleRobotsAreReportedAndExcluded) {
   EXPECT_TRUE(two.tracks.empty());
   const FloorRun seldom = parse_floor_run(kHeader + still(2, 75, 75, 20), "f.csv");
   ASSERT_EQ(seldom.faults.size(), 1u);
-  EXPECT_EQ(seldom.faults[0].reason, "heard 20 times only");
+  EXPECT_EQ(seldom.faults[0].reason, "only 20 reports");
 }
 
 TEST(FloorLog, ASingleWrongRowIsRemoved) {
@@ -72,7 +72,7 @@ TEST(FloorLog, ErrorsNameFileAndLine) {
             "f.csv:3:7: the row has 3 cells; the header names 4");
   EXPECT_EQ(error_of(kHeader + "0,1,25,25\n1,1,25,nan\n"),
             "f.csv:3:8: y_mm is \"nan\"; give a number");
-  EXPECT_EQ(error_of(kHeader + "5,1,25,25\n4,1,25,25\n"), "f.csv:3:1: time_s is 4; an earlier row is later; sort the rows by time");
+  EXPECT_EQ(error_of(kHeader + "5,1,25,25\n4,1,25,25\n"), "f.csv:3:1: time_s is 4; the previous row is later; sort the rows by time");
   EXPECT_EQ(error_of(kHeader + "5,1,1025,25\n"),
             "f.csv:2:5: x_mm is 1025; on this floor x is within 0..1000 mm");
 }
