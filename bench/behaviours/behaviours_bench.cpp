@@ -9,9 +9,10 @@
 #include <filesystem>
 #include <string>
 
+#include "core/os/files.hpp"
+#include "idl/manifest.pb.h"
 #include "services/behaviours/compiler.hpp"
 #include "services/behaviours/engine.hpp"
-#include "core/os/files.hpp"
 
 namespace {
 
@@ -77,7 +78,7 @@ void measure(const Case& one, std::uint32_t robots, int rounds, const fs::path& 
     manifest.add_heading_rad(0);
   }
   const RunPlan plan(manifest);
-  BehavioursEngine engine(plan, HostId{0}, ProgramSet::load(plan.manifest, folder));
+  BehavioursEngine engine(plan, HostId{0}, ProgramSet::load(plan, folder));
   Tick tick;
   for (; tick.count() < 3; ++tick) engine.step(tick, air(tick, robots, true));
   constexpr int kTicks = 30;

@@ -21,7 +21,7 @@ void light(benchmark::State& state) {
   BodyFrame frame;
   for (std::uint32_t robot = 0; robot < kRobots; ++robot) {
     const Pose pose = plan.initial_pose(robot);
-    frame.add(robot, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
+    frame.add(robot, pose.x_mm, pose.y_mm, pose.heading_rad);
   }
   const BodyFrame* const frames[] = {&frame};
   for (auto _ : state) {

@@ -51,16 +51,16 @@ proto::RobotModel model_of(std::uint32_t robot, const RobotParameters& parameter
 std::uint32_t export_model(const proto::Manifest& manifest, const std::filesystem::path& file) {
   const RunPlan plan(manifest);
   proto::Model model;
-  *model.mutable_motion() = plan.experiment().motion();
+  *model.mutable_motion() = manifest.experiment().motion();
   write_defaults(*model.mutable_motion());
-  if (plan.experiment().radio().model() == proto::Radio::PROPAGATION) {
-    *model.mutable_propagation() = plan.experiment().radio().propagation();
+  if (manifest.experiment().radio().model() == proto::Radio::PROPAGATION) {
+    *model.mutable_propagation() = manifest.experiment().radio().propagation();
     write_defaults(*model.mutable_propagation());
   }
-  *model.mutable_effect() = plan.experiment().effect();
-  *model.mutable_field() = plan.experiment().field();
+  *model.mutable_effect() = manifest.experiment().effect();
+  *model.mutable_field() = manifest.experiment().field();
   std::string text = fmt::format("# The model of {}, seed {}, with the parameters of its robots.\n",
-                                 plan.experiment().name(), plan.seed());
+                                 plan.experiment_name(), plan.seed());
   std::string blocks;
   google::protobuf::TextFormat::PrintToString(model, &blocks);
   text += blocks;
@@ -70,7 +70,7 @@ std::uint32_t export_model(const proto::Manifest& manifest, const std::filesyste
   line.SetSingleLineMode(true);
   const RobotParameters parameters(plan);
   std::vector<proto::RobotModel> stated(plan.robots());
-  for (const proto::RobotModel& robot : plan.experiment().robot_model()) {
+  for (const proto::RobotModel& robot : manifest.experiment().robot_model()) {
     if (robot.robot() < plan.robots()) stated[robot.robot()] = robot;
   }
   std::uint32_t robots = 0;

@@ -267,7 +267,7 @@ class Launcher {
 }  // namespace
 
 int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options) {
-  proto::Manifest manifest = plan.manifest;
+  proto::Manifest manifest = plan.manifest();
   for (;;) {
     const RunPlan attempt(manifest);
     std::optional<behaviours::Culprit> culprit;

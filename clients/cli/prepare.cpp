@@ -18,9 +18,10 @@
 #include "core/experiment/layout.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/surroundings.hpp"
-#include "core/experiment/validate.hpp"
+#include "core/experiment/field_checks.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/os/files.hpp"
+#include "core/plan/from_manifest.hpp"
 #include "core/plan/plan.hpp"
 #include "services/behaviours/compiler.hpp"
 #include "services/behaviours/sha256.hpp"
@@ -140,7 +141,7 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
     if (program == kNoProgram) continue;
     text += fmt::format("# robots[{}] run {}\n", g, group.behaviour(0));
     group.clear_behaviour();
-    const fs::path object = directory.program(manifest.program(static_cast<int>(program)));
+    const fs::path object = directory.program(settings_of(manifest.program(static_cast<int>(program))));
     group.add_behaviour(object.lexically_relative(directory.path()).string());
   }
   for (int i = 0; i < experiment.light().image_size(); ++i) {
@@ -254,7 +255,7 @@ Prepared prepare(const RunArguments& arguments) {
                                recorder::RunDirectory::default_path(experiment.name(), experiment.seed()), inputs);
   try {
     for (int i = 0; i < manifest.program_size(); ++i) {
-      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(manifest.program(i)),
+      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(settings_of(manifest.program(i))),
                     fs::copy_options::overwrite_existing);
     }
     copy_sources(loaded, directory.programs());
@@ -276,7 +277,7 @@ Prepared prepare(const RunArguments& arguments) {
 proto::Manifest read_manifest(const recorder::RunDirectory& directory) {
   proto::Manifest manifest = directory.read_manifest();
   const std::string file = directory.manifest().string();
-  validate_values({manifest.experiment(), file, SourceLocations(file)});
+  check_values({manifest.experiment(), file, SourceLocations(file)});
   const auto require = [&](bool right, std::string_view what) {
     if (!right) throw UserError(fmt::format("{}: {}; prepare the run again", file, what));
   };

@@ -116,9 +116,9 @@ Beginning beginning_of(const RunPlan& plan, const recorder::RunDirectory& direct
   Beginning beginning;
   const fs::path place = place_of(directory);
   if (is_complete(place))
-    beginning.resumed = read_checkpoint(place, plan.manifest);
-  else if (plan.manifest.resumed())
-    beginning.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);
+    beginning.resumed = read_checkpoint(place, plan.manifest());
+  else if (plan.resumed)
+    beginning.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest());
   const fs::path recording = earlier_recording(directory);
   if (recording.empty()) return beginning;
   const Tick first = beginning.resumed ? beginning.resumed->tick : Tick{0};

@@ -162,7 +162,7 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   recorder::Reader reader(directory.recording());
   const Recorded recorded = read_recorded(reader);
   const RunPlan plan(read_manifest(directory));
-  if (reader.header().robots() != plan.robots() || reader.header().tick_cycles() != plan.experiment().tick_cycles() ||
+  if (reader.header().robots() != plan.robots() || reader.header().tick_cycles() != plan.tick_length.cycles() ||
       reader.header().movable_size() != static_cast<int>(plan.movables())) {
     throw RunError(fmt::format("{}: of another experiment than {}", reader.path().string(),
                                directory.manifest().string()));
@@ -176,13 +176,13 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   }
 
   local::LocalOptions options;
-  if (plan.manifest.resumed()) options.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest);
+  if (plan.resumed) options.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest());
   options.inputs = inputs_of_replay(recorded);
   options.save_checkpoints = false;
   options.run_directory = directory.path();
 
   catch_interrupts();
-  const auto programs = behaviours::ProgramSet::load(plan.manifest, directory.path());
+  const auto programs = behaviours::ProgramSet::load(plan, directory.path());
   ProgressBar progress(plan, !quiet);
   Verifier verifier(plan, recorded, directory.recording(), progress);
   const RunTotals totals = local::run(plan, programs, options, verifier);

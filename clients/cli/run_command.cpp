@@ -59,7 +59,7 @@ void run_in_this_process(const RunPlan& plan, const recorder::RunDirectory& dire
   Beginning beginning = beginning_of(plan, directory);
   options.resumed = std::move(beginning.resumed);
   options.inputs = std::move(beginning.inputs);
-  const auto programs = behaviours::ProgramSet::load(plan.manifest, directory.path());
+  const auto programs = behaviours::ProgramSet::load(plan, directory.path());
   ProgressBar progress(plan, !quiet);
   RunRecorder run_recorder(plan, directory, options.resumed, [&](const RunProgress& now) { progress.show(now); });
   const RunTotals totals = local::run(plan, programs, options, run_recorder);

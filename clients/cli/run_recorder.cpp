@@ -14,10 +14,10 @@ proto::RecordingHeader header_of(const RunPlan& plan, const recorder::RunDirecto
                                  const std::optional<Checkpoint>& resumed) {
   if (const auto earlier = earlier_recording(directory); !earlier.empty()) {
     const recorder::Reader reader(earlier);
-    return recorder::recording_header(plan.manifest, Tick{reader.header().first_tick()},
+    return recorder::recording_header(plan.manifest(), Tick{reader.header().first_tick()},
                                       reader.header().first_hash());
   }
-  return recorder::recording_header(plan.manifest, resumed ? resumed->tick : Tick{0},
+  return recorder::recording_header(plan.manifest(), resumed ? resumed->tick : Tick{0},
                                     resumed ? resumed->hash_chain() : 0);
 }
 
@@ -29,7 +29,7 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       directory_(directory),
       header_(header_of(plan, directory, resumed)),
       writer_(directory.recording(), header_),
-      when_(plan.tick_length, plan.experiment().recording().every_s()),
+      when_(plan.tick_length, plan.recording_settings().every_s),
       on_idle_(std::move(on_idle)),
       state_(plan) {
   if (const auto earlier = earlier_recording(directory); !earlier.empty())
@@ -99,7 +99,7 @@ void RunRecorder::idle(const RunProgress& progress) {
 }
 
 recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
-  if (plan_.experiment().recording().messages()) {
+  if (plan_.recording_settings().messages) {
     proto::MessagesRecord messages;
     for (const PairCount& pair : totals.pairs) {
       messages.add_receiver(pair.receiver);
@@ -123,9 +123,9 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   writer_.end(std::max(totals.last, totals.first), totals.state_hash, totals.failure);
 
   recorder::Summary summary;
-  summary.name = plan_.experiment().name();
+  summary.name = plan_.experiment_name();
   summary.seed = plan_.seed();
-  summary.mode = plan_.manifest.mode();
+  summary.mode = plan_.mode;
   summary.partition_columns = plan_.grid.columns();
   summary.partition_rows = plan_.grid.rows();
   summary.hosts = plan_.hosts;
@@ -142,7 +142,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
   for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
   summary.robots_failed = totals.robots_failed;
-  summary.recoveries = static_cast<std::uint32_t>(plan_.manifest.program_failure_size());
+  summary.recoveries = static_cast<std::uint32_t>(plan_.program_failures().size());
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
   const double steps =
       static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());

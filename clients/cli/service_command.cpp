@@ -81,7 +81,7 @@ void run_station(const RunPlan& plan, const ServiceContext& context, const recor
 /// From now on every line of this process goes to the federate's log.
 void begin_log(const RunPlan& plan, FederateId self, const dds::Transport& transport) {
   log_as(plan.name(self));
-  say(fmt::format("starts: run {}, seed {}, domain {}", plan.experiment().name(), plan.seed(), transport.domain));
+  say(fmt::format("starts: run {}, seed {}, domain {}", plan.experiment_name(), plan.seed(), transport.domain));
 }
 
 int serve(const ServiceArguments& arguments) {

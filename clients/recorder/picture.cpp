@@ -18,6 +18,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
+#include "core/plan/from_manifest.hpp"
 #include "core/plan/world.hpp"
 #include "core/senses/light_source.hpp"
 
@@ -224,7 +225,7 @@ std::string draw_lamps(const proto::Light& light, double time_s, const View& vie
   constexpr double kRadius = 55, kRay = 100;
   std::string out;
   for (const proto::LightSource& source : light.source()) {
-    const senses::Lamp lamp = senses::lamp_at(source, time_s);
+    const senses::Lamp lamp = senses::lamp_at(settings_of(source), time_s);
     const auto x = static_cast<double>(view.x(lamp.x_mm)), y = static_cast<double>(view.y(lamp.y_mm));
     std::string rays;
     for (int i = 0; i < 8; ++i) {

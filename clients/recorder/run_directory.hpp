@@ -43,9 +43,7 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path manifest() const { return directory_ / "manifest.pb"; }
   [[nodiscard]] std::filesystem::path experiment() const { return directory_ / "experiment.txtpb"; }
   [[nodiscard]] std::filesystem::path programs() const { return directory_ / "programs"; }
-  [[nodiscard]] std::filesystem::path program(const proto::Program& program) const {
-    return programs() / program_file(program);
-  }
+  [[nodiscard]] std::filesystem::path program(const Program& program) const { return programs() / program.file(); }
   [[nodiscard]] std::filesystem::path provenance() const { return directory_ / "provenance.json"; }
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }

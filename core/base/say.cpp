@@ -47,4 +47,16 @@ std::string_view error_text(std::string_view line) {
   return level == "error" ? rest : std::string_view();
 }
 
+std::string one_line(std::string_view text, std::size_t longest) {
+  std::string line{text};
+  if (line.size() > longest) {
+    line = text.substr(0, longest / 2);
+    line.append("...").append(text.substr(text.size() - longest / 2));
+  }
+  for (char& c : line) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  }
+  return line;
+}
+
 }  // namespace kilotwin

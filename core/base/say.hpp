@@ -2,6 +2,7 @@
 /// level.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -20,5 +21,8 @@ void log_as(const std::string& federate);
 /// The text of an error line of a log; nothing for its other lines. A line without a stamp is taken as it is: the process wrote
 /// it before it was a service, or in a crash.
 [[nodiscard]] std::string_view error_text(std::string_view line);
+
+/// `text` made fit for one line of a terminal: control characters as '?', the middle of what is overlong cut out.
+[[nodiscard]] std::string one_line(std::string_view text, std::size_t longest = 4096);
 
 }  // namespace kilotwin

@@ -5,10 +5,11 @@
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/math/elementary.h"
+#include "idl/checkpoint.pb.h"
 
 namespace kilotwin {
 
-using proto::ArenaField;
+using Counts = ArenaFieldSettings::Counts;
 
 namespace {
 
@@ -21,18 +22,18 @@ std::uint32_t clamped_cell(double cells, std::uint32_t count) {
 
 ArenaFields::ArenaFields(const RunPlan& plan, PartitionId partition, double reach_mm)
     : plan_(plan), partition_(partition) {
-  const proto::Experiment& experiment = plan.experiment();
+  const double width_mm = plan.world.arena.stated_width_mm(), height_mm = plan.world.arena.stated_height_mm();
   const Rectangle& rectangle = plan.grid.rectangle(partition);
-  for (int i = 0; i < experiment.field_size(); ++i) {
-    const ArenaField& given = experiment.field(i);
+  for (std::uint32_t i = 0; i < plan.fields().size(); ++i) {
+    const ArenaFieldSettings& given = plan.fields()[i];
     Field field{};
-    field.counts = given.counts();
-    field.cells_per_mm = 1 / given.cell_mm();
-    field.x0_mm = -experiment.arena().width_mm() / 2;
-    field.y0_mm = -experiment.arena().height_mm() / 2;
-    field.forget_ticks = given.forget_s() / plan.tick_length.seconds();
-    field.columns = static_cast<std::uint32_t>(experiment.arena().width_mm() * field.cells_per_mm) + 1;
-    field.rows = static_cast<std::uint32_t>(experiment.arena().height_mm() * field.cells_per_mm) + 1;
+    field.counts = given.counts;
+    field.cells_per_mm = 1 / given.cell_mm;
+    field.x0_mm = -width_mm / 2;
+    field.y0_mm = -height_mm / 2;
+    field.forget_ticks = given.forget_s / plan.tick_length.seconds();
+    field.columns = static_cast<std::uint32_t>(width_mm * field.cells_per_mm) + 1;
+    field.rows = static_cast<std::uint32_t>(height_mm * field.cells_per_mm) + 1;
     const auto column = [&](double x_mm) {
       return clamped_cell((x_mm - field.x0_mm) * field.cells_per_mm, field.columns);
     };
@@ -44,15 +45,14 @@ ArenaFields::ArenaFields(const RunPlan& plan, PartitionId partition, double reac
     field.width = column(rectangle.x_max_mm + reach_mm) - field.first_column + 1;
     field.height = row(rectangle.y_max_mm + reach_mm) - field.first_row + 1;
     field.cells.resize(std::size_t{field.width} * field.height);
-    if (field.counts == ArenaField::VISITS)
-      field.slot = plan.memory.index_of({MemorySlot::Kind::kFieldCell, 0, static_cast<std::uint32_t>(i)});
+    if (field.counts == Counts::kVisits) field.slot = plan.memory.index_of({MemorySlot::Kind::kFieldCell, 0, i});
     fields_.push_back(std::move(field));
   }
 }
 
 double ArenaFields::margin_mm(const RunPlan& plan) {
   double widest_mm = 0;
-  for (const ArenaField& field : plan.experiment().field()) widest_mm = std::max(widest_mm, field.cell_mm());
+  for (const ArenaFieldSettings& field : plan.fields()) widest_mm = std::max(widest_mm, field.cell_mm);
   return 1.5 * widest_mm;  // more than a cell's diagonal
 }
 
@@ -97,11 +97,11 @@ void ArenaFields::count(Tick now, const RobotColumns& robots, std::span<double> 
   for (std::uint32_t f = 0; f < fields_.size(); ++f) {
     Field& field = fields_[f];
     for (std::size_t i = 0; i < robots.size(); ++i) {
-      if (field.counts != ArenaField::PRESENT_TIME && robots.tracked[i] != 0) continue;
-      if (field.counts == ArenaField::DRIVEN_TIME && !robots.duties[i].any()) continue;
+      if (field.counts != Counts::kPresentTime && robots.tracked[i] != 0) continue;
+      if (field.counts == Counts::kDrivenTime && !robots.duties[i].any()) continue;
       const std::uint32_t number = cell_of(field, robots.x_mm[i], robots.y_mm[i]);
       double amount = plan_.tick_length.seconds();
-      if (field.counts == ArenaField::VISITS) {
+      if (field.counts == Counts::kVisits) {
         double& last = memory[i * stride + field.slot];
         if (last == number) continue;
         last = number;

@@ -10,9 +10,13 @@
 #include <vector>
 
 #include "core/effects/robots.hpp"
-#include "idl/checkpoint.pb.h"
+#include "core/plan/effect_settings.hpp"
 
 namespace kilotwin {
+
+namespace proto {
+class PhysicsState;
+}
 
 class ArenaFields {
  public:
@@ -43,7 +47,7 @@ class ArenaFields {
     std::int64_t tick = 0;  ///< for which the value holds; later ones forget
   };
   struct Field {
-    proto::ArenaField::Counts counts;
+    ArenaFieldSettings::Counts counts;
     double cells_per_mm, x0_mm, y0_mm;
     double forget_ticks;                                   ///< 0: never
     std::uint32_t columns, rows;                           ///< of the arena

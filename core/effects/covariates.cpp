@@ -7,33 +7,30 @@
 
 namespace kilotwin {
 
-using proto::Function;
 using Kind = MemorySlot::Kind;
 
 namespace {
 
 /// The slot of memory that a covariate is read from, if any.
-std::optional<MemorySlot> slot_of(Function::Covariate covariate, double forget_s) {
+std::optional<MemorySlot> slot_of(Covariate covariate, double forget_s) {
   switch (covariate) {
-    case Function::TIME_SINCE_COMMAND: return MemorySlot{Kind::kTimeSinceCommand};
-    case Function::LEFT_MOTOR_TIME: return MemorySlot{Kind::kLeftMotorTime, forget_s};
-    case Function::RIGHT_MOTOR_TIME: return MemorySlot{Kind::kRightMotorTime, forget_s};
-    case Function::DRIVEN_TIME: return MemorySlot{Kind::kDrivenTime, forget_s};
-    case Function::PREVIOUS_FORWARD: return MemorySlot{Kind::kPreviousForward};
-    case Function::PREVIOUS_SIDEWAYS: return MemorySlot{Kind::kPreviousSideways};
-    case Function::PREVIOUS_TURN: return MemorySlot{Kind::kPreviousTurn};
-    case Function::PREVIOUS_COMMAND: return MemorySlot{Kind::kPreviousCommand};
-    case Function::LAST_TURN: return MemorySlot{Kind::kLastTurn};
-    case Function::PREVIOUS_LASTED: return MemorySlot{Kind::kPreviousLasted};
-    case Function::SINCE_REST: return MemorySlot{Kind::kSinceRest};
+    case Covariate::kTimeSinceCommand: return MemorySlot{Kind::kTimeSinceCommand};
+    case Covariate::kLeftMotorTime: return MemorySlot{Kind::kLeftMotorTime, forget_s};
+    case Covariate::kRightMotorTime: return MemorySlot{Kind::kRightMotorTime, forget_s};
+    case Covariate::kDrivenTime: return MemorySlot{Kind::kDrivenTime, forget_s};
+    case Covariate::kPreviousForward: return MemorySlot{Kind::kPreviousForward};
+    case Covariate::kPreviousSideways: return MemorySlot{Kind::kPreviousSideways};
+    case Covariate::kPreviousTurn: return MemorySlot{Kind::kPreviousTurn};
+    case Covariate::kPreviousCommand: return MemorySlot{Kind::kPreviousCommand};
+    case Covariate::kLastTurn: return MemorySlot{Kind::kLastTurn};
+    case Covariate::kPreviousLasted: return MemorySlot{Kind::kPreviousLasted};
+    case Covariate::kSinceRest: return MemorySlot{Kind::kSinceRest};
     default: return std::nullopt;
   }
 }
 
 /// Whether neighbours are added up.
-bool is_sum(Function::Covariate covariate) {
-  return covariate == Function::NEIGHBOURS || covariate == Function::DENSITY;
-}
+bool is_sum(Covariate covariate) { return covariate == Covariate::kNeighbours || covariate == Covariate::kDensity; }
 
 /// What of a robot counts whose direction is off by an angle of that cosine.
 double focused(double cosine, std::uint32_t focus) {
@@ -45,36 +42,35 @@ double focused(double cosine, std::uint32_t focus) {
 
 }  // namespace
 
-Function::Covariate of_wheel(Function::Covariate covariate, std::uint32_t wheel) {
-  if (covariate == Function::DUTY) return wheel == 0 ? Function::RIGHT_DUTY : Function::LEFT_DUTY;
-  if (covariate == Function::MOTOR_TIME) return wheel == 0 ? Function::RIGHT_MOTOR_TIME : Function::LEFT_MOTOR_TIME;
+Covariate of_wheel(Covariate covariate, std::uint32_t wheel) {
+  if (covariate == Covariate::kDuty) return wheel == 0 ? Covariate::kRightDuty : Covariate::kLeftDuty;
+  if (covariate == Covariate::kMotorTime)
+    return wheel == 0 ? Covariate::kRightMotorTime : Covariate::kLeftMotorTime;
   return covariate;
 }
 
 Covariates::Covariates(const RunPlan& plan) : plan_(plan) {}
 
-std::uint32_t Covariates::need(Covariate covariate, const Function& function) {
+std::uint32_t Covariates::need(Covariate covariate, const FunctionSettings& function) {
   Column column{covariate, 0, 0, 0, 0, 0, 0, {}};
   if (is_of_neighbours(covariate)) {
-    column.radius_mm = function.radius_mm();
-    if (is_sum(covariate) && function.focus() > 0) {
-      column.focus = function.focus();
-      column.toward_rad = function.toward_deg() * (kPi / 180);
+    column.radius_mm = function.radius_mm;
+    if (is_sum(covariate) && function.focus > 0) {
+      column.focus = function.focus;
+      column.toward_rad = function.toward_deg * (kPi / 180);
     }
     if (column.radius_mm > radius_mm_) {
       radius_mm_ = column.radius_mm;
       cells_.emplace(radius_mm_);
     }
   }
-  if (covariate == Function::PLACE) {
-    const auto& fields = plan_.experiment().field();
-    while (column.field < static_cast<std::uint32_t>(fields.size()) &&
-           fields[static_cast<int>(column.field)].name() != function.field())
-      ++column.field;
-    KILOTWIN_DEMAND(column.field < static_cast<std::uint32_t>(fields.size()));
+  if (covariate == Covariate::kPlace) {
+    const std::vector<ArenaFieldSettings>& fields = plan_.fields();
+    while (column.field < fields.size() && fields[column.field].name != function.field) ++column.field;
+    KILOTWIN_DEMAND(column.field < fields.size());
   }
-  if (covariate >= Function::LEFT_MOTOR_TIME && covariate <= Function::DRIVEN_TIME)
-    column.forget_s = function.forget_s();
+  if (covariate >= Covariate::kLeftMotorTime && covariate <= Covariate::kDrivenTime)
+    column.forget_s = function.forget_s;
   if (const auto slot = slot_of(covariate, column.forget_s)) column.slot = plan_.memory.index_of(*slot);
   for (std::uint32_t i = 0; i < columns_.size(); ++i) {
     const Column& known = columns_[i];
@@ -89,42 +85,42 @@ std::uint32_t Covariates::need(Covariate covariate, const Function& function) {
 
 Range Covariates::range(std::uint32_t index) const {
   const Column& column = columns_[index];
-  const proto::Experiment& e = plan_.experiment();
-  const double x_mm = e.arena().width_mm() / 2, y_mm = e.arena().height_mm() / 2;
+  const double x_mm = plan_.world.arena.stated_width_mm() / 2, y_mm = plan_.world.arena.stated_height_mm() / 2;
+  const double duration_s = plan_.duration_s;
   const double most_neighbours =
       (column.radius_mm / kRobotRadius_mm + 1) * (column.radius_mm / kRobotRadius_mm + 1);
   constexpr double kFast_mm_s = 200, kFast_rad_s = 20;  // beyond what the limits of models allow
   switch (column.covariate) {
-    case Function::TIME:
-    case Function::TIME_SINCE_COMMAND:
-    case Function::LEFT_MOTOR_TIME:
-    case Function::RIGHT_MOTOR_TIME:
-    case Function::DRIVEN_TIME:
-    case Function::PREVIOUS_LASTED:
-    case Function::SINCE_REST: return {0, e.duration_s()};
-    case Function::MOTOR_TIME_DIFFERENCE: return {-e.duration_s(), e.duration_s()};
-    case Function::X: return {-x_mm, x_mm};
-    case Function::Y: return {-y_mm, y_mm};
-    case Function::RADIUS: return {0, __builtin_sqrt(x_mm * x_mm + y_mm * y_mm)};
-    case Function::HEADING:
-    case Function::NEAREST_BEARING: return {-kPi, kPi};
-    case Function::COMMAND:
-    case Function::PREVIOUS_COMMAND:
-    case Function::LAST_TURN: return {0, 3};
-    case Function::LEFT_DUTY:
-    case Function::RIGHT_DUTY: return {0, 255};
-    case Function::NEIGHBOURS:
-    case Function::DENSITY: return {0, std::min(most_neighbours, static_cast<double>(plan_.robots()))};
-    case Function::NEAREST: return {0, column.radius_mm};
-    case Function::ROBOT: return {0, static_cast<double>(plan_.robots())};
-    case Function::RUN: return {static_cast<double>(e.run_number()), static_cast<double>(e.run_number())};
-    case Function::PLACE: return {0, e.duration_s() * plan_.robots() / plan_.tick_length.seconds()};
-    case Function::PREVIOUS_FORWARD:
-    case Function::PREVIOUS_SIDEWAYS: return {-kFast_mm_s, kFast_mm_s};
-    case Function::PREVIOUS_TURN: return {-kFast_rad_s, kFast_rad_s};
-    case Function::NOTHING:
-    case Function::DUTY:
-    case Function::MOTOR_TIME: break;
+    case Covariate::kTime:
+    case Covariate::kTimeSinceCommand:
+    case Covariate::kLeftMotorTime:
+    case Covariate::kRightMotorTime:
+    case Covariate::kDrivenTime:
+    case Covariate::kPreviousLasted:
+    case Covariate::kSinceRest: return {0, duration_s};
+    case Covariate::kMotorTimeDifference: return {-duration_s, duration_s};
+    case Covariate::kX: return {-x_mm, x_mm};
+    case Covariate::kY: return {-y_mm, y_mm};
+    case Covariate::kRadius: return {0, __builtin_sqrt(x_mm * x_mm + y_mm * y_mm)};
+    case Covariate::kHeading:
+    case Covariate::kNearestBearing: return {-kPi, kPi};
+    case Covariate::kCommand:
+    case Covariate::kPreviousCommand:
+    case Covariate::kLastTurn: return {0, 3};
+    case Covariate::kLeftDuty:
+    case Covariate::kRightDuty: return {0, 255};
+    case Covariate::kNeighbours:
+    case Covariate::kDensity: return {0, std::min(most_neighbours, static_cast<double>(plan_.robots()))};
+    case Covariate::kNearest: return {0, column.radius_mm};
+    case Covariate::kRobot: return {0, static_cast<double>(plan_.robots())};
+    case Covariate::kRun: return {static_cast<double>(plan_.run_number()), static_cast<double>(plan_.run_number())};
+    case Covariate::kPlace: return {0, duration_s * plan_.robots() / plan_.tick_length.seconds()};
+    case Covariate::kPreviousForward:
+    case Covariate::kPreviousSideways: return {-kFast_mm_s, kFast_mm_s};
+    case Covariate::kPreviousTurn: return {-kFast_rad_s, kFast_rad_s};
+    case Covariate::kNothing:
+    case Covariate::kDuty:
+    case Covariate::kMotorTime: break;
   }
   return {0, 0};
 }
@@ -132,8 +128,7 @@ Range Covariates::range(std::uint32_t index) const {
 void Covariates::fill(Tick now, const RobotColumns& robots, std::span<const std::uint32_t> who,
                       const ArenaFields* fields) {
   command_bits_.resize(who.size());
-  for (std::size_t i = 0; i < who.size(); ++i)
-    command_bits_[i] = static_cast<std::uint8_t>(1u << command_of(robots.duties[who[i]]));
+  for (std::size_t i = 0; i < who.size(); ++i) command_bits_[i] = bit_of(command_of(robots.duties[who[i]]));
   for (Column& column : columns_) {
     column.values.resize(who.size());
     fill(column, now, robots, who, fields);
@@ -150,26 +145,27 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
   };
   const auto remembered = [&] { each([&](std::size_t r) { return robots.memory[r * stride + column.slot]; }); };
   switch (column.covariate) {
-    case Function::TIME: return each([time_s = plan_.tick_length.seconds_at(now)](std::size_t) { return time_s; });
-    case Function::X: return each([&](std::size_t r) { return robots.x_mm[r]; });
-    case Function::Y: return each([&](std::size_t r) { return robots.y_mm[r]; });
-    case Function::RADIUS:
+    case Covariate::kTime:
+      return each([time_s = plan_.tick_length.seconds_at(now)](std::size_t) { return time_s; });
+    case Covariate::kX: return each([&](std::size_t r) { return robots.x_mm[r]; });
+    case Covariate::kY: return each([&](std::size_t r) { return robots.y_mm[r]; });
+    case Covariate::kRadius:
       return each([&](std::size_t r) {
         return __builtin_sqrt(robots.x_mm[r] * robots.x_mm[r] + robots.y_mm[r] * robots.y_mm[r]);
       });
-    case Function::HEADING: return each([&](std::size_t r) { return robots.heading_rad[r]; });
-    case Function::COMMAND:
+    case Covariate::kHeading: return each([&](std::size_t r) { return robots.heading_rad[r]; });
+    case Covariate::kCommand:
       return each([&](std::size_t r) { return static_cast<double>(command_of(robots.duties[r])); });
-    case Function::LEFT_DUTY: return each([&](std::size_t r) { return double{1} * robots.duties[r].left; });
-    case Function::RIGHT_DUTY: return each([&](std::size_t r) { return double{1} * robots.duties[r].right; });
-    case Function::TIME_SINCE_COMMAND: {
+    case Covariate::kLeftDuty: return each([&](std::size_t r) { return double{1} * robots.duties[r].left; });
+    case Covariate::kRightDuty: return each([&](std::size_t r) { return double{1} * robots.duties[r].right; });
+    case Covariate::kTimeSinceCommand: {
       const std::uint32_t command = plan_.memory.index_of({Kind::kCommand});
       return each([&](std::size_t r) {
         const double* const memory = robots.memory.data() + r * stride;
         return memory[command] == static_cast<double>(command_of(robots.duties[r])) ? memory[column.slot] : 0.0;
       });
     }
-    case Function::PREVIOUS_COMMAND: {
+    case Covariate::kPreviousCommand: {
       const std::uint32_t command = plan_.memory.index_of({Kind::kCommand});
       return each([&](std::size_t r) {
         const double* const memory = robots.memory.data() + r * stride;
@@ -177,7 +173,7 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
                                                                                     : memory[command];
       });
     }
-    case Function::PREVIOUS_LASTED: {
+    case Covariate::kPreviousLasted: {
       const std::uint32_t command = plan_.memory.index_of({Kind::kCommand}),
                           time = plan_.memory.index_of({Kind::kTimeSinceCommand});
       return each([&](std::size_t r) {
@@ -186,10 +182,10 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
                                                                                     : memory[time];
       });
     }
-    case Function::SINCE_REST:
+    case Covariate::kSinceRest:
       return each(
           [&](std::size_t r) { return robots.duties[r].any() ? robots.memory[r * stride + column.slot] : 0.0; });
-    case Function::MOTOR_TIME_DIFFERENCE: {
+    case Covariate::kMotorTimeDifference: {
       const std::uint32_t left = plan_.memory.index_of({Kind::kLeftMotorTime}),
                           right = plan_.memory.index_of({Kind::kRightMotorTime});
       return each([&](std::size_t r) {
@@ -197,30 +193,29 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
         return memory[left] - memory[right];
       });
     }
-    case Function::LAST_TURN:
+    case Covariate::kLastTurn:
       return each([&](std::size_t r) {
-        const proto::Command command = command_of(robots.duties[r]);
+        const MotionCommand command = command_of(robots.duties[r]);
         return is_turn(command) ? static_cast<double>(command) : robots.memory[r * stride + column.slot];
       });
-    case Function::LEFT_MOTOR_TIME:
-    case Function::RIGHT_MOTOR_TIME:
-    case Function::DRIVEN_TIME:
-    case Function::PREVIOUS_FORWARD:
-    case Function::PREVIOUS_SIDEWAYS:
-    case Function::PREVIOUS_TURN: return remembered();
-    case Function::ROBOT: return each([&](std::size_t r) { return static_cast<double>(robots.robot[r]); });
-    case Function::RUN:
-      return each([run = static_cast<double>(plan_.experiment().run_number())](std::size_t) { return run; });
-    case Function::PLACE:
+    case Covariate::kLeftMotorTime:
+    case Covariate::kRightMotorTime:
+    case Covariate::kDrivenTime:
+    case Covariate::kPreviousForward:
+    case Covariate::kPreviousSideways:
+    case Covariate::kPreviousTurn: return remembered();
+    case Covariate::kRobot: return each([&](std::size_t r) { return static_cast<double>(robots.robot[r]); });
+    case Covariate::kRun: return each([run = static_cast<double>(plan_.run_number())](std::size_t) { return run; });
+    case Covariate::kPlace:
       KILOTWIN_DEMAND(fields != nullptr);
       return each([&](std::size_t r) { return fields->value(column.field, robots.x_mm[r], robots.y_mm[r], now); });
-    case Function::NEIGHBOURS:
-    case Function::NEAREST:
-    case Function::DENSITY:
-    case Function::NEAREST_BEARING:  // fill_neighbours
-    case Function::NOTHING:
-    case Function::DUTY:
-    case Function::MOTOR_TIME: return;
+    case Covariate::kNeighbours:
+    case Covariate::kNearest:
+    case Covariate::kDensity:
+    case Covariate::kNearestBearing:  // fill_neighbours
+    case Covariate::kNothing:
+    case Covariate::kDuty:
+    case Covariate::kMotorTime: return;
   }
 }
 
@@ -256,9 +251,9 @@ void Covariates::fill_neighbours(const RobotColumns& robots, std::span<const std
       }
       double value = 0;
       switch (column.covariate) {
-        case Function::NEIGHBOURS: value = neighbours; break;
-        case Function::DENSITY: value = density; break;
-        case Function::NEAREST: value = __builtin_sqrt(nearest_square_mm2); break;
+        case Covariate::kNeighbours: value = neighbours; break;
+        case Covariate::kDensity: value = density; break;
+        case Covariate::kNearest: value = __builtin_sqrt(nearest_square_mm2); break;
         default:
           if (nearest != self) {
             value =

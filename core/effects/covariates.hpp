@@ -17,7 +17,7 @@ class Covariates {
   explicit Covariates(const RunPlan&);
 
   /// The column of a covariate with the parameters of the function; MOTOR_TIME and DUTY are those of no wheel, see of_wheel().
-  [[nodiscard]] std::uint32_t need(proto::Function::Covariate, const proto::Function&);
+  [[nodiscard]] std::uint32_t need(Covariate, const FunctionSettings&);
   /// How far away robots count, mm; 0 where none do.
   [[nodiscard]] double radius_mm() const { return radius_mm_; }
   /// Where the values of a column can lie.
@@ -28,15 +28,14 @@ class Covariates {
   void fill(Tick, const RobotColumns& robots, std::span<const std::uint32_t> who, const ArenaFields* fields);
   [[nodiscard]] std::span<const double> values(std::uint32_t column) const { return columns_[column].values; }
 
-  /// The number of a Command as a bit, per robot of who.
+  /// The number of a MotionCommand as a bit, per robot of who.
   [[nodiscard]] std::span<const std::uint8_t> command_bits() const { return command_bits_; }
 
-  [[nodiscard]] static bool is_of_neighbours(proto::Function::Covariate covariate) {
-    return covariate >= proto::Function::NEIGHBOURS && covariate <= proto::Function::NEAREST_BEARING;
+  [[nodiscard]] static bool is_of_neighbours(Covariate covariate) {
+    return covariate >= Covariate::kNeighbours && covariate <= Covariate::kNearestBearing;
   }
 
  private:
-  using Covariate = proto::Function::Covariate;
   struct Column {
     Covariate covariate;
     double radius_mm = 0, forget_s = 0, toward_rad = 0;
@@ -58,6 +57,6 @@ class Covariates {
 };
 
 /// The covariate as the left (0) or the right (1) wheel has it: the right motor drives the left wheel.
-[[nodiscard]] proto::Function::Covariate of_wheel(proto::Function::Covariate, std::uint32_t wheel);
+[[nodiscard]] Covariate of_wheel(Covariate, std::uint32_t wheel);
 
 }  // namespace kilotwin

@@ -11,10 +11,6 @@ namespace {
 /// exp() of more is taken as that: values stay finite, whatever a model says.
 constexpr double kLargestExponent = 60;
 
-std::vector<double> values(const google::protobuf::RepeatedField<double>& field) {
-  return {field.begin(), field.end()};
-}
-
 double magnitude(double v) { return v < 0 ? -v : v; }
 
 /// The ends of the range, and the knots within it with places between them.
@@ -45,39 +41,33 @@ double EffectFunction::Steps::operator()(double c, double) const {
   return value[static_cast<std::size_t>(std::upper_bound(at.begin(), at.end(), c) - at.begin())];
 }
 
-EffectFunction::EffectFunction(const proto::Function& function) : shape_(shape_of(function)) {}
+EffectFunction::EffectFunction(const FunctionSettings& function) : shape_(compiled(function)) {}
 
-EffectFunction::Shape EffectFunction::shape_of(const proto::Function& f) {
-  switch (f.shape_case()) {
-    case proto::Function::kConstant: return Constant{f.constant()};
-    case proto::Function::kNoise: return Constant{f.noise().sd()};
-    case proto::Function::kEpisodes: return Constant{1};
-    case proto::Function::kLinear: return Linear{f.linear().at_zero(), f.linear().slope()};
-    case proto::Function::kExponential: {
-      const proto::Exponential& e = f.exponential();
-      return Exponential{e.at_infinity(), e.at_zero() - e.at_infinity(), -1 / e.scale()};
+EffectFunction::Shape EffectFunction::compiled(const FunctionSettings& function) {
+  struct Compile {
+    Shape operator()(const ConstantShape& f) const { return Constant{f.value}; }
+    Shape operator()(const LinearShape& f) const { return Linear{f.at_zero, f.slope}; }
+    Shape operator()(const ExponentialShape& f) const {
+      return Exponential{f.at_infinity, f.at_zero - f.at_infinity, -1 / f.scale};
     }
-    case proto::Function::kHarmonic: {
-      const proto::Harmonic& h = f.harmonic();
-      return Harmonic{h.mean(), h.cosine(), h.sine(), 2 * kPi / h.period()};
+    Shape operator()(const HarmonicShape& f) const {
+      return Harmonic{f.mean, f.cosine, f.sine, 2 * kPi / f.period};
     }
-    case proto::Function::kSpline: return One{Spline(values(f.spline().knot()), values(f.spline().value()))};
-    case proto::Function::kSpline2D: {
-      const proto::Spline2d& s = f.spline_2d();
-      return Spline2d(values(s.knot()), values(s.and_knot()), values(s.value()));
-    }
-    case proto::Function::kSteps: return Steps{values(f.steps().at()), values(f.steps().value())};
-    case proto::Function::kTable: {
-      Table table{{}, f.table().otherwise()};
-      for (const std::uint32_t key : f.table().key()) {
+    Shape operator()(const SplineShape& f) const { return One{Spline(f.knots, f.values)}; }
+    Shape operator()(const Spline2dShape& f) const { return Spline2d(f.first_knots, f.second_knots, f.values); }
+    Shape operator()(const StepsShape& f) const { return Steps{f.at, f.values}; }
+    Shape operator()(const TableShape& f) const {
+      Table table{{}, f.otherwise};
+      for (const std::uint32_t key : f.keys) {
         if (table.value.size() <= key) table.value.resize(std::size_t{key} + 1, table.otherwise);
       }
-      for (int i = 0; i < f.table().key_size(); ++i) table.value[f.table().key(i)] = f.table().value(i);
+      for (std::size_t i = 0; i < f.keys.size(); ++i) table.value[f.keys[i]] = f.values[i];
       return table;
     }
-    case proto::Function::SHAPE_NOT_SET: break;
-  }
-  return Constant{0};
+    Shape operator()(const NoiseShape& f) const { return Constant{f.sd}; }
+    Shape operator()(const EpisodesShape&) const { return Constant{1}; }
+  };
+  return std::visit(Compile{}, function.shape);
 }
 
 void EffectFunction::multiply(std::span<const double> first, std::span<const double> second,

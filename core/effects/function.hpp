@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "core/effects/spline.hpp"
-#include "idl/effects.pb.h"
+#include "core/plan/effect_settings.hpp"
 
 namespace kilotwin {
 
@@ -18,7 +18,7 @@ struct Range {
 class EffectFunction {
  public:
   /// The shape of a function that validation has passed. Noise counts as the constant sd.
-  explicit EffectFunction(const proto::Function&);
+  explicit EffectFunction(const FunctionSettings&);
 
   /// value[i] *= f(first[i]), or f(first[i], second[i]). Finite for finite covariates.
   void multiply(std::span<const double> first, std::span<const double> second, std::span<double> value) const;
@@ -60,7 +60,7 @@ class EffectFunction {
   };
   using Shape = std::variant<Constant, Linear, Exponential, Harmonic, One, Spline2d, Steps, Table>;
 
-  static Shape shape_of(const proto::Function&);
+  static Shape compiled(const FunctionSettings&);
 
   Shape shape_;
 };

@@ -7,7 +7,7 @@
 
 namespace kilotwin {
 
-using proto::Effect;
+using Target = EffectSettings::Target;
 
 Measurement::Measurement(const RunPlan& plan) : plan_(plan), motors_(plan), terms_(plan, TermList::Of::kMeasured) {
   if (!any()) return;
@@ -57,18 +57,18 @@ void Measurement::measure(Tick now, std::span<const BodyFrame* const> bodies,
   const RobotColumns robots{robot_, x_mm_, y_mm_, heading_rad_, memory_, duties_, tracked_};
   terms_.evaluate(now, robots, who_, nullptr, [&](const Term& term, std::span<const double> values) {
     switch (term.target) {
-      case Effect::MEASURED_OFFSET:
+      case Target::kMeasuredOffset:
         add(offset_x_mm_, values, term.along);
         add(offset_y_mm_, values, term.across);
         break;
-      case Effect::MEASURED_BODY_OFFSET:
+      case Target::kMeasuredBodyOffset:
         add(ahead_mm_, values, term.along);
         add(left_mm_, values, term.across);
         break;
-      case Effect::MEASURED_SCALE:
+      case Target::kMeasuredScale:
         for (std::size_t i = 0; i < count; ++i) scale_[i] *= 1 + values[i];
         break;
-      case Effect::MEASURED_HEADING: add(turn_rad_, values, 1); break;
+      case Target::kMeasuredHeading: add(turn_rad_, values, 1); break;
       default: break;
     }
   });

@@ -11,11 +11,11 @@ namespace {
 std::uint32_t draw_of(const MemorySlot& slot) { return (slot.index * 8 + slot.function) * 2 + slot.wheel; }
 
 /// At least a tick, so that no phase is lost.
-double wait_s(const proto::Episodes& e, double uniform, double tick_s) {
-  return std::max(-e.mean_apart_s() * kt_log(uniform), tick_s);
+double wait_s(const EpisodesShape& e, double uniform, double tick_s) {
+  return std::max(-e.mean_apart_s * kt_log(uniform), tick_s);
 }
-double length_s(const proto::Episodes& e, double uniform, double tick_s) {
-  return std::clamp(e.scale_s() * (kt_pow(uniform, -1 / e.tail()) - 1), tick_s, std::max(e.longest_s(), tick_s));
+double length_s(const EpisodesShape& e, double uniform, double tick_s) {
+  return std::clamp(e.scale_s * (kt_pow(uniform, -1 / e.tail) - 1), tick_s, std::max(e.longest_s, tick_s));
 }
 
 }  // namespace
@@ -30,9 +30,8 @@ EffectMemory::EffectMemory(const RunPlan& plan)
     if (slot.kind == Kind::kPreviousCommand) previous_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kPreviousLasted) lasted_slot_ = static_cast<std::uint32_t>(s);
     if (slot.kind == Kind::kNoise) {
-      const proto::Effect& effect = plan.experiment().effect(static_cast<int>(slot.index));
-      const double keep =
-          kt_exp(-tick_s_ / effect.function(static_cast<int>(slot.function)).noise().correlation_s());
+      const NoiseShape& noise = *plan.effects()[slot.index].functions[slot.function].noise();
+      const double keep = kt_exp(-tick_s_ / noise.correlation_s);
       fades_[s] = {keep, __builtin_sqrt(1 - keep * keep)};
     } else if (slot.forget_s > 0) {
       fades_[s].keep = kt_exp(-tick_s_ / slot.forget_s);
@@ -55,8 +54,7 @@ double EffectMemory::next_episode(const MemorySlot& slot, std::uint32_t robot, T
   // Half a tick at most is neither counted twice nor lost.
   if (left_s > tick_s_ * 1.5) return left_s - tick_s_;
   if (left_s < -tick_s_ * 1.5) return left_s + tick_s_;
-  const proto::Episodes& episodes =
-      plan_.experiment().effect(static_cast<int>(slot.index)).function(static_cast<int>(slot.function)).episodes();
+  const EpisodesShape& episodes = *plan_.effects()[slot.index].functions[slot.function].episodes();
   const double uniform = random_.uniform(Stream::kEpisodes, robot, now, draw_of(slot));
   return left_s > 0 ? -length_s(episodes, uniform, tick_s_) : wait_s(episodes, uniform, tick_s_);
 }
@@ -91,7 +89,7 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
         break;
       case Kind::kLastTurn:
         each(s, [&](std::size_t i, double was) {
-          const proto::Command command = command_of(robots.duties[i]);
+          const MotionCommand command = command_of(robots.duties[i]);
           return is_turn(command) ? static_cast<double>(command) : was;
         });
         break;

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 
+#include "core/plan/motion_settings.hpp"
+
 namespace kilotwin {
 
-using proto::Effect;
+using Target = EffectSettings::Target;
 
 namespace {
 
@@ -14,11 +16,11 @@ double magnitude(double v) { return v < 0 ? -v : v; }
 
 MotionEffects::MotionEffects(const RunPlan& plan)
     : terms_(plan, TermList::Of::kMotion),
-      half_base_mm_(plan.experiment().motion().wheel_base_mm() / 2),
-      limit_mm_s_(plan.experiment().motion().effects_limit_mm_s()) {
+      half_base_mm_(plan.motion_settings().wheel_base_mm / 2),
+      limit_mm_s_(plan.motion_settings().effects_limit_mm_s) {
   for (const Term& term : terms_.terms()) {
-    act_at_rest_ = act_at_rest_ || (term.commands & 1u << proto::STOP) != 0;
-    drift_ = drift_ || term.target == Effect::WORLD_DRIFT || term.target == Effect::BODY_DRIFT;
+    act_at_rest_ = act_at_rest_ || (term.commands & bit_of(MotionCommand::kStop)) != 0;
+    drift_ = drift_ || term.target == Target::kWorldDrift || term.target == Target::kBodyDrift;
   }
 }
 
@@ -28,14 +30,14 @@ MotionEffects::Limits MotionEffects::limits(double top_wheel_mm_s) const {
   for (const Term& term : terms_.terms()) {
     const double largest = terms_.largest(term);
     switch (term.target) {
-      case Effect::WHEEL_GAIN: gain *= 1 + largest; break;
-      case Effect::WHEEL_OFFSET: limits.wheel_mm_s += largest; break;
-      case Effect::TURN_RATE: limits.wheel_mm_s += largest * half_base_mm_; break;
-      case Effect::BODY_DRIFT:
+      case Target::kWheelGain: gain *= 1 + largest; break;
+      case Target::kWheelOffset: limits.wheel_mm_s += largest; break;
+      case Target::kTurnRate: limits.wheel_mm_s += largest * half_base_mm_; break;
+      case Target::kBodyDrift:
         limits.wheel_mm_s += largest * magnitude(term.along);
         limits.sideways_mm_s += largest * magnitude(term.across);
         break;
-      case Effect::WORLD_DRIFT:
+      case Target::kWorldDrift:
         limits.drift_mm_s += largest * std::max(magnitude(term.along), magnitude(term.across));
         break;
       default: break;
@@ -62,26 +64,26 @@ void MotionEffects::evaluate(Tick from, const RobotColumns& robots, std::span<co
   };
   terms_.evaluate(from, robots, who, fields, [&](const Term& term, std::span<const double> values) {
     switch (term.target) {
-      case Effect::WHEEL_GAIN:
+      case Target::kWheelGain:
         for (std::size_t i = 0; i < count; ++i) {
           if (term.left) changes.left_gain[i] *= 1 + values[i];
           if (term.right) changes.right_gain[i] *= 1 + values[i];
         }
         break;
-      case Effect::WHEEL_OFFSET:
+      case Target::kWheelOffset:
         if (term.left) add(changes.left_mm_s, values, 1);
         if (term.right) add(changes.right_mm_s, values, 1);
         break;
-      case Effect::TURN_RATE:
+      case Target::kTurnRate:
         add(changes.left_mm_s, values, -half_base_mm_);
         add(changes.right_mm_s, values, half_base_mm_);
         break;
-      case Effect::BODY_DRIFT:
+      case Target::kBodyDrift:
         add(changes.left_mm_s, values, term.along);
         add(changes.right_mm_s, values, term.along);
         add(changes.sideways_mm_s, values, term.across);
         break;
-      case Effect::WORLD_DRIFT:
+      case Target::kWorldDrift:
         add(changes.drift_x_mm_s, values, term.along);
         add(changes.drift_y_mm_s, values, term.across);
         break;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/plan/effect_settings.hpp"
 #include "core/plan/plan.hpp"
 
 namespace kilotwin {
@@ -35,14 +36,19 @@ class MotorRule {
 };
 
 /// As its motors show; a kick alone counts as STRAIGHT.
-[[nodiscard]] inline proto::Command command_of(Duties duties) {
-  if (duties.left != 0) return duties.right != 0 ? proto::STRAIGHT : proto::LEFT;
-  if (duties.right != 0) return proto::RIGHT;
-  return duties.spin_up != 0 ? proto::STRAIGHT : proto::STOP;
+[[nodiscard]] inline MotionCommand command_of(Duties duties) {
+  if (duties.left != 0) return duties.right != 0 ? MotionCommand::kStraight : MotionCommand::kTurnLeft;
+  if (duties.right != 0) return MotionCommand::kTurnRight;
+  return duties.spin_up != 0 ? MotionCommand::kStraight : MotionCommand::kStop;
 }
 
-[[nodiscard]] constexpr bool is_turn(proto::Command command) {
-  return command == proto::LEFT || command == proto::RIGHT;
+/// Of a set of commands.
+[[nodiscard]] constexpr std::uint8_t bit_of(MotionCommand command) {
+  return static_cast<std::uint8_t>(1u << static_cast<unsigned>(command));
+}
+
+[[nodiscard]] constexpr bool is_turn(MotionCommand command) {
+  return command == MotionCommand::kTurnLeft || command == MotionCommand::kTurnRight;
 }
 
 /// Robots at one instant, structure of arrays, ascending ids: a view of somebody's columns, all of one length.

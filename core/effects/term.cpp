@@ -4,12 +4,13 @@
 
 namespace kilotwin {
 
-using proto::Effect, proto::Function;
-
 namespace {
 
-constexpr std::uint8_t kDriven = 1u << proto::STRAIGHT | 1u << proto::LEFT | 1u << proto::RIGHT;
-constexpr std::uint8_t kAlways = kDriven | 1u << proto::STOP;
+using Wheel = EffectSettings::Wheel;
+
+constexpr std::uint8_t kDriven =
+    bit_of(MotionCommand::kStraight) | bit_of(MotionCommand::kTurnLeft) | bit_of(MotionCommand::kTurnRight);
+constexpr std::uint8_t kAlways = kDriven | bit_of(MotionCommand::kStop);
 
 /// Draws of one effect: 2 per function, for the wheels.
 constexpr std::uint32_t kDrawsPerEffect = 16;
@@ -22,13 +23,11 @@ TermList::TermList(const RunPlan& plan, Of of)
       random_(plan.seed()),
       noise_per_tick_(of == Of::kMotion ? __builtin_sqrt(1 / plan.tick_length.seconds()) : 1),
       covariates_(plan) {
-  const proto::Experiment& experiment = plan.experiment();
-  for (int i = 0; i < experiment.effect_size(); ++i) {
-    const Effect& effect = experiment.effect(i);
-    if (is_measured(effect.acts_on()) != (of == Of::kMeasured)) continue;
-    const auto number = static_cast<std::uint32_t>(i);
-    const bool left = effect.wheel() != Effect::RIGHT_WHEEL, right = effect.wheel() != Effect::LEFT_WHEEL;
-    if (left && right && is_per_wheel(effect)) {
+  for (std::uint32_t number = 0; number < plan.effects().size(); ++number) {
+    const EffectSettings& effect = plan.effects()[number];
+    if (effect.is_measured() != (of == Of::kMeasured)) continue;
+    const bool left = effect.wheel != Wheel::kRightWheel, right = effect.wheel != Wheel::kLeftWheel;
+    if (left && right && effect.is_per_wheel()) {
       add(effect, number, true, false, 0);
       add(effect, number, false, true, 1);
     } else {
@@ -37,41 +36,41 @@ TermList::TermList(const RunPlan& plan, Of of)
   }
 }
 
-void TermList::add(const Effect& effect, std::uint32_t number, bool left, bool right, std::uint32_t wheel) {
+void TermList::add(const EffectSettings& effect, std::uint32_t number, bool left, bool right, std::uint32_t wheel) {
   Term term{};
-  term.target = effect.acts_on();
+  term.target = effect.target;
   term.left = left;
   term.right = right;
-  const double direction_deg = effect.direction_deg();
+  const double direction_deg = effect.direction_deg;
   if (direction_deg != 0) kt_sincos(direction_deg * (kPi / 180), &term.across, &term.along);
   term.commands = of_ == Of::kMeasured ? kAlways : kDriven;
-  if (effect.during_size() > 0) term.commands = 0;
-  for (const int command : effect.during())
-    term.commands = static_cast<std::uint8_t>(term.commands | 1u << command);
-  if (effect.robot_size() > 0) {
+  if (!effect.during.empty()) term.commands = 0;
+  for (const MotionCommand command : effect.during)
+    term.commands = static_cast<std::uint8_t>(term.commands | bit_of(command));
+  if (!effect.robots.empty()) {
     term.applies.assign(plan_.robots(), 0);
-    for (const std::uint32_t robot : effect.robot()) {
+    for (const std::uint32_t robot : effect.robots) {
       if (robot < plan_.robots()) term.applies[robot] = 1;
     }
   }
-  for (int f = 0; f < effect.function_size(); ++f) {
-    const Function& given = effect.function(f);
-    Term::Factor factor{EffectFunction(given), 0, 0, false, false, given.has_noise(), given.has_episodes(),
-                        std::nullopt,          0};
-    const auto column = [&](Function::Covariate of, std::uint32_t& index) {
-      if (of == Function::NOTHING) return false;
+  for (std::uint32_t f = 0; f < effect.functions.size(); ++f) {
+    const FunctionSettings& given = effect.functions[f];
+    Term::Factor factor{
+        EffectFunction(given), 0, 0, false, false, given.noise() != nullptr, given.episodes() != nullptr,
+        std::nullopt,          0};
+    const auto column = [&](Covariate of, std::uint32_t& index) {
+      if (of == Covariate::kNothing) return false;
       index = covariates_.need(of_wheel(of, wheel), given);
       return true;
     };
-    factor.has_first = column(given.of(), factor.first);
-    factor.has_second = column(given.and_of(), factor.second);
-    const auto at = static_cast<std::uint32_t>(f);
-    factor.draw = number * kDrawsPerEffect + 2 * at + wheel;
-    if (factor.is_noise && given.noise().correlation_s() > 0) {
-      const std::uint32_t slot_wheel = effect.wheel() == Effect::BOTH_WHEELS ? wheel : 0;
-      factor.slot = plan_.memory.index_of({MemorySlot::Kind::kNoise, 0, number, at, slot_wheel});
+    factor.has_first = column(given.of, factor.first);
+    factor.has_second = column(given.and_of, factor.second);
+    factor.draw = number * kDrawsPerEffect + 2 * f + wheel;
+    if (factor.is_noise && given.noise()->correlation_s > 0) {
+      const std::uint32_t slot_wheel = effect.wheel == Wheel::kBoth ? wheel : 0;
+      factor.slot = plan_.memory.index_of({MemorySlot::Kind::kNoise, 0, number, f, slot_wheel});
     }
-    if (factor.is_episodes) factor.slot = plan_.memory.index_of({MemorySlot::Kind::kEpisode, 0, number, at});
+    if (factor.is_episodes) factor.slot = plan_.memory.index_of({MemorySlot::Kind::kEpisode, 0, number, f});
     term.factors.push_back(std::move(factor));
   }
   terms_.push_back(std::move(term));

@@ -23,10 +23,10 @@ struct Term {
     std::uint32_t draw = 0;             ///< of independent noise
   };
 
-  proto::Effect::Target target;
+  EffectSettings::Target target;
   bool left = false, right = false;   ///< which wheels, with effects on them
   double along = 1, across = 0;       ///< cosine and sine of the direction
-  std::uint8_t commands = 0;          ///< bits of the Commands during which it acts
+  std::uint8_t commands = 0;          ///< bits of the MotionCommands during which it acts
   std::vector<std::uint8_t> applies;  ///< per robot; empty: to all
   std::vector<Factor> factors;
 };
@@ -55,7 +55,7 @@ class TermList {
   }
 
  private:
-  void add(const proto::Effect&, std::uint32_t number, bool left, bool right, std::uint32_t wheel);
+  void add(const EffectSettings&, std::uint32_t number, bool left, bool right, std::uint32_t wheel);
   void compute(const Term&, Tick, const RobotColumns&, std::span<const std::uint32_t> who);
 
   const RunPlan& plan_;

@@ -6,13 +6,14 @@
 #include <cmath>
 
 #include "core/base/pose.hpp"
+#include "core/base/say.hpp"
+#include "core/experiment/field_checks.hpp"
 #include "core/experiment/fields.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/occupancy.hpp"
 #include "core/experiment/poses_csv.hpp"
-#include "core/experiment/validate.hpp"
-#include "core/plan/world.hpp"
 #include "core/math/elementary.h"
+#include "core/plan/world.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin {
@@ -43,8 +44,7 @@ class Placement {
   explicit Placement(const LoadedExperiment& loaded)
       : loaded_(loaded), experiment_(loaded.experiment), random_(experiment_.seed()), world_(experiment_) {
     for (const MovableBodyModel& body : world_.movables) {
-      movable_places_.push_back(
-          Place::at(body.pose.position_mm.x(), body.pose.position_mm.y(), body.pose.heading_rad));
+      movable_places_.push_back(Place::at(body.pose.x_mm, body.pose.y_mm, body.pose.heading_rad));
     }
   }
   PlacedRobots place();
@@ -104,7 +104,7 @@ void Placement::measure() {
     placed_.group_count.push_back(group.count);
     groups_.push_back(std::move(group));
   }
-  validate_total(loaded_, total);
+  check_total(loaded_, total);
   placed_.x_mm.resize(total);
   placed_.y_mm.resize(total);
   placed_.heading_rad.resize(total);
@@ -314,7 +314,7 @@ PlacedRobots Placement::place() {
 }  // namespace
 
 PlacedRobots place_robots(const LoadedExperiment& loaded) {
-  validate_fields(loaded);
+  check_fields(loaded);
   return Placement{loaded}.place();
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "core/base/say.hpp"
 #include "idl/model.pb.h"
 
 namespace kilotwin {

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <vector>
 
+#include "core/base/say.hpp"
 #include "core/experiment/fields.hpp"
 #include "core/experiment/load.hpp"
 

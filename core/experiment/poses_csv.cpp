@@ -6,6 +6,7 @@
 
 #include "core/base/pose.hpp"
 #include "core/csv/csv_reader.hpp"
+#include "core/base/say.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/text_file.hpp"
 #include "core/math/elementary.h"

@@ -83,7 +83,7 @@ proto::LightRaster read_png(const fs::path& file, std::string& wrong) {
 
 }  // namespace
 
-void validate_surroundings(const LoadedExperiment& loaded) {
+void check_surroundings(const LoadedExperiment& loaded) {
   const Check check(loaded);
   const proto::Light& light = loaded.experiment.light();
   for (int i = 0; i < light.source_size(); ++i) check.source(light.source(i), fmt::format("light.source[{}]", i));

@@ -9,7 +9,7 @@
 namespace kilotwin {
 
 /// Checks what fields of light and batteries demand of each other. Throws UserError "WHERE: what is wrong; what would be right".
-void validate_surroundings(const LoadedExperiment& loaded);
+void check_surroundings(const LoadedExperiment& loaded);
 
 /// The brightness of all pictures of the experiment's light, in order. Throws UserError where one is no PNG file.
 [[nodiscard]] std::vector<proto::LightRaster> read_light_rasters(const LoadedExperiment& loaded);

@@ -10,8 +10,8 @@
 #include <tuple>
 #include <vector>
 
+#include "core/base/say.hpp"
 #include "core/experiment/fields.hpp"
-#include "core/experiment/text_file.hpp"
 
 namespace kilotwin {
 namespace pb = google::protobuf;

@@ -13,6 +13,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/base/say.hpp"
 #include "core/experiment/syntax_error.hpp"
 
 namespace kilotwin {
@@ -113,17 +114,6 @@ std::string SourceLocations::where(std::string_view path) const {
 
 UserError SourceLocations::error(std::string_view path, std::string_view text) const {
   return UserError{fmt::format("{}: {}", where(path), text)};
-}
-
-std::string one_line(std::string_view text, std::size_t longest) {
-  std::string line{text};
-  if (line.size() > longest) {
-    line = fmt::format("{}...{}", text.substr(0, longest / 2), text.substr(text.size() - longest / 2));
-  }
-  for (char& c : line) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  }
-  return line;
 }
 
 std::string read_text(const std::filesystem::path& file, std::string_view where) {

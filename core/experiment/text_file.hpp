@@ -46,9 +46,6 @@ class SourceLocations {
   std::map<std::string, Place, std::less<>> places_;
 };
 
-/// `text` made fit for one line of a terminal: control characters as '?', the middle of what is overlong cut out.
-[[nodiscard]] std::string one_line(std::string_view text, std::size_t longest = 4096);
-
 /// The content of a file of at most 32 MiB. Throws UserError, beginning with `where`, if it cannot be read.
 [[nodiscard]] std::string read_text(const std::filesystem::path& file, std::string_view where);
 

@@ -11,6 +11,7 @@
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/os/checksummed_file.hpp"
+#include "idl/manifest.pb.h"
 
 namespace kilotwin {
 namespace {
@@ -107,7 +108,7 @@ void write_checkpoint_part(const fs::path& run_directory, const RunPlan& plan, T
   header.set_tick(tick.count());
   header.set_federate(plan.name(id));
   header.set_parts(plan.federates());
-  header.set_experiment_hash(resumable_hash(plan.manifest));
+  header.set_experiment_hash(resumable_hash(plan.manifest()));
 
   const fs::path directory = checkpoint_directory(run_directory, tick);
   std::error_code ignored;

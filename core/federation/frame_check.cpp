@@ -43,19 +43,19 @@ const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, Fede
        {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm, &movable.vy_mm, &movable.turn_rad}) {
     if (!all_finite(*column)) return "a movable body's state is not finite";
   }
-  const PressedColumns& pressed = frame.pressed;
-  if (!std::includes(frame.robot.begin(), frame.robot.end(), pressed.robot.begin(), pressed.robot.end()) ||
-      !ascending_within(pressed.robot, {0, plan.robots()}))
-    return "its pressed robots are not ascending robots of the frame";
-  if (!all_finite(pressed.slip_x_mm) || !all_finite(pressed.slip_y_mm) || !all_finite(pressed.push_mm) ||
-      !all_finite(pressed.rub_mm))
+  const ContactColumns& contact = frame.contact;
+  if (!std::includes(frame.robot.begin(), frame.robot.end(), contact.robot.begin(), contact.robot.end()) ||
+      !ascending_within(contact.robot, {0, plan.robots()}))
+    return "its robots with contacts are not ascending robots of the frame";
+  if (!all_finite(contact.slip_x_mm) || !all_finite(contact.slip_y_mm) || !all_finite(contact.normal_impulse_mm) ||
+      !all_finite(contact.tangent_impulse_mm))
     return "a contact's state is not finite";
   constexpr std::uint32_t kMostWalls = 32;
   const auto obstacles = static_cast<std::uint32_t>(plan.world.obstacles.size());
   const auto known_body = [&](std::uint32_t other) {
     return other < plan.robots() + plan.movables() + obstacles + kMostWalls;
   };
-  if (!std::all_of(pressed.other.begin(), pressed.other.end(), known_body)) return "a contact is with nobody";
+  if (!std::all_of(contact.other.begin(), contact.other.end(), known_body)) return "a contact is with nobody";
   return nullptr;
 }
 

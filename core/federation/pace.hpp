@@ -5,14 +5,14 @@
 #include <chrono>
 #include <thread>
 
-#include "core/plan/plan.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin {
 
 class Pace {
  public:
-  explicit Pace(const RunPlan& plan) : factor_(plan.manifest.pace()), tick_s_(plan.tick_length.seconds()) {}
+  explicit Pace(const RunPlan& plan) : factor_(plan.pace), tick_s_(plan.tick_length.seconds()) {}
 
   /// Returns when `ticks` ticks may have passed, or the process is interrupted. `wall_s()`: how long the run has taken for
   /// them so far, pauses excluded. `idle()` is called about every 100 ms meanwhile.

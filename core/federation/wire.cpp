@@ -64,14 +64,14 @@ WireBodyFrame to_wire(const WireHeader& header, const BodyFrame& frame) {
   wire.movable_vx_mm = borrow<Doubles>(frame.movable.vx_mm);
   wire.movable_vy_mm = borrow<Doubles>(frame.movable.vy_mm);
   wire.movable_turn_rad = borrow<Doubles>(frame.movable.turn_rad);
-  wire.pressed = borrow<ULongs>(frame.pressed.robot);
-  wire.slip_x_mm = borrow<Doubles>(frame.pressed.slip_x_mm);
-  wire.slip_y_mm = borrow<Doubles>(frame.pressed.slip_y_mm);
-  wire.contacts = borrow<Octets>(frame.pressed.contacts);
-  wire.contact_other = borrow<ULongs>(frame.pressed.other);
-  wire.contact_push_mm = borrow<Doubles>(frame.pressed.push_mm);
+  wire.contact_robot = borrow<ULongs>(frame.contact.robot);
+  wire.slip_x_mm = borrow<Doubles>(frame.contact.slip_x_mm);
+  wire.slip_y_mm = borrow<Doubles>(frame.contact.slip_y_mm);
+  wire.contact_count = borrow<Octets>(frame.contact.count);
+  wire.contact_other = borrow<ULongs>(frame.contact.other);
+  wire.contact_normal_impulse_mm = borrow<Doubles>(frame.contact.normal_impulse_mm);
   wire.memory = borrow<Doubles>(frame.memory);
-  wire.contact_rub_mm = borrow<Doubles>(frame.pressed.rub_mm);
+  wire.contact_tangent_impulse_mm = borrow<Doubles>(frame.contact.tangent_impulse_mm);
   return wire;
 }
 
@@ -95,17 +95,19 @@ bool from_wire(const WireBodyFrame& wire, BodyFrame& frame) {
        {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm, &movable.vy_mm, &movable.turn_rad}) {
     if (column->size() != movable.body.size()) return false;
   }
-  PressedColumns& pressed = frame.pressed;
-  if (!copy(wire.pressed, pressed.robot) || !copy(wire.slip_x_mm, pressed.slip_x_mm) ||
-      !copy(wire.slip_y_mm, pressed.slip_y_mm) || !copy(wire.contacts, pressed.contacts) ||
-      !copy(wire.contact_other, pressed.other) || !copy(wire.contact_push_mm, pressed.push_mm) ||
-      !copy(wire.contact_rub_mm, pressed.rub_mm)) {
+  ContactColumns& contact = frame.contact;
+  if (!copy(wire.contact_robot, contact.robot) || !copy(wire.slip_x_mm, contact.slip_x_mm) ||
+      !copy(wire.slip_y_mm, contact.slip_y_mm) || !copy(wire.contact_count, contact.count) ||
+      !copy(wire.contact_other, contact.other) ||
+      !copy(wire.contact_normal_impulse_mm, contact.normal_impulse_mm) ||
+      !copy(wire.contact_tangent_impulse_mm, contact.tangent_impulse_mm)) {
     return false;
   }
-  const std::size_t p = pressed.robot.size();
-  return pressed.slip_x_mm.size() == p && pressed.slip_y_mm.size() == p && pressed.contacts.size() == p &&
-         pressed.other.size() == pressed.push_mm.size() && pressed.other.size() == pressed.rub_mm.size() &&
-         std::accumulate(pressed.contacts.begin(), pressed.contacts.end(), std::size_t{0}) == pressed.other.size();
+  const std::size_t p = contact.robot.size();
+  return contact.slip_x_mm.size() == p && contact.slip_y_mm.size() == p && contact.count.size() == p &&
+         contact.other.size() == contact.normal_impulse_mm.size() &&
+         contact.other.size() == contact.tangent_impulse_mm.size() &&
+         std::accumulate(contact.count.begin(), contact.count.end(), std::size_t{0}) == contact.other.size();
 }
 
 WireActuationFrame to_wire(const WireHeader& header, const ActuationFrame& frame) {

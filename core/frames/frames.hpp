@@ -25,23 +25,23 @@ struct MovableColumns {
   }
 };
 
-/// Robots that touch others or slip against their drive; ascending ids.
-struct PressedColumns {
+/// The contact cache of robots that touch others or slip against their drive; ascending ids.
+struct ContactColumns {
   std::vector<std::uint32_t> robot;
   std::vector<double> slip_x_mm, slip_y_mm;  ///< per robot: velocity less that of its drive
-  std::vector<std::uint8_t> contacts;        ///< per robot: how many entries of the next three are its own
+  std::vector<std::uint8_t> count;           ///< per robot: how many entries of the next three are its own
   std::vector<std::uint32_t> other;          ///< ascending within a robot: another robot, or robots + movable body
-  std::vector<double> push_mm;               ///< above 0
-  std::vector<double> rub_mm;
+  std::vector<double> normal_impulse_mm;     ///< above 0
+  std::vector<double> tangent_impulse_mm;
 
   void clear() {
     robot.clear();
     slip_x_mm.clear();
     slip_y_mm.clear();
-    contacts.clear();
+    count.clear();
     other.clear();
-    push_mm.clear();
-    rub_mm.clear();
+    normal_impulse_mm.clear();
+    tangent_impulse_mm.clear();
   }
 };
 
@@ -55,7 +55,7 @@ struct BodyFrame {
 
   static constexpr std::size_t kSpatialColumns = 11;
   MovableColumns movable;
-  PressedColumns pressed;      ///< in ghosts only
+  ContactColumns contact;      ///< in ghosts only
   std::vector<double> memory;  ///< RunPlan::memory.size() values per robot: what the model's effects remember of it
 
   void clear() {
@@ -65,7 +65,7 @@ struct BodyFrame {
     heading_rad.clear();
     spatial.clear();
     movable.clear();
-    pressed.clear();
+    contact.clear();
     memory.clear();
   }
   void add(std::uint32_t id, double x, double y, double heading) {

@@ -3,45 +3,45 @@
 #include <algorithm>
 
 #include "core/model/ranging.hpp"
+#include "core/plan/radio_settings.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin {
 
 RadioParameters::RadioParameters(const RunPlan& plan)
-    : decay_db_per_mm_(plan.experiment().radio().propagation().decay_db_per_mm()),
+    : decay_db_per_mm_(plan.radio_settings().propagation.decay_db_per_mm),
       power_db_(plan.robots(), 0),
       sensitivity_db_(plan.robots(), 0),
       calibration_db_(plan.robots(), 0),
       power_bearing_(plan.robots()),
       sensitivity_bearing_(plan.robots()) {
-  if (plan.experiment().radio().model() != proto::Radio::PROPAGATION) return;
-  const proto::Propagation& model = plan.experiment().radio().propagation();
+  if (plan.radio_settings().model != RadioSettings::Model::kPropagation) return;
+  const PropagationSettings& model = plan.radio_settings().propagation;
   const Random random(plan.seed());
   for (std::uint32_t i = 0; i < plan.robots(); ++i) {
     const auto draw = [&](std::uint32_t number, double sd) {
       return sd > 0 ? sd * random.normal(Stream::kLink, i, Tick{-1}, number) : 0.0;
     };
-    power_db_[i] = draw(0, model.power_sd_db());
-    sensitivity_db_[i] = draw(1, model.sensitivity_sd_db());
-    power_bearing_[i] = {draw(2, model.power_bearing_sd_db()), draw(3, model.power_bearing_sd_db())};
-    sensitivity_bearing_[i] = {draw(4, model.sensitivity_bearing_sd_db()),
-                               draw(5, model.sensitivity_bearing_sd_db())};
-    calibration_db_[i] = draw(6, model.calibration_sd_db());
+    power_db_[i] = draw(0, model.power_sd_db);
+    sensitivity_db_[i] = draw(1, model.sensitivity_sd_db);
+    power_bearing_[i] = {draw(2, model.power_bearing_sd_db), draw(3, model.power_bearing_sd_db)};
+    sensitivity_bearing_[i] = {draw(4, model.sensitivity_bearing_sd_db), draw(5, model.sensitivity_bearing_sd_db)};
+    calibration_db_[i] = draw(6, model.calibration_sd_db);
   }
-  for (const proto::RobotRadio& known : model.robot()) {
-    const std::uint32_t i = known.robot();
+  for (const RobotRadioSettings& known : model.robots) {
+    const std::uint32_t i = known.robot;
     if (i >= plan.robots()) continue;
-    if (known.has_power_db()) power_db_[i] = known.power_db();
-    if (known.has_sensitivity_db()) sensitivity_db_[i] = known.sensitivity_db();
-    if (known.has_power_ahead_db()) power_bearing_[i].ahead_db = known.power_ahead_db();
-    if (known.has_power_left_db()) power_bearing_[i].left_db = known.power_left_db();
-    if (known.has_sensitivity_ahead_db()) sensitivity_bearing_[i].ahead_db = known.sensitivity_ahead_db();
-    if (known.has_sensitivity_left_db()) sensitivity_bearing_[i].left_db = known.sensitivity_left_db();
-    if (known.ir_high_size() != KILOTWIN_IR_ENTRIES) continue;
+    if (known.power_db) power_db_[i] = *known.power_db;
+    if (known.sensitivity_db) sensitivity_db_[i] = *known.sensitivity_db;
+    if (known.power_ahead_db) power_bearing_[i].ahead_db = *known.power_ahead_db;
+    if (known.power_left_db) power_bearing_[i].left_db = *known.power_left_db;
+    if (known.sensitivity_ahead_db) sensitivity_bearing_[i].ahead_db = *known.sensitivity_ahead_db;
+    if (known.sensitivity_left_db) sensitivity_bearing_[i].left_db = *known.sensitivity_left_db;
+    if (known.ir_high.size() != KILOTWIN_IR_ENTRIES) continue;
     RangingTable& table = stated_.emplace_back(i, RangingTable{}).second;
-    for (int n = 0; n < KILOTWIN_IR_ENTRIES; ++n) {
-      table.high[static_cast<std::size_t>(n)] = static_cast<std::uint16_t>(known.ir_high(n));
-      table.low[static_cast<std::size_t>(n)] = static_cast<std::uint16_t>(known.ir_low(n));
+    for (std::size_t n = 0; n < KILOTWIN_IR_ENTRIES; ++n) {
+      table.high[n] = static_cast<std::uint16_t>(known.ir_high[n]);
+      table.low[n] = static_cast<std::uint16_t>(known.ir_low[n]);
     }
   }
   const auto nonzero = [](double db) { return db != 0; };

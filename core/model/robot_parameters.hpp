@@ -16,7 +16,7 @@ struct Calibration {
   bool operator==(const Calibration&) const = default;
 };
 
-/// Added to the nominal speed of a wheel while the robot is driven, mm/s (seed, section 2.2).
+/// Added to the nominal speed of a wheel while the robot is driven, mm/s (the ARGoS paper, Pinciroli 2018, section 2.2).
 struct WheelBias {
   double left_mm_s, right_mm_s;
 };

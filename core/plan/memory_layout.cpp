@@ -3,50 +3,48 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
+#include "core/plan/effect_settings.hpp"
 
 namespace kilotwin {
 
 using Kind = MemorySlot::Kind;
-using proto::Effect, proto::Function;
-
-bool is_measured(Effect::Target target) { return target >= Effect::MEASURED_OFFSET; }
-
-bool is_per_wheel(const Effect& effect) {
-  if (effect.acts_on() != Effect::WHEEL_GAIN && effect.acts_on() != Effect::WHEEL_OFFSET) return false;
-  return std::any_of(effect.function().begin(), effect.function().end(), [](const Function& f) {
-    const auto own = [](Function::Covariate c) { return c == Function::DUTY || c == Function::MOTOR_TIME; };
-    return f.has_noise() || own(f.of()) || own(f.and_of());
+bool EffectSettings::is_per_wheel() const {
+  if (target != Target::kWheelGain && target != Target::kWheelOffset) return false;
+  return std::any_of(functions.begin(), functions.end(), [](const FunctionSettings& f) {
+    const auto own = [](Covariate c) { return c == Covariate::kDuty || c == Covariate::kMotorTime; };
+    return f.noise() != nullptr || own(f.of) || own(f.and_of);
   });
 }
 
-MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
-  const auto need_for = [&](Function::Covariate covariate, double forget_s) {
+MemoryLayout::MemoryLayout(const std::vector<EffectSettings>& effects,
+                           const std::vector<ArenaFieldSettings>& fields) {
+  const auto need_for = [&](Covariate covariate, double forget_s) {
     switch (covariate) {
-      case Function::TIME_SINCE_COMMAND:
+      case Covariate::kTimeSinceCommand:
         need({Kind::kCommand});
         need({Kind::kTimeSinceCommand});
         break;
-      case Function::MOTOR_TIME:
+      case Covariate::kMotorTime:
         need({Kind::kLeftMotorTime, forget_s});
         need({Kind::kRightMotorTime, forget_s});
         break;
-      case Function::LEFT_MOTOR_TIME: need({Kind::kLeftMotorTime, forget_s}); break;
-      case Function::RIGHT_MOTOR_TIME: need({Kind::kRightMotorTime, forget_s}); break;
-      case Function::DRIVEN_TIME: need({Kind::kDrivenTime, forget_s}); break;
-      case Function::SINCE_REST: need({Kind::kSinceRest}); break;
-      case Function::MOTOR_TIME_DIFFERENCE:
+      case Covariate::kLeftMotorTime: need({Kind::kLeftMotorTime, forget_s}); break;
+      case Covariate::kRightMotorTime: need({Kind::kRightMotorTime, forget_s}); break;
+      case Covariate::kDrivenTime: need({Kind::kDrivenTime, forget_s}); break;
+      case Covariate::kSinceRest: need({Kind::kSinceRest}); break;
+      case Covariate::kMotorTimeDifference:
         need({Kind::kLeftMotorTime});
         need({Kind::kRightMotorTime});
         break;
-      case Function::PREVIOUS_FORWARD: need({Kind::kPreviousForward}); break;
-      case Function::PREVIOUS_SIDEWAYS: need({Kind::kPreviousSideways}); break;
-      case Function::PREVIOUS_TURN: need({Kind::kPreviousTurn}); break;
-      case Function::PREVIOUS_COMMAND:
+      case Covariate::kPreviousForward: need({Kind::kPreviousForward}); break;
+      case Covariate::kPreviousSideways: need({Kind::kPreviousSideways}); break;
+      case Covariate::kPreviousTurn: need({Kind::kPreviousTurn}); break;
+      case Covariate::kPreviousCommand:
         need({Kind::kCommand});
         need({Kind::kPreviousCommand});
         break;
-      case Function::LAST_TURN: need({Kind::kLastTurn}); break;
-      case Function::PREVIOUS_LASTED:
+      case Covariate::kLastTurn: need({Kind::kLastTurn}); break;
+      case Covariate::kPreviousLasted:
         need({Kind::kCommand});
         need({Kind::kTimeSinceCommand});
         need({Kind::kPreviousLasted});
@@ -54,23 +52,20 @@ MemoryLayout::MemoryLayout(const proto::Experiment& experiment) {
       default: break;
     }
   };
-  for (int e = 0; e < experiment.effect_size(); ++e) {
-    const Effect& effect = experiment.effect(e);
-    for (int f = 0; f < effect.function_size(); ++f) {
-      const Function& function = effect.function(f);
-      need_for(function.of(), function.forget_s());
-      need_for(function.and_of(), function.forget_s());
-      if (function.has_episodes())
-        need({Kind::kEpisode, 0, static_cast<std::uint32_t>(e), static_cast<std::uint32_t>(f)});
-      if (!function.has_noise() || !(function.noise().correlation_s() > 0)) continue;
-      const auto index = static_cast<std::uint32_t>(e), number = static_cast<std::uint32_t>(f);
-      need({Kind::kNoise, 0, index, number, 0});
-      if (is_per_wheel(effect) && effect.wheel() == Effect::BOTH_WHEELS) need({Kind::kNoise, 0, index, number, 1});
+  for (std::uint32_t e = 0; e < effects.size(); ++e) {
+    const EffectSettings& effect = effects[e];
+    for (std::uint32_t f = 0; f < effect.functions.size(); ++f) {
+      const FunctionSettings& function = effect.functions[f];
+      need_for(function.of, function.forget_s);
+      need_for(function.and_of, function.forget_s);
+      if (function.episodes() != nullptr) need({Kind::kEpisode, 0, e, f});
+      if (function.noise() == nullptr || !(function.noise()->correlation_s > 0)) continue;
+      need({Kind::kNoise, 0, e, f, 0});
+      if (effect.is_per_wheel() && effect.wheel == EffectSettings::Wheel::kBoth) need({Kind::kNoise, 0, e, f, 1});
     }
   }
-  for (int i = 0; i < experiment.field_size(); ++i) {
-    if (experiment.field(i).counts() == proto::ArenaField::VISITS)
-      need({Kind::kFieldCell, 0, static_cast<std::uint32_t>(i)});
+  for (std::uint32_t i = 0; i < fields.size(); ++i) {
+    if (fields[i].counts == ArenaFieldSettings::Counts::kVisits) need({Kind::kFieldCell, 0, i});
   }
 }
 

@@ -5,14 +5,15 @@
 #include <cstdint>
 #include <vector>
 
-#include "idl/experiment.pb.h"
-
 namespace kilotwin {
+
+struct ArenaFieldSettings;
+struct EffectSettings;
 
 /// One double of each robot.
 struct MemorySlot {
   enum class Kind : std::uint8_t {
-    kCommand,           ///< number of the Command of the tick before; STOP at first
+    kCommand,           ///< the MotionCommand of the tick before; kStop at first
     kTimeSinceCommand,  ///< s for which that has lasted
     kEpisode,           ///< of effect `index`, `function`: s until the next begins, or less than 0: until it ends
     kLeftMotorTime,     ///< s, forgetting within `forget_s`
@@ -23,9 +24,9 @@ struct MemorySlot {
     kPreviousTurn,     ///< rad/s
     kFieldCell,        ///< cell of field `index` in which the robot was counted last; -1: none
     kNoise,            ///< of effect `index`, `function`, `wheel`
-    kPreviousCommand,  ///< number of the Command before kCommand; STOP at first
-    kLastTurn,         ///< number of the last Command that was LEFT or RIGHT; 0 at first
-    kPreviousLasted,   ///< s for which the Command before kCommand lasted; 0 at first
+    kPreviousCommand,  ///< the MotionCommand before that of kCommand; kStop at first
+    kLastTurn,         ///< the last MotionCommand that was kTurnLeft or kTurnRight; 0 at first
+    kPreviousLasted,   ///< s for which the command before that of kCommand lasted; 0 at first
     kSinceRest,        ///< s for which a motor has turned without a rest of both
   };
   Kind kind;
@@ -38,7 +39,7 @@ struct MemorySlot {
 class MemoryLayout {
  public:
   MemoryLayout() = default;
-  explicit MemoryLayout(const proto::Experiment&);
+  MemoryLayout(const std::vector<EffectSettings>&, const std::vector<ArenaFieldSettings>&);
 
   [[nodiscard]] const std::vector<MemorySlot>& slots() const { return slots_; }
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(slots_.size()); }
@@ -50,10 +51,5 @@ class MemoryLayout {
 
   std::vector<MemorySlot> slots_;
 };
-
-/// Whether the effect acts on what is measured, not on how robots move.
-[[nodiscard]] bool is_measured(proto::Effect::Target);
-/// Whether the effect is computed for each wheel on its own: its noise and what it looks at are the wheel's.
-[[nodiscard]] bool is_per_wheel(const proto::Effect&);
 
 }  // namespace kilotwin

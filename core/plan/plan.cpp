@@ -12,60 +12,15 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/plan/from_manifest.hpp"
+#include "idl/manifest.pb.h"
 
 namespace kilotwin {
 namespace {
 
-constexpr std::uint32_t kManifestFormat = 1;
-
-void require(bool condition, const std::string& wrong, const char* right) {
-  if (!condition) throw UserError("manifest: " + wrong + "; " + right);
-}
-
-/// The manifest itself, where it is one from which a plan can be made.
-proto::Manifest checked(proto::Manifest manifest) {
-  require(manifest.format() == kManifestFormat, "is of format " + std::to_string(manifest.format()),
-          "this program reads format 1: prepare the run again");
-  const proto::Experiment& experiment = manifest.experiment();
-  const proto::Deployment& deployment = experiment.deployment();
-  require(experiment.tick_cycles() > 0, "tick_cycles is 0", "2^15..2^20");
-  require(experiment.duration_s() > 0 && experiment.duration_s() <= 1e6, "duration_s is out of range",
-          "above 0, at most 1e6");
-  require(experiment.arena().width_mm() > 0 && experiment.arena().height_mm() > 0, "the arena is empty",
-          "40..1e6 mm");
-  const auto divides = [](std::uint32_t n) { return n >= 1 && n <= 64; };
-  require(divides(deployment.partition_columns()) && divides(deployment.partition_rows()) &&
-              divides(deployment.hosts()),
-          "partition_columns, partition_rows or hosts is out of range", "1..64 each");
-
-  std::uint64_t robots = 0;
-  for (const proto::RobotGroup& group : experiment.robots()) robots += group.count();
-  const auto poses = static_cast<std::uint64_t>(manifest.x_mm_size());
-  require(poses == robots && manifest.y_mm_size() == manifest.x_mm_size() &&
-              manifest.heading_rad_size() == manifest.x_mm_size(),
-          "the initial poses do not match the " + std::to_string(robots) + " robots of the experiment",
-          "one pose per robot");
-  require(manifest.group_program_size() == experiment.robots_size(),
-          "group_program does not match the groups of robots", "one entry per group");
-  for (const std::uint32_t program : manifest.group_program()) {
-    require(
-        program == kNoProgram || program < static_cast<std::uint32_t>(manifest.program_size()),
-        "group_program names program " + std::to_string(program) + " of " + std::to_string(manifest.program_size()),
-        "an index into program");
-  }
-  int rasters = 0;
-  for (const proto::LightImage& image : experiment.light().image()) rasters += image.png_size();
-  require(manifest.light_raster_size() == rasters, "the pictures of light do not match the experiment",
-          "one raster per picture");
-  for (const proto::LightRaster& raster : manifest.light_raster()) {
-    const std::uint64_t pixels = std::uint64_t{raster.columns()} * raster.rows();
-    require(pixels > 0 && raster.brightness().size() == pixels, "a picture of light is damaged",
-            "as many octets as pixels");
-  }
-  for (const proto::RobotEeprom& eeprom : manifest.eeprom()) {
-    require(eeprom.robot() < robots && eeprom.content().size() == 1024, "an EEPROM is damaged", "1024 octets");
-  }
-  return manifest;
+std::shared_ptr<const proto::Manifest> checked(proto::Manifest manifest) {
+  check_manifest(manifest);
+  return std::make_shared<const proto::Manifest>(std::move(manifest));
 }
 
 World world_of(const proto::Experiment& experiment) {
@@ -160,44 +115,78 @@ std::vector<PartitionId> PartitionGrid::neighbours(PartitionId p, double margin_
 }
 
 RunPlan::RunPlan(proto::Manifest given)
-    : manifest(checked(std::move(given))),
-      tick_length(experiment().tick_cycles()),
-      last_tick(tick_length.at_or_after(experiment().duration_s())),
-      world(world_of(experiment())),
+    : manifest_(checked(std::move(given))),
+      settings_(std::make_shared<const PlanSettings>(settings_of(*manifest_))),
+      tick_length(manifest_->experiment().tick_cycles()),
+      duration_s(manifest_->experiment().duration_s()),
+      last_tick(tick_length.at_or_after(duration_s)),
+      world(world_of(manifest_->experiment())),
       grid(2 * world.arena.half_width_mm(), 2 * world.arena.half_height_mm(),
-           experiment().deployment().partition_columns(), experiment().deployment().partition_rows()),
-      hosts(experiment().deployment().hosts()),
-      memory(experiment()),
-      hash(hash_of(manifest)) {
-  program_of_.reserve(robots());
-  group_of_.reserve(robots());
-  uid_of_.reserve(robots());
-  for (int group = 0; group < experiment().robots_size(); ++group) {
-    const proto::RobotGroup& robots_of_group = experiment().robots(group);
-    program_of_.insert(program_of_.end(), robots_of_group.count(), manifest.group_program(group));
-    immobile_.insert(immobile_.end(), robots_of_group.count(), robots_of_group.immobile());
-    group_of_.insert(group_of_.end(), robots_of_group.count(), static_cast<std::uint32_t>(group));
-    std::uint32_t uid =
-        robots_of_group.has_first_uid() ? robots_of_group.first_uid() : static_cast<std::uint32_t>(uid_of_.size());
+           manifest_->experiment().deployment().partition_columns(),
+           manifest_->experiment().deployment().partition_rows()),
+      hosts(manifest_->experiment().deployment().hosts()),
+      memory(settings_->effects, settings_->fields),
+      hash(hash_of(*manifest_)),
+      resumed(manifest_->resumed()),
+      pace(manifest_->pace()),
+      mode(manifest_->mode()),
+      run_(manifest_->run()),
+      seed_(manifest_->experiment().seed()),
+      checkpoint_every_(
+          tick_length.at_or_after(manifest_->experiment().deployment().checkpoint_every_s()).count()) {
+  const auto robots = settings_->poses.size();
+  program_of_.reserve(robots);
+  immobile_.reserve(robots);
+  loop_rate_.reserve(robots);
+  uid_of_.reserve(robots);
+  for (int g = 0; g < manifest_->experiment().robots_size(); ++g) {
+    const proto::RobotGroup& group = manifest_->experiment().robots(g);
+    program_of_.insert(program_of_.end(), group.count(), manifest_->group_program(g));
+    immobile_.insert(immobile_.end(), group.count(), group.immobile());
+    loop_rate_.insert(
+        loop_rate_.end(), group.count(),
+        group.loop_rate() == proto::RobotGroup::AS_ON_ROBOT ? LoopRate::kAsOnRobot : LoopRate::kOncePerTick);
+    auto uid = group.has_first_uid() ? group.first_uid() : static_cast<std::uint32_t>(uid_of_.size());
     while (uid_of_.size() < program_of_.size()) uid_of_.push_back(static_cast<std::uint16_t>(uid++));
   }
 }
 
-std::string program_file(const proto::Program& program) {
-  const std::string& path = program.path();
+const std::string& RunPlan::experiment_name() const { return settings_->name; }
+std::uint32_t RunPlan::run_number() const { return settings_->run_number; }
+const MotionSettings& RunPlan::motion_settings() const { return settings_->motion; }
+const std::vector<RobotSettings>& RunPlan::robot_settings() const { return settings_->robots; }
+const std::vector<EffectSettings>& RunPlan::effects() const { return settings_->effects; }
+const std::vector<ArenaFieldSettings>& RunPlan::fields() const { return settings_->fields; }
+const PhysicsSettings& RunPlan::physics_settings() const { return settings_->physics; }
+const RadioSettings& RunPlan::radio_settings() const { return settings_->radio; }
+const StationSettings& RunPlan::station_settings() const { return settings_->station; }
+const std::optional<LightSettings>& RunPlan::light_settings() const { return settings_->light; }
+const std::optional<BatterySettings>& RunPlan::battery_settings() const { return settings_->battery; }
+const std::optional<TemperatureSettings>& RunPlan::temperature_settings() const { return settings_->temperature; }
+const RecordingSettings& RunPlan::recording_settings() const { return settings_->recording; }
+const std::vector<Program>& RunPlan::programs() const { return settings_->programs; }
+const std::vector<RobotEeprom>& RunPlan::eeproms() const { return settings_->eeproms; }
+const std::vector<ProgramFailure>& RunPlan::program_failures() const { return settings_->program_failures; }
+
+std::string Program::file() const {
   const bool hex = path.size() > 4 && (path.ends_with(".hex") || path.ends_with(".HEX"));
-  return program.sha256() + (!program.firmware() ? ".so" : hex ? ".hex" : ".elf");
+  return sha256 + (!firmware ? ".so" : hex ? ".hex" : ".elf");
+}
+
+bool RunPlan::firmware(std::uint32_t robot) const {
+  return !tracked(robot) && settings_->programs[program_of_[robot]].firmware;
 }
 
 bool RunPlan::has_firmware() const {
-  return std::any_of(manifest.program().begin(), manifest.program().end(),
-                     [](const proto::Program& program) { return program.firmware(); });
+  return std::any_of(settings_->programs.begin(), settings_->programs.end(),
+                     [](const Program& program) { return program.firmware; });
 }
 
-Pose RunPlan::initial_pose(std::uint32_t robot) const {
-  const int i = static_cast<int>(robot);
-  return {{manifest.x_mm(i), manifest.y_mm(i)}, manifest.heading_rad(i)};
+bool RunPlan::hosts_see_bodies() const {
+  return settings_->light.has_value() || (settings_->battery && !settings_->battery->chargers.empty());
 }
+
+Pose RunPlan::initial_pose(std::uint32_t robot) const { return settings_->poses[robot]; }
 
 Share RunPlan::share(HostId host) const {
   const auto first_of = [this](std::uint64_t h) { return static_cast<std::uint32_t>(h * robots() / hosts); };

@@ -1,20 +1,39 @@
 /// RunPlan: the experiment as resolved. Every federate computes the same plan from the same manifest, and every engine is
 /// built from a plan and its own index in it.
+///
+/// Settings come by subject, each with a header of its own (motion_settings.hpp, radio_settings.hpp...), which a unit includes
+/// where it reads them. No header of this folder includes the schema.
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/time.hpp"
 #include "core/plan/memory_layout.hpp"
+#include "core/plan/run_settings.hpp"
 #include "core/plan/world.hpp"
-#include "idl/manifest.pb.h"
 
 namespace kilotwin {
+
+namespace proto {
+class Manifest;
+}
+struct ArenaFieldSettings;
+struct BatterySettings;
+struct EffectSettings;
+struct LightSettings;
+struct MotionSettings;
+struct PhysicsSettings;
+struct PlanSettings;
+struct RadioSettings;
+struct RobotSettings;
+struct StationSettings;
+struct TemperatureSettings;
 
 /// A half-open rectangle of the arena, mm. Edges of outermost partitions lie at +-infinity, so that every pose has an owner.
 struct Rectangle {
@@ -55,35 +74,55 @@ struct Share {
   [[nodiscard]] bool contains(std::uint32_t robot) const { return robot >= first && robot < last; }
 };
 
-inline constexpr std::uint32_t kNoProgram = 0xffffffffu;
-
-/// The name of a program's file in the run directory's programs/: SHA256 and .so, .elf or .hex.
-[[nodiscard]] std::string program_file(const proto::Program&);
-
 class RunPlan {
+  // First, as the members below are made of them.
+  std::shared_ptr<const proto::Manifest> manifest_;
+  std::shared_ptr<const PlanSettings> settings_;
+
  public:
   /// Throws UserError where the manifest is of another format.
   explicit RunPlan(proto::Manifest manifest);
 
-  const proto::Manifest manifest;
   const TickLength tick_length;
-  const Tick last_tick;  ///< where the run ends
-  const World world;     ///< walls, obstacles, movable bodies
+  const double duration_s;  ///< as the experiment states it
+  const Tick last_tick;     ///< where the run ends
+  const World world;        ///< walls, obstacles, movable bodies
   const PartitionGrid grid;
   const std::uint32_t hosts;
   const MemoryLayout memory;  ///< of each robot, for the model's effects
   const std::uint64_t hash;   ///< of what determines results and topology; alike in all federates of a run
+  const bool resumed;         ///< starts from the checkpoint in the run directory's resumed/
+  const double pace;          ///< simulated over wall time, at most; 0: as fast as possible
+  const std::string mode;     ///< "local" or "federated"
 
-  [[nodiscard]] const proto::Experiment& experiment() const { return manifest.experiment(); }
-  [[nodiscard]] std::uint64_t run() const { return manifest.run(); }
-  [[nodiscard]] std::uint64_t seed() const { return experiment().seed(); }
+  /// What the plan was made of, for those that write it again. Who reads it includes idl/manifest.pb.h.
+  [[nodiscard]] const proto::Manifest& manifest() const { return *manifest_; }
+
+  [[nodiscard]] std::uint64_t run() const { return run_; }
+  [[nodiscard]] std::uint64_t seed() const { return seed_; }
   /// Ticks between checkpoints; 0: none.
-  [[nodiscard]] std::int64_t checkpoint_every() const {
-    return tick_length.at_or_after(experiment().deployment().checkpoint_every_s()).count();
-  }
-  [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(manifest.x_mm_size()); }
+  [[nodiscard]] std::int64_t checkpoint_every() const { return checkpoint_every_; }
+  [[nodiscard]] const std::string& experiment_name() const;
+  [[nodiscard]] std::uint32_t run_number() const;  ///< the covariate RUN
+  [[nodiscard]] const MotionSettings& motion_settings() const;
+  /// Of single robots. Their ids need not be those of robots of this run.
+  [[nodiscard]] const std::vector<RobotSettings>& robot_settings() const;
+  [[nodiscard]] const std::vector<EffectSettings>& effects() const;
+  [[nodiscard]] const std::vector<ArenaFieldSettings>& fields() const;
+  [[nodiscard]] const PhysicsSettings& physics_settings() const;
+  [[nodiscard]] const RadioSettings& radio_settings() const;
+  [[nodiscard]] const StationSettings& station_settings() const;
+  [[nodiscard]] const std::optional<LightSettings>& light_settings() const;
+  [[nodiscard]] const std::optional<BatterySettings>& battery_settings() const;
+  [[nodiscard]] const std::optional<TemperatureSettings>& temperature_settings() const;
+  [[nodiscard]] const RecordingSettings& recording_settings() const;
+  [[nodiscard]] const std::vector<Program>& programs() const;
+  [[nodiscard]] const std::vector<RobotEeprom>& eeproms() const;  ///< of robots that bring one
+  [[nodiscard]] const std::vector<ProgramFailure>& program_failures() const;
+
+  [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(program_of_.size()); }
   [[nodiscard]] Pose initial_pose(std::uint32_t robot) const;
-  /// Index of the robot's program in manifest.program, or kNoProgram where its group is tracked.
+  /// Index of the robot's program in programs(), or kNoProgram where its group is tracked.
   [[nodiscard]] std::uint32_t program_of(std::uint32_t robot) const { return program_of_[robot]; }
   [[nodiscard]] bool tracked(std::uint32_t robot) const { return program_of_[robot] == kNoProgram; }
   /// Whether the robot is a beacon: motors have no effect on it, and nothing moves it.
@@ -91,22 +130,16 @@ class RunPlan {
   /// Bodies that robots can push, numbered from 0: world.movables.
   [[nodiscard]] std::uint32_t movables() const { return static_cast<std::uint32_t>(world.movables.size()); }
   /// Whether the robot runs firmware for its own processor. The radio simulates that processor.
-  [[nodiscard]] bool firmware(std::uint32_t robot) const {
-    return !tracked(robot) && manifest.program(static_cast<int>(program_of_[robot])).firmware();
-  }
+  [[nodiscard]] bool firmware(std::uint32_t robot) const;
   /// Whether any robot does.
   [[nodiscard]] bool has_firmware() const;
   /// The robot's kilo_uid as it is calibrated: its number, or counted through its group from where the group says.
   [[nodiscard]] std::uint16_t uid_of(std::uint32_t robot) const { return uid_of_[robot]; }
-  /// Whether hosts of behaviours need poses: for light, and for batteries that can be charged.
-  [[nodiscard]] bool hosts_see_bodies() const {
-    return experiment().has_light() || experiment().battery().charger_size() > 0;
-  }
-  /// The group of the experiment that the robot belongs to.
-  [[nodiscard]] const proto::RobotGroup& group(std::uint32_t robot) const {
-    return experiment().robots(static_cast<int>(group_of_[robot]));
-  }
-  /// The robots of one host of behaviours: a range of ids, of about equal size for all hosts.
+  /// Whether behaviours hosts need poses: for light, and for batteries that can be charged.
+  [[nodiscard]] bool hosts_see_bodies() const;
+  /// Of the robot's group.
+  [[nodiscard]] LoopRate loop_rate(std::uint32_t robot) const { return loop_rate_[robot]; }
+  /// The robots of one behaviours host: a range of ids, of about equal size for all hosts.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;
 
@@ -128,8 +161,12 @@ class RunPlan {
     return result;
   }
 
-  std::vector<std::uint32_t> program_of_, group_of_;
+  std::uint64_t run_, seed_;
+  std::int64_t checkpoint_every_;
+  // Per robot.
+  std::vector<std::uint32_t> program_of_;
   std::vector<std::uint8_t> immobile_;
+  std::vector<LoopRate> loop_rate_;
   std::vector<std::uint16_t> uid_of_;
 };
 

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "core/math/elementary.h"
+#include "idl/experiment.pb.h"
 
 namespace kilotwin {
 namespace {
@@ -46,7 +47,7 @@ template <class Body> double height_of(const Body& body) {
 template <class Body> Pose pose_of(const Body& body, Point2 centre) {
   const double heading_rad = wrapped(body.heading_deg() * kRadiansPerDegree);
   const Point2 at = Place::at(body.x_mm(), body.y_mm(), heading_rad).to_arena(centre);
-  return {{at.x_mm, at.y_mm}, heading_rad};
+  return {at.x_mm, at.y_mm, heading_rad};
 }
 
 }  // namespace
@@ -55,7 +56,11 @@ Convex shape_of(const proto::Obstacle& body, Point2& centre) { return any_shape_
 Convex shape_of(const proto::MovableBody& body, Point2& centre) { return any_shape_of(body, centre); }
 
 ArenaShape::ArenaShape(const proto::Arena& arena)
-    : kind_(Kind::kRectangle), half_width_mm_(arena.width_mm() / 2), half_height_mm_(arena.height_mm() / 2) {
+    : kind_(Kind::kRectangle),
+      stated_width_mm_(arena.width_mm()),
+      stated_height_mm_(arena.height_mm()),
+      half_width_mm_(arena.width_mm() / 2),
+      half_height_mm_(arena.height_mm() / 2) {
   if (arena.has_circle()) {
     if (!arena.circle().has_radius_mm()) throw std::invalid_argument("radius_mm is missing");
     kind_ = Kind::kCircle;
@@ -120,8 +125,8 @@ World::World(const proto::Experiment& experiment) : arena(experiment.arena()) {
     Point2 centre;
     Convex shape = shape_of(body, centre);
     const Pose pose = pose_of(body, centre);
-    obstacles.push_back({std::move(shape), Place::at(pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad),
-                         pose.heading_rad, height_of(body)});
+    obstacles.push_back(
+        {std::move(shape), Place::at(pose.x_mm, pose.y_mm, pose.heading_rad), pose.heading_rad, height_of(body)});
   }
   for (const proto::MovableBody& body : experiment.movable()) {
     Point2 centre;

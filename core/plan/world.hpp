@@ -7,9 +7,15 @@
 
 #include "core/base/pose.hpp"
 #include "core/geometry/convex.hpp"
-#include "idl/experiment.pb.h"
 
 namespace kilotwin {
+
+namespace proto {
+class Arena;
+class Experiment;
+class MovableBody;
+class Obstacle;
+}  // namespace proto
 
 /// Standard gravity, m/s^2.
 inline constexpr double kGravity_m_s2 = 9.80665;
@@ -26,6 +32,9 @@ class ArenaShape {
   [[nodiscard]] double half_width_mm() const { return half_width_mm_; }
   [[nodiscard]] double half_height_mm() const { return half_height_mm_; }
   [[nodiscard]] double radius_mm() const { return radius_mm_; }  ///< of a circle
+  /// Arena.width_mm and height_mm: of a rectangle its extents; of another shape their defaults.
+  [[nodiscard]] double stated_width_mm() const { return stated_width_mm_; }
+  [[nodiscard]] double stated_height_mm() const { return stated_height_mm_; }
   /// Of a polygon, anticlockwise, in the arena's frame; edge i goes from corner i to the next, with its outward normal.
   [[nodiscard]] const std::vector<Point2>& corners() const { return corners_; }
   [[nodiscard]] const std::vector<Point2>& normals() const { return normals_; }
@@ -38,6 +47,7 @@ class ArenaShape {
 
  private:
   Kind kind_;
+  double stated_width_mm_, stated_height_mm_;
   double half_width_mm_, half_height_mm_, radius_mm_ = 0;
   std::vector<Point2> corners_, normals_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/math/elementary.h"
+#include "core/plan/senses_settings.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::senses {
@@ -34,31 +35,31 @@ double open_circuit_volts(double charge) {
 }
 
 Battery::Battery(const RunPlan& plan) : plan_(plan), tick_cycles_(plan.tick_length.cycles()) {
-  const proto::Battery& battery = plan.experiment().battery();
-  capacity_ = std::max<std::int64_t>(whole(battery.capacity_mah() * 1000 * kCyclesPerHour), 1);
+  const BatterySettings& battery = *plan.battery_settings();
+  capacity_ = std::max<std::int64_t>(whole(battery.capacity_mAh * 1000 * kCyclesPerHour), 1);
   restart_ = whole(kRestart * static_cast<double>(capacity_));
-  idle_ = microamperes(battery.idle_ma()) * tick_cycles_;
-  sleep_ = microamperes(battery.sleep_ma()) * tick_cycles_;
-  transmission_ = microamperes(battery.transmission_ma()) * kPacketCycles;
+  idle_ = microamperes(battery.idle_mA) * tick_cycles_;
+  sleep_ = microamperes(battery.sleep_mA) * tick_cycles_;
+  transmission_ = microamperes(battery.transmission_mA) * kPacketCycles;
   for (std::size_t duty = 0; duty < motor_.size(); ++duty)
-    motor_[duty] = microamperes(battery.motor_ma() * static_cast<double>(duty) / 255) * tick_cycles_;
+    motor_[duty] = microamperes(battery.motor_mA * static_cast<double>(duty) / 255) * tick_cycles_;
   for (std::size_t led = 0; led < led_.size(); ++led) {
     const std::size_t levels = (led & 3) + (led >> 2 & 3) + (led >> 4);
-    led_[led] = microamperes(battery.led_ma() * static_cast<double>(levels) / 3) * tick_cycles_;
+    led_[led] = microamperes(battery.led_mA * static_cast<double>(levels) / 3) * tick_cycles_;
   }
-  ohm_ = battery.resistance_ohm();
-  sd_ = battery.reading_sd();
-  for (const proto::Charger& charger : battery.charger()) {
+  ohm_ = battery.resistance_ohm;
+  sd_ = battery.reading_sd;
+  for (const ChargerSettings& charger : battery.chargers) {
     chargers_.push_back(
-        {charger.x_mm(), charger.y_mm(), charger.radius_mm(), microamperes(charger.current_ma()) * tick_cycles_});
+        {charger.x_mm, charger.y_mm, charger.radius_mm, microamperes(charger.current_mA) * tick_cycles_});
   }
 }
 
 std::int64_t Battery::initial(std::uint32_t robot) const {
-  const proto::Battery& battery = plan_.experiment().battery();
-  double part = battery.charge();
-  if (battery.charge_sd() > 0)
-    part += battery.charge_sd() * Random(plan_.seed()).normal(Stream::kBattery, robot, Tick{0}, 0);
+  const BatterySettings& battery = *plan_.battery_settings();
+  double part = battery.charge;
+  if (battery.charge_sd > 0)
+    part += battery.charge_sd * Random(plan_.seed()).normal(Stream::kBattery, robot, Tick{0}, 0);
   return whole(std::clamp(part, 0.0, 1.0) * static_cast<double>(capacity_));
 }
 

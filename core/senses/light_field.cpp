@@ -2,44 +2,42 @@
 
 #include "core/base/error.hpp"
 #include "core/math/elementary.h"
+#include "core/plan/motion_settings.hpp"
+#include "core/plan/senses_settings.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::senses {
 
 LightField::LightField(const RunPlan& plan, Share share)
     : plan_(plan),
-      light_(plan.experiment().light()),
+      light_(*plan.light_settings()),
       share_(share),
-      anchor_z_mm_(light_.sensor().height_mm()),
+      anchor_z_mm_(light_.sensor.height_mm),
       gain_(share.size()),
       offset_(share.size()),
       x_mm_(plan.robots()),
       y_mm_(plan.robots()),
       heading_rad_(plan.robots()) {
-  const proto::LightSensor& sensor = light_.sensor();
+  const LightSensorSettings& sensor = light_.sensor;
   double s = 0, c = 0;
-  kt_sincos(sensor.angle_deg() * (kPi / 180), &s, &c);
-  anchor_x_mm_ = sensor.radius_mm() * c;
-  anchor_y_mm_ = sensor.radius_mm() * s;
+  kt_sincos(sensor.angle_deg * (kPi / 180), &s, &c);
+  anchor_x_mm_ = sensor.radius_mm * c;
+  anchor_y_mm_ = sensor.radius_mm * s;
 
   const Random random(plan.seed());
   for (std::uint32_t i = 0; i < share.size(); ++i) {
     const auto draw = random.normal_pair(Stream::kLightSensor, share.first + i, Tick{0}, 0);
-    gain_[i] = kt_exp(sensor.gain_sd() * draw[0]);
-    offset_[i] = sensor.offset_sd() * draw[1];
+    gain_[i] = kt_exp(sensor.gain_sd * draw[0]);
+    offset_[i] = sensor.offset_sd * draw[1];
   }
-  for (const proto::RobotModel& robot : plan.experiment().robot_model()) {
-    if (!share.contains(robot.robot())) continue;
-    if (robot.has_light_gain()) gain_[robot.robot() - share.first] = robot.light_gain();
-    if (robot.has_light_offset()) offset_[robot.robot() - share.first] = robot.light_offset();
+  for (const RobotSettings& robot : plan.robot_settings()) {
+    if (!share.contains(robot.robot)) continue;
+    if (robot.light_gain) gain_[robot.robot - share.first] = *robot.light_gain;
+    if (robot.light_offset) offset_[robot.robot - share.first] = *robot.light_offset;
   }
 
-  int rasters = 0;
-  for (const proto::LightImage& image : light_.image()) {
-    images_.emplace_back(image, plan.manifest, rasters);
-    rasters += image.png_size();
-  }
-  if (light_.shadows()) shadows_.emplace(sensor.body_height_mm());
+  for (const LightImageSettings& image : light_.images) images_.emplace_back(image);
+  if (light_.shadows) shadows_.emplace(sensor.body_height_mm);
 }
 
 void LightField::at(Tick tick, std::span<const BodyFrame* const> bodies) {
@@ -60,7 +58,7 @@ void LightField::at(Tick tick, std::span<const BodyFrame* const> bodies) {
 
   const double time_s = plan_.tick_length.seconds_at(tick);
   lamps_.clear();
-  for (const proto::LightSource& source : light_.source()) {
+  for (const LightSourceSettings& source : light_.sources) {
     const Lamp lamp = lamp_at(source, time_s);
     if (lamp.intensity > 0) lamps_.push_back(lamp);
   }
@@ -68,10 +66,10 @@ void LightField::at(Tick tick, std::span<const BodyFrame* const> bodies) {
 }
 
 double LightField::light(double x_mm, double y_mm, double z_mm, std::uint32_t self) const {
-  double sum = light_.ambient();
+  double sum = light_.ambient;
   for (const Lamp& lamp : lamps_) {
     if (shadows_ && shadows_->hides(lamp, x_mm, y_mm, z_mm, self)) continue;
-    sum += reading_of(lamp, x_mm, y_mm, z_mm, light_.sensor().cosine());
+    sum += reading_of(lamp, x_mm, y_mm, z_mm, light_.sensor.cosine);
   }
   for (const LightImage& image : images_) sum += image.reading(x_mm, y_mm);
   return sum;
@@ -86,7 +84,7 @@ double LightField::reading(std::uint32_t id) const {
 }
 
 double LightField::sd(double reading) const {
-  const double floor = light_.sensor().noise_floor(), relative = light_.sensor().noise_relative() * reading;
+  const double floor = light_.sensor.noise_floor, relative = light_.sensor.noise_relative * reading;
   return __builtin_sqrt(floor * floor + relative * relative);
 }
 

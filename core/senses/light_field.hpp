@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/frames/frames.hpp"
+#include "core/plan/plan.hpp"
 #include "core/senses/light_image.hpp"
 #include "core/senses/light_source.hpp"
 #include "core/senses/shadows.hpp"
@@ -16,7 +16,7 @@ namespace kilotwin::senses {
 /// A pure function of (experiment, seed, tick, poses): the same on every host.
 class LightField {
  public:
-  /// For robots of `share`. The plan's experiment has light; the plan must outlive this object.
+  /// For robots of `share`. The plan has light and must outlive this object.
   LightField(const RunPlan&, Share share);
 
   /// The field of `tick`, with the poses of that tick from all partitions, in any order.
@@ -33,7 +33,7 @@ class LightField {
 
  private:
   const RunPlan& plan_;
-  const proto::Light& light_;
+  const LightSettings& light_;
   const Share share_;
   double anchor_x_mm_ = 0, anchor_y_mm_ = 0, anchor_z_mm_;  ///< the sensor's place on a robot with heading 0
   std::vector<double> gain_, offset_;                       ///< per robot of the share

@@ -2,25 +2,22 @@
 
 #include "core/base/error.hpp"
 #include "core/math/elementary.h"
+#include "core/plan/senses_settings.hpp"
 
 namespace kilotwin::senses {
 
-LightImage::LightImage(const proto::LightImage& image, const proto::Manifest& manifest, int first)
-    : width_mm_(image.has_width_mm() ? image.width_mm() : manifest.experiment().arena().width_mm()),
-      height_mm_(image.has_height_mm() ? image.height_mm() : manifest.experiment().arena().height_mm()),
-      picture_s_(image.picture_s()),
-      loop_(image.loop()) {
-  left_mm_ = image.x_mm() - width_mm_ / 2;
-  top_mm_ = image.y_mm() + height_mm_ / 2;
-  for (int i = 0; i < image.png_size(); ++i) {
-    const proto::LightRaster& raster = manifest.light_raster(first + i);
-    KILOTWIN_DEMAND(raster.columns() > 0 && raster.rows() > 0 &&
-                    raster.brightness().size() == std::size_t{raster.columns()} * raster.rows());
-    rasters_.push_back({raster.columns(), raster.rows(), raster.brightness().data()});
+LightImage::LightImage(const LightImageSettings& image)
+    : width_mm_(image.width_mm), height_mm_(image.height_mm), picture_s_(image.picture_s), loop_(image.loop) {
+  left_mm_ = image.x_mm - width_mm_ / 2;
+  top_mm_ = image.y_mm + height_mm_ / 2;
+  for (const LightRaster& raster : image.pictures) {
+    KILOTWIN_DEMAND(raster.columns > 0 && raster.rows > 0 &&
+                    raster.brightness.size() == std::size_t{raster.columns} * raster.rows);
+    rasters_.push_back({raster.columns, raster.rows, raster.brightness.data()});
   }
   for (int i = 0; i < 256; ++i) {
     reading_of_[static_cast<std::size_t>(i)] =
-        image.black() + (image.white() - image.black()) * kt_pow(i / 255.0, image.gamma());
+        image.black + (image.white - image.black) * kt_pow(i / 255.0, image.gamma);
   }
 }
 

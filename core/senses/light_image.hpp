@@ -5,14 +5,16 @@
 #include <cstdint>
 #include <vector>
 
-#include "idl/manifest.pb.h"
+namespace kilotwin {
+struct LightImageSettings;
+}
 
 namespace kilotwin::senses {
 
 class LightImage {
  public:
-  /// `rasters`: the manifest's, of which the image takes as many as it names pictures, from `first` on.
-  LightImage(const proto::LightImage&, const proto::Manifest&, int first);
+  /// The settings must outlive this object, which reads their pictures.
+  explicit LightImage(const LightImageSettings&);
 
   /// Chooses the picture of an instant.
   void at(double time_s);
@@ -23,7 +25,7 @@ class LightImage {
  private:
   struct Raster {
     std::uint32_t columns = 0, rows = 0;
-    const char* brightness = nullptr;  ///< row by row from the top, 0..255; the manifest's own
+    const char* brightness = nullptr;  ///< row by row from the top, 0..255; of the settings
   };
   std::vector<Raster> rasters_;
   std::array<double, 256> reading_of_{};  ///< per brightness

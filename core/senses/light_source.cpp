@@ -2,55 +2,56 @@
 
 #include "core/base/pose.hpp"
 #include "core/math/elementary.h"
+#include "core/plan/senses_settings.hpp"
 
 namespace kilotwin::senses {
 namespace {
 
 /// Whether the source shines: it changes at each time of its list.
-bool shines(const proto::LightSource& source, double time_s) {
-  bool on = source.on();
-  const double within_s = source.switch_period_s() > 0 ? kt_fmod(time_s, source.switch_period_s()) : time_s;
-  for (const double at_s : source.switch_s()) {
+bool shines(const LightSourceSettings& source, double time_s) {
+  bool on = source.on;
+  const double within_s = source.switch_period_s > 0 ? kt_fmod(time_s, source.switch_period_s) : time_s;
+  for (const double at_s : source.switch_s) {
     if (at_s > within_s) break;
     on = !on;
   }
   return on;
 }
 
-void follow_way(const proto::LightSource& source, double time_s, Lamp& lamp) {
-  const int last = source.waypoint_size() - 1;
-  const double whole_s = source.waypoint(last).time_s();
-  if (source.loop() && whole_s > 0) time_s = kt_fmod(time_s, whole_s);
-  int next = 0;
-  while (next < last && source.waypoint(next).time_s() <= time_s) ++next;
-  const proto::LightWaypoint& to = source.waypoint(next);
-  const proto::LightWaypoint& from = source.waypoint(next > 0 ? next - 1 : 0);
-  const double span_s = to.time_s() - from.time_s();
-  double part = span_s > 0 ? (time_s - from.time_s()) / span_s : 1;
+void follow_way(const LightSourceSettings& source, double time_s, Lamp& lamp) {
+  const std::size_t last = source.waypoints.size() - 1;
+  const double whole_s = source.waypoints[last].time_s;
+  if (source.loop && whole_s > 0) time_s = kt_fmod(time_s, whole_s);
+  std::size_t next = 0;
+  while (next < last && source.waypoints[next].time_s <= time_s) ++next;
+  const LightWaypointSettings& to = source.waypoints[next];
+  const LightWaypointSettings& from = source.waypoints[next > 0 ? next - 1 : 0];
+  const double span_s = to.time_s - from.time_s;
+  double part = span_s > 0 ? (time_s - from.time_s) / span_s : 1;
   part = part < 0 ? 0 : part > 1 ? 1 : part;
   const auto between = [part](double a, double b) { return a + part * (b - a); };
-  lamp.x_mm = between(from.x_mm(), to.x_mm());
-  lamp.y_mm = between(from.y_mm(), to.y_mm());
-  if (from.has_height_mm() && to.has_height_mm()) lamp.z_mm = between(from.height_mm(), to.height_mm());
+  lamp.x_mm = between(from.x_mm, to.x_mm);
+  lamp.y_mm = between(from.y_mm, to.y_mm);
+  if (from.height_mm && to.height_mm) lamp.z_mm = between(*from.height_mm, *to.height_mm);
 }
 
-void follow_circle(const proto::LightSource& source, double time_s, Lamp& lamp) {
-  const proto::LightCircle& circle = source.circle();
+void follow_circle(const LightSourceSettings& source, double time_s, Lamp& lamp) {
+  const LightCircleSettings& circle = *source.circle;
   // Whole turns are taken off first, so that a long run loses no accuracy.
-  const double turns = kt_fmod(time_s, circle.period_s()) / circle.period_s();
-  const double angle_rad = 2 * kPi * (circle.clockwise() ? -turns : turns) + circle.phase_deg() * (kPi / 180);
+  const double turns = kt_fmod(time_s, circle.period_s) / circle.period_s;
+  const double angle_rad = 2 * kPi * (circle.clockwise ? -turns : turns) + circle.phase_deg * (kPi / 180);
   double s = 0, c = 0;
   kt_sincos(angle_rad, &s, &c);
-  lamp.x_mm += circle.radius_mm() * c;
-  lamp.y_mm += circle.radius_mm() * s;
+  lamp.x_mm += circle.radius_mm * c;
+  lamp.y_mm += circle.radius_mm * s;
 }
 
 }  // namespace
 
-Lamp lamp_at(const proto::LightSource& source, double time_s) {
-  Lamp lamp{source.x_mm(), source.y_mm(), source.height_mm(), shines(source, time_s) ? source.intensity() : 0};
-  if (source.waypoint_size() > 0) follow_way(source, time_s, lamp);
-  if (source.has_circle()) follow_circle(source, time_s, lamp);
+Lamp lamp_at(const LightSourceSettings& source, double time_s) {
+  Lamp lamp{source.x_mm, source.y_mm, source.height_mm, shines(source, time_s) ? source.intensity : 0};
+  if (!source.waypoints.empty()) follow_way(source, time_s, lamp);
+  if (source.circle) follow_circle(source, time_s, lamp);
   return lamp;
 }
 

@@ -1,7 +1,9 @@
 /// Where a light is at an instant, and how bright.
 #pragma once
 
-#include "idl/experiment.pb.h"
+namespace kilotwin {
+struct LightSourceSettings;
+}
 
 namespace kilotwin::senses {
 
@@ -12,7 +14,7 @@ struct Lamp {
 };
 
 /// A pure function of time: along the way-points or around the circle, switched as the source says.
-[[nodiscard]] Lamp lamp_at(const proto::LightSource&, double time_s);
+[[nodiscard]] Lamp lamp_at(const LightSourceSettings&, double time_s);
 
 /// The reading of a nominal sensor at (x, y, z), counts, above or below what the converter can show. It falls with the square of
 /// the distance; `cosine`: and with the cosine of the angle from the vertical, as on a flat sensor that looks up.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/plan/senses_settings.hpp"
 #include "core/random/random.hpp"
 
 namespace kilotwin::senses {
@@ -17,21 +18,19 @@ double temperature_reading(double celsius) {
 }  // namespace
 
 RobotSenses::RobotSenses(const RunPlan& plan, Share share) : share_(share) {
-  const proto::Experiment& experiment = plan.experiment();
-  if (experiment.has_light()) light_.emplace(plan, share);
+  if (plan.light_settings()) light_.emplace(plan, share);
 
-  const proto::Temperature& temperature = experiment.temperature();
-  temperature_.assign(share.size(), temperature_reading(temperature.celsius()));
-  if (experiment.has_temperature()) {
-    temperature_sd_ = temperature.reading_sd();
+  temperature_.assign(share.size(), Readings{}.temperature);
+  if (const std::optional<TemperatureSettings>& temperature = plan.temperature_settings()) {
+    temperature_sd_ = temperature->reading_sd;
     const Random random(plan.seed());
     for (std::uint32_t i = 0; i < share.size(); ++i) {
       const double offset = random.normal(Stream::kTemperature, share.first + i, Tick{0}, 0);
-      temperature_[i] = temperature_reading(temperature.celsius() + temperature.offset_sd() * offset);
+      temperature_[i] = temperature_reading(temperature->celsius + temperature->offset_sd * offset);
     }
   }
 
-  if (!experiment.has_battery()) return;
+  if (!plan.battery_settings()) return;
   battery_.emplace(plan);
   charge_.resize(share.size());
   drain_.resize(share.size());

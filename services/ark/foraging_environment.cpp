@@ -5,6 +5,7 @@
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/math/elementary.h"
+#include "idl/checkpoint.pb.h"
 
 namespace kilotwin::ark {
 namespace {
@@ -19,23 +20,22 @@ double squared(double x) { return x * x; }
 
 }  // namespace
 
-ForagingEnvironment::ForagingEnvironment(const proto::ForagingEnvironment& setting, std::uint32_t robots)
-    : setting_(setting), loads_left_(setting.loads()), carries_(robots, '\0') {}
+ForagingEnvironment::ForagingEnvironment(const ForagingSettings& setting, std::uint32_t robots)
+    : setting_(setting), loads_left_(setting.loads), carries_(robots, '\0') {}
 
 double ForagingEnvironment::food_radius_mm() const {
-  return setting_.food_radius_mm() * loads_left_ / setting_.loads();
+  return setting_.food_radius_mm * loads_left_ / setting_.loads;
 }
 
 double ForagingEnvironment::home_radius_mm() const {
-  return setting_.home_radius_mm() + setting_.food_radius_mm() * delivered_ / setting_.loads();
+  return setting_.home_radius_mm + setting_.food_radius_mm * delivered_ / setting_.loads;
 }
 
 bool ForagingEnvironment::is_within(const TrackedRobot& robot, bool of_home, double margin_mm) const {
-  const double x_mm = of_home ? setting_.home_x_mm() : setting_.food_x_mm();
-  const double y_mm = of_home ? setting_.home_y_mm() : setting_.food_y_mm();
+  const double x_mm = of_home ? setting_.home_x_mm : setting_.food_x_mm;
+  const double y_mm = of_home ? setting_.home_y_mm : setting_.food_y_mm;
   const double radius_mm = (of_home ? home_radius_mm() : food_radius_mm()) + margin_mm;
-  return squared(robot.p_WR.position_mm.x() - x_mm) + squared(robot.p_WR.position_mm.y() - y_mm) <=
-         squared(radius_mm);
+  return squared(robot.p_WR.x_mm - x_mm) + squared(robot.p_WR.y_mm - y_mm) <= squared(radius_mm);
 }
 
 std::optional<ArkMessage> ForagingEnvironment::sense(const TrackedRobot& robot) {
@@ -58,15 +58,15 @@ std::optional<ArkMessage> ForagingEnvironment::sense(const TrackedRobot& robot) 
   }
   if (carries == 0 && loads_left_ == 0) return ArkMessage{id, kNoFood, 0};
   const bool home = carries != 0;
-  const Eigen::Vector2d goal_mm = home ? Eigen::Vector2d{setting_.home_x_mm(), setting_.home_y_mm()}
-                                       : Eigen::Vector2d{setting_.food_x_mm(), setting_.food_y_mm()};
-  const double x_mm = goal_mm.x() - robot.p_WR.position_mm.x(), y_mm = goal_mm.y() - robot.p_WR.position_mm.y();
+  const Point2 goal =
+      home ? Point2{setting_.home_x_mm, setting_.home_y_mm} : Point2{setting_.food_x_mm, setting_.food_y_mm};
+  const double x_mm = goal.x_mm - robot.p_WR.x_mm, y_mm = goal.y_mm - robot.p_WR.y_mm;
   const double distance_mm = __builtin_sqrt(x_mm * x_mm + y_mm * y_mm);
-  if (!home && distance_mm > setting_.scent_radius_mm()) return std::nullopt;
+  if (!home && distance_mm > setting_.scent_radius_mm) return std::nullopt;
   std::uint8_t type = kInside;
   if (!is_within(robot, home, 0))
     type = static_cast<std::uint8_t>(std::min<double>(kFarthest, kt_floor(distance_mm / kStep_mm) + 1));
-  return ArkMessage{id, type, bearing_deg(robot.p_WR, goal_mm)};
+  return ArkMessage{id, type, bearing_deg(robot.p_WR, goal)};
 }
 
 std::uint64_t ForagingEnvironment::word() const {
@@ -82,7 +82,7 @@ void ForagingEnvironment::save(proto::EnvironmentState& state) const {
 }
 
 void ForagingEnvironment::load(const proto::EnvironmentState& state) {
-  if (state.carries().size() != carries_.size() || state.loads_left() > setting_.loads())
+  if (state.carries().size() != carries_.size() || state.loads_left() > setting_.loads)
     throw RunError("the checkpoint is of another virtual environment; resume from another one");
   loads_left_ = state.loads_left();
   delivered_ = state.delivered();

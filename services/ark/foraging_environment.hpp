@@ -16,7 +16,7 @@ namespace kilotwin::ark {
 
 class ForagingEnvironment final : public VirtualEnvironment {
  public:
-  ForagingEnvironment(const proto::ForagingEnvironment&, std::uint32_t robots);
+  ForagingEnvironment(const ForagingSettings&, std::uint32_t robots);
 
   [[nodiscard]] std::optional<ArkMessage> sense(const TrackedRobot& robot) override;
   [[nodiscard]] std::uint64_t word() const override;
@@ -32,7 +32,7 @@ class ForagingEnvironment final : public VirtualEnvironment {
  private:
   [[nodiscard]] bool is_within(const TrackedRobot&, bool of_home, double margin_mm) const;
 
-  const proto::ForagingEnvironment setting_;
+  const ForagingSettings setting_;
   std::uint32_t loads_left_, delivered_ = 0;
   std::string carries_;  ///< per robot
 };

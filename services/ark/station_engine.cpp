@@ -4,6 +4,8 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/plan/station_settings.hpp"
+#include "idl/checkpoint.pb.h"
 
 namespace kilotwin::ark {
 namespace {
@@ -32,13 +34,13 @@ std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
 
 StationEngine::StationEngine(const RunPlan& plan)
     : plan_(plan),
-      start_ends_(plan.tick_length.at_or_after(plan.experiment().station().start_broadcast_s())),
-      packet_ticks_(plan.tick_length.at_or_after(plan.experiment().station().packet_interval_s()).count()),
+      start_ends_(plan.tick_length.at_or_after(plan.station_settings().start_broadcast_s)),
+      packet_ticks_(plan.tick_length.at_or_after(plan.station_settings().packet_interval_s).count()),
       robot_ticks_(plan.tick_length.at_or_after(robot_interval_s(plan.robots())).count()),
       packets_{run_packet()},
       next_packet_(start_ends_ + packet_ticks_),
       measurement_(plan) {
-  for (const proto::VirtualEnvironment& description : plan.experiment().station().environment()) {
+  for (const EnvironmentSettings& description : plan.station_settings().environments) {
     environments_.push_back(make_environment(description, plan.robots()));
   }
   if (!environments_.empty()) {
@@ -53,16 +55,13 @@ void StationEngine::see(const Inputs& inputs) {
     for (std::size_t i = 0; i < frame->robot.size(); ++i) {
       TrackedRobot& robot = seen_[frame->robot[i]];
       robot.robot = frame->robot[i];
-      robot.p_WR.position_mm = {frame->x_mm[i], frame->y_mm[i]};
-      robot.p_WR.heading_rad = frame->heading_rad[i];
+      robot.p_WR = {frame->x_mm[i], frame->y_mm[i], frame->heading_rad[i]};
     }
   }
   if (measurement_.any()) {
     measurement_.measure(inputs.bodies.front()->tick, inputs.bodies, inputs.actuation, measured_);
-    for (std::size_t i = 0; i < seen_.size(); ++i) {
-      seen_[i].p_WR.position_mm = {measured_.x_mm[i], measured_.y_mm[i]};
-      seen_[i].p_WR.heading_rad = measured_.heading_rad[i];
-    }
+    for (std::size_t i = 0; i < seen_.size(); ++i)
+      seen_[i].p_WR = {measured_.x_mm[i], measured_.y_mm[i], measured_.heading_rad[i]};
   }
   for (const ActuationFrame* frame : inputs.actuation) {
     for (std::size_t i = 0; i < frame->led.size(); ++i) seen_[frame->first_robot + i].led = frame->led[i];

@@ -12,10 +12,13 @@
 #include <vector>
 
 #include "core/effects/measurement.hpp"
-#include "core/plan/plan.hpp"
 #include "core/frames/frames.hpp"
-#include "idl/checkpoint.pb.h"
+#include "core/plan/plan.hpp"
 #include "services/ark/virtual_environment.hpp"
+
+namespace kilotwin::proto {
+class StationState;
+}
 
 namespace kilotwin::ark {
 

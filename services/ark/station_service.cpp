@@ -8,9 +8,9 @@
 
 #include "core/base/error.hpp"
 #include "core/federation/frame_io.hpp"
-#include "core/os/interrupt.hpp"
 #include "core/federation/pace.hpp"
 #include "core/federation/snapshots.hpp"
+#include "core/os/interrupt.hpp"
 #include "services/ark/external_input.hpp"
 #include "services/ark/run_metrics.hpp"
 #include "services/ark/station_engine.hpp"
@@ -103,7 +103,7 @@ class StationFederate : public Federate {
     const RunPlan& plan = session_.plan();
     PublicRunStatus status{};
     status.run = plan.run();
-    plan.experiment().name().copy(status.name, sizeof status.name - 1);
+    plan.experiment_name().copy(status.name, sizeof status.name - 1);
     status.phase = phase;
     status.tick = progress.now.count();
     status.last_tick = plan.last_tick.count();
@@ -207,7 +207,7 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   Session session(plan, plan.station(), context.transport, context.first(), context.inputs);
   // The chain of a resumed run goes on from H at the checkpoint: its first own sum is that of the tick after.
   RunMetrics books(plan, session.participant(), first_hashed(context.first()),
-                 context.resumed ? context.resumed->hash_chain() : 0);
+                   context.resumed ? context.resumed->hash_chain() : 0);
   StationFederate federate(session, engine, books, observer, context);
   RunTotals totals;
   try {

@@ -5,9 +5,13 @@
 #include <optional>
 
 #include "core/base/pose.hpp"
-#include "idl/checkpoint.pb.h"
-#include "idl/experiment.pb.h"
+#include "core/geometry/convex.hpp"
+#include "core/plan/station_settings.hpp"
 #include "services/ark/ark_message.hpp"
+
+namespace kilotwin::proto {
+class EnvironmentState;
+}
 
 namespace kilotwin::ark {
 
@@ -33,10 +37,10 @@ class VirtualEnvironment {
 };
 
 /// The bearing of a place from a robot, whole degrees 0..359, anticlockwise from its heading.
-[[nodiscard]] std::uint16_t bearing_deg(const Pose& p_WR, const Eigen::Vector2d& place_mm);
+[[nodiscard]] std::uint16_t bearing_deg(const Pose& p_WR, const Point2& place);
 
 /// For `robots` robots.
-[[nodiscard]] std::unique_ptr<VirtualEnvironment> make_environment(const proto::VirtualEnvironment& description,
+[[nodiscard]] std::unique_ptr<VirtualEnvironment> make_environment(const EnvironmentSettings&,
                                                                    std::uint32_t robots);
 
 }  // namespace kilotwin::ark

@@ -4,13 +4,13 @@
 
 #include <optional>
 
+#include "core/base/say.hpp"
+#include "core/federation/frame_io.hpp"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
 #include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
-#include "core/base/say.hpp"
-#include "core/federation/frame_io.hpp"
 
 namespace kilotwin::behaviours {
 namespace {
@@ -78,7 +78,7 @@ class BehavioursFederate : public Federate {
 }  // namespace
 
 void run_service(const RunPlan& plan, HostId host, const ServiceContext& context) {
-  BehavioursEngine engine(plan, host, ProgramSet::load(plan.manifest, context.run_directory));
+  BehavioursEngine engine(plan, host, ProgramSet::load(plan, context.run_directory));
   if (context.resumed) engine.load(context.first(), context.resumed->behaviours());
   Session session(plan, plan.behaviours(host), context.transport, context.first(), context.inputs);
   RunningNote note(context.run_directory, host);

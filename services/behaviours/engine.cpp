@@ -58,18 +58,18 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       first_reception_(share_.size() + 1),
       spins_(share_.size()),
       divided_(programs_->size()) {
-  KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.manifest.program_size()));
-  for (const proto::RobotEeprom& brought : plan.manifest.eeprom()) {
-    if (!share_.contains(brought.robot())) continue;
-    auto& eeprom = eeprom_[brought.robot() - share_.first] = std::make_unique<Eeprom>();
-    std::copy_n(brought.content().begin(), eeprom->size(), eeprom->begin());
+  KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.programs().size()));
+  for (const RobotEeprom& brought : plan.eeproms()) {
+    if (!share_.contains(brought.robot)) continue;
+    auto& eeprom = eeprom_[brought.robot - share_.first] = std::make_unique<Eeprom>();
+    std::copy_n(brought.content.begin(), eeprom->size(), eeprom->begin());
   }
   if (const RadioParameters radios(plan); radios.own_tables()) calibrate_ranging(radios);
   // Hosts of one process start at different slots, so that they seldom wait for each other.
   const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
   for (std::uint32_t s = 0; s < kSlots; ++s) {
     for (std::uint32_t p = 0; p < programs_->size(); ++p) {
-      if (plan.manifest.program(static_cast<int>(p)).firmware()) continue;
+      if (plan.programs()[p].firmware) continue;
       Group group{p, (first_slot + s) % kSlots, {}};
       for (std::uint32_t i = 0; i < share_.size(); ++i) {
         const std::uint32_t robot = share_.first + i;
@@ -333,8 +333,7 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
   auto robot = memory_[i].get<KtRobot>(program, program.file.table.robot);
   robot.noise = random_.bits(Stream::kProgram, id, tick, 0);
   robot.tick_cycles = plan_.tick_length.cycles();
-  robot.loop_rate =
-      plan_.group(id).loop_rate() == proto::RobotGroup::AS_ON_ROBOT ? KT_LOOP_AS_ON_ROBOT : KT_LOOP_PER_TICK;
+  robot.loop_rate = plan_.loop_rate(id) == LoopRate::kAsOnRobot ? KT_LOOP_AS_ON_ROBOT : KT_LOOP_PER_TICK;
   robot.uid = plan_.uid_of(id);
   robot.turn_left = calibration.turn_left;
   robot.turn_right = calibration.turn_right;
@@ -351,9 +350,9 @@ void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Pro
 
 /// Robots that brought down their host in an earlier attempt at this run.
 void BehavioursEngine::fail_known_culprits(Tick from) {
-  for (const proto::ProgramFailure& failure : plan_.manifest.program_failure()) {
-    if (failure.tick() != from.count() || !share_.contains(failure.robot())) continue;
-    const std::uint32_t i = failure.robot() - share_.first;
+  for (const ProgramFailure& failure : plan_.program_failures()) {
+    if (failure.tick != from || !share_.contains(failure.robot)) continue;
+    const std::uint32_t i = failure.robot - share_.first;
     if (presence_[i] == Presence::kNew || presence_[i] == Presence::kAlive)
       fail_robot(i, "its program brings down its host");
   }

@@ -2,8 +2,9 @@
 #include <algorithm>
 #include <array>
 
-#include "services/behaviours/engine.hpp"
 #include "core/base/error.hpp"
+#include "idl/checkpoint.pb.h"
+#include "services/behaviours/engine.hpp"
 
 namespace kilotwin::behaviours {
 namespace {

@@ -1,8 +1,8 @@
 #include "services/behaviours/program_set.hpp"
 
+#include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "services/behaviours/sha256.hpp"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 
@@ -18,35 +18,34 @@ std::uint64_t place_for(const std::string& hashes, std::uint64_t size) {
 
 }  // namespace
 
-std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest,
-                                             const std::filesystem::path& run_directory) {
+std::shared_ptr<ProgramSet> ProgramSet::load(const RunPlan& plan, const std::filesystem::path& run_directory) {
   std::vector<ElfFile> files;
   std::string hashes;
   std::uint64_t size = 0;
-  for (const proto::Program& program : manifest.program()) {
-    if (program.firmware()) continue;
-    const std::filesystem::path path = run_directory / "programs" / (program.sha256() + ".so");
+  for (const kilotwin::Program& program : plan.programs()) {
+    if (program.firmware) continue;
+    const std::filesystem::path path = run_directory / "programs" / program.file();
     const auto octets = read_file(path);
     if (!octets) {
       throw UserError(path.string() + ": cannot be read; the run directory must hold the programs of its manifest");
     }
-    if (sha256_hex(*octets) != program.sha256()) {
+    if (sha256_hex(*octets) != program.sha256) {
       throw UserError(path.string() +
                       ": its SHA-256 is not what its name says; copy it again from where the run was prepared");
     }
     files.push_back(ElfFile::parse(*octets, path.string()));
     size += Program::size(files.back());
-    hashes += program.sha256() + '\n';
+    hashes += program.sha256 + '\n';
   }
   auto set = std::make_shared<ProgramSet>();
   std::uint64_t address = place_for(hashes, size);
   std::size_t next = 0;
-  for (const proto::Program& program : manifest.program()) {
-    if (program.firmware()) {
+  for (const kilotwin::Program& program : plan.programs()) {
+    if (program.firmware) {
       set->programs_.push_back(nullptr);
       continue;
     }
-    set->programs_.push_back(Program::load(std::move(files[next++]), program.path(), program.sha256(), address));
+    set->programs_.push_back(Program::load(std::move(files[next++]), program.path, program.sha256, address));
     address = set->programs_.back()->end;
   }
   return set;

@@ -6,24 +6,21 @@
 #include <memory>
 #include <vector>
 
+#include "core/plan/plan.hpp"
 #include "services/behaviours/image.hpp"
-#include "idl/manifest.pb.h"
 
 namespace kilotwin::behaviours {
 
 class ProgramSet {
  public:
-  /// Loads programs/SHA256.so of the run directory for each program of the manifest but firmware, which is none for this
-  /// machine. Where they lie in memory follows from
-  /// their contents and order alone, so that checkpoints hold anywhere, and runs of different programs seldom meet in one
-  /// process. Throws UserError where a file is missing, is not what its name says, or is no program; RunError where memory is
+  /// Loads programs/SHA256.so of the run directory for each program of the plan, except firmware. Addresses in memory follow
+  /// from the contents and order of the programs alone: so checkpoints hold anywhere, and runs of different programs seldom
+  /// collide in one process. Throws UserError where a file is missing, is not what its name says, or is no program; RunError where memory is
   /// short or the addresses are taken.
-  [[nodiscard]] static std::shared_ptr<ProgramSet> load(const proto::Manifest&,
-                                                        const std::filesystem::path& run_directory);
+  [[nodiscard]] static std::shared_ptr<ProgramSet> load(const RunPlan&, const std::filesystem::path& run_directory);
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(programs_.size()); }
-  /// `index` as in RunPlan::program_of.
-  /// Not of firmware.
+  /// `index` as in RunPlan::program_of; not of firmware.
   [[nodiscard]] const Program& program(std::uint32_t index) const { return *programs_[index]; }
 
  private:

@@ -6,6 +6,8 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/plan/radio_settings.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/comm/message_octets.hpp"
 
 namespace kilotwin::comm {
@@ -26,7 +28,7 @@ FirmwareAir::FirmwareAir(const RunPlan& plan, FirmwareRobots& robots, const Tick
       ranging_(ranging),
       overhead_gains_(overhead_gains),
       cycles_per_tick_(plan.tick_length.cycles()),
-      loss_(plan.experiment().radio().loss()),
+      loss_(plan.radio_settings().loss),
       random_(plan.seed()),
       index_(plan.robots(), kNobody) {
   const auto ids = robots.ids();

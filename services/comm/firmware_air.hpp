@@ -13,7 +13,6 @@
 
 #include "core/plan/plan.hpp"
 #include "core/random/random.hpp"
-#include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"
 #include "services/comm/firmware_robots.hpp"
 #include "services/comm/link_budget.hpp"
@@ -21,6 +20,10 @@
 #include "services/comm/overhead_controller.hpp"
 #include "services/comm/packet_bits.hpp"
 #include "services/comm/tick_timers.hpp"
+
+namespace kilotwin::proto {
+class RadioState;
+}
 
 namespace kilotwin::comm {
 

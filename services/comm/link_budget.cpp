@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/math/elementary.h"
+#include "core/plan/radio_settings.hpp"
 
 namespace kilotwin::comm {
 namespace {
@@ -22,31 +23,31 @@ constexpr double kPerDecibel = 0.2302585092994046;
 LinkBudget::LinkBudget(const RunPlan& plan)
     : robots_(plan),
       random_(plan.seed()),
-      is_disc_(plan.experiment().radio().model() != proto::Radio::PROPAGATION),
-      range_mm_(plan.experiment().radio().range_mm()),
+      is_disc_(plan.radio_settings().model != RadioSettings::Model::kPropagation),
+      range_mm_(plan.radio_settings().range_mm),
       range_square_(range_mm_ * range_mm_),
-      decay_db_per_mm_(plan.experiment().radio().propagation().decay_db_per_mm()),
+      decay_db_per_mm_(plan.radio_settings().propagation.decay_db_per_mm),
       mm_per_db_(1 / decay_db_per_mm_),
       reach_mm_(range_mm_),
       surely_square_(range_square_) {
   if (is_disc_) return;
-  const proto::Propagation& model = plan.experiment().radio().propagation();
-  body_loss_db_ = model.body_loss_db();
-  link_sd_db_ = model.link_sd_db();
-  pair_sd_db_ = model.pair_sd_db();
-  run_sd_db_ = model.run_sd_db();
-  packet_sd_db_ = model.packet_sd_db();
-  capture_db_ = model.capture_db();
-  reading_sd_db_ = model.reading_sd_db();
-  notice_db_ = model.notice_db();
-  const auto take = [](const auto& entries, Pattern& pattern) {
-    for (int i = 0; i + 1 < entries.size(); i += 2)
-      pattern.harmonics.push_back({entries.Get(i), entries.Get(i + 1)});
+  const PropagationSettings& model = plan.radio_settings().propagation;
+  body_loss_db_ = model.body_loss_db;
+  link_sd_db_ = model.link_sd_db;
+  pair_sd_db_ = model.pair_sd_db;
+  run_sd_db_ = model.run_sd_db;
+  packet_sd_db_ = model.packet_sd_db;
+  capture_db_ = model.capture_db;
+  reading_sd_db_ = model.reading_sd_db;
+  notice_db_ = model.notice_db;
+  const auto take = [](const std::vector<double>& entries, Pattern& pattern) {
+    for (std::size_t i = 0; i + 1 < entries.size(); i += 2)
+      pattern.harmonics.push_back({entries[i], entries[i + 1]});
   };
-  take(model.power_pattern_db(), power_pattern_);
-  take(model.sensitivity_pattern_db(), sensitivity_pattern_);
-  for (const proto::RadioLink& link : model.link())
-    links_.push_back({key(link.sender(), link.receiver()), link.offset_db()});
+  take(model.power_pattern_db, power_pattern_);
+  take(model.sensitivity_pattern_db, sensitivity_pattern_);
+  for (const RadioLinkSettings& link : model.links)
+    links_.push_back({key(link.sender, link.receiver), link.offset_db});
   std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) { return a.key < b.key; });
 
   const auto points = [](const RadioParameters::Bearing& b) { return b.ahead_db != 0 || b.left_db != 0; };

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/state_hash.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/comm/message_octets.hpp"
 
 namespace kilotwin::comm {

@@ -6,8 +6,11 @@
 #include <vector>
 
 #include "core/frames/frames.hpp"
-#include "idl/checkpoint.pb.h"
 #include "services/comm/air.hpp"
+
+namespace kilotwin::proto {
+class OverheadControllerState;
+}
 
 namespace kilotwin::comm {
 

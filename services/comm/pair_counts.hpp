@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/federation/run_observer.hpp"
+#include "core/frames/radio_counts.hpp"
 
 namespace kilotwin::comm {
 

@@ -1,5 +1,6 @@
 // Saving and loading of the radio engine.
 #include "core/base/error.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/comm/message_octets.hpp"
 #include "services/comm/radio_engine.hpp"
 

@@ -4,6 +4,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/plan/radio_settings.hpp"
 #include "services/comm/message_octets.hpp"
 
 namespace kilotwin::comm {
@@ -27,11 +28,11 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
       divided_(!region.is_everywhere()),
       shares_(all_shares(plan)),
       cycles_per_tick_(plan.tick_length.cycles()),
-      loss_(plan.experiment().radio().loss()),
-      counts_pairs_(plan.experiment().recording().messages()),
+      loss_(plan.radio_settings().loss),
+      counts_pairs_(plan.recording_settings().messages),
       random_(plan.seed()),
-      simple_(plan.experiment().radio().model() == proto::Radio::SIMPLE),
-      simple_model_(plan.experiment().radio().simple()),
+      simple_(plan.radio_settings().model == RadioSettings::Model::kSimple),
+      simple_model_(plan.radio_settings().simple),
       overhead_gains_(ranging_.gains(kOverheadDistance_mm)),
       timers_(plan),
       state_(plan.robots(), 0),
@@ -50,7 +51,7 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
       jammed_(plan.robots(), 0) {
   for (std::uint32_t i = 0; i < plan.robots(); ++i) {
     const Pose pose = plan.initial_pose(i);
-    neighbourhood_.place(i, pose.position_mm.x(), pose.position_mm.y());
+    neighbourhood_.place(i, pose.x_mm, pose.y_mm);
     apart_.push_back(plan.tracked(i) || plan.firmware(i));
   }
   KILOTWIN_DEMAND(!divided_ || !plan.has_firmware());
@@ -61,7 +62,7 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
   }
   // Nobody has sent just now: the first times are spread over the interval.
   for (std::uint32_t i = 0; i < next_send_.size(); ++i)
-    next_send_[i] = static_cast<Cycles>(simple_model_.interval_s() * kNominalClockHz *
+    next_send_[i] = static_cast<Cycles>(simple_model_.interval_s * kNominalClockHz *
                                         random_.uniform(Stream::kBackOff, i, Tick{-1}, 0));
   KILOTWIN_DEMAND(!plan.has_firmware() || firmware_robots_ != nullptr);
   if (plan.has_firmware())

@@ -31,12 +31,12 @@
 #include <span>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/frames/frames.hpp"
-#include "core/federation/run_observer.hpp"
+#include "core/frames/radio_counts.hpp"
 #include "core/model/ranging.hpp"
+#include "core/plan/plan.hpp"
+#include "core/plan/radio_settings.hpp"
 #include "core/random/random.hpp"
-#include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"
 #include "services/comm/firmware_air.hpp"
 #include "services/comm/link_budget.hpp"
@@ -47,6 +47,10 @@
 #include "services/comm/reception_log.hpp"
 #include "services/comm/region.hpp"
 #include "services/comm/tick_timers.hpp"
+
+namespace kilotwin::proto {
+class RadioState;
+}
 
 namespace kilotwin::comm {
 
@@ -162,7 +166,7 @@ class RadioEngine {
   const bool counts_pairs_;
   const Random random_;
   const bool simple_;  ///< no packets in time: exchange_simply()
-  const proto::SimpleRadio simple_model_;
+  const SimpleRadioSettings simple_model_;
   const Ranging ranging_;
   const Gains overhead_gains_;
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "idl/checkpoint.pb.h"
+
 namespace kilotwin::comm {
 
 void ReceptionLog::clear() {

@@ -4,10 +4,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/frames/frames.hpp"
 #include "core/model/ranging.hpp"
-#include "idl/checkpoint.pb.h"
+#include "core/plan/plan.hpp"
+
+namespace kilotwin::proto {
+class RadioState;
+}
 
 namespace kilotwin::comm {
 

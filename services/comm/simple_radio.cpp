@@ -1,4 +1,4 @@
-// The seed's model of the radio (section 2.3): no clocks, no carrier sense, no packets in time. Whoever holds a message and
+// The radio of the ARGoS paper (Pinciroli 2018, section 2.3): no clocks, no carrier sense, no packets in time. Whoever holds a message and
 // has not sent for the interval sends it within the tick, at once; those in range receive it unless it is dropped, or lost to
 // another sender of the tick.
 #include <algorithm>
@@ -15,8 +15,8 @@ constexpr std::uint32_t kDrawsPerSender = 64, kDraws = 1u << 17;
 }  // namespace
 
 void RadioEngine::exchange_simply(Tick now) {
-  const proto::SimpleRadio& model = simple_model_;
-  const auto interval = static_cast<Cycles>(model.interval_s() * kNominalClockHz);
+  const SimpleRadioSettings& model = simple_model_;
+  const auto interval = static_cast<Cycles>(model.interval_s * kNominalClockHz);
   const Cycles begin = begin_of(now), end = begin_of(now + 1);
   timers_.begin_tick();
   neighbourhood_.sort();
@@ -28,7 +28,7 @@ void RadioEngine::exchange_simply(Tick now) {
     const bool own = owns(i);
     counters_.attempted += own;
     radio_counts_[i].attempted += own;
-    if (random_.uniform(Stream::kBackOff, i, now, 0) < model.sending_error()) {
+    if (random_.uniform(Stream::kBackOff, i, now, 0) < model.sending_error) {
       counters_.aborted += own;
       radio_counts_[i].backed_off += own;
       continue;
@@ -47,7 +47,7 @@ void RadioEngine::exchange_simply(Tick now) {
 }
 
 void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
-  const proto::SimpleRadio& model = simple_model_;
+  const SimpleRadioSettings& model = simple_model_;
   if (owns(sender)) {
     ++counters_.sent;
     ++radio_counts_[sender].sent;
@@ -64,12 +64,12 @@ void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
     std::uint32_t draw = first_draw + 2;
     for (const std::uint32_t rival : sent_) {
       if (rival == sender || (rival != receiver && !neighbourhood_.in_range(receiver, rival))) continue;
-      spoilt = spoilt || happens(model.contention(), draw++);
+      spoilt = spoilt || happens(model.contention, draw++);
     }
     if (spoilt) {
       ++counters_.collided;
       ++radio_counts_[receiver].collided;
-    } else if (happens(model.drop_probability(), first_draw) || happens(loss_, first_draw + 1)) {
+    } else if (happens(model.drop_probability, first_draw) || happens(loss_, first_draw + 1)) {
       ++counters_.faded;
     } else {
       ++counters_.received;

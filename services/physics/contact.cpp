@@ -10,12 +10,12 @@ ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
     : limits_(plan, drive),
       pass_limits_(limits_.of_pass()),
       sub_step_part_(1.0 / limits_.sub_steps),
-      candidates_(limits_.cutoff_mm + kSeatSkin_mm),
+      candidates_(limits_.cutoff_mm + kSkin_mm),
       world_(plan.world),
       has_shapes_(world_.arena.kind() != ArenaShape::Kind::kRectangle || !world_.obstacles.empty() ||
                   !world_.movables.empty()),
       immobile_(plan.robots()),
-      presses_(plan.robots()),
+      cache_(plan.robots()),
       movable_pass_(plan, limits_),
       touching_(plan.movables()),
       lively_movable_(plan.movables()) {
@@ -24,7 +24,7 @@ ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
     has_immobile_ |= plan.immobile(r);
   }
   for (const MovableBodyModel& body : world_.movables) {
-    movables_.push_back({body.pose.position_mm.x(), body.pose.position_mm.y(), body.pose.heading_rad, 0, 0, 0});
+    movables_.push_back({body.pose.x_mm, body.pose.y_mm, body.pose.heading_rad, 0, 0, 0});
   }
 }
 
@@ -46,19 +46,19 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
   if (active_count_ == 0 && !any_moves) return false;
 
   if (own.empty() && !has_shapes_ && !any_overlap_) {
-    keep_seats(bodies);
+    update_slots(bodies);
     rest_who_can();
     return true;
   }
-  leave_seats();
-  seated_robot_ = bodies.robot;
+  release_slots();
+  slot_robot_ = bodies.robot;
   lively_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) lively_[i] = driven_[i] | presses_.any(bodies.robot[i]);
+  for (std::size_t i = 0; i < count; ++i) lively_[i] = driven_[i] | cache_.any(bodies.robot[i]);
   candidates_.update(bodies);
   find_specials(bodies);
   search_all(bodies, own, own_movable);
-  seat_movers();
-  seat_points();
+  assign_slots();
+  assign_point_slots();
   pass_.rest();
   fill_batches(bodies, 0, false);
   if (has_others_) {
@@ -70,14 +70,14 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
 
 /// Places, drives, normals, gaps and velocities at the tick's start.
 void ContactSolver::begin(const Bodies& bodies, const BodyColumns& columns) {
-  any_overlap_ = any_overlap_ && !seats_are_kept_;
+  any_overlap_ = any_overlap_ && !slots_are_kept_;
   for (std::size_t b = 1; b < pass_.batches(); ++b) {
     ContactBatch& batch = pass_.batch(b);
-    if (batch.size == 0 || (seats_are_kept_ && batch.passes == 0)) continue;
-    Start start = pass_.begin(pass_limits_, seats_are_kept_, columns, b);
-    if (seats_are_kept_ && start.is_new) {
+    if (batch.size == 0 || (slots_are_kept_ && batch.passes == 0)) continue;
+    Start start = pass_.begin(pass_limits_, slots_are_kept_, columns, b);
+    if (slots_are_kept_ && start.is_new) {
       order_contacts(batch);
-      start = pass_.begin(pass_limits_, seats_are_kept_, columns, b);
+      start = pass_.begin(pass_limits_, slots_are_kept_, columns, b);
     }
     batch.overlap = start.nearest_mm - kDiameter_mm < -kOverlapTolerance_mm;
     any_overlap_ |= batch.overlap;
@@ -87,10 +87,11 @@ void ContactSolver::begin(const Bodies& bodies, const BodyColumns& columns) {
     if (batch.special) {
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const bool is_body = lane < batch.size;
-        fill_specials(lane, is_body ? seated_[(b - 1) * kLanes + lane] : Mover{batch.body[lane], 0, 0, 0}, batch);
+        fill_specials(lane, is_body ? slot_movers_[(b - 1) * kLanes + lane] : Mover{batch.body[lane], 0, 0, 0},
+                      batch);
       }
     }
-    if (!seats_are_kept_) continue;
+    if (!slots_are_kept_) continue;
     if (batch.used == 0 && !batch.near_wall) batch.passes = 0;  // They roll.
     remember_forces(batch);
   }
@@ -102,23 +103,23 @@ void ContactSolver::move(Bodies& bodies, Drives& drives) {
                             drives.y_mm.data(),     drives.cos_turn.data(), drives.sin_turn.data(),
                             drives.turn_rad.data(), driven_.data()};
   for (Special& special : specials_)
-    special.push_mm = presses_[bodies.robot[special.body]].touch_of(special.key).push_mm;
+    special.normal_impulse_mm = cache_[bodies.robot[special.body]].contact_with(special.key).normal_impulse_mm;
   begin(bodies, columns);
   pass_.kernel().roll(pass_limits_, columns, bodies.x_mm.data(), bodies.y_mm.data(), bodies.heading_rad.data(),
                       bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) bodies.awake[i] = driven_[i] | bodies.tracked[i];
-  for (std::size_t i = 0; i < bodies.size() && !seats_are_kept_; ++i) {
+  for (std::size_t i = 0; i < bodies.size() && !slots_are_kept_; ++i) {
     if (hops_[i] != 0) {
       bodies.awake[i] = hops_[i] != kOutOfReach;
-    } else if (seat_of_[i] == ContactPass::kStill && active_[i] != 0 && lively_[i] != 0) {
-      presses_.clear(bodies.robot[i]);  // It touches nobody.
+    } else if (slot_of_[i] == ContactPass::kStill && active_[i] != 0 && lively_[i] != 0) {
+      cache_.clear(bodies.robot[i]);  // It touches nobody.
     }
   }
-  if (seated_.empty() && movable_pass_.empty()) return;
+  if (slot_movers_.empty() && movable_pass_.empty()) return;
   for (const Special& s : specials_) {
     if (s.movable == kNone || !movable_pass_.has(s.movable)) continue;
-    movable_pass_.add_contact(s.movable, {seat_of_[s.body], s.seat, s.normal_x, s.normal_y, s.gap_mm, s.gain,
-                                          s.push_mm, s.lever_x_mm, s.lever_y_mm});
+    movable_pass_.add_contact(s.movable, {slot_of_[s.body], s.slot, s.normal_x, s.normal_y, s.gap_mm, s.gain,
+                                          s.normal_impulse_mm, s.lever_x_mm, s.lever_y_mm});
   }
   movable_pass_.set_off(movables_, pass_);
   pass_.run(pass_limits_, any_overlap_, [&](std::uint32_t step) { movable_pass_.sub_step(step, pass_); });
@@ -132,7 +133,7 @@ void ContactSolver::end(Bodies& bodies) {
   for (std::size_t b = 1; b < pass_.batches(); ++b) {
     ContactBatch& batch = pass_.batch(b);
     if (batch.passes == 0) continue;
-    if (batch.contacts > Press::kMost) keep_most(batch);
+    if (batch.contacts > CachedContacts::kMost) keep_most(batch);
     for (std::size_t lane = 0; lane < batch.size; ++lane) {
       const std::uint32_t i = batch.body[lane];
       if (hops_[i] != 0) continue;
@@ -144,25 +145,26 @@ void ContactSolver::end(Bodies& bodies) {
       }
       bodies.x_mm[i] = to_x;
       bodies.y_mm[i] = to_y;
-      if (driven_[i] != 0 && seats_are_kept_) continue;  // It is awake.
+      if (driven_[i] != 0 && slots_are_kept_) continue;  // It is awake.
       const bool moved = to_x != x || to_y != y || limits_.outside(to_x, to_y);
-      const bool changed = seats_are_kept_
-                               ? batch.overlap || !stays(batch, lane)
-                               : keep_press(bodies.robot[i], seated_[(b - 1) * kLanes + lane]) || overlaps_[i] != 0;
+      const bool changed =
+          slots_are_kept_
+              ? batch.overlap || !stays(batch, lane)
+              : store_contacts(bodies.robot[i], slot_movers_[(b - 1) * kLanes + lane]) || overlaps_[i] != 0;
       bodies.awake[i] = static_cast<std::uint8_t>(moved | changed | (driven_[i] != 0));
     }
   }
-  presses_are_kept_ = !seats_are_kept_;
+  cache_is_current_ = !slots_are_kept_;
 }
 
-/// Forces beyond what a press holds end.
+/// Contacts beyond what the cache holds end.
 void ContactSolver::keep_most(const ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     std::size_t n = 0;
     for (std::uint32_t p = 0; p < batch.contacts; ++p) {
-      if (contacts[p].push_mm[lane] > 0 && ++n > Press::kMost)
-        contacts[p].push_mm[lane] = contacts[p].rub_mm[lane] = 0;
+      if (contacts[p].normal_impulse_mm[lane] > 0 && ++n > CachedContacts::kMost)
+        contacts[p].normal_impulse_mm[lane] = contacts[p].tangent_impulse_mm[lane] = 0;
     }
   }
 }
@@ -179,8 +181,8 @@ void ContactSolver::remember_forces(ContactBatch& batch) {
   double* to = remembered_.data() + first;
   const ContactLanes* const contacts = pass_.contacts_of(batch);
   for (std::uint32_t p = 0; p < batch.contacts; ++p) {
-    to = std::copy_n(contacts[p].push_mm, kLanes, to);
-    to = std::copy_n(contacts[p].rub_mm, kLanes, to);
+    to = std::copy_n(contacts[p].normal_impulse_mm, kLanes, to);
+    to = std::copy_n(contacts[p].tangent_impulse_mm, kLanes, to);
   }
 }
 
@@ -190,7 +192,7 @@ bool ContactSolver::stays(const ContactBatch& batch, std::size_t lane) const {
   const double* from = remembered_.data() + 2 * kLanes * batch.first_contact + lane;
   const ContactLanes* const contacts = pass_.contacts_of(batch);
   for (std::uint32_t p = 0; p < batch.contacts; ++p, from += 2 * kLanes)
-    same &= contacts[p].push_mm[lane] == from[0] && contacts[p].rub_mm[lane] == from[kLanes];
+    same &= contacts[p].normal_impulse_mm[lane] == from[0] && contacts[p].tangent_impulse_mm[lane] == from[kLanes];
   return same;
 }
 

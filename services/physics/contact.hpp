@@ -14,7 +14,7 @@
 /// The normal of a pair stays that of the tick's start within the tick, and the gap is measured along it, never more than the
 /// true one. The limit: the excess along n is taken off and the tangential part stays, for the two limits that are missed
 /// most; where others are still missed then, all of the rest is scaled down. A body that overlaps from the start moves out of
-/// it at up to kSeparation_mm_s and may press into others up to half of its own deepest overlap: overlaps spread and vanish.
+/// it at up to kSeparation_mm_s and may move into others up to half of its own deepest overlap: overlaps spread and vanish.
 ///
 /// A body depends on its neighbours only: one hop per sub-step; a movable body is one hop however large. So of the bodies of
 /// other partitions only those are computed that own ones reach by contacts, and one that is h hops away only in the first
@@ -40,25 +40,25 @@ namespace kilotwin::physics {
 
 /// A tick is find(), then the drives of those that ask for one, then move().
 ///
-/// Seats of bodies, and their forces there, are kept from tick to tick where one partition holds all and only discs and straight
-/// walls are there: until somebody has moved by half of a skin. Contacts that the skin adds are beyond the cutoff and do
-/// nothing, so that no result depends on when seats were given. Else, and while discs overlap, which may then have more contacts
-/// than a press keeps, they are given anew in each tick.
+/// Lanes are warm-started: slots of bodies, their neighbours and impulses persist until a robot has moved by half of the skin.
+/// That holds where one partition has all robots, and only discs and straight walls are there. Contacts that the skin adds are
+/// beyond the cutoff and do nothing, so that no result depends on when slots were assigned. Otherwise, and while discs overlap,
+/// slots are assigned in each tick: discs that overlap may have more contacts than the cache holds.
 class ContactSolver {
  public:
   ContactSolver(const RunPlan&, const DriveModel&);
 
   /// What contact keeps; per robot of the swarm, and per movable body.
-  [[nodiscard]] PressTable& presses() {
-    leave_seats();
-    return presses_;
+  [[nodiscard]] ContactCache& cache() {
+    release_slots();
+    return cache_;
   }
-  [[nodiscard]] const PressTable& presses() const {
-    keep_presses();
-    return presses_;
+  [[nodiscard]] const ContactCache& cache() const {
+    store_cache();
+    return cache_;
   }
   /// Sum of the hashes of what contact keeps of these robots.
-  [[nodiscard]] std::uint64_t hash_presses(const std::vector<std::uint32_t>& robots) const;
+  [[nodiscard]] std::uint64_t hash_contacts(const std::vector<std::uint32_t>& robots) const;
   [[nodiscard]] std::vector<MovableState>& movables() { return movables_; }
   [[nodiscard]] const std::vector<MovableState>& movables() const { return movables_; }
 
@@ -80,7 +80,7 @@ class ContactSolver {
   static constexpr std::uint8_t kOutOfReach = 255;
   /// Bodies with more contacts than this are not told apart.
   static constexpr std::uint32_t kMostContacts = 7;
-  static_assert(kMostContacts < Press::kMost);
+  static_assert(kMostContacts < CachedContacts::kMost);
 
   /// A body that may be moved by contacts or walls, or whose drive moves one.
   struct Mover {
@@ -90,12 +90,12 @@ class ContactSolver {
 
   /// A contact of a robot with what is no disc.
   struct Special {
-    std::uint32_t body, key;    ///< key: as Press::other
+    std::uint32_t body, key;    ///< key: as CachedContacts::other
     std::uint32_t movable;      ///< or kNone: nothing moves it
     double normal_x, normal_y;  ///< from the robot
-    double gap_mm, gain, push_mm;
+    double gap_mm, gain, normal_impulse_mm;
     double lever_x_mm, lever_y_mm;  ///< of the touched point from the movable body's centre
-    Seat seat;
+    Slot slot;
   };
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
@@ -121,20 +121,20 @@ class ContactSolver {
   [[nodiscard]] std::pair<const Special*, const Special*> specials_of(std::uint32_t body) const;
   void fill_specials(std::size_t lane, const Mover&, ContactBatch&);
 
-  // contact_seats.cpp: who works in which lane.
-  void keep_seats(const Bodies&);
+  // contact_cache.cpp: which body works in which lane.
+  void update_slots(const Bodies&);
   void list_near(const Bodies&, std::uint32_t body);
-  void seat_movers();
-  void seat_points();
-  void fill_batches(const Bodies&, double more_mm, bool from_stash);
+  void assign_slots();
+  void assign_point_slots();
+  void fill_batches(const Bodies&, double more_mm, bool warm_start);
   void fill_lane(const Bodies&, std::size_t lane, const Mover&, ContactBatch&);
-  void fill_lane_from_stash(std::size_t lane, const Mover&, ContactBatch&);
+  void warm_start_lane(std::size_t lane, const Mover&, ContactBatch&);
   void order_contacts(const ContactBatch&);
   void fill_rest(std::size_t lane, const Mover&, ContactBatch&);
   void part_lane(const Bodies&, std::size_t lane, const ContactBatch&, ContactLanes*) const;
-  bool keep_press(std::uint32_t robot, const Mover&) const;
-  void keep_presses() const;
-  void leave_seats();
+  bool store_contacts(std::uint32_t robot, const Mover&) const;
+  void store_cache() const;
+  void release_slots();
   void rest_who_can();
 
   ContactLimits limits_;
@@ -142,8 +142,8 @@ class ContactSolver {
   double sub_step_part_;
   CandidateList candidates_;
   ContactPass pass_;
-  std::vector<Mover> movers_, seated_;  ///< by hops; by seats
-  std::vector<std::uint32_t> others_;   ///< the contacts of the movers
+  std::vector<Mover> movers_, slot_movers_;  ///< by hops; by slots
+  std::vector<std::uint32_t> others_;        ///< the contacts of the movers
   std::size_t other_count_ = 0;
   bool any_overlap_ = true, has_others_ = false;
   std::size_t active_count_ = 0;
@@ -151,8 +151,8 @@ class ContactSolver {
   bool has_immobile_ = false;
   bool has_shapes_;                     ///< anything but robots and straight walls
   std::vector<std::uint8_t> immobile_;  ///< per robot
-  mutable PressTable presses_;          ///< out of date while seats are kept, until somebody asks
-  mutable bool presses_are_kept_ = true;
+  mutable ContactCache cache_;          ///< out of date while slots are kept, until it is read
+  mutable bool cache_is_current_ = true;
   std::vector<MovableState> movables_;
   MovablePass movable_pass_;
   std::vector<Special> specials_;                     ///< by body, then by key
@@ -160,17 +160,17 @@ class ContactSolver {
   std::vector<std::uint8_t> lively_movable_, has_special_;
   // Per body.
   std::vector<std::uint8_t> hops_;  ///< by contacts from the own bodies, or kOutOfReach
-  std::vector<std::uint8_t> driven_, active_, overlaps_, lively_;  ///< lively: driven or pressed
-  std::vector<Seat> seat_of_;
+  std::vector<std::uint8_t> driven_, active_, overlaps_, lively_;  ///< lively: driven, or with cached contacts
+  std::vector<Slot> slot_of_;
   std::vector<std::uint8_t> asked_;     ///< driven, and within reach; where there are others
   std::vector<std::uint32_t> reached_;  ///< others' bodies, by hops
   std::vector<std::uint32_t> far_;      ///< scratch
-  // While seats are kept.
-  std::vector<Seat> stashed_seat_of_;  ///< as seat_of_ was before seats were given
-  bool seats_are_kept_ = false;
-  std::vector<std::uint32_t> seated_robot_;        ///< per body, when seats were given
-  std::vector<double> seated_x_mm_, seated_y_mm_;  ///< per body, when seats were given
-  std::vector<double> remembered_;                 ///< forces at the tick's start, of batches that may come to rest
+  // While slots are kept.
+  std::vector<Slot> previous_slot_of_;  ///< slot_of_ before slots were assigned
+  bool slots_are_kept_ = false;
+  std::vector<std::uint32_t> slot_robot_;      ///< per body, when slots were assigned
+  std::vector<double> slot_x_mm_, slot_y_mm_;  ///< per body, when slots were assigned
+  std::vector<double> remembered_;             ///< forces at the tick's start, of batches that may come to rest
 };
 
 }  // namespace kilotwin::physics

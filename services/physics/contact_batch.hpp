@@ -1,7 +1,7 @@
 /// What the passes of contact work on: columns of eight, the same in memory for every instruction set. contact.hpp states the law.
 ///
-/// A batch takes bodies with about as many contacts, a body per lane, so that all lanes are at work. A body's seat is its number
-/// among all lanes of all batches; where its motion is kept follows from it. The seats of batch 0 stand for all that stay
+/// A batch takes bodies with about as many contacts, a body per lane, so that all lanes are at work. A body's slot is its number
+/// among all lanes of all batches; where its motion is kept follows from it. The slots of batch 0 stand for all that stay
 /// where they are.
 #pragma once
 
@@ -11,22 +11,22 @@
 namespace kilotwin::physics {
 
 inline constexpr std::size_t kLanes = 8;
-using Seat = std::uint32_t;
+using Slot = std::uint32_t;
 
 /// One contact of each body of a batch.
 struct alignas(64) ContactLanes {
   double normal_x[kLanes], normal_y[kLanes];  ///< from the body to the other
   double gap_mm[kLanes];                      ///< at the tick's start; huge where a lane has no such contact
-  double push_mm[kLanes];                     ///< force of the contact
-  double rub_mm[kLanes];                      ///< tangential force
+  double normal_impulse_mm[kLanes];           ///< normal impulse
+  double tangent_impulse_mm[kLanes];          ///< tangent impulse
   double spin_mm[kLanes];                     ///< way of both rims about their centres in a sub-step
-  Seat other[kLanes];
+  Slot other[kLanes];
   std::uint32_t
       there[kLanes];  ///< the other's number among the bodies; of any disc where a lane has no such contact
 };
 
 /// Of a contact of each body of a batch that has others than discs: by which the force grows with what the two close, and what
-/// bounds rub over push.
+/// bounds the tangent impulse over the normal one.
 struct alignas(64) SpecialLanes {
   double gain[kLanes], friction[kLanes];
 };
@@ -82,13 +82,13 @@ struct Start {
 /// The inner loops, compiled for one instruction set; all of them give the same bits.
 struct ContactKernel {
   const char* name;
-  /// Fills in places, drives, normals and gaps of a batch's contacts with discs, and the rows of its seats at the tick's start:
+  /// Fills in places, drives, normals and gaps of a batch's contacts with discs, and the rows of its slots at the tick's start:
   /// displacement 0 and velocity. Forces of contacts beyond the cutoff end, and so does the slip of bodies without any contact
-  /// within it, if seats are `kept` from tick to tick.
+  /// within it, if slots are `kept` from tick to tick.
   Start (*begin)(const PassLimits&, bool kept, const BodyColumns&, ContactBatch&, ContactLanes* contacts,
                  double* rows);
-  /// A Jacobi pass over batches [0, count): motions are read from rows `now` of all seats and written to `after`, each row the
-  /// displacement and the swing of a seat, x, y. `overlap`: whether any bodies do. `room_mm` is scratch, kLanes per contact.
+  /// A Jacobi pass over batches [0, count): motions are read from rows `now` of all slots and written to `after`, each row the
+  /// displacement and the swing of a slot, x, y. `overlap`: whether any bodies do. `room_mm` is scratch, kLanes per contact.
   void (*pass)(const PassLimits&, std::uint32_t step, bool overlap, ContactBatch* batches, std::size_t count,
                ContactLanes* contacts, const SpecialLanes* specials, const double* now, double* after,
                double* room_mm);

@@ -1,4 +1,4 @@
-// Who works in which lane of which batch, and what is kept of it.
+// Which body works in which lane of which batch, and what lanes are warm-started with.
 #include <algorithm>
 #include <utility>
 
@@ -11,53 +11,55 @@ namespace {
 std::uint64_t slip_hash(std::uint32_t robot, double x_mm, double y_mm) {
   return entity_hash(HashDomain::kContact, robot, {hash_bits(x_mm), hash_bits(y_mm)});
 }
-std::uint64_t touch_hash(std::uint32_t robot, std::uint32_t other, double push_mm, double rub_mm) {
-  return entity_hash(HashDomain::kContact, robot, {other, hash_bits(push_mm), hash_bits(rub_mm), 1});
+std::uint64_t contact_hash(std::uint32_t robot, std::uint32_t other, double normal_impulse_mm,
+                           double tangent_impulse_mm) {
+  return entity_hash(HashDomain::kContact, robot,
+                     {other, hash_bits(normal_impulse_mm), hash_bits(tangent_impulse_mm), 1});
 }
 
 }  // namespace
 namespace {
 
 /// What two bodies may have moved towards each other, less what rounding may hide.
-constexpr double kSeatWay_mm = 0.499 * kSeatSkin_mm;
+constexpr double kSlotWay_mm = 0.499 * kSkin_mm;
 
 }  // namespace
 
-void ContactSolver::keep_seats(const Bodies& bodies) {
-  if (seats_are_kept_ && seated_robot_ == bodies.robot &&
-      !pass_.kernel().any_moved(bodies.x_mm.data(), bodies.y_mm.data(), seated_x_mm_.data(), seated_y_mm_.data(),
-                                bodies.size(), kSeatWay_mm * kSeatWay_mm)) {
+void ContactSolver::update_slots(const Bodies& bodies) {
+  if (slots_are_kept_ && slot_robot_ == bodies.robot &&
+      !pass_.kernel().any_moved(bodies.x_mm.data(), bodies.y_mm.data(), slot_x_mm_.data(), slot_y_mm_.data(),
+                                bodies.size(), kSlotWay_mm * kSlotWay_mm)) {
     return;
   }
-  const bool same_robots = seats_are_kept_ && seated_robot_ == bodies.robot;
+  const bool same_robots = slots_are_kept_ && slot_robot_ == bodies.robot;
   if (same_robots) {
-    pass_.stash();
-    stashed_seat_of_ = seat_of_;
+    pass_.keep_previous();
+    previous_slot_of_ = slot_of_;
   } else {
-    leave_seats();
+    release_slots();
   }
   candidates_.update(bodies);
   const auto count = static_cast<std::uint32_t>(bodies.size());
   hops_.assign(count, 0);
-  seat_of_.assign(count, ContactPass::kStill);
+  slot_of_.assign(count, ContactPass::kStill);
   movers_.clear();
   specials_.clear();
   movable_pass_.clear();
   other_count_ = 0;
   has_others_ = false;
   for (std::uint32_t i = 0; i < count; ++i) list_near(bodies, i);
-  seat_movers();
+  assign_slots();
   pass_.rest();
-  fill_batches(bodies, kSeatSkin_mm, same_robots);
-  seated_robot_ = bodies.robot;
-  seated_x_mm_ = bodies.x_mm;
-  seated_y_mm_ = bodies.y_mm;
-  seats_are_kept_ = true;
+  fill_batches(bodies, kSkin_mm, same_robots);
+  slot_robot_ = bodies.robot;
+  slot_x_mm_ = bodies.x_mm;
+  slot_y_mm_ = bodies.y_mm;
+  slots_are_kept_ = true;
 }
 
 void ContactSolver::list_near(const Bodies& bodies, std::uint32_t i) {
   if (bodies.tracked[i] != 0 || immobile_[bodies.robot[i]] != 0) return;
-  const double x = bodies.x_mm[i], y = bodies.y_mm[i], reach_mm = limits_.cutoff_mm + kSeatSkin_mm;
+  const double x = bodies.x_mm[i], y = bodies.y_mm[i], reach_mm = limits_.cutoff_mm + kSkin_mm;
   const auto candidates = candidates_.of(i);
   if (others_.size() <= other_count_ + candidates.size())
     others_.resize(2 * (other_count_ + candidates.size() + 1));
@@ -76,38 +78,38 @@ void ContactSolver::list_near(const Bodies& bodies, std::uint32_t i) {
   }
   std::copy_n(far_.begin(), far, others + near);
   const std::uint32_t contacts = near + far;
-  if (contacts == 0 && !limits_.near_wall(x, y, kSeatSkin_mm)) {
-    presses_.clear(bodies.robot[i]);  // It touches nobody.
+  if (contacts == 0 && !limits_.near_wall(x, y, kSkin_mm)) {
+    cache_.clear(bodies.robot[i]);  // It touches nobody.
     return;
   }
   movers_.push_back({i, static_cast<std::uint32_t>(other_count_), contacts, near});
   other_count_ += contacts;
 }
 
-void ContactSolver::seat_movers() {
+void ContactSolver::assign_slots() {
   // By the number of contacts, so that lanes have work alike; those with equally many stay in the order of hops.
   std::array<std::uint32_t, kMostContacts + 2> end{};
   const auto key = [](const Mover& m) { return std::min(m.near, kMostContacts); };
   for (const Mover& m : movers_) ++end[key(m) + 1];
   for (std::size_t k = 1; k < end.size(); ++k) end[k] += end[k - 1];
-  seated_.resize(movers_.size());
-  for (const Mover& m : movers_) seated_[end[key(m)]++] = m;
+  slot_movers_.resize(movers_.size());
+  for (const Mover& m : movers_) slot_movers_[end[key(m)]++] = m;
 
   pass_.clear();
-  for (std::size_t at = 0; at < seated_.size(); at += kLanes) {
-    const std::size_t size = std::min(kLanes, seated_.size() - at);
+  for (std::size_t at = 0; at < slot_movers_.size(); at += kLanes) {
+    const std::size_t size = std::min(kLanes, slot_movers_.size() - at);
     std::uint32_t contacts = 0, hops = limits_.sub_steps;
     for (std::size_t lane = 0; lane < size; ++lane) {
-      contacts = std::max(contacts, seated_[at + lane].contacts);
-      hops = std::min<std::uint32_t>(hops, hops_[seated_[at + lane].body]);
+      contacts = std::max(contacts, slot_movers_[at + lane].contacts);
+      hops = std::min<std::uint32_t>(hops, hops_[slot_movers_[at + lane].body]);
     }
     pass_.add_batch(contacts, limits_.sub_steps - hops);
-    for (std::size_t lane = 0; lane < size; ++lane) seat_of_[seated_[at + lane].body] = pass_.seat(lane);
+    for (std::size_t lane = 0; lane < size; ++lane) slot_of_[slot_movers_[at + lane].body] = pass_.slot(lane);
   }
 }
 
-/// The touched points of movable bodies have seats of their own; nothing but their body moves them.
-void ContactSolver::seat_points() {
+/// The touched points of movable bodies have slots of their own; only their body moves them.
+void ContactSolver::assign_point_slots() {
   std::size_t lane = kLanes;
   for (Special& special : specials_) {
     if (special.movable == kNone || !movable_pass_.has(special.movable)) continue;
@@ -115,74 +117,74 @@ void ContactSolver::seat_points() {
       pass_.add_batch(0, 0);
       lane = 0;
     }
-    special.seat = pass_.seat(lane++);
+    special.slot = pass_.slot(lane++);
   }
 }
 
-void ContactSolver::fill_batches(const Bodies& bodies, double more_mm, bool from_stash) {
+void ContactSolver::fill_batches(const Bodies& bodies, double more_mm, bool warm_start) {
   std::size_t at = 0;
-  for (std::size_t b = 1; at < seated_.size(); ++b, at += kLanes) {
+  for (std::size_t b = 1; at < slot_movers_.size(); ++b, at += kLanes) {
     ContactBatch& batch = pass_.batch(b);
-    batch.size = static_cast<std::uint32_t>(std::min(kLanes, seated_.size() - at));
+    batch.size = static_cast<std::uint32_t>(std::min(kLanes, slot_movers_.size() - at));
     bool special = false;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const bool is_body = lane < batch.size;
-      const Mover mover = is_body ? seated_[at + lane] : Mover{seated_[at].body, 0, 0, 0};
+      const Mover mover = is_body ? slot_movers_[at + lane] : Mover{slot_movers_[at].body, 0, 0, 0};
       const std::uint32_t i = mover.body;
       batch.body[lane] = i;
       // One that the last hop has reached brings its velocity alone, and that counts.
-      if (from_stash) {
-        fill_lane_from_stash(lane, mover, batch);
+      if (warm_start) {
+        warm_start_lane(lane, mover, batch);
       } else if (is_body && (mover.contacts > 0 || hops_[i] == limits_.sub_steps)) {
-        const Press& press = presses_[bodies.robot[i]];
-        batch.slip_x_mm[lane] = press.slip_x_mm;
-        batch.slip_y_mm[lane] = press.slip_y_mm;
+        const CachedContacts& cached = cache_[bodies.robot[i]];
+        batch.slip_x_mm[lane] = cached.slip_x_mm;
+        batch.slip_y_mm[lane] = cached.slip_y_mm;
       }
       batch.near_wall |= limits_.near_wall(bodies.x_mm[i], bodies.y_mm[i], more_mm);
       special |= mover.contacts > 0 && others_[mover.first + mover.contacts - 1] >= bodies.size();
-      if (!from_stash) fill_lane(bodies, lane, mover, batch);
+      if (!warm_start) fill_lane(bodies, lane, mover, batch);
       fill_rest(lane, mover, batch);
     }
     if (special) pass_.make_special(batch);
   }
 }
 
-/// Who the others are, and forces as presses have them.
+/// The neighbours of a lane, and their impulses from the cache.
 void ContactSolver::fill_lane(const Bodies& bodies, std::size_t lane, const Mover& mover, ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
-  const Press& press = presses_[bodies.robot[mover.body]];
+  const CachedContacts& cached = cache_[bodies.robot[mover.body]];
   std::uint32_t p = 0;
   for (; p < mover.contacts; ++p) {
     const std::uint32_t j = others_[mover.first + p];
     if (j >= bodies.size()) break;  // What is no disc comes last.
     const std::uint32_t id = bodies.robot[j];
-    double push_mm = 0, rub_mm = 0;
-    if (press.contacts != 0) {
-      const Press::Touch own = press.touch_of(id);
-      push_mm = own.push_mm;
-      rub_mm = own.rub_mm;
-    } else if (presses_.any(id)) {
-      // Both keep a contact's forces, unless one has come to be pressed only in the last tick.
-      const Press::Touch theirs = presses_[id].touch_of(bodies.robot[mover.body]);
-      push_mm = theirs.push_mm;
-      rub_mm = theirs.rub_mm;
+    double normal_impulse_mm = 0, tangent_impulse_mm = 0;
+    if (cached.contacts != 0) {
+      const CachedContacts::Contact own = cached.contact_with(id);
+      normal_impulse_mm = own.normal_impulse_mm;
+      tangent_impulse_mm = own.tangent_impulse_mm;
+    } else if (cache_.any(id)) {
+      // Both robots cache a contact's impulses, unless one has touched nobody before the last tick.
+      const CachedContacts::Contact theirs = cache_[id].contact_with(bodies.robot[mover.body]);
+      normal_impulse_mm = theirs.normal_impulse_mm;
+      tangent_impulse_mm = theirs.tangent_impulse_mm;
     }
-    contacts[p].push_mm[lane] = push_mm;
-    contacts[p].rub_mm[lane] = rub_mm;
+    contacts[p].normal_impulse_mm[lane] = normal_impulse_mm;
+    contacts[p].tangent_impulse_mm[lane] = tangent_impulse_mm;
     contacts[p].gap_mm[lane] = p < mover.near ? 0 : kNoContact_mm;
-    contacts[p].other[lane] = seat_of_[j];
+    contacts[p].other[lane] = slot_of_[j];
     contacts[p].there[lane] = j;
   }
   batch.discs[lane] = p;
 }
 
-/// The same, and the slip, as the seat that the body had before has them.
-void ContactSolver::fill_lane_from_stash(std::size_t lane, const Mover& mover, ContactBatch& batch) {
+/// The same, and the slip, from the slot that the body had before.
+void ContactSolver::warm_start_lane(std::size_t lane, const Mover& mover, ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
-  const Seat seat = mover.contacts > 0 ? stashed_seat_of_[mover.body] : ContactPass::kStill;
-  const std::size_t old_lane = ContactPass::lane_of(seat);
-  const ContactBatch& old_batch = pass_.stashed_batch_of(seat);
-  const ContactLanes* const old = pass_.stashed_contacts_of(old_batch);
+  const Slot slot = mover.contacts > 0 ? previous_slot_of_[mover.body] : ContactPass::kStill;
+  const std::size_t old_lane = ContactPass::lane_of(slot);
+  const ContactBatch& old_batch = pass_.previous_batch_of(slot);
+  const ContactLanes* const old = pass_.previous_contacts_of(old_batch);
   const auto old_contacts = static_cast<std::uint32_t>(old_batch.discs[old_lane]);
   batch.slip_x_mm[lane] = old_batch.slip_x_mm[old_lane];
   batch.slip_y_mm[lane] = old_batch.slip_y_mm[old_lane];
@@ -192,10 +194,10 @@ void ContactSolver::fill_lane_from_stash(std::size_t lane, const Mover& mover, C
     std::uint32_t q = 0;
     while (q < old_contacts && old[q].there[old_lane] != j) ++q;
     const bool is_old = q < old_contacts;
-    contacts[p].push_mm[lane] = is_old ? old[q].push_mm[old_lane] : 0;
-    contacts[p].rub_mm[lane] = is_old ? old[q].rub_mm[old_lane] : 0;
+    contacts[p].normal_impulse_mm[lane] = is_old ? old[q].normal_impulse_mm[old_lane] : 0;
+    contacts[p].tangent_impulse_mm[lane] = is_old ? old[q].tangent_impulse_mm[old_lane] : 0;
     contacts[p].gap_mm[lane] = p < mover.near ? 0 : kNoContact_mm;
-    contacts[p].other[lane] = seat_of_[j];
+    contacts[p].other[lane] = slot_of_[j];
     contacts[p].there[lane] = j;
   }
 }
@@ -213,8 +215,8 @@ void ContactSolver::order_contacts(const ContactBatch& batch) {
     for (std::uint32_t p = 1; p < discs; ++p) {
       for (std::uint32_t q = p; q > 0 && follows(q - 1, q); --q) {
         ContactLanes &low = contacts[q - 1], &high = contacts[q];
-        std::swap(low.push_mm[lane], high.push_mm[lane]);
-        std::swap(low.rub_mm[lane], high.rub_mm[lane]);
+        std::swap(low.normal_impulse_mm[lane], high.normal_impulse_mm[lane]);
+        std::swap(low.tangent_impulse_mm[lane], high.tangent_impulse_mm[lane]);
         std::swap(low.gap_mm[lane], high.gap_mm[lane]);
         std::swap(low.other[lane], high.other[lane]);
         std::swap(low.there[lane], high.there[lane]);
@@ -227,10 +229,10 @@ void ContactSolver::order_contacts(const ContactBatch& batch) {
 void ContactSolver::fill_rest(std::size_t lane, const Mover& mover, ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
   auto p = static_cast<std::uint32_t>(batch.discs[lane]);
-  const std::uint32_t last = static_cast<std::uint32_t>(seat_of_.size()) - 1;
+  const std::uint32_t last = static_cast<std::uint32_t>(slot_of_.size()) - 1;
   const std::uint32_t any = p > 0 ? contacts[0].there[lane] : mover.body == 0 ? last : 0;
   for (; p < batch.contacts; ++p) {
-    contacts[p].push_mm[lane] = contacts[p].rub_mm[lane] = 0;
+    contacts[p].normal_impulse_mm[lane] = contacts[p].tangent_impulse_mm[lane] = 0;
     contacts[p].gap_mm[lane] = kNoContact_mm;
     contacts[p].other[lane] = ContactPass::kStill;
     contacts[p].there[lane] = any;
@@ -249,28 +251,29 @@ void ContactSolver::part_lane(const Bodies& bodies, std::size_t lane, const Cont
   }
 }
 
-/// Puts what a seat has come to where it outlasts seats; whether that is a change, or the body slips.
-bool ContactSolver::keep_press(std::uint32_t robot, const Mover& m) const {
-  const Seat seat = seat_of_[m.body];
-  const ContactBatch& batch = pass_.batch_of(seat);
-  const std::size_t lane = ContactPass::lane_of(seat);
+/// Copies the contacts of a slot into the cache. Returns whether they changed, or the body slips.
+bool ContactSolver::store_contacts(std::uint32_t robot, const Mover& m) const {
+  const Slot slot = slot_of_[m.body];
+  const ContactBatch& batch = pass_.batch_of(slot);
+  const std::size_t lane = ContactPass::lane_of(slot);
   const ContactLanes* const contacts = pass_.contacts_of(batch);
-  const auto count = static_cast<std::uint32_t>(seated_robot_.size());
-  return presses_.change(robot, [&](Press& kept) {
+  const auto count = static_cast<std::uint32_t>(slot_robot_.size());
+  return cache_.change(robot, [&](CachedContacts& kept) {
     const double slip_x = batch.slip_x_mm[lane], slip_y = batch.slip_y_mm[lane];
     bool changed = kept.slip_x_mm != slip_x || kept.slip_y_mm != slip_y;
     kept.slip_x_mm = slip_x;
     kept.slip_y_mm = slip_y;
     std::uint32_t n = 0;
-    for (std::uint32_t p = 0; p < m.contacts && n < Press::kMost; ++p) {
-      const double push_mm = contacts[p].push_mm[lane];
-      if (!(push_mm > 0)) continue;
+    for (std::uint32_t p = 0; p < m.contacts && n < CachedContacts::kMost; ++p) {
+      const double normal_impulse_mm = contacts[p].normal_impulse_mm[lane];
+      if (!(normal_impulse_mm > 0)) continue;
       const bool is_disc = p < static_cast<std::uint32_t>(batch.discs[lane]);
       const std::uint32_t entry = is_disc ? contacts[p].there[lane] : others_[m.first + p];
-      const Press::Touch touch{push_mm, entry < count ? contacts[p].rub_mm[lane] : 0,
-                               entry < count ? seated_robot_[entry] : specials_[entry - count].key};
-      changed |= !(kept.touch[n] == touch);
-      kept.touch[n++] = touch;
+      const CachedContacts::Contact contact{normal_impulse_mm,
+                                            entry < count ? contacts[p].tangent_impulse_mm[lane] : 0,
+                                            entry < count ? slot_robot_[entry] : specials_[entry - count].key};
+      changed |= !(kept.contact[n] == contact);
+      kept.contact[n++] = contact;
     }
     changed |= kept.contacts != n;
     kept.contacts = n;
@@ -278,22 +281,23 @@ bool ContactSolver::keep_press(std::uint32_t robot, const Mover& m) const {
   });
 }
 
-void ContactSolver::keep_presses() const {
-  if (presses_are_kept_) return;
-  presses_are_kept_ = true;
-  for (const Mover& m : seated_) keep_press(seated_robot_[m.body], m);
+void ContactSolver::store_cache() const {
+  if (cache_is_current_) return;
+  cache_is_current_ = true;
+  for (const Mover& m : slot_movers_) store_contacts(slot_robot_[m.body], m);
 }
 
-/// From the seats where they are up to date: presses need not be made for it in each tick.
-std::uint64_t ContactSolver::hash_presses(const std::vector<std::uint32_t>& robots) const {
+/// From the slots where these are up to date, so that the cache is not filled in each tick.
+std::uint64_t ContactSolver::hash_contacts(const std::vector<std::uint32_t>& robots) const {
   std::uint64_t sum = 0;
-  if (presses_are_kept_) {
+  if (cache_is_current_) {
     for (const std::uint32_t robot : robots) {
-      if (!presses_.any(robot)) continue;
-      const Press& press = presses_[robot];
-      sum += slip_hash(robot, press.slip_x_mm, press.slip_y_mm);
-      for (std::uint32_t p = 0; p < press.contacts; ++p)
-        sum += touch_hash(robot, press.touch[p].other, press.touch[p].push_mm, press.touch[p].rub_mm);
+      if (!cache_.any(robot)) continue;
+      const CachedContacts& cached = cache_[robot];
+      sum += slip_hash(robot, cached.slip_x_mm, cached.slip_y_mm);
+      for (std::uint32_t p = 0; p < cached.contacts; ++p)
+        sum += contact_hash(robot, cached.contact[p].other, cached.contact[p].normal_impulse_mm,
+                            cached.contact[p].tangent_impulse_mm);
     }
     return sum;
   }
@@ -301,13 +305,14 @@ std::uint64_t ContactSolver::hash_presses(const std::vector<std::uint32_t>& robo
     const ContactBatch& batch = pass_.batch(b);
     const ContactLanes* const contacts = pass_.contacts_of(batch);
     for (std::size_t lane = 0; lane < batch.size; ++lane) {
-      const std::uint32_t robot = seated_robot_[batch.body[lane]];
+      const std::uint32_t robot = slot_robot_[batch.body[lane]];
       bool any = batch.slip_x_mm[lane] != 0 || batch.slip_y_mm[lane] != 0;
       for (std::uint32_t p = 0; p < batch.contacts; ++p) {
         const ContactLanes& c = contacts[p];
-        if (!(c.push_mm[lane] > 0)) continue;
+        if (!(c.normal_impulse_mm[lane] > 0)) continue;
         any = true;
-        sum += touch_hash(robot, seated_robot_[c.there[lane]], c.push_mm[lane], c.rub_mm[lane]);
+        sum +=
+            contact_hash(robot, slot_robot_[c.there[lane]], c.normal_impulse_mm[lane], c.tangent_impulse_mm[lane]);
       }
       if (any) sum += slip_hash(robot, batch.slip_x_mm[lane], batch.slip_y_mm[lane]);
     }
@@ -315,9 +320,9 @@ std::uint64_t ContactSolver::hash_presses(const std::vector<std::uint32_t>& robo
   return sum;
 }
 
-void ContactSolver::leave_seats() {
-  keep_presses();
-  seats_are_kept_ = false;
+void ContactSolver::release_slots() {
+  store_cache();
+  slots_are_kept_ = false;
 }
 
 /// A batch rests if nobody in it, and nobody beside one of it, is driven or awake.

@@ -12,8 +12,8 @@ inline constexpr double kOverlapTolerance_mm = 5e-10;
 /// sum of n n^T over six normals has the eigenvalue 3, a contact has two ends, and the masses are the unit.
 inline constexpr double kGain = 0.15;
 /// By which the friction of a contact grows with what the rims slide. Six discs around one, each with six, have
-/// 6 (kGain + kRubGain) = 1.26, below the 4/3 up to which the iteration converges (Banert et al., 2023).
-inline constexpr double kRubGain = 0.06;
+/// 6 (kGain + kTangentGain) = 1.26, below the 4/3 up to which the iteration converges (Banert et al., 2023).
+inline constexpr double kTangentGain = 0.06;
 /// How fast a force ends where a gap opens beyond what a contact bridges, over how fast it ends where bodies part. With 1, a chain
 /// of robots hammers on what it pushes, and so moves what its force does not.
 inline constexpr double kEase = 0.25;
@@ -25,6 +25,6 @@ inline constexpr double kInertia = 2;
 inline constexpr double kNoContact_mm = 1e100;
 /// Contacts are listed up to so much beyond where they matter, so that a list stays good until somebody has moved by half of it.
 /// A wider one adds contacts that do nothing.
-inline constexpr double kSeatSkin_mm = 4;
+inline constexpr double kSkin_mm = 4;
 
 }  // namespace kilotwin::physics

@@ -34,8 +34,8 @@ Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, Cont
     newest = larger(newest, load(contact.gap_mm) - gap);
     if (any_above(no_contact, gap)) used = static_cast<std::uint32_t>(p) + 1;
     store(gap, contact.gap_mm);
-    store(within(load(contact.push_mm), zero), contact.push_mm);
-    store(within(load(contact.rub_mm), zero), contact.rub_mm);
+    store(within(load(contact.normal_impulse_mm), zero), contact.normal_impulse_mm);
+    store(within(load(contact.tangent_impulse_mm), zero), contact.tangent_impulse_mm);
     // The same number for both, to the last bit.
     store((turn + gather(bodies.turn_rad, contact.there)) * rim_mm_per_turn, contact.spin_mm);
     nearest = smaller(nearest, within(distance, no_contact));
@@ -100,7 +100,7 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
                  const SpecialLanes* specials, const double* motion, double* after, double* room_mm) {
   const std::size_t count = kCount > 0 ? kCount : batch.used;
   const Lanes zero = all(0), a_half = all(0.5), separation_mm = all(limits.separation_mm);
-  const Lanes touch_mm = all(limits.touch_mm), ease = all(kEase), rub_gain = all(kRubGain);
+  const Lanes touch_mm = all(limits.touch_mm), ease = all(kEase), tangent_gain = all(kTangentGain);
   const Lanes disc_gain = all(kGain), disc_friction = all(limits.friction), tolerance_mm = all(kLimitTolerance_mm);
   const bool special = kCount == 0 && batch.special;
   const Lanes shift_x = load(batch.shift_x_mm), shift_y = load(batch.shift_y_mm);
@@ -121,15 +121,16 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
     const Lanes closing = normal_x * (swing_x - other.c) + normal_y * (swing_y - other.d);
     const Lanes gain = special ? load(specials[p].gain) : disc_gain;
     const Lanes friction = special ? load(specials[p].friction) : disc_friction;
-    const Lanes push = larger(load(c.push_mm) + gain * (closing - ease * larger(gap - touch_mm, zero)), zero);
+    const Lanes normal_impulse =
+        larger(load(c.normal_impulse_mm) + gain * (closing - ease * larger(gap - touch_mm, zero)), zero);
     // Of the rims, along the normal turned left: the same number for both bodies, to the last bit.
     const Lanes sliding = (normal_x * (swing_y - other.d) - normal_y * (swing_x - other.c)) + load(c.spin_mm);
-    const Lanes most = friction * push;
-    const Lanes rub = larger(smaller(load(c.rub_mm) + rub_gain * sliding, most), -most);
-    store(push, c.push_mm);
-    store(rub, c.rub_mm);
-    slip_x = slip_x - push * normal_x + rub * normal_y;
-    slip_y = slip_y - push * normal_y - rub * normal_x;
+    const Lanes most = friction * normal_impulse;
+    const Lanes tangent_impulse = larger(smaller(load(c.tangent_impulse_mm) + tangent_gain * sliding, most), -most);
+    store(normal_impulse, c.normal_impulse_mm);
+    store(tangent_impulse, c.tangent_impulse_mm);
+    slip_x = slip_x - normal_impulse * normal_x + tangent_impulse * normal_y;
+    slip_y = slip_y - normal_impulse * normal_y - tangent_impulse * normal_x;
     if constexpr (kWithOverlaps) {
       const Lanes overlap = chosen(all(-kOverlapTolerance_mm) > gap, -gap, zero);
       deepest = larger(deepest, overlap);

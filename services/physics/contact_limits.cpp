@@ -2,10 +2,12 @@
 
 #include <algorithm>
 
+#include "core/plan/physics_settings.hpp"
+
 namespace kilotwin::physics {
 
 ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
-    : sub_steps(std::clamp(plan.experiment().physics().sub_steps(), 1u, 4u)) {
+    : sub_steps(std::clamp(plan.physics_settings().sub_steps, 1u, 4u)) {
   const double steps = sub_steps;
   const double sub_step_s = plan.tick_length.seconds() / steps;
   separation_mm = kSeparation_mm_s * sub_step_s;
@@ -17,12 +19,12 @@ ContactLimits::ContactLimits(const RunPlan& plan, const DriveModel& drive)
   x_limit_mm = plan.world.arena.half_width_mm() - kRobotRadius_mm;
   y_limit_mm = plan.world.arena.half_height_mm() - kRobotRadius_mm;
   touch_mm = 2 * stride_mm;
-  const proto::Physics& physics = plan.experiment().physics();
+  const PhysicsSettings& physics = plan.physics_settings();
   // What an acceleration of the true mass adds to a velocity in a sub-step.
   const double mm_per_m_s2 = 1000 * sub_step_s * sub_step_s / kInertia;
-  thrust_mm = physics.thrust_n() / (physics.robot_mass_g() / 1000) * mm_per_m_s2;
-  rim_friction = physics.rim_friction();
-  hold_mm = physics.robot_friction() * kGravity_m_s2 * mm_per_m_s2;
+  thrust_mm = physics.thrust_N / (physics.robot_mass_g / 1000) * mm_per_m_s2;
+  rim_friction = physics.rim_friction;
+  hold_mm = physics.robot_friction * kGravity_m_s2 * mm_per_m_s2;
 }
 
 }  // namespace kilotwin::physics

@@ -17,9 +17,9 @@ void ContactPass::clear() {
   add_batch(0, 0);
 }
 
-void ContactPass::stash() {
-  batches_.swap(stashed_batches_);
-  contacts_.swap(stashed_contacts_);
+void ContactPass::keep_previous() {
+  batches_.swap(previous_batches_);
+  contacts_.swap(previous_contacts_);
 }
 
 void ContactPass::add_batch(std::uint32_t contacts, std::uint32_t passes) {

@@ -10,17 +10,17 @@ namespace kilotwin::physics {
 
 class ContactPass {
  public:
-  static constexpr Seat kStill = 0;
+  static constexpr Slot kStill = 0;
 
   ContactPass();
 
   /// Starts anew with batch 0 alone, in which nothing moves.
   void clear();
   /// Puts all batches aside, to be read while new ones are made.
-  void stash();
-  [[nodiscard]] const ContactBatch& stashed_batch_of(Seat seat) const { return stashed_batches_[seat / kLanes]; }
-  [[nodiscard]] const ContactLanes* stashed_contacts_of(const ContactBatch& batch) const {
-    return stashed_contacts_.data() + batch.first_contact;
+  void keep_previous();
+  [[nodiscard]] const ContactBatch& previous_batch_of(Slot slot) const { return previous_batches_[slot / kLanes]; }
+  [[nodiscard]] const ContactLanes* previous_contacts_of(const ContactBatch& batch) const {
+    return previous_contacts_.data() + batch.first_contact;
   }
   /// Appends a batch; its bodies and contacts are to be filled in.
   void add_batch(std::uint32_t contacts, std::uint32_t passes);
@@ -38,11 +38,11 @@ class ContactPass {
   [[nodiscard]] SpecialLanes* specials_of(const ContactBatch& batch) {
     return specials_.data() + batch.first_special;
   }
-  [[nodiscard]] static std::size_t lane_of(Seat seat) { return seat % kLanes; }
-  [[nodiscard]] const ContactBatch& batch_of(Seat seat) const { return batches_[seat / kLanes]; }
+  [[nodiscard]] static std::size_t lane_of(Slot slot) { return slot % kLanes; }
+  [[nodiscard]] const ContactBatch& batch_of(Slot slot) const { return batches_[slot / kLanes]; }
   /// Of the batch appended last.
-  [[nodiscard]] Seat seat(std::size_t lane) const {
-    return static_cast<Seat>((batches_.size() - 1) * kLanes + lane);
+  [[nodiscard]] Slot slot(std::size_t lane) const {
+    return static_cast<Slot>((batches_.size() - 1) * kLanes + lane);
   }
   /// Once all batches are there: nobody moves.
   void rest();
@@ -65,10 +65,10 @@ class ContactPass {
       now_.swap(after_);
     }
   }
-  /// Of a seat: displacement since the tick's start, x, y; velocity, carried on as it changes, x, y.
-  [[nodiscard]] const double* now(Seat seat) const { return now_.data() + kRow * seat; }
-  [[nodiscard]] double* after(Seat seat) { return after_.data() + kRow * seat; }
-  [[nodiscard]] double* start(Seat seat) { return now_.data() + kRow * seat; }
+  /// Of a slot: displacement since the tick's start, x, y; velocity, carried on as it changes, x, y.
+  [[nodiscard]] const double* now(Slot slot) const { return now_.data() + kRow * slot; }
+  [[nodiscard]] double* after(Slot slot) { return after_.data() + kRow * slot; }
+  [[nodiscard]] double* start(Slot slot) { return now_.data() + kRow * slot; }
 
  private:
   static constexpr std::size_t kRow = 4;
@@ -76,8 +76,8 @@ class ContactPass {
   const ContactKernel* kernel_;
   std::vector<ContactBatch> batches_;
   std::vector<ContactLanes> contacts_;
-  std::vector<ContactBatch> stashed_batches_;
-  std::vector<ContactLanes> stashed_contacts_;
+  std::vector<ContactBatch> previous_batches_;
+  std::vector<ContactLanes> previous_contacts_;
   std::vector<SpecialLanes> specials_;
   std::size_t contact_count_ = 0;
   std::vector<double> now_, after_;

@@ -20,7 +20,7 @@ void ContactSolver::search_all(const Bodies& bodies, const std::vector<std::uint
   for (std::uint32_t m = 0; m < movables && has_others_; ++m)
     hops_[count + m] = own_movable[m] != 0 ? 0 : kOutOfReach;
   overlaps_.assign(count, 0);
-  seat_of_.assign(count, ContactPass::kStill);
+  slot_of_.assign(count, ContactPass::kStill);
   movers_.clear();
   reached_.clear();
   movable_pass_.clear();

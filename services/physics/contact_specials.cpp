@@ -11,7 +11,7 @@ void ContactSolver::find_specials(const Bodies& bodies) {
   const bool straight = world_.arena.kind() == ArenaShape::Kind::kRectangle;
   if (straight && world_.obstacles.empty() && world_.movables.empty()) return;
   const auto count = static_cast<std::uint32_t>(bodies.size());
-  const auto robots = static_cast<std::uint32_t>(presses_.size());
+  const auto robots = static_cast<std::uint32_t>(cache_.size());
   const auto movables = static_cast<std::uint32_t>(movables_.size());
   has_special_.assign(count, 0);
   const double near_mm = limits_.cutoff_mm - kRobotRadius_mm;  // of a centre, from a rim
@@ -116,9 +116,9 @@ void ContactSolver::fill_specials(std::size_t lane, const Mover& mover, ContactB
     contact.normal_x[lane] = special.normal_x;
     contact.normal_y[lane] = special.normal_y;
     contact.gap_mm[lane] = special.gap_mm;
-    contact.push_mm[lane] = special.push_mm;
-    contact.rub_mm[lane] = contact.spin_mm[lane] = 0;
-    contact.other[lane] = special.seat;
+    contact.normal_impulse_mm[lane] = special.normal_impulse_mm;
+    contact.tangent_impulse_mm[lane] = contact.spin_mm[lane] = 0;
+    contact.other[lane] = special.slot;
     laws[p].gain[lane] = special.gain;
   }
 }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/math/elementary.h"
+#include "core/plan/motion_settings.hpp"
 
 namespace kilotwin::physics {
 namespace {
@@ -99,24 +100,24 @@ void Drives::spread(std::size_t bodies) {
 DriveModel::DriveModel(const RunPlan& plan)
     : random_(plan.seed()),
       tick_s_(plan.tick_length.seconds()),
-      wheel_base_mm_(plan.experiment().motion().wheel_base_mm()),
-      axle_offset_mm_(plan.experiment().motion().axle_offset_mm()),
+      wheel_base_mm_(plan.motion_settings().wheel_base_mm),
+      axle_offset_mm_(plan.motion_settings().axle_offset_mm),
       motors_(plan),
       effects_(plan),
       bias_(plan.robots(), {0, 0}) {
   const DriveKernel* kernels[3];
   drive_kernels(kernels);
   kernel_ = kernels[0];
-  const proto::Motion& motion = plan.experiment().motion();
+  const MotionSettings& motion = plan.motion_settings();
   const RobotParameters parameters(plan);
   make_curves(motion, parameters);
   double top_bias = 0;
-  if (motion.noise()) {
+  if (motion.noise) {
     for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) {
       bias_[robot] = parameters.bias(robot);
       top_bias = std::max({top_bias, magnitude(bias_[robot].left_mm_s), magnitude(bias_[robot].right_mm_s)});
     }
-    if (motion.factor_variance_s() > 0) factor_sd_ = __builtin_sqrt(motion.factor_variance_s() / tick_s_);
+    if (motion.factor_variance_s > 0) factor_sd_ = __builtin_sqrt(motion.factor_variance_s / tick_s_);
   }
 
   double top_straight = 0, top_turn = 0;
@@ -140,17 +141,17 @@ DriveModel::DriveModel(const RunPlan& plan)
   top_speed_mm_s_ += limits_.wheel_mm_s * widest + limits_.sideways_mm_s + 1.5 * limits_.drift_mm_s;
 }
 
-void DriveModel::make_curves(const proto::Motion& motion, const RobotParameters& parameters) {
+void DriveModel::make_curves(const MotionSettings& motion, const RobotParameters& parameters) {
   std::map<std::pair<bool, std::uint8_t>, std::uint16_t> known;
   const auto curve_of = [&](bool turn, std::uint8_t calibrated) {
     const auto [entry, is_new] = known.try_emplace({turn, calibrated}, static_cast<std::uint16_t>(curves_.size()));
     if (is_new) {
       Curve& curve = curves_.emplace_back();
       for (std::size_t duty = std::size_t{motors_.dead_band_duty()} + 1; duty < 256; ++duty) {
-        const double slope = motion.duty_slope(), of_calibrated = static_cast<double>(duty) / calibrated;
+        const double slope = motion.duty_slope, of_calibrated = static_cast<double>(duty) / calibrated;
         const double ratio = slope * of_calibrated + (1 - slope);
-        curve[duty] = (turn ? motion.turn_speed_mm_s() : motion.straight_speed_mm_s()) *
-                      std::clamp(ratio, 0.0, motion.top_speed_ratio());
+        curve[duty] = (turn ? motion.turn_speed_mm_s : motion.straight_speed_mm_s) *
+                      std::clamp(ratio, 0.0, motion.top_speed_ratio);
       }
     }
     return entry->second;

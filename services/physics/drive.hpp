@@ -8,8 +8,8 @@
 #include "core/base/time.hpp"
 #include "core/effects/motion_effects.hpp"
 #include "core/effects/robots.hpp"
-#include "core/plan/plan.hpp"
 #include "core/model/robot_parameters.hpp"
+#include "core/plan/plan.hpp"
 #include "core/random/random.hpp"
 #include "services/physics/drive_kernel.hpp"
 
@@ -80,7 +80,7 @@ class DriveModel {
     double left_mm_s, right_mm_s;  ///< of the wheels
   };
 
-  void make_curves(const proto::Motion&, const RobotParameters&);
+  void make_curves(const MotionSettings&, const RobotParameters&);
   [[nodiscard]] Speeds nominal(const Curves& of, std::uint8_t left, std::uint8_t right) const {
     if (left != 0 && right != 0) return {curves_[of.straight_right][right], curves_[of.straight_left][left]};
     return {curves_[of.turn_right][right], curves_[of.turn_left][left]};

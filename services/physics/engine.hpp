@@ -9,9 +9,12 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/time.hpp"
-#include "core/plan/plan.hpp"
 #include "core/frames/frames.hpp"
-#include "idl/checkpoint.pb.h"
+#include "core/plan/plan.hpp"
+
+namespace kilotwin::proto {
+class PhysicsState;
+}
 
 namespace kilotwin::physics {
 

@@ -13,8 +13,8 @@ KinematicEngine::KinematicEngine(const RunPlan& plan, PartitionId partition)
 
 KinematicEngine::KinematicEngine(const RunPlan& plan, PartitionId partition, const DriveModel& drive)
     : PopulationEngine(plan, partition, drive, margin_mm(plan, drive)),
-      x_limit_mm_(plan.experiment().arena().width_mm() / 2 - kRobotRadius_mm),
-      y_limit_mm_(plan.experiment().arena().height_mm() / 2 - kRobotRadius_mm) {}
+      x_limit_mm_(plan.world.arena.stated_width_mm() / 2 - kRobotRadius_mm),
+      y_limit_mm_(plan.world.arena.stated_height_mm() / 2 - kRobotRadius_mm) {}
 
 void KinematicEngine::move(Tick from, const Inputs&) {
   Bodies& known = population_.known();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/plan/physics_settings.hpp"
+
 namespace kilotwin::physics {
 namespace {
 
@@ -21,7 +23,7 @@ MovablePass::MovablePass(const RunPlan& plan, const ContactLimits& limits)
       stride_mm_(limits.stride_mm),
       touch_mm_(limits.touch_mm),
       range_mm_(2 * limits.sub_steps * limits.stride_mm),
-      robot_kg_(plan.experiment().physics().robot_mass_g() / 1000),
+      robot_kg_(plan.physics_settings().robot_mass_g / 1000),
       mover_of_(plan.movables(), kNone) {
   const double sub_step_s = plan.tick_length.seconds() / limits.sub_steps;
   for (const MovableBodyModel& body : bodies_)
@@ -123,7 +125,7 @@ void MovablePass::find_stops(Mover& mover, const std::vector<MovableState>& stat
 }
 
 void MovablePass::move_points(const Mover& mover, const Motion& shift, const Motion& swing,
-                              double* (ContactPass::*of)(Seat), ContactPass& pass) const {
+                              double* (ContactPass::*of)(Slot), ContactPass& pass) const {
   const double rho_mm = bodies_[mover.movable].shape.mean_distance_mm();
   for (const Contact& c : mover.contacts) {
     double* const point = (pass.*of)(c.point);
@@ -182,10 +184,11 @@ void MovablePass::push(Mover& mover, const ContactPass& pass) const {
     const double* const point = pass.now(c.point);
     const double gap = c.gap_mm + (c.normal_x * (point[0] - robot[0]) + c.normal_y * (point[1] - robot[1]));
     const double closing = c.normal_x * (robot[2] - point[2]) + c.normal_y * (robot[3] - point[3]);
-    c.push_mm = std::max(c.push_mm + c.gain * (closing - kEase * std::max(gap - touch_mm_, 0.0)), 0.0);
-    force.x_mm += c.push_mm * c.normal_x;
-    force.y_mm += c.push_mm * c.normal_y;
-    force.turn_mm += c.push_mm * arm(mover, c.lever_x_mm, c.lever_y_mm, c.normal_x, c.normal_y);
+    c.normal_impulse_mm =
+        std::max(c.normal_impulse_mm + c.gain * (closing - kEase * std::max(gap - touch_mm_, 0.0)), 0.0);
+    force.x_mm += c.normal_impulse_mm * c.normal_x;
+    force.y_mm += c.normal_impulse_mm * c.normal_y;
+    force.turn_mm += c.normal_impulse_mm * arm(mover, c.lever_x_mm, c.lever_y_mm, c.normal_x, c.normal_y);
   }
   mover.before = mover.velocity;
   mover.velocity = {mover.before.x_mm + share * force.x_mm, mover.before.y_mm + share * force.y_mm,

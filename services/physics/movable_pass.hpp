@@ -24,9 +24,9 @@ class MovablePass {
  public:
   /// A robot that may touch a body within the tick.
   struct Contact {
-    Seat robot, point;                  ///< of the robot, and of the touched point
+    Slot robot, point;                  ///< of the robot, and of the touched point
     double normal_x, normal_y, gap_mm;  ///< from the robot, at the tick's start
-    double gain, push_mm;
+    double gain, normal_impulse_mm;
     double lever_x_mm, lever_y_mm;  ///< of the touched point from the body's centre
   };
 
@@ -105,7 +105,7 @@ class MovablePass {
   [[nodiscard]] double arm(const Mover& mover, double lever_x_mm, double lever_y_mm, double nx, double ny) const {
     return (lever_x_mm * ny - lever_y_mm * nx) / bodies_[mover.movable].shape.mean_distance_mm();
   }
-  void move_points(const Mover&, const Motion& shift, const Motion& swing, double* (ContactPass::*of)(Seat),
+  void move_points(const Mover&, const Motion& shift, const Motion& swing, double* (ContactPass::*of)(Slot),
                    ContactPass&) const;
   /// Way of the point at this lever along a direction.
   [[nodiscard]] static double along(const Motion& m, double nx, double ny, double arm) {

@@ -6,6 +6,9 @@
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/math/elementary.h"
+#include "core/plan/motion_settings.hpp"
+#include "core/plan/physics_settings.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/physics/contact.hpp"
 
 namespace kilotwin::physics {
@@ -43,34 +46,34 @@ RigidState unpacked(double x_mm, double y_mm, const double* columns) {
   return state;
 }
 
-Vector3 downhill_of(const proto::Physics& physics) {
+Vector3 downhill_of(const PhysicsSettings& physics) {
   double sine, cosine;
-  kt_sincos(physics.downhill_deg() * (kPi / 180), &sine, &cosine);
+  kt_sincos(physics.downhill_deg * (kPi / 180), &sine, &cosine);
   return {cosine, sine, 0};
 }
 
-Vector3 gravity_of(const proto::Physics& physics) {
+Vector3 gravity_of(const PhysicsSettings& physics) {
   double sine, cosine;
-  kt_sincos(physics.tilt_deg() * (kPi / 180), &sine, &cosine);
+  kt_sincos(physics.tilt_deg * (kPi / 180), &sine, &cosine);
   const Vector3 downhill = downhill_of(physics);
   return {kGravity_mm_s2 * sine * downhill[0], kGravity_mm_s2 * sine * downhill[1], -kGravity_mm_s2 * cosine};
 }
 
 /// Whether a body at rest stays so.
-bool holds(const proto::Physics& physics, double grip) {
+bool holds(const PhysicsSettings& physics, double grip) {
   double sine, cosine;
-  kt_sincos(physics.tilt_deg() * (kPi / 180), &sine, &cosine);
+  kt_sincos(physics.tilt_deg * (kPi / 180), &sine, &cosine);
   return sine < grip * cosine;
 }
 
 }  // namespace
 
 OdeLimits::OdeLimits(const RunPlan& plan, const DriveModel& drive)
-    : sub_steps(std::clamp(plan.experiment().physics().sub_steps(), 1u, 4u)) {
+    : sub_steps(std::clamp(plan.physics_settings().sub_steps, 1u, 4u)) {
   const double tick_s = plan.tick_length.seconds();
   const double width_mm = 2 * plan.world.arena.half_width_mm(), height_mm = 2 * plan.world.arena.half_height_mm();
   sub_step_s = tick_s / sub_steps;
-  const Vector3 gravity = gravity_of(plan.experiment().physics());
+  const Vector3 gravity = gravity_of(plan.physics_settings());
   const double along_mm_s2 = __builtin_sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1]);
   const double diagonal_mm = __builtin_sqrt(width_mm * width_mm + height_mm * height_mm);
   top_speed_mm_s =
@@ -91,28 +94,26 @@ OdeEngine::OdeEngine(const RunPlan& plan, PartitionId partition, const DriveMode
       limits_(plan, drive),
       random_(plan.seed()),
       scene_(plan.world),
-      thrust_g_mm_s2_(plan.experiment().physics().thrust_n() * kNewton_g_mm_s2),
-      downhill_(downhill_of(plan.experiment().physics())),
-      world_(gravity_of(plan.experiment().physics()), limits_.sub_step_s),
+      thrust_g_mm_s2_(plan.physics_settings().thrust_N * kNewton_g_mm_s2),
+      downhill_(downhill_of(plan.physics_settings())),
+      world_(gravity_of(plan.physics_settings()), limits_.sub_step_s),
       candidates_(2 * kRobotRadius_mm + limits_.reach_mm),
       states_(plan.robots()) {
-  const proto::Physics& physics = plan.experiment().physics();
-  const proto::Motion& motion = plan.experiment().motion();
-  const double half_base_mm = motion.wheel_base_mm() / 2;
-  legs_mm_ = {{{-motion.axle_offset_mm(), half_base_mm, -kRobotHeight_mm / 2},
-               {-motion.axle_offset_mm(), -half_base_mm, -kRobotHeight_mm / 2},
+  const PhysicsSettings& physics = plan.physics_settings();
+  const MotionSettings& motion = plan.motion_settings();
+  const double half_base_mm = motion.wheel_base_mm / 2;
+  legs_mm_ = {{{-motion.axle_offset_mm, half_base_mm, -kRobotHeight_mm / 2},
+               {-motion.axle_offset_mm, -half_base_mm, -kRobotHeight_mm / 2},
                {kRobotRadius_mm, 0, -kRobotHeight_mm / 2}}};
   const auto make_kind = [&](const Convex& shape, double mass_g, double height_mm, double friction) {
     return Kind{shape, Inertia::prism(mass_g, shape, height_mm), height_mm, friction, holds(physics, friction)};
   };
-  robot_ =
-      make_kind(Convex::disc(kRobotRadius_mm), physics.robot_mass_g(), kRobotHeight_mm, physics.robot_friction());
+  robot_ = make_kind(Convex::disc(kRobotRadius_mm), physics.robot_mass_g, kRobotHeight_mm, physics.robot_friction);
   immobile_.resize(plan.robots());
   for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) immobile_[robot] = plan.immobile(robot);
   for (const MovableBodyModel& body : scene_.movables) {
     movable_.push_back(make_kind(body.shape, 1000 * body.mass_kg, body.height_mm, body.friction));
-    movable_states_.push_back(
-        upright(body.pose.position_mm.x(), body.pose.position_mm.y(), body.pose.heading_rad, body.height_mm));
+    movable_states_.push_back(upright(body.pose.x_mm, body.pose.y_mm, body.pose.heading_rad, body.height_mm));
   }
   own_movable_.resize(movable_.size());
   list_movables();

@@ -5,6 +5,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "idl/checkpoint.pb.h"
 
 namespace kilotwin::physics {
 
@@ -37,21 +38,21 @@ void PlanarEngine::take(const Inputs& inputs) {
       contact_.movables()[movable.body[i]] = {movable.x_mm[i],  movable.y_mm[i],  movable.heading_rad[i],
                                               movable.vx_mm[i], movable.vy_mm[i], movable.turn_rad[i]};
     }
-    for (const std::uint32_t robot : frame->robot) contact_.presses().clear(robot);
-    const PressedColumns& pressed = frame->pressed;
+    for (const std::uint32_t robot : frame->robot) contact_.cache().clear(robot);
+    const ContactColumns& contact = frame->contact;
     std::size_t at = 0;
-    for (std::size_t i = 0; i < pressed.robot.size(); ++i) {
-      Press press;
-      press.slip_x_mm = pressed.slip_x_mm[i];
-      press.slip_y_mm = pressed.slip_y_mm[i];
-      for (std::uint32_t p = 0; p < pressed.contacts[i]; ++p, ++at) {
-        if (p >= Press::kMost) continue;
-        press.touch[p] = {pressed.push_mm[at], pressed.rub_mm[at], pressed.other[at]};
-        press.contacts = p + 1;
+    for (std::size_t i = 0; i < contact.robot.size(); ++i) {
+      CachedContacts cached;
+      cached.slip_x_mm = contact.slip_x_mm[i];
+      cached.slip_y_mm = contact.slip_y_mm[i];
+      for (std::uint32_t p = 0; p < contact.count[i]; ++p, ++at) {
+        if (p >= CachedContacts::kMost) continue;
+        cached.contact[p] = {contact.normal_impulse_mm[at], contact.tangent_impulse_mm[at], contact.other[at]};
+        cached.contacts = p + 1;
       }
-      contact_.presses().set(pressed.robot[i], press);
-      const auto found = std::lower_bound(known.robot.begin(), known.robot.end(), pressed.robot[i]);
-      if (found != known.robot.end() && *found == pressed.robot[i])
+      contact_.cache().set(contact.robot[i], cached);
+      const auto found = std::lower_bound(known.robot.begin(), known.robot.end(), contact.robot[i]);
+      if (found != known.robot.end() && *found == contact.robot[i])
         known.awake[static_cast<std::size_t>(found - known.robot.begin())] = 1;
     }
   }
@@ -135,22 +136,22 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   }
   add_movables(frame);
   for (const std::uint32_t robot : frame.robot) {
-    if (!contact_.presses().any(robot)) continue;
-    const Press& press = contact_.presses()[robot];
-    frame.pressed.robot.push_back(robot);
-    frame.pressed.slip_x_mm.push_back(press.slip_x_mm);
-    frame.pressed.slip_y_mm.push_back(press.slip_y_mm);
-    frame.pressed.contacts.push_back(static_cast<std::uint8_t>(press.contacts));
-    for (std::uint32_t p = 0; p < press.contacts; ++p) {
-      frame.pressed.other.push_back(press.touch[p].other);
-      frame.pressed.push_mm.push_back(press.touch[p].push_mm);
-      frame.pressed.rub_mm.push_back(press.touch[p].rub_mm);
+    if (!contact_.cache().any(robot)) continue;
+    const CachedContacts& cached = contact_.cache()[robot];
+    frame.contact.robot.push_back(robot);
+    frame.contact.slip_x_mm.push_back(cached.slip_x_mm);
+    frame.contact.slip_y_mm.push_back(cached.slip_y_mm);
+    frame.contact.count.push_back(static_cast<std::uint8_t>(cached.contacts));
+    for (std::uint32_t p = 0; p < cached.contacts; ++p) {
+      frame.contact.other.push_back(cached.contact[p].other);
+      frame.contact.normal_impulse_mm.push_back(cached.contact[p].normal_impulse_mm);
+      frame.contact.tangent_impulse_mm.push_back(cached.contact[p].tangent_impulse_mm);
     }
   }
 }
 
 std::uint64_t PlanarEngine::hash_part() const {
-  std::uint64_t sum = population_.hash_part() + contact_.hash_presses(population_.listed().robot);
+  std::uint64_t sum = population_.hash_part() + contact_.hash_contacts(population_.listed().robot);
   for (std::uint32_t m = 0; m < listed_movable_.size(); ++m) {
     if (listed_movable_[m] == 0) continue;
     const MovableState& b = contact_.movables()[m];
@@ -171,29 +172,30 @@ void PlanarEngine::save(proto::PhysicsState& state) const {
       state.add_movable_state(value);
   }
   for (const std::uint32_t robot : population_.listed().robot) {
-    if (!contact_.presses().any(robot)) continue;
-    const Press& press = contact_.presses()[robot];
-    state.add_pressed(robot);
-    state.add_contacts(press.contacts);
-    state.add_pressed_state(press.slip_x_mm);
-    state.add_pressed_state(press.slip_y_mm);
-    for (std::uint32_t p = 0; p < press.contacts; ++p) {
-      state.add_contact_other(press.touch[p].other);
-      state.add_pressed_state(press.touch[p].push_mm);
-      state.add_pressed_state(press.touch[p].rub_mm);
+    if (!contact_.cache().any(robot)) continue;
+    const CachedContacts& cached = contact_.cache()[robot];
+    state.add_contact_robot(robot);
+    state.add_contact_count(cached.contacts);
+    state.add_contact_state(cached.slip_x_mm);
+    state.add_contact_state(cached.slip_y_mm);
+    for (std::uint32_t p = 0; p < cached.contacts; ++p) {
+      state.add_contact_other(cached.contact[p].other);
+      state.add_contact_state(cached.contact[p].normal_impulse_mm);
+      state.add_contact_state(cached.contact[p].tangent_impulse_mm);
     }
   }
 }
 
 void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> parts) {
   population_.load(tick, parts);
-  PressTable& presses = contact_.presses();
+  ContactCache& cache = contact_.cache();
   std::vector<MovableState>& movables = contact_.movables();
-  for (std::size_t robot = 0; robot < presses.size(); ++robot) presses.clear(robot);
+  for (std::size_t robot = 0; robot < cache.size(); ++robot) cache.clear(robot);
   std::vector<std::uint8_t> seen(movables.size(), 0);
   std::size_t found = 0;
   for (const proto::PhysicsState* part : parts) {
-    if (part->movable_state_size() != 6 * part->movable_size() || part->contacts_size() != part->pressed_size())
+    if (part->movable_state_size() != 6 * part->movable_size() ||
+        part->contact_count_size() != part->contact_robot_size())
       throw RunError("checkpoint: physics: columns of unequal length; the file is damaged");
     for (int i = 0; i < part->movable_size(); ++i) {
       const std::uint32_t m = part->movable(i);
@@ -204,23 +206,23 @@ void PlanarEngine::load(Tick tick, std::span<const proto::PhysicsState* const> p
       ++found;
     }
     int value = 0, other = 0;
-    for (int i = 0; i < part->pressed_size(); ++i) {
-      const std::uint32_t robot = part->pressed(i), contacts = part->contacts(i);
-      const int size = static_cast<int>(std::min<std::uint32_t>(contacts, Press::kMost + 1));
-      if (robot >= presses.size() || contacts > Press::kMost || value + 2 + 2 * size > part->pressed_state_size() ||
-          other + size > part->contact_other_size()) {
+    for (int i = 0; i < part->contact_robot_size(); ++i) {
+      const std::uint32_t robot = part->contact_robot(i), contacts = part->contact_count(i);
+      const int size = static_cast<int>(std::min<std::uint32_t>(contacts, CachedContacts::kMost + 1));
+      if (robot >= cache.size() || contacts > CachedContacts::kMost ||
+          value + 2 + 2 * size > part->contact_state_size() || other + size > part->contact_other_size()) {
         throw RunError("checkpoint: physics: contacts of robot " + std::to_string(robot) + " are damaged");
       }
-      Press press;
-      press.slip_x_mm = part->pressed_state(value++);
-      press.slip_y_mm = part->pressed_state(value++);
-      press.contacts = contacts;
+      CachedContacts cached;
+      cached.slip_x_mm = part->contact_state(value++);
+      cached.slip_y_mm = part->contact_state(value++);
+      cached.contacts = contacts;
       for (std::uint32_t p = 0; p < contacts; ++p) {
-        press.touch[p].other = part->contact_other(other++);
-        press.touch[p].push_mm = part->pressed_state(value++);
-        press.touch[p].rub_mm = part->pressed_state(value++);
+        cached.contact[p].other = part->contact_other(other++);
+        cached.contact[p].normal_impulse_mm = part->contact_state(value++);
+        cached.contact[p].tangent_impulse_mm = part->contact_state(value++);
       }
-      presses.set(robot, press);
+      cache.set(robot, cached);
     }
   }
   if (found != movables.size()) throw RunError("checkpoint: physics: a movable body is missing");

@@ -5,6 +5,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "idl/checkpoint.pb.h"
 
 namespace kilotwin::physics {
 
@@ -28,7 +29,7 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
   for (Bodies* const bodies : {&listed_, &tracked_, &known_, &previous_}) bodies->remembered = memory_.size();
   for (std::uint32_t robot = 0; robot < robots_; ++robot) {
     const Pose pose = plan.initial_pose(robot);
-    const double x = pose.position_mm.x(), y = pose.position_mm.y(), heading = wrapped(pose.heading_rad);
+    const double x = pose.x_mm, y = pose.y_mm, heading = wrapped(pose.heading_rad);
     const bool tracked = plan.tracked(robot);
     if (tracked) {
       is_tracked_.resize(robots_, 0);

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "idl/manifest.pb.h"
+
 namespace kilotwin::testing {
 namespace {
 

@@ -6,6 +6,7 @@
 
 #include "core/base/pose.hpp"
 #include "core/math/elementary.h"
+#include "idl/manifest.pb.h"
 #include "services/physics/engine.hpp"
 
 namespace kilotwin::kilogrid {

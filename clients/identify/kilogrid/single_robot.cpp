@@ -5,6 +5,7 @@
 
 #include "core/base/pose.hpp"
 #include "core/math/elementary.h"
+#include "core/plan/from_manifest.hpp"
 
 namespace kilotwin::kilogrid {
 
@@ -20,7 +21,7 @@ SingleRobot::SingleRobot(const Floor& floor, const FloorSettings& settings) : fl
     if (effect.during_size() == 0) term.commands = 0xe;
     for (const Function& f : effect.function()) {
       const double correlation_s = f.noise().correlation_s();
-      Factor factor{EffectFunction(f),
+      Factor factor{EffectFunction(settings_of(f)),
                     f.of(),
                     f.and_of(),
                     std::nullopt,

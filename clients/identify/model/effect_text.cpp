@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/effects/function.hpp"
+#include "core/plan/from_manifest.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -283,7 +284,8 @@ MapSum sum_of(const std::vector<const Effect*>& effects) {
   }
   sum.value.assign(sum.x_mm.size() * sum.y_mm.size(), 0);
   for (const Effect* effect : effects) {
-    std::vector<EffectFunction> functions(effect->function().begin(), effect->function().end());
+    std::vector<EffectFunction> functions;
+    for (const Function& f : effect->function()) functions.emplace_back(settings_of(f));
     std::size_t k = 0;
     for (const double y : sum.y_mm) {
       for (const double x : sum.x_mm) {

@@ -1,5 +1,6 @@
 #include "clients/identify/radio/grid_run.hpp"
 
+#include "idl/manifest.pb.h"
 #include "services/comm/radio_engine.hpp"
 
 namespace kilotwin::radio_fit {
@@ -41,7 +42,7 @@ GridRun simulate(const GridSet& set, const proto::Radio& radio, std::uint64_t se
   BodyFrame bodies;
   for (std::uint32_t i = 0; i < robots; ++i) {
     const Pose pose = plan.initial_pose(i);
-    bodies.add(i, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
+    bodies.add(i, pose.x_mm, pose.y_mm, pose.heading_rad);
   }
   ActuationFrame actuation;
   actuation.motor_left.assign(robots, 0);

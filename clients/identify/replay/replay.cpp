@@ -6,6 +6,7 @@
 
 #include "core/base/error.hpp"
 #include "core/effects/measurement.hpp"
+#include "idl/manifest.pb.h"
 #include "services/physics/engine.hpp"
 
 namespace kilotwin::identify {

@@ -6,10 +6,10 @@
 #include <iterator>
 #include <map>
 
-#include "core/os/worker_pool.hpp"
-#include "services/comm/firmware/eeprom.hpp"
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/os/worker_pool.hpp"
+#include "services/comm/firmware/eeprom.hpp"
 #include "services/comm/tick_timers.hpp"
 
 namespace kilotwin::firmware {
@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 /// Own cycles of a robot between two of its regular timer interrupts.
 constexpr comm::Cycles kPeriod = comm::kTimerCounts * comm::kTimerCount;
 
-FlashImage read_program(const proto::Program& program, const fs::path& run_directory) {
-  const fs::path path = run_directory / "programs" / program_file(program);
+FlashImage read_program(const Program& program, const fs::path& run_directory) {
+  const fs::path path = run_directory / "programs" / program.file();
   std::ifstream stream(path, std::ios::binary);
   const std::string octets{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) {
@@ -35,7 +35,7 @@ FlashImage read_program(const proto::Program& program, const fs::path& run_direc
 FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory, std::uint32_t threads,
                              bool keeps_logs)
     : logs_(keeps_logs ? run_directory / "logs" : fs::path{}),
-      appends_logs_(plan.manifest.resumed()),
+      appends_logs_(plan.resumed),
       cycles_per_tick_(plan.tick_length.cycles()),
       senses_(plan, {0, plan.robots()}),
       workers_(std::make_unique<WorkerPool>(threads)) {
@@ -47,8 +47,7 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   for (std::uint32_t id = 0; id < plan.robots(); ++id) {
     if (!plan.firmware(id)) continue;
     const std::uint32_t program = plan.program_of(id);
-    if (images.count(program) == 0)
-      images.emplace(program, read_program(plan.manifest.program(static_cast<int>(program)), run_directory));
+    if (images.count(program) == 0) images.emplace(program, read_program(plan.programs()[program], run_directory));
     ids_.push_back(id);
     Robot& robot = robots_.emplace_back();
     robot.period = timers.period(id);
@@ -59,7 +58,7 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   // Up to tick 0, before which nobody sends.
   std::vector<std::vector<comm::Cycles>> flashes(robots_.size());
   workers_->share(static_cast<std::uint32_t>(robots_.size()),
-               [&](std::uint32_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
+                  [&](std::uint32_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
   commit();
 }
 

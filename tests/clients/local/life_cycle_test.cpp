@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "clients/local/local_run.hpp"
+#include "idl/manifest.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::local {

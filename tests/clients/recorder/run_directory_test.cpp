@@ -22,11 +22,9 @@ TEST(RunDirectory, NamesItsFiles) {
   EXPECT_TRUE(fs::is_directory(run.programs()));
   EXPECT_EQ(run.manifest(), run.path() / "manifest.pb");
   EXPECT_EQ(run.experiment(), run.path() / "experiment.txtpb");
-  proto::Program program;
-  program.set_path("../walk.hex");
-  program.set_sha256("00ff");
+  Program program{"../walk.hex", "00ff", false};
   EXPECT_EQ(run.program(program), run.path() / "programs/00ff.so");
-  program.set_firmware(true);
+  program.firmware = true;
   EXPECT_EQ(run.program(program), run.path() / "programs/00ff.hex");
   EXPECT_EQ(run.recording(), run.path() / "recording.ktrec");
   EXPECT_EQ(run.summary(), run.path() / "summary.json");

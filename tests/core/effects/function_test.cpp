@@ -1,5 +1,7 @@
 // Functions of effects against their closed forms.
 #include "core/effects/function.hpp"
+#include "core/plan/from_manifest.hpp"
+#include "idl/effects.pb.h"
 
 #include <google/protobuf/text_format.h>
 #include <gtest/gtest.h>
@@ -15,7 +17,7 @@ namespace {
 EffectFunction function(const std::string& text) {
   proto::Function parsed;
   if (!google::protobuf::TextFormat::ParseFromString(text, &parsed)) throw std::runtime_error(text);
-  return EffectFunction(parsed);
+  return EffectFunction(settings_of(parsed));
 }
 
 std::string list(const std::vector<double>& values) {

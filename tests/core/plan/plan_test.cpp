@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "idl/manifest.pb.h"
 
 namespace kilotwin {
 namespace {
@@ -185,7 +186,8 @@ TEST(RunPlan, TellsWhatTheManifestTells) {
   EXPECT_EQ(plan.last_tick, Tick{306});  // 305.2 ticks
   EXPECT_EQ(plan.grid.size(), 6u);
   EXPECT_EQ(plan.hosts, 4u);
-  EXPECT_EQ(plan.initial_pose(4).position_mm, Eigen::Vector2d(4, -4));
+  EXPECT_EQ(plan.initial_pose(4).x_mm, 4);
+  EXPECT_EQ(plan.initial_pose(4).y_mm, -4);
   EXPECT_EQ(plan.initial_pose(4).heading_rad, 0.5);
   for (std::uint32_t robot = 0; robot < 17; ++robot) {
     EXPECT_EQ(plan.program_of(robot), robot < 5 ? 1 : robot < 8 ? kNoProgram : 0);
@@ -248,7 +250,7 @@ TEST(RunPlan, HashIsOfAllButTheMode) {
   EXPECT_EQ(RunPlan(manifest).hash, base);
   manifest.set_mode("federated");
   EXPECT_EQ(RunPlan(manifest).hash, base);
-  EXPECT_EQ(RunPlan(manifest).manifest.mode(), "federated");
+  EXPECT_EQ(RunPlan(manifest).manifest().mode(), "federated");
 
   // Written to a file and read again, as the services do.
   proto::Manifest read;

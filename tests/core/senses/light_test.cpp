@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 
+#include "core/plan/from_manifest.hpp"
 #include "core/senses/light_field.hpp"
+#include "idl/manifest.pb.h"
 #include "tests/support/scenes.hpp"
 
 namespace kilotwin::senses {
@@ -22,7 +24,7 @@ BodyFrame frame_of(const RunPlan& plan, Tick tick = {}) {
   frame.tick = tick;
   for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) {
     const Pose pose = plan.initial_pose(robot);
-    frame.add(robot, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
+    frame.add(robot, pose.x_mm, pose.y_mm, pose.heading_rad);
   }
   return frame;
 }
@@ -95,13 +97,13 @@ TEST(Light, MovesOnACircle) {
   source.mutable_circle()->set_phase_deg(30);
   for (int k = 0; k < 100; ++k) {
     const double t = 0.37 * k, angle = 2 * kPi * t / 8 + kPi / 6;
-    const Lamp lamp = lamp_at(source, t);
+    const Lamp lamp = lamp_at(settings_of(source), t);
     EXPECT_NEAR(lamp.x_mm, 5 + 100 * std::cos(angle), 1e-9);
     EXPECT_NEAR(lamp.y_mm, -7 + 100 * std::sin(angle), 1e-9);
   }
   source.mutable_circle()->set_clockwise(true);
   source.mutable_circle()->set_phase_deg(0);
-  EXPECT_NEAR(lamp_at(source, 2).y_mm, -107, 1e-9);
+  EXPECT_NEAR(lamp_at(settings_of(source), 2).y_mm, -107, 1e-9);
 }
 
 TEST(Light, GoesFromWayPointToWayPoint) {
@@ -118,22 +120,22 @@ TEST(Light, GoesFromWayPointToWayPoint) {
   add(4, 100, 50);
   for (const auto& [t, x, y] : std::vector<std::array<double, 3>>{
            {0, 0, 0}, {1, 0, 0}, {1.5, 25, 0}, {3, 100, 0}, {3.5, 100, 25}, {4, 100, 50}, {99, 100, 50}}) {
-    EXPECT_NEAR(lamp_at(source, t).x_mm, x, 1e-12) << t;
-    EXPECT_NEAR(lamp_at(source, t).y_mm, y, 1e-12) << t;
-    EXPECT_EQ(lamp_at(source, t).z_mm, 100);
+    EXPECT_NEAR(lamp_at(settings_of(source), t).x_mm, x, 1e-12) << t;
+    EXPECT_NEAR(lamp_at(settings_of(source), t).y_mm, y, 1e-12) << t;
+    EXPECT_EQ(lamp_at(settings_of(source), t).z_mm, 100);
   }
   source.set_loop(true);
-  EXPECT_NEAR(lamp_at(source, 4 + 1.5).x_mm, 25, 1e-12);
+  EXPECT_NEAR(lamp_at(settings_of(source), 4 + 1.5).x_mm, 25, 1e-12);
   source.mutable_waypoint(1)->set_height_mm(20);
   source.mutable_waypoint(2)->set_height_mm(40);
-  EXPECT_NEAR(lamp_at(source, 3.5).z_mm, 30, 1e-12);
+  EXPECT_NEAR(lamp_at(settings_of(source), 3.5).z_mm, 30, 1e-12);
 }
 
 TEST(Light, IsSwitchedAtItsTimes) {
   proto::LightSource source;
   source.add_switch_s(2);
   source.add_switch_s(5);
-  const auto on = [&](double t) { return lamp_at(source, t).intensity > 0; };
+  const auto on = [&](double t) { return lamp_at(settings_of(source), t).intensity > 0; };
   for (const double t : {0.0, 1.9, 5.0, 100.0}) EXPECT_TRUE(on(t)) << t;
   for (const double t : {2.0, 4.9}) EXPECT_FALSE(on(t)) << t;
   source.set_switch_period_s(6);
@@ -174,7 +176,7 @@ TEST(Light, NoiseGrowsWithTheReading) {
 /// A plan with pictures in its manifest.
 RunPlan with_picture(const std::string& image, std::uint32_t columns, std::uint32_t rows,
                      const std::vector<std::string>& pictures) {
-  proto::Manifest manifest = make_plan("arena { width_mm: 400 height_mm: 200 }", {{0, 0, 0}}).manifest;
+  proto::Manifest manifest = make_plan("arena { width_mm: 400 height_mm: 200 }", {{0, 0, 0}}).manifest();
   proto::Light& light = *manifest.mutable_experiment()->mutable_light();
   EXPECT_TRUE(google::protobuf::TextFormat::ParseFromString("image { " + image + " }", &light));
   for (const std::string& picture : pictures) {

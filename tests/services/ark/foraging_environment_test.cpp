@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.hpp"
+#include "idl/checkpoint.pb.h"
 
 namespace kilotwin::ark {
 namespace {
@@ -11,17 +12,17 @@ constexpr std::uint8_t kBlue = 0x30, kRed = 0x03, kGreen = 0x0c;
 
 /// Food of 4 loads around (0, 0), 200 mm; home around (1000, 0), 50 mm; scent 700 mm.
 ForagingEnvironment field() {
-  proto::ForagingEnvironment setting;
-  setting.set_food_x_mm(0);
-  setting.set_food_y_mm(0);
-  setting.set_home_x_mm(1000);
-  setting.set_home_y_mm(0);
-  setting.set_loads(4);
+  ForagingSettings setting;
+  setting.food_radius_mm = 200;
+  setting.home_x_mm = 1000;
+  setting.home_radius_mm = 50;
+  setting.scent_radius_mm = 700;
+  setting.loads = 4;
   return {setting, 10};
 }
 
 std::optional<ArkMessage> at(ForagingEnvironment& field, double x_mm, std::uint8_t led, std::uint32_t robot = 3) {
-  return field.sense({robot, {{x_mm, 0}, 0}, led});
+  return field.sense({robot, {x_mm, 0, 0}, led});
 }
 
 TEST(Foraging, LeadsToTheFoodWithinItsScent) {

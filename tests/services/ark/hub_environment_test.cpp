@@ -10,16 +10,12 @@ namespace kilotwin::ark {
 namespace {
 
 std::unique_ptr<VirtualEnvironment> hub(double x_mm, double y_mm, double radius_mm) {
-  proto::VirtualEnvironment description;
-  description.mutable_hub()->set_x_mm(x_mm);
-  description.mutable_hub()->set_y_mm(y_mm);
-  description.mutable_hub()->set_radius_mm(radius_mm);
-  return make_environment(description, 2000);
+  return make_environment(HubSettings{x_mm, y_mm, radius_mm}, 2000);
 }
 
 ArkMessage seen_from(VirtualEnvironment& environment, double x_mm, double y_mm, double heading_rad,
                      std::uint32_t robot = 7) {
-  return environment.sense({robot, {{x_mm, y_mm}, heading_rad}, 0}).value();
+  return environment.sense({robot, {x_mm, y_mm, heading_rad}, 0}).value();
 }
 
 TEST(HubEnvironment, TellsInsideFromOutside) {

@@ -9,6 +9,8 @@
 #include <string>
 
 #include "core/base/error.hpp"
+#include "core/plan/station_settings.hpp"
+#include "idl/checkpoint.pb.h"
 #include "tests/support/scenes.hpp"
 
 namespace kilotwin::ark {
@@ -27,7 +29,7 @@ class Scene {
   explicit Scene(const RunPlan& plan, std::uint32_t parts = 1) : station(plan), bodies_(parts), actuation_(parts) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
-      bodies_[i % parts].add(i, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
+      bodies_[i % parts].add(i, pose.x_mm, pose.y_mm, pose.heading_rad);
     }
     for (std::uint32_t p = 0; p < parts; ++p) {
       const std::uint32_t first = plan.robots() * p / parts, last = plan.robots() * (p + 1) / parts;
@@ -135,7 +137,7 @@ TEST(StationEngine, TellsWhatTheTrackerSaw) {
   const RunPlan plan = plan_of(9, "station { environment { hub { x_mm: 40 y_mm: 0 radius_mm: 30 } } }");
   Scene scene(plan);
   std::size_t inside = 0;
-  const auto hub = make_environment(plan.experiment().station().environment(0), 9);
+  const auto hub = make_environment(plan.station_settings().environments[0], 9);
   for (int k = 0; k < 40; ++k) {
     scene.step();
     if (scene.frame.packets.empty() || scene.frame.packets[0].command != OverheadCommand::kRepeat) continue;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.hpp"
+#include "idl/checkpoint.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {

@@ -2,9 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "core/os/files.hpp"
-#include "services/behaviours/sha256.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
+#include "idl/manifest.pb.h"
+#include "services/behaviours/sha256.hpp"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {
@@ -163,13 +164,13 @@ TEST(Compiler, ClangGivesTheSameBehaviour) {
   auto frames = [&](bool clang_made) {
     Swarm swarm({source.string()}, 30);
     if (clang_made) {
-      proto::Manifest manifest = swarm.plan->manifest;
+      proto::Manifest manifest = swarm.plan->manifest();
       manifest.mutable_program(0)->set_sha256(by_clang.sha256);
       swarm.folder.write("programs/" + by_clang.sha256 + ".so", read_file(by_clang.file).value());
       swarm.hosts.clear();
       swarm.programs.reset();
       swarm.plan = std::make_unique<RunPlan>(manifest);
-      swarm.programs = ProgramSet::load(manifest, swarm.folder.path());
+      swarm.programs = ProgramSet::load(*swarm.plan, swarm.folder.path());
       swarm.hosts.push_back(std::make_unique<BehavioursEngine>(*swarm.plan, HostId{0}, swarm.programs));
     }
     std::vector<ActuationFrame> result;

@@ -3,11 +3,12 @@
 
 #include <algorithm>
 
+#include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "idl/manifest.pb.h"
 #include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/robot_warnings.hpp"
-#include "core/base/error.hpp"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {
@@ -148,14 +149,14 @@ TEST(Dialects, Cpp) {
                        kMain);
   EXPECT_EQ(compile({source}, cached()).notes.size(), 0u);
   Swarm swarm({"#include <kilolib.h>\nvoid f() {}\nint main() { kilo_init(); kilo_start(f, f); }\n"}, 1);
-  proto::Manifest manifest = swarm.plan->manifest;
+  proto::Manifest manifest = swarm.plan->manifest();
   const CompiledProgram program = compile({source}, cached());
   manifest.mutable_program(0)->set_sha256(program.sha256);
   swarm.folder.write("programs/" + program.sha256 + ".so", read_file(program.file).value());
   swarm.hosts.clear();
   swarm.programs.reset();
   swarm.plan = std::make_unique<RunPlan>(manifest);
-  swarm.programs = ProgramSet::load(manifest, swarm.folder.path());
+  swarm.programs = ProgramSet::load(*swarm.plan, swarm.folder.path());
   swarm.hosts.push_back(std::make_unique<BehavioursEngine>(*swarm.plan, HostId{0}, swarm.programs));
   swarm.start();
   swarm.steps(3);

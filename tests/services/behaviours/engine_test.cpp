@@ -248,12 +248,12 @@ TEST(Engine, HostsOnThreadsEqualOneHost) {
 
 TEST(ProgramSet, RejectsWhatIsNotWhatItsNameSays) {
   Swarm swarm({program("")}, 1);
-  const std::string name = "programs/" + swarm.plan->manifest.program(0).sha256() + ".so";
+  const std::string name = "programs/" + swarm.plan->programs()[0].file();
   Folder other;
-  EXPECT_THROW((void)ProgramSet::load(swarm.plan->manifest, other.path()), UserError);
+  EXPECT_THROW((void)ProgramSet::load(*swarm.plan, other.path()), UserError);
   other.write(name, "something else");
-  EXPECT_THROW((void)ProgramSet::load(swarm.plan->manifest, other.path()), UserError);
-  EXPECT_EQ(ProgramSet::load(swarm.plan->manifest, swarm.folder.path())->size(), 1u);  // shared with the first
+  EXPECT_THROW((void)ProgramSet::load(*swarm.plan, other.path()), UserError);
+  EXPECT_EQ(ProgramSet::load(*swarm.plan, swarm.folder.path())->size(), 1u);  // shared with the first
 }
 
 }  // namespace

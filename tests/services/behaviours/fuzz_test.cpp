@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <random>
 
+#include "idl/checkpoint.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {

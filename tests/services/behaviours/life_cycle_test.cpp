@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "idl/checkpoint.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {

@@ -1,6 +1,7 @@
 // Programs that do not return from loop(): they wait, or are interrupted where the tick is over, and go on later.
 #include <gtest/gtest.h>
 
+#include "idl/manifest.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {

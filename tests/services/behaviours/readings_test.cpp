@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "idl/manifest.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {

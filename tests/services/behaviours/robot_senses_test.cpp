@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "idl/checkpoint.pb.h"
+#include "idl/manifest.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {

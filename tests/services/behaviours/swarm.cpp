@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "core/os/files.hpp"
+#include "idl/manifest.pb.h"
 
 namespace kilotwin::behaviours::test {
 namespace fs = std::filesystem;
@@ -106,9 +107,9 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
   plan = std::make_unique<RunPlan>(manifest);
   for (std::uint32_t robot = 0; robot < plan->robots(); ++robot) {
     const Pose pose = plan->initial_pose(robot);
-    bodies.add(robot, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
+    bodies.add(robot, pose.x_mm, pose.y_mm, pose.heading_rad);
   }
-  programs = ProgramSet::load(plan->manifest, folder.path());
+  programs = ProgramSet::load(*plan, folder.path());
   for (std::uint32_t h = 0; h < host_count; ++h) {
     hosts.push_back(std::make_unique<BehavioursEngine>(*plan, HostId{h}, programs));
   }

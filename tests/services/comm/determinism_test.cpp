@@ -11,6 +11,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "idl/checkpoint.pb.h"
 #include "tests/services/comm/fake_hosts.hpp"
 
 namespace kilotwin::comm {

@@ -27,7 +27,7 @@ class FakeHosts {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) poses.push_back({});
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
-      poses[i] = {pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad};
+      poses[i] = {pose.x_mm, pose.y_mm, pose.heading_rad};
     }
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       const Share share = plan.share(HostId{h});

@@ -28,7 +28,7 @@ struct Air {
   explicit Air(const RunPlan& plan) : links(plan), robots(links.reach_mm(), links.span_mm(), plan.robots()) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
-      robots.place(i, pose.position_mm.x(), pose.position_mm.y());
+      robots.place(i, pose.x_mm, pose.y_mm);
       links.turn(i, pose.heading_rad);
     }
     robots.sort();

@@ -30,7 +30,7 @@ TEST(LinkTable, RemembersWhatWouldBeComputed) {
   std::vector<testing::ScenePose> poses;
   for (std::uint32_t i = 0; i < kRobots; ++i) {
     const Pose pose = plan.initial_pose(i);
-    poses.push_back({pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad});
+    poses.push_back({pose.x_mm, pose.y_mm, pose.heading_rad});
   }
   std::size_t found = 0;
   for (int tick = 0; tick < 60; ++tick) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "idl/checkpoint.pb.h"
 #include "tests/services/comm/fake_hosts.hpp"
 
 namespace kilotwin::comm {

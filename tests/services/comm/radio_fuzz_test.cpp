@@ -5,6 +5,7 @@
 #include <random>
 #include <set>
 
+#include "idl/checkpoint.pb.h"
 #include "tests/services/comm/fake_hosts.hpp"
 
 namespace kilotwin::comm {

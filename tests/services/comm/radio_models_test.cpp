@@ -1,4 +1,4 @@
-// The channel's models against closed forms: hidden terminals, the seed's simple model, counts of single robots, and
+// The channel's models against closed forms: hidden terminals, the simple model of the ARGoS paper, counts of single robots, and
 // distances by robots' own tables.
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/model/radio_parameters.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/comm/link_budget.hpp"
 #include "tests/services/comm/fake_hosts.hpp"
 
@@ -129,7 +130,7 @@ struct Air {
   explicit Air(const RunPlan& plan) : links(plan), robots(links.reach_mm(), links.span_mm(), plan.robots()) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
-      robots.place(i, pose.position_mm.x(), pose.position_mm.y());
+      robots.place(i, pose.x_mm, pose.y_mm);
     }
     robots.sort();
   }

@@ -7,6 +7,7 @@
 #include <ostream>
 
 #include "core/base/error.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/physics/drive.hpp"
 #include "tests/services/physics/swarm.hpp"
 

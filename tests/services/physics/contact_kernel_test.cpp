@@ -12,7 +12,7 @@
 namespace kilotwin::physics {
 namespace {
 
-constexpr std::uint32_t kBatches = 6, kMostContacts = 7, kSeats = kBatches * kLanes, kSubSteps = 4;
+constexpr std::uint32_t kBatches = 6, kMostContacts = 7, kSlots = kBatches * kLanes, kSubSteps = 4;
 constexpr PassLimits kLimits{{0.3, 0.04}, 0.16, 0.17, 0.33, 20, 20, 6.25, 40.0 * 40, 16.5 / kSubSteps, kSubSteps};
 
 struct Scene {
@@ -37,10 +37,10 @@ Scene make_scene(std::uint32_t seed) {
   scene.batches.resize(kBatches);
   scene.contacts.resize(kBatches * kMostContacts);
   scene.specials.resize(kMostContacts);
-  scene.now.resize(4 * kSeats);
+  scene.now.resize(4 * kSlots);
   for (double& v : scene.now) v = value(0.3);
   scene.after = scene.now;
-  for (std::uint32_t i = 0; i < kSeats; ++i) {
+  for (std::uint32_t i = 0; i < kSlots; ++i) {
     scene.x_mm.push_back(value(50));
     scene.y_mm.push_back(value(50));
     scene.heading_rad.push_back(value(3.14159));
@@ -72,9 +72,9 @@ Scene make_scene(std::uint32_t seed) {
         column[lane] = generator() % 5 == 0 ? 0 : value(0.2);
       for (std::uint32_t p = 0; p < kMostContacts; ++p) {
         ContactLanes& contact = scene.contacts[batch.first_contact + p];
-        contact.push_mm[lane] = generator() % 3 == 0 ? 0 : std::abs(value(0.1));
-        contact.rub_mm[lane] = value(0.1);
-        contact.there[lane] = static_cast<std::uint32_t>(generator() % kSeats);
+        contact.normal_impulse_mm[lane] = generator() % 3 == 0 ? 0 : std::abs(value(0.1));
+        contact.tangent_impulse_mm[lane] = value(0.1);
+        contact.there[lane] = static_cast<std::uint32_t>(generator() % kSlots);
         contact.other[lane] = contact.there[lane];
       }
     }
@@ -113,12 +113,13 @@ std::vector<double> results(const ContactKernel& kernel, std::uint32_t seed) {
     all.insert(all.end(), batch.drive_y_mm, batch.drive_y_mm + kLanes);
     for (std::uint32_t p = 0; p < batch.contacts; ++p) {
       const ContactLanes& contact = scene.contacts[batch.first_contact + p];
-      for (const double* const column : {contact.normal_x, contact.gap_mm, contact.push_mm, contact.rub_mm})
+      for (const double* const column :
+           {contact.normal_x, contact.gap_mm, contact.normal_impulse_mm, contact.tangent_impulse_mm})
         all.insert(all.end(), column, column + kLanes);
     }
   }
   const BodyColumns bodies = scene.bodies();
-  kernel.roll(kLimits, bodies, scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(), kSeats - 3);
+  kernel.roll(kLimits, bodies, scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(), kSlots - 3);
   for (const auto* column : {&scene.x_mm, &scene.y_mm, &scene.heading_rad})
     all.insert(all.end(), column->begin(), column->end());
   return all;
@@ -163,10 +164,10 @@ TEST(ContactKernel, RollsAsABatchDoes) {
       scene.now.swap(scene.after);
     }
     const Scene before = scene;
-    constexpr std::uint32_t kRolled = kSeats - 3;
+    constexpr std::uint32_t kRolled = kSlots - 3;
     kernels[k]->roll(kLimits, before.bodies(), scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(),
                      kRolled);
-    for (std::uint32_t i = kLanes; i < kSeats; ++i) {
+    for (std::uint32_t i = kLanes; i < kSlots; ++i) {
       const bool rolled = i < kRolled;
       EXPECT_EQ(scene.x_mm[i], before.x_mm[i] + (rolled ? scene.now[4 * i] : 0)) << kernels[k]->name << ' ' << i;
       EXPECT_EQ(scene.y_mm[i], before.y_mm[i] + (rolled ? scene.now[4 * i + 1] : 0))

@@ -55,7 +55,7 @@ TEST(Contact, APushEndsWithTheDrive) {
 }
 
 TEST(Contact, OneRobotDoesNotPushTwoInARow) {
-  // The force of one drive is spent on one resting robot: peers' motors hold with the force they push with.
+  // The force of one drive is spent on one resting robot: motors in ARGoS and Kilombo hold with the force they push with.
   const RunPlan plan = make_plan(kQuiet, {{-33, 0, 0}, {0, 0, 0}, {33, 0, 0}});
   Swarm swarm(plan);
   swarm.set_motors(0, 70, 70);

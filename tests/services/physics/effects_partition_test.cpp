@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "idl/experiment.pb.h"
 #include "tests/services/physics/swarm.hpp"
 
 namespace kilotwin {

@@ -27,7 +27,8 @@ std::vector<ScenePose> pushers(int k, bool columns, double face_mm) {
   return poses;
 }
 
-// The seed, section 3.3: an 18 g box needs five robots. The peer's figures for the same set-up: 0.04, 0.2, 0.6, 1.5 and 394 mm.
+// The ARGoS paper (Pinciroli 2018, section 3.3): an 18 g box needs five robots. ARGoS' figures for this set-up: 0.04, 0.2, 0.6,
+// 1.5 and 394 mm.
 TEST(OdeBox, FourRobotsDoNotMoveItAndFiveDo) {
   for (const bool columns : {false, true}) {
     for (int k = 1; k <= 5; ++k) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/error.hpp"
+#include "idl/checkpoint.pb.h"
 #include "services/physics/planar_engine.hpp"
 #include "tests/services/physics/swarm.hpp"
 

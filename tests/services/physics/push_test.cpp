@@ -6,6 +6,7 @@
 #include <memory>
 #include <random>
 
+#include "idl/experiment.pb.h"
 #include "tests/services/physics/swarm.hpp"
 
 namespace kilotwin {
@@ -156,9 +157,7 @@ TEST(Push, MirroredPushesMirror) {
   first.run(600);
   second.run(600);
   const ScenePose p = first.movables()[0], q = second.movables()[0];
-  EXPECT_GT(std::hypot(p.x_mm - a.world.movables[0].pose.position_mm.x(),
-                       p.y_mm - a.world.movables[0].pose.position_mm.y()),
-            0.5);
+  EXPECT_GT(std::hypot(p.x_mm - a.world.movables[0].pose.x_mm, p.y_mm - a.world.movables[0].pose.y_mm), 0.5);
   EXPECT_NEAR(p.x_mm, q.x_mm, 1e-6);
   EXPECT_NEAR(p.y_mm, -q.y_mm, 1e-6);
   EXPECT_NEAR(p.heading_rad, -q.heading_rad, 1e-8);
@@ -222,9 +221,10 @@ std::vector<ScenePose> mixed_robots(const std::string& text, std::uint64_t seed)
   for (const ScenePose& p : testing::random_crowd(160, 540, 540, 33.5, seed)) {
     bool free = world.world.arena.clearance_mm({p.x_mm, p.y_mm}) > 17;
     for (const MovableBodyModel& m : world.world.movables)
-      free = free && m.shape.nearest(Place::at(m.pose.position_mm.x(), m.pose.position_mm.y(), m.pose.heading_rad),
-                                     {p.x_mm, p.y_mm})
-                             .distance_mm > 17;
+      free =
+          free &&
+          m.shape.nearest(Place::at(m.pose.x_mm, m.pose.y_mm, m.pose.heading_rad), {p.x_mm, p.y_mm}).distance_mm >
+              17;
     for (const ObstacleBody& o : world.world.obstacles)
       free = free && o.shape.nearest(o.place, {p.x_mm, p.y_mm}).distance_mm > 17;
     if (free && poses.size() < 73) poses.push_back(p);
@@ -297,8 +297,8 @@ TEST_P(Mixed, NothingOverlapsOrTunnelsAndAllPartitionsAgree) {
     bool moved = false;
     for (std::size_t m = 0; m < 3; ++m) {
       const Pose& start = plans[0].world.movables[m].pose;
-      moved |= std::hypot(swarms[0]->movables()[m].x_mm - start.position_mm.x(),
-                          swarms[0]->movables()[m].y_mm - start.position_mm.y()) > 3;
+      moved |= std::hypot(swarms[0]->movables()[m].x_mm - start.x_mm,
+                          swarms[0]->movables()[m].y_mm - start.y_mm) > 3;
     }
     EXPECT_TRUE(moved);
     // What nine partitions saved goes on, on one and on two, as if nothing had happened.

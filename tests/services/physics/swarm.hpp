@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "idl/checkpoint.pb.h"
 #include "services/physics/engine.hpp"
 #include "tests/support/scenes.hpp"
 

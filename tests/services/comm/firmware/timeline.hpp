@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "services/behaviours/program_set.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/local/local_run.hpp"
+#include "services/behaviours/program_set.hpp"
 
 namespace kilotwin::firmware {
 
@@ -72,7 +72,7 @@ inline Timeline run_timeline(const std::string& experiment, const std::filesyste
   options.threads = threads;
   options.run_directory = prepared.directory.path();
   TimelineObserver observer(plan.robots());
-  const auto programs = behaviours::ProgramSet::load(plan.manifest, options.run_directory);
+  const auto programs = behaviours::ProgramSet::load(plan, options.run_directory);
   observer.timeline.totals = local::run(plan, programs, options, observer);
   return observer.timeline;
 }

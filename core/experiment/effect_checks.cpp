@@ -4,10 +4,11 @@
 #include <map>
 #include <set>
 
+#include "core/base/say.hpp"
+#include "core/experiment/field_checks.hpp"
 #include "core/experiment/fields.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/plan/memory_layout.hpp"
-#include "core/experiment/validate.hpp"
 
 namespace kilotwin {
 
@@ -107,7 +108,8 @@ class EffectCheck {
            fmt::format("there are {} functions; it takes 1..{}, function {{ ... }}", effect.function_size(),
                        kMostFunctions));
     for (int f = 0; f < effect.function_size(); ++f)
-      check_function(effect.function(f), fmt::format("{}.function[{}]", path, f), on_wheels, is_measured(target));
+      check_function(effect.function(f), fmt::format("{}.function[{}]", path, f), on_wheels,
+                     target >= Effect::MEASURED_OFFSET);
     std::set<std::uint32_t> robots;
     for (int i = 0; i < effect.robot_size(); ++i) {
       demand(robots.insert(effect.robot(i)).second, fmt::format("{}.robot[{}]", path, i),
@@ -248,6 +250,6 @@ class EffectCheck {
 
 }  // namespace
 
-void validate_effects(const LoadedExperiment& loaded) { EffectCheck(loaded).check(); }
+void check_effects(const LoadedExperiment& loaded) { EffectCheck(loaded).check(); }
 
 }  // namespace kilotwin

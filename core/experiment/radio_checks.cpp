@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/base/ir_calibration.h"
-#include "core/experiment/validate.hpp"
+#include "core/experiment/field_checks.hpp"
 
 namespace kilotwin {
 namespace {
@@ -93,7 +93,7 @@ void check_links(const LoadedExperiment& loaded) {
 
 }  // namespace
 
-void validate_radio(const LoadedExperiment& loaded) {
+void check_radio(const LoadedExperiment& loaded) {
   const proto::Propagation& model = loaded.experiment.radio().propagation();
   check_use(loaded);
   check_pattern(loaded, "power_pattern_db", model.power_pattern_db_size());

@@ -1,0 +1,130 @@
+/// Effects and arena fields, as plain values. Meaning, units and defaults: idl/effects.proto, whose numbers the enumerations
+/// share.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace kilotwin {
+
+enum class MotionCommand : std::uint8_t { kStop, kStraight, kTurnLeft, kTurnRight };
+
+enum class Covariate : std::uint8_t {
+  kNothing,
+  kTime,
+  kX,
+  kY,
+  kRadius,
+  kHeading,
+  kCommand,
+  kDuty,
+  kLeftDuty,
+  kRightDuty,
+  kTimeSinceCommand,
+  kMotorTime,
+  kLeftMotorTime,
+  kRightMotorTime,
+  kDrivenTime,
+  kNeighbours,
+  kNearest,
+  kDensity,
+  kNearestBearing,
+  kRobot,
+  kRun,
+  kPlace,
+  kPreviousForward,
+  kPreviousSideways,
+  kPreviousTurn,
+  kPreviousCommand,
+  kLastTurn,
+  kPreviousLasted,
+  kSinceRest,
+  kMotorTimeDifference
+};
+
+struct ConstantShape {
+  double value = 0;
+};
+struct LinearShape {
+  double at_zero = 0, slope = 0;
+};
+struct ExponentialShape {
+  double at_zero = 0, at_infinity = 0, scale = 1;
+};
+struct HarmonicShape {
+  double mean = 0, cosine = 0, sine = 0, period = 1;
+};
+struct SplineShape {
+  std::vector<double> knots, values;
+};
+struct Spline2dShape {
+  std::vector<double> first_knots, second_knots, values;  ///< values of the first knot of the second variable first
+};
+struct StepsShape {
+  std::vector<double> at, values;
+};
+struct TableShape {
+  std::vector<std::uint32_t> keys;
+  std::vector<double> values;
+  double otherwise = 0;
+};
+struct NoiseShape {
+  double sd = 0, correlation_s = 0;
+};
+struct EpisodesShape {
+  double mean_apart_s = 0, scale_s = 0, tail = 0, longest_s = 0;
+};
+
+struct FunctionSettings {
+  Covariate of = Covariate::kNothing, and_of = Covariate::kNothing;
+  double radius_mm = 0;
+  std::string field;  ///< name of an arena field, with kPlace
+  double forget_s = 0;
+  std::uint32_t focus = 0;
+  double toward_deg = 0;
+  std::variant<ConstantShape, LinearShape, ExponentialShape, HarmonicShape, SplineShape, Spline2dShape, StepsShape,
+               TableShape, NoiseShape, EpisodesShape>
+      shape;
+
+  /// The shape, where it is of this kind; else null.
+  [[nodiscard]] const NoiseShape* noise() const { return std::get_if<NoiseShape>(&shape); }
+  [[nodiscard]] const EpisodesShape* episodes() const { return std::get_if<EpisodesShape>(&shape); }
+};
+
+struct EffectSettings {
+  enum class Target : std::uint8_t {
+    kWheelGain,
+    kWheelOffset,
+    kTurnRate,
+    kBodyDrift,
+    kWorldDrift,
+    kMeasuredOffset,
+    kMeasuredBodyOffset,
+    kMeasuredScale,
+    kMeasuredHeading
+  };
+  enum class Wheel : std::uint8_t { kBoth, kLeftWheel, kRightWheel };
+
+  Target target = Target::kWheelGain;
+  Wheel wheel = Wheel::kBoth;
+  double direction_deg = 0;
+  std::vector<FunctionSettings> functions;
+  std::vector<MotionCommand> during;
+  std::vector<std::uint32_t> robots;
+
+  /// Whether the effect acts on what is measured, not on how robots move.
+  [[nodiscard]] bool is_measured() const { return target >= Target::kMeasuredOffset; }
+  /// Whether the effect is computed for each wheel on its own: its noise and its covariate are the wheel's.
+  [[nodiscard]] bool is_per_wheel() const;
+};
+
+struct ArenaFieldSettings {
+  enum class Counts : std::uint8_t { kDrivenTime, kPresentTime, kVisits };
+  std::string name;
+  Counts counts = Counts::kDrivenTime;
+  double cell_mm = 0, forget_s = 0;
+};
+
+}  // namespace kilotwin
