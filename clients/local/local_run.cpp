@@ -3,12 +3,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
-#include <atomic>
-#include <barrier>
 #include <chrono>
-#include <exception>
-#include <mutex>
-#include <thread>
 #include <utility>
 
 #include "services/behaviours/eeprom_files.hpp"
@@ -21,6 +16,7 @@
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_sums.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/worker_pool.hpp"
 #include "core/federation/pace.hpp"
 #include "core/federation/snapshots.hpp"
 #include "services/ark/station_engine.hpp"
@@ -91,7 +87,7 @@ class LocalRun {
     std::vector<const behaviours::BehavioursEngine*> engines;
     for (const auto& engine : hosts_) engines.push_back(engine.get());
     const behaviours::Watchdog watchdog(engines);
-    Workers workers(*this, options_.threads);
+    os::WorkerPool workers(options_.threads);
     const auto begun = Clock::now();
     auto next_idle = begun;
     Tick now = first_;
@@ -117,7 +113,7 @@ class LocalRun {
         observer_.idle(progress(now, static_cast<double>(ns(begun, recorded_to)) * 1e-9));
       }
       if (last) break;
-      workers.step(now);
+      step(workers, now);
       tell(now);
       chain = close_tick(now + 1, chain);
     }
@@ -136,69 +132,17 @@ class LocalRun {
   }
 
  private:
-  /// Threads that share the tasks of a tick; a task is the step of one engine.
-  class Workers {
-   public:
-    Workers(LocalRun& run, std::uint32_t threads) : run_(run), barrier_(static_cast<std::ptrdiff_t>(threads)) {
-      for (std::uint32_t i = 1; i < threads; ++i) {
-        threads_.emplace_back([this] {
-          for (;;) {
-            barrier_.arrive_and_wait();
-            if (done_) return;
-            work();
-            barrier_.arrive_and_wait();
-          }
-        });
-      }
-    }
-    ~Workers() {
-      if (threads_.empty()) return;
-      done_ = true;
-      barrier_.arrive_and_wait();
-      for (std::thread& thread : threads_) thread.join();
-    }
-    void step(Tick from) {
-      from_ = from;
-      next_task_ = 0;
-      if (threads_.empty()) return share_tasks();
-      barrier_.arrive_and_wait();
-      work();
-      barrier_.arrive_and_wait();
-      if (failure_) std::rethrow_exception(failure_);
-    }
-
-   private:
-    /// Whatever a task throws is thrown again on the run's own thread, once all have stopped.
-    void work() {
-      try {
-        share_tasks();
-      } catch (...) {
-        const std::lock_guard lock(failure_mutex_);
-        failure_ = std::current_exception();
-      }
-    }
-    void share_tasks() {
-      auto begun = Clock::now();
-      // Hosts first: they take longest.
-      const std::uint32_t tasks = run_.plan_.federates();
-      for (std::uint32_t i = next_task_++; i < tasks; i = next_task_++) {
-        const std::uint32_t task = tasks - 1 - i;
-        run_.step(task, from_);
-        run_.emit(task, run_.frames_of(from_ + 1));
-        const auto ended = Clock::now();
-        run_.task_ns_[task] += ns(begun, ended);
-        begun = ended;
-      }
-    }
-    LocalRun& run_;
-    std::barrier<> barrier_;
-    std::vector<std::thread> threads_;
-    std::atomic<std::uint32_t> next_task_{0};
-    Tick from_;
-    bool done_ = false;
-    std::mutex failure_mutex_;
-    std::exception_ptr failure_;
-  };
+  /// All engines from one tick to the next. A task is the step of one engine; hosts come first, as they take longest.
+  void step(os::WorkerPool& workers, Tick from) {
+    const std::uint32_t tasks = plan_.federates();
+    workers.for_each(tasks, [this, from, tasks](std::size_t i) {
+      const auto task = tasks - 1 - static_cast<std::uint32_t>(i);
+      const auto begun = Clock::now();
+      step(task, from);
+      emit(task, frames_of(from + 1));
+      task_ns_[task] += ns(begun, Clock::now());
+    });
+  }
 
   static std::uint64_t ns(Clock::time_point from, Clock::time_point to) {
     return static_cast<std::uint64_t>(std::chrono::nanoseconds(to - from).count());

@@ -26,7 +26,7 @@ std::shared_ptr<ProgramSet> ProgramSet::load(const proto::Manifest& manifest,
   for (const proto::Program& program : manifest.program()) {
     if (program.firmware()) continue;
     const std::filesystem::path path = run_directory / "programs" / (program.sha256() + ".so");
-    const auto octets = read_file(path);
+    const auto octets = os::read_if_there(path);
     if (!octets) {
       throw UserError(path.string() + ": cannot be read; the run directory must hold the programs of its manifest");
     }

@@ -39,7 +39,7 @@ void RobotLogs::cut(Tick first, const Share& share) {
   std::error_code error;
   if (!fs::is_directory(folder_, error)) return;
   for (std::uint32_t robot = share.first; robot < share.first + share.size(); ++robot) {
-    const auto text = read_file(file_of(robot));
+    const auto text = os::read_if_there(file_of(robot));
     if (!text) continue;
     std::size_t kept = 0;
     while (kept < text->size() &&

@@ -40,7 +40,7 @@ RunningNote::~RunningNote() {
 
 std::optional<Culprit> take_note(const std::filesystem::path& run_directory, HostId host) {
   const std::filesystem::path path = note_of(run_directory, host);
-  const auto octets = read_file(path);
+  const auto octets = os::read_if_there(path);
   unlink(path.c_str());
   if (!octets || octets->size() != sizeof(Running)) return std::nullopt;
   Culprit culprit;

@@ -38,7 +38,7 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
       appends_logs_(plan.manifest.resumed()),
       cycles_per_tick_(plan.tick_length.cycles()),
       senses_(plan, {0, plan.robots()}),
-      workers_(std::make_unique<WorkerPool>(threads)) {
+      workers_(std::make_unique<os::WorkerPool>(threads)) {
   std::map<std::uint32_t, FlashImage> images;
   const comm::TickTimers timers(plan);
   const Random random(plan.seed());
@@ -58,8 +58,7 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   }
   // Up to tick 0, before which nobody sends.
   std::vector<std::vector<comm::Cycles>> flashes(robots_.size());
-  workers_->share(static_cast<std::uint32_t>(robots_.size()),
-               [&](std::uint32_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
+  workers_->for_each(robots_.size(), [&](std::size_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
   commit();
 }
 
@@ -78,7 +77,7 @@ void FirmwareSwarm::run(comm::Cycles until, std::span<const std::uint32_t> robot
                         const std::vector<std::vector<comm::Pulse>>& light,
                         std::vector<std::vector<comm::Cycles>>& flashes) {
   until_ = until;
-  workers_->share(static_cast<std::uint32_t>(robots.size()), [&](std::uint32_t n) {
+  workers_->for_each(robots.size(), [&](std::size_t n) {
     const std::uint32_t i = robots[n];
     run_robot(robots_[i], until, light[i], flashes[i]);
   });

@@ -9,9 +9,11 @@
 #include "core/plan/plan.hpp"
 #include "services/comm/firmware_robots.hpp"
 
-namespace kilotwin::firmware {
-
+namespace kilotwin::os {
 class WorkerPool;
+}
+
+namespace kilotwin::firmware {
 
 /// Each robot was switched on within the last tick of its own clock before the run began, such that its first timer interrupt
 /// comes when that of a robot with a native program would: rate and phase of clocks are those of comm::TickTimers.
@@ -72,7 +74,7 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
   const comm::Cycles cycles_per_tick_;
   comm::Cycles begin_ = 0, until_ = 0;  ///< of the run at hand
   senses::RobotSenses senses_;          ///< of all robots of the run
-  std::unique_ptr<WorkerPool> workers_;
+  std::unique_ptr<os::WorkerPool> workers_;
 };
 
 /// The plan's firmware robots; null where there are none.

@@ -116,7 +116,7 @@ TEST(Compiler, KeepsResultsByContent) {
                                        "#include <kilolib.h>\n#include \"part.h\"\n#ifndef K\n#define K 0\n#endif\n"
                                        "int main(void) { set_color(COLOUR + K); kilo_start(0, 0); }\n");
   const CompiledProgram first = compile({source}, options);
-  EXPECT_EQ(first.sha256, sha256_hex(read_file(first.file).value()));
+  EXPECT_EQ(first.sha256, sha256_hex(os::read_if_there(first.file).value()));
   const auto written = fs::last_write_time(first.file);
   const CompiledProgram again = compile({source}, options);
   EXPECT_EQ(again.file, first.file);
@@ -141,7 +141,7 @@ TEST(Compiler, SeveralSourcesAndReadySharedObjects) {
   const fs::path b =
       folder.write("b.c", "#include \"kilolib.h\"\nuint8_t shared;\nvoid helper(void) { set_color(++shared); }\n");
   const CompiledProgram built = compile({a, b}, cached());
-  const fs::path copy = folder.write("ready.so", read_file(built.file).value());
+  const fs::path copy = folder.write("ready.so", os::read_if_there(built.file).value());
   const CompiledProgram ready = compile({copy}, cached());
   EXPECT_EQ(ready.file, copy);
   EXPECT_EQ(ready.sha256, built.sha256);
@@ -165,7 +165,7 @@ TEST(Compiler, ClangGivesTheSameBehaviour) {
     if (clang_made) {
       proto::Manifest manifest = swarm.plan->manifest;
       manifest.mutable_program(0)->set_sha256(by_clang.sha256);
-      swarm.folder.write("programs/" + by_clang.sha256 + ".so", read_file(by_clang.file).value());
+      swarm.folder.write("programs/" + by_clang.sha256 + ".so", os::read_if_there(by_clang.file).value());
       swarm.hosts.clear();
       swarm.programs.reset();
       swarm.plan = std::make_unique<RunPlan>(manifest);

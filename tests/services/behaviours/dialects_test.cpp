@@ -151,7 +151,7 @@ TEST(Dialects, Cpp) {
   proto::Manifest manifest = swarm.plan->manifest;
   const CompiledProgram program = compile({source}, cached());
   manifest.mutable_program(0)->set_sha256(program.sha256);
-  swarm.folder.write("programs/" + program.sha256 + ".so", read_file(program.file).value());
+  swarm.folder.write("programs/" + program.sha256 + ".so", os::read_if_there(program.file).value());
   swarm.hosts.clear();
   swarm.programs.reset();
   swarm.plan = std::make_unique<RunPlan>(manifest);
@@ -321,14 +321,14 @@ TEST(Printing, LogsBeginEachLineWithItsTimeAndGoOnFromACheckpoint) {
     logs.write(Tick{10}, {{2, "c\n"}, {1, "x\n"}});
     logs.write(Tick{20}, {{2, "d\n"}});
   }
-  EXPECT_EQ(read_file(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n0.655 d\n");
+  EXPECT_EQ(os::read_if_there(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n0.655 d\n");
   RobotLogs resumed(folder.path(), length, Tick{20}, share);
-  EXPECT_EQ(read_file(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n");
-  EXPECT_EQ(read_file(folder.path() / "logs/robot-00001.txt").value(), "0.328 x\n");
+  EXPECT_EQ(os::read_if_there(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n");
+  EXPECT_EQ(os::read_if_there(folder.path() / "logs/robot-00001.txt").value(), "0.328 x\n");
 }
 
 TEST(RobotWarnings, TellWhatAvrComputesOtherwise) {
-  if (find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
+  if (os::find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
   const Folder folder;
   const fs::path source = folder.write("a.c",
                                        "#include <kilolib.h>\n"
@@ -355,7 +355,7 @@ TEST(RobotWarnings, TellWhatAvrComputesOtherwise) {
 }
 
 TEST(RobotWarnings, CompilingForAvrTakesTheSameSources) {
-  if (find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
+  if (os::find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
   const Folder folder;
   folder.write("kilolib.h", "extern volatile uint32_t kilo_ticks;\n");
   folder.write("part.h", "int part(void);\n");

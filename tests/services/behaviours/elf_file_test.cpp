@@ -15,7 +15,7 @@ namespace kilotwin::behaviours::test {
 namespace {
 
 std::string valid() {
-  return read_file(compile({std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c"}, cached()).file).value();
+  return os::read_if_there(compile({std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c"}, cached()).file).value();
 }
 
 TEST(ElfFile, DescribesAProgram) {
