@@ -152,6 +152,36 @@ TEST(Compiler, SeveralSourcesAndReadySharedObjects) {
             std::string::npos);
 }
 
+TEST(Compiler, ACompilerThatIsKilledIsAFailureAndNoReasonForAnotherLanguage) {
+  const Folder folder;
+  CompileOptions options = cached();
+  options.compiler = folder.write("killed-cc",
+                                  "#!/bin/sh\n"
+                                  "case \"$*\" in *cpp-output*)\n"
+                                  "  deed=$(cat \"$0.deed\" 2>/dev/null); rm -f \"$0.deed\"\n"
+                                  "  case \"$deed\" in\n"
+                                  "    itself) kill -9 $$;;\n"
+                                  "    child) echo 'cc: fatal error: Killed signal terminated program cc1' >&2; exit 1;;\n"
+                                  "  esac;;\n"
+                                  "esac\nexec cc \"$@\"\n");
+  fs::permissions(options.compiler, fs::perms::owner_all);
+  const fs::path source = folder.write("a.c", program("static void loop(void) { set_color(1); }"));
+  const auto failure = [&](const char* deed) -> std::string {
+    folder.write("killed-cc.deed", deed);
+    try {
+      (void)compile({source}, options);
+    } catch (const RunError& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  const std::string itself = failure("itself"), child = failure("child");
+  EXPECT_TRUE(itself.starts_with(options.compiler.string() + " was ended by signal 9 (Killed)")) << itself;
+  EXPECT_NE(child.find("cc: fatal error: Killed signal terminated program cc1"), std::string::npos) << child;
+  const CompiledProgram built = compile({source}, options);
+  EXPECT_TRUE(built.notes.empty()) << built.notes.front();
+}
+
 TEST(Compiler, ClangGivesTheSameBehaviour) {
   // Where the machine has clang: the same frames, tick by tick.
   const fs::path clang = "/usr/bin/clang";
