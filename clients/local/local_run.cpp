@@ -8,10 +8,10 @@
 
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
-#include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
+#include "core/logs/robot_logs.hpp"
 #include "core/base/say.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_sums.hpp"
@@ -55,6 +55,7 @@ class LocalRun {
         options_(options),
         observer_(observer),
         radio_(plan, firmware::make_firmware_robots(plan, options.run_directory, options.threads,
+                                                    options.resumed ? options.resumed->tick : Tick{0},
                                                     options.save_checkpoints)),
         station_(plan),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
@@ -66,8 +67,10 @@ class LocalRun {
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
       if (options.run_directory.empty() || !options.save_checkpoints) continue;
-      logs_.push_back(std::make_unique<behaviours::RobotLogs>(options.run_directory, plan.tick_length, first_,
-                                                              plan.share(HostId{h})));
+      logs_.push_back(std::make_unique<RobotLogs>(
+          options.run_directory, plan.tick_length, first_, [&plan, share = plan.share(HostId{h})](std::uint32_t robot) {
+            return share.contains(robot) && !plan.firmware(robot);
+          }));
       notes_.push_back(std::make_unique<behaviours::RunningNote>(options.run_directory, HostId{h}));
       hosts_.back()->note_running_in(notes_.back()->place());
     }
@@ -182,7 +185,8 @@ class LocalRun {
     } else {
       const std::size_t host = task - partitions - 2;
       hosts_[host]->step(from, in.radio[host], in.all_bodies);
-      if (!logs_.empty()) logs_[host]->write(from, hosts_[host]->printed());
+      if (logs_.empty()) return;
+      for (const auto& printed : hosts_[host]->printed()) logs_[host]->write(from, printed.robot, printed.text);
     }
   }
 
@@ -304,7 +308,7 @@ class LocalRun {
   ark::StationEngine station_;
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
   // Per host, where there is a run directory.
-  std::vector<std::unique_ptr<behaviours::RobotLogs>> logs_;
+  std::vector<std::unique_ptr<RobotLogs>> logs_;
   std::vector<std::unique_ptr<behaviours::RunningNote>> notes_;
   const Tick first_;
   RunSchedule schedule_;

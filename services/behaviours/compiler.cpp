@@ -257,6 +257,30 @@ struct Incomplete {
   std::string errors;
 };
 
+/// Links twice: where variables end is known only then, and they shall end where a page does, so that an access beyond them faults.
+std::string linked(const Arguments& first, const Arguments& rest, const fs::path& place, const std::vector<fs::path>& sources) {
+  constexpr std::uint64_t kAlignment = 64;  // no variable asks for more
+  const Temporary result(place), front(place);
+  for (std::uint64_t pad = 0;;) {
+    os::write_file(front.path(), ".section .data,\"aw\"\n.balign " + std::to_string(kAlignment) + "\n.zero " + std::to_string(pad) +
+                                     "\n.globl kilotwin_variables\n.hidden kilotwin_variables\nkilotwin_variables:\n"
+                                     ".section .note.GNU-stack,\"\"\n");
+    Arguments arguments = first;
+    append(arguments, {"-x", "assembler", front.path(), "-x", "none"});
+    append(arguments, rest);
+    append(arguments, {"-o", result.path()});
+    const os::ProcessResult process = run_compiler(arguments);
+    if (!process.end.well()) {
+      if (!undefined_names(process.errors).empty()) throw Incomplete{process.errors};
+      throw UserError(first_error(process.errors, sources));
+    }
+    std::string octets = os::read_file(result.path());
+    const std::uint64_t unused = ElfFile::parse(octets, place.string()).unused_octets() / kAlignment * kAlignment;
+    if (unused == 0 || pad != 0) return octets;
+    pad = unused;
+  }
+}
+
 /// One compiler with everything that does not depend on the program.
 struct Toolchain {
   Compiler compiler;
@@ -320,8 +344,8 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
       // Damaged on disk: made again below.
     }
   }
-  Arguments link{compiler.path};
-  append(link, kLinkFlags);
+  Arguments first{compiler.path}, link;
+  append(first, kLinkFlags);
   // The runtime's variables come first: what is written past the end of an array meets the program's own, as on the robot.
   link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
   append(link, {"-x", "assembler"});
@@ -335,14 +359,7 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
     link.push_back(parts.back()->path());
   }
   append(link, {"-x", "none", "-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
-  const Temporary result(kept);
-  append(link, {"-o", result.path()});
-  const os::ProcessResult linked = run_compiler(link);
-  if (!linked.end.well()) {
-    if (!undefined_names(linked.errors).empty()) throw Incomplete{linked.errors};
-    throw UserError(first_error(linked.errors, text.sources));
-  }
-  const std::string octets = os::read_file(result.path());
+  const std::string octets = linked(first, link, kept, text.sources);
   os::write_file(kept, octets);
   return checked(kept, octets);
 }

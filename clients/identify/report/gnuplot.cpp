@@ -5,9 +5,8 @@
 
 #include <filesystem>
 
-#include "core/os/process.hpp"
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 #include "core/os/process.hpp"
 
 namespace kilotwin::identify {
