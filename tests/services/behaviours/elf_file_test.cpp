@@ -21,7 +21,9 @@ std::string valid() {
 TEST(ElfFile, DescribesAProgram) {
   const ElfFile file = ElfFile::parse(valid(), "disperse.so");
   EXPECT_LT(file.data.last - file.data.first, 400u);
-  EXPECT_EQ(file.data.first % kPage, 0u);
+  EXPECT_LT(file.unused_octets(), 64u) << "its memory ends where a page does";
+  EXPECT_EQ(file.pad.first % kPage, 0u);
+  EXPECT_LT(file.pad.last - file.pad.first, kPage);
   EXPECT_EQ(file.function_at(file.table.interrupts), "interrupts");
   EXPECT_EQ(file.function_at(file.table.leave + 1), "kt_leave");
 }
