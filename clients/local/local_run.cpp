@@ -239,6 +239,7 @@ class LocalRun {
 
   void save(Tick now, std::uint64_t chain) {
     observer_.saved();
+    for (const auto& logs : logs_) logs->flush();  // who goes on from this checkpoint finds what was printed before it
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
       proto::CheckpointPart part;
       if (task < physics_.size())

@@ -55,6 +55,7 @@ class BehavioursFederate : public Federate {
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 
   void save(Tick now) override {
+    logs_.flush();  // who goes on from this checkpoint finds what was printed before it
     proto::CheckpointPart part;
     engine_.save(*part.mutable_behaviours());
     write_checkpoint_part(context_.run_directory, session_.plan(), now, session_.plan().behaviours(host_), part);

@@ -207,6 +207,8 @@ std::uint64_t FirmwareSwarm::word(std::uint32_t i) const {
 }
 
 std::string FirmwareSwarm::save(std::uint32_t i) const {
+  // Who goes on from this checkpoint finds what was printed before it.
+  if (logs_) logs_->flush();
   const Robot& robot = robots_[i];
   const int flags =
       (robot.full ? 1 : 0) | (robot.kick_goes_on ? 2 : 0) | (robot.spun_up ? 4 : 0) | (robot.flat ? 8 : 0);

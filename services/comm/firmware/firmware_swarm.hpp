@@ -68,7 +68,7 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
   void write_log(std::uint32_t i);
   void use_battery(std::uint32_t i);
 
-  std::optional<RobotLogs> logs_;  ///< nothing: none are kept
+  mutable std::optional<RobotLogs> logs_;  ///< nothing: none are kept
   std::vector<std::uint32_t> ids_;
   std::vector<Robot> robots_;
   const comm::Cycles cycles_per_tick_;
