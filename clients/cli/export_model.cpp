@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/model/robot_parameters.hpp"
 #include "core/plan/plan.hpp"
 
@@ -81,7 +81,7 @@ std::uint32_t export_model(const proto::Manifest& manifest, const std::filesyste
     text += fmt::format("robot {{ {}}}\n", fields);
     ++robots;
   }
-  recorder::write_file(file, text);
+  os::write_file(file, text);
   return robots;
 }
 

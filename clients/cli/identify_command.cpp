@@ -17,7 +17,7 @@
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/report/prediction_residuals.hpp"
 #include "clients/identify/report/report.hpp"
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 
@@ -135,10 +135,10 @@ int identify_data(const IdentifyArguments& arguments) {
   }
 
   progress->show(0.97, "drawing the report", "drawing");
-  recorder::write_file(out / "model.txtpb", identify::text_of(found.model, fmt::format("Identified from {}.",
+  os::write_file(out / "model.txtpb", identify::text_of(found.model, fmt::format("Identified from {}.",
                                                                                        arguments.train.string())));
-  recorder::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
-  recorder::write_file(out / "predictions.csv", csv_of(found.predictions));
+  os::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
+  os::write_file(out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.document, out / "report.html");
   unfinished.keep();
   progress.reset();

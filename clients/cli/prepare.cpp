@@ -10,7 +10,6 @@
 #include <random>
 #include <set>
 
-#include "clients/recorder/file.hpp"
 #include "clients/recorder/provenance.hpp"
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
@@ -59,7 +58,7 @@ std::uint64_t new_run_id() {
 
 /// Reads and checks firmware, which runs unchanged. Throws UserError if the file is not firmware.
 behaviours::CompiledProgram checked_firmware(const fs::path& file) {
-  const auto octets = behaviours::read_file(file);
+  const auto octets = os::read_if_there(file);
   if (!octets) throw UserError(file.string() + ": cannot be read; give an .elf or .hex file");
   static_cast<void>(firmware::parse_firmware(*octets, file.string()));
   return {file, behaviours::sha256_hex(*octets), {}};
@@ -260,7 +259,7 @@ Prepared prepare(const RunArguments& arguments) {
     }
     copy_sources(loaded, directory.programs());
     if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
-    recorder::write_file(directory.experiment(), experiment_as_run(loaded, manifest, directory));
+    os::write_file(directory.experiment(), experiment_as_run(loaded, manifest, directory));
     recorder::write_provenance(recorder::provenance_of_this_process(), directory.provenance());
     directory.write_manifest(manifest);
   } catch (const std::exception& error) {

@@ -85,12 +85,20 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
       forget_attempts(directory);
       return std::nullopt;
     }
-    if (WIFEXITED(*status)) return WEXITSTATUS(*status);  // the worker has reported its error
+    // A program that calls the system where that cannot be refused (services/behaviours/faults.hpp) ends the worker as if all were
+    // well. In every other case the worker has reported its error.
+    const bool no_result =
+        WIFEXITED(*status) && WEXITSTATUS(*status) == 0 && !std::filesystem::exists(directory.summary());
+    if (WIFEXITED(*status) && !no_result) return WEXITSTATUS(*status);
     std::vector<behaviours::Culprit> running;
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       if (const auto culprit = behaviours::take_note(directory.path(), HostId{h})) running.push_back(*culprit);
     }
-    if (!brought_itself_down(*status) || running.empty()) {
+    if (no_result && running.empty()) {
+      throw RunError(fmt::format("the run has ended without a result; what was recorded so far is in {}",
+                                 directory.path().string()));
+    }
+    if (!no_result && (!brought_itself_down(*status) || running.empty())) {
       throw RunError(fmt::format("the run was ended by signal {}; what was recorded so far is in {}",
                                  WTERMSIG(*status), directory.path().string()));
     }

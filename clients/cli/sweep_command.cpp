@@ -12,7 +12,7 @@
 #include "clients/cli/sweep_points.hpp"
 #include "clients/cli/sweep_report.hpp"
 #include "clients/cli/sweep_runs.hpp"
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "clients/recorder/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -122,8 +122,8 @@ int sweep(const SweepArguments& arguments) {
   if (!all) say(fmt::format("kilotwin: interrupted; {} of {} runs were done", report.runs(), runs.size()));
   if (report.runs() == 0) return 1;
 
-  recorder::write_file(directory / "sweep.csv", report.table_csv());
-  recorder::write_file(directory / "curves.csv", report.curves_csv());
+  os::write_file(directory / "sweep.csv", report.table_csv());
+  os::write_file(directory / "curves.csv", report.curves_csv());
   recorder::write_plot(report.curves(), directory / "sweep.svg");
   std::string plots = (directory / "sweep.svg").string();
   if (report.has_response()) {

@@ -3,24 +3,20 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
-#include <atomic>
-#include <barrier>
 #include <chrono>
-#include <exception>
-#include <mutex>
-#include <thread>
 #include <utility>
 
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
-#include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
+#include "core/logs/robot_logs.hpp"
 #include "core/base/say.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_sums.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/worker_pool.hpp"
 #include "core/federation/pace.hpp"
 #include "core/federation/snapshots.hpp"
 #include "services/ark/station_engine.hpp"
@@ -59,6 +55,7 @@ class LocalRun {
         options_(options),
         observer_(observer),
         radio_(plan, firmware::make_firmware_robots(plan, options.run_directory, options.threads,
+                                                    options.resumed ? options.resumed->tick : Tick{0},
                                                     options.save_checkpoints)),
         station_(plan),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
@@ -70,8 +67,10 @@ class LocalRun {
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
       if (options.run_directory.empty() || !options.save_checkpoints) continue;
-      logs_.push_back(std::make_unique<behaviours::RobotLogs>(options.run_directory, plan.tick_length, first_,
-                                                              plan.share(HostId{h})));
+      logs_.push_back(std::make_unique<RobotLogs>(
+          options.run_directory, plan.tick_length, first_, [&plan, share = plan.share(HostId{h})](std::uint32_t robot) {
+            return share.contains(robot) && !plan.firmware(robot);
+          }));
       notes_.push_back(std::make_unique<behaviours::RunningNote>(options.run_directory, HostId{h}));
       hosts_.back()->note_running_in(notes_.back()->place());
     }
@@ -91,7 +90,7 @@ class LocalRun {
     std::vector<const behaviours::BehavioursEngine*> engines;
     for (const auto& engine : hosts_) engines.push_back(engine.get());
     const behaviours::Watchdog watchdog(engines);
-    Workers workers(*this, options_.threads);
+    os::WorkerPool workers(options_.threads);
     const auto begun = Clock::now();
     auto next_idle = begun;
     Tick now = first_;
@@ -117,7 +116,7 @@ class LocalRun {
         observer_.idle(progress(now, static_cast<double>(ns(begun, recorded_to)) * 1e-9));
       }
       if (last) break;
-      workers.step(now);
+      step(workers, now);
       tell(now);
       chain = close_tick(now + 1, chain);
     }
@@ -136,69 +135,17 @@ class LocalRun {
   }
 
  private:
-  /// Threads that share the tasks of a tick; a task is the step of one engine.
-  class Workers {
-   public:
-    Workers(LocalRun& run, std::uint32_t threads) : run_(run), barrier_(static_cast<std::ptrdiff_t>(threads)) {
-      for (std::uint32_t i = 1; i < threads; ++i) {
-        threads_.emplace_back([this] {
-          for (;;) {
-            barrier_.arrive_and_wait();
-            if (done_) return;
-            work();
-            barrier_.arrive_and_wait();
-          }
-        });
-      }
-    }
-    ~Workers() {
-      if (threads_.empty()) return;
-      done_ = true;
-      barrier_.arrive_and_wait();
-      for (std::thread& thread : threads_) thread.join();
-    }
-    void step(Tick from) {
-      from_ = from;
-      next_task_ = 0;
-      if (threads_.empty()) return share_tasks();
-      barrier_.arrive_and_wait();
-      work();
-      barrier_.arrive_and_wait();
-      if (failure_) std::rethrow_exception(failure_);
-    }
-
-   private:
-    /// Whatever a task throws is thrown again on the run's own thread, once all have stopped.
-    void work() {
-      try {
-        share_tasks();
-      } catch (...) {
-        const std::lock_guard lock(failure_mutex_);
-        failure_ = std::current_exception();
-      }
-    }
-    void share_tasks() {
-      auto begun = Clock::now();
-      // Hosts first: they take longest.
-      const std::uint32_t tasks = run_.plan_.federates();
-      for (std::uint32_t i = next_task_++; i < tasks; i = next_task_++) {
-        const std::uint32_t task = tasks - 1 - i;
-        run_.step(task, from_);
-        run_.emit(task, run_.frames_of(from_ + 1));
-        const auto ended = Clock::now();
-        run_.task_ns_[task] += ns(begun, ended);
-        begun = ended;
-      }
-    }
-    LocalRun& run_;
-    std::barrier<> barrier_;
-    std::vector<std::thread> threads_;
-    std::atomic<std::uint32_t> next_task_{0};
-    Tick from_;
-    bool done_ = false;
-    std::mutex failure_mutex_;
-    std::exception_ptr failure_;
-  };
+  /// All engines from one tick to the next. A task is the step of one engine; hosts come first, as they take longest.
+  void step(os::WorkerPool& workers, Tick from) {
+    const std::uint32_t tasks = plan_.federates();
+    workers.for_each(tasks, [this, from, tasks](std::size_t i) {
+      const auto task = tasks - 1 - static_cast<std::uint32_t>(i);
+      const auto begun = Clock::now();
+      step(task, from);
+      emit(task, frames_of(from + 1));
+      task_ns_[task] += ns(begun, Clock::now());
+    });
+  }
 
   static std::uint64_t ns(Clock::time_point from, Clock::time_point to) {
     return static_cast<std::uint64_t>(std::chrono::nanoseconds(to - from).count());
@@ -238,7 +185,8 @@ class LocalRun {
     } else {
       const std::size_t host = task - partitions - 2;
       hosts_[host]->step(from, in.radio[host], in.all_bodies);
-      if (!logs_.empty()) logs_[host]->write(from, hosts_[host]->printed());
+      if (logs_.empty()) return;
+      for (const auto& printed : hosts_[host]->printed()) logs_[host]->write(from, printed.robot, printed.text);
     }
   }
 
@@ -291,6 +239,7 @@ class LocalRun {
 
   void save(Tick now, std::uint64_t chain) {
     observer_.saved();
+    for (const auto& logs : logs_) logs->flush();  // who goes on from this checkpoint finds what was printed before it
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
       proto::CheckpointPart part;
       if (task < physics_.size())
@@ -360,7 +309,7 @@ class LocalRun {
   ark::StationEngine station_;
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
   // Per host, where there is a run directory.
-  std::vector<std::unique_ptr<behaviours::RobotLogs>> logs_;
+  std::vector<std::unique_ptr<RobotLogs>> logs_;
   std::vector<std::unique_ptr<behaviours::RunningNote>> notes_;
   const Tick first_;
   RunSchedule schedule_;

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "clients/recorder/axis.hpp"
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "clients/recorder/paths.hpp"
 #include "clients/recorder/svg.hpp"
 #include "core/base/error.hpp"
@@ -429,7 +429,7 @@ std::string picture_svg(Reader& recording) {
 }
 
 void write_picture(Reader& recording, const std::filesystem::path& file) {
-  write_file(file, picture_svg(recording));
+  os::write_file(file, picture_svg(recording));
 }
 
 }  // namespace kilotwin::recorder

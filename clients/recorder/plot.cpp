@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "clients/recorder/axis.hpp"
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "clients/recorder/svg.hpp"
 #include "core/base/error.hpp"
 
@@ -222,6 +222,6 @@ std::string plot_svg(const Plot& plot) {
                        fmt::format("{} against {}. {}", plot.y_name, plot.x_name, plot.subtitle), body);
 }
 
-void write_plot(const Plot& plot, const std::filesystem::path& file) { write_file(file, plot_svg(plot)); }
+void write_plot(const Plot& plot, const std::filesystem::path& file) { os::write_file(file, plot_svg(plot)); }
 
 }  // namespace kilotwin::recorder

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::recorder {
@@ -42,13 +42,13 @@ Provenance provenance_of_this_process() {
 void write_provenance(const Provenance& p, const std::filesystem::path& file) {
   const Json json{{"version", p.version}, {"build", p.build}, {"date", p.date},
                   {"command_line", p.command_line}, {"host", p.host}, {"cores", p.cores}};
-  write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 std::optional<Provenance> read_provenance(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return std::nullopt;
   try {
-    const Json json = Json::parse(read_file(file));
+    const Json json = Json::parse(os::read_file(file));
     Provenance p;
     json.at("version").get_to(p.version);
     json.at("build").get_to(p.build);

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
 
@@ -76,10 +76,10 @@ Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
   const auto foreign = [&](std::string_view why) {
     return UserError(fmt::format("{}: not a Kilotwin recording; {}", file_.string(), why));
   };
-  if (::stat(file_.c_str(), &about) != 0) throw unreadable(system_reason());
+  if (::stat(file_.c_str(), &about) != 0) throw unreadable(os::system_reason());
   if (!S_ISREG(about.st_mode)) throw foreign("expected a file, the recording.ktrec of a run directory");
   descriptor_ = ::open(file_.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor_ < 0) throw unreadable(system_reason());
+  if (descriptor_ < 0) throw unreadable(os::system_reason());
   try {
     if (!read_record() || !record_.has_header()) {
       if (begins_as_format_1()) {
@@ -152,7 +152,7 @@ bool Reader::fill(std::size_t bytes) {
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) {
       block_.clear();
-      throw RunError(fmt::format("{}: cannot be read: {}", file_.string(), system_reason()));
+      throw RunError(fmt::format("{}: cannot be read: {}", file_.string(), os::system_reason()));
     }
     if (n == 0) break;
     got += static_cast<std::size_t>(n);

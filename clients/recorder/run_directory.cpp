@@ -9,7 +9,7 @@
 #include <iterator>
 #include <system_error>
 
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/os/checksummed_file.hpp"
 
@@ -26,7 +26,7 @@ constexpr FileKind kManifestFile{"KTWNMANI", 2, "the manifest of a run", "prepar
 bool claim(const fs::path& directory) {
   const auto refuse = [](const fs::path& what) {
     return RunError(
-        fmt::format("{}: cannot be created: {}; choose another place with --out", what.string(), system_reason()));
+        fmt::format("{}: cannot be created: {}; choose another place with --out", what.string(), os::system_reason()));
   };
   if (::mkdir(directory.c_str(), 0777) != 0) {
     if (errno != EEXIST) throw refuse(directory);

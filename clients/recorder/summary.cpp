@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::recorder {
@@ -126,11 +126,11 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"host", s.provenance.host},
       {"cores", s.provenance.cores},
   };
-  write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 Summary read_summary(const std::filesystem::path& file) {
-  const std::string text = read_file(file);
+  const std::string text = os::read_file(file);
   try {
     const Json json = Json::parse(text);
     Summary s;

@@ -40,7 +40,7 @@ void assign(std::string* field, std::span<const std::uint8_t> values) {
 }  // namespace
 
 Writer::Writer(std::filesystem::path file, const proto::RecordingHeader& header)
-    : output_(std::move(file), OutputFile::Existing::kRefuse),
+    : output_(std::move(file), os::OutputFile::Existing::kRefuse),
       robots_(header.robots()),
       movables_(static_cast<std::size_t>(header.movable_size())),
       last_state_(header.first_tick() - 1),

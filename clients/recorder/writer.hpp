@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "clients/recorder/recording.hpp"
 
 namespace kilotwin::recorder {
@@ -57,7 +57,7 @@ class Writer {
   void append(const proto::Record& record);  // to the buffer only
   void append_hashes();
 
-  OutputFile output_;
+  os::OutputFile output_;
   const std::uint32_t robots_;
   const std::size_t movables_;
   std::int64_t last_state_, last_hash_;

@@ -1,43 +1,32 @@
 #include "core/os/process.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <poll.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <system_error>
+#include <utility>
 
 #include "core/base/error.hpp"
+#include "core/os/descriptor.hpp"
+#include "core/os/files.hpp"
 
-namespace kilotwin::behaviours {
+namespace kilotwin::os {
 namespace {
-
-class Descriptor {
- public:
-  Descriptor() = default;
-  explicit Descriptor(int fd) : fd_(fd) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() { reset(-1); }
-  [[nodiscard]] int get() const { return fd_; }
-  void reset(int fd) {
-    if (fd_ >= 0) close(fd_);
-    fd_ = fd;
-  }
-
- private:
-  int fd_ = -1;
-};
 
 struct Pipe {
   Descriptor read_end, write_end;
   Pipe() {
     std::array<int, 2> ends{};
-    if (pipe2(ends.data(), O_CLOEXEC) != 0) throw RunError(std::string("pipe: ") + std::strerror(errno));
+    if (pipe2(ends.data(), O_CLOEXEC) != 0) throw RunError("cannot start a program: " + system_reason());
     read_end.reset(ends[0]);
     write_end.reset(ends[1]);
   }
@@ -93,29 +82,109 @@ void drain(const Pipe& output, const Pipe& errors, ProcessResult& result) {
 
 }  // namespace
 
+std::string signal_name(int signal) {
+  const char* const words = sigdescr_np(signal);
+  return fmt::format("signal {}{}", signal, words == nullptr ? "" : fmt::format(" ({})", words));
+}
+
+Process::Process(const Command& command) : own_group_(command.own_group) {
+  KILOTWIN_DEMAND(!command.arguments.empty());
+  const std::string program = command.program.empty() ? command.arguments[0] : command.program.string();
+  std::vector<std::string> argument_texts = command.arguments, environment_texts;
+  std::vector<char*> own_environment;
+  const std::vector<char*> arguments = pointers(argument_texts);
+  if (command.environment == Command::Environment::kPlain) {
+    environment_texts = plain_environment();
+    own_environment = pointers(environment_texts);
+  }
+  char** const environment = own_environment.empty() ? environ : own_environment.data();
+  const Descriptor nothing(open("/dev/null", O_RDWR | O_CLOEXEC));
+  Pipe trouble;  // closed by the start of the program; gets errno where that fails
+  const pid_t parent = getpid();
+  id_ = fork();
+  if (id_ < 0) throw RunError(fmt::format("cannot start {}: {}", program, system_reason()));
+  if (id_ == 0) {
+    // Only calls that are safe between fork and exec.
+    if (command.own_group) setpgid(0, 0);
+    if (command.at_death != 0) prctl(PR_SET_PDEATHSIG, command.at_death);
+    if (command.at_death != 0 && getppid() != parent) _exit(127);
+    sigset_t none;
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, nullptr);
+    const auto connect = [&](int from, int to) {
+      if (from == Command::kOwn) return;
+      dup2(from == Command::kNowhere ? nothing.get() : from, to);
+    };
+    // Of two that change places neither is overwritten before it is read.
+    const int errors = command.errors == STDOUT_FILENO && command.output != Command::kOwn ? dup(STDOUT_FILENO) : command.errors;
+    connect(Command::kNowhere, STDIN_FILENO);
+    connect(command.output, STDOUT_FILENO);
+    connect(errors, STDERR_FILENO);
+    execve(program.c_str(), arguments.data(), environment);
+    const int error = errno;
+    const ssize_t told = write(trouble.write_end.get(), &error, sizeof error);
+    _exit(told == sizeof error ? 127 : 126);
+  }
+  trouble.write_end.reset();
+  int error = 0;
+  ssize_t octets = 0;
+  do octets = read(trouble.read_end.get(), &error, sizeof error);
+  while (octets < 0 && errno == EINTR);
+  if (octets != sizeof error) return;
+  wait();
+  throw RunError(fmt::format("cannot start {}: {}", program, std::generic_category().message(error)));
+}
+
+Process::Process(Process&& other) noexcept
+    : id_(std::exchange(other.id_, -1)), own_group_(other.own_group_), end_(other.end_) {}
+
+Process::~Process() {
+  if (id_ < 0 || end_) return;
+  signal(SIGKILL);
+  collect(0);
+}
+
+bool Process::collect(int flags) {
+  int status = 0;
+  pid_t found = 0;
+  do found = waitpid(id_, &status, flags);
+  while (found < 0 && errno == EINTR);
+  if (found != id_) return false;
+  if (WIFSIGNALED(status))
+    end_ = ProcessEnd{0, WTERMSIG(status)};
+  else
+    end_ = ProcessEnd{WEXITSTATUS(status), 0};
+  return true;
+}
+
+const std::optional<ProcessEnd>& Process::poll() {
+  if (!end_) collect(WNOHANG);
+  return end_;
+}
+
+ProcessEnd Process::wait() {
+  if (!end_ && !collect(0))
+    throw RunError(fmt::format("cannot wait for process {}: {}", id_, system_reason()));
+  return *end_;
+}
+
+void Process::signal(int number) const {
+  if (id_ > 0 && !end_) kill(own_group_ ? -id_ : id_, number);
+}
+
 ProcessResult run_process(const std::vector<std::string>& arguments) {
-  KILOTWIN_DEMAND(!arguments.empty());
   Pipe output, errors;
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, output.write_end.get(), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, errors.write_end.get(), STDERR_FILENO);
-  std::vector<std::string> argument_texts = arguments, environment_texts = plain_environment();
-  pid_t child = 0;
-  const int error = posix_spawn(&child, arguments[0].c_str(), &actions, nullptr, pointers(argument_texts).data(),
-                                pointers(environment_texts).data());
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) throw RunError("cannot start " + arguments[0] + ": " + std::strerror(error));
-  output.write_end.reset(-1);
-  errors.write_end.reset(-1);
+  Command command;
+  command.arguments = arguments;
+  command.output = output.write_end.get();
+  command.errors = errors.write_end.get();
+  command.environment = Command::Environment::kPlain;
+  Process process(command);
+  output.write_end.reset();
+  errors.write_end.reset();
   ProcessResult result;
   drain(output, errors, result);
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) throw RunError("cannot wait for " + arguments[0] + ": " + std::strerror(errno));
-  }
-  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.end = process.wait();
   return result;
 }
 
@@ -135,4 +204,4 @@ std::filesystem::path find_executable(std::string_view name) {
   return {};
 }
 
-}  // namespace kilotwin::behaviours
+}  // namespace kilotwin::os

@@ -1,83 +1,63 @@
-/// Threads that share short tasks, thousands of times a second: between two calls they look for the next one a while before
-/// they go to sleep.
+/// Threads that share short tasks, thousands of times a second.
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
+#include <mutex>
 #include <thread>
 #include <vector>
 
-namespace kilotwin::firmware {
+namespace kilotwin::os {
 
+/// Processors that this process may use, at least 1.
+[[nodiscard]] std::uint32_t cores();
+
+/// Between two calls, threads spin for some tens of us before they sleep, as waking a thread costs as much as several tasks.
+/// Where there are more threads than cores they yield instead: a thread that spins would keep a core from one that works.
 class WorkerPool {
  public:
-  /// `threads`: with the caller's own.
-  explicit WorkerPool(std::uint32_t threads) {
-    for (std::uint32_t i = 1; i < threads; ++i) threads_.emplace_back([this] { serve(); });
-  }
+  using Task = std::function<void(std::size_t)>;
+
+  /// `threads`: the caller's own included; 0 is taken as 1.
+  explicit WorkerPool(std::uint32_t threads);
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
-  ~WorkerPool() {
-    ended_ = true;
-    unclaimed_.store(1, std::memory_order_release);
-    unclaimed_.notify_all();
-    for (std::thread& hand : threads_) hand.join();
-  }
+  ~WorkerPool();
 
-  /// Calls task(i) once for each i below `count`, in any order on any thread; returns when all are done. Tasks do not throw.
-  /// A hand that the system does not let run costs nothing: whoever is awake takes what is left.
-  void share(std::uint32_t count, const std::function<void(std::uint32_t)>& task) {
-    if (threads_.empty() || count < 2) {
-      for (std::uint32_t i = 0; i < count; ++i) task(i);
-      return;
-    }
-    task_ = &task;
-    unfinished_.store(count, std::memory_order_relaxed);
-    unclaimed_.store(count, std::memory_order_release);
-    unclaimed_.notify_all();
-    work();
-    wait(unfinished_, [](std::uint32_t unfinished) { return unfinished == 0; });
-  }
+  [[nodiscard]] std::uint32_t threads() const { return static_cast<std::uint32_t>(threads_.size() + 1); }
+
+  /// Calls task(i) once for each i below `count` (at most 2^32 - 2), started in ascending order, and returns when all are done.
+  /// A thread that the system does not let run delays nobody: the others take what is left. Where tasks throw, those that have
+  /// not started are left out, and the exception of the lowest i is thrown again here: the one that a single thread would meet.
+  /// One call at a time; tasks do not call the pool that runs them.
+  void for_each(std::size_t count, const Task& task);
 
  private:
-  /// Looks so often before it sleeps, with a pause of 10 to 50 ns after each look: for some tens of us, longer than one thread
-  /// alone works between two rounds. To wake a thread that sleeps takes as long as several robots' tasks.
-  static constexpr int kLooks = 2000;
+  void wait_while(std::atomic<std::uint32_t>& value, std::uint32_t unwanted) const;
+  void work();
+  void serve();
+  void run(std::size_t i);
+  void fail(std::size_t i);
 
-  template <class Done> static void wait(std::atomic<std::uint32_t>& value, Done done) {
-    for (int look = 0;; ++look) {
-      const std::uint32_t now = value.load(std::memory_order_acquire);
-      if (done(now)) return;
-      if (look >= kLooks)
-        value.wait(now, std::memory_order_acquire);
-      else
-        __builtin_ia32_pause();
-    }
-  }
-  /// Whoever brings `unclaimed_` from n to n - 1 has task n - 1 of the round of that moment, which cannot end before it is
-  /// done: so a hand that slept through rounds still claims right.
-  void work() {
-    for (std::uint32_t n = unclaimed_.load(std::memory_order_acquire); n != 0;) {
-      if (!unclaimed_.compare_exchange_weak(n, n - 1, std::memory_order_acq_rel, std::memory_order_acquire))
-        continue;
-      (*task_)(n - 1);
-      if (unfinished_.fetch_sub(1, std::memory_order_acq_rel) == 1) unfinished_.notify_one();
-      n = unclaimed_.load(std::memory_order_acquire);
-    }
-  }
-  void serve() {
-    for (;;) {
-      wait(unclaimed_, [](std::uint32_t unclaimed) { return unclaimed != 0; });
-      if (ended_) return;
-      work();
-    }
-  }
+  // Of the call at hand; written while no thread has a task.
+  const Task* task_ = nullptr;
+  std::size_t count_ = 0;
 
-  const std::function<void(std::uint32_t)>* task_ = nullptr;
-  std::atomic<std::uint32_t> unclaimed_{0}, unfinished_{0};
-  std::atomic<bool> ended_{false};
+  /// Tasks that nobody has taken, or kEnd. Whoever brings it from n to n - 1 has task count_ - n of the call of that moment,
+  /// which cannot end before it is done: a thread that slept through calls still takes a task of the right one.
+  std::atomic<std::uint32_t> unclaimed_{0};
+  std::atomic<std::uint32_t> unfinished_{0};
+  std::mutex failure_mutex_;
+  std::exception_ptr failure_;
+  std::size_t failed_ = 0;  ///< the task that threw failure_
+  int spins_ = 0;
   std::vector<std::thread> threads_;
 };
 
-}  // namespace kilotwin::firmware
+/// WorkerPool::for_each() on threads of its own, for tasks that take much longer than to start a thread. May be nested.
+void in_parallel(std::size_t count, std::uint32_t threads, const WorkerPool::Task& task);
+
+}  // namespace kilotwin::os

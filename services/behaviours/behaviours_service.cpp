@@ -6,9 +6,9 @@
 
 #include "core/base/say.hpp"
 #include "core/federation/frame_io.hpp"
+#include "core/logs/robot_logs.hpp"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
-#include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
 
@@ -25,7 +25,10 @@ class BehavioursFederate : public Federate {
         radio_(session, topics::radio(host.value()), {session.plan().radio()}),
         actuation_(session, topics::actuation()),
         told_(engine.failures().size()),
-        logs_(context.run_directory, session.plan().tick_length, context.first(), session.plan().share(host)) {
+        logs_(context.run_directory, session.plan().tick_length, context.first(),
+              [&plan = session.plan(), host](std::uint32_t robot) {
+                return plan.share(host).contains(robot) && !plan.firmware(robot);
+              }) {
     if (session.plan().hosts_see_bodies()) bodies_.emplace(session, topics::bodies(), session.plan().all_physics());
   }
 
@@ -36,7 +39,7 @@ class BehavioursFederate : public Federate {
 
   void step(Tick from) override {
     engine_.step(from, *radio_.at(from)[0], bodies_ ? bodies_->at(from) : std::span<const BodyFrame* const>());
-    logs_.write(from, engine_.printed());
+    for (const auto& printed : engine_.printed()) logs_.write(from, printed.robot, printed.text);
     for (; told_ < engine_.failures().size(); ++told_) {
       const auto& failure = engine_.failures()[told_];
       say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot,
@@ -52,6 +55,7 @@ class BehavioursFederate : public Federate {
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 
   void save(Tick now) override {
+    logs_.flush();  // who goes on from this checkpoint finds what was printed before it
     proto::CheckpointPart part;
     engine_.save(*part.mutable_behaviours());
     write_checkpoint_part(context_.run_directory, session_.plan(), now, session_.plan().behaviours(host_), part);

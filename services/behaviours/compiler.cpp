@@ -40,12 +40,12 @@ struct Compiler {
 Compiler find_compiler(const fs::path& wanted) {
   Compiler compiler{wanted.string(), ""};
   for (const char* name : {"cc", "gcc", "clang"}) {
-    if (compiler.path.empty()) compiler.path = find_executable(name).string();
+    if (compiler.path.empty()) compiler.path = os::find_executable(name).string();
   }
   if (!compiler.path.empty() && access(compiler.path.c_str(), X_OK) == 0) {
-    const ProcessResult result = run_process({compiler.path, "--version"});
+    const os::ProcessResult result = run_compiler({compiler.path, "--version"});
     compiler.version = result.output;
-    if (result.status == 0) return compiler;
+    if (result.end.well()) return compiler;
   }
   throw UserError("no C compiler" + (wanted.empty() ? "" : " at " + wanted.string()) +
                   "; robots' programs are compiled when a run starts: apt-get install gcc");
@@ -91,7 +91,7 @@ const Arguments kLinkFlags{"-shared",           "-nostdlib",           "-Wl,-Bsy
 
 /// Headers: ours before the compiler's own, no others.
 Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
-  std::string own = run_process({compiler.path, "-print-file-name=include"}).output;
+  std::string own = run_compiler({compiler.path, "-print-file-name=include"}).output;
   while (!own.empty() && own.back() == '\n') own.pop_back();
   return {"-isystem",
           (runtime / "kilolib").string(),
@@ -122,7 +122,7 @@ CompiledProgram checked(const fs::path& file, const std::string& octets) {
 }
 
 CompiledProgram given(const fs::path& file) {
-  const auto octets = read_file(file);
+  const auto octets = os::read_if_there(file);
   if (!octets) throw UserError(file.string() + ": cannot be read; name a C source or a .so of `kilotwin build`");
   return checked(file, *octets);
 }
@@ -150,22 +150,21 @@ class Temporary {
 std::string build(Arguments arguments, const fs::path& kept, const std::vector<fs::path>& sources) {
   const Temporary result(kept);
   append(arguments, {"-o", result.path()});
-  const ProcessResult process = run_process(arguments);
-  if (process.status != 0) throw UserError(first_error(process.errors, sources));
-  const auto octets = read_file(result.path());
-  if (!octets || !write_file(kept, *octets))
-    throw RunError(kept.string() + ": cannot be written; is the disk full?");
-  return *octets;
+  const os::ProcessResult process = run_compiler(arguments);
+  if (!process.end.well()) throw UserError(first_error(process.errors, sources));
+  std::string octets = os::read_file(result.path());
+  os::write_file(kept, octets);
+  return octets;
 }
 
 /// Runs a compilation to assembly. Nothing where it fails; `errors` is then what the compiler said.
 std::optional<std::string> assembly_of(Arguments arguments, const fs::path& place, std::string& errors) {
   const Temporary result(place);
   append(arguments, {"-S", "-o", result.path()});
-  const ProcessResult process = run_process(arguments);
+  const os::ProcessResult process = run_compiler(arguments);
   errors = process.errors;
-  if (process.status != 0) return std::nullopt;
-  return read_file(result.path());
+  if (!process.end.well()) return std::nullopt;
+  return os::read_if_there(result.path());
 }
 
 /// Nested functions that use variables of the one around them, and whose address is taken, are called by way of code on the
@@ -189,8 +188,7 @@ void refuse_code_on_stack(const std::string& assembly, Arguments compile, const 
 std::string counted_assembly(const Arguments& compiler, const fs::path& source, const std::string& preprocessed,
                              const std::vector<fs::path>& sources, const fs::path& place) {
   const Temporary marked(place);
-  if (!write_file(marked.path(), with_loop_barriers(preprocessed)))
-    throw RunError(place.string() + ": cannot be written; is the disk full?");
+  os::write_file(marked.path(), with_loop_barriers(preprocessed));
   std::string errors;
   Arguments arguments;
   for (std::size_t i = 0; i < compiler.size(); ++i) {
@@ -235,8 +233,7 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& includes, con
     parts.push_back(std::make_unique<Temporary>(kept));
     const bool is_firmware = name == std::string_view("kilolib.c") || name == std::string_view("machine.c");
     const auto counted = is_firmware ? Counted::kTestsOnly : Counted::kAll;
-    if (!write_file(parts.back()->path(), with_cycle_counters(*assembly, counted)))
-      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    os::write_file(parts.back()->path(), with_cycle_counters(*assembly, counted));
     link.push_back(parts.back()->path());
   }
   (void)build(link, kept, {runtime / "kilolib.c"});
@@ -259,6 +256,30 @@ std::set<std::string> undefined_names(const std::string& errors) {
 struct Incomplete {
   std::string errors;
 };
+
+/// Links twice: where variables end is known only then, and they shall end where a page does, so that an access beyond them faults.
+std::string linked(const Arguments& first, const Arguments& rest, const fs::path& place, const std::vector<fs::path>& sources) {
+  constexpr std::uint64_t kAlignment = 64;  // no variable asks for more
+  const Temporary result(place), front(place);
+  for (std::uint64_t pad = 0;;) {
+    os::write_file(front.path(), ".section .data,\"aw\"\n.balign " + std::to_string(kAlignment) + "\n.zero " + std::to_string(pad) +
+                                     "\n.globl kilotwin_variables\n.hidden kilotwin_variables\nkilotwin_variables:\n"
+                                     ".section .note.GNU-stack,\"\"\n");
+    Arguments arguments = first;
+    append(arguments, {"-x", "assembler", front.path(), "-x", "none"});
+    append(arguments, rest);
+    append(arguments, {"-o", result.path()});
+    const os::ProcessResult process = run_compiler(arguments);
+    if (!process.end.well()) {
+      if (!undefined_names(process.errors).empty()) throw Incomplete{process.errors};
+      throw UserError(first_error(process.errors, sources));
+    }
+    std::string octets = os::read_file(result.path());
+    const std::uint64_t unused = ElfFile::parse(octets, place.string()).unused_octets() / kAlignment * kAlignment;
+    if (unused == 0 || pad != 0) return octets;
+    pad = unused;
+  }
+}
 
 /// One compiler with everything that does not depend on the program.
 struct Toolchain {
@@ -288,8 +309,8 @@ std::string Toolchain::preprocessed(const fs::path& source, const Arguments& dia
   Arguments preprocess{compiler.path, "-E", "-P"};
   append(preprocess, flags_for(text, text.files[0], dialect));
   preprocess.push_back(text.files[0].string());
-  const ProcessResult process = run_process(preprocess);
-  return process.status == 0 ? process.output : "";
+  const os::ProcessResult process = run_compiler(preprocess);
+  return process.end.well() ? process.output : "";
 }
 
 CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialect) const {
@@ -308,23 +329,23 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
     Arguments preprocess{compiler.path, "-E"};
     append(preprocess, flags_for(text, file, dialect));
     preprocess.push_back(file.string());
-    ProcessResult process = run_process(preprocess);
-    if (process.status != 0) throw UserError(first_error(process.errors, text.sources));
+    os::ProcessResult process = run_compiler(preprocess);
+    if (!process.end.well()) throw UserError(first_error(process.errors, text.sources));
     content += sha256_hex(process.output);
     for_kilombo = for_kilombo || process.output.find("UserdataSize") != std::string::npos;
     texts.push_back(std::move(process.output));
     if (i + 1 == text.files.size() && for_kilombo) files.push_back(runtime / "simulator.c");
   }
   const fs::path kept = cache / "programs" / (sha256_hex(content) + ".so");
-  if (const auto octets = read_file(kept)) {
+  if (const auto octets = os::read_if_there(kept)) {
     try {
       return checked(kept, *octets);
     } catch (const UserError&) {
       // Damaged on disk: made again below.
     }
   }
-  Arguments link{compiler.path};
-  append(link, kLinkFlags);
+  Arguments first{compiler.path}, link;
+  append(first, kLinkFlags);
   // The runtime's variables come first: what is written past the end of an array meets the program's own, as on the robot.
   link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
   append(link, {"-x", "assembler"});
@@ -334,27 +355,18 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
     append(compile, flags_for(text, files[i], dialect));
     parts.push_back(std::make_unique<Temporary>(kept));
     const std::string assembly = counted_assembly(compile, files[i], texts[i], text.sources, kept);
-    if (!write_file(parts.back()->path(), assembly))
-      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    os::write_file(parts.back()->path(), assembly);
     link.push_back(parts.back()->path());
   }
   append(link, {"-x", "none", "-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
-  const Temporary result(kept);
-  append(link, {"-o", result.path()});
-  const ProcessResult linked = run_process(link);
-  if (linked.status != 0) {
-    if (!undefined_names(linked.errors).empty()) throw Incomplete{linked.errors};
-    throw UserError(first_error(linked.errors, text.sources));
-  }
-  const auto octets = read_file(result.path());
-  if (!octets || !write_file(kept, *octets))
-    throw RunError(kept.string() + ": cannot be written; is the disk full?");
-  return checked(kept, *octets);
+  const std::string octets = linked(first, link, kept, text.sources);
+  os::write_file(kept, octets);
+  return checked(kept, octets);
 }
 
 bool mentions(const std::vector<fs::path>& sources, std::string_view word) {
   for (const fs::path& source : sources) {
-    if (read_file(source).value_or("").find(word) != std::string::npos) return true;
+    if (os::read_if_there(source).value_or("").find(word) != std::string::npos) return true;
   }
   return false;
 }
@@ -428,7 +440,7 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
   Toolchain toolchain;
   toolchain.defines = define_flags(options.defines);
   toolchain.compiler = find_compiler(options.compiler);
-  toolchain.cache = cache_directory(options.cache_directory);
+  toolchain.cache = os::cache_directory(options.cache_directory);
   toolchain.runtime = unpacked_runtime(toolchain.cache);
   toolchain.includes = include_flags(toolchain.compiler, toolchain.runtime);
   toolchain.code = code_flags(toolchain.compiler);

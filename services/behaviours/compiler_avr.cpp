@@ -31,7 +31,7 @@ class TemporaryFolder {
 };
 
 std::string required_tool(const char* name, const char* package) {
-  const fs::path path = find_executable(name);
+  const fs::path path = os::find_executable(name);
   if (path.empty()) throw UserError(std::string("no ") + name + " on this machine; apt-get install " + package);
   return path.string();
 }
@@ -52,10 +52,10 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
   check_sources(sources);
   const std::string gcc = required_tool("avr-gcc", "gcc-avr avr-libc");
   const std::string size = required_tool("avr-size", "binutils-avr");
-  const fs::path runtime = unpacked_runtime(cache_directory(options.cache_directory));
+  const fs::path runtime = unpacked_runtime(os::cache_directory(options.cache_directory));
   const TemporaryFolder folder;
   std::vector<std::string> link{gcc, "-mmcu=atmega328p", "-r", "-nostartfiles", "-Wl,-d"};
-  const ProgramText text = program_text(sources, cache_directory(options.cache_directory));
+  const ProgramText text = program_text(sources, os::cache_directory(options.cache_directory));
   for (const fs::path& source : text.files) {
     const std::string object = (folder.path() / (std::to_string(link.size()) + ".o")).string();
     std::vector<std::string> arguments{gcc,
@@ -72,16 +72,16 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
                                        (runtime / "kilolib").string()};
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
-    const ProcessResult result = run_process(arguments);
-    if (result.status != 0) throw UserError(first_error(result.errors, text.sources));
+    const os::ProcessResult result = run_compiler(arguments);
+    if (!result.end.well()) throw UserError(first_error(result.errors, text.sources));
     link.push_back(object);
   }
   // One object of all, with the variables that several files share and what is used of the C library; kilolib stays open.
   const std::string whole = (folder.path() / "program.o").string();
   link.insert(link.end(), {"-Wl,--start-group", "-lm", "-lc", "-lgcc", "-Wl,--end-group", "-o", whole});
-  const ProcessResult linked = run_process(link);
-  if (linked.status != 0) throw UserError(first_error(linked.errors, sources));
-  return parsed_size(run_process({size, whole}).output);
+  const os::ProcessResult linked = run_compiler(link);
+  if (!linked.end.well()) throw UserError(first_error(linked.errors, sources));
+  return parsed_size(run_compiler({size, whole}).output);
 }
 
 }  // namespace kilotwin::behaviours

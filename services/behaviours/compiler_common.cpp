@@ -1,7 +1,6 @@
 #include "services/behaviours/compiler_common.hpp"
 
 #include <algorithm>
-
 #include <optional>
 #include <sstream>
 #include <string_view>
@@ -32,10 +31,10 @@ fs::path unpacked_runtime(const fs::path& cache) {
   const fs::path folder = cache / ("runtime-" + content_hash.substr(0, 16));
   for (const RuntimeFile& file : runtime_files()) {
     const fs::path path = folder / file.name;
-    if (read_file(path) == file.text) continue;
+    if (os::read_if_there(path) == file.text) continue;
     std::error_code error;
     fs::create_directories(path.parent_path(), error);
-    if (!write_file(path, file.text)) throw RunError(path.string() + ": cannot be written; is the disk full?");
+    os::write_file(path, file.text);
   }
   return folder;
 }
@@ -108,6 +107,18 @@ std::optional<std::string> assembler_error(std::string_view line) {
   return std::string(place) + ":1: error: " + std::string(line.substr(at + kMark.size()));
 }
 
+/// Whether a line of a compiler says that one of its own programs has been killed, has run out of room or has failed within
+/// itself: gcc, collect2, clang, in the C locale.
+bool is_trouble_of_the_machine(std::string_view line) {
+  for (const std::string_view mark :
+       {"signal terminated program", "terminated with signal", "internal compiler error", "unable to execute command",
+        "command failed due to signal", "out of memory", "virtual memory exhausted", "Cannot allocate memory",
+        "No space left on device"}) {
+    if (line.find(mark) != std::string_view::npos) return true;
+  }
+  return false;
+}
+
 std::size_t linker_complaint(std::string_view line) {
   return std::min(line.find("undefined reference"), line.find("multiple definition"));
 }
@@ -145,6 +156,22 @@ std::optional<std::string> placeless_error(std::string_view line, const fs::path
 }
 
 }  // namespace
+
+os::ProcessResult run_compiler(const std::vector<std::string>& arguments) {
+  os::ProcessResult result = os::run_process(arguments);
+  if (result.end.signal != 0) {
+    throw RunError(arguments[0] + " was ended by " + os::signal_name(result.end.signal) +
+                   " while it compiled; is memory short? Run this command again");
+  }
+  if (result.end.well()) return result;
+  std::istringstream stream(result.errors);
+  for (std::string line; std::getline(stream, line);) {
+    // Lines of the source, which compilers repeat, are indented.
+    if (!line.empty() && line[0] != ' ' && is_trouble_of_the_machine(line))
+      throw RunError(arguments[0] + " failed: " + line + "; this is no error of the program: run this command again");
+  }
+  return result;
+}
 
 std::string first_error(const std::string& output, const std::vector<fs::path>& sources) {
   std::vector<std::string> lines;

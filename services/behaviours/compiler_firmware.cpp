@@ -13,9 +13,9 @@ namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
 
 CompiledProgram compile_firmware(const std::vector<fs::path>& sources, const CompileOptions& options) {
-  const fs::path gcc = find_executable("avr-gcc");
+  const fs::path gcc = os::find_executable("avr-gcc");
   if (gcc.empty()) throw UserError("no avr-gcc on this machine; apt-get install gcc-avr avr-libc binutils-avr");
-  const fs::path cache = cache_directory(options.cache_directory), runtime = unpacked_runtime(cache);
+  const fs::path cache = os::cache_directory(options.cache_directory), runtime = unpacked_runtime(cache);
   std::error_code error;
   fs::create_directories(cache / "firmware", error);
   std::string unfinished = (cache / "firmware" / "linking-XXXXXX").string();
@@ -42,13 +42,13 @@ CompiledProgram compile_firmware(const std::vector<fs::path>& sources, const Com
   for (const fs::path& source : sources) arguments.push_back(source.string());
   arguments.insert(arguments.end(), {(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(),
                                      "-lm", "-o", whole.string()});
-  const ProcessResult result = run_process(arguments);
-  const auto octets = read_file(whole);
+  const os::ProcessResult result = run_compiler(arguments);
+  const auto octets = os::read_if_there(whole);
   fs::remove_all(unfinished, error);
-  if (result.status != 0 || !octets) throw UserError(first_error(result.errors, sources));
+  if (!result.end.well() || !octets) throw UserError(first_error(result.errors, sources));
   const std::string sha256 = sha256_hex(*octets);
   const fs::path file = cache / "firmware" / (sha256 + ".elf");
-  if (!write_file(file, *octets)) throw RunError(file.string() + ": cannot be written; is the disk full?");
+  os::write_file(file, *octets);
   return {file, sha256, {}};
 }
 

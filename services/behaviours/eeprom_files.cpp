@@ -1,7 +1,6 @@
 #include "services/behaviours/eeprom_files.hpp"
 
 #include "core/os/files.hpp"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 
@@ -12,9 +11,8 @@ void write_eeproms(const BehavioursEngine& engine, Share share, const std::files
     if (eeprom == nullptr) continue;
     std::error_code ignored;
     std::filesystem::create_directories(directory, ignored);
-    const std::filesystem::path file = directory / (std::to_string(robot) + ".eeprom");
-    if (!write_file(file, {reinterpret_cast<const char*>(eeprom->data()), eeprom->size()}))  // NOLINT
-      throw RunError(file.string() + ": cannot be written");
+    os::write_file(directory / (std::to_string(robot) + ".eeprom"),
+                   {reinterpret_cast<const char*>(eeprom->data()), eeprom->size()});  // NOLINT
   }
 }
 

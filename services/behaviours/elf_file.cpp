@@ -199,6 +199,9 @@ class Parser {
          {table.boot, table.enter, table.call, table.leave, table.interrupts, table.transmit}) {
       require(executable(offset), "its table of functions is damaged");
     }
+    require(file_.data.contains(table.variables, 1), "its table of functions is damaged");
+    file_.pad = {file_.data.first, table.variables};
+    file_.data.first = table.variables;
     require(file_.data.contains(table.robot, sizeof(KtRobot)) && file_.data.contains(table.ticks, 4) &&
                 file_.data.contains(table.tx_period, 2) && file_.relro.contains(table.exchange, 8) &&
                 file_.relro.contains(table.surroundings, 8),
@@ -293,6 +296,14 @@ class Parser {
 }  // namespace
 
 ElfFile ElfFile::parse(std::string_view octets, const std::string& name) { return Parser(octets, name).parse(); }
+
+std::uint64_t ElfFile::unused_octets() const {
+  std::uint64_t last = 0;
+  for (const Segment& segment : segments) {
+    if (segment.writable) last = std::max(last, segment.range.last + kSlackOctets);
+  }
+  return page_up(last) - last;
+}
 
 std::string ElfFile::function_at(std::uint64_t offset) const {
   auto after = std::upper_bound(functions.begin(), functions.end(), offset,

@@ -38,6 +38,7 @@ class ElfFile {
   std::vector<Segment> segments;    ///< ascending, no page shared
   Range relro;                      ///< whole pages: read-only once relocated
   Range data;                       ///< what stays writable: a robot's globals and statics
+  Range pad;                        ///< directly before them, as writable but of no use
   Range heap;                       ///< behind them; empty where a program uses none
   std::vector<Range> kept;          ///< parts of data that outlive a reset: .noinit and EEMEM variables
   KtImage table{};                  ///< with offsets for addresses
@@ -45,13 +46,17 @@ class ElfFile {
 
   LineTables lines;
 
+  /// Octets from the end of all that is writable, slack included, to the end of its page.
+  [[nodiscard]] std::uint64_t unused_octets() const;
   /// The function that holds this offset, or "".
   [[nodiscard]] std::string function_at(std::uint64_t offset) const;
 };
 
-/// Memory beyond a robot's variables, for programs that write past the end of an array, as many do unnoticed on the robot. It
-/// is zero whenever a robot begins to run.
+/// Memory beyond a robot's variables and heap, for programs that write past the end of an array, as many do unnoticed on the
+/// robot. It is zero whenever a robot begins to run. The compiler places variables such that a page ends with it.
 inline constexpr std::uint64_t kSlackOctets = 256;
+/// Of the pad before the variables, the octets nearest to them are looked at whenever a robot has run.
+inline constexpr std::uint64_t kWatchedOctets = 64;
 inline constexpr std::uint64_t kPage = 4096;
 [[nodiscard]] constexpr std::uint64_t page_down(std::uint64_t at) { return at & ~(kPage - 1); }
 [[nodiscard]] constexpr std::uint64_t page_up(std::uint64_t at) { return page_down(at + kPage - 1); }

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "core/base/error.hpp"
+#include "core/base/message_crc.h"
 #include "core/base/state_hash.hpp"
 
 namespace kilotwin::behaviours {
@@ -18,17 +19,6 @@ constexpr std::int64_t kPatienceCycles = 8'000'000;
 constexpr std::size_t kAhead = 2;
 
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
-
-/// CRC-16/MCRF4XX over data and type.
-std::uint16_t message_crc(const IrMessage& message) {
-  std::uint32_t crc = 0xffff;
-  for (const std::uint8_t octet : message) {
-    std::uint32_t x = (octet ^ crc) & 0xff;
-    x = (x ^ x << 4) & 0xff;
-    crc = (crc >> 8 ^ x << 8 ^ x << 3 ^ x >> 4) & 0xffff;
-  }
-  return static_cast<std::uint16_t>(crc);
-}
 
 }  // namespace
 
@@ -99,7 +89,7 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
     const IrMessage& message = radio.messages[m];
     std::copy_n(message.begin(), 9, messages_[m].data);
     messages_[m].type = message[9];
-    messages_[m].crc = message_crc(message);
+    messages_[m].crc = kilotwin_message_crc(message.data());
   }
   receptions_.resize(radio.reception_robot.size());
   std::uint32_t next = 0;
@@ -253,6 +243,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   note_outputs(i, robot, executor.tx_period());
   if (thread.divided != 0) note_division(i, thread.divided, program, slot);
   robot.spin_up = 0;
+  if (!slot.clear_before_data()) return fail_robot(i, Fault{Fault::kBeforeVariables, 0, 0}, program, slot);
   if (!memory.copy_out(slot, executor.data_octets(), thread))
     fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
 }
@@ -345,6 +336,7 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
 }
 
 void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Program& program, const Slot& slot) {
+  static_cast<void>(slot.clear_before_data());  // the next robot there finds it as it was
   fail_robot(i, describe(fault, program, slot));
 }
 

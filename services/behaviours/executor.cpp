@@ -196,6 +196,8 @@ std::string describe(const Fault& fault, const Program& program, const Slot& slo
                                                                                        : "kilo_message_tx");
       text += ": it loops";
       break;
+    case SIGSYS: text = "system call " + std::to_string(fault.address) + ", which a robot does not have"; break;
+    case SIGTRAP: text = "breakpoint instruction"; break;
     case SIGILL: text = "illegal instruction (abort, or what the compiler knew to be undefined)"; break;
     case SIGSEGV:
     case SIGBUS:
@@ -203,6 +205,7 @@ std::string describe(const Fault& fault, const Program& program, const Slot& slo
                                                                                        : "access to address ";
       text += address;
       break;
+    case Fault::kBeforeVariables: return "a write before its first variable, by code of " + program.name;
     default: text = "stack pointer lost";
   }
   return text + place(fault.code, program, slot);

@@ -1,21 +1,25 @@
 #include "services/behaviours/faults.hpp"
 
 #include <asm/prctl.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <ucontext.h>
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
+#include <cstddef>
 #include <mutex>
 
 #include "services/behaviours/division.hpp"
+#include "services/behaviours/image.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 namespace {
 
-constexpr std::array<int, 4> kSignals{SIGSEGV, SIGBUS, SIGFPE, SIGILL};
+constexpr std::array<int, 7> kSignals{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGABRT};
 std::array<struct sigaction, kSignals.size()> previous_actions;
 
 thread_local RobotThread robot_thread{};
@@ -23,15 +27,21 @@ thread_local RobotThread robot_thread{};
 constexpr std::size_t kHandlerStackOctets = 64 * 1024;
 thread_local std::vector<std::uint8_t> handler_stack;
 
+/// As if no handler were here: the instruction faults again, or the signal comes again, and goes to whoever was here first.
+void pass_on(int signal, bool was_sent) {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    if (kSignals[i] == signal) sigaction(signal, &previous_actions[i], nullptr);
+  }
+  if (was_sent) raise(signal);  // arrives when the handler has returned
+}
+
 void handle(int signal, siginfo_t* info, void* context) {
   RobotThread& thread = robot_thread;
-  if (thread.leave == 0) {
-    // Not a robot's: as it was before, the instruction faults again and goes to whoever was here first.
-    for (std::size_t i = 0; i < kSignals.size(); ++i) {
-      if (kSignals[i] == signal) sigaction(signal, &previous_actions[i], nullptr);
-    }
-    return;
+  const bool was_sent = info->si_code <= 0;  // by a process, this one or another; faults have positive codes
+  if (was_sent && info->si_pid != getpid()) {
+    if (auto* const told = before_sent_signal.load()) told();
   }
+  if (was_sent || thread.leave == 0) return pass_on(signal, was_sent);
   ucontext_t& interrupted = *static_cast<ucontext_t*>(context);
   auto& registers = interrupted.uc_mcontext.gregs;
   const auto code = static_cast<std::uint64_t>(registers[REG_RIP]);
@@ -40,9 +50,13 @@ void handle(int signal, siginfo_t* info, void* context) {
     return;
   }
   thread.fault = {signal, reinterpret_cast<std::uint64_t>(info->si_addr), code};
-  // As the host has them: upwards in strings, rounding to nearest, no exceptions of floating-point arithmetic.
-  constexpr greg_t kDirectionFlag = 0x400;
-  registers[REG_EFL] &= ~kDirectionFlag;
+  // Of these two the instruction lies before the address.
+  if (signal == SIGSYS) thread.fault = {signal, static_cast<std::uint32_t>(info->si_syscall), code - 1};
+  if (signal == SIGTRAP) thread.fault = {signal, 0, code - 1};
+  // As the host has them: no trap after each instruction, upwards in strings, words at any address, rounding to nearest, no
+  // exceptions of floating-point arithmetic.
+  constexpr greg_t kTrapFlag = 0x100, kDirectionFlag = 0x400, kAlignmentCheck = 0x40000;
+  registers[REG_EFL] &= ~(kTrapFlag | kDirectionFlag | kAlignmentCheck);
   interrupted.uc_mcontext.fpregs->mxcsr = 0x1f80;
   interrupted.uc_mcontext.fpregs->cwd = 0x37f;
   interrupted.uc_mcontext.fpregs->ftw = 0;
@@ -59,6 +73,24 @@ RobotThread& own_thread() {
   return robot_thread;
 }
 
+/// System calls from robots' addresses become SIGSYS.
+void refuse_system_calls() {
+  constexpr std::uint32_t kLow = offsetof(seccomp_data, instruction_pointer), kHigh = kLow + 4;
+  std::array<sock_filter, 7> filter{{BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kHigh),
+                                     BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, 0, 0, 3),
+                                     BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kLow),
+                                     BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kFirstAddress, 0, 1),
+                                     BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kLastAddress, 0, 1),
+                                     BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+                                     BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP)}};
+  const sock_fprog program{filter.size(), filter.data()};
+  // Without the last flag older kernels would slow this process down, as if it ran strangers' code by speculation.
+  if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0) {
+    syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_TSYNC | SECCOMP_FILTER_FLAG_SPEC_ALLOW,
+            &program);
+  }
+}
+
 void install_handlers() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     struct sigaction action {};
@@ -66,6 +98,7 @@ void install_handlers() {
     action.sa_flags = SA_SIGINFO | SA_ONSTACK;
     KILOTWIN_DEMAND(sigaction(kSignals[i], &action, &previous_actions[i]) == 0);
   }
+  refuse_system_calls();
 }
 
 }  // namespace

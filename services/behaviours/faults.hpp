@@ -1,6 +1,7 @@
 /// Robots' code runs inside this process. What faults there costs the robot, not the process.
 #pragma once
 
+#include <atomic>
 #include <csignal>
 #include <cstdint>
 #include <vector>
@@ -10,10 +11,16 @@
 namespace kilotwin::behaviours {
 
 struct Fault {
-  /// Besides the signals SIGSEGV, SIGBUS, SIGFPE and SIGILL:
-  enum Other : int { kNone = 0, kEndlessLoop = -1, kCallbackOverrun = -2, kStackLost = -3 };
+  /// Besides the signals SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP and SIGSYS:
+  enum Other : int {
+    kNone = 0,
+    kEndlessLoop = -1,
+    kCallbackOverrun = -2,
+    kStackLost = -3,
+    kBeforeVariables = -4  ///< it has written before its first variable
+  };
   int signal = kNone;
-  std::uint64_t address = 0;  ///< that could not be accessed
+  std::uint64_t address = 0;  ///< that could not be accessed; of SIGSYS the number of the system call
   std::uint64_t code = 0;     ///< address of the instruction
 };
 
@@ -24,8 +31,14 @@ struct RobotThread : KtThread {
   Fault fault;
 };
 
+/// What is called, in a signal handler, before a signal that another process has sent ends this one: which robot runs at that
+/// moment is chance. One for all of this process.
+inline std::atomic<void (*)()> before_sent_signal{nullptr};
+
 /// While one exists on a thread, that thread may run robots' code. Installs the handlers of the process once (handlers that
-/// were there before keep every fault that is not a robot's) and gives the thread a stack for them.
+/// were there before keep every fault that is not a robot's) and gives the thread a stack for them. From then on the system
+/// refuses every call that an instruction at the addresses of robots' programs makes, in this process and what it starts:
+/// such an instruction faults. A system without seccomp filters does not; a program may then end the process.
 class FaultGuard {
  public:
   FaultGuard();

@@ -2,7 +2,9 @@
 /// stack are valid in every process, on every machine and after every checkpoint.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -42,6 +44,13 @@ class Slot {
   }
   /// A robot's data; behind them its heap.
   [[nodiscard]] std::uint8_t* data() const { return at<std::uint8_t*>(data_offset_); }
+  /// Whether the octets before a robot's data are zero, as they were; makes them so.
+  [[nodiscard]] bool clear_before_data() const {
+    std::uint64_t any = 0;
+    for (std::uint64_t i = 1; i <= watched_words_; ++i) any |= reinterpret_cast<const std::uint64_t*>(data())[-static_cast<std::int64_t>(i)];  // NOLINT
+    if (any != 0) std::memset(data() - 8 * watched_words_, 0, 8 * watched_words_);
+    return any == 0;
+  }
   /// One past the highest octet of the main stack; aligned to 16.
   [[nodiscard]] std::uint64_t stack_top() const { return stack_top_; }
   [[nodiscard]] std::uint64_t interrupt_stack_top() const { return interrupt_stack_top_; }
@@ -52,7 +61,7 @@ class Slot {
   std::mutex mutex;  ///< held while robots run here
 
  private:
-  std::uint64_t address_, size_, stack_top_, interrupt_stack_top_, surroundings_, exchange_, image_, data_offset_;
+  std::uint64_t address_, size_, stack_top_, interrupt_stack_top_, surroundings_, exchange_, image_, data_offset_, watched_words_;
   std::vector<std::uint8_t> initial_data_;
 };
 

@@ -25,7 +25,7 @@ std::shared_ptr<ProgramSet> ProgramSet::load(const RunPlan& plan, const std::fil
   for (const kilotwin::Program& program : plan.programs()) {
     if (program.firmware) continue;
     const std::filesystem::path path = run_directory / "programs" / program.file();
-    const auto octets = read_file(path);
+    const auto octets = os::read_if_there(path);
     if (!octets) {
       throw UserError(path.string() + ": cannot be read; the run directory must hold the programs of its manifest");
     }

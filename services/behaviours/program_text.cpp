@@ -180,7 +180,7 @@ class Preparation {
     const fs::path key = normal(file);
     if (const auto known = done_.find(key); known != done_.end()) return known->second;
     done_.emplace(key, file);  // for headers that include each other
-    const auto text = read_file(file);
+    const auto text = os::read_if_there(file);
     if (!text) return file;
     std::vector<std::pair<Include, std::string>> changes, fixed;
     for (const Include& include : includes_of(*text)) {
@@ -204,8 +204,7 @@ class Preparation {
     const fs::path kept = cache_ / "sources" / (sha256_hex(copy) + file.extension().string());
     std::error_code error;
     fs::create_directories(kept.parent_path(), error);
-    if (!is_file(kept) && !write_file(kept, copy))
-      throw RunError(kept.string() + ": cannot be written; is the disk full?");
+    if (!is_file(kept)) os::write_file(kept, copy);
     return done_[key] = kept;
   }
 
@@ -233,7 +232,7 @@ class Preparation {
     for (const Vendored& header : vendored_headers()) {
       if (base != header.name) continue;
       if (!there) return named.has_parent_path() && !include.name.starts_with("argos3/") ? "<" + base + ">" : "";
-      const std::string text = read_file(target).value_or("");
+      const std::string text = os::read_if_there(target).value_or("");
       for (const char* word : header.words) {
         if (text.find(word) == std::string::npos) continue;
         note((file.parent_path() / named).lexically_normal().string() +
@@ -281,7 +280,7 @@ ProgramText program_text(const std::vector<fs::path>& sources, const fs::path& c
   ProgramText result;
   Preparation preparation(result, cache);
   for (const fs::path& source : sources) {
-    if (sources.size() > 1 && is_kilolib_source(source, read_file(source).value_or(""))) {
+    if (sources.size() > 1 && is_kilolib_source(source, os::read_if_there(source).value_or(""))) {
       preparation.note(source.string() + ": left aside; programs are linked with Kilotwin's own kilolib");
       continue;
     }
@@ -350,7 +349,7 @@ std::vector<fs::path> sources_with(const std::set<std::string>& missing, const P
   };
   for (const fs::path& candidate : sources_around(text)) {
     if (open.empty()) break;
-    const std::string original = read_file(candidate).value_or("");
+    const std::string original = os::read_if_there(candidate).value_or("");
     if (original.size() > kMostOctets || is_kilolib_source(candidate, original)) continue;
     const std::string code = code_of(original);
     if (!std::regex_search(code, kMain) && !take(candidate, code)) without.push_back(candidate);

@@ -1,5 +1,7 @@
 #include "services/behaviours/robot_warnings.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <map>
@@ -160,13 +162,13 @@ std::vector<std::string> narrow_products(const std::string& gimple) {
 }
 
 std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, const CompileOptions& options) {
-  const std::string avr = find_executable("avr-gcc").string(), host = find_executable("gcc").string();
+  const std::string avr = os::find_executable("avr-gcc").string(), host = os::find_executable("gcc").string();
   if (avr.empty() || host.empty()) return {};
-  const fs::path cache = cache_directory(options.cache_directory);
+  const fs::path cache = os::cache_directory(options.cache_directory);
   const fs::path runtime = unpacked_runtime(cache);
   const ProgramText text = program_text(sources, cache);
   std::vector<std::string> result;
-  const fs::path dump = cache / ("gimple." + std::to_string(std::hash<std::string>{}(sources.front().string())));
+  const fs::path dump = cache / ("gimple." + std::to_string(getpid()) + '.' + std::to_string(std::hash<std::string>{}(sources.front().string())));
   for (std::size_t i = 0; i < text.files.size(); ++i) {
     if (is_cpp(text.files[i])) continue;
     Arguments shared{"-std=gnu11", "-funsigned-char", "-fpack-struct", "-fshort-enums", "-DF_CPU=8000000"};
@@ -178,16 +180,16 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
     Arguments on_host{host, "-fsyntax-only", "-nostdinc"};
     on_robot.insert(on_robot.end(), shared.begin(), shared.end());
     on_host.insert(on_host.end(), shared.begin(), shared.end());
-    std::string own = run_process({host, "-print-file-name=include"}).output;
+    std::string own = run_compiler({host, "-print-file-name=include"}).output;
     while (!own.empty() && own.back() == '\n') own.pop_back();
     on_host.insert(on_host.end(), {"-isystem", (runtime / "libc").string(), "-isystem", own, "-include",
                                    (runtime / "machine.h").string()});
     on_robot.push_back(text.files[i].string());
     on_host.push_back(text.files[i].string());
-    const ProcessResult robot = run_process(on_robot);
-    if (robot.status != 0) continue;
+    const os::ProcessResult robot = run_compiler(on_robot);
+    if (!robot.end.well()) continue;
     std::set<std::string> alike;
-    for (const Diagnostic& found : diagnostics(run_process(on_host).errors))
+    for (const Diagnostic& found : diagnostics(run_compiler(on_host).errors))
       alike.insert(found.file + ':' + found.line + found.option);
     std::set<std::string> lines;
     for (const Diagnostic& found : diagnostics(robot.errors)) {
@@ -197,7 +199,7 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
       result.push_back(place + ':' + found.column +
                        ": warning: on the robot (int 16 bits, double 32): " + readable(found.text));
     }
-    const auto gimple = read_file(dump);
+    const auto gimple = os::read_if_there(dump);
     std::error_code error;
     fs::remove(dump, error);
     if (!gimple) continue;

@@ -4,17 +4,29 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstring>
 #include <new>
 
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
+#include "services/behaviours/faults.hpp"
 
 namespace kilotwin::behaviours {
 namespace {
 
 using Running = BehavioursEngine::Running;
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free);
+
+/// The notes of this process that tell of running programs, for the signal handler.
+std::array<std::atomic<Running*>, 64> noted{};
+
+/// A signal that came from outside is no robot's doing.
+void clear_notes() {
+  for (const auto& place : noted) {
+    if (Running* const running = place.load()) running->robot.store(BehavioursEngine::kNobody);
+  }
+}
 
 std::filesystem::path note_of(const std::filesystem::path& run_directory, HostId host) {
   return run_directory / ("running-" + std::to_string(host.value() + 1));
@@ -31,16 +43,25 @@ RunningNote::RunningNote(const std::filesystem::path& run_directory, HostId host
   if (file >= 0) close(file);
   if (mapped == MAP_FAILED) throw RunError(path_.string() + ": cannot be written; is the disk full?");
   place_ = new (mapped) Running;
+  for (auto& free : noted) {
+    Running* none = nullptr;
+    if (free.compare_exchange_strong(none, place_)) break;
+  }
+  before_sent_signal = clear_notes;
 }
 
 RunningNote::~RunningNote() {
+  for (auto& own : noted) {
+    Running* here = place_;
+    if (own.compare_exchange_strong(here, nullptr)) break;
+  }
   munmap(static_cast<void*>(place_), sizeof(Running));
   unlink(path_.c_str());
 }
 
 std::optional<Culprit> take_note(const std::filesystem::path& run_directory, HostId host) {
   const std::filesystem::path path = note_of(run_directory, host);
-  const auto octets = read_file(path);
+  const auto octets = os::read_if_there(path);
   unlink(path.c_str());
   if (!octets || octets->size() != sizeof(Running)) return std::nullopt;
   Culprit culprit;

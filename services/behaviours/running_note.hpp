@@ -27,7 +27,8 @@ struct Culprit {
   std::uint32_t robot = 0;
   Tick tick;  ///< of the step in which its program was running
 };
-/// Whose program was running when a host ended; nobody where it was between programs. Removes the note.
+/// Whose program was running when a host ended; nobody where it was between programs, or was ended by a signal that another
+/// process had sent. Removes the note.
 [[nodiscard]] std::optional<Culprit> take_note(const std::filesystem::path& run_directory, HostId host);
 
 }  // namespace kilotwin::behaviours

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "core/base/message_crc.h"
+
 namespace kilotwin::comm {
 namespace {
 
@@ -10,15 +12,7 @@ constexpr std::size_t kStopBit = kBitsPerOctet - 1;
 
 }  // namespace
 
-std::uint16_t message_crc(const IrMessage& message) {
-  std::uint32_t crc = 0xffff;
-  for (const std::uint8_t octet : message) {
-    std::uint32_t x = (octet ^ crc) & 0xff;
-    x = (x ^ x << 4) & 0xff;
-    crc = (crc >> 8 ^ x << 8 ^ x << 3 ^ x >> 4) & 0xffff;
-  }
-  return static_cast<std::uint16_t>(crc);
-}
+std::uint16_t message_crc(const IrMessage& message) { return kilotwin_message_crc(message.data()); }
 
 PacketBits packet_bits(const IrMessage& message) {
   std::array<std::uint8_t, 13> octets{};

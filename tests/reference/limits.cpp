@@ -10,7 +10,7 @@
 #include "core/experiment/fields.hpp"
 #include "core/experiment/limits.hpp"
 #include "services/behaviours/image.hpp"
-#include "services/behaviours/robot_logs.hpp"
+#include "core/logs/robot_logs.hpp"
 
 namespace kilotwin::reference {
 namespace {
@@ -62,8 +62,8 @@ std::string limits_table() {
       "services/behaviours/image.hpp");
   row("copies of a program in memory: robots of one program that run at the same time", number(behaviours::kSlots),
       "services/behaviours/image.hpp");
-  row("log file of a robot", fmt::format("{} MiB", behaviours::RobotLogs::kMostOctets >> 20),
-      "services/behaviours/robot_logs.hpp");
+  row("log file of a robot", fmt::format("{} MiB", RobotLogs::kMostOctets >> 20),
+      "core/logs/robot_logs.hpp");
   row("record of a recording", fmt::format("{} MiB", recorder::kLongestRecord_bytes >> 20),
       "clients/recorder/recording.hpp");
   row("runs of a sweep", number(cli::kMostSweepRuns), "clients/cli/sweep_points.hpp");

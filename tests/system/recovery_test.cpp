@@ -48,10 +48,8 @@ class Recoveries : public testing::Test {
   Scratch scratch;
 };
 
-/// By the system calls gettid and tkill: a wild pointer does not hit the host for certain.
-constexpr const char* kKillHost =
-    "long p; __asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(186) : \"rcx\", \"r11\", \"memory\");\n"
-    "__asm__ volatile(\"syscall\" : \"=a\"(p) : \"a\"(200), \"D\"(p), \"S\"(6) : \"rcx\", \"r11\", \"memory\");";
+/// It loses the register by which the way back to the host is found: a wild pointer does not hit the host for certain.
+constexpr const char* kKillHost = "__asm__ volatile(\"mov %0, %%gs\" : : \"r\"(0));";
 
 TEST_F(Recoveries, ACrashedHostFailsTheRobotThatCausedItAlone) {
   const std::string kills = behaviour("kills", kKillHost), faults = behaviour("faults", "*(volatile int*)8 = 1;");
@@ -179,6 +177,47 @@ TEST_F(Recoveries, ExternalInputIsRepeated) {
     EXPECT_EQ(inputs, 1);
     const Outcome replayed = kilotwin({"replay", scratch / name, "--verify"}, scratch);
     EXPECT_EQ(replayed.status, 0) << replayed.err;
+  }
+}
+
+TEST_F(Recoveries, FirmwareRobotsLogsAreThoseOfOneRun) {
+  // Robot 3, native, brings down its host at about 1.9 s. The others are firmware, and print from the first second on.
+  std::ofstream(scratch / "talk.c") << "#define DEBUG\n#include <kilolib.h>\n#include <debug.h>\n"
+                                       "static void setup(void) { printf(\"robot %u\\n\", kilo_uid); }\n"
+                                       "static void loop(void) { static uint32_t next = 0;\n"
+                                       "  if (kilo_ticks >= next) { printf(\"at %lu\\n\", (unsigned long)next); next += 15; } }\n"
+                                       "int main(void) { kilo_init(); debug_init(); kilo_start(setup, loop); return 0; }\n";
+  const auto logs_of = [&](const std::string& action, const std::string& name, const Words& more) {
+    std::ofstream(scratch / (name + ".txtpb"))
+        << "duration_s: 5 robots { count: 3 behaviour: \"talk.c\" avr: true layout { grid { pitch_mm: 50 } } }\n"
+           "robots { count: 1 behaviour: \"" << behaviour(name, action) << "\" layout { x_mm: 250 } }\n";
+    Words words{scratch / (name + ".txtpb")};
+    words.insert(words.end(), more.begin(), more.end());
+    const auto summary = run(words, scratch, name);
+    EXPECT_EQ(summary.robots_failed, 1u);
+    std::vector<std::string> logs{std::to_string(summary.recoveries)};
+    for (int robot = 0; robot < 3; ++robot)
+      logs.push_back(read(scratch.path() / name / "logs" / ("robot-0000" + std::to_string(robot) + ".txt")));
+    return logs;
+  };
+  auto whole = logs_of("*(volatile int*)8 = 1;", "whole", {"--mode", "local"});
+  EXPECT_NE(whole[1].find("at 0\n"), std::string::npos) << whole[1];
+  EXPECT_NE(whole[1].find("at 120\n"), std::string::npos) << whole[1];
+  whole[0] = "1";
+  EXPECT_EQ(logs_of(kKillHost, "saving", {"--mode", "local", "--checkpoint-every", "0.5"}), whole);
+  EXPECT_EQ(logs_of(kKillHost, "federated", {"--partitions", "1x1", "--checkpoint-every", "0.5"}), whole);
+}
+
+TEST_F(Recoveries, SystemCallsFailTheirRobotAlone) {
+  // exit_group(0), by which a program would end the whole run with status 0.
+  const std::string ends = behaviour(
+      "ends", "__asm__ volatile(\"syscall\" : : \"a\"(231), \"D\"(0) : \"rcx\", \"r11\", \"memory\");");
+  const auto failed = outcome("failed", behaviour("faults", "*(volatile int*)8 = 1;"), {"--mode", "local"});
+  for (const Words& words : {Words{"--mode", "local"}, Words{"--partitions", "1x1"}}) {
+    const auto ended = outcome("ended" + words[0], ends, words);
+    EXPECT_EQ(ended.robots_failed, 1u);
+    EXPECT_EQ(ended.recoveries, 0u);
+    EXPECT_EQ(ended.state_hash, failed.state_hash);
   }
 }
 

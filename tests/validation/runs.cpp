@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "core/base/error.hpp"
@@ -84,7 +84,7 @@ std::vector<Recorded> Runs::sweep(const std::string& experiment, const std::vect
   std::vector<std::string> all{"sweep", experiment, "--out", out.string()};
   all.insert(all.end(), words.begin(), words.end());
   if (!run(all, log))
-    throw RunError(fmt::format("kilotwin sweep {} failed; it said: {}", experiment, recorder::read_file(log)));
+    throw RunError(fmt::format("kilotwin sweep {} failed; it said: {}", experiment, os::read_file(log)));
   std::vector<std::pair<std::pair<std::string, std::uint64_t>, fs::path>> found;  // by point, then seed
   for (const fs::directory_entry& entry : fs::directory_iterator(out)) {
     if (!fs::exists(entry.path() / "summary.json")) continue;

@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "clients/identify/data/measured_set.hpp"
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/csv/csv_writer.hpp"
@@ -161,13 +161,13 @@ void import_set(const fs::path& from, const fs::path& to) {
   }
   std::error_code error;
   fs::create_directories(to, error);
-  recorder::write_file(
+  os::write_file(
       to / "trajectories.csv",
       (is_ark_log(files.front()) ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") +
           text);
   for (const char* name : {"commands.csv", "commands.csv.gz"}) {
     fs::remove(to / name, error);
-    if (fs::exists(from / name, error)) recorder::write_file(to / name, recorder::read_file(from / name));
+    if (fs::exists(from / name, error)) os::write_file(to / name, os::read_file(from / name));
   }
 }
 

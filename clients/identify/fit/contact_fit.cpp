@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/os/worker_pool.hpp"
+
 #include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/fit/wall_detection.hpp"
 
@@ -148,7 +150,7 @@ void Fitter::fit_contact_noise(MotionModel& model) const {
 
 double Fitter::persistent_push_mm2_s(const MotionModel& model, const std::vector<const TrackView*>& tracks) const {
   std::vector<ContactPushes> pushes(tracks.size(), ContactPushes(model.noise.position_mm2));
-  in_parallel(tracks.size(), threads_, [&](std::size_t i) {
+  os::in_parallel(tracks.size(), threads_, [&](std::size_t i) {
     RobotBias bias = model.bias_of(tracks[i]->track->robot);
     bias.covariance.setZero();
     TrackFilter filter(model, bias, tracks[i]->track->robot, tracks[i]->number);

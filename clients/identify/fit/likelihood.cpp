@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "clients/identify/fit/fitter.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 
@@ -21,7 +22,7 @@ LogLikelihood likelihood_of(const MotionModel& model, const TrackView& view, boo
 double Fitter::log_likelihood_with_contacts(const MotionModel& model,
                                             const std::vector<const TrackView*>& tracks) const {
   std::vector<double> sums(tracks.size());
-  in_parallel(tracks.size(), threads_,
+  os::in_parallel(tracks.size(), threads_,
               [&](std::size_t i) { sums[i] = likelihood_of(model, *tracks[i], true).sum; });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
@@ -29,7 +30,7 @@ double Fitter::log_likelihood_with_contacts(const MotionModel& model,
 double Fitter::log_likelihood(const MotionModel& model) const {
   const std::vector<TrackView>& views = set_.views();
   std::vector<double> sums(views.size());
-  in_parallel(views.size(), threads_, [&](std::size_t i) {
+  os::in_parallel(views.size(), threads_, [&](std::size_t i) {
     if (views[i].track->held_out) return;
     sums[i] = likelihood_of(model, views[i]).sum;
   });

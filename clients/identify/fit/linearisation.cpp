@@ -2,12 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <atomic>
 #include <functional>
-#include <thread>
 
 #include "clients/identify/fit/contact_gate.hpp"
 #include "clients/identify/fit/products.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -307,21 +306,10 @@ class Sensitivities {
 
 }  // namespace
 
-void in_parallel(std::size_t count, std::uint32_t threads, const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next{0};
-  const auto run = [&] {
-    for (std::size_t i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::thread> others;
-  for (std::uint32_t t = 1; t < threads; ++t) others.emplace_back(run);
-  run();
-  for (std::thread& other : others) other.join();
-}
-
 std::vector<Unit> linearise(const MotionModel& model, const std::vector<std::vector<const TrackView*>>& units,
                             const std::vector<Block>& blocks, const LineariseOptions& options) {
   std::vector<Unit> out(units.size());
-  in_parallel(units.size(), options.threads, [&](std::size_t u) {
+  os::in_parallel(units.size(), options.threads, [&](std::size_t u) {
     Sensitivities sums(model, blocks, options);
     RobotBias bias;
     for (const TrackView* view : units[u]) {

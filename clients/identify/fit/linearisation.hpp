@@ -42,7 +42,4 @@ struct LineariseOptions {
                                           const std::vector<std::vector<const TrackView*>>& units,
                                           const std::vector<Block>& blocks, const LineariseOptions&);
 
-/// Runs `work(i)` for i = 0..count-1 on `threads` threads.
-void in_parallel(std::size_t count, std::uint32_t threads, const std::function<void(std::size_t)>& work);
-
 }  // namespace kilotwin::identify

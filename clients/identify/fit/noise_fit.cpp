@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "clients/identify/fit/linearisation.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -229,7 +230,7 @@ class Climb {
     std::vector<NoiseVector> variance;
     for (const NoiseVector& logs : at) variance.push_back(variances(logs));
     std::vector<std::vector<double>> of_paths(paths_.size(), std::vector<double>(at.size()));
-    in_parallel(paths_.size(), threads_, [&](std::size_t p) {
+    os::in_parallel(paths_.size(), threads_, [&](std::size_t p) {
       for (std::size_t i = 0; i < at.size(); ++i) of_paths[p][i] = log_likelihood(paths_[p], variance[i]);
     });
     std::vector<double> sums(at.size());
@@ -273,7 +274,7 @@ Noise most_likely_noise(const MotionModel& start, const std::vector<const TrackV
   constexpr double kSettled = 0.1;  // in the logarithm; the paths are then consistent with the variances
   for (int round = 0; round < kMostRounds; ++round) {
     std::vector<Path> paths(tracks.size());
-    in_parallel(tracks.size(), threads, [&](std::size_t i) { paths[i] = path_of(model, *tracks[i]); });
+    os::in_parallel(tracks.size(), threads, [&](std::size_t i) { paths[i] = path_of(model, *tracks[i]); });
     const Climb climb(paths, has_headings, threads);
     const NoiseVector before = logs_of(model.noise);
     NoiseVector at = before;

@@ -9,6 +9,7 @@
 #include "clients/identify/fit/linearisation.hpp"
 #include "clients/identify/model/camera_scale.hpp"
 #include "clients/identify/model/visited_boundary.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 
@@ -45,7 +46,7 @@ std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
 
 void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) {
   std::vector<Centres> centres(views_.size());
-  in_parallel(views_.size(), threads, [&](std::size_t v) { centres[v] = centres_of(model, views_[v]); });
+  os::in_parallel(views_.size(), threads, [&](std::size_t v) { centres[v] = centres_of(model, views_[v]); });
   centres_.clear();
   for (std::size_t r = 0; r < neighbours_.size(); ++r) {
     // A track too short for the filter uses its measured positions.
@@ -106,7 +107,7 @@ std::vector<RobotPair> PreparedSet::pairs() const {
 }
 
 void PreparedSet::find_headings(const MotionModel& model, std::uint32_t threads) {
-  in_parallel(views_.size(), threads, [&](std::size_t v) {
+  os::in_parallel(views_.size(), threads, [&](std::size_t v) {
     TrackView& view = views_[v];
     const Sample& first = view.track->samples.front();
     if (TrackFilter::has_heading(first)) {

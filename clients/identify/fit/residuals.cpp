@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/os/worker_pool.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -58,7 +60,7 @@ template <class Of> std::pair<double, double> range_of(const std::vector<Disturb
 
 std::vector<Disturbance> disturbances_of(const MotionModel& model, const PreparedSet& set, std::uint32_t threads) {
   std::vector<std::vector<Disturbance>> parts(set.views().size());
-  in_parallel(parts.size(), threads, [&](std::size_t v) {
+  os::in_parallel(parts.size(), threads, [&](std::size_t v) {
     const TrackView& view = set.views()[v];
     RobotBias bias = model.bias_of(view.track->robot);
     bias.covariance.setZero();

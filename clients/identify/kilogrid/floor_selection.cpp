@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "clients/identify/kilogrid/floor_evidence.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -151,7 +152,7 @@ Selection choose(const FloorModel& model, const std::vector<FloorTerm>& candidat
   const Eigen::MatrixXd correlation = correlation_of(sets);
 
   std::vector<std::optional<Gains>> made(sets.size());
-  in_parallel(target.threads(), sets.size(), [&](std::size_t b) {
+  os::in_parallel(sets.size(), target.threads(), [&](std::size_t b) {
     made[b].emplace(FloorMisfit(sets[b], others_than(sets, b), slopes, correlation), of, candidates.size(), box);
   });
   double all_by_chance = 0;

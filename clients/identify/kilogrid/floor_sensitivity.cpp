@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "clients/identify/kilogrid/fast_swarm.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -148,7 +149,7 @@ void add_points(FloorPoints& points, const FloorModel& model, const FloorTarget&
     points.run.push_back(i % runs);
   }
   points.said.resize(before + more);
-  in_parallel(target.threads(), more, [&](std::size_t i) {
+  os::in_parallel(more, target.threads(), [&](std::size_t i) {
     const std::size_t run = points.run[before + i];
     points.said[before + i] =
         statistics_of(sums_at(target, model.settings(points.values[before + i]), run, longest_s, seed * 1000 + run))
@@ -209,12 +210,12 @@ void add_slopes_of_switches(Eigen::MatrixXd& slopes, const FloorModel& model, co
                     runs = scenes * std::max<std::size_t>(static_cast<std::size_t>(kRobotTime_s / robot_time_s), 1);
   const std::size_t statistics = statistic_count();
   std::vector<std::vector<RobotSums>> none(runs);
-  in_parallel(target.threads(), runs, [&](std::size_t i) {
+  os::in_parallel(runs, target.threads(), [&](std::size_t i) {
     none[i] = sums_at(target, model.settings(), i % scenes, longest_s, seed * 1000 + 500 + i);
   });
   Pooled without(statistics);
   for (const auto& run : none) without.add(run);
-  in_parallel(target.threads(), switches.size(), [&](std::size_t k) {
+  os::in_parallel(switches.size(), target.threads(), [&](std::size_t k) {
     const std::size_t p = switches[k];
     // Two-sided amplitudes are nearly linear, so a longer step has a better ratio of signal to noise.
     std::vector<double> values = model.values;

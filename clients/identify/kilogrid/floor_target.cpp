@@ -1,13 +1,12 @@
 #include "clients/identify/kilogrid/floor_target.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <thread>
 
 #include "clients/identify/kilogrid/fast_swarm.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -72,16 +71,6 @@ std::vector<std::vector<RobotSums>> sums_of(const std::vector<FloorRun>& runs, c
 }
 
 }  // namespace
-
-void in_parallel(std::uint32_t threads_to_use, std::size_t n, const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next{0};
-  std::vector<std::jthread> threads;
-  for (std::uint32_t t = 0; t < threads_to_use; ++t) {
-    threads.emplace_back([&] {
-      for (std::size_t i = next++; i < n; i = next++) work(i);
-    });
-  }
-}
 
 std::vector<UnlikeRun> unlike_runs(const std::vector<FloorRun>& runs, const Floor& floor) {
   std::vector<FloorStatistics> each;
@@ -180,7 +169,7 @@ std::vector<FloorRun> simulate_scenes(const FloorTarget& target, const FloorSett
                                       int repeats) {
   const std::size_t scenes = target.scenes().size();
   std::vector<FloorRun> runs(scenes * static_cast<std::size_t>(repeats));
-  in_parallel(target.threads(), runs.size(), [&](std::size_t i) {
+  os::in_parallel(runs.size(), target.threads(), [&](std::size_t i) {
     runs[i] = simulate(target.scenes()[i % scenes], target.floor(), settings.model, settings.times, settings.radio,
                        seed * 100 + i);
   });
@@ -191,7 +180,7 @@ std::vector<std::vector<RobotSums>> simulated_sums(const FloorTarget& target, co
                                                    std::uint64_t seed, int repeats, Simulator by) {
   const std::size_t scenes = target.scenes().size();
   std::vector<std::vector<RobotSums>> sums(scenes * static_cast<std::size_t>(repeats));
-  in_parallel(target.threads(), sums.size(), [&](std::size_t i) {
+  os::in_parallel(sums.size(), target.threads(), [&](std::size_t i) {
     const FloorScene& scene = target.scenes()[i % scenes];
     const FloorRun run = by == Simulator::kQuick ? simulate_fast(scene, target.floor(), settings, seed * 100 + i)
                                                  : simulate(scene, target.floor(), settings.model, settings.times,

@@ -66,9 +66,6 @@ class FloorTarget {
   std::array<double, 4> later_;
 };
 
-/// Calls work(0) ... work(n - 1) on several threads.
-void in_parallel(std::uint32_t threads, std::size_t n, const std::function<void(std::size_t)>& work);
-
 /// One simulated run per scene, `repeats` times.
 [[nodiscard]] std::vector<FloorRun> simulate_scenes(const FloorTarget&, const FloorSettings&, std::uint64_t seed,
                                                     int repeats = 1);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "clients/identify/kilogrid/floor_classifier.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -104,7 +105,7 @@ json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& u
   const std::size_t days = pairs.size(), runs = test.size();
   for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_before[i]});
   for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_after[i]});
-  in_parallel(held_out.threads(), pairs.size(),
+  os::in_parallel(pairs.size(), held_out.threads(),
               [&](std::size_t i) { pairs[i].result = classifier_test(*pairs[i].a, *pairs[i].b); });
 
   MeanArea all_days, days_alike, mean_before, mean_after;

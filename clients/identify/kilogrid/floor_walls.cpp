@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "clients/identify/kilogrid/fast_swarm.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::kilogrid {
 namespace {
@@ -57,7 +58,7 @@ NullWalls by_chance(const FloorModel& model, const FloorTarget& target, int roun
     return FloorSet(std::move(runs));
   };
   std::vector<double> gains(kSets), left(kSets);
-  in_parallel(target.threads(), kSets, [&](std::size_t b) {
+  os::in_parallel(kSets, target.threads(), [&](std::size_t b) {
     const std::uint64_t own = 10 * b;
     const Fitted walls = fitted(model, sums(model, own), rounds, [&](const FloorModel& of, std::uint64_t number) {
       return sums(of, own + 1 + number).statistics;

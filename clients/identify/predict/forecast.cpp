@@ -9,6 +9,7 @@
 #include "clients/identify/fit/filter_bank.hpp"
 #include "clients/identify/predict/rollout.hpp"
 #include "clients/identify/predict/run_amplitude.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -329,7 +330,7 @@ std::vector<Forecast> forecast(const MotionModel& model, const PreparedSet& set,
   const bool effects_of_neighbours = looks_at_neighbours(model),
              neighbours =
                  effects_of_neighbours || model.contacts || TrafficGrids(model).any() || Edges(model).any();
-  in_parallel(runs.size(), threads, [&](std::size_t run) {
+  os::in_parallel(runs.size(), threads, [&](std::size_t run) {
     std::vector<const TrackView*> views;
     double last_s = 0;
     bool wanted = false;

@@ -5,6 +5,7 @@
 
 #include "clients/identify/fit/likelihood.hpp"
 #include "clients/identify/fit/linearisation.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet& set, std::uint32_t threads) {
   set.find_headings(model, threads);
   std::vector<double> sums(set.views().size());
-  in_parallel(sums.size(), threads, [&](std::size_t v) {
+  os::in_parallel(sums.size(), threads, [&](std::size_t v) {
     const TrackView& view = set.views()[v];
     TrackFilter filter(model, model.bias_of(view.track->robot), view.track->robot, view.number);
     LogLikelihood likelihood;

@@ -8,6 +8,7 @@
 
 #include "clients/identify/replay/replay.hpp"
 #include "clients/identify/replay/track_statistics.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -179,7 +180,7 @@ json simulation_check(const WrittenModel& base, const WrittenModel& full, Prepar
   // Base model with each seed first, then the full model. Without effects both are one.
   const std::size_t first_full = full.fitted.terms.empty() ? 0 : seeds;
   std::vector<Tallies> simulated(first_full + seeds, none);
-  in_parallel(simulated.size(), threads, [&](std::size_t k) {
+  os::in_parallel(simulated.size(), threads, [&](std::size_t k) {
     std::size_t at = 0;
     for (std::size_t p = 0; p < played.size(); ++p) {
       const Scene& scene = k < first_full ? played[p].base : played[p].full;
@@ -194,7 +195,7 @@ json simulation_check(const WrittenModel& base, const WrittenModel& full, Prepar
   const bool decidable = units.count >= kFewestUnits;
   bool agrees = true;
   std::vector<json> entries(statistics.list().size());
-  in_parallel(entries.size(), threads, [&](std::size_t s) {
+  os::in_parallel(entries.size(), threads, [&](std::size_t s) {
     const Statistic& statistic = statistics.list()[s];
     const auto of = [&](std::size_t first) {
       std::vector<std::vector<Tally>> all;

@@ -5,8 +5,8 @@
 
 #include <filesystem>
 
-#include "clients/recorder/file.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 #include "core/os/process.hpp"
 
 namespace kilotwin::identify {
@@ -66,29 +66,29 @@ std::string Gnuplot::script(std::size_t plot, const std::string& file) const {
 
 std::vector<Gnuplot::Drawn> Gnuplot::draw() const {
   if (plots_.empty()) return {};
-  const fs::path program = behaviours::find_executable("gnuplot");
+  const fs::path program = os::find_executable("gnuplot");
   if (program.empty())
     throw RunError("the report's plots need gnuplot, which is not on the PATH; install gnuplot-nox");
   const Scratch scratch;
   const auto file = [&](std::size_t k) { return (scratch.path() / fmt::format("{}.svg", k)).string(); };
   const auto run = [&](const std::string& commands) {
-    recorder::write_file(scratch.path() / "plots", commands);
-    return behaviours::run_process({program.string(), (scratch.path() / "plots").string()});
+    os::write_file(scratch.path() / "plots", commands);
+    return os::run_process({program.string(), (scratch.path() / "plots").string()});
   };
   std::string all;
   for (std::size_t k = 0; k < plots_.size(); ++k) all += script(k, file(k));
   std::vector<Drawn> drawn(plots_.size());
-  const bool good = run(all).status == 0;
+  const bool good = run(all).end.well();
   for (std::size_t k = 0; k < plots_.size(); ++k) {
     if (!good) {
       // gnuplot stops at the first plot it cannot draw. The others are then drawn one by one.
-      const behaviours::ProcessResult result = run(script(k, file(k)));
-      if (result.status != 0) {
+      const os::ProcessResult result = run(script(k, file(k)));
+      if (!result.end.well()) {
         drawn[k].error = result.errors;
         continue;
       }
     }
-    drawn[k].svg = recorder::read_file(file(k));
+    drawn[k].svg = os::read_file(file(k));
   }
   return drawn;
 }

@@ -13,7 +13,7 @@
 #include "clients/identify/report/report_simulated.hpp"
 #include "clients/identify/report/report_summary.hpp"
 #include "clients/identify/report/report_text.hpp"
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::identify {
 
@@ -175,7 +175,7 @@ std::string report_html(const json& document) {
 }
 
 void write_report(const json& document, const std::filesystem::path& file) {
-  recorder::write_file(file, report_html(document));
+  os::write_file(file, report_html(document));
 }
 
 }  // namespace kilotwin::identify

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/os/worker_pool.hpp"
+
 namespace kilotwin::identify {
 namespace {
 
@@ -87,7 +89,7 @@ std::vector<TrackInnovations> innovations_of(const Fitter& fitter, const MotionM
   for (const TrackView& view : fitter.set().views())
     if (!view.track->held_out) views.push_back(&view);
   std::vector<TrackInnovations> all(views.size());
-  in_parallel(views.size(), fitter.threads(), [&](std::size_t i) {
+  os::in_parallel(views.size(), fitter.threads(), [&](std::size_t i) {
     const TrackView& view = *views[i];
     RobotBias bias = model.bias_of(view.track->robot);
     bias.covariance.setZero();
@@ -272,7 +274,7 @@ std::optional<CalibrationShift> find_calibration_shift(const Fitter& fitter, con
     const auto count = static_cast<std::size_t>((to_s - from_s) / step_s);
     if (count < kFewest) return std::nullopt;
     std::vector<Candidate> of(count);
-    in_parallel(count, fitter.threads(), [&](std::size_t i) {
+    os::in_parallel(count, fitter.threads(), [&](std::size_t i) {
       // Off the midpoint between frames, so that the raster does not coincide with regular frames.
       of[i] = candidate_at(scan, from_s + (static_cast<double>(i) + 0.47) * step_s);
     });

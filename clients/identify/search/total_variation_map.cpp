@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "clients/identify/search/total_variation_solver.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -95,7 +96,7 @@ std::vector<NormalEquations> sums_of(const Fitter& fitter, const MotionModel& mo
                                      const NodeGrid& grid) {
   const auto units = fitter.set().units();
   std::vector<NormalEquations> folds(std::min(kFolds, units.size()), NormalEquations(grid));
-  in_parallel(folds.size(), fitter.threads(), [&](std::size_t f) {
+  os::in_parallel(folds.size(), fitter.threads(), [&](std::size_t f) {
     FineSums sums(model, map, folds[f]);
     for (std::size_t u = f; u < units.size(); u += folds.size()) {
       for (const TrackView* view : units[u]) {
@@ -236,7 +237,7 @@ double unit_of_weight(const NormalEquations& all) {
 double choose(const std::vector<NormalEquations>& folds, const NormalEquations& all,
               const std::vector<Variation>& tried, std::uint32_t threads, Fitted& map) {
   std::vector<double> gains(tried.size() * folds.size());
-  in_parallel(gains.size(), threads, [&](std::size_t k) {
+  os::in_parallel(gains.size(), threads, [&](std::size_t k) {
     const NormalEquations& out = folds[k % folds.size()];
     NormalEquations rest = all;
     rest.add(out, -1);

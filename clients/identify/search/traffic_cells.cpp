@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "clients/identify/fit/contact_gate.hpp"
+#include "core/os/worker_pool.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -68,7 +69,7 @@ std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionMo
   const PreparedSet& set = fitter.set();
   const std::vector<TrackView>& views = set.views();
   std::vector<std::vector<Residual>> residuals(views.size());
-  in_parallel(views.size(), fitter.threads(), [&](std::size_t v) {
+  os::in_parallel(views.size(), fitter.threads(), [&](std::size_t v) {
     if (views[v].track->held_out) return;
     RobotBias bias = model.bias_of(views[v].track->robot);
     bias.covariance.setZero();
@@ -215,12 +216,12 @@ GridCells fit_grid_cells(const Fitter& fitter, const MotionModel& model, const G
   for (double side = kSmallest_mm; side < kLargest_mm; side *= 1 + 0.3 * side / extent_mm)
     for (int i = 0; i < kCorners; ++i)
       for (int j = 0; j < kCorners; ++j) all.push_back({{side, side * i / kCorners, side * j / kCorners}, 0});
-  in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i].value = explained(runs, all[i].cells); });
+  os::in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i].value = explained(runs, all[i].cells); });
   std::stable_sort(all.begin(), all.end(),
                    [](const RatedCells& a, const RatedCells& b) { return a.value > b.value; });
   constexpr std::size_t kClimbed = 6;
   all.resize(std::min(all.size(), kClimbed));
-  in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i] = climbed(runs, all[i], extent_mm); });
+  os::in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i] = climbed(runs, all[i], extent_mm); });
   return std::max_element(all.begin(), all.end(),
                           [](const RatedCells& a, const RatedCells& b) { return a.value < b.value; })
       ->cells;

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 4u
+#define KT_IMAGE_VERSION 5u
 /* Room for what a robot prints in one tick; a serial line of 38400 baud takes 126 octets in a tick. */
 #define KT_LOG_OCTETS 3584
 /* The heap's section; the last of a robot's memory, so that only what is in use need be kept. */
@@ -140,6 +140,7 @@ struct KtImage {
   uint64_t interrupts;   /* uint64_t(void): callbacks for what the exchange tells */
   uint64_t transmit;     /* uint64_t(void): 1 if the robot sends what is then in the exchange, else 0 */
   uint64_t surroundings; /* of the KtSurroundings*; the loader writes it */
+  uint64_t variables;    /* of the first octet of a robot's memory; what is writable before it is unused */
 };
 
 #ifdef __cplusplus
@@ -154,6 +155,6 @@ KT_ASSERT(sizeof(struct KtThread) == 48 && __builtin_offsetof(struct KtThread, b
               __builtin_offsetof(struct KtThread, held) == KT_THREAD_HELD,
           "no padding");
 KT_ASSERT(sizeof(struct KtSurroundings) == 1104, "no padding");
-KT_ASSERT(sizeof(struct KtImage) == 104, "no padding");
+KT_ASSERT(sizeof(struct KtImage) == 112, "no padding");
 
 #endif

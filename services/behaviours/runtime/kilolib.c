@@ -6,6 +6,7 @@
 #include <util/delay.h>
 
 #include "core/base/eeprom_layout.h"
+#include "core/base/message_crc.h"
 #include "core/math/elementary.h"
 #include "image_abi.h"
 
@@ -245,16 +246,7 @@ uint8_t rand_soft(void) {
 
 void rand_seed(uint8_t seed) { soft_seed = seed; }
 
-uint16_t message_crc(const message_t* message) {
-  const uint8_t* octet = (const uint8_t*)message;
-  uint16_t crc = 0xffff;
-  for (int i = 0; i < 10; ++i) {
-    uint8_t x = octet[i] ^ (uint8_t)crc;
-    x ^= (uint8_t)(x << 4);
-    crc = (uint16_t)(((uint16_t)x << 8 | crc >> 8) ^ (uint8_t)(x >> 4) ^ (uint16_t)x << 3);
-  }
-  return crc;
-}
+uint16_t message_crc(const message_t* message) { return kilotwin_message_crc((const uint8_t*)message); }
 
 /* Millimetres beyond contact at entry `i` of a table, interpolated from the entry before. */
 static uint8_t beyond_contact(const uint16_t* table, int i, int reading) {
@@ -548,6 +540,9 @@ static uint64_t transmit(void) {
   return 1;
 }
 
+/* Made by the linking of the program. */
+extern uint8_t kilotwin_variables[] __attribute__((visibility("hidden")));
+
 __attribute__((visibility("default"), used)) const struct KtImage kilotwin_image = {
     KT_IMAGE_MAGIC,
     KT_IMAGE_VERSION,
@@ -562,4 +557,5 @@ __attribute__((visibility("default"), used)) const struct KtImage kilotwin_image
     (uint64_t)&interrupts,
     (uint64_t)&transmit,
     (uint64_t)&kt_surroundings,
+    (uint64_t)kilotwin_variables,
 };

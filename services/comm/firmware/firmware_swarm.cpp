@@ -1,13 +1,10 @@
 #include "services/comm/firmware/firmware_swarm.hpp"
 
-#include <fmt/format.h>
-
-#include <fstream>
-#include <iterator>
 #include <map>
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/os/files.hpp"
 #include "core/os/worker_pool.hpp"
 #include "services/comm/firmware/eeprom.hpp"
 #include "services/comm/tick_timers.hpp"
@@ -22,23 +19,20 @@ constexpr comm::Cycles kPeriod = comm::kTimerCounts * comm::kTimerCount;
 
 FlashImage read_program(const Program& program, const fs::path& run_directory) {
   const fs::path path = run_directory / "programs" / program.file();
-  std::ifstream stream(path, std::ios::binary);
-  const std::string octets{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) {
+  const auto octets = os::read_if_there(path);
+  if (!octets) {
     throw UserError(path.string() + ": cannot be read; the run directory must hold the programs of its manifest");
   }
-  return parse_firmware(octets, path.string());
+  return parse_firmware(*octets, path.string());
 }
 
 }  // namespace
 
-FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory, std::uint32_t threads,
+FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory, std::uint32_t threads, Tick first,
                              bool keeps_logs)
-    : logs_(keeps_logs ? run_directory / "logs" : fs::path{}),
-      appends_logs_(plan.resumed),
-      cycles_per_tick_(plan.tick_length.cycles()),
+    : cycles_per_tick_(plan.tick_length.cycles()),
       senses_(plan, {0, plan.robots()}),
-      workers_(std::make_unique<WorkerPool>(threads)) {
+      workers_(std::make_unique<os::WorkerPool>(threads)) {
   std::map<std::uint32_t, FlashImage> images;
   const comm::TickTimers timers(plan);
   const Random random(plan.seed());
@@ -57,8 +51,13 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   }
   // Up to tick 0, before which nobody sends.
   std::vector<std::vector<comm::Cycles>> flashes(robots_.size());
-  workers_->share(static_cast<std::uint32_t>(robots_.size()),
-                  [&](std::uint32_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
+  workers_->for_each(robots_.size(), [&](std::size_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
+  if (keeps_logs)
+    logs_.emplace(run_directory, plan.tick_length, first, [&plan](std::uint32_t robot) { return plan.firmware(robot); });
+  // What they print while they are switched on belongs to the run's beginning.
+  if (first > Tick{0}) {
+    for (Robot& robot : robots_) robot.mcu->printed().clear();
+  }
   commit();
 }
 
@@ -77,7 +76,7 @@ void FirmwareSwarm::run(comm::Cycles until, std::span<const std::uint32_t> robot
                         const std::vector<std::vector<comm::Pulse>>& light,
                         std::vector<std::vector<comm::Cycles>>& flashes) {
   until_ = until;
-  workers_->share(static_cast<std::uint32_t>(robots.size()), [&](std::uint32_t n) {
+  workers_->for_each(robots.size(), [&](std::size_t n) {
     const std::uint32_t i = robots[n];
     run_robot(robots_[i], until, light[i], flashes[i]);
   });
@@ -117,7 +116,6 @@ void FirmwareSwarm::run_robot(Robot& robot, comm::Cycles until, const std::vecto
 }
 
 void FirmwareSwarm::commit() {
-  begin_ = until_;
   for (std::uint32_t i = 0; i < robots_.size(); ++i) {
     Robot& robot = robots_[i];
     robot.has_run = false;
@@ -127,8 +125,9 @@ void FirmwareSwarm::commit() {
       robot.kicked = robot.kicked || robot.full;
     }
     robot.fulls.clear();
-    if (!robot.mcu->printed().empty()) write_log(i);
+    write_log(i);
   }
+  begin_ = until_;
 }
 
 void FirmwareSwarm::begin_tick(Tick tick, std::span<const BodyFrame* const> bodies) {
@@ -175,16 +174,12 @@ void FirmwareSwarm::use_battery(std::uint32_t i) {
   robot.shown_left = robot.shown_right = 0;
 }
 
+/// What a robot has printed since the last commit.
 void FirmwareSwarm::write_log(std::uint32_t i) {
-  Robot& robot = robots_[i];
-  if (!logs_.empty()) {
-    std::error_code ignored;
-    fs::create_directories(logs_, ignored);
-    const auto mode = appends_logs_ || robot.has_printed ? std::ios::app : std::ios::trunc;
-    std::ofstream(logs_ / fmt::format("robot-{:05}.txt", ids_[i]), std::ios::out | mode) << robot.mcu->printed();
-  }
-  robot.has_printed = true;
-  robot.mcu->printed().clear();
+  std::string& printed = robots_[i].mcu->printed();
+  if (printed.empty()) return;
+  if (logs_) logs_->write(Tick{begin_ / cycles_per_tick_}, ids_[i], printed);
+  printed.clear();
 }
 
 comm::FirmwareRobots::Outputs FirmwareSwarm::outputs(std::uint32_t i) const {
@@ -211,6 +206,8 @@ std::uint64_t FirmwareSwarm::word(std::uint32_t i) const {
 }
 
 std::string FirmwareSwarm::save(std::uint32_t i) const {
+  // Who goes on from this checkpoint finds what was printed before it.
+  if (logs_) logs_->flush();
   const Robot& robot = robots_[i];
   const int flags =
       (robot.full ? 1 : 0) | (robot.kick_goes_on ? 2 : 0) | (robot.spun_up ? 4 : 0) | (robot.flat ? 8 : 0);
@@ -244,9 +241,9 @@ void FirmwareSwarm::load(std::uint32_t i, const std::string& octets) {
 }
 
 std::unique_ptr<comm::FirmwareRobots> make_firmware_robots(const RunPlan& plan, const fs::path& run_directory,
-                                                           std::uint32_t threads, bool keeps_logs) {
+                                                           std::uint32_t threads, Tick first, bool keeps_logs) {
   if (!plan.has_firmware()) return nullptr;
-  return std::make_unique<FirmwareSwarm>(plan, run_directory, threads, keeps_logs);
+  return std::make_unique<FirmwareSwarm>(plan, run_directory, threads, first, keeps_logs);
 }
 
 }  // namespace kilotwin::firmware

@@ -3,25 +3,29 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "core/logs/robot_logs.hpp"
 #include "services/comm/firmware/mcu.hpp"
 #include "core/plan/plan.hpp"
 #include "services/comm/firmware_robots.hpp"
 
-namespace kilotwin::firmware {
-
+namespace kilotwin::os {
 class WorkerPool;
+}
+
+namespace kilotwin::firmware {
 
 /// Each robot was switched on within the last tick of its own clock before the run began, such that its first timer interrupt
 /// comes when that of a robot with a native program would: rate and phase of clocks are those of comm::TickTimers.
 class FirmwareSwarm final : public comm::FirmwareRobots {
  public:
   /// Reads programs/ of the run directory. `threads`: how many run robots at a time; results do not depend on it.
-  /// What robots print goes to logs/robot-ID.txt there, if they print at all
-  /// and `keeps_logs`. Throws UserError where a program is missing or
-  /// damaged.
-  FirmwareSwarm(const RunPlan&, const std::filesystem::path& run_directory, std::uint32_t threads, bool keeps_logs);
+  /// With `keeps_logs`, what robots print goes to their logs there (core/logs/robot_logs.hpp). `first`: the tick at which the run
+  /// starts; load() follows where that is not 0. Throws UserError where a program is missing or damaged.
+  FirmwareSwarm(const RunPlan&, const std::filesystem::path& run_directory, std::uint32_t threads, Tick first,
+                bool keeps_logs);
   ~FirmwareSwarm() override;
 
   [[nodiscard]] std::span<const std::uint32_t> ids() const override { return ids_; }
@@ -51,7 +55,6 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
     bool kick_goes_on = false;  ///< at the end of the last tick
     std::uint8_t shown_left = 0, shown_right = 0;
     bool spun_up = false;
-    bool has_printed = false;
     bool has_sent = false;  ///< in this tick
     bool flat = false;
     std::vector<Light> light;
@@ -65,19 +68,18 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
   void write_log(std::uint32_t i);
   void use_battery(std::uint32_t i);
 
-  std::filesystem::path logs_;  ///< empty: none are kept
-  bool appends_logs_;           ///< the run continues an earlier one
+  mutable std::optional<RobotLogs> logs_;  ///< nothing: none are kept
   std::vector<std::uint32_t> ids_;
   std::vector<Robot> robots_;
   const comm::Cycles cycles_per_tick_;
   comm::Cycles begin_ = 0, until_ = 0;  ///< of the run at hand
   senses::RobotSenses senses_;          ///< of all robots of the run
-  std::unique_ptr<WorkerPool> workers_;
+  std::unique_ptr<os::WorkerPool> workers_;
 };
 
 /// The plan's firmware robots; null where there are none.
 [[nodiscard]] std::unique_ptr<comm::FirmwareRobots> make_firmware_robots(const RunPlan&,
                                                                          const std::filesystem::path& run_directory,
-                                                                         std::uint32_t threads, bool keeps_logs);
+                                                                         std::uint32_t threads, Tick first, bool keeps_logs);
 
 }  // namespace kilotwin::firmware

@@ -37,6 +37,7 @@ enum Register : std::uint16_t {
   kPortC = 0x28,
   kDdrD = 0x2a,
   kPortD = 0x2b,
+  kEearh = 0x42,
   kSmcr = 0x53,
   kMcucr = 0x55,
   kAdcsra = 0x7a,
@@ -114,6 +115,10 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
       mode.size = 8;
     }
   }
+  // Of the EEPROM's address the processor has ten bits, libsimavr sixteen.
+  avr_register_io_write(
+      avr_, kEearh,
+      [](avr_t* avr, avr_io_addr_t address, std::uint8_t value, void*) { avr->data[address] = value & 3; }, nullptr);
   // External interrupts by level are polled in every cycle while a pin is low; no Kilobot has a source for them.
   avr_extint_set_strict_lvl_trig(avr_, 0, 0);
   avr_extint_set_strict_lvl_trig(avr_, 1, 0);
@@ -360,6 +365,9 @@ void Mcu::on_log(avr_t* avr, int, const char* format, void*) {
   self.state_.halt = illegal ? Halt::kIllegalInstruction : Halt::kBadAddress;
   self.state_.fault_at = avr->pc;
   avr->state = cpu_Crashed;
+  // ELPM, which this processor lacks: libsimavr says so, and then reads the flash all the same, at an address whose upper octet
+  // it takes from R0.
+  avr->data[0] = 0;
 }
 
 }  // namespace kilotwin::firmware

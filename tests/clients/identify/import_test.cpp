@@ -9,7 +9,7 @@
 #include <string>
 
 #include "clients/identify/data/measured_set.hpp"
-#include "clients/recorder/file.hpp"
+#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {
@@ -29,7 +29,7 @@ class ImportTest : public testing::Test {
   ~ImportTest() override { fs::remove_all(folder_); }
 
   void give(const std::string& name, const std::string& content) {
-    recorder::write_file(folder_ / "from" / name, content);
+    os::write_file(folder_ / "from" / name, content);
   }
   MeasuredSet imported() {
     import_set(folder_ / "from", folder_ / "to");
@@ -147,7 +147,7 @@ TEST_F(ImportTest, WhateverIsInAFileItIsReadOrComplainedOf) {
       const std::string rows =
           is_ark ? rows_of_ark_log(folder_ / "from" / name) : rows_of_recording(folder_ / "from" / name);
       // Whatever is accepted yields valid rows.
-      recorder::write_file(
+      os::write_file(
           folder_ / "to" / "trajectories.csv",
           (is_ark ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + rows);
       const MeasuredSet set = load_measured_set(folder_ / "to");

@@ -117,7 +117,7 @@ TEST(Compiler, KeepsResultsByContent) {
                                        "#include <kilolib.h>\n#include \"part.h\"\n#ifndef K\n#define K 0\n#endif\n"
                                        "int main(void) { set_color(COLOUR + K); kilo_start(0, 0); }\n");
   const CompiledProgram first = compile({source}, options);
-  EXPECT_EQ(first.sha256, sha256_hex(read_file(first.file).value()));
+  EXPECT_EQ(first.sha256, sha256_hex(os::read_if_there(first.file).value()));
   const auto written = fs::last_write_time(first.file);
   const CompiledProgram again = compile({source}, options);
   EXPECT_EQ(again.file, first.file);
@@ -142,7 +142,7 @@ TEST(Compiler, SeveralSourcesAndReadySharedObjects) {
   const fs::path b =
       folder.write("b.c", "#include \"kilolib.h\"\nuint8_t shared;\nvoid helper(void) { set_color(++shared); }\n");
   const CompiledProgram built = compile({a, b}, cached());
-  const fs::path copy = folder.write("ready.so", read_file(built.file).value());
+  const fs::path copy = folder.write("ready.so", os::read_if_there(built.file).value());
   const CompiledProgram ready = compile({copy}, cached());
   EXPECT_EQ(ready.file, copy);
   EXPECT_EQ(ready.sha256, built.sha256);
@@ -151,6 +151,36 @@ TEST(Compiler, SeveralSourcesAndReadySharedObjects) {
                                    "ELF")})
                 .find("not a program for simulated robots"),
             std::string::npos);
+}
+
+TEST(Compiler, ACompilerThatIsKilledIsAFailureAndNoReasonForAnotherLanguage) {
+  const Folder folder;
+  CompileOptions options = cached();
+  options.compiler = folder.write("killed-cc",
+                                  "#!/bin/sh\n"
+                                  "case \"$*\" in *cpp-output*)\n"
+                                  "  deed=$(cat \"$0.deed\" 2>/dev/null); rm -f \"$0.deed\"\n"
+                                  "  case \"$deed\" in\n"
+                                  "    itself) kill -9 $$;;\n"
+                                  "    child) echo 'cc: fatal error: Killed signal terminated program cc1' >&2; exit 1;;\n"
+                                  "  esac;;\n"
+                                  "esac\nexec cc \"$@\"\n");
+  fs::permissions(options.compiler, fs::perms::owner_all);
+  const fs::path source = folder.write("a.c", program("static void loop(void) { set_color(1); }"));
+  const auto failure = [&](const char* deed) -> std::string {
+    folder.write("killed-cc.deed", deed);
+    try {
+      (void)compile({source}, options);
+    } catch (const RunError& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  const std::string itself = failure("itself"), child = failure("child");
+  EXPECT_TRUE(itself.starts_with(options.compiler.string() + " was ended by signal 9 (Killed)")) << itself;
+  EXPECT_NE(child.find("cc: fatal error: Killed signal terminated program cc1"), std::string::npos) << child;
+  const CompiledProgram built = compile({source}, options);
+  EXPECT_TRUE(built.notes.empty()) << built.notes.front();
 }
 
 TEST(Compiler, ClangGivesTheSameBehaviour) {
@@ -166,7 +196,7 @@ TEST(Compiler, ClangGivesTheSameBehaviour) {
     if (clang_made) {
       proto::Manifest manifest = swarm.plan->manifest();
       manifest.mutable_program(0)->set_sha256(by_clang.sha256);
-      swarm.folder.write("programs/" + by_clang.sha256 + ".so", read_file(by_clang.file).value());
+      swarm.folder.write("programs/" + by_clang.sha256 + ".so", os::read_if_there(by_clang.file).value());
       swarm.hosts.clear();
       swarm.programs.reset();
       swarm.plan = std::make_unique<RunPlan>(manifest);

@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
+#include "core/logs/robot_logs.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
 #include "idl/manifest.pb.h"
-#include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/robot_warnings.hpp"
 #include "tests/services/behaviours/swarm.hpp"
 
@@ -152,7 +152,7 @@ TEST(Dialects, Cpp) {
   proto::Manifest manifest = swarm.plan->manifest();
   const CompiledProgram program = compile({source}, cached());
   manifest.mutable_program(0)->set_sha256(program.sha256);
-  swarm.folder.write("programs/" + program.sha256 + ".so", read_file(program.file).value());
+  swarm.folder.write("programs/" + program.sha256 + ".so", os::read_if_there(program.file).value());
   swarm.hosts.clear();
   swarm.programs.reset();
   swarm.plan = std::make_unique<RunPlan>(manifest);
@@ -315,21 +315,34 @@ TEST(Printing, TakesTheTimeOfTheSerialLine) {
 TEST(Printing, LogsBeginEachLineWithItsTimeAndGoOnFromACheckpoint) {
   const Folder folder;
   const TickLength length(262144);
-  const Share share{0, 3};
+  const auto own = [](std::uint32_t robot) { return robot != 0; };
+  const std::string others = "0.983 of another process\n";
+  folder.write("logs/robot-00000.txt", others);
+  folder.write("logs/robot-00002.txt", "0.000 of an attempt before\n");
   {
-    RobotLogs logs(folder.path(), length, Tick{0}, share);
-    logs.write(Tick{0}, {{2, "a\nb"}});
-    logs.write(Tick{10}, {{2, "c\n"}, {1, "x\n"}});
-    logs.write(Tick{20}, {{2, "d\n"}});
+    RobotLogs logs(folder.path(), length, Tick{0}, own);
+    logs.write(Tick{0}, 2, "a\nb");
+    logs.write(Tick{10}, 2, "c\n");
+    logs.write(Tick{10}, 1, "x\n");
+    logs.write(Tick{20}, 2, "d\n");
   }
-  EXPECT_EQ(read_file(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n0.655 d\n");
-  RobotLogs resumed(folder.path(), length, Tick{20}, share);
-  EXPECT_EQ(read_file(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n");
-  EXPECT_EQ(read_file(folder.path() / "logs/robot-00001.txt").value(), "0.328 x\n");
+  EXPECT_EQ(os::read_if_there(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n0.655 d\n");
+  RobotLogs resumed(folder.path(), length, Tick{20}, own);
+  EXPECT_EQ(os::read_if_there(folder.path() / "logs/robot-00002.txt").value(), "0.000 a\n0.000 bc\n");
+  EXPECT_EQ(os::read_if_there(folder.path() / "logs/robot-00001.txt").value(), "0.328 x\n");
+  EXPECT_EQ(os::read_file(folder.path() / "logs/robot-00000.txt"), others);
+}
+
+TEST(Printing, ALogThatCannotBeWrittenEndsTheRun) {
+  const Folder folder;
+  folder.write("logs", "no folder");
+  RobotLogs logs(folder.path(), TickLength(262144), Tick{0}, [](std::uint32_t) { return true; });
+  logs.write(Tick{0}, 2, "a\n");
+  EXPECT_THROW(logs.write(Tick{40}, 2, "b\n"), RunError);
 }
 
 TEST(RobotWarnings, TellWhatAvrComputesOtherwise) {
-  if (find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
+  if (os::find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
   const Folder folder;
   const fs::path source = folder.write("a.c",
                                        "#include <kilolib.h>\n"
@@ -356,7 +369,7 @@ TEST(RobotWarnings, TellWhatAvrComputesOtherwise) {
 }
 
 TEST(RobotWarnings, CompilingForAvrTakesTheSameSources) {
-  if (find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
+  if (os::find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
   const Folder folder;
   folder.write("kilolib.h", "extern volatile uint32_t kilo_ticks;\n");
   folder.write("part.h", "int part(void);\n");

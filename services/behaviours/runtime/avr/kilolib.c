@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <util/delay.h>
 
+#include "../core/base/message_crc.h"
+
 uint8_t kilo_send(const uint8_t* packet); /* infrared.c; 0: another packet was noticed, and this one was given up */
 
 enum { SLEEPING, IDLE, BATTERY, SETUP, RUNNING, CHARGING, MOVING };
@@ -163,16 +165,7 @@ void delay(uint16_t ms) {
 
 /* Messages. */
 
-uint16_t message_crc(const message_t* message) {
-  const uint8_t* octet = (const uint8_t*)message;
-  uint16_t crc = 0xffff;
-  for (uint8_t i = 0; i < 10; ++i) {
-    uint8_t x = octet[i] ^ (uint8_t)crc;
-    x ^= (uint8_t)(x << 4);
-    crc = (uint16_t)(((uint16_t)x << 8 | crc >> 8) ^ (uint8_t)(x >> 4) ^ (uint16_t)x << 3);
-  }
-  return crc;
-}
+uint16_t message_crc(const message_t* message) { return kilotwin_message_crc((const uint8_t*)message); }
 
 /* Millimetres beyond contact at entry `i` of a table, interpolated from the entry before. */
 static uint8_t beyond_contact(const uint16_t* table, uint8_t i, int16_t value) {

@@ -70,7 +70,7 @@ TEST(FlashImage, RefusesWhatItIsNotWithTheLine) {
 TEST(FlashImage, SurvivesDamage) {
   const std::filesystem::path file =
       compiled(whole_program("static void setup(void) {} static void loop(void) {}"));
-  const std::string elf = behaviours::read_file(file).value();
+  const std::string elf = os::read_if_there(file).value();
   std::mt19937 random(1);
   int read = 0, refused = 0;
   for (int n = 0; n < 4000; ++n) {

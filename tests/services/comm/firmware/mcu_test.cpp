@@ -271,5 +271,66 @@ TEST(Mcu, StoresItsCalibration) {
   EXPECT_EQ(mcu.eeprom()[0x05], 99);
 }
 
+/// An image of these instructions, and erased flash behind them.
+FlashImage image_of(const std::vector<std::uint16_t>& words) {
+  FlashImage image;
+  image.flash.fill(0xff);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    image.flash[2 * i] = static_cast<std::uint8_t>(words[i] & 0xff);
+    image.flash[2 * i + 1] = static_cast<std::uint8_t>(words[i] >> 8);
+  }
+  image.used_octets = static_cast<std::uint32_t>(2 * words.size());
+  return image;
+}
+
+TEST(Mcu, ExtendedLoadsAreNoInstructionsOfThisProcessor) {
+  // elpm r0, Z; elpm r16, Z; elpm r16, Z+: libsimavr takes the upper octet of the address from r0, here 255.
+  for (const std::uint16_t elpm : {0x95d8, 0x9106, 0x9107}) {
+    Mcu mcu = make(image_of({0xef0f /* ldi r16, 255 */, 0x2e00 /* mov r0, r16 */, elpm}));
+    mcu.run(100, {});
+    EXPECT_EQ(mcu.halt(), Halt::kIllegalInstruction);
+    EXPECT_EQ(mcu.program_counter(), 4u);
+  }
+}
+
+TEST(Mcu, EepromAddressesHaveTenBits) {
+  const FlashImage image = firmware(
+      "#include <avr/io.h>\nint main(void) {\n"
+      "  EEAR = 0xfc10; EEDR = 0x5a; EECR = _BV(EEMPE); EECR |= _BV(EEPE);\n"
+      "  while (EECR & _BV(EEPE)); EEAR = 0xa810; EECR |= _BV(EERE);\n"
+      "  DDRB = 8; PORTB = EEDR == 0x5a ? 8 : 0; for (;;); }\n");
+  Mcu mcu = make(image);
+  mcu.run(kSecond / 10, {});
+  EXPECT_EQ(mcu.eeprom()[0x10], 0x5a);
+  EXPECT_EQ(mcu.outputs().motor_left, 255);
+}
+
+TEST(Mcu, NoProgramLeavesItsProcessor) {
+  // Instructions at random, and a real program with octets changed: each runs or stops its robot, and harms nobody else.
+  std::mt19937 random(3);
+  const FlashImage& real = talker();
+  int halted = 0;
+  for (int n = 0; n < 400; ++n) {
+    FlashImage image = real;
+    if (n % 2 == 0) {
+      for (std::uint8_t& octet : image.flash) octet = static_cast<std::uint8_t>(random());
+      // Half of all are of the groups that name addresses: loads, stores, jumps, calls, I/O.
+      for (std::size_t at = 1; at < image.flash.size(); at += 4)
+        image.flash[at] = static_cast<std::uint8_t>(0x90 + random() % 0x30);
+    } else {
+      for (int i = 0; i < 40; ++i) image.flash[random() % real.used_octets] = static_cast<std::uint8_t>(random());
+    }
+    Mcu mcu = make(image);
+    for (int k = 0; k < 4; ++k) mcu.run(mcu.now() + 40'000, light(kRun, mcu.now() + 1000));
+    halted += mcu.halt() != Halt::kNone ? 1 : 0;
+    EXPECT_EQ(mcu.now() >= 160'000, true);
+    // What it has come to is as good as any state.
+    Mcu other = make(image);
+    other.load(mcu.save());
+    EXPECT_EQ(other.now(), mcu.now());
+  }
+  EXPECT_GT(halted, 100);
+}
+
 }  // namespace
 }  // namespace kilotwin::firmware

@@ -30,7 +30,7 @@ inline std::filesystem::path compiled(const std::string& source) {
 
 inline FlashImage firmware(const std::string& source) {
   const std::filesystem::path file = compiled(source);
-  return parse_firmware(behaviours::read_file(file).value(), file.string());
+  return parse_firmware(os::read_if_there(file).value(), file.string());
 }
 
 }  // namespace kilotwin::firmware

@@ -1,0 +1,103 @@
+#include "core/logs/robot_logs.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.hpp"
+#include "core/base/say.hpp"
+#include "core/os/files.hpp"
+
+namespace kilotwin {
+namespace fs = std::filesystem;
+namespace {
+
+/// Octets, and ticks (one second), that wait at most.
+constexpr std::size_t kBuffered = 4096;
+constexpr std::int64_t kPatience = 31;
+
+/// The number in robot-NUMBER.txt; -1: none.
+std::int64_t robot_of(const fs::path& file) {
+  unsigned robot = 0;
+  char rest = 0;
+  return std::sscanf(file.filename().c_str(), "robot-%u.tx%c", &robot, &rest) == 2 && rest == 't' ? std::int64_t{robot} : -1;
+}
+
+}  // namespace
+
+RobotLogs::RobotLogs(const fs::path& run_directory, const TickLength& tick_length, Tick first,
+                     const std::function<bool(std::uint32_t)>& own)
+    : folder_(run_directory / "logs"), tick_length_(tick_length) {
+  cut(first, own);
+}
+
+RobotLogs::~RobotLogs() {
+  try {
+    flush();
+  } catch (const RunError& error) {
+    say(error.what());
+  }
+}
+
+fs::path RobotLogs::file_of(std::uint32_t robot) const { return folder_ / fmt::format("robot-{:05}.txt", robot); }
+
+void RobotLogs::cut(Tick first, const std::function<bool(std::uint32_t)>& own) {
+  std::error_code none;
+  std::vector<std::uint32_t> robots;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, none)) {
+    const std::int64_t robot = robot_of(entry.path());
+    if (robot >= 0 && own(static_cast<std::uint32_t>(robot))) robots.push_back(static_cast<std::uint32_t>(robot));
+  }
+  // Times are printed in ms.
+  const double end_s = tick_length_.seconds_at(first) - 0.00051;
+  for (const std::uint32_t robot : robots) {
+    const std::string text = os::read_file(file_of(robot));
+    std::size_t kept = 0;
+    while (kept < text.size() && std::strtod(text.c_str() + kept, nullptr) < end_s) {
+      const std::size_t end = text.find('\n', kept);
+      kept = end == std::string::npos ? text.size() : end + 1;
+    }
+    std::error_code error;
+    fs::resize_file(file_of(robot), kept, error);
+    if (error) throw RunError(fmt::format("{}: cannot be cut: {}", file_of(robot).string(), error.message()));
+    logs_[robot].octets = kept;
+  }
+}
+
+void RobotLogs::write(Tick from, std::uint32_t robot, std::string_view text) {
+  Log& log = logs_[robot];
+  const std::string prefix = fmt::format("{:.3f} ", tick_length_.seconds_at(from));
+  const std::size_t before = log.text.size();
+  for (const char c : text) {
+    if (log.octets >= kMostOctets) break;
+    const std::size_t length = log.text.size();
+    if (log.at_line_start) log.text += prefix;
+    log.text += c;
+    log.at_line_start = c == '\n';
+    log.octets += log.text.size() - length;
+    if (log.octets >= kMostOctets) log.text += "\n(this robot's log ends here: it has reached 1 MiB)\n";
+  }
+  if (waiting_ == 0) waiting_since_ = from;
+  waiting_ += log.text.size() - before;
+  if (waiting_ >= kBuffered || from - waiting_since_ > kPatience) flush();
+}
+
+void RobotLogs::flush() {
+  if (waiting_ == 0) return;
+  waiting_ = 0;  // of what cannot be written, nothing is tried again
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  for (auto& [robot, log] : logs_) {
+    if (log.text.empty()) continue;
+    const std::string text = std::exchange(log.text, {});
+    os::OutputFile file(file_of(robot), os::OutputFile::Existing::kAppend);
+    file.buffer() = text;
+    file.close();
+  }
+}
+
+}  // namespace kilotwin

@@ -1,0 +1,110 @@
+#include "core/os/worker_pool.hpp"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::os {
+namespace {
+
+/// Of `unclaimed_`: the pool ends. No call has so many tasks.
+constexpr std::uint32_t kEnd = 0xffffffff;
+/// With a pause of 10 to 50 ns each: some tens of us, longer than one thread works between two calls.
+constexpr int kSpins = 2000;
+/// Where threads outnumber cores: each lets another thread run, so that a few suffice.
+constexpr int kYields = 8;
+
+}  // namespace
+
+std::uint32_t cores() { return std::max(1u, std::thread::hardware_concurrency()); }
+
+WorkerPool::WorkerPool(std::uint32_t threads) : spins_(threads <= cores() ? kSpins : 0) {
+  try {
+    for (std::uint32_t i = 1; i < threads; ++i) threads_.emplace_back([this] { serve(); });
+  } catch (const std::system_error&) {
+    // The system has no room for more threads; those that there are do the work.
+  }
+}
+
+WorkerPool::~WorkerPool() {
+  unclaimed_.store(kEnd, std::memory_order_release);
+  unclaimed_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void WorkerPool::for_each(std::size_t count, const Task& task) {
+  KILOTWIN_DEMAND(count < kEnd);
+  if (threads_.empty() || count < 2) {
+    for (std::size_t i = 0; i < count; ++i) task(i);
+    return;
+  }
+  task_ = &task;
+  count_ = count;
+  unfinished_.store(static_cast<std::uint32_t>(count), std::memory_order_relaxed);
+  unclaimed_.store(static_cast<std::uint32_t>(count), std::memory_order_release);
+  unclaimed_.notify_all();
+  work();
+  for (std::uint32_t n = unfinished_.load(std::memory_order_acquire); n != 0;
+       n = unfinished_.load(std::memory_order_acquire)) {
+    wait_while(unfinished_, n);
+  }
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+}
+
+void WorkerPool::wait_while(std::atomic<std::uint32_t>& value, std::uint32_t unwanted) const {
+  for (int i = 0; i < spins_; ++i) {
+    if (value.load(std::memory_order_acquire) != unwanted) return;
+    __builtin_ia32_pause();
+  }
+  for (int i = 0; spins_ == 0 && i < kYields; ++i) {
+    if (value.load(std::memory_order_acquire) != unwanted) return;
+    sched_yield();
+  }
+  value.wait(unwanted, std::memory_order_acquire);
+}
+
+void WorkerPool::work() {
+  for (std::uint32_t n = unclaimed_.load(std::memory_order_acquire); n != 0 && n != kEnd;) {
+    if (!unclaimed_.compare_exchange_weak(n, n - 1, std::memory_order_acq_rel, std::memory_order_acquire)) continue;
+    run(count_ - n);
+    n = unclaimed_.load(std::memory_order_acquire);
+  }
+}
+
+void WorkerPool::run(std::size_t i) {
+  std::uint32_t done = 1;
+  try {
+    (*task_)(i);
+  } catch (...) {
+    fail(i);
+    // The call cannot end before this task has: what is unclaimed is this call's.
+    done += unclaimed_.exchange(0, std::memory_order_acq_rel);
+  }
+  if (unfinished_.fetch_sub(done, std::memory_order_acq_rel) == done) unfinished_.notify_one();
+}
+
+void WorkerPool::fail(std::size_t i) {
+  const std::lock_guard lock(failure_mutex_);
+  if (failure_ && failed_ < i) return;
+  failure_ = std::current_exception();
+  failed_ = i;
+}
+
+void WorkerPool::serve() {
+  for (;;) {
+    wait_while(unclaimed_, 0);
+    if (unclaimed_.load(std::memory_order_acquire) == kEnd) return;
+    work();
+  }
+}
+
+void in_parallel(std::size_t count, std::uint32_t threads, const WorkerPool::Task& task) {
+  WorkerPool pool(static_cast<std::uint32_t>(std::min<std::size_t>(threads, count)));
+  pool.for_each(count, task);
+}
+
+}  // namespace kilotwin::os
