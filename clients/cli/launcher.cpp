@@ -107,7 +107,8 @@ class Launcher {
         file.begin(), file.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '-');
     words.insert(words.begin(), {"kilotwin", "service"});
     words.insert(words.end(), {"--run", directory_.path().string(), "--domain", std::to_string(options_.domain),
-                               "--start-monotonic", fmt::format("{:.6f}", options_.start_monotonic_s)});
+                               "--start-monotonic", fmt::format("{:.6f}", options_.start_monotonic_s),
+                               "--give-up-after", fmt::format("{}", options_.give_up_after_s)});
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);

@@ -40,6 +40,7 @@ void RunMetrics::on_metrics(const WireMetrics& metrics) {
     return;
   }
   account.next = account.next + metrics.hash_parts._length;
+  account.heard = true;
   account.last = metrics.last;
   account.step_ns = metrics.step_ns;
   account.exchange_ns = metrics.exchange_ns;
@@ -75,6 +76,11 @@ void RunMetrics::advance(const std::function<void(Tick, std::uint64_t)>& each) {
   }
   for (const auto& [tick, values] : parts) KILOTWIN_DEMAND(hashes_.add(tick, values));
   while (hashes_.advance()) each(hashes_.tick(), hashes_.chain());
+}
+
+bool RunMetrics::heard_all() {
+  const std::lock_guard lock(mutex_);
+  return std::all_of(accounts_.begin(), accounts_.end(), [](const Account& account) { return account.heard; });
 }
 
 bool RunMetrics::complete() {

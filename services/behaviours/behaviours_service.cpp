@@ -80,7 +80,8 @@ class BehavioursFederate : public Federate {
 void run_service(const RunPlan& plan, HostId host, const ServiceContext& context) {
   BehavioursEngine engine(plan, host, ProgramSet::load(plan.manifest, context.run_directory));
   if (context.resumed) engine.load(context.first(), context.resumed->behaviours());
-  Session session(plan, plan.behaviours(host), context.transport, context.first(), context.inputs);
+  Session session(plan, plan.behaviours(host), context.transport, context.first(), context.inputs,
+                  context.give_up_after_s);
   RunningNote note(context.run_directory, host);
   engine.note_running_in(note.place());
   const Watchdog watchdog({&engine});
