@@ -61,6 +61,7 @@ class LocalRun {
         radio_(plan, firmware::make_firmware_robots(plan, options.run_directory, options.threads,
                                                     options.save_checkpoints)),
         station_(plan),
+        swarm_(plan.robots(), plan.movables(), plan.memory.size()),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()),
         snapshots_(options.run_directory,
@@ -105,7 +106,9 @@ class LocalRun {
       const bool last = finished || !totals.failure.empty();
       if (options_.save_checkpoints && schedule_.checkpoint_at(now)) save(now, chain);
       const auto recorded_from = Clock::now();
-      observer_.state(now, frames_of(now).all_bodies, frames_of(now).all_actuation, last);
+      swarm_.gather(now, frames_of(now).all_bodies);
+      swarm_.gather(frames_of(now).all_actuation);
+      observer_.state(now, swarm_, last);
       const auto recorded_to = Clock::now();
       recording_ns_ += ns(recorded_from, recorded_to);
       if (!last && snapshots_.due(recorded_to)) {
@@ -232,12 +235,12 @@ class LocalRun {
     if (task < partitions) {
       physics_[task]->step(from, {in.ghosts_for[task], in.all_actuation, schedule_.tracked_poses()});
     } else if (task == partitions) {
-      radio_.step(from, {in.all_bodies, in.all_actuation, in.overhead});
+      radio_.step(from, {swarm_, in.overhead});
     } else if (task == partitions + 1) {
-      station_.step(from, {in.all_bodies, in.all_actuation, schedule_.overhead_inputs()});
+      station_.step(from, {swarm_, schedule_.overhead_inputs()});
     } else {
       const std::size_t host = task - partitions - 2;
-      hosts_[host]->step(from, in.radio[host], in.all_bodies);
+      hosts_[host]->step(from, in.radio[host], &swarm_);
       if (!logs_.empty()) logs_[host]->write(from, hosts_[host]->printed());
     }
   }
@@ -358,6 +361,7 @@ class LocalRun {
   std::vector<std::unique_ptr<physics::Engine>> physics_;
   comm::RadioEngine radio_;
   ark::StationEngine station_;
+  SwarmView swarm_;  // of the tick at hand
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
   // Per host, where there is a run directory.
   std::vector<std::unique_ptr<behaviours::RobotLogs>> logs_;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/time.hpp"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/federation/schedule.hpp"
 
 namespace kilotwin {
@@ -43,9 +43,8 @@ struct RunProgress {
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  /// The complete state of a tick: bodies of all partitions, actuation of all hosts. `last`: the run ends here.
-  virtual void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>,
-                     bool last) = 0;
+  /// The whole swarm at a tick. `last`: the run ends here.
+  virtual void state(Tick, const SwarmView&, bool last) = 0;
   /// H(tick).
   virtual void hash(Tick, std::uint64_t chain) = 0;
   /// A stamped input was announced.

@@ -13,17 +13,16 @@
 
 #include "core/effects/measurement.hpp"
 #include "core/plan/plan.hpp"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/ark/virtual_environment.hpp"
 
 namespace kilotwin::ark {
 
-/// What a step from tick k reads; every frame is of tick k.
+/// What a step from tick k reads; all of it is of tick k.
 struct Inputs {
-  std::span<const BodyFrame* const> bodies;
-  std::span<const ActuationFrame* const> actuation;
-  std::span<const OverheadPacket> outside;  ///< stamped by the ingress for this tick, in order
+  const SwarmView& swarm;
+  std::span<const OverheadPacket> external;  ///< stamped by the ingress for this tick, in order
 };
 
 class StationEngine {
@@ -41,8 +40,8 @@ class StationEngine {
 
  private:
   /// The station's own packet at `now_`, if one is due.
-  void send_own(const Inputs& inputs);
-  void see(const Inputs& inputs);
+  void send_own(const SwarmView&);
+  void see(const SwarmView&);
 
   const RunPlan& plan_;
   const Tick start_ends_;            ///< when RUN gives way to STOP

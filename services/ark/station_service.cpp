@@ -54,15 +54,17 @@ class StationFederate : public Federate {
   [[nodiscard]] double ahead_s(Tick now) override { return pace_.ahead_s(now - session_.first(), session_.wall_s()); }
 
   void inputs_complete(Tick now, bool last) override {
+    swarm_.gather(now, bodies_.at(now));
+    swarm_.gather(actuation_.at(now));
     const auto begun = Clock::now();
-    observer_.state(now, bodies_.at(now), actuation_.at(now), last);
+    observer_.state(now, swarm_, last);
     recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());
     if (begun >= next_robots_ && robots_.readers() > 0) publish_robots(now);
     if (begun >= next_robots_) next_robots_ = begun + kRobotsPeriod;
   }
 
   void step(Tick from) override {
-    engine_.step(from, {bodies_.at(from), actuation_.at(from), session_.schedule().overhead_inputs()});
+    engine_.step(from, {swarm_, session_.schedule().overhead_inputs()});
   }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
@@ -164,19 +166,13 @@ class StationFederate : public Federate {
     PublicRobotState state{};
     state.run = session_.plan().run();
     state.time_s = session_.plan().tick_length.seconds_at(now);
-    led_.resize(session_.plan().robots());
-    for (const ActuationFrame* frame : actuation_.at(now)) {
-      std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
-    }
-    for (const BodyFrame* frame : bodies_.at(now)) {
-      for (std::size_t i = 0; i < frame->robot.size(); ++i) {
-        state.robot = frame->robot[i];
-        state.x_mm = frame->x_mm[i];
-        state.y_mm = frame->y_mm[i];
-        state.heading_rad = frame->heading_rad[i];
-        state.led = led_[state.robot];
-        robots_.write(state);
-      }
+    for (std::uint32_t robot = 0; robot < swarm_.robots(); ++robot) {
+      state.robot = robot;
+      state.x_mm = swarm_.x_mm[robot];
+      state.y_mm = swarm_.y_mm[robot];
+      state.heading_rad = swarm_.heading_rad[robot];
+      state.led = swarm_.led[robot];
+      robots_.write(state);
     }
   }
 
@@ -191,11 +187,11 @@ class StationFederate : public Federate {
   Input<BodyFrame> bodies_;
   Input<ActuationFrame> actuation_;
   Output<OverheadFrame> overhead_;
+  SwarmView swarm_{session_.plan().robots(), session_.plan().movables(), session_.plan().memory.size()};
   dds::Writer<PublicRunStatus> status_;
   dds::Writer<PublicRobotState> robots_;
   Clock::time_point next_robots_{};
   Pace pace_{session_.plan()};
-  std::vector<std::uint8_t> led_;
   std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash
   std::uint64_t recording_ns_ = 0;
   bool stop_announced_ = false;

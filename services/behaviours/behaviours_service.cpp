@@ -26,7 +26,10 @@ class BehavioursFederate : public Federate {
         actuation_(session, topics::actuation()),
         told_(engine.failures().size()),
         logs_(context.run_directory, session.plan().tick_length, context.first(), session.plan().share(host)) {
-    if (session.plan().hosts_see_bodies()) bodies_.emplace(session, topics::bodies(), session.plan().all_physics());
+    const RunPlan& plan = session.plan();
+    if (!plan.hosts_see_bodies()) return;
+    bodies_.emplace(session, topics::bodies(), plan.all_physics());
+    swarm_.emplace(plan.robots(), plan.movables(), plan.memory.size());
   }
 
   void publish(Tick) override {
@@ -35,7 +38,8 @@ class BehavioursFederate : public Federate {
   }
 
   void step(Tick from) override {
-    engine_.step(from, *radio_.at(from)[0], bodies_ ? bodies_->at(from) : std::span<const BodyFrame* const>());
+    if (swarm_) swarm_->gather(from, bodies_->at(from));
+    engine_.step(from, *radio_.at(from)[0], swarm_ ? &*swarm_ : nullptr);
     logs_.write(from, engine_.printed());
     for (; told_ < engine_.failures().size(); ++told_) {
       const auto& failure = engine_.failures()[told_];
@@ -68,7 +72,9 @@ class BehavioursFederate : public Federate {
   const HostId host_;
   BehavioursEngine& engine_;
   Input<RadioFrame> radio_;
-  std::optional<Input<BodyFrame>> bodies_;  // only where the experiment has something to sense by place
+  // Only where the experiment has something to sense by place.
+  std::optional<Input<BodyFrame>> bodies_;
+  std::optional<SwarmView> swarm_;
   Output<ActuationFrame> actuation_;
   std::size_t told_;  // of the engine's failures; those of a checkpoint were told when they happened
   RobotLogs logs_;

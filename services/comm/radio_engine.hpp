@@ -32,7 +32,7 @@
 #include <vector>
 
 #include "core/plan/plan.hpp"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/federation/run_observer.hpp"
 #include "core/model/ranging.hpp"
 #include "core/random/random.hpp"
@@ -52,11 +52,9 @@ namespace kilotwin::comm {
 
 class RadioEngine {
  public:
-  /// What a step from tick k reads; every frame is of tick k, in any order. Bodies list every robot once. Robots that no
-  /// actuation frame covers stay as they were.
+  /// What a step from tick k reads; all of it is of tick k.
   struct Inputs {
-    std::span<const BodyFrame* const> bodies;
-    std::span<const ActuationFrame* const> actuation;
+    const SwarmView& swarm;
     const OverheadFrame& overhead;
     /// Of every other region, what it emits for this one; none where the region is everywhere.
     std::span<const RadioGhosts* const> ghosts = {};
@@ -126,12 +124,13 @@ class RadioEngine {
 
   void take_ghosts(std::span<const RadioGhosts* const>);
   void divide();
-  void read_poses(std::span<const BodyFrame* const>);
-  void read_actuation(std::span<const ActuationFrame* const>);
+  void read_poses(const SwarmView&);
+  void read_life_cycles(const SwarmView&);
+  void take_offers(const SwarmView&);
   void drop_message(std::uint32_t robot);
   void forget(Cycles begin);
 
-  void contend(Tick now, std::span<const BodyFrame* const>);
+  void contend(Tick now, const SwarmView&);
   void contend_until(Cycles end, Tick now);
   [[nodiscard]] Cycles next_meeting(Cycles end) const;
   void run_firmware(Cycles from, Cycles until, Tick now);

@@ -33,7 +33,9 @@ std::vector<double> readings(const std::string& light, const std::vector<ScenePo
   LightField field(plan, {0, plan.robots()});
   const BodyFrame frame = frame_of(plan, tick);
   const BodyFrame* const frames[] = {&frame};
-  field.at(tick, frames);
+  SwarmView swarm(plan.robots(), 0, 0);
+  swarm.gather(tick, frames);
+  field.at(swarm);
   std::vector<double> result;
   for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) result.push_back(field.reading(robot));
   return result;
