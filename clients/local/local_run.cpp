@@ -11,19 +11,19 @@
 #include <thread>
 #include <utility>
 
+#include "core/base/say.hpp"
+#include "core/base/state_hash.hpp"
+#include "core/federation/hash_sums.hpp"
+#include "core/federation/pace.hpp"
+#include "core/federation/snapshots.hpp"
+#include "core/os/interrupt.hpp"
+#include "services/ark/station_engine.hpp"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
 #include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
-#include "core/base/say.hpp"
-#include "core/base/state_hash.hpp"
-#include "core/federation/hash_sums.hpp"
-#include "core/os/interrupt.hpp"
-#include "core/federation/pace.hpp"
-#include "core/federation/snapshots.hpp"
-#include "services/ark/station_engine.hpp"
 #include "services/comm/radio_engine.hpp"
 #include "services/physics/engine.hpp"
 
@@ -65,7 +65,7 @@ class LocalRun {
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()),
         snapshots_(options.run_directory,
-               options.save_checkpoints && !options.run_directory.empty() && plan.checkpoint_every() == 0) {
+                   options.save_checkpoints && !options.run_directory.empty() && plan.checkpoint_every() == 0) {
     for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
       physics_.push_back(physics::make_engine(plan, PartitionId{p}));
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {

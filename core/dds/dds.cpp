@@ -80,10 +80,10 @@ Domain::Domain(const Transport& transport) : id_(transport.domain) {
     dds_set_log_sink(remember_log, nullptr);
     const dds_entity_t domain = dds_create_domain(id_, cyclone_configuration(transport).c_str());
     if (domain < 0 && domain_is_full(id_)) {
-      throw RunError(
-          fmt::format("DDS domain {} is full: {} processes of this machine take part in it, and no more can; end some, use "
-                      "fewer partitions and hosts, or choose another --domain",
-                      id_, kMostParticipants));
+      throw RunError(fmt::format(
+          "DDS domain {} is full: {} processes of this machine take part in it, and no more can; end some, use "
+          "fewer partitions and hosts, or choose another --domain",
+          id_, kMostParticipants));
     }
     shared.entity = Entity(domain, fmt::format("domain {}", id_));
   }

@@ -31,8 +31,7 @@ void Measurement::measure(const SwarmView& swarm, MeasuredPoses& seen) {
   const auto add = [count](std::vector<double>& to, std::span<const double> values, double factor) {
     for (std::size_t i = 0; i < count; ++i) to[i] += factor * values[i];
   };
-  const RobotColumns robots{robot_,       swarm.x_mm, swarm.y_mm, swarm.heading_rad,
-                             swarm.memory, duties_,    tracked_};
+  const RobotColumns robots{robot_, swarm.x_mm, swarm.y_mm, swarm.heading_rad, swarm.memory, duties_, tracked_};
   terms_.evaluate(swarm.tick, robots, who_, nullptr, [&](const Term& term, std::span<const double> values) {
     switch (term.target) {
       case Effect::MEASURED_OFFSET:

@@ -34,7 +34,8 @@ bool all_within(const std::vector<double>& values, double most) {
 /// Life cycles that there are.
 bool all_life_cycles(const std::vector<std::uint8_t>& values) {
   return std::all_of(values.begin(), values.end(), [](std::uint8_t value) {
-    return value <= static_cast<std::uint8_t>(LifeCycle::kMoving) || value >= static_cast<std::uint8_t>(LifeCycle::kFlat);
+    return value <= static_cast<std::uint8_t>(LifeCycle::kMoving) ||
+           value >= static_cast<std::uint8_t>(LifeCycle::kFlat);
   });
 }
 

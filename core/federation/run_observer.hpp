@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/base/time.hpp"
-#include "core/frames/swarm_view.hpp"
 #include "core/federation/schedule.hpp"
+#include "core/frames/swarm_view.hpp"
 
 namespace kilotwin {
 

@@ -28,9 +28,9 @@ constexpr auto kBeatPeriod = milliseconds(500);
 constexpr auto kIdlePeriod = milliseconds(100);
 /// What counts of the time between two looks at who is silent: a process that was not let run has not listened either.
 constexpr auto kMostWatched = milliseconds(200);
-/// How long a federate may be silent until it is lost: where every process has a core, and before the first tick.
-constexpr double kShortestLease_s = 2.0, kStartPatience_s = 30.0;
-/// Processes per core from which on the lease grows with their number.
+/// How long a federate may be silent before the first tick, and at most.
+constexpr double kStartPatience_s = 30.0;
+/// Services per core from which on the patience grows with their number.
 constexpr double kCrowd = 4.0;
 constexpr auto kReportAfter = milliseconds(1000), kReportEvery = milliseconds(5000);
 /// After a wait of this length without progress the report says what the cause may be.
@@ -85,9 +85,9 @@ Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& tra
   }
   member_.publisher = self_.value();
   member_.run = plan_.run();
-  member_.arrived_us = std::chrono::duration_cast<std::chrono::microseconds>(
-                           std::chrono::system_clock::now().time_since_epoch())
-                           .count();
+  member_.arrived_us =
+      std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+          .count();
   member_.plan_hash = plan_.hash;
   member_.process = static_cast<std::uint32_t>(getpid());
   set_text(member_.name, plan_.name(self_));
@@ -115,16 +115,17 @@ void Session::beat(const std::stop_token& stop) {
   }
 }
 
-double Session::lease_s() const {
+double Session::patience_s() const {
+  if (!started_) return kStartPatience_s;
   const double cores = std::max(1u, std::thread::hardware_concurrency());
-  return std::clamp(kShortestLease_s * plan_.federates() / (kCrowd * cores), kShortestLease_s, kStartPatience_s);
+  return std::clamp(dds::kSilence_s * plan_.federates() / (kCrowd * cores), dds::kSilence_s, kStartPatience_s);
 }
 
 /// Whoever shows no sign of life is lost.
 void Session::watch_silence() {
   const auto now = Clock::now();
   const auto watched = std::min<Clock::duration>(now - std::exchange(watched_at_, now), kMostWatched);
-  const std::chrono::duration<double> patience(started_ ? lease_s() : kStartPatience_s);
+  const std::chrono::duration<double> patience(patience_s());
   const std::lock_guard lock(mutex_);
   for (std::uint32_t i = 0; i < members_.size(); ++i) {
     MemberState& member = members_[i];
@@ -158,8 +159,9 @@ void Session::on_member_of_another_run(const WireMember& member, bool alive) {
   if (!alive || phase_ != kilotwin_wire_ARRIVING || member.phase >= kilotwin_wire_FINISHED) return;
   const bool came_later = std::pair(member.arrived_us, member.run) > std::pair(member_.arrived_us, member_.run);
   if (member.phase == kilotwin_wire_ARRIVING && came_later) return;
-  fail_as_user_error(fmt::format("the DDS domain {} is in use by another run ({} on {}); choose another with --domain",
-                                 transport_.domain, member.name, member.host));
+  fail_as_user_error(
+      fmt::format("the DDS domain {} is in use by another run ({} on {}); choose another with --domain",
+                  transport_.domain, member.name, member.host));
 }
 
 void Session::on_member(const WireMember& member, dds::SampleState state) {
@@ -250,8 +252,8 @@ void Session::report_wait(Clock::time_point since, const std::string& whom) {
   const auto now = Clock::now();
   const double waited_s = std::chrono::duration<double>(now - since).count();
   if (give_up_after_s_ > 0 && waited_s >= give_up_after_s_) {
-    throw RunError(fmt::format("{} gave up after it had waited {:.0f} s for {}: {}", plan_.name(self_), waited_s, whom,
-                               likely_cause()));
+    throw RunError(fmt::format("{} gave up after it had waited {:.0f} s for {}: {}", plan_.name(self_), waited_s,
+                               whom, likely_cause()));
   }
   if (now < next_report_) return;
   next_report_ = now + kReportEvery;

@@ -9,8 +9,8 @@
 /// that fails, ends the session of all others with a RunError that names it; so does one that left while something of it is
 /// still missing, and a frame that cannot be ours.
 ///
-/// Every federate rewrites its member sample twice a second. One that is silent for lease_s() is lost. Before the first tick
-/// processes compete for the cores, and silence counts for less: kStartPatience_s.
+/// Every federate rewrites its member sample twice a second. One that is silent for patience_s() is lost:
+/// dds::kSilence_s, longer on crowded machines and before the first tick, when all processes compete for the cores.
 #pragma once
 
 #include <atomic>
@@ -27,10 +27,10 @@
 #include <vector>
 
 #include "core/dds/dds.hpp"
-#include "core/plan/plan.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/tick_gate.hpp"
 #include "core/federation/wire.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin {
 
@@ -118,7 +118,7 @@ class Session {
   void fail_as_user_error(const std::string& line);
   void beat(const std::stop_token& stop);
   void watch_silence();
-  [[nodiscard]] double lease_s() const;
+  [[nodiscard]] double patience_s() const;
   void on_directive(const WireDirective& wire);
   /// kFirst: nothing was counted yet, but the station hears by it that the metrics come through.
   enum class Report { kFirst, kNext, kLast };

@@ -33,7 +33,8 @@ void SwarmView::gather(Tick of, std::span<const BodyFrame* const> frames) {
     for (std::size_t i = 0; i < frame->robot.size(); ++i) {
       const std::uint32_t robot = frame->robot[i];
       if (listed_in_[robot] == gathering_)
-        throw RunError("two partitions claim robot " + std::to_string(robot) + " at tick " + std::to_string(of.count()));
+        throw RunError("two partitions claim robot " + std::to_string(robot) + " at tick " +
+                       std::to_string(of.count()));
       listed_in_[robot] = gathering_;
       x_mm[robot] = frame->x_mm[i];
       y_mm[robot] = frame->y_mm[i];

@@ -25,14 +25,14 @@ class SwarmView {
   [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(x_mm.size()); }
 
   // To be read only.
-  Tick tick{-1};                                                         ///< of the poses
-  std::vector<double> x_mm, y_mm, heading_rad;                           ///< per robot
-  std::vector<double> memory;                                            ///< per robot, as in BodyFrame
-  std::vector<double> movable_x_mm, movable_y_mm, movable_heading_rad;   ///< per movable body
-  std::vector<std::uint8_t> motor_left, motor_right, spin_up;            ///< per robot, as in ActuationFrame
-  std::vector<std::uint8_t> led, life_cycle;                             ///< per robot, as in ActuationFrame
-  std::vector<std::uint16_t> tx_period;                                  ///< per robot, as in ActuationFrame
-  std::vector<std::uint32_t> offer_robot;                                ///< as in ActuationFrame, host by host
+  Tick tick{-1};                                                        ///< of the poses
+  std::vector<double> x_mm, y_mm, heading_rad;                          ///< per robot
+  std::vector<double> memory;                                           ///< per robot, as in BodyFrame
+  std::vector<double> movable_x_mm, movable_y_mm, movable_heading_rad;  ///< per movable body
+  std::vector<std::uint8_t> motor_left, motor_right, spin_up;           ///< per robot, as in ActuationFrame
+  std::vector<std::uint8_t> led, life_cycle;                            ///< per robot, as in ActuationFrame
+  std::vector<std::uint16_t> tx_period;                                 ///< per robot, as in ActuationFrame
+  std::vector<std::uint32_t> offer_robot;                               ///< as in ActuationFrame, host by host
   std::vector<IrMessage> offer_message;
 
  private:

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/frames/swarm_view.hpp"
+#include "core/plan/plan.hpp"
 #include "core/senses/light_image.hpp"
 #include "core/senses/light_source.hpp"
 #include "core/senses/shadows.hpp"

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/frames/swarm_view.hpp"
+#include "core/plan/plan.hpp"
 #include "core/senses/battery.hpp"
 #include "core/senses/light_field.hpp"
 

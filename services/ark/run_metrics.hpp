@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/federation/hash_sums.hpp"
 #include "core/federation/run_observer.hpp"
 #include "core/federation/topics.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::ark {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/effects/measurement.hpp"
-#include "core/plan/plan.hpp"
 #include "core/frames/swarm_view.hpp"
+#include "core/plan/plan.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/ark/virtual_environment.hpp"
 

@@ -9,9 +9,9 @@
 
 #include "core/base/error.hpp"
 #include "core/federation/frame_io.hpp"
-#include "core/os/interrupt.hpp"
 #include "core/federation/pace.hpp"
 #include "core/federation/snapshots.hpp"
+#include "core/os/interrupt.hpp"
 #include "services/ark/external_input.hpp"
 #include "services/ark/run_metrics.hpp"
 #include "services/ark/station_engine.hpp"
@@ -51,7 +51,9 @@ class StationFederate : public Federate {
   }
 
   [[nodiscard]] bool hears_all() override { return metrics_.heard_all(); }
-  [[nodiscard]] double ahead_s(Tick now) override { return pace_.ahead_s(now - session_.first(), session_.wall_s()); }
+  [[nodiscard]] double ahead_s(Tick now) override {
+    return pace_.ahead_s(now - session_.first(), session_.wall_s());
+  }
 
   void inputs_complete(Tick now, bool last) override {
     swarm_.gather(now, bodies_.at(now));
@@ -63,9 +65,7 @@ class StationFederate : public Federate {
     if (begun >= next_robots_) next_robots_ = begun + kRobotsPeriod;
   }
 
-  void step(Tick from) override {
-    engine_.step(from, {swarm_, session_.schedule().overhead_inputs()});
-  }
+  void step(Tick from) override { engine_.step(from, {swarm_, session_.schedule().overhead_inputs()}); }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 
@@ -206,14 +206,15 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
                   context.give_up_after_s);
   // The chain of a resumed run goes on from H at the checkpoint: its first own sum is that of the tick after.
   RunMetrics metrics(plan, session.participant(), first_hashed(context.first()),
-                 context.resumed ? context.resumed->hash_chain() : 0);
+                     context.resumed ? context.resumed->hash_chain() : 0);
   StationFederate federate(session, engine, metrics, observer, context);
   RunTotals totals;
   try {
     federate.publish_status(kilotwin_open_STARTING, federate.progress());
     session.run(federate);
     const auto patience = Clock::now() + std::chrono::duration<double>(kMetricsPatience_s);
-    while (!metrics.complete() && Clock::now() < patience) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (!metrics.complete() && Clock::now() < patience)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
   } catch (const UserError&) {
     throw;
   } catch (const std::exception& error) {

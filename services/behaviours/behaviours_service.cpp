@@ -4,13 +4,13 @@
 
 #include <optional>
 
+#include "core/base/say.hpp"
+#include "core/federation/frame_io.hpp"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
 #include "services/behaviours/robot_logs.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
-#include "core/base/say.hpp"
-#include "core/federation/frame_io.hpp"
 
 namespace kilotwin::behaviours {
 namespace {

@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "services/behaviours/executor.hpp"
-#include "services/behaviours/program_set.hpp"
 #include "core/base/eeprom_layout.h"
-#include "core/plan/plan.hpp"
 #include "core/frames/swarm_view.hpp"
 #include "core/model/radio_parameters.hpp"
 #include "core/model/robot_parameters.hpp"
+#include "core/plan/plan.hpp"
 #include "core/random/random.hpp"
 #include "core/senses/robot_senses.hpp"
 #include "idl/checkpoint.pb.h"
+#include "services/behaviours/executor.hpp"
+#include "services/behaviours/program_set.hpp"
 
 namespace kilotwin::behaviours {
 

@@ -31,10 +31,10 @@
 #include <span>
 #include <vector>
 
-#include "core/plan/plan.hpp"
-#include "core/frames/swarm_view.hpp"
 #include "core/federation/run_observer.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/model/ranging.hpp"
+#include "core/plan/plan.hpp"
 #include "core/random/random.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/channel.hpp"

@@ -94,8 +94,7 @@ class CommFederate : public Federate {
 void run_service(const RunPlan& plan, const ServiceContext& context, std::unique_ptr<FirmwareRobots> firmware) {
   RadioEngine engine(plan, std::move(firmware));
   if (context.resumed) engine.load(context.first(), context.resumed->radio());
-  Session session(plan, plan.radio(), context.transport, context.first(), context.inputs,
-                  context.give_up_after_s);
+  Session session(plan, plan.radio(), context.transport, context.first(), context.inputs, context.give_up_after_s);
   CommFederate federate(session, engine, context);
   session.run(federate);
 }

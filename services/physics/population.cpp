@@ -96,7 +96,8 @@ void Population::gather(std::span<const BodyFrame* const> ghosts) {
   // List 0 is what was listed, 1 the tracked ones, the others are ghosts.
   const auto add = [this](std::uint32_t robot, Merge::Entry entry) {
     if (!merge_.add(robot, entry))
-      throw RunError("two partitions claim robot " + std::to_string(robot) + " at tick " + std::to_string(tick_.count()));
+      throw RunError("two partitions claim robot " + std::to_string(robot) + " at tick " +
+                     std::to_string(tick_.count()));
   };
   for (std::uint32_t i = 0; i < listed_.size(); ++i) {
     if (listed_.tracked[i] == 0) add(listed_.robot[i], {0, i});

@@ -150,7 +150,8 @@ TEST_F(BadInput, AnAddressThatServicesCannotMeetAtIsRefused) {
 }
 
 TEST_F(BadInput, AServiceOfAnotherBuildIsRefused) {
-  ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--prepare", "--out", scratch / "run"}, scratch).status,
+  ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--prepare", "--out", scratch / "run"}, scratch)
+                .status,
             0);
   proto::Manifest manifest;
   ASSERT_TRUE(manifest.ParseFromString(read(scratch / "run/manifest.pb")));

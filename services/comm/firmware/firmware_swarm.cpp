@@ -6,10 +6,10 @@
 #include <iterator>
 #include <map>
 
-#include "core/os/worker_pool.hpp"
-#include "services/comm/firmware/eeprom.hpp"
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/os/worker_pool.hpp"
+#include "services/comm/firmware/eeprom.hpp"
 #include "services/comm/tick_timers.hpp"
 
 namespace kilotwin::firmware {
@@ -59,7 +59,7 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   // Up to tick 0, before which nobody sends.
   std::vector<std::vector<comm::Cycles>> flashes(robots_.size());
   workers_->share(static_cast<std::uint32_t>(robots_.size()),
-               [&](std::uint32_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
+                  [&](std::uint32_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
   commit();
 }
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "services/comm/firmware/mcu.hpp"
 #include "core/plan/plan.hpp"
+#include "services/comm/firmware/mcu.hpp"
 #include "services/comm/firmware_robots.hpp"
 
 namespace kilotwin::firmware {

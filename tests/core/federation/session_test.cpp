@@ -406,7 +406,8 @@ TEST_F(Sessions, RefuseAnotherBuild) {
   start(plan_.radio());
   join();
   const std::string& failure = outcomes_[plan_.radio().value()].failure;
-  EXPECT_NE(failure.find("is of build 1.0-other, this service is of build " + plan_.manifest.build()), std::string::npos)
+  EXPECT_NE(failure.find("is of build 1.0-other, this service is of build " + plan_.manifest.build()),
+            std::string::npos)
       << failure;
 }
 

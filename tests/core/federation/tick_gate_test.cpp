@@ -39,8 +39,7 @@ TEST(TickGate, RefusesStrangersAndGapsAndPassesOverRepeats) {
 
 TEST(TickGate, RefusesWhoWouldLapTheReader) {
   TickGate gate({FederateId{1}}, Tick{3});
-  for (int t = 3; t < 3 + kFrameRing; ++t)
-    EXPECT_TRUE(gate.accept(FederateId{1}, Tick{t}));
+  for (int t = 3; t < 3 + kFrameRing; ++t) EXPECT_TRUE(gate.accept(FederateId{1}, Tick{t}));
   EXPECT_EQ(gate.arrival(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kUnexpected);
   gate.reading(Tick{4});
   EXPECT_TRUE(gate.accept(FederateId{1}, Tick{3 + kFrameRing}));

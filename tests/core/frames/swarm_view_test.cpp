@@ -64,7 +64,8 @@ TEST(SwarmView, RefusesARobotThatNoPartitionHas) {
   bodies[1].add(1, 0, 0, 0);
   EXPECT_EQ(refusal(view, bodies), "");
   bodies[1].robot.pop_back();
-  EXPECT_EQ(refusal(view, bodies, Tick{4}), "no partition has robot 1 at tick 4") << "what was gathered before counts no more";
+  EXPECT_EQ(refusal(view, bodies, Tick{4}), "no partition has robot 1 at tick 4")
+      << "what was gathered before counts no more";
 }
 
 TEST(SwarmView, RefusesARobotThatTwoPartitionsClaim) {

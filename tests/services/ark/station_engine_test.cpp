@@ -25,7 +25,10 @@ RunPlan plan_of(std::uint32_t robots, const std::string& experiment = "") {
 class Scene {
  public:
   explicit Scene(const RunPlan& plan, std::uint32_t parts = 1)
-      : station(plan), bodies_(parts), actuation_(parts), swarm_(plan.robots(), plan.movables(), plan.memory.size()) {
+      : station(plan),
+        bodies_(parts),
+        actuation_(parts),
+        swarm_(plan.robots(), plan.movables(), plan.memory.size()) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
       bodies_[i % parts].add(i, pose.position_mm.x(), pose.position_mm.y(), pose.heading_rad);
@@ -171,8 +174,8 @@ TEST(StationEngine, ForwardsPacketsFromOutsideInOrder) {
   const RunPlan plan = plan_of(1000, kHub);
   Scene scene(plan);
   const std::vector<OverheadPacket> external{{OverheadCommand::kOnce, {1, 2, 3, 4, 5, 6, 7, 8, 9, 0x83}},
-                                            {OverheadCommand::kRepeat, {9, 8, 7, 6, 5, 4, 3, 2, 1, 0x42}},
-                                            {OverheadCommand::kStop, {}}};
+                                             {OverheadCommand::kRepeat, {9, 8, 7, 6, 5, 4, 3, 2, 1, 0x42}},
+                                             {OverheadCommand::kStop, {}}};
   for (int k = 1; k < 100; ++k) {
     if (k % 7 != 0) {
       scene.step();

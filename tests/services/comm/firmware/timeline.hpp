@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "services/behaviours/program_set.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/local/local_run.hpp"
+#include "services/behaviours/program_set.hpp"
 
 namespace kilotwin::firmware {
 
