@@ -1,4 +1,4 @@
-/// What a run tells about itself while it goes, and what it adds up to: the seam between the federation and whoever
+/// What a run reports while it goes, and its totals: the interface between the federation and what
 /// records, shows or summarises it.
 #pragma once
 
@@ -49,7 +49,7 @@ class RunObserver {
   virtual void hash(Tick, std::uint64_t chain) = 0;
   /// A stamped input was announced.
   virtual void input(const Directive&) = 0;
-  /// A checkpoint comes to be complete: what was told up to its tick must not be lost with this process.
+  /// A checkpoint comes to be complete: what was recorded up to its tick must not be lost with this process.
   virtual void saved() {}
   /// Called a few times a second, also while the run pauses or waits.
   virtual void idle(const RunProgress& progress) { static_cast<void>(progress); }
@@ -69,7 +69,7 @@ struct RunTotals {
   std::uint32_t robots_failed = 0;
   std::array<std::uint64_t, static_cast<std::size_t>(Work::kCount)> work_ns{};
   std::vector<PairCount> pairs;    ///< where the recording wants messages
-  std::vector<RadioCount> radios;  ///< per robot; empty where the run broke before the radio told
+  std::vector<RadioCount> radios;  ///< per robot; empty where the run broke before the radio reported
   bool stopped_early = false;      ///< by a directive
   std::string failure;             ///< one line, where the run broke
 };

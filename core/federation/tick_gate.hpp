@@ -29,8 +29,6 @@ class TickGate {
   bool accept(FederateId publisher, Tick tick);
   /// The reader has come to `tick`: it reads the frames of that tick, and is done with those before.
   void reading(Tick tick) { reading_ = tick; }
-  /// Every publisher's frame of the tick that is being read is here.
-  [[nodiscard]] bool ready() const { return ready(reading_); }
 
   /// Every publisher has said hello.
   [[nodiscard]] bool heard_all() const;

@@ -3,7 +3,7 @@
 /// Tick 0: RUN, repeated by the overhead controller. After start_broadcast_s: STOP, so that the air is free. Then, with
 /// environments, at most one packet per packet_interval_s with ARK messages for the three robots that have waited longest,
 /// none of which hears more often than every max(1 s, N * 0.05 s / 3) (ARK's users' rule); a packet is repeated until the
-/// next, and STOP follows when nobody's turn has come. A packet from outside takes the place of the station's own.
+/// next, and STOP follows when nobody's turn has come. A packet of external input takes the place of the station's own.
 #pragma once
 
 #include <array>
@@ -54,7 +54,7 @@ class StationEngine {
   std::uint32_t next_robot_ = 0;         ///< whose turn it is: robots are served in a circle
   Tick next_packet_{0};
   bool repeating_ = true;             ///< the controller repeats an own packet
-  std::vector<Tick> served_;          ///< per robot, where there are environments: when it was told a reading last
+  std::vector<Tick> served_;          ///< per robot, where there are environments: when it was sent a reading last
   std::vector<std::uint32_t> turns_;  ///< per robot: how often; environments answer by turns
 
   // Of the step at hand: robots as the tracker sees them.

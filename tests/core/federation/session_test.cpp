@@ -190,12 +190,12 @@ class Sessions : public ::testing::Test {
     }
   }
   void expect_malformed(const std::string& why) {
-    bool told = false;
+    bool named = false;
     for (const Outcome& outcome : outcomes_) {
       EXPECT_NE(outcome.failure, "");
-      told = told || outcome.failure.find("malformed: " + why) != std::string::npos;
+      named = named || outcome.failure.find("malformed: " + why) != std::string::npos;
     }
-    EXPECT_TRUE(told) << outcomes_[0].failure << '\n'
+    EXPECT_TRUE(named) << outcomes_[0].failure << '\n'
                       << outcomes_[1].failure << '\n'
                       << outcomes_[2].failure << '\n'
                       << outcomes_[3].failure;

@@ -129,7 +129,7 @@ struct Scene {
   const char* experiment;
 };
 
-class FrameFuzz : public testing::TestWithParam<Scene> {
+class FrameFuzz : public ::testing::TestWithParam<Scene> {
  protected:
   static constexpr int kTrials = 400;
   static constexpr int kTicksAfter = 3;
@@ -245,7 +245,7 @@ TEST_P(FrameFuzz, OverheadPacketsToTheRadio) {
 
 INSTANTIATE_TEST_SUITE_P(
     Engines, FrameFuzz,
-    testing::Values(
+    ::testing::Values(
         Scene{"Planar",
               "movable { box { width_mm: 100 length_mm: 40 } y_mm: 100 mass_g: 20 } station { environment { hub { "
               "radius_mm: 300 } } } light { shadows: true source { height_mm: 250 intensity: 88 } }"},
