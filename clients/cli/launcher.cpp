@@ -195,7 +195,7 @@ class Launcher {
       if (deadline_ && Clock::now() > *deadline_) end_all();
       {
         const std::lock_guard lock(mutex_);
-        if (started_ && !interrupted_) progress_.show(latest_);
+        if (started_ && !interrupted_ && culprit_ == nullptr) progress_.show(latest_);
       }
       std::this_thread::sleep_for(kPoll);
     }

@@ -124,7 +124,7 @@ TEST_F(BadInput, ADomainInUseByServicesStartedByHand) {
   ASSERT_EQ(kilotwin({"run", good, "--prepare", "--out", scratch / "first"}, scratch).status, 0);
   const std::string domain = std::to_string(dds::DomainClaim::any().domain());
   Process other({program(), "service", "comm", "--run", scratch / "first", "--domain", domain}, scratch.path());
-  ASSERT_TRUE(eventually([&] { return read("/proc/" + std::to_string(other.id()) + "/net/udp").size() > 200; }));
+  ASSERT_TRUE(other.says("has waited", 30)) << "it is there, and came first";
   const Outcome outcome = kilotwin({"run", good, "--domain", domain, "--out", scratch / "second"}, scratch);
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   expect_in("in use by another run", outcome.err);
