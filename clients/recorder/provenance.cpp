@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "clients/recorder/file.hpp"
+#include "core/base/build_identity.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::recorder {
@@ -32,7 +33,7 @@ Provenance provenance_of_this_process() {
   ::gethostname(host, sizeof host - 1);
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   return {KILOTWIN_VERSION,
-          KILOTWIN_VERSION,
+          std::string(build_identity()),
           fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now)),
           words_of_this_process(),
           host,
