@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// For how long services may take to leave once they were asked to.
+/// For how long services may take to leave after a signal.
 constexpr auto kGrace = std::chrono::milliseconds(3000);
 constexpr auto kPoll = std::chrono::milliseconds(5);
 
@@ -107,7 +107,8 @@ class Launcher {
         file.begin(), file.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '-');
     words.insert(words.begin(), {"kilotwin", "service"});
     words.insert(words.end(), {"--run", directory_.path().string(), "--domain", std::to_string(options_.domain),
-                               "--start-monotonic", fmt::format("{:.6f}", options_.start_monotonic_s)});
+                               "--start-monotonic", fmt::format("{:.6f}", options_.start_monotonic_s),
+                               "--give-up-after", fmt::format("{}", options_.give_up_after_s)});
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -171,7 +172,7 @@ class Launcher {
       child.status = status;
       const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
       if (!well && !ending_ && !interrupted_ && culprit_ == nullptr) {
-        // The first to end is the culprit: whoever only noticed its loss ends later.
+        // The first to end is the culprit: services that only noticed its loss end later.
         culprit_ = &child;
         if (child.host && brought_itself_down(status))
           corrupted_by_ = behaviours::take_note(directory_.path(), *child.host);
@@ -194,7 +195,7 @@ class Launcher {
       if (deadline_ && Clock::now() > *deadline_) end_all();
       {
         const std::lock_guard lock(mutex_);
-        if (started_ && !interrupted_) progress_.show(latest_);
+        if (started_ && !interrupted_ && culprit_ == nullptr) progress_.show(latest_);
       }
       std::this_thread::sleep_for(kPoll);
     }
@@ -204,7 +205,7 @@ class Launcher {
           fmt::format("kilotwin: interrupted; what was recorded so far is in {}", directory_.path().string()));
       return 1;
     }
-    // Bad input is bad input whoever of several finds it first, and whoever leaves first because of it.
+    // Bad input is bad input, whichever service finds it first or leaves first because of it.
     const auto refused = [](const Child& child) {
       return WIFEXITED(child.status) && WEXITSTATUS(child.status) == 2;
     };
@@ -237,7 +238,7 @@ class Launcher {
 
   /// Ends every child, by force if need be.
   void end_all() {
-    ending_ = true;  // what ends from now on was told to
+    ending_ = true;  // what ends from now on ends by our signal
     for (const int signal : {SIGTERM, SIGKILL}) {
       for (const Child& child : children_) {
         if (child.running) kill(child.process, signal);

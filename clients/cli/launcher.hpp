@@ -10,6 +10,7 @@ namespace kilotwin::cli {
 struct LaunchOptions {
   std::uint32_t domain = 0;
   double start_monotonic_s = 0;  ///< when the command was given
+  double give_up_after_s = 0;    ///< how long services wait for each other without progress; 0: for ever
   bool show_progress = true;
 };
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/cli/commands.hpp"
+#include "core/base/build_identity.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 
@@ -33,7 +34,7 @@ int main_of(int argc, char** argv) {
   CLI::App program{"Kilotwin simulates swarms of Kilobots as services over DDS. Start: kilotwin run EXPERIMENT"};
   program.name("kilotwin");
   program.require_subcommand(1);
-  program.set_version_flag("--version", KILOTWIN_VERSION);
+  program.set_version_flag("--version", fmt::format("kilotwin {} ({})", build_identity(), build_compiler()));
   const std::vector<Command> commands{
       add_run(program, started_s), add_check(program),  add_build(program),    add_sweep(program),
       add_export(program),         add_replay(program), add_identify(program), add_service(program, started_s),

@@ -11,15 +11,18 @@
 #include <set>
 
 #include "clients/recorder/provenance.hpp"
+#include "core/base/build_identity.hpp"
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/say.hpp"
+#include "core/dds/dds.hpp"
 #include "core/experiment/layout.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/surroundings.hpp"
 #include "core/experiment/field_checks.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/os/files.hpp"
+#include "core/os/limits.hpp"
 #include "core/plan/from_manifest.hpp"
 #include "core/plan/plan.hpp"
 #include "services/behaviours/compiler.hpp"
@@ -156,17 +159,18 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
   return text + fields;
 }
 
-/// The number of processes on one machine is limited by the participant indices of DDS (core/dds/dds.cpp); the launcher and
-/// observers take part as well.
+/// Refuses a run whose services do not fit on this machine.
 void check_processes(const proto::Deployment& deployment) {
-  constexpr std::uint32_t kMost = 110;
   const std::uint32_t partitions = deployment.partition_columns() * deployment.partition_rows();
-  if (const std::uint32_t processes = partitions + deployment.hosts() + 2; processes > kMost) {
+  const std::uint32_t services = partitions + deployment.hosts() + 2;
+  if (services > dds::kMostServices) {
     throw UserError(
-        fmt::format("--partitions {}x{}: {} processes, more than the {} that run on one machine; divide less, or "
-                    "use --mode local",
-                    deployment.partition_columns(), deployment.partition_rows(), processes, kMost));
+        fmt::format("--partitions {}x{}: {} services, and one machine has room for {} in a DDS domain; give fewer "
+                    "partitions or hosts, use --mode local, or --prepare and start services on several machines",
+                    deployment.partition_columns(), deployment.partition_rows(), services, dds::kMostServices));
   }
+  constexpr std::uint64_t kOwnFiles = 64;
+  require_open_files(kOwnFiles + services, fmt::format("a run of {} services", services));
 }
 
 fs::path checkpoint_directory(const fs::path& resume) {
@@ -215,6 +219,7 @@ Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, 
   proto::Manifest& manifest = resolved.manifest;
   manifest.set_format(1);
   manifest.set_run(new_run_id());
+  manifest.set_build(std::string(build_identity()));
   *manifest.mutable_experiment() = with_counts(loaded, placed);
   manifest.mutable_x_mm()->Add(placed.x_mm.begin(), placed.x_mm.end());
   manifest.mutable_y_mm()->Add(placed.y_mm.begin(), placed.y_mm.end());

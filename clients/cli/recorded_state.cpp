@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
+#include <vector>
 
 namespace kilotwin::cli {
 namespace {
@@ -22,45 +24,11 @@ std::string difference(std::string_view whose, std::string_view field, std::span
 
 }  // namespace
 
-RecordedState::RecordedState(const RunPlan& plan)
-    : x_mm_(plan.robots()),
-      y_mm_(plan.robots()),
-      heading_rad_(plan.robots()),
-      led_(plan.robots()),
-      life_cycle_(plan.robots()),
-      movable_x_mm_(plan.movables()),
-      movable_y_mm_(plan.movables()),
-      movable_heading_rad_(plan.movables()),
-      measurement_(plan) {}
-
-void RecordedState::gather(Tick tick, std::span<const BodyFrame* const> bodies,
-                           std::span<const ActuationFrame* const> actuation) {
-  tick_ = tick;
-  for (const BodyFrame* frame : bodies) {
-    for (std::size_t i = 0; i < frame->robot.size(); ++i) {
-      const std::uint32_t robot = frame->robot[i];
-      x_mm_[robot] = frame->x_mm[i];
-      y_mm_[robot] = frame->y_mm[i];
-      heading_rad_[robot] = frame->heading_rad[i];
-    }
-    const MovableColumns& movable = frame->movable;
-    for (std::size_t i = 0; i < movable.body.size(); ++i) {
-      movable_x_mm_[movable.body[i]] = movable.x_mm[i];
-      movable_y_mm_[movable.body[i]] = movable.y_mm[i];
-      movable_heading_rad_[movable.body[i]] = movable.heading_rad[i];
-    }
-  }
-  for (const ActuationFrame* frame : actuation) {
-    std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
-    std::copy(frame->life_cycle.begin(), frame->life_cycle.end(), life_cycle_.begin() + frame->first_robot);
-  }
-  if (measurement_.any()) measurement_.measure(tick, bodies, actuation, measured_);
-}
-
-recorder::StateView RecordedState::view() const {
-  return {tick_,         x_mm_,         y_mm_,          heading_rad_,
-          led_,          life_cycle_,   movable_x_mm_,  movable_y_mm_,
-          movable_heading_rad_, measured_.x_mm, measured_.y_mm, measured_.heading_rad};
+recorder::StateView RecordedState::of(const SwarmView& swarm) {
+  if (measurement_.any()) measurement_.measure(swarm, measured_);
+  return {swarm.tick,       swarm.x_mm,           swarm.y_mm,         swarm.heading_rad,         swarm.led,
+          swarm.life_cycle, swarm.movable_x_mm,   swarm.movable_y_mm, swarm.movable_heading_rad, measured_.x_mm,
+          measured_.y_mm,   measured_.heading_rad};
 }
 
 std::string first_difference(const recorder::StateView& state, const proto::StateRecord& recorded) {

@@ -1,31 +1,23 @@
-/// The state of all robots at one tick, gathered from the frames of partitions and hosts, as recordings hold it.
+/// The state of all robots at one tick, as recordings hold it.
 #pragma once
 
-#include <cstdint>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "clients/recorder/writer.hpp"
 #include "core/effects/measurement.hpp"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {
 
 class RecordedState {
  public:
-  explicit RecordedState(const RunPlan& plan);
+  explicit RecordedState(const RunPlan& plan) : measurement_(plan) {}
 
-  void gather(Tick tick, std::span<const BodyFrame* const> bodies, std::span<const ActuationFrame* const> actuation);
-  /// Valid until the next gather().
-  [[nodiscard]] recorder::StateView view() const;
+  /// Of a swarm, with what the tracker measures of it. Valid until the next call, and as long as the swarm.
+  [[nodiscard]] recorder::StateView of(const SwarmView&);
 
  private:
-  Tick tick_;
-  std::vector<double> x_mm_, y_mm_, heading_rad_;
-  std::vector<std::uint8_t> led_, life_cycle_;
-  std::vector<double> movable_x_mm_, movable_y_mm_, movable_heading_rad_;
   Measurement measurement_;
   MeasuredPoses measured_;
 };

@@ -1,6 +1,6 @@
 /// When a robot's program has brought down its host, the run goes on from its last checkpoint, or from its beginning, with
 /// that robot failed in the step in which it happened: the result is that of a run in which it failed there. What was
-/// recorded up to the checkpoint, and the inputs from outside that had been stamped for later ticks, are kept.
+/// recorded up to the checkpoint, and the external inputs that had been stamped for later ticks, are kept.
 ///
 /// RUN/recovered holds what the next attempt goes on from: the parts of the checkpoint, if there is one, and the recording.
 #pragma once
@@ -17,7 +17,7 @@
 
 namespace kilotwin::cli {
 
-/// Whether a process has ended by what its own code did, not by a signal from outside. `status` as of waitpid().
+/// Whether a process has ended by what its own code did, not by a signal of another process. `status` as of waitpid().
 [[nodiscard]] bool brought_itself_down(int status);
 
 /// Makes the run directory and the manifest those of the next attempt, and says so. `running`: whose programs ran when the

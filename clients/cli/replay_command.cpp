@@ -96,8 +96,7 @@ class Verifier : public RunObserver {
         state_(plan),
         next_(reader_.next_state()) {}
 
-  void state(Tick tick, std::span<const BodyFrame* const> bodies, std::span<const ActuationFrame* const> actuation,
-             bool) override {
+  void state(Tick tick, const SwarmView& swarm, bool) override {
     const bool due = schedule_.due(tick) || states_ == 0;
     if (next_ == nullptr || tick < Tick{next_->tick()}) {
       const bool ended = recorded_.end && recorded_.end->failure().empty();
@@ -107,8 +106,7 @@ class Verifier : public RunObserver {
     }
     if (tick > Tick{next_->tick()})
       throw RunError(fmt::format("tick {}: the recording holds a state of it, the run has none", next_->tick()));
-    state_.gather(tick, bodies, actuation);
-    if (const std::string difference = first_difference(state_.view(), *next_); !difference.empty())
+    if (const std::string difference = first_difference(state_.of(swarm), *next_); !difference.empty())
       throw RunError(fmt::format("tick {}: {}", tick.count(), difference));
     ++states_;
     next_ = reader_.next_state();

@@ -33,6 +33,7 @@ struct RunArguments {
   std::filesystem::path resume;  ///< a run, or one of its checkpoints; empty: from tick 0
   bool prepare = false;          ///< write the run directory and stop
   std::optional<std::uint32_t> domain;
+  double give_up_after_s = 0;  ///< how long services wait for each other without progress; 0: for ever
   Output output;
   bool quiet = false;  ///< no progress, no summary on the screen
 };

@@ -109,6 +109,8 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
 
 int run(const RunArguments& arguments, double started_s) {
   if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
+  if (arguments.mode == "local" && arguments.domain)
+    throw UserError("--domain: a local run takes part in no DDS domain; leave it away, or give --mode federated");
   // The domain is claimed before anything is written: a refused run leaves no files.
   std::optional<dds::DomainClaim> claim;
   if (arguments.mode == "federated" && !arguments.prepare) {
@@ -125,7 +127,8 @@ int run(const RunArguments& arguments, double started_s) {
     if (const auto status = run_locally(prepared.manifest, prepared.directory, arguments, started_s))
       return *status;
   } else {
-    const int status = launch(plan, prepared.directory, {claim->domain(), started_s, !arguments.quiet});
+    const int status =
+        launch(plan, prepared.directory, {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet});
     if (status != 0) return status;
   }
   if (!arguments.quiet) {
@@ -185,6 +188,11 @@ Command add_run(CLI::App& program, double started_s) {
                "write the run directory, print the commands that start the services by hand, and stop");
   app.add_option("--domain", arguments->domain, "DDS domain (default: a free one)")->type_name("N");
   app.footer("Example: kilotwin run experiments/disperse.txtpb --seed 2 --out here");
+  app.add_option("--give-up-after", arguments->give_up_after_s,
+                 "end the run after services have waited so long for each other without progress; 0: never")
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->capture_default_str()
+      ->type_name("SECONDS");
   add_output_options(app, arguments->output, "runs/NAME-SEED, with a number added if it exists");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
   return {&app, [arguments, started_s] { return run(*arguments, started_s); }};

@@ -68,16 +68,13 @@ void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
   }
 }
 
-void RunRecorder::state(Tick tick, std::span<const BodyFrame* const> bodies,
-                        std::span<const ActuationFrame* const> actuation, bool last) {
+void RunRecorder::state(Tick tick, const SwarmView& swarm, bool last) {
   if (first_tick_at_ == std::chrono::steady_clock::time_point{}) first_tick_at_ = std::chrono::steady_clock::now();
   if (any_state_ && tick < next_ && !last) return;
   any_state_ = true;
   next_ = when_.at_or_after(tick + 1);
-  state_.gather(tick, bodies, actuation);
-  const recorder::StateView view = state_.view();
-  writer_.state(view);
-  displacement_.add(view.x_mm, view.y_mm);
+  writer_.state(state_.of(swarm));
+  displacement_.add(swarm.x_mm, swarm.y_mm);
 }
 
 void RunRecorder::hash(Tick tick, std::uint64_t chain) { writer_.hash(tick, chain); }

@@ -24,7 +24,7 @@ class RunRecorder : public RunObserver {
   RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory,
               const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle);
 
-  void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>, bool last) override;
+  void state(Tick, const SwarmView&, bool last) override;
   void hash(Tick, std::uint64_t chain) override;
   void input(const Directive&) override;
   void saved() override;

@@ -14,9 +14,11 @@
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_recorder.hpp"
+#include "core/base/build_identity.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/limits.hpp"
 #include "services/ark/station_service.hpp"
 #include "services/behaviours/behaviours_service.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
@@ -32,8 +34,12 @@ struct ServiceArguments {
   std::string partition;      ///< physics: "C,R"
   std::string share;          ///< behaviours: "I/N"
   dds::Transport transport;
-  double started_s = 0;  ///< when the run was asked for, steady clock; for start_s
+  double give_up_after_s = 0;  ///< how long to wait for others without progress; 0: for ever
+  double started_s = 0;        ///< when the run was asked for, steady clock; for start_s
 };
+
+/// Files and sockets of the busiest service, with room to spare.
+constexpr std::uint64_t kServiceFiles = 64;
 
 /// "A<separator>B" with two numbers.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> two_numbers(const std::string& text, char separator) {
@@ -68,6 +74,26 @@ HostId parse_share(const std::string& text, std::uint32_t hosts) {
   return HostId{share->first - 1};
 }
 
+/// A service of another build would compute other results.
+void require_this_build(const RunPlan& plan, const recorder::RunDirectory& directory) {
+  if (plan.build == build_identity()) return;
+  throw UserError(
+      fmt::format("{}: prepared by build {} of kilotwin, and this is build {}; run one build everywhere, or "
+                  "prepare the run again "
+                  "with this one",
+                  directory.manifest().string(),
+                  plan.build.empty() ? "(unnamed)" : plan.build, build_identity()));
+}
+
+/// Addresses at which others are looked for: IPv4, or names.
+void require_peers(const std::vector<std::string>& peers) {
+  for (const std::string& peer : peers) {
+    if (peer.empty() || peer.find(':') != std::string::npos)
+      throw UserError(fmt::format(
+          "--peer: \"{}\" is no IPv4 address; services meet over IPv4, for example --peer 192.168.1.5", peer));
+  }
+}
+
 void run_station(const RunPlan& plan, const ServiceContext& context, const recorder::RunDirectory& directory,
                  double started_s) {
   RunRecorder run_recorder(plan, directory, context.resumed, {});
@@ -86,11 +112,15 @@ void begin_log(const RunPlan& plan, FederateId self, const dds::Transport& trans
 
 int serve(const ServiceArguments& arguments) {
   catch_interrupts();
+  require_peers(arguments.transport.peers);
+  require_open_files(kServiceFiles, "a service");
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
   const RunPlan plan(read_manifest(directory));
+  require_this_build(plan, directory);
   ServiceContext context;
   context.transport = arguments.transport;
   context.run_directory = directory.path();
+  context.give_up_after_s = arguments.give_up_after_s;
   Beginning beginning = beginning_of(plan, directory);
   context.resumed = std::move(beginning.resumed);
   context.inputs = std::move(beginning.inputs);
@@ -150,6 +180,11 @@ Command add_service(CLI::App& program, double started_s) {
                  "machine)")
       ->allow_extra_args(false)
       ->type_name("ADDRESS");
+  app.add_option("--give-up-after", arguments->give_up_after_s,
+                 "end after it has waited so long for others without progress; 0: never")
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->capture_default_str()
+      ->type_name("SECONDS");
   app.add_option("--start-monotonic", arguments->started_s, "when the run was asked for")->group("");
   return {&app, [arguments] { return serve(*arguments); }};
 }

@@ -41,14 +41,14 @@ std::optional<int> status_of_worker() {
     if (getppid() != parent) _exit(1);
     return std::nullopt;
   }
-  bool told = false;
+  bool forwarded = false;
   for (int status = 0;;) {
     if (waitpid(worker, &status, WNOHANG) == worker) return status;
     const int signal = held.next();
     if (signal != SIGINT && signal != SIGTERM) continue;
     // A terminal sends SIGINT to both, and a second one to a process ends it whatever it does.
-    kill(worker, told && signal == SIGINT ? SIGKILL : SIGTERM);
-    told = true;
+    kill(worker, forwarded && signal == SIGINT ? SIGKILL : SIGTERM);
+    forwarded = true;
   }
 }
 

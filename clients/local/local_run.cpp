@@ -6,20 +6,20 @@
 #include <chrono>
 #include <utility>
 
+#include "core/base/say.hpp"
+#include "core/base/state_hash.hpp"
+#include "core/federation/hash_sums.hpp"
+#include "core/federation/pace.hpp"
+#include "core/federation/snapshots.hpp"
+#include "core/logs/robot_logs.hpp"
+#include "core/os/interrupt.hpp"
+#include "core/os/worker_pool.hpp"
+#include "services/ark/station_engine.hpp"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
-#include "core/logs/robot_logs.hpp"
-#include "core/base/say.hpp"
-#include "core/base/state_hash.hpp"
-#include "core/federation/hash_sums.hpp"
-#include "core/os/interrupt.hpp"
-#include "core/os/worker_pool.hpp"
-#include "core/federation/pace.hpp"
-#include "core/federation/snapshots.hpp"
-#include "services/ark/station_engine.hpp"
 #include "services/comm/radio_engine.hpp"
 #include "services/physics/engine.hpp"
 
@@ -58,10 +58,11 @@ class LocalRun {
                                                     options.resumed ? options.resumed->tick : Tick{0},
                                                     options.save_checkpoints)),
         station_(plan),
+        swarm_(plan.robots(), plan.movables(), plan.memory.size()),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()),
         snapshots_(options.run_directory,
-               options.save_checkpoints && !options.run_directory.empty() && plan.checkpoint_every() == 0) {
+                   options.save_checkpoints && !options.run_directory.empty() && plan.checkpoint_every() == 0) {
     for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
       physics_.push_back(physics::make_engine(plan, PartitionId{p}));
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
@@ -104,7 +105,9 @@ class LocalRun {
       const bool last = finished || !totals.failure.empty();
       if (options_.save_checkpoints && schedule_.checkpoint_at(now)) save(now, chain);
       const auto recorded_from = Clock::now();
-      observer_.state(now, frames_of(now).all_bodies, frames_of(now).all_actuation, last);
+      swarm_.gather(now, frames_of(now).all_bodies);
+      swarm_.gather(frames_of(now).all_actuation);
+      observer_.state(now, swarm_, last);
       const auto recorded_to = Clock::now();
       recording_ns_ += ns(recorded_from, recorded_to);
       if (!last && snapshots_.due(recorded_to)) {
@@ -179,12 +182,12 @@ class LocalRun {
     if (task < partitions) {
       physics_[task]->step(from, {in.ghosts_for[task], in.all_actuation, schedule_.tracked_poses()});
     } else if (task == partitions) {
-      radio_.step(from, {in.all_bodies, in.all_actuation, in.overhead});
+      radio_.step(from, {swarm_, in.overhead});
     } else if (task == partitions + 1) {
-      station_.step(from, {in.all_bodies, in.all_actuation, schedule_.overhead_inputs()});
+      station_.step(from, {swarm_, schedule_.overhead_inputs()});
     } else {
       const std::size_t host = task - partitions - 2;
-      hosts_[host]->step(from, in.radio[host], in.all_bodies);
+      hosts_[host]->step(from, in.radio[host], &swarm_);
       if (logs_.empty()) return;
       for (const auto& printed : hosts_[host]->printed()) logs_[host]->write(from, printed.robot, printed.text);
     }
@@ -307,6 +310,7 @@ class LocalRun {
   std::vector<std::unique_ptr<physics::Engine>> physics_;
   comm::RadioEngine radio_;
   ark::StationEngine station_;
+  SwarmView swarm_;  // of the tick at hand
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
   // Per host, where there is a run directory.
   std::vector<std::unique_ptr<RobotLogs>> logs_;

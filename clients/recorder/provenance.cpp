@@ -9,8 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "core/os/files.hpp"
+#include "core/base/build_identity.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::recorder {
 
@@ -32,7 +33,7 @@ Provenance provenance_of_this_process() {
   ::gethostname(host, sizeof host - 1);
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   return {KILOTWIN_VERSION,
-          KILOTWIN_VERSION,
+          std::string(build_identity()),
           fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now)),
           words_of_this_process(),
           host,

@@ -1,5 +1,6 @@
 #include "core/dds/dds.hpp"
 
+#include <dds/ddsrt/log.h>
 #include <fmt/format.h>
 
 #include <map>
@@ -19,16 +20,36 @@ std::string cyclone_configuration(const Transport& transport) {
   return fmt::format(
       R"(<CycloneDDS><Domain id="any"><General>{}<AllowMulticast>false</AllowMulticast>)"
       R"(<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>64000B</FragmentSize></General>)"
-      R"(<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>120</MaxAutoParticipantIndex>)"
-      R"(<LeaseDuration>{}ms</LeaseDuration><Peers>{}</Peers></Discovery></Domain></CycloneDDS>)",
-      local ? R"(<Interfaces><NetworkInterface name="lo"/></Interfaces>)" : "", static_cast<int>(kLease_s * 1000),
-      peers);
+      R"(<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>)"
+      R"(<LeaseDuration>{}ms</LeaseDuration><SPDPInterval>{}ms</SPDPInterval><Peers>{}</Peers></Discovery></Domain>)"
+      R"(</CycloneDDS>)",
+      local ? R"(<Interfaces><NetworkInterface name="lo"/></Interfaces>)" : "", kMostParticipants - 1,
+      static_cast<int>(kLease_s * 1000), static_cast<int>(kAnnounceEvery_s * 1000), peers);
 }
+
+namespace {
+
+/// What Cyclone has said last; it belongs into the one line that tells of an error.
+std::mutex log_mutex;
+std::string last_log;
+
+void remember_log(void*, const dds_log_data_t* data) {
+  const std::lock_guard lock(log_mutex);
+  last_log = data->message;
+  last_log.erase(last_log.find_last_not_of(" \n") + 1);
+}
+
+std::string logged() {
+  const std::lock_guard lock(log_mutex);
+  return last_log.empty() ? "" : " (" + last_log + ")";
+}
+
+}  // namespace
 
 Entity::Entity(dds_entity_t handle, const std::string& what) : handle_(handle) {
   if (handle < 0) {
     handle_ = 0;
-    throw RunError(fmt::format("DDS: cannot make {}: {}", what, dds_strretcode(handle)));
+    throw RunError(fmt::format("DDS: cannot make {}: {}{}", what, dds_strretcode(handle), logged()));
   }
 }
 
@@ -56,8 +77,15 @@ Domain::Domain(const Transport& transport) : id_(transport.domain) {
   const std::lock_guard lock(domains_mutex);
   SharedDomain& shared = domains[id_];
   if (shared.users == 0) {
-    shared.entity =
-        Entity(dds_create_domain(id_, cyclone_configuration(transport).c_str()), fmt::format("domain {}", id_));
+    dds_set_log_sink(remember_log, nullptr);
+    const dds_entity_t domain = dds_create_domain(id_, cyclone_configuration(transport).c_str());
+    if (domain < 0 && domain_is_full(id_)) {
+      throw RunError(fmt::format(
+          "DDS domain {} is full: {} processes of this machine take part in it, and no more can; end some, use "
+          "fewer partitions and hosts, or choose another --domain",
+          id_, kMostParticipants));
+    }
+    shared.entity = Entity(domain, fmt::format("domain {}", id_));
   }
   ++shared.users;
 }
@@ -71,6 +99,8 @@ Participant::Participant(const Transport& transport)
     : domain_(transport),
       participant_(dds_create_participant(transport.domain, nullptr, nullptr),
                    fmt::format("a participant in domain {}", transport.domain)) {}
+
+static_assert(10 + 2 * (kMostParticipants - 1) + 1 < 250, "the last index stays below the next domain's ports");
 
 namespace detail {
 namespace {
@@ -90,9 +120,14 @@ Qos make_qos(const Channel& channel) {
     case Delivery::kMembership:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
       dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-      dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, static_cast<dds_duration_t>(kLease_s * 1e9));
       // One that leaves takes nobody else of the same key along.
       dds_qset_writer_data_lifecycle(qos.get(), false);
+      break;
+    case Delivery::kMetrics:
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
+      dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
+                                  DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
       break;
     case Delivery::kLog:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);

@@ -24,20 +24,31 @@ struct Transport {
 
 /// Highest domain whose UDP ports (7400 + 250 domain + ...) exist.
 inline constexpr std::uint32_t kLastDomain = 230;
-/// For how long a process may be silent until the others take it for lost, s.
-inline constexpr double kLease_s = 2.0;
+/// Participants of one domain on one machine, at most. Index i listens at UDP ports 7400 + 250 domain + 10 + 2i and + 11 + 2i
+/// (RTPS 9.6.1.1): those of index 120 would be the next domain's.
+inline constexpr std::uint32_t kMostParticipants = 120;
+/// Services of a run on one machine, at most: the launcher and some that watch or steer take part as well.
+inline constexpr std::uint32_t kMostServices = kMostParticipants - 10;
+/// For how long a federate may be silent until the others take it for lost, s; longer on crowded machines.
+inline constexpr double kSilence_s = 2.0;
+/// For how long a process may be silent until DDS forgets it, s. Longer than the busiest start; who takes part in a run is
+/// known sooner (core/federation/session.hpp).
+inline constexpr double kLease_s = 30.0;
+/// How often a participant tells others that it is there, s.
+inline constexpr double kAnnounceEvery_s = 2.0;
 
 /// The configuration that the transport gives Cyclone, as XML.
 [[nodiscard]] std::string cyclone_configuration(const Transport&);
 
 /// Who may hear what, for how long.
 enum class Delivery {
-  kFrame,  ///< reliable, keep-last 8 per publisher, volatile: tick topics
-  kMembership,  ///< reliable, keep-last 1, transient-local, with a lease: who is here. An instance lives while any writer does
-  kLog,        ///< reliable, keep-all, transient-local: late readers get everything
-  kStatus,     ///< reliable, keep-last 1, transient-local
-  kRequest,    ///< reliable, keep-last 16, volatile: what outsiders ask
-  kTelemetry,  ///< best effort, keep-last 1, volatile
+  kFrame,       ///< reliable, keep-last 8 per publisher, volatile: tick topics
+  kMembership,  ///< reliable, keep-last 1, transient-local: who is here. An instance lives while any writer does
+  kMetrics,     ///< reliable, keep-all; of what was read, late readers get the last sample
+  kLog,         ///< reliable, keep-all, transient-local: late readers get everything
+  kStatus,      ///< reliable, keep-last 1, transient-local
+  kRequest,     ///< reliable, keep-last 16, volatile: what outsiders ask
+  kTelemetry,   ///< best effort, keep-last 1, volatile
 };
 
 /// An entity handle that deletes what it names.
@@ -169,6 +180,9 @@ template <class T> class Reader {
   std::unique_ptr<Receiver> receiver_;
   detail::Endpoint endpoint_;
 };
+
+/// Whether every participant index of the domain is taken on this machine.
+[[nodiscard]] bool domain_is_full(std::uint32_t domain);
 
 /// Picks a domain that nobody on this machine uses and keeps it for this process; freed when the process ends, however it
 /// ends. Throws UserError where `wanted` is in use, RunError where all are.

@@ -27,21 +27,28 @@ int claim_name(std::uint32_t domain) {
   return -1;
 }
 
-// Every participant of a domain takes the first free discovery port, 7400 + 250 domain + 10 + 2 index (RTPS 9.6.1.1): if
-// that of index 0 is taken, somebody's DDS, ours or not, is on the domain.
-bool discovery_port_is_free(std::uint32_t domain) {
+// Every participant of a domain takes the first free discovery port (RTPS 9.6.1.1): if that of index 0 is taken, somebody's
+// DDS, ours or not, is on the domain.
+bool discovery_port_is_free(std::uint32_t domain, std::uint32_t index) {
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return false;
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_ANY);
-  address.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * domain + 10));
+  address.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * domain + 10 + 2 * index));
   const bool is_free = bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   close(fd);
   return is_free;
 }
 
 }  // namespace
+
+bool domain_is_full(std::uint32_t domain) {
+  for (std::uint32_t index = 0; index < kMostParticipants; ++index) {
+    if (discovery_port_is_free(domain, index)) return false;
+  }
+  return true;
+}
 
 DomainClaim DomainClaim::any() {
   // Others start at 0; starting elsewhere keeps two runs that start at once from trying the same ones.
@@ -50,7 +57,7 @@ DomainClaim DomainClaim::any() {
     const std::uint32_t domain = 1 + (start + i) % kLastDomain;
     const int fd = claim_name(domain);
     if (fd < 0) continue;
-    if (discovery_port_is_free(domain)) return {domain, fd};
+    if (discovery_port_is_free(domain, 0)) return {domain, fd};
     close(fd);
   }
   throw RunError(fmt::format("all DDS domains from 1 to {} are in use on this machine", kLastDomain));

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/effects/term.hpp"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 
 namespace kilotwin {
 
@@ -22,18 +22,15 @@ class Measurement {
 
   /// False: what is measured is how things are.
   [[nodiscard]] bool any() const { return !terms_.empty(); }
-  /// From the frames of all partitions and hosts at a tick. Real robots are seen by their own tracker and stay as they are.
-  void measure(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>, MeasuredPoses&);
+  /// What the tracker sees of a swarm. Real robots are seen by their own tracker and stay as they are.
+  void measure(const SwarmView&, MeasuredPoses&);
 
  private:
-  void gather(std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>);
-
   const RunPlan& plan_;
   MotorRule motors_;
   TermList terms_;
   // Of all robots, by id.
   std::vector<std::uint32_t> robot_, who_;
-  std::vector<double> x_mm_, y_mm_, heading_rad_, memory_;
   std::vector<Duties> duties_;
   std::vector<std::uint8_t> tracked_;
   // Per robot of who_.

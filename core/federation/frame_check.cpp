@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <span>
+
+#include "core/base/pose.hpp"
+#include "core/plan/physics_settings.hpp"
 
 namespace kilotwin {
 namespace {
@@ -21,6 +25,39 @@ bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
+/// Farther from the centre than anything can get: arenas are at most 1e6 mm wide.
+constexpr double kFarthest_mm = 1e9;
+
+bool all_within(const std::vector<double>& values, double most) {
+  return std::all_of(values.begin(), values.end(), [most](double value) { return std::abs(value) <= most; });
+}
+
+/// Life cycles that there are.
+bool all_life_cycles(const std::vector<std::uint8_t>& values) {
+  return std::all_of(values.begin(), values.end(), [](std::uint8_t value) {
+    return value <= static_cast<std::uint8_t>(LifeCycle::kMoving) ||
+           value >= static_cast<std::uint8_t>(LifeCycle::kFlat);
+  });
+}
+
+/// Colours of two bits per channel.
+bool all_colours(const std::vector<std::uint8_t>& values) {
+  return std::all_of(values.begin(), values.end(), [](std::uint8_t value) { return value < 64; });
+}
+
+/// Rigid states as the ODE engine packs them: z, a unit quaternion, velocity, spin.
+bool are_rigid_states(std::span<const double> columns) {
+  constexpr double kMostMotion = 1e9, kLeastNorm = 0.9, kMostNorm = 1.1;
+  for (; !columns.empty(); columns = columns.subspan(BodyFrame::kSpatialColumns)) {
+    double square = 0;
+    for (const double q : columns.subspan(1, 4)) square += q * q;
+    if (!(square >= kLeastNorm && square <= kMostNorm)) return false;
+    for (std::size_t i = 0; i < BodyFrame::kSpatialColumns; ++i)
+      if (!(std::abs(columns[i]) <= kMostMotion)) return false;
+  }
+  return true;
+}
+
 bool known(OverheadCommand command) {
   return command == OverheadCommand::kStop || command == OverheadCommand::kRepeat ||
          command == OverheadCommand::kOnce;
@@ -28,12 +65,18 @@ bool known(OverheadCommand command) {
 
 }  // namespace
 
-const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, FederateId) {
+const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, FederateId reader) {
   if (!ascending_within(frame.robot, {0, plan.robots()}))
     return "its robots are not ascending ids of the experiment";
-  if (!all_finite(frame.x_mm) || !all_finite(frame.y_mm) || !all_finite(frame.heading_rad) ||
-      !all_finite(frame.spatial))
-    return "a pose is not finite";
+  if (!all_within(frame.x_mm, kFarthest_mm) || !all_within(frame.y_mm, kFarthest_mm) ||
+      !all_within(frame.heading_rad, kPi))
+    return "a pose is out of range";
+  const bool is_of_ghosts = reader.value() < plan.grid.size();
+  const bool has_rigid_states = is_of_ghosts && plan.physics_settings().engine == PhysicsSettings::Engine::kOde;
+  const std::size_t bodies = frame.robot.size() + frame.movable.body.size();
+  if (frame.spatial.size() != (has_rigid_states ? BodyFrame::kSpatialColumns * bodies : 0) ||
+      !are_rigid_states(frame.spatial))
+    return "its states in space are none of its bodies";
   if (frame.memory.size() != frame.robot.size() * plan.memory.size() || !all_finite(frame.memory))
     return "its robots do not remember what the model's effects ask for";
   const MovableColumns& movable = frame.movable;
@@ -41,7 +84,7 @@ const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, Fede
     return "its movable bodies are not ascending numbers of the experiment";
   for (const auto* column :
        {&movable.x_mm, &movable.y_mm, &movable.heading_rad, &movable.vx_mm, &movable.vy_mm, &movable.turn_rad}) {
-    if (!all_finite(*column)) return "a movable body's state is not finite";
+    if (!all_within(*column, kFarthest_mm)) return "a movable body's state is out of range";
   }
   const ContactColumns& contact = frame.contact;
   if (!std::includes(frame.robot.begin(), frame.robot.end(), contact.robot.begin(), contact.robot.end()) ||
@@ -63,6 +106,8 @@ const char* defect(const ActuationFrame& frame, const RunPlan& plan, FederateId 
   const Share share = share_of(plan, publisher);
   if (frame.first_robot != share.first || frame.motor_left.size() != share.size())
     return "it is not of the host's share of robots";
+  if (!all_life_cycles(frame.life_cycle)) return "a life cycle is unknown";
+  if (!all_colours(frame.led)) return "an LED has no such colour";
   if (!ascending_within(frame.offer_robot, share)) return "it offers messages of robots that are not the host's";
   return nullptr;
 }
@@ -77,6 +122,8 @@ const char* defect(const RadioFrame& frame, const RunPlan& plan, FederateId, Fed
   if (!ascending_within(frame.firmware_robot, share) ||
       !std::all_of(frame.firmware_robot.begin(), frame.firmware_robot.end(), runs_firmware))
     return "it shows firmware robots that are none of this host's";
+  if (!all_life_cycles(frame.firmware_life_cycle)) return "a life cycle is unknown";
+  if (!all_colours(frame.firmware_led)) return "an LED has no such colour";
   const std::vector<std::uint32_t>& receivers = frame.reception_robot;
   if (!std::is_sorted(receivers.begin(), receivers.end()) ||
       (!receivers.empty() && !(share.contains(receivers.front()) && share.contains(receivers.back())))) {
@@ -95,6 +142,7 @@ const char* defect(const OverheadFrame& frame, const RunPlan&, FederateId, Feder
 
 const char* defect(const Directive& directive, const RunPlan& plan) {
   if (directive.tick < Tick{0}) return "its tick is negative";
+  if (directive.tick > plan.last_tick + kAnnounceAhead) return "its tick lies after the run's end";
   switch (directive.kind) {
     case DirectiveKind::kPause:
     case DirectiveKind::kContinue:

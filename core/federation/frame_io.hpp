@@ -52,33 +52,43 @@ template <class Frame> class Input : public InputBase {
   }
 
  private:
+  /// Called on a receive thread, one sample of this topic at a time. A frame is decoded and checked without the session's
+  /// mutex: its slot lies ahead of the tick that the session reads, and nobody looks at it before the gate accepts it.
   void take(const Wire& wire, dds::SampleState state) {
-    if (!state.valid || wire.run != session_.plan().run()) return;
-    const std::lock_guard lock(session_.mutex());
+    if (!state.valid || wire.run != session_.plan().run() || !is_new(wire)) return;
     const FederateId publisher{wire.publisher};
-    if (wire.tick < 0) {
-      gate_.hello(publisher);
-      return session_.notify();
-    }
-    if (!session_.expects_frames())
-      return;  // from a run in full swing, in which our place is taken: the membership will say so
-    switch (gate_.arrived(publisher, Tick{wire.tick})) {
-      case TickGate::Arrival::kRepeated: return;
-      case TickGate::Arrival::kUnexpected:
-        return session_.fail(
-            fmt::format("{}: frame {} of federate {} was not expected", topic_, wire.tick, wire.publisher));
-      case TickGate::Arrival::kAccepted: break;
-    }
     const auto index = static_cast<std::size_t>(gate_.index_of(publisher));
     Frame& frame = rings_[index][static_cast<std::size_t>(wire.tick % kFrameRing)];
     const char* const wrong = from_wire(wire, frame) ? defect(frame, session_.plan(), publisher, session_.self())
                                                      : "its arrays differ in length";
+    const std::lock_guard lock(session_.mutex());
     if (wrong != nullptr) {
       return session_.fail(fmt::format("{}: frame {} of {} is malformed: {}", topic_, wire.tick,
                                        session_.plan().name(publisher), wrong));
     }
+    gate_.accept(publisher, Tick{wire.tick});
     session_.mention(wire.directives);
-    session_.notify();
+    session_.notify();  // also of one frame of several: on busy machines the session then waits for a core meanwhile
+  }
+
+  /// Takes notice of hellos and of frames that cannot be; true for the next frame of a publisher.
+  bool is_new(const Wire& wire) {
+    const std::lock_guard lock(session_.mutex());
+    const FederateId publisher{wire.publisher};
+    if (wire.tick < 0) {
+      gate_.hello(publisher);
+      session_.notify();
+      return false;
+    }
+    // A run at work in which this federate's place is taken: the membership will say so.
+    if (!session_.expects_frames()) return false;
+    switch (gate_.arrival(publisher, Tick{wire.tick})) {
+      case TickGate::Arrival::kNew: return true;
+      case TickGate::Arrival::kRepeated: return false;
+      case TickGate::Arrival::kUnexpected: break;
+    }
+    session_.fail(fmt::format("{}: frame {} of federate {} was not expected", topic_, wire.tick, wire.publisher));
+    return false;
   }
 
   std::vector<std::array<Frame, kFrameRing>> rings_;

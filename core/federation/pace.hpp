@@ -14,15 +14,20 @@ class Pace {
  public:
   explicit Pace(const RunPlan& plan) : factor_(plan.pace), tick_s_(plan.tick_length.seconds()) {}
 
-  /// Returns when `ticks` ticks may have passed, or the process is interrupted. `wall_s()`: how long the run has taken for
+  /// How much earlier than the pace allows `ticks` ticks are over after `wall_s`, s; 0 or less: not at all.
+  [[nodiscard]] double ahead_s(std::int64_t ticks, double wall_s) const {
+    return factor_ <= 0 ? 0 : static_cast<double>(ticks) * tick_s_ / factor_ - wall_s;
+  }
+
+  /// Returns when `ticks` ticks may be over, or the process is interrupted. `wall_s()`: how long the run has taken for
   /// them so far, pauses excluded. `idle()` is called about every 100 ms meanwhile.
   template <class Wall, class Idle> void hold(std::int64_t ticks, Wall wall_s, Idle idle) const {
     if (factor_ <= 0) return;
     while (interrupted() == 0) {
-      const double ahead_s = static_cast<double>(ticks) * tick_s_ / factor_ - wall_s();
-      if (ahead_s <= 0) return;
-      std::this_thread::sleep_for(std::chrono::duration<double>(std::min(ahead_s, kIdle_s)));
-      if (ahead_s > kIdle_s) idle();
+      const double ahead = ahead_s(ticks, wall_s());
+      if (ahead <= 0) return;
+      std::this_thread::sleep_for(std::chrono::duration<double>(std::min(ahead, kIdle_s)));
+      if (ahead > kIdle_s) idle();
     }
   }
 

@@ -1,4 +1,4 @@
-/// What a run tells about itself while it goes, and what it adds up to: the seam between the federation and whoever
+/// What a run reports while it goes, and its totals: the interface between the federation and what
 /// records, shows or summarises it.
 #pragma once
 
@@ -10,8 +10,8 @@
 
 #include "core/base/time.hpp"
 #include "core/federation/schedule.hpp"
-#include "core/frames/frames.hpp"
 #include "core/frames/radio_counts.hpp"
+#include "core/frames/swarm_view.hpp"
 
 namespace kilotwin {
 
@@ -29,14 +29,13 @@ struct RunProgress {
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  /// The complete state of a tick: bodies of all partitions, actuation of all hosts. `last`: the run ends here.
-  virtual void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const>,
-                     bool last) = 0;
+  /// The whole swarm at a tick. `last`: the run ends here.
+  virtual void state(Tick, const SwarmView&, bool last) = 0;
   /// H(tick).
   virtual void hash(Tick, std::uint64_t chain) = 0;
   /// A stamped input was announced.
   virtual void input(const Directive&) = 0;
-  /// A checkpoint comes to be complete: what was told up to its tick must not be lost with this process.
+  /// A checkpoint comes to be complete: what was recorded up to its tick must not be lost with this process.
   virtual void saved() {}
   /// Called a few times a second, also while the run pauses or waits.
   virtual void idle(const RunProgress& progress) { static_cast<void>(progress); }
@@ -56,7 +55,7 @@ struct RunTotals {
   std::uint32_t robots_failed = 0;
   std::array<std::uint64_t, static_cast<std::size_t>(Work::kCount)> work_ns{};
   std::vector<PairCount> pairs;    ///< where the recording wants messages
-  std::vector<RadioCount> radios;  ///< per robot; empty where the run broke before the radio told
+  std::vector<RadioCount> radios;  ///< per robot; empty where the run broke before the radio reported
   bool stopped_early = false;      ///< by a directive
   std::string failure;             ///< one line, where the run broke
 };

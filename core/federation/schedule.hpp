@@ -1,4 +1,4 @@
-/// When the run pauses, goes on, saves and ends, and which outside inputs belong to which tick: a pure state machine that
+/// When the run pauses, continues, saves and ends, and which external inputs belong to which tick: a pure state machine that
 /// every federate runs on the same directives, and so with the same outcome. Free of clocks and networks.
 ///
 /// A directive is decided by the ingress, which gives it the next sequence number and the tick from which it counts. It
@@ -85,10 +85,10 @@ class RunSchedule {
   Tick inputs_tick_{-1};  // of the two lists below
   std::vector<OverheadPacket> overhead_inputs_;
   std::vector<TrackedPoseInput> tracked_poses_;
-  std::vector<Tick> checkpoints_;  // asked for
+  std::vector<Tick> checkpoints_;  // by directives
 };
 
-/// Stamps what comes from outside: the one place where a tick is chosen for it.
+/// Stamps external input: the one place where a tick is chosen for it.
 class Ingress {
  public:
   Ingress() = default;

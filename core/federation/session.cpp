@@ -5,11 +5,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_io.hpp"
 #include "core/federation/hash_sums.hpp"
+#include "core/federation/likely_cause.hpp"
 #include "core/os/interrupt.hpp"
 
 namespace kilotwin {
@@ -18,11 +20,21 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr auto kHelloPeriod = milliseconds(10);
-/// How often idle work is done, and how far by wall time the books may lag behind where a run goes slowly.
+/// How often hellos are repeated, at first and at most.
+constexpr auto kHelloPeriod = milliseconds(10), kLongestHelloPeriod = milliseconds(500);
+/// How often a federate shows that it lives.
+constexpr auto kBeatPeriod = milliseconds(500);
+/// How often idle work is done, and how far by wall time metrics may lag behind where a run goes slowly.
 constexpr auto kIdlePeriod = milliseconds(100);
-constexpr auto kComplainAfter = milliseconds(1000);
-constexpr auto kComplainEvery = milliseconds(5000);
+/// What counts of the time between two looks at who is silent: a process that was not let run has not listened either.
+constexpr auto kMostWatched = milliseconds(200);
+/// How long a federate may be silent before the first tick, and at most.
+constexpr double kStartPatience_s = 30.0;
+/// Services per core from which on the patience grows with their number.
+constexpr double kCrowd = 4.0;
+constexpr auto kReportAfter = milliseconds(1000), kReportEvery = milliseconds(5000);
+/// After a wait of this length without progress the report says what the cause may be.
+constexpr auto kCauseAfter = milliseconds(60'000);
 constexpr double kFlush_s = 2.0;
 /// For how long a directive that frames mention may fail to come from a station that lives.
 constexpr auto kDirectivePatience = milliseconds(10'000);
@@ -39,16 +51,24 @@ std::string host_name() {
   return name;
 }
 
+template <std::size_t size> void set_text(char (&to)[size], std::string_view text) {
+  std::fill(std::begin(to), std::end(to), '\0');
+  text.copy(to, size - 1);
+}
+
 }  // namespace
 
 Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first,
-                 std::span<const Directive> inputs)
+                 std::span<const Directive> inputs, double give_up_after_s)
     : plan_(plan),
       self_(self),
+      transport_(transport),
       first_(first),
+      give_up_after_s_(give_up_after_s),
       now_(first),
       schedule_(first, plan.last_tick, plan.checkpoint_every()),
-      peers_(plan.federates()),
+      watched_at_(Clock::now()),
+      members_(plan.federates()),
       hash_first_(first_hashed(first)),
       participant_(transport) {
   for (const Directive& directive : inputs) schedule_.add(directive);
@@ -63,13 +83,59 @@ Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& tra
           if (state.valid && wire.run == plan_.run()) on_directive(wire);
         });
   }
+  member_.publisher = self_.value();
+  member_.run = plan_.run();
+  member_.arrived_us =
+      std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+          .count();
+  member_.plan_hash = plan_.hash;
+  member_.process = static_cast<std::uint32_t>(getpid());
+  set_text(member_.name, plan_.name(self_));
+  set_text(member_.host, host_name());
+  set_text(member_.build, plan_.build);
   write_member(kilotwin_wire_ARRIVING);
   member_reader_ = std::make_unique<dds::Reader<WireMember>>(
       participant_, topics::members(),
       [this](const WireMember& member, dds::SampleState state) { on_member(member, state); });
+  heart_ = std::jthread([this](const std::stop_token& stop) { beat(stop); });
 }
 
 Session::~Session() = default;
+
+void Session::beat(const std::stop_token& stop) {
+  std::condition_variable_any wake;
+  for (;;) {
+    std::unique_lock lock(member_mutex_);
+    if (wake.wait_for(lock, stop, kBeatPeriod, [] { return false; }); stop.stop_requested()) return;
+    try {
+      member_writer_->write(member_);
+    } catch (const RunError&) {
+      return;  // the session's own thread meets the same fault, and tells it
+    }
+  }
+}
+
+double Session::patience_s() const {
+  if (!started_) return kStartPatience_s;
+  const double cores = std::max(1u, std::thread::hardware_concurrency());
+  return std::clamp(dds::kSilence_s * plan_.federates() / (kCrowd * cores), dds::kSilence_s, kStartPatience_s);
+}
+
+/// Whoever shows no sign of life is lost.
+void Session::watch_silence() {
+  const auto now = Clock::now();
+  const auto watched = std::min<Clock::duration>(now - std::exchange(watched_at_, now), kMostWatched);
+  const std::chrono::duration<double> patience(patience_s());
+  const std::lock_guard lock(mutex_);
+  for (std::uint32_t i = 0; i < members_.size(); ++i) {
+    MemberState& member = members_[i];
+    if (FederateId{i} == self_ || !member.alive || member.phase >= kilotwin_wire_FINISHED) continue;
+    member.silent += watched;
+    if (member.silent > patience)
+      fail(fmt::format("{} was lost: nothing was heard of it for {:.1f} s", plan_.name(FederateId{i}),
+                       patience.count()));
+  }
+}
 
 double Session::wall_s() const {
   if (!started_) return 0;
@@ -83,29 +149,48 @@ void Session::fail(const std::string& line) {
   notify();
 }
 
+void Session::fail_as_user_error(const std::string& line) {
+  if (failure_.empty()) failure_is_user_error_ = true;
+  fail(line);
+}
+
+/// Of two runs on one domain the one that came later leaves; the one that is at work goes on.
+void Session::on_member_of_another_run(const WireMember& member, bool alive) {
+  if (!alive || phase_ != kilotwin_wire_ARRIVING || member.phase >= kilotwin_wire_FINISHED) return;
+  const bool came_later = std::pair(member.arrived_us, member.run) > std::pair(member_.arrived_us, member_.run);
+  if (member.phase == kilotwin_wire_ARRIVING && came_later) return;
+  fail_as_user_error(
+      fmt::format("the DDS domain {} is in use by another run ({} on {}); choose another with --domain",
+                  transport_.domain, member.name, member.host));
+}
+
 void Session::on_member(const WireMember& member, dds::SampleState state) {
   const std::lock_guard lock(mutex_);
-  if (state.valid && member.run != plan_.run()) {
-    if (!state.alive) return;  // somebody's earlier run going away
-    failure_is_user_error_ = true;
-    return fail(fmt::format("the DDS domain is in use by another run ({} on {}); choose another with --domain",
-                            member.name, member.host));
+  if (member.run != plan_.run()) {
+    if (state.valid) on_member_of_another_run(member, state.alive);
+    return;
   }
-  if (member.publisher >= peers_.size()) return;
-  Peer& peer = peers_[member.publisher];
+  if (member.publisher >= members_.size()) return;
+  MemberState& known = members_[member.publisher];
+  const bool was_heard = std::exchange(known.heard, known.heard || state.valid), was_alive = known.alive;
+  const auto was_in = known.phase;
+  known.silent = {};
   if (state.valid) {
-    const bool is_other_self =
-        member.publisher == self_.value() &&
-        (member.process != static_cast<std::uint32_t>(getpid()) || member.host != host_name());
+    const bool is_other_self = member.publisher == self_.value() &&
+                               (member.process != member_.process || std::string_view(member.host) != member_.host);
     if (is_other_self) {
-      // Who came later leaves; who is at work does not mind.
+      // Of two the one that came later leaves; the one that is at work goes on.
       if (phase_ != kilotwin_wire_ARRIVING) return;
-      is_double_ = failure_is_user_error_ = true;
-      return fail(fmt::format("{} of this run was started already (process {} on {}); start each service once",
-                              plan_.name(self_), member.process, member.host));
+      is_double_ = true;
+      return fail_as_user_error(
+          fmt::format("{} of this run was started already (process {} on {}); start each service once",
+                      plan_.name(self_), member.process, member.host));
     }
-    peer.here = true;
-    peer.phase = std::max(peer.phase, member.phase);
+    known.phase = std::max(known.phase, member.phase);
+    if (std::string_view(member.build) != member_.build) {
+      return fail(fmt::format("{} on {} is of build {}, this service is of build {}; run one build everywhere",
+                              member.name, member.host, member.build, member_.build));
+    }
     if (member.plan_hash != plan_.hash) {
       return fail(fmt::format("{} on {} runs another experiment than this service; give all the same run directory",
                               member.name, member.host));
@@ -116,13 +201,10 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
                                              : fmt::format("{}: {}", member.name, failure));
     }
   }
-  const bool was_alive = peer.alive;
-  peer.alive = state.alive;
-  if (was_alive && !peer.alive && peer.phase != kilotwin_wire_FINISHED && !finished_) {
-    return fail(fmt::format("{} was lost (it ended, or did not answer for {} s)",
-                            plan_.name(FederateId{member.publisher}), dds::kLease_s));
-  }
-  notify();
+  known.alive = state.alive;
+  if (was_alive && !known.alive && known.phase != kilotwin_wire_FINISHED && !finished_)
+    return fail(plan_.name(FederateId{member.publisher}) + " was lost: its process has ended");
+  if (!was_heard || known.phase != was_in || known.alive != was_alive) notify();
 }
 
 void Session::on_directive(const WireDirective& wire) {
@@ -140,17 +222,10 @@ void Session::write_member(kilotwin_wire_MemberPhase phase, const std::string& f
     const std::lock_guard lock(mutex_);
     phase_ = phase;
   }
-  WireMember member{};
-  const std::string name = plan_.name(self_);
-  member.publisher = self_.value();
-  member.run = plan_.run();
-  member.plan_hash = plan_.hash;
-  member.phase = phase;
-  name.copy(member.name, sizeof member.name - 1);
-  host_name().copy(member.host, sizeof member.host - 1);
-  member.process = static_cast<std::uint32_t>(getpid());
-  failure.copy(member.failure, sizeof member.failure - 1);
-  member_writer_->write(member);
+  const std::lock_guard lock(member_mutex_);
+  member_.phase = phase;
+  set_text(member_.failure, failure);
+  member_writer_->write(member_);
 }
 
 std::string Session::names(std::vector<FederateId> ids) const {
@@ -172,26 +247,39 @@ void Session::check() const {
   }
 }
 
-void Session::complain(Clock::duration waited, const std::string& whom) {
+/// Says now and then for whom a wait without progress is, and ends it where it lasts too long. With the mutex held.
+void Session::report_wait(Clock::time_point since, const std::string& whom) {
   const auto now = Clock::now();
-  if (now < next_complaint_) return;
-  next_complaint_ = now + kComplainEvery;
+  const double waited_s = std::chrono::duration<double>(now - since).count();
+  if (give_up_after_s_ > 0 && waited_s >= give_up_after_s_) {
+    throw RunError(fmt::format("{} gave up after it had waited {:.0f} s for {}: {}", plan_.name(self_), waited_s,
+                               whom, likely_cause()));
+  }
+  if (now < next_report_) return;
+  next_report_ = now + kReportEvery;
   waiting_for_ = whom;
-  say(fmt::format("{} has waited {:.0f} s for {}", plan_.name(self_), std::chrono::duration<double>(waited).count(),
-                  whom));
+  const bool tells_cause = now - since >= kCauseAfter && !cause_told_;
+  cause_told_ = cause_told_ || tells_cause;
+  say(fmt::format("{} has waited {:.0f} s for {}{}", plan_.name(self_), waited_s, whom,
+                  tells_cause ? ": " + likely_cause() : ""));
+}
+
+std::string Session::likely_cause() const {
+  const auto heard = std::count_if(members_.begin(), members_.end(), [](const MemberState& m) { return m.heard; });
+  return kilotwin::likely_cause(transport_, static_cast<std::uint32_t>(heard), plan_.federates());
 }
 
 bool Session::hears_all() const {
   return std::all_of(inputs_.begin(), inputs_.end(), [](InputBase* input) { return input->gate().heard_all(); });
 }
 
-/// Whom assembly waits for: those who have not arrived, else those whose frames do not come through; empty: nobody.
-std::string Session::awaited_in_assembly() const {
+/// For whom the start waits: those who have not arrived, else those whose frames do not come through; empty: nobody.
+std::string Session::missing_at_start() const {
   std::vector<FederateId> absent, silent, deaf;
-  for (std::uint32_t i = 0; i < peers_.size(); ++i) {
-    if (!peers_[i].here)
+  for (std::uint32_t i = 0; i < members_.size(); ++i) {
+    if (!members_[i].heard)
       absent.push_back(FederateId{i});
-    else if (peers_[i].phase == kilotwin_wire_ARRIVING)
+    else if (members_[i].phase == kilotwin_wire_ARRIVING)
       deaf.push_back(FederateId{i});
   }
   if (!absent.empty()) return names(absent) + " to arrive";
@@ -203,17 +291,24 @@ std::string Session::awaited_in_assembly() const {
 }
 
 void Session::assemble(Federate& federate) {
-  const auto since = Clock::now();
-  next_complaint_ = since + kComplainAfter;
+  auto since = Clock::now();
+  next_report_ = since + kReportAfter;
   next_idle_ = since;
+  write_metrics(federate, Report::kFirst);
+  // The more federates there are, the longer they need to find each other, and the less they should talk meanwhile.
+  const auto first_period = std::min(kHelloPeriod * (1 + plan_.federates() / 8), kLongestHelloPeriod);
   auto next_hello = since;
+  auto period = first_period;
+  std::string waits_for;
   for (;;) {
     if (Clock::now() >= next_hello) {
-      next_hello = Clock::now() + kHelloPeriod;
       for (OutputBase* output : outputs_) output->hello();
+      next_hello = Clock::now() + period;
+      period = std::min(period * 5 / 4, kLongestHelloPeriod);
     }
+    const bool federate_hears_all = federate.hears_all();
     std::unique_lock lock(mutex_);
-    if (phase_ == kilotwin_wire_ARRIVING && hears_all()) {
+    if (phase_ == kilotwin_wire_ARRIVING && federate_hears_all && hears_all()) {
       lock.unlock();
       write_member(kilotwin_wire_HEARS_ALL);
       lock.lock();
@@ -221,9 +316,15 @@ void Session::assemble(Federate& federate) {
     check();
     if (interrupted() != 0)
       throw RunError(fmt::format("stopped by signal {} before the first tick", interrupted()));
-    const std::string whom = awaited_in_assembly();
+    std::string whom = missing_at_start();
     if (whom.empty()) break;
-    complain(Clock::now() - since, whom);
+    if (whom != waits_for) {
+      waits_for = std::move(whom);
+      since = Clock::now();
+      cause_told_ = false;
+      period = first_period;
+    }
+    report_wait(since, waits_for);
     arrived_.wait_until(lock, next_hello);
     lock.unlock();
     if (Clock::now() >= next_idle_) idle(federate);
@@ -231,7 +332,24 @@ void Session::assemble(Federate& federate) {
   waiting_for_.clear();
 }
 
-void Session::note_pause(bool pause) {
+/// Waits for wall time where the run must not go faster.
+void Session::hold(Federate& federate, Tick now) {
+  constexpr double kLongest_s = 1.0;
+  while (interrupted() == 0) {
+    const double ahead_s = federate.ahead_s(now);
+    if (ahead_s <= 0) return;
+    {
+      std::unique_lock lock(mutex_);
+      check();
+      const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                            std::chrono::duration<double>(std::min(ahead_s, kLongest_s)));
+      arrived_.wait_until(lock, std::min(until, next_idle_));
+    }
+    if (Clock::now() >= next_idle_) idle(federate);
+  }
+}
+
+void Session::set_paused(bool pause) {
   if (pause == paused()) return;
   if (pause) {
     paused_since_ = Clock::now();
@@ -242,17 +360,17 @@ void Session::note_pause(bool pause) {
 }
 
 /// For whom the step from `now` waits. Throws RunError where it would wait in vain.
-std::string Session::awaited(Tick now, Clock::duration waited) const {
+std::string Session::missing_inputs(Tick now, Clock::duration waited) const {
   std::vector<FederateId> late;
   for (InputBase* input : inputs_) {
     for (const FederateId id : input->gate().missing(now)) late.push_back(id);
   }
   for (const FederateId id : late) {
-    if (!peers_[id.value()].alive)
+    if (!members_[id.value()].alive)
       throw RunError(fmt::format("{} left without its frame of tick {}", plan_.name(id), now.count()));
   }
   if (!late.empty()) return names(late) + fmt::format(" (tick {})", now.count());
-  if (!peers_[plan_.station().value()].alive || waited > kDirectivePatience) {
+  if (!members_[plan_.station().value()].alive || waited > kDirectivePatience) {
     throw RunError("a directive that was mentioned did not come from the station");
   }
   return "a directive of the station";
@@ -260,7 +378,8 @@ std::string Session::awaited(Tick now, Clock::duration waited) const {
 
 RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
   auto since = Clock::now();
-  next_complaint_ = since + kComplainAfter;
+  next_report_ = since + kReportAfter;
+  cause_told_ = false;
   std::unique_lock lock(mutex_);
   for (InputBase* input : inputs_) input->gate().reading(now);
   for (;;) {
@@ -270,7 +389,7 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
         std::all_of(inputs_.begin(), inputs_.end(), [now](InputBase* input) { return input->gate().ready(now); });
     if (ready) verdict = schedule_.verdict(now);
     known_ = schedule_.known();
-    note_pause(verdict == RunSchedule::Verdict::kPaused);
+    set_paused(verdict == RunSchedule::Verdict::kPaused);
     if (verdict == RunSchedule::Verdict::kStep || verdict == RunSchedule::Verdict::kFinished) {
       waiting_for_.clear();
       return verdict;
@@ -278,12 +397,12 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
     const auto at = Clock::now();
     if (paused()) {
       since = at;
-    } else if (at >= since + kComplainAfter) {
-      const std::string whom = awaited(now, at - since);
+    } else if (at >= since + kReportAfter) {
+      const std::string whom = missing_inputs(now, at - since);
       // The station ends an interrupted run in order, but not one that has come to a halt.
       if (interrupted() != 0)
         throw RunError(fmt::format("stopped by signal {} while it waited for {}", interrupted(), whom));
-      complain(at - since, whom);
+      report_wait(since, whom);
     }
     if (at < next_idle_) {
       arrived_.wait_until(lock, next_idle_);
@@ -296,22 +415,24 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
   }
 }
 
-/// The books lag behind by wall time no more than the period of this, also where the run goes slowly or stands.
+/// Metrics lag behind by wall time no more than the period of this, also where the run goes slowly or stands.
 void Session::idle(Federate& federate) {
   next_idle_ = Clock::now() + kIdlePeriod;
-  write_metrics(federate, false);
+  watch_silence();
+  write_metrics(federate, Report::kNext);
   federate.idle();
 }
 
 void Session::save_once(Federate& federate, Tick now) {
   if (saved_ == now) return;
   saved_ = now;
-  write_metrics(federate, false);
+  write_metrics(federate, Report::kNext);
   federate.save(now);
 }
 
-void Session::write_metrics(Federate& federate, bool last) {
-  if (hash_parts_.empty() && !last) return;
+void Session::write_metrics(Federate& federate, Report report) {
+  if (hash_parts_.empty() && report == Report::kNext) return;
+  const bool last = report == Report::kLast;
   WireMetrics metrics{};
   metrics.publisher = self_.value();
   metrics.run = plan_.run();
@@ -355,6 +476,7 @@ void Session::run(Federate& federate) {
       federate.publish(now_);
       const auto published = Clock::now();
       const RunSchedule::Verdict verdict = await(federate, now_);
+      hold(federate, now_);
       const auto released = Clock::now();
       federate.inputs_complete(now_, verdict == RunSchedule::Verdict::kFinished);
       if (schedule_.checkpoint_at(now_)) save_once(federate, now_);
@@ -362,7 +484,7 @@ void Session::run(Federate& federate) {
       federate.step(now_);
       ++now_;
       hash_parts_.push_back(federate.hash_part());
-      if (hash_parts_.size() >= kMetricsTicks) write_metrics(federate, false);
+      if (hash_parts_.size() >= kMetricsTicks) write_metrics(federate, Report::kNext);
       const auto stepped = Clock::now();
       exchange_ns_ += elapsed_ns(begun, published);
       wait_ns_ += elapsed_ns(published, released);
@@ -393,7 +515,7 @@ void Session::run(Federate& federate) {
 }
 
 void Session::leave(Federate& federate) {
-  write_metrics(federate, true);
+  write_metrics(federate, Report::kLast);
   for (const OutputBase* output : outputs_) output->flush(kFlush_s);
   if (directive_writer_) directive_writer_->flush(kFlush_s);
   metrics_writer_->flush(kFlush_s);

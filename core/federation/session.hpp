@@ -5,8 +5,12 @@
 ///   loop       publish frames of tick k, wait for the inputs of tick k, step
 ///   leave      wait until everything sent is acknowledged, say FINISHED
 ///
-/// Any wait over 1 s says for whom. A federate that is lost, or that fails, ends the session of all others with a RunError
-/// that names it; so does one that left while something of it is still missing, and a frame that cannot be ours.
+/// Any wait over 1 s says for whom; one without progress for 60 s says what the cause may be. A federate that is lost, or
+/// that fails, ends the session of all others with a RunError that names it; so does one that left while something of it is
+/// still missing, and a frame that cannot be ours.
+///
+/// Every federate rewrites its member sample twice a second. One that is silent for patience_s() is lost:
+/// dds::kSilence_s, longer on crowded machines and before the first tick, when all processes compete for the cores.
 #pragma once
 
 #include <atomic>
@@ -19,13 +23,14 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "core/dds/dds.hpp"
-#include "core/plan/plan.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/tick_gate.hpp"
 #include "core/federation/wire.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin {
 
@@ -38,6 +43,10 @@ class Federate {
   virtual ~Federate() = default;
   /// Write the frames of `now`.
   virtual void publish(Tick now) = 0;
+  /// Whether it has heard all that it must hear before the run starts, besides the frames of its inputs.
+  [[nodiscard]] virtual bool hears_all() { return true; }
+  /// How long the step from `now` must still wait for wall time, s; 0 or less: not at all.
+  [[nodiscard]] virtual double ahead_s(Tick now) { return static_cast<void>(now), 0.0; }
   /// All inputs of `now` are here; `last`: the run ends here, else the step from it follows.
   virtual void inputs_complete(Tick now, bool last) { static_cast<void>(now), static_cast<void>(last); }
   /// Advance the engine from `from` to the next tick.
@@ -55,9 +64,9 @@ class Federate {
 class Session {
  public:
   /// `first`: the tick at which the run starts (0, or that of a checkpoint). `inputs`: what all federates know from the start
-  /// of what will be stamped, numbered from 0.
+  /// of what will be stamped, numbered from 0. `give_up_after_s`: how long it waits without progress, 0: for ever.
   Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first,
-          std::span<const Directive> inputs = {});
+          std::span<const Directive> inputs = {}, double give_up_after_s = 0);
   ~Session();
 
   /// Runs `federate` to the end of the run. Throws RunError where another federate is lost or failed, or the run was
@@ -93,31 +102,44 @@ class Session {
  private:
   friend class InputBase;
   friend class OutputBase;
-  struct Peer {
-    bool here = false, alive = false;
+  using Clock = std::chrono::steady_clock;
+  struct MemberState {
+    bool heard = false, alive = false;
     kilotwin_wire_MemberPhase phase = kilotwin_wire_ARRIVING;
+    Clock::duration silent{};  ///< wall time that this session has watched since the last sample
   };
 
   void assemble(Federate&);
+  void hold(Federate&, Tick now);
   RunSchedule::Verdict await(Federate&, Tick now);
   void write_member(kilotwin_wire_MemberPhase phase, const std::string& failure = {});
   void on_member(const WireMember& member, dds::SampleState state);
+  void on_member_of_another_run(const WireMember& member, bool alive);
+  void fail_as_user_error(const std::string& line);
+  void beat(const std::stop_token& stop);
+  void watch_silence();
+  [[nodiscard]] double patience_s() const;
   void on_directive(const WireDirective& wire);
-  void write_metrics(Federate&, bool last);
+  /// kFirst: nothing was counted yet, but the station hears by it that the metrics come through.
+  enum class Report { kFirst, kNext, kLast };
+  void write_metrics(Federate&, Report);
   void idle(Federate&);
   void save_once(Federate&, Tick now);
   void check() const;
-  void note_pause(bool pause);
+  void set_paused(bool pause);
   [[nodiscard]] bool hears_all() const;
-  [[nodiscard]] std::string awaited_in_assembly() const;
-  [[nodiscard]] std::string awaited(Tick now, std::chrono::steady_clock::duration waited) const;
-  void complain(std::chrono::steady_clock::duration waited, const std::string& whom);
+  [[nodiscard]] std::string missing_at_start() const;
+  [[nodiscard]] std::string missing_inputs(Tick now, Clock::duration waited) const;
+  void report_wait(Clock::time_point since, const std::string& whom);
+  [[nodiscard]] std::string likely_cause() const;
   void leave(Federate&);
   [[nodiscard]] std::string names(std::vector<FederateId>) const;
 
   const RunPlan& plan_;
   const FederateId self_;
+  const dds::Transport transport_;
   const Tick first_;
+  const double give_up_after_s_;
   Tick now_;
   std::mutex mutex_;
   std::condition_variable arrived_;
@@ -128,23 +150,27 @@ class Session {
   bool is_double_ = false;  // another process is this federate already
   kilotwin_wire_MemberPhase phase_ = kilotwin_wire_ARRIVING;
   std::string waiting_for_;
-  std::chrono::steady_clock::time_point next_complaint_, next_idle_;
-  std::vector<Peer> peers_;
+  Clock::time_point next_report_, next_idle_, watched_at_;
+  bool cause_told_ = false;  // of the present wait
+  std::vector<MemberState> members_;
   std::vector<class InputBase*> inputs_;
   std::vector<class OutputBase*> outputs_;
   std::vector<std::uint64_t> hash_parts_;
   Tick hash_first_;  // of hash_parts_
   Tick saved_{-1};   // the last checkpoint
   std::uint64_t step_ns_ = 0, exchange_ns_ = 0, wait_ns_ = 0, paused_ns_ = 0;
-  std::optional<std::chrono::steady_clock::time_point> started_, ended_, paused_since_;
+  std::optional<Clock::time_point> started_, ended_, paused_since_;
   bool finished_ = false;
 
   dds::Participant participant_;  // before the endpoints, so that it outlives them
+  std::mutex member_mutex_;       // guards member_ and the order of its samples; taken before mutex_
+  WireMember member_{};
   std::unique_ptr<dds::Writer<WireMember>> member_writer_;
   std::unique_ptr<dds::Reader<WireMember>> member_reader_;
   std::unique_ptr<dds::Writer<WireDirective>> directive_writer_;
   std::unique_ptr<dds::Reader<WireDirective>> directive_reader_;
   std::unique_ptr<dds::Writer<WireMetrics>> metrics_writer_;
+  std::jthread heart_;  // last: ends before the writer that it uses
 };
 
 }  // namespace kilotwin

@@ -1,4 +1,4 @@
-/// Checkpoints that nobody has asked for: from them a run goes on when a robot's program has brought down its host.
+/// Checkpoints that a run takes by itself: from them it continues when a robot's program has brought down its host.
 #pragma once
 
 #include <chrono>

@@ -24,14 +24,18 @@ bool TickGate::hello(FederateId publisher) {
   return true;
 }
 
-TickGate::Arrival TickGate::arrived(FederateId publisher, Tick tick) {
+TickGate::Arrival TickGate::arrival(FederateId publisher, Tick tick) const {
   const std::ptrdiff_t index = index_of(publisher);
   if (index < 0) return Arrival::kUnexpected;
-  Tick& newest = newest_[static_cast<std::size_t>(index)];
+  const Tick newest = newest_[static_cast<std::size_t>(index)];
   if (tick <= newest) return Arrival::kRepeated;
-  if (tick > newest + 1 || tick - reading_ >= kFrameRing) return Arrival::kUnexpected;
-  newest = tick;
-  return Arrival::kAccepted;
+  return tick > newest + 1 || tick - reading_ >= kFrameRing ? Arrival::kUnexpected : Arrival::kNew;
+}
+
+bool TickGate::accept(FederateId publisher, Tick tick) {
+  if (arrival(publisher, tick) != Arrival::kNew) return false;
+  newest_[static_cast<std::size_t>(index_of(publisher))] = tick;
+  return true;
 }
 
 bool TickGate::heard_all() const {

@@ -21,10 +21,12 @@ class TickGate {
 
   /// A hello, which carries no state, was heard. False: nobody expects this publisher here.
   bool hello(FederateId publisher);
-  enum class Arrival { kAccepted, kRepeated, kUnexpected };
-  /// A frame was heard. kRepeated: an older one again, or one from before `first`. kUnexpected: not one of ours, or one
-  /// that leaves a gap or runs ahead of the reader by the whole ring.
-  Arrival arrived(FederateId publisher, Tick tick);
+  enum class Arrival { kNew, kRepeated, kUnexpected };
+  /// What a frame is that was just heard. kNew: the next one of its publisher. kRepeated: an older one again, or one from
+  /// before `first`. kUnexpected: not one of ours, or one that leaves a gap or runs ahead of the reader by the whole ring.
+  [[nodiscard]] Arrival arrival(FederateId publisher, Tick tick) const;
+  /// A new frame can be read from now on. False where it is not new.
+  bool accept(FederateId publisher, Tick tick);
   /// The reader has come to `tick`: it reads the frames of that tick, and is done with those before.
   void reading(Tick tick) { reading_ = tick; }
 

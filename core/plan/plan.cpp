@@ -130,6 +130,7 @@ RunPlan::RunPlan(proto::Manifest given)
       resumed(manifest_->resumed()),
       pace(manifest_->pace()),
       mode(manifest_->mode()),
+      build(manifest_->build()),
       run_(manifest_->run()),
       seed_(manifest_->experiment().seed()),
       checkpoint_every_(

@@ -94,6 +94,7 @@ class RunPlan {
   const bool resumed;         ///< starts from the checkpoint in the run directory's resumed/
   const double pace;          ///< simulated over wall time, at most; 0: as fast as possible
   const std::string mode;     ///< "local" or "federated"
+  const std::string build;    ///< of the program that prepared the run: core/base/build_identity.hpp
 
   /// What the plan was made of, for those that write it again. Who reads it includes idl/manifest.pb.h.
   [[nodiscard]] const proto::Manifest& manifest() const { return *manifest_; }

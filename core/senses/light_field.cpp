@@ -1,6 +1,5 @@
 #include "core/senses/light_field.hpp"
 
-#include "core/base/error.hpp"
 #include "core/math/elementary.h"
 #include "core/plan/motion_settings.hpp"
 #include "core/plan/senses_settings.hpp"
@@ -14,10 +13,7 @@ LightField::LightField(const RunPlan& plan, Share share)
       share_(share),
       anchor_z_mm_(light_.sensor.height_mm),
       gain_(share.size()),
-      offset_(share.size()),
-      x_mm_(plan.robots()),
-      y_mm_(plan.robots()),
-      heading_rad_(plan.robots()) {
+      offset_(share.size()) {
   const LightSensorSettings& sensor = light_.sensor;
   double s = 0, c = 0;
   kt_sincos(sensor.angle_deg * (kPi / 180), &s, &c);
@@ -40,23 +36,11 @@ LightField::LightField(const RunPlan& plan, Share share)
   if (light_.shadows) shadows_.emplace(sensor.body_height_mm);
 }
 
-void LightField::at(Tick tick, std::span<const BodyFrame* const> bodies) {
-  std::size_t robots = 0;
-  for (const BodyFrame* frame : bodies) {
-    KILOTWIN_DEMAND(frame->tick == tick);
-    robots += frame->robot.size();
-    for (std::size_t n = 0; n < frame->robot.size(); ++n) {
-      const std::uint32_t robot = frame->robot[n];
-      if (!shadows_ && !share_.contains(robot)) continue;
-      x_mm_[robot] = frame->x_mm[n];
-      y_mm_[robot] = frame->y_mm[n];
-      heading_rad_[robot] = frame->heading_rad[n];
-    }
-  }
-  KILOTWIN_DEMAND(robots == plan_.robots());
-  if (shadows_) shadows_->prepare(x_mm_, y_mm_);
+void LightField::at(const SwarmView& swarm) {
+  swarm_ = &swarm;
+  if (shadows_) shadows_->prepare(swarm.x_mm, swarm.y_mm);
 
-  const double time_s = plan_.tick_length.seconds_at(tick);
+  const double time_s = plan_.tick_length.seconds_at(swarm.tick);
   lamps_.clear();
   for (const LightSourceSettings& source : light_.sources) {
     const Lamp lamp = lamp_at(source, time_s);
@@ -77,9 +61,9 @@ double LightField::light(double x_mm, double y_mm, double z_mm, std::uint32_t se
 
 double LightField::reading(std::uint32_t id) const {
   double s = 0, c = 0;
-  kt_sincos(heading_rad_[id], &s, &c);
-  const double x_mm = x_mm_[id] + c * anchor_x_mm_ - s * anchor_y_mm_;
-  const double y_mm = y_mm_[id] + s * anchor_x_mm_ + c * anchor_y_mm_;
+  kt_sincos(swarm_->heading_rad[id], &s, &c);
+  const double x_mm = swarm_->x_mm[id] + c * anchor_x_mm_ - s * anchor_y_mm_;
+  const double y_mm = swarm_->y_mm[id] + s * anchor_x_mm_ + c * anchor_y_mm_;
   return gain_[id - share_.first] * light(x_mm, y_mm, anchor_z_mm_, id) + offset_[id - share_.first];
 }
 

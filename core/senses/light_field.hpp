@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/plan/plan.hpp"
 #include "core/senses/light_image.hpp"
 #include "core/senses/light_source.hpp"
@@ -19,8 +19,8 @@ class LightField {
   /// For robots of `share`. The plan has light and must outlive this object.
   LightField(const RunPlan&, Share share);
 
-  /// The field of `tick`, with the poses of that tick from all partitions, in any order.
-  void at(Tick tick, std::span<const BodyFrame* const> bodies);
+  /// The field among a swarm, at its tick. Readings are of that swarm: it must outlive them.
+  void at(const SwarmView&);
 
   /// What the sensor of robot `id` of the share gives on average, counts before the converter cuts them to 0..1023: its gain
   /// times the light there, and its offset.
@@ -37,7 +37,7 @@ class LightField {
   const Share share_;
   double anchor_x_mm_ = 0, anchor_y_mm_ = 0, anchor_z_mm_;  ///< the sensor's place on a robot with heading 0
   std::vector<double> gain_, offset_;                       ///< per robot of the share
-  std::vector<double> x_mm_, y_mm_, heading_rad_;  ///< per robot, by id; without shadows, of the share alone
+  const SwarmView* swarm_ = nullptr;
   std::vector<LightImage> images_;
   std::vector<Lamp> lamps_;  ///< those that shine
   std::optional<Shadows> shadows_;

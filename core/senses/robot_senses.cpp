@@ -38,15 +38,11 @@ RobotSenses::RobotSenses(const RunPlan& plan, Share share) : share_(share) {
   for (std::uint32_t i = 0; i < share.size(); ++i) charge_[i] = battery_->initial(share.first + i);
 }
 
-void RobotSenses::at(Tick tick, std::span<const BodyFrame* const> bodies) {
-  if (light_) light_->at(tick, bodies);
+void RobotSenses::at(const SwarmView& swarm) {
+  if (light_) light_->at(swarm);
   if (!battery_) return;
-  for (const BodyFrame* frame : bodies) {
-    for (std::size_t n = 0; n < frame->robot.size(); ++n) {
-      if (share_.contains(frame->robot[n]))
-        supply_[frame->robot[n] - share_.first] = battery_->supply(frame->x_mm[n], frame->y_mm[n]);
-    }
-  }
+  for (std::uint32_t i = 0; i < share_.size(); ++i)
+    supply_[i] = battery_->supply(swarm.x_mm[share_.first + i], swarm.y_mm[share_.first + i]);
 }
 
 void RobotSenses::restore(std::uint32_t i, std::int64_t charge, std::int64_t drain) {

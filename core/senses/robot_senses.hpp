@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "core/frames/swarm_view.hpp"
 #include "core/plan/plan.hpp"
-#include "core/frames/frames.hpp"
 #include "core/senses/battery.hpp"
 #include "core/senses/light_field.hpp"
 
@@ -28,8 +28,8 @@ class RobotSenses {
  public:
   RobotSenses(const RunPlan&, Share share);
 
-  /// The surroundings of `tick`. `bodies`: the poses of that tick from all partitions, where RunPlan::hosts_see_bodies().
-  void at(Tick tick, std::span<const BodyFrame* const> bodies);
+  /// The surroundings among a swarm, at its tick; needed where RunPlan::hosts_see_bodies(). The swarm must outlive readings.
+  void at(const SwarmView&);
   [[nodiscard]] Readings readings(std::uint32_t i) const {
     Readings result;
     if (light_) {

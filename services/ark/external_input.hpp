@@ -1,4 +1,4 @@
-/// What comes in from outside by the public topics: collected on receive threads, handed over on the station's own.
+/// External input, from the public topics: collected on receive threads, handed over on the station's own.
 #pragma once
 
 #include <map>

@@ -1,6 +1,6 @@
 /// Foraging as ARK demonstrates it: virtual food, a virtual home, and robots that carry one load at a time.
 ///
-/// What a robot is told: 0 inside its goal; 1..13 outside, 1 within 100 mm of its centre and one more for every 100 mm; 14 that
+/// What a robot is sent: 0 inside its goal; 1..13 outside, 1 within 100 mm of its centre and one more for every 100 mm; 14 that
 /// it has changed its goal, with 0 to the home and 1 to the food; 15 that no food is left. The data of 0..13 is the bearing of
 /// the goal's centre.
 ///

@@ -26,9 +26,11 @@ bool RunMetrics::fits(const WireMetrics& metrics, const Account& account) const 
   const std::uint32_t radios = metrics.robot_attempted._length;
   return (radios == 0 || radios == plan_.robots()) && metrics.robot_sent._length == radios &&
          metrics.robot_received._length == radios && metrics.robot_collided._length == radios &&
-         metrics.robot_backed_off._length == radios && !account.last && metrics.first_tick == account.next.count() &&
+         metrics.robot_backed_off._length == radios && !account.last &&
+         metrics.first_tick == account.next.count() &&
          metrics.hash_parts._length <= plan_.last_tick + 1 - account.next && metrics.pair_sender._length == pairs &&
-         metrics.pair_count._length == pairs && all_robots(metrics.pair_receiver) && all_robots(metrics.pair_sender);
+         metrics.pair_count._length == pairs && all_robots(metrics.pair_receiver) &&
+         all_robots(metrics.pair_sender);
 }
 
 void RunMetrics::on_metrics(const WireMetrics& metrics) {
@@ -36,10 +38,12 @@ void RunMetrics::on_metrics(const WireMetrics& metrics) {
   Account& account = accounts_[metrics.publisher];
   if (!fits(metrics, account)) {
     if (malformed_.empty())
-      malformed_ = fmt::format("{}: a metrics sample does not fit the run", plan_.name(FederateId{metrics.publisher}));
+      malformed_ =
+          fmt::format("{}: a metrics sample does not fit the run", plan_.name(FederateId{metrics.publisher}));
     return;
   }
   account.next = account.next + metrics.hash_parts._length;
+  account.heard = true;
   account.last = metrics.last;
   account.step_ns = metrics.step_ns;
   account.exchange_ns = metrics.exchange_ns;
@@ -75,6 +79,11 @@ void RunMetrics::advance(const std::function<void(Tick, std::uint64_t)>& each) {
   }
   for (const auto& [tick, values] : parts) KILOTWIN_DEMAND(hashes_.add(tick, values));
   while (hashes_.advance()) each(hashes_.tick(), hashes_.chain());
+}
+
+bool RunMetrics::heard_all() {
+  const std::lock_guard lock(mutex_);
+  return std::all_of(accounts_.begin(), accounts_.end(), [](const Account& account) { return account.heard; });
 }
 
 bool RunMetrics::complete() {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/federation/hash_sums.hpp"
 #include "core/federation/run_observer.hpp"
 #include "core/federation/topics.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::ark {
 
@@ -23,6 +23,8 @@ class RunMetrics {
   /// The last tick whose H is known, and that H.
   [[nodiscard]] Tick hash_tick() const { return hashes_.tick(); }
   [[nodiscard]] std::uint64_t chain() const { return hashes_.chain(); }
+  /// Every federate has sent its first metrics: from then on none is lost.
+  [[nodiscard]] bool heard_all();
   /// Every federate has sent its last metrics.
   [[nodiscard]] bool complete();
   /// What the metrics say so far; the fields that they do not know are left alone.
@@ -31,7 +33,7 @@ class RunMetrics {
  private:
   struct Account {
     Tick next;  ///< of the hash parts that come next
-    bool last = false;
+    bool heard = false, last = false;
     std::uint64_t step_ns = 0, exchange_ns = 0, cpu_ns = 0;
     std::uint32_t peak_memory_kib = 0, robots_failed = 0;
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;

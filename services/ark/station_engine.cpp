@@ -50,25 +50,21 @@ StationEngine::StationEngine(const RunPlan& plan)
   }
 }
 
-void StationEngine::see(const Inputs& inputs) {
-  for (const BodyFrame* frame : inputs.bodies) {
-    for (std::size_t i = 0; i < frame->robot.size(); ++i) {
-      TrackedRobot& robot = seen_[frame->robot[i]];
-      robot.robot = frame->robot[i];
-      robot.p_WR = {frame->x_mm[i], frame->y_mm[i], frame->heading_rad[i]};
+void StationEngine::see(const SwarmView& swarm) {
+  if (measurement_.any()) measurement_.measure(swarm, measured_);
+  for (std::uint32_t robot = 0; robot < seen_.size(); ++robot) {
+    TrackedRobot& seen = seen_[robot];
+    seen.robot = robot;
+    if (measurement_.any()) {
+      seen.p_WR = {measured_.x_mm[robot], measured_.y_mm[robot], measured_.heading_rad[robot]};
+    } else {
+      seen.p_WR = {swarm.x_mm[robot], swarm.y_mm[robot], swarm.heading_rad[robot]};
     }
-  }
-  if (measurement_.any()) {
-    measurement_.measure(inputs.bodies.front()->tick, inputs.bodies, inputs.actuation, measured_);
-    for (std::size_t i = 0; i < seen_.size(); ++i)
-      seen_[i].p_WR = {measured_.x_mm[i], measured_.y_mm[i], measured_.heading_rad[i]};
-  }
-  for (const ActuationFrame* frame : inputs.actuation) {
-    for (std::size_t i = 0; i < frame->led.size(); ++i) seen_[frame->first_robot + i].led = frame->led[i];
+    seen.led = swarm.led[robot];
   }
 }
 
-void StationEngine::send_own(const Inputs& inputs) {
+void StationEngine::send_own(const SwarmView& swarm) {
   if (now_ == start_ends_ && repeating_) {
     packets_.push_back({OverheadCommand::kStop, {}});
     repeating_ = false;
@@ -77,7 +73,7 @@ void StationEngine::send_own(const Inputs& inputs) {
   if (environments_.empty() || now_ < next_packet_) return;
   std::array<ArkMessage, kArkSlots> messages;
   std::size_t count = 0;
-  see(inputs);
+  see(swarm);
   while (count < kArkSlots && now_ - served_[next_robot_] >= robot_ticks_) {
     VirtualEnvironment& environment = *environments_[turns_[next_robot_] % environments_.size()];
     if (const auto message = environment.sense(seen_[next_robot_])) messages[count++] = *message;
@@ -99,8 +95,8 @@ void StationEngine::send_own(const Inputs& inputs) {
 void StationEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == now_);
   ++now_;
-  packets_.assign(inputs.outside.begin(), inputs.outside.end());
-  if (packets_.empty()) return send_own(inputs);
+  packets_.assign(inputs.external.begin(), inputs.external.end());
+  if (packets_.empty()) return send_own(inputs.swarm);
   // What the controller does now is not the station's to stop; the next own packet overrides it, an interval later.
   repeating_ = false;
   next_packet_ = std::max(next_packet_, now_ + packet_ticks_);

@@ -3,7 +3,7 @@
 /// Tick 0: RUN, repeated by the overhead controller. After start_broadcast_s: STOP, so that the air is free. Then, with
 /// environments, at most one packet per packet_interval_s with ARK messages for the three robots that have waited longest,
 /// none of which hears more often than every max(1 s, N * 0.05 s / 3) (ARK's users' rule); a packet is repeated until the
-/// next, and STOP follows when nobody's turn has come. A packet from outside takes the place of the station's own.
+/// next, and STOP follows when nobody's turn has come. A packet of external input takes the place of the station's own.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/effects/measurement.hpp"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/plan/plan.hpp"
 #include "services/ark/virtual_environment.hpp"
 
@@ -22,11 +22,10 @@ class StationState;
 
 namespace kilotwin::ark {
 
-/// What a step from tick k reads; every frame is of tick k.
+/// What a step from tick k reads; all of it is of tick k.
 struct Inputs {
-  std::span<const BodyFrame* const> bodies;
-  std::span<const ActuationFrame* const> actuation;
-  std::span<const OverheadPacket> outside;  ///< stamped by the ingress for this tick, in order
+  const SwarmView& swarm;
+  std::span<const OverheadPacket> external;  ///< stamped by the ingress for this tick, in order
 };
 
 class StationEngine {
@@ -44,8 +43,8 @@ class StationEngine {
 
  private:
   /// The station's own packet at `now_`, if one is due.
-  void send_own(const Inputs& inputs);
-  void see(const Inputs& inputs);
+  void send_own(const SwarmView&);
+  void see(const SwarmView&);
 
   const RunPlan& plan_;
   const Tick start_ends_;            ///< when RUN gives way to STOP
@@ -58,7 +57,7 @@ class StationEngine {
   std::uint32_t next_robot_ = 0;         ///< whose turn it is: robots are served in a circle
   Tick next_packet_{0};
   bool repeating_ = true;             ///< the controller repeats an own packet
-  std::vector<Tick> served_;          ///< per robot, where there are environments: when it was told a reading last
+  std::vector<Tick> served_;          ///< per robot, where there are environments: when it was sent a reading last
   std::vector<std::uint32_t> turns_;  ///< per robot: how often; environments answer by turns
 
   // Of the step at hand: robots as the tracker sees them.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <thread>
@@ -27,12 +28,12 @@ constexpr auto kRobotsPeriod = std::chrono::milliseconds(100);
 
 class StationFederate : public Federate {
  public:
-  StationFederate(Session& session, StationEngine& engine, RunMetrics& books, RunObserver& observer,
+  StationFederate(Session& session, StationEngine& engine, RunMetrics& metrics, RunObserver& observer,
                   const ServiceContext& context)
       : session_(session),
         context_(context),
         engine_(engine),
-        metrics_(books),
+        metrics_(metrics),
         observer_(observer),
         ingress_(context.inputs),
         snapshots_(context.run_directory, session.plan().checkpoint_every() == 0),
@@ -49,19 +50,22 @@ class StationFederate : public Federate {
     overhead_.write();
   }
 
+  [[nodiscard]] bool hears_all() override { return metrics_.heard_all(); }
+  [[nodiscard]] double ahead_s(Tick now) override {
+    return pace_.ahead_s(now - session_.first(), session_.wall_s());
+  }
+
   void inputs_complete(Tick now, bool last) override {
-    pace_.hold(
-        now - session_.first(), [this] { return session_.wall_s(); }, [this] { idle(); });
+    swarm_.gather(now, bodies_.at(now));
+    swarm_.gather(actuation_.at(now));
     const auto begun = Clock::now();
-    observer_.state(now, bodies_.at(now), actuation_.at(now), last);
+    observer_.state(now, swarm_, last);
     recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());
     if (begun >= next_robots_ && robots_.readers() > 0) publish_robots(now);
     if (begun >= next_robots_) next_robots_ = begun + kRobotsPeriod;
   }
 
-  void step(Tick from) override {
-    engine_.step(from, {bodies_.at(from), actuation_.at(from), session_.schedule().overhead_inputs()});
-  }
+  void step(Tick from) override { engine_.step(from, {swarm_, session_.schedule().overhead_inputs()}); }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 
@@ -83,7 +87,7 @@ class StationFederate : public Federate {
                    progress);
   }
 
-  /// Brings the books up to date, and writes checkpoint parts whose state hash has become known.
+  /// Takes in what federates have counted, and writes checkpoint parts whose state hash has become known.
   void settle() {
     write_checkpoint();
     metrics_.advance([this](Tick tick, std::uint64_t chain) {
@@ -124,8 +128,8 @@ class StationFederate : public Federate {
   [[nodiscard]] bool was_interrupted() const { return stop_announced_; }
 
  private:
-  /// Writes the part of the checkpoint of the tick whose state hash is the last one known, if there is one. The books know
-  /// no tick beyond that at which the station stands, so a part that comes to be saved is never too late.
+  /// Writes the part of the checkpoint of the tick whose state hash is the last one known, if there is one. The state hash
+  /// is known of no tick beyond that at which the station stands, so a part that comes to be saved is never too late.
   void write_checkpoint() {
     if (unfinished_.empty() || unfinished_.front().first != metrics_.hash_tick()) return;
     auto& [tick, part] = unfinished_.front();
@@ -162,19 +166,13 @@ class StationFederate : public Federate {
     PublicRobotState state{};
     state.run = session_.plan().run();
     state.time_s = session_.plan().tick_length.seconds_at(now);
-    led_.resize(session_.plan().robots());
-    for (const ActuationFrame* frame : actuation_.at(now)) {
-      std::copy(frame->led.begin(), frame->led.end(), led_.begin() + frame->first_robot);
-    }
-    for (const BodyFrame* frame : bodies_.at(now)) {
-      for (std::size_t i = 0; i < frame->robot.size(); ++i) {
-        state.robot = frame->robot[i];
-        state.x_mm = frame->x_mm[i];
-        state.y_mm = frame->y_mm[i];
-        state.heading_rad = frame->heading_rad[i];
-        state.led = led_[state.robot];
-        robots_.write(state);
-      }
+    for (std::uint32_t robot = 0; robot < swarm_.robots(); ++robot) {
+      state.robot = robot;
+      state.x_mm = swarm_.x_mm[robot];
+      state.y_mm = swarm_.y_mm[robot];
+      state.heading_rad = swarm_.heading_rad[robot];
+      state.led = swarm_.led[robot];
+      robots_.write(state);
     }
   }
 
@@ -189,11 +187,11 @@ class StationFederate : public Federate {
   Input<BodyFrame> bodies_;
   Input<ActuationFrame> actuation_;
   Output<OverheadFrame> overhead_;
+  SwarmView swarm_{session_.plan().robots(), session_.plan().movables(), session_.plan().memory.size()};
   dds::Writer<PublicRunStatus> status_;
   dds::Writer<PublicRobotState> robots_;
   Clock::time_point next_robots_{};
   Pace pace_{session_.plan()};
-  std::vector<std::uint8_t> led_;
   std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash
   std::uint64_t recording_ns_ = 0;
   bool stop_announced_ = false;
@@ -204,17 +202,19 @@ class StationFederate : public Federate {
 RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObserver& observer) {
   StationEngine engine(plan);
   if (context.resumed) engine.load(context.first(), context.resumed->station());
-  Session session(plan, plan.station(), context.transport, context.first(), context.inputs);
+  Session session(plan, plan.station(), context.transport, context.first(), context.inputs,
+                  context.give_up_after_s);
   // The chain of a resumed run goes on from H at the checkpoint: its first own sum is that of the tick after.
-  RunMetrics books(plan, session.participant(), first_hashed(context.first()),
-                   context.resumed ? context.resumed->hash_chain() : 0);
-  StationFederate federate(session, engine, books, observer, context);
+  RunMetrics metrics(plan, session.participant(), first_hashed(context.first()),
+                     context.resumed ? context.resumed->hash_chain() : 0);
+  StationFederate federate(session, engine, metrics, observer, context);
   RunTotals totals;
   try {
     federate.publish_status(kilotwin_open_STARTING, federate.progress());
     session.run(federate);
     const auto patience = Clock::now() + std::chrono::duration<double>(kMetricsPatience_s);
-    while (!books.complete() && Clock::now() < patience) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (!metrics.complete() && Clock::now() < patience)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
   } catch (const UserError&) {
     throw;
   } catch (const std::exception& error) {
@@ -227,10 +227,13 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
     if (totals.failure.empty()) totals.failure = error.what();
   }
   totals.first = context.first();
-  totals.last = books.hash_tick();
-  totals.state_hash = books.chain();
+  totals.last = metrics.hash_tick();
+  totals.state_hash = metrics.chain();
   totals.wall_s = session.wall_s();
-  books.fill(totals);
+  metrics.fill(totals);
+  // The recorder works within the station's step.
+  std::uint64_t& station_ns = totals.work_ns[static_cast<std::size_t>(Work::kStation)];
+  station_ns -= std::min(station_ns, federate.recording_ns());
   totals.work_ns[static_cast<std::size_t>(Work::kRecording)] = federate.recording_ns();
   totals.stopped_early = session.schedule().stopped_early();
   if (totals.failure.empty() && federate.was_interrupted()) totals.failure = "interrupted";

@@ -29,7 +29,10 @@ class BehavioursFederate : public Federate {
               [&plan = session.plan(), host](std::uint32_t robot) {
                 return plan.share(host).contains(robot) && !plan.firmware(robot);
               }) {
-    if (session.plan().hosts_see_bodies()) bodies_.emplace(session, topics::bodies(), session.plan().all_physics());
+    const RunPlan& plan = session.plan();
+    if (!plan.hosts_see_bodies()) return;
+    bodies_.emplace(session, topics::bodies(), plan.all_physics());
+    swarm_.emplace(plan.robots(), plan.movables(), plan.memory.size());
   }
 
   void publish(Tick) override {
@@ -38,7 +41,8 @@ class BehavioursFederate : public Federate {
   }
 
   void step(Tick from) override {
-    engine_.step(from, *radio_.at(from)[0], bodies_ ? bodies_->at(from) : std::span<const BodyFrame* const>());
+    if (swarm_) swarm_->gather(from, bodies_->at(from));
+    engine_.step(from, *radio_.at(from)[0], swarm_ ? &*swarm_ : nullptr);
     for (const auto& printed : engine_.printed()) logs_.write(from, printed.robot, printed.text);
     for (; told_ < engine_.failures().size(); ++told_) {
       const auto& failure = engine_.failures()[told_];
@@ -72,7 +76,9 @@ class BehavioursFederate : public Federate {
   const HostId host_;
   BehavioursEngine& engine_;
   Input<RadioFrame> radio_;
-  std::optional<Input<BodyFrame>> bodies_;  // only where the experiment has something to sense by place
+  // Only where the experiment has something to sense by place.
+  std::optional<Input<BodyFrame>> bodies_;
+  std::optional<SwarmView> swarm_;
   Output<ActuationFrame> actuation_;
   std::size_t told_;  // of the engine's failures; those of a checkpoint were told when they happened
   RobotLogs logs_;
@@ -84,7 +90,8 @@ class BehavioursFederate : public Federate {
 void run_service(const RunPlan& plan, HostId host, const ServiceContext& context) {
   BehavioursEngine engine(plan, host, ProgramSet::load(plan, context.run_directory));
   if (context.resumed) engine.load(context.first(), context.resumed->behaviours());
-  Session session(plan, plan.behaviours(host), context.transport, context.first(), context.inputs);
+  Session session(plan, plan.behaviours(host), context.transport, context.first(), context.inputs,
+                  context.give_up_after_s);
   RunningNote note(context.run_directory, host);
   engine.note_running_in(note.place());
   const Watchdog watchdog({&engine});

@@ -103,12 +103,12 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
   while (next < first_reception_.size()) first_reception_[next++] = static_cast<std::uint32_t>(receptions_.size());
 }
 
-void BehavioursEngine::step(Tick from, const RadioFrame& radio, std::span<const BodyFrame* const> bodies) {
+void BehavioursEngine::step(Tick from, const RadioFrame& radio, const SwarmView* swarm) {
   KILOTWIN_DEMAND(from == now_ && radio.tick == from && radio.first_robot == share_.first &&
                   radio.kilo_ticks.size() == share_.size());
   ++now_;
   gather(radio);
-  senses_.at(from, bodies);
+  if (swarm != nullptr) senses_.at(*swarm);
   printed_.clear();
   std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
   running_->tick.store(from.count(), std::memory_order_relaxed);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/base/eeprom_layout.h"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/model/radio_parameters.hpp"
 #include "core/model/robot_parameters.hpp"
 #include "core/plan/plan.hpp"
@@ -40,9 +40,9 @@ class BehavioursEngine {
   /// State at tick 0. `programs` are those of the plan's manifest.
   BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs);
 
-  /// From tick `from` to the next. The frames are those of tick `from`: the radio's for this host, and the bodies of all
-  /// partitions where RunPlan::hosts_see_bodies().
-  void step(Tick from, const RadioFrame& radio, std::span<const BodyFrame* const> bodies = {});
+  /// From tick `from` to the next. The radio's frame for this host is of tick `from`, and so is the swarm, which is needed
+  /// where RunPlan::hosts_see_bodies().
+  void step(Tick from, const RadioFrame& radio, const SwarmView* swarm = nullptr);
   void emit(ActuationFrame& frame) const;
   /// Sum of entity_hash over own robots: motors, LED, life cycle, tx period, whether a message is held;
   /// where there are batteries, their charge.

@@ -49,8 +49,8 @@ FirmwareAir::FirmwareAir(const RunPlan& plan, FirmwareRobots& robots, const Tick
   show();
 }
 
-void FirmwareAir::begin_tick(Tick tick, std::span<const BodyFrame* const> bodies) {
-  robots_.begin_tick(tick, bodies);
+void FirmwareAir::begin_tick(const SwarmView& swarm) {
+  robots_.begin_tick(swarm);
   const auto ids = robots_.ids();
   for (std::uint32_t i = 0; i < ids.size(); ++i) {
     neighbours_[i].clear();

@@ -56,7 +56,7 @@ class FirmwareAir {
   [[nodiscard]] LifeCycle life_cycle(std::uint32_t i) const { return life_cycle_[i]; }
 
   /// Poses are those of the tick that begins.
-  void begin_tick(Tick, std::span<const BodyFrame* const>);
+  void begin_tick(const SwarmView&);
   /// From `from` to `until`, one span or several. Returns what happened, in the order of time, valid until the next call.
   const std::vector<Event>& advance(Cycles from, Cycles until, const Channel&, const OverheadController&);
   /// Reads what the robots show.

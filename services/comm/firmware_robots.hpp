@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/time.hpp"
-#include "core/frames/frames.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/model/ranging.hpp"
 #include "services/comm/air.hpp"
 
@@ -50,7 +50,7 @@ class FirmwareRobots {
   virtual void note_sent(std::uint32_t i) = 0;
 
   /// A tick begins, with these poses; and ends.
-  virtual void begin_tick(Tick, std::span<const BodyFrame* const>) = 0;
+  virtual void begin_tick(const SwarmView&) = 0;
   virtual void end_tick() = 0;
   [[nodiscard]] virtual Outputs outputs(std::uint32_t i) const = 0;
   /// A word of its state, for the state hash.

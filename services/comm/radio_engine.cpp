@@ -73,63 +73,54 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == tick_);
   if (divided_) take_ghosts(inputs.ghosts);
   forget(begin_of(from));
-  read_poses(inputs.bodies);
+  read_poses(inputs.swarm);
   if (divided_) divide();
-  read_actuation(inputs.actuation);
+  read_life_cycles(inputs.swarm);
+  take_offers(inputs.swarm);
   overhead_.command(inputs.overhead.packets, begin_of(from));
   overhead_.advance(begin_of(from + 1));
   if (simple_) {
     exchange_simply(from);
   } else {
-    contend(from, inputs.bodies);
+    contend(from, inputs.swarm);
     arrive(from);
   }
   ++tick_;
 }
 
-void RadioEngine::read_poses(std::span<const BodyFrame* const> frames) {
-  std::size_t listed = 0;
+void RadioEngine::read_poses(const SwarmView& swarm) {
+  KILOTWIN_DEMAND(swarm.robots() == state_.size());
   table_.begin_tick();
-  for (const BodyFrame* frame : frames) {
-    for (std::size_t n = 0; n < frame->robot.size(); ++n) {
-      const std::uint32_t robot = frame->robot[n];
-      KILOTWIN_DEMAND(robot < state_.size());
-      if (table_.used()) {
-        table_.move(robot, frame->x_mm[n], frame->y_mm[n], frame->heading_rad[n]);
-      } else {
-        neighbourhood_.place(robot, frame->x_mm[n], frame->y_mm[n]);
-      }
-    }
-    listed += frame->robot.size();
+  for (std::uint32_t robot = 0; robot < state_.size(); ++robot) {
+    if (table_.used())
+      table_.move(robot, swarm.x_mm[robot], swarm.y_mm[robot], swarm.heading_rad[robot]);
+    else
+      neighbourhood_.place(robot, swarm.x_mm[robot], swarm.y_mm[robot]);
   }
-  KILOTWIN_DEMAND(listed == state_.size());
 }
 
-void RadioEngine::read_actuation(std::span<const ActuationFrame* const> frames) {
-  for (const ActuationFrame* frame : frames) {
-    const std::size_t robots = frame->life_cycle.size();
-    KILOTWIN_DEMAND(frame->first_robot + robots <= state_.size() && frame->tx_period.size() == robots &&
-                    frame->offer_message.size() == frame->offer_robot.size());
-    std::copy(frame->tx_period.begin(), frame->tx_period.end(), tx_period_.begin() + frame->first_robot);
-    for (std::size_t n = 0; n < robots; ++n) {
-      const auto robot = static_cast<std::uint32_t>(frame->first_robot + n);
-      if (divided_ && known_[robot] == 0) continue;
-      const auto life_cycle = static_cast<LifeCycle>(frame->life_cycle[n]);
-      const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed ||
-                        life_cycle == LifeCycle::kFlat || apart_[robot] != 0;
-      const bool running = life_cycle == LifeCycle::kRunning && apart_[robot] == 0;
-      const int kept = state_[robot] & (kHolding | kFlying);
-      state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));
-      if (!running && kept != 0) drop_message(robot);
-      if (firmware_ && firmware_->has(robot) && firmware_->listening(robot)) state_[robot] |= kFirmware;
-    }
-    for (std::size_t n = 0; n < frame->offer_robot.size(); ++n) {
-      const std::uint32_t robot = frame->offer_robot[n];
-      KILOTWIN_DEMAND(robot < state_.size());
-      if (!is(robot, kRunning) || is(robot, kHolding)) continue;
-      state_[robot] |= kHolding;
-      message_[robot] = frame->offer_message[n];
-    }
+void RadioEngine::read_life_cycles(const SwarmView& swarm) {
+  tx_period_ = swarm.tx_period;
+  for (std::uint32_t robot = 0; robot < state_.size(); ++robot) {
+    if (divided_ && known_[robot] == 0) continue;
+    const auto life_cycle = static_cast<LifeCycle>(swarm.life_cycle[robot]);
+    const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed ||
+                      life_cycle == LifeCycle::kFlat || apart_[robot] != 0;
+    const bool running = life_cycle == LifeCycle::kRunning && apart_[robot] == 0;
+    const int kept = state_[robot] & (kHolding | kFlying);
+    state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));
+    if (!running && kept != 0) drop_message(robot);
+    if (firmware_ && firmware_->has(robot) && firmware_->listening(robot)) state_[robot] |= kFirmware;
+  }
+}
+
+void RadioEngine::take_offers(const SwarmView& swarm) {
+  for (std::size_t n = 0; n < swarm.offer_robot.size(); ++n) {
+    const std::uint32_t robot = swarm.offer_robot[n];
+    KILOTWIN_DEMAND(robot < state_.size());
+    if (!is(robot, kRunning) || is(robot, kHolding)) continue;
+    state_[robot] |= kHolding;
+    message_[robot] = swarm.offer_message[n];
   }
 }
 
@@ -159,7 +150,7 @@ bool RadioEngine::later(const Attempt& a, const Attempt& b) {
 }
 
 /// A packet that ends at `end` arrives in the tick that begins there, so that nothing in a tick is of a later instant.
-void RadioEngine::contend(Tick now, std::span<const BodyFrame* const> bodies) {
+void RadioEngine::contend(Tick now, const SwarmView& swarm) {
   const Cycles end = begin_of(now + 1);
   channel_.locate();
   if (table_.used()) neighbourhood_.sort();
@@ -177,7 +168,7 @@ void RadioEngine::contend(Tick now, std::span<const BodyFrame* const> bodies) {
   while (next_copy_ < copies.size() && copies[next_copy_].start < begin_of(now)) ++next_copy_;
   simulated_ = begin_of(now);
   if (!firmware_) return contend_until(end, now);
-  firmware_->begin_tick(now, bodies);
+  firmware_->begin_tick(swarm);
   while (simulated_ < end) {
     const Cycles until = next_meeting(end);
     contend_until(until, now);

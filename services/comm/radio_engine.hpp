@@ -31,8 +31,8 @@
 #include <span>
 #include <vector>
 
-#include "core/frames/frames.hpp"
 #include "core/frames/radio_counts.hpp"
+#include "core/frames/swarm_view.hpp"
 #include "core/model/ranging.hpp"
 #include "core/plan/plan.hpp"
 #include "core/plan/radio_settings.hpp"
@@ -56,11 +56,9 @@ namespace kilotwin::comm {
 
 class RadioEngine {
  public:
-  /// What a step from tick k reads; every frame is of tick k, in any order. Bodies list every robot once. Robots that no
-  /// actuation frame covers stay as they were.
+  /// What a step from tick k reads; all of it is of tick k.
   struct Inputs {
-    std::span<const BodyFrame* const> bodies;
-    std::span<const ActuationFrame* const> actuation;
+    const SwarmView& swarm;
     const OverheadFrame& overhead;
     /// Of every other region, what it emits for this one; none where the region is everywhere.
     std::span<const RadioGhosts* const> ghosts = {};
@@ -130,12 +128,13 @@ class RadioEngine {
 
   void take_ghosts(std::span<const RadioGhosts* const>);
   void divide();
-  void read_poses(std::span<const BodyFrame* const>);
-  void read_actuation(std::span<const ActuationFrame* const>);
+  void read_poses(const SwarmView&);
+  void read_life_cycles(const SwarmView&);
+  void take_offers(const SwarmView&);
   void drop_message(std::uint32_t robot);
   void forget(Cycles begin);
 
-  void contend(Tick now, std::span<const BodyFrame* const>);
+  void contend(Tick now, const SwarmView&);
   void contend_until(Cycles end, Tick now);
   [[nodiscard]] Cycles next_meeting(Cycles end) const;
   void run_firmware(Cycles from, Cycles until, Tick now);

@@ -14,7 +14,8 @@ class CommFederate : public Federate {
         engine_(engine),
         bodies_(session, topics::bodies(), session.plan().all_physics()),
         actuation_(session, topics::actuation(), session.plan().all_behaviours()),
-        overhead_(session, topics::overhead(), {session.plan().station()}) {
+        overhead_(session, topics::overhead(), {session.plan().station()}),
+        swarm_(session.plan().robots(), session.plan().movables(), session.plan().memory.size()) {
     for (std::uint32_t host = 0; host < session.plan().hosts; ++host) {
       radio_out_.push_back(std::make_unique<Output<RadioFrame>>(session, topics::radio(host)));
     }
@@ -28,7 +29,9 @@ class CommFederate : public Federate {
   }
 
   void step(Tick from) override {
-    engine_.step(from, {bodies_.at(from), actuation_.at(from), *overhead_.at(from)[0]});
+    swarm_.gather(from, bodies_.at(from));
+    swarm_.gather(actuation_.at(from));
+    engine_.step(from, {swarm_, *overhead_.at(from)[0]});
   }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
@@ -79,6 +82,7 @@ class CommFederate : public Federate {
   Input<BodyFrame> bodies_;
   Input<ActuationFrame> actuation_;
   Input<OverheadFrame> overhead_;
+  SwarmView swarm_;
   std::vector<std::unique_ptr<Output<RadioFrame>>> radio_out_;
   // What the last metrics lends.
   std::vector<std::uint32_t> receiver_, sender_, count_;
@@ -90,7 +94,7 @@ class CommFederate : public Federate {
 void run_service(const RunPlan& plan, const ServiceContext& context, std::unique_ptr<FirmwareRobots> firmware) {
   RadioEngine engine(plan, std::move(firmware));
   if (context.resumed) engine.load(context.first(), context.resumed->radio());
-  Session session(plan, plan.radio(), context.transport, context.first(), context.inputs);
+  Session session(plan, plan.radio(), context.transport, context.first(), context.inputs, context.give_up_after_s);
   CommFederate federate(session, engine, context);
   session.run(federate);
 }

@@ -16,11 +16,15 @@ class Merge {
 
   explicit Merge(std::uint32_t robots) : marks_(robots / 64 + 1, 0), entry_(robots) {}
 
-  /// Each robot once.
-  void add(std::uint32_t robot, Entry entry) {
-    marks_[robot / 64] |= std::uint64_t{1} << robot % 64;
+  /// False, and nothing done, where the robot was added already.
+  [[nodiscard]] bool add(std::uint32_t robot, Entry entry) {
+    std::uint64_t& marks = marks_[robot / 64];
+    const std::uint64_t mark = std::uint64_t{1} << robot % 64;
+    if ((marks & mark) != 0) return false;
+    marks |= mark;
     entry_[robot] = entry;
     ++size_;
+    return true;
   }
   [[nodiscard]] std::size_t size() const { return size_; }
 

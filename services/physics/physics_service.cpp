@@ -65,7 +65,8 @@ class PhysicsFederate : public Federate {
 void run_service(const RunPlan& plan, PartitionId partition, const ServiceContext& context) {
   std::unique_ptr<Engine> engine = make_engine(plan, partition);
   if (context.resumed) engine->load(context.first(), context.resumed->physics());
-  Session session(plan, plan.physics(partition), context.transport, context.first(), context.inputs);
+  Session session(plan, plan.physics(partition), context.transport, context.first(), context.inputs,
+                  context.give_up_after_s);
   PhysicsFederate federate(session, partition, std::move(engine), context);
   session.run(federate);
 }

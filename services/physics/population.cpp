@@ -95,18 +95,23 @@ void Population::gather(std::span<const BodyFrame* const> ghosts) {
     return;
   }
   // List 0 is what was listed, 1 the tracked ones, the others are ghosts.
+  const auto add = [this](std::uint32_t robot, Merge::Entry entry) {
+    if (!merge_.add(robot, entry))
+      throw RunError("two partitions claim robot " + std::to_string(robot) + " at tick " +
+                     std::to_string(tick_.count()));
+  };
   for (std::uint32_t i = 0; i < listed_.size(); ++i) {
-    if (listed_.tracked[i] == 0) merge_.add(listed_.robot[i], {0, i});
+    if (listed_.tracked[i] == 0) add(listed_.robot[i], {0, i});
   }
   for (std::uint32_t i = 0; i < tracked_.size(); ++i) {
     if (rectangle_.distance_mm(tracked_.x_mm[i], tracked_.y_mm[i]) <= margin_mm_) {
-      merge_.add(tracked_.robot[i], {1, i});
+      add(tracked_.robot[i], {1, i});
     }
   }
   for (std::uint32_t g = 0; g < ghosts.size(); ++g) {
     for (std::uint32_t i = 0; i < ghosts[g]->robot.size(); ++i) {
       const std::uint32_t robot = ghosts[g]->robot[i];
-      if (is_tracked_.empty() || is_tracked_[robot] == 0) merge_.add(robot, {2 + g, i});
+      if (is_tracked_.empty() || is_tracked_[robot] == 0) add(robot, {2 + g, i});
     }
   }
   known_.swap(previous_);
@@ -253,7 +258,7 @@ void Population::load(Tick tick, std::span<const proto::PhysicsState* const> par
     throw RunError("checkpoint: physics: holds " + std::to_string(all.size()) + " of " + std::to_string(robots_) +
                    " robots");
   }
-  for (std::uint32_t i = 0; i < all.size(); ++i) merge_.add(all.robot[i], {0, i});
+  for (std::uint32_t i = 0; i < all.size(); ++i) KILOTWIN_DEMAND(merge_.add(all.robot[i], {0, i}));
   listed_.clear();
   tracked_.clear();
   known_.clear();

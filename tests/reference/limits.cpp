@@ -22,15 +22,6 @@ std::string range_of(std::string_view field) {
   throw std::runtime_error(fmt::format("core/experiment/fields.cpp has no rule for {}", field));
 }
 
-/// The highest index of a participant, as Cyclone is configured.
-std::string last_participant() {
-  const std::string configuration = dds::cyclone_configuration({}), tag = "<MaxAutoParticipantIndex>";
-  const std::size_t at = configuration.find(tag);
-  if (at == std::string::npos) throw std::runtime_error("core/dds/dds.cpp sets no MaxAutoParticipantIndex");
-  const std::size_t from = at + tag.size();
-  return configuration.substr(from, configuration.find('<', from) - from);
-}
-
 }  // namespace
 
 std::string limits_table() {
@@ -52,8 +43,11 @@ std::string limits_table() {
   row("physics partitions along y", range_of("Deployment.partition_rows"), "core/experiment/fields.cpp");
   row("behaviours hosts", range_of("Deployment.hosts"), "core/experiment/fields.cpp");
   row("DDS domain", fmt::format("0..{}", dds::kLastDomain), "core/dds/dds.hpp");
-  row("index of a DDS participant in its domain, per machine", "0.." + last_participant(), "core/dds/dds.cpp");
-  row("silence after which a federate counts as lost", fmt::format("{} s", dds::kLease_s), "core/dds/dds.hpp");
+  row("index of a DDS participant in its domain, per machine", fmt::format("0..{}", dds::kMostParticipants - 1),
+      "core/dds/dds.hpp");
+  row("services of a federated run on one machine", number(dds::kMostServices), "core/dds/dds.hpp");
+  row("silence after which a federate counts as lost (2 s per 4 services and core, where there are more)",
+      fmt::format("{} s", dds::kSilence_s), "core/dds/dds.hpp");
   row("stack of a simulated program (a robot has 2 KiB of RAM)",
       fmt::format("{} KiB", behaviours::kStackOctets / 1024), "services/behaviours/image.hpp");
   row("addresses of all programs of a run",

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/dds/dds.hpp"
+#include "idl/manifest.pb.h"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -123,7 +124,7 @@ TEST_F(BadInput, ADomainInUseByServicesStartedByHand) {
   ASSERT_EQ(kilotwin({"run", good, "--prepare", "--out", scratch / "first"}, scratch).status, 0);
   const std::string domain = std::to_string(dds::DomainClaim::any().domain());
   Process other({program(), "service", "comm", "--run", scratch / "first", "--domain", domain}, scratch.path());
-  ASSERT_TRUE(eventually([&] { return read("/proc/" + std::to_string(other.id()) + "/net/udp").size() > 200; }));
+  ASSERT_TRUE(other.says("has waited", 30)) << "it is there, and came first";
   const Outcome outcome = kilotwin({"run", good, "--domain", domain, "--out", scratch / "second"}, scratch);
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   expect_in("in use by another run", outcome.err);
@@ -137,6 +138,30 @@ TEST_F(BadInput, APartitionOrShareOutsideTheRun) {
             0);
   expect_in("--partition", refusal({"service", "physics", "--run", scratch / "run", "--partition", "1,0"}));
   expect_in("--share", refusal({"service", "behaviours", "--run", scratch / "run", "--share", "2/2"}));
+}
+
+TEST_F(BadInput, ADomainForALocalRunIsRefused) {
+  expect_in("--domain", refusal({"run", source("experiments/disperse.txtpb"), "--mode", "local", "--domain", "5"}));
+}
+
+TEST_F(BadInput, AnAddressThatServicesCannotMeetAtIsRefused) {
+  expect_in("--peer: \"fe80::1\" is no IPv4 address",
+            refusal({"service", "comm", "--run", scratch / "nowhere", "--peer", "fe80::1"}));
+}
+
+TEST_F(BadInput, AServiceOfAnotherBuildIsRefused) {
+  ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--prepare", "--out", scratch / "run"}, scratch)
+                .status,
+            0);
+  proto::Manifest manifest;
+  ASSERT_TRUE(manifest.ParseFromString(read(scratch / "run/manifest.pb")));
+  const std::string own = manifest.build();
+  EXPECT_NE(kilotwin({"--version"}, scratch).out.find(own), std::string::npos) << own;
+  manifest.set_build("0.1.0-other");
+  write(scratch / "run/manifest.pb", manifest.SerializeAsString());
+  const std::string line = refusal({"service", "comm", "--run", scratch / "run"});
+  expect_in("build 0.1.0-other", line);
+  expect_in("this is build " + own, line);
 }
 
 }  // namespace

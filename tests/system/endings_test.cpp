@@ -6,6 +6,7 @@
 #include <regex>
 
 #include "clients/recorder/reader.hpp"
+#include "core/dds/dds.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -203,9 +204,43 @@ TEST_F(Endings, ServiceLogsHaveTimeStampsFederatesAndLevels) {
       scratch, "run");
   const std::string log = read(scratch / "run/logs/behaviours-1-1.log");
   EXPECT_TRUE(std::regex_search(
-      log, std::regex(R"(^\[\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z\] \[behaviours 1/1\] \[info\] starts: run disperse)")))
+      log, std::regex(
+               R"(^\[\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z\] \[behaviours 1/1\] \[info\] starts: run disperse)")))
       << log;
   EXPECT_NE(log.find("Z] [behaviours 1/1] [info] robot 3 failed"), std::string::npos) << log;
+}
+
+TEST_F(Endings, TooFewOpenFilesAreNamedBeforeTheRunStarts) {
+  Words words = long_run();
+  words.insert(words.begin(), {"/bin/sh", "-c", "ulimit -n 16; exec \"$@\"", "sh"});
+  const Outcome outcome = Process(words, scratch.path()).wait(60);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("open files at a time, and the limit is 16; raise it with: ulimit -n"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_FALSE(fs::exists(scratch / "run"));
+}
+
+TEST_F(Endings, ALowLimitOfOpenFilesIsRaisedWhereTheSystemAllows) {
+  Words words = long_run({"--quiet"});
+  words[4] = "1";
+  words[6] = "max";
+  words.insert(words.begin(), {"/bin/sh", "-c", "ulimit -S -n 16; exec \"$@\"", "sh"});
+  const Outcome outcome = Process(words, scratch.path()).wait(60);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+}
+
+TEST_F(Endings, AServiceThatMeetsNobodyGivesUpWhereItIsTold) {
+  ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--prepare", "--out", scratch / "run"}, scratch)
+                .status,
+            0);
+  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
+  const Outcome outcome =
+      kilotwin({"service", "comm", "--run", scratch / "run", "--domain", domain, "--give-up-after", "1"}, scratch);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("radio gave up after it had waited"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("services were heard on DDS domain " + domain), std::string::npos) << outcome.err;
 }
 
 }  // namespace

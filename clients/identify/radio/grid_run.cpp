@@ -54,6 +54,8 @@ GridRun simulate(const GridSet& set, const proto::Radio& radio, std::uint64_t se
   OverheadFrame overhead;
   const BodyFrame* const body_frames[] = {&bodies};
   const ActuationFrame* const actuation_frames[] = {&actuation};
+  SwarmView swarm(robots, 0, plan.memory.size());
+  swarm.gather(Tick{0}, body_frames);
   std::vector<std::uint32_t> kilo_ticks(robots, 0), sent_at(robots, 0);
   std::vector<std::uint8_t> has_sent(robots, 0), holds(robots, 0);
   RadioFrame frame;
@@ -63,7 +65,8 @@ GridRun simulate(const GridSet& set, const proto::Radio& radio, std::uint64_t se
     overhead.packets.clear();
     if (now.count() == 0) overhead.packets.push_back({OverheadCommand::kRepeat, {}});
     if (now.count() == kCall_ticks) overhead.packets.push_back({OverheadCommand::kStop, {}});
-    engine.step(now, {body_frames, actuation_frames, overhead});
+    swarm.gather(actuation_frames);
+    engine.step(now, {swarm, overhead});
     actuation.offer_robot.clear();
     actuation.offer_message.clear();
     running = 0;

@@ -142,7 +142,11 @@ class Motors {
 class Tracker {
  public:
   Tracker(const Scene& scene, const RunPlan& plan)
-      : scene_(scene), measurement_(plan), next_(scene.robots.size(), 0), out_(scene.robots.size()) {
+      : scene_(scene),
+        measurement_(plan),
+        swarm_(plan.robots(), plan.movables(), plan.memory.size()),
+        next_(scene.robots.size(), 0),
+        out_(scene.robots.size()) {
     // Skips samples before the start of the run.
     for (std::size_t r = 0; r < next_.size(); ++r)
       while (next_[r] < samples(r).size() && samples(r)[next_[r]].time_s < 0) ++next_[r];
@@ -164,7 +168,9 @@ class Tracker {
       if (measurement_.any()) {
         const BodyFrame* const bodies[] = {&between_};
         const ActuationFrame* const actuation[] = {&motors};
-        measurement_.measure(now.tick, bodies, actuation, seen_);
+        swarm_.gather(now.tick, bodies);
+        swarm_.gather(actuation);
+        measurement_.measure(swarm_, seen_);
       }
       for (const std::size_t r : due_) {
         const Sample& measured = samples(r)[next_[r]++];
@@ -188,6 +194,7 @@ class Tracker {
 
   const Scene& scene_;
   Measurement measurement_;
+  SwarmView swarm_;
   std::vector<std::size_t> next_, due_;
   BodyFrame between_;
   MeasuredPoses seen_;

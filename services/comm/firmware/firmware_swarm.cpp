@@ -130,9 +130,9 @@ void FirmwareSwarm::commit() {
   begin_ = until_;
 }
 
-void FirmwareSwarm::begin_tick(Tick tick, std::span<const BodyFrame* const> bodies) {
-  begin_ = tick.count() * cycles_per_tick_;
-  senses_.at(tick, bodies);
+void FirmwareSwarm::begin_tick(const SwarmView& swarm) {
+  begin_ = swarm.tick.count() * cycles_per_tick_;
+  senses_.at(swarm);
   for (std::uint32_t i = 0; i < robots_.size(); ++i) {
     Robot& robot = robots_[i];
     robot.full_throughout = robot.full;

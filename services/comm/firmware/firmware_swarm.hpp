@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/logs/robot_logs.hpp"
-#include "services/comm/firmware/mcu.hpp"
 #include "core/plan/plan.hpp"
+#include "services/comm/firmware/mcu.hpp"
 #include "services/comm/firmware_robots.hpp"
 
 namespace kilotwin::os {
@@ -34,7 +34,7 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
            std::vector<std::vector<comm::Cycles>>& flashes) override;
   void commit() override;
   void note_sent(std::uint32_t i) override { robots_[i].has_sent = true; }
-  void begin_tick(Tick, std::span<const BodyFrame* const>) override;
+  void begin_tick(const SwarmView&) override;
   void end_tick() override;
   [[nodiscard]] Outputs outputs(std::uint32_t i) const override;
   [[nodiscard]] std::uint64_t word(std::uint32_t i) const override;

@@ -17,14 +17,11 @@ using behaviours::test::Swarm;
 /// Notes each tick's life cycles, motors and LEDs.
 class Watcher : public RunObserver {
  public:
-  void state(Tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const> actuation,
-             bool) override {
+  void state(Tick, const SwarmView& swarm, bool) override {
     ActuationFrame all;
-    for (const ActuationFrame* frame : actuation) {
-      all.life_cycle.insert(all.life_cycle.end(), frame->life_cycle.begin(), frame->life_cycle.end());
-      all.motor_left.insert(all.motor_left.end(), frame->motor_left.begin(), frame->motor_left.end());
-      all.led.insert(all.led.end(), frame->led.begin(), frame->led.end());
-    }
+    all.life_cycle = swarm.life_cycle;
+    all.motor_left = swarm.motor_left;
+    all.led = swarm.led;
     ticks.push_back(all);
   }
   void hash(Tick, std::uint64_t) override {}

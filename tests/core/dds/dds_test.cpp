@@ -1,6 +1,8 @@
 #include "core/dds/dds.hpp"
 
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -47,6 +49,54 @@ PublicRunStatus status_of(std::uint64_t run) {
   return status;
 }
 
+TEST(Dds, KeepsMetricsUntilTheyAreReadAndTheLastOfThem) {
+  const DomainClaim claim = DomainClaim::any();
+  const Participant participant({claim.domain(), {}});
+  Writer<WireMetrics> writer(participant, topics::metrics());
+  constexpr std::size_t kSamples = 1000;
+  const auto write_all = [&] {
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      WireMetrics metrics{};
+      metrics.run = 1;
+      metrics.first_tick = static_cast<std::int64_t>(i);
+      writer.write(metrics);
+    }
+  };
+  Mailbox<std::int64_t> early, late;
+  const auto to = [](Mailbox<std::int64_t>& box) {
+    return [&box](const WireMetrics& metrics, SampleState state) {
+      if (state.valid) box.put(metrics.first_tick);
+    };
+  };
+  const Reader<WireMetrics> reader(participant, topics::metrics(), to(early));
+  write_all();
+  ASSERT_TRUE(early.wait_for(kSamples));
+  const Reader<WireMetrics> newcomer(participant, topics::metrics(), to(late));
+  ASSERT_TRUE(late.wait_for(1));
+  EXPECT_EQ(late.values(), std::vector<std::int64_t>{kSamples - 1});
+}
+
+TEST(Dds, SaysThatADomainIsFull) {
+  const DomainClaim claim = DomainClaim::any();
+  EXPECT_FALSE(domain_is_full(claim.domain()));
+  std::vector<int> sockets;
+  for (std::uint32_t index = 0; index < kMostParticipants; ++index) {
+    sockets.push_back(socket(AF_INET, SOCK_DGRAM, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * claim.domain() + 10 + 2 * index));
+    ASSERT_EQ(bind(sockets.back(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0) << index;
+  }
+  try {
+    const Participant participant({claim.domain(), {}});
+    ADD_FAILURE() << "an index of the next domain was taken";
+  } catch (const RunError& error) {
+    EXPECT_NE(std::string(error.what()).find("is full: 120 processes"), std::string::npos) << error.what();
+  }
+  for (const int fd : sockets) close(fd);
+  const Participant participant({claim.domain(), {}});
+}
+
 TEST(Dds, CarriesSamplesToALateReader) {
   const DomainClaim claim = DomainClaim::any();
   const Participant participant({claim.domain(), {}});
@@ -85,26 +135,33 @@ TEST(Dds, RoutesByPartition) {
   EXPECT_EQ(second.values(), std::vector<std::uint64_t>{2});
 }
 
-TEST(Dds, TellsThatAKilledProcessIsGone) {
+TEST(Dds, TellsThatAProcessThatEndsIsGone) {
   const DomainClaim claim = DomainClaim::any();
+  int stay[2];
+  ASSERT_EQ(pipe(stay), 0);
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    const Participant participant({claim.domain(), {}});
-    Writer<WireMember> writer(participant, topics::members());
-    WireMember member{};
-    member.publisher = 5;
-    writer.write(member);
-    pause();
+    close(stay[1]);
+    {
+      const Participant participant({claim.domain(), {}});
+      Writer<WireMember> writer(participant, topics::members());
+      WireMember member{};
+      member.publisher = 5;
+      writer.write(member);
+      char octet = 0;
+      while (::read(stay[0], &octet, 1) > 0) continue;
+    }
     _exit(0);
   }
+  close(stay[0]);
   const Participant participant({claim.domain(), {}});
   Mailbox<bool> alive;
   const Reader<WireMember> reader(participant, topics::members(), [&](const WireMember& sample, SampleState state) {
     if (sample.publisher == 5) alive.put(state.alive);
   });
   const bool came = alive.wait_for(1);
-  kill(child, SIGKILL);
+  close(stay[1]);
   waitpid(child, nullptr, 0);
   ASSERT_TRUE(came);
   ASSERT_TRUE(alive.wait_for(2));

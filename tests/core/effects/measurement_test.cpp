@@ -29,7 +29,10 @@ MeasuredPoses seen(const RunPlan& plan, const std::vector<ScenePose>& poses, Tic
   const BodyFrame* const frames[] = {&bodies};
   const ActuationFrame* const motors[] = {&actuation};
   MeasuredPoses measured;
-  measurement.measure(tick, frames, motors, measured);
+  SwarmView swarm(plan.robots(), plan.movables(), plan.memory.size());
+  swarm.gather(tick, frames);
+  swarm.gather(motors);
+  measurement.measure(swarm, measured);
   return measured;
 }
 

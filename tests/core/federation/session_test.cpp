@@ -10,6 +10,7 @@
 
 #include "core/base/error.hpp"
 #include "core/federation/frame_io.hpp"
+#include "core/federation/likely_cause.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace kilotwin {
@@ -22,6 +23,7 @@ constexpr std::int64_t kLast = 60;
 /// What tests do to a federate: all called on its own thread.
 struct Hooks {
   std::function<void(Session&)> on_publish, on_idle;
+  std::function<double(Tick)> ahead_s;
   std::function<void(BodyFrame&)> spoil_bodies;
   std::function<void(ActuationFrame&)> spoil_actuation;
   std::function<void(RadioFrame&)> spoil_radio;
@@ -81,6 +83,7 @@ class Tiny : public Federate {
     });
     send(overhead_, now, hooks_.spoil_overhead, [](OverheadFrame& frame) { frame.packets.resize(1); });
   }
+  double ahead_s(Tick now) override { return hooks_.ahead_s ? hooks_.ahead_s(now) : 0; }
   void inputs_complete(Tick now, bool is_last) override {
     if (is_last) last = now;
   }
@@ -145,7 +148,7 @@ class Sessions : public ::testing::Test {
   void start(FederateId id) {
     threads_.emplace_back([this, id] {
       Outcome& outcome = outcomes_[id.value()];
-      Session session(plan_, id, {claim_.domain(), {}}, Tick{0});
+      Session session(plan_, id, {claim_.domain(), {}}, Tick{0}, {}, give_up_after_s_);
       Tiny federate(session, hooks_[id.value()]);
       try {
         session.run(federate);
@@ -187,12 +190,12 @@ class Sessions : public ::testing::Test {
     }
   }
   void expect_malformed(const std::string& why) {
-    bool told = false;
+    bool named = false;
     for (const Outcome& outcome : outcomes_) {
       EXPECT_NE(outcome.failure, "");
-      told = told || outcome.failure.find("malformed: " + why) != std::string::npos;
+      named = named || outcome.failure.find("malformed: " + why) != std::string::npos;
     }
-    EXPECT_TRUE(told) << outcomes_[0].failure << '\n'
+    EXPECT_TRUE(named) << outcomes_[0].failure << '\n'
                       << outcomes_[1].failure << '\n'
                       << outcomes_[2].failure << '\n'
                       << outcomes_[3].failure;
@@ -204,6 +207,7 @@ class Sessions : public ::testing::Test {
     sample.plan_hash = plan_.hash;
     sample.phase = phase;
     sample.process = 1;
+    std::string_view(plan_.build).copy(sample.build, sizeof sample.build - 1);
     return sample;
   }
 
@@ -212,6 +216,7 @@ class Sessions : public ::testing::Test {
                          {{0, 0, 0}, {50, 0, 0}, {100, 0, 0}});
   const dds::DomainClaim claim_ = dds::DomainClaim::any();
   const FederateId physics_ = plan_.physics(PartitionId{0}), host_ = plan_.behaviours(HostId{0});
+  double give_up_after_s_ = 0;
   std::array<Hooks, 4> hooks_;
   std::array<Outcome, 4> outcomes_;
   std::vector<std::thread> threads_;
@@ -357,6 +362,55 @@ TEST_F(Sessions, SayForWhomTheyWait) {
   expect_all_end_at(kLast);
 }
 
+TEST_F(Sessions, GiveUpAWaitWithoutProgress) {
+  give_up_after_s_ = 0.5;
+  start(plan_.station());
+  join();
+  const std::string& failure = outcomes_[plan_.station().value()].failure;
+  EXPECT_NE(failure.find("station gave up after it had waited"), std::string::npos) << failure;
+  EXPECT_NE(failure.find("for physics 0,0; radio; behaviours 1/1 to arrive"), std::string::npos) << failure;
+  EXPECT_NE(failure.find(fmt::format("1 of 4 services were heard on DDS domain {}", claim_.domain())),
+            std::string::npos)
+      << failure;
+}
+
+TEST_F(Sessions, CountWaitingForThePaceAsWaiting) {
+  constexpr std::uint64_t kHeld_ns = 1'000'000'000;
+  std::optional<std::chrono::steady_clock::time_point> held_from;
+  of(plan_.station()).ahead_s = [&](Tick now) {
+    if (now != Tick{5}) return 0.0;
+    const auto at = std::chrono::steady_clock::now();
+    if (!held_from) held_from = at;
+    return std::chrono::duration<double>(*held_from + std::chrono::nanoseconds(kHeld_ns) - at).count();
+  };
+  const dds::Participant participant({claim_.domain(), {}});
+  std::atomic<std::uint64_t> step_ns{0}, wait_ns{0};
+  const dds::Reader<WireMetrics> reader(participant, topics::metrics(),
+                                        [&](const WireMetrics& metrics, dds::SampleState state) {
+                                          if (!state.valid || metrics.publisher != plan_.station().value()) return;
+                                          step_ns = metrics.step_ns;
+                                          wait_ns = metrics.wait_ns;
+                                        });
+  run_all();
+  expect_all_end_at(kLast);
+  EXPECT_GE(wait_ns, kHeld_ns);
+  EXPECT_LT(step_ns, kHeld_ns);
+}
+
+TEST_F(Sessions, RefuseAnotherBuild) {
+  const dds::Participant participant({claim_.domain(), {}});
+  dds::Writer<WireMember> writer(participant, topics::members());
+  WireMember other = member(host_, kilotwin_wire_ARRIVING);
+  std::string_view("1.0-other").copy(other.build, sizeof other.build - 1);
+  writer.write(other);
+  start(plan_.radio());
+  join();
+  const std::string& failure = outcomes_[plan_.radio().value()].failure;
+  EXPECT_NE(failure.find("is of build 1.0-other, this service is of build " + plan_.build),
+            std::string::npos)
+      << failure;
+}
+
 TEST_F(Sessions, StartedTwiceLeaveTheFirstAlone) {
   const dds::Participant participant({claim_.domain(), {}});
   dds::Writer<WireMember> first(participant, topics::members());
@@ -379,6 +433,16 @@ TEST_F(Sessions, AreNotKeptFromTheirWorkByASecondStart) {
   };
   run_all();
   expect_all_end_at(kLast);
+}
+
+TEST(LikelyCause, TellsWhereOthersAreLookedFor) {
+  const std::string local = likely_cause({7, {}}, 1, 4);
+  EXPECT_NE(local.find("1 of 4 services were heard on DDS domain 7"), std::string::npos) << local;
+  EXPECT_NE(local.find("without --peer only services of this machine meet"), std::string::npos) << local;
+  EXPECT_NE(local.find("UDP ports 9150 to 9399"), std::string::npos) << local;
+  const std::string spread = likely_cause({7, {"10.0.0.1", "10.0.0.2"}}, 3, 4);
+  EXPECT_NE(spread.find("looks for others at 10.0.0.1, 10.0.0.2"), std::string::npos) << spread;
+  EXPECT_NE(likely_cause({7, {}}, 4, 4).find("frames do not come through"), std::string::npos);
 }
 
 // Frames that no engine may see.
@@ -476,10 +540,36 @@ TEST_F(Strangers, CannotSendHalfAPacket) {
   EXPECT_NE(outcomes_[0].failure.find("malformed: its packet"), std::string::npos) << outcomes_[0].failure;
 }
 
-TEST_F(Strangers, OfAnotherRunOnTheDomainAreNamed) {
+TEST_F(Strangers, OfASecondRunDoNotEndTheRunAtWork) {
+  for (const auto phase : {kilotwin_wire_ARRIVING, kilotwin_wire_STEPPING, kilotwin_wire_FAILED}) {
+    WireMember other = member(host_, phase);
+    other.run = plan_.run() + 1;
+    interfere(topics::members(), other);
+    expect_all_end_at(kLast);
+  }
+}
+
+TEST_F(Strangers, OfARunAtWorkAreNamedByOneThatCameLater) {
   WireMember other = member(host_, kilotwin_wire_STEPPING);
   other.run = plan_.run() + 1;
-  interfere(topics::members(), other);
+  dds::Writer<WireMember> writer(participant_, topics::members());
+  writer.write(other);
+  run_all();
+  for (const Outcome& outcome : outcomes_)
+    EXPECT_NE(outcome.failure.find("in use by another run"), std::string::npos) << outcome.failure;
+}
+
+TEST_F(Strangers, OfTwoRunsThatArriveTheLaterOneLeaves) {
+  WireMember other = member(host_, kilotwin_wire_ARRIVING);
+  other.run = plan_.run() + 1;
+  other.arrived_us = std::numeric_limits<std::int64_t>::max();
+  dds::Writer<WireMember> writer(participant_, topics::members());
+  writer.write(other);
+  run_all();
+  expect_all_end_at(kLast);
+  other.arrived_us = 0;
+  writer.write(other);
+  run_all();
   for (const Outcome& outcome : outcomes_)
     EXPECT_NE(outcome.failure.find("in use by another run"), std::string::npos) << outcome.failure;
 }

@@ -10,38 +10,37 @@ using Ids = std::vector<FederateId>;
 TEST(TickGate, IsReadyWhenEveryPublisherHasArrived) {
   TickGate gate({FederateId{7}, FederateId{3}}, Tick{0});
   EXPECT_FALSE(gate.ready(Tick{0}));
-  EXPECT_EQ(gate.arrived(FederateId{3}, Tick{0}), TickGate::Arrival::kAccepted);
+  EXPECT_TRUE(gate.accept(FederateId{3}, Tick{0}));
   EXPECT_EQ(gate.missing(Tick{0}), Ids{FederateId{7}});
-  EXPECT_EQ(gate.arrived(FederateId{7}, Tick{0}), TickGate::Arrival::kAccepted);
+  EXPECT_TRUE(gate.accept(FederateId{7}, Tick{0}));
   EXPECT_TRUE(gate.ready(Tick{0}));
   EXPECT_FALSE(gate.ready(Tick{1}));
 }
 
 TEST(TickGate, LetsPublishersRunAhead) {
   TickGate gate({FederateId{0}, FederateId{1}}, Tick{5});
-  for (int t = 5; t < 9; ++t) EXPECT_EQ(gate.arrived(FederateId{0}, Tick{t}), TickGate::Arrival::kAccepted);
+  for (int t = 5; t < 9; ++t) EXPECT_TRUE(gate.accept(FederateId{0}, Tick{t}));
   EXPECT_EQ(gate.missing(Tick{5}), Ids{FederateId{1}});
-  gate.arrived(FederateId{1}, Tick{5});
+  EXPECT_TRUE(gate.accept(FederateId{1}, Tick{5}));
   EXPECT_TRUE(gate.ready(Tick{5}));
   EXPECT_EQ(gate.missing(Tick{6}), Ids{FederateId{1}});
 }
 
 TEST(TickGate, RefusesStrangersAndGapsAndPassesOverRepeats) {
   TickGate gate({FederateId{1}}, Tick{0});
-  EXPECT_EQ(gate.arrived(FederateId{2}, Tick{0}), TickGate::Arrival::kUnexpected);
-  EXPECT_EQ(gate.arrived(FederateId{1}, Tick{1}), TickGate::Arrival::kUnexpected);
-  EXPECT_EQ(gate.arrived(FederateId{1}, Tick{0}), TickGate::Arrival::kAccepted);
-  EXPECT_EQ(gate.arrived(FederateId{1}, Tick{0}), TickGate::Arrival::kRepeated);
+  EXPECT_EQ(gate.arrival(FederateId{2}, Tick{0}), TickGate::Arrival::kUnexpected);
+  EXPECT_EQ(gate.arrival(FederateId{1}, Tick{1}), TickGate::Arrival::kUnexpected);
+  EXPECT_TRUE(gate.accept(FederateId{1}, Tick{0}));
+  EXPECT_EQ(gate.arrival(FederateId{1}, Tick{0}), TickGate::Arrival::kRepeated);
   EXPECT_FALSE(gate.hello(FederateId{9}));
 }
 
 TEST(TickGate, RefusesWhoWouldLapTheReader) {
   TickGate gate({FederateId{1}}, Tick{3});
-  for (int t = 3; t < 3 + kFrameRing; ++t)
-    EXPECT_EQ(gate.arrived(FederateId{1}, Tick{t}), TickGate::Arrival::kAccepted);
-  EXPECT_EQ(gate.arrived(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kUnexpected);
+  for (int t = 3; t < 3 + kFrameRing; ++t) EXPECT_TRUE(gate.accept(FederateId{1}, Tick{t}));
+  EXPECT_EQ(gate.arrival(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kUnexpected);
   gate.reading(Tick{4});
-  EXPECT_EQ(gate.arrived(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kAccepted);
+  EXPECT_TRUE(gate.accept(FederateId{1}, Tick{3 + kFrameRing}));
 }
 
 TEST(TickGate, CountsHellosApartFromFrames) {

@@ -29,13 +29,21 @@ BodyFrame frame_of(const RunPlan& plan, Tick tick = {}) {
   return frame;
 }
 
+/// The swarm at its initial poses.
+SwarmView swarm_of(const RunPlan& plan, Tick tick = {}) {
+  const BodyFrame frame = frame_of(plan, tick);
+  const BodyFrame* const frames[] = {&frame};
+  SwarmView swarm(plan.robots(), 0, 0);
+  swarm.gather(tick, frames);
+  return swarm;
+}
+
 /// What robots read at `tick` in poses of the scene.
 std::vector<double> readings(const std::string& light, const std::vector<ScenePose>& poses, Tick tick = {}) {
   const RunPlan plan = make_plan("light { " + light + " }", poses);
   LightField field(plan, {0, plan.robots()});
-  const BodyFrame frame = frame_of(plan, tick);
-  const BodyFrame* const frames[] = {&frame};
-  field.at(tick, frames);
+  const SwarmView swarm = swarm_of(plan, tick);
+  field.at(swarm);
   std::vector<double> result;
   for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) result.push_back(field.reading(robot));
   return result;
@@ -160,9 +168,8 @@ TEST(Light, GainsDifferBetweenRobotsAsMeasured) {
   const RunPlan known = make_plan("light { ambient: 100 } robot_model { robot: 1 light_gain: 2 light_offset: -5 }",
                                   {{0, 0, 0}, {50, 0, 0}});
   LightField field(known, {1, 2});
-  const BodyFrame frame = frame_of(known);
-  const BodyFrame* const frames[] = {&frame};
-  field.at(Tick{0}, frames);
+  const SwarmView swarm = swarm_of(known);
+  field.at(swarm);
   EXPECT_NEAR(field.reading(1), 195, 1e-12);
 }
 
@@ -193,9 +200,8 @@ TEST(LightImage, LiesOnTheArenaWithItsTopUp) {
   // 4 x 2 pixels of 100 mm, all black but the second of the upper row.
   const RunPlan plan = with_picture("black: 10 white: 110 gamma: 1", 4, 2, {std::string("\0\xff\0\0\0\0\0\0", 8)});
   LightField field(plan, {0, 1});
-  const BodyFrame frame = frame_of(plan);
-  const BodyFrame* const frames[] = {&frame};
-  field.at(Tick{0}, frames);
+  const SwarmView swarm = swarm_of(plan);
+  field.at(swarm);
   const auto at = [&](double x, double y) { return field.light(x, y, 30, 0); };
   EXPECT_NEAR(at(-50, 50), 110, 1e-9);  // the pixel's centre
   EXPECT_NEAR(at(-50, 99), 110, 1e-9);  // beyond the outermost centres
@@ -210,9 +216,8 @@ TEST(LightImage, BrightnessGoesThroughGamma) {
   const RunPlan plan =
       with_picture("black: 0 white: 1000 gamma: 2", 1, 1, {std::string("\x33", 1)});  // 51 = 0.2 of 255
   LightField field(plan, {0, 1});
-  const BodyFrame frame = frame_of(plan);
-  const BodyFrame* const frames[] = {&frame};
-  field.at(Tick{0}, frames);
+  const SwarmView swarm = swarm_of(plan);
+  field.at(swarm);
   EXPECT_NEAR(field.light(0, 0, 30, 0), 40, 1e-9);
 }
 
@@ -224,9 +229,8 @@ TEST(LightImage, SequencesGoByTime) {
                      1, 1, pictures);
     LightField field(plan, {0, 1});
     for (std::int64_t k = 0; k < 100; ++k) {
-      const BodyFrame frame = frame_of(plan, Tick{k});
-      const BodyFrame* const frames[] = {&frame};
-      field.at(Tick{k}, frames);
+      const SwarmView swarm = swarm_of(plan, Tick{k});
+      field.at(swarm);
       const auto shown = static_cast<std::size_t>(plan.tick_length.seconds_at(Tick{k}) / 0.5);
       const std::size_t right = loop ? shown % 3 : std::min<std::size_t>(shown, 2);
       EXPECT_NEAR(field.light(0, 0, 30, 0), static_cast<unsigned char>(pictures[right][0]), 1e-9) << k;
@@ -241,7 +245,6 @@ TEST(Light, IsTheSameHoweverBodiesAreDivided) {
       "300 } }";
   const RunPlan plan = make_plan(light, poses);
   LightField whole(plan, {0, 300}), part(plan, {100, 200});
-  const BodyFrame frame = frame_of(plan, Tick{7});
   BodyFrame pieces[3];
   for (BodyFrame& piece : pieces) piece.tick = Tick{7};
   for (std::uint32_t robot = 0; robot < 300; ++robot)
@@ -249,10 +252,12 @@ TEST(Light, IsTheSameHoweverBodiesAreDivided) {
            : poses[robot].x_mm < 150 ? 0
                                      : 1]
         .add(robot, poses[robot].x_mm, poses[robot].y_mm, poses[robot].heading_rad);
-  const BodyFrame* const one[] = {&frame};
   const BodyFrame* const three[] = {&pieces[0], &pieces[1], &pieces[2]};
-  whole.at(Tick{7}, one);
-  part.at(Tick{7}, three);
+  SwarmView divided(plan.robots(), 0, 0);
+  divided.gather(Tick{7}, three);
+  const SwarmView swarm = swarm_of(plan, Tick{7});
+  whole.at(swarm);
+  part.at(divided);
   for (std::uint32_t robot = 100; robot < 200; ++robot) EXPECT_EQ(whole.reading(robot), part.reading(robot));
 }
 

@@ -26,7 +26,11 @@ RunPlan plan_of(std::uint32_t robots, const std::string& experiment = "") {
 /// A station with robots at rest, divided into some frames.
 class Scene {
  public:
-  explicit Scene(const RunPlan& plan, std::uint32_t parts = 1) : station(plan), bodies_(parts), actuation_(parts) {
+  explicit Scene(const RunPlan& plan, std::uint32_t parts = 1)
+      : station(plan),
+        bodies_(parts),
+        actuation_(parts),
+        swarm_(plan.robots(), plan.movables(), plan.memory.size()) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
       const Pose pose = plan.initial_pose(i);
       bodies_[i % parts].add(i, pose.x_mm, pose.y_mm, pose.heading_rad);
@@ -41,8 +45,10 @@ class Scene {
     std::reverse(body_frames_.begin(), body_frames_.end());
     station.emit(frame);
   }
-  void step(const std::vector<OverheadPacket>& outside = {}) {
-    station.step(now, {body_frames_, actuation_frames_, outside});
+  void step(const std::vector<OverheadPacket>& external = {}) {
+    swarm_.gather(now, body_frames_);
+    swarm_.gather(actuation_frames_);
+    station.step(now, {swarm_, external});
     station.emit(frame);
     ++now;
   }
@@ -56,6 +62,7 @@ class Scene {
   std::vector<ActuationFrame> actuation_;
   std::vector<const BodyFrame*> body_frames_;
   std::vector<const ActuationFrame*> actuation_frames_;
+  SwarmView swarm_;
 };
 
 bool equal(const OverheadPacket& a, const OverheadPacket& b) {
@@ -168,23 +175,23 @@ TEST(StationEngine, FreesTheAirWhileNobodyIsDue) {
 TEST(StationEngine, ForwardsPacketsFromOutsideInOrder) {
   const RunPlan plan = plan_of(1000, kHub);
   Scene scene(plan);
-  const std::vector<OverheadPacket> outside{{OverheadCommand::kOnce, {1, 2, 3, 4, 5, 6, 7, 8, 9, 0x83}},
-                                            {OverheadCommand::kRepeat, {9, 8, 7, 6, 5, 4, 3, 2, 1, 0x42}},
-                                            {OverheadCommand::kStop, {}}};
+  const std::vector<OverheadPacket> external{{OverheadCommand::kOnce, {1, 2, 3, 4, 5, 6, 7, 8, 9, 0x83}},
+                                             {OverheadCommand::kRepeat, {9, 8, 7, 6, 5, 4, 3, 2, 1, 0x42}},
+                                             {OverheadCommand::kStop, {}}};
   for (int k = 1; k < 100; ++k) {
     if (k % 7 != 0) {
       scene.step();
       continue;
     }
-    scene.step(outside);
+    scene.step(external);
     ASSERT_EQ(scene.frame.packets.size(), 3u);
-    for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(equal(scene.frame.packets[i], outside[i]));
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(equal(scene.frame.packets[i], external[i]));
     scene.step();  // 33 ms later: the overhead controller is not ready for the next
     EXPECT_TRUE(scene.frame.packets.empty());
   }
 }
 
-/// What somebody outside repeats goes on until somebody outside ends it, where the station has nothing of its own to say.
+/// What somebody external repeats goes on until somebody external ends it, where the station has nothing of its own to say.
 TEST(StationEngine, DoesNotStopWhatComesFromOutside) {
   for (int when : {3, 8, 20}) {
     const RunPlan plan = plan_of(5);
@@ -220,11 +227,11 @@ TEST(StationEngine, LoadedEngineGoesOnAsTheSavedOne) {
     Scene scene(plan);
     std::unique_ptr<Scene> loaded;
     for (int k = 0; k < 1500; ++k) {
-      std::vector<OverheadPacket> outside;
-      if (random() % 20 == 0) outside.push_back({OverheadCommand::kRepeat, {static_cast<std::uint8_t>(random())}});
-      scene.step(outside);
+      std::vector<OverheadPacket> external;
+      if (random() % 20 == 0) external.push_back({OverheadCommand::kRepeat, {static_cast<std::uint8_t>(random())}});
+      scene.step(external);
       if (loaded) {
-        loaded->step(outside);
+        loaded->step(external);
         ASSERT_EQ(loaded->station.hash_part(), scene.station.hash_part()) << robots << " " << k;
         ASSERT_EQ(loaded->frame.packets.size(), scene.frame.packets.size());
         for (std::size_t i = 0; i < scene.frame.packets.size(); ++i) {

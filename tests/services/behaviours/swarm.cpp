@@ -118,8 +118,10 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
 void Swarm::step(const Air& air) {
   bodies.tick = tick;
   const BodyFrame* const all[] = {&bodies};
+  SwarmView view(plan->robots(), plan->movables(), plan->memory.size());
+  view.gather(tick, all);
   for (std::uint32_t h = 0; h < hosts.size(); ++h)
-    hosts[h]->step(tick, air.frame(tick, plan->share(HostId{h})), all);
+    hosts[h]->step(tick, air.frame(tick, plan->share(HostId{h})), &view);
   ++tick;
 }
 

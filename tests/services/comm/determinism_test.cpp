@@ -135,7 +135,7 @@ TEST(Determinism, LoadedEngineGoesOnAsTheSavedOne) {
     std::size_t straddled = 0;
     for (int k = 0; k < 1000; ++k) {
       stir(swarm.hosts, swarm.now);
-      if (following) loaded->step(swarm.now, swarm.hosts.inputs());
+      if (following) loaded->step(swarm.now, swarm.hosts.inputs(swarm.now));
       swarm.step();
       if (random() % 7 == 0) {
         proto::RadioState part;

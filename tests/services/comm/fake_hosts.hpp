@@ -23,6 +23,7 @@ class FakeHosts {
         plan_(plan),
         bodies_(plan.grid.size()),
         actuation_(plan.hosts),
+        swarm_(plan.robots(), 0, 0),
         slot_(plan.robots(), 0) {
     for (std::uint32_t i = 0; i < plan.robots(); ++i) poses.push_back({});
     for (std::uint32_t i = 0; i < plan.robots(); ++i) {
@@ -59,7 +60,12 @@ class FakeHosts {
   std::vector<ScenePose> poses;
   OverheadFrame overhead;
 
-  [[nodiscard]] comm::RadioEngine::Inputs inputs() const { return {body_frames_, actuation_frames_, overhead}; }
+  /// What the radio reads in its step from `now`.
+  [[nodiscard]] comm::RadioEngine::Inputs inputs(Tick now) {
+    swarm_.gather(now, body_frames_);
+    swarm_.gather(actuation_frames_);
+    return {swarm_, overhead};
+  }
 
   /// Lists the robots in the frames of the partitions that own their places.
   void place() {
@@ -101,6 +107,7 @@ class FakeHosts {
   std::vector<ActuationFrame> actuation_;
   std::vector<const BodyFrame*> body_frames_;
   std::vector<const ActuationFrame*> actuation_frames_;
+  SwarmView swarm_;
   std::vector<std::uint8_t> slot_;
 };
 
@@ -116,7 +123,7 @@ class Swarm {
 
   /// One tick. Packets given in hosts.overhead are taken once.
   void step() {
-    radio.step(now, hosts.inputs());
+    radio.step(now, hosts.inputs(now));
     hosts.overhead.packets.clear();
     for (std::uint32_t h = 0; h < frames.size(); ++h) hosts.answer(now, HostId{h}, frames[h]);
     ++now;

@@ -240,7 +240,7 @@ TEST(Mac, WhatIsOnTheAirEndsUnreported) {
       swarm.radio.save(part);
       const proto::RadioState* const parts[] = {&part};
       loaded.load(swarm.now, parts);
-      loaded.step(swarm.now, swarm.hosts.inputs());
+      loaded.step(swarm.now, swarm.hosts.inputs(swarm.now));
       RadioFrame frame;
       loaded.emit(HostId{0}, frame);
       EXPECT_TRUE(frame.sent.empty());

@@ -78,14 +78,14 @@ TEST_P(Regions, AddUpToTheWhole) {
     }
     if (now.count() == 10) hosts.overhead.packets.push_back({OverheadCommand::kRepeat, {}});
     if (now.count() == 30) hosts.overhead.packets.push_back({OverheadCommand::kStop, {}});
-    whole.step(now, hosts.inputs());
+    whole.step(now, hosts.inputs(now));
     for (std::size_t to = 0; to < parts.size(); ++to) {
       std::vector<const RadioGhosts*> others;
       for (std::size_t from = 0; from < parts.size(); ++from) {
         if (from != to) others.push_back(&ghosts[to][from]);
       }
-      RadioEngine::Inputs inputs = hosts.inputs();
-      parts[to]->step(now, {inputs.bodies, inputs.actuation, inputs.overhead, others});
+      RadioEngine::Inputs inputs = hosts.inputs(now);
+      parts[to]->step(now, {inputs.swarm, inputs.overhead, others});
     }
     hosts.overhead.packets.clear();
     Seen all(kRobots), split(kRobots);

@@ -60,7 +60,9 @@ TEST(CandidateList, FollowsAChangeOfRobots) {
 TEST(Merge, GivesRobotsInAscendingOrderWithTheirEntries) {
   physics::Merge merge(200);
   for (int round = 0; round < 2; ++round) {  // It is empty again after each.
-    for (const std::uint32_t robot : {199u, 0u, 63u, 64u, 128u}) merge.add(robot, {robot % 3, robot + 7});
+    for (const std::uint32_t robot : {199u, 0u, 63u, 64u, 128u})
+      EXPECT_TRUE(merge.add(robot, {robot % 3, robot + 7}));
+    EXPECT_FALSE(merge.add(63, {0, 0})) << "each robot once";
     EXPECT_EQ(merge.size(), 5u);
     std::vector<std::uint32_t> order;
     merge.drain([&](std::uint32_t robot, physics::Merge::Entry entry) {

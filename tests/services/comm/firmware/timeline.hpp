@@ -30,18 +30,13 @@ class TimelineObserver : public RunObserver {
     timeline.motors.resize(robots);
     timeline.led.resize(robots);
   }
-  void state(Tick tick, std::span<const BodyFrame* const>, std::span<const ActuationFrame* const> frames,
-             bool) override {
-    for (const ActuationFrame* frame : frames) {
-      for (std::size_t i = 0; i < frame->led.size(); ++i) {
-        const std::size_t robot = frame->first_robot + i;
-        // A kick is shorter than a tick: whether its duties are those at a tick's end is by chance.
-        const bool kick = frame->motor_left[i] == 255 && frame->motor_right[i] == 255;
-        if (!kick) {
-          note(timeline.motors[robot], tick, std::uint32_t{frame->motor_left[i]} << 8 | frame->motor_right[i]);
-        }
-        note(timeline.led[robot], tick, frame->led[i]);
-      }
+  void state(Tick tick, const SwarmView& swarm, bool) override {
+    for (std::uint32_t robot = 0; robot < swarm.robots(); ++robot) {
+      // A kick is shorter than a tick: whether its duties are those at a tick's end is by chance.
+      const bool kick = swarm.motor_left[robot] == 255 && swarm.motor_right[robot] == 255;
+      if (!kick)
+        note(timeline.motors[robot], tick, std::uint32_t{swarm.motor_left[robot]} << 8 | swarm.motor_right[robot]);
+      note(timeline.led[robot], tick, swarm.led[robot]);
     }
   }
   void hash(Tick, std::uint64_t) override {}

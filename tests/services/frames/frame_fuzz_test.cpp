@@ -1,0 +1,261 @@
+// Frames changed at random never abort an engine: the checks of core/federation refuse them, the engine ends the run with a
+// RunError, or it goes on. An abort ends the whole test program.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <memory>
+#include <random>
+
+#include "core/base/error.hpp"
+#include "core/federation/frame_check.hpp"
+#include "core/federation/wire.hpp"
+#include "core/frames/swarm_view.hpp"
+#include "core/senses/robot_senses.hpp"
+#include "services/ark/station_engine.hpp"
+#include "services/comm/radio_engine.hpp"
+#include "services/physics/engine.hpp"
+#include "tests/support/scenes.hpp"
+
+namespace kilotwin {
+namespace {
+
+using Random = std::mt19937_64;
+
+template <class Visit> void each_field(BodyFrame& f, Visit visit) {
+  visit(f.robot), visit(f.x_mm), visit(f.y_mm), visit(f.heading_rad), visit(f.spatial), visit(f.memory);
+  MovableColumns& m = f.movable;
+  visit(m.body), visit(m.x_mm), visit(m.y_mm), visit(m.heading_rad), visit(m.vx_mm), visit(m.vy_mm),
+      visit(m.turn_rad);
+  PressedColumns& p = f.pressed;
+  visit(p.robot), visit(p.slip_x_mm), visit(p.slip_y_mm), visit(p.contacts), visit(p.other), visit(p.push_mm),
+      visit(p.rub_mm);
+}
+
+template <class Visit> void each_field(ActuationFrame& f, Visit visit) {
+  visit(f.motor_left), visit(f.motor_right), visit(f.led), visit(f.life_cycle), visit(f.tx_period),
+      visit(f.offer_robot);
+  visit(f.offer_message), visit(f.spin_up);
+}
+
+template <class Visit> void each_field(OverheadFrame& f, Visit visit) { visit(f.packets); }
+
+std::size_t below(Random& random, std::size_t count) {
+  return std::uniform_int_distribution<std::size_t>(0, count - 1)(random);
+}
+
+void change(Random& random, double& value) {
+  const double odd[] = {0,
+                        -0.0,
+                        1,
+                        -1,
+                        16.4,
+                        -50,
+                        1e6,
+                        -1e8,
+                        2e9,
+                        1e300,
+                        1e-300,
+                        std::numeric_limits<double>::infinity(),
+                        std::numeric_limits<double>::quiet_NaN(),
+                        value + 40,
+                        value - 40,
+                        -value};
+  value = odd[below(random, std::size(odd))];
+}
+template <class Integer>
+requires std::is_integral_v<Integer>
+void change(Random& random, Integer& value) {
+  const Integer odd[] = {0,
+                         1,
+                         2,
+                         5,
+                         static_cast<Integer>(value + 1),
+                         static_cast<Integer>(value - 1),
+                         std::numeric_limits<Integer>::max(),
+                         static_cast<Integer>(random())};
+  value = odd[below(random, std::size(odd))];
+}
+void change(Random& random, IrMessage& value) { change(random, value[below(random, value.size())]); }
+void change(Random& random, OverheadPacket& value) {
+  value.command = static_cast<OverheadCommand>(random() % 8);
+  change(random, value.message);
+}
+
+template <class T> void change(Random& random, std::vector<T>& values) {
+  switch (random() % 6) {
+    case 0:
+      if (!values.empty()) values.pop_back();
+      break;
+    case 1:
+      values.emplace_back();
+      change(random, values.back());
+      break;
+    case 2: values.clear(); break;
+    case 3:
+      if (values.size() > 1) std::swap(values[below(random, values.size())], values[below(random, values.size())]);
+      break;
+    default:
+      if (!values.empty()) change(random, values[below(random, values.size())]);
+  }
+}
+
+/// Changes one to three fields; or takes out all robots, or adds one, so that lengths still agree.
+template <class Frame> void mutate(Random& random, Frame& frame) {
+  if constexpr (std::is_same_v<Frame, BodyFrame>) {
+    if (random() % 4 == 0) {
+      frame.robot.clear(), frame.x_mm.clear(), frame.y_mm.clear(), frame.heading_rad.clear(), frame.memory.clear();
+      frame.spatial.resize(BodyFrame::kSpatialColumns *
+                           std::min<std::size_t>(frame.spatial.size(), frame.movable.body.size()));
+      frame.pressed.clear();
+      return;
+    }
+    if (random() % 4 == 0 && !frame.robot.empty() && frame.spatial.empty() && frame.memory.empty()) {
+      frame.add(frame.robot.back() + 1, 0, 0, 0);
+      return;
+    }
+  }
+  std::size_t fields = 0;
+  each_field(frame, [&](auto&) { ++fields; });
+  for (std::size_t n = 1 + random() % 3; n > 0; --n) {
+    std::size_t chosen = below(random, fields);
+    each_field(frame, [&](auto& field) {
+      if (chosen-- == 0) change(random, field);
+    });
+  }
+}
+
+struct Scene {
+  const char* name;
+  const char* experiment;
+};
+
+class FrameFuzz : public ::testing::TestWithParam<Scene> {
+ protected:
+  static constexpr int kTrials = 400;
+  static constexpr int kTicksAfter = 3;
+
+  /// All engines but the behaviours hosts, and the frames between them.
+  struct Run {
+    explicit Run(const RunPlan& of)
+        : plan(of),
+          radio(of),
+          station(of),
+          senses(of, {0, of.robots()}),
+          swarm(of.robots(), of.movables(), of.memory.size()) {
+      for (std::uint32_t p = 0; p < plan.grid.size(); ++p)
+        physics.push_back(physics::make_engine(plan, PartitionId{p}));
+      actuation = testing::motors(Tick{0}, std::vector<std::uint8_t>(plan.robots(), 200),
+                                  std::vector<std::uint8_t>(plan.robots(), 100));
+      actuation.life_cycle.assign(plan.robots(), static_cast<std::uint8_t>(LifeCycle::kRunning));
+      actuation.offer_robot = {1};
+      actuation.offer_message = {IrMessage{3}};
+      emit();
+    }
+    void emit() {
+      bodies.resize(physics.size());
+      ghosts.resize(physics.size());
+      for (std::size_t p = 0; p < physics.size(); ++p) {
+        physics[p]->emit_bodies(bodies[p]);
+        ghosts[p].resize(physics[p]->neighbours().size());
+        for (std::size_t i = 0; i < ghosts[p].size(); ++i)
+          physics[p]->emit_ghosts(physics[p]->neighbours()[i], ghosts[p][i]);
+      }
+      station.emit(overhead);
+      actuation.tick = now;
+    }
+    void step() {
+      std::vector<const BodyFrame*> all;
+      for (const BodyFrame& frame : bodies) all.push_back(&frame);
+      const ActuationFrame* const hosts[] = {&actuation};
+      swarm.gather(now, all);
+      swarm.gather(hosts);
+      senses.at(swarm);
+      for (std::uint32_t i = 0; i < plan.robots(); ++i) static_cast<void>(senses.readings(i));
+      radio.step(now, {swarm, overhead});
+      station.step(now, {swarm, {}});
+      for (std::uint32_t p = 0; p < physics.size(); ++p) {
+        std::vector<const BodyFrame*> in;
+        for (std::size_t from = 0; from < physics.size(); ++from) {
+          for (std::size_t i = 0; i < ghosts[from].size(); ++i)
+            if (physics[from]->neighbours()[i] == PartitionId{p}) in.push_back(&ghosts[from][i]);
+        }
+        physics[p]->step(now, {in, hosts, {}});
+      }
+      ++now;
+      emit();
+    }
+    const RunPlan& plan;
+    std::vector<std::unique_ptr<physics::Engine>> physics;
+    comm::RadioEngine radio;
+    ark::StationEngine station;
+    senses::RobotSenses senses;
+    SwarmView swarm;
+    Tick now;
+    std::vector<BodyFrame> bodies;
+    std::vector<std::vector<BodyFrame>> ghosts;
+    ActuationFrame actuation;
+    OverheadFrame overhead;
+  };
+
+  /// Mutates the frame that `pick` finds, as a publisher would send it to `reader`.
+  template <class Pick> void fuzz(FederateId publisher, FederateId reader, Pick pick) {
+    const RunPlan plan =
+        testing::make_plan(GetParam().experiment, testing::grid_crowd(12, 34, testing::Facing::kInwards), 2, 1);
+    int refused = 0, accepted = 0, ended = 0;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      SCOPED_TRACE(trial);
+      Random random(static_cast<std::uint64_t>(trial));
+      Run run(plan);
+      for (int k = 0; k < trial % 4; ++k) run.step();
+      auto& frame = pick(run);
+      auto sent = frame;
+      mutate(random, sent);
+      auto received = frame;
+      if (!from_wire(to_wire({publisher.value(), 1, 0}, sent), received) ||
+          defect(received, plan, publisher, reader) != nullptr) {
+        ++refused;
+        continue;
+      }
+      ++accepted;
+      frame = received;
+      try {
+        for (int k = 0; k < kTicksAfter; ++k) run.step();
+      } catch (const RunError&) {
+        ++ended;
+      }
+    }
+    EXPECT_GT(refused, kTrials / 20);
+    EXPECT_GT(accepted, kTrials / 50) << "nothing reached the engines";
+    RecordProperty("ended", ended);
+  }
+};
+
+TEST_P(FrameFuzz, BodiesToTheRadioAndTheStation) {
+  fuzz(FederateId{0}, FederateId{2}, [](Run& run) -> BodyFrame& { return run.bodies[0]; });
+}
+TEST_P(FrameFuzz, GhostsToANeighbour) {
+  fuzz(FederateId{0}, FederateId{1}, [](Run& run) -> BodyFrame& { return run.ghosts[0][0]; });
+}
+TEST_P(FrameFuzz, ActuationToAll) {
+  fuzz(FederateId{4}, FederateId{0}, [](Run& run) -> ActuationFrame& { return run.actuation; });
+}
+TEST_P(FrameFuzz, OverheadPacketsToTheRadio) {
+  fuzz(FederateId{3}, FederateId{2}, [](Run& run) -> OverheadFrame& { return run.overhead; });
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Engines, FrameFuzz,
+    ::testing::Values(
+        Scene{"Planar",
+              "movable { box { width_mm: 100 length_mm: 40 } y_mm: 100 mass_g: 20 } station { environment { hub { "
+              "radius_mm: 300 } } } light { shadows: true source { height_mm: 250 intensity: 88 } }"},
+        Scene{"Ode",
+              "physics { engine: ODE } movable { box { width_mm: 100 length_mm: 40 } y_mm: 100 mass_g: 20 }"},
+        Scene{"Kinematic", "physics { engine: KINEMATIC } radio { model: SIMPLE }"},
+        Scene{"Memory",
+              "effect { name: 'a' acts_on: WHEEL_GAIN function { of: MOTOR_TIME linear { slope: -1e-4 } } } "
+              "battery { }"}),
+    [](const auto& tested) { return tested.param.name; });
+
+}  // namespace
+}  // namespace kilotwin
