@@ -17,9 +17,9 @@
 #include "clients/identify/model/model_file.hpp"
 #include "clients/identify/report/prediction_residuals.hpp"
 #include "clients/identify/report/report.hpp"
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::cli {
 namespace fs = std::filesystem;
@@ -135,8 +135,8 @@ int identify_data(const IdentifyArguments& arguments) {
   }
 
   progress->show(0.97, "drawing the report", "drawing");
-  os::write_file(out / "model.txtpb", identify::text_of(found.model, fmt::format("Identified from {}.",
-                                                                                       arguments.train.string())));
+  os::write_file(out / "model.txtpb",
+                 identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   os::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
   os::write_file(out / "predictions.csv", csv_of(found.predictions));
   identify::write_report(found.document, out / "report.html");

@@ -1,16 +1,15 @@
 #include "clients/cli/recovery.hpp"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <algorithm>
-#include <csignal>
 
 #include "clients/cli/run_recorder.hpp"
 #include "clients/recorder/reader.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_check.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -64,12 +63,6 @@ std::string keep(const recorder::RunDirectory& directory, const proto::Manifest&
 }
 
 }  // namespace
-
-bool brought_itself_down(int status) {
-  if (!WIFSIGNALED(status)) return false;
-  const int signal = WTERMSIG(status);
-  return signal == SIGSEGV || signal == SIGBUS || signal == SIGILL || signal == SIGFPE || signal == SIGABRT;
-}
 
 void recover(const recorder::RunDirectory& directory, proto::Manifest& manifest,
              std::span<const behaviours::Culprit> running) {

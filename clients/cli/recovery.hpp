@@ -1,8 +1,8 @@
-/// When a robot's program has brought down its host, the run goes on from its last checkpoint, or from its beginning, with
-/// that robot failed in the step in which it happened: the result is that of a run in which it failed there. What was
-/// recorded up to the checkpoint, and the external inputs that had been stamped for later ticks, are kept.
+/// When a robot's program crashes its behaviours host, the run continues from its last checkpoint, or from its beginning, with
+/// that robot failed in the tick of the crash: the result is that of a run in which the robot failed there. The recording up to
+/// the checkpoint, and the external inputs that were stamped for later ticks, are kept.
 ///
-/// RUN/recovered holds what the next attempt goes on from: the parts of the checkpoint, if there is one, and the recording.
+/// RUN/recovered holds the start of the next attempt: the parts of the checkpoint, if there is one, and the recording.
 #pragma once
 
 #include <optional>
@@ -17,26 +17,24 @@
 
 namespace kilotwin::cli {
 
-/// Whether a process has ended by what its own code did, not by a signal of another process. `status` as of waitpid().
-[[nodiscard]] bool brought_itself_down(int status);
-
-/// Makes the run directory and the manifest those of the next attempt, and says so. `running`: whose programs ran when the
-/// attempt ended. Where that is one robot, it fails; of several, nobody knows which it was, and none does: run them one after
-/// another. Throws RunError where a program that has failed already is named.
+/// Turns the run directory and the manifest into those of the next attempt, and says so. `running`: the robots whose programs
+/// ran when the attempt ended. If it is one robot, that robot fails. If there are several, it is not known which of them
+/// crashed, and none fails: the next attempt runs them one after another. Throws RunError if a robot that has failed already
+/// is among them.
 void recover(const recorder::RunDirectory& directory, proto::Manifest& manifest,
              std::span<const behaviours::Culprit> running);
 
-/// Where an attempt at a run starts.
+/// The start of an attempt at a run.
 struct Beginning {
   std::optional<Checkpoint> resumed;  ///< nothing: at tick 0
-  std::vector<Directive> inputs;      ///< stamped in an earlier attempt, for ticks to come; numbered from 0
+  std::vector<Directive> inputs;      ///< stamped in an earlier attempt for later ticks; numbered from 0
 };
 [[nodiscard]] Beginning beginning_of(const RunPlan& plan, const recorder::RunDirectory& directory);
 
-/// The recording of the attempt before, where there was one; else empty.
+/// The recording of the previous attempt; empty if there was none.
 [[nodiscard]] std::filesystem::path earlier_recording(const recorder::RunDirectory& directory);
 
-/// The run has come to its end: removes what only recovery needs.
+/// Removes the files that only recovery needs, once the run has ended.
 void forget_attempts(const recorder::RunDirectory& directory);
 
 }  // namespace kilotwin::cli

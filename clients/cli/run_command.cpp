@@ -1,6 +1,5 @@
 // `kilotwin run`: an experiment from its file to its summary.
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <CLI/CLI.hpp>
 #include <charconv>
@@ -18,6 +17,7 @@
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
 #include "core/dds/dds.hpp"
+#include "core/os/children.hpp"
 #include "core/os/interrupt.hpp"
 #include "services/behaviours/program_set.hpp"
 
@@ -79,28 +79,27 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
   std::uint32_t threads = std::max(1u, arguments.threads);
   for (;;) {
     const RunPlan plan(manifest);
-    const std::optional<int> status = status_of_worker();
-    if (!status) {
+    const std::optional<os::ProcessEnd> end = end_of_worker();
+    if (!end) {
       run_in_this_process(plan, directory, threads, arguments.quiet, started_s);
       forget_attempts(directory);
       return std::nullopt;
     }
-    // A program that calls the system where that cannot be refused (services/behaviours/faults.hpp) ends the worker as if all were
-    // well. In every other case the worker has reported its error.
-    const bool no_result =
-        WIFEXITED(*status) && WEXITSTATUS(*status) == 0 && !std::filesystem::exists(directory.summary());
-    if (WIFEXITED(*status) && !no_result) return WEXITSTATUS(*status);
+    // A program that calls the system where that cannot be refused (services/behaviours/faults.hpp) ends the worker with status 0
+    // and without a result. In every other case of a status the worker has reported its error.
+    const bool no_result = end->well() && !std::filesystem::exists(directory.summary());
+    if (end->signal == 0 && !no_result) return end->code;
     std::vector<behaviours::Culprit> running;
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       if (const auto culprit = behaviours::take_note(directory.path(), HostId{h})) running.push_back(*culprit);
     }
     if (no_result && running.empty()) {
-      throw RunError(fmt::format("the run has ended without a result; what was recorded so far is in {}",
+      throw RunError(fmt::format("the run ended without a result; what was recorded so far is in {}",
                                  directory.path().string()));
     }
-    if (!no_result && (!brought_itself_down(*status) || running.empty())) {
-      throw RunError(fmt::format("the run was ended by signal {}; what was recorded so far is in {}",
-                                 WTERMSIG(*status), directory.path().string()));
+    if (!no_result && (!os::crashed(*end) || running.empty())) {
+      throw RunError(fmt::format("the run {}; what was recorded so far is in {}", os::in_words(*end),
+                                 directory.path().string()));
     }
     recover(directory, manifest, running);
     if (running.size() > 1) threads = 1;

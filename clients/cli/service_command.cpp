@@ -132,7 +132,8 @@ int serve(const ServiceArguments& arguments) {
   } else if (arguments.service == "comm") {
     begin_log(plan, plan.radio(), arguments.transport);
     const std::uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
-    comm::run_service(plan, context, firmware::make_firmware_robots(plan, directory.path(), threads, context.first(), true));
+    comm::run_service(plan, context,
+                      firmware::make_firmware_robots(plan, directory.path(), threads, context.first(), true));
   } else if (arguments.service == "behaviours") {
     const HostId host = parse_share(arguments.share, plan.hosts);
     begin_log(plan, plan.behaviours(host), arguments.transport);

@@ -12,10 +12,10 @@
 #include "clients/cli/sweep_points.hpp"
 #include "clients/cli/sweep_report.hpp"
 #include "clients/cli/sweep_runs.hpp"
-#include "core/os/files.hpp"
 #include "clients/recorder/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
+#include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
 
 namespace kilotwin::cli {
@@ -111,7 +111,8 @@ int sweep(const SweepArguments& arguments) {
   };
   catch_interrupts();
   const bool all = run_all(runs, arguments.jobs > 0 ? arguments.jobs : cores, [&](const SweepRun& run) {
-    if (!run.well) return complain(run, last_words(run));
+    if (!run.well)
+      return complain(run, run.last_line.empty() ? "it said nothing; is the disk full?" : run.last_line);
     try {
       report.add(run.point, run.directory);
     } catch (const std::exception& error) {

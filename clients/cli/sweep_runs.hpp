@@ -1,4 +1,4 @@
-/// Many runs, each a process of its own: programs are loaded at fixed addresses, one set per process.
+/// The runs of a sweep, each a process of its own: programs are loaded at fixed addresses, one set per process.
 #pragma once
 
 #include <cstddef>
@@ -13,17 +13,16 @@ namespace kilotwin::cli {
 struct SweepRun {
   std::size_t point = 0;
   std::uint64_t seed = 0;
-  std::filesystem::path directory;  ///< of the run; what it says goes to directory + ".log"
+  std::filesystem::path directory;  ///< of the run; its stdout and stderr go to directory + ".log"
   std::vector<std::string> words;   ///< its command line
   bool well = false;                ///< it ended with status 0
+  std::string last_line;            ///< of its log: why it failed, if it did
 };
 
-/// Starts `at_a_time` runs, a next one as each ends, and calls `ended` with each, until all have ended or the process is
-/// interrupted; then those that run are told to end, and false is returned. `progress` is shown on a terminal.
+/// Runs `at_a_time` runs at once until all have ended, and calls `ended` after each. Where this process is interrupted, the
+/// runs that still run are ended, and it returns false. Shows its progress on
+/// stderr.
 [[nodiscard]] bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time,
                            const std::function<void(const SweepRun&)>& ended);
-
-/// Why a run failed: the last line that it said.
-[[nodiscard]] std::string last_words(const SweepRun& run);
 
 }  // namespace kilotwin::cli

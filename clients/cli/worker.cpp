@@ -12,16 +12,16 @@
 namespace kilotwin::cli {
 namespace {
 
-/// Signals that wait to be taken, while the object exists.
-class Held {
+/// While the object exists, these signals wait until next() takes them.
+class HeldSignals {
  public:
-  Held() {
+  HeldSignals() {
     sigemptyset(&signals_);
     for (const int signal : {SIGINT, SIGTERM, SIGCHLD}) sigaddset(&signals_, signal);
     sigprocmask(SIG_BLOCK, &signals_, &before_);
   }
-  ~Held() { sigprocmask(SIG_SETMASK, &before_, nullptr); }
-  Held(const Held&) = delete;
+  ~HeldSignals() { sigprocmask(SIG_SETMASK, &before_, nullptr); }
+  HeldSignals(const HeldSignals&) = delete;
   [[nodiscard]] int next() const { return sigwaitinfo(&signals_, nullptr); }
 
  private:
@@ -30,9 +30,9 @@ class Held {
 
 }  // namespace
 
-std::optional<int> status_of_worker() {
+std::optional<os::ProcessEnd> end_of_worker() {
   std::fflush(nullptr);
-  const Held held;
+  const HeldSignals held;
   const pid_t parent = getpid();
   const pid_t worker = fork();
   if (worker < 0) throw RunError("the run cannot be started: the system has no room for another process");
@@ -43,7 +43,9 @@ std::optional<int> status_of_worker() {
   }
   bool forwarded = false;
   for (int status = 0;;) {
-    if (waitpid(worker, &status, WNOHANG) == worker) return status;
+    if (waitpid(worker, &status, WNOHANG) == worker) {
+      return WIFSIGNALED(status) ? os::ProcessEnd{0, WTERMSIG(status)} : os::ProcessEnd{WEXITSTATUS(status), 0};
+    }
     const int signal = held.next();
     if (signal != SIGINT && signal != SIGTERM) continue;
     // A terminal sends SIGINT to both, and a second one to a process ends it whatever it does.

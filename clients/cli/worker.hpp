@@ -1,14 +1,16 @@
-/// A local run happens in a process of its own, a worker, so that a robot's program that brings it down does not take along
-/// the process that sees to what comes next.
+/// A local run happens in a process of its own, the worker: a robot's program that ends its process by a defect does not end
+/// the process that starts the run again from its last checkpoint.
 #pragma once
 
 #include <optional>
 
+#include "core/os/process.hpp"
+
 namespace kilotwin::cli {
 
-/// Forks. In the worker, which is to run and then end as this process would have: nothing. In the process that called, when
-/// the worker has ended: its status, as of waitpid(). SIGINT and SIGTERM end the worker in order, and the worker does not
-/// outlive its parent. Only where no other thread runs. Throws RunError where there is no room for a process.
-[[nodiscard]] std::optional<int> status_of_worker();
+/// Starts the worker by fork(). In the worker it returns nothing: the worker does the run and ends as this process would have.
+/// In the calling process it returns how the worker has ended, once it has. SIGINT and SIGTERM end the worker in
+/// order; the worker does not outlive its parent. Only where no other thread runs. Throws RunError if fork() fails.
+[[nodiscard]] std::optional<os::ProcessEnd> end_of_worker();
 
 }  // namespace kilotwin::cli

@@ -59,7 +59,7 @@ inline Timeline run_timeline(const std::string& experiment, const std::filesyste
   cli::RunArguments arguments;
   arguments.experiment = file;
   arguments.mode = "local";
-  arguments.out = folder / "run";
+  arguments.output.out = folder / "run";
   arguments.set = set;
   const cli::Prepared prepared = cli::prepare(arguments);
   const RunPlan plan(prepared.manifest);
