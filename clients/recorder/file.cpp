@@ -28,7 +28,7 @@ OutputFile::~OutputFile() {
   try {
     flush();
   } catch (const RunError&) {
-    // A destructor has nobody to tell.
+    // Destructors report no errors.
   }
   ::close(descriptor_);
 }
@@ -58,7 +58,7 @@ void OutputFile::close() {
 }
 
 void write_file(const std::filesystem::path& file, std::string_view content) {
-  // A device or a pipe is written to; only what is a file can be replaced.
+  // Only a regular file can be replaced; a device or a pipe is written to.
   std::error_code none;
   if (std::filesystem::exists(file, none) && !std::filesystem::is_regular_file(file, none)) {
     OutputFile output(file, OutputFile::Existing::kReplace);

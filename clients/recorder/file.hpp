@@ -1,5 +1,4 @@
-/// Files as the recorder writes and reads them. Whatever fails is told in one line that names the file and the
-/// reason.
+/// Files as the recorder writes and reads them. Errors are one line that names the file and the reason.
 #pragma once
 
 #include <cstddef>
@@ -16,15 +15,15 @@ class OutputFile {
 
   /// Throws RunError where the file cannot be created, or exists and must not.
   OutputFile(std::filesystem::path file, Existing existing);
-  /// Hands over what is left as far as that is possible; whoever wants to know of errors calls close().
+  /// Writes the rest of the buffer if that is possible. Only close() reports errors.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// The bytes that wait to be handed to the kernel; to be appended to.
+  /// The bytes that flush() will write. Callers append to it.
   [[nodiscard]] std::string& buffer() { return buffer_; }
-  /// Hands all of them over, after which they outlive this process. On failure throws RunError, and keeps what was
-  /// not written, so that a later call goes on where this one stopped.
+  /// Writes the buffer; the bytes then outlive this process. On failure throws RunError and keeps the bytes that were not
+  /// written, so that a later call continues.
   void flush();
   void flush_if_above(std::size_t bytes) {
     if (buffer_.size() >= bytes) flush();
@@ -39,13 +38,13 @@ class OutputFile {
   std::string buffer_;
 };
 
-/// Writes a file as a whole: readers see the old one or the new one, nothing in between. Throws RunError.
+/// Writes the file whole: readers see the old content or the new content, never a part. Throws RunError.
 void write_file(const std::filesystem::path& file, std::string_view content);
 
 /// The whole content. Throws UserError where it cannot be read.
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
 
-/// The system's words for the errno at hand.
+/// The system's description of the current errno.
 [[nodiscard]] std::string system_reason();
 
 }  // namespace kilotwin::recorder
