@@ -1,4 +1,4 @@
-/// The model of a run as a file: what `run --model` reads to make the same robots move alike again.
+/// The model of a run as a file. `run --model` reads it and gives the same robots.
 #pragma once
 
 #include <cstdint>

@@ -1,11 +1,12 @@
-/// `kilotwin replay RUN --verify`: steps a recorded run again and compares every tick's state hash.
+/// `kilotwin replay RUN --verify`: steps a recorded run again and compares every state hash and every recorded state.
 #pragma once
 
 #include <filesystem>
 
 namespace kilotwin::cli {
 
-/// Returns 0 where every hash agrees. Throws RunError that names the first tick that differs, UserError for what is no run.
+/// Returns 0 if all agree. Throws RunError that names the first tick that differs, or says why the recording is damaged or too
+/// short; UserError if the directory holds no run.
 int replay_command(const std::filesystem::path& run, bool quiet);
 
 }  // namespace kilotwin::cli

@@ -1,4 +1,4 @@
-/// The observer of a run that records it, and what is written when the run is over.
+/// RunRecorder: the observer that records a run, and writes summary and picture at its end.
 #pragma once
 
 #include <chrono>
@@ -19,8 +19,8 @@ namespace kilotwin::cli {
 
 class RunRecorder : public RunObserver {
  public:
-  /// `resumed`: where the run starts from a checkpoint. `on_idle`: told how far the run is; may be empty. Takes over what an
-  /// earlier attempt at this run has recorded, see recovery.hpp.
+  /// `resumed`: where the run starts from a checkpoint. `on_idle` receives the progress of the run; it may be empty. The
+  /// recording continues that of an earlier attempt at this run: recovery.hpp.
   RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory,
               const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle);
 
@@ -32,7 +32,7 @@ class RunRecorder : public RunObserver {
 
   /// Ends the recording, and writes summary and picture. `start_s`: wall time from the command to the first tick.
   recorder::Summary finish(const RunTotals& totals, double start_s);
-  /// When the first state came: the first tick.
+  /// Wall time of the first tick.
   [[nodiscard]] std::chrono::steady_clock::time_point first_tick_at() const { return first_tick_at_; }
 
  private:
@@ -54,7 +54,8 @@ class RunRecorder : public RunObserver {
 };
 
 [[nodiscard]] proto::InputRecord to_record(const Directive& directive);
-/// What replays repeat. Pauses took no simulated time, checkpoints change nothing, and where a run stopped, its recording ends.
+/// Whether replays repeat the input. Pauses take no simulated time, checkpoints change nothing, and a recording ends where its
+/// run stopped.
 [[nodiscard]] inline bool changes_results(const Directive& directive) {
   return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kTrackedPose;
 }

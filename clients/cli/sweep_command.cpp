@@ -12,7 +12,7 @@
 #include "clients/cli/sweep_points.hpp"
 #include "clients/cli/sweep_report.hpp"
 #include "clients/cli/sweep_runs.hpp"
-#include "clients/recorder/plot.hpp"
+#include "clients/recorder/provenance.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/os/files.hpp"
@@ -123,17 +123,12 @@ int sweep(const SweepArguments& arguments) {
   if (!all) say(fmt::format("kilotwin: interrupted; {} of {} runs were done", report.runs(), runs.size()));
   if (report.runs() == 0) return 1;
 
-  os::write_file(directory / "sweep.csv", report.table_csv());
-  os::write_file(directory / "curves.csv", report.curves_csv());
-  recorder::write_plot(report.curves(), directory / "sweep.svg");
+  report.write(directory, recorder::provenance_of_this_process());
   std::string plots = (directory / "sweep.svg").string();
-  if (report.has_response()) {
-    recorder::write_plot(report.response(), directory / "response.svg");
-    plots += " and " + (directory / "response.svg").string();
-  }
-  fmt::print("{}table   {}\ncurves  {}\nplot    {}\nresults {}\n", report.table(),
+  if (report.has_response()) plots += " and " + (directory / "response.svg").string();
+  fmt::print("{}table   {}\ncurves  {}\nplot    {}\nreport  {}\nresults {}\n", report.table(),
              (directory / "sweep.csv").string(), (directory / "curves.csv").string(), plots,
-             place_in_words(directory, arguments.run.output, fallback));
+             (directory / "report.html").string(), place_in_words(directory, arguments.run.output, fallback));
   return failed == 0 && all ? kDone : kFailed;
 }
 

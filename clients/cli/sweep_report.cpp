@@ -5,9 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
+#include "core/os/files.hpp"
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/summary.hpp"
+#include "clients/report/html.hpp"
+#include "clients/report/templates.hpp"
+#include "core/csv/csv_writer.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -15,7 +20,7 @@ namespace {
 using recorder::kObservables;
 using recorder::Sample;
 
-/// More than these cannot be told apart in one plot.
+/// More curves than these cannot be distinguished in one plot.
 constexpr std::size_t kMostCurves = 8;
 
 std::string with_error(const Sample& sample) {
@@ -35,13 +40,6 @@ std::string csv_header(const std::string& first) {
   for (const recorder::ObservableInfo& o : kObservables)
     text += fmt::format(",{0}{1},{0}_se{1}", o.name, o.column_suffix);
   return text;
-}
-
-/// A text as a CSV field.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + '"';
 }
 
 /// Lays rows out in columns, the first to the left and the others to the right. "±" is one character of two bytes.
@@ -69,6 +67,11 @@ std::string laid_out(const std::vector<std::vector<std::string>>& rows) {
 
 SweepReport::SweepReport(std::string name, std::vector<SweepPoint> points, recorder::Observable plotted)
     : name_(std::move(name)), points_(std::move(points)), plotted_(plotted), observed_(points_.size()) {
+  for (std::size_t field = 0; field < points_[0].size(); ++field) {
+    const bool alike = std::all_of(points_.begin(), points_.end(),
+                                   [&](const SweepPoint& point) { return point[field] == points_[0][field]; });
+    if (!alike) varying_.push_back(field);
+  }
   // The field with the most numbers.
   std::size_t most = 1;
   for (std::size_t field = 0; field < points_[0].size(); ++field) {
@@ -114,7 +117,25 @@ std::string SweepReport::name_of(std::size_t point) const {
   return points_[point].empty() ? name_ : label(points_[point]);
 }
 
-std::string SweepReport::table() const {
+std::string SweepReport::short_name_of(std::size_t point) const {
+  if (varying_.size() == 1) {
+    const std::string& set = points_[point][varying_[0]];
+    return set.substr(set.find('=') + 1);
+  }
+  SweepPoint fields;
+  for (const std::size_t field : varying_) fields.push_back(points_[point][field]);
+  return label(fields);
+}
+
+std::string SweepReport::constant() const {
+  SweepPoint fields;
+  for (std::size_t field = 0; field < points_[0].size(); ++field) {
+    if (std::find(varying_.begin(), varying_.end(), field) == varying_.end()) fields.push_back(points_[0][field]);
+  }
+  return label(fields);
+}
+
+std::vector<std::vector<std::string>> SweepReport::rows() const {
   std::vector<std::string> header{"at the end", "runs"};
   // Quantities that none of the runs has are left out.
   std::array<bool, kObservables.size()> shown{};
@@ -143,7 +164,61 @@ std::string SweepReport::table() const {
     row.push_back(fmt::format("{:.0f}", at.realtime.mean()));
     rows.push_back(std::move(row));
   }
-  return laid_out(rows);
+  return rows;
+}
+
+std::string SweepReport::table() const { return laid_out(rows()); }
+
+std::string SweepReport::page(const recorder::Provenance& provenance) const {
+  using html::Data;
+  const auto object = [](std::initializer_list<std::pair<const char*, std::string>> fields) {
+    Data data{Data::type::object};
+    for (const auto& [key, value] : fields) data.set(key, value);
+    return data;
+  };
+  const std::vector<std::vector<std::string>> all = rows();
+  std::vector<std::string> heads;
+  for (const std::string& head : all[0]) heads.push_back(html::escaped(head));
+  html::Table table(std::move(heads));
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    std::vector<std::string> cells;
+    for (const std::string& cell : all[i]) cells.push_back(html::escaped(cell));
+    table.row(cells);
+  }
+  Data figures{Data::type::list};
+  const auto add = [&](const Plot& plot, const std::string& caption) {
+    figures << object({{"image", html::image(plot_svg(plot), caption)}, {"caption", caption}});
+  };
+  add(curves(), "Over time, a curve per point");
+  if (has_response()) add(response(), "At the end of the runs");
+  Data facts{Data::type::list};
+  std::string words;
+  for (const std::string& word : provenance.command_line) words += (words.empty() ? "" : " ") + word;
+  for (const auto& [fact, value] : {std::pair<const char*, std::string>{"command line", words},
+                                    {"version", provenance.build},
+                                    {"machine", fmt::format("{}, {} cores", provenance.host, provenance.cores)},
+                                    {"tables", "sweep.csv (at the end), curves.csv (over time)"}}) {
+    facts << object({{"fact", fact}, {"value", value}});
+  }
+  Data page = object({{"name", name_}, {"date", provenance.date}, {"runs", runs_text()}, {"table", table.text()}});
+  if (const std::string fields = constant(); !fields.empty()) page.set("constant", fields);
+  page.set("figures", figures);
+  page.set("facts", facts);
+  return html::page("Kilotwin: sweep of " + name_, html::rendered(html::templates::kSweep, page));
+}
+
+void SweepReport::write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const {
+  const auto table = [&](const char* name, const std::string& csv) {
+    const std::size_t header = csv.find('\n');
+    CsvWriter writer(directory / name, csv.substr(0, header));
+    writer.rows() += csv.substr(header + 1);
+    writer.close();
+  };
+  table("sweep.csv", table_csv());
+  table("curves.csv", curves_csv());
+  write_plot(curves(), directory / "sweep.svg");
+  if (has_response()) write_plot(response(), directory / "response.svg");
+  os::write_file(directory / "report.html", page(provenance));
 }
 
 std::string SweepReport::table_csv() const {
@@ -151,7 +226,7 @@ std::string SweepReport::table_csv() const {
                     ",sent,sent_se,received,received_se,collided,collided_se,robots_failed,realtime_factor\n";
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Observed& at = observed_[i];
-    csv += fmt::format("{},{}", quoted(name_of(i)), at.realtime.count());
+    csv += fmt::format("{},{}", csv_cell(name_of(i)), at.realtime.count());
     for (const Sample& sample : at.at_end) csv += csv_pair(sample);
     for (const Sample* sample : {&at.sent, &at.received, &at.collided}) csv += csv_pair(*sample);
     csv += fmt::format(",{:.6g},{:.6g}\n", at.failed.mean(), at.realtime.mean());
@@ -163,7 +238,7 @@ std::string SweepReport::curves_csv() const {
   std::string csv = csv_header("point,time_s,runs") + "\n";
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Observed& at = observed_[i];
-    const std::string point = quoted(name_of(i));
+    const std::string point = csv_cell(name_of(i));
     for (std::size_t k = 0; k < at.over_time.size(); ++k) {
       csv += fmt::format("{},{:.10g},{}", point, at.time_s[k], at.over_time[k][0].count());
       for (const Sample& sample : at.over_time[k]) csv += csv_pair(sample);
@@ -183,9 +258,9 @@ std::string SweepReport::runs_text() const {
   return least == most ? fmt::format("{} runs each", most) : fmt::format("{} to {} runs each", least, most);
 }
 
-recorder::Plot SweepReport::plot() const {
+Plot SweepReport::plot() const {
   const recorder::ObservableInfo& observable = kObservables[static_cast<std::size_t>(plotted_)];
-  recorder::Plot plot;
+  Plot plot;
   plot.title = fmt::format("{}: {}", name_, observable.title);
   plot.y_name = observable.title;
   if (plotted_ == recorder::Observable::kMsd) plot.y_name = "MSD";
@@ -193,21 +268,23 @@ recorder::Plot SweepReport::plot() const {
   return plot;
 }
 
-recorder::Plot SweepReport::curves() const {
-  recorder::Plot plot = this->plot();
+Plot SweepReport::curves() const {
+  Plot plot = this->plot();
   const bool errors =
       std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.realtime.count() > 1; });
   plot.subtitle = runs_text() + (errors ? "; shaded: standard error of the mean" : "");
   plot.x_name = "time";
   plot.x_unit = "s";
+  if (varying_.size() == 1) plot.legend_title = field_of(points_[0][varying_[0]]);
+  if (const std::string fields = constant(); !fields.empty()) plot.subtitle += "; " + fields;
   // Of many points some, evenly from the first to the last.
   const std::size_t curves = std::min(points_.size(), kMostCurves);
   if (curves < points_.size()) plot.subtitle += fmt::format("; {} of {} points", curves, points_.size());
   for (std::size_t curve = 0; curve < curves; ++curve) {
     const std::size_t i = curves < 2 ? 0 : curve * (points_.size() - 1) / (curves - 1);
     const Observed& at = observed_[i];
-    recorder::PlotSeries series;
-    series.name = points_[i].empty() ? "" : name_of(i);
+    PlotSeries series;
+    series.name = short_name_of(i);
     series.x = at.time_s;
     for (const Samples& samples : at.over_time) {
       const Sample& sample = samples[static_cast<std::size_t>(plotted_)];
@@ -221,18 +298,25 @@ recorder::Plot SweepReport::curves() const {
   return plot;
 }
 
-recorder::Plot SweepReport::response() const {
-  recorder::Plot plot = this->plot();
+Plot SweepReport::response() const {
+  Plot plot = this->plot();
   const bool errors =
       std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.realtime.count() > 1; });
   plot.subtitle = "at the end of the runs, " + runs_text() + (errors ? "; bars: standard error of the mean" : "");
+  if (const std::string fields = constant(); !fields.empty()) plot.subtitle += "; " + fields;
   plot.x_name = field_of(points_[0][response_field_]);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Sample& sample = observed_[i].at_end[static_cast<std::size_t>(plotted_)];
-    SweepPoint others = points_[i];
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(response_field_));
-    const std::string name = label(others);
+    SweepPoint others;
+    for (const std::size_t field : varying_) {
+      if (field != response_field_) others.push_back(points_[i][field]);
+    }
+    std::string name = label(others);
+    if (others.size() == 1) {
+      plot.legend_title = field_of(others[0]);
+      name = others[0].substr(others[0].find('=') + 1);
+    }
     const auto found = std::find(names.begin(), names.end(), name);
     const auto index = static_cast<std::size_t>(found - names.begin());
     if (found == names.end()) {

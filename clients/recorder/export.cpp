@@ -77,13 +77,13 @@ std::string exact_seconds(Tick tick, TickLength length) {
   return text;
 }
 
-/// A readable multiple of the recorded interval, the nearest to what was asked for.
+/// The multiple of the recorded interval that is nearest to `asked_s`.
 std::string suggested_interval(double recorded_s, double asked_s) {
   return fmt::format("{:.10g}", recorded_s * std::max(1.0, std::round(asked_s / recorded_s)));
 }
 
-/// Whether the recording's schedule has a state within one tick after each wanted time. Both repeat, so that a
-/// thousand of them tell.
+/// Throws if the recording's schedule has no state within one tick after a wanted time. Both schedules are periodic, so a
+/// thousand times suffice.
 void check_interval(const Reader& recording, const RecordingSchedule& wanted, double every_s) {
   const double recorded_s = recording.header().every_s();
   const RecordingSchedule recorded(recording.tick_length(), recorded_s);
@@ -139,7 +139,7 @@ std::uint64_t append_body_rows(std::string& text, const proto::StateRecord& stat
   return static_cast<std::uint64_t>(state.movable_x_mm_size());
 }
 
-/// Rows of the states that are wanted; `append` adds those of one state and says how many.
+/// Writes the rows of the scheduled states; `append` adds the rows of one state and returns their number.
 template <class Append>
 std::uint64_t export_states(Reader& recording, const std::filesystem::path& csv, double every_s,
                             const char* columns, Append append) {

@@ -1,4 +1,4 @@
-/// Observables: the few quantities over time that say something of any swarm, from a recording.
+/// Observables: quantities over time that are defined for any swarm, from a recording.
 ///
 ///   msd            mean over robots of the squared distance from where each was in the first state, mm^2
 ///   displacement   mean over robots of that distance, mm
@@ -7,7 +7,7 @@
 ///   pushed         mean over movable bodies of the distance from where each was in the first state, mm
 ///   polarisation   length of the mean of all heading vectors, 0 (no common direction) .. 1 (all alike)
 ///
-/// A quantity that a run does not have, such as the nearest other of a single robot, or bodies where there are none, is NaN.
+/// A quantity that is undefined for a run is NaN: the nearest other of a single robot, or bodies in a run without any.
 #pragma once
 
 #include <array>

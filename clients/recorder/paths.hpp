@@ -1,4 +1,4 @@
-/// Paths of all robots, from any number of states in memory that does not depend on how many there are.
+/// Paths of all robots, in memory that does not grow with the number of states.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ class Paths {
   [[nodiscard]] std::size_t robots() const { return first_.x_mm.size(); }
   [[nodiscard]] const Snapshot& first() const { return first_; }
   [[nodiscard]] const Snapshot& last() const { return last_; }
-  /// A robot's way from its first to its last place.
+  /// A robot's path from its first to its last place.
   [[nodiscard]] std::vector<Point> path(std::size_t robot) const;
 
  private:
@@ -44,7 +44,7 @@ class Paths {
   std::vector<std::vector<Point>> kept_;  // per kept state, all robots
 };
 
-/// The path with fewer points, none of which was further than `tolerance_mm` from it (Douglas and Peucker 1973).
+/// The path with fewer points; no omitted point lies further than `tolerance_mm` from it (Douglas and Peucker 1973).
 [[nodiscard]] std::vector<Point> simplified(std::span<const Point> path, double tolerance_mm);
 
 }  // namespace kilotwin::recorder

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -83,7 +84,7 @@ void put(std::string& out, fmt::format_string<Arguments...> format, Arguments&&.
   fmt::format_to(std::back_inserter(out), format, std::forward<Arguments>(arguments)...);
 }
 
-/// "30 s", "59.97 s", "1200 s": as exact as a tick, without zeros that say nothing.
+/// "30 s", "59.97 s", "1200 s": two decimals, without trailing zeros.
 std::string time_text(double time_s) { return fmt::format("{:g} s", std::round(time_s * 100) / 100); }
 
 bool failed(const Snapshot& at, std::size_t robot) {
@@ -122,7 +123,7 @@ std::string draw_discs(const Snapshot& at, const View& view) {
   return out;
 }
 
-/// Ways of all robots, coloured by where in the swarm they began, so that one sees who went where and how they mix.
+/// Paths of all robots. Colours follow x at the start, so that mixing is visible.
 std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
   std::array<std::string, kByStart.size()> ways, ends;
   std::string starts;
@@ -197,7 +198,7 @@ std::string draw_bodies(const World& world, const Snapshot& at, const View& view
   return out;
 }
 
-/// Walls that are no rectangle, on a ground that tells inside from outside.
+/// Walls that are not a rectangle, on ground of another colour than the outside.
 std::string draw_walls(const View& view, const ArenaShape& arena) {
   const std::string style = fmt::format("fill=\"#fbfcfd\" stroke=\"{}\" stroke-width=\"16\"", svg::kInk);
   if (arena.kind() == ArenaShape::Kind::kCircle)
@@ -205,7 +206,7 @@ std::string draw_walls(const View& view, const ArenaShape& arena) {
   return fmt::format("<path d=\"{}\" {}/>\n", outline(view, arena.corners()), style);
 }
 
-/// The arena's walls as far as the view shows them, on a ground that tells inside from outside.
+/// The arena's walls within the view, on ground of another colour than the outside.
 std::string draw_arena(const View& view, const World& world, double width_mm, double height_mm) {
   if (world.arena.kind() != ArenaShape::Kind::kRectangle) return draw_walls(view, world.arena);
   const auto clipped = [](long value, double px) {
@@ -218,6 +219,49 @@ std::string draw_arena(const View& view, const World& world, double width_mm, do
   return fmt::format(
       "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"#fbfcfd\" stroke=\"{}\" stroke-width=\"16\"/>\n",
       left, top, right - left, bottom - top, svg::kInk);
+}
+
+/// A circle that exists in the station alone: food, home, a hub.
+struct VirtualCircle {
+  double x_mm, y_mm, radius_mm;
+  std::string_view name, fill, stroke;
+};
+
+std::vector<VirtualCircle> virtual_circles(const proto::RecordingHeader& header) {
+  std::vector<VirtualCircle> circles;
+  for (const proto::VirtualEnvironment& environment : header.environment()) {
+    if (environment.has_hub()) {
+      const proto::HubEnvironment& hub = environment.hub();
+      circles.push_back({hub.x_mm(), hub.y_mm(), hub.radius_mm(), "hub", "#e3ecf7", "#2563a8"});
+    }
+    if (environment.has_foraging()) {
+      const proto::ForagingEnvironment& foraging = environment.foraging();
+      circles.push_back({foraging.food_x_mm(), foraging.food_y_mm(), foraging.food_radius_mm(), "food", "#f6ecd2",
+                         "#b8860b"});
+      circles.push_back({foraging.home_x_mm(), foraging.home_y_mm(), foraging.home_radius_mm(), "home", "#dff0e6",
+                         "#2a8f5b"});
+    }
+  }
+  return circles;
+}
+
+/// As they are at the start: the food shrinks and the home grows with every load.
+std::string draw_circles(const std::vector<VirtualCircle>& circles, const View& view) {
+  constexpr double kText = 130;
+  std::string out;
+  for (const VirtualCircle& circle : circles) {
+    const long x = view.x(circle.x_mm), y = view.y(circle.y_mm);
+    const double radius = view.length(circle.radius_mm);
+    put(out,
+        "<circle cx=\"{}\" cy=\"{}\" r=\"{:.1f}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"14\" "
+        "stroke-dasharray=\"50 30\"/>\n",
+        x, y, radius, circle.fill, circle.stroke);
+    // Above the circle, or within it where the panel ends.
+    const double above = static_cast<double>(y) - radius - 40;
+    out += svg::text(static_cast<double>(x), above > kText ? above : static_cast<double>(y) - radius + 1.2 * kText, kText,
+                     circle.name, circle.stroke, svg::Anchor::kMiddle);
+  }
+  return out;
 }
 
 /// The lamps as they are at an instant: suns, hollow where they are off.
@@ -240,13 +284,17 @@ std::string draw_lamps(const proto::Light& light, double time_s, const View& vie
   return out;
 }
 
-/// The dashed outline of what another panel shows enlarged.
+/// The dashed outline of what another panel shows enlarged, on a light line that parts it from the paths below.
 std::string draw_frame(const View& view, const Box& box) {
-  return fmt::format(
-      "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"10\" "
-      "stroke-dasharray=\"40 30\"/>\n",
-      view.x(box.x_min_mm), view.y(box.y_max_mm), view.x(box.x_max_mm) - view.x(box.x_min_mm),
-      view.y(box.y_min_mm) - view.y(box.y_max_mm), svg::kFaint);
+  std::string out;
+  for (const auto& [colour, width, dashes] :
+       {std::tuple{svg::kPaper, 40, ""}, {svg::kInk, 16, " stroke-dasharray=\"60 40\""}}) {
+    put(out,
+        "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"{}/>\n",
+        view.x(box.x_min_mm), view.y(box.y_max_mm), view.x(box.x_max_mm) - view.x(box.x_min_mm),
+        view.y(box.y_min_mm) - view.y(box.y_max_mm), colour, width, dashes);
+  }
+  return out;
 }
 
 std::string scale_bar(const View& view, double x, double y) {
@@ -259,7 +307,7 @@ std::string scale_bar(const View& view, double x, double y) {
   return out + svg::text(x + length_px + 8, y + 4, kCaption_px, fmt::format("{:g} mm", length_mm));
 }
 
-/// The commonest LEDs with their numbers, as many as fit, then the failed robots.
+/// The legend of failed robots and of LEDs, the most frequent first, as many as fit.
 std::string led_legend(const Snapshot& at, double x, double y, double width_px) {
   std::map<std::uint8_t, std::size_t> counts;
   std::size_t failures = 0;
@@ -289,7 +337,7 @@ std::string led_legend(const Snapshot& at, double x, double y, double width_px) 
   return out;
 }
 
-/// What grey and coloured dots mean in the panel of paths.
+/// The legend of the panel of paths.
 std::string path_legend(double x, double y) {
   std::string out =
       fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x + 5, y - 4, kStartDot);
@@ -302,7 +350,7 @@ std::string path_legend(double x, double y) {
   return out + svg::text(x, y, kCaption_px, "end, coloured by x at the start", svg::kFaint);
 }
 
-/// A drawing clipped to its frame, with what stands above it, and below it scale bar and remark.
+/// A drawing clipped to its frame: title and time above it, scale bar and remark below.
 struct Panel {
   std::string title, when, drawing, remark;
 };
@@ -328,7 +376,33 @@ Box extent(const Snapshot& at) {
   return box;
 }
 
-/// `inner` where it is much smaller than `outer`, and then with some ground around it.
+/// `box` widened to the shape of a panel, so that a panel shows it and no more.
+Box fitted(const Box& box, double width_px, double height_px) {
+  const double px_per_mm = std::min(width_px / box.width_mm(), height_px / box.height_mm());
+  const double wider_mm = width_px / px_per_mm - box.width_mm(), higher_mm = height_px / px_per_mm - box.height_mm();
+  return {box.x_min_mm - wider_mm / 2, box.y_min_mm - higher_mm / 2, box.x_max_mm + wider_mm / 2,
+          box.y_max_mm + higher_mm / 2};
+}
+
+/// `box` moved into `outer`, which is at least as large.
+Box moved_into(const Box& box, const Box& outer) {
+  const auto shift = [](double low, double high, double outer_low, double outer_high) {
+    return low < outer_low ? outer_low - low : high > outer_high ? outer_high - high : 0.0;
+  };
+  const double x = shift(box.x_min_mm, box.x_max_mm, outer.x_min_mm, outer.x_max_mm);
+  const double y = shift(box.y_min_mm, box.y_max_mm, outer.y_min_mm, outer.y_max_mm);
+  return {box.x_min_mm + x, box.y_min_mm + y, box.x_max_mm + x, box.y_max_mm + y};
+}
+
+/// The bodies whole, wherever they are turned to.
+void add_movables(Box& box, const World& world, const Snapshot& at) {
+  for (std::size_t i = 0; i < world.movables.size(); ++i) {
+    const double reach_mm = world.movables[i].shape.reach_mm();
+    for (const double way_mm : {-reach_mm, reach_mm}) box.add(at.movable_x_mm[i] + way_mm, at.movable_y_mm[i] + way_mm);
+  }
+}
+
+/// `inner` with some ground around it if that is much smaller than `outer`, else `outer`.
 Box zoomed(const Box& inner, const Box& outer) {
   const double size = std::max({inner.width_mm(), inner.height_mm(), 8 * kRobotRadius_mm});
   Box wide = inner.widened(0.06 * size + 2 * kRobotRadius_mm);
@@ -357,35 +431,32 @@ std::string picture_svg(Reader& recording) {
   *stated.mutable_obstacle() = header.obstacle();
   *stated.mutable_movable() = header.movable();
   const World world(stated);
+  const std::vector<VirtualCircle> circles = virtual_circles(header);
   const auto ground = [&](const View& of, const Snapshot& at) {
-    return draw_arena(of, world, arena_width, arena_height) + draw_bodies(world, at, of);
+    return draw_arena(of, world, arena_width, arena_height) + draw_circles(circles, of) + draw_bodies(world, at, of);
   };
   Box everything;
   for (std::size_t i = 0; i < paths.robots(); ++i) {
     for (const Point& p : paths.path(i)) everything.add(p.x_mm, p.y_mm);
   }
-  Box movables;
-  for (const Snapshot* at : {&paths.first(), &paths.last()}) {
-    for (std::size_t i = 0; i < world.movables.size(); ++i) {
-      const double reach_mm = world.movables[i].shape.reach_mm();
-      for (const double way_mm : {-reach_mm, reach_mm})
-        movables.add(at->movable_x_mm[i] + way_mm, at->movable_y_mm[i] + way_mm);
-    }
-  }
-  if (!world.movables.empty()) {
-    everything.add(movables.x_min_mm, movables.y_min_mm);
-    everything.add(movables.x_max_mm, movables.y_max_mm);
+  for (const Snapshot* at : {&paths.first(), &paths.last()}) add_movables(everything, world, *at);
+  for (const VirtualCircle& circle : circles) {
+    everything.add(circle.x_mm - circle.radius_mm, circle.y_mm - circle.radius_mm);
+    everything.add(circle.x_mm + circle.radius_mm, circle.y_mm + circle.radius_mm);
   }
   const Box arena = Box{-arena_width / 2, -arena_height / 2, arena_width / 2, arena_height / 2};
   const Box whole = arena.widened(0.01 * std::max(arena_width, arena_height));
   const Box shown = zoomed(everything, whole);
   const Box start = extent(paths.first());
-  const Box shown_at_start = zoomed(start, shown);
+  Box at_start = start;
+  add_movables(at_start, world, paths.first());
 
   const bool stacked = shown.width_mm() > 2.2 * shown.height_mm();  // wide ones lie one below the other
   const double width_px = stacked ? 900 : 384;
   const double ratio = shown.height_mm() / shown.width_mm();
   const double height_px = std::clamp(width_px * ratio, stacked ? 110.0 : 200.0, 560.0);
+  const Box shown_at_start =
+      moved_into(fitted(zoomed(at_start, shown), width_px, height_px), fitted(shown, width_px, height_px));
   const View view(shown, width_px, height_px), start_view(shown_at_start, width_px, height_px);
   const double enlarged = start_view.px_per_mm() / view.px_per_mm();
   const std::string part =
@@ -405,7 +476,7 @@ std::string picture_svg(Reader& recording) {
   const Panel end_panel{"End", to,
                         ground(view, paths.last()) + draw_discs(paths.last(), view) +
                             draw_lamps(header.light(), paths.last().time_s, view),
-                        large_discs ? "discs larger than life" : part};
+                        large_discs ? "discs drawn larger than robots" : part};
 
   const double panel_height = kPanelTitle_px + height_px + kPanelFoot_px;
   const double step_x = stacked ? 0 : width_px + kGap_px, step_y = stacked ? panel_height : 0;

@@ -1,4 +1,4 @@
-/// The picture of a run: where the robots started, which ways they went, and where they ended.
+/// The picture of a run in three panels: start, paths and end of all robots.
 #pragma once
 
 #include <filesystem>

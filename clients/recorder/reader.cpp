@@ -37,7 +37,7 @@ bool all_within(const google::protobuf::RepeatedField<double>& values, double bo
 
 bool valid_tick(std::int64_t tick) { return tick >= 0 && tick <= kLastTick; }
 
-/// Whether walls and bodies are such as can be drawn.
+/// Whether walls and bodies have shapes that can be drawn.
 bool valid_world(const proto::RecordingHeader& header) {
   proto::Experiment experiment;
   *experiment.mutable_arena() = header.arena();
@@ -161,8 +161,7 @@ bool Reader::fill(std::size_t bytes) {
   return got >= bytes;
 }
 
-/// Reads the frame at offset_ into record_ and moves behind it. False at the end, with a warning where that is no
-/// whole frame's.
+/// Reads the frame at offset_ into record_ and moves behind it. False at the end, with a warning if the end is within a frame.
 bool Reader::read_record() {
   warning_.clear();
   damaged_ = false;
@@ -193,7 +192,7 @@ bool Reader::read_record() {
   return true;
 }
 
-/// What keeps record_ from being handed out; nullptr where nothing does.
+/// Why record_ is not valid; nullptr where it is.
 const char* Reader::defect_of_record() const {
   const auto robots = static_cast<int>(header_.robots());
   switch (record_.kind_case()) {

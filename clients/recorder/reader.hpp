@@ -13,7 +13,7 @@
 
 namespace kilotwin::recorder {
 
-/// Bounds of what a Reader hands out, beyond which a file is no recording.
+/// Bounds of valid recordings.
 inline constexpr std::uint32_t kMostRobots = 100'000;  ///< idl/experiment.proto
 inline constexpr double kFarthest_mm = 1e7;            ///< of a robot from the origin; arenas are at most 1e6 wide
 
@@ -30,8 +30,8 @@ class Reader {
   [[nodiscard]] TickLength tick_length() const { return TickLength{header_.tick_cycles()}; }
   [[nodiscard]] const std::filesystem::path& path() const { return file_; }
 
-  /// The next record after the header, valid until the next call; nullptr at the end. Where the file grows, a later
-  /// call goes on. States have one entry per robot in every field, finite poses and ascending ticks; messages name
+  /// The next record after the header, valid until the next call; nullptr at the end. If the file has grown, a later call
+  /// continues. States have one entry per robot in every field, finite poses and ascending ticks; messages name
   /// robots.
   [[nodiscard]] const proto::Record* next();
   /// The next state among the records, nullptr at the end.
@@ -42,7 +42,7 @@ class Reader {
   /// After next() gave nullptr: whether the end mark of the run was reached. Without it and without a warning, the run
   /// was killed, or goes on.
   [[nodiscard]] bool ended() const { return ended_; }
-  /// After next() gave nullptr: empty, or one line that tells where and how the file breaks off:
+  /// After next() gave nullptr: empty, or one line that says where and how the file breaks off:
   /// "FILE: cut off at byte N; read up to there".
   [[nodiscard]] const std::string& warning() const { return warning_; }
   /// After next() gave nullptr: whether the warning is about bytes that changed since they were written. A file that is
@@ -66,7 +66,7 @@ class Reader {
   bool ended_ = false, damaged_ = false;
   std::uint64_t offset_ = 0;         // of the next frame in the file
   std::uint64_t records_from_ = 0;   // offset of the first frame after the header
-  std::int64_t last_state_ = 0;      // tick of the last state handed out
+  std::int64_t last_state_ = 0;      // tick of the last state that next() returned
   std::vector<std::uint8_t> block_;  // bytes of the file from block_from_ on
   std::uint64_t block_from_ = 0;
 };

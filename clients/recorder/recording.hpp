@@ -1,4 +1,4 @@
-/// What writer and readers of a recording agree on, besides idl/recording.proto.
+/// The format of recordings beyond idl/recording.proto: frames, header, schedule.
 #pragma once
 
 #include <cstddef>
@@ -40,19 +40,20 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   *header.mutable_movable() = experiment.movable();
   if (experiment.has_light()) *header.mutable_light() = experiment.light();
   for (const proto::RobotGroup& group : experiment.robots()) header.add_group_robots(group.count());
+  *header.mutable_environment() = experiment.station().environment();
   header.set_messages(experiment.recording().messages());
   header.set_first_tick(first_tick.count());
   header.set_first_hash(first_hash);
   return header;
 }
 
-/// A field of a state as the functions of this folder take it.
+/// A field of a state as a span.
 [[nodiscard]] inline std::span<const double> values(const google::protobuf::RepeatedField<double>& field) {
   return {field.data(), static_cast<std::size_t>(field.size())};
 }
 
-/// The first tick at or after `seconds` (>= 0), where a multiple of an interval that is meant to be a tick, and by
-/// rounding lies some nanoseconds behind it, counts as that tick.
+/// The first tick at or after `seconds` (>= 0). A multiple of an interval that rounding has moved some nanoseconds behind a
+/// tick counts as that tick.
 [[nodiscard]] inline Tick tick_at_or_after(TickLength length, double seconds) {
   constexpr double kSlack_ticks = 1e-6;
   const double ticks = seconds / length.seconds() - kSlack_ticks;

@@ -1,8 +1,8 @@
-/// RunDirectory: where the files of one run lie.
+/// RunDirectory: the files of one run.
 ///   manifest.pb      the experiment as resolved, for machines: idl/manifest.proto
 ///   experiment.txtpb the experiment as run; it runs again from there
-///   programs/        the behaviours as built, SHA256.so, and firmware as it was given, SHA256.elf or .hex
-///   recording.ktrec  what happened: idl/recording.proto
+///   programs/        the behaviours as built, SHA256.so, and firmware as given, SHA256.elf or .hex
+///   recording.ktrec  states and events over time: idl/recording.proto
 ///   provenance.json  by what, when and where the run was prepared: clients/recorder/provenance.hpp
 ///   summary.json     clients/recorder/summary.hpp
 ///   picture.svg      clients/recorder/picture.hpp
@@ -30,7 +30,7 @@ class RunDirectory {
   /// Makes a directory for new results, and `programs` in it. Of several that start at the same time each gets its own.
   /// Throws RunError where none can be made, UserError where `wanted` is a file.
   [[nodiscard]] static RunDirectory create(const std::filesystem::path& wanted, Existing = Existing::kNumber);
-  /// runs/NAME-SEED, which create() takes where the user names none.
+  /// runs/NAME-SEED: the directory of runs without --out.
   [[nodiscard]] static std::filesystem::path default_path(std::string_view name, std::uint64_t seed);
 
   enum class Needs { kRecording, kManifest };

@@ -1,4 +1,4 @@
-/// What a sweep tells of many runs or robots: means with standard errors, and displacements.
+/// Statistics over runs or robots: means with standard errors, and displacements.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace kilotwin::recorder {
 
-/// Mean and spread of values as they come (Welford's recurrence: no cancellation).
+/// Mean and standard deviation, updated per value (Welford 1962: no cancellation).
 class Sample {
  public:
   void add(double value);
@@ -15,7 +15,7 @@ class Sample {
   [[nodiscard]] double mean() const { return mean_; }  ///< 0 without values
   /// With n - 1 in the denominator; 0 for fewer than two values.
   [[nodiscard]] double standard_deviation() const;
-  /// Of the mean: standard deviation / sqrt(n); 0 for fewer than two values, which say nothing of it.
+  /// Of the mean: standard deviation / sqrt(n); 0 for fewer than two values.
   [[nodiscard]] double standard_error() const;
 
  private:
@@ -23,7 +23,7 @@ class Sample {
   double mean_ = 0, squares_ = 0;
 };
 
-/// How far robots are from where they were in the first state. Every state has the same robots.
+/// Distances of robots from their first recorded places. Every state has the same robots.
 class DisplacementObserver {
  public:
   void add(std::span<const double> x_mm, std::span<const double> y_mm);

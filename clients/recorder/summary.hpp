@@ -1,4 +1,4 @@
-/// Summary: what a run was and did, as summary.json for scripts and as a few lines for people.
+/// Summary: facts and counts of a run, as summary.json for scripts and as a few lines for people.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,11 @@ struct Summary {
   std::uint32_t hosts = 1;
   std::uint32_t robots = 0;
   std::int64_t ticks = 0;                ///< the run's last tick
-  std::int64_t resumed_from_tick = 0;    ///< 0 where it began at the beginning
-  std::int64_t recovered_from_tick = 0;  ///< where it went on after its last recovery
+  std::int64_t resumed_from_tick = 0;    ///< 0 if the run started at tick 0
+  std::int64_t recovered_from_tick = 0;  ///< tick of the checkpoint of the last recovery; 0: none
   double simulated_s = 0;                ///< at the last tick
-  double start_s = 0;                    ///< wall time from the command to the first tick, or to where it went on
-  double wall_s = 0;                     ///< wall time from there to the last tick
+  double start_s = 0;                    ///< wall time from the command to the first tick of this attempt
+  double wall_s = 0;                     ///< wall time from that tick to the last tick
   double cpu_s = 0;                      ///< of all processes of the run
   double peak_memory_mib = 0;            ///< of all processes of the run, resident
   std::uint64_t state_hash = 0;          ///< 16 hex digits in the file
@@ -64,7 +64,7 @@ void write_summary(const Summary& summary, const std::filesystem::path& file);
 /// ...".
 [[nodiscard]] Summary read_summary(const std::filesystem::path& file);
 
-/// 8 to 12 lines that tell what happened and where the results are.
+/// 8 to 12 lines: what happened, and where the results are.
 /// `place`: the directory of the results, in words.
 [[nodiscard]] std::string summary_text(const Summary& summary, const std::string& place);
 

@@ -1,4 +1,4 @@
-/// What the pictures share: text, colours and the frame of an SVG document.
+/// Text, colours and the document frame that all pictures share.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 namespace kilotwin::recorder::svg {
 
 inline constexpr std::string_view kInk = "#1f2933";    ///< text and outlines
-inline constexpr std::string_view kFaint = "#66727f";  ///< what explains
+inline constexpr std::string_view kFaint = "#66727f";  ///< explanations
 inline constexpr std::string_view kLine = "#c8d0d9";   ///< grids and frames
 inline constexpr std::string_view kPaper = "#ffffff";
 
@@ -24,7 +24,7 @@ inline constexpr std::array<std::string_view, 8> kPalette = {"#2563a8", "#d95f0e
 /// The first `most` characters, with an ellipsis where there were more.
 [[nodiscard]] std::string shortened(std::string_view text, std::size_t most);
 
-/// About how wide a line is, px: the mean advance of sans-serif fonts is 0.55 of their size.
+/// Approximate width of a line, px: the mean advance of sans-serif fonts is 0.55 of their size.
 [[nodiscard]] double text_width_px(std::string_view text, double size_px);
 
 enum class Anchor { kStart, kMiddle, kEnd };
@@ -33,8 +33,7 @@ enum class Anchor { kStart, kMiddle, kEnd };
 [[nodiscard]] std::string text(double x, double y, double size_px, std::string_view line,
                                std::string_view colour = kInk, Anchor anchor = Anchor::kStart, bool bold = false);
 
-/// The document around `body`, on paper of its own so that it reads on light and dark pages. `description` is for
-/// those who hear it.
+/// The document around `body`, with its own background for light and dark pages. `description` is for screen readers.
 [[nodiscard]] std::string document(double width_px, double height_px, std::string_view title,
                                    std::string_view description, std::string_view body);
 

@@ -10,11 +10,11 @@
 namespace kilotwin::recorder {
 namespace {
 
-/// Half of the second that is promised: what follows a flush closely may wait for the next call.
+/// Half of the promised second: a record that closely follows a flush waits for the next call.
 constexpr std::int64_t kFlushEvery_ns = 500'000'000;
 /// Hashes in one record.
 constexpr int kHashesPerRecord = 4096;
-/// Of the 256 KiB that are promised, what the hashes that wait may take is left out.
+/// The promised 256 KiB less the hashes that may wait.
 constexpr std::size_t kMostUnflushed_bytes = 256 * 1024 - kHashesPerRecord * sizeof(std::uint64_t);
 
 /// Wall time. The coarse clock (about 4 ms) costs 5 ns, which counts in runs of a few robots.

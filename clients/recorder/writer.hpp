@@ -1,8 +1,7 @@
-/// Writer: the recording of a run, as the run goes. One thread.
+/// Writer: writes the recording of a run while it runs. For one thread.
 ///
-/// What is older than about a second, or more than 256 KiB, is in the kernel and outlives a killed process. Time is
-/// looked at in each call; a run that makes none for long, because it is paused or waits, calls flush_if_due()
-/// while it waits.
+/// At most about one second or 256 KiB of records are lost if the process is killed: every call checks both. A run that
+/// records nothing for long, because it is paused or waits, calls flush_if_due() meanwhile.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +21,7 @@ struct StateView {
   std::span<const std::uint8_t> led;                                              ///< r | g << 2 | b << 4
   std::span<const std::uint8_t> life_cycle;                                       ///< LifeCycle
   std::span<const double> movable_x_mm{}, movable_y_mm{}, movable_heading_rad{};  ///< per movable body, from 0
-  /// As a tracker sees them; empty where that is how they are.
+  /// Poses as a tracker measures them; empty if the model has no effects on measurement.
   std::span<const double> measured_x_mm = {}, measured_y_mm = {}, measured_heading_rad = {};
 };
 
@@ -33,22 +32,21 @@ class Writer {
   /// Creates the file, which must not exist, and writes the header at once.
   Writer(std::filesystem::path file, const proto::RecordingHeader& header);
 
-  /// A state, or a state hash H(tick). Ticks at or before the last one recorded are passed over: a run that went
-  /// back to a checkpoint repeats them, bit for bit.
+  /// A state, or a state hash H(tick). Ticks at or before the last recorded one are ignored: a run that returned to a
+  /// checkpoint repeats them bit for bit.
   void state(const StateView& state);
   void hash(Tick tick, std::uint64_t chain);
   void input(const proto::InputRecord& input);
-  /// Counts since the start; they take the place of what was recorded for the same pairs before.
+  /// Counts since the start. They replace earlier counts of the same pairs.
   void messages(const proto::MessagesRecord& messages);
   /// One entry per robot in every field.
   void radio(const proto::RadioRecord& radio);
-  /// The last record of all, where the run came to its end. `failure`: one line, empty where it ended well. Closes
-  /// the file.
+  /// The end mark of a run that came to its end. `failure`: one line, empty if the run succeeded. Closes the file.
   void end(Tick tick, std::uint64_t state_hash, const std::string& failure = {});
 
-  /// Hands everything to the kernel.
+  /// Writes everything to the file.
   void flush();
-  /// The same, where the last time lies half a second back or much waits.
+  /// The same if the last flush was half a second ago, or if the buffer is long.
   void flush_if_due();
   /// Bytes recorded so far.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
@@ -63,7 +61,7 @@ class Writer {
   std::int64_t last_state_, last_hash_;
   std::int64_t flushed_ns_ = 0;
   std::uint64_t bytes_ = 0;
-  proto::Record state_, hashes_, other_;  // kept, so that their memory serves again
+  proto::Record state_, hashes_, other_;  // reused: they keep their memory
 };
 
 }  // namespace kilotwin::recorder

@@ -1,4 +1,4 @@
-/// Checkpoints on disk: RUN/checkpoints/TICK/ holds one file per part, each put there whole. A checkpoint is complete when
+/// Checkpoints on disk: RUN/checkpoints/TICK/ holds one file per part, each written whole. A checkpoint is complete when
 /// all its parts are there.
 #pragma once
 
@@ -16,17 +16,17 @@ struct Checkpoint {
   std::vector<proto::CheckpointPart> parts;
   /// H at `tick`.
   [[nodiscard]] std::uint64_t hash_chain() const;
-  /// One kind of state out of all parts, as engines' load() takes it.
+  /// The states of one kind from all parts, for the load() of engines.
   [[nodiscard]] std::vector<const proto::PhysicsState*> physics() const;
   [[nodiscard]] std::vector<const proto::RadioState*> radio() const;
   [[nodiscard]] std::vector<const proto::StationState*> station() const;
   [[nodiscard]] std::vector<const proto::BehavioursState*> behaviours() const;
 };
 
-/// Where the checkpoint of a tick lies.
+/// The directory of the checkpoint of a tick.
 [[nodiscard]] std::filesystem::path checkpoint_directory(const std::filesystem::path& run_directory, Tick tick);
 
-/// Names what a checkpoint can be resumed by: the experiment without what may differ (length, division, recording).
+/// A hash of the experiment without the fields in which a resuming run may differ (length, division, recording).
 [[nodiscard]] std::uint64_t resumable_hash(const proto::Manifest& manifest);
 
 /// Writes `part` (its header is filled in here) of the checkpoint of `tick`, saved by federate `id` of the plan.

@@ -1,4 +1,4 @@
-/// Checkpoints that a run takes by itself: from them it continues when a robot's program has brought down its host.
+/// Snapshots: checkpoints for recovery. If a robot's program ends its host, the run continues from one.
 #pragma once
 
 #include <chrono>
@@ -9,19 +9,19 @@
 
 namespace kilotwin {
 
-/// One for each minute that a run takes, of which the last two are kept. A run that comes to its end leaves none.
+/// One per minute of wall time; the last two are kept. A run that comes to its end leaves none.
 class Snapshots {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr auto kPeriod = std::chrono::seconds(60);
 
-  /// `wanted`: false where the run has checkpoints of its own, or is not to write any.
+  /// `wanted`: false if the run saves checkpoints anyway, or must not write any.
   Snapshots(std::filesystem::path run_directory, bool wanted)
       : run_directory_(std::move(run_directory)), wanted_(wanted) {}
 
   /// Whether one is due. Minutes are counted from the first call.
   [[nodiscard]] bool due(Clock::time_point now);
-  /// One is taken at `tick`; removes the one before the one before.
+  /// A snapshot was taken at `tick`. Removes all but the last two.
   void taken(Tick tick);
   /// The run has come to its end.
   void remove_all();

@@ -190,7 +190,27 @@ TEST_F(Commands, SweepTabulatesAllCombinations) {
   EXPECT_NE(outcome.out.find("robots.layout.grid.pitch_mm=60"), std::string::npos) << outcome.out;
   const std::string csv = read(scratch / "sweep/sweep.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
-  EXPECT_TRUE(fs::exists(scratch / "sweep/sweep.svg"));
+  // The legend names the field once, and a value per curve.
+  const std::string plot = read(scratch / "sweep/sweep.svg");
+  EXPECT_NE(plot.find("robots.layout.grid.pitch_mm:"), std::string::npos);
+  EXPECT_EQ(plot.find("pitch_mm=40"), std::string::npos);
+  EXPECT_NE(plot.find(">40<"), std::string::npos);
+  const std::string page = read(scratch / "sweep/report.html");
+  for (const char* text : {"<h1>disperse</h1>", "data:image/svg+xml;base64,", "robots.layout.grid.pitch_mm=60</td>", "--seeds"})
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+}
+
+TEST_F(Commands, ASweepOfOneValueNeedsNoLegend) {
+  const Outcome outcome =
+      kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "9", "--duration", "2", "--seeds", "1..2",
+                "--set", "robots.layout.grid.pitch_mm=40", "--out", scratch / "sweep"},
+               scratch);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  // The value stands in the subtitle alone.
+  const std::string plot = read(scratch / "sweep/sweep.svg");
+  const std::size_t first = plot.find("robots.layout.grid.pitch_mm=40");
+  EXPECT_NE(first, std::string::npos);
+  EXPECT_EQ(plot.find("pitch_mm=40", first + 30), std::string::npos);
 }
 
 TEST_F(Commands, SweepOverARangeOfNumbersPlotsTheResponse) {
@@ -202,7 +222,7 @@ TEST_F(Commands, SweepOverARangeOfNumbersPlotsTheResponse) {
   // Of each point the states at 0, 1, 2 and 3 s, and a header.
   const std::string curves = read(scratch / "sweep/curves.csv");
   EXPECT_EQ(std::count(curves.begin(), curves.end(), '\n'), 1 + 4 * 4);
-  EXPECT_NE(curves.find("\"physics.sub_steps=4\",0,1,0,"), std::string::npos) << curves;
+  EXPECT_NE(curves.find("\nphysics.sub_steps=4,0,1,0,"), std::string::npos) << curves;
   EXPECT_EQ(kilotwin({"sweep", source("experiments/diffusion.txtpb"), "--plot", "speed"}, scratch).status, 2);
 }
 
@@ -219,7 +239,7 @@ TEST_F(Commands, AnInterruptedSweepReportsTheRunsThatEnded) {
   const Outcome outcome = sweep.wait();
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.err.find("interrupted; 2 of 4 runs were done"), std::string::npos) << outcome.err;
-  EXPECT_NE(read(scratch / "sweep/sweep.csv").find("\"duration_s=1\",2,"), std::string::npos);
+  EXPECT_NE(read(scratch / "sweep/sweep.csv").find("\nduration_s=1,2,"), std::string::npos);
   EXPECT_TRUE(processes_with(scratch / "sweep").empty());
 }
 

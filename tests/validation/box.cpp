@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "clients/recorder/plot.hpp"
+#include "clients/report/plot.hpp"
 #include "tests/validation/validations.hpp"
 
 namespace kilotwin::validation {
@@ -20,13 +20,13 @@ struct Formation {
 };
 
 /// Adds rows and returns how far the box got, by number of robots.
-recorder::PlotSeries validate_formation(Runs& runs, Verdicts& verdicts, const std::string& engine,
+PlotSeries validate_formation(Runs& runs, Verdicts& verdicts, const std::string& engine,
                                         const Formation& formation, std::size_t first, std::size_t last) {
   std::vector<std::string> words{"--set", fmt::format("robots.count={}..{}", first, last), "--set",
                                  "physics.engine=" + engine};
   words.insert(words.end(), formation.words.begin(), formation.words.end());
   const std::vector<Recorded> swept = runs.sweep(runs.source("experiments/box-push.txtpb"), words);
-  recorder::PlotSeries series;
+  PlotSeries series;
   series.name = engine + ", " + formation.name;
   for (std::size_t i = 0; i < swept.size(); ++i) {
     const Recorded& run = swept[i];
@@ -58,7 +58,7 @@ void validate_box(Runs& runs, Verdicts& verdicts, Effort effort) {
                           {"--set", "robots.layout.grid.columns=1", "--set", "robots.layout.grid.pitch_mm=33.5"}};
   const Formation three{"in three columns",
                         {"--set", "robots.layout.grid.columns=3", "--set", "robots.layout.grid.pitch_mm=33.5"}};
-  recorder::Plot plot;
+  Plot plot;
   plot.title = "How many robots it takes to push a box of 18 g";
   plot.subtitle = "way of the box in 40 s; robots drive at 10 mm/s";
   plot.x_name = "robots";
@@ -75,7 +75,7 @@ void validate_box(Runs& runs, Verdicts& verdicts, Effort effort) {
       plot.series.push_back(
           validate_formation(runs, verdicts, engine, formation, effort.quick ? 4 : 1, effort.quick ? 5 : 8));
   }
-  if (!effort.plots.empty()) recorder::write_plot(plot, effort.plots / "validation-box.svg");
+  if (!effort.plots.empty()) write_plot(plot, effort.plots / "validation-box.svg");
 }
 
 }  // namespace kilotwin::validation

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "clients/recorder/plot.hpp"
+#include "clients/report/plot.hpp"
 #include "tests/validation/reference.hpp"
 #include "tests/validation/validations.hpp"
 
@@ -16,8 +16,8 @@ Figure msd_at(const std::vector<Recorded>& swarms, double time_s) {
   return mean_of(values);
 }
 
-recorder::PlotSeries curve(const std::string& name, const std::vector<Recorded>& swarms) {
-  recorder::PlotSeries series;
+PlotSeries curve(const std::string& name, const std::vector<Recorded>& swarms) {
+  PlotSeries series;
   series.name = name;
   series.points = false;
   series.band = true;
@@ -31,8 +31,8 @@ recorder::PlotSeries curve(const std::string& name, const std::vector<Recorded>&
 }
 
 template <std::size_t kPoints>
-recorder::PlotSeries points(const std::string& name, const std::array<ReferencePoint, kPoints>& reference) {
-  recorder::PlotSeries series;
+PlotSeries points(const std::string& name, const std::array<ReferencePoint, kPoints>& reference) {
+  PlotSeries series;
   series.name = name;
   series.line = false;
   for (const ReferencePoint& point : reference) {
@@ -70,7 +70,7 @@ void validate_diffusion(Runs& runs, Verdicts& verdicts, Effort effort) {
                       {without.value / with.value}, 1 + kAgreement);
   }
   if (effort.plots.empty()) return;
-  recorder::Plot plot;
+  Plot plot;
   plot.title = "A crowd of 50 robots diffuses";
   plot.subtitle = fmt::format("seeds {}; shaded and bars: standard error of the mean", seeds);
   plot.x_name = "time";
@@ -79,7 +79,7 @@ void validate_diffusion(Runs& runs, Verdicts& verdicts, Effort effort) {
   plot.y_unit = "mm\u00b2";
   plot.series = {curve("contact", crowd), points("ARGoS", kDiffusionRing), curve("no contact", free),
                  points("ARGoS, far apart", kDiffusionFar)};
-  recorder::write_plot(plot, effort.plots / "validation-diffusion.svg");
+  write_plot(plot, effort.plots / "validation-diffusion.svg");
 }
 
 }  // namespace kilotwin::validation

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "clients/recorder/plot.hpp"
+#include "clients/report/plot.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "tests/validation/reference.hpp"
 #include "tests/validation/straight_theory.hpp"
@@ -82,7 +82,7 @@ void validate_straight(Runs& runs, Verdicts& verdicts, Effort effort) {
                             {measured.value * scale, measured.error * scale}, {point.value, point.error}, 3);
   }
   if (!effort.plots.empty()) {
-    recorder::Plot plot;
+    Plot plot;
     plot.title = "600 robots drive straight on";
     plot.subtitle = "wheel biases bend their paths; bars: standard error of the mean";
     plot.x_name = "time";
@@ -107,7 +107,7 @@ void validate_straight(Runs& runs, Verdicts& verdicts, Effort effort) {
       put(1, exact_s, measured);
     }
     for (const ReferencePoint& point : kStraightNoise) put(2, point.time_s, {point.value, point.error});
-    recorder::write_plot(plot, effort.plots / "validation-straight.svg");
+    write_plot(plot, effort.plots / "validation-straight.svg");
   }
   const std::vector<Recorded> clean =
       runs.sweep(runs.source("experiments/straight.txtpb"),

@@ -13,7 +13,7 @@
 #include "clients/identify/radio/grid_run.hpp"
 #include "clients/identify/radio/link_fit.hpp"
 #include "clients/identify/radio/scores.hpp"
-#include "clients/recorder/plot.hpp"
+#include "clients/report/plot.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "idl/model.pb.h"
@@ -509,14 +509,14 @@ void Loop::write_result() const {
 
 void Loop::write_figures() const {
   for (std::size_t q = 0; q < train_.size(); ++q) {
-    recorder::Plot plot;
+    Plot plot;
     plot.title = fmt::format("Reception over distance, {}", train_[q].name);
     plot.subtitle = fmt::format("{} held-out runs; {} simulated runs", test_[q].runs.size(), options_.runs);
     plot.x_name = "distance";
     plot.x_unit = "mm";
     plot.y_name = "reception share";
     const auto series = [&](const std::string& name, const Statistics& s) {
-      recorder::PlotSeries& line = plot.series.emplace_back();
+      PlotSeries& line = plot.series.emplace_back();
       line.name = name;
       line.line = false;
       for (const DisplacementClass& c : s.classes) {
@@ -528,9 +528,9 @@ void Loop::write_figures() const {
     series("measured", statistics(test_[q]));
     series(steps_.front().name, steps_.front().errors[q].simulated);
     series("all effects", steps_.back().errors[q].simulated);
-    recorder::write_plot(plot, options_.out / ("reception-" + train_[q].name + ".svg"));
+    write_plot(plot, options_.out / ("reception-" + train_[q].name + ".svg"));
   }
-  recorder::Plot plot;
+  Plot plot;
   plot.title = "Gain of each effect";
   plot.subtitle = "log-likelihood of held-out runs, below that of the training runs' means";
   plot.x_name = "effect";
@@ -539,14 +539,14 @@ void Loop::write_figures() const {
   plot.y_logarithmic = true;
   for (const Step& step : steps_) plot.x_categories.push_back(step.name);
   for (std::size_t q = 0; q < train_.size(); ++q) {
-    recorder::PlotSeries& line = plot.series.emplace_back();
+    PlotSeries& line = plot.series.emplace_back();
     line.name = train_[q].name;
     for (std::size_t n = 0; n < steps_.size(); ++n) {
       line.x.push_back(static_cast<double>(n));
       line.y.push_back(std::max(steps_[n].errors[q].deficit, 1e-3));
     }
   }
-  recorder::write_plot(plot, options_.out / "effects.svg");
+  write_plot(plot, options_.out / "effects.svg");
 }
 
 void Loop::go() {

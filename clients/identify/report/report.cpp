@@ -8,7 +8,7 @@
 
 #include "clients/identify/report/report_effects.hpp"
 #include "clients/identify/report/report_figures.hpp"
-#include "clients/identify/report/report_html.hpp"
+#include "clients/report/html.hpp"
 #include "clients/identify/report/report_plots.hpp"
 #include "clients/identify/report/report_simulated.hpp"
 #include "clients/identify/report/report_summary.hpp"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/identify/report/report_html.hpp"
+#include "clients/report/html.hpp"
 
 namespace kilotwin::identify::report {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identify/report/report_html.hpp"
+#include "clients/report/html.hpp"
 #include "clients/identify/report/report_plots.hpp"
 
 namespace kilotwin::identify::report {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "clients/identify/report/gnuplot.hpp"
+#include "clients/report/gnuplot.hpp"
 
 namespace kilotwin::identify {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "clients/identify/report/report_html.hpp"
+#include "clients/report/html.hpp"
 
 namespace kilotwin::identify::report {
 namespace {

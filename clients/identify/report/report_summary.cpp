@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "clients/identify/report/report_html.hpp"
+#include "clients/report/html.hpp"
 
 namespace kilotwin::identify::report {
 namespace {

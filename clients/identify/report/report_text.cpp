@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "clients/identify/report/report_html.hpp"
+#include "clients/report/html.hpp"
 #include "clients/identify/report/report_plots.hpp"
 
 namespace kilotwin::identify::report {

@@ -9,8 +9,8 @@
 #include <random>
 #include <string>
 
-#include "clients/identify/report/gnuplot.hpp"
-#include "clients/identify/report/report_html.hpp"
+#include "clients/report/gnuplot.hpp"
+#include "clients/report/html.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {

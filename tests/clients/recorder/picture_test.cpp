@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
+#include <sstream>
+#include <vector>
 
+#include "clients/recorder/axis.hpp"
 #include "clients/recorder/paths.hpp"
 #include "clients/recorder/svg.hpp"
 #include "core/base/error.hpp"
@@ -76,6 +80,82 @@ TEST(Picture, EnlargesASmallSwarmAndSaysSo) {
   EXPECT_FALSE(full.has_text("enlarged"));
 }
 
+TEST(Picture, ShowsFoodAndHomeOfTheStation) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(4);
+  header.set_arena_height_mm(2000);
+  header.add_environment()->mutable_foraging();
+  header.add_environment()->mutable_hub();
+  const Xml xml(picture_of(scratch, header, 30));
+  for (const char* const name : {"food", "home", "hub"}) {
+    EXPECT_TRUE(xml.has_text(name)) << name;
+  }
+  // The food's circle, far from all robots, lies within each of the three panels.
+  int circles = 0;
+  for (const Element& element : xml.elements()) {
+    if (element.name != "circle" || element.attribute("stroke") != "#b8860b") continue;
+    ++circles;
+    EXPECT_GE(std::stod(element.attribute("cx")), 0);
+    EXPECT_GE(std::stod(element.attribute("cy")), 0);
+  }
+  EXPECT_EQ(circles, 3);
+}
+
+/// The numbers of a path or a rectangle.
+std::vector<double> numbers_of(std::string text) {
+  for (char& c : text) c = (c >= '0' && c <= '9') || c == '-' || c == '.' ? c : ' ';
+  std::istringstream in(text);
+  return {std::istream_iterator<double>(in), {}};
+}
+
+TEST(Picture, ShowsMovableBodiesWholeWhereItEnlarges) {
+  const Scratch scratch;
+  proto::RecordingHeader header = synthetic_header(3);
+  proto::MovableBody& body = *header.add_movable();
+  body.mutable_box()->set_width_mm(300);
+  body.mutable_box()->set_length_mm(100);
+  {
+    Writer writer(scratch / "r.ktrec", header);
+    for (const int t : {0, 1}) {
+      const std::vector<double> x{-40, 0, 40}, y(3, -400 + 300.0 * t), heading(3, 1.57), body_x{0},
+          body_y{-330 + 300.0 * t}, body_heading{0};
+      const std::vector<std::uint8_t> led(3, 0), life(3, 4);
+      writer.state({Tick{t}, x, y, heading, led, life, body_x, body_y, body_heading});
+    }
+    writer.end(Tick{1}, 0);
+  }
+  Reader reader(scratch / "r.ktrec");
+  const Xml xml(picture_svg(reader));
+  EXPECT_TRUE(xml.has_text("see dashed frame"));
+  std::vector<double> panel;  // viewBox of the panel that the element lies in
+  int bodies = 0, frames = 0;
+  for (const Element& element : xml.elements()) {
+    if (element.name == "svg") panel = numbers_of(element.attribute("viewBox"));
+    if (element.name == "path" && element.attribute("fill") == "#e9d8b4") {
+      ++bodies;
+      const std::vector<double> corners = numbers_of(element.attribute("d"));
+      ASSERT_EQ(corners.size(), 8u);
+      for (std::size_t i = 0; i < corners.size(); ++i) {
+        EXPECT_GT(corners[i], 0) << "body " << bodies;
+        EXPECT_LT(corners[i], panel[2 + i % 2]) << "body " << bodies;
+      }
+    }
+    if (element.name == "rect" && element.attribute("stroke-dasharray") == "60 40") {
+      ++frames;
+      const double left = std::stod(element.attribute("x")), top = std::stod(element.attribute("y"));
+      EXPECT_GE(left, -1);
+      EXPECT_GE(top, -1);
+      EXPECT_LE(left + std::stod(element.attribute("width")), panel[2] + 1);
+      EXPECT_LE(top + std::stod(element.attribute("height")), panel[3] + 1);
+      EXPECT_NEAR(std::stod(element.attribute("width")) / std::stod(element.attribute("height")), panel[2] / panel[3],
+                  0.02)
+          << "the frame has the shape of the panel that it stands for";
+    }
+  }
+  EXPECT_EQ(bodies, 3);
+  EXPECT_EQ(frames, 1);
+}
+
 TEST(Picture, OddRunsAreDrawnToo) {
   const Scratch scratch;
   proto::RecordingHeader header = synthetic_header(1);
@@ -88,6 +168,14 @@ TEST(Picture, OddRunsAreDrawnToo) {
     header.set_arena_height_mm(height);
     EXPECT_FALSE(Xml(picture_of(scratch, header, 5000)).elements().empty());
   }
+}
+
+TEST(ScaleBar, StepsAreRound) {
+  EXPECT_DOUBLE_EQ(round_step(10, 5), 2);
+  EXPECT_DOUBLE_EQ(round_step(10, 10), 1);
+  EXPECT_DOUBLE_EQ(round_step(11, 5), 5);
+  EXPECT_DOUBLE_EQ(round_step(0.7, 7), 0.1);
+  EXPECT_DOUBLE_EQ(round_step(6e6, 6), 1e6);
 }
 
 TEST(Picture, WithoutAStateThereIsNone) {

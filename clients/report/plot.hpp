@@ -1,11 +1,13 @@
-/// A plot of points with error bars and lines, as SVG.
+/// A plot of points with error bars, lines and bands, drawn by gnuplot as SVG.
 #pragma once
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
-namespace kilotwin::recorder {
+#include "clients/report/gnuplot.hpp"
+
+namespace kilotwin {
 
 struct PlotSeries {
   std::string name;           ///< in the legend, which is left out for one series without a name
@@ -19,17 +21,22 @@ struct PlotSeries {
 struct Plot {
   std::string title;
   std::string subtitle;        ///< small, below the title: what the bars are, how many runs
+  std::string legend_title;    ///< what the names of the series have in common
   std::string x_name, x_unit;  ///< unit "" where there is none
   std::string y_name, y_unit;
   std::vector<std::string> x_categories;  ///< where x is no number: the names of x = 0, 1, 2...
   bool x_logarithmic = false;             ///< ignored where some x <= 0
-  bool y_logarithmic = false;
+  bool y_logarithmic = false;             ///< ignored where some y <= 0
   std::vector<PlotSeries> series;
 };
 
+/// Adds the plot to those that one gnuplot process draws; returns its number.
+std::size_t add_plot(Gnuplot& plots, const Plot& plot);
+
+/// Throws RunError where gnuplot is missing.
 [[nodiscard]] std::string plot_svg(const Plot& plot);
 
 /// Throws RunError.
 void write_plot(const Plot& plot, const std::filesystem::path& file);
 
-}  // namespace kilotwin::recorder
+}  // namespace kilotwin

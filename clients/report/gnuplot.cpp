@@ -1,4 +1,4 @@
-#include "clients/identify/report/gnuplot.hpp"
+#include "clients/report/gnuplot.hpp"
 
 #include <fmt/format.h>
 #include <stdlib.h>
@@ -9,7 +9,7 @@
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
 
-namespace kilotwin::identify {
+namespace kilotwin {
 namespace fs = std::filesystem;
 namespace {
 
@@ -109,4 +109,4 @@ std::string gnuplot_text(std::string_view text) {
   return out + "'";
 }
 
-}  // namespace kilotwin::identify
+}  // namespace kilotwin

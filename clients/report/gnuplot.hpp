@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kilotwin::identify {
+namespace kilotwin {
 
 /// Plots that one gnuplot process draws.
 class Gnuplot {
@@ -33,4 +33,4 @@ class Gnuplot {
 /// A quoted gnuplot string. Commands and markup in it have no effect.
 [[nodiscard]] std::string gnuplot_text(std::string_view text);
 
-}  // namespace kilotwin::identify
+}  // namespace kilotwin

@@ -6,7 +6,9 @@
 #include <string_view>
 #include <vector>
 
-namespace kilotwin::identify::html {
+#include <kainjow/mustache.hpp>
+
+namespace kilotwin::html {
 
 /// Escaped text. Invalid UTF-8 is replaced.
 [[nodiscard]] std::string escaped(std::string_view text);
@@ -19,6 +21,12 @@ namespace kilotwin::identify::html {
 /// An inline image.
 [[nodiscard]] std::string image(std::string_view svg, std::string_view alt);
 
+/// What a template is filled with.
+using Data = kainjow::mustache::data;
+
+/// A mustache template, filled. {{names}} are escaped, {{{names}}} are markup.
+[[nodiscard]] std::string rendered(std::string_view text, const Data& data);
+
 class Table {
  public:
   explicit Table(std::vector<std::string> heads) : heads_(std::move(heads)) {}
@@ -28,10 +36,10 @@ class Table {
 
  private:
   std::vector<std::string> heads_;
-  std::string rows_;
+  std::vector<Data> rows_;
 };
 
 /// The whole document around `body`, with its style sheet.
 [[nodiscard]] std::string page(std::string_view title, std::string_view body);
 
-}  // namespace kilotwin::identify::html
+}  // namespace kilotwin::html
