@@ -1,33 +1,82 @@
-# Flags that every target of the project shares, and two functions that declare targets.
+# Flags that all targets share, and the functions that declare targets.
+
+set(KILOTWIN_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
+option(KILOTWIN_WERROR "Treat warnings as errors" OFF)
+option(KILOTWIN_PCH "Precompile the headers of the standard library and of the packages" ON)
 
 add_library(kilotwin_flags INTERFACE)
 target_compile_options(kilotwin_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Werror
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion
   # Results must have the same bits whatever compiler and level built them: docs/explanation/determinism.md.
   -ffp-contract=off -fno-fast-math -fno-math-errno)
-target_include_directories(kilotwin_flags INTERFACE ${PROJECT_SOURCE_DIR})
-
-set(KILOTWIN_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
+if(KILOTWIN_WERROR)
+  target_compile_options(kilotwin_flags INTERFACE -Werror)
+endif()
 if(KILOTWIN_SANITIZE)
-  target_compile_options(kilotwin_flags INTERFACE -fsanitize=${KILOTWIN_SANITIZE} -fno-omit-frame-pointer
-    -fno-sanitize-recover=all)
+  target_compile_options(kilotwin_flags INTERFACE
+    -fsanitize=${KILOTWIN_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(kilotwin_flags INTERFACE -fsanitize=${KILOTWIN_SANITIZE})
 endif()
 
-# kilotwin_library(NAME SOURCES a.cpp ... DEPENDS target ...): a static library of one folder.
+# The headers that most units include, precompiled once for libraries and once for tests. A unit still includes what it uses:
+# with -DKILOTWIN_PCH=OFF everything builds too, and scripts/test --debug builds so.
+set(kilotwin_precompiled
+  <algorithm> <array> <charconv> <chrono> <cmath> <condition_variable> <cstdint> <cstring> <deque> <filesystem> <fstream>
+  <functional> <limits> <map> <memory> <mutex> <numeric> <optional> <random> <set> <span> <sstream> <string> <string_view>
+  <thread> <utility> <variant> <vector>
+  <fmt/format.h> <Eigen/Core> <google/protobuf/arena.h> <google/protobuf/extension_set.h>
+  <google/protobuf/generated_message_reflection.h> <google/protobuf/message.h> <google/protobuf/repeated_field.h>)
+if(KILOTWIN_PCH)
+  # fmt says by a macro that it is a shared library. All units must agree on it, or the precompiled headers do not fit.
+  target_link_libraries(kilotwin_flags INTERFACE fmt::fmt)
+  file(WRITE ${CMAKE_BINARY_DIR}/precompiled.cpp "")
+  add_library(kilotwin_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cpp)
+  target_link_libraries(kilotwin_precompiled PRIVATE kilotwin_flags Eigen3::Eigen protobuf::libprotobuf)
+  target_precompile_headers(kilotwin_precompiled PRIVATE ${kilotwin_precompiled})
+endif()
+
+# kilotwin_precompile(NAME FROM TARGET): NAME uses the headers that TARGET has precompiled.
+function(kilotwin_precompile name)
+  cmake_parse_arguments(arg "" "FROM" "" ${ARGN})
+  get_target_property(sources ${name} SOURCES)
+  if(KILOTWIN_PCH AND sources MATCHES "\\.(cpp|cc)(;|$)")
+    target_precompile_headers(${name} REUSE_FROM ${arg_FROM})
+  endif()
+endfunction()
+
+# kilotwin_library(NAME SOURCES a.cpp ... DEPENDS target ...): a static library of one folder. It brings the path under which
+# its headers are included; tests/layers says which folder may include which.
 function(kilotwin_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
+  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PUBLIC ${arg_DEPENDS} kilotwin_flags)
+  kilotwin_precompile(${name} FROM kilotwin_precompiled)
 endfunction()
 
-# kilotwin_test(NAME SOURCES a_test.cpp ... DEPENDS target ... [TIMEOUT s]): one GoogleTest program, its cases known to ctest.
+# kilotwin_program(NAME SOURCES a.cpp ... DEPENDS target ...): an executable that is not a test.
+function(kilotwin_program name)
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE ${arg_DEPENDS} kilotwin_flags)
+  kilotwin_precompile(${name} FROM kilotwin_precompiled)
+endfunction()
+
+# kilotwin_test(NAME SOURCES a_test.cpp ... DEPENDS target ... [TIMEOUT s] [LABELS label ...]): one GoogleTest program; ctest
+# knows each of its cases. Labels: fast (the default; all of them together take some 20 s), dds (federates over Cyclone DDS),
+# system (the program as users run it), slow (statistics, fuzzing, identification).
 function(kilotwin_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
+  if(NOT arg_LABELS)
+    set(arg_LABELS fast)
+  endif()
   add_executable(${name} ${arg_SOURCES})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${arg_DEPENDS} kilotwin_flags GTest::gtest GTest::gtest_main)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${arg_TIMEOUT})
+  kilotwin_precompile(${name} FROM kilotwin_precompiled_test)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()

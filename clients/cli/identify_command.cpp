@@ -1,178 +1,45 @@
-// `kilotwin identify`: a model, its evaluation and a report from measured data.
+// `kilotwin identify`: starts the program kilotwin-identify, which lies beside this one, with the same arguments.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <memory>
-#include <optional>
+#include <cerrno>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include "clients/cli/commands.hpp"
-#include "clients/cli/other_data.hpp"
-#include "clients/cli/output.hpp"
-#include "clients/cli/progress.hpp"
-#include "clients/identify/data/data_faults.hpp"
-#include "clients/identify/data/import.hpp"
-#include "clients/identify/data/plausibility.hpp"
-#include "clients/identify/identify.hpp"
-#include "clients/identify/model/model_file.hpp"
-#include "clients/identify/report/prediction_residuals.hpp"
-#include "clients/identify/report/report.hpp"
 #include "core/base/error.hpp"
-#include "core/base/say.hpp"
-#include "core/os/files.hpp"
 
 namespace kilotwin::cli {
-namespace fs = std::filesystem;
 namespace {
 
-struct IdentifyArguments {
-  fs::path train, test;
-  Output output;
-  double horizon_s = 10;
-  std::uint32_t threads = 2;
-  bool quiet = false;
-};
-
-std::string csv_of(const std::vector<identify::Prediction>& predictions) {
-  std::string text = "run,robot,time_s,before_x_mm,before_y_mm,after_x_mm,after_y_mm\n";
-  for (const identify::Prediction& p : predictions) {
-    fmt::format_to(std::back_inserter(text), "{},{},{:.10g},{:.4f},{:.4f},{:.4f},{:.4f}\n", p.run, p.robot,
-                   p.time_s, p.before_x_mm, p.before_y_mm, p.after_x_mm, p.after_y_mm);
-  }
-  return text;
-}
-
-/// For trajectories. `out`: gets imported data as trajectories. `faults` receives what was excluded.
-identify::Identified identify_trajectories(const IdentifyArguments& arguments, const fs::path& out,
-                                           const identify::Options& options,
-                                           std::vector<identify::DataFault>& faults) {
-  identify::MeasuredSet train = identify::load_or_import(arguments.train, out / "imported-train");
-  identify::demand_plausible(train, arguments.train.string());
-  options.progress(0, "checking for faults of the data");
-  // No robot can produce these samples: they are excluded before the fit.
-  faults = identify::exclude_faults(train);
-  std::optional<identify::MeasuredSet> test;
-  if (!arguments.test.empty()) {
-    test = identify::load_or_import(arguments.test, out / "imported-test");
-    identify::demand_plausible(*test, arguments.test.string());
-    identify::demand_longer_than(*test, arguments.horizon_s, false, arguments.test.string());
-  } else {
-    identify::hold_out_part(train);
-    const bool held_out = std::any_of(train.runs.begin(), train.runs.end(), [](const identify::Run& run) {
-      return std::any_of(run.tracks.begin(), run.tracks.end(), [](const identify::Track& t) { return t.held_out; });
-    });
-    identify::demand_longer_than(train, arguments.horizon_s, held_out, arguments.train.string());
-  }
-  identify::Identified found = identify::identify(train, test ? &*test : nullptr, options);
-  found.document["contract"]["faults"] = identify::document_of(faults);
-  const nlohmann::json residuals =
-      identify::residual_parts(test ? *test : train, found.predictions, arguments.horizon_s);
-  for (const auto& [part, content] : residuals.items()) {
-    if (!found.document.contains(part)) found.document[part] = content;
-  }
-  return found;
-}
-
-/// Removes the directory unless it is kept: a command that fails leaves no files.
-class Unfinished {
- public:
-  explicit Unfinished(fs::path directory) : directory_(std::move(directory)) {}
-  ~Unfinished() {
-    std::error_code ignored;
-    if (!kept_) fs::remove_all(directory_, ignored);
-  }
-  Unfinished(const Unfinished&) = delete;
-  void keep() { kept_ = true; }
-
- private:
-  fs::path directory_;
-  bool kept_ = false;
-};
-
-void print_results(const IdentifyArguments& arguments, const identify::Identified& found,
-                   const std::vector<identify::DataFault>& faults) {
-  const auto& result = found.document.at("contract");
-  if (found.document.contains("summary")) {
-    for (const auto& line : found.document.at("summary")) fmt::print("{}\n", line.get<std::string>());
-  } else {
-    const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
-    fmt::print(
-        "prediction error, horizon {:g} s: {:.2f} mm with the base model, {:.2f} mm with effects; noise floor "
-        "{:.2f} "
-        "mm\n",
-        arguments.horizon_s, number("before"), number("after"), result.at("noise_floor_mm").get<double>());
-  }
-  for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
-  for (const auto& effect : result.at("effects"))
-    fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());
-  if (result.at("effects").empty()) fmt::print("no significant effect: the base model explains these data\n");
-}
-
-int identify_data(const IdentifyArguments& arguments) {
-  if (!(arguments.horizon_s > 0)) throw UserError("--horizon: give a number of seconds above 0");
-  warn_beyond_cores("--threads", arguments.threads);
-  demand_known_data("--train", arguments.train);
-  if (!arguments.test.empty()) demand_known_data("--test", arguments.test);
-  const fs::path fallback = "identified";
-  const fs::path out = make_plain_output(arguments.output, fallback, {arguments.train, arguments.test});
-  Unfinished unfinished(out);
-  identify::Options options;
-  options.horizon_s = arguments.horizon_s;
-  options.threads = arguments.threads;
-  std::optional<Progress> progress(std::in_place, !arguments.quiet);
-  // Reading takes the first 2 %, drawing the last 3 %.
-  options.progress = [&](double share, const std::string& what) {
-    progress->show(0.02 + 0.95 * share, what, what);
-  };
-  progress->show(0, "reading " + arguments.train.string(), "reading");
-  std::vector<identify::DataFault> faults;
-  identify::Identified found;
-  if (std::optional<identify::Identified> other =
-          identify_other_data(arguments.train, arguments.test, out, options)) {
-    found = std::move(*other);
-  } else {
-    found = identify_trajectories(arguments, out, options, faults);
-  }
-
-  progress->show(0.97, "drawing the report", "drawing");
-  os::write_file(out / "model.txtpb",
-                 identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
-  os::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
-  os::write_file(out / "predictions.csv", csv_of(found.predictions));
-  identify::write_report(found.document, out / "report.html");
-  unfinished.keep();
-  progress.reset();
-  if (!arguments.quiet) {
-    print_results(arguments, found, faults);
-    fmt::print("results {}: report.html, model.txtpb, result.json, predictions.csv\n",
-               place_in_words(out, arguments.output, fallback));
-  }
-  return kDone;
+/// Becomes that program. Throws RunError where it is not there.
+int become_identify(const std::vector<std::string>& arguments) {
+  const std::filesystem::path program =
+      std::filesystem::read_symlink("/proc/self/exe").parent_path() / "kilotwin-identify";
+  std::vector<std::string> words{"kilotwin", "identify"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  execv(program.c_str(), argv.data());
+  if (errno != ENOENT)
+    throw RunError(fmt::format("{} cannot be started: {}", program.string(), std::generic_category().message(errno)));
+  throw RunError(fmt::format("{} is not there; scripts/demo builds the simulator alone. Build the rest: "
+                             "cmake --preset release && cmake --build --preset release",
+                             program.string()));
 }
 
 }  // namespace
 
 Command add_identify(CLI::App& program) {
-  const auto arguments = std::make_shared<IdentifyArguments>();
   CLI::App& app =
       *program.add_subcommand("identify", "fit the model to measured data and find effects that it lacks");
-  app.add_option("--train", arguments->train, "directory of measured data to fit to")->required()->type_name("DIR");
-  app.add_option("--test", arguments->test,
-                 "directory of measured data to predict, never fitted to (default: a part of --train is held out)")
-      ->type_name("DIR");
-  add_output_options(app, arguments->output, "identified, with a number added if it exists");
-  app.add_option("--horizon", arguments->horizon_s, "time from the last measurement used to a prediction, s")
-      ->capture_default_str()
-      ->type_name("SECONDS");
-  app.add_option("--threads", arguments->threads, "threads to work on")
-      ->check(CLI::Range(1, 256).description(""))
-      ->capture_default_str()
-      ->type_name("N");
-  app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
-  app.footer(
-      "Example: kilotwin identify --train measured --out found. measured/ holds trajectories.csv with the columns "
-      "run,robot,time_s,x_mm,y_mm.");
-  return {&app, [arguments] { return identify_data(*arguments); }};
+  // The other program parses the arguments, --help included.
+  app.set_help_flag();
+  app.prefix_command();
+  return {&app, [&app] { return become_identify(app.remaining()); }};
 }
 
 }  // namespace kilotwin::cli

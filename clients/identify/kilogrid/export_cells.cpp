@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identify/kilogrid/floor_swarm.hpp"
+#include "clients/identify/kilogrid/floor_reporter.hpp"
 #include "core/base/error.hpp"
 #include "core/base/time.hpp"
 #include "core/csv/csv_writer.hpp"

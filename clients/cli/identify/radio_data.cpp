@@ -1,4 +1,4 @@
-#include "clients/cli/radio_data.hpp"
+#include "clients/cli/identify/radio_data.hpp"
 
 #include <fmt/format.h>
 #include <google/protobuf/text_format.h>

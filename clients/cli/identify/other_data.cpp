@@ -1,4 +1,4 @@
-#include "clients/cli/other_data.hpp"
+#include "clients/cli/identify/other_data.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <fstream>
 #include <vector>
 
-#include "clients/cli/radio_data.hpp"
+#include "clients/cli/identify/radio_data.hpp"
 #include "clients/identify/bristle/identify_bristle.hpp"
 #include "clients/identify/data/import.hpp"
 #include "clients/identify/kilogrid/identify_floor.hpp"

@@ -1,0 +1,72 @@
+#include "clients/cli/program.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+
+#include "core/base/build_identity.hpp"
+#include "core/base/error.hpp"
+#include "core/base/say.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+/// What the arguments lack, in one line.
+std::string complaint(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
+  const std::vector<CLI::App*> given = program.get_subcommands();
+  if (!given.empty())
+    return fmt::format("kilotwin: {}; see kilotwin {} --help", error.what(), given.front()->get_name());
+  if (argc < 2 || argv[1][0] == '-') return fmt::format("kilotwin: {}; see kilotwin --help", error.what());
+  std::string known;
+  for (const CLI::App* command : program.get_subcommands(nullptr))
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  return fmt::format("kilotwin: \"{}\" is no command; there are {}; see kilotwin --help", argv[1], known);
+}
+
+int parse_and_run(int argc, char** argv, const std::string& description,
+                  const std::function<std::vector<Command>(CLI::App&)>& add_commands) {
+  CLI::App program{description};
+  program.name("kilotwin");
+  program.require_subcommand(1);
+  program.set_version_flag("--version", fmt::format("kilotwin {} ({})", build_identity(), build_compiler()));
+  const std::vector<Command> commands = add_commands(program);
+  // After the commands, which would inherit it.
+  program.footer(
+      "kilotwin COMMAND --help lists the options of a command. Exit status: 0 done, 1 the run or the check "
+      "failed, 2 bad input or arguments.");
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    return program.exit(success);
+  } catch (const CLI::ParseError& error) {
+    say_error(complaint(program, error, argc, argv));
+    return kBadInput;
+  }
+  for (const Command& command : commands) {
+    if (command.parser->parsed()) return command.work();
+  }
+  return kBadInput;  // not reached: the parser requires a command
+}
+
+}  // namespace
+
+int run_program(int argc, char** argv, const std::string& description,
+                const std::function<std::vector<Command>(CLI::App&)>& add_commands) {
+  // The next file to be opened would take the place of a closed stdin, stdout or stderr, and receive what is written there.
+  for (int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) return kFailed;
+  }
+  try {
+    return parse_and_run(argc, argv, description, add_commands);
+  } catch (const UserError& error) {
+    say_error(error.what());
+    return kBadInput;
+  } catch (const std::exception& error) {
+    say_error(fmt::format("kilotwin: {}", error.what()));
+    return kFailed;
+  }
+}
+
+}  // namespace kilotwin::cli
