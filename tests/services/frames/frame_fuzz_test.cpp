@@ -26,9 +26,9 @@ template <class Visit> void each_field(BodyFrame& f, Visit visit) {
   MovableColumns& m = f.movable;
   visit(m.body), visit(m.x_mm), visit(m.y_mm), visit(m.heading_rad), visit(m.vx_mm), visit(m.vy_mm),
       visit(m.turn_rad);
-  PressedColumns& p = f.pressed;
-  visit(p.robot), visit(p.slip_x_mm), visit(p.slip_y_mm), visit(p.contacts), visit(p.other), visit(p.push_mm),
-      visit(p.rub_mm);
+  ContactColumns& c = f.contact;
+  visit(c.robot), visit(c.slip_x_mm), visit(c.slip_y_mm), visit(c.count), visit(c.other),
+      visit(c.normal_impulse_mm), visit(c.tangent_impulse_mm);
 }
 
 template <class Visit> void each_field(ActuationFrame& f, Visit visit) {
@@ -106,7 +106,7 @@ template <class Frame> void mutate(Random& random, Frame& frame) {
       frame.robot.clear(), frame.x_mm.clear(), frame.y_mm.clear(), frame.heading_rad.clear(), frame.memory.clear();
       frame.spatial.resize(BodyFrame::kSpatialColumns *
                            std::min<std::size_t>(frame.spatial.size(), frame.movable.body.size()));
-      frame.pressed.clear();
+      frame.contact.clear();
       return;
     }
     if (random() % 4 == 0 && !frame.robot.empty() && frame.spatial.empty() && frame.memory.empty()) {
