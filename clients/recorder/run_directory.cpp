@@ -12,6 +12,7 @@
 #include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/os/checksummed_file.hpp"
+#include "idl/manifest.pb.h"
 
 namespace kilotwin::recorder {
 namespace {
