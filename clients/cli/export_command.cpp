@@ -71,13 +71,15 @@ int export_run(const ExportArguments& arguments) {
 
 Command add_export(CLI::App& program) {
   const auto arguments = std::make_shared<ExportArguments>();
-  CLI::App& app = *program.add_subcommand("export", "write tables (CSV) from a recorded run; FILE.csv.gz is gzipped, - is standard output");
+  CLI::App& app = *program.add_subcommand(
+      "export", "write tables (CSV) from a recorded run; FILE.csv.gz is gzipped, - is standard output");
   app.add_option("RUN", arguments->run, "run directory or recording")->required()->type_name("");
   app.add_option("--trajectories", arguments->trajectories, fmt::format("columns {}", recorder::kTrajectoryColumns))
       ->type_name("FILE");
   app.add_option("--bodies", arguments->bodies, "movable bodies: columns time_s,body,x_mm,y_mm,heading_rad")
       ->type_name("FILE");
-  app.add_option("--messages", arguments->messages, fmt::format("columns {}", recorder::kMessageColumns))->type_name("FILE");
+  app.add_option("--messages", arguments->messages, fmt::format("columns {}", recorder::kMessageColumns))
+      ->type_name("FILE");
   app.add_option("--radio", arguments->radio, "columns robot,attempted,sent,received,collided,backed_off")
       ->type_name("FILE");
   app.add_option("--cells", arguments->cells,

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/os/files.hpp"
 #include "core/model/robot_parameters.hpp"
+#include "core/os/files.hpp"
 #include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {

@@ -25,10 +25,12 @@ int become_identify(const std::vector<std::string>& arguments) {
   argv.push_back(nullptr);
   execv(program.c_str(), argv.data());
   if (errno != ENOENT)
-    throw RunError(fmt::format("{} cannot be started: {}", program.string(), std::generic_category().message(errno)));
-  throw RunError(fmt::format("{} is not there; scripts/demo builds the simulator alone. Build the rest: "
-                             "cmake --preset release && cmake --build --preset release",
-                             program.string()));
+    throw RunError(
+        fmt::format("{} cannot be started: {}", program.string(), std::generic_category().message(errno)));
+  throw RunError(
+      fmt::format("{} is not there; scripts/demo builds the simulator alone. Build the rest: "
+                  "cmake --preset release && cmake --build --preset release",
+                  program.string()));
 }
 
 }  // namespace

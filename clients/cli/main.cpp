@@ -12,8 +12,9 @@ int main(int argc, char** argv) {
   return run_program(argc, argv,
                      "Kilotwin simulates swarms of Kilobots as services over DDS. Start: kilotwin run EXPERIMENT",
                      [started_s](CLI::App& program) -> std::vector<Command> {
-                       return {add_run(program, started_s), add_check(program),    add_build(program),
-                               add_sweep(program),          add_export(program),   add_replay(program),
+                       return {add_run(program, started_s), add_check(program),
+                               add_build(program),          add_sweep(program),
+                               add_export(program),         add_replay(program),
                                add_identify(program),       add_service(program, started_s),
                                add_config(program),         add_doctor(program)};
                      });

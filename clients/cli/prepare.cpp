@@ -16,10 +16,10 @@
 #include "core/base/pose.hpp"
 #include "core/base/say.hpp"
 #include "core/dds/dds.hpp"
+#include "core/experiment/field_checks.hpp"
 #include "core/experiment/layout.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/surroundings.hpp"
-#include "core/experiment/field_checks.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/os/files.hpp"
 #include "core/os/limits.hpp"
@@ -46,8 +46,8 @@ double parse_pace(const std::string& text) {
   if (error != std::errc() || end != text.data() + text.size() || !(factor >= kSlowestPace) ||
       !(factor <= kFastestPace)) {
     throw UserError(
-        fmt::format("--pace: \"{}\" is no pace; give max, or a factor from {:g} to {:g} such as 1 for real time", text,
-                    kSlowestPace, kFastestPace));
+        fmt::format("--pace: \"{}\" is no pace; give max, or a factor from {:g} to {:g} such as 1 for real time",
+                    text, kSlowestPace, kFastestPace));
   }
   return factor;
 }

@@ -37,8 +37,9 @@ Recorded read_recorded(recorder::Reader& reader) {
       const Tick first{record->hash().first_tick()};
       if (recorded.chain.empty()) recorded.first_hash = first;
       if (!recorded.chain.empty() && first != recorded.last() + 1) {
-        throw RunError(fmt::format("{}: after the state hash of tick {} follows that of tick {}; hashes are missing",
-                                   reader.path().string(), recorded.last().count(), first.count()));
+        throw RunError(
+            fmt::format("{}: after the state hash of tick {} follows that of tick {}; hashes are missing",
+                        reader.path().string(), recorded.last().count(), first.count()));
       }
       recorded.chain.insert(recorded.chain.end(), record->hash().chain().begin(), record->hash().chain().end());
     }
@@ -58,11 +59,11 @@ std::string check_length(const Recorded& recorded, const recorder::RunDirectory&
   const std::string file = reader.path().string();
   const std::int64_t last = recorded.last().count();
   if (recorded.end) {
-    const bool whole =
-        recorded.end->tick() == last && recorded.end->state_hash() == recorded.chain.back();
+    const bool whole = recorded.end->tick() == last && recorded.end->state_hash() == recorded.chain.back();
     if (!whole && recorded.end->failure().empty()) {
-      throw RunError(fmt::format("{}: its end mark is of tick {}, hash {:016x}; its last state hash is of tick {}, {:016x}",
-                                 file, recorded.end->tick(), recorded.end->state_hash(), last, recorded.chain.back()));
+      throw RunError(
+          fmt::format("{}: its end mark is of tick {}, hash {:016x}; its last state hash is of tick {}, {:016x}",
+                      file, recorded.end->tick(), recorded.end->state_hash(), last, recorded.chain.back()));
     }
   }
   if (!std::filesystem::exists(directory.summary())) {
@@ -72,23 +73,25 @@ std::string check_length(const Recorded& recorded, const recorder::RunDirectory&
   }
   if (!recorded.end) {
     const std::string where = reader.warning().empty() ? "" : "; " + reader.warning();
-    throw RunError(fmt::format("{}: it ends at tick {} without an end mark, but summary.json says that the run ended "
-                               "at tick {}{}",
-                               file, last, recorder::read_summary(directory.summary()).ticks, where));
+    throw RunError(
+        fmt::format("{}: it ends at tick {} without an end mark, but summary.json says that the run ended "
+                    "at tick {}{}",
+                    file, last, recorder::read_summary(directory.summary()).ticks, where));
   }
   const recorder::Summary summary = recorder::read_summary(directory.summary());
   if (summary.ticks != std::max<std::int64_t>(0, recorded.end->tick()) ||
       summary.state_hash != recorded.end->state_hash()) {
-    throw RunError(fmt::format("{}: it ends at tick {} with hash {:016x}, but summary.json says tick {} and {:016x}",
-                               file, recorded.end->tick(), recorded.end->state_hash(), summary.ticks,
-                               summary.state_hash));
+    throw RunError(
+        fmt::format("{}: it ends at tick {} with hash {:016x}, but summary.json says tick {} and {:016x}", file,
+                    recorded.end->tick(), recorded.end->state_hash(), summary.ticks, summary.state_hash));
   }
   return {};
 }
 
 class Verifier : public RunObserver {
  public:
-  Verifier(const RunPlan& plan, const Recorded& recorded, const std::filesystem::path& recording, ProgressBar& progress)
+  Verifier(const RunPlan& plan, const Recorded& recorded, const std::filesystem::path& recording,
+           ProgressBar& progress)
       : recorded_(recorded),
         progress_(progress),
         reader_(recording),
@@ -162,8 +165,8 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   const RunPlan plan(read_manifest(directory));
   if (reader.header().robots() != plan.robots() || reader.header().tick_cycles() != plan.tick_length.cycles() ||
       reader.header().movable_size() != static_cast<int>(plan.movables())) {
-    throw RunError(fmt::format("{}: of another experiment than {}", reader.path().string(),
-                               directory.manifest().string()));
+    throw RunError(
+        fmt::format("{}: of another experiment than {}", reader.path().string(), directory.manifest().string()));
   }
   const std::string remark = check_length(recorded, directory, reader);
   for (const Directive& input : recorded.inputs) {
@@ -192,10 +195,11 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   if (verifier.states_remain() && recorded.end && recorded.end->failure().empty())
     throw RunError(fmt::format("{}: it holds states after its last tick", directory.recording().string()));
   if (!quiet) {
-    fmt::print("verified: {} ticks, up to tick {} at {:g} s; every state hash ({:016x} at the end) and {} recorded "
-               "states agree{}\n",
-               verifier.hashes(), recorded.last().count(), plan.tick_length.seconds_at(recorded.last()),
-               totals.state_hash, verifier.states(), remark);
+    fmt::print(
+        "verified: {} ticks, up to tick {} at {:g} s; every state hash ({:016x} at the end) and {} recorded "
+        "states agree{}\n",
+        verifier.hashes(), recorded.last().count(), plan.tick_length.seconds_at(recorded.last()), totals.state_hash,
+        verifier.states(), remark);
   }
   return 0;
 }

@@ -81,8 +81,7 @@ void require_this_build(const RunPlan& plan, const recorder::RunDirectory& direc
       fmt::format("{}: prepared by build {} of kilotwin, and this is build {}; run one build everywhere, or "
                   "prepare the run again "
                   "with this one",
-                  directory.manifest().string(),
-                  plan.build.empty() ? "(unnamed)" : plan.build, build_identity()));
+                  directory.manifest().string(), plan.build.empty() ? "(unnamed)" : plan.build, build_identity()));
 }
 
 /// Addresses at which others are looked for: IPv4, or names.

@@ -7,12 +7,12 @@
 #include <set>
 #include <utility>
 
-#include "core/os/files.hpp"
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/summary.hpp"
 #include "clients/report/html.hpp"
 #include "clients/report/templates.hpp"
 #include "core/csv/csv_writer.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::cli {
 namespace {

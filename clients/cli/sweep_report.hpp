@@ -8,9 +8,9 @@
 
 #include "clients/cli/sweep_points.hpp"
 #include "clients/recorder/observables.hpp"
-#include "clients/report/plot.hpp"
 #include "clients/recorder/provenance.hpp"
 #include "clients/recorder/statistics.hpp"
+#include "clients/report/plot.hpp"
 
 namespace kilotwin::cli {
 

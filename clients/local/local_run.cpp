@@ -68,10 +68,10 @@ class LocalRun {
     for (std::uint32_t h = 0; h < plan.hosts; ++h) {
       hosts_.push_back(std::make_unique<behaviours::BehavioursEngine>(plan, HostId{h}, programs));
       if (options.run_directory.empty() || !options.save_checkpoints) continue;
-      logs_.push_back(std::make_unique<RobotLogs>(
-          options.run_directory, plan.tick_length, first_, [&plan, share = plan.share(HostId{h})](std::uint32_t robot) {
-            return share.contains(robot) && !plan.firmware(robot);
-          }));
+      logs_.push_back(std::make_unique<RobotLogs>(options.run_directory, plan.tick_length, first_,
+                                                  [&plan, share = plan.share(HostId{h})](std::uint32_t robot) {
+                                                    return share.contains(robot) && !plan.firmware(robot);
+                                                  }));
       notes_.push_back(std::make_unique<behaviours::RunningNote>(options.run_directory, HostId{h}));
       hosts_.back()->note_running_in(notes_.back()->place());
     }
@@ -242,7 +242,8 @@ class LocalRun {
 
   void save(Tick now, std::uint64_t chain) {
     observer_.saved();
-    for (const auto& logs : logs_) logs->flush();  // who goes on from this checkpoint finds what was printed before it
+    for (const auto& logs : logs_)
+      logs->flush();  // who goes on from this checkpoint finds what was printed before it
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
       proto::CheckpointPart part;
       if (task < physics_.size())

@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include "services/behaviours/program_set.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/run_observer.hpp"
+#include "services/behaviours/program_set.hpp"
 
 namespace kilotwin::local {
 

@@ -168,7 +168,8 @@ std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path
                                   Poses which) {
   const std::vector<std::string> groups = group_cells(recording.header());
   std::array<std::string, 256> states;
-  for (std::size_t code = 0; code < states.size(); ++code) states[code] = state_name(static_cast<std::uint8_t>(code));
+  for (std::size_t code = 0; code < states.size(); ++code)
+    states[code] = state_name(static_cast<std::uint8_t>(code));
   return export_states(recording, csv, every_s, kTrajectoryColumns.data(),
                        [&](std::string& text, const proto::StateRecord& state, const std::string& time) {
                          return append_rows(text, state, time, which, groups, states);

@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "clients/recorder/axis.hpp"
-#include "core/os/files.hpp"
 #include "clients/recorder/paths.hpp"
 #include "clients/recorder/svg.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/pose.hpp"
+#include "core/os/files.hpp"
 #include "core/plan/from_manifest.hpp"
 #include "core/plan/world.hpp"
 #include "core/senses/light_source.hpp"
@@ -236,10 +236,10 @@ std::vector<VirtualCircle> virtual_circles(const proto::RecordingHeader& header)
     }
     if (environment.has_foraging()) {
       const proto::ForagingEnvironment& foraging = environment.foraging();
-      circles.push_back({foraging.food_x_mm(), foraging.food_y_mm(), foraging.food_radius_mm(), "food", "#f6ecd2",
-                         "#b8860b"});
-      circles.push_back({foraging.home_x_mm(), foraging.home_y_mm(), foraging.home_radius_mm(), "home", "#dff0e6",
-                         "#2a8f5b"});
+      circles.push_back(
+          {foraging.food_x_mm(), foraging.food_y_mm(), foraging.food_radius_mm(), "food", "#f6ecd2", "#b8860b"});
+      circles.push_back(
+          {foraging.home_x_mm(), foraging.home_y_mm(), foraging.home_radius_mm(), "home", "#dff0e6", "#2a8f5b"});
     }
   }
   return circles;
@@ -258,8 +258,8 @@ std::string draw_circles(const std::vector<VirtualCircle>& circles, const View& 
         x, y, radius, circle.fill, circle.stroke);
     // Above the circle, or within it where the panel ends.
     const double above = static_cast<double>(y) - radius - 40;
-    out += svg::text(static_cast<double>(x), above > kText ? above : static_cast<double>(y) - radius + 1.2 * kText, kText,
-                     circle.name, circle.stroke, svg::Anchor::kMiddle);
+    out += svg::text(static_cast<double>(x), above > kText ? above : static_cast<double>(y) - radius + 1.2 * kText,
+                     kText, circle.name, circle.stroke, svg::Anchor::kMiddle);
   }
   return out;
 }
@@ -379,7 +379,8 @@ Box extent(const Snapshot& at) {
 /// `box` widened to the shape of a panel, so that a panel shows it and no more.
 Box fitted(const Box& box, double width_px, double height_px) {
   const double px_per_mm = std::min(width_px / box.width_mm(), height_px / box.height_mm());
-  const double wider_mm = width_px / px_per_mm - box.width_mm(), higher_mm = height_px / px_per_mm - box.height_mm();
+  const double wider_mm = width_px / px_per_mm - box.width_mm(),
+               higher_mm = height_px / px_per_mm - box.height_mm();
   return {box.x_min_mm - wider_mm / 2, box.y_min_mm - higher_mm / 2, box.x_max_mm + wider_mm / 2,
           box.y_max_mm + higher_mm / 2};
 }
@@ -398,7 +399,8 @@ Box moved_into(const Box& box, const Box& outer) {
 void add_movables(Box& box, const World& world, const Snapshot& at) {
   for (std::size_t i = 0; i < world.movables.size(); ++i) {
     const double reach_mm = world.movables[i].shape.reach_mm();
-    for (const double way_mm : {-reach_mm, reach_mm}) box.add(at.movable_x_mm[i] + way_mm, at.movable_y_mm[i] + way_mm);
+    for (const double way_mm : {-reach_mm, reach_mm})
+      box.add(at.movable_x_mm[i] + way_mm, at.movable_y_mm[i] + way_mm);
   }
 }
 
@@ -433,7 +435,8 @@ std::string picture_svg(Reader& recording) {
   const World world(stated);
   const std::vector<VirtualCircle> circles = virtual_circles(header);
   const auto ground = [&](const View& of, const Snapshot& at) {
-    return draw_arena(of, world, arena_width, arena_height) + draw_circles(circles, of) + draw_bodies(world, at, of);
+    return draw_arena(of, world, arena_width, arena_height) + draw_circles(circles, of) +
+           draw_bodies(world, at, of);
   };
   Box everything;
   for (std::size_t i = 0; i < paths.robots(); ++i) {

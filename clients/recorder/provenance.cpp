@@ -41,8 +41,8 @@ Provenance provenance_of_this_process() {
 }
 
 void write_provenance(const Provenance& p, const std::filesystem::path& file) {
-  const Json json{{"version", p.version}, {"build", p.build}, {"date", p.date},
-                  {"command_line", p.command_line}, {"host", p.host}, {"cores", p.cores}};
+  const Json json{{"version", p.version},           {"build", p.build}, {"date", p.date},
+                  {"command_line", p.command_line}, {"host", p.host},   {"cores", p.cores}};
   os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
@@ -59,7 +59,8 @@ std::optional<Provenance> read_provenance(const std::filesystem::path& file) {
     json.at("cores").get_to(p.cores);
     return p;
   } catch (const Json::exception& error) {
-    throw UserError(fmt::format("{}: is not the provenance.json of a run directory ({})", file.string(), error.what()));
+    throw UserError(
+        fmt::format("{}: is not the provenance.json of a run directory ({})", file.string(), error.what()));
   }
 }
 

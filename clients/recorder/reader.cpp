@@ -13,9 +13,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/base/pose.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -83,16 +83,19 @@ Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
   try {
     if (!read_record() || !record_.has_header()) {
       if (begins_as_format_1()) {
-        throw foreign(fmt::format("it has format 1 of an older version, this one reads format {}; run the experiment again",
-                                  kRecordingFormat));
+        throw foreign(
+            fmt::format("it has format 1 of an older version, this one reads format {}; run the experiment again",
+                        kRecordingFormat));
       }
-      if (damaged_) throw foreign("damaged at byte 0, or another file; expected the recording.ktrec of a run directory");
+      if (damaged_)
+        throw foreign("damaged at byte 0, or another file; expected the recording.ktrec of a run directory");
       throw foreign(about.st_size == 0 ? "it is empty; expected the recording.ktrec of a run directory"
                                        : "expected the recording.ktrec of a run directory");
     }
     header_ = std::move(*record_.mutable_header());
     if (header_.format() != kRecordingFormat) {
-      throw foreign(fmt::format("it has format {}, this program reads format {}", header_.format(), kRecordingFormat));
+      throw foreign(
+          fmt::format("it has format {}, this program reads format {}", header_.format(), kRecordingFormat));
     }
     if (!valid(header_)) throw foreign("its header has values that no run has");
   } catch (...) {

@@ -9,9 +9,9 @@
 #include <iterator>
 #include <system_error>
 
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/os/checksummed_file.hpp"
+#include "core/os/files.hpp"
 #include "idl/manifest.pb.h"
 
 namespace kilotwin::recorder {
@@ -26,8 +26,8 @@ constexpr FileKind kManifestFile{"KTWNMANI", 2, "the manifest of a run", "prepar
 /// that also an empty directory that was there before goes to one run alone.
 bool claim(const fs::path& directory) {
   const auto refuse = [](const fs::path& what) {
-    return RunError(
-        fmt::format("{}: cannot be created: {}; choose another place with --out", what.string(), os::system_reason()));
+    return RunError(fmt::format("{}: cannot be created: {}; choose another place with --out", what.string(),
+                                os::system_reason()));
   };
   if (::mkdir(directory.c_str(), 0777) != 0) {
     if (errno != EEXIST) throw refuse(directory);

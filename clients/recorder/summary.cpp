@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::recorder {
 namespace {

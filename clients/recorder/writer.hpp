@@ -9,8 +9,8 @@
 #include <span>
 #include <string>
 
-#include "core/os/files.hpp"
 #include "clients/recorder/recording.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::recorder {
 

@@ -7,9 +7,9 @@
 #include <iterator>
 #include <limits>
 
-#include "core/os/files.hpp"
 #include "clients/recorder/svg.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin {
 namespace {
@@ -107,14 +107,16 @@ std::vector<std::string> elements(const PlotSeries& series, std::size_t number, 
   const std::string title =
       in_legend ? "title " + gnuplot_text(recorder::svg::shortened(series.name, kLongestName)) : "notitle";
   const bool dense = series.line && series.x.size() > kMostPoints;
-  const bool errors = std::any_of(series.error.begin(), series.error.end(), [](double e) { return std::abs(e) > 0; });
+  const bool errors =
+      std::any_of(series.error.begin(), series.error.end(), [](double e) { return std::abs(e) > 0; });
   std::vector<std::string> out;
   if (series.band && errors)
-    out.push_back(fmt::format("{} using 1:3:4 with filledcurves {} fs transparent solid 0.2 noborder notitle", data, colour));
+    out.push_back(
+        fmt::format("{} using 1:3:4 with filledcurves {} fs transparent solid 0.2 noborder notitle", data, colour));
   if (errors && !series.band)
     out.push_back(fmt::format("{} using 1:2:3:4 with yerrorbars pt 7 ps 0.05 lw 1.2 {} notitle", data, colour));
-  const std::string_view style = series.line ? (series.points && !dense ? "linespoints pt 7 ps 0.6" : "lines")
-                                             : "points pt 7 ps 0.6";
+  const std::string_view style =
+      series.line ? (series.points && !dense ? "linespoints pt 7 ps 0.6" : "lines") : "points pt 7 ps 0.6";
   out.push_back(fmt::format("{} using 1:2 with {} lw 1.8 {} {}", data, style, colour, title));
   return out;
 }
@@ -128,14 +130,17 @@ std::string commands_of(const Plot& plot) {
   std::string out = "set lmargin 11\nset rmargin 3\nset tmargin at screen 0.79\nset bmargin 4\nset format '%h'\n";
   out += fmt::format("set label 1 {} at screen 0.04,0.94 font ',17' textcolor rgb '{}'\n",
                      gnuplot_text(recorder::svg::shortened(plot.title, kLongestTitle)), recorder::svg::kInk);
-  out += fmt::format("set label 2 {} at screen 0.04,0.885 textcolor rgb '{}'\n",
-                     gnuplot_text(recorder::svg::shortened(plot.subtitle, kLongestSubtitle)), recorder::svg::kFaint);
+  out +=
+      fmt::format("set label 2 {} at screen 0.04,0.885 textcolor rgb '{}'\n",
+                  gnuplot_text(recorder::svg::shortened(plot.subtitle, kLongestSubtitle)), recorder::svg::kFaint);
   if (legend) {
     // The title stands beside the key: within it gnuplot would give it a line of its own.
     const std::string title = plot.legend_title.empty() ? "" : plot.legend_title + ":";
     const double from = 0.03 + recorder::svg::text_width_px(title, kText_px) / kWidth_px;
-    out += fmt::format("set label 3 {} at screen 0.04,0.83 textcolor rgb '{}'\n", gnuplot_text(title), recorder::svg::kInk);
-    out += fmt::format("set key at screen {:.3f},0.85 left top Left reverse horizontal maxrows 1 samplen 2\n", from);
+    out += fmt::format("set label 3 {} at screen 0.04,0.83 textcolor rgb '{}'\n", gnuplot_text(title),
+                       recorder::svg::kInk);
+    out +=
+        fmt::format("set key at screen {:.3f},0.85 left top Left reverse horizontal maxrows 1 samplen 2\n", from);
   } else {
     out += "unset key\n";
   }
@@ -155,8 +160,7 @@ std::string commands_of(const Plot& plot) {
   if (y_logarithmic) shown.low = std::max(shown.low, 0.5 * extent.y.low);
   out += range_command('y', shown, y_logarithmic, true);
 
-  if (extent.x.empty())
-    return out + "set label 4 'no data' at graph 0.5,0.5 center\nplot NaN notitle\n";
+  if (extent.x.empty()) return out + "set label 4 'no data' at graph 0.5,0.5 center\nplot NaN notitle\n";
   std::vector<std::string> all;
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     out += data_block(plot.series[i], i, extent, x_logarithmic, y_logarithmic);
@@ -169,7 +173,9 @@ std::string commands_of(const Plot& plot) {
 
 }  // namespace
 
-std::size_t add_plot(Gnuplot& plots, const Plot& plot) { return plots.add(kWidth_px, kHeight_px, commands_of(plot)); }
+std::size_t add_plot(Gnuplot& plots, const Plot& plot) {
+  return plots.add(kWidth_px, kHeight_px, commands_of(plot));
+}
 
 std::string plot_svg(const Plot& plot) {
   Gnuplot plots;

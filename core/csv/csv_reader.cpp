@@ -45,7 +45,8 @@ char separator_of_header(std::string_view content) {
 
 std::string read_all(const std::filesystem::path& file) {
   std::error_code error;
-  if (!std::filesystem::exists(file, error)) throw UserError(fmt::format("{}: there is no such file", file.string()));
+  if (!std::filesystem::exists(file, error))
+    throw UserError(fmt::format("{}: there is no such file", file.string()));
   if (std::filesystem::is_directory(file, error))
     throw UserError(fmt::format("{}: is a directory; name a file", file.string()));
   errno = 0;
@@ -155,8 +156,8 @@ bool CsvReader::next() {
   if (cells_.size() == width_) return true;
   const std::string_view reference = layout_.header ? "the header names" : "the first row has";
   if (cells_.size() < width_) {
-    complain(cells_.size(),
-             fmt::format("the row has {} cell{}; {} {}", cells_.size(), cells_.size() == 1 ? "" : "s", reference, width_));
+    complain(cells_.size(), fmt::format("the row has {} cell{}; {} {}", cells_.size(),
+                                        cells_.size() == 1 ? "" : "s", reference, width_));
   }
   complain(width_, fmt::format("the row has {} cells; {} {}", cells_.size(), reference, width_));
 }
@@ -168,8 +169,9 @@ bool CsvReader::read_row() {
     row_at_ = at_;
     row_line_ = next_line_;
     const void* const found = std::memchr(content_.data() + at_, '\n', content_.size() - at_);
-    const std::size_t line_end =
-        found == nullptr ? content_.size() : static_cast<std::size_t>(static_cast<const char*>(found) - content_.data());
+    const std::size_t line_end = found == nullptr
+                                     ? content_.size()
+                                     : static_cast<std::size_t>(static_cast<const char*>(found) - content_.data());
     std::size_t end = line_end;
     if (end > at_ && content_[end - 1] == '\r') --end;
     if (std::memchr(content_.data() + at_, '"', end - at_) != nullptr) {
@@ -234,7 +236,8 @@ std::size_t CsvReader::read_quoted_cell(std::size_t at) {
 void CsvReader::read_quoted_row() {
   std::vector<std::size_t> doubled;  // cells whose text is the next of unquoted_
   while (true) {
-    while (at_ < content_.size() && is_blank(content_[at_]) && !(separator_ == '\t' && content_[at_] == '\t')) ++at_;
+    while (at_ < content_.size() && is_blank(content_[at_]) && !(separator_ == '\t' && content_[at_] == '\t'))
+      ++at_;
     if (at_ < content_.size() && content_[at_] == '"') {
       const std::size_t opening = at_, texts = unquoted_.size();
       at_ = read_quoted_cell(at_);
@@ -245,7 +248,8 @@ void CsvReader::read_quoted_row() {
     } else {
       const std::size_t from = at_;
       while (at_ < content_.size() && !separates(content_[at_]) && content_[at_] != '\n') {
-        if (content_[at_] == '"') complain_at(at_, "a quote within a cell; quote the whole cell, and write the quote twice");
+        if (content_[at_] == '"')
+          complain_at(at_, "a quote within a cell; quote the whole cell, and write the quote twice");
         ++at_;
       }
       std::size_t to = at_;
@@ -288,7 +292,8 @@ void CsvReader::complain(std::size_t column, std::string_view what) const {
 
 double CsvReader::number_or_nan(std::size_t column) const {
   const std::string_view cell = cells_[column].text;
-  if (cell.empty() || cell == "nan" || cell == "NaN" || cell == "NA") return std::numeric_limits<double>::quiet_NaN();
+  if (cell.empty() || cell == "nan" || cell == "NaN" || cell == "NA")
+    return std::numeric_limits<double>::quiet_NaN();
   return number(column);
 }
 

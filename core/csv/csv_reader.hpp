@@ -22,8 +22,8 @@ namespace kilotwin {
 struct CsvLayout {
   /// '\0': comma or tab, by the header. ' ': runs of blanks and tabs.
   char separator = '\0';
-  bool header = true;       ///< the first row names the columns
-  bool same_width = true;   ///< every row has as many cells as the first
+  bool header = true;      ///< the first row names the columns
+  bool same_width = true;  ///< every row has as many cells as the first
 };
 
 class CsvReader {
@@ -69,9 +69,7 @@ class CsvReader {
   void read_plain_row(std::size_t end);
   void read_quoted_row();
   std::size_t read_quoted_cell(std::size_t at);
-  [[nodiscard]] bool separates(char c) const {
-    return c == separator_ || (separator_ == ' ' && c == '\t');
-  }
+  [[nodiscard]] bool separates(char c) const { return c == separator_ || (separator_ == ' ' && c == '\t'); }
   [[nodiscard]] std::string name_of(std::size_t column) const;
   [[noreturn]] void complain_at(std::size_t offset, std::string_view what) const;
 

@@ -60,7 +60,8 @@ struct CsvWriter::Gzip {
 };
 
 std::string csv_cell(std::string_view text) {
-  const bool blank_end = !text.empty() && (text.front() == ' ' || text.front() == '\t' || text.back() == ' ' || text.back() == '\t');
+  const bool blank_end =
+      !text.empty() && (text.front() == ' ' || text.front() == '\t' || text.back() == ' ' || text.back() == '\t');
   if (!blank_end && text.find_first_of(",\"\r\n\t") == std::string_view::npos) return std::string(text);
   std::string cell = "\"";
   for (const char c : text) {

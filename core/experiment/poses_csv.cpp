@@ -5,8 +5,8 @@
 #include <string>
 
 #include "core/base/pose.hpp"
-#include "core/csv/csv_reader.hpp"
 #include "core/base/say.hpp"
+#include "core/csv/csv_reader.hpp"
 #include "core/experiment/limits.hpp"
 #include "core/experiment/text_file.hpp"
 #include "core/math/elementary.h"
@@ -21,7 +21,8 @@ constexpr std::string_view kRadians = "x_mm,y_mm,heading_rad", kDegrees = "x_mm,
 CsvPoses read_poses_csv(const std::filesystem::path& file, std::string_view named_at) {
   CsvReader csv(one_line(file.string()), read_text(file, named_at));
   const bool degrees = csv.find_column("heading_deg").has_value();
-  csv.require({"x_mm", "y_mm", degrees ? "heading_deg" : "heading_rad"}, fmt::format("{} or {}", kRadians, kDegrees));
+  csv.require({"x_mm", "y_mm", degrees ? "heading_deg" : "heading_rad"},
+              fmt::format("{} or {}", kRadians, kDegrees));
   const std::size_t x = csv.column("x_mm"), y = csv.column("y_mm"),
                     heading = csv.column(degrees ? "heading_deg" : "heading_rad");
   CsvPoses poses;

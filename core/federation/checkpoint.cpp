@@ -56,8 +56,8 @@ std::vector<fs::path> part_files(const fs::path& directory) {
 proto::CheckpointPart read_part(const fs::path& file) {
   proto::CheckpointPart part;
   if (!part.ParseFromString(read_checksummed(file, kPartFile)) || part.header().format() != kFormat) {
-    throw UserError(fmt::format("{}: is not {} that this program wrote; {}", file.string(), kPartFile.name,
-                                kPartFile.remedy));
+    throw UserError(
+        fmt::format("{}: is not {} that this program wrote; {}", file.string(), kPartFile.name, kPartFile.remedy));
   }
   return part;
 }

@@ -2,9 +2,9 @@
 /// Anybody on the domain can write a sample.
 #pragma once
 
-#include "core/plan/plan.hpp"
-#include "core/frames/frames.hpp"
 #include "core/federation/schedule.hpp"
+#include "core/frames/frames.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin {
 

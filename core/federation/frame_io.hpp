@@ -68,7 +68,8 @@ template <class Frame> class Input : public InputBase {
     }
     gate_.accept(publisher, Tick{wire.tick});
     session_.mention(wire.directives);
-    session_.notify();  // also of one frame of several: on busy machines the session then waits for a core meanwhile
+    session_
+        .notify();  // also of one frame of several: on busy machines the session then waits for a core meanwhile
   }
 
   /// Takes notice of hellos and of frames that cannot be; true for the next frame of a publisher.

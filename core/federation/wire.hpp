@@ -3,9 +3,9 @@
 /// plan is for frame_check.hpp to say.
 #pragma once
 
-#include "core/frames/frames.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/topics.hpp"
+#include "core/frames/frames.hpp"
 
 namespace kilotwin {
 

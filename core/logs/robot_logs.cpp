@@ -24,7 +24,9 @@ constexpr std::int64_t kPatience = 31;
 std::int64_t robot_of(const fs::path& file) {
   unsigned robot = 0;
   char rest = 0;
-  return std::sscanf(file.filename().c_str(), "robot-%u.tx%c", &robot, &rest) == 2 && rest == 't' ? std::int64_t{robot} : -1;
+  return std::sscanf(file.filename().c_str(), "robot-%u.tx%c", &robot, &rest) == 2 && rest == 't'
+             ? std::int64_t{robot}
+             : -1;
 }
 
 }  // namespace

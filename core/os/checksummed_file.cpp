@@ -108,8 +108,8 @@ std::string read_checksummed(const fs::path& file, const FileKind& kind) {
   if (length > rest || length + blocks_of(length) * kCrc_bytes > rest)
     throw refuse(fmt::format("is cut off at octet {}", all.size()));
   if (length + blocks_of(length) * kCrc_bytes < rest) {
-    throw refuse(fmt::format("goes on after its end at octet {}",
-                             kHeader_bytes + length + blocks_of(length) * kCrc_bytes));
+    throw refuse(
+        fmt::format("goes on after its end at octet {}", kHeader_bytes + length + blocks_of(length) * kCrc_bytes));
   }
   std::string content;
   content.reserve(length);

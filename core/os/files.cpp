@@ -36,7 +36,8 @@ bool own_private_directory(const fs::path& directory) {
 /// Appends all that the descriptor gives; false on failure, with errno.
 bool read_all(int descriptor, std::string& content) {
   struct stat status {};
-  if (fstat(descriptor, &status) == 0 && status.st_size > 0) content.reserve(static_cast<std::size_t>(status.st_size) + 1);
+  if (fstat(descriptor, &status) == 0 && status.st_size > 0)
+    content.reserve(static_cast<std::size_t>(status.st_size) + 1);
   char block[1 << 16];
   for (;;) {
     const ssize_t n = read(descriptor, block, sizeof block);

@@ -116,7 +116,8 @@ Process::Process(const Command& command) : own_group_(command.own_group) {
       dup2(from == Command::kNowhere ? nothing.get() : from, to);
     };
     // Of two that change places neither is overwritten before it is read.
-    const int errors = command.errors == STDOUT_FILENO && command.output != Command::kOwn ? dup(STDOUT_FILENO) : command.errors;
+    const int errors =
+        command.errors == STDOUT_FILENO && command.output != Command::kOwn ? dup(STDOUT_FILENO) : command.errors;
     connect(Command::kNowhere, STDIN_FILENO);
     connect(command.output, STDOUT_FILENO);
     connect(errors, STDERR_FILENO);
@@ -163,8 +164,7 @@ const std::optional<ProcessEnd>& Process::poll() {
 }
 
 ProcessEnd Process::wait() {
-  if (!end_ && !collect(0))
-    throw RunError(fmt::format("cannot wait for process {}: {}", id_, system_reason()));
+  if (!end_ && !collect(0)) throw RunError(fmt::format("cannot wait for process {}: {}", id_, system_reason()));
   return *end_;
 }
 

@@ -31,7 +31,7 @@ struct Command {
 
   std::vector<std::string> arguments;  ///< [0]: the program's path; what it is called, if `program` is given
   std::filesystem::path program;       ///< empty: arguments[0]
-  int output = kOwn, errors = kOwn;    ///< descriptors that it gets as standard output and errors. Its input is empty
+  int output = kOwn, errors = kOwn;  ///< descriptors that it gets as standard output and errors. Its input is empty
   Environment environment = Environment::kOwn;
   /// A process group of its own: the terminal's Ctrl-C does not reach it, and signals reach what it starts as well.
   bool own_group = false;

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/federation/topics.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::ark {
 

@@ -9,15 +9,15 @@
 #include <set>
 #include <system_error>
 
+#include "core/base/error.hpp"
+#include "core/os/files.hpp"
+#include "core/os/process.hpp"
 #include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/cycle_counters.hpp"
 #include "services/behaviours/elf_file.hpp"
-#include "core/os/files.hpp"
 #include "services/behaviours/loop_barriers.hpp"
-#include "core/os/process.hpp"
 #include "services/behaviours/program_text.hpp"
 #include "services/behaviours/sha256.hpp"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
@@ -258,13 +258,16 @@ struct Incomplete {
 };
 
 /// Links twice: where variables end is known only then, and they shall end where a page does, so that an access beyond them faults.
-std::string linked(const Arguments& first, const Arguments& rest, const fs::path& place, const std::vector<fs::path>& sources) {
+std::string linked(const Arguments& first, const Arguments& rest, const fs::path& place,
+                   const std::vector<fs::path>& sources) {
   constexpr std::uint64_t kAlignment = 64;  // no variable asks for more
   const Temporary result(place), front(place);
   for (std::uint64_t pad = 0;;) {
-    os::write_file(front.path(), ".section .data,\"aw\"\n.balign " + std::to_string(kAlignment) + "\n.zero " + std::to_string(pad) +
-                                     "\n.globl kilotwin_variables\n.hidden kilotwin_variables\nkilotwin_variables:\n"
-                                     ".section .note.GNU-stack,\"\"\n");
+    os::write_file(front.path(),
+                   ".section .data,\"aw\"\n.balign " + std::to_string(kAlignment) + "\n.zero " +
+                       std::to_string(pad) +
+                       "\n.globl kilotwin_variables\n.hidden kilotwin_variables\nkilotwin_variables:\n"
+                       ".section .note.GNU-stack,\"\"\n");
     Arguments arguments = first;
     append(arguments, {"-x", "assembler", front.path(), "-x", "none"});
     append(arguments, rest);

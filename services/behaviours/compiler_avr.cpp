@@ -2,12 +2,12 @@
 #include <sstream>
 #include <system_error>
 
-#include "services/behaviours/compiler.hpp"
-#include "services/behaviours/compiler_common.hpp"
+#include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "services/behaviours/compiler.hpp"
+#include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/program_text.hpp"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 namespace fs = std::filesystem;

@@ -6,11 +6,11 @@
 #include <string_view>
 #include <system_error>
 
+#include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "services/behaviours/program_text.hpp"
 #include "services/behaviours/runtime_files.hpp"
 #include "services/behaviours/sha256.hpp"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
@@ -111,9 +111,9 @@ std::optional<std::string> assembler_error(std::string_view line) {
 /// itself: gcc, collect2, clang, in the C locale.
 bool is_trouble_of_the_machine(std::string_view line) {
   for (const std::string_view mark :
-       {"signal terminated program", "terminated with signal", "internal compiler error", "unable to execute command",
-        "command failed due to signal", "out of memory", "virtual memory exhausted", "Cannot allocate memory",
-        "No space left on device"}) {
+       {"signal terminated program", "terminated with signal", "internal compiler error",
+        "unable to execute command", "command failed due to signal", "out of memory", "virtual memory exhausted",
+        "Cannot allocate memory", "No space left on device"}) {
     if (line.find(mark) != std::string_view::npos) return true;
   }
   return false;
@@ -168,7 +168,8 @@ os::ProcessResult run_compiler(const std::vector<std::string>& arguments) {
   for (std::string line; std::getline(stream, line);) {
     // Lines of the source, which compilers repeat, are indented.
     if (!line.empty() && line[0] != ' ' && is_trouble_of_the_machine(line))
-      throw RunError(arguments[0] + " failed: " + line + "; this is no error of the program: run this command again");
+      throw RunError(arguments[0] + " failed: " + line +
+                     "; this is no error of the program: run this command again");
   }
   return result;
 }

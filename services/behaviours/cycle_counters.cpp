@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/error.hpp"
 #include "services/behaviours/assembly.hpp"
 #include "services/behaviours/runtime/image_abi.h"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 namespace {

@@ -12,9 +12,9 @@
 #include <cstddef>
 #include <mutex>
 
+#include "core/base/error.hpp"
 #include "services/behaviours/division.hpp"
 #include "services/behaviours/image.hpp"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 namespace {
@@ -76,13 +76,11 @@ RobotThread& own_thread() {
 /// System calls from robots' addresses become SIGSYS.
 void refuse_system_calls() {
   constexpr std::uint32_t kLow = offsetof(seccomp_data, instruction_pointer), kHigh = kLow + 4;
-  std::array<sock_filter, 7> filter{{BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kHigh),
-                                     BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, 0, 0, 3),
-                                     BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kLow),
-                                     BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kFirstAddress, 0, 1),
-                                     BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kLastAddress, 0, 1),
-                                     BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
-                                     BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP)}};
+  std::array<sock_filter, 7> filter{
+      {BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kHigh), BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, 0, 0, 3),
+       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kLow), BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kFirstAddress, 0, 1),
+       BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kLastAddress, 0, 1), BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+       BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP)}};
   const sock_fprog program{filter.size(), filter.data()};
   // Without the last flag older kernels would slow this process down, as if it ran strangers' code by speculation.
   if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0) {

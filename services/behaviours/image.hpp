@@ -47,7 +47,8 @@ class Slot {
   /// Whether the octets before a robot's data are zero, as they were; makes them so.
   [[nodiscard]] bool clear_before_data() const {
     std::uint64_t any = 0;
-    for (std::uint64_t i = 1; i <= watched_words_; ++i) any |= reinterpret_cast<const std::uint64_t*>(data())[-static_cast<std::int64_t>(i)];  // NOLINT
+    for (std::uint64_t i = 1; i <= watched_words_; ++i)
+      any |= reinterpret_cast<const std::uint64_t*>(data())[-static_cast<std::int64_t>(i)];  // NOLINT
     if (any != 0) std::memset(data() - 8 * watched_words_, 0, 8 * watched_words_);
     return any == 0;
   }
@@ -61,7 +62,8 @@ class Slot {
   std::mutex mutex;  ///< held while robots run here
 
  private:
-  std::uint64_t address_, size_, stack_top_, interrupt_stack_top_, surroundings_, exchange_, image_, data_offset_, watched_words_;
+  std::uint64_t address_, size_, stack_top_, interrupt_stack_top_, surroundings_, exchange_, image_, data_offset_,
+      watched_words_;
   std::vector<std::uint8_t> initial_data_;
 };
 

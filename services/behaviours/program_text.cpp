@@ -9,10 +9,10 @@
 #include <string_view>
 #include <system_error>
 
+#include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "services/behaviours/runtime_files.hpp"
 #include "services/behaviours/sha256.hpp"
-#include "core/base/error.hpp"
 
 namespace kilotwin::behaviours {
 namespace fs = std::filesystem;

@@ -12,9 +12,9 @@
 #include <system_error>
 #include <tuple>
 
-#include "services/behaviours/compiler_common.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/program_text.hpp"
 
 namespace kilotwin::behaviours {
@@ -168,7 +168,8 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
   const fs::path runtime = unpacked_runtime(cache);
   const ProgramText text = program_text(sources, cache);
   std::vector<std::string> result;
-  const fs::path dump = cache / ("gimple." + std::to_string(getpid()) + '.' + std::to_string(std::hash<std::string>{}(sources.front().string())));
+  const fs::path dump = cache / ("gimple." + std::to_string(getpid()) + '.' +
+                                 std::to_string(std::hash<std::string>{}(sources.front().string())));
   for (std::size_t i = 0; i < text.files.size(); ++i) {
     if (is_cpp(text.files[i])) continue;
     Arguments shared{"-std=gnu11", "-funsigned-char", "-fpack-struct", "-fshort-enums", "-DF_CPU=8000000"};

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/model/radio_parameters.hpp"
 #include "core/model/ranging.hpp"
+#include "core/plan/plan.hpp"
 #include "core/random/random.hpp"
 #include "services/comm/neighbourhood.hpp"
 

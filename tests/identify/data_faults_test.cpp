@@ -216,7 +216,8 @@ TEST(DataFaults, DocumentSaysWhoAndWhen) {
   EXPECT_EQ(document[0]["kind"], "duplicate");
   EXPECT_EQ(document[0]["run"], "0");
   EXPECT_EQ(document[0]["robot"], 40);
-  EXPECT_NE(document[0]["in_words"].get<std::string>().find("robot 40 is a second track of robot 5"), std::string::npos);
+  EXPECT_NE(document[0]["in_words"].get<std::string>().find("robot 40 is a second track of robot 5"),
+            std::string::npos);
 }
 
 TEST(DataFaults, EmptyAndTinySetsHaveNone) {

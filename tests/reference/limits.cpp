@@ -9,8 +9,8 @@
 #include "core/dds/dds.hpp"
 #include "core/experiment/fields.hpp"
 #include "core/experiment/limits.hpp"
-#include "services/behaviours/image.hpp"
 #include "core/logs/robot_logs.hpp"
+#include "services/behaviours/image.hpp"
 
 namespace kilotwin::reference {
 namespace {
@@ -56,8 +56,7 @@ std::string limits_table() {
       "services/behaviours/image.hpp");
   row("copies of a program in memory: robots of one program that run at the same time", number(behaviours::kSlots),
       "services/behaviours/image.hpp");
-  row("log file of a robot", fmt::format("{} MiB", RobotLogs::kMostOctets >> 20),
-      "core/logs/robot_logs.hpp");
+  row("log file of a robot", fmt::format("{} MiB", RobotLogs::kMostOctets >> 20), "core/logs/robot_logs.hpp");
   row("record of a recording", fmt::format("{} MiB", recorder::kLongestRecord_bytes >> 20),
       "clients/recorder/recording.hpp");
   row("runs of a sweep", number(cli::kMostSweepRuns), "clients/cli/sweep_points.hpp");

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/plan/plan.hpp"
 #include "core/frames/frames.hpp"
+#include "core/plan/plan.hpp"
 
 namespace kilotwin::testing {
 

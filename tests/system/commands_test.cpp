@@ -75,7 +75,8 @@ TEST_F(Commands, ExportWritesGzipAndToStandardOutput) {
 TEST_F(Commands, ARunSaysByWhatWhenAndWhereItWasMade) {
   run(small({"--seed", "4"}), scratch, "run");
   const auto summary = nlohmann::json::parse(read(scratch / "run/summary.json"));
-  for (const char* field : {"version", "build", "host", "date"}) EXPECT_FALSE(summary[field].get<std::string>().empty());
+  for (const char* field : {"version", "build", "host", "date"})
+    EXPECT_FALSE(summary[field].get<std::string>().empty());
   EXPECT_GE(summary["cores"].get<int>(), 1);
   const std::string date = summary["date"];
   ASSERT_EQ(date.size(), 20u) << date;
@@ -196,14 +197,15 @@ TEST_F(Commands, SweepTabulatesAllCombinations) {
   EXPECT_EQ(plot.find("pitch_mm=40"), std::string::npos);
   EXPECT_NE(plot.find(">40<"), std::string::npos);
   const std::string page = read(scratch / "sweep/report.html");
-  for (const char* text : {"<h1>disperse</h1>", "data:image/svg+xml;base64,", "robots.layout.grid.pitch_mm=60</td>", "--seeds"})
+  for (const char* text :
+       {"<h1>disperse</h1>", "data:image/svg+xml;base64,", "robots.layout.grid.pitch_mm=60</td>", "--seeds"})
     EXPECT_NE(page.find(text), std::string::npos) << text;
 }
 
 TEST_F(Commands, ASweepOfOneValueNeedsNoLegend) {
   const Outcome outcome =
-      kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "9", "--duration", "2", "--seeds", "1..2",
-                "--set", "robots.layout.grid.pitch_mm=40", "--out", scratch / "sweep"},
+      kilotwin({"sweep", source("experiments/disperse.txtpb"), "--robots", "9", "--duration", "2", "--seeds",
+                "1..2", "--set", "robots.layout.grid.pitch_mm=40", "--out", scratch / "sweep"},
                scratch);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   // The value stands in the subtitle alone.

@@ -65,8 +65,7 @@ class Damage : public testing::Test {
 };
 
 /// Flips one to three bits of a file in each of `tries`; `use` must end in an error that names the file.
-void flip_bits(const fs::path& file, int tries, std::mt19937_64& random,
-               const std::function<Outcome()>& use) {
+void flip_bits(const fs::path& file, int tries, std::mt19937_64& random, const std::function<Outcome()>& use) {
   const std::string right = read(file);
   for (int attempt = 0; attempt < tries; ++attempt) {
     std::string wrong = right;
@@ -117,8 +116,9 @@ TEST_F(Damage, FilesOfOlderFormatsAreRefusedInOneLine) {
   write(directory.manifest(), directory.read_manifest().SerializeAsString());
   const Outcome outcome = replay("run");
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.err.find("manifest.pb: is not the manifest of a run in format 2: another file, an older format"),
-            std::string::npos)
+  EXPECT_NE(
+      outcome.err.find("manifest.pb: is not the manifest of a run in format 2: another file, an older format"),
+      std::string::npos)
       << outcome.err;
 }
 
@@ -136,7 +136,8 @@ TEST_F(Damage, AManifestWithRightChecksumsAndWrongValuesEndsInOneLine) {
       {"pose", [](proto::Manifest& m) { m.set_heading_rad(3, std::nan("")); }},
       {"pace", [](proto::Manifest& m) { m.set_pace(1e-300); }},
       {"pace", [](proto::Manifest& m) { m.set_pace(std::nan("")); }},
-      {"count is 4000000000", [](proto::Manifest& m) { m.mutable_experiment()->mutable_robots(0)->set_count(4'000'000'000u); }},
+      {"count is 4000000000",
+       [](proto::Manifest& m) { m.mutable_experiment()->mutable_robots(0)->set_count(4'000'000'000u); }},
   };
   for (const auto& [word, change] : cases) {
     proto::Manifest wrong = right;
@@ -209,8 +210,9 @@ TEST_F(Damage, ReplayRefusesARecordingThatIsShorterThanTheRun) {
   rewrite("run", first_half);
   const Outcome half = replay("run");
   EXPECT_EQ(half.status, 1) << half.out;
-  EXPECT_NE(half.err.find("it ends at tick 39 without an end mark, but summary.json says that the run ended at tick 92"),
-            std::string::npos)
+  EXPECT_NE(
+      half.err.find("it ends at tick 39 without an end mark, but summary.json says that the run ended at tick 92"),
+      std::string::npos)
       << half.err;
   // Without a summary the run was killed; what was recorded until then is verified.
   fs::rename(scratch / "run/summary.json", scratch / "summary.json");

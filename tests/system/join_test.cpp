@@ -56,8 +56,7 @@ TEST_F(Join, ThePageShowsTheExampleAsItIsTested) {
   const std::string example = read(source("tests/interop/join_example.c"));
   ASSERT_FALSE(example.empty());
   for (const auto& entry : fs::recursive_directory_iterator(source("docs"))) {
-    if (entry.path().extension() == ".md" &&
-        read(entry.path()).find("\n" + example + "```") != std::string::npos)
+    if (entry.path().extension() == ".md" && read(entry.path()).find("\n" + example + "```") != std::string::npos)
       return;
   }
   ADD_FAILURE() << "no page of docs/ shows tests/interop/join_example.c as it is";

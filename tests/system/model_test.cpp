@@ -45,7 +45,8 @@ TEST_F(Model, AnExportedModelGivesTheSameRunAgain) {
   ASSERT_EQ(exported.status, 0) << exported.err;
   const auto again = run(disperse({"--mode", "local", "--model", scratch / "m.txtpb"}), scratch, "again");
   EXPECT_EQ(again.state_hash, first.state_hash);
-  for (const char* field : {"wheel_base_mm: 25\n", "noise: true\n", "calibrated_turn_duty: 70\n", "spin_up_s: 0.015\n"})
+  for (const char* field :
+       {"wheel_base_mm: 25\n", "noise: true\n", "calibrated_turn_duty: 70\n", "spin_up_s: 0.015\n"})
     EXPECT_NE(read(scratch / "m.txtpb").find(field), std::string::npos) << "a default is stated: " << field;
   // With another seed, an exported model keeps each robot's biases: a second export is the same.
   run(disperse({"--mode", "local", "--seed", "5", "--model", scratch / "m.txtpb"}), scratch, "other");

@@ -182,15 +182,17 @@ TEST_F(Recoveries, ExternalInputIsRepeated) {
 
 TEST_F(Recoveries, FirmwareRobotsLogsAreThoseOfOneRun) {
   // Robot 3, native, brings down its host at about 1.9 s. The others are firmware, and print from the first second on.
-  std::ofstream(scratch / "talk.c") << "#define DEBUG\n#include <kilolib.h>\n#include <debug.h>\n"
-                                       "static void setup(void) { printf(\"robot %u\\n\", kilo_uid); }\n"
-                                       "static void loop(void) { static uint32_t next = 0;\n"
-                                       "  if (kilo_ticks >= next) { printf(\"at %lu\\n\", (unsigned long)next); next += 15; } }\n"
-                                       "int main(void) { kilo_init(); debug_init(); kilo_start(setup, loop); return 0; }\n";
+  std::ofstream(scratch / "talk.c")
+      << "#define DEBUG\n#include <kilolib.h>\n#include <debug.h>\n"
+         "static void setup(void) { printf(\"robot %u\\n\", kilo_uid); }\n"
+         "static void loop(void) { static uint32_t next = 0;\n"
+         "  if (kilo_ticks >= next) { printf(\"at %lu\\n\", (unsigned long)next); next += 15; } }\n"
+         "int main(void) { kilo_init(); debug_init(); kilo_start(setup, loop); return 0; }\n";
   const auto logs_of = [&](const std::string& action, const std::string& name, const Words& more) {
     std::ofstream(scratch / (name + ".txtpb"))
         << "duration_s: 5 robots { count: 3 behaviour: \"talk.c\" avr: true layout { grid { pitch_mm: 50 } } }\n"
-           "robots { count: 1 behaviour: \"" << behaviour(name, action) << "\" layout { x_mm: 250 } }\n";
+           "robots { count: 1 behaviour: \""
+        << behaviour(name, action) << "\" layout { x_mm: 250 } }\n";
     Words words{scratch / (name + ".txtpb")};
     words.insert(words.end(), more.begin(), more.end());
     const auto summary = run(words, scratch, name);
@@ -210,8 +212,8 @@ TEST_F(Recoveries, FirmwareRobotsLogsAreThoseOfOneRun) {
 
 TEST_F(Recoveries, SystemCallsFailTheirRobotAlone) {
   // exit_group(0), by which a program would end the whole run with status 0.
-  const std::string ends = behaviour(
-      "ends", "__asm__ volatile(\"syscall\" : : \"a\"(231), \"D\"(0) : \"rcx\", \"r11\", \"memory\");");
+  const std::string ends =
+      behaviour("ends", "__asm__ volatile(\"syscall\" : : \"a\"(231), \"D\"(0) : \"rcx\", \"r11\", \"memory\");");
   const auto failed = outcome("failed", behaviour("faults", "*(volatile int*)8 = 1;"), {"--mode", "local"});
   for (const Words& words : {Words{"--mode", "local"}, Words{"--partitions", "1x1"}}) {
     const auto ended = outcome("ended" + words[0], ends, words);

@@ -20,8 +20,8 @@ struct Formation {
 };
 
 /// Adds rows and returns how far the box got, by number of robots.
-PlotSeries validate_formation(Runs& runs, Verdicts& verdicts, const std::string& engine,
-                                        const Formation& formation, std::size_t first, std::size_t last) {
+PlotSeries validate_formation(Runs& runs, Verdicts& verdicts, const std::string& engine, const Formation& formation,
+                              std::size_t first, std::size_t last) {
   std::vector<std::string> words{"--set", fmt::format("robots.count={}..{}", first, last), "--set",
                                  "physics.engine=" + engine};
   words.insert(words.end(), formation.words.begin(), formation.words.end());

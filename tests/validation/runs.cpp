@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/os/files.hpp"
 #include "clients/recorder/reader.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::validation {
 

@@ -3,8 +3,8 @@
 #include <array>
 #include <cmath>
 
-#include "clients/report/plot.hpp"
 #include "clients/recorder/statistics.hpp"
+#include "clients/report/plot.hpp"
 #include "tests/validation/reference.hpp"
 #include "tests/validation/straight_theory.hpp"
 #include "tests/validation/validations.hpp"

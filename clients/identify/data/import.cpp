@@ -10,10 +10,10 @@
 #include <string_view>
 
 #include "clients/identify/data/measured_set.hpp"
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/csv/csv_writer.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::identify {
 namespace fs = std::filesystem;
@@ -84,8 +84,7 @@ std::vector<fs::path> importable(const fs::path& directory) {
   for (const fs::directory_entry& entry : fs::directory_iterator(directory, error)) {
     const fs::path& file = entry.path();
     if (!entry.is_regular_file(error) || name_of_run(file) == "commands") continue;
-    if ((is_ark_log(file) && looks_like_ark_log(file)) ||
-        (is_table(file) && looks_like_recording(file)))
+    if ((is_ark_log(file) && looks_like_ark_log(file)) || (is_table(file) && looks_like_recording(file)))
       files.push_back(file);
   }
   std::sort(files.begin(), files.end());
@@ -161,10 +160,9 @@ void import_set(const fs::path& from, const fs::path& to) {
   }
   std::error_code error;
   fs::create_directories(to, error);
-  os::write_file(
-      to / "trajectories.csv",
-      (is_ark_log(files.front()) ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") +
-          text);
+  os::write_file(to / "trajectories.csv", (is_ark_log(files.front()) ? "run,robot,time_s,x_mm,y_mm\n"
+                                                                     : "run,robot,time_s,x_mm,y_mm,heading_rad\n") +
+                                              text);
   for (const char* name : {"commands.csv", "commands.csv.gz"}) {
     fs::remove(to / name, error);
     if (fs::exists(from / name, error)) os::write_file(to / name, os::read_file(from / name));

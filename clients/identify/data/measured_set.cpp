@@ -204,7 +204,8 @@ void save_measured_set(const MeasuredSet& set, const fs::path& directory) {
       }
       for (const CommandChange& c : track.commands) {
         if (c.time_s > -1e299 || c.motion != Motion::kStop)
-          commands += fmt::format("{},{},{:.4f},{}\n", name, track.robot, std::max(c.time_s, -1e6), name_of(c.motion));
+          commands +=
+              fmt::format("{},{},{:.4f},{}\n", name, track.robot, std::max(c.time_s, -1e6), name_of(c.motion));
       }
     }
   }

@@ -23,7 +23,7 @@ double Fitter::log_likelihood_with_contacts(const MotionModel& model,
                                             const std::vector<const TrackView*>& tracks) const {
   std::vector<double> sums(tracks.size());
   os::in_parallel(tracks.size(), threads_,
-              [&](std::size_t i) { sums[i] = likelihood_of(model, *tracks[i], true).sum; });
+                  [&](std::size_t i) { sums[i] = likelihood_of(model, *tracks[i], true).sum; });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 

@@ -73,14 +73,17 @@ FloorRun read_floor_run(CsvReader csv, const std::string& name, const Floor& flo
     const double time_s = csv.number(time), x_mm = csv.number(x), y_mm = csv.number(y);
     const std::uint32_t robot = csv.whole(id);
     const auto check = [&](std::size_t column, bool right, const std::string& expected) {
-      if (!right) csv.complain(column, fmt::format("{} is {}; {}", csv.columns()[column], csv.text(column), expected));
+      if (!right)
+        csv.complain(column, fmt::format("{} is {}; {}", csv.columns()[column], csv.text(column), expected));
     };
     check(time, time_s >= 0, "times are at least 0");
     check(id, robot <= kHighestRobot, fmt::format("robots are 0..{}", kHighestRobot));
     check(x, x_mm > 0 && x_mm < floor.width_mm, fmt::format("on this floor x is within 0..{} mm", floor.width_mm));
-    check(y, y_mm > 0 && y_mm < floor.height_mm, fmt::format("on this floor y is within 0..{} mm", floor.height_mm));
+    check(y, y_mm > 0 && y_mm < floor.height_mm,
+          fmt::format("on this floor y is within 0..{} mm", floor.height_mm));
     FloorTrack& track = tracks[robot];
-    check(time, track.time_s.empty() || track.time_s.back() <= time_s, "the previous row is later; sort the rows by time");
+    check(time, track.time_s.empty() || track.time_s.back() <= time_s,
+          "the previous row is later; sort the rows by time");
     track.time_s.push_back(time_s);
     track.x_mm.push_back(x_mm);
     track.y_mm.push_back(y_mm);

@@ -106,7 +106,7 @@ json classify(const std::vector<FloorRun>& alike, const std::vector<FloorRun>& u
   for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_before[i]});
   for (std::size_t i = 0; i < runs; ++i) pairs.push_back({&measured[i], &by_after[i]});
   os::in_parallel(pairs.size(), held_out.threads(),
-              [&](std::size_t i) { pairs[i].result = classifier_test(*pairs[i].a, *pairs[i].b); });
+                  [&](std::size_t i) { pairs[i].result = classifier_test(*pairs[i].a, *pairs[i].b); });
 
   MeanArea all_days, days_alike, mean_before, mean_after;
   const std::size_t like_others = runs + alike.size();

@@ -8,11 +8,11 @@
 
 #include "clients/identify/report/report_effects.hpp"
 #include "clients/identify/report/report_figures.hpp"
-#include "clients/report/html.hpp"
 #include "clients/identify/report/report_plots.hpp"
 #include "clients/identify/report/report_simulated.hpp"
 #include "clients/identify/report/report_summary.hpp"
 #include "clients/identify/report/report_text.hpp"
+#include "clients/report/html.hpp"
 #include "core/os/files.hpp"
 
 namespace kilotwin::identify {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/report/html.hpp"
 #include "clients/identify/report/report_plots.hpp"
+#include "clients/report/html.hpp"
 
 namespace kilotwin::identify::report {
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 
-#include "clients/report/html.hpp"
 #include "clients/identify/report/report_plots.hpp"
+#include "clients/report/html.hpp"
 
 namespace kilotwin::identify::report {
 namespace {

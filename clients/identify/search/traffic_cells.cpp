@@ -216,7 +216,8 @@ GridCells fit_grid_cells(const Fitter& fitter, const MotionModel& model, const G
   for (double side = kSmallest_mm; side < kLargest_mm; side *= 1 + 0.3 * side / extent_mm)
     for (int i = 0; i < kCorners; ++i)
       for (int j = 0; j < kCorners; ++j) all.push_back({{side, side * i / kCorners, side * j / kCorners}, 0});
-  os::in_parallel(all.size(), fitter.threads(), [&](std::size_t i) { all[i].value = explained(runs, all[i].cells); });
+  os::in_parallel(all.size(), fitter.threads(),
+                  [&](std::size_t i) { all[i].value = explained(runs, all[i].cells); });
   std::stable_sort(all.begin(), all.end(),
                    [](const RatedCells& a, const RatedCells& b) { return a.value > b.value; });
   constexpr std::size_t kClimbed = 6;

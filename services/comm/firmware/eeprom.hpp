@@ -3,10 +3,10 @@
 
 #include <array>
 
-#include "services/comm/firmware/flash_image.hpp"
 #include "core/base/eeprom_layout.h"
 #include "core/model/radio_parameters.hpp"
 #include "core/model/robot_parameters.hpp"
+#include "services/comm/firmware/flash_image.hpp"
 
 namespace kilotwin::firmware {
 

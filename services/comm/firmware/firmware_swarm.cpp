@@ -53,7 +53,8 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
   std::vector<std::vector<comm::Cycles>> flashes(robots_.size());
   workers_->for_each(robots_.size(), [&](std::size_t i) { run_robot(robots_[i], 0, {}, flashes[i]); });
   if (keeps_logs)
-    logs_.emplace(run_directory, plan.tick_length, first, [&plan](std::uint32_t robot) { return plan.firmware(robot); });
+    logs_.emplace(run_directory, plan.tick_length, first,
+                  [&plan](std::uint32_t robot) { return plan.firmware(robot); });
   // What they print while they are switched on belongs to the run's beginning.
   if (first > Tick{0}) {
     for (Robot& robot : robots_) robot.mcu->printed().clear();

@@ -80,6 +80,7 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
 /// The plan's firmware robots; null where there are none.
 [[nodiscard]] std::unique_ptr<comm::FirmwareRobots> make_firmware_robots(const RunPlan&,
                                                                          const std::filesystem::path& run_directory,
-                                                                         std::uint32_t threads, Tick first, bool keeps_logs);
+                                                                         std::uint32_t threads, Tick first,
+                                                                         bool keeps_logs);
 
 }  // namespace kilotwin::firmware

@@ -118,7 +118,8 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
   // Of the EEPROM's address the processor has ten bits, libsimavr sixteen.
   avr_register_io_write(
       avr_, kEearh,
-      [](avr_t* avr, avr_io_addr_t address, std::uint8_t value, void*) { avr->data[address] = value & 3; }, nullptr);
+      [](avr_t* avr, avr_io_addr_t address, std::uint8_t value, void*) { avr->data[address] = value & 3; },
+      nullptr);
   // External interrupts by level are polled in every cycle while a pin is low; no Kilobot has a source for them.
   avr_extint_set_strict_lvl_trig(avr_, 0, 0);
   avr_extint_set_strict_lvl_trig(avr_, 1, 0);

@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "services/comm/firmware/flash_image.hpp"
 #include "core/random/random.hpp"
 #include "core/senses/robot_senses.hpp"
+#include "services/comm/firmware/flash_image.hpp"
 
 struct avr_t;
 struct avr_irq_t;

@@ -12,8 +12,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "services/comm/firmware/mcu.hpp"
 #include "core/base/error.hpp"
+#include "services/comm/firmware/mcu.hpp"
 
 extern "C" {
 // Where this program's code begins and ends, by the linker.

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "clients/identify/data/measured_set.hpp"
-#include "core/os/files.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -147,9 +147,8 @@ TEST_F(ImportTest, WhateverIsInAFileItIsReadOrComplainedOf) {
       const std::string rows =
           is_ark ? rows_of_ark_log(folder_ / "from" / name) : rows_of_recording(folder_ / "from" / name);
       // Whatever is accepted yields valid rows.
-      os::write_file(
-          folder_ / "to" / "trajectories.csv",
-          (is_ark ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + rows);
+      os::write_file(folder_ / "to" / "trajectories.csv",
+                     (is_ark ? "run,robot,time_s,x_mm,y_mm\n" : "run,robot,time_s,x_mm,y_mm,heading_rad\n") + rows);
       const MeasuredSet set = load_measured_set(folder_ / "to");
       for (const Track& track : set.runs.at(0).tracks) {
         for (const Sample& s : track.samples)

@@ -65,7 +65,8 @@ TEST(Export, NumbersAreRoundedAndNeverMinusZero) {
   EXPECT_EQ(
       lines_of(scratch / "t.csv"),
       (std::vector<std::string>{std::string(kTrajectoryColumns), "0,0,0.0000,-0.5000,-3.141593,3,3,3,0,running",
-                                "0,1,0.0001,1000000.0000,3.141593,1,2,3,0,running", "0,2,-1234.5679,1000.0000,0.000000,3,3,3,0,running"}));
+                                "0,1,0.0001,1000000.0000,3.141593,1,2,3,0,running",
+                                "0,2,-1234.5679,1000.0000,0.000000,3,3,3,0,running"}));
 }
 
 TEST(Export, WantedTimesTakeTheFirstStateAtOrAfter) {
@@ -146,7 +147,8 @@ TEST(Export, MessagesByReceiverAndSender) {
   write_synthetic(scratch / "r.ktrec", synthetic_header(2), 10);
   Reader reader(scratch / "r.ktrec");
   EXPECT_EQ(export_messages(reader, scratch / "m.csv"), 3u);
-  EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count,sent_if_receiver_is_sender\n0,0,9,1\n0,1,4,0\n1,0,7,0\n");
+  EXPECT_EQ(content(scratch / "m.csv"),
+            "receiver,sender,count,sent_if_receiver_is_sender\n0,0,9,1\n0,1,4,0\n1,0,7,0\n");
 }
 
 TEST(Export, LaterCountsOfAPairTakeThePlaceOfEarlier) {
@@ -197,9 +199,9 @@ TEST(Export, GroupsAndStatesAreNamed) {
   Reader reader(scratch / "r.ktrec");
   export_trajectories(reader, scratch / "t.csv");
   EXPECT_EQ(lines_of(scratch / "t.csv"),
-            (std::vector<std::string>{std::string(kTrajectoryColumns), "0,0,0.0000,0.0000,0.000000,0,0,0,0,sleeping",
-                                      "0,1,0.0000,0.0000,0.000000,3,0,0,0,flat",
-                                      "0,2,0.0000,0.0000,0.000000,0,3,0,1,77"}));
+            (std::vector<std::string>{
+                std::string(kTrajectoryColumns), "0,0,0.0000,0.0000,0.000000,0,0,0,0,sleeping",
+                "0,1,0.0000,0.0000,0.000000,3,0,0,0,flat", "0,2,0.0000,0.0000,0.000000,0,3,0,1,77"}));
 }
 
 TEST(Export, TablesWhoseNameEndsInGzAreGzipped) {

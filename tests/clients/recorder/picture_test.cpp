@@ -147,8 +147,8 @@ TEST(Picture, ShowsMovableBodiesWholeWhereItEnlarges) {
       EXPECT_GE(top, -1);
       EXPECT_LE(left + std::stod(element.attribute("width")), panel[2] + 1);
       EXPECT_LE(top + std::stod(element.attribute("height")), panel[3] + 1);
-      EXPECT_NEAR(std::stod(element.attribute("width")) / std::stod(element.attribute("height")), panel[2] / panel[3],
-                  0.02)
+      EXPECT_NEAR(std::stod(element.attribute("width")) / std::stod(element.attribute("height")),
+                  panel[2] / panel[3], 0.02)
           << "the frame has the shape of the panel that it stands for";
     }
   }

@@ -312,14 +312,16 @@ TEST(Recording, OtherFilesAreToldInOneLine) {
   *newer.mutable_header() = synthetic_header(2);
   newer.mutable_header()->set_format(3);
   put_content(file, framed(newer.SerializeAsString()));
-  EXPECT_EQ(error_of(file), file.string() + ": not a Kilotwin recording; it has format 3, this program reads format 2");
+  EXPECT_EQ(error_of(file),
+            file.string() + ": not a Kilotwin recording; it has format 3, this program reads format 2");
   // Format 1: length and CRC, no checksum of them.
   std::string older = framed(newer.SerializeAsString());
   older.erase(8, 4);
   put_content(file, older);
-  EXPECT_EQ(error_of(file), file.string() +
-                                ": not a Kilotwin recording; it has format 1 of an older version, this one reads format "
-                                "2; run the experiment again");
+  EXPECT_EQ(error_of(file),
+            file.string() +
+                ": not a Kilotwin recording; it has format 1 of an older version, this one reads format "
+                "2; run the experiment again");
 }
 
 TEST(Recording, IsReadWhileItGrows) {

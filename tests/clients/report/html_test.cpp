@@ -9,9 +9,10 @@ TEST(Html, ATableHasHeadsAndRows) {
   Table table({"a", "<b>b</b>"});
   table.row({"1", escaped("<2>")});
   table.row({"3", "4"});
-  EXPECT_EQ(table.text("facts"),
-            "<div class=\"scroll\"><table class=\"facts\"><thead><tr><th>a</th><th><b>b</b></th></tr></thead><tbody>\n"
-            "<tr><td>1</td><td>&lt;2&gt;</td></tr>\n<tr><td>3</td><td>4</td></tr>\n</tbody></table></div>\n");
+  EXPECT_EQ(
+      table.text("facts"),
+      "<div class=\"scroll\"><table class=\"facts\"><thead><tr><th>a</th><th><b>b</b></th></tr></thead><tbody>\n"
+      "<tr><td>1</td><td>&lt;2&gt;</td></tr>\n<tr><td>3</td><td>4</td></tr>\n</tbody></table></div>\n");
   const std::string empty = Table(std::vector<std::string>{"x"}).text();
   EXPECT_NE(empty.find("<table><thead><tr><th>x</th></tr></thead><tbody>"), std::string::npos) << empty;
 }
@@ -20,7 +21,8 @@ TEST(Html, APageHoldsTitleStyleAndBody) {
   const std::string whole = page("a & b", "<p>body {{name}}</p>\n");
   EXPECT_TRUE(whole.starts_with("<!DOCTYPE html>"));
   EXPECT_NE(whole.find("<title>a &amp; b</title>"), std::string::npos);
-  EXPECT_NE(whole.find("<body>\n<p>body {{name}}</p>\n</body></html>"), std::string::npos) << "a body is no template";
+  EXPECT_NE(whole.find("<body>\n<p>body {{name}}</p>\n</body></html>"), std::string::npos)
+      << "a body is no template";
   EXPECT_NE(whole.find("@media print"), std::string::npos);
 }
 

@@ -85,7 +85,9 @@ TEST(CsvReader, ErrorsNameFileLineAndColumn) {
   EXPECT_EQ(error_of("a,b\n\"1\"2,3\n"),
             "t.csv:2:4: text after the closing quote; write a separator, or the quotes within the cell twice");
   EXPECT_EQ(error_of("a,b,a\n"), "t.csv:1:5: there are two columns \"a\"; name one of them otherwise");
-  EXPECT_EQ(error_of("\xff\xfe" "a\0"), "t.csv:1:1: is UTF-16; save it as UTF-8");
+  EXPECT_EQ(error_of("\xff\xfe"
+                     "a\0"),
+            "t.csv:1:1: is UTF-16; save it as UTF-8");
   CsvReader reader("t.csv", "a,b\n\n\"x\ny\", 1.5x\n");
   ASSERT_TRUE(reader.next());
   try {

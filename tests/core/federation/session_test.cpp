@@ -196,9 +196,9 @@ class Sessions : public ::testing::Test {
       named = named || outcome.failure.find("malformed: " + why) != std::string::npos;
     }
     EXPECT_TRUE(named) << outcomes_[0].failure << '\n'
-                      << outcomes_[1].failure << '\n'
-                      << outcomes_[2].failure << '\n'
-                      << outcomes_[3].failure;
+                       << outcomes_[1].failure << '\n'
+                       << outcomes_[2].failure << '\n'
+                       << outcomes_[3].failure;
   }
   WireMember member(FederateId id, kilotwin_wire_MemberPhase phase) const {
     WireMember sample{};
@@ -406,8 +406,7 @@ TEST_F(Sessions, RefuseAnotherBuild) {
   start(plan_.radio());
   join();
   const std::string& failure = outcomes_[plan_.radio().value()].failure;
-  EXPECT_NE(failure.find("is of build 1.0-other, this service is of build " + plan_.build),
-            std::string::npos)
+  EXPECT_NE(failure.find("is of build 1.0-other, this service is of build " + plan_.build), std::string::npos)
       << failure;
 }
 

@@ -17,7 +17,8 @@ constexpr FileKind kKind{"KTWNTEST", 7, "a test's file", "write it again"};
 
 /// In memory where that is possible: these tests write thousands of files.
 std::filesystem::path memory() {
-  return ::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm") : std::filesystem::temp_directory_path();
+  return ::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm")
+                                         : std::filesystem::temp_directory_path();
 }
 
 class ChecksummedFile : public testing::Test {
@@ -117,10 +118,12 @@ TEST_F(ChecksummedFile, NoticesBlocksThatChangedPlaces) {
 
 TEST_F(ChecksummedFile, RefusesOtherKindsAndFormats) {
   write_checksummed(file(), kKind, "content");
-  EXPECT_NE(complaint({"KTWNELSE", 7, "something else", "write it again"}).find("is not something else in format 7"),
-            std::string::npos);
-  EXPECT_NE(complaint({"KTWNTEST", 8, "a test's file", "write it again"}).find("is of format 7; this program reads"),
-            std::string::npos);
+  EXPECT_NE(
+      complaint({"KTWNELSE", 7, "something else", "write it again"}).find("is not something else in format 7"),
+      std::string::npos);
+  EXPECT_NE(
+      complaint({"KTWNTEST", 8, "a test's file", "write it again"}).find("is of format 7; this program reads"),
+      std::string::npos);
   put("");
   EXPECT_NE(complaint().find("is empty"), std::string::npos);
   std::filesystem::remove(file());

@@ -46,8 +46,10 @@ TEST_F(Files, GiveBackWhatWasWritten) {
 
 TEST_F(Files, SayWhyTheyCannotBeRead) {
   const std::string name = (folder_ / "none").string();
-  EXPECT_EQ(error_of<UserError>([&] { (void)read_file(name); }), name + ": cannot be read: No such file or directory");
-  EXPECT_EQ(error_of<UserError>([&] { (void)read_file(folder_); }), folder_.string() + ": cannot be read: Is a directory");
+  EXPECT_EQ(error_of<UserError>([&] { (void)read_file(name); }),
+            name + ": cannot be read: No such file or directory");
+  EXPECT_EQ(error_of<UserError>([&] { (void)read_file(folder_); }),
+            folder_.string() + ": cannot be read: Is a directory");
   EXPECT_EQ(read_if_there(name), std::nullopt);
   EXPECT_EQ(read_if_there(folder_), std::nullopt);
 }

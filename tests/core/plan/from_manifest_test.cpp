@@ -24,18 +24,35 @@ PlanSettings settings(const std::string& experiment) {
 
 TEST(FromManifest, EveryCovariateOfTheSchemaHasItsPlainOne) {
   const std::vector<std::pair<F::Covariate, Covariate>> pairs{
-      {F::NOTHING, Covariate::kNothing}, {F::TIME, Covariate::kTime}, {F::X, Covariate::kX}, {F::Y,
-      Covariate::kY}, {F::RADIUS, Covariate::kRadius}, {F::HEADING, Covariate::kHeading}, {F::COMMAND,
-      Covariate::kCommand}, {F::DUTY, Covariate::kDuty}, {F::LEFT_DUTY, Covariate::kLeftDuty}, {F::RIGHT_DUTY,
-      Covariate::kRightDuty}, {F::TIME_SINCE_COMMAND, Covariate::kTimeSinceCommand}, {F::MOTOR_TIME,
-      Covariate::kMotorTime}, {F::LEFT_MOTOR_TIME, Covariate::kLeftMotorTime}, {F::RIGHT_MOTOR_TIME,
-      Covariate::kRightMotorTime}, {F::DRIVEN_TIME, Covariate::kDrivenTime}, {F::NEIGHBOURS,
-      Covariate::kNeighbours}, {F::NEAREST, Covariate::kNearest}, {F::DENSITY, Covariate::kDensity},
-      {F::NEAREST_BEARING, Covariate::kNearestBearing}, {F::ROBOT, Covariate::kRobot}, {F::RUN,
-      Covariate::kRun}, {F::PLACE, Covariate::kPlace}, {F::PREVIOUS_FORWARD, Covariate::kPreviousForward},
-      {F::PREVIOUS_SIDEWAYS, Covariate::kPreviousSideways}, {F::PREVIOUS_TURN, Covariate::kPreviousTurn},
-      {F::PREVIOUS_COMMAND, Covariate::kPreviousCommand}, {F::LAST_TURN, Covariate::kLastTurn},
-      {F::PREVIOUS_LASTED, Covariate::kPreviousLasted}, {F::SINCE_REST, Covariate::kSinceRest},
+      {F::NOTHING, Covariate::kNothing},
+      {F::TIME, Covariate::kTime},
+      {F::X, Covariate::kX},
+      {F::Y, Covariate::kY},
+      {F::RADIUS, Covariate::kRadius},
+      {F::HEADING, Covariate::kHeading},
+      {F::COMMAND, Covariate::kCommand},
+      {F::DUTY, Covariate::kDuty},
+      {F::LEFT_DUTY, Covariate::kLeftDuty},
+      {F::RIGHT_DUTY, Covariate::kRightDuty},
+      {F::TIME_SINCE_COMMAND, Covariate::kTimeSinceCommand},
+      {F::MOTOR_TIME, Covariate::kMotorTime},
+      {F::LEFT_MOTOR_TIME, Covariate::kLeftMotorTime},
+      {F::RIGHT_MOTOR_TIME, Covariate::kRightMotorTime},
+      {F::DRIVEN_TIME, Covariate::kDrivenTime},
+      {F::NEIGHBOURS, Covariate::kNeighbours},
+      {F::NEAREST, Covariate::kNearest},
+      {F::DENSITY, Covariate::kDensity},
+      {F::NEAREST_BEARING, Covariate::kNearestBearing},
+      {F::ROBOT, Covariate::kRobot},
+      {F::RUN, Covariate::kRun},
+      {F::PLACE, Covariate::kPlace},
+      {F::PREVIOUS_FORWARD, Covariate::kPreviousForward},
+      {F::PREVIOUS_SIDEWAYS, Covariate::kPreviousSideways},
+      {F::PREVIOUS_TURN, Covariate::kPreviousTurn},
+      {F::PREVIOUS_COMMAND, Covariate::kPreviousCommand},
+      {F::LAST_TURN, Covariate::kLastTurn},
+      {F::PREVIOUS_LASTED, Covariate::kPreviousLasted},
+      {F::SINCE_REST, Covariate::kSinceRest},
       {F::MOTOR_TIME_DIFFERENCE, Covariate::kMotorTimeDifference}};
   ASSERT_EQ(static_cast<int>(pairs.size()), F::Covariate_descriptor()->value_count());
   for (const auto& [schema, plain] : pairs) {
@@ -48,11 +65,15 @@ TEST(FromManifest, EveryCovariateOfTheSchemaHasItsPlainOne) {
 }
 
 TEST(FromManifest, EveryTargetAndCommandOfTheSchemaHasItsPlainOne) {
-  const std::vector<std::pair<E::Target, Target>> targets{
-      {E::WHEEL_GAIN, Target::kWheelGain}, {E::WHEEL_OFFSET, Target::kWheelOffset}, {E::TURN_RATE, Target::kTurnRate},
-      {E::BODY_DRIFT, Target::kBodyDrift}, {E::WORLD_DRIFT, Target::kWorldDrift},
-      {E::MEASURED_OFFSET, Target::kMeasuredOffset}, {E::MEASURED_BODY_OFFSET, Target::kMeasuredBodyOffset},
-      {E::MEASURED_SCALE, Target::kMeasuredScale}, {E::MEASURED_HEADING, Target::kMeasuredHeading}};
+  const std::vector<std::pair<E::Target, Target>> targets{{E::WHEEL_GAIN, Target::kWheelGain},
+                                                          {E::WHEEL_OFFSET, Target::kWheelOffset},
+                                                          {E::TURN_RATE, Target::kTurnRate},
+                                                          {E::BODY_DRIFT, Target::kBodyDrift},
+                                                          {E::WORLD_DRIFT, Target::kWorldDrift},
+                                                          {E::MEASURED_OFFSET, Target::kMeasuredOffset},
+                                                          {E::MEASURED_BODY_OFFSET, Target::kMeasuredBodyOffset},
+                                                          {E::MEASURED_SCALE, Target::kMeasuredScale},
+                                                          {E::MEASURED_HEADING, Target::kMeasuredHeading}};
   ASSERT_EQ(static_cast<int>(targets.size()), E::Target_descriptor()->value_count());
   for (const auto& [schema, plain] : targets) {
     E effect;
@@ -114,9 +135,10 @@ TEST(FromManifest, ValuesOfSingleRobotsAreThereWhereTheyAreStated) {
 
 TEST(FromManifest, EachImageTakesItsOwnPictures) {
   proto::Manifest manifest;
-  ASSERT_TRUE(google::protobuf::TextFormat::ParseFromString(
-      "arena { width_mm: 400 height_mm: 300 } light { image { png: 'a' png: 'b' } image { png: 'c' width_mm: 20 } }",
-      manifest.mutable_experiment()));
+  ASSERT_TRUE(
+      google::protobuf::TextFormat::ParseFromString("arena { width_mm: 400 height_mm: 300 } light { image { png: "
+                                                    "'a' png: 'b' } image { png: 'c' width_mm: 20 } }",
+                                                    manifest.mutable_experiment()));
   for (const char* brightness : {"1", "2", "3"}) {
     proto::LightRaster& raster = *manifest.add_light_raster();
     raster.set_columns(1);

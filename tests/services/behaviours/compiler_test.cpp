@@ -156,15 +156,16 @@ TEST(Compiler, SeveralSourcesAndReadySharedObjects) {
 TEST(Compiler, ACompilerThatIsKilledIsAFailureAndNoReasonForAnotherLanguage) {
   const Folder folder;
   CompileOptions options = cached();
-  options.compiler = folder.write("killed-cc",
-                                  "#!/bin/sh\n"
-                                  "case \"$*\" in *cpp-output*)\n"
-                                  "  deed=$(cat \"$0.deed\" 2>/dev/null); rm -f \"$0.deed\"\n"
-                                  "  case \"$deed\" in\n"
-                                  "    itself) kill -9 $$;;\n"
-                                  "    child) echo 'cc: fatal error: Killed signal terminated program cc1' >&2; exit 1;;\n"
-                                  "  esac;;\n"
-                                  "esac\nexec cc \"$@\"\n");
+  options.compiler =
+      folder.write("killed-cc",
+                   "#!/bin/sh\n"
+                   "case \"$*\" in *cpp-output*)\n"
+                   "  deed=$(cat \"$0.deed\" 2>/dev/null); rm -f \"$0.deed\"\n"
+                   "  case \"$deed\" in\n"
+                   "    itself) kill -9 $$;;\n"
+                   "    child) echo 'cc: fatal error: Killed signal terminated program cc1' >&2; exit 1;;\n"
+                   "  esac;;\n"
+                   "esac\nexec cc \"$@\"\n");
   fs::permissions(options.compiler, fs::perms::owner_all);
   const fs::path source = folder.write("a.c", program("static void loop(void) { set_color(1); }"));
   const auto failure = [&](const char* deed) -> std::string {

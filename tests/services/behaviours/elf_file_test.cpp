@@ -5,10 +5,10 @@
 
 #include <cstring>
 
-#include "core/os/files.hpp"
-#include "services/behaviours/image.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 #include "core/random/random.hpp"
+#include "services/behaviours/image.hpp"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {

@@ -93,21 +93,25 @@ TEST(Faults, SystemCalls) {
   // By the three ways that a processor has: exit_group(0) and exit(0), which would end the whole run.
   one_fails("__asm__ volatile(\"syscall\" : : \"a\"(231), \"D\"(0) : \"rcx\", \"r11\", \"memory\");",
             "system call 231, which a robot does not have in loop() at program0.c:4");
-  one_fails("__asm__ volatile(\"syscall\" : : \"a\"(60), \"D\"(0) : \"rcx\", \"r11\", \"memory\");", "system call 60,");
+  one_fails("__asm__ volatile(\"syscall\" : : \"a\"(60), \"D\"(0) : \"rcx\", \"r11\", \"memory\");",
+            "system call 60,");
   one_fails("__asm__ volatile(\"int $0x80\" : : \"a\"(1), \"b\"(0) : \"memory\");", "system call 1,");
 }
 
 TEST(Faults, Breakpoint) { one_fails("__asm__ volatile(\"int3\");", "breakpoint instruction in loop()"); }
 
 TEST(Faults, SingleStepping) {
-  one_fails("__asm__ volatile(\"pushf; orl $0x100, (%%rsp); popf; nop\" : : : \"cc\", \"memory\");", "breakpoint instruction");
+  one_fails("__asm__ volatile(\"pushf; orl $0x100, (%%rsp); popf; nop\" : : : \"cc\", \"memory\");",
+            "breakpoint instruction");
 }
 
 TEST(Faults, BeyondTheVariables) {
   // It looks at one octet after the other behind its last variable: 256 are there, the next is not.
-  Swarm swarm({program("static uint8_t here; static void loop(void) { if (kilo_uid != 9 || kilo_ticks < 5) return;\n"
-                       "  uint8_t sum = 0; for (const volatile uint8_t* p = &here;; ++p) { sum += *p; if (sum == 3) set_color(1); } }")},
-              10);
+  Swarm swarm(
+      {program("static uint8_t here; static void loop(void) { if (kilo_uid != 9 || kilo_ticks < 5) return;\n"
+               "  uint8_t sum = 0; for (const volatile uint8_t* p = &here;; ++p) { sum += *p; if (sum == 3) "
+               "set_color(1); } }")},
+      10);
   swarm.start();
   swarm.steps(10);
   const Program& loaded = swarm.programs->program(0);

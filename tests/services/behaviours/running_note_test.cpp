@@ -52,7 +52,9 @@ TEST(RunningNote, ASignalFromAnotherProcessIsNobodysFault) {
 
 TEST(RunningNote, NamesTheRobotWhoseProgramEndedTheProcess) {
   // It loses %gs, and with it the way back to its host.
-  Swarm swarm({program("static void loop(void) { if (kilo_uid == 1 && kilo_ticks == 5) __asm__ volatile(\"mov %0, %%gs\" : : \"r\"(0)); }")}, 2);
+  Swarm swarm({program("static void loop(void) { if (kilo_uid == 1 && kilo_ticks == 5) __asm__ volatile(\"mov %0, "
+                       "%%gs\" : : \"r\"(0)); }")},
+              2);
   const pid_t process = run_in_a_process(swarm);
   int status = 0;
   ASSERT_EQ(waitpid(process, &status, 0), process);

@@ -297,8 +297,8 @@ TEST_P(Mixed, NothingOverlapsOrTunnelsAndAllPartitionsAgree) {
     bool moved = false;
     for (std::size_t m = 0; m < 3; ++m) {
       const Pose& start = plans[0].world.movables[m].pose;
-      moved |= std::hypot(swarms[0]->movables()[m].x_mm - start.x_mm,
-                          swarms[0]->movables()[m].y_mm - start.y_mm) > 3;
+      moved |=
+          std::hypot(swarms[0]->movables()[m].x_mm - start.x_mm, swarms[0]->movables()[m].y_mm - start.y_mm) > 3;
     }
     EXPECT_TRUE(moved);
     // What nine partitions saved goes on, on one and on two, as if nothing had happened.

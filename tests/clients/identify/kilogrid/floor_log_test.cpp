@@ -67,14 +67,13 @@ TEST(FloorLog, ASingleWrongRowIsRemoved) {
 
 TEST(FloorLog, ErrorsNameFileAndLine) {
   EXPECT_EQ(error_of("a,b\n"),
-            "f.csv:1:1: the columns time_s, robot, x_mm, y_mm are missing, the header has a, b; write time_s,robot,x_mm,y_mm");
-  EXPECT_EQ(error_of(kHeader + "0,1,25,25\n1,1,25\n"),
-            "f.csv:3:7: the row has 3 cells; the header names 4");
-  EXPECT_EQ(error_of(kHeader + "0,1,25,25\n1,1,25,nan\n"),
-            "f.csv:3:8: y_mm is \"nan\"; give a number");
-  EXPECT_EQ(error_of(kHeader + "5,1,25,25\n4,1,25,25\n"), "f.csv:3:1: time_s is 4; the previous row is later; sort the rows by time");
-  EXPECT_EQ(error_of(kHeader + "5,1,1025,25\n"),
-            "f.csv:2:5: x_mm is 1025; on this floor x is within 0..1000 mm");
+            "f.csv:1:1: the columns time_s, robot, x_mm, y_mm are missing, the header has a, b; write "
+            "time_s,robot,x_mm,y_mm");
+  EXPECT_EQ(error_of(kHeader + "0,1,25,25\n1,1,25\n"), "f.csv:3:7: the row has 3 cells; the header names 4");
+  EXPECT_EQ(error_of(kHeader + "0,1,25,25\n1,1,25,nan\n"), "f.csv:3:8: y_mm is \"nan\"; give a number");
+  EXPECT_EQ(error_of(kHeader + "5,1,25,25\n4,1,25,25\n"),
+            "f.csv:3:1: time_s is 4; the previous row is later; sort the rows by time");
+  EXPECT_EQ(error_of(kHeader + "5,1,1025,25\n"), "f.csv:2:5: x_mm is 1025; on this floor x is within 0..1000 mm");
 }
 
 TEST(FloorLog, AnyTextGivesRunsOrAnError) {

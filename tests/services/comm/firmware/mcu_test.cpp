@@ -5,8 +5,8 @@
 
 #include <random>
 
-#include "services/comm/firmware/eeprom.hpp"
 #include "core/base/error.hpp"
+#include "services/comm/firmware/eeprom.hpp"
 #include "services/comm/packet_bits.hpp"
 #include "tests/services/comm/firmware/programs.hpp"
 

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <string>
 
-#include "services/behaviours/compiler.hpp"
 #include "core/os/files.hpp"
+#include "services/behaviours/compiler.hpp"
 #include "services/comm/firmware/flash_image.hpp"
 
 namespace kilotwin::firmware {
