@@ -285,7 +285,7 @@ FlashImage image_of(const std::vector<std::uint16_t>& words) {
 
 TEST(Mcu, ExtendedLoadsAreNoInstructionsOfThisProcessor) {
   // elpm r0, Z; elpm r16, Z; elpm r16, Z+: libsimavr takes the upper octet of the address from r0, here 255.
-  for (const std::uint16_t elpm : {0x95d8, 0x9106, 0x9107}) {
+  for (const std::uint16_t elpm : {std::uint16_t{0x95d8}, std::uint16_t{0x9106}, std::uint16_t{0x9107}}) {
     Mcu mcu = make(image_of({0xef0f /* ldi r16, 255 */, 0x2e00 /* mov r0, r16 */, elpm}));
     mcu.run(100, {});
     EXPECT_EQ(mcu.halt(), Halt::kIllegalInstruction);
