@@ -66,6 +66,8 @@ void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
       if (input.tick < until || changes_results(input)) writer_.input(record->input());
     }
   }
+  // This attempt may end before its first flush, and its recording replaces the earlier one.
+  writer_.flush();
 }
 
 void RunRecorder::state(Tick tick, const SwarmView& swarm, bool last) {

@@ -123,8 +123,11 @@ std::vector<std::string> elements(const PlotSeries& series, std::size_t number, 
 
 std::string commands_of(const Plot& plot) {
   const Extent extent(plot);
-  const bool x_logarithmic = plot.x_logarithmic && plot.x_categories.empty() && extent.x.low > kSmallestLogarithmic;
-  const bool y_logarithmic = plot.y_logarithmic && extent.y.low > kSmallestLogarithmic;
+  const auto logarithmic = [](bool wanted, const Range& data) {
+    return wanted && !data.empty() && data.low > kSmallestLogarithmic;
+  };
+  const bool x_logarithmic = plot.x_categories.empty() && logarithmic(plot.x_logarithmic, extent.x);
+  const bool y_logarithmic = logarithmic(plot.y_logarithmic, extent.y);
   const bool legend = plot.series.size() > 1 || (plot.series.size() == 1 && !plot.series[0].name.empty());
 
   std::string out = "set lmargin 11\nset rmargin 3\nset tmargin at screen 0.79\nset bmargin 4\nset format '%h'\n";

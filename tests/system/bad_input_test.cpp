@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "clients/recorder/run_directory.hpp"
 #include "core/dds/dds.hpp"
 #include "idl/manifest.pb.h"
 #include "tests/system/program.hpp"
@@ -99,8 +100,8 @@ TEST_F(BadInput, InArguments) {
   expect_in("no command", refusal({"ruin", good}));
   expect_in("--seed", refusal({"run", good, "--seed", "-1"}));
   expect_in("--seed", refusal({"run", good, "--seed", "18446744073709551616"}));
-  expect_in("4099 processes", refusal({"run", good, "--partitions", "64x64", "--hosts", "1", "--set",
-                                       "arena.width_mm=100000", "--set", "arena.height_mm=100000"}));
+  expect_in("4099 services", refusal({"run", good, "--partitions", "64x64", "--hosts", "1", "--set",
+                                      "arena.width_mm=100000", "--set", "arena.height_mm=100000"}));
 }
 
 TEST_F(BadInput, ThatIsNotARecording) {
@@ -125,7 +126,8 @@ TEST_F(BadInput, ADomainInUseByServicesStartedByHand) {
   const std::string domain = std::to_string(dds::DomainClaim::any().domain());
   Process other({program(), "service", "comm", "--run", scratch / "first", "--domain", domain}, scratch.path());
   ASSERT_TRUE(other.says("has waited", 30)) << "it is there, and came first";
-  const Outcome outcome = kilotwin({"run", good, "--domain", domain, "--out", scratch / "second"}, scratch);
+  const Outcome outcome =
+      kilotwin({"run", good, "--domain", domain, "--duration", "100000", "--out", scratch / "second"}, scratch);
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   expect_in("in use by another run", outcome.err);
 }
@@ -153,12 +155,12 @@ TEST_F(BadInput, AServiceOfAnotherBuildIsRefused) {
   ASSERT_EQ(kilotwin({"run", source("experiments/disperse.txtpb"), "--prepare", "--out", scratch / "run"}, scratch)
                 .status,
             0);
-  proto::Manifest manifest;
-  ASSERT_TRUE(manifest.ParseFromString(read(scratch / "run/manifest.pb")));
+  const auto directory = recorder::RunDirectory::open(scratch / "run", recorder::RunDirectory::Needs::kManifest);
+  proto::Manifest manifest = directory.read_manifest();
   const std::string own = manifest.build();
   EXPECT_NE(kilotwin({"--version"}, scratch).out.find(own), std::string::npos) << own;
   manifest.set_build("0.1.0-other");
-  write(scratch / "run/manifest.pb", manifest.SerializeAsString());
+  directory.write_manifest(manifest);
   const std::string line = refusal({"service", "comm", "--run", scratch / "run"});
   expect_in("build 0.1.0-other", line);
   expect_in("this is build " + own, line);

@@ -59,7 +59,7 @@ TEST(Process, SaysWhyAProgramCannotBeStarted) {
 TEST(Process, EndsWithItsOwner) {
   pid_t id = 0;
   {
-    Process process(shell("sleep 1000"));
+    Process process(shell("exec sleep 1000"));
     id = process.id();
     EXPECT_FALSE(process.poll().has_value());
     EXPECT_TRUE(alive(id));
