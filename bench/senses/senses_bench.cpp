@@ -1,6 +1,7 @@
 // What light costs: per robot and tick, with k sources, with and without shadows, and a picture.
 #include <benchmark/benchmark.h>
 
+#include "core/frames/swarm_view.hpp"
 #include "core/senses/light_field.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -24,8 +25,10 @@ void light(benchmark::State& state) {
     frame.add(robot, pose.x_mm, pose.y_mm, pose.heading_rad);
   }
   const BodyFrame* const frames[] = {&frame};
+  SwarmView swarm(kRobots, 0, 0);
   for (auto _ : state) {
-    field.at(frame.tick, frames);
+    swarm.gather(frame.tick, frames);
+    field.at(swarm);
     double sum = 0;
     for (std::uint32_t robot = 0; robot < kRobots; ++robot) sum += field.reading(robot);
     benchmark::DoNotOptimize(sum);

@@ -1,4 +1,4 @@
-/// A host of behaviours as a federate: radio frames in, actuation out.
+/// A behaviours host as a federate: radio frames in, actuation out.
 #pragma once
 
 #include "core/federation/service_context.hpp"

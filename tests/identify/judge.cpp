@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -14,9 +13,9 @@
 #include <fstream>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "core/os/worker_pool.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/oracle.hpp"
 #include "tests/identify/truth/play.hpp"
@@ -159,32 +158,22 @@ void print_row(const Verdict& v) {
   std::fflush(stdout);
 }
 
-/// Runs `job(i)` for 0..count-1 on `threads` threads.
-template <class Job> void share_out(int count, int threads, Job job) {
-  std::atomic<int> next = 0;
-  std::vector<std::jthread> crew;
-  for (int t = 0; t < threads; ++t) {
-    crew.emplace_back([&] {
-      for (int i = next++; i < count; i = next++) job(i);
-    });
-  }
-}
-
 /// Returns the number of failed scenes.
 int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   int misses = 0;
   std::mutex printing;
   print_header();
-  share_out(static_cast<int>(arguments.scenes.size()), arguments.jobs, [&](int i) {
-    Scene scene = scene_of(arguments.scenes[static_cast<std::size_t>(i)]);
-    if (arguments.small) scene = smaller(std::move(scene));
-    scene = resized(std::move(scene), arguments.robots, arguments.runs, arguments.seconds);
-    const Verdict verdict =
-        try_scene(arguments, scene, arguments.seed, arguments.small ? 30 : 100, folder / scene.name);
-    const std::lock_guard lock(printing);
-    print_row(verdict);
-    if (!verdict.good()) ++misses;
-  });
+  kilotwin::os::in_parallel(
+      arguments.scenes.size(), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
+        Scene scene = scene_of(arguments.scenes[i]);
+        if (arguments.small) scene = smaller(std::move(scene));
+        scene = resized(std::move(scene), arguments.robots, arguments.runs, arguments.seconds);
+        const Verdict verdict =
+            try_scene(arguments, scene, arguments.seed, arguments.small ? 30 : 100, folder / scene.name);
+        const std::lock_guard lock(printing);
+        print_row(verdict);
+        if (!verdict.good()) ++misses;
+      });
   fmt::print(
       "{} of {} scenes as good as they must be: error at or below {:.2f} of the oracle's, every cause named, "
       "nothing else\n",
@@ -197,16 +186,18 @@ int judge_nothing(const Arguments& arguments, const fs::path& folder) {
   int alarms = 0;
   std::mutex printing;
   std::vector<double> ratios;
-  share_out(arguments.nothing, arguments.jobs, [&](int i) {
-    const std::uint64_t seed = arguments.seed * 1000 + static_cast<std::uint64_t>(i);
-    const Scene scene = nothing_to_find(seed);
-    const Verdict verdict = try_scene(arguments, scene, seed, 20, folder / scene.name);
-    const std::lock_guard lock(printing);
-    if (verdict.failure.empty()) ratios.push_back(verdict.later_after_mm / verdict.later_oracle_mm);
-    if (verdict.failure.empty() && verdict.false_findings.empty()) return;
-    ++alarms;
-    print_row(verdict);
-  });
+  kilotwin::os::in_parallel(static_cast<std::size_t>(arguments.nothing), static_cast<std::uint32_t>(arguments.jobs),
+                            [&](std::size_t i) {
+                              const std::uint64_t seed = arguments.seed * 1000 + i;
+                              const Scene scene = nothing_to_find(seed);
+                              const Verdict verdict = try_scene(arguments, scene, seed, 20, folder / scene.name);
+                              const std::lock_guard lock(printing);
+                              if (verdict.failure.empty())
+                                ratios.push_back(verdict.later_after_mm / verdict.later_oracle_mm);
+                              if (verdict.failure.empty() && verdict.false_findings.empty()) return;
+                              ++alarms;
+                              print_row(verdict);
+                            });
   std::sort(ratios.begin(), ratios.end());
   fmt::print("{} of {} sets without an effect with something found; error over the oracle's, median {:.3f}\n",
              alarms, arguments.nothing, ratios.empty() ? 0 : ratios[ratios.size() / 2]);
