@@ -144,6 +144,10 @@ Qos make_qos(const Channel& channel) {
       dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
       break;
+    case Delivery::kSensor:
+      dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 16);
+      break;
   }
   return qos;
 }

@@ -49,6 +49,7 @@ enum class Delivery {
   kStatus,      ///< reliable, keep-last 1, transient-local
   kRequest,     ///< reliable, keep-last 16, volatile: what outsiders ask
   kTelemetry,   ///< best effort, keep-last 1, volatile
+  kSensor,  ///< best effort, keep-last 16, volatile: frames of sensors; a late frame is worth less than the next
 };
 
 /// An entity handle that deletes what it names.

@@ -19,6 +19,7 @@ using WireMetrics = kilotwin_wire_Metrics;
 using PublicRunControl = kilotwin_open_RunControl;
 using PublicOverheadPacket = kilotwin_open_OverheadPacket;
 using PublicTrackedPose = kilotwin_open_TrackedPose;
+using PublicTrackerFrame = kilotwin_open_TrackerFrame;
 using PublicRunStatus = kilotwin_open_RunStatus;
 using PublicRobotState = kilotwin_open_RobotState;
 
@@ -45,6 +46,7 @@ inline Channel metrics() { return {"kilotwin/metrics", Delivery::kMetrics, ""}; 
 inline Channel run_control() { return {"kilotwin/run_control", Delivery::kRequest, ""}; }
 inline Channel overhead_packets() { return {"kilotwin/overhead_packets", Delivery::kRequest, ""}; }
 inline Channel tracked_poses() { return {"kilotwin/tracked_poses", Delivery::kRequest, ""}; }
+inline Channel tracker_frames() { return {"kilotwin/tracker_frames", Delivery::kSensor, ""}; }
 inline Channel run_status() { return {"kilotwin/run_status", Delivery::kStatus, ""}; }
 inline Channel robots() { return {"kilotwin/robots", Delivery::kTelemetry, ""}; }
 
@@ -76,6 +78,9 @@ template <> inline const dds_topic_descriptor_t* descriptor<PublicOverheadPacket
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackedPose>() {
   return &kilotwin_open_TrackedPose_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackerFrame>() {
+  return &kilotwin_open_TrackerFrame_desc;
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicRunStatus>() {
   return &kilotwin_open_RunStatus_desc;
