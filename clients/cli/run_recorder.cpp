@@ -173,6 +173,8 @@ proto::InputRecord to_record(const Directive& directive) {
   if (directive.kind == DirectiveKind::kOverheadInput) {
     record.mutable_packet()->push_back(static_cast<char>(directive.packet.command));
     record.mutable_packet()->append(directive.packet.message.begin(), directive.packet.message.end());
+    if (const std::uint32_t offset = directive.packet.offset_cycles(); offset != 0)
+      record.set_packet_offset_cycles(offset);
   }
   if (directive.kind == DirectiveKind::kTrackedPose) {
     record.set_robot(directive.tracked_pose.robot);
@@ -192,6 +194,7 @@ Directive from_record(const proto::InputRecord& record) {
   if (record.packet().size() == 1 + directive.packet.message.size()) {
     directive.packet.command = static_cast<OverheadCommand>(record.packet()[0]);
     std::copy(record.packet().begin() + 1, record.packet().end(), directive.packet.message.begin());
+    directive.packet = directive.packet.at(record.packet_offset_cycles());
   }
   directive.tracked_pose = {record.robot(), record.x_mm(), record.y_mm(), record.heading_rad()};
   return directive;

@@ -135,9 +135,17 @@ const char* defect(const RadioFrame& frame, const RunPlan& plan, FederateId, Fed
   return nullptr;
 }
 
-const char* defect(const OverheadFrame& frame, const RunPlan&, FederateId, FederateId) {
+const char* defect(const OverheadFrame& frame, const RunPlan& plan, FederateId, FederateId) {
   const auto sound = [](const OverheadPacket& packet) { return known(packet.command); };
-  return std::all_of(frame.packets.begin(), frame.packets.end(), sound) ? nullptr : "a packet's command is unknown";
+  if (!std::all_of(frame.packets.begin(), frame.packets.end(), sound)) return "a packet's command is unknown";
+  const auto earlier = [](const OverheadPacket& a, const OverheadPacket& b) {
+    return a.offset_cycles() < b.offset_cycles();
+  };
+  if (!std::is_sorted(frame.packets.begin(), frame.packets.end(), earlier))
+    return "its packets are not in the order of time";
+  if (!frame.packets.empty() && frame.packets.back().offset_cycles() >= plan.tick_length.cycles())
+    return "a packet's offset lies beyond the tick";
+  return nullptr;
 }
 
 const char* defect(const Directive& directive, const RunPlan& plan) {
@@ -150,7 +158,10 @@ const char* defect(const Directive& directive, const RunPlan& plan) {
     case DirectiveKind::kStop:
     case DirectiveKind::kCheckpoint: return nullptr;
     case DirectiveKind::kOverheadInput:
-      return known(directive.packet.command) ? nullptr : "its packet's command is unknown";
+      if (!known(directive.packet.command)) return "its packet's command is unknown";
+      return directive.packet.offset_cycles() < plan.tick_length.cycles()
+                 ? nullptr
+                 : "its packet's offset lies beyond the tick";
     case DirectiveKind::kTrackedPose: {
       const TrackedPoseInput& pose = directive.tracked_pose;
       if (pose.robot >= plan.robots() || !plan.tracked(pose.robot)) return "its robot is none that is tracked";

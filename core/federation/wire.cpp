@@ -7,7 +7,7 @@ namespace kilotwin {
 namespace {
 
 static_assert(sizeof(IrMessage) == 10);
-static_assert(sizeof(OverheadPacket) == 11 && alignof(OverheadPacket) == 1);
+static_assert(sizeof(OverheadPacket) == 15 && alignof(OverheadPacket) == 1);
 
 // A wire sequence that borrows `count` elements; Cyclone reads it and neither writes nor frees.
 template <class Sequence, class T> Sequence borrow(const T* data, std::size_t count) {

@@ -109,12 +109,29 @@ struct RadioFrame {
 
 enum class OverheadCommand : std::uint8_t { kStop = 0, kRepeat = 2, kOnce = 6 };
 
+/// Laid out as on the wire: 15 octets without padding.
 struct OverheadPacket {
   OverheadCommand command = OverheadCommand::kStop;
   IrMessage message{};
+  std::array<std::uint8_t, 4> offset{};  ///< offset_cycles(), least octet first
+
+  /// When within its tick it reaches the overhead controller, cycles from the tick's start, below the tick's length.
+  [[nodiscard]] constexpr std::uint32_t offset_cycles() const {
+    return offset[0] | std::uint32_t{offset[1]} << 8 | std::uint32_t{offset[2]} << 16 |
+           std::uint32_t{offset[3]} << 24;
+  }
+  /// The same packet at another offset.
+  [[nodiscard]] constexpr OverheadPacket at(std::uint32_t offset_cycles) const {
+    OverheadPacket packet = *this;
+    for (std::uint8_t& octet : packet.offset) {
+      octet = static_cast<std::uint8_t>(offset_cycles & 255);
+      offset_cycles >>= 8;
+    }
+    return packet;
+  }
 };
 
-/// What the station sends down to the overhead controller within one tick, in order.
+/// What the station sends down to the overhead controller within one tick, by ascending offset.
 struct OverheadFrame {
   Tick tick;
   std::vector<OverheadPacket> packets;

@@ -23,6 +23,13 @@ double robot_interval_s(std::uint32_t robots) {
   return std::max(kShortestPerRobot_s, robots * kArkSecondsPerPacket / static_cast<double>(kArkSlots));
 }
 
+/// The least whole number of cycles that is not shorter.
+std::int64_t cycles_of(double seconds) {
+  const double cycles = seconds * kNominalClockHz;
+  const auto whole = static_cast<std::int64_t>(cycles);
+  return whole + static_cast<std::int64_t>(static_cast<double>(whole) < cycles);
+}
+
 std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
   std::uint64_t word = 0;
   for (std::size_t i = from; i < std::min(from + 8, packet.message.size()); ++i)
@@ -35,16 +42,17 @@ std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
 StationEngine::StationEngine(const RunPlan& plan)
     : plan_(plan),
       start_ends_(plan.tick_length.at_or_after(plan.station_settings().start_broadcast_s)),
-      packet_ticks_(plan.tick_length.at_or_after(plan.station_settings().packet_interval_s).count()),
-      robot_ticks_(plan.tick_length.at_or_after(robot_interval_s(plan.robots())).count()),
+      packet_interval_(cycles_of(plan.station_settings().packet_interval_s)),
+      robot_interval_(cycles_of(robot_interval_s(plan.robots()))),
       packets_{run_packet()},
-      next_packet_(start_ends_ + packet_ticks_),
+      next_packet_(begin_of(start_ends_) +
+                   begin_of(plan.tick_length.at_or_after(plan.station_settings().packet_interval_s))),
       measurement_(plan) {
   for (const EnvironmentSettings& description : plan.station_settings().environments) {
     environments_.push_back(make_environment(description, plan.robots()));
   }
   if (!environments_.empty()) {
-    served_.resize(plan.robots(), Tick{-robot_ticks_});
+    served_.resize(plan.robots(), -robot_interval_);
     turns_.resize(plan.robots(), 0);
     seen_.resize(plan.robots());
   }
@@ -66,30 +74,43 @@ void StationEngine::see(const SwarmView& swarm) {
 
 void StationEngine::send_own(const SwarmView& swarm) {
   if (now_ == start_ends_ && repeating_) {
-    packets_.push_back({OverheadCommand::kStop, {}});
+    push({OverheadCommand::kStop, {}}, begin_of(now_));
     repeating_ = false;
-    return;
+  } else if (!environments_.empty() && next_packet_ < begin_of(now_ + 1)) {
+    send_readings(swarm);
   }
-  if (environments_.empty() || now_ < next_packet_) return;
-  std::array<ArkMessage, kArkSlots> messages;
-  std::size_t count = 0;
-  see(swarm);
-  while (count < kArkSlots && now_ - served_[next_robot_] >= robot_ticks_) {
+}
+
+void StationEngine::push(const OverheadPacket& packet, Cycles t) {
+  packets_.push_back(packet.at(static_cast<std::uint32_t>(t - begin_of(now_))));
+}
+
+std::vector<ArkMessage> StationEngine::readings(Cycles t) {
+  std::vector<ArkMessage> messages;
+  while (messages.size() < kArkSlots && t - served_[next_robot_] >= robot_interval_) {
     VirtualEnvironment& environment = *environments_[turns_[next_robot_] % environments_.size()];
-    if (const auto message = environment.sense(seen_[next_robot_])) messages[count++] = *message;
-    served_[next_robot_] = now_;
+    if (const auto message = environment.sense(seen_[next_robot_])) messages.push_back(*message);
+    served_[next_robot_] = t;
     ++turns_[next_robot_];
     next_robot_ = (next_robot_ + 1) % plan_.robots();
   }
-  if (count > 0) {
-    packets_.push_back({OverheadCommand::kRepeat, pack(std::span(messages).first(count))});
-  } else if (repeating_) {
-    packets_.push_back({OverheadCommand::kStop, {}});
-  } else {
-    return;
+  return messages;
+}
+
+void StationEngine::send_readings(const SwarmView& swarm) {
+  see(swarm);
+  Cycles t = std::max(next_packet_, begin_of(now_));
+  while (t < begin_of(now_ + 1)) {
+    const std::vector<ArkMessage> messages = readings(t);
+    if (messages.empty() && !repeating_) {
+      // The air is free until somebody's turn comes.
+      t = std::max(t + 1, served_[next_robot_] + robot_interval_);
+      continue;
+    }
+    push(messages.empty() ? OverheadPacket{} : OverheadPacket{OverheadCommand::kRepeat, pack(messages)}, t);
+    repeating_ = !messages.empty();
+    t = next_packet_ = t + packet_interval_;
   }
-  repeating_ = count > 0;
-  next_packet_ = now_ + packet_ticks_;
 }
 
 void StationEngine::step(Tick from, const Inputs& inputs) {
@@ -97,9 +118,12 @@ void StationEngine::step(Tick from, const Inputs& inputs) {
   ++now_;
   packets_.assign(inputs.external.begin(), inputs.external.end());
   if (packets_.empty()) return send_own(inputs.swarm);
+  std::stable_sort(packets_.begin(), packets_.end(), [](const OverheadPacket& a, const OverheadPacket& b) {
+    return a.offset_cycles() < b.offset_cycles();
+  });
   // What the controller does now is not the station's to stop; the next own packet overrides it, an interval later.
   repeating_ = false;
-  next_packet_ = std::max(next_packet_, now_ + packet_ticks_);
+  next_packet_ = std::max(next_packet_, begin_of(now_) + packets_.back().offset_cycles() + packet_interval_);
 }
 
 void StationEngine::emit(OverheadFrame& frame) const {
@@ -108,13 +132,15 @@ void StationEngine::emit(OverheadFrame& frame) const {
 }
 
 std::uint64_t StationEngine::hash_part() const {
-  std::uint64_t sum = entity_hash(HashDomain::kStation, 0,
-                                  {next_robot_, static_cast<std::uint64_t>(next_packet_.count()),
-                                   static_cast<std::uint64_t>(repeating_), packets_.size()});
+  std::uint64_t sum = entity_hash(
+      HashDomain::kStation, 0,
+      {next_robot_, static_cast<std::uint64_t>(next_packet_ / begin_of(Tick{1})),
+       static_cast<std::uint64_t>(next_packet_ % begin_of(Tick{1})) << 1 | static_cast<std::uint64_t>(repeating_),
+       packets_.size()});
   for (std::uint32_t i = 0; i < packets_.size(); ++i) {
-    sum += entity_hash(
-        HashDomain::kStation, 1 + i,
-        {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0), word_of(packets_[i], 8)});
+    sum += entity_hash(HashDomain::kStation, 1 + i,
+                       {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0),
+                        word_of(packets_[i], 8) | std::uint64_t{packets_[i].offset_cycles()} << 16});
   }
   for (std::uint32_t i = 0; i < environments_.size(); ++i) {
     // Apart from the packets, of which there are few.
@@ -126,39 +152,42 @@ std::uint64_t StationEngine::hash_part() const {
 }
 
 void StationEngine::save(proto::StationState& state) const {
-  state.set_next_packet_tick(next_packet_.count());
+  state.set_next_packet_cycle(next_packet_);
   state.set_repeating_own(repeating_);
   for (const OverheadPacket& packet : packets_) {
     state.mutable_packets()->push_back(static_cast<char>(packet.command));
     state.mutable_packets()->append(packet.message.begin(), packet.message.end());
+    state.add_packet_offset_cycles(packet.offset_cycles());
   }
-  for (const Tick served : served_) state.add_served_tick(served.count());
+  for (const Cycles served : served_) state.add_served_cycle(served);
   for (const std::uint32_t turns : turns_) state.add_turns(turns);
   for (const auto& environment : environments_) environment->save(*state.add_environment());
 }
 
 void StationEngine::load(Tick tick, std::span<const proto::StationState* const> parts) {
   constexpr std::size_t kPacketOctets = 11;
-  if (parts.size() != 1 || static_cast<std::size_t>(parts[0]->served_tick_size()) != served_.size() ||
+  if (parts.size() != 1 || static_cast<std::size_t>(parts[0]->served_cycle_size()) != served_.size() ||
       static_cast<std::size_t>(parts[0]->turns_size()) != turns_.size() ||
       static_cast<std::size_t>(parts[0]->environment_size()) != environments_.size() ||
-      parts[0]->packets().size() % kPacketOctets != 0) {
+      parts[0]->packets().size() !=
+          kPacketOctets * static_cast<std::size_t>(parts[0]->packet_offset_cycles_size())) {
     throw RunError("the checkpoint holds no station's state of this experiment");
   }
   const proto::StationState& state = *parts[0];
   now_ = tick;
-  next_packet_ = Tick{state.next_packet_tick()};
+  next_packet_ = state.next_packet_cycle();
   repeating_ = state.repeating_own();
   packets_.clear();
-  for (std::size_t from = 0; from < state.packets().size(); from += kPacketOctets) {
-    OverheadPacket packet;
+  for (const std::uint32_t offset : state.packet_offset_cycles()) {
+    const std::size_t from = packets_.size() * kPacketOctets;
+    OverheadPacket packet = OverheadPacket{}.at(offset);
     packet.command = static_cast<OverheadCommand>(state.packets()[from]);
     std::copy_n(state.packets().begin() + static_cast<std::ptrdiff_t>(from) + 1, packet.message.size(),
                 packet.message.begin());
     packets_.push_back(packet);
   }
   for (std::size_t i = 0; i < served_.size(); ++i) {
-    served_[i] = Tick{state.served_tick(static_cast<int>(i))};
+    served_[i] = state.served_cycle(static_cast<int>(i));
     turns_[i] = state.turns(static_cast<int>(i));
   }
   for (std::size_t i = 0; i < environments_.size(); ++i)

@@ -3,7 +3,8 @@
 /// Tick 0: RUN, repeated by the overhead controller. After start_broadcast_s: STOP, so that the air is free. Then, with
 /// environments, at most one packet per packet_interval_s with ARK messages for the three robots that have waited longest,
 /// none of which hears more often than every max(1 s, N * 0.05 s / 3) (ARK's users' rule); a packet is repeated until the
-/// next, and STOP follows when nobody's turn has come. A packet of external input takes the place of the station's own.
+/// next, and STOP follows when nobody's turn has come. Packets leave at cycles within a tick, so that intervals are exact;
+/// they answer poses of the tick before. A packet of external input takes the place of the station's own.
 #pragma once
 
 #include <array>
@@ -42,22 +43,30 @@ class StationEngine {
   void load(Tick tick, std::span<const proto::StationState* const> parts);
 
  private:
-  /// The station's own packet at `now_`, if one is due.
+  /// An instant or a length of simulated time, cycles of the robots' nominal clock; the start is 0.
+  using Cycles = std::int64_t;
+
+  /// The station's own packets within the tick `now_`, as far as they are due.
   void send_own(const SwarmView&);
+  void send_readings(const SwarmView&);
+  /// Messages for robots that are due at `t`.
+  [[nodiscard]] std::vector<ArkMessage> readings(Cycles t);
   void see(const SwarmView&);
+  [[nodiscard]] Cycles begin_of(Tick tick) const { return tick.count() * plan_.tick_length.cycles(); }
+  void push(const OverheadPacket& packet, Cycles t);
 
   const RunPlan& plan_;
-  const Tick start_ends_;            ///< when RUN gives way to STOP
-  const std::int64_t packet_ticks_;  ///< at least, between two packets
-  const std::int64_t robot_ticks_;   ///< at least, between two messages to one robot
+  const Tick start_ends_;         ///< when RUN gives way to STOP
+  const Cycles packet_interval_;  ///< at least, between two packets
+  const Cycles robot_interval_;   ///< at least, between two messages to one robot
   std::vector<std::unique_ptr<VirtualEnvironment>> environments_;
 
   Tick now_;
   std::vector<OverheadPacket> packets_;  ///< of now_
   std::uint32_t next_robot_ = 0;         ///< whose turn it is: robots are served in a circle
-  Tick next_packet_{0};
+  Cycles next_packet_;
   bool repeating_ = true;             ///< the controller repeats an own packet
-  std::vector<Tick> served_;          ///< per robot, where there are environments: when it was sent a reading last
+  std::vector<Cycles> served_;        ///< per robot, where there are environments: when it was sent a reading last
   std::vector<std::uint32_t> turns_;  ///< per robot: how often; environments answer by turns
 
   // Of the step at hand: robots as the tracker sees them.

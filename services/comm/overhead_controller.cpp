@@ -9,7 +9,6 @@
 namespace kilotwin::comm {
 
 void OverheadController::command(std::span<const OverheadPacket> packets, Cycles now) {
-  if (packets.empty()) return;
   next_ = std::max(next_, now);
   waiting_.clear();
   for (const OverheadPacket& packet : packets) {
@@ -19,7 +18,19 @@ void OverheadController::command(std::span<const OverheadPacket> packets, Cycles
   }
 }
 
-void OverheadController::advance(Cycles end) {
+void OverheadController::advance(std::span<const OverheadPacket> packets, Cycles begin, Cycles end) {
+  while (!packets.empty()) {
+    const std::uint32_t offset = packets.front().offset_cycles();
+    std::size_t together = 1;
+    while (together < packets.size() && packets[together].offset_cycles() == offset) ++together;
+    start_copies(begin + offset);
+    command(packets.first(together), begin + offset);
+    packets = packets.subspan(together);
+  }
+  start_copies(end);
+}
+
+void OverheadController::start_copies(Cycles end) {
   std::size_t sent = 0;
   for (; next_ < end && (sent < waiting_.size() || repeating_); next_ += kOverheadPeriod) {
     copies_.push_back({next_, sent < waiting_.size() ? waiting_[sent++] : message_});

@@ -24,11 +24,10 @@ class OverheadController {
     [[nodiscard]] bool sensed_at(Cycles t) const { return t - start >= kNoticed && t < end(); }
   };
 
-  /// Takes the packets that arrive at `now`. Each message goes out at least once, in order; what an earlier call left
-  /// waiting is dropped. A copy on the air, and the pause after it, are brought to their end.
-  void command(std::span<const OverheadPacket> packets, Cycles now);
-  /// Starts all copies that are due before `end`.
-  void advance(Cycles end);
+  /// Takes the packets of a tick, by ascending offset, and starts all copies that are due before `end`, where the tick
+  /// that begins at `begin` ends. A packet ends what earlier offsets have left. Of the packets with one offset, each
+  /// message goes out at least once, in order. A copy on the air, and the pause after it, are brought to their end.
+  void advance(std::span<const OverheadPacket> packets, Cycles begin, Cycles end);
   /// Copies in the order of their start.
   [[nodiscard]] const std::vector<Copy>& copies() const { return copies_; }
   /// Forgets copies that are over at `t`.
@@ -39,6 +38,9 @@ class OverheadController {
   void load(const proto::OverheadControllerState&);
 
  private:
+  void command(std::span<const OverheadPacket> packets, Cycles now);
+  void start_copies(Cycles end);
+
   Cycles next_ = 0;  ///< when a copy can start
   bool repeating_ = false;
   IrMessage message_{};             ///< what is repeated

@@ -77,8 +77,7 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
   if (divided_) divide();
   read_life_cycles(inputs.swarm);
   take_offers(inputs.swarm);
-  overhead_.command(inputs.overhead.packets, begin_of(from));
-  overhead_.advance(begin_of(from + 1));
+  overhead_.advance(inputs.overhead.packets, begin_of(from), begin_of(from + 1));
   if (simple_) {
     exchange_simply(from);
   } else {

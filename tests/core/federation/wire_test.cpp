@@ -67,12 +67,15 @@ TEST(Wire, CarriesActuationAndRadioAndOverhead) {
   EXPECT_EQ(radio_in.messages, radio.messages);
 
   OverheadFrame overhead;
-  overhead.packets = {{OverheadCommand::kRepeat, IrMessage{8, 8}}, {OverheadCommand::kStop, {}}};
+  overhead.packets = {{OverheadCommand::kRepeat, IrMessage{8, 8}},
+                      OverheadPacket{OverheadCommand::kStop, {}}.at(262143)};
   OverheadFrame overhead_in;
   ASSERT_TRUE(from_wire(to_wire(kHeader, overhead), overhead_in));
   ASSERT_EQ(overhead_in.packets.size(), 2u);
   EXPECT_EQ(overhead_in.packets[0].command, OverheadCommand::kRepeat);
   EXPECT_EQ(overhead_in.packets[0].message, overhead.packets[0].message);
+  EXPECT_EQ(overhead_in.packets[0].offset_cycles(), 0u);
+  EXPECT_EQ(overhead_in.packets[1].offset_cycles(), 262143u);
 }
 
 TEST(Wire, CarriesDirectives) {

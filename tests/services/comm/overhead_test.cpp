@@ -93,6 +93,36 @@ TEST(Overhead, PacketsOfOneTickGoOutInOrder) {
   for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(messages[i][0], expected[i]);
 }
 
+/// A packet acts at its cycle of the tick.
+TEST(Overhead, PacketsActAtTheirOffsets) {
+  const auto packet = [](OverheadCommand command, std::uint8_t octet, Cycles offset) {
+    return OverheadPacket{command, {octet}}.at(static_cast<std::uint32_t>(offset));
+  };
+  std::vector<IrMessage> messages;
+  const std::vector<OverheadPacket> at_offsets{packet(OverheadCommand::kRepeat, 1, 10'000),
+                                               packet(OverheadCommand::kRepeat, 2, 10'000 + kPeriod + 1),
+                                               packet(OverheadCommand::kOnce, 3, kTick - kPacket)};
+  // 1 starts at its offset, and again a period later, just before packet 2 comes; 2 and 3 follow, each after a period. The
+  // last one starts 2328 cycles before the tick's end and ends in the next.
+  EXPECT_EQ(heard_after(at_offsets, 3, &messages), (std::vector<std::size_t>{3, 1, 0}));
+  ASSERT_EQ(messages.size(), 4u);
+  EXPECT_EQ((std::array{messages[0][0], messages[1][0], messages[2][0], messages[3][0]}),
+            (std::array<std::uint8_t, 4>{1, 1, 2, 3}));
+
+  messages.clear();
+  EXPECT_EQ(heard_after({packet(OverheadCommand::kRepeat, 1, 0), packet(OverheadCommand::kStop, 0, kPeriod - 1)}, 2,
+                        &messages),
+            (std::vector<std::size_t>{1, 0}));
+  messages.clear();
+  EXPECT_EQ(heard_after({packet(OverheadCommand::kRepeat, 1, 0), packet(OverheadCommand::kStop, 0, kPeriod + 1)}, 2,
+                        &messages),
+            (std::vector<std::size_t>{2, 0}));
+  // A copy that starts in the last cycle of a tick arrives in the next one.
+  messages.clear();
+  EXPECT_EQ(heard_after({packet(OverheadCommand::kOnce, 7, kTick - 1)}, 2, &messages),
+            (std::vector<std::size_t>{0, 1}));
+}
+
 /// Lone robots, each with a silent listener; their first attempt is predicted from the phase of the copies, which run from
 /// tick 0 on: sensed where a copy's leading byte is over, given up where a copy starts within the own leading byte, drowned
 /// where a copy overlaps otherwise.

@@ -79,6 +79,9 @@ void change(Random& random, IrMessage& value) { change(random, value[below(rando
 void change(Random& random, OverheadPacket& value) {
   value.command = static_cast<OverheadCommand>(random() % 8);
   change(random, value.message);
+  std::uint32_t offset = value.offset_cycles();
+  change(random, offset);
+  value = value.at(offset);
 }
 
 template <class T> void change(Random& random, std::vector<T>& values) {
