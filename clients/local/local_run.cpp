@@ -28,11 +28,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// How often the observer's idle() is called.
+/// Period of calls to the observer's idle().
 constexpr auto kIdlePeriod = std::chrono::milliseconds(100);
 
-/// How many failures of a host's robots are told one by one.
-constexpr std::size_t kFailuresTold = 20;
+/// Number of failed robots per host that are printed one by one.
+constexpr std::size_t kFailuresPrinted = 20;
 
 /// All frames of one tick.
 struct Frames {
@@ -41,7 +41,7 @@ struct Frames {
   std::vector<RadioFrame> radio;               // per host
   std::vector<ActuationFrame> actuation;       // per host
   OverheadFrame overhead;
-  // The same as engines take them.
+  // Views of the frames above, in the form that engines take.
   std::vector<const BodyFrame*> all_bodies;
   std::vector<const ActuationFrame*> all_actuation;
   std::vector<std::vector<const BodyFrame*>> ghosts_for;  // per receiving partition, by ascending sender
@@ -77,10 +77,10 @@ class LocalRun {
     }
     if (options.resumed) load(*options.resumed);
     for (const Directive& directive : options.inputs) schedule_.add(directive);
-    for (Frames& frames : frames_) lay_out(frames);
+    for (Frames& frames : frames_) connect(frames);
     task_ns_.resize(plan.federates());
     hash_parts_.resize(plan.federates());
-    for (const auto& engine : hosts_) told_.emplace_back(engine->failures().size(), engine->warnings().size());
+    for (const auto& engine : hosts_) printed_.emplace_back(engine->failures().size(), engine->warnings().size());
   }
 
   RunTotals run() {
@@ -120,7 +120,7 @@ class LocalRun {
       }
       if (last) break;
       step(workers, now);
-      tell(now);
+      print_faults(now);
       chain = close_tick(now + 1, chain);
     }
     totals.wall_s = static_cast<double>(ns(begun, Clock::now())) * 1e-9;
@@ -138,7 +138,7 @@ class LocalRun {
   }
 
  private:
-  /// All engines from one tick to the next. A task is the step of one engine; hosts come first, as they take longest.
+  /// Steps all engines from `from` to the next tick. A task steps one engine. Hosts start first because they take longest.
   void step(os::WorkerPool& workers, Tick from) {
     const std::uint32_t tasks = plan_.federates();
     workers.for_each(tasks, [this, from, tasks](std::size_t i) {
@@ -156,7 +156,7 @@ class LocalRun {
 
   Frames& frames_of(Tick tick) { return frames_[static_cast<std::size_t>(tick.count() & 1)]; }
 
-  void lay_out(Frames& frames) {
+  void connect(Frames& frames) {
     const std::size_t partitions = physics_.size();
     frames.bodies.resize(partitions);
     frames.ghosts.resize(partitions);
@@ -175,7 +175,7 @@ class LocalRun {
     for (const ActuationFrame& frame : frames.actuation) frames.all_actuation.push_back(&frame);
   }
 
-  // Tasks are numbered as federates are: partitions, radio, station, hosts.
+  // Tasks have the numbers of federates: partitions, radio, station, hosts.
   void step(std::uint32_t task, Tick from) {
     const Frames& in = frames_of(from);
     const auto partitions = static_cast<std::uint32_t>(physics_.size());
@@ -213,16 +213,16 @@ class LocalRun {
     }
   }
 
-  /// What programs did wrong in the step from this tick.
-  void tell(Tick from) {
+  /// Prints failures and warnings of programs in the step from tick `from`.
+  void print_faults(Tick from) {
     for (std::size_t h = 0; h < hosts_.size(); ++h) {
       const double at_s = plan_.tick_length.seconds_at(from);
-      auto& [failures, warnings] = told_[h];
+      auto& [failures, warnings] = printed_[h];
       for (; failures < hosts_[h]->failures().size(); ++failures) {
         const auto& failure = hosts_[h]->failures()[failures];
-        if (failures < kFailuresTold)
+        if (failures < kFailuresPrinted)
           say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot, at_s, failure.text));
-        else if (failures == kFailuresTold)
+        else if (failures == kFailuresPrinted)
           say("more robots fail; the summary counts them");
       }
       for (; warnings < hosts_[h]->warnings().size(); ++warnings) {
@@ -242,8 +242,8 @@ class LocalRun {
 
   void save(Tick now, std::uint64_t chain) {
     observer_.saved();
-    for (const auto& logs : logs_)
-      logs->flush();  // who goes on from this checkpoint finds what was printed before it
+    // A run that resumes from this checkpoint keeps the lines printed before it, so the files must hold them.
+    for (const auto& logs : logs_) logs->flush();
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) {
       proto::CheckpointPart part;
       if (task < physics_.size())
@@ -311,17 +311,17 @@ class LocalRun {
   std::vector<std::unique_ptr<physics::Engine>> physics_;
   comm::RadioEngine radio_;
   ark::StationEngine station_;
-  SwarmView swarm_;  // of the tick at hand
+  SwarmView swarm_;  // at the current tick
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
-  // Per host, where there is a run directory.
+  // One per host; empty without a run directory.
   std::vector<std::unique_ptr<RobotLogs>> logs_;
   std::vector<std::unique_ptr<behaviours::RunningNote>> notes_;
   const Tick first_;
   RunSchedule schedule_;
   Snapshots snapshots_;
-  Frames frames_[2];  // of even and of odd ticks: while one is read the other is written
+  Frames frames_[2];  // double buffer, indexed by the tick's parity: a step reads one and writes the other
   std::vector<std::uint64_t> task_ns_, hash_parts_;
-  std::vector<std::pair<std::size_t, std::size_t>> told_;  // per host: of its failures and warnings
+  std::vector<std::pair<std::size_t, std::size_t>> printed_;  // per host: number of printed failures and warnings
   std::uint64_t recording_ns_ = 0;
 };
 

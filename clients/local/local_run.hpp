@@ -1,4 +1,4 @@
-/// A run in this process: the same engines, called directly, on any number of threads, with no DDS on the path.
+/// A local run: all engines in this process, called directly, on any number of threads, without DDS.
 #pragma once
 
 #include <filesystem>
@@ -15,15 +15,15 @@ namespace kilotwin::local {
 
 struct LocalOptions {
   std::uint32_t threads = 1;
-  std::filesystem::path run_directory;  ///< where programs are; where checkpoints, logs and robots' EEPROMs go
-  std::optional<Checkpoint> resumed;
-  /// Stamped inputs of an earlier run, to be applied at their ticks; pauses are passed over.
+  std::filesystem::path run_directory;  ///< holds the programs; gets checkpoints, logs and the robots' EEPROMs
+  std::optional<Checkpoint> resumed;    ///< the checkpoint from which the run continues
+  /// Recorded external inputs, applied at their ticks. Pauses are ignored.
   std::vector<Directive> inputs;
-  bool save_checkpoints = true;  ///< and logs
+  bool save_checkpoints = true;  ///< false: writes neither checkpoints nor logs
 };
 
-/// Runs the plan to its end, or until the process is interrupted, which the totals then name as their failure. Throws
-/// RunError where a checkpoint cannot be written.
+/// Runs the plan to its end or until SIGINT or SIGTERM; RunTotals::failure then is "interrupted". Throws RunError if a
+/// checkpoint or a log cannot be written.
 RunTotals run(const RunPlan& plan, const std::shared_ptr<behaviours::ProgramSet>& programs,
               const LocalOptions& options, RunObserver& observer);
 

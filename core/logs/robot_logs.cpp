@@ -16,11 +16,11 @@ namespace kilotwin {
 namespace fs = std::filesystem;
 namespace {
 
-/// Octets, and ticks (one second), that wait at most.
+/// Text is written to the files when this many octets wait, or when the oldest has waited for this many ticks (one second).
 constexpr std::size_t kBuffered = 4096;
 constexpr std::int64_t kPatience = 31;
 
-/// The number in robot-NUMBER.txt; -1: none.
+/// The number in robot-NUMBER.txt, or -1 if the name has another form.
 std::int64_t robot_of(const fs::path& file) {
   unsigned robot = 0;
   char rest = 0;
@@ -54,7 +54,7 @@ void RobotLogs::cut(Tick first, const std::function<bool(std::uint32_t)>& own) {
     const std::int64_t robot = robot_of(entry.path());
     if (robot >= 0 && own(static_cast<std::uint32_t>(robot))) robots.push_back(static_cast<std::uint32_t>(robot));
   }
-  // Times are printed in ms.
+  // Times are printed in whole ms, so a line of tick `first` may begin up to half a millisecond below the tick's time.
   const double end_s = tick_length_.seconds_at(first) - 0.00051;
   for (const std::uint32_t robot : robots) {
     const std::string text = os::read_file(file_of(robot));
@@ -65,7 +65,7 @@ void RobotLogs::cut(Tick first, const std::function<bool(std::uint32_t)>& own) {
     }
     std::error_code error;
     fs::resize_file(file_of(robot), kept, error);
-    if (error) throw RunError(fmt::format("{}: cannot be cut: {}", file_of(robot).string(), error.message()));
+    if (error) throw RunError(fmt::format("{}: cannot be shortened: {}", file_of(robot).string(), error.message()));
     logs_[robot].octets = kept;
   }
 }
@@ -90,7 +90,7 @@ void RobotLogs::write(Tick from, std::uint32_t robot, std::string_view text) {
 
 void RobotLogs::flush() {
   if (waiting_ == 0) return;
-  waiting_ = 0;  // of what cannot be written, nothing is tried again
+  waiting_ = 0;  // if a write fails, its text is lost: a retry would fail each second of a full disk
   std::error_code error;
   fs::create_directories(folder_, error);
   for (auto& [robot, log] : logs_) {

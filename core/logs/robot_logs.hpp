@@ -1,5 +1,5 @@
-/// What robots print, in files of their own: logs/robot-00017.txt of the run directory. Each line begins with the time at which it
-/// was begun, s.
+/// Log files of what robots print, one per robot: logs/robot-00017.txt in the run directory. Each line begins with the time, s, at
+/// which the robot began to print it.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,21 @@ namespace kilotwin {
 
 class RobotLogs {
  public:
-  static constexpr std::uint64_t kMostOctets = 1 << 20;  ///< of one file; a last line says that it ends there
+  static constexpr std::uint64_t kMostOctets =
+      1 << 20;  ///< per file; the file's last line says that its log ends there
 
-  /// A run that starts at tick `first`, from a checkpoint or from its beginning, loses what earlier attempts have printed from
-  /// there on: by robots that are `own`, which no other process writes for. No file is made before a robot prints.
+  /// Prepares the logs of an attempt that starts at tick `first`, which is 0 or a checkpoint's tick. Removes the lines that
+  /// earlier attempts wrote at `first` or later. Touches only the files of robots for which own(robot) is true, because other
+  /// processes write the others. A robot gets a file when it first prints. Throws RunError if a file cannot be shortened.
   RobotLogs(const std::filesystem::path& run_directory, const TickLength& tick_length, Tick first,
             const std::function<bool(std::uint32_t robot)>& own);
   RobotLogs(const RobotLogs&) = delete;
   RobotLogs& operator=(const RobotLogs&) = delete;
-  /// Writes what is left. An error is said, as there is nobody to tell.
+  /// Writes the text that waits. Prints an error to stderr, because a destructor cannot throw.
   ~RobotLogs();
 
-  /// Of a robot in the step from `from`. Written at once where much is waiting, else after a second or with the object's end.
-  /// Throws RunError where a file cannot be written.
+  /// Adds text that the robot printed in the step from tick `from`. The text reaches the file after at most one second of
+  /// simulated time, earlier if 4 KiB wait. Throws RunError if a file cannot be written.
   void write(Tick from, std::uint32_t robot, std::string_view text);
   void flush();
 

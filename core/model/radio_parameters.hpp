@@ -1,5 +1,5 @@
-/// What each robot's infrared transmitter and receiver have of their own: stated in radio.propagation, else drawn. For the
-/// radio, and for the tables in the robots' EEPROMs by which their programs make distances of readings.
+/// Per-robot parameters of the infrared transmitter and receiver: stated in radio.propagation, else drawn at random. The radio
+/// uses them. So do the calibration tables in the robots' EEPROMs, with which programs convert readings to distances.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace kilotwin {
 
-/// Readings of the two amplifiers at 33, 38.. 98 mm, as kilolib keeps them.
+/// Calibration table of kilolib: readings of the two amplifiers, ADC counts, at the distances 33, 38 ... 98 mm.
 struct RangingTable {
   std::array<std::uint16_t, KILOTWIN_IR_ENTRIES> high, low;
   bool operator==(const RangingTable&) const = default;
@@ -19,7 +19,7 @@ struct RangingTable {
 
 class RadioParameters {
  public:
-  /// What a level depends on the bearing by: a vector in the robot's frame, dB.
+  /// Directivity: the level at bearing b (anticlockwise from ahead) is raised by ahead_db * cos(b) + left_db * sin(b).
   struct Bearing {
     double ahead_db = 0, left_db = 0;
   };
@@ -33,7 +33,7 @@ class RadioParameters {
   [[nodiscard]] const Bearing& sensitivity_bearing(std::uint32_t robot) const {
     return sensitivity_bearing_[robot];
   }
-  /// As the robot was calibrated: with its own sensitivity, a nominal sender and an error.
+  /// The calibration table in the robot's EEPROM: its own sensitivity, a nominal sender, and a calibration error.
   [[nodiscard]] RangingTable table(std::uint32_t robot) const;
   /// Whether any robot's table differs from the nominal one.
   [[nodiscard]] bool own_tables() const { return own_tables_; }

@@ -1,4 +1,4 @@
-/// Readings of the two distance amplifiers for a sender at a distance.
+/// Readings of the two receiver amplifiers as functions of the sender's distance.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +12,13 @@ struct Gains {
   bool operator==(const Gains&) const = default;
 };
 
-/// The nominal calibration of core/base/ir_calibration.h, linear between its entries; beyond the last it decays
-/// exponentially with the length constant of the table's own curve. Nearer than contact is a signal stronger than the nominal
-/// robot's: the low gain rises on to its greatest reading, the high gain is saturated.
+/// The nominal calibration of core/base/ir_calibration.h. Readings are linear between its entries. Beyond the last entry they
+/// decay exponentially with the length constant of the table's curve. A distance below contact stands for a signal that is
+/// stronger than a nominal sender's at contact: the low gain rises up to 1023, the high gain is saturated.
 class Ranging {
  public:
   Ranging();
-  /// `distance_mm`: of disc centres.
+  /// `distance_mm`: between disc centres.
   [[nodiscard]] Gains gains(double distance_mm) const {
     const double step = (distance_mm - kContact_mm) * (1.0 / kStep_mm);
     if (!(step > 0)) return rounded(high_[0], std::min(low_[0] + step * (low_[1] - low_[0]), kMost));

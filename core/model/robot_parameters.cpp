@@ -6,7 +6,7 @@
 namespace kilotwin {
 namespace {
 
-/// A duty of 0 would be no calibration: it never drives the wheel.
+/// Limits a stated duty to 1..255. A duty of 0 would never drive the wheel.
 std::uint8_t duty(std::uint32_t stated) {
   return static_cast<std::uint8_t>(stated < 1 ? 1 : stated > 255 ? 255 : stated);
 }

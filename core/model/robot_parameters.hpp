@@ -1,5 +1,5 @@
-/// What each robot has of its own: calibrated duties and biases, stated in the experiment or the model file, else the
-/// default or a draw. The one place that resolves them: for physics, for the programs' kilo_turn_left..., for exports.
+/// Per-robot motion parameters: calibrated duties and wheel biases. A value is stated in the experiment or the model file, else it
+/// is the default or a random draw. Physics, the programs' kilo_turn_left etc. and exports all resolve them here.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace kilotwin {
 
-/// Duties, 1..255, at which the robot's wheels run at the nominal speeds: what its kilo_turn_left... hold.
+/// Motor duties, 1..255, at which the robot's wheels run at the nominal speeds: the values of its kilo_turn_left etc.
 struct Calibration {
   std::uint8_t turn_left, turn_right, straight_left, straight_right;
 
   bool operator==(const Calibration&) const = default;
 };
 
-/// Added to the nominal speed of a wheel while the robot is driven, mm/s (the ARGoS paper, Pinciroli 2018, section 2.2).
+/// Speed added to the nominal speed of each wheel while the robot is driven, mm/s (Pinciroli 2018, section 2.2).
 struct WheelBias {
   double left_mm_s, right_mm_s;
 };
@@ -28,7 +28,7 @@ class RobotParameters {
 
   [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(calibration_.size()); }
   [[nodiscard]] const Calibration& calibration(std::uint32_t robot) const { return calibration_[robot]; }
-  /// The robot's own, whether or not the experiment's motion.noise lets it act. 0 on tracked robots, unless stated.
+  /// The robot's bias, even if motion.noise of the experiment switches it off. A tracked robot has 0 unless a bias is stated.
   [[nodiscard]] const WheelBias& bias(std::uint32_t robot) const { return bias_[robot]; }
 
  private:

@@ -37,7 +37,7 @@ std::uint32_t crc_of(std::string_view bytes, std::uint32_t before = 0) {
       ::crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
-/// The block's number is part of it, so that blocks which changed places are noticed.
+/// The CRC covers the block's number too, so that exchanged blocks are detected.
 std::uint32_t crc_of_block(std::uint64_t number, std::string_view content) {
   std::string prefix;
   put(prefix, number, 8);
@@ -103,7 +103,7 @@ std::string read_checksummed(const fs::path& file, const FileKind& kind) {
     throw refuse(fmt::format("has blocks of {} octets; this program reads {}", block, kBlock_bytes));
 
   const std::uint64_t length = get(all, kMagic_bytes + 8, 8);
-  // A length from a file bounds no memory before it agrees with the file's own.
+  // Allocate nothing by a length from the file before it agrees with the file's size.
   const std::uint64_t rest = all.size() - kHeader_bytes;
   if (length > rest || length + blocks_of(length) * kCrc_bytes > rest)
     throw refuse(fmt::format("is cut off at octet {}", all.size()));

@@ -27,8 +27,8 @@ Process start_process(const std::string& name, std::vector<std::string> words, c
   Command command;
   command.arguments = std::move(words);
   command.program = options.program;
-  command.output = options.output_to_log && log >= 0 ? log : Command::kNowhere;
-  command.errors = log >= 0 ? log : Command::kOwn;
+  command.output = options.output_to_log && log >= 0 ? log : Command::kDiscard;
+  command.errors = log >= 0 ? log : Command::kInherit;
   command.own_group = options.own_group;
   command.at_death = options.at_death;
   try {
@@ -46,8 +46,8 @@ std::string in_words(const ProcessEnd& end) {
 }
 
 bool crashed(const ProcessEnd& end) {
-  constexpr int kOwn[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
-  return std::find(std::begin(kOwn), std::end(kOwn), end.signal) != std::end(kOwn);
+  constexpr int kSignals[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
+  return std::find(std::begin(kSignals), std::end(kSignals), end.signal) != std::end(kSignals);
 }
 
 Child::Child(std::string name, std::vector<std::string> words, const ChildOptions& options)
@@ -80,12 +80,13 @@ void Children::signal(std::size_t tag, int number) {
 
 std::list<Child> Children::reap() {
   const auto now = Clock::now();
-  const bool ask = ask_at_ && !asked_ && now >= *ask_at_, kill = kill_at_ && now >= *kill_at_;
-  asked_ = asked_ || ask;
+  const bool terminate = terminate_at_ && !terminated_ && now >= *terminate_at_;
+  const bool kill = kill_at_ && now >= *kill_at_;
+  terminated_ = terminated_ || terminate;
   std::list<Child> ended;
   for (auto child = running_.begin(); child != running_.end();) {
     const auto next = std::next(child);
-    if (ask) child->process().signal(SIGTERM);
+    if (terminate) child->process().signal(SIGTERM);
     if (kill) child->process().signal(SIGKILL);
     if (child->process().poll()) ended.splice(ended.end(), running_, child);
     child = next;
@@ -94,8 +95,8 @@ std::list<Child> Children::reap() {
 }
 
 void Children::allow_until(Clock::time_point when, std::chrono::milliseconds patience) {
-  if (ask_at_ && *ask_at_ <= when) return;
-  ask_at_ = when;
+  if (terminate_at_ && *terminate_at_ <= when) return;
+  terminate_at_ = when;
   kill_at_ = when + patience;
 }
 
@@ -105,8 +106,8 @@ void Children::end() {
     static_cast<void>(reap());
     if (running() > 0) std::this_thread::sleep_for(kPoll);
   }
-  ask_at_ = kill_at_ = std::nullopt;
-  asked_ = false;
+  terminate_at_ = kill_at_ = std::nullopt;
+  terminated_ = false;
 }
 
 }  // namespace kilotwin::os

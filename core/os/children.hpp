@@ -1,5 +1,5 @@
-/// Processes that this one starts and answers for: none outlives it, each has a time by which it must have ended, and each end
-/// is known in words.
+/// Child processes that run beside this one. None outlives this process. allow_until() gives them a deadline. in_words()
+/// describes how each one ended.
 #pragma once
 
 #include <chrono>
@@ -17,28 +17,28 @@ namespace kilotwin::os {
 
 /// "was killed by signal 9 (Killed)", "ended with status 3".
 [[nodiscard]] std::string in_words(const ProcessEnd& end);
-/// Whether its own code ended it (a wild access, abort()), not a signal from another process.
+/// True if a signal that the process raised itself ended it (a wild access, abort()), false for a signal from another process.
 [[nodiscard]] bool crashed(const ProcessEnd& end);
 
-/// This program, started again with other arguments.
+/// How to start a child. The default program is this one, started again with other arguments.
 struct ChildOptions {
   std::filesystem::path program = "/proc/self/exe";
-  std::filesystem::path log;   ///< gets what it writes to stderr
-  bool output_to_log = false;  ///< what it writes to stdout too; else that is dropped
-  bool own_group = false;  ///< Ctrl-C of the terminal does not reach it, and signals reach all that it has started
-  int at_death = SIGTERM;  ///< the signal that it gets when this process ends
-  std::size_t tag = 0;     ///< for the starter's own use
+  std::filesystem::path log;   ///< file for its stderr
+  bool output_to_log = false;  ///< true: its stdout goes to the log too; false: its stdout is discarded
+  bool own_group = false;      ///< see Command::own_group
+  int at_death = SIGTERM;      ///< the signal that it gets when this process ends
+  std::size_t tag = 0;         ///< a number of the caller's choice, for Children::signal()
 };
 
 class Child {
  public:
-  /// `words`: its command line. Throws RunError that begins with `name`.
+  /// `words`: the command line, argv. Throws RunError, with `name` as its first word, if the start fails.
   Child(std::string name, std::vector<std::string> words, const ChildOptions& options);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t tag() const { return tag_; }
   [[nodiscard]] Process& process() { return process_; }
-  /// The last line of its log that is not empty. Works also if the file has been removed.
+  /// The last non-empty line of its log, also if the file has been removed.
   [[nodiscard]] std::string last_line() const;
 
  private:
@@ -48,7 +48,7 @@ class Child {
   Process process_;
 };
 
-/// When the object goes, the children that still run are ended.
+/// A set of children. The destructor ends those that still run.
 class Children {
  public:
   using Clock = std::chrono::steady_clock;
@@ -59,22 +59,22 @@ class Children {
 
   void start(std::string name, std::vector<std::string> words, const ChildOptions& options);
   [[nodiscard]] std::size_t running() const { return running_.size(); }
-  /// To the children with this tag that run.
+  /// Sends signal `number` to the running children with this tag.
   void signal(std::size_t tag, int number);
-  /// The children that have ended since the last call. Does not wait. Signals the others when their time is over.
+  /// Returns the children that ended since the last call. Does not wait. Signals the others if their deadline has passed.
   [[nodiscard]] std::list<Child> reap();
-  /// Gives the children time until `when`: those that still run then get SIGTERM, and SIGKILL `patience` later. A later call
-  /// can only shorten the time.
+  /// Sets a deadline. Children that still run at `when` get SIGTERM, and `patience` later SIGKILL, sent by reap(). A further
+  /// call can only bring the deadline forward.
   void allow_until(Clock::time_point when, std::chrono::milliseconds patience = kPatience);
-  /// Ends all that run and waits for them.
+  /// Ends all running children and waits for them.
   void end();
 
   static constexpr std::chrono::milliseconds kPatience{1000};
 
  private:
   std::list<Child> running_;
-  std::optional<Clock::time_point> ask_at_, kill_at_;
-  bool asked_ = false;
+  std::optional<Clock::time_point> terminate_at_, kill_at_;
+  bool terminated_ = false;
 };
 
 }  // namespace kilotwin::os

@@ -1,4 +1,4 @@
-/// A file descriptor with an owner.
+/// A file descriptor that closes itself.
 #pragma once
 
 #include <unistd.h>

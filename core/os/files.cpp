@@ -25,7 +25,7 @@ bool usable(const fs::path& directory) {
   return fs::is_directory(directory, error) && access(directory.c_str(), W_OK | X_OK) == 0;
 }
 
-/// Makes it if need be; false where it is a link, another user's, or open to others.
+/// Creates the directory if it does not exist. False if the path is a link, belongs to another user, or is open to others.
 bool own_private_directory(const fs::path& directory) {
   struct stat status {};
   if (mkdir(directory.c_str(), 0700) != 0 && errno != EEXIST) return false;
@@ -33,7 +33,7 @@ bool own_private_directory(const fs::path& directory) {
          (status.st_mode & 077) == 0 && access(directory.c_str(), W_OK | X_OK) == 0;
 }
 
-/// Appends all that the descriptor gives; false on failure, with errno.
+/// Reads the descriptor to its end and appends to `content`. On failure returns false and leaves errno set.
 bool read_all(int descriptor, std::string& content) {
   struct stat status {};
   if (fstat(descriptor, &status) == 0 && status.st_size > 0)
@@ -82,7 +82,7 @@ void write_file(const fs::path& file, std::string_view content) {
   };
   std::error_code none;
   if (fs::exists(file, none) && !fs::is_regular_file(file, none)) return write_to(file);
-  // As readable as the user's other files (mkstemp would keep it from a colleague who replays the run).
+  // open() with the user's umask. mkstemp() would make the file unreadable for a colleague who replays the run.
   static std::atomic<unsigned> counter{0};
   fs::path draft = file;
   draft += fmt::format(".{}.{}.part", getpid(), counter++);
@@ -109,7 +109,7 @@ OutputFile::~OutputFile() {
   try {
     flush();
   } catch (const RunError&) {
-    // A destructor has nobody to tell.
+    // A destructor cannot throw.
   }
   ::close(descriptor_);
 }
@@ -132,7 +132,7 @@ void OutputFile::flush() {
 void OutputFile::close() {
   if (descriptor_ < 0) return;
   flush();
-  // Network file systems report a full disk here at the latest.
+  // Network file systems may report a full disk only here.
   if (::close(std::exchange(descriptor_, -1)) != 0 && errno != EINTR) {
     throw RunError(fmt::format("{}: cannot be written: {}", file_.string(), system_reason()));
   }
@@ -147,7 +147,7 @@ fs::path cache_directory(const fs::path& wanted) {
     return home / ".cache/kilotwin";
   }
   std::error_code error;
-  // Without a home: a directory that all runs of this user share, where nobody else can write.
+  // Without a home directory: one that all runs of this user share and nobody else can write to.
   const fs::path shared = fs::temp_directory_path(error) / ("kilotwin-" + std::to_string(geteuid()));
   if (own_private_directory(shared)) return shared;
   std::string temporary = (fs::temp_directory_path(error) / "kilotwin-XXXXXX").string();

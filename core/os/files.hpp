@@ -1,5 +1,5 @@
-/// Whole files in and out, files that are written in blocks, and the directory where compiled programs are kept. Every failure is
-/// one line that names the file and the reason.
+/// Functions that read or write a whole file, files that are written in blocks, and the cache directory for compiled programs.
+/// Every error is one line that names the file and the reason.
 #pragma once
 
 #include <cstddef>
@@ -10,35 +10,35 @@
 
 namespace kilotwin::os {
 
-/// The whole content. Throws UserError where it cannot be read.
+/// The whole content. Throws UserError if the file cannot be read.
 [[nodiscard]] std::string read_file(const std::filesystem::path&);
 
-/// The whole content of a regular file; nothing where there is none or it cannot be read.
+/// The whole content of a regular file, or nothing if the file does not exist or cannot be read.
 [[nodiscard]] std::optional<std::string> read_if_there(const std::filesystem::path&);
 
-/// Writes a file as a whole: readers see the old one or the new one, nothing in between. A device or a pipe, which cannot be
-/// replaced, is written to. Throws RunError.
+/// Replaces a file atomically: readers see the whole old content or the whole new one. Writes straight into a device or a pipe,
+/// which cannot be replaced. Throws RunError.
 void write_file(const std::filesystem::path&, std::string_view content);
 
-/// The system's words for the errno at hand.
+/// The system's message for the current errno.
 [[nodiscard]] std::string system_reason();
 
-/// A file that is written from its beginning, in blocks. Not inherited by child processes.
+/// A file that is written in blocks. Child processes do not inherit its descriptor.
 class OutputFile {
  public:
   enum class Existing { kRefuse, kReplace, kAppend };
 
-  /// Throws RunError where the file cannot be created, or exists and must not.
+  /// Throws RunError if the file cannot be created, or if it exists and `existing` is kRefuse.
   OutputFile(std::filesystem::path file, Existing existing);
-  /// Hands over what is left as far as that is possible; whoever wants to know of errors calls close().
+  /// Writes the rest of the buffer and ignores errors. Call close() to learn of them.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// The bytes that wait to be handed to the kernel; to be appended to.
+  /// The bytes that the kernel does not have yet. Append to it.
   [[nodiscard]] std::string& buffer() { return buffer_; }
-  /// Hands all of them over, after which they outlive this process. On failure throws RunError, and keeps what was
-  /// not written, so that a later call goes on where this one stopped.
+  /// Hands the buffer to the kernel, so that its bytes survive a crash of this process. On failure throws RunError and keeps the
+  /// bytes that were not written, so that a later call continues with them.
   void flush();
   void flush_if_above(std::size_t bytes) {
     if (buffer_.size() >= bytes) flush();
@@ -53,8 +53,8 @@ class OutputFile {
   std::string buffer_;
 };
 
-/// A directory that this user may write to: `wanted` if given, else $XDG_CACHE_HOME/kilotwin or ~/.cache/kilotwin; where
-/// none of them can be had, a private directory of this user among the system's temporary files. Throws RunError where that fails too.
+/// A directory that this user may write to: `wanted` if given, else $XDG_CACHE_HOME/kilotwin or ~/.cache/kilotwin. If none of
+/// them can be written to, it is a private directory in the system's temporary directory. Throws RunError if that fails too.
 [[nodiscard]] std::filesystem::path cache_directory(const std::filesystem::path& wanted);
 
 }  // namespace kilotwin::os

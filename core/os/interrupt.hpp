@@ -1,9 +1,9 @@
-/// SIGINT and SIGTERM as a flag that loops look at.
+/// SIGINT and SIGTERM as a flag for loops to poll.
 #pragma once
 
 namespace kilotwin {
 
-/// From now on SIGINT and SIGTERM set the flag instead of ending the process; a second SIGINT ends it.
+/// After this call SIGINT and SIGTERM set the flag and do not end the process. A second SIGINT ends it.
 void catch_interrupts();
 /// The signal that arrived, or 0.
 [[nodiscard]] int interrupted();

@@ -17,7 +17,7 @@ void require_open_files(std::uint64_t count, const std::string& what) {
   throw RunError(what + " needs " + std::to_string(count) + " open files at a time, and the limit is " +
                  std::to_string(before) + "; raise it with: ulimit -n " +
                  std::to_string(std::max<std::uint64_t>(1024, count)) +
-                 " (where that is refused, nofile in /etc/security/limits.conf)");
+                 " (if the shell refuses, raise nofile in /etc/security/limits.conf)");
 }
 
 }  // namespace kilotwin

@@ -1,4 +1,4 @@
-/// What the system lets this process have.
+/// Resource limits of this process.
 #pragma once
 
 #include <cstdint>
@@ -6,8 +6,8 @@
 
 namespace kilotwin {
 
-/// Sees to it that this process may have `count` files and sockets open at a time: raises its limit as far as the system
-/// allows. Throws RunError where that is too little; `what` begins the line, e.g. "a service".
+/// Raises the soft limit of open files and sockets to `count`. Throws RunError if the hard limit is lower. `what` is the subject
+/// of the error line, e.g. "a service".
 void require_open_files(std::uint64_t count, const std::string& what);
 
 }  // namespace kilotwin

@@ -99,12 +99,12 @@ Process::Process(const Command& command) : own_group_(command.own_group) {
   }
   char** const environment = own_environment.empty() ? environ : own_environment.data();
   const Descriptor nothing(open("/dev/null", O_RDWR | O_CLOEXEC));
-  Pipe trouble;  // closed by the start of the program; gets errno where that fails
+  Pipe trouble;  // exec closes it; if exec fails, the child writes errno to it
   const pid_t parent = getpid();
   id_ = fork();
   if (id_ < 0) throw RunError(fmt::format("cannot start {}: {}", program, system_reason()));
   if (id_ == 0) {
-    // Only calls that are safe between fork and exec.
+    // Between fork and exec only async-signal-safe calls are allowed.
     if (command.own_group) setpgid(0, 0);
     if (command.at_death != 0) prctl(PR_SET_PDEATHSIG, command.at_death);
     if (command.at_death != 0 && getppid() != parent) _exit(127);
@@ -112,19 +112,19 @@ Process::Process(const Command& command) : own_group_(command.own_group) {
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, nullptr);
     const auto connect = [&](int from, int to) {
-      if (from == Command::kOwn) return;
-      dup2(from == Command::kNowhere ? nothing.get() : from, to);
+      if (from == Command::kInherit) return;
+      dup2(from == Command::kDiscard ? nothing.get() : from, to);
     };
-    // Of two that change places neither is overwritten before it is read.
-    const int errors =
-        command.errors == STDOUT_FILENO && command.output != Command::kOwn ? dup(STDOUT_FILENO) : command.errors;
-    connect(Command::kNowhere, STDIN_FILENO);
+    // Both descriptors are duplicated first, because output may be 2 and errors may be 1.
+    const int errors = command.errors == STDOUT_FILENO && command.output != Command::kInherit ? dup(STDOUT_FILENO)
+                                                                                              : command.errors;
+    connect(Command::kDiscard, STDIN_FILENO);
     connect(command.output, STDOUT_FILENO);
     connect(errors, STDERR_FILENO);
     execve(program.c_str(), arguments.data(), environment);
     const int error = errno;
-    const ssize_t told = write(trouble.write_end.get(), &error, sizeof error);
-    _exit(told == sizeof error ? 127 : 126);
+    const ssize_t written = write(trouble.write_end.get(), &error, sizeof error);
+    _exit(written == sizeof error ? 127 : 126);
   }
   trouble.write_end.reset();
   int error = 0;

@@ -1,4 +1,4 @@
-/// Other programs: started, watched, ended. No shell is involved.
+/// Child processes: start them, watch them, end them. No shell is involved.
 #pragma once
 
 #include <sys/types.h>
@@ -11,48 +11,51 @@
 
 namespace kilotwin::os {
 
-/// How a process has ended.
+/// How a process ended.
 struct ProcessEnd {
-  int code = 0;    ///< exit status; meaningless where `signal` is not 0
-  int signal = 0;  ///< that ended it; 0: it ended by itself
+  int code = 0;    ///< exit status; meaningless if `signal` is not 0
+  int signal = 0;  ///< the signal that ended it; 0: it ended by itself
   [[nodiscard]] bool well() const { return code == 0 && signal == 0; }
 };
 /// "signal 9 (Killed)".
 [[nodiscard]] std::string signal_name(int signal);
 
-/// A program to be started.
+/// A program to start, with its surroundings.
 struct Command {
-  static constexpr int kNowhere = -1, kOwn = -2;  ///< /dev/null; that of this process
+  static constexpr int kDiscard = -1;  ///< /dev/null
+  static constexpr int kInherit = -2;  ///< the descriptor of this process
   enum class Environment {
-    kOwn,
+    kInherit,
     /// The C locale, and none of the variables that redirect compilers (CPATH, GCC_EXEC_PREFIX...).
     kPlain
   };
 
-  std::vector<std::string> arguments;  ///< [0]: the program's path; what it is called, if `program` is given
+  std::vector<std::string> arguments;  ///< argv; arguments[0] is also the program's path unless `program` is given
   std::filesystem::path program;       ///< empty: arguments[0]
-  int output = kOwn, errors = kOwn;  ///< descriptors that it gets as standard output and errors. Its input is empty
-  Environment environment = Environment::kOwn;
-  /// A process group of its own: the terminal's Ctrl-C does not reach it, and signals reach what it starts as well.
+  int output = kInherit,
+      errors = kInherit;  ///< descriptors for its standard output and error; its standard input is empty
+  Environment environment = Environment::kInherit;
+  /// Starts a process group. The terminal's Ctrl-C does not reach the group, and signal() reaches its descendants too.
   bool own_group = false;
-  int at_death = 0;  ///< signal that it gets when the thread that started it ends, however that ends; 0: none
+  /// The signal that the child gets when the thread that started it ends for any reason (PR_SET_PDEATHSIG); 0: none.
+  int at_death = 0;
 };
 
-/// A child process. Signals are sent only while it has not been waited for, so never to a stranger of the same number.
+/// A child process. Signals are sent only before it has been waited for, so never to an unrelated process with a reused id.
 class Process {
  public:
-  /// Throws RunError where it cannot be started, for lack of the program or of room.
+  /// Starts it. Throws RunError if the program does not exist or the system lacks memory or process ids.
   explicit Process(const Command&);
   Process(Process&&) noexcept;
   Process& operator=(Process&&) = delete;
-  /// Kills it if it still runs.
+  /// Kills the child if it still runs.
   ~Process();
 
   [[nodiscard]] pid_t id() const { return id_; }
-  /// Its end, if it has ended. Does not wait.
+  /// How the child ended, or nothing while it runs. Does not wait.
   [[nodiscard]] const std::optional<ProcessEnd>& poll();
   ProcessEnd wait();
-  /// To it, or to its group if it has its own; nothing once its end is known.
+  /// Sends a signal to the child, or to its group if it has one. Does nothing after poll() or wait() has reported the end.
   void signal(int number) const;
 
  private:
@@ -65,13 +68,13 @@ class Process {
 
 struct ProcessResult {
   ProcessEnd end;
-  std::string output;  ///< what it wrote to standard output
-  std::string errors;  ///< what it wrote to standard error
+  std::string output;  ///< its standard output
+  std::string errors;  ///< its standard error
 };
-/// Runs arguments[0], a path, to its end in the plain environment. Throws RunError where it cannot be started.
+/// Runs arguments[0], a path, to its end in Environment::kPlain. Throws RunError if it cannot be started.
 [[nodiscard]] ProcessResult run_process(const std::vector<std::string>& arguments);
 
-/// The first directory of $PATH that holds an executable of this name; empty where none does.
+/// The path of the first executable of this name in the directories of $PATH; empty if there is none.
 [[nodiscard]] std::filesystem::path find_executable(std::string_view name);
 
 }  // namespace kilotwin::os

@@ -11,11 +11,11 @@
 namespace kilotwin::os {
 namespace {
 
-/// Of `unclaimed_`: the pool ends. No call has so many tasks.
+/// Value of `unclaimed_` that tells the threads to end. No call has that many tasks.
 constexpr std::uint32_t kEnd = 0xffffffff;
-/// With a pause of 10 to 50 ns each: some tens of us, longer than one thread works between two calls.
+/// One spin is a pause of 10 to 50 ns. All spins take some tens of us, longer than the caller works between two calls.
 constexpr int kSpins = 2000;
-/// Where threads outnumber cores: each lets another thread run, so that a few suffice.
+/// Used if threads outnumber cores. One yield may last as long as another thread's time slice, so a few suffice.
 constexpr int kYields = 8;
 
 }  // namespace
@@ -26,7 +26,7 @@ WorkerPool::WorkerPool(std::uint32_t threads) : spins_(threads <= cores() ? kSpi
   try {
     for (std::uint32_t i = 1; i < threads; ++i) threads_.emplace_back([this] { serve(); });
   } catch (const std::system_error&) {
-    // The system has no room for more threads; those that there are do the work.
+    // The system has no room for more threads. The threads that exist do the work.
   }
 }
 
@@ -81,7 +81,7 @@ void WorkerPool::run(std::size_t i) {
     (*task_)(i);
   } catch (...) {
     fail(i);
-    // The call cannot end before this task has: what is unclaimed is this call's.
+    // This task is unfinished, so the call has not ended and all unclaimed tasks belong to it.
     done += unclaimed_.exchange(0, std::memory_order_acq_rel);
   }
   if (unfinished_.fetch_sub(done, std::memory_order_acq_rel) == done) unfinished_.notify_one();

@@ -1,4 +1,4 @@
-/// Threads that share short tasks, thousands of times a second.
+/// A worker pool for short tasks, called thousands of times a second.
 #pragma once
 
 #include <atomic>
@@ -15,13 +15,13 @@ namespace kilotwin::os {
 /// Processors that this process may use, at least 1.
 [[nodiscard]] std::uint32_t cores();
 
-/// Between two calls, threads spin for some tens of us before they sleep, as waking a thread costs as much as several tasks.
-/// Where there are more threads than cores they yield instead: a thread that spins would keep a core from one that works.
+/// Between two calls the threads spin for some tens of us before they sleep, because waking a thread costs as much as several
+/// tasks. If there are more threads than cores, they yield and do not spin: a spinning thread would take a core from a working one.
 class WorkerPool {
  public:
   using Task = std::function<void(std::size_t)>;
 
-  /// `threads`: the caller's own included; 0 is taken as 1.
+  /// `threads` counts the caller's thread; 0 means 1.
   explicit WorkerPool(std::uint32_t threads);
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
@@ -29,10 +29,10 @@ class WorkerPool {
 
   [[nodiscard]] std::uint32_t threads() const { return static_cast<std::uint32_t>(threads_.size() + 1); }
 
-  /// Calls task(i) once for each i below `count` (at most 2^32 - 2), started in ascending order, and returns when all are done.
-  /// A thread that the system does not let run delays nobody: the others take what is left. Where tasks throw, those that have
-  /// not started are left out, and the exception of the lowest i is thrown again here: the one that a single thread would meet.
-  /// One call at a time; tasks do not call the pool that runs them.
+  /// Calls task(i) once for each i < count (at most 2^32 - 2) and returns when all are done. Tasks start in ascending order. A
+  /// thread that the system does not schedule delays nobody: the others take the remaining tasks. If a task throws, tasks that
+  /// have not started are skipped. for_each() then rethrows the exception of the lowest i, the one that a single thread would
+  /// meet. Only one call may be active, and tasks must not call the pool that runs them.
   void for_each(std::size_t count, const Task& task);
 
  private:
@@ -42,12 +42,12 @@ class WorkerPool {
   void run(std::size_t i);
   void fail(std::size_t i);
 
-  // Of the call at hand; written while no thread has a task.
+  // The current call's tasks. Written only while no thread has a task.
   const Task* task_ = nullptr;
   std::size_t count_ = 0;
 
-  /// Tasks that nobody has taken, or kEnd. Whoever brings it from n to n - 1 has task count_ - n of the call of that moment,
-  /// which cannot end before it is done: a thread that slept through calls still takes a task of the right one.
+  /// Number of tasks that no thread has taken, or kEnd. The thread that lowers it from n to n - 1 takes task count_ - n. The
+  /// current call cannot end before that task is done, so a thread that slept through calls still reads the right task_.
   std::atomic<std::uint32_t> unclaimed_{0};
   std::atomic<std::uint32_t> unfinished_{0};
   std::mutex failure_mutex_;
@@ -57,7 +57,7 @@ class WorkerPool {
   std::vector<std::thread> threads_;
 };
 
-/// WorkerPool::for_each() on threads of its own, for tasks that take much longer than to start a thread. May be nested.
+/// WorkerPool::for_each() on a temporary pool, for tasks that take much longer than the start of a thread. May be nested.
 void in_parallel(std::size_t count, std::uint32_t threads, const WorkerPool::Task& task);
 
 }  // namespace kilotwin::os

@@ -10,8 +10,9 @@ namespace kilotwin::senses {
 namespace {
 
 constexpr double kCyclesPerHour = 3600 * 8e6;
-constexpr std::int64_t kPacketCycles = 13 * 10 * 269;  // kilolib: 13 octets of 10 bits
-/// Of its charge, a robot that was flat needs as much to start again.
+/// Duration of a packet of kilolib: 13 octets of 10 bits, 269 cycles per bit.
+constexpr std::int64_t kPacketCycles = 13 * 10 * 269;
+/// A robot whose battery was flat starts again at this fraction of its capacity.
 constexpr double kRestart = 0.05;
 
 std::int64_t whole(double value) { return static_cast<std::int64_t>(kt_floor(value + 0.5)); }
@@ -20,7 +21,7 @@ std::int64_t microamperes(double mA) { return whole(mA * 1000); }
 }  // namespace
 
 double open_circuit_volts(double charge) {
-  // A lithium-ion cell at small currents: 4.2 V full, a plateau about 3.8 V, and a steep end at 3.0 V.
+  // A lithium-ion cell at small currents: 4.2 V when full, a plateau about 3.8 V, and a steep fall to 3.0 V when empty.
   static constexpr double kCharge[] = {0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1};
   static constexpr double kVolts[] = {3.0, 3.3, 3.45, 3.6, 3.7, 3.78, 3.86, 4.0, 4.08, 4.2};
   constexpr std::size_t last = std::size(kCharge) - 1;

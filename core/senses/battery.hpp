@@ -1,5 +1,5 @@
-/// A robot's battery: what drains it, what charges it, and the voltage that its program reads. Charges are whole numbers of
-/// uA cycles (1 uA during one cycle of 8 MHz, an eighth of a picocoulomb), so that energy balances exactly.
+/// Battery model of a robot: loads, chargers, and the voltage that its program reads. Charges are integers in uA cycles: 1 uA
+/// during one cycle of 8 MHz is an eighth of a picocoulomb. The charge balance is therefore exact.
 #pragma once
 
 #include <array>
@@ -11,21 +11,21 @@
 
 namespace kilotwin::senses {
 
-/// 10-bit reading of a battery of so many volts. The firmware's thresholds 682, 648 and 614 are 4.0, 3.8 and 3.6 V to the count
-/// if the full range is 6 V: a divider by two before a converter with a reference of 3 V.
+/// ADC reading, counts, of a battery voltage. The full range of 1024 counts is 6 V: a divider by two before a converter with a
+/// reference of 3 V. With this range the firmware's thresholds 682, 648 and 614 are 4.0, 3.8 and 3.6 V to the count.
 [[nodiscard]] constexpr double voltage_reading(double volts) { return volts * (1024 / 6.0); }
 
-/// Volts of a lithium-ion cell without load, by charge 0..1: a generic discharge curve, piecewise linear.
+/// Open-circuit voltage of a lithium-ion cell, V, at state of charge 0..1: a generic discharge curve, piecewise linear.
 [[nodiscard]] double open_circuit_volts(double charge);
 
 class Battery {
  public:
-  /// The plan's experiment has batteries.
+  /// Requires plan.battery_settings().
   explicit Battery(const RunPlan&);
 
-  /// Of a full one; more than 0.
+  /// Charge of a full battery, uA cycles; more than 0.
   [[nodiscard]] std::int64_t capacity() const { return capacity_; }
-  /// Of a robot at the start.
+  /// Charge of a robot's battery at the start of the run.
   [[nodiscard]] std::int64_t initial(std::uint32_t robot) const;
 
   struct Use {
@@ -33,20 +33,20 @@ class Battery {
     std::uint8_t led = 0;                          ///< r | g << 2 | b << 4
     bool asleep = false, transmits = false;
   };
-  /// What a robot takes in one tick.
+  /// Charge that a robot draws in one tick.
   [[nodiscard]] std::int64_t drain(const Use& use) const {
     if (use.asleep) return sleep_;
     return idle_ + motor_[use.motor_left] + motor_[use.motor_right] + led_[use.led & 63] +
            (use.transmits ? transmission_ : 0);
   }
-  /// What a robot at this place gets in one tick; 0 off all chargers.
+  /// Charge that a robot at this position receives in one tick; 0 outside all chargers.
   [[nodiscard]] std::int64_t supply(double x_mm, double y_mm) const;
 
-  /// Average reading of its voltage while it takes `drain` per tick, counts.
+  /// Mean reading of the voltage, counts, under a load of `drain` per tick.
   [[nodiscard]] double reading(std::int64_t charge, std::int64_t drain) const;
   /// Standard deviation of one reading, counts.
   [[nodiscard]] double sd() const { return sd_; }
-  /// A flat robot starts again with this charge.
+  /// Charge at which a robot with a flat battery starts again.
   [[nodiscard]] std::int64_t restart() const { return restart_; }
 
  private:

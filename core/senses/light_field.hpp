@@ -1,4 +1,4 @@
-/// The light that robots' sensors see: lamps, projected pictures and an ambient level, in shadow where bodies stand between.
+/// The light at robots' sensors: the sum of lamps, projected images and an ambient level. Bodies cast shadows.
 #pragma once
 
 #include <optional>
@@ -13,33 +13,32 @@
 
 namespace kilotwin::senses {
 
-/// A pure function of (experiment, seed, tick, poses): the same on every host.
+/// A pure function of (experiment, seed, tick, poses), so alike on every host.
 class LightField {
  public:
-  /// For robots of `share`. The plan has light and must outlive this object.
+  /// For the robots of `share`. Requires plan.light_settings(). The plan must outlive this object.
   LightField(const RunPlan&, Share share);
 
-  /// The field among a swarm, at its tick. Readings are of that swarm: it must outlive them.
+  /// Sets the swarm and the tick for the functions below, which read the swarm: it must outlive their calls.
   void at(const SwarmView&);
 
-  /// What the sensor of robot `id` of the share gives on average, counts before the converter cuts them to 0..1023: its gain
-  /// times the light there, and its offset.
+  /// Mean reading of the sensor of robot `id` of the share, counts: gain * light + offset, before the converter's limits 0..1023.
   [[nodiscard]] double reading(std::uint32_t id) const;
-  /// Standard deviation of one reading of that average, counts.
+  /// Standard deviation of one reading with this mean, counts.
   [[nodiscard]] double sd(double reading) const;
 
-  /// The light at a place, in counts of a nominal sensor. `self` throws no shadow there.
+  /// The light at a point, in counts of a nominal sensor. Robot `self` casts no shadow on it.
   [[nodiscard]] double light(double x_mm, double y_mm, double z_mm, std::uint32_t self) const;
 
  private:
   const RunPlan& plan_;
   const LightSettings& light_;
   const Share share_;
-  double anchor_x_mm_ = 0, anchor_y_mm_ = 0, anchor_z_mm_;  ///< the sensor's place on a robot with heading 0
+  double anchor_x_mm_ = 0, anchor_y_mm_ = 0, anchor_z_mm_;  ///< the sensor's position in the robot's frame
   std::vector<double> gain_, offset_;                       ///< per robot of the share
   const SwarmView* swarm_ = nullptr;
   std::vector<LightImage> images_;
-  std::vector<Lamp> lamps_;  ///< those that shine
+  std::vector<Lamp> lamps_;  ///< lamps that are on
   std::optional<Shadows> shadows_;
 };
 

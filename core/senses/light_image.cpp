@@ -29,7 +29,7 @@ void LightImage::at(double time_s) {
 
 double LightImage::reading(double x_mm, double y_mm) const {
   const Raster& raster = rasters_[shown_];
-  // In pixels from the left and from the top; the centre of the first pixel is at 0.
+  // x and y become pixel coordinates from the left and from the top, with the centre of the first pixel at 0.
   double x = (x_mm - left_mm_) / width_mm_, y = (top_mm_ - y_mm) / height_mm_;
   if (!(x >= 0 && x <= 1 && y >= 0 && y <= 1)) return 0;
   x = x * raster.columns - 0.5;

@@ -1,4 +1,4 @@
-/// A projector's pictures on the arena's floor, as light.
+/// A projector: a sequence of pictures on the arena's floor.
 #pragma once
 
 #include <array>
@@ -13,19 +13,19 @@ namespace kilotwin::senses {
 
 class LightImage {
  public:
-  /// The settings must outlive this object, which reads their pictures.
+  /// The settings must outlive this object, because it reads their pixels.
   explicit LightImage(const LightImageSettings&);
 
-  /// Chooses the picture of an instant.
+  /// Chooses the picture that is shown at `time_s`.
   void at(double time_s);
-  /// The reading of a nominal sensor there, counts, between those of black and white; interpolated between the centres of
-  /// pixels, even beyond the outermost ones. 0 outside the picture.
+  /// Reading of a nominal sensor at a point, counts, between the settings' `black` and `white`. Bilinear between the centres of
+  /// pixels, constant between the outermost centres and the edge, 0 outside the picture.
   [[nodiscard]] double reading(double x_mm, double y_mm) const;
 
  private:
   struct Raster {
     std::uint32_t columns = 0, rows = 0;
-    const char* brightness = nullptr;  ///< row by row from the top, 0..255; of the settings
+    const char* brightness = nullptr;  ///< 0..255, row by row from the top; owned by the settings
   };
   std::vector<Raster> rasters_;
   std::array<double, 256> reading_of_{};  ///< per brightness

@@ -7,8 +7,8 @@
 namespace kilotwin::senses {
 namespace {
 
-/// Whether the source shines: it changes at each time of its list.
-bool shines(const LightSourceSettings& source, double time_s) {
+/// Whether the source is on: it starts as `on` and toggles at each time of `switch_s`.
+bool is_on(const LightSourceSettings& source, double time_s) {
   bool on = source.on;
   const double within_s = source.switch_period_s > 0 ? kt_fmod(time_s, source.switch_period_s) : time_s;
   for (const double at_s : source.switch_s) {
@@ -37,7 +37,7 @@ void follow_way(const LightSourceSettings& source, double time_s, Lamp& lamp) {
 
 void follow_circle(const LightSourceSettings& source, double time_s, Lamp& lamp) {
   const LightCircleSettings& circle = *source.circle;
-  // Whole turns are taken off first, so that a long run loses no accuracy.
+  // Reduce to one turn before the multiplication by 2 pi, so that long runs lose no accuracy.
   const double turns = kt_fmod(time_s, circle.period_s) / circle.period_s;
   const double angle_rad = 2 * kPi * (circle.clockwise ? -turns : turns) + circle.phase_deg * (kPi / 180);
   double s = 0, c = 0;
@@ -49,7 +49,7 @@ void follow_circle(const LightSourceSettings& source, double time_s, Lamp& lamp)
 }  // namespace
 
 Lamp lamp_at(const LightSourceSettings& source, double time_s) {
-  Lamp lamp{source.x_mm, source.y_mm, source.height_mm, shines(source, time_s) ? source.intensity : 0};
+  Lamp lamp{source.x_mm, source.y_mm, source.height_mm, is_on(source, time_s) ? source.intensity : 0};
   if (!source.waypoints.empty()) follow_way(source, time_s, lamp);
   if (source.circle) follow_circle(source, time_s, lamp);
   return lamp;

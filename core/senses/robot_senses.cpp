@@ -8,8 +8,8 @@
 namespace kilotwin::senses {
 namespace {
 
-/// The processor's own sensor, counts: 242 mV at -45, 314 mV at 25, 380 mV at 85 degrees Celsius (data sheet of the
-/// ATmega328P), of 1.1 V in 1024 steps.
+/// Reading of the processor's temperature sensor, counts, with a reference of 1.1 V. The data sheet of the ATmega328P gives
+/// 242 mV at -45, 314 mV at 25 and 380 mV at 85 degrees Celsius.
 double temperature_reading(double celsius) {
   const double mV = 314 + (celsius - 25) * (celsius < 25 ? 72.0 / 70 : 66.0 / 60);
   return mV * (1024 / 1100.0);

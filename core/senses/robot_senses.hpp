@@ -1,4 +1,4 @@
-/// What surrounds some of a run's robots while their programs run: light, temperature, and their batteries.
+/// Light, temperature and batteries of a share of the robots, as their programs read them.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,23 @@
 
 namespace kilotwin::senses {
 
-/// What a robot's converter gives on average, counts before they are rounded and cut to 0..1023, and the spread of one reading.
-/// Where the experiment says nothing: light in the middle of the range, and a charged battery, above 682, the firmware's
-/// threshold for full, with the noise that makes rand_hard() random.
+/// Mean and standard deviation of ADC readings, counts, before they are rounded and limited to 0..1023. The defaults hold for an
+/// experiment that states nothing: light in the middle of the range and a charged battery. 682 is the firmware's threshold for
+/// a full battery. The noise of the voltage makes rand_hard() random.
 struct Readings {
   double light = 512, light_sd = 0;
   double voltage = 700, voltage_sd = 0.5;
   double temperature = 314 * (1024 / 1100.0), temperature_sd = 0;  ///< 25 degrees Celsius
-  bool charging = false;                                           ///< a charger's voltage is on its contacts
+  bool charging = false;  ///< a charger's voltage is on the robot's contacts
 };
 
-/// Indices are those of robots within the share. Where the experiment says nothing, readings are constant.
+/// An index i counts the robots of the share from 0. Quantities that the experiment does not state are constant.
 class RobotSenses {
  public:
   RobotSenses(const RunPlan&, Share share);
 
-  /// The surroundings among a swarm, at its tick; needed where RunPlan::hosts_see_bodies(). The swarm must outlive readings.
+  /// Sets the swarm and the tick for readings(). Call it every tick if RunPlan::hosts_see_bodies(). The swarm must outlive the
+  /// calls of readings().
   void at(const SwarmView&);
   [[nodiscard]] Readings readings(std::uint32_t i) const {
     Readings result;
@@ -47,11 +48,11 @@ class RobotSenses {
   }
 
   [[nodiscard]] bool has_batteries() const { return battery_.has_value(); }
-  /// uA cycles; see Battery.
+  /// Charge of the battery, uA cycles (see Battery).
   [[nodiscard]] std::int64_t charge(std::uint32_t i) const { return charge_[i]; }
-  /// One tick of use, and of what a charger gives.
+  /// Advances the charge by one tick with this load and the charger, if the robot stands on one.
   void spend(std::uint32_t i, const Battery::Use& use) { settle(i, battery_->drain(use)); }
-  /// One tick of a robot that is off.
+  /// Advances the charge of a robot that is off by one tick.
   void rest(std::uint32_t i) { settle(i, 0); }
   [[nodiscard]] bool is_flat(std::uint32_t i) const { return charge_[i] == 0; }
   [[nodiscard]] bool can_restart(std::uint32_t i) const { return charge_[i] >= battery_->restart(); }
@@ -65,10 +66,11 @@ class RobotSenses {
 
   const Share share_;
   std::optional<LightField> light_;
-  std::vector<double> temperature_;  ///< average readings
+  std::vector<double> temperature_;  ///< mean readings, counts
   double temperature_sd_ = 0;
   std::optional<Battery> battery_;
-  std::vector<std::int64_t> charge_, drain_, supply_;  ///< the latter two of the tick at hand
+  std::vector<std::int64_t> charge_, drain_,
+      supply_;  ///< uA cycles; drain_ and supply_ per tick, of the current tick
 };
 
 }  // namespace kilotwin::senses

@@ -7,10 +7,10 @@
 namespace kilotwin::senses {
 namespace {
 
-/// Cells are not smaller than a body, nor more than a few per body.
+/// Upper limit of the number of cells. Cells are also at least as wide as a body.
 constexpr double kCellsPerBody = 2;
 
-/// The cell of 0..count-1 in which `at` lies, in cells; what lies outside counts to the ends.
+/// Index 0..count-1 of the cell at coordinate `at`, which is in cell widths. Coordinates outside belong to the outermost cells.
 std::uint32_t cell(double at, std::uint32_t count) {
   return !(at > 0) ? 0 : at < count ? static_cast<std::uint32_t>(at) : count - 1;
 }
@@ -35,7 +35,7 @@ void Shadows::prepare(const std::vector<double>& x_mm, const std::vector<double>
   columns_ = static_cast<std::uint32_t>(width_mm / cell_mm_) + 1;
   rows_ = static_cast<std::uint32_t>(height_mm / cell_mm_) + 1;
 
-  // Counting sort: bodies of a cell stand in ascending order.
+  // Counting sort by cell. Within a cell, bodies stand in ascending order.
   first_.assign(std::size_t{columns_} * rows_ + 1, 0);
   cell_of_.resize(x_mm.size());
   body_.resize(x_mm.size());
@@ -46,14 +46,14 @@ void Shadows::prepare(const std::vector<double>& x_mm, const std::vector<double>
   }
   for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
   for (std::size_t i = x_mm.size(); i-- > 0;) body_[--first_[cell_of_[i] + 1]] = static_cast<std::uint32_t>(i);
-  // first_[c + 1] has come down to where cell c begins.
+  // After the loop first_[c + 1] is the start of cell c, so shift by one.
   first_.erase(first_.begin());
   first_.push_back(static_cast<std::uint32_t>(x_mm.size()));
 }
 
 bool Shadows::hides(const Lamp& lamp, double x_mm, double y_mm, double z_mm, std::uint32_t self) const {
   if (z_mm >= height_mm_ || columns_ == 0) return false;
-  // The part of the line below the bodies' tops.
+  // Fraction of the line, from the sensor, that lies below the tops of the bodies.
   const double part = lamp.z_mm > height_mm_ ? (height_mm_ - z_mm) / (lamp.z_mm - z_mm) : 1;
   const double dx = part * (lamp.x_mm - x_mm), dy = part * (lamp.y_mm - y_mm), square = dx * dx + dy * dy;
 
@@ -62,7 +62,7 @@ bool Shadows::hides(const Lamp& lamp, double x_mm, double y_mm, double z_mm, std
   const std::uint32_t from = cell((low_x - reach - left_mm_) / cell_mm_, columns_),
                       to = cell((high_x + reach - left_mm_) / cell_mm_, columns_);
   for (std::uint32_t column = from; column <= to; ++column) {
-    // The line's y while it is within reach of this column.
+    // Range of the line's y where a body of this column can touch the line.
     double y0 = y_mm, y1 = y_mm + dy;
     if (dx != 0) {
       const double x0 = left_mm_ + cell_mm_ * column - reach, x1 = x0 + cell_mm_ + 2 * reach;

@@ -33,7 +33,7 @@ bool is_prefix(std::string_view word) {
   return std::find(kPrefixes.begin(), kPrefixes.end(), word) != kPrefixes.end();
 }
 
-/// One of `bases`, perhaps with a suffix of size.
+/// Whether `name` is one of `bases`, with or without a size suffix (b, w, l, q).
 template <std::size_t N> bool is_sized(std::string_view name, const std::array<std::string_view, N>& bases) {
   for (const std::string_view base : bases) {
     if (name == base) return true;
@@ -62,7 +62,7 @@ class Reader {
   void line(std::string_view text) {
     const std::string_view content = trimmed(text);
     if (content.empty() || content[0] == '#') return add({Statement::Kind::kNothing, section_, text, {}, {}});
-    // Directives may hold any text in quotes; only what is code is looked at more closely.
+    // A directive may hold arbitrary text in quotes, so it is not split further.
     if (content[0] == '.' && content.find(':') == std::string_view::npos) return directive(text, content);
     if (const std::string_view symbol = first_symbol(content);
         content[0] == '.' && symbol.size() < content.size() && content[symbol.size()] != ':') {
@@ -122,7 +122,7 @@ class Reader {
   std::vector<Statement> statements_;
 };
 
-/// The operand that is memory, or "".
+/// The memory operand, or "".
 std::string_view memory_operand(std::string_view operands) {
   const std::size_t open = operands.find('(');
   if (open == std::string_view::npos) return {};
@@ -175,7 +175,7 @@ bool reads_memory(const Statement& instruction) {
     if (name.starts_with(start) && operands.find("(%rsi)") != std::string_view::npos) return true;
   }
   const std::string_view memory = memory_operand(operands);
-  // %gs: what is left of the cycles, which the next tick changes.
+  // A read of %gs counts as well: it is the remaining budget of cycles, which changes from tick to tick.
   if (memory.empty())
     return operands.find("%fs:") != std::string_view::npos || operands.find("%gs:") != std::string_view::npos;
   if (memory.find("(%rsp") != std::string_view::npos || memory.find("(%rbp") != std::string_view::npos ||
@@ -188,7 +188,7 @@ bool reads_memory(const Statement& instruction) {
 
 namespace {
 
-/// Symbols that some instruction or datum mentions: as the target of a jump, or as an address.
+/// Symbols that instructions or data refer to: functions, jump targets, and labels whose address is taken.
 struct Mentioned {
   std::set<std::string_view> functions, jumped_to, taken;
   [[nodiscard]] bool contains(std::string_view label) const {
@@ -227,7 +227,7 @@ FlowGraph flow_graph(const std::vector<Statement>& statements) {
   using Kind = Statement::Kind;
   FlowGraph graph;
   const Mentioned mentioned = mentioned_in(statements);
-  // Blocks end before a label that something mentions, and after whatever does not simply go on.
+  // A block ends before a label that something refers to, and after an instruction with another flow than kNext.
   std::map<std::string_view, std::uint32_t> block_of;
   std::map<std::string_view, std::vector<std::uint32_t>> blocks_of_number;
   bool open = false, has_code = false;

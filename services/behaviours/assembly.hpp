@@ -1,4 +1,4 @@
-/// Assembly text of a compiler (x86-64, AT&T syntax, GNU directives), read as far as a control-flow graph needs.
+/// Parser of a compiler's assembly output (x86-64, AT&T syntax, GNU directives). It reads what a control-flow graph needs.
 #pragma once
 
 #include <cstdint>
@@ -8,40 +8,42 @@
 
 namespace kilotwin::behaviours {
 
-/// One line or, in inline assembly, one statement of a line.
+/// A line, or one of several statements on a line of inline assembly.
 struct Statement {
   enum class Kind : std::uint8_t { kNothing, kLabel, kDirective, kInstruction };
   Kind kind = Kind::kNothing;
   enum class Section : std::uint8_t { kCode, kData, kDebug };
   Section section = Section::kCode;
-  std::string_view text;  ///< all of it
-  std::string_view name;  ///< of the label, directive or instruction; prefixes of instructions left out
+  std::string_view text;  ///< the whole statement
+  std::string_view name;  ///< label, directive or mnemonic; without prefixes of the instruction
   std::string_view operands;
   [[nodiscard]] bool is_code(Kind which) const { return section == Section::kCode && kind == which; }
 };
 
-/// The statements of a text, which must outlive them.
+/// Splits `text` into statements, which point into it: it must outlive them.
 [[nodiscard]] std::vector<Statement> read_assembly(std::string_view text);
 
-/// What an instruction does to the order of execution.
+/// How an instruction continues: with the next one, at a branch target, not at all, etc.
 enum class Flow : std::uint8_t { kNext, kBranch, kJump, kIndirect, kCall, kReturn, kStop };
 [[nodiscard]] Flow flow_of(const Statement& instruction);
 
-/// Whether an instruction reads the arithmetic flags, or leaves no flag as it was.
+/// Whether an instruction reads any arithmetic flag.
 [[nodiscard]] bool reads_flags(std::string_view instruction);
+/// Whether an instruction overwrites all arithmetic flags.
 [[nodiscard]] bool overwrites_flags(std::string_view instruction);
-/// Whether it uses registers other than the sixteen general ones.
+/// Whether an instruction uses registers other than the sixteen general-purpose ones.
 [[nodiscard]] bool uses_vectors(const Statement& instruction);
-/// Whether it reads memory that others may write: neither the stack below %rsp or %rbp nor the table of global addresses.
+/// Whether an instruction reads memory that an interrupt may write. Operands relative to %rsp or %rbp, the function's own
+/// stack frame, and the global offset table do not count.
 [[nodiscard]] bool reads_memory(const Statement& instruction);
 
-/// Basic blocks of all code of a text. Blocks are numbered in the order of the text.
+/// Control-flow graph: the basic blocks of all code, in the order of the text.
 struct FlowGraph {
   struct Block {
     std::uint32_t first = 0, last = 0;  ///< statements [first, last)
-    std::vector<std::uint32_t> next;    ///< blocks that may follow
-    bool leaves = false;                ///< may return, or go where nobody knows
-    bool is_function = false;           ///< its first label is a function
+    std::vector<std::uint32_t> next;    ///< successors
+    bool leaves = false;                ///< the block may return or jump to an unknown target
+    bool is_function = false;           ///< the block's first label is a function
   };
   std::vector<Block> blocks;
 };

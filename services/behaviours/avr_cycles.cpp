@@ -7,14 +7,14 @@ namespace kilotwin::behaviours {
 namespace {
 
 struct Cost {
-  std::string_view start;  ///< of the instruction's name
+  std::string_view start;  ///< beginning of the mnemonic
   unsigned cycles;
 };
 
 }  // namespace
 
 unsigned avr_cycles(std::string_view name, std::string_view operands) {
-  // Mnemonics by their beginning, the first that fits.
+  // The first entry whose beginning matches applies.
   static constexpr std::array kCosts{
       Cost{"call", 8},    Cost{"ret", 4},     Cost{"push", 2},   Cost{"pop", 2},    Cost{"lea", 2},
       Cost{"nop", 0},     Cost{"cltq", 0},    Cost{"cltd", 0},   Cost{"cqto", 0},   Cost{"movs", 1},

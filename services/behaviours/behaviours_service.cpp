@@ -24,7 +24,7 @@ class BehavioursFederate : public Federate {
         engine_(engine),
         radio_(session, topics::radio(host.value()), {session.plan().radio()}),
         actuation_(session, topics::actuation()),
-        told_(engine.failures().size()),
+        printed_failures_(engine.failures().size()),
         logs_(context.run_directory, session.plan().tick_length, context.first(),
               [&plan = session.plan(), host](std::uint32_t robot) {
                 return plan.share(host).contains(robot) && !plan.firmware(robot);
@@ -44,13 +44,13 @@ class BehavioursFederate : public Federate {
     if (swarm_) swarm_->gather(from, bodies_->at(from));
     engine_.step(from, *radio_.at(from)[0], swarm_ ? &*swarm_ : nullptr);
     for (const auto& printed : engine_.printed()) logs_.write(from, printed.robot, printed.text);
-    for (; told_ < engine_.failures().size(); ++told_) {
-      const auto& failure = engine_.failures()[told_];
+    for (; printed_failures_ < engine_.failures().size(); ++printed_failures_) {
+      const auto& failure = engine_.failures()[printed_failures_];
       say(fmt::format("robot {} failed at {:.3f} s: {}", failure.robot,
                       session_.plan().tick_length.seconds_at(from), failure.text));
     }
-    for (; warned_ < engine_.warnings().size(); ++warned_) {
-      const auto& warning = engine_.warnings()[warned_];
+    for (; printed_warnings_ < engine_.warnings().size(); ++printed_warnings_) {
+      const auto& warning = engine_.warnings()[printed_warnings_];
       say(fmt::format("robot {} at {:.3f} s: {}", warning.robot, session_.plan().tick_length.seconds_at(from),
                       warning.text));
     }
@@ -59,7 +59,7 @@ class BehavioursFederate : public Federate {
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 
   void save(Tick now) override {
-    logs_.flush();  // who goes on from this checkpoint finds what was printed before it
+    logs_.flush();  // a run that resumes from this checkpoint keeps the lines printed before it
     proto::CheckpointPart part;
     engine_.save(*part.mutable_behaviours());
     write_checkpoint_part(context_.run_directory, session_.plan(), now, session_.plan().behaviours(host_), part);
@@ -76,13 +76,14 @@ class BehavioursFederate : public Federate {
   const HostId host_;
   BehavioursEngine& engine_;
   Input<RadioFrame> radio_;
-  // Only where the experiment has something to sense by place.
+  // Only if RunPlan::hosts_see_bodies().
   std::optional<Input<BodyFrame>> bodies_;
   std::optional<SwarmView> swarm_;
   Output<ActuationFrame> actuation_;
-  std::size_t told_;  // of the engine's failures; those of a checkpoint were told when they happened
+  std::size_t
+      printed_failures_;  // a resumed engine starts with the failures of its checkpoint, printed by the earlier run
   RobotLogs logs_;
-  std::size_t warned_ = 0;
+  std::size_t printed_warnings_ = 0;
 };
 
 }  // namespace

@@ -27,7 +27,7 @@ using Arguments = std::vector<std::string>;
 
 void append(Arguments& to, const Arguments& more) { to.insert(to.end(), more.begin(), more.end()); }
 
-/// A C compiler and what it says of itself.
+/// A C compiler and its version text.
 struct Compiler {
   std::string path, version;
   [[nodiscard]] bool is_clang() const { return version.find("clang") != std::string::npos; }
@@ -51,20 +51,21 @@ Compiler find_compiler(const fs::path& wanted) {
                   "; robots' programs are compiled when a run starts: apt-get install gcc");
 }
 
-/// As kilolib is built for the robot (unsigned char, packed structs, short enums, common globals of avr-gcc's age), with
-/// what makes results equal everywhere: no contraction, no libm, wrapping integers, locals that start as zero, one CPU.
+/// Flags for all code. One part follows kilolib's build for the robot: unsigned char, packed structs, short enums, common globals.
+/// The other part makes results alike on all machines: no contraction of floating-point operations, no libm, wrapping integers,
+/// zero-initialised locals, one CPU type.
 Arguments code_flags(const Compiler& compiler) {
   Arguments flags{
       "-O2", "-g1", "-w", "-fdiagnostics-color=never", "-nostdinc", "-DF_CPU=8000000", "-funsigned-char",
       "-fpack-struct", "-fshort-enums", "-fcommon", "-march=x86-64", "-fPIC", "-fvisibility=hidden",
       "-ffp-contract=off", "-fno-math-errno", "-fno-strict-aliasing", "-fwrapv", "-fno-delete-null-pointer-checks",
       "-fcf-protection=none", "-fno-stack-protector", "-fstack-clash-protection", "-fno-asynchronous-unwind-tables",
-      // What the counters of cycles rely on: whatever lies below the stack pointer is free, jumps tell where they
-      // go, recursion uses the stack, and loops that do nothing stay.
+      // The cycle counters need: memory below the stack pointer is free, jumps have known targets, recursion uses the
+      // stack, and empty loops stay.
       "-mno-red-zone", "-fno-jump-tables", "-fno-optimize-sibling-calls", "-fno-finite-loops",
       "-ffunction-sections", "-fdata-sections", "-ftrivial-auto-var-init=zero"};
   if (compiler.is_clang()) {
-    // Before 16, clang wants to be told twice.
+    // clang 15 and older refuse -ftrivial-auto-var-init=zero without this second flag.
     if (compiler.major_version() < 16) {
       flags.emplace_back("-enable-trivial-auto-var-init-zero-knowing-it-will-be-removed-from-clang");
     }
@@ -75,10 +76,10 @@ Arguments code_flags(const Compiler& compiler) {
   return flags;
 }
 
-/// The runtime is the C library: no function of it may be made a call of another.
+/// The runtime implements the C library, so the compiler must not replace its loops by calls of memcpy() and the like.
 const Arguments kRuntimeFlags{"-std=gnu11", "-ffreestanding", "-fno-builtin", "-fno-common"};
 
-/// Robots have neither exceptions nor threads, and avr-gcc no C++ library.
+/// C++ without exceptions, threads and library, as with avr-gcc.
 Arguments language_flags(bool cpp) {
   if (!cpp) return {"-std=gnu11"};
   return {"-std=gnu++17", "-fno-exceptions",     "-fno-rtti",  "-fno-threadsafe-statics",
@@ -89,7 +90,7 @@ const Arguments kLinkFlags{"-shared",           "-nostdlib",           "-Wl,-Bsy
                            "-Wl,-z,now",        "-Wl,-z,noexecstack",  "-Wl,-z,separate-code", "-Wl,--no-undefined",
                            "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,kilotwin_image"};
 
-/// Headers: ours before the compiler's own, no others.
+/// Header search path: the runtime's headers, then the compiler's own, and no others.
 Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
   std::string own = run_compiler({compiler.path, "-print-file-name=include"}).output;
   while (!own.empty() && own.back() == '\n') own.pop_back();
@@ -104,7 +105,7 @@ Arguments include_flags(const Compiler& compiler, const fs::path& runtime) {
           "-ffile-prefix-map=" + runtime.string() + "=/kilotwin"};
 }
 
-/// Leaves the folders of the sources out of the result, so that the same content gives the same octets wherever it lies.
+/// Removes the sources' folders from debug information, so that equal sources in different folders give equal octets.
 Arguments place_flags(const std::vector<fs::path>& sources) {
   std::error_code error;
   Arguments flags;
@@ -127,7 +128,7 @@ CompiledProgram given(const fs::path& file) {
   return checked(file, *octets);
 }
 
-/// A private name next to `file`, in a directory that is made if need be, that ceases to exist with this object.
+/// A temporary file beside `file`, removed by the destructor. Creates the directory if it does not exist.
 class Temporary {
  public:
   explicit Temporary(const fs::path& file) : path_(file.string() + ".XXXXXX") {
@@ -146,7 +147,7 @@ class Temporary {
   std::string path_;
 };
 
-/// Runs a compilation that ends in `-o FILE`, and keeps the file as `kept`. Throws UserError with the compiler's words.
+/// Runs a compilation with `-o` and stores its output as `kept`. Throws UserError with the compiler's first error.
 std::string build(Arguments arguments, const fs::path& kept, const std::vector<fs::path>& sources) {
   const Temporary result(kept);
   append(arguments, {"-o", result.path()});
@@ -157,7 +158,7 @@ std::string build(Arguments arguments, const fs::path& kept, const std::vector<f
   return octets;
 }
 
-/// Runs a compilation to assembly. Nothing where it fails; `errors` is then what the compiler said.
+/// Compiles to assembly. On failure returns nothing and puts the compiler's messages into `errors`.
 std::optional<std::string> assembly_of(Arguments arguments, const fs::path& place, std::string& errors) {
   const Temporary result(place);
   append(arguments, {"-S", "-o", result.path()});
@@ -167,8 +168,8 @@ std::optional<std::string> assembly_of(Arguments arguments, const fs::path& plac
   return os::read_if_there(result.path());
 }
 
-/// Nested functions that use variables of the one around them, and whose address is taken, are called by way of code on the
-/// stack. avr-gcc has none of that either, as a robot cannot execute its RAM.
+/// Refuses trampolines: gcc calls a nested function through code on the stack if its address is taken and it uses variables of the
+/// enclosing function. The AVR cannot execute its RAM, and here stacks are not executable.
 void refuse_code_on_stack(const std::string& assembly, Arguments compile, const std::vector<fs::path>& sources,
                           const fs::path& place) {
   if (assembly.find(".note.GNU-stack,\"x\"") == std::string::npos) return;
@@ -183,8 +184,8 @@ void refuse_code_on_stack(const std::string& assembly, Arguments compile, const 
       "call it there by its name alone");
 }
 
-/// One source to assembly that counts cycles, with loops that see what interrupts change. The text that is compiled for that
-/// differs from the source; what the compiler says of it is said of the source.
+/// Compiles one source to assembly with cycle counters and loop barriers. The barriers change the text that is compiled, so error
+/// messages come from a compilation of the unchanged source.
 std::string counted_assembly(const Arguments& compiler, const fs::path& source, const std::string& preprocessed,
                              const std::vector<fs::path>& sources, const fs::path& place) {
   const Temporary marked(place);
@@ -193,7 +194,7 @@ std::string counted_assembly(const Arguments& compiler, const fs::path& source, 
   Arguments arguments;
   for (std::size_t i = 0; i < compiler.size(); ++i) {
     if (compiler[i] == "-include")
-      ++i;  // is in the text already
+      ++i;  // skip "-include FILE": the preprocessed text contains it
     else
       arguments.push_back(compiler[i]);
   }
@@ -209,7 +210,7 @@ std::string counted_assembly(const Arguments& compiler, const fs::path& source, 
   return with_cycle_counters(*assembly);
 }
 
-/// The runtime as one object, made once per compiler.
+/// The runtime as one object file, cached per compiler.
 fs::path runtime_object(const Compiler& compiler, const Arguments& includes, const fs::path& runtime,
                         const std::string& content) {
   const fs::path kept = runtime / (sha256_hex(content) + ".o");
@@ -240,7 +241,7 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& includes, con
   return kept;
 }
 
-/// Functions and variables that a linker did not find.
+/// Functions and variables that a linker reports as undefined.
 std::set<std::string> undefined_names(const std::string& errors) {
   constexpr std::string_view kMark = "undefined reference to `";
   std::set<std::string> names;
@@ -252,15 +253,16 @@ std::set<std::string> undefined_names(const std::string& errors) {
   return names;
 }
 
-/// What the linker said of a program whose sources are not all there.
+/// The linker's messages about a program with undefined functions or variables.
 struct Incomplete {
   std::string errors;
 };
 
-/// Links twice: where variables end is known only then, and they shall end where a page does, so that an access beyond them faults.
+/// Links twice. The first link gives the size of the variables. The second aligns their end with the end of a page, so that an
+/// access beyond them faults.
 std::string linked(const Arguments& first, const Arguments& rest, const fs::path& place,
                    const std::vector<fs::path>& sources) {
-  constexpr std::uint64_t kAlignment = 64;  // no variable asks for more
+  constexpr std::uint64_t kAlignment = 64;  // the largest alignment of any variable
   const Temporary result(place), front(place);
   for (std::uint64_t pad = 0;;) {
     os::write_file(front.path(),
@@ -284,17 +286,16 @@ std::string linked(const Arguments& first, const Arguments& rest, const fs::path
   }
 }
 
-/// One compiler with everything that does not depend on the program.
+/// A compiler with the flags and the runtime, which do not depend on the program.
 struct Toolchain {
   Compiler compiler;
   fs::path cache, runtime;
   Arguments code, includes, defines;
 
-  /// Compiles and links, or takes the result of an earlier time. Throws Incomplete where functions are missing, UserError for
-  /// all other errors.
+  /// Compiles and links, or returns the cached result. Throws Incomplete if functions are missing, UserError for other errors.
   [[nodiscard]] CompiledProgram make(const ProgramText& text, const Arguments& dialect) const;
 
-  /// A source alone after the preprocessor, or nothing where that fails.
+  /// The preprocessed text of one source, or "" on failure.
   [[nodiscard]] std::string preprocessed(const fs::path& source, const Arguments& dialect) const;
 
  private:
@@ -344,12 +345,12 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
     try {
       return checked(kept, *octets);
     } catch (const UserError&) {
-      // Damaged on disk: made again below.
+      // The cached file is damaged, so compile again below.
     }
   }
   Arguments first{compiler.path}, link;
   append(first, kLinkFlags);
-  // The runtime's variables come first: what is written past the end of an array meets the program's own, as on the robot.
+  // The runtime's variables come first. A write past the end of a program's array then hits the program's variables, as on the robot.
   link.push_back(runtime_object(compiler, includes, runtime, runtime_content).string());
   append(link, {"-x", "assembler"});
   std::vector<std::unique_ptr<Temporary>> parts;
@@ -374,7 +375,7 @@ bool mentions(const std::vector<fs::path>& sources, std::string_view word) {
   return false;
 }
 
-/// Makes the program; adds sources that are missing as long as some are found.
+/// Makes the program, and adds missing sources until it links or no further source is found.
 CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sources, const Arguments& dialect) {
   std::vector<std::string> notes;
   for (;;) {
@@ -396,13 +397,13 @@ CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sourc
   }
 }
 
-/// A way to understand a program that is none in the robot's own compiler's eyes.
+/// Compiler options under which a program may compile that is invalid without them, and the note for the user.
 struct Dialect {
   Arguments flags;
   std::string note;
 };
 
-/// What could help after this error, likeliest first.
+/// Dialects that may cure this error, the likeliest first.
 std::vector<Dialect> dialects_for(const std::string& error, const std::vector<fs::path>& sources,
                                   const fs::path& runtime) {
   auto says = [&](std::string_view word) { return error.find(word) != std::string::npos; };
@@ -456,7 +457,7 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
         program.notes.push_back(sources.front().string() + ": " + dialect.note);
         return program;
       } catch (const UserError&) {
-        // The first error is the one that tells.
+        // Keep the error of the first attempt, because it is about the program as written.
       }
     }
     throw;

@@ -1,4 +1,4 @@
-/// Turns robots' programs, C or C++ written for kilolib, into what this simulation runs, and checks them for the real robot.
+/// Compiles robots' programs, C or C++ written for kilolib, for the simulation and for the robot's processor.
 #pragma once
 
 #include <cstdint>
@@ -11,37 +11,36 @@ namespace kilotwin::behaviours {
 struct CompileOptions {
   std::vector<std::string> defines;       ///< macros, NAME or NAME=VALUE
   std::filesystem::path compiler;         ///< empty: the first of cc, gcc, clang on the PATH
-  std::filesystem::path cache_directory;  ///< empty: as files.hpp says
+  std::filesystem::path cache_directory;  ///< empty: os::cache_directory()
 };
 
 struct CompiledProgram {
   std::filesystem::path file;      ///< a self-contained shared object
-  std::string sha256;              ///< of its octets
-  std::vector<std::string> notes;  ///< what a user should know of how it was compiled, one line each
+  std::string sha256;              ///< SHA-256 of the file, hexadecimal
+  std::vector<std::string> notes;  ///< lines for the user: sources left out or added, options that had to be added
 };
 
-/// Compiles C and C++ sources, together with the embedded runtime, into one shared object with pinned flags. Copies of
-/// kilolib next to them are left aside, and sources that they lack are looked for around them (program_text.hpp). The result is kept in
-/// the cache by the content of everything that goes into it; the same content gives the same octets. A single .so is
-/// checked and returned as it is.
-/// Throws UserError: "FILE:LINE:COLUMN: error: ..." of the first error, and how many more there are; or, where the machine
-/// has no compiler, the package to install.
+/// Compiles C and C++ sources, together with the embedded runtime, into one shared object with fixed compiler flags. Ignores
+/// copies of kilolib beside the sources, and searches the neighbourhood for missing sources (program_text.hpp). The cache key is
+/// the content of all inputs; equal inputs give equal octets. A single .so is checked and returned unchanged.
+/// Throws UserError "FILE:LINE:COLUMN: error: ..." with the first error and the number of further errors. If the machine has no
+/// compiler, the error names the package to install.
 [[nodiscard]] CompiledProgram compile(const std::vector<std::filesystem::path>& sources,
                                       const CompileOptions& options = {});
 
-/// Compiles and links C sources with avr-gcc and this project's own kilolib for the robot's processor: an .elf file, kept in
-/// the cache, for a robot or its simulated processor. Throws UserError as compile() does.
+/// Compiles and links C sources with avr-gcc and this project's kilolib for the robot's processor. The result is an .elf file in
+/// the cache that runs on a robot and on its simulated processor. Throws UserError like compile().
 [[nodiscard]] CompiledProgram compile_firmware(const std::vector<std::filesystem::path>& sources,
                                                const CompileOptions& options = {});
 
-/// What a program needs of an ATmega328P (32 KiB of flash, 2 KiB of RAM), with what it uses of the C library and without
-/// kilolib.
+/// Memory that a program occupies in an ATmega328P (32 KiB of flash, 2 KiB of RAM), including the functions of the C library that
+/// it uses, excluding kilolib.
 struct AvrSize {
   std::uint32_t flash_octets = 0;  ///< code, constants, initial values
   std::uint32_t ram_octets = 0;    ///< globals and statics
 };
 
-/// Compiles the sources with avr-gcc for the real robot. Throws UserError as compile() does.
+/// Compiles the sources with avr-gcc for the robot's processor and measures their size. Throws UserError like compile().
 [[nodiscard]] AvrSize compile_for_avr(const std::vector<std::filesystem::path>& sources,
                                       const CompileOptions& options = {});
 

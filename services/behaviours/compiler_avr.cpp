@@ -36,13 +36,13 @@ std::string required_tool(const char* name, const char* package) {
   return path.string();
 }
 
-/// What avr-size says of an object: text, data and bss in the second line.
+/// Parses the output of avr-size: text, data and bss in the second line.
 AvrSize parsed_size(const std::string& table) {
   std::istringstream stream(table);
   std::string header;
   std::getline(stream, header);
   std::uint32_t text = 0, data = 0, bss = 0;
-  if (!(stream >> text >> data >> bss)) throw RunError("avr-size said something unexpected: " + table);
+  if (!(stream >> text >> data >> bss)) throw RunError("avr-size printed no sizes: " + table);
   return {text + data, data + bss};
 }
 
@@ -76,7 +76,7 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
     if (!result.end.well()) throw UserError(first_error(result.errors, text.sources));
     link.push_back(object);
   }
-  // One object of all, with the variables that several files share and what is used of the C library; kilolib stays open.
+  // A relocatable link of all objects with the C library. References to kilolib stay undefined.
   const std::string whole = (folder.path() / "program.o").string();
   link.insert(link.end(), {"-Wl,--start-group", "-lm", "-lc", "-lgcc", "-Wl,--end-group", "-o", whole});
   const os::ProcessResult linked = run_compiler(link);

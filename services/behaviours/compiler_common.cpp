@@ -73,7 +73,7 @@ void check_sources(const std::vector<fs::path>& sources) {
 
 namespace {
 
-/// Removes ":NUMBER" from the end; false where there is none.
+/// Removes ":NUMBER" from the end. False if there is none.
 bool drop_number(std::string_view& text) {
   std::size_t end = text.size();
   while (end > 0 && is_digit(text[end - 1])) --end;
@@ -82,7 +82,7 @@ bool drop_number(std::string_view& text) {
   return true;
 }
 
-/// "FILE:LINE:COLUMN: error: WHAT" of a compiler, whose fatal errors are errors here.
+/// A compiler's line "FILE:LINE:COLUMN: error: WHAT" or "... fatal error: WHAT", the latter rewritten as "error".
 std::optional<std::string> compiler_error(std::string_view line) {
   for (const std::string_view mark : {": error: ", ": fatal error: "}) {
     const std::size_t at = line.find(mark);
@@ -96,7 +96,7 @@ std::optional<std::string> compiler_error(std::string_view line) {
   return std::nullopt;
 }
 
-/// "FILE:LINE: Error: WHAT" of an assembler, at an asm statement.
+/// An assembler's line "FILE:LINE: Error: WHAT", about an asm statement.
 std::optional<std::string> assembler_error(std::string_view line) {
   constexpr std::string_view kMark = ": Error: ";
   const std::size_t at = line.find(kMark);
@@ -107,9 +107,9 @@ std::optional<std::string> assembler_error(std::string_view line) {
   return std::string(place) + ":1: error: " + std::string(line.substr(at + kMark.size()));
 }
 
-/// Whether a line of a compiler says that one of its own programs has been killed, has run out of room or has failed within
-/// itself: gcc, collect2, clang, in the C locale.
-bool is_trouble_of_the_machine(std::string_view line) {
+/// Whether a line of gcc, collect2 or clang (C locale) reports that one of its own processes was killed, ran out of memory or disk
+/// space, or had an internal error.
+bool is_machine_failure(std::string_view line) {
   for (const std::string_view mark :
        {"signal terminated program", "terminated with signal", "internal compiler error",
         "unable to execute command", "command failed due to signal", "out of memory", "virtual memory exhausted",
@@ -123,7 +123,7 @@ std::size_t linker_complaint(std::string_view line) {
   return std::min(line.find("undefined reference"), line.find("multiple definition"));
 }
 
-/// "... FILE:LINE: WHAT" of a linker, which knows sources by their names alone and no columns.
+/// A linker's line "... FILE:LINE: WHAT". The linker gives file names without directories, and no columns.
 std::optional<std::string> linker_error(std::string_view line, const std::vector<fs::path>& sources) {
   const std::size_t at = linker_complaint(line);
   if (at == std::string_view::npos || at < 2 || line.substr(at - 2, 2) != ": ") return std::nullopt;
@@ -137,18 +137,18 @@ std::optional<std::string> linker_error(std::string_view line, const std::vector
   for (const fs::path& source : sources) {
     if (source.filename() == fs::path(named).filename()) named = source.string();
   }
-  // Where the first of several definitions is, the linker tells by the name of a temporary file.
+  // Cut off the place of the other definition: it names a temporary file.
   return named + number + ":1: error: " + std::string(line.substr(at, line.find("; ", at) - at));
 }
 
-/// Only the runtime calls main(), so its place would tell a user nothing.
+/// Error for a program without main(). The linker's place is the call in the runtime, which would mislead the user.
 std::optional<std::string> missing_main(std::string_view line, const fs::path& source) {
   if (line.find("undefined reference to `main'") == std::string_view::npos) return std::nullopt;
   return source.string() +
          ":1:1: error: there is no main(); a program has one that calls kilo_init() and kilo_start(setup, loop)";
 }
 
-/// What says nothing of a place.
+/// An error line without a place, e.g. of the compiler driver. It is attributed to `source`.
 std::optional<std::string> placeless_error(std::string_view line, const fs::path& source) {
   const std::size_t at = std::min(linker_complaint(line), line.find("error"));
   if (at == std::string_view::npos) return std::nullopt;
@@ -166,8 +166,8 @@ os::ProcessResult run_compiler(const std::vector<std::string>& arguments) {
   if (result.end.well()) return result;
   std::istringstream stream(result.errors);
   for (std::string line; std::getline(stream, line);) {
-    // Lines of the source, which compilers repeat, are indented.
-    if (!line.empty() && line[0] != ' ' && is_trouble_of_the_machine(line))
+    // Compilers indent the source lines that they quote; those are skipped.
+    if (!line.empty() && line[0] != ' ' && is_machine_failure(line))
       throw RunError(arguments[0] + " failed: " + line +
                      "; this is no error of the program: run this command again");
   }

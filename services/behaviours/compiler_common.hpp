@@ -1,4 +1,4 @@
-/// What compiling for the simulation and for the real robot share.
+/// Functions that compiling for the simulation and compiling for the robot share.
 #pragma once
 
 #include <filesystem>
@@ -10,21 +10,21 @@
 
 namespace kilotwin::behaviours {
 
-/// Writes the embedded runtime below the cache, once per content, and returns its folder.
+/// Writes the embedded runtime to a folder of the cache that its content names, unless it exists, and returns the folder.
 [[nodiscard]] std::filesystem::path unpacked_runtime(const std::filesystem::path& cache);
 
-/// -D options; throws UserError where a macro's name is none.
+/// The -D options. Throws UserError if a definition is not NAME or NAME=VALUE.
 [[nodiscard]] std::vector<std::string> define_flags(const std::vector<std::string>& defines);
 
-/// Throws UserError where there is no source, or one that is not a readable file named *.c.
+/// Throws UserError if there is no source, or one is not a readable C or C++ file.
 void check_sources(const std::vector<std::filesystem::path>& sources);
 
-/// Runs a compiler or a linker. A signal that ends it or a program that it has started, memory that runs out, a full disk and an
-/// internal error say nothing about the sources: throws RunError.
+/// Runs a compiler or a linker. Throws RunError for failures that are no error of the sources: a signal that ends the compiler
+/// or a program that it started, lack of memory, a full disk, an internal compiler error.
 [[nodiscard]] os::ProcessResult run_compiler(const std::vector<std::string>& arguments);
 
-/// The first error of a compiler's or linker's output as one line, "FILE:LINE:COLUMN: error: ...", and how many more there
-/// are. FILE is one of the sources as they were named, or a header.
+/// The first error in a compiler's or linker's output as one line, "FILE:LINE:COLUMN: error: ... (N more errors)". FILE is a
+/// source, spelled as in `sources`, or a header.
 [[nodiscard]] std::string first_error(const std::string& output, const std::vector<std::filesystem::path>& sources);
 
 }  // namespace kilotwin::behaviours

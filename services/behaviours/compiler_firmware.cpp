@@ -1,4 +1,4 @@
-// Programs for the robot's own processor: compiled by avr-gcc and linked with this project's kilolib for it.
+// Compiles programs for the robot's processor: avr-gcc, linked with this project's kilolib for the AVR.
 #include <cstdlib>
 #include <system_error>
 

@@ -14,15 +14,15 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
 
-/// What is known of the strongly connected component of a block.
+/// Properties of a strongly connected component of the control-flow graph.
 struct Component {
   bool is_cycle = false;
-  bool reads = false;      ///< memory that an interrupt may change, or it calls something
-  bool can_leave = false;  ///< from here some return can be reached
-  bool calls = false;      ///< from here some call can be reached
+  bool reads = false;      ///< it reads memory that an interrupt may change, or calls a function
+  bool can_leave = false;  ///< a return is reachable from it
+  bool calls = false;      ///< a call is reachable from it
 };
 
-/// Depth first over all blocks: the targets of edges that close a cycle, and strongly connected components.
+/// Depth-first search over all blocks: the targets of back edges, and the strongly connected components (Tarjan 1972).
 class Cycles {
  public:
   Cycles(const FlowGraph& graph, const std::vector<Statement>& statements)
@@ -42,7 +42,7 @@ class Cycles {
 
  public:
   std::vector<std::uint32_t> component_of;
-  std::vector<bool> closes;  ///< per block: some cycle ends with a jump to it
+  std::vector<bool> closes;  ///< per block: it is the target of a back edge
   std::vector<Component> components;
 
  private:
@@ -79,7 +79,7 @@ class Cycles {
     }
   }
 
-  /// Components are found after all that they lead to.
+  /// The search completes a component after all components that are reachable from it, so their properties are known.
   void close_component(std::uint32_t root, const std::vector<Statement>& statements) {
     std::vector<std::uint32_t> members;
     do {
@@ -115,7 +115,7 @@ class Cycles {
   std::uint32_t counter_ = 0;
 };
 
-/// Which blocks need the flags as they find them.
+/// Blocks at whose entry the flags are live.
 std::vector<bool> blocks_that_need_flags(const FlowGraph& graph, const std::vector<Statement>& statements) {
   std::vector<bool> needs(graph.blocks.size(), false), passes(graph.blocks.size(), true);
   for (std::uint32_t b = 0; b < graph.blocks.size(); ++b) {
@@ -159,7 +159,7 @@ class Instrumenter {
       const Statement& s = statements_[i];
       if (s.kind == Statement::Kind::kDirective && s.section == Statement::Section::kCode) {
         if (s.name == ".loc") place = s.text.substr(0, s.text.find(" view "));
-        // The end of a function: what its counters call when they have run out.
+        // At the end of a function, place the stubs that its tests jump to when the budget is used up.
         if (s.name == ".size" && !stubs.empty()) {
           result += stubs;
           stubs.clear();
@@ -176,7 +176,7 @@ class Instrumenter {
 
  private:
   struct Counter {
-    std::uint32_t before = 0;  ///< which statement
+    std::uint32_t before = 0;  ///< index of the statement before which the counter stands
     std::uint32_t cycles = 0;
     bool tests = false, keeps_flags = false;
     unsigned kind = 0;  ///< KT_CHECK_*
@@ -199,7 +199,7 @@ class Instrumenter {
       if (!place && !counter.tests) continue;
       counter.before = place ? *place : first_instruction(block);
       counter.keeps_flags = !place;
-      if (counter.before == block.last) continue;  // no instruction at all: nothing is executed
+      if (counter.before == block.last) continue;  // the block has no instruction
       const Component& component = cycles_.components[cycles_.component_of[b]];
       if (!component.is_cycle || component.reads) counter.kind |= KT_CHECK_WAITS;
       if (component.is_cycle && !component.can_leave && !component.calls) counter.kind |= KT_CHECK_ENDLESS;
@@ -209,7 +209,7 @@ class Instrumenter {
     verify();
   }
 
-  /// Without the blocks that test, no cycle may be left.
+  /// Checks that the graph without the testing blocks is acyclic.
   void verify() const {
     FlowGraph rest = graph_;
     for (std::uint32_t b = 0; b < rest.blocks.size(); ++b) {
@@ -230,7 +230,7 @@ class Instrumenter {
     return i;
   }
 
-  /// The first instruction before which nobody needs the flags.
+  /// The first instruction of a block before which the flags are dead.
   [[nodiscard]] std::optional<std::uint32_t> place_in(std::uint32_t b) const {
     const FlowGraph::Block& block = graph_.blocks[b];
     bool needed =
@@ -245,7 +245,7 @@ class Instrumenter {
     return first;
   }
 
-  /// Properties of the function that begins at or before a block; the code of a file counts as functions in a row.
+  /// Properties of the function that contains a block. A function extends to the start of the next one.
   [[nodiscard]] bool function_calls(std::uint32_t b) const {
     return any_in_function(
         b, [](const Statement& s) { return flow_of(s) == Flow::kCall || flow_of(s) == Flow::kIndirect; });
@@ -274,7 +274,7 @@ class Instrumenter {
     } else {
       code += count + "\tjs\t.Lkt_out" + id + "\n.Lkt_back" + id + ":\n";
       stubs.append(".Lkt_out" + id + ":\n").append(place).append(place.empty() ? "" : "\n");
-      // A call, but for the processor's prediction of returns: see switch.c.
+      // A call written as push and jump, because it is not matched by a return: see switch.c.
       stubs.append("\tleaq\t-8(%rsp), %rsp\n\tpushq\t%rax\n\tleaq\t.Lkt_back" + id +
                    "(%rip), %rax\n\tmovq\t%rax, 8(%rsp)\n\tpopq\t%rax\n\tjmp\t" + preempt);
     }

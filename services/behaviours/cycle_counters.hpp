@@ -1,5 +1,6 @@
-/// Makes programs interruptible at places that depend on what they execute and on nothing else: their machine code counts
-/// the cycles that a Kilobot's processor would have needed, about, and hands over to the host when it has used up its share.
+/// Deterministic preemption: a pass over a program's assembly inserts counters of the cycles that a Kilobot's processor would need,
+/// approximately. When the tick's budget is used up, the program returns to the host. The place of preemption therefore depends
+/// on the executed instructions alone.
 #pragma once
 
 #include <string>
@@ -7,18 +8,18 @@
 
 namespace kilotwin::behaviours {
 
-/// The text of a compiler's assembly with counters: one in each basic block, and in at least one block of every cycle, as
-/// well as at the entry of every function that calls another, a test of what is left. The code must be compiled with
-/// -mno-red-zone. Throws RunError if a cycle was left without a test, which would be an error of this function.
-/// To be raised whenever this pass, or that of the loops, comes to give other code: compiled programs are kept by it.
+/// Part of the cache key of compiled programs. Raise it when this pass or with_loop_barriers() changes its output.
 inline constexpr int kCountersVersion = 4;
 
+/// kTestsOnly counts one cycle per test and nothing else. It is for kilolib, which a robot runs in another form.
 enum class Counted : bool { kAll, kTestsOnly };
-/// Of code that a robot has in another form, as kilolib, only the tests count, one cycle each.
+/// Adds counters to a compiler's assembly. Each basic block gets a counter. At least one block of every cycle of the control-flow
+/// graph, and the entry of every function that calls another, also tests whether the budget is used up. The code must be compiled
+/// with -mno-red-zone. Throws RunError if a cycle has no test, which would be a defect of this function.
 [[nodiscard]] std::string with_cycle_counters(std::string_view assembly, Counted counted = Counted::kAll);
 
-/// About how many cycles of an ATmega328P an instruction for x86-64 stands for, in code compiled from the same source.
-/// docs/explanation/execution.md tells how good that is.
+/// Estimated cycles of an ATmega328P per x86-64 instruction, for code compiled from the same source. docs/explanation/execution.md
+/// gives the accuracy.
 [[nodiscard]] unsigned avr_cycles(std::string_view instruction, std::string_view operands);
 
 }  // namespace kilotwin::behaviours

@@ -7,7 +7,7 @@
 namespace kilotwin::behaviours {
 namespace {
 
-/// General registers in the order of the processor's encoding.
+/// General-purpose registers in the order of the instruction encoding.
 constexpr std::array<int, 16> kRegisters{REG_RAX, REG_RCX, REG_RDX, REG_RBX, REG_RSP, REG_RBP, REG_RSI, REG_RDI,
                                          REG_R8,  REG_R9,  REG_R10, REG_R11, REG_R12, REG_R13, REG_R14, REG_R15};
 
@@ -63,7 +63,7 @@ class Division {
     const std::size_t low = modrm & 7u, base_bit = (rex_ & 1u) << 3, index_bit = (rex_ & 2u) << 2;
     const unsigned mode = modrm >> 6;
     if (mode == 3) {
-      // Without REX, the upper four of the eight octet registers are the second octets of the first four.
+      // Without a REX prefix, octet registers 4 to 7 are the second octets of registers 0 to 3 (%ah, %ch, %dh, %bh).
       if (width_ == 8 && rex_ == 0 && low >= 4) return value(kRegisters[low - 4]) >> 8;
       return value(kRegisters[low + base_bit]);
     }

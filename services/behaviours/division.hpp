@@ -1,13 +1,13 @@
-/// Division by zero as the robot's processor does it, which has no instruction for division and no trap.
+/// Integer division by zero with the results of the robot's processor, which divides in software and has no trap.
 #pragma once
 
 #include <ucontext.h>
 
 namespace kilotwin::behaviours {
 
-/// If the instruction at which a thread has stopped is an integer division by zero, or the most negative number divided by
-/// -1: gives it the result of avr-libgcc, steps past it, and returns true. By zero, the remainder is the dividend and the
-/// quotient all ones without sign, -1 or, of a negative dividend, 1 with sign; otherwise the quotient is the dividend.
+/// Emulates the division instruction at which a thread has faulted, and steps past it. Returns false if the instruction is neither
+/// a division by zero nor INT_MIN / -1. Results are those of avr-libgcc. For a division by zero the remainder is the dividend; the
+/// unsigned quotient is all ones, the signed one is -1, or 1 if the dividend is negative. INT_MIN / -1 gives INT_MIN.
 [[nodiscard]] bool divide_as_robot(gregset_t& registers);
 
 }  // namespace kilotwin::behaviours

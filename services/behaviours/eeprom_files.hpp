@@ -1,4 +1,4 @@
-/// The EEPROMs of a run's robots as files.
+/// Files with the EEPROM contents of a run's robots.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +7,8 @@
 
 namespace kilotwin::behaviours {
 
-/// Writes eeprom/ID.eeprom, 1024 octets, into the run directory for each robot of the host that has an EEPROM of its own:
-/// brought along, or written to. Throws RunError.
+/// Writes eeprom/ID.eeprom, 1024 octets, into the run directory for each robot of the host whose EEPROM the experiment states or
+/// its program has written to. Throws RunError.
 void write_eeproms(const BehavioursEngine& engine, Share share, const std::filesystem::path& run_directory);
 
 }  // namespace kilotwin::behaviours

@@ -12,7 +12,7 @@
 namespace kilotwin::behaviours {
 namespace {
 
-constexpr std::uint64_t kMostOctets = 16u << 20;  // of a whole image
+constexpr std::uint64_t kMostOctets = 16u << 20;  // upper limit of an image's size
 
 class Parser {
  public:
@@ -39,7 +39,7 @@ class Parser {
     if (!condition) fail(what);
   }
 
-  /// A structure at this place of the file or of the image, if it lies inside.
+  /// Reads a structure at an offset of the file or the image; nothing if it reaches beyond the end.
   template <class T, class Octets> static std::optional<T> at(const Octets& from, std::uint64_t offset) {
     if (offset > from.size() || from.size() - offset < sizeof(T)) return std::nullopt;
     T value;
@@ -206,7 +206,7 @@ class Parser {
                 file_.data.contains(table.tx_period, 2) && file_.relro.contains(table.exchange, 8) &&
                 file_.relro.contains(table.surroundings, 8),
             "its table of functions is damaged");
-    // Each address of the table must be relocated, and with it nothing that is not an address.
+    // Every address of the table must have a relocation, and no other word of it may have one.
     constexpr std::uint64_t kAddresses = (sizeof(KtImage) - offsetof(KtImage, exchange)) / 8;
     const std::uint64_t first = header_.e_entry + offsetof(KtImage, exchange);
     const auto lower = std::lower_bound(file_.relocations.begin(), file_.relocations.end(), first - 23);
@@ -219,7 +219,7 @@ class Parser {
     file_.table = table;
   }
 
-  /// Sections that a reset does not touch, and the heap. A file without names of sections has none.
+  /// Finds the sections that a reset preserves, and the heap. A file without section names has neither.
   void find_sections() {
     const auto section_at = [&](std::uint64_t i) {
       return at<Elf64_Shdr>(octets_, header_.e_shoff + i * sizeof(Elf64_Shdr));
@@ -235,7 +235,7 @@ class Parser {
       const std::string_view whole = name.substr(0, name.find('\0'));
       if (whole.starts_with(".noinit") || whole == "kilotwin_eeprom")
         file_.kept.push_back({section->sh_addr, section->sh_addr + section->sh_size});
-      // Elsewhere it would be data like any other.
+      // A heap section that is not directly behind the data is ordinary data.
       constexpr std::uint64_t kBefore = 64;  // see constructors.ld
       if (whole == KT_HEAP_SECTION && section->sh_size >= kBefore &&
           section->sh_addr + section->sh_size == file_.data.last) {
@@ -245,7 +245,7 @@ class Parser {
     }
   }
 
-  /// Names of functions, for people only: what is damaged here is left out.
+  /// Reads the functions' names, which only messages use. Damaged entries are skipped.
   void read_functions() {
     for (std::uint64_t i = 0; i < header_.e_shnum; ++i) {
       const auto section = at<Elf64_Shdr>(octets_, header_.e_shoff + i * sizeof(Elf64_Shdr));
@@ -266,7 +266,7 @@ class Parser {
                      [](const ElfFile::Function& a, const ElfFile::Function& b) { return a.offset < b.offset; });
   }
 
-  /// The same holds for lines.
+  /// Reads the line tables, which only messages use. Damaged tables are skipped.
   void read_lines() {
     const auto names = at<Elf64_Shdr>(octets_, header_.e_shoff + header_.e_shstrndx * sizeof(Elf64_Shdr));
     if (!names) return;

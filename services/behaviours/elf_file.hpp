@@ -1,4 +1,4 @@
-/// A compiled robot's program as read from disk: an ELF64 shared object for x86-64 that needs nothing else.
+/// Reader of compiled robots' programs: self-contained ELF64 shared objects for x86-64.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 
 namespace kilotwin::behaviours {
 
-/// Everything is checked on construction; offsets are octets from the start of the image and lie inside it.
+/// parse() checks everything. Offsets are octets from the start of the image and lie inside it.
 class ElfFile {
  public:
-  /// `name` is the file as errors name it. Throws UserError where the octets are no program of this runtime's version.
+  /// `name`: the file's name for error lines. Throws UserError if `octets` are not a program of this runtime's version.
   [[nodiscard]] static ElfFile parse(std::string_view octets, const std::string& name);
 
   struct Range {
@@ -32,30 +32,30 @@ class ElfFile {
     std::string name;
   };
 
-  std::vector<std::uint8_t> memory;  ///< the image as if it lay at address 0; whole pages
+  std::vector<std::uint8_t> memory;  ///< the image as loaded at address 0; whole pages
   std::vector<std::uint32_t>
       relocations;                  ///< ascending offsets of 64-bit words to which the image's address is added
   std::vector<Segment> segments;    ///< ascending, no page shared
   Range relro;                      ///< whole pages: read-only once relocated
-  Range data;                       ///< what stays writable: a robot's globals and statics
-  Range pad;                        ///< directly before them, as writable but of no use
-  Range heap;                       ///< behind them; empty where a program uses none
-  std::vector<Range> kept;          ///< parts of data that outlive a reset: .noinit and EEMEM variables
-  KtImage table{};                  ///< with offsets for addresses
-  std::vector<Function> functions;  ///< for the text of faults; ascending
+  Range data;                       ///< a robot's globals and statics, which stay writable
+  Range pad;                        ///< writable, unused octets directly before `data`
+  Range heap;                       ///< directly behind `data`; empty if the program uses no heap
+  std::vector<Range> kept;          ///< parts of `data` that survive a reset: .noinit and EEMEM variables
+  KtImage table{};                  ///< its addresses are offsets
+  std::vector<Function> functions;  ///< for messages about faults; ascending offsets
 
   LineTables lines;
 
-  /// Octets from the end of all that is writable, slack included, to the end of its page.
+  /// Octets from the end of the writable memory, slack included, to the end of its page.
   [[nodiscard]] std::uint64_t unused_octets() const;
-  /// The function that holds this offset, or "".
+  /// The name of the function that contains this offset, or "".
   [[nodiscard]] std::string function_at(std::uint64_t offset) const;
 };
 
-/// Memory beyond a robot's variables and heap, for programs that write past the end of an array, as many do unnoticed on the
-/// robot. It is zero whenever a robot begins to run. The compiler places variables such that a page ends with it.
+/// Slack: writable octets behind a robot's variables and heap. It tolerates short writes past the end of an array, which go
+/// unnoticed on the robot too. The host clears it before a robot runs. The compiler aligns its end with the end of a page.
 inline constexpr std::uint64_t kSlackOctets = 256;
-/// Of the pad before the variables, the octets nearest to them are looked at whenever a robot has run.
+/// The last octets of the pad before the variables. The host checks after each run of a robot that they are still zero.
 inline constexpr std::uint64_t kWatchedOctets = 64;
 inline constexpr std::uint64_t kPage = 4096;
 [[nodiscard]] constexpr std::uint64_t page_down(std::uint64_t at) { return at & ~(kPage - 1); }

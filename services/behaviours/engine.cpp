@@ -10,12 +10,12 @@
 namespace kilotwin::behaviours {
 namespace {
 
-/// How long a message is on the air, 13 octets of 10 bits of 269 cycles (kilolib): it keeps its receivers' converters busy, and
-/// its sender's processor with interrupts off.
+/// Duration of a packet, cycles: 13 octets of 10 bits of 269 cycles (kilolib). Meanwhile the receivers' ADCs are busy and the
+/// sender's processor has interrupts disabled.
 constexpr std::uint64_t kPacketCycles = 13 * 10 * 269;
-/// For how long a program may go round in a loop that has no way out and calls nothing: one second.
+/// A program fails after one second in a loop without exit and without calls.
 constexpr std::int64_t kPatienceCycles = 8'000'000;
-/// So many robots before its turn, a robot's memory is asked for.
+/// Prefetch distance: a robot's memory is prefetched while the robot this many places before it runs.
 constexpr std::size_t kAhead = 2;
 
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
@@ -43,10 +43,10 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       holds_(share_.size()),
       offers_(share_.size()),
       message_(share_.size()),
-      asked_(share_.size()),
+      requested_(share_.size()),
       sent_(share_.size()),
       first_reception_(share_.size() + 1),
-      spins_(share_.size()),
+      wait_period_(share_.size()),
       divided_(programs_->size()) {
   KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.programs().size()));
   for (const RobotEeprom& brought : plan.eeproms()) {
@@ -55,7 +55,7 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
     std::copy_n(brought.content.begin(), eeprom->size(), eeprom->begin());
   }
   if (const RadioParameters radios(plan); radios.own_tables()) calibrate_ranging(radios);
-  // Hosts of one process start at different slots, so that they seldom wait for each other.
+  // Hosts in one process start at different slots, so that they seldom wait for each other's mutex.
   const std::uint32_t first_slot = host.value() * kSlots / std::max(plan.hosts, 1u);
   for (std::uint32_t s = 0; s < kSlots; ++s) {
     for (std::uint32_t p = 0; p < programs_->size(); ++p) {
@@ -79,9 +79,9 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
     KILOTWIN_DEMAND(share_.contains(robot));
     return robot - share_.first;
   };
-  std::fill(asked_.begin(), asked_.end(), std::uint8_t{0});
+  std::fill(requested_.begin(), requested_.end(), std::uint8_t{0});
   std::fill(sent_.begin(), sent_.end(), std::uint8_t{0});
-  for (const std::uint32_t robot : radio.ask) asked_[own(robot)] = 1;
+  for (const std::uint32_t robot : radio.ask) requested_[own(robot)] = 1;
   for (const std::uint32_t robot : radio.sent) sent_[own(robot)] = 1;
 
   messages_.resize(radio.messages.size());
@@ -121,7 +121,7 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio, const SwarmView*
     const Executor executor(program, slot, guard.thread());
     slot.exchange()->log_length = slot.exchange()->log_lost = 0;
     for (std::size_t n = 0; n < group.robots.size(); ++n) {
-      // Others have used the caches since the last tick.
+      // Other engines have replaced the caches' content since the last tick.
       if (n + kAhead < group.robots.size()) memory_[group.robots[n + kAhead]].prefetch();
       const std::uint32_t i = group.robots[n];
       run_robot(from, i, radio.kilo_ticks[i], program, slot, executor);
@@ -134,8 +134,8 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio, const SwarmView*
   for (std::uint32_t i = 0; i < share_.size(); ++i) use_battery(i);
 }
 
-/// Robots that run firmware show in the next frame what their processors have set by this one: as with programs that have
-/// run in between, so that the same motion comes at the same time from either kind.
+/// Copies the outputs of firmware robots at tick k into the frame of tick k + 1. Programs that run here have the same delay, so
+/// both kinds of robots move at the same time.
 void BehavioursEngine::relay_firmware(const RadioFrame& radio) {
   for (std::size_t n = 0; n < radio.firmware_robot.size(); ++n) {
     const std::uint32_t robot = radio.firmware_robot[n], i = robot - share_.first;
@@ -168,7 +168,7 @@ void BehavioursEngine::use_battery(std::uint32_t i) {
   const bool asleep = life_cycle_[i] == static_cast<std::uint8_t>(LifeCycle::kSleeping);
   senses_.spend(i, {motor_left_[i], motor_right_[i], led_[i], asleep, sent_[i] != 0});
   if (!senses_.is_flat(i)) return;
-  // Off: what its memory held is lost.
+  // The robot switches off and loses its memory.
   presence_[i] = Presence::kNew;
   memory_[i].release();
   life_cycle_[i] = kFlat;
@@ -206,7 +206,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   thread.divided = 0;
   memory.copy_in(slot, thread);
   executor.advance_clock(kilo_ticks);
-  surround(i, slot, static_cast<std::uint32_t>(receptions.size()));
+  set_surroundings(i, slot, static_cast<std::uint32_t>(receptions.size()));
   std::int32_t interrupted_cycles = 0;
   if (eventful) {
     const Fault* const fault = executor.interrupt(receptions, sent, interrupted_cycles);
@@ -224,10 +224,10 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     const Fault* const fault = run_main(i, executor, interrupted_cycles);
     if (fault != nullptr) return fail_robot(i, *fault, program, slot);
   }
-  // Field by field: what the robot has just written a part of, a processor cannot read as a whole at once.
+  // Read single fields. A copy of the whole struct would stall: store forwarding fails for parts that the robot has just written.
   KtRobot& robot = executor.robot();
   if (robot.state != static_cast<std::uint8_t>(LifeCycle::kRunning)) holds_[i] = 0;
-  if (asked_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
+  if (requested_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
     const KtMessage* message = nullptr;
     std::int32_t cycles = 0;
     const Fault* const fault = executor.transmit(message, cycles);
@@ -248,7 +248,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
 }
 
-/// The main program's share of a tick.
+/// Runs the main program for the rest of the tick.
 const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executor,
                                         std::int32_t interrupted_cycles) {
   KtRobot& robot = executor.robot();
@@ -256,15 +256,15 @@ const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executo
   std::int64_t cycles = tick_cycles;
   const bool as_on_robot = robot.loop_rate == KT_LOOP_AS_ON_ROBOT;
   if (as_on_robot) {
-    // Callbacks, transmissions and what the last tick used too much come first.
+    // Callbacks, transmissions and the cycles by which the last tick was exceeded reduce the budget.
     const std::uint64_t owed = robot.debt_cycles + static_cast<std::uint64_t>(interrupted_cycles);
     const std::uint64_t paid = std::min<std::uint64_t>(owed, static_cast<std::uint64_t>(tick_cycles));
     robot.debt_cycles = owed - paid;
     cycles -= static_cast<std::int64_t>(paid);
     if (cycles <= 0) return nullptr;
   }
-  Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), spins_[i]);
-  spins_[i] = main.spins;
+  Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), wait_period_[i]);
+  wait_period_[i] = main.wait_period;
   if (main.fault != nullptr) return main.fault;
   if (as_on_robot && main.left < 0) robot.debt_cycles += static_cast<std::uint64_t>(-main.left);
   if (main.preempted) ++robot.waits;
@@ -276,8 +276,8 @@ const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executo
   return nullptr;
 }
 
-/// What the robot in the slot senses in this tick.
-void BehavioursEngine::surround(std::uint32_t i, const Slot& slot, std::uint32_t receptions) {
+/// Sets the sensor readings and the EEPROM of the robot in the slot for this tick.
+void BehavioursEngine::set_surroundings(std::uint32_t i, const Slot& slot, std::uint32_t receptions) {
   KtSurroundings& around = *slot.surroundings();
   const senses::Readings readings = senses_.readings(i);
   around.light = readings.light;
@@ -302,7 +302,7 @@ void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
   std::copy_n(around.eeprom_copy, eeprom_[i]->size(), eeprom_[i]->begin());
 }
 
-/// Robots that have brought no EEPROM find their own ranging tables in it.
+/// Gives each robot without a stated EEPROM one with its own ranging table.
 void BehavioursEngine::calibrate_ranging(const RadioParameters& radios) {
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
     const std::uint32_t id = share_.first + i;
@@ -336,17 +336,17 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
 }
 
 void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Program& program, const Slot& slot) {
-  static_cast<void>(slot.clear_before_data());  // the next robot there finds it as it was
+  static_cast<void>(slot.clear_before_data());  // for the next robot in the slot
   fail_robot(i, describe(fault, program, slot));
 }
 
-/// Robots that brought down their host in an earlier attempt at this run.
+/// Stops robots whose programs crashed their host at this tick in an earlier attempt at this run.
 void BehavioursEngine::fail_known_culprits(Tick from) {
   for (const ProgramFailure& failure : plan_.program_failures()) {
     if (failure.tick != from || !share_.contains(failure.robot)) continue;
     const std::uint32_t i = failure.robot - share_.first;
     if (presence_[i] == Presence::kNew || presence_[i] == Presence::kAlive)
-      fail_robot(i, "its program brings down its host");
+      fail_robot(i, "its program crashes its host");
   }
 }
 
@@ -369,7 +369,7 @@ void BehavioursEngine::note_division(std::uint32_t i, std::uint64_t code, const 
 
 void BehavioursEngine::take_log(std::uint32_t i, const Slot& slot) {
   KtExchange& exchange = *slot.exchange();
-  // The robot may have written anything here.
+  // The robot may have overwritten the exchange, so limit its length.
   const std::uint32_t length = std::min<std::uint32_t>(exchange.log_length, KT_LOG_OCTETS);
   printed_.push_back({share_.first + i, std::string(exchange.log, length)});
   if (exchange.log_lost != 0)
@@ -382,7 +382,7 @@ void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::
   motor_right_[i] = robot.motors_on != 0 ? robot.duty_right : std::uint8_t{0};
   spin_up_[i] = robot.motors_on != 0 ? robot.spin_up : std::uint8_t{0};
   led_[i] = robot.led & 63;
-  // A sleeping robot that has woken up to listen is, for the radio, one that is idle.
+  // A sleeping robot that has woken up to listen is idle for the radio.
   const bool listens = robot.state == static_cast<std::uint8_t>(LifeCycle::kSleeping) && robot.deaf == 0;
   life_cycle_[i] = listens ? static_cast<std::uint8_t>(LifeCycle::kIdle) : robot.state;
   tx_period_[i] = tx_period;

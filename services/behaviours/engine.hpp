@@ -1,4 +1,5 @@
-/// The robots' programs of one host: messages and time in; motors, LEDs and messages out.
+/// The behaviours engine: it runs the robots' programs of one host. Inputs are messages, clocks and readings of sensors; outputs are
+/// motors, LEDs and messages.
 #pragma once
 
 #include <array>
@@ -25,39 +26,45 @@ class BehavioursState;
 
 namespace kilotwin::behaviours {
 
-/// In step k, for each robot in this order: its clock advances; kilo_message_tx_success if its message has left; receptions
-/// in order of arrival; the main program until it has used up the tick; kilo_message_tx if it is asked, runs, and holds no
-/// message. A message is held until it has left or the robot stops running.
-/// Robots that run firmware have it in the radio; their motors and LEDs are passed on from its frame.
-/// Robots of tracked groups have no program: motors 0, LED 0, life cycle IDLE.
-/// A sleeping robot wakes every 8 s to listen and shows as IDLE meanwhile. One whose battery is flat shows as FLAT, and
-/// starts anew once it is charged.
-/// Pure, but for robots' code that faults: that stops its robot and is noted. Engines of one process may step in parallel.
+/// A step does for each robot, in this order:
+///   1. advance the robot's clock;
+///   2. call kilo_message_tx_success if its message has been sent;
+///   3. call kilo_message_rx for each reception, in order of arrival;
+///   4. run the main program until it has used up the tick;
+///   5. call kilo_message_tx if the radio requests a message, the robot is running, and it holds no message.
+/// A robot holds a message until it is sent or the robot stops running.
+///
+/// The radio runs the processors of firmware robots; this engine copies their motors and LEDs from the radio's frame. Robots of
+/// tracked groups have no program: motors 0, LED 0, life cycle IDLE. A sleeping robot wakes every 8 s to listen and meanwhile has
+/// the life cycle IDLE. A robot with a flat battery has the life cycle FLAT and restarts once it is charged.
+///
+/// The engine is a pure function of its inputs. A fault in a robot's code stops that robot and adds a Failure. Engines of one
+/// process may step in parallel.
 class BehavioursEngine {
  public:
   using Eeprom = std::array<std::uint8_t, KILOTWIN_EEPROM_OCTETS>;
 
-  /// State at tick 0. `programs` are those of the plan's manifest.
+  /// The state at tick 0. `programs` must be loaded from the plan's run directory.
   BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs);
 
-  /// From tick `from` to the next. The radio's frame for this host is of tick `from`, and so is the swarm, which is needed
-  /// where RunPlan::hosts_see_bodies().
+  /// Steps from tick `from` to the next. `radio` is the frame for this host at tick `from`. `swarm` is at tick `from` too; it may
+  /// be null unless RunPlan::hosts_see_bodies().
   void step(Tick from, const RadioFrame& radio, const SwarmView* swarm = nullptr);
   void emit(ActuationFrame& frame) const;
-  /// Sum of entity_hash over own robots: motors, LED, life cycle, tx period, whether a message is held;
-  /// where there are batteries, their charge.
+  /// Sum of entity_hash over the host's robots. It covers motors, LED, life cycle, transmission period, whether a message is held,
+  /// and the charge if the experiment has batteries.
   [[nodiscard]] std::uint64_t hash_part() const;
 
   void save(proto::BehavioursState& state) const;
-  /// Takes own robots out of all parts of a checkpoint of tick `tick`. Throws RunError where a robot is missing or does not
-  /// fit its program.
+  /// Loads the host's robots from the parts of a checkpoint at tick `tick`. Throws RunError if a robot is missing or its state does
+  /// not fit its program.
   void load(Tick tick, std::span<const proto::BehavioursState* const> parts);
 
   struct Failure {
     std::uint32_t robot = 0;
-    std::string text;  ///< one line: what its program did
+    std::string text;  ///< one line about the program's fault
   };
-  /// Robots whose program has faulted: new ones are appended.
+  /// Robots whose program has faulted, in order of time.
   [[nodiscard]] const std::vector<Failure>& failures() const { return failures_; }
   [[nodiscard]] std::uint32_t robots_failed() const { return static_cast<std::uint32_t>(failures_.size()); }
 
@@ -65,30 +72,30 @@ class BehavioursEngine {
     std::uint32_t robot = 0;
     std::string text;
   };
-  /// What robots printed in the last step, in the order in which they ran. Not part of their state.
+  /// Text that robots printed in the last step, in the order in which they ran. Not part of the state.
   [[nodiscard]] const std::vector<Printed>& printed() const { return printed_; }
 
-  /// What robots' programs do that goes on, but is hardly meant: new ones are appended, one per program and kind.
+  /// Divisions by zero in robots' programs, which go on running: the first one of each program, in order of time.
   [[nodiscard]] const std::vector<Failure>& warnings() const { return warnings_; }
 
-  /// Whose code runs at this moment. May be read from any thread, or process, while the engine steps.
+  /// The robot whose code is running. Any thread or process may read it while the engine steps.
   struct Running {
     std::atomic<std::uint32_t> robot{kNobody};
-    std::atomic<std::uint64_t> entry{0};  ///< robots entered since the start: the same number, the same call
-    std::atomic<std::int64_t> tick{0};    ///< of the step
+    std::atomic<std::uint64_t> entry{0};  ///< count of calls into robots' code; an equal count means the same call
+    std::atomic<std::int64_t> tick{0};    ///< tick from which the engine steps
   };
   static constexpr std::uint32_t kNobody = 0xffffffffu;
   [[nodiscard]] const Running& running() const { return *running_; }
-  /// Notes it there instead, in memory that outlives this process, say.
+  /// Uses `place` in place of the engine's own Running, e.g. in a mapped file, which survives a crash of this process.
   void note_running_in(Running& place) { running_ = &place; }
 
-  /// What robot `id`, one of this host's, has in its EEPROM; nullptr where that is what calibration has left.
+  /// The EEPROM of robot `id` of this host, or nullptr if it holds only the calibration.
   [[nodiscard]] const Eeprom* eeprom(std::uint32_t id) const {
     const std::uint32_t i = id - share_.first;
     return calibrated_[i] != 0 ? nullptr : eeprom_[i].get();
   }
 
-  /// Octets of memory that robots' programs take at present.
+  /// Octets that the memories of all robots occupy.
   [[nodiscard]] std::uint64_t memory_octets() const;
 
  private:
@@ -98,7 +105,7 @@ class BehavioursEngine {
   void relay_firmware(const RadioFrame& radio);
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
   void use_battery(std::uint32_t i);
-  void surround(std::uint32_t i, const Slot&, std::uint32_t receptions);
+  void set_surroundings(std::uint32_t i, const Slot&, std::uint32_t receptions);
   void calibrate_ranging(const RadioParameters&);
   void keep_eeprom(std::uint32_t i, const Slot&);
   const Fault* run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles);
@@ -119,37 +126,38 @@ class BehavioursEngine {
 
   Tick now_;
 
-  /// Own robots by slot and program: the order in which they run.
+  /// Robots with the same program and slot. Groups run one after the other.
   struct Group {
     std::uint32_t program = 0, slot = 0;
-    std::vector<std::uint32_t> robots;  ///< indices below, ascending
+    std::vector<std::uint32_t> robots;  ///< ascending indices into the vectors below
   };
   std::vector<Group> groups_;
 
-  // Per own robot; index i is robot share_.first + i.
+  // Per robot of the host; index i is robot share_.first + i.
   senses::RobotSenses senses_;
   std::vector<RobotMemory> memory_;
-  std::vector<std::uint8_t> calibrated_;         ///< 1: its EEPROM is what calibration has left
-  std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< of those that have written to it, or have one of their own
+  std::vector<std::uint8_t> calibrated_;         ///< 1: the EEPROM holds only the calibration
+  std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< null: the default content, uid and motor calibration
   std::vector<Presence> presence_;
   std::vector<std::uint8_t> motor_left_, motor_right_, spin_up_, led_, life_cycle_;
   std::vector<std::uint16_t> tx_period_;
-  std::vector<std::uint8_t> holds_;   ///< a message that has not left
-  std::vector<std::uint8_t> offers_;  ///< a message that is new in this tick
-  std::vector<IrMessage> message_;    ///< where it offers one
+  std::vector<std::uint8_t> holds_;   ///< 1: the robot holds a message that is not sent yet
+  std::vector<std::uint8_t> offers_;  ///< 1: the robot offers a further message in this tick
+  std::vector<IrMessage> message_;    ///< the offered message; valid if offers_
 
   std::vector<Failure> failures_, warnings_;
   std::vector<Printed> printed_;
 
-  // Of the step at hand; per own robot where not said otherwise.
-  std::vector<std::uint8_t> asked_, sent_;
-  std::vector<std::uint32_t> first_reception_;  ///< one more than robots
+  // Inputs of the current step.
+  std::vector<std::uint8_t> requested_,
+      sent_;  ///< per robot: the radio requests a message; its message has been sent
+  std::vector<std::uint32_t> first_reception_;  ///< per robot, plus one: index into receptions_
   std::vector<KtReception> receptions_;         ///< ordered by robot, then by time of arrival
-  std::vector<KtMessage> messages_;             ///< with their checksums
+  std::vector<KtMessage> messages_;             ///< of receptions_, with checksums
 
-  // Nothing that a result depends on.
-  std::vector<std::int32_t> spins_;    ///< per own robot: Executor::Main::spins of the last tick
-  std::vector<std::uint8_t> divided_;  ///< per program: a division by zero was told
+  // No result depends on these.
+  std::vector<std::int32_t> wait_period_;  ///< per robot: Executor::Main::wait_period of the last tick
+  std::vector<std::uint8_t> divided_;      ///< per program: 1 if a division by zero was reported
 
   Running own_running_;
   Running* running_ = &own_running_;

@@ -1,4 +1,4 @@
-/// What a host keeps for each robot, to and from checkpoints.
+/// Saves and loads a host's state per robot.
 #include <algorithm>
 #include <array>
 
@@ -17,7 +17,7 @@ std::string text(std::span<const std::uint8_t> octets) {
   return {reinterpret_cast<const char*>(octets.data()), octets.size()};  // NOLINT
 }
 
-/// RobotProgramState.host: these octets in this order, then the text of a failure.
+/// Layout of RobotProgramState.host: these octets in this order, then the text of the failure.
 enum Field : std::size_t {
   kPresence,
   kLeft,
@@ -85,7 +85,8 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     const auto presence = Presence{fields[kPresence]};
     if (presence > Presence::kFirmware || (presence == Presence::kNone) != tracked ||
         (presence == Presence::kFirmware) != plan_.firmware(id)) {
-      throw RunError("robot " + std::to_string(id) + " was of another kind when the checkpoint was made");
+      throw RunError("robot " + std::to_string(id) +
+                     " is firmware, tracked or a program here, and another of these in the checkpoint");
     }
     presence_[i] = presence;
     memory_[i].release();

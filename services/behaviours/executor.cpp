@@ -11,7 +11,7 @@
 namespace kilotwin::behaviours {
 
 void RobotMemory::resize(std::uint32_t data_octets, std::uint32_t stack_octets) {
-  constexpr std::uint32_t kRoom = 256;  // for a stack that grows a little
+  constexpr std::uint32_t kRoom = 256;  // spare octets, so that a slightly larger stack needs no reallocation
   const std::uint32_t needed = data_octets + stack_octets;
   if (needed > capacity_) {
     capacity_ = (needed + kRoom + 63) / 64 * 64;
@@ -22,10 +22,10 @@ void RobotMemory::resize(std::uint32_t data_octets, std::uint32_t stack_octets) 
 }
 
 void RobotMemory::reset(const Program& program, const Slot& slot) {
-  // What the entry into the main program pops: six registers, the address where it starts, and an end for back-traces.
+  // The frame that the entry into the main program pops: six registers, the start address, and a null to end back-traces.
   std::array<std::uint64_t, 8> frame{};
   frame[6] = slot.image_address() + program.file.table.boot;
-  // What a reset does not touch, of a robot that has run before.
+  // A robot that has run before keeps the ranges that a reset preserves.
   std::vector<std::uint8_t> kept;
   if (octets_) {
     for (const ElfFile::Range& range : program.file.kept) {
@@ -60,15 +60,15 @@ void RobotMemory::restore(const Program& program, const Slot& slot, std::span<co
 
 namespace {
 
-/// What a callback may use, of its robot's time: one second. On a robot, a longer one would have kept every message, every
-/// tick and the program waiting.
+/// Limit of a callback: one second of the robot's time. On a robot a longer callback would block all messages, the clock and the
+/// main program.
 constexpr std::int32_t kCallbackCycles = 8'000'000;
-/// A program that is suspected of waiting in a loop is looked at each time round, this many times.
-constexpr int kLooks = 24;
-/// Of Main::spins: the loop has one test; shorter than any loop.
+/// A busy wait is looked for in this many slices; a slice ends at the next test of the budget.
+constexpr int kMostSlices = 24;
+/// Value of Main::wait_period for a loop with a single test. No period is that short.
 constexpr std::int32_t kOneTest = 1;
 
-/// The state of the robot in a slot.
+/// A copy of the state of the robot in a slot.
 class Snapshot {
  public:
   void take(const Slot& slot, std::size_t data_octets, const RobotThread& thread) {
@@ -95,7 +95,7 @@ class Snapshot {
   std::vector<std::uint8_t> octets_;
 };
 
-/// " in f() at FILE:LINE", as far as known.
+/// " in f() at FILE:LINE", as far as the program's tables tell.
 std::string place(std::uint64_t code, const Program& program, const Slot& slot) {
   const std::uint64_t offset = code - slot.image_address();
   const std::string function = program.file.function_at(offset);
@@ -106,41 +106,41 @@ std::string place(std::uint64_t code, const Program& program, const Slot& slot) 
 
 }  // namespace
 
-/// The main program until it waits or has used up the tick: one that waits in a loop, or did in the tick before, or has run
-/// for long enough to be suspected of it.
-void Executor::follow(Main& main, std::int32_t spun) const {
+/// Runs a main program that may be in a busy wait until it waits or has used up the tick. If a test finds the robot in the same
+/// state as an earlier test, only an interrupt can end the loop. Its rounds need not be executed then: only the phase at the end
+/// of the tick matters.
+void Executor::run_busy_wait(Main& main, std::int32_t previous_period) const {
   thread_local Snapshot snapshot;
   if (robot_->looped != 0) {
-    // The last tick ended in a loop that reads nothing which an interrupt could change. If it comes to the same state
-    // again, nothing ever will.
+    // The last tick ended in a loop that reads nothing that an interrupt could change. If the state repeats, the loop is
+    // endless.
     snapshot.take(slot_, data_octets(), thread_);
     if (!run(main, 0)) return;
     if (snapshot.equals(slot_, data_octets(), thread_)) {
       main.fault = fail({Fault::kEndlessLoop, 0, thread_.place});
       return;
     }
-    if (spun == 0 && main.left >= 0 && !run(main, std::min(main.left, kUnsuspected))) return;
+    if (previous_period == 0 && main.left >= 0 && !run(main, std::min(main.left, kUnsuspected))) return;
   }
-  // Whoever comes to the same place in the same state goes round in a loop that only an interrupt can end: it need not be
-  // followed any further than for its phase at the end of the tick.
-  int next_snapshot = 0, snapshot_look = 0;
+  int next_snapshot = 0, snapshot_slice = 0;
   std::int32_t snapshot_left = 0;
-  // A loop with several tests is likely to be the one of the last tick. The first round may end otherwise than it began, with
-  // what an interrupt has changed in a register.
-  if (spun > kOneTest && main.left >= 0 && !run(main, std::min(spun, main.left + 1) - 1)) return;
-  for (int look = 0; look < kLooks && main.left >= 0; ++look) {
-    const bool whole_round = look == 0 && spun > kOneTest;
-    if (look == next_snapshot) {
+  // A loop with several tests is probably the loop of the last tick, so run whole rounds of its period. Run one round before the
+  // first snapshot, because an interrupt may have changed a register.
+  if (previous_period > kOneTest && main.left >= 0 && !run(main, std::min(previous_period, main.left + 1) - 1))
+    return;
+  for (int slice = 0; slice < kMostSlices && main.left >= 0; ++slice) {
+    const bool whole_round = slice == 0 && previous_period > kOneTest;
+    if (slice == next_snapshot) {
       snapshot.take(slot_, data_octets(), thread_);
-      snapshot_look = look;
+      snapshot_slice = slice;
       snapshot_left = main.left;
-      next_snapshot = 2 * look + 1;
+      next_snapshot = 2 * slice + 1;
     }
-    if (!run(main, whole_round ? std::min(spun, main.left + 1) - 1 : 0)) return;
+    if (!run(main, whole_round ? std::min(previous_period, main.left + 1) - 1 : 0)) return;
     if (!snapshot.equals(slot_, data_octets(), thread_)) continue;
     const std::int32_t period = snapshot_left - main.left;
-    const bool one_test = look == snapshot_look && !whole_round;
-    main.spins = one_test ? kOneTest : period;
+    const bool one_test = slice == snapshot_slice && !whole_round;
+    main.wait_period = one_test ? kOneTest : period;
     if (main.left >= 0) main.left %= period;
     if (one_test && main.left >= 0) main.left -= period;
     break;

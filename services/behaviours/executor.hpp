@@ -1,4 +1,4 @@
-/// Runs one robot's code in a slot: memory in, interrupts, main program, memory out.
+/// Runs one robot's code in a slot: copies its memory in, runs callbacks and main program, copies its memory out.
 #pragma once
 
 #include <algorithm>
@@ -14,22 +14,22 @@
 
 namespace kilotwin::behaviours {
 
-/// Octets below a stack pointer, the end of what frames were there, that are zero whenever a robot begins to run: one that looks
-/// there by mistake finds the same whoever ran before it.
+/// Octets below the stack pointer that are cleared before a robot runs. A program that reads there by mistake gets the same result
+/// whichever robot used the slot before.
 inline constexpr std::uint32_t kClearedOctets = 256;
-/// Sets octets to zero, by the library's function: where compilers see how many octets there are, they choose an instruction
-/// that takes longer to begin than this does.
+/// memset() to zero with a size that is hidden from the compiler. For a known size compilers emit `rep stos`, whose start-up is slower
+/// than the call.
 inline void clear(std::uint8_t* first, std::size_t octets) {
   __asm__("" : "+r"(octets));
   std::memset(first, 0, octets);
 }
 
-/// A robot's memory while it does not run: its data with what it uses of its heap, then its live stack, in one buffer.
+/// A robot's memory while it does not run, in one buffer: its data, the used part of its heap, its live stack.
 class RobotMemory {
  public:
-  /// As at reset: initial data, and a stack from which the main program starts.
+  /// The state at reset: initial data, and a stack frame from which the main program starts.
   void reset(const Program&, const Slot&);
-  /// From a checkpoint. Throws RunError where the sizes do not fit the program.
+  /// Loads the memory from a checkpoint. Throws RunError if the sizes do not fit the program.
   void restore(const Program&, const Slot&, std::span<const std::uint8_t> data,
                std::span<const std::uint8_t> stack);
   void release() { *this = RobotMemory(); }
@@ -45,7 +45,7 @@ class RobotMemory {
     if (stack_octets_ + kClearedOctets <= kStackOctets) clear(stack - kClearedOctets, kClearedOctets);
     thread.robot_stack = slot.stack_top() - stack_octets_;
   }
-  /// `data_octets`: Executor::data_octets(). False where the robot's stack pointer has left its stack.
+  /// `data_octets`: Executor::data_octets(). False if the robot's stack pointer lies outside its stack.
   [[nodiscard]] bool copy_out(const Slot& slot, std::uint32_t data_octets, const RobotThread& thread) {
     const std::uint64_t size = slot.stack_top() - thread.robot_stack;
     if (size > kStackOctets) return false;
@@ -64,7 +64,7 @@ class RobotMemory {
     return {octets_.get() + data_octets_, stack_octets_};
   }
 
-  /// A variable of the robot: `offset` is one of ElfFile::table.
+  /// Reads a variable of the robot at an offset from ElfFile::table.
   template <class T> [[nodiscard]] T get(const Program& program, std::uint64_t offset) const {
     T value;
     std::memcpy(&value, octets_.get() + (offset - program.file.data.first), sizeof value);
@@ -81,8 +81,8 @@ class RobotMemory {
   std::uint32_t capacity_ = 0, data_octets_ = 0, stack_octets_ = 0;
 };
 
-/// Code of the robot whose memory is in the slot. Each call returns what faulted, until the next call, or null. Needs the
-/// slot's mutex and a FaultGuard on this thread.
+/// Runs code of the robot whose memory is in the slot. Each call returns its fault, valid until the next call, or null. Requires
+/// the slot's mutex and a FaultGuard on this thread.
 class Executor {
  public:
   Executor(const Program& program, const Slot& slot, RobotThread& thread)
@@ -104,11 +104,11 @@ class Executor {
   /// The simulated hardware of the robot in the slot.
   [[nodiscard]] KtRobot& robot() const { return *robot_; }
   [[nodiscard]] RobotThread& thread() const { return thread_; }
-  /// Of the memory of the robot in the slot, heap included. The robot may have written anything there.
+  /// Size of data and used heap of the robot in the slot. Limited, because the robot may have overwritten heap_octets.
   [[nodiscard]] std::uint32_t data_octets() const {
     return fixed_octets_ + std::min(robot_->heap_octets, heap_octets_);
   }
-  /// Of its own clock, by so many ticks.
+  /// Advances kilo_ticks.
   void advance_clock(std::uint32_t ticks) const {
     std::uint32_t value = 0;
     std::memcpy(&value, ticks_, sizeof value);
@@ -121,7 +121,7 @@ class Executor {
     return value;
   }
 
-  /// Notes what the host has found to be a fault.
+  /// Reports a fault that the host has detected.
   [[nodiscard]] const Fault* fail(const Fault& fault) const {
     thread_.fault = fault;
     return &thread_.fault;
@@ -129,24 +129,25 @@ class Executor {
 
   struct Main {
     const Fault* fault = nullptr;
-    bool preempted = false;  ///< it was stopped within its code, having used up its cycles
-    std::int32_t spins = 0;  ///< not 0: ... in a loop that only an interrupt can end
-    std::int32_t left = 0;   ///< cycles; negative: it has used more
+    bool preempted = false;  ///< it used up its budget and was stopped within its code
+    std::int32_t wait_period =
+        0;                  ///< cycles per round of a loop that only an interrupt can end; 0: in no such loop
+    std::int32_t left = 0;  ///< cycles left of the budget; negative: exceeded
   };
-  /// The main program, until it waits or has used up so many cycles. `spun`: what Main::spins was the last time, or 0; a hint
-  /// that changes how long this takes and nothing else.
-  [[nodiscard]] Main run_main(std::int32_t cycles, std::int32_t spun) const {
+  /// Runs the main program until it waits or has used up `cycles`. `previous_period` is Main::wait_period of the last tick, or 0; it
+  /// is a hint that affects the computing time and not the result.
+  [[nodiscard]] Main run_main(std::int32_t cycles, std::int32_t previous_period) const {
     Main main;
     main.left = cycles;
-    if (robot_->looped == 0 && spun == 0 && !run(main, std::min(cycles, kUnsuspected))) return main;
-    follow(main, spun);
+    if (robot_->looped == 0 && previous_period == 0 && !run(main, std::min(cycles, kUnsuspected))) return main;
+    run_busy_wait(main, previous_period);
     return main;
   }
 
-  /// Callbacks for what has happened. `cycles` is what they have used.
+  /// Calls kilo_message_tx_success if `sent`, and kilo_message_rx per reception. Adds their cycles to `cycles`.
   [[nodiscard]] const Fault* interrupt(std::span<const KtReception> receptions, bool sent,
                                        std::int32_t& cycles) const;
-  /// `message` is what the robot gives, or null.
+  /// Calls kilo_message_tx. `message` becomes the robot's message, or null if it has none. Adds the cycles to `cycles`.
   [[nodiscard]] const Fault* transmit(const KtMessage*& message, std::int32_t& cycles) const;
 
  private:
@@ -164,11 +165,11 @@ class Executor {
     thread_.leave = 0;
     std::atomic_signal_fence(std::memory_order_seq_cst);
   }
-  /// After so many cycles a program is suspected of waiting in a loop.
+  /// A program that runs for this many cycles is checked for a busy wait.
   static constexpr std::int32_t kUnsuspected = 32768;
 
-  /// The main program to the next test of its cycles, or as far as `slice` of them goes; false when that ended otherwise than
-  /// by preemption.
+  /// Runs the main program for `slice` cycles, at least to the next test of its budget. False if it ended in another way than by
+  /// preemption.
   bool run(Main& main, std::int32_t slice) const {
     thread_.held = main.left - slice;
     thread_.budget = slice;
@@ -180,14 +181,14 @@ class Executor {
     main.preempted = main.preempted && main.fault == nullptr;
     return main.preempted;
   }
-  void follow(Main& main, std::int32_t spun) const;
+  void run_busy_wait(Main& main, std::int32_t previous_period) const;
   [[nodiscard]] const Fault* call(std::uint64_t function, std::uint64_t& result, std::int32_t& cycles) const;
   [[nodiscard]] const Fault* fault() const {
     return thread_.fault.signal == Fault::kNone ? nullptr : &thread_.fault;
   }
 
   const Slot& slot_;
-  const std::uint32_t fixed_octets_, heap_octets_;  ///< of data; of the heap at most
+  const std::uint32_t fixed_octets_, heap_octets_;  ///< size of the data; largest size of the heap
   RobotThread& thread_;
   std::uint64_t leave_;
   Enter* enter_;
@@ -198,9 +199,9 @@ class Executor {
   const std::uint16_t* tx_period_;
 };
 
-/// A fault in words: what, where in the program.
+/// One line about a fault: what happened and where in the program.
 [[nodiscard]] std::string describe(const Fault&, const Program&, const Slot&);
-/// A division by zero at this address, in words.
+/// One line about a division by zero at address `code`.
 [[nodiscard]] std::string describe_division(std::uint64_t code, const Program&, const Slot&);
 
 }  // namespace kilotwin::behaviours

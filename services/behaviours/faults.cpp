@@ -27,7 +27,7 @@ thread_local RobotThread robot_thread{};
 constexpr std::size_t kHandlerStackOctets = 64 * 1024;
 thread_local std::vector<std::uint8_t> handler_stack;
 
-/// As if no handler were here: the instruction faults again, or the signal comes again, and goes to whoever was here first.
+/// Restores the earlier handler and returns: the instruction then faults again, or the signal is raised again.
 void pass_on(int signal, bool was_sent) {
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     if (kSignals[i] == signal) sigaction(signal, &previous_actions[i], nullptr);
@@ -37,7 +37,7 @@ void pass_on(int signal, bool was_sent) {
 
 void handle(int signal, siginfo_t* info, void* context) {
   RobotThread& thread = robot_thread;
-  const bool was_sent = info->si_code <= 0;  // by a process, this one or another; faults have positive codes
+  const bool was_sent = info->si_code <= 0;  // a process sent it; the kernel's faults have positive codes
   if (was_sent && info->si_pid != getpid()) {
     if (auto* const told = before_sent_signal.load()) told();
   }
@@ -50,11 +50,11 @@ void handle(int signal, siginfo_t* info, void* context) {
     return;
   }
   thread.fault = {signal, reinterpret_cast<std::uint64_t>(info->si_addr), code};
-  // Of these two the instruction lies before the address.
+  // For SIGSYS and SIGTRAP the saved address is that of the next instruction.
   if (signal == SIGSYS) thread.fault = {signal, static_cast<std::uint32_t>(info->si_syscall), code - 1};
   if (signal == SIGTRAP) thread.fault = {signal, 0, code - 1};
-  // As the host has them: no trap after each instruction, upwards in strings, words at any address, rounding to nearest, no
-  // exceptions of floating-point arithmetic.
+  // Restore the processor state of the host: no single-stepping, ascending string operations, no alignment checks, rounding to
+  // nearest, floating-point exceptions masked.
   constexpr greg_t kTrapFlag = 0x100, kDirectionFlag = 0x400, kAlignmentCheck = 0x40000;
   registers[REG_EFL] &= ~(kTrapFlag | kDirectionFlag | kAlignmentCheck);
   interrupted.uc_mcontext.fpregs->mxcsr = 0x1f80;
@@ -64,7 +64,7 @@ void handle(int signal, siginfo_t* info, void* context) {
   thread.leave = 0;
 }
 
-/// Lets %gs of this thread point to what it has in common with robots; nothing else uses that register on Linux.
+/// Points %gs of this thread to its RobotThread. Nothing else uses that register on x86-64 Linux.
 RobotThread& own_thread() {
   thread_local const bool set = [] {
     return syscall(SYS_arch_prctl, ARCH_SET_GS, static_cast<KtThread*>(&robot_thread)) == 0;
@@ -73,7 +73,7 @@ RobotThread& own_thread() {
   return robot_thread;
 }
 
-/// System calls from robots' addresses become SIGSYS.
+/// Installs the seccomp filter that turns system calls from robots' addresses into SIGSYS.
 void refuse_system_calls() {
   constexpr std::uint32_t kLow = offsetof(seccomp_data, instruction_pointer), kHigh = kLow + 4;
   std::array<sock_filter, 7> filter{
@@ -82,7 +82,7 @@ void refuse_system_calls() {
        BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kLastAddress, 0, 1), BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP)}};
   const sock_fprog program{filter.size(), filter.data()};
-  // Without the last flag older kernels would slow this process down, as if it ran strangers' code by speculation.
+  // Without SPEC_ALLOW, kernels before 5.16 switch on speculation mitigations for a filtered process, which slow it down.
   if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0) {
     syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_TSYNC | SECCOMP_FILTER_FLAG_SPEC_ALLOW,
             &program);

@@ -1,4 +1,4 @@
-/// Robots' code runs inside this process. What faults there costs the robot, not the process.
+/// Faults of robots' code, which runs inside this process. A fault ends the robot, not the process.
 #pragma once
 
 #include <atomic>
@@ -11,34 +11,34 @@
 namespace kilotwin::behaviours {
 
 struct Fault {
-  /// Besides the signals SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP and SIGSYS:
+  /// Values of `signal` besides SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP and SIGSYS.
   enum Other : int {
     kNone = 0,
     kEndlessLoop = -1,
     kCallbackOverrun = -2,
     kStackLost = -3,
-    kBeforeVariables = -4  ///< it has written before its first variable
+    kBeforeVariables = -4  ///< the program wrote before its first variable
   };
   int signal = kNone;
-  std::uint64_t address = 0;  ///< that could not be accessed; of SIGSYS the number of the system call
-  std::uint64_t code = 0;     ///< address of the instruction
+  std::uint64_t address = 0;  ///< the inaccessible address; for SIGSYS the number of the system call
+  std::uint64_t code = 0;     ///< address of the faulting instruction
 };
 
-/// What a thread and the robot that it runs have in common. %gs points to it.
+/// Data that a thread shares with the robot's code that it runs. %gs points to it.
 struct RobotThread : KtThread {
-  std::uint64_t leave = 0;    ///< where execution goes on after a fault; 0: no robot runs
+  std::uint64_t leave = 0;    ///< address where execution continues after a fault; 0: no robot runs
   std::uint64_t divided = 0;  ///< address of the latest division by zero; 0: none
   Fault fault;
 };
 
-/// What is called, in a signal handler, before a signal that another process has sent ends this one: which robot runs at that
-/// moment is chance. One for all of this process.
+/// Called in the signal handler before a signal from another process ends this one. The robot that runs at that moment is not the
+/// cause. One per process.
 inline std::atomic<void (*)()> before_sent_signal{nullptr};
 
-/// While one exists on a thread, that thread may run robots' code. Installs the handlers of the process once (handlers that
-/// were there before keep every fault that is not a robot's) and gives the thread a stack for them. From then on the system
-/// refuses every call that an instruction at the addresses of robots' programs makes, in this process and what it starts:
-/// such an instruction faults. A system without seccomp filters does not; a program may then end the process.
+/// A thread may run robots' code while it has a FaultGuard. The first guard installs the process's signal handlers; faults outside
+/// robots' code go to the handlers that were installed earlier. Each guard gives its thread an alternate signal stack.
+/// The first guard also installs a seccomp filter, which child processes inherit: a system call by an instruction at an address
+/// of robots' programs faults. Without seccomp filters in the kernel, a program's system call can end the process.
 class FaultGuard {
  public:
   FaultGuard();
@@ -46,7 +46,7 @@ class FaultGuard {
   FaultGuard(const FaultGuard&) = delete;
   FaultGuard& operator=(const FaultGuard&) = delete;
 
-  /// Of the thread that made this guard.
+  /// The data of the thread that made this guard.
   [[nodiscard]] RobotThread& thread() const { return thread_; }
 
  private:

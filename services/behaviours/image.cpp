@@ -37,7 +37,7 @@ struct Registry {
 };
 
 Registry& registry() {
-  static Registry* const instance = new Registry;  // outlives every user, at exit as well
+  static Registry* const instance = new Registry;  // never destroyed, because users may outlive static destructors
   return *instance;
 }
 

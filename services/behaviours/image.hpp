@@ -1,5 +1,5 @@
-/// A program in memory, ready to run: copies of its image at fixed addresses, so that pointers in a robot's memory and on its
-/// stack are valid in every process, on every machine and after every checkpoint.
+/// A loaded program: copies of its image at fixed addresses. Pointers in a robot's memory and on its stack are therefore valid in
+/// every process, on every machine and after every checkpoint.
 #pragma once
 
 #include <algorithm>
@@ -14,27 +14,27 @@
 
 namespace kilotwin::behaviours {
 
-/// Robot r runs in slot r % kSlots of its program: up to kSlots robots of a program run at the same time.
+/// Number of copies per program. Robot r runs in slot r % kSlots, so up to kSlots robots of a program run at the same time.
 inline constexpr std::uint32_t kSlots = 8;
-/// Where images live. Free of everything else in a position-independent program, under sanitizers as well.
+/// Address range of images. It is free in position-independent executables, also under sanitizers.
 inline constexpr std::uint64_t kFirstAddress = 0x20000000, kLastAddress = 0x70000000;
-inline constexpr std::uint64_t kAddressStep = 64 * 1024;  ///< slots begin at multiples of it
+inline constexpr std::uint64_t kAddressStep = 64 * 1024;  ///< alignment of slots
 inline constexpr std::uint64_t kStackOctets = 64 * 1024;
 
-/// One copy of an image with its stacks. From low to high addresses, each followed by a guard: main stack, interrupt stack,
-/// surroundings, exchange, image. Code and constants are not writable, data and stacks not executable.
+/// One copy of an image with its stacks. From low to high addresses: main stack, interrupt stack, surroundings, exchange, image,
+/// each followed by a guard page. Code and constants are not writable; data and stacks are not executable.
 class Slot {
  public:
-  /// Maps the slot. Throws RunError where the addresses are taken or memory is short.
+  /// Maps the slot. Throws RunError if the addresses are in use or memory is short.
   Slot(const ElfFile&, std::uint64_t address);
   ~Slot();
   Slot(const Slot&) = delete;
   Slot& operator=(const Slot&) = delete;
 
-  /// Octets of address space that a slot of this program takes.
+  /// Octets of address space that a slot of this program occupies.
   [[nodiscard]] static std::uint64_t size(const ElfFile&);
 
-  /// A function or variable of the image; `offset` is one of ElfFile::table.
+  /// A function or variable of the image at an offset from ElfFile::table.
   template <class T> [[nodiscard]] T at(std::uint64_t offset) const {
     return reinterpret_cast<T>(image_ + offset);
   }                                                                                                // NOLINT
@@ -42,9 +42,9 @@ class Slot {
   [[nodiscard]] KtSurroundings* surroundings() const {
     return reinterpret_cast<KtSurroundings*>(surroundings_);  // NOLINT
   }
-  /// A robot's data; behind them its heap.
+  /// Start of the robot's data, which its heap follows.
   [[nodiscard]] std::uint8_t* data() const { return at<std::uint8_t*>(data_offset_); }
-  /// Whether the octets before a robot's data are zero, as they were; makes them so.
+  /// Clears the watched octets before the robot's data. False if one was not zero.
   [[nodiscard]] bool clear_before_data() const {
     std::uint64_t any = 0;
     for (std::uint64_t i = 1; i <= watched_words_; ++i)
@@ -52,14 +52,14 @@ class Slot {
     if (any != 0) std::memset(data() - 8 * watched_words_, 0, 8 * watched_words_);
     return any == 0;
   }
-  /// One past the highest octet of the main stack; aligned to 16.
+  /// Address after the highest octet of the main stack; aligned to 16.
   [[nodiscard]] std::uint64_t stack_top() const { return stack_top_; }
   [[nodiscard]] std::uint64_t interrupt_stack_top() const { return interrupt_stack_top_; }
   [[nodiscard]] std::uint64_t image_address() const { return image_; }
-  /// A robot's data as they are at reset.
+  /// The robot's data at reset.
   [[nodiscard]] const std::vector<std::uint8_t>& initial_data() const { return initial_data_; }
 
-  std::mutex mutex;  ///< held while robots run here
+  std::mutex mutex;  ///< held while robots run in this slot
 
  private:
   std::uint64_t address_, size_, stack_top_, interrupt_stack_top_, surroundings_, exchange_, image_, data_offset_,
@@ -67,14 +67,14 @@ class Slot {
   std::vector<std::uint8_t> initial_data_;
 };
 
-/// A program in all its slots.
+/// A program with all its slots.
 class Program {
  public:
-  /// The program at this address. Engines and program sets of one process share what is the same. Throws RunError where
-  /// something else lies there or memory is short.
+  /// Loads the program at this address, or returns it if this process has loaded it there. Throws RunError if another program
+  /// occupies the address or memory is short.
   [[nodiscard]] static std::shared_ptr<Program> load(ElfFile file, const std::string& name,
                                                      const std::string& sha256, std::uint64_t address);
-  /// Octets of address space that it takes.
+  /// Octets of address space that the program occupies.
   [[nodiscard]] static std::uint64_t size(const ElfFile& file) { return kSlots * Slot::size(file); }
 
   Program(ElfFile file, std::string name, std::string sha256, std::uint64_t address);
@@ -82,7 +82,7 @@ class Program {
   const ElfFile file;
   const std::string name;
   const std::string sha256;
-  const std::uint64_t address, end;  ///< [address, end) is taken
+  const std::uint64_t address, end;  ///< the program occupies [address, end)
   [[nodiscard]] Slot& slot(std::uint32_t index) const { return *slots_[index]; }
   [[nodiscard]] std::uint64_t data_size() const { return file.data.last - file.data.first; }
 

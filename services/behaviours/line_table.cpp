@@ -6,7 +6,7 @@
 namespace kilotwin::behaviours {
 namespace {
 
-/// Little-endian values in a row; beyond the end all are 0 and `good` is false.
+/// Reads little-endian values one after the other. Beyond the end it returns 0 and `good` is false.
 class Octets {
  public:
   explicit Octets(std::string_view octets) : rest_(octets) {}
@@ -54,7 +54,7 @@ class Octets {
   std::string_view rest_;
 };
 
-/// One table: a header, and a program that makes the rows.
+/// One line table: a header, and the line-number program that generates the rows.
 class Table {
  public:
   Table(Octets& octets, const LineTables& sections) : sections_(sections), body_(octets.part(octets.fixed(4))) {}
@@ -95,7 +95,7 @@ class Table {
     return header.good && line_range_ > 0 && !operands_.empty();
   }
 
-  /// Entries of a format that the table itself describes; their names.
+  /// Reads a list of directories or files (DWARF 5), whose entry format the header describes, and returns the names.
   std::vector<std::string> read_names(Octets& header) {
     constexpr std::uint64_t kPath = 1;
     std::vector<Format> formats(header.fixed(1));
@@ -155,7 +155,7 @@ class Table {
         continue;
       }
       switch (opcode) {
-        case 0: {  // extended
+        case 0: {  // extended opcode
           Octets rest = body_.part(body_.variable());
           const std::uint64_t kind = rest.fixed(1);
           if (kind == 2) address = rest.fixed(8);

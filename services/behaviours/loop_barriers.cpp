@@ -10,19 +10,19 @@ namespace {
 
 struct Token {
   std::string_view text;
-  std::size_t at = 0;  ///< in the whole text
+  std::size_t at = 0;  ///< offset in the text
 };
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '$'; }
 
-/// Past the end of a literal in quotes that begins at `at`.
+/// Offset after the quoted literal that begins at `at`.
 std::size_t end_of_literal(std::string_view text, std::size_t at) {
   const char quote = text[at++];
   while (at < text.size() && text[at] != quote && text[at] != '\n') at += text[at] == '\\' ? 2u : 1u;
   return at < text.size() ? at + 1 : text.size();
 }
 
-/// Words, literals and single characters; no white space, no lines that begin with '#'.
+/// Splits the text into words, literals and single characters. Skips white space and lines that begin with '#'.
 std::vector<Token> tokens_of(std::string_view text) {
   std::vector<Token> tokens;
   bool line_begins = true;
@@ -55,7 +55,7 @@ std::vector<Token> tokens_of(std::string_view text) {
   return tokens;
 }
 
-/// The index of the bracket that closes the one at `open`, or the number of tokens.
+/// Index of the bracket that closes the one at `open`, or the number of tokens if there is none.
 std::size_t closing(const std::vector<Token>& tokens, std::size_t open) {
   int depth = 0;
   for (std::size_t i = open; i < tokens.size(); ++i) {
@@ -103,7 +103,7 @@ class Marker {
   };
   void insert(std::size_t at, std::string_view what) { inserts_.insert({at, std::string(what)}); }
 
-  /// The condition in tokens [first, end).
+  /// Inserts a barrier into the condition, tokens [first, end).
   void mark(std::size_t first, std::size_t end) {
     if (end >= tokens_.size() || is_declaration(first, end)) return;
     if (first == end) return insert(tokens_[end].at, std::string(kBarrier) + "1");
@@ -124,7 +124,7 @@ class Marker {
     if (semicolons.size() == 2) mark(semicolons[0] + 1, semicolons[1]);
   }
 
-  /// `T x = ...`: a word after a word, `*` or `&`, and then a single `=`.
+  /// Whether tokens [first, end) are a declaration `T x = ...`: a word after a word, `*` or `&`, then a single `=`.
   [[nodiscard]] bool is_declaration(std::size_t first, std::size_t end) const {
     for (std::size_t i = first; i + 1 < end; ++i) {
       const char c = tokens_[i].text[0];

@@ -1,4 +1,4 @@
-/// Busy waits that work: `while (!received);` ends when an interrupt sets `received`, volatile or not.
+/// Makes busy waits end: `while (!received);` sees an interrupt's write to `received`, even if it is not volatile.
 #pragma once
 
 #include <string>
@@ -6,9 +6,9 @@
 
 namespace kilotwin::behaviours {
 
-/// Preprocessed C or C++ in which every loop (while, do, for, and labels that a goto names) reads memory anew each time
-/// round: the condition begins with a barrier for the compiler that costs no instruction. Everything stays on its line.
-/// Text that it does not understand stays as it is; a condition that is a declaration (C++) as well.
+/// Inserts a compiler barrier, which costs no instruction, into every loop of preprocessed C or C++: while, do, for, and labels of
+/// goto. The loop then reads memory in each round. Lines keep their numbers. Text that the parser does not understand and C++
+/// conditions that are declarations stay unchanged.
 [[nodiscard]] std::string with_loop_barriers(std::string_view preprocessed);
 
 }  // namespace kilotwin::behaviours

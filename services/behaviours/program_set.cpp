@@ -8,7 +8,7 @@ namespace kilotwin::behaviours {
 
 namespace {
 
-/// A place for `size` octets that follows from the programs' hashes.
+/// An address for `size` octets, derived from the programs' hashes.
 std::uint64_t place_for(const std::string& hashes, std::uint64_t size) {
   const std::uint64_t room = kLastAddress - kFirstAddress;
   if (size > room) throw RunError("the programs of this experiment are too large to be in memory together");

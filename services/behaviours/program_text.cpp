@@ -18,7 +18,7 @@ namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
 namespace {
 
-/// Files of kilolib and of the simulators' copies of it, each with words that only a copy contains, one of which suffices.
+/// Headers of kilolib and of its copies in simulators. A file of such a name is a copy if it contains one of the words.
 struct Vendored {
   const char* name;
   std::vector<const char*> words;
@@ -36,7 +36,7 @@ const std::vector<Vendored>& vendored_headers() {
   return kHeaders;
 }
 
-/// Kilolib's and the simulators' own sources, which the runtime replaces.
+/// Whether a file is a source of kilolib or of a simulator's version of it, which the runtime replaces.
 bool is_kilolib_source(const fs::path& path, const std::string& text) {
   const std::string name = path.filename().string();
   if (name == "message_crc.c") return text.find("message_crc") != std::string::npos;
@@ -46,7 +46,7 @@ bool is_kilolib_source(const fs::path& path, const std::string& text) {
 }
 
 struct Include {
-  std::size_t begin, end;  ///< of "NAME" or <NAME> with what encloses it
+  std::size_t begin, end;  ///< range of "NAME" or <NAME>, delimiters included
   std::string name;
   bool quoted;
 };
@@ -73,7 +73,7 @@ std::vector<Include> includes_of(const std::string& text) {
   return result;
 }
 
-/// The text without comments and with string literals emptied, for what is looked up in it.
+/// The text without comments and with empty string literals, for searches.
 std::string code_of(const std::string& text) {
   std::string code;
   code.reserve(text.size());
@@ -108,7 +108,7 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error);
 }
 
-/// Files of a folder and of those in it, at most three deep, in the order of their names.
+/// Files below a folder, at most three levels deep, in the order of their names.
 std::vector<fs::path> files_below(const fs::path& folder) {
   constexpr std::size_t kMost = 4000;
   std::vector<fs::path> result;
@@ -127,7 +127,7 @@ std::vector<fs::path> files_below(const fs::path& folder) {
   return result;
 }
 
-/// Whether a project could begin here: it has what lies at the top of a repository.
+/// Whether a folder looks like the top of a repository.
 bool is_top(const fs::path& folder) {
   std::error_code error;
   for (const char* name :
@@ -137,14 +137,14 @@ bool is_top(const fs::path& folder) {
   return false;
 }
 
-/// Whether a folder is as wide as a home, or wider.
+/// Whether a folder is a home directory or a parent of one, which is too wide to search.
 bool is_wide(const fs::path& folder) {
   const char* const home = std::getenv("HOME");
   return std::distance(folder.begin(), folder.end()) < 3 || folder.parent_path() == "/home" ||
          (home != nullptr && folder == fs::path(home));
 }
 
-/// A project's folders around a file: its own, up to two above, and farther up to its top where that is found.
+/// Folders to search around a file: its own, up to two above it, and further ones up to the repository's top if there is one.
 std::vector<fs::path> folders_around(const fs::path& file) {
   constexpr std::size_t kSurely = 3, kMost = 8;
   std::vector<fs::path> result;
@@ -160,7 +160,7 @@ std::vector<fs::path> folders_around(const fs::path& file) {
   return result;
 }
 
-/// A header that is not where it is named, as a makefile's -I would find it.
+/// Finds a header that a makefile's -I would find, or nothing.
 std::optional<fs::path> header_around(const fs::path& includer, const std::string& name) {
   for (const fs::path& folder : folders_around(includer)) {
     for (const fs::path& candidate : files_below(folder)) {
@@ -175,11 +175,11 @@ class Preparation {
  public:
   Preparation(ProgramText& result, fs::path cache) : result_(result), cache_(std::move(cache)) {}
 
-  /// The file as it is to be compiled: itself, or a copy.
+  /// The file to compile: `file` itself, or a copy with changed #include lines.
   fs::path prepared(const fs::path& file) {
     const fs::path key = normal(file);
     if (const auto known = done_.find(key); known != done_.end()) return known->second;
-    done_.emplace(key, file);  // for headers that include each other
+    done_.emplace(key, file);  // ends the recursion for headers that include each other
     const auto text = os::read_if_there(file);
     if (!text) return file;
     std::vector<std::pair<Include, std::string>> changes, fixed;
@@ -223,7 +223,7 @@ class Preparation {
     return result;
   }
 
-  /// What an #include is to name instead; empty where it stays.
+  /// The new target of an #include, or "" to keep it.
   std::string replacement(const fs::path& file, const Include& include) {
     const fs::path named(include.name);
     const std::string base = named.filename().string();
@@ -254,7 +254,7 @@ class Preparation {
     return '"' + fs::absolute(prepared(*found)).string() + '"';
   }
 
-  /// Whether the search for headers finds it anyway: in the runtime, or among the compiler's own.
+  /// Whether a header is found by the compiler's search path: in the runtime or among the compiler's own.
   static bool is_runtime_header(const std::string& name) {
     static const std::set<std::string> kCompilers{"stdbool.h", "stddef.h", "stdarg.h",
                                                   "float.h",   "iso646.h", "stdalign.h"};
@@ -294,7 +294,7 @@ ProgramText program_text(const std::vector<fs::path>& sources, const fs::path& c
 
 namespace {
 
-/// What a text defines of these names, and does not merely declare: functions with a body, variables at the beginning of a line.
+/// The names that a text defines: functions with a body, and variables at the beginning of a line. Declarations do not count.
 std::set<std::string> defined_names(const std::string& code, const std::set<std::string>& names) {
   std::set<std::string> result;
   for (const std::string& name : names) {
@@ -306,8 +306,8 @@ std::set<std::string> defined_names(const std::string& code, const std::set<std:
   return result;
 }
 
-/// Sources around these: first what bears the name of an included header, then whatever lies next to the sources, then farther
-/// off.
+/// Further source files around a program, in order: those named like an included header, those beside its sources, those in folders
+/// around it.
 std::vector<fs::path> sources_around(const ProgramText& text) {
   std::set<std::string> stems;
   for (const fs::path& header : text.included) stems.insert(header.stem().string());
@@ -331,10 +331,10 @@ std::vector<fs::path> sources_around(const ProgramText& text) {
 std::vector<fs::path> sources_with(const std::set<std::string>& missing, const ProgramText& text,
                                    const std::function<std::string(const fs::path&)>& preprocessed) {
   static const std::regex kMain(R"(\bmain\s*\()");
-  constexpr std::size_t kMostOctets = 200'000;  // what regular expressions cope with
+  constexpr std::size_t kMostOctets = 200'000;  // std::regex overflows the stack on larger texts
   std::set<std::string> open;
   for (const std::string& name : missing) {
-    // Of a C++ name the last part, where that is a word.
+    // For a C++ name, take the last part if it is a word.
     const std::string last = name.substr(name.rfind(':') == std::string::npos ? 0 : name.rfind(':') + 1);
     if (std::all_of(last.begin(), last.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; }) &&
         !last.empty())
@@ -355,7 +355,7 @@ std::vector<fs::path> sources_with(const std::set<std::string>& missing, const P
     if (!std::regex_search(code, kMain) && !take(candidate, code)) without.push_back(candidate);
   }
   if (!result.empty()) return result;
-  // Names that macros put together are to be seen in preprocessed text alone.
+  // Names that macros assemble appear only in preprocessed text.
   constexpr std::size_t kMostFiles = 100;
   if (without.size() > kMostFiles) without.resize(kMostFiles);
   for (const fs::path& candidate : without) {

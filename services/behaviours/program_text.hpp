@@ -1,5 +1,5 @@
-/// The sources of a program as the compiler gets them. Programs come as they lie in their repositories: with a copy of kilolib
-/// next to them or in another folder, with headers that a makefile would find and files that it would link.
+/// Prepares a program's sources for the compiler without its makefile. Published programs come with a copy of kilolib, with headers
+/// in folders that the makefile names, and with further sources that it links.
 #pragma once
 
 #include <filesystem>
@@ -11,28 +11,28 @@
 namespace kilotwin::behaviours {
 
 struct ProgramText {
-  /// What to compile, in order: the sources, or copies below the cache where an #include had to be written anew (their lines
-  /// keep their numbers, and #line names the original).
+  /// The files to compile, in order: the sources, or copies in the cache with changed #include lines. Copies keep the line numbers
+  /// and name the original by #line.
   std::vector<std::filesystem::path> files;
-  /// The sources that remain, in the order of `files`: a copy of kilolib itself is left out.
+  /// The originals of `files`, in the same order. Copies of kilolib are left out.
   std::vector<std::filesystem::path> sources;
-  /// What was left aside or found elsewhere, one line each.
+  /// Lines for the user: files that were ignored or found elsewhere.
   std::vector<std::string> notes;
-  /// Local headers and sources that these sources include, directly or not.
+  /// Local files that the sources include, directly or indirectly.
   std::set<std::filesystem::path> included;
 };
 
-/// Reads the sources. Throws UserError where no program remains.
+/// Reads the sources. Throws UserError if all of them are copies of kilolib.
 [[nodiscard]] ProgramText program_text(const std::vector<std::filesystem::path>& sources,
                                        const std::filesystem::path& cache);
 
-/// Further sources near these that define one of the missing functions or variables and no main(); empty where there are none.
-/// `preprocessed` gives a source after its preprocessor, or nothing.
+/// Searches the folders around the sources for files that define one of the missing functions or variables and no main().
+/// `preprocessed` returns a source after preprocessing, or "" on failure.
 [[nodiscard]] std::vector<std::filesystem::path> sources_with(
     const std::set<std::string>& missing, const ProgramText& text,
     const std::function<std::string(const std::filesystem::path&)>& preprocessed);
 
-/// Whether a source is C++ by its name.
+/// Whether a source's file name has an ending of C++.
 [[nodiscard]] bool is_cpp(const std::filesystem::path& source);
 
 }  // namespace kilotwin::behaviours

@@ -51,13 +51,13 @@ std::string readable(std::string text) {
   return std::regex_replace(text, kAlias, "");
 }
 
-/// Of the options asked for, and about a type whose size differs.
-bool tells(const Diagnostic& found) {
+/// Whether a warning belongs to the requested options and is about a type whose size differs on the robot.
+bool is_relevant(const Diagnostic& found) {
   static const std::set<std::string> kOptions{"-Wconversion", "-Woverflow", "-Wtype-limits",
                                               "-Wshift-count-overflow", "-Wformat="};
   if (!kOptions.contains(found.option)) return false;
   if (found.option != "-Wconversion") return true;
-  // To types that are smaller there; all others cut alike.
+  // Conversions matter only for types that are smaller on the robot.
   const std::string text = readable(found.text);
   for (const char* type : {"'int'", "'unsigned int'", "'size_t'", "'double'"}) {
     if (text.find(std::string("to ") + type) != std::string::npos) return true;
@@ -65,11 +65,11 @@ bool tells(const Diagnostic& found) {
   return false;
 }
 
-/// Integers of a temporary or variable in the dump: octets, largest magnitude.
+/// Integer type of a temporary or variable in the dump: size in octets and largest magnitude.
 struct Value {
   int octets = 0;
   double most = 0;
-  bool overflows = false;  ///< a product or shift of 16 bits that may not fit, or a sum with one
+  bool overflows = false;  ///< a 16-bit product or shift that may overflow, or a sum that contains one
   std::string place;
 };
 
@@ -116,7 +116,7 @@ std::vector<std::string> narrow_products(const std::string& gimple) {
       values[match[2]] = of_type(match[1]);
       continue;
     }
-    // Locations of variables are written in front of them; they say nothing here.
+    // The dump puts a location before each variable; remove them.
     static const std::regex kInner(R"(\[[^\]]+:\d+:\d+\] ?)");
     const std::size_t bracket = line.find(']');
     if (bracket == std::string::npos) continue;
@@ -194,7 +194,7 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
       alike.insert(found.file + ':' + found.line + found.option);
     std::set<std::string> lines;
     for (const Diagnostic& found : diagnostics(robot.errors)) {
-      if (!tells(found) || alike.contains(found.file + ':' + found.line + found.option)) continue;
+      if (!is_relevant(found) || alike.contains(found.file + ':' + found.line + found.option)) continue;
       const std::string place = found.file + ':' + found.line;
       if (!lines.insert(place + found.option).second) continue;
       result.push_back(place + ':' + found.column +

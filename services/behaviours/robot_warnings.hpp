@@ -1,4 +1,4 @@
-/// Where a program would compute otherwise on the robot, whose int has 16 bits and whose double 32.
+/// Warnings for code that computes something else on the robot, where int has 16 bits and double has 32.
 #pragma once
 
 #include <filesystem>
@@ -9,14 +9,14 @@
 
 namespace kilotwin::behaviours {
 
-/// What avr-gcc warns of and the host's compiler, asked the same, does not: values that are cut, comparisons that are always
-/// true, overflow in constants, formats of printf. Further products and shifts of 16 bits whose result is used with more.
-/// Lines as compilers write them, "FILE:LINE:COLUMN: warning: on the robot ...", in the users' files only. Empty where this
-/// machine has no avr-gcc, or avr-gcc does not compile the program.
+/// Warnings that avr-gcc gives and the host's compiler with the same options does not: truncated values, comparisons that are always
+/// true, overflow in constants, formats of printf. Also 16-bit products and shifts whose result is used with more bits.
+/// Each line is "FILE:LINE:COLUMN: warning: on the robot ..." and is about a file of the user. Empty if this machine has no avr-gcc
+/// or avr-gcc does not compile the program.
 [[nodiscard]] std::vector<std::string> robot_warnings(const std::vector<std::filesystem::path>& sources,
                                                       const CompileOptions& options = {});
 
-/// Part of it, for tests: reads what `avr-gcc -fdump-tree-gimple-lineno` writes.
+/// Finds the 16-bit products and shifts in the output of `avr-gcc -fdump-tree-gimple-lineno`. Exposed for tests.
 [[nodiscard]] std::vector<std::string> narrow_products(const std::string& gimple);
 
 }  // namespace kilotwin::behaviours

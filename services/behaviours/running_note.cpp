@@ -18,10 +18,10 @@ namespace {
 using Running = BehavioursEngine::Running;
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free && std::atomic<std::int64_t>::is_always_lock_free);
 
-/// The notes of this process that tell of running programs, for the signal handler.
+/// All notes of this process, for the signal handler.
 std::array<std::atomic<Running*>, 64> noted{};
 
-/// A signal that came from outside is no robot's doing.
+/// Clears all notes, because a signal from another process is not caused by a robot.
 void clear_notes() {
   for (const auto& place : noted) {
     if (Running* const running = place.load()) running->robot.store(BehavioursEngine::kNobody);

@@ -1,4 +1,4 @@
-/// Whose program a host runs, in a file of the run directory: it tells who has brought down the host.
+/// A file in the run directory with the robot whose program a host is running. After a crash of the host it identifies the cause.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 
 namespace kilotwin::behaviours {
 
-/// The file, mapped and written by the host of this number while the object exists. A host that ends in order removes it.
+/// The host maps the file and writes to it while this object exists. The destructor removes the file.
 class RunningNote {
  public:
-  /// Throws RunError where the file cannot be made.
+  /// Creates and maps the file. Throws RunError if that fails.
   RunningNote(const std::filesystem::path& run_directory, HostId host);
   ~RunningNote();
   RunningNote(const RunningNote&) = delete;
@@ -25,10 +25,10 @@ class RunningNote {
 
 struct Culprit {
   std::uint32_t robot = 0;
-  Tick tick;  ///< of the step in which its program was running
+  Tick tick;  ///< tick from which the host was stepping
 };
-/// Whose program was running when a host ended; nobody where it was between programs, or was ended by a signal that another
-/// process had sent. Removes the note.
+/// The robot whose program was running when the host ended. Nothing if the host was between programs, or a signal from another
+/// process ended it. Removes the file.
 [[nodiscard]] std::optional<Culprit> take_note(const std::filesystem::path& run_directory, HostId host);
 
 }  // namespace kilotwin::behaviours

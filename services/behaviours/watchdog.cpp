@@ -11,11 +11,10 @@
 namespace kilotwin::behaviours {
 namespace {
 
-/// How often it is looked.
 constexpr auto kPeriod = std::chrono::milliseconds(1000);
-/// A call that takes so many looks does not come back. Programs count what they execute and hand over within milliseconds,
-/// unless one has jumped into the middle of an instruction, say, and left the code that counts.
-constexpr int kNamed = 2, kLost = 30;
+/// Periods after which a call is reported, and after which the process is aborted. The cycle counters return control within
+/// milliseconds, unless a program leaves the counted code, e.g. by a jump into the middle of an instruction.
+constexpr int kReportAfter = 2, kAbortAfter = 30;
 
 }  // namespace
 
@@ -35,7 +34,7 @@ Watchdog::~Watchdog() {
 void Watchdog::watch() {
   struct Watched {
     std::uint64_t entry = 0;
-    int looks = 0;  // that have found the same call
+    int periods = 0;  // in which the same call was running
   };
   std::vector<Watched> watched(engines_.size());
   std::unique_lock lock(mutex_);
@@ -44,16 +43,16 @@ void Watchdog::watch() {
       const BehavioursEngine::Running& running = engines_[i]->running();
       const std::uint64_t entry = running.entry.load(std::memory_order_acquire);
       const std::uint32_t robot = running.robot.load(std::memory_order_relaxed);
-      auto& [before, looks] = watched[i];
-      looks = robot != BehavioursEngine::kNobody && entry == before ? looks + 1 : 0;
+      auto& [before, periods] = watched[i];
+      periods = robot != BehavioursEngine::kNobody && entry == before ? periods + 1 : 0;
       before = entry;
-      if (looks < kNamed) continue;
-      if (looks == kNamed) say(fmt::format("the program of robot {} has not returned for over 1 s", robot));
+      if (periods < kReportAfter) continue;
+      if (periods == kReportAfter) say(fmt::format("the program of robot {} has not returned for over 1 s", robot));
       if (interrupted() != 0) {
         say_error(fmt::format("kilotwin: interrupted while the program of robot {} did not return", robot));
         std::_Exit(1);
       }
-      if (looks == kLost) {
+      if (periods == kAbortAfter) {
         say_error(fmt::format("kilotwin: the program of robot {} does not return", robot));
         std::abort();
       }

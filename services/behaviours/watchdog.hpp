@@ -1,4 +1,4 @@
-/// Says which robot's program does not return: an engine cannot, as it waits for it.
+/// Reports a robot whose program does not return. The engine cannot report it, because it waits for the program.
 #pragma once
 
 #include <condition_variable>
@@ -10,8 +10,8 @@
 
 namespace kilotwin::behaviours {
 
-/// Watches engines of this process from a thread of its own. Names a robot whose program has not returned for over 1 s. Where
-/// the process has been interrupted meanwhile, ends it with status 1, since nobody else can; after 30 s, aborts it.
+/// A thread that watches the engines of this process. It prints the robot whose program has not returned for more than 1 s. If the
+/// process was interrupted meanwhile, it ends the process with status 1. After 30 s it aborts the process.
 class Watchdog {
  public:
   explicit Watchdog(std::vector<const BehavioursEngine*> engines);
