@@ -1,4 +1,4 @@
-// `kilotwin build`: compiles a behaviour for simulation, or checks that it fits the real robot.
+// `kilotwin build`: compiles a behaviour for simulation, or checks that it fits into a robot.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

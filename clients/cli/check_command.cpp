@@ -1,4 +1,4 @@
-// `kilotwin check`: everything that would keep an experiment from running.
+// `kilotwin check`: makes all checks that are possible before a run.
 #include <CLI/CLI.hpp>
 #include <memory>
 

@@ -1,5 +1,4 @@
-/// The commands of `kilotwin`. Each function adds its command and the command's options to the program's parser; its
-/// file has the same name. ARCHITECTURE.md says what the commands call.
+/// The commands of `kilotwin`. Each function adds a command with its options to the program's parser. add_X() is in X_command.cpp.
 #pragma once
 
 #include <functional>
@@ -10,7 +9,7 @@ class App;
 
 namespace kilotwin::cli {
 
-/// Exit statuses: docs and scripts rely on them.
+/// Exit statuses, part of the public interface (docs/reference).
 inline constexpr int kDone = 0, kFailed = 1, kBadInput = 2;
 
 struct Command {
@@ -18,7 +17,7 @@ struct Command {
   std::function<int()> work;   ///< returns the exit status; throws UserError and RunError
 };
 
-/// `started_s`: when the program was started, steady clock, s.
+/// `started_s`: start time of the program, steady clock, s.
 [[nodiscard]] Command add_run(CLI::App& program, double started_s);
 [[nodiscard]] Command add_check(CLI::App& program);
 [[nodiscard]] Command add_build(CLI::App& program);

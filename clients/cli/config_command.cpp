@@ -1,4 +1,4 @@
-// `kilotwin config`: the DDS configuration with which a program joins a run.
+// `kilotwin config`: prints the DDS configuration with which a program joins a run.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

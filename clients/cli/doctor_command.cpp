@@ -1,4 +1,4 @@
-// `kilotwin doctor`: what on this machine would keep an experiment from running, and the remedy.
+// `kilotwin doctor`: finds obstacles to running experiments on this machine, and names remedies.
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// The result of a check. With a remedy it is a warning, or, with `fatal`, a failure.
+/// The result of a check. A finding with a remedy is a warning, or a failure if it is `fatal`.
 struct Finding {
   std::string found, remedy;
   bool fatal = false;

@@ -1,4 +1,4 @@
-// `kilotwin export`: tables from a recorded run.
+// `kilotwin export`: writes tables from a recorded run.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -63,7 +63,7 @@ int export_run(const ExportArguments& arguments) {
        [&](recorder::Reader& reader, const auto& csv) { return recorder::export_radio(reader, csv); });
   each(arguments.cells,
        [&](recorder::Reader& reader, const auto& csv) { return kilogrid::export_cells(reader, csv); });
-  // The tables hold what lies before the damage.
+  // A damaged recording is exported up to the damage.
   return damaged ? kFailed : kDone;
 }
 

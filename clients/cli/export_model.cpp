@@ -17,7 +17,7 @@ namespace {
 
 namespace pb = google::protobuf;
 
-/// Sets every field that is not set to its default, so that the file says all that holds.
+/// Sets every absent field to its default, so that the file is complete.
 void write_defaults(pb::Message& message) {
   const pb::Reflection& r = *message.GetReflection();
   for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
@@ -33,7 +33,7 @@ void write_defaults(pb::Message& message) {
   }
 }
 
-/// Adds what was drawn for the robot to what the experiment states of it.
+/// Adds the robot's random draws to the parameters that the experiment states.
 proto::RobotModel model_of(std::uint32_t robot, const RobotParameters& parameters, proto::RobotModel model) {
   const Calibration& calibration = parameters.calibration(robot);
   model.set_robot(robot);
@@ -65,7 +65,7 @@ std::uint32_t export_model(const proto::Manifest& manifest, const std::filesyste
   google::protobuf::TextFormat::PrintToString(model, &blocks);
   text += blocks;
 
-  // A robot takes a line.
+  // One line per robot.
   google::protobuf::TextFormat::Printer line;
   line.SetSingleLineMode(true);
   const RobotParameters parameters(plan);

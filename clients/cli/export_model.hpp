@@ -1,4 +1,4 @@
-/// The model of a run as a file. `run --model` reads it and gives the same robots.
+/// Writes a run's model to a file. `run --model` with it gives robots with the same parameters.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 
 namespace kilotwin::cli {
 
-/// Writes the parameters of motion, and of the radio's propagation where the experiment uses that, with all defaults; the
-/// effects; and the parameters of every robot, drawn ones included. Returns the number of
-/// robots. Throws RunError where the file cannot be written.
+/// Writes the motion parameters and, if the experiment uses the PROPAGATION model, those of the radio, all with defaults. Also writes
+/// the effects and every robot's parameters, including random draws. Returns the number of robots. Throws RunError if the file
+/// cannot be written.
 std::uint32_t export_model(const proto::Manifest&, const std::filesystem::path& file);
 
 }  // namespace kilotwin::cli

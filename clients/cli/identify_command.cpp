@@ -1,4 +1,4 @@
-// `kilotwin identify`: starts the program kilotwin-identify, which lies beside this one, with the same arguments.
+// `kilotwin identify`: executes the program kilotwin-identify beside this one with the same arguments.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -14,7 +14,7 @@
 namespace kilotwin::cli {
 namespace {
 
-/// Becomes that program. Throws RunError where it is not there.
+/// Replaces this process by kilotwin-identify. Throws RunError if it does not exist.
 int become_identify(const std::vector<std::string>& arguments) {
   const std::filesystem::path program =
       std::filesystem::read_symlink("/proc/self/exe").parent_path() / "kilotwin-identify";
@@ -38,7 +38,7 @@ int become_identify(const std::vector<std::string>& arguments) {
 Command add_identify(CLI::App& program) {
   CLI::App& app =
       *program.add_subcommand("identify", "fit the model to measured data and find effects that it lacks");
-  // The other program parses the arguments, --help included.
+  // kilotwin-identify parses the arguments, including --help.
   app.set_help_flag();
   app.prefix_command();
   return {&app, [&app] { return become_identify(app.remaining()); }};

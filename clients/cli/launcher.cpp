@@ -25,12 +25,12 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = os::Children::Clock;
 
-/// For how long services may take to leave by themselves once the run has broken, or is interrupted.
+/// Time for services to leave by themselves after the run has failed or was interrupted.
 constexpr auto kGrace = std::chrono::milliseconds(3000);
 constexpr auto kPoll = std::chrono::milliseconds(5);
 
-/// Why a service ended, as it said itself; without the prefix of a user's terminal.
-std::string last_words(const os::Child& service) {
+/// The last line of a service's log, without the prefix "kilotwin: ".
+std::string last_message(const os::Child& service) {
   const std::string line = service.last_line();
   std::string_view text = error_text(line);
   constexpr std::string_view kPrefix = "kilotwin: ";
@@ -55,7 +55,7 @@ class Launcher {
     for (std::uint32_t h = 0; h < plan_.hosts; ++h) {
       start(plan_.behaviours(HostId{h}), {"behaviours", "--share", fmt::format("{}/{}", h + 1, plan_.hosts)});
     }
-    // The launcher watches the run as any other program may.
+    // The launcher reads the public topics, like any other client.
     const dds::Participant participant({options_.domain, {}});
     const dds::Reader<PublicRunStatus> status(participant, topics::run_status(),
                                               [this](const PublicRunStatus& sample, dds::SampleState state) {
@@ -68,7 +68,7 @@ class Launcher {
     return watch();
   }
 
-  /// Whose program has brought down its host, where that is what ended the run.
+  /// The robot whose program crashed its host, if that ended the run.
   [[nodiscard]] const std::optional<behaviours::Culprit>& corrupted_by() const { return corrupted_by_; }
 
  private:
@@ -83,7 +83,7 @@ class Launcher {
                                "--give-up-after", fmt::format("{}", options_.give_up_after_s)});
     os::ChildOptions options;
     options.log = directory_.path() / "logs" / (file + ".log");
-    options.own_group = true;  // the launcher decides how the run ends, not the terminal's Ctrl-C
+    options.own_group = true;  // the terminal's Ctrl-C must reach only the launcher, which ends the run in order
     options.tag = id.value();
     services_.start(name, std::move(words), options);
   }
@@ -98,23 +98,23 @@ class Launcher {
     latest_.paused = sample.phase == kilotwin_open_PAUSED;
     const bool over = sample.phase == kilotwin_open_ENDED || sample.phase == kilotwin_open_BROKEN;
     latest_.waiting_for = over ? "" : sample.note;
-    // While it starts there is something to show only if it waits for somebody.
+    // While the run is starting, show only waits.
     started_ = started_ || sample.phase != kilotwin_open_STARTING || sample.note[0] != '\0';
   }
 
   void on_member(const WireMember& sample) {
-    // A federate that left because of another says so; the first of the others is where the run broke.
+    // kLeft marks federates that left because another one failed. The first failure without it is the cause.
     const std::string_view failure = sample.failure;
     if (sample.phase != kilotwin_wire_FAILED || failure.starts_with(kLeft)) return;
     const std::lock_guard lock(mutex_);
-    if (told_.empty()) told_ = fmt::format("{}: {}", sample.name, failure);
+    if (cause_.empty()) cause_ = fmt::format("{}: {}", sample.name, failure);
   }
 
-  /// Collects services that have ended, and finds the first of them that broke the run.
+  /// Collects services that have ended, and finds the first one whose failure ended the run.
   void reap() {
     for (os::Child& service : services_.reap()) {
       const os::ProcessEnd end = *service.process().poll();
-      // Bad input is bad input, whichever of several services finds it first.
+      // Bad input gives status 2, whichever service reports it first.
       refused_ = refused_ || (end.signal == 0 && end.code == kBadInput);
       if (end.well() || interrupted_ || broken_) continue;
       broken_ = true;
@@ -122,7 +122,7 @@ class Launcher {
         if (plan_.behaviours(HostId{h}).value() == service.tag())
           corrupted_by_ = behaviours::take_note(directory_.path(), HostId{h});
       }
-      if (!corrupted_by_) name_culprit(service, end);
+      if (!corrupted_by_) report_failure(service, end);
       services_.allow_until(Clock::now() + (corrupted_by_ ? std::chrono::milliseconds(0) : kGrace));
     }
   }
@@ -132,7 +132,7 @@ class Launcher {
       reap();
       if (interrupted() != 0 && !interrupted_) {
         interrupted_ = true;
-        services_.signal(plan_.station().value(), SIGTERM);  // the station ends the run in order
+        services_.signal(plan_.station().value(), SIGTERM);  // the station ends the run by a directive
         services_.allow_until(Clock::now() + kGrace);
       }
       {
@@ -151,20 +151,20 @@ class Launcher {
     return kDone;
   }
 
-  /// Says which service broke the run, at once: what follows is only cleaning up.
-  void name_culprit(os::Child& service, const os::ProcessEnd& end) {
+  /// Prints the failed service immediately, before the clean-up.
+  void report_failure(os::Child& service, const os::ProcessEnd& end) {
     progress_.clear();
     const std::string so_far = "what was recorded so far is in " + directory_.path().string();
     if (end.signal != 0) {
       return say_error(fmt::format("kilotwin: {} (process {}) {}; {}", service.name(), service.process().id(),
                                    os::in_words(end), so_far));
     }
-    const std::string line = last_words(service);
+    const std::string line = last_message(service);
     if (end.code == kBadInput) return say_error(line);
     const std::lock_guard lock(mutex_);
     const std::string why =
-        !told_.empty()
-            ? told_
+        !cause_.empty()
+            ? cause_
             : fmt::format("{}: {}", service.name(),
                           line.empty() ? os::in_words(end) + " and said nothing; is the disk full?" : line);
     say_error(fmt::format("kilotwin: {}; {}", why, so_far));
@@ -177,10 +177,10 @@ class Launcher {
   os::Children services_;
   std::optional<behaviours::Culprit> corrupted_by_;
   bool interrupted_ = false, broken_ = false, refused_ = false;
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   RunProgress latest_;
   bool started_ = false;
-  std::string told_;  // why the first federate failed that did not only leave because of another
+  std::string cause_;  // failure text of the first federate that did not leave because of another
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// Starts the services of a federated run as processes of this machine, shows the progress of the run, and ends all services.
-/// It takes no part in the run: the services could as well be started by hand.
+/// The launcher starts the services of a federated run as processes on this machine, shows the progress of the run, and ends all
+/// services. It is not a federate; services started by hand give the same run.
 #pragma once
 
 #include "clients/cli/prepare.hpp"
@@ -9,13 +9,13 @@ namespace kilotwin::cli {
 
 struct LaunchOptions {
   std::uint32_t domain = 0;
-  double start_monotonic_s = 0;  ///< when the command was given
-  double give_up_after_s = 0;    ///< how long services wait for each other without progress; 0: for ever
+  double start_monotonic_s = 0;  ///< start time of the command, steady clock, s
+  double give_up_after_s = 0;    ///< longest wait of services for each other without progress; 0: no limit
   bool show_progress = true;
 };
 
-/// Returns the exit status when all services have ended. Reports the first service that was lost or failed on stderr, at once.
-/// Throws RunError if a service cannot be started.
+/// Runs the services until all have ended, and returns the exit status. Prints the first service that was lost or failed to stderr
+/// immediately. Throws RunError if a service cannot be started.
 int launch(const RunPlan& plan, const recorder::RunDirectory& directory, const LaunchOptions& options);
 
 }  // namespace kilotwin::cli

@@ -1,4 +1,4 @@
-// The program `kilotwin`: every command is a file of its own, see commands.hpp.
+// The program `kilotwin`. commands.hpp lists its commands.
 
 #include <CLI/CLI.hpp>
 #include <chrono>

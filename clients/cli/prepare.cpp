@@ -34,9 +34,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Simulated over wall time. At the slowest a tick takes minutes.
+/// Limits of simulated time over wall time. At the slowest pace a tick takes minutes.
 constexpr double kSlowestPace = 1e-4, kFastestPace = 1e9;
-/// Of a robot from the origin: arenas are at most 1e6 wide.
+/// Limit of a robot's coordinates. Arenas are at most 1e6 mm wide.
 constexpr double kFarthest_mm = 1e7;
 
 double parse_pace(const std::string& text) {
@@ -52,7 +52,7 @@ double parse_pace(const std::string& text) {
   return factor;
 }
 
-/// Run ids must differ; results do not depend on them.
+/// A random run id. Ids of runs on one domain must differ; results do not depend on them.
 std::uint64_t new_run_id() {
   std::random_device device;
   const std::uint64_t id = static_cast<std::uint64_t>(device()) << 32 | device();
@@ -86,7 +86,7 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
     const behaviours::CompiledProgram compiled = is_linked     ? checked_firmware(sources.front())
                                                  : group.avr() ? behaviours::compile_firmware(sources, options)
                                                                : behaviours::compile(sources, options);
-    if (notes == Notes::kSaid) {
+    if (notes == Notes::kPrinted) {
       for (const std::string& note : compiled.notes) say("note: " + note);
     }
     int index = 0;
@@ -119,8 +119,8 @@ void copy_sources(const LoadedExperiment& loaded, const fs::path& to) {
   }
 }
 
-/// The experiment with all overrides, such that it runs again from the run directory: with the compiled programs and copies of
-/// its other files. Throws filesystem_error.
+/// The experiment with all overrides and with paths into the run directory, which gets copies of its files, so that it can run again
+/// from there. Throws filesystem_error.
 std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manifest& manifest,
                               const recorder::RunDirectory& directory) {
   proto::Experiment experiment = manifest.experiment();
@@ -159,7 +159,7 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
   return text + fields;
 }
 
-/// Refuses a run whose services do not fit on this machine.
+/// Throws UserError or RunError if one machine cannot run that many services.
 void check_processes(const proto::Deployment& deployment) {
   const std::uint32_t partitions = deployment.partition_columns() * deployment.partition_rows();
   const std::uint32_t services = partitions + deployment.hosts() + 2;
@@ -238,7 +238,7 @@ Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, 
 Prepared prepare(const RunArguments& arguments) {
   const LoadedExperiment loaded = load_with_overrides(arguments);
   if (arguments.mode == "federated" && !arguments.prepare) check_processes(loaded.experiment.deployment());
-  auto [manifest, objects] = resolve(loaded, arguments, Notes::kSaid);
+  auto [manifest, objects] = resolve(loaded, arguments, Notes::kPrinted);
   fs::path checkpoint;
   if (manifest.resumed()) {
     checkpoint = checkpoint_directory(arguments.resume);

@@ -1,4 +1,4 @@
-/// From arguments to a run directory that every service can run from.
+/// Preparation of a run: from arguments to a run directory that all services read.
 #pragma once
 
 #include "clients/cli/run_arguments.hpp"
@@ -11,15 +11,15 @@ namespace kilotwin::cli {
 /// The experiment with all overrides applied. Throws UserError.
 [[nodiscard]] LoadedExperiment load_with_overrides(const RunArguments& arguments);
 
-/// Whether the compiler's notes on programs are shown.
-enum class Notes { kSaid, kSilent };
+/// Whether the compiler's notes on programs are printed.
+enum class Notes { kPrinted, kSilent };
 
 struct Resolved {
   proto::Manifest manifest;
   std::vector<std::filesystem::path> objects;  ///< the compiled programs, in the manifest's order
 };
-/// Checks everything that can be checked before a run: places robots, reads images and EEPROMs, compiles programs (once:
-/// results are cached). Writes nothing. Throws UserError with the place of the first error.
+/// Makes all checks that are possible before a run: places robots, reads images and EEPROMs, compiles programs or takes them from the
+/// cache. Writes nothing else. Throws UserError with the place of the first error.
 [[nodiscard]] Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, Notes notes);
 
 struct Prepared {
@@ -27,14 +27,13 @@ struct Prepared {
   proto::Manifest manifest;
 };
 
-/// Resolves the experiment and writes the run directory. Nothing is left behind where it throws
-/// (UserError for bad input).
+/// Resolves the experiment and writes the run directory. If it throws (UserError for bad input), it leaves no files behind.
 [[nodiscard]] Prepared prepare(const RunArguments& arguments);
 
 /// The manifest of a prepared directory. Throws UserError.
 [[nodiscard]] proto::Manifest read_manifest(const recorder::RunDirectory& directory);
 
-/// "3x2" -> {3, 2}. Throws UserError.
+/// Parses columns and rows: "3x2" gives {3, 2}. Throws UserError.
 [[nodiscard]] std::pair<std::uint32_t, std::uint32_t> parse_partitions(const std::string& text);
 
 }  // namespace kilotwin::cli

@@ -13,7 +13,7 @@
 namespace kilotwin::cli {
 namespace {
 
-/// What the arguments lack, in one line.
+/// The error line about wrong arguments.
 std::string complaint(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
   const std::vector<CLI::App*> given = program.get_subcommands();
   if (!given.empty())
@@ -32,7 +32,7 @@ int parse_and_run(int argc, char** argv, const std::string& description,
   program.require_subcommand(1);
   program.set_version_flag("--version", fmt::format("kilotwin {} ({})", build_identity(), build_compiler()));
   const std::vector<Command> commands = add_commands(program);
-  // After the commands, which would inherit it.
+  // Set after the commands are added, because they would inherit it.
   program.footer(
       "kilotwin COMMAND --help lists the options of a command. Exit status: 0 done, 1 the run or the check "
       "failed, 2 bad input or arguments.");
@@ -54,7 +54,7 @@ int parse_and_run(int argc, char** argv, const std::string& description,
 
 int run_program(int argc, char** argv, const std::string& description,
                 const std::function<std::vector<Command>(CLI::App&)>& add_commands) {
-  // The next file to be opened would take the place of a closed stdin, stdout or stderr, and receive what is written there.
+  // If stdin, stdout or stderr is closed, the next file that is opened would get its descriptor and receive the program's output.
   for (int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) return kFailed;
   }

@@ -1,4 +1,4 @@
-/// What the programs `kilotwin` and `kilotwin-identify` share: from arguments to an exit status.
+/// The common main function of `kilotwin` and `kilotwin-identify`.
 #pragma once
 
 #include <functional>
@@ -9,8 +9,8 @@
 
 namespace kilotwin::cli {
 
-/// Parses the arguments, runs the command that they name and returns the exit status. Prints every error as one line on stderr.
-/// `add_commands` adds the commands to the parser that it is given.
+/// Parses the arguments, runs the command and returns the exit status. Prints an error as one line on stderr. `add_commands` adds the
+/// commands to the parser that it receives.
 [[nodiscard]] int run_program(int argc, char** argv, const std::string& description,
                               const std::function<std::vector<Command>(CLI::App&)>& add_commands);
 

@@ -50,7 +50,7 @@ void Progress::show(double share, const std::string& what, const std::string& pa
   if (!shown_) return;
   const std::lock_guard lock(mutex_);
   if (!part.empty() && !watcher_.joinable()) watcher_ = std::thread([this] { watch(); });
-  // Estimates of the work left may be revised; a share that was shown as done stays done.
+  // The caller may revise its estimate of the work, but the displayed fraction must not decrease.
   share_ = std::max(share_, share);
   const bool another_part = part != part_;
   what_ = what;

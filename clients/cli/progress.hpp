@@ -1,4 +1,4 @@
-/// How far work is, on stderr: on a terminal one line that is kept up to date, else a line now and then.
+/// Progress display on stderr: on a terminal one line that is updated, else a line at intervals.
 #pragma once
 
 #include <chrono>
@@ -12,22 +12,23 @@
 
 namespace kilotwin::cli {
 
-/// Shows the share done, the time since the start, and what is being done. All functions may be called from any thread.
+/// Shows the completed fraction, the time since the start, and the current activity. All functions may be called from any thread.
 class Progress {
  public:
-  /// `shown`: false for one that stays silent.
+  /// `shown`: false disables the display.
   explicit Progress(bool shown);
-  /// Takes the line off the screen.
+  /// Removes the line from the screen.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// The share done, 0..1, and what is done now; shown when enough time has passed. Work in parts that last names them: a
-  /// new part is shown at once, and the time goes on while it lasts.
+  /// Sets the completed fraction, 0..1, and the current activity. The display changes if enough time has passed since the last
+  /// change. `part` names a long part of the work: the display changes immediately when the part changes, and its time advances
+  /// while the part lasts.
   void show(double share, const std::string& what, const std::string& part = {});
-  /// Whether show() would show anything: a caller for whom the text is costly asks first.
+  /// Whether show() would change the display. Call it first if the text is costly.
   [[nodiscard]] bool due();
-  /// Takes the line off the screen until the next show().
+  /// Removes the line from the screen until the next show().
   void clear();
   /// "[######........]  43 %  1:07  what"
   [[nodiscard]] static std::string line(double share, double seconds, const std::string& what, bool bar);
@@ -46,10 +47,10 @@ class Progress {
   std::string what_, part_;
   Clock::time_point next_;
   bool on_screen_ = false, ends_ = false;
-  std::thread watcher_;  ///< keeps the time going while a part lasts
+  std::thread watcher_;  ///< updates the time while a part lasts
 };
 
-/// The progress of a run: simulated time, speed over real time, robots, messages, and for whom the run waits.
+/// Progress of a run: simulated time, speed relative to real time, robots, messages, and the federates for which the run waits.
 class ProgressBar {
  public:
   ProgressBar(const RunPlan& plan, bool shown);

@@ -1,4 +1,4 @@
-/// The state of all robots at one tick, as recordings hold it.
+/// The state of all robots at one tick, in the form that recordings hold.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ class RecordedState {
  public:
   explicit RecordedState(const RunPlan& plan) : measurement_(plan) {}
 
-  /// Of a swarm, with what the tracker measures of it. Valid until the next call, and as long as the swarm.
+  /// The state of a swarm with its measured poses. Valid until the next call and as long as the swarm.
   [[nodiscard]] recorder::StateView of(const SwarmView&);
 
  private:
@@ -22,7 +22,7 @@ class RecordedState {
   MeasuredPoses measured_;
 };
 
-/// The first value that differs, in words: "robot 3: x_mm is 1.5, recorded was 1.25". Empty where every bit agrees.
+/// The first difference as text: "robot 3: x_mm is 1.5, recorded was 1.25". Empty if all bits agree.
 [[nodiscard]] std::string first_difference(const recorder::StateView& state, const proto::StateRecord& recorded);
 
 }  // namespace kilotwin::cli

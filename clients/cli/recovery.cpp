@@ -27,7 +27,7 @@ Tick last_recorded(const fs::path& recording) {
       if (record->has_hash()) last = Tick{record->hash().first_tick() + record->hash().chain_size() - 1};
     }
   } catch (const UserError&) {
-    // The attempt broke before anything was recorded.
+    // The attempt ended before the first record.
   }
   return last;
 }
@@ -45,7 +45,7 @@ std::optional<CheckpointDirectory> newest_until(const recorder::RunDirectory& di
   return found;
 }
 
-/// Moves checkpoint and recording to RUN/recovered. Returns the start of the next attempt in words.
+/// Moves checkpoint and recording to RUN/recovered. Returns a description of the start of the next attempt.
 std::string keep(const recorder::RunDirectory& directory, const proto::Manifest& manifest, Tick latest,
                  TickLength tick_length) {
   const fs::path place = place_of(directory);

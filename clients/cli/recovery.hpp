@@ -1,8 +1,8 @@
-/// When a robot's program crashes its behaviours host, the run continues from its last checkpoint, or from its beginning, with
-/// that robot failed in the tick of the crash: the result is that of a run in which the robot failed there. The recording up to
-/// the checkpoint, and the external inputs that were stamped for later ticks, are kept.
+/// Recovery from a robot's program that crashes its behaviours host. The run continues from its last checkpoint, or from its
+/// beginning, and the robot fails at the tick of the crash. The result equals that of a run in which the robot failed at that
+/// tick. The recording up to the checkpoint and the external inputs for later ticks are kept.
 ///
-/// RUN/recovered holds the start of the next attempt: the parts of the checkpoint, if there is one, and the recording.
+/// RUN/recovered holds the start of the next attempt: the recording, and the checkpoint's parts if there is one.
 #pragma once
 
 #include <optional>
@@ -17,24 +17,23 @@
 
 namespace kilotwin::cli {
 
-/// Turns the run directory and the manifest into those of the next attempt, and says so. `running`: the robots whose programs
-/// ran when the attempt ended. If it is one robot, that robot fails. If there are several, it is not known which of them
-/// crashed, and none fails: the next attempt runs them one after another. Throws RunError if a robot that has failed already
-/// is among them.
+/// Changes the run directory and the manifest to those of the next attempt, and prints a line. `running`: the robots whose programs
+/// were running when the attempt ended. A single one fails in the next attempt. If there are several, the one that crashed is
+/// unknown and none fails: the next attempt runs on one thread. Throws RunError if a robot that has already failed is among them.
 void recover(const recorder::RunDirectory& directory, proto::Manifest& manifest,
              std::span<const behaviours::Culprit> running);
 
 /// The start of an attempt at a run.
 struct Beginning {
-  std::optional<Checkpoint> resumed;  ///< nothing: at tick 0
-  std::vector<Directive> inputs;      ///< stamped in an earlier attempt for later ticks; numbered from 0
+  std::optional<Checkpoint> resumed;  ///< absent: the attempt starts at tick 0
+  std::vector<Directive> inputs;      ///< directives of an earlier attempt for later ticks, numbered from 0
 };
 [[nodiscard]] Beginning beginning_of(const RunPlan& plan, const recorder::RunDirectory& directory);
 
-/// The recording of the previous attempt; empty if there was none.
+/// The path of the previous attempt's recording; empty if there was no previous attempt.
 [[nodiscard]] std::filesystem::path earlier_recording(const recorder::RunDirectory& directory);
 
-/// Removes the files that only recovery needs, once the run has ended.
+/// Removes the files that only recovery needs. Call it after the end of the run.
 void forget_attempts(const recorder::RunDirectory& directory);
 
 }  // namespace kilotwin::cli

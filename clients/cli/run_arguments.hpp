@@ -1,4 +1,4 @@
-/// The options that choose an experiment and change it, which `run`, `check` and `sweep` share, and those of `run` alone.
+/// Options of `run`, `check` and `sweep` that select and change an experiment, and further options of `run`.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,13 @@ namespace kilotwin::cli {
 struct RunArguments {
   std::filesystem::path experiment;
   std::string mode = "federated";  ///< "local" or "federated"
-  std::string partitions;          ///< "CxR"; empty: as the experiment says
+  std::string partitions;          ///< "CxR"; empty: as in the experiment
   std::optional<std::uint32_t> hosts;
   std::uint32_t threads = 1;  ///< local mode
   std::optional<std::uint64_t> seed;
   std::optional<double> duration_s;
   std::optional<std::uint32_t> robots;
-  std::filesystem::path behaviour;  ///< empty: as the experiment says
+  std::filesystem::path behaviour;  ///< empty: as in the experiment
   std::vector<std::string> set;     ///< FIELD=VALUE
   std::vector<std::string> define;  ///< NAME=VALUE
   std::filesystem::path model;
@@ -33,12 +33,12 @@ struct RunArguments {
   std::filesystem::path resume;  ///< a run, or one of its checkpoints; empty: from tick 0
   bool prepare = false;          ///< write the run directory and stop
   std::optional<std::uint32_t> domain;
-  double give_up_after_s = 0;  ///< how long services wait for each other without progress; 0: for ever
+  double give_up_after_s = 0;  ///< longest wait of services for each other without progress; 0: no limit
   Output output;
-  bool quiet = false;  ///< no progress, no summary on the screen
+  bool quiet = false;  ///< print neither progress nor summary
 };
 
-/// The experiment, and what replaces parts of it in `run`, `check` and `sweep`.
+/// Adds the argument EXPERIMENT and the options that replace parts of the experiment, for `run`, `check` and `sweep`.
 void add_experiment_options(CLI::App& app, RunArguments& arguments);
 
 }  // namespace kilotwin::cli

@@ -1,4 +1,4 @@
-// `kilotwin run`: an experiment from its file to its summary.
+// `kilotwin run`: runs an experiment from its file to its summary.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -24,7 +24,7 @@
 namespace kilotwin::cli {
 namespace {
 
-/// The word, quoted for a shell.
+/// Quotes a word for a shell.
 std::string quoted(const std::string& word) {
   constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+,:=@%";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
@@ -43,7 +43,7 @@ std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& dir
     text += fmt::format("  kilotwin service physics --run {} --partition {},{}\n", run, p % plan.grid.columns(),
                         p / plan.grid.columns());
   }
-  text += fmt::format("  kilotwin service comm --run {}\n", run);
+  text += fmt::format("  kilotwin service radio --run {}\n", run);
   for (std::uint32_t h = 0; h < plan.hosts; ++h) {
     text += fmt::format("  kilotwin service behaviours --run {} --share {}/{}\n", run, h + 1, plan.hosts);
   }
@@ -72,8 +72,7 @@ void run_in_this_process(const RunPlan& plan, const recorder::RunDirectory& dire
   }
 }
 
-/// Returns twice: nothing in the worker process, which has done the run, and the exit status in the process that waited for
-/// the worker.
+/// Returns in two processes: nothing in the worker, which has done the run; the exit status in the process that waited for it.
 std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDirectory& directory,
                                const RunArguments& arguments, double started_s) {
   std::uint32_t threads = std::max(1u, arguments.threads);
@@ -85,8 +84,8 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
       forget_attempts(directory);
       return std::nullopt;
     }
-    // A program that calls the system where that cannot be refused (services/behaviours/faults.hpp) ends the worker with status 0
-    // and without a result. In every other case of a status the worker has reported its error.
+    // Where system calls cannot be refused (services/behaviours/faults.hpp), a robot's program may end the worker with status 0 and
+    // without a result. With any other status the worker has reported its error.
     const bool no_result = end->well() && !std::filesystem::exists(directory.summary());
     if (end->signal == 0 && !no_result) return end->code;
     std::vector<behaviours::Culprit> running;
@@ -110,7 +109,7 @@ int run(const RunArguments& arguments, double started_s) {
   if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
   if (arguments.mode == "local" && arguments.domain)
     throw UserError("--domain: a local run takes part in no DDS domain; leave it away, or give --mode federated");
-  // The domain is claimed before anything is written: a refused run leaves no files.
+  // Claim the domain before the first file is written, so that a refused run leaves no files.
   std::optional<dds::DomainClaim> claim;
   if (arguments.mode == "federated" && !arguments.prepare) {
     claim.emplace(arguments.domain ? dds::DomainClaim::exactly(*arguments.domain) : dds::DomainClaim::any());
@@ -139,7 +138,7 @@ int run(const RunArguments& arguments, double started_s) {
   return kDone;
 }
 
-/// A seed is decimal, also with leading zeros. A number that does not fit is refused, as it would become another seed.
+/// Checks a seed: decimal, leading zeros allowed. Refuses a number beyond 64 bits, because truncation would make another seed of it.
 std::string decimal_seed(std::string& text) {
   std::uint64_t seed = 0;
   const char* const last = text.data() + text.size();

@@ -34,14 +34,14 @@ struct ServiceArguments {
   std::string partition;      ///< physics: "C,R"
   std::string share;          ///< behaviours: "I/N"
   dds::Transport transport;
-  double give_up_after_s = 0;  ///< how long to wait for others without progress; 0: for ever
-  double started_s = 0;        ///< when the run was asked for, steady clock; for start_s
+  double give_up_after_s = 0;  ///< longest wait for others without progress; 0: no limit
+  double started_s = 0;        ///< start time of the user's command, steady clock, s; for start_s of the summary
 };
 
-/// Files and sockets of the busiest service, with room to spare.
+/// Upper limit of a service's open files and sockets.
 constexpr std::uint64_t kServiceFiles = 64;
 
-/// "A<separator>B" with two numbers.
+/// Parses "A<separator>B" with two numbers.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> two_numbers(const std::string& text, char separator) {
   std::uint32_t a = 0, b = 0;
   const char* const last = text.data() + text.size();
@@ -74,7 +74,7 @@ HostId parse_share(const std::string& text, std::uint32_t hosts) {
   return HostId{share->first - 1};
 }
 
-/// A service of another build would compute other results.
+/// Throws UserError if another build prepared the run, because its results could differ.
 void require_this_build(const RunPlan& plan, const recorder::RunDirectory& directory) {
   if (plan.build == build_identity()) return;
   throw UserError(
@@ -84,7 +84,7 @@ void require_this_build(const RunPlan& plan, const recorder::RunDirectory& direc
                   directory.manifest().string(), plan.build.empty() ? "(unnamed)" : plan.build, build_identity()));
 }
 
-/// Addresses at which others are looked for: IPv4, or names.
+/// Throws UserError unless all addresses are IPv4 addresses or host names.
 void require_peers(const std::vector<std::string>& peers) {
   for (const std::string& peer : peers) {
     if (peer.empty() || peer.find(':') != std::string::npos)
@@ -103,7 +103,7 @@ void run_station(const RunPlan& plan, const ServiceContext& context, const recor
   if (!totals.failure.empty()) throw RunError(totals.failure);
 }
 
-/// From now on every line of this process goes to the federate's log.
+/// Directs all further lines of this process to the federate's log.
 void begin_log(const RunPlan& plan, FederateId self, const dds::Transport& transport) {
   log_as(plan.name(self));
   say(fmt::format("starts: run {}, seed {}, domain {}", plan.experiment_name(), plan.seed(), transport.domain));
@@ -145,7 +145,7 @@ int serve(const ServiceArguments& arguments) {
   return kDone;
 }
 
-/// The contract calls the radio comm, and everything else calls it radio: both are taken. Returns what is wrong.
+/// Validator of the argument SERVICE. `radio` and `comm` both name the radio. Returns an error text or "".
 std::string service_name(std::string& name) {
   if (name == "radio") name = "comm";
   for (const char* known : {"physics", "comm", "station", "behaviours"}) {

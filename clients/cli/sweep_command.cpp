@@ -24,10 +24,10 @@ namespace {
 namespace fs = std::filesystem;
 
 struct SweepArguments {
-  RunArguments run;              ///< what all runs share; its output is the sweep's
-  std::string seeds;             ///< "A..B", or one number; empty: the experiment's own
+  RunArguments run;              ///< arguments of all runs; its output is that of the sweep
+  std::string seeds;             ///< "A..B", or one number; empty: the seed of the experiment
   std::vector<std::string> set;  ///< FIELD=V1,V2,... or FIELD=A..B: one run per value, all combinations
-  /// The observable that plots show: clients/recorder/observables.hpp; empty: pushed where there are movable bodies, else msd.
+  /// The observable in the plots: clients/recorder/observables.hpp. Empty: pushed if there are movable bodies, else msd.
   std::string plot;
   std::uint32_t jobs = 0;  ///< runs at a time; 0: one per core
 };
@@ -76,7 +76,7 @@ int sweep(const SweepArguments& arguments) {
   if (points.size() * std::max<std::size_t>(1, seeds.size()) > kMostSweepRuns)
     throw UserError(
         fmt::format("{} points with {} seeds are more than {} runs", points.size(), seeds.size(), kMostSweepRuns));
-  // Every point is checked before the first run starts.
+  // Check every point before the first run starts.
   std::string name;
   std::vector<std::uint64_t> own_seeds;
   for (const SweepPoint& point : points) {

@@ -11,7 +11,7 @@
 namespace kilotwin::cli {
 namespace {
 
-/// Reads "A..B" or "A"; false for other text.
+/// Parses "A..B" or "A". Returns false for other text.
 template <class Integer> bool parse_range(const std::string& text, Integer& first, Integer& last) {
   const char* const end = text.data() + text.size();
   std::from_chars_result read = std::from_chars(text.data(), end, first);

@@ -20,7 +20,7 @@ namespace {
 using recorder::kObservables;
 using recorder::Sample;
 
-/// More curves than these cannot be distinguished in one plot.
+/// Largest number of curves that a reader can distinguish in one plot.
 constexpr std::size_t kMostCurves = 8;
 
 std::string with_error(const Sample& sample) {
@@ -29,7 +29,7 @@ std::string with_error(const Sample& sample) {
   return fmt::format("{:.5g} ±{:.2g}", sample.mean(), sample.standard_error());
 }
 
-/// Columns as in CSV: mean and standard error; nothing where there is no value.
+/// Two CSV columns, mean and standard error; both empty without a value.
 std::string csv_pair(const Sample& sample) {
   if (sample.count() == 0) return ",,";
   return fmt::format(",{:.10g},{:.4g}", sample.mean(), sample.standard_error());
@@ -42,8 +42,8 @@ std::string csv_header(const std::string& first) {
   return text;
 }
 
-/// Lays rows out in columns, the first to the left and the others to the right. "±" is one character of two bytes.
-std::string laid_out(const std::vector<std::vector<std::string>>& rows) {
+/// Formats rows as columns, the first left-aligned and the others right-aligned. "±" is one character of two bytes.
+std::string aligned(const std::vector<std::vector<std::string>>& rows) {
   const auto width_of = [](const std::string& cell) {
     return static_cast<std::size_t>(std::count_if(
         cell.begin(), cell.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
@@ -72,7 +72,7 @@ SweepReport::SweepReport(std::string name, std::vector<SweepPoint> points, recor
                                    [&](const SweepPoint& point) { return point[field] == points_[0][field]; });
     if (!alike) varying_.push_back(field);
   }
-  // The field with the most numbers.
+  // The response field is the one with the most different numbers.
   std::size_t most = 1;
   for (std::size_t field = 0; field < points_[0].size(); ++field) {
     std::set<double> numbers;
@@ -137,7 +137,7 @@ std::string SweepReport::constant() const {
 
 std::vector<std::vector<std::string>> SweepReport::rows() const {
   std::vector<std::string> header{"at the end", "runs"};
-  // Quantities that none of the runs has are left out.
+  // Omit observables that no run has.
   std::array<bool, kObservables.size()> shown{};
   for (std::size_t o = 0; o < kObservables.size(); ++o) {
     for (const Observed& at : observed_) shown[o] = shown[o] || at.at_end[o].count() > 0;
@@ -167,7 +167,7 @@ std::vector<std::vector<std::string>> SweepReport::rows() const {
   return rows;
 }
 
-std::string SweepReport::table() const { return laid_out(rows()); }
+std::string SweepReport::table() const { return aligned(rows()); }
 
 std::string SweepReport::page(const recorder::Provenance& provenance) const {
   using html::Data;
@@ -277,7 +277,7 @@ Plot SweepReport::curves() const {
   plot.x_unit = "s";
   if (varying_.size() == 1) plot.legend_title = field_of(points_[0][varying_[0]]);
   if (const std::string fields = constant(); !fields.empty()) plot.subtitle += "; " + fields;
-  // Of many points some, evenly from the first to the last.
+  // If there are too many points, plot an evenly spaced selection that includes the first and the last.
   const std::size_t curves = std::min(points_.size(), kMostCurves);
   if (curves < points_.size()) plot.subtitle += fmt::format("; {} of {} points", curves, points_.size());
   for (std::size_t curve = 0; curve < curves; ++curve) {

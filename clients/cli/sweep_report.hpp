@@ -1,4 +1,4 @@
-/// SweepReport: a table of summaries and observables with standard errors over runs, curves over time, plots, and a page.
+/// SweepReport: tables of observables with standard errors over runs, curves over time, plots, and a page.
 #pragma once
 
 #include <array>
@@ -24,22 +24,22 @@ class SweepReport {
   /// Number of runs added.
   [[nodiscard]] std::size_t runs() const { return runs_; }
 
-  /// The table, for people: a line per point.
+  /// The table for the terminal: one line per point.
   [[nodiscard]] std::string table() const;
-  /// The same on a page, with the plots and how the sweep was made.
+  /// A page with the table, the plots and the provenance.
   [[nodiscard]] std::string page(const recorder::Provenance& provenance) const;
-  /// Writes sweep.csv, curves.csv, sweep.svg, response.svg where has_response(), and report.html. Throws RunError; the tables
-  /// are written first.
+  /// Writes sweep.csv, curves.csv, sweep.svg, response.svg if has_response(), and report.html. Throws RunError; the tables are
+  /// written first.
   void write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const;
-  /// Per point, every observable at the end of the runs and the sums of their summaries, means with standard errors.
+  /// One row per point: every observable at the end of the runs and the summaries' counts, each with mean and standard error.
   [[nodiscard]] std::string table_csv() const;
-  /// The same over time: a row per point and recorded state.
+  /// One row per point and recorded state: every observable with mean and standard error.
   [[nodiscard]] std::string curves_csv() const;
-  /// The plotted observable over time, a curve per point.
+  /// The plotted observable over time, one curve per point.
   [[nodiscard]] Plot curves() const;
-  /// Whether a field was swept over numbers, so that there is something to plot against it.
+  /// Whether a field was swept over numbers, so that response() can plot against it.
   [[nodiscard]] bool has_response() const { return response_field_ < most_fields_; }
-  /// The plotted observable at the end of the runs against that field, a line per combination of the others.
+  /// The plotted observable at the end of the runs against that field, one line per combination of the other fields.
   [[nodiscard]] Plot response() const;
 
  private:
@@ -55,9 +55,9 @@ class SweepReport {
 
   [[nodiscard]] std::vector<std::vector<std::string>> rows() const;
   [[nodiscard]] std::string name_of(std::size_t point) const;
-  /// Its fields that not all points have alike; without the field's name where that is the only one.
+  /// The values of the fields that differ between points, with the fields' names if there are several.
   [[nodiscard]] std::string short_name_of(std::size_t point) const;
-  /// The fields that all points have alike, as they were set.
+  /// The settings that all points share.
   [[nodiscard]] std::string constant() const;
   [[nodiscard]] std::string runs_text() const;
   [[nodiscard]] Plot plot() const;

@@ -16,10 +16,10 @@ namespace {
 using Clock = os::Children::Clock;
 
 constexpr auto kPoll = std::chrono::milliseconds(2);
-/// For how long runs may take to end after SIGTERM.
+/// Time for runs to end after SIGTERM.
 constexpr auto kGrace = std::chrono::milliseconds(3000);
 
-/// Starts run `index`; false where the system has no room for another process at the moment.
+/// Starts run `index`. Returns false if the system currently has no room for another process.
 bool start(os::Children& children, const SweepRun& run, std::size_t index) {
   os::ChildOptions options;
   options.log = run.directory.string() + ".log";
@@ -58,7 +58,7 @@ bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time,
     if (children.running() == 0) return done == runs.size();
     if (interrupted() != 0) children.allow_until(Clock::now(), kGrace);
     for (os::Child& child : children.reap()) {
-      if (interrupted() != 0) continue;  // its end says nothing: it was asked to end
+      if (interrupted() != 0) continue;  // the run was ended on request, so its status means nothing
       SweepRun& run = runs[child.tag()];
       run.well = child.process().poll()->well();
       run.last_line = child.last_line();

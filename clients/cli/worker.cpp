@@ -12,7 +12,7 @@
 namespace kilotwin::cli {
 namespace {
 
-/// While the object exists, these signals wait until next() takes them.
+/// Blocks SIGINT, SIGTERM and SIGCHLD while the object exists; next() waits for one of them.
 class HeldSignals {
  public:
   HeldSignals() {
@@ -48,7 +48,7 @@ std::optional<os::ProcessEnd> end_of_worker() {
     }
     const int signal = held.next();
     if (signal != SIGINT && signal != SIGTERM) continue;
-    // A terminal sends SIGINT to both, and a second one to a process ends it whatever it does.
+    // The terminal sends SIGINT to both processes, and a second SIGINT would end the worker at once. So send SIGTERM first.
     kill(worker, forwarded && signal == SIGINT ? SIGKILL : SIGTERM);
     forwarded = true;
   }

@@ -1,5 +1,5 @@
-/// A local run happens in a process of its own, the worker: a robot's program that ends its process by a defect does not end
-/// the process that starts the run again from its last checkpoint.
+/// The worker: the process in which a local run is executed. If a robot's program crashes it, the parent process survives and
+/// restarts the run from its last checkpoint.
 #pragma once
 
 #include <optional>
@@ -8,9 +8,9 @@
 
 namespace kilotwin::cli {
 
-/// Starts the worker by fork(). In the worker it returns nothing: the worker does the run and ends as this process would have.
-/// In the calling process it returns how the worker has ended, once it has. SIGINT and SIGTERM end the worker in
-/// order; the worker does not outlive its parent. Only where no other thread runs. Throws RunError if fork() fails.
+/// Forks the worker and waits for its end. Returns nothing in the worker, which then executes the run. Returns the worker's end in
+/// the calling process. Forwards SIGINT and SIGTERM to the worker, which then ends in order. The worker does not outlive its
+/// parent. Requires that no other thread runs. Throws RunError if fork() fails.
 [[nodiscard]] std::optional<os::ProcessEnd> end_of_worker();
 
 }  // namespace kilotwin::cli

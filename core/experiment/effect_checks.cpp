@@ -1,4 +1,4 @@
-// The list of effects: what the table of ranges cannot say.
+// Checks of the list of effects that the table of ranges cannot express.
 #include <fmt/format.h>
 
 #include <map>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kMostFunctions = 8, kMostKnots = 1000, kMostKnots2d = 200;
 constexpr double kNearestKnots = 1e-6, kSmallestScale = 1e-6;
-/// Cells of one arena field; 8 octets each.
+/// Upper limit of an arena field's cells, 8 octets each.
 constexpr double kMostCells = 4e6;
 
 const char* name_of(Function::Covariate covariate) { return Function::Covariate_Name(covariate).c_str(); }
@@ -63,7 +63,7 @@ class EffectCheck {
     if (!condition) fail(path, text);
   }
 
-  /// Names are plain, and each is its own.
+  /// Checks that a name has allowed characters and is unique.
   void check_name(const std::string& name, bool given, const std::string& path, const char* what,
                   std::map<std::string, std::string>& known) const {
     demand(given, path, fmt::format("name is missing; state name: \"...\", one that no other {} has", what));

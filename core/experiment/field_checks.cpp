@@ -222,8 +222,8 @@ void check_robot_models(const LoadedExperiment& loaded) {
   }
 }
 
-/// What the floor and the robots of the ODE engine take and others do not.
-void check_legs(const LoadedExperiment& loaded) {
+/// Checks the tilt of the floor and the axle offset, whose limits depend on the physics engine.
+void check_floor_and_axle(const LoadedExperiment& loaded) {
   const proto::Physics& physics = loaded.experiment.physics();
   const auto level_floor = [&](const char* field, bool given, double value) {
     if (!given || value == 0 || physics.engine() == proto::Physics::ODE) return;
@@ -300,11 +300,11 @@ void check_bodies(const LoadedExperiment& loaded) {
   for (int i = 0; i < experiment.movable_size(); ++i) {
     if (experiment.movable(i).has_mass_g()) continue;
     throw loaded.locations.error(fmt::format("movable[{}]", i),
-                                 "mass_g is missing; state mass_g: M, what it weighs");
+                                 "mass_g is missing; state mass_g: M, the body's mass");
   }
 }
 
-/// What an engine does not compute is refused, never left out.
+/// Refuses features that the physics engine does not compute.
 void check_engine(const LoadedExperiment& loaded) {
   const proto::Experiment& experiment = loaded.experiment;
   if (experiment.physics().engine() == proto::Physics::ODE) return;
@@ -368,7 +368,7 @@ void check_values(const LoadedExperiment& loaded) {
   check_arena(loaded);
   check_bodies(loaded);
   check_engine(loaded);
-  check_legs(loaded);
+  check_floor_and_axle(loaded);
   const ArenaShape arena(experiment.arena());
   check_partition(loaded, "partition_columns", experiment.deployment().partition_columns(), "width",
                   2 * arena.half_width_mm());

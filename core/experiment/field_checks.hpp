@@ -1,5 +1,5 @@
-/// The checks of an experiment that need no poses of robots: ranges (fields.hpp), and what fields demand of each other. All
-/// throw UserError "WHERE: what is wrong; what would be right".
+/// Checks of an experiment that need no poses of robots: ranges (fields.hpp), and dependencies between fields. All functions throw
+/// UserError "WHERE: what is wrong; what would be right".
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,19 @@
 
 namespace kilotwin {
 
-/// All of them.
+/// Makes all checks.
 void check_fields(const LoadedExperiment& loaded);
-/// Those that read no other file: also for an experiment out of a manifest.
+/// Makes the checks that read no other file, so also for an experiment from a manifest.
 void check_values(const LoadedExperiment& loaded);
-/// Those of `effect` and `field`, whose numbers are in their ranges.
+/// Checks `effect` and `field`, whose numbers have been found in their ranges.
 void check_effects(const LoadedExperiment& loaded);
-/// Those of the infrared channel that the table of ranges cannot express.
+/// Checks dependencies between fields of the infrared channel.
 void check_radio(const LoadedExperiment& loaded);
 
-/// How many robots the group has, by its count or, where that is absent, by its rings. 0: only its CSV file knows.
+/// Number of robots in the group by its `count`, or by its rings if `count` is absent. 0: its CSV file gives the number.
 [[nodiscard]] std::uint64_t stated_count(const proto::RobotGroup& group);
 
-/// The total over all groups, which is known once the CSV files of layouts have been read, and what depends on it.
+/// Checks the total number of robots, which is known after the layouts' CSV files have been read, and limits that depend on it.
 void check_total(const LoadedExperiment& loaded, std::uint64_t robots);
 
 }  // namespace kilotwin

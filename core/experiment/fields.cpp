@@ -22,7 +22,7 @@ using pb::FieldDescriptor;
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 /// Poses stay within the largest arena, times within the longest run.
 constexpr double kLongest_mm = 1e6, kLongest_s = 1e6;
-/// Of the numbers that make up functions of effects.
+/// Largest magnitude of the numbers in functions of effects.
 constexpr double kLargestValue = 1e6;
 
 constexpr FieldRule kRules[] = {
@@ -66,7 +66,7 @@ constexpr FieldRule kRules[] = {
     {"RandomLayout.min_gap_mm", 0, kLongest_mm, "mm"},
     {"RandomLayout.heading_deg", -360, 360, "degrees"},
 
-    // Speeds and biases up to about ten times what robots do.
+    // Speeds and biases up to about ten times those of real robots.
     {"Motion.straight_speed_mm_s", 0, 200, "mm/s"},
     {"Motion.turn_speed_mm_s", 0, 200, "mm/s"},
     {"Motion.wheel_base_mm", 0, 100, "mm", Lower::kExcluded},
@@ -263,7 +263,7 @@ RuleTable rules_by_field() {
   return table;
 }
 
-/// Levenshtein's distance; swapped neighbours count as one.
+/// Edit distance of Damerau and Levenshtein: a swap of adjacent characters counts as one edit.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before(b.size() + 1), row(b.size() + 1), next(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});

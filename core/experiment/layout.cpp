@@ -22,10 +22,10 @@ namespace {
 
 constexpr double kDiameter_mm = 2 * kRobotRadius_mm;
 constexpr double kRadiansPerDegree = kPi / 180;
-/// Draws of Stream::kLayout per robot: dart i takes 2 i and 2 i + 1, the heading the last one.
-constexpr std::uint32_t kMostDarts = 30'000, kHeadingDraw = 65'535;
+/// Draw numbers of Stream::kLayout per robot: trial i of random placement uses 2 i and 2 i + 1, the heading uses the last one.
+constexpr std::uint32_t kMostTrials = 30'000, kHeadingDraw = 65'535;
 
-/// True if |at| exceeds the limit by more than rounding.
+/// Whether |at_mm| exceeds the limit by more than rounding errors.
 bool beyond(double at_mm, double limit_mm) {
   return at_mm > limit_mm + kTouchTolerance_mm || at_mm < -limit_mm - kTouchTolerance_mm;
 }
@@ -33,9 +33,9 @@ bool beyond(double at_mm, double limit_mm) {
 /// The robots of one group, while they are being placed.
 struct Group {
   const proto::RobotGroup* spec;
-  std::string path;  ///< of the group in the experiment
+  std::string path;  ///< path of the group in the experiment
   std::uint32_t first = 0, count = 0;
-  CsvPoses csv;  ///< with a layout by poses
+  CsvPoses csv;  ///< for a layout by poses
   std::string csv_name;
 };
 
@@ -57,7 +57,7 @@ class Placement {
   void place_random(const Group& group);
   void check_movables() const;
   void check_placed(Occupancy& occupancy, const Group& group) const;
-  /// The path of an obstacle or movable body that a disc around the point reaches into by more than rounding, or nothing.
+  /// The path of an obstacle or movable body that a disc overlaps by more than rounding errors, or "".
   [[nodiscard]] std::string body_within(double x_mm, double y_mm, double radius_mm) const;
   void set_heading(std::uint32_t robot, const proto::Layout& layout, proto::Heading heading, double heading_deg);
   void set_position(std::uint32_t robot, double x_mm, double y_mm) {
@@ -79,7 +79,7 @@ class Placement {
   PlacedRobots placed_;
 };
 
-/// Finds out how many robots there are, for which files of poses must be read.
+/// Reads the files of poses and counts the robots of every group.
 void Placement::measure() {
   std::uint64_t total = 0;
   for (int g = 0; g < experiment_.robots_size(); ++g) {
@@ -97,7 +97,7 @@ void Placement::measure() {
       }
       count = rows;
     }
-    // Numbers too large for 32 bits are turned down by the total below.
+    // check_total() below refuses totals that exceed 32 bits.
     group.first = static_cast<std::uint32_t>(total);
     group.count = static_cast<std::uint32_t>(count);
     total += count;
@@ -181,7 +181,7 @@ void Placement::place_random(const Group& group) {
   struct Span {
     double min_mm, max_mm;
   };
-  // Where centres may lie along one axis: discs stay within the rectangle and within the walls.
+  // The interval of centres along one axis for which discs lie within the rectangle and within the walls.
   const auto span = [](double middle_mm, double extent_mm, double arena_mm) {
     return Span{std::max(middle_mm - extent_mm / 2, -arena_mm / 2) + kRobotRadius_mm,
                 std::min(middle_mm + extent_mm / 2, arena_mm / 2) - kRobotRadius_mm};
@@ -206,18 +206,18 @@ void Placement::place_random(const Group& group) {
   }
   for (std::uint32_t i = 0; i < group.count; ++i) {
     const std::uint32_t robot = group.first + i;
-    std::uint32_t dart = 0;
+    std::uint32_t trial = 0;
     do {
-      if (dart == kMostDarts) {
+      if (trial == kMostTrials) {
         throw error_at(group, robot,
                        fmt::format("only {} of {} robots fit at random with gaps of {} mm; place fewer, widen the "
                                    "rectangle or lower min_gap_mm (about half of the area can be covered)",
                                    i, group.count, number_text(spec.min_gap_mm())));
       }
-      const double u = random_.uniform(Stream::kLayout, robot, Tick{0}, 2 * dart);
-      const double v = random_.uniform(Stream::kLayout, robot, Tick{0}, 2 * dart + 1);
+      const double u = random_.uniform(Stream::kLayout, robot, Tick{0}, 2 * trial);
+      const double v = random_.uniform(Stream::kLayout, robot, Tick{0}, 2 * trial + 1);
       set_position(robot, x.min_mm + u * (x.max_mm - x.min_mm), y.min_mm + v * (y.max_mm - y.min_mm));
-      ++dart;
+      ++trial;
     } while (occupancy.first_within(placed_.x_mm[robot], placed_.y_mm[robot], distance_mm) ||
              blocked(placed_.x_mm[robot], placed_.y_mm[robot]));
     occupancy.add(robot);

@@ -1,4 +1,4 @@
-/// Limits of an experiment that are no range of one field.
+/// Limits of an experiment that are not ranges of single fields.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ inline constexpr int kMostMovables = 1000, kMostObstacles = 1000;
 inline constexpr int kMostEffects = 256, kMostFields = 16;
 /// ARK messages carry 10-bit robot ids, and 1023 marks an unused slot.
 inline constexpr std::uint32_t kMostArkRobots = 1022;
-/// Robots' centres may be this much closer than a diameter, for rounding's sake, mm.
+/// Robots' centres may be closer than a diameter by this much, mm, to allow for rounding.
 inline constexpr double kTouchTolerance_mm = 1e-6;
 
 }  // namespace kilotwin

@@ -74,7 +74,7 @@ void apply_model(LoadedExperiment& loaded, const std::filesystem::path& file) {
     experiment.mutable_robot_model(known->second)->MergeFrom(model.robot(i));
     merged.locations.adopt(locations, from, fmt::format("robot_model[{}]", known->second));
   }
-  // Effects and fields go by names that they share, so one list replaces the other.
+  // Effects refer to fields by name, so both lists are replaced together.
   if (model.effect_size() > 0 || model.field_size() > 0) {
     *experiment.mutable_effect() = model.effect();
     *experiment.mutable_field() = model.field();

@@ -1,5 +1,4 @@
-/// Which places are taken: a grid of cells hashed into a table, so that memory depends on the robots and not on the
-/// arena.
+/// Spatial hash of placed robots. Its memory depends on the number of robots, not on the size of the arena.
 #pragma once
 
 #include <bit>
@@ -13,7 +12,8 @@ namespace kilotwin {
 
 class Occupancy {
  public:
-  /// Robots lie at (x_mm[i], y_mm[i]); the arrays outlive this and keep their size. Finds robots up to cell_mm away.
+  /// Robot i is at (x_mm[i], y_mm[i]). The arrays must outlive this object and keep their size. `cell_mm` is the largest search
+  /// distance.
   Occupancy(double cell_mm, const std::vector<double>& x_mm, const std::vector<double>& y_mm)
       : cell_mm_(cell_mm),
         x_mm_(x_mm),
@@ -27,13 +27,13 @@ class Occupancy {
     head = robot;
   }
 
-  /// The lowest id of the robots added whose centre is closer to the point than distance_mm, at most cell_mm.
+  /// The lowest id of an added robot whose centre is closer to the point than distance_mm, which is at most cell_mm.
   [[nodiscard]] std::optional<std::uint32_t> first_within(double x_mm, double y_mm, double distance_mm) const {
     std::uint32_t lowest = kNone;
     const std::int64_t column = cell(x_mm), row = cell(y_mm);
     for (std::int64_t r = row - 1; r <= row + 1; ++r) {
       for (std::int64_t c = column - 1; c <= column + 1; ++c) {
-        // A bucket may hold robots of other cells too; the distance decides.
+        // A bucket may hold robots of other cells, so test the distance.
         for (std::uint32_t robot = head_[bucket(c, r)]; robot != kNone; robot = next_[robot]) {
           const double dx_mm = x_mm_[robot] - x_mm, dy_mm = y_mm_[robot] - y_mm;
           if (dx_mm * dx_mm + dy_mm * dy_mm < distance_mm * distance_mm && robot < lowest) lowest = robot;

@@ -28,7 +28,8 @@ CsvPoses read_poses_csv(const std::filesystem::path& file, std::string_view name
   CsvPoses poses;
   while (csv.next()) {
     if (poses.line.size() == kMostRobots)
-      csv.complain(0, fmt::format("the file has more rows than {}; that many robots are the most", kMostRobots));
+      csv.complain(0, fmt::format("the file has more than {} rows; an experiment takes at most that many robots",
+                                  kMostRobots));
     const double value = csv.number(heading);
     const double heading_rad = degrees ? kt_fmod(value, 360) * (kPi / 180) : kt_fmod(value, 2 * kPi);
     poses.x_mm.push_back(csv.number(x));

@@ -11,11 +11,10 @@ namespace kilotwin {
 struct CsvPoses {
   std::vector<double> x_mm, y_mm;
   std::vector<double> heading_rad;  ///< in [-pi, pi)
-  std::vector<std::uint32_t> line;  ///< of the file, from 1
+  std::vector<std::uint32_t> line;  ///< line of the file, from 1
 };
 
-/// Throws UserError that names a place in the file, or begins with
-/// `named_at` if the file cannot be read.
+/// Throws UserError with a place in the file. If the file cannot be read, the error begins with `named_at`, the place that names it.
 [[nodiscard]] CsvPoses read_poses_csv(const std::filesystem::path& file, std::string_view named_at);
 
 }  // namespace kilotwin

@@ -1,4 +1,4 @@
-// The infrared channel: what the table of ranges cannot say.
+// Checks of the infrared channel that the table of ranges cannot express.
 #include <fmt/format.h>
 
 #include <map>

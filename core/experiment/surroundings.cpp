@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMostPixels = 64u << 20;  // of one picture
+constexpr std::uint64_t kMostPixels = 64u << 20;  // per picture
 
 class Check {
  public:
@@ -30,13 +30,14 @@ class Check {
       if (!point.has_time_s() || !point.has_x_mm() || !point.has_y_mm())
         fail(at, "time_s, x_mm or y_mm is missing; a way-point needs all three");
       if (point.time_s() <= before_s)
-        fail(at, "time_s is not later than the way-point's before; put them in order");
+        fail(at, "time_s is not later than that of the previous way-point; put them in order");
       before_s = point.time_s();
     }
     before_s = -1;
     for (int i = 0; i < source.switch_s_size(); ++i) {
       const std::string at = fmt::format("{}.switch_s[{}]", path, i);
-      if (source.switch_s(i) <= before_s) fail(at, "switch_s is not later than the time before; put them in order");
+      if (source.switch_s(i) <= before_s)
+        fail(at, "switch_s is not later than the previous one; put them in order");
       before_s = source.switch_s(i);
     }
     if (source.switch_period_s() > 0 && before_s >= source.switch_period_s())

@@ -1,4 +1,4 @@
-/// What an experiment names of robots' surroundings: pictures of light, and EEPROMs.
+/// Checks of light and batteries, and readers of the pictures and EEPROM files that an experiment names.
 #pragma once
 
 #include <vector>
@@ -8,13 +8,13 @@
 
 namespace kilotwin {
 
-/// Checks what fields of light and batteries demand of each other. Throws UserError "WHERE: what is wrong; what would be right".
+/// Checks dependencies between fields of light and batteries. Throws UserError "WHERE: what is wrong; what would be right".
 void check_surroundings(const LoadedExperiment& loaded);
 
-/// The brightness of all pictures of the experiment's light, in order. Throws UserError where one is no PNG file.
+/// The brightness of all pictures of the experiment's light, in order. Throws UserError if one is not a PNG file.
 [[nodiscard]] std::vector<proto::LightRaster> read_light_rasters(const LoadedExperiment& loaded);
 
-/// The EEPROMs that groups bring along; `counts`: robots per group. Throws UserError where a file has not 1024 octets.
+/// The EEPROMs that groups state; `counts`: robots per group. Throws UserError if a file does not have 1024 octets.
 [[nodiscard]] std::vector<proto::RobotEeprom> read_eeproms(const LoadedExperiment& loaded,
                                                            const std::vector<std::uint32_t>& counts);
 

@@ -26,31 +26,31 @@ class Silent : public pb::io::ErrorCollector {
   void AddError(int, pb::io::ColumnNumber, const std::string&) override {}
 };
 
-/// The words that stand for numbers.
+/// Whether a word is protobuf's notation of an infinite number or NaN.
 bool is_not_finite(std::string word) {
   for (char& c : word) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   return word == "inf" || word == "infinity" || word == "nan";
 }
 
-/// Reads the text along the schema until something does not fit it.
+/// Follows the text token by token and reports the first one that the schema does not allow.
 class Reader {
  public:
   explicit Reader(const pb::Descriptor& root) { blocks_.push_back(Block{&root, nullptr, 0, false, {}}); }
 
-  /// The error at this token, if it is wrong there.
+  /// Reads a token. Returns an error if it is wrong.
   std::optional<TextError> read(const Tokenizer::Token& token);
-  /// The error of a text that ends here.
+  /// Returns an error if the text must not end here.
   [[nodiscard]] std::optional<TextError> end(const Tokenizer::Token& token) const;
-  /// True after a minus sign, which is one with the token that follows.
+  /// True after a minus sign, which belongs to the next token.
   [[nodiscard]] bool within_value() const { return negative_; }
 
  private:
   struct Block {
     const pb::Descriptor* type;
-    const FieldDescriptor* field;  ///< that it is the value of; null for the whole text
-    int line;                      ///< where it opens
-    bool in_list;                  ///< one of several values in brackets
-    std::set<std::string> given;   ///< names of the fields and oneofs that have a value
+    const FieldDescriptor* field;  ///< the field whose value the block is; null for the whole text
+    int line;                      ///< line of its opening brace
+    bool in_list;                  ///< it is an element of a list in brackets
+    std::set<std::string> given;   ///< names of fields and oneofs that have a value
   };
   enum class Expected { kName, kColonOrBlock, kValue };
 

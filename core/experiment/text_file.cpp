@@ -22,9 +22,9 @@ namespace pb = google::protobuf;
 namespace {
 
 constexpr std::size_t kLargestFile = std::size_t{32} << 20;
-/// Elements of one list beyond this many share the place of the list, which bounds the memory that places take.
+/// Elements of a list beyond this number share the place of the list, which limits the memory for places.
 constexpr int kLocatedElements = 100'000;
-/// The experiment's messages nest less than ten deep.
+/// Limit of nested messages. An experiment has fewer than ten levels.
 constexpr int kDeepestNesting = 100;
 
 class FirstError : public pb::io::ErrorCollector {
@@ -61,7 +61,7 @@ void note_places(const pb::Message& message, const pb::TextFormat::ParseInfoTree
   }
 }
 
-/// True if `path` names `root` or something below it.
+/// Whether `path` is `root` or below it.
 bool lies_in(std::string_view path, std::string_view root) {
   return path.starts_with(root) &&
          (path.size() == root.size() || path[root.size()] == '.' || path[root.size()] == '[');
@@ -72,7 +72,7 @@ bool lies_in(std::string_view path, std::string_view root) {
 SourceLocations::SourceLocations(std::string_view file) : sources_{std::string{file}} {}
 
 std::uint32_t SourceLocations::source(std::string_view name) {
-  // A place rarely comes from another source than the one before it.
+  // Search from the end, because successive places usually have the same source.
   const auto known = std::find(sources_.rbegin(), sources_.rend(), name);
   if (known != sources_.rend()) return static_cast<std::uint32_t>(sources_.rend() - known - 1);
   sources_.emplace_back(name);

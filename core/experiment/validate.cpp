@@ -6,7 +6,7 @@
 namespace kilotwin {
 
 void validate(const LoadedExperiment& loaded) {
-  static_cast<void>(place_robots(loaded));  // checks the fields first
+  static_cast<void>(place_robots(loaded));  // this also checks the fields
   static_cast<void>(read_light_rasters(loaded));
 }
 

@@ -1,4 +1,4 @@
-/// Whether an experiment makes sense: its fields, the files that it names, and the places of its robots.
+/// Validation of an experiment: its fields, the files that it names, and the placement of its robots.
 #pragma once
 
 #include "core/experiment/load.hpp"

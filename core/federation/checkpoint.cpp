@@ -18,7 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Format 1 had no checksums.
 constexpr std::uint32_t kFormat = 2;
 constexpr FileKind kPartFile{"KTWNCHKP", kFormat, "a part of a checkpoint", "resume from another checkpoint"};
 
@@ -169,7 +168,7 @@ Checkpoint read_checkpoint(const fs::path& directory, const proto::Manifest& man
     checkpoint.parts.push_back(std::move(part));
   }
   if (checkpoint.parts.empty() || checkpoint.parts.size() != checkpoint.parts.front().header().parts()) {
-    throw UserError(fmt::format("{}: not a complete checkpoint; resume from another one", directory.string()));
+    throw UserError(fmt::format("{}: the checkpoint is incomplete; resume from another one", directory.string()));
   }
   return checkpoint;
 }

@@ -11,7 +11,7 @@
 namespace kilotwin {
 namespace {
 
-/// The robots of the host that federate `id` is.
+/// The share of the behaviours host with federate id `id`.
 Share share_of(const RunPlan& plan, FederateId id) {
   return plan.share(HostId{id.value() - plan.behaviours(HostId{0}).value()});
 }
@@ -25,14 +25,14 @@ bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
-/// Farther from the centre than anything can get: arenas are at most 1e6 mm wide.
+/// Limit of coordinates. Arenas are at most 1e6 mm wide, so no body gets that far.
 constexpr double kFarthest_mm = 1e9;
 
 bool all_within(const std::vector<double>& values, double most) {
   return std::all_of(values.begin(), values.end(), [most](double value) { return std::abs(value) <= most; });
 }
 
-/// Life cycles that there are.
+/// Whether all values are enumerators of LifeCycle.
 bool all_life_cycles(const std::vector<std::uint8_t>& values) {
   return std::all_of(values.begin(), values.end(), [](std::uint8_t value) {
     return value <= static_cast<std::uint8_t>(LifeCycle::kMoving) ||
@@ -40,12 +40,12 @@ bool all_life_cycles(const std::vector<std::uint8_t>& values) {
   });
 }
 
-/// Colours of two bits per channel.
+/// Whether all values are colours with two bits per channel.
 bool all_colours(const std::vector<std::uint8_t>& values) {
   return std::all_of(values.begin(), values.end(), [](std::uint8_t value) { return value < 64; });
 }
 
-/// Rigid states as the ODE engine packs them: z, a unit quaternion, velocity, spin.
+/// Whether the columns are valid rigid-body states of the ODE engine: z, a unit quaternion, velocity, angular velocity.
 bool are_rigid_states(std::span<const double> columns) {
   constexpr double kMostMotion = 1e9, kLeastNorm = 0.9, kMostNorm = 1.1;
   for (; !columns.empty(); columns = columns.subspan(BodyFrame::kSpatialColumns)) {

@@ -1,5 +1,5 @@
-/// What comes over the wire, held against the plan before an engine sees it: engines index by robot, and trust their frames.
-/// Anybody on the domain can write a sample.
+/// Checks of received samples against the plan, before an engine uses them. Engines index arrays by robot ids from frames, and any
+/// program on the DDS domain can write a sample.
 #pragma once
 
 #include "core/federation/schedule.hpp"
@@ -8,12 +8,12 @@
 
 namespace kilotwin {
 
-// What no frame of `publisher` to `reader` in this plan can be, in a few words; nullptr where nothing is wrong.
+/// The first defect of a frame from `publisher` for `reader`, as a clause for an error line; nullptr if the frame is valid.
 [[nodiscard]] const char* defect(const BodyFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 [[nodiscard]] const char* defect(const ActuationFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 [[nodiscard]] const char* defect(const RadioFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 [[nodiscard]] const char* defect(const OverheadFrame&, const RunPlan&, FederateId publisher, FederateId reader);
-/// The same for a directive.
+/// The first defect of a directive, or nullptr.
 [[nodiscard]] const char* defect(const Directive&, const RunPlan&);
 
 }  // namespace kilotwin

@@ -1,4 +1,4 @@
-/// A federate's inputs and outputs: rings of frames that receive threads fill, and writers of frames.
+/// A federate's inputs, ring buffers of frames that receive threads fill, and its outputs, writers of frames.
 #pragma once
 
 #include <fmt/format.h>
@@ -20,7 +20,7 @@ class InputBase {
   }
   virtual ~InputBase() = default;
   InputBase(const InputBase&) = delete;
-  /// With the session's mutex held.
+  /// Requires the session's mutex.
   [[nodiscard]] TickGate& gate() { return gate_; }
 
  protected:
@@ -42,7 +42,7 @@ template <class Frame> class Input : public InputBase {
         session.participant(), channel, [this](const Wire& wire, dds::SampleState state) { take(wire, state); });
   }
 
-  /// The frames of `tick`, by ascending publisher; they stay until the session asks for the next tick.
+  /// The frames of `tick`, by ascending publisher. They are valid until the session waits for the next tick.
   std::span<const Frame* const> at(Tick tick) {
     for (std::size_t i = 0; i < rings_.size(); ++i) {
       current_[i] = &rings_[i][static_cast<std::size_t>(tick.count() % kFrameRing)];
@@ -52,8 +52,8 @@ template <class Frame> class Input : public InputBase {
   }
 
  private:
-  /// Called on a receive thread, one sample of this topic at a time. A frame is decoded and checked without the session's
-  /// mutex: its slot lies ahead of the tick that the session reads, and nobody looks at it before the gate accepts it.
+  /// Called on a receive thread, one sample of this topic at a time. Decodes and checks a frame without the session's mutex: its
+  /// ring slot is ahead of the tick that the session reads, and the session reads it only after the gate has accepted it.
   void take(const Wire& wire, dds::SampleState state) {
     if (!state.valid || wire.run != session_.plan().run() || !is_new(wire)) return;
     const FederateId publisher{wire.publisher};
@@ -68,11 +68,10 @@ template <class Frame> class Input : public InputBase {
     }
     gate_.accept(publisher, Tick{wire.tick});
     session_.mention(wire.directives);
-    session_
-        .notify();  // also of one frame of several: on busy machines the session then waits for a core meanwhile
+    session_.notify();  // after each frame, even if others are missing: waking up early hides scheduling delays
   }
 
-  /// Takes notice of hellos and of frames that cannot be; true for the next frame of a publisher.
+  /// Handles hellos, and fails the session for an unexpected frame. True for the next frame of a publisher.
   bool is_new(const Wire& wire) {
     const std::lock_guard lock(session_.mutex());
     const FederateId publisher{wire.publisher};
@@ -81,7 +80,7 @@ template <class Frame> class Input : public InputBase {
       session_.notify();
       return false;
     }
-    // A run at work in which this federate's place is taken: the membership will say so.
+    // Before the start, a frame means that another process already runs as this federate. on_member() reports that.
     if (!session_.expects_frames()) return false;
     switch (gate_.arrival(publisher, Tick{wire.tick})) {
       case TickGate::Arrival::kNew: return true;
@@ -95,7 +94,8 @@ template <class Frame> class Input : public InputBase {
   std::vector<std::array<Frame, kFrameRing>> rings_;
   std::vector<const Frame*> current_;
   std::string topic_;
-  std::unique_ptr<dds::Reader<Wire>> reader_;  // last: stops calling back before the rings go
+  std::unique_ptr<dds::Reader<Wire>>
+      reader_;  // declared last: destroyed first, so that no callback uses a destroyed ring
 };
 
 class OutputBase {
@@ -117,7 +117,7 @@ template <class Frame> class Output : public OutputBase {
   Output(Session& session, const dds::Channel& channel)
       : OutputBase(session), writer_(session.participant(), channel) {}
 
-  /// To be filled by the engine's emit, then sent with write(). Its arrays are reused from tick to tick.
+  /// The engine's emit() fills it, then write() sends it. Its arrays are reused from tick to tick.
   Frame frame;
   void write() { writer_.write(to_wire(session_.header(), frame)); }
 

@@ -1,4 +1,4 @@
-/// Adds up the federates' shares of h(t), in whatever order they come, and chains the sums.
+/// Sums the federates' shares of h(t), which may arrive in any order, and chains the sums: H(t) = hash_chain(H(t - 1), h(t)).
 #pragma once
 
 #include <cstdint>
@@ -9,21 +9,21 @@
 
 namespace kilotwin {
 
-/// The first tick that enters the chain of a run which starts at `first`: tick 0 itself, but not a checkpoint's tick, which
-/// is in the chain already.
+/// The first tick that enters the chain of a run that starts at `first`: tick 0, or the tick after a checkpoint, whose chain includes
+/// the checkpoint's tick.
 [[nodiscard]] constexpr Tick first_hashed(Tick first) { return first > Tick{0} ? first + 1 : first; }
 
 class HashSums {
  public:
-  /// `federates` shares make up a sum. The chain starts with `chain` as H(first - 1).
+  /// `federates`: number of shares per sum. `chain`: H(first - 1).
   HashSums(std::uint32_t federates, Tick first, std::uint64_t chain)
       : federates_(federates), next_(first), chain_(chain) {}
 
-  /// One federate's shares of h(from), h(from + 1)... False where a share comes twice or too late.
+  /// Adds one federate's shares of h(from), h(from + 1)... Returns false if a share arrives twice or too late.
   bool add(Tick from, std::span<const std::uint64_t> parts);
-  /// Moves on by one tick if its sum is complete.
+  /// Advances the chain by one tick if the tick's sum is complete. Returns whether it did.
   bool advance();
-  /// The last tick whose H is known; first - 1 before the first advance.
+  /// The last tick whose H is known; first - 1 before the first advance().
   [[nodiscard]] Tick tick() const { return next_ - 1; }
   /// H(tick()).
   [[nodiscard]] std::uint64_t chain() const { return chain_; }
@@ -36,7 +36,7 @@ class HashSums {
   std::uint32_t federates_;
   Tick next_;
   std::uint64_t chain_;
-  std::deque<Sum> sums_;  // of next_, next_ + 1, ...
+  std::deque<Sum> sums_;  // for next_, next_ + 1, ...
 };
 
 }  // namespace kilotwin

@@ -1,4 +1,4 @@
-/// Why federates may fail to meet, in words for people.
+/// Explains why federates may fail to discover each other.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace kilotwin {
 
-/// One line, without a full stop. `heard`: how many of the run's `federates` were heard so far, the own one included.
+/// One line without a full stop. `heard`: number of the run's `federates` that were heard so far, including this one.
 [[nodiscard]] std::string likely_cause(const dds::Transport&, std::uint32_t heard, std::uint32_t federates);
 
 }  // namespace kilotwin

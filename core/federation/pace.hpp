@@ -1,4 +1,4 @@
-/// Keeps a run from going faster than wall time allows.
+/// Limits the speed of a run: simulated time over wall time is at most RunPlan::pace.
 #pragma once
 
 #include <algorithm>
@@ -14,13 +14,13 @@ class Pace {
  public:
   explicit Pace(const RunPlan& plan) : factor_(plan.pace), tick_s_(plan.tick_length.seconds()) {}
 
-  /// How much earlier than the pace allows `ticks` ticks are over after `wall_s`, s; 0 or less: not at all.
+  /// Seconds by which `ticks` ticks in `wall_s` of wall time are ahead of the pace; 0 or less: not ahead.
   [[nodiscard]] double ahead_s(std::int64_t ticks, double wall_s) const {
     return factor_ <= 0 ? 0 : static_cast<double>(ticks) * tick_s_ / factor_ - wall_s;
   }
 
-  /// Returns when `ticks` ticks may be over, or the process is interrupted. `wall_s()`: how long the run has taken for
-  /// them so far, pauses excluded. `idle()` is called about every 100 ms meanwhile.
+  /// Waits until the pace allows the end of `ticks` ticks, or the process is interrupted. `wall_s()` returns the wall time of the
+  /// run so far, without pauses. Calls `idle()` about every 100 ms.
   template <class Wall, class Idle> void hold(std::int64_t ticks, Wall wall_s, Idle idle) const {
     if (factor_ <= 0) return;
     while (interrupted() == 0) {

@@ -1,5 +1,4 @@
-/// What a run reports while it goes, and its totals: the interface between the federation and what
-/// records, shows or summarises it.
+/// Progress and totals of a run: the interface between the federation and the code that records, shows or summarises the run.
 #pragma once
 
 #include <array>
@@ -15,49 +14,49 @@
 
 namespace kilotwin {
 
-/// How far a run is.
+/// Progress of a run.
 struct RunProgress {
   Tick now;
-  double wall_s = 0;                     ///< since the first tick, pauses excluded
+  double wall_s = 0;                     ///< wall time since the first tick, without pauses
   std::uint64_t sent = 0, received = 0;  ///< messages since the start
   std::uint32_t robots_failed = 0;
   bool paused = false;
-  std::string waiting_for;  ///< one line; empty: for nobody
+  std::string waiting_for;  ///< the federates for which the run waits, one line; empty if it does not wait
 };
 
-/// Called on one thread, with ascending ticks for each function.
+/// All functions are called on one thread. The ticks passed to each function ascend.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  /// The whole swarm at a tick. `last`: the run ends here.
+  /// The state of the whole swarm at a tick. `last`: the run ends at this tick.
   virtual void state(Tick, const SwarmView&, bool last) = 0;
-  /// H(tick).
+  /// The chained state hash H(tick).
   virtual void hash(Tick, std::uint64_t chain) = 0;
-  /// A stamped input was announced.
+  /// A directive with its tick and sequence number was announced.
   virtual void input(const Directive&) = 0;
-  /// A checkpoint comes to be complete: what was recorded up to its tick must not be lost with this process.
+  /// A checkpoint is about to be complete. The recording up to its tick must be on disk when this returns.
   virtual void saved() {}
   /// Called a few times a second, also while the run pauses or waits.
   virtual void idle(const RunProgress& progress) { static_cast<void>(progress); }
 };
 
-/// Where the time of a run goes.
+/// Categories of computing time.
 enum class Work : std::uint8_t { kBehaviours, kPhysics, kRadio, kStation, kExchange, kRecording, kCount };
 
-/// What a run adds up to.
+/// Totals of a run.
 struct RunTotals {
-  Tick first, last;  ///< last: where it ended, which may be before the experiment's end
+  Tick first, last;  ///< last: the tick at which the run ended, possibly before the experiment's end
   std::uint64_t state_hash = 0;
-  double wall_s = 0;           ///< from the first to the last tick, pauses excluded
-  double cpu_s = 0;            ///< of all processes
-  double peak_memory_mib = 0;  ///< of all processes together
+  double wall_s = 0;           ///< wall time from the first to the last tick, without pauses
+  double cpu_s = 0;            ///< CPU time of all processes
+  double peak_memory_mib = 0;  ///< sum over all processes
   std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   std::uint32_t robots_failed = 0;
   std::array<std::uint64_t, static_cast<std::size_t>(Work::kCount)> work_ns{};
-  std::vector<PairCount> pairs;    ///< where the recording wants messages
-  std::vector<RadioCount> radios;  ///< per robot; empty where the run broke before the radio reported
-  bool stopped_early = false;      ///< by a directive
-  std::string failure;             ///< one line, where the run broke
+  std::vector<PairCount> pairs;    ///< empty unless RecordingSettings::messages
+  std::vector<RadioCount> radios;  ///< per robot; empty if the run failed before the radio's report
+  bool stopped_early = false;      ///< a directive ended the run
+  std::string failure;             ///< one line if the run failed, else empty
 };
 
 }  // namespace kilotwin

@@ -20,23 +20,24 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-/// How often hellos are repeated, at first and at most.
+/// Period of repeated hello samples: initial and longest.
 constexpr auto kHelloPeriod = milliseconds(10), kLongestHelloPeriod = milliseconds(500);
-/// How often a federate shows that it lives.
+/// Period of the member samples by which a federate shows that it is alive.
 constexpr auto kBeatPeriod = milliseconds(500);
-/// How often idle work is done, and how far by wall time metrics may lag behind where a run goes slowly.
+/// Period of idle(), which also limits the delay of metrics in a slow run.
 constexpr auto kIdlePeriod = milliseconds(100);
-/// What counts of the time between two looks at who is silent: a process that was not let run has not listened either.
+/// Largest part of the time between two calls of watch_silence() that counts as silence. A process that was not scheduled for
+/// longer could not receive either.
 constexpr auto kMostWatched = milliseconds(200);
-/// How long a federate may be silent before the first tick, and at most.
+/// Patience before the first tick, and upper limit of the patience after it.
 constexpr double kStartPatience_s = 30.0;
-/// Services per core from which on the patience grows with their number.
-constexpr double kCrowd = 4.0;
+/// The patience grows with the number of services if there are more than this many per core.
+constexpr double kServicesPerCore = 4.0;
 constexpr auto kReportAfter = milliseconds(1000), kReportEvery = milliseconds(5000);
-/// After a wait of this length without progress the report says what the cause may be.
+/// After a wait of this length without progress the report includes the likely cause.
 constexpr auto kCauseAfter = milliseconds(60'000);
 constexpr double kFlush_s = 2.0;
-/// For how long a directive that frames mention may fail to come from a station that lives.
+/// Longest wait for a directive that frames mention while the station is alive.
 constexpr auto kDirectivePatience = milliseconds(10'000);
 /// Ticks per metrics sample.
 constexpr std::size_t kMetricsTicks = 32;
@@ -97,7 +98,7 @@ Session::Session(const RunPlan& plan, FederateId self, const dds::Transport& tra
   member_reader_ = std::make_unique<dds::Reader<WireMember>>(
       participant_, topics::members(),
       [this](const WireMember& member, dds::SampleState state) { on_member(member, state); });
-  heart_ = std::jthread([this](const std::stop_token& stop) { beat(stop); });
+  heartbeat_ = std::jthread([this](const std::stop_token& stop) { beat(stop); });
 }
 
 Session::~Session() = default;
@@ -110,7 +111,7 @@ void Session::beat(const std::stop_token& stop) {
     try {
       member_writer_->write(member_);
     } catch (const RunError&) {
-      return;  // the session's own thread meets the same fault, and tells it
+      return;  // the session's thread gets the same error and reports it
     }
   }
 }
@@ -118,10 +119,11 @@ void Session::beat(const std::stop_token& stop) {
 double Session::patience_s() const {
   if (!started_) return kStartPatience_s;
   const double cores = std::max(1u, std::thread::hardware_concurrency());
-  return std::clamp(dds::kSilence_s * plan_.federates() / (kCrowd * cores), dds::kSilence_s, kStartPatience_s);
+  return std::clamp(dds::kSilence_s * plan_.federates() / (kServicesPerCore * cores), dds::kSilence_s,
+                    kStartPatience_s);
 }
 
-/// Whoever shows no sign of life is lost.
+/// Fails the session if a federate has been silent for too long.
 void Session::watch_silence() {
   const auto now = Clock::now();
   const auto watched = std::min<Clock::duration>(now - std::exchange(watched_at_, now), kMostWatched);
@@ -154,7 +156,7 @@ void Session::fail_as_user_error(const std::string& line) {
   fail(line);
 }
 
-/// Of two runs on one domain the one that came later leaves; the one that is at work goes on.
+/// Fails this session while it is ARRIVING: of two runs on one domain the later one leaves.
 void Session::on_member_of_another_run(const WireMember& member, bool alive) {
   if (!alive || phase_ != kilotwin_wire_ARRIVING || member.phase >= kilotwin_wire_FINISHED) return;
   const bool came_later = std::pair(member.arrived_us, member.run) > std::pair(member_.arrived_us, member_.run);
@@ -179,7 +181,7 @@ void Session::on_member(const WireMember& member, dds::SampleState state) {
     const bool is_other_self = member.publisher == self_.value() &&
                                (member.process != member_.process || std::string_view(member.host) != member_.host);
     if (is_other_self) {
-      // Of two the one that came later leaves; the one that is at work goes on.
+      // Of two processes with one federate id the later one leaves.
       if (phase_ != kilotwin_wire_ARRIVING) return;
       is_double_ = true;
       return fail_as_user_error(
@@ -241,13 +243,13 @@ void Session::check() const {
     if (failure_is_user_error_) throw UserError(failure_);
     throw RunError(failure_);
   }
-  // The station turns an interrupt into the run's orderly end; nobody else can.
+  // The station handles interrupts itself: it ends the run in order by a directive.
   if (interrupted() != 0 && self_ != plan_.station()) {
     throw RunError(fmt::format("stopped by signal {}", interrupted()));
   }
 }
 
-/// Says now and then for whom a wait without progress is, and ends it where it lasts too long. With the mutex held.
+/// Prints at intervals the federates for which the session waits. Throws RunError after give_up_after_s_. Requires the mutex.
 void Session::report_wait(Clock::time_point since, const std::string& whom) {
   const auto now = Clock::now();
   const double waited_s = std::chrono::duration<double>(now - since).count();
@@ -258,10 +260,10 @@ void Session::report_wait(Clock::time_point since, const std::string& whom) {
   if (now < next_report_) return;
   next_report_ = now + kReportEvery;
   waiting_for_ = whom;
-  const bool tells_cause = now - since >= kCauseAfter && !cause_told_;
-  cause_told_ = cause_told_ || tells_cause;
+  const bool reports_cause = now - since >= kCauseAfter && !cause_reported_;
+  cause_reported_ = cause_reported_ || reports_cause;
   say(fmt::format("{} has waited {:.0f} s for {}{}", plan_.name(self_), waited_s, whom,
-                  tells_cause ? ": " + likely_cause() : ""));
+                  reports_cause ? ": " + likely_cause() : ""));
 }
 
 std::string Session::likely_cause() const {
@@ -273,7 +275,8 @@ bool Session::hears_all() const {
   return std::all_of(inputs_.begin(), inputs_.end(), [](InputBase* input) { return input->gate().heard_all(); });
 }
 
-/// For whom the start waits: those who have not arrived, else those whose frames do not come through; empty: nobody.
+/// The federates for which the start waits: absent ones, else those whose hellos do not arrive here, else those that do not hear all
+/// others. Empty if there are none.
 std::string Session::missing_at_start() const {
   std::vector<FederateId> absent, silent, deaf;
   for (std::uint32_t i = 0; i < members_.size(); ++i) {
@@ -295,7 +298,7 @@ void Session::assemble(Federate& federate) {
   next_report_ = since + kReportAfter;
   next_idle_ = since;
   write_metrics(federate, Report::kFirst);
-  // The more federates there are, the longer they need to find each other, and the less they should talk meanwhile.
+  // Discovery takes longer with more federates, and hellos compete with it for the processor.
   const auto first_period = std::min(kHelloPeriod * (1 + plan_.federates() / 8), kLongestHelloPeriod);
   auto next_hello = since;
   auto period = first_period;
@@ -321,7 +324,7 @@ void Session::assemble(Federate& federate) {
     if (whom != waits_for) {
       waits_for = std::move(whom);
       since = Clock::now();
-      cause_told_ = false;
+      cause_reported_ = false;
       period = first_period;
     }
     report_wait(since, waits_for);
@@ -332,7 +335,7 @@ void Session::assemble(Federate& federate) {
   waiting_for_.clear();
 }
 
-/// Waits for wall time where the run must not go faster.
+/// Waits while the run is ahead of its pace.
 void Session::hold(Federate& federate, Tick now) {
   constexpr double kLongest_s = 1.0;
   while (interrupted() == 0) {
@@ -359,7 +362,7 @@ void Session::set_paused(bool pause) {
   }
 }
 
-/// For whom the step from `now` waits. Throws RunError where it would wait in vain.
+/// The federates for which the step from `now` waits. Throws RunError if a missing input can no longer arrive.
 std::string Session::missing_inputs(Tick now, Clock::duration waited) const {
   std::vector<FederateId> late;
   for (InputBase* input : inputs_) {
@@ -379,7 +382,7 @@ std::string Session::missing_inputs(Tick now, Clock::duration waited) const {
 RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
   auto since = Clock::now();
   next_report_ = since + kReportAfter;
-  cause_told_ = false;
+  cause_reported_ = false;
   std::unique_lock lock(mutex_);
   for (InputBase* input : inputs_) input->gate().reading(now);
   for (;;) {
@@ -399,7 +402,7 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
       since = at;
     } else if (at >= since + kReportAfter) {
       const std::string whom = missing_inputs(now, at - since);
-      // The station ends an interrupted run in order, but not one that has come to a halt.
+      // The station ends an interrupted run by a directive, which has no effect while the run waits for a lost input.
       if (interrupted() != 0)
         throw RunError(fmt::format("stopped by signal {} while it waited for {}", interrupted(), whom));
       report_wait(since, whom);
@@ -415,7 +418,7 @@ RunSchedule::Verdict Session::await(Federate& federate, Tick now) {
   }
 }
 
-/// Metrics lag behind by wall time no more than the period of this, also where the run goes slowly or stands.
+/// Called at least every kIdlePeriod, also while the run is slow, waits or pauses.
 void Session::idle(Federate& federate) {
   next_idle_ = Clock::now() + kIdlePeriod;
   watch_silence();
@@ -494,7 +497,7 @@ void Session::run(Federate& federate) {
     ended_ = Clock::now();
     leave(federate);
   } catch (const std::exception& error) {
-    // Tell the others why, so that all name the same culprit; a failure that came from them is theirs to tell.
+    // Publish the failure, so that all federates report the same one. Mark a failure that came from another federate.
     const std::string line = error.what();
     bool own = false;
     if (!ended_) ended_ = Clock::now();
@@ -508,7 +511,7 @@ void Session::run(Federate& federate) {
       write_member(kilotwin_wire_FAILED, own ? line : std::string(kLeft) + line);
       member_writer_->flush(0.5);
     } catch (const std::exception&) {
-      // The connection itself may be what broke; the first error is the one to tell.
+      // The connection may have caused the failure. Report the first error.
     }
     throw;
   }

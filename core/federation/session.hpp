@@ -1,16 +1,16 @@
-/// A federate's part in a federated run: it finds the others, steps when its inputs are in, and leaves in order.
+/// A federate's session in a federated run. It runs in three phases:
 ///
-///   assemble   write hellos on all outputs until everybody hears everybody (a reliable reader drops what it is sent before
-///              the first heartbeat of a writer; the hellos get that over with)
-///   loop       publish frames of tick k, wait for the inputs of tick k, step
-///   leave      wait until everything sent is acknowledged, say FINISHED
+///   assemble   write hello samples on all outputs until all federates hear each other (a reliable reader drops samples that
+///              arrive before the writer's first heartbeat, so no frame may be sent earlier)
+///   loop       publish the frames of tick k, wait for the inputs of tick k, step
+///   leave      wait until all samples are acknowledged, then write FINISHED
 ///
-/// Any wait over 1 s says for whom; one without progress for 60 s says what the cause may be. A federate that is lost, or
-/// that fails, ends the session of all others with a RunError that names it; so does one that left while something of it is
-/// still missing, and a frame that cannot be ours.
+/// A wait of more than 1 s prints the federates for which it waits; after 60 s without progress it also prints the likely cause.
+/// If a federate is lost or fails, the sessions of all others end with a RunError that names it. The same holds for a federate that
+/// leaves before it has sent a frame that others need, and for a malformed frame.
 ///
-/// Every federate rewrites its member sample twice a second. One that is silent for patience_s() is lost:
-/// dds::kSilence_s, longer on crowded machines and before the first tick, when all processes compete for the cores.
+/// Every federate rewrites its member sample twice a second. A federate that is silent for patience_s() is lost. That time is
+/// dds::kSilence_s, and longer before the first tick and on machines with many services per core.
 #pragma once
 
 #include <atomic>
@@ -34,28 +34,29 @@
 
 namespace kilotwin {
 
-/// How the failure of a federate begins that left because of another: what follows is the other's.
+/// Prefix of a federate's failure text if it left because another one failed. The other's failure text follows.
 inline constexpr std::string_view kLeft = "left: ";
 
-/// What the session drives.
+/// Interface of a service to its session.
 class Federate {
  public:
   virtual ~Federate() = default;
-  /// Write the frames of `now`.
+  /// Writes the frames of `now`.
   virtual void publish(Tick now) = 0;
-  /// Whether it has heard all that it must hear before the run starts, besides the frames of its inputs.
+  /// Whether all topics other than the inputs' frames are connected, as required for the start.
   [[nodiscard]] virtual bool hears_all() { return true; }
-  /// How long the step from `now` must still wait for wall time, s; 0 or less: not at all.
+  /// Seconds by which the run is ahead of its pace at `now`; the session waits for them before the step. 0 or less: no wait.
   [[nodiscard]] virtual double ahead_s(Tick now) { return static_cast<void>(now), 0.0; }
-  /// All inputs of `now` are here; `last`: the run ends here, else the step from it follows.
+  /// Called when all inputs of `now` have arrived. `last`: the run ends at `now`; else the step from `now` follows.
   virtual void inputs_complete(Tick now, bool last) { static_cast<void>(now), static_cast<void>(last); }
-  /// Advance the engine from `from` to the next tick.
+  /// Advances the engine from tick `from` to the next.
   virtual void step(Tick from) = 0;
   /// This federate's share of h(now).
   [[nodiscard]] virtual std::uint64_t hash_part() const = 0;
-  /// Write this federate's part of the checkpoint of `now`.
+  /// Writes this federate's part of the checkpoint at `now`.
   virtual void save(Tick now) = 0;
-  /// Add what is counted; `last`: nothing follows. Sequences must outlive the call.
+  /// Adds the federate's counters to a metrics sample. `last`: no further sample follows. Sequences must stay valid until the
+  /// sample is written.
   virtual void count(WireMetrics& metrics, bool last) { static_cast<void>(metrics), static_cast<void>(last); }
   /// Called about every 100 ms while the session waits, and about as often while it steps.
   virtual void idle() {}
@@ -63,40 +64,40 @@ class Federate {
 
 class Session {
  public:
-  /// `first`: the tick at which the run starts (0, or that of a checkpoint). `inputs`: what all federates know from the start
-  /// of what will be stamped, numbered from 0. `give_up_after_s`: how long it waits without progress, 0: for ever.
+  /// `first`: the tick at which the run starts: 0, or that of a checkpoint. `inputs`: directives that all federates know from the
+  /// start, numbered from 0. `give_up_after_s`: longest wait without progress; 0: no limit.
   Session(const RunPlan& plan, FederateId self, const dds::Transport& transport, Tick first,
           std::span<const Directive> inputs = {}, double give_up_after_s = 0);
   ~Session();
 
-  /// Runs `federate` to the end of the run. Throws RunError where another federate is lost or failed, or the run was
-  /// interrupted, and UserError where another run is on the domain, or this very federate runs already.
+  /// Runs `federate` to the end of the run. Throws RunError if another federate is lost or failed, or the run was interrupted.
+  /// Throws UserError if another run uses the domain, or another process already runs this federate.
   void run(Federate& federate);
 
   [[nodiscard]] const RunPlan& plan() const { return plan_; }
   [[nodiscard]] FederateId self() const { return self_; }
   [[nodiscard]] const dds::Participant& participant() const { return participant_; }
   [[nodiscard]] Tick first() const { return first_; }
-  /// Valid on the session's own thread.
+  /// To be called on the session's thread only.
   [[nodiscard]] const RunSchedule& schedule() const { return schedule_; }
   [[nodiscard]] Tick now() const { return now_; }
   [[nodiscard]] WireHeader header() const { return {self_.value(), plan_.run(), known_}; }
-  /// One line: for whom the session waits; empty while it does not.
+  /// The federates for which the session waits, one line; empty if it does not wait.
   [[nodiscard]] std::string waiting_for() const { return waiting_for_; }
-  /// The first tick has begun.
+  /// Whether the first tick has begun.
   [[nodiscard]] bool started() const { return started_.has_value(); }
   [[nodiscard]] bool paused() const { return paused_since_.has_value(); }
-  /// Wall seconds since the first tick, pauses excluded.
+  /// Wall time since the first tick, without pauses, s.
   [[nodiscard]] double wall_s() const;
 
-  /// Called from receive threads: guards what they write.
+  /// The functions below are called on receive threads. The mutex guards the data that they write.
   [[nodiscard]] std::mutex& mutex() { return mutex_; }
   void notify() { arrived_.notify_one(); }
-  /// Nobody steps before all hear all, this federate included.
+  /// False while this federate is ARRIVING: no federate steps before all hear each other.
   [[nodiscard]] bool expects_frames() const { return phase_ != kilotwin_wire_ARRIVING; }  ///< with the mutex held
   void mention(std::uint64_t directives) { schedule_.mention(directives); }               ///< with the mutex held
   void fail(const std::string& line);                                                     ///< with the mutex held
-  /// The ingress announces a directive (station only, own thread).
+  /// Publishes a directive of the ingress. Only the station calls it, on the session's thread.
   void announce(const Directive& directive);
 
  private:
@@ -106,7 +107,8 @@ class Session {
   struct MemberState {
     bool heard = false, alive = false;
     kilotwin_wire_MemberPhase phase = kilotwin_wire_ARRIVING;
-    Clock::duration silent{};  ///< wall time that this session has watched since the last sample
+    Clock::duration
+        silent{};  ///< time since the last sample, without intervals in which this process was not scheduled
   };
 
   void assemble(Federate&);
@@ -120,7 +122,7 @@ class Session {
   void watch_silence();
   [[nodiscard]] double patience_s() const;
   void on_directive(const WireDirective& wire);
-  /// kFirst: nothing was counted yet, but the station hears by it that the metrics come through.
+  /// kFirst: an empty sample, by which the station learns that metrics arrive.
   enum class Report { kFirst, kNext, kLast };
   void write_metrics(Federate&, Report);
   void idle(Federate&);
@@ -143,26 +145,26 @@ class Session {
   Tick now_;
   std::mutex mutex_;
   std::condition_variable arrived_;
-  RunSchedule schedule_;     // log and mentions guarded by mutex_
-  std::uint32_t known_ = 0;  // schedule_.known() as of the last look: what own frames mention
+  RunSchedule schedule_;     // add() and mention() are guarded by mutex_
+  std::uint32_t known_ = 0;  // copy of schedule_.known() for the headers of frames
   std::string failure_;
   bool failure_is_user_error_ = false;
-  bool is_double_ = false;  // another process is this federate already
+  bool is_double_ = false;  // another process already runs as this federate
   kilotwin_wire_MemberPhase phase_ = kilotwin_wire_ARRIVING;
   std::string waiting_for_;
   Clock::time_point next_report_, next_idle_, watched_at_;
-  bool cause_told_ = false;  // of the present wait
+  bool cause_reported_ = false;  // the likely cause of the current wait was printed
   std::vector<MemberState> members_;
   std::vector<class InputBase*> inputs_;
   std::vector<class OutputBase*> outputs_;
   std::vector<std::uint64_t> hash_parts_;
-  Tick hash_first_;  // of hash_parts_
-  Tick saved_{-1};   // the last checkpoint
+  Tick hash_first_;  // tick of hash_parts_[0]
+  Tick saved_{-1};   // tick of the last checkpoint
   std::uint64_t step_ns_ = 0, exchange_ns_ = 0, wait_ns_ = 0, paused_ns_ = 0;
   std::optional<Clock::time_point> started_, ended_, paused_since_;
   bool finished_ = false;
 
-  dds::Participant participant_;  // before the endpoints, so that it outlives them
+  dds::Participant participant_;  // declared before the endpoints, so that it outlives them
   std::mutex member_mutex_;       // guards member_ and the order of its samples; taken before mutex_
   WireMember member_{};
   std::unique_ptr<dds::Writer<WireMember>> member_writer_;
@@ -170,7 +172,7 @@ class Session {
   std::unique_ptr<dds::Writer<WireDirective>> directive_writer_;
   std::unique_ptr<dds::Reader<WireDirective>> directive_reader_;
   std::unique_ptr<dds::Writer<WireMetrics>> metrics_writer_;
-  std::jthread heart_;  // last: ends before the writer that it uses
+  std::jthread heartbeat_;  // declared last: it ends before the writer that it uses is destroyed
 };
 
 }  // namespace kilotwin

@@ -26,7 +26,7 @@ void Snapshots::remove_all() {
   std::error_code ignored;
   for (; !taken_.empty(); taken_.pop_front())
     std::filesystem::remove_all(checkpoint_directory(run_directory_, taken_.front()), ignored);
-  // Where there is no other.
+  // remove() deletes the directory only if it is empty.
   if (wanted_) std::filesystem::remove(run_directory_ / "checkpoints", ignored);
 }
 

@@ -1,4 +1,4 @@
-/// Snapshots: checkpoints for recovery. If a robot's program ends its host, the run continues from one.
+/// Snapshots: checkpoints for recovery. If a robot's program crashes its host, the run continues from the last one.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@
 
 namespace kilotwin {
 
-/// One per minute of wall time; the last two are kept. A run that comes to its end leaves none.
+/// Schedules one snapshot per minute of wall time and keeps the last two. A run that reaches its end keeps none.
 class Snapshots {
  public:
   using Clock = std::chrono::steady_clock;
@@ -19,11 +19,11 @@ class Snapshots {
   Snapshots(std::filesystem::path run_directory, bool wanted)
       : run_directory_(std::move(run_directory)), wanted_(wanted) {}
 
-  /// Whether one is due. Minutes are counted from the first call.
+  /// Whether a snapshot is due. The first call starts the first minute.
   [[nodiscard]] bool due(Clock::time_point now);
-  /// A snapshot was taken at `tick`. Removes all but the last two.
+  /// Registers the snapshot of `tick` and removes all but the last two.
   void taken(Tick tick);
-  /// The run has come to its end.
+  /// Removes all snapshots, at the end of the run.
   void remove_all();
 
  private:

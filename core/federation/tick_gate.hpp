@@ -1,4 +1,4 @@
-/// Who must be heard before a federate may step: a pure state machine, free of clocks and networks.
+/// Gate before a step: it knows which publishers' frames are missing. A pure state machine without clock and network.
 #pragma once
 
 #include <vector>
@@ -8,35 +8,35 @@
 
 namespace kilotwin {
 
-/// Frames of a publisher that may be outstanding at once. A publisher is at most 4 ticks ahead of a reader (schedule.hpp),
-/// so a ring of this many slots never overwrites what is still to be read.
+/// Slots of a publisher's ring buffer. A publisher is at most 4 ticks ahead of a reader (schedule.hpp), so a frame is never
+/// overwritten before it is read.
 inline constexpr std::int64_t kFrameRing = 8;
 
-/// Keeps, per expected publisher, the newest tick heard. Frames of one publisher arrive in order and without gaps
-/// (reliable delivery).
+/// Tracks the newest tick received from each expected publisher. Frames of one publisher arrive in order and without gaps, because
+/// delivery is reliable.
 class TickGate {
  public:
-  /// `first`: the tick of the first frame expected from everybody, and where the reader stands.
+  /// `first`: the tick of the first frame expected from each publisher, and the reader's current tick.
   TickGate(std::vector<FederateId> publishers, Tick first);
 
-  /// A hello, which carries no state, was heard. False: nobody expects this publisher here.
+  /// Registers a hello, which carries no state. False if the publisher is not expected.
   bool hello(FederateId publisher);
   enum class Arrival { kNew, kRepeated, kUnexpected };
-  /// What a frame is that was just heard. kNew: the next one of its publisher. kRepeated: an older one again, or one from
-  /// before `first`. kUnexpected: not one of ours, or one that leaves a gap or runs ahead of the reader by the whole ring.
+  /// Classifies a received frame. kNew: the publisher's next frame. kRepeated: an older one, or one before `first`. kUnexpected: the
+  /// publisher is not expected, or the frame leaves a gap, or it is ahead of the reader by the whole ring.
   [[nodiscard]] Arrival arrival(FederateId publisher, Tick tick) const;
-  /// A new frame can be read from now on. False where it is not new.
+  /// Makes a new frame readable. False if it is not new.
   bool accept(FederateId publisher, Tick tick);
-  /// The reader has come to `tick`: it reads the frames of that tick, and is done with those before.
+  /// Sets the tick whose frames the reader uses. It no longer needs older frames.
   void reading(Tick tick) { reading_ = tick; }
 
-  /// Every publisher has said hello.
+  /// Whether every publisher has sent a hello.
   [[nodiscard]] bool heard_all() const;
-  /// Every publisher's frame of `tick` is here.
+  /// Whether every publisher's frame of `tick` has arrived.
   [[nodiscard]] bool ready(Tick tick) const;
-  /// The publishers whose frame of `tick` is not here yet, ascending.
+  /// The publishers whose frame of `tick` is missing, ascending.
   [[nodiscard]] std::vector<FederateId> missing(Tick tick) const;
-  /// Those who have not said hello yet.
+  /// The publishers that have not sent a hello, ascending.
   [[nodiscard]] std::vector<FederateId> unheard() const;
   [[nodiscard]] const std::vector<FederateId>& publishers() const { return publishers_; }
   /// Index of a publisher in publishers(), or -1.
@@ -44,7 +44,7 @@ class TickGate {
 
  private:
   std::vector<FederateId> publishers_;
-  std::vector<Tick> newest_;  // first - 1: nothing yet
+  std::vector<Tick> newest_;  // per publisher; first - 1 before its first frame
   Tick reading_;
   std::vector<bool> hello_;
 };

@@ -1,4 +1,4 @@
-/// Every topic of the project: its type, its name and how it is delivered. The one place where names are spelled.
+/// All DDS topics of the project: type, name and delivery.
 #pragma once
 
 #include "core/dds/dds.hpp"
@@ -8,7 +8,7 @@
 
 namespace kilotwin {
 
-// Types of idl/, as idlc names them.
+// Types of idl/, with the names that idlc generates.
 using WireBodyFrame = kilotwin_wire_BodyFrame;
 using WireActuationFrame = kilotwin_wire_ActuationFrame;
 using WireRadioFrame = kilotwin_wire_RadioFrame;
@@ -28,14 +28,14 @@ namespace topics {
 using dds::Channel;
 using dds::Delivery;
 
-/// Poses of the robots that a partition owns, to the radio and the station, and to hosts where RunPlan::hosts_see_bodies().
+/// Poses of the robots that a partition owns, for the radio and the station, and for hosts if RunPlan::hosts_see_bodies().
 inline Channel bodies() { return {"kilotwin/bodies", Delivery::kFrame, ""}; }
-/// Bodies near the border, to the partition `to` alone.
+/// Bodies near the border, only for partition `to`.
 inline Channel ghosts(std::uint32_t to) {
   return {"kilotwin/ghosts", Delivery::kFrame, "to." + std::to_string(to)};
 }
 inline Channel actuation() { return {"kilotwin/actuation", Delivery::kFrame, ""}; }
-/// What the radio tells the host `to`.
+/// Receptions, clocks and requests for messages, only for host `to`.
 inline Channel radio(std::uint32_t to) { return {"kilotwin/radio", Delivery::kFrame, "to." + std::to_string(to)}; }
 inline Channel overhead() { return {"kilotwin/overhead", Delivery::kFrame, ""}; }
 

@@ -1,5 +1,5 @@
-/// Effects and arena fields, as plain values. Meaning, units and defaults: idl/effects.proto, whose numbers the enumerations
-/// share.
+/// Settings of effects and arena fields. idl/effects.proto gives meaning, units and defaults. Enumerators have the numbers of its
+/// enumerations.
 #pragma once
 
 #include <cstdint>
@@ -60,7 +60,8 @@ struct SplineShape {
   std::vector<double> knots, values;
 };
 struct Spline2dShape {
-  std::vector<double> first_knots, second_knots, values;  ///< values of the first knot of the second variable first
+  std::vector<double> first_knots, second_knots;
+  std::vector<double> values;  ///< per pair of knots; the index of the first variable runs fastest
 };
 struct StepsShape {
   std::vector<double> at, values;
@@ -88,7 +89,7 @@ struct FunctionSettings {
                TableShape, NoiseShape, EpisodesShape>
       shape;
 
-  /// The shape, where it is of this kind; else null.
+  /// The shape if it is of this kind, else null.
   [[nodiscard]] const NoiseShape* noise() const { return std::get_if<NoiseShape>(&shape); }
   [[nodiscard]] const EpisodesShape* episodes() const { return std::get_if<EpisodesShape>(&shape); }
 };
@@ -114,9 +115,9 @@ struct EffectSettings {
   std::vector<MotionCommand> during;
   std::vector<std::uint32_t> robots;
 
-  /// Whether the effect acts on what is measured, not on how robots move.
+  /// Whether the effect belongs to the measurement model, not to the motion model.
   [[nodiscard]] bool is_measured() const { return target >= Target::kMeasuredOffset; }
-  /// Whether the effect is computed for each wheel on its own: its noise and its covariate are the wheel's.
+  /// Whether the effect is computed for each wheel separately, because its noise or covariate differs between the wheels.
   [[nodiscard]] bool is_per_wheel() const;
 };
 

@@ -152,7 +152,7 @@ LightWaypointSettings waypoint_of(const proto::LightWaypoint& point) {
   return out;
 }
 
-/// Pictures take their rasters from the manifest's list, in order, `first` on.
+/// The image's pictures take their rasters from the manifest's list, in order, from index `first`.
 LightImageSettings image_of(const proto::LightImage& image, const proto::Manifest& manifest, int first) {
   const proto::Arena& arena = manifest.experiment().arena();
   LightImageSettings out;
@@ -250,7 +250,7 @@ decltype(FunctionSettings::shape) shape_of(const proto::Function& f) {
   return ConstantShape{0};
 }
 
-// Numbers of these enumerations are those of the schema, which tests/core/plan compares name by name.
+// These enumerations have the numbers of the schema; tests/core/plan compares them name by name.
 Covariate covariate_of(proto::Function::Covariate covariate) { return static_cast<Covariate>(covariate); }
 EffectSettings::Target target_of(proto::Effect::Target target) {
   return static_cast<EffectSettings::Target>(target);

@@ -1,5 +1,5 @@
-/// What every robot must remember from tick to tick for the effects of an experiment: a number of doubles per robot, the
-/// same for all robots of a run. Physics keeps them, frames carry them between partitions, checkpoints and hashes hold them.
+/// Layout of the effects' memory: the doubles per robot that the effects of an experiment need from tick to tick. It is the same
+/// for all robots of a run. Physics holds them, frames carry them between partitions, checkpoints and hashes include them.
 #pragma once
 
 #include <cstdint>
@@ -10,28 +10,29 @@ namespace kilotwin {
 struct ArenaFieldSettings;
 struct EffectSettings;
 
-/// One double of each robot.
+/// Meaning of one double per robot.
 struct MemorySlot {
   enum class Kind : std::uint8_t {
-    kCommand,           ///< the MotionCommand of the tick before; kStop at first
-    kTimeSinceCommand,  ///< s for which that has lasted
-    kEpisode,           ///< of effect `index`, `function`: s until the next begins, or less than 0: until it ends
-    kLeftMotorTime,     ///< s, forgetting within `forget_s`
+    kCommand,           ///< the MotionCommand of the previous tick; initially kStop
+    kTimeSinceCommand,  ///< duration of that command so far, s
+    kEpisode,  ///< effect `index`, function `function`: >= 0: s until the next episode; < 0: minus s until its end
+    kLeftMotorTime,  ///< motor-on time, s; it decays exponentially with time constant `forget_s`
     kRightMotorTime,
     kDrivenTime,
-    kPreviousForward,  ///< mm/s
+    kPreviousForward,  ///< velocity in the previous tick, mm/s
     kPreviousSideways,
     kPreviousTurn,     ///< rad/s
-    kFieldCell,        ///< cell of field `index` in which the robot was counted last; -1: none
-    kNoise,            ///< of effect `index`, `function`, `wheel`
-    kPreviousCommand,  ///< the MotionCommand before that of kCommand; kStop at first
-    kLastTurn,         ///< the last MotionCommand that was kTurnLeft or kTurnRight; 0 at first
-    kPreviousLasted,   ///< s for which the command before that of kCommand lasted; 0 at first
-    kSinceRest,        ///< s for which a motor has turned without a rest of both
+    kFieldCell,        ///< cell of field `index` that last counted the robot; -1: none
+    kNoise,            ///< state of the noise of effect `index`, function `function`, `wheel`
+    kPreviousCommand,  ///< the MotionCommand before that of kCommand; initially kStop
+    kLastTurn,         ///< the last MotionCommand that was kTurnLeft or kTurnRight; initially 0
+    kPreviousLasted,   ///< duration of the command before that of kCommand, s; initially 0
+    kSinceRest,        ///< time since both motors were last at rest, s
   };
   Kind kind;
   double forget_s = 0;
-  std::uint32_t index = 0, function = 0, wheel = 0;  ///< wheel: 1 for the right one where both have their own
+  std::uint32_t index = 0, function = 0,
+                wheel = 0;  ///< wheel: 1 for the right one if each wheel has a slot, else 0
 
   bool operator==(const MemorySlot&) const = default;
 };
@@ -43,7 +44,7 @@ class MemoryLayout {
 
   [[nodiscard]] const std::vector<MemorySlot>& slots() const { return slots_; }
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(slots_.size()); }
-  /// The slot must be there.
+  /// Requires that the slot exists.
   [[nodiscard]] std::uint32_t index_of(const MemorySlot&) const;
 
  private:

@@ -1,5 +1,4 @@
-/// The model of motion and the parameters of single robots, as plain values. Meaning, units and defaults: Motion and RobotModel
-/// in idl/model.proto.
+/// Settings of the motion model and of single robots. Motion and RobotModel in idl/model.proto give meaning, units and defaults.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +19,7 @@ struct MotionSettings {
   double effects_limit_mm_s = 0;
 };
 
-/// Absent values are drawn, or are those of all robots.
+/// An absent value is drawn at random, or is the common value of all robots.
 struct RobotSettings {
   std::uint32_t robot = 0;
   std::optional<double> bias_left_mm_s, bias_right_mm_s;

@@ -1,4 +1,4 @@
-/// The physics engine and its constants, as plain values. Meaning, units and defaults: Physics in idl/experiment.proto.
+/// Settings of the physics engine. Physics in idl/experiment.proto gives meaning, units and defaults.
 #pragma once
 
 #include <cstdint>

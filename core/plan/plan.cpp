@@ -32,7 +32,7 @@ World world_of(const proto::Experiment& experiment) {
   }
 }
 
-/// Of all fields but `mode`: a local and a federated run of the same experiment are the same run.
+/// Hash of all fields except `mode`: a local and a federated run of the same experiment are the same run.
 std::uint64_t hash_of(proto::Manifest manifest) {
   manifest.clear_mode();
   std::string bytes;
@@ -45,13 +45,14 @@ std::uint64_t hash_of(proto::Manifest manifest) {
   return hash_bytes(bytes);
 }
 
-/// Index of the cell of `count` that `offset_cells` (distance from the first edge, in cells) falls into, ends included.
+/// Index 0..count-1 of the cell at `offset_cells`, the distance from the first edge in cells. Offsets outside belong to the outermost
+/// cells.
 std::uint32_t cell_of(double offset_cells, std::uint32_t count) {
   if (!(offset_cells >= 1)) return 0;
   return offset_cells < count ? static_cast<std::uint32_t>(offset_cells) : count - 1;
 }
 
-/// Distance of two intervals, 0 where they touch or overlap. Lower ends are never +infinity, upper ends never -infinity.
+/// Distance of two intervals; 0 if they touch or overlap. Lower ends are never +infinity, upper ends never -infinity.
 double gap(double a_min, double a_max, double b_min, double b_max) {
   return std::max({0.0, b_min - a_max, a_min - b_max});
 }
@@ -95,7 +96,7 @@ PartitionId PartitionGrid::owner(double x_mm, double y_mm) const {
   KILOTWIN_DEMAND(!std::isnan(x_mm) && !std::isnan(y_mm));
   std::uint32_t column = cell_of((x_mm - x0_mm_) / cell_width_mm_, columns_);
   std::uint32_t row = cell_of((y_mm - y0_mm_) / cell_height_mm_, rows_);
-  // The quotient is rounded; the edges decide. The outermost ones are infinite and end the loops.
+  // The quotient is rounded, so compare with the edges. The outermost edges are infinite and end the loops.
   const auto at = [this](std::uint32_t c, std::uint32_t r) -> const Rectangle& {
     return rectangles_[r * columns_ + c];
   };

@@ -1,8 +1,8 @@
-/// RunPlan: the experiment as resolved. Every federate computes the same plan from the same manifest, and every engine is
-/// built from a plan and its own index in it.
+/// RunPlan: the resolved experiment. Every federate computes the same plan from the same manifest. Every engine is built from a
+/// plan and its index in it.
 ///
-/// Settings come by subject, each with a header of its own (motion_settings.hpp, radio_settings.hpp...), which a unit includes
-/// where it reads them. No header of this folder includes the schema.
+/// Each subject's settings have a header (motion_settings.hpp, radio_settings.hpp...). Units include only the headers of the
+/// settings that they read. No header of this folder includes the schema.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct RobotSettings;
 struct StationSettings;
 struct TemperatureSettings;
 
-/// A half-open rectangle of the arena, mm. Edges of outermost partitions lie at +-infinity, so that every pose has an owner.
+/// A half-open rectangle of the arena, mm. Outer edges of the outermost partitions are infinite, so that every pose has an owner.
 struct Rectangle {
   double x_min_mm, y_min_mm, x_max_mm, y_max_mm;
   [[nodiscard]] bool contains(double x_mm, double y_mm) const {
@@ -43,12 +43,12 @@ struct Rectangle {
   }
   /// Distance of a point from the rectangle; 0 inside.
   [[nodiscard]] double distance_mm(double x_mm, double y_mm) const;
-  /// Distance of two rectangles; 0 where they touch or overlap.
+  /// Distance of two rectangles; 0 if they touch or overlap.
   [[nodiscard]] double distance_mm(const Rectangle& other) const;
 };
 
-/// The arena cut into columns x rows of equal rectangles. Partition (column, row) has id row * columns + column; row 0 lies
-/// at the bottom.
+/// Division of the arena into columns x rows equal rectangles. Partition (column, row) has id row * columns + column; row 0 is the
+/// bottom row.
 class PartitionGrid {
  public:
   PartitionGrid(double arena_width_mm, double arena_height_mm, std::uint32_t columns, std::uint32_t rows);
@@ -56,7 +56,7 @@ class PartitionGrid {
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
   [[nodiscard]] std::uint32_t size() const { return columns_ * rows_; }
   [[nodiscard]] const Rectangle& rectangle(PartitionId p) const { return rectangles_[p.value()]; }
-  /// The partition that owns a robot at this place: a pure function of the pose.
+  /// The partition that owns a robot at this position.
   [[nodiscard]] PartitionId owner(double x_mm, double y_mm) const;
   /// Ascending ids of the partitions other than `p` whose rectangle lies within `margin_mm` of that of `p`.
   [[nodiscard]] std::vector<PartitionId> neighbours(PartitionId p, double margin_mm) const;
@@ -75,28 +75,28 @@ struct Share {
 };
 
 class RunPlan {
-  // First, as the members below are made of them.
+  // Declared first, because the members below are initialised from them.
   std::shared_ptr<const proto::Manifest> manifest_;
   std::shared_ptr<const PlanSettings> settings_;
 
  public:
-  /// Throws UserError where the manifest is of another format.
+  /// Throws UserError if the manifest has another format or is inconsistent.
   explicit RunPlan(proto::Manifest manifest);
 
   const TickLength tick_length;
-  const double duration_s;  ///< as the experiment states it
-  const Tick last_tick;     ///< where the run ends
+  const double duration_s;  ///< as stated in the experiment
+  const Tick last_tick;     ///< the run ends at this tick
   const World world;        ///< walls, obstacles, movable bodies
   const PartitionGrid grid;
   const std::uint32_t hosts;
-  const MemoryLayout memory;  ///< of each robot, for the model's effects
-  const std::uint64_t hash;   ///< of what determines results and topology; alike in all federates of a run
-  const bool resumed;         ///< starts from the checkpoint in the run directory's resumed/
-  const double pace;          ///< simulated over wall time, at most; 0: as fast as possible
+  const MemoryLayout memory;  ///< layout of the effects' memory
+  const std::uint64_t hash;   ///< hash of all that determines results and topology; alike in all federates of a run
+  const bool resumed;         ///< the run starts from the checkpoint in resumed/ of the run directory
+  const double pace;          ///< upper limit of simulated time over wall time; 0: none
   const std::string mode;     ///< "local" or "federated"
-  const std::string build;    ///< of the program that prepared the run: core/base/build_identity.hpp
+  const std::string build;    ///< build identity of the program that prepared the run: core/base/build_identity.hpp
 
-  /// What the plan was made of, for those that write it again. Who reads it includes idl/manifest.pb.h.
+  /// The manifest of which the plan was made. Callers include idl/manifest.pb.h.
   [[nodiscard]] const proto::Manifest& manifest() const { return *manifest_; }
 
   [[nodiscard]] std::uint64_t run() const { return run_; }
@@ -106,7 +106,7 @@ class RunPlan {
   [[nodiscard]] const std::string& experiment_name() const;
   [[nodiscard]] std::uint32_t run_number() const;  ///< the covariate RUN
   [[nodiscard]] const MotionSettings& motion_settings() const;
-  /// Of single robots. Their ids need not be those of robots of this run.
+  /// Settings of single robots. They may contain ids that this run does not have.
   [[nodiscard]] const std::vector<RobotSettings>& robot_settings() const;
   [[nodiscard]] const std::vector<EffectSettings>& effects() const;
   [[nodiscard]] const std::vector<ArenaFieldSettings>& fields() const;
@@ -118,29 +118,29 @@ class RunPlan {
   [[nodiscard]] const std::optional<TemperatureSettings>& temperature_settings() const;
   [[nodiscard]] const RecordingSettings& recording_settings() const;
   [[nodiscard]] const std::vector<Program>& programs() const;
-  [[nodiscard]] const std::vector<RobotEeprom>& eeproms() const;  ///< of robots that bring one
+  [[nodiscard]] const std::vector<RobotEeprom>& eeproms() const;  ///< the EEPROMs that the experiment states
   [[nodiscard]] const std::vector<ProgramFailure>& program_failures() const;
 
   [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(program_of_.size()); }
   [[nodiscard]] Pose initial_pose(std::uint32_t robot) const;
-  /// Index of the robot's program in programs(), or kNoProgram where its group is tracked.
+  /// Index of the robot's program in programs(), or kNoProgram if its group is tracked.
   [[nodiscard]] std::uint32_t program_of(std::uint32_t robot) const { return program_of_[robot]; }
   [[nodiscard]] bool tracked(std::uint32_t robot) const { return program_of_[robot] == kNoProgram; }
-  /// Whether the robot is a beacon: motors have no effect on it, and nothing moves it.
+  /// Whether the robot is immobile: motors have no effect, and nothing moves it.
   [[nodiscard]] bool immobile(std::uint32_t robot) const { return immobile_[robot] != 0; }
-  /// Bodies that robots can push, numbered from 0: world.movables.
+  /// Number of bodies that robots can push: world.movables.
   [[nodiscard]] std::uint32_t movables() const { return static_cast<std::uint32_t>(world.movables.size()); }
-  /// Whether the robot runs firmware for its own processor. The radio simulates that processor.
+  /// Whether the robot runs AVR firmware. The radio simulates its processor.
   [[nodiscard]] bool firmware(std::uint32_t robot) const;
-  /// Whether any robot does.
+  /// Whether any robot runs AVR firmware.
   [[nodiscard]] bool has_firmware() const;
-  /// The robot's kilo_uid as it is calibrated: its number, or counted through its group from where the group says.
+  /// The robot's calibrated kilo_uid: its id, or its number in the group plus the group's first uid.
   [[nodiscard]] std::uint16_t uid_of(std::uint32_t robot) const { return uid_of_[robot]; }
   /// Whether behaviours hosts need poses: for light, and for batteries that can be charged.
   [[nodiscard]] bool hosts_see_bodies() const;
-  /// Of the robot's group.
+  /// The loop rate of the robot's group.
   [[nodiscard]] LoopRate loop_rate(std::uint32_t robot) const { return loop_rate_[robot]; }
-  /// The robots of one behaviours host: a range of ids, of about equal size for all hosts.
+  /// The robots of a behaviours host: a range of ids. The sizes of all hosts' shares differ by at most one.
   [[nodiscard]] Share share(HostId host) const;
   [[nodiscard]] HostId host_of(std::uint32_t robot) const;
 

@@ -1,5 +1,5 @@
-/// The infrared channel, as plain values. Meaning, units and defaults: Radio and SimpleRadio in idl/experiment.proto, the others
-/// in idl/model.proto.
+/// Settings of the infrared channel. Radio and SimpleRadio in idl/experiment.proto and the other messages in idl/model.proto give
+/// meaning, units and defaults.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace kilotwin {
 
-/// Absent values are drawn.
+/// An absent value is drawn at random.
 struct RobotRadioSettings {
   std::uint32_t robot = 0;
   std::optional<double> power_db, sensitivity_db;
   std::optional<double> power_ahead_db, power_left_db, sensitivity_ahead_db, sensitivity_left_db;
   std::optional<double> oscillator;
-  std::vector<std::uint32_t> ir_high, ir_low;  ///< of equal length: 14 readings or none
+  std::vector<std::uint32_t> ir_high, ir_low;  ///< both have 14 readings, or both are empty
 };
 
 struct RadioLinkSettings {

@@ -1,4 +1,4 @@
-/// What a run takes along besides the settings of engines: programs, EEPROMs, earlier failures; how it is recorded.
+/// Settings of a run besides those of engines: programs, EEPROMs, failures in earlier attempts, recording.
 #pragma once
 
 #include <cstdint>
@@ -8,36 +8,36 @@
 
 namespace kilotwin {
 
-/// In place of a program: the group is tracked.
+/// The program index of tracked groups, which have none.
 inline constexpr std::uint32_t kNoProgram = 0xffffffffu;
 
 struct Program {
-  std::string path;       ///< as the experiment names it; the first source where it has several
-  std::string sha256;     ///< of what runs, hex
-  bool firmware = false;  ///< for the robot's own processor
+  std::string path;       ///< as the experiment states it; the first source if there are several
+  std::string sha256;     ///< SHA-256 of the executable file, hexadecimal
+  bool firmware = false;  ///< compiled for the robot's processor
 
-  /// The name of its file in the run directory's programs/: SHA256 and .so, .elf or .hex.
+  /// The file's name in programs/ of the run directory: the SHA-256 with .so, .elf or .hex.
   [[nodiscard]] std::string file() const;
 };
 
-/// The content that a robot's EEPROM starts with.
+/// The initial content of a robot's EEPROM.
 struct RobotEeprom {
   std::uint32_t robot = 0;
   std::string content;  ///< 1024 octets
 };
 
-/// A robot whose program brought down its host in an earlier attempt at this run. It fails in the step from `tick`.
+/// A robot whose program crashed its host in an earlier attempt at this run. It fails in the step from `tick`.
 struct ProgramFailure {
   std::uint32_t robot = 0;
   Tick tick;
 };
 
 struct RecordingSettings {
-  double every_s = 0;     ///< between recorded states
-  bool messages = false;  ///< whether messages are counted per pair of robots
+  double every_s = 0;     ///< interval of recorded states
+  bool messages = false;  ///< count messages per pair of robots
 };
 
-/// How often loop() runs: RobotGroup.LoopRate in idl/experiment.proto.
+/// Rate of loop(): RobotGroup.LoopRate in idl/experiment.proto.
 enum class LoopRate : std::uint8_t { kOncePerTick, kAsOnRobot };
 
 }  // namespace kilotwin

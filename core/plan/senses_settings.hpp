@@ -1,5 +1,5 @@
-/// Light, batteries and temperature, as plain values. Meaning, units and defaults: Light, Battery and Temperature in
-/// idl/experiment.proto.
+/// Settings of light, batteries and temperature. Light, Battery and Temperature in idl/experiment.proto give meaning, units and
+/// defaults.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct LightCircleSettings {
 
 struct LightWaypointSettings {
   double time_s = 0, x_mm = 0, y_mm = 0;
-  std::optional<double> height_mm;  ///< absent: the source's
+  std::optional<double> height_mm;  ///< absent: the height of the source
 };
 
 struct LightSourceSettings {

@@ -1,5 +1,5 @@
-/// All settings of a run, by subject. RunPlan hands out each on its own, so that a unit includes the headers of those that it
-/// reads; this one is for core/plan itself.
+/// All settings of a run, by subject. Only core/plan includes this header. Other units get each subject from RunPlan and include
+/// only its header.
 #pragma once
 
 #include <cstdint>

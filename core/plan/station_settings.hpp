@@ -1,5 +1,4 @@
-/// The base station and its virtual environments, as plain values. Meaning, units and defaults: Station in
-/// idl/experiment.proto.
+/// Settings of the station and its virtual environments. Station in idl/experiment.proto gives meaning, units and defaults.
 #pragma once
 
 #include <cstdint>

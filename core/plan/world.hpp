@@ -1,4 +1,4 @@
-/// What stands in the arena besides robots, as the experiment states it: walls, obstacles, movable bodies.
+/// The arena without robots: walls, obstacles, movable bodies.
 #pragma once
 
 #include <cstdint>
@@ -24,25 +24,26 @@ class ArenaShape {
  public:
   enum class Kind : std::uint8_t { kRectangle, kCircle, kPolygon };
 
-  /// Throws std::invalid_argument where its polygon is none.
+  /// Throws std::invalid_argument if its polygon is not convex or does not contain the origin.
   explicit ArenaShape(const proto::Arena&);
 
   [[nodiscard]] Kind kind() const { return kind_; }
-  /// The smallest rectangle around the origin that holds it has these halves.
+  /// Half extents of the smallest rectangle around the origin that contains the arena.
   [[nodiscard]] double half_width_mm() const { return half_width_mm_; }
   [[nodiscard]] double half_height_mm() const { return half_height_mm_; }
-  [[nodiscard]] double radius_mm() const { return radius_mm_; }  ///< of a circle
-  /// Arena.width_mm and height_mm: of a rectangle its extents; of another shape their defaults.
+  [[nodiscard]] double radius_mm() const { return radius_mm_; }  ///< for kCircle
+  /// Arena.width_mm and height_mm: the extents of a rectangle; for other shapes the fields' defaults.
   [[nodiscard]] double stated_width_mm() const { return stated_width_mm_; }
   [[nodiscard]] double stated_height_mm() const { return stated_height_mm_; }
-  /// Of a polygon, anticlockwise, in the arena's frame; edge i goes from corner i to the next, with its outward normal.
+  /// For kPolygon: corners in the arena's frame, anticlockwise. Edge i goes from corner i to the next; normals()[i] is its
+  /// outward normal.
   [[nodiscard]] const std::vector<Point2>& corners() const { return corners_; }
   [[nodiscard]] const std::vector<Point2>& normals() const { return normals_; }
-  /// Distance of a point within from the nearest wall, mm; negative outside.
+  /// Distance of a point from the nearest wall, mm; negative outside.
   [[nodiscard]] double clearance_mm(Point2) const;
-  /// The least clearance of any point of a body.
+  /// The smallest clearance of any point of a body, mm.
   [[nodiscard]] double clearance_mm(const Convex&, const Place&) const;
-  /// "width x height" or what it is, for people.
+  /// Size or shape for messages: "400 mm x 300 mm", "circle of radius 200 mm".
   [[nodiscard]] std::string described() const;
 
  private:
@@ -61,17 +62,17 @@ struct ObstacleBody {
 
 struct MovableBodyModel {
   Convex shape;
-  Pose pose;  ///< of its centre at tick 0
+  Pose pose;  ///< pose of its centre at tick 0
   double height_mm;
   double mass_kg;
   double friction;  ///< coefficient of dry friction on the floor
 
-  /// The force that friction holds at most, N.
+  /// Limit of the friction force on the floor, N.
   [[nodiscard]] double grip_N() const { return friction * mass_kg * kGravity_m_s2; }
 };
 
 struct World {
-  /// Throws std::invalid_argument where a shape is none.
+  /// Throws std::invalid_argument if a shape is invalid.
   explicit World(const proto::Experiment&);
 
   ArenaShape arena;
@@ -79,8 +80,8 @@ struct World {
   std::vector<MovableBodyModel> movables;
 };
 
-/// The obstacle's or movable body's shape about its centre, and where in the shape's own coordinates that centre lies. Throws
-/// std::invalid_argument where it is none.
+/// The shape of an obstacle or movable body, relative to its centre. `centre` becomes the centre in the coordinates of the stated
+/// polygon. Throws std::invalid_argument if the shape is invalid.
 [[nodiscard]] Convex shape_of(const proto::Obstacle&, Point2& centre);
 [[nodiscard]] Convex shape_of(const proto::MovableBody&, Point2& centre);
 

@@ -1,4 +1,4 @@
-# cmake -DOUTPUT=FILE.cpp -DNAMES=a;b -DPATHS=/x/a;/y/b -P embed.cmake: a C++ source that holds the files' octets.
+# cmake -DOUTPUT=FILE.cpp -DNAMES=a;b -DPATHS=/x/a;/y/b -P embed.cmake: writes a C++ source with the contents of the files.
 set(arrays "")
 set(rows "")
 set(index 0)

@@ -1,4 +1,4 @@
-/* Included before programs that lean on headers which a simulator's own header includes. */
+/* Included before programs that rely on headers that a simulator's header includes. */
 #include <float.h>
 #include <kilolib.h>
 #include <math.h>

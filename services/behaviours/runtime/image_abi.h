@@ -1,4 +1,4 @@
-/* What a robot's image and its host agree on: C and C++, natural alignment without padding in both. */
+/* Interface of a robot's image and its host. It is both C and C++; all structs have natural alignment and no padding. */
 #ifndef KILOTWIN_BEHAVIOURS_IMAGE_ABI_H
 #define KILOTWIN_BEHAVIOURS_IMAGE_ABI_H
 
@@ -6,47 +6,47 @@
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
 #define KT_IMAGE_VERSION 5u
-/* Room for what a robot prints in one tick; a serial line of 38400 baud takes 126 octets in a tick. */
+/* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
-/* The heap's section; the last of a robot's memory, so that only what is in use need be kept. */
+/* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
 #define KT_HEAP_SECTION ".kilotwin_heap"
 
-/* What a host thread and the robot that it runs have in common; %gs points to it. Robots' pointers do not reach it. */
+/* Data that a host thread shares with the robot's code that it runs. %gs points to it, so ordinary pointers cannot reach it. */
 struct KtThread {
   uint64_t host_stack;      /* the host's stack pointer while robot code runs */
   uint64_t robot_stack;     /* the main program's stack pointer while it waits */
-  uint64_t interrupt_stack; /* where callbacks start */
-  int32_t budget;           /* cycles left; once below 0, the next test hands over to the host */
-  uint8_t check;            /* KT_CHECK_* of the test that did */
+  uint64_t interrupt_stack; /* initial stack pointer of callbacks */
+  int32_t budget;           /* cycles left; at the first test that finds it below 0, control returns to the host */
+  uint8_t check;            /* KT_CHECK_* of that test */
   uint8_t in_interrupt;
-  uint8_t overrun; /* the budget of a callback has run out */
+  uint8_t overrun; /* a callback has used up its budget */
   uint8_t reserved;
-  uint64_t place; /* where that test is */
-  int32_t held;   /* cycles of this tick that the host has not yet put into the budget */
+  uint64_t place; /* address of that test */
+  int32_t held;   /* cycles of this tick that the host has not yet added to the budget */
   uint32_t unused;
 };
 #define KT_THREAD_BUDGET 24
 #define KT_THREAD_HELD 40
 
-/* What the place of a test tells: the loop reads what an interrupt may change; it has no way out and calls nothing; its
- * function names vector or floating-point registers. */
+/* Properties of a test's place. WAITS: the loop reads memory that an interrupt may change, or there is no loop. ENDLESS: the
+ * loop has no exit and no calls. VECTORS: the function uses vector or floating-point registers. */
 #define KT_CHECK_WAITS 1u
 #define KT_CHECK_ENDLESS 2u
 #define KT_CHECK_VECTORS 4u
 
-/* Why kt_enter returns. */
+/* Results of kt_enter. */
 #define KT_WAITED 0u
 #define KT_PREEMPTED 1u
 
-/* Simulated hardware of one robot and the state of its firmware; part of the robot's memory. */
+/* Simulated hardware of one robot and the state of its firmware; part of the robot's memory. "host": the host writes it. */
 struct KtRobot {
-  uint64_t noise;       /* host: state of the generator behind rand_hard */
-  uint64_t debt_cycles; /* time that the program spent in delays and has still to wait for */
+  uint64_t noise;       /* host: state of the random number generator of sensors and rand_hard */
+  uint64_t debt_cycles; /* cycles spent in delays for which the program has not waited yet */
   uint32_t tick_cycles; /* host: length of a tick */
-  uint16_t stuck_ticks; /* host: since when in a loop without a way out */
+  uint16_t stuck_ticks; /* host: ticks spent in a loop without exit */
   uint8_t loop_rate;    /* host: KT_LOOP_* */
-  uint8_t effects;      /* counts what the program has done outside of its memory */
-  uint16_t uid;         /* host: what calibration has found out, as a robot's first EEPROM has it */
+  uint8_t effects;      /* count of effects outside the memory: EEPROM writes, calls that found the ADC busy */
+  uint16_t uid;         /* host: uid and duties of the calibration, the initial content of the EEPROM */
   uint8_t turn_left;    /* host */
   uint8_t turn_right;   /* host */
   uint8_t state;        /* kilotwin::LifeCycle */
@@ -56,24 +56,24 @@ struct KtRobot {
   uint8_t led;
   uint8_t in_interrupt; /* KT_IN_* */
   uint8_t parked;       /* the main program does nothing until a message of the overhead controller arrives */
-  uint8_t deaf;         /* interrupts are off: asleep, or the program has ended */
+  uint8_t deaf;         /* interrupts are disabled: the robot is asleep, or the program has ended */
   uint8_t bootloader;
-  uint8_t reset;  /* the memory is to be made anew */
-  uint8_t motion; /* what calibration messages asked for */
+  uint8_t reset;  /* the host must reset the memory */
+  uint8_t motion; /* the motion that the last calibration message commanded */
   uint8_t motion_done;
-  uint64_t waits;         /* how often the program has waited for a tick */
-  uint8_t spin_up;        /* spinup_motors() was called; the host takes note once a tick */
+  uint64_t waits;         /* number of times that the program has waited for a tick */
+  uint8_t spin_up;        /* spinup_motors() was called; the host reads and clears it once per tick */
   uint8_t straight_left;  /* host */
   uint8_t straight_right; /* host */
-  uint8_t heard;          /* something was received while a sleeping robot listened */
-  int16_t adc;            /* the last conversion, which get_voltage() leaves where a message's strength should be */
-  uint8_t trigger_lost;   /* it has */
-  uint8_t looped;         /* host: the tick ended in a loop that reads nothing which an interrupt may change */
-  uint32_t heap_octets;   /* of the heap's beginning that are in use, or were once */
+  uint8_t heard;          /* a message arrived while a sleeping robot listened */
+  int16_t adc; /* the last conversion; after get_voltage() it replaces the next message's high-gain strength */
+  uint8_t trigger_lost; /* get_voltage() was called since the last message */
+  uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
+  uint32_t heap_octets; /* largest extent of the heap so far */
   uint32_t unused;
 };
 
-/* The callback that runs. */
+/* The running callback. */
 #define KT_IN_TX_SUCCESS 1u
 #define KT_IN_RX 2u
 #define KT_IN_TX 3u
@@ -94,20 +94,20 @@ struct KtReception {
   int16_t high_gain;
 };
 
-/* What happened to a robot in a tick, and what it answers: a part of the slot that is no part of a robot's memory. */
+/* Events of a robot in a tick and its answers. Part of the slot, not of a robot's memory. */
 #define KT_MOST_RECEPTIONS 192u
 struct KtExchange {
-  uint32_t receptions; /* more than there is room for come in parts */
-  uint32_t sent;       /* 1: the robot's own message has left */
+  uint32_t receptions; /* if there are more than KT_MOST_RECEPTIONS, the host delivers them in several calls */
+  uint32_t sent;       /* 1: the robot's own message has been sent */
   struct KtMessage message;
   struct KtReception reception[KT_MOST_RECEPTIONS];
-  uint32_t log_length; /* of the text that the robot has printed since the host last emptied the log */
-  uint32_t log_lost;   /* octets that found no room */
+  uint32_t log_length; /* octets printed since the host last emptied the log */
+  uint32_t log_lost;   /* octets beyond KT_LOG_OCTETS, which are dropped */
   char log[KT_LOG_OCTETS];
 };
 
-/* What surrounds the robot that runs: the host's page in a slot, no part of any robot's memory. Readings are expected values of
- * this robot's converter, 10-bit counts; sd is the standard deviation of one reading. */
+/* Sensors and EEPROM of the robot that runs, written by the host. Part of the slot, not of a robot's memory. Readings are
+ * expected values of this robot's ADC, 10-bit counts; sd is the standard deviation of one reading. */
 struct KtSurroundings {
   double light;
   double light_sd;
@@ -115,12 +115,12 @@ struct KtSurroundings {
   double voltage_sd;
   double temperature;
   double temperature_sd;
-  uint64_t receiving_cycles; /* of this tick, in which the converter is busy with a message's strength */
-  uint64_t receiving_from;   /* 0 on entry; else one more than when in the tick that begins */
-  uint8_t* eeprom;           /* the robot's own 1024 octets; NULL: as calibration has left them */
-  uint8_t eeprom_filled;     /* 0 on entry; 1: eeprom_copy holds what calibration has left */
-  uint8_t eeprom_written;    /* 0 on entry */
-  uint8_t charging;          /* a charger's voltage is on its contacts */
+  uint64_t receiving_cycles; /* cycles of this tick in which the ADC measures messages */
+  uint64_t receiving_from;   /* 0 on entry; else 1 + cycle within the tick at which reception starts */
+  uint8_t* eeprom;           /* the robot's 1024 octets; NULL: default content, uid and motor calibration */
+  uint8_t eeprom_filled;     /* 0 on entry; 1: eeprom_copy holds the default content */
+  uint8_t eeprom_written;    /* 0 on entry; 1: the program has written to its EEPROM */
+  uint8_t charging;          /* 1: a charger's voltage is on the robot's contacts */
   uint8_t unused[5];
   uint8_t eeprom_copy[1024];
 };
@@ -129,18 +129,18 @@ struct KtSurroundings {
 struct KtImage {
   uint64_t magic;
   uint64_t version;
-  uint64_t exchange;     /* of the KtExchange*; the loader writes it */
-  uint64_t robot;        /* of the KtRobot */
-  uint64_t ticks;        /* of kilo_ticks, uint32_t */
-  uint64_t tx_period;    /* of kilo_tx_period, uint16_t */
-  uint64_t boot;         /* void(void): where a robot starts */
-  uint64_t enter;        /* uint64_t(void): continues the main program; KT_WAITED or KT_PREEMPTED */
+  uint64_t exchange;     /* address of the KtExchange*, which the loader writes */
+  uint64_t robot;        /* address of the KtRobot */
+  uint64_t ticks;        /* address of kilo_ticks, uint32_t */
+  uint64_t tx_period;    /* address of kilo_tx_period, uint16_t */
+  uint64_t boot;         /* void(void): entry point of a robot after a reset */
+  uint64_t enter;        /* uint64_t(void): continues the main program; returns KT_WAITED or KT_PREEMPTED */
   uint64_t call;         /* uint64_t(function): runs a function on the interrupt stack */
-  uint64_t leave;        /* the way back to the host out of both, from anywhere */
-  uint64_t interrupts;   /* uint64_t(void): callbacks for what the exchange tells */
-  uint64_t transmit;     /* uint64_t(void): 1 if the robot sends what is then in the exchange, else 0 */
-  uint64_t surroundings; /* of the KtSurroundings*; the loader writes it */
-  uint64_t variables;    /* of the first octet of a robot's memory; what is writable before it is unused */
+  uint64_t leave;        /* a jump to it from anywhere returns from enter or call to the host */
+  uint64_t interrupts;   /* uint64_t(void): calls the callbacks for the events in the exchange */
+  uint64_t transmit;     /* uint64_t(void): 1 if the robot has put a message into the exchange, else 0 */
+  uint64_t surroundings; /* address of the KtSurroundings*, which the loader writes */
+  uint64_t variables;    /* address of the first octet of a robot's memory; writable octets before it are unused */
 };
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* kilolib for simulated robots: the firmware's state machine, callbacks and functions over simulated hardware. */
+/* kilolib for simulated robots: the firmware's state machine, callbacks and functions on simulated hardware. */
 #define KILOTWIN_RUNTIME
 #include <avr/io.h>
 #include <kilolib.h>
@@ -14,7 +14,7 @@ enum { SLEEPING, IDLE, BATTERY, SETUP, RUNNING, CHARGING, MOVING };
 enum { STAND, TURN_LEFT, TURN_RIGHT, STRAIGHT };
 enum { CYCLES_PER_MS = 8000 };
 
-/* How long a call takes (the converter at 1 MHz, 13 clocks; at 62.5 kHz for the temperature; a call in vain). */
+/* Duration of calls. A conversion takes 13 clocks of the ADC: 1 MHz, for the temperature 62.5 kHz. BUSY: the ADC is in use. */
 enum {
   READING_CYCLES = 150,
   TEMPERATURE_CYCLES = 1720,
@@ -29,7 +29,7 @@ void kt_leave(void);
 int main();
 extern struct KtExchange* kt_exchange;
 
-/* Read-only once the loader has set it. */
+/* Read-only after the loader has set it. */
 __attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtSurroundings* kt_surroundings = 0;
 
 static struct KtRobot robot = {.state = IDLE};
@@ -51,7 +51,7 @@ uint16_t kilo_uid;
 uint8_t kilo_turn_left, kilo_turn_right, kilo_straight_left, kilo_straight_right;
 uint16_t kilo_irhigh[KILOTWIN_IR_ENTRIES], kilo_irlow[KILOTWIN_IR_ENTRIES];
 
-/* Known to programs that declare them themselves. */
+/* Variables of kilolib that some programs declare extern. */
 message_t rx_msg;
 distance_measurement_t rx_dist;
 volatile uint8_t rx_busy;
@@ -60,7 +60,7 @@ uint16_t tx_clock, tx_increment = 255;
 
 /* Time. */
 
-/* Comes back in the next tick. A jump where a call would do: see switch.c. */
+/* Waits for the next tick. It jumps and does not call; see switch.c. */
 #define IN_LINE static inline __attribute__((always_inline))
 IN_LINE void wait_for_tick(void) {
   ++robot.waits;
@@ -90,14 +90,14 @@ static void set_cycles_left(int32_t left) {
   __asm__ volatile("movl %0, %%gs:%c1" : : "r"(left), "i"(KT_THREAD_BUDGET) : "memory");
 }
 
-/* Spends time: whole ticks at once, the rest when it has added up to one. A callback cannot wait: what it spends, the main
- * program waits for. Where code takes its time as well, both come out of the cycles of the tick. */
+/* Lets the main program wait for `cycles`. With KT_LOOP_PER_TICK it waits for whole ticks; remainders add up. A callback cannot
+ * wait, so the main program waits for it. With KT_LOOP_AS_ON_ROBOT the cycles reduce the tick's budget, as code does. */
 static void spend(uint64_t cycles) {
   if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT && !robot.in_interrupt) {
     while (cycles > 0) {
       const int32_t part = cycles < MOST_AT_ONCE ? (int32_t)cycles : MOST_AT_ONCE;
       set_cycles_left(cycles_left() - part);
-      /* Below 0 the loop's test hands over to the host, which comes back when what is owed has passed. */
+      /* Below 0 the loop's test returns to the host, which continues here when the budget is positive again. */
       while (cycles_left() < 0) {}
       cycles -= (uint64_t)part;
     }
@@ -111,10 +111,10 @@ static void spend(uint64_t cycles) {
   }
 }
 
-/* For the heap. */
+/* For malloc(). */
 uint32_t* kt_heap_octets(void) { return &robot.heap_octets; }
 
-/* For what the rest of the runtime lets a program wait for. */
+/* For delays in the rest of the runtime. */
 void kilotwin_spend(unsigned long long cycles) { spend(cycles); }
 
 void kilotwin_sleep(void) {
@@ -138,7 +138,7 @@ void set_motors(uint8_t left, uint8_t right) {
 
 volatile uint8_t* kilotwin_motor_duty(uint8_t right) { return right ? &robot.duty_right : &robot.duty_left; }
 
-/* The kick itself is the physics engine's: 15 ms at full duty within the tick for which the next duties hold. */
+/* The physics engine simulates the spin-up: 15 ms at full duty within the tick for which the next duties hold. */
 void spinup_motors(void) {
   delay(15);
   set_motors(255, 255);
@@ -147,7 +147,7 @@ void spinup_motors(void) {
 
 void set_color(uint8_t color) { robot.led = color & 63; }
 
-/* EEPROM, the size of an ATmega328P's. */
+/* The EEPROM of an ATmega328P, 1024 octets. */
 uint8_t* kt_eeprom(void) {
   struct KtSurroundings* around = kt_surroundings;
   if (around->eeprom != NULL) return around->eeprom;
@@ -175,8 +175,8 @@ static uint64_t noise(void) {
   return z;
 }
 
-/* Receptions occupy one stretch of the tick, which begins anywhere in it and may go on at its beginning. Callbacks come when
- * a message is complete. */
+/* Whether the ADC is measuring a message. Receptions occupy one interval of the tick with a random start, which wraps around at
+ * the end of the tick. Callbacks run after a message is complete, when the ADC is free. */
 static uint8_t is_receiving(void) {
   struct KtSurroundings* around = kt_surroundings;
   if (around->receiving_cycles == 0 || robot.in_interrupt) return 0;
@@ -188,7 +188,7 @@ static uint8_t is_receiving(void) {
   return (now - around->receiving_from) % robot.tick_cycles < around->receiving_cycles;
 }
 
-/* The converter's count for an expected value and its noise. What it takes to compute is not the robot's time. */
+/* An ADC reading with this mean and standard deviation. The computation costs the robot no cycles. */
 static int16_t convert(double expected, double sd) {
   const int32_t left = cycles_left();
   set_cycles_left(INT32_MAX);
@@ -200,7 +200,8 @@ static int16_t convert(double expected, double sd) {
 
 static int16_t reading(double expected, double sd, uint64_t cycles) {
   if (is_receiving()) {
-    ++robot.effects; /* who waits for this to pass does not wait for an interrupt */
+    ++robot
+          .effects; /* a loop that waits for the ADC ends without an interrupt, so it must not count as a busy wait */
     spend(BUSY_CYCLES);
     return -1;
   }
@@ -217,16 +218,15 @@ int16_t get_temperature(void) {
   return reading(kt_surroundings->temperature, kt_surroundings->temperature_sd, TEMPERATURE_CYCLES);
 }
 
-/* As in the firmware, the converter is not put back to the next message: that message's high-gain strength is what was
- * converted here. */
+/* As in the firmware, this leaves the ADC on the battery's channel. The next message's high-gain strength is then this reading. */
 int16_t get_voltage(void) {
   const int16_t voltage = reading(kt_surroundings->voltage, kt_surroundings->voltage_sd, READING_CYCLES);
   if (voltage >= 0) robot.trigger_lost = 1;
   return voltage;
 }
 
-/* The firmware makes each bit of the lowest bits of pairs of voltage readings that differ; of independent readings that is a
- * fair bit. A battery without noise gives readings that never differ, and all bits alike. */
+/* The firmware takes each bit from a pair of voltage readings whose lowest bits differ, which is a fair bit if readings are
+ * independent. Without noise the readings never differ, and all bits are equal. */
 uint8_t rand_hard(void) {
   spend(RAND_HARD_CYCLES);
   robot.trigger_lost = 0;
@@ -248,13 +248,13 @@ void rand_seed(uint8_t seed) { soft_seed = seed; }
 
 uint16_t message_crc(const message_t* message) { return kilotwin_message_crc((const uint8_t*)message); }
 
-/* Millimetres beyond contact at entry `i` of a table, interpolated from the entry before. */
+/* Distance beyond contact, mm, for a reading between entries i - 1 and i of a table; linear interpolation. */
 static uint8_t beyond_contact(const uint16_t* table, int i, int reading) {
   const int step = table[i] - table[i - 1];
   return step == 0 ? (uint8_t)(5 * i) : (uint8_t)((reading - table[i] + step * i) * 10 / (2 * step));
 }
 
-/* The first entry that lies below the reading, or `none`. */
+/* Index of the first entry below the reading, or `none`. */
 static int first_below(const uint16_t* table, int reading, int none) {
   for (int i = 0; i < KILOTWIN_IR_ENTRIES; ++i) {
     if (reading > table[i]) return i;
@@ -304,7 +304,7 @@ void kilo_init(void) {
   robot.state = IDLE;
 }
 
-/* A whole tick goes by; what a delay has left over of it goes by with it. */
+/* Waits for the end of the tick. The remainder of a delay is dropped. */
 IN_LINE void rest_of_tick(void) {
   robot.debt_cycles = 0;
   wait_for_tick();
@@ -334,8 +334,8 @@ static void follow_calibration(void) {
 }
 
 static void sleep_and_listen(void) {
-  /* On a robot 10 ms; here what is heard in one tick is told in the one after. A robot that hears something as it is about to
-   * sleep again listens on for a while. */
+  /* A robot listens for 10 ms. Here callbacks for a tick's messages run in the next tick, so it listens for two. A robot that
+   * hears a message keeps listening for LISTENING_ON_MS. */
   enum { ASLEEP_MS = 8000, LISTENING_TICKS = 2, LISTENING_ON_MS = 100 };
   set_color(0);
   robot.deaf = 1;
@@ -376,7 +376,7 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
         robot.state = RUNNING;
         /* fall through */
       case RUNNING: {
-        /* Once per tick. If loop() itself waited, it is due again in the tick in which the wait has ended. */
+        /* Once per tick. If loop() itself waited, it is called again in the tick in which its wait ended. */
         const uint64_t waits = robot.waits;
         loop();
         if (robot.loop_rate == KT_LOOP_PER_TICK && waits == robot.waits) rest_of_tick();
@@ -391,13 +391,13 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
   }
 }
 
-/* The program has ended: on a robot it spins for ever with interrupts off. */
+/* The end of main(). On a robot avr-libc then loops for ever with interrupts disabled. */
 _Noreturn void kilotwin_end(void) {
   robot.deaf = 1;
   for (;;) park();
 }
 
-/* Constructors of a C++ program's globals; the linker makes the ends. */
+/* Constructors of a C++ program's globals; constructors.ld defines the two symbols. */
 extern void (*__init_array_start[])(void) __attribute__((weak, visibility("hidden")));
 extern void (*__init_array_end[])(void) __attribute__((weak, visibility("hidden")));
 
@@ -501,12 +501,12 @@ static void obey(const message_t* message) {
   if (robot.bootloader) robot.parked = 1;
 }
 
-/* The boot loader keeps the program away until it hears anything but its own kind of message; then the robot restarts. */
+/* In the boot loader the program does not run. Any message that is not for the boot loader restarts the robot. */
 static void boot_loader(uint8_t type) {
   if (type < BOOT || type > BOOTPGM_SIZE) robot.reset = 1;
 }
 
-/* What is received after a RESET in the same tick is lost while the robot starts. */
+/* Messages after a RESET in the same tick are lost, because the robot is starting. */
 static uint64_t interrupts(void) {
   const struct KtExchange* events = kt_exchange;
   robot.in_interrupt = KT_IN_TX_SUCCESS;
@@ -540,7 +540,7 @@ static uint64_t transmit(void) {
   return 1;
 }
 
-/* Made by the linking of the program. */
+/* Defined when the program is linked. */
 extern uint8_t kilotwin_variables[] __attribute__((visibility("hidden")));
 
 __attribute__((visibility("default"), used)) const struct KtImage kilotwin_image = {

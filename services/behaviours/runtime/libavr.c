@@ -22,7 +22,7 @@ enum { EEPROM_OCTETS = E2END + 1 };
 uint8_t* kt_eeprom(void);
 void kt_write_eeprom(uint16_t address, uint8_t value);
 
-/* Addresses are numbers up to E2END, or those of EEMEM variables: no variable of a program lies at such a low address. */
+/* An address up to E2END is an offset in the EEPROM. Any other is that of an EEMEM variable, since no variable lies so low. */
 void eeprom_read_block(void* to, const void* address, size_t size) {
   const uint8_t* from = address;
   for (size_t i = 0; i < size; ++i, ++from) {
@@ -53,9 +53,9 @@ ACCESS(word, uint16_t)
 ACCESS(dword, uint32_t)
 ACCESS(float, float)
 
-/* A heap that grows as it is needed: blocks in a row, each with its size before it, the lowest bit set while it is in use. First
- * fit; neighbours that are free are joined on the way. What it has grown by is zero. Many times a robot's whole memory, for
- * programs that were written for other simulators. */
+/* First-fit heap that grows on demand. Each block begins with its size, whose lowest bit is set while the block is in use. The
+ * search joins adjacent free blocks. New memory is zero. The size is many times a robot's RAM, for programs that were written for
+ * other simulators. */
 enum { HEAP_OCTETS = 65536, HEADER = sizeof(size_t), ALIGNMENT = 8 };
 
 __attribute__((section(".bss" KT_HEAP_SECTION))) static uint64_t heap[HEAP_OCTETS / sizeof(uint64_t)];

@@ -1,4 +1,4 @@
-/* Strings, characters, sorting, random numbers: what robots' programs use of the C library. */
+/* Strings, characters, sorting and random numbers of the C library. */
 #include <ctype.h>
 #include <errno.h>
 #include <stdint.h>
@@ -242,7 +242,7 @@ int abs(int value) { return value < 0 ? -value : value; }
 long labs(long value) { return value < 0 ? -value : value; }
 long long llabs(long long value) { return value < 0 ? -value : value; }
 
-/* Park and Miller's generator in Schrage's form, as avr-libc has it: state 0 stands for 123459876. */
+/* The generator of Park and Miller in Schrage's form, as in avr-libc: a state of 0 stands for 123459876. */
 static int32_t next_random(int32_t* state) {
   int32_t x = *state == 0 ? 123459876 : *state;
   x = 16807 * (x % 127773) - 2836 * (x / 127773);
@@ -271,7 +271,7 @@ long random_r(unsigned long* state) {
   return (long)(*state = (unsigned long)x);
 }
 
-/* Insertion sort: stable, small, and fast for the few elements that a robot has. */
+/* Insertion sort: stable, small, and fast enough for a robot's few elements. */
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*)) {
   unsigned char* first = base;
   for (size_t i = 1; i < count; ++i) {
@@ -317,7 +317,7 @@ char* getenv(const char* name) {
   return NULL;
 }
 
-/* A robot's program does not end. */
+/* A robot's program does not end, so the function is never called. */
 int atexit(void (*function)(void)) {
   (void)function;
   return 0;

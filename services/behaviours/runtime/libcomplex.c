@@ -1,4 +1,4 @@
-/* Complex numbers over the real functions. */
+/* Complex functions, computed from real ones. */
 #include <complex.h>
 #include <math.h>
 

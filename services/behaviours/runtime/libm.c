@@ -1,4 +1,4 @@
-/* The names of the C library's mathematics over core/math/elementary.h. */
+/* The mathematical functions of the C library, implemented by core/math/elementary.h. */
 #include <math.h>
 
 #include "core/math/elementary.h"
@@ -39,7 +39,7 @@ double log1p(double x) { return fabs(x) < 1e-5 ? x - x * x / 2 : kt_log(1 + x); 
 double fdim(double x, double y) { return x > y ? x - y : 0; }
 double fma(double x, double y, double z) { return x * y + z; }
 
-/* A third of the logarithm, and one step of Newton's. */
+/* exp(log(x) / 3), improved by one step of Newton's method. */
 double cbrt(double x) {
   if (x == 0 || x - x != 0) return x;
   const double size = fabs(x);
@@ -74,13 +74,13 @@ void sincos(double x, double* sine, double* cosine) {
 double fmin(double x, double y) { return isnan(x) || y < x ? y : x; }
 double fmax(double x, double y) { return isnan(x) || y > x ? y : x; }
 
-/* To the nearest integer, halves away from zero. */
+/* Rounds to the nearest integer, halves away from zero. */
 double round(double x) {
   const double whole = trunc(x), rest = fabs(x - whole);
   return rest >= 0.5 ? whole + copysign(1, x) : whole;
 }
 
-/* To the nearest integer, halves to even. */
+/* Rounds to the nearest integer, halves to even. */
 double rint(double x) {
   const double low = kt_floor(x), rest = x - low;
   if (rest != 0.5) return rest > 0.5 ? low + 1 : low;
@@ -99,7 +99,7 @@ long lrint(double x) { return (long)rint(x); }
 long long llround(double x) { return (long long)round(x); }
 long long llrint(double x) { return (long long)rint(x); }
 
-/* One instruction, correctly rounded. */
+/* A single instruction, whose result is correctly rounded. */
 double sqrt(double x) {
   double root;
   __asm__("sqrtsd %1, %0" : "=x"(root) : "x"(x));

@@ -1,4 +1,4 @@
-/* Numbers as text and back. */
+/* Conversion of numbers to text and back. */
 #include <ctype.h>
 #include <errno.h>
 #include <limits.h>
@@ -12,7 +12,7 @@
 
 static int digit_of(char c) { return isdigit(c) ? c - '0' : isalpha(c) ? tolower(c) - 'a' + 10 : 36; }
 
-/* The magnitude; `negative` tells the sign, `high` 1 when it does not fit into 64 bits. `end` is where it stops, or `text`. */
+/* Parses a magnitude. `high` becomes 1 if it exceeds 64 bits. `end` becomes the first unread character, or `text` on failure. */
 static uint64_t magnitude(const char* text, const char** end, int base, int* negative, int* high) {
   const char* at = text;
   *end = text;
@@ -62,7 +62,7 @@ long long atoll(const char* text) { return strtoll(text, NULL, 10); }
 long atol(const char* text) { return strtol(text, NULL, 10); }
 int atoi(const char* text) { return (int)strtol(text, NULL, 10); }
 
-/* Up to 19 digits count; tens are multiplied or divided by one at a time, so the last bits are not the nearest always. */
+/* Uses the first 19 digits, and multiplies or divides by 10 one step at a time. The result is not always correctly rounded. */
 double strtod(const char* text, char** end) {
   const char* at = text;
   while (isspace(*at)) ++at;
@@ -155,7 +155,7 @@ char* dtostrf(double value, signed char width, unsigned char decimals, char* to)
   return to;
 }
 
-/* One conversion of sscanf(); `width` counts characters. Returns where the text goes on, or NULL where it does not fit. */
+/* One conversion of sscanf(); `width` counts characters. Returns the first unread character, or NULL if the text does not match. */
 static const char* convert(const char* text, char kind, int width, int longs, void* to) {
   char copy[64];
   char* stop;

@@ -1,4 +1,4 @@
-/* Formatted text, into memory and into the robot's log. */
+/* Formatted output to memory and to the robot's log. */
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -20,7 +20,7 @@ void kilotwin_serial_line(unsigned long baud) {
   cycles_per_octet = baud == 0 ? 0 : (uint32_t)(CLOCK_HZ * BITS_PER_OCTET / baud);
 }
 
-/* To the log, and to the function behind the stream if there is one. */
+/* Writes to the log, and to the stream's function if it has one. */
 static void put_into(FILE* stream, char c) {
   if (kt_exchange->log_length < KT_LOG_OCTETS)
     kt_exchange->log[kt_exchange->log_length++] = c;
@@ -31,7 +31,7 @@ static void put_into(FILE* stream, char c) {
 }
 
 struct Output {
-  char* to; /* NULL: the stream */
+  char* to; /* NULL: output goes to the stream */
   size_t size, length;
   FILE* stream;
 };
@@ -52,7 +52,7 @@ struct Field {
   int left, zero, plus, other, width, precision;
 };
 
-/* `sign` (0: none) and `length` characters, padded to the field. */
+/* Writes `sign` (0: none) and `length` characters, padded to the field's width. */
 static void put_field(struct Output* out, const struct Field* field, char sign, const char* text, int length) {
   const int space = field->width - length - (sign != 0);
   if (!field->left && !field->zero) fill(out, ' ', space);
@@ -62,7 +62,7 @@ static void put_field(struct Output* out, const struct Field* field, char sign, 
   if (field->left) fill(out, ' ', space);
 }
 
-/* Digits of `value`, right-aligned before `end`; the address of the first. */
+/* Writes the digits of `value` right-aligned before `end`. Returns the address of the first. */
 static char* digits(char* end, uint64_t value, unsigned base, int least, char ten) {
   char* at = end;
   for (; value != 0 || end - at < least; value /= base) {
@@ -84,8 +84,8 @@ static void put_integer(struct Output* out, struct Field* field, uint64_t value,
   put_field(out, field, sign, first, (int)(text + MOST_DIGITS - first));
 }
 
-/* Puts what is no number; returns 0 where it is one. */
-static int put_no_number(struct Output* out, struct Field* field, double value, char sign) {
+/* Writes "nan" or "inf" and returns 1; returns 0 for a finite value. */
+static int put_not_finite(struct Output* out, struct Field* field, double value, char sign) {
   if (value - value == 0) return 0;
   field->zero = 0;
   put_field(out, field, value != value ? 0 : sign, value != value ? "nan" : "inf", 3);
@@ -94,14 +94,14 @@ static int put_no_number(struct Output* out, struct Field* field, double value, 
 
 static void put_fixed(struct Output* out, struct Field* field, double value) {
   const char sign = (char)(__builtin_signbit(value) && value == value ? '-' : field->plus ? '+' : 0);
-  if (put_no_number(out, field, value, sign)) return;
+  if (put_not_finite(out, field, value, sign)) return;
   if (value < 0) value = -value;
   const int decimals = field->precision < 0               ? 6
                        : field->precision > MOST_DECIMALS ? MOST_DECIMALS
                                                           : field->precision;
   uint64_t scale = 1;
   for (int i = 0; i < decimals; ++i) scale *= 10;
-  /* Beyond 18 digits before the point come zeros. */
+  /* Digits before the point beyond the first 18 are zeros. */
   int zeros = 0;
   for (; value >= 1e18; value /= 10) ++zeros;
   uint64_t whole = (uint64_t)kt_floor(value);
@@ -121,10 +121,10 @@ static void put_fixed(struct Output* out, struct Field* field, double value) {
   put_field(out, field, sign, at, (int)(text + sizeof text - at));
 }
 
-/* %e, and %g, which takes %f's form for exponents of ten from -4 to its precision and leaves zeros at the end out. */
+/* %e and %g. %g uses the form of %f for decimal exponents from -4 to its precision, and drops trailing zeros. */
 static void put_scientific(struct Output* out, struct Field* field, double value, char kind) {
   const char sign = (char)(__builtin_signbit(value) && value == value ? '-' : field->plus ? '+' : 0);
-  if (put_no_number(out, field, value, sign)) return;
+  if (put_not_finite(out, field, value, sign)) return;
   const int general = (kind | 32) == 'g';
   if (value < 0) value = -value;
   int places = field->precision < 0 ? 6 : field->precision > MOST_DECIMALS ? MOST_DECIMALS : field->precision;
@@ -301,7 +301,7 @@ int printf(const char* format, ...) {
   return length;
 }
 
-/* printf() also where a program without DEBUG has none. */
+/* printf() for the runtime's macros: without DEBUG, debug.h defines printf() as nothing. */
 int kilotwin_print(const char* format, ...) {
   va_list arguments;
   va_start(arguments, format);
@@ -348,7 +348,7 @@ FILE* fdevopen(int (*put_octet)(char, FILE*), int (*get)(FILE*)) {
   return stdout;
 }
 
-/* Files and input: there are none. */
+/* Robots have no files and no input, so these functions fail. */
 FILE* fopen(const char* name, const char* mode) {
   (void)name, (void)mode;
   return NULL;

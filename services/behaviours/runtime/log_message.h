@@ -1,4 +1,4 @@
-/* Included before programs of simulators that print by log_message(): a line of the robot's log per call. */
+/* Included before simulators' programs that print by log_message(). Each call prints a line to the robot's log. */
 #ifdef __cplusplus
 extern "C"
 #endif

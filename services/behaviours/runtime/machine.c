@@ -1,4 +1,4 @@
-/* What programs find beside kilolib: clock and waiting under the names of a host, the converter, setjmp, what C++ needs. */
+/* Further functions for programs: POSIX names for clock and delays, the ADC's registers, setjmp, support for C++. */
 #define KILOTWIN_RUNTIME
 #include <avr/io.h>
 #include <kilolib.h>
@@ -35,7 +35,7 @@ time_t time(time_t* seconds) {
 clock_t clock(void) { return kilo_ticks; }
 double difftime(time_t later, time_t earlier) { return (double)(later - earlier); }
 
-/* Channels of the converter: 6 battery, 7 light, 8 temperature. */
+/* ADC channels: 6 battery, 7 light, 8 temperature. */
 static struct kilotwin_adc converter;
 
 volatile struct kilotwin_adc* kilotwin_adc(void) {
@@ -51,7 +51,7 @@ volatile struct kilotwin_adc* kilotwin_adc(void) {
   return &converter;
 }
 
-/* A structure of the program's own that ARGoS shares with its loop functions. */
+/* Memory for a program's debug_info_t, which ARGoS shares with its loop functions. */
 enum { DEBUG_INFO_OCTETS = 512 };
 static uint64_t debug_info[DEBUG_INFO_OCTETS / 8];
 
@@ -60,7 +60,7 @@ void* kilotwin_debug_info(unsigned long size) {
   return debug_info;
 }
 
-/* What a call must keep (System V, x86-64): rbx, rbp, r12..r15, the stack pointer, and where it returns to. */
+/* setjmp saves the callee-saved registers (System V, x86-64): rbx, rbp, r12..r15, the stack pointer, and the return address. */
 __asm__(
     ".text\n"
     ".weak setjmp\n.type setjmp, @function\nsetjmp:\n"
@@ -72,7 +72,7 @@ __asm__(
     "mov (%rdi), %rbx\nmov 8(%rdi), %rbp\nmov 16(%rdi), %r12\nmov 24(%rdi), %r13\nmov 32(%rdi), %r14\n"
     "mov 40(%rdi), %r15\nmov 48(%rdi), %rsp\njmp *56(%rdi)\n.size longjmp, .-longjmp\n");
 
-/* C++: new and delete over the robot's heap; destructors of statics never run. */
+/* C++: new and delete use the robot's heap. Destructors of static objects never run. */
 void* __dso_handle __attribute__((visibility("hidden")));
 
 int __cxa_atexit(void (*destroy)(void*), void* object, void* handle) {

@@ -1,4 +1,4 @@
-/* Included before every program: what avr-gcc knows and a host's compiler does not. */
+/* Included before every program: built-in functions and keywords of avr-gcc that the host's compiler lacks. */
 #ifndef KILOTWIN_MACHINE_H
 #define KILOTWIN_MACHINE_H
 
@@ -19,7 +19,7 @@ void kilotwin_spend(unsigned long long cycles);
 #ifdef __cplusplus
 }
 #endif
-/* Instructions that programs write as they stand. */
+/* AVR instructions that programs use in asm statements. They do nothing here. */
 __asm__(
     ".macro sei\n.endm\n"
     ".macro cli\n.endm\n"

@@ -1,5 +1,5 @@
-/* Compiled with programs that are Kilombo's alone: room for their data, where they leave it to the simulator, and the
- * callbacks that they set by name, of which none is called. */
+/* Compiled with programs that work only with Kilombo. It provides memory for their user data if they leave that to the
+ * simulator, and defines the callbacks that they set. No callback is called. */
 #include <jansson.h>
 #include <stdint.h>
 #include <stdlib.h>

@@ -1,13 +1,13 @@
-/* How the host enters a robot and how a robot returns to its host: System V calling convention, x86-64. The host's
- * registers rest on the host's stack, the robot's on the robot's, so that a robot's stack holds addresses of its own image
- * and nothing else. %gs points to the thread's KtThread. */
+/* Context switch between host and robot (x86-64, System V calling convention). The host's registers are saved on the host's
+ * stack, the robot's on the robot's stack. A robot's stack therefore contains no addresses except those of its own image.
+ * %gs points to the thread's KtThread. */
 #ifndef __x86_64__
 #error "robots' programs are simulated on x86-64 only"
 #endif
 
 #include "image_abi.h"
 
-/* Read-only once the loader has set it. */
+/* Read-only after the loader has set it. */
 __attribute__((section(".data.rel.ro.kilotwin"), used)) struct KtExchange* kt_exchange = 0;
 
 #define HOST_STACK "%gs:0"
@@ -27,7 +27,7 @@ _Static_assert(__builtin_offsetof(struct KtThread, robot_stack) == 8 &&
 
 #define SAVE "push %rbx\n push %rbp\n push %r12\n push %r13\n push %r14\n push %r15\n"
 #define RESTORE "pop %r15\n pop %r14\n pop %r13\n pop %r12\n pop %rbp\n pop %rbx\n"
-/* What a program finds in registers that nobody gave it does not depend on the host. */
+/* Clears registers, so that a program that reads one without setting it does not see the host's values. */
 #define CLEAR                                                                                               \
   "xor %edx, %edx\n xor %esi, %esi\n xor %edi, %edi\n xor %r8d, %r8d\n xor %r9d, %r9d\n xor %r10d, %r10d\n" \
   "xor %r11d, %r11d\n"
@@ -36,9 +36,9 @@ _Static_assert(__builtin_offsetof(struct KtThread, robot_stack) == 8 &&
   "xorps %xmm5, %xmm5\n xorps %xmm6, %xmm6\n xorps %xmm7, %xmm7\n xorps %xmm8, %xmm8\n xorps %xmm9, %xmm9\n" \
   "xorps %xmm10, %xmm10\n xorps %xmm11, %xmm11\n xorps %xmm12, %xmm12\n xorps %xmm13, %xmm13\n"              \
   "xorps %xmm14, %xmm14\n xorps %xmm15, %xmm15\n"
-/* Processors predict returns by the calls that they have seen. So that all calls and returns between a host's call of kt_enter
- * and its end pair up, a robot is continued by a jump and comes to wait by a jump, with the address where it goes on pushed
- * by hand; the host is returned to by the return that its call expects. Counters call kt_preempt in the same way. */
+/* Processors predict returns by the calls that they have seen, so calls and returns must pair up between the host's call of
+ * kt_enter and its return. A robot is therefore continued by a jump, and waits by a jump after it has pushed its return address.
+ * Only the return to the host is a `ret`, which matches the host's call. Counters jump to kt_preempt in the same way. */
 #define CONTINUE "pop %rcx\n jmp *%rcx\n"
 #define FUNCTION(name) ".globl " #name "\n .hidden " #name "\n .type " #name ", @function\n" #name ":\n"
 #define END(name) ".size " #name ", .-" #name "\n"
@@ -67,8 +67,8 @@ __asm__(
     FUNCTION(kt_leave)
     "movb $0, " IN_INTERRUPT "\n"
     "mov " HOST_STACK ", %rsp\n" RESTORE "ret\n" END(kt_leave)
-/* void kt_preempt_N(void): called where a counter has run out, with N out of KT_CHECK_*. Keeps all registers but the
-     * flags. */
+/* void kt_preempt_N(void): called when a test finds the budget used up; N is its KT_CHECK_*. Preserves all registers except
+     * the flags. */
 #define PREEMPT(kind, to) \
   FUNCTION(kt_preempt_##kind) "movb $" #kind ", " CHECK "\n jmp " to "\n" END(kt_preempt_##kind)
     PREEMPT(0, "kt_preempt") PREEMPT(1, "kt_preempt") PREEMPT(2, "kt_preempt") PREEMPT(3, "kt_preempt")
@@ -78,7 +78,7 @@ __asm__(
   "push %rbp\n mov %rsp, %rbp\n"                                                                              \
   "push %rax\n push %rcx\n push %rdx\n push %rsi\n push %rdi\n push %r8\n push %r9\n push %r10\n push %r11\n" \
   "mov 8(%rbp), %rax\n mov %rax, " PLACE "\n"
-/* What a function may hand on without naming it. */
+/* Saves the vector registers for arguments, which a function may pass on without naming them. */
 #define SAVE_ARGUMENTS                                                                                \
   "movups %xmm0, (%rsp)\n movups %xmm1, 16(%rsp)\n movups %xmm2, 32(%rsp)\n movups %xmm3, 48(%rsp)\n" \
   "movups %xmm4, 64(%rsp)\n movups %xmm5, 80(%rsp)\n movups %xmm6, 96(%rsp)\n movups %xmm7, 112(%rsp)\n"

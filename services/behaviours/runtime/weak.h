@@ -1,4 +1,4 @@
-/* Programs may have functions of their own under the names of the C library, as on the robot: the library's give way. */
+/* Weak symbols: a program may define functions with names of the C library, as on the robot. They replace the library's. */
 #define KT_TEXT(text) #text
 #define WEAK(name) _Pragma(KT_TEXT(weak name))
 

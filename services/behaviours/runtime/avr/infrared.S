@@ -1,11 +1,11 @@
-/* Sends a packet of 12 octets as pulses of infrared light, after a leading octet of zeros in which it looks out for others.
+/* Sends a packet of 12 octets as infrared pulses after a leading octet of zeros, during which it senses the carrier.
  *
- *   uint8_t kilo_send(const uint8_t* packet)   with interrupts off; 1: sent; 0: given up
+ *   uint8_t kilo_send(const uint8_t* packet)   requires disabled interrupts; returns 1: sent, 0: another packet was noticed
  *
- * A bit lasts 269 cycles; a 1 is a pulse of 9. An octet is a start bit, 8 bits, the lowest first, and a stop bit. */
+ * A bit lasts 269 cycles; a 1 is a pulse of 9 cycles. An octet is a start bit, 8 bits (lowest first) and a stop bit. */
 #include <avr/io.h>
 
-#define LIT r18     /* port B while the LEDs are on, and while they are off */
+#define LIT r18     /* value of port B with the LEDs on; DARK: with the LEDs off */
 #define DARK r19
 #define BITS_LOW r20
 #define BITS_HIGH r21
@@ -13,14 +13,14 @@
 #define OCTETS r23
 #define SCRATCH r0
 
-/* n times 3 cycles, 1..255. */
+/* Waits for 3 n cycles, n in 1..255. */
 .macro wait3 n
   ldi r25, \n
 9: dec r25
   brne 9b
 .endm
 
-/* 9 cycles from light to darkness; 10 in all. */
+/* A pulse of 9 cycles. The macro takes 10. */
 .macro pulse
   out _SFR_IO_ADDR(PORTB), LIT
   rjmp .
@@ -38,7 +38,7 @@ kilo_send:
   lds LIT, tx_mask
   or LIT, DARK
 
-  /* The leading octet: its start bit, and two bits in which this very pulse fades. */
+  /* The leading octet: its start bit, and a wait of two bits until the receiver no longer sees this pulse. */
   pulse                         ; 0 .. 10
   wait3 175                     ; 535
   rjmp .                        ; 537
@@ -56,14 +56,14 @@ kilo_send:
   ldi OCTETS, 12
   wait3 83                      ; 2681
 
-2: /* 9 cycles more than the bits */
+2: /* per octet: 9 cycles in addition to its bits */
   ld BITS_LOW, X+
   ldi BITS_HIGH, 1
   sec
   rol BITS_LOW
   rol BITS_HIGH
   ldi COUNT, 10
-3: /* 268 cycles: ten bits and the 9 make an octet of 2689 */
+3: /* per bit: 268 cycles; an octet takes 10 * 268 + 9 = 2689 */
   mov SCRATCH, DARK
   sbrc BITS_LOW, 0
   mov SCRATCH, LIT
@@ -88,7 +88,7 @@ kilo_send:
   ldi r24, 0
 9:
   in SCRATCH, _SFR_IO_ADDR(ACSR)
-  ldi r25, 1 << ACI             ; what this robot has made the comparator see
+  ldi r25, 1 << ACI             ; clear the comparator's interrupt, which the robot's own pulses have set
   or SCRATCH, r25
   out _SFR_IO_ADDR(ACSR), SCRATCH
   ret

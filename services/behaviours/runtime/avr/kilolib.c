@@ -1,6 +1,6 @@
-/* kilolib for the robot itself, an ATmega328P at 8 MHz: what programs find on a Kilobot, written from the robot's observed
- * behaviour and timing. The same headers, the same messages on the air, the same pins and EEPROM as the makers' library,
- * so that robots of either kind understand each other. */
+/* kilolib for the robot's processor, an ATmega328P at 8 MHz, written from the robot's observed behaviour and timing. It has the
+ * headers, the packet format, the pins and the EEPROM layout of the original library, so robots with either library can
+ * communicate. */
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -13,12 +13,12 @@
 
 #include "../core/base/message_crc.h"
 
-uint8_t kilo_send(const uint8_t* packet); /* infrared.c; 0: another packet was noticed, and this one was given up */
+uint8_t kilo_send(const uint8_t* packet); /* infrared.S; returns 0 if carrier sense noticed another packet */
 
 enum { SLEEPING, IDLE, BATTERY, SETUP, RUNNING, CHARGING, MOVING };
 enum { STAND, TURN_LEFT, TURN_RIGHT, STRAIGHT };
 
-/* Where the EEPROM holds what. */
+/* EEPROM addresses. */
 enum {
   EE_OSCCAL = 0x01,
   EE_TURN_LEFT = 0x05,
@@ -32,7 +32,7 @@ enum {
 };
 #define IR_ENTRIES 14
 
-/* One bit of a packet, in cycles; half of one; and the time after which a receiver gives up, 11 bits. */
+/* Cycles of a bit and of half a bit, and the receiver's timeout of 11 bits. */
 #define BIT 269
 #define HALF_BIT 134
 #define TIMEOUT 2959
@@ -64,7 +64,7 @@ uint16_t tx_clock, tx_increment;
 static volatile uint8_t state;
 static volatile uint8_t motion, motion_done;
 
-/* The converter. While nobody asks for a reading, the comparator's edges start conversions of the strong amplifier. */
+/* The ADC. While no program takes a reading, edges of the comparator start conversions of the high-gain amplifier. */
 
 static void listen_to(uint8_t channel) { ADMUX = _BV(REFS0) | channel; }
 
@@ -95,7 +95,7 @@ int16_t get_ambientlight(void) { return reading(_BV(REFS0) | 7); }
 int16_t get_voltage(void) { return reading(_BV(REFS0) | 6); }
 int16_t get_temperature(void) { return reading(_BV(REFS1) | _BV(REFS0) | 8); }
 
-/* Of eight pairs of the lowest bit, which noise tosses, those that differ. */
+/* Each bit is the first of two readings' lowest bits that differ, which noise makes a fair coin. At most 64 tries per bit. */
 uint8_t rand_hard(void) {
   uint8_t value = 0;
   for (uint8_t bit = 0; bit < 8; ++bit) {
@@ -145,7 +145,7 @@ void spinup_motors(void) {
   delay(15);
 }
 
-/* A colour is on while its pin, which is low, is an output; two resistors per colour. */
+/* A colour is on while its pins are outputs at low level. Each colour has two pins with different resistors. */
 void set_color(uint8_t color) {
   uint8_t c = DDRC & (uint8_t) ~(_BV(2) | _BV(3) | _BV(4) | _BV(5));
   uint8_t d = DDRD & (uint8_t) ~(_BV(4) | _BV(5));
@@ -167,13 +167,13 @@ void delay(uint16_t ms) {
 
 uint16_t message_crc(const message_t* message) { return kilotwin_message_crc((const uint8_t*)message); }
 
-/* Millimetres beyond contact at entry `i` of a table, interpolated from the entry before. */
+/* Distance beyond contact, mm, for a reading between entries i - 1 and i of a table; linear interpolation. */
 static uint8_t beyond_contact(const uint16_t* table, uint8_t i, int16_t value) {
   const int16_t step = (int16_t)(table[i] - table[i - 1]);
   return step == 0 ? 5 * i : (uint8_t)((int32_t)(value - (int16_t)table[i] + step * i) * 10 / (2 * step));
 }
 
-/* The first entry that lies below the reading, or `none`. */
+/* Index of the first entry below the reading, or `none`. */
 static int8_t first_below(const uint16_t* table, int16_t value, int8_t none) {
   for (int8_t i = 0; i < IR_ENTRIES; ++i) {
     if (value > (int16_t)table[i]) return i;
@@ -201,13 +201,13 @@ uint8_t estimate_distance(const distance_measurement_t* distance) {
 
 /* Messages of the overhead controller. */
 
-/* The hardware starts anew: with interrupts off, at the program's first instruction. */
+/* Restarts the program at its first instruction, with interrupts disabled. */
 static void restart(void) {
   cli();
   __asm__ volatile("clr r1\n\tjmp 0");
 }
 
-/* The boot loader's section, where there is one. */
+/* Jumps to the boot loader, if its section is programmed. */
 static void boot(void) {
   cli();
   TIMSK0 = 0;
@@ -292,10 +292,10 @@ static void obey(void) {
   }
 }
 
-/* The receiver. A pulse that begins an octet starts timer 1; the others are bits by their time since. */
+/* The receiver. The start bit's pulse starts timer 1. The timer's value at a later pulse gives the number of the bit that is 1. */
 
-static uint8_t in_octet;    /* its start bit has been seen */
-static uint8_t octet_count; /* octets that are in, the leading one included */
+static uint8_t in_octet;    /* 1: the octet's start bit has arrived */
+static uint8_t octet_count; /* complete octets, the leading one included */
 static uint8_t octet;
 
 static void stop_receiving(void) {
@@ -311,7 +311,7 @@ static void take_octet(void) {
   in_octet = 0;
   if (octet_count == 0) {
     if (octet != 0) {
-      stop_receiving(); /* two packets at once */
+      stop_receiving(); /* a collision: the leading octet of a packet is 0 */
       return;
     }
     rx_dist.low_gain = (int16_t)conversion();
@@ -353,7 +353,7 @@ ISR(ANALOG_COMP_vect) {
     take_octet();
 }
 
-/* The clock: every 256 counts of 1024 cycles, and once in between after a collision. */
+/* The clock ticks every 256 counts of 1024 cycles. After a failed attempt to send, one tick has a random length. */
 
 ISR(TIMER0_COMPA_vect) {
   ++kilo_ticks;
@@ -448,7 +448,7 @@ static void follow_calibration(void) {
 
 EMPTY_INTERRUPT(WDT_vect)
 
-/* Eight seconds with its clocks off, ten milliseconds of listening. */
+/* Sleeps for 8 s with all clocks off, then listens for 10 ms. */
 static void sleep_and_listen(void) {
   set_color(0);
   cli();
@@ -488,7 +488,7 @@ static void show_battery(void) {
     set_color(RGB(3, 0, 0));
 }
 
-/* A blink that a message ends. */
+/* Blinks once. A message that changes the state ends the wait. */
 static void blink(uint8_t color, uint8_t on_ms, uint8_t off_ms) {
   const uint8_t before = state;
   set_color(color);
@@ -515,7 +515,7 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
           has_setup = 1;
           setup();
         }
-        cli(); /* unless a message has said otherwise meanwhile */
+        cli(); /* a message may change the state at any time until here */
         if (state == SETUP) state = RUNNING;
         sei();
         break;

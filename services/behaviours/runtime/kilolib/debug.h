@@ -1,6 +1,6 @@
-/* printf() over the serial line of a robot under development: with DEBUG the text goes to the robot's log and, after
- * debug_init(), takes the time that 38400 baud take; without DEBUG it is compiled to nothing. Further ARGoS' way to debug: a
- * structure debug_info_t of the program's own. */
+/* Debugging by printf(), on the robot over its serial line. With DEBUG the text goes to the robot's log; after debug_init() it
+ * also takes the transmission time of 38400 baud. Without DEBUG printf() compiles to nothing. Also the debug_info_ macros of
+ * ARGoS, which access a structure debug_info_t that the program defines. */
 #ifndef KILOTWIN_DEBUG_H
 #define KILOTWIN_DEBUG_H
 
@@ -58,7 +58,7 @@ static inline void debug_init(void) {
 
 #endif
 
-/* A program that sets fields without having defined debug_info_t is one for the robot, where they vanish. */
+/* A program that sets fields without a definition of debug_info_t was written for the robot, where the macros are empty. */
 #if defined(__AVR__) || defined(KILOTWIN_NO_DEBUG_INFO)
 
 #define debug_info_create() ((void)0)

@@ -1,5 +1,5 @@
-/* What Kilombo's json_state callbacks name. They are never called here, so these functions are declared and no more: the
- * recording of a run holds the states (kilotwin export). */
+/* Declarations for Kilombo's json_state callbacks. The callbacks are never called here, so the functions have no definitions.
+ * The recording of a run holds the robots' states (kilotwin export). */
 #ifndef KILOTWIN_JANSSON_H
 #define KILOTWIN_JANSSON_H
 

@@ -1,4 +1,4 @@
-/* The programming interface of a Kilobot, as robots' programs know it from kilolib: the same names, types and meaning. */
+/* The programming interface of a Kilobot, with the names, types and meanings of kilolib. */
 #ifndef KILOTWIN_KILOLIB_H
 #define KILOTWIN_KILOLIB_H
 
@@ -7,9 +7,9 @@
 #include "message.h"
 #include "message_crc.h"
 
-/* Two bits per colour, 0..3 each. Unparenthesised outside, as programs have always known it. */
+/* Two bits per colour, 0..3 each. Without outer parentheses, as in kilolib: a program's result may depend on it. */
 #define RGB(r, g, b) (r & 3) | (((g & 3) << 2)) | ((b & 3) << 4)
-/* Ticks of the robot's clock per second, about. */
+/* Approximate ticks of the robot's clock per second. */
 #define TICKS_PER_SEC 31
 
 /* Strength of a received message, 10-bit ADC counts. */
@@ -36,7 +36,7 @@ extern uint8_t kilo_turn_right;
 extern uint8_t kilo_straight_left;
 extern uint8_t kilo_straight_right;
 
-/* Called like interrupts: on reception, when a message may be sent (NULL: none), and when it has left. */
+/* Callbacks, called like interrupts: for a received message; for a message to send (NULL: none); after it has been sent. */
 extern message_rx_t kilo_message_rx;
 extern message_tx_t kilo_message_tx;
 extern message_tx_success_t kilo_message_tx_success;
@@ -44,7 +44,7 @@ extern message_tx_success_t kilo_message_tx_success;
 /* Distance of the sender, centre to centre, mm. */
 uint8_t estimate_distance(const distance_measurement_t* d);
 void delay(uint16_t ms);
-/* Without void, so that in C arguments too many are passed over as on the robot. */
+/* Declared without void, so that C ignores surplus arguments, as on the robot. */
 uint8_t rand_hard();
 uint8_t rand_soft();
 void rand_seed(uint8_t seed);
@@ -56,7 +56,7 @@ void set_motors(uint8_t left, uint8_t right);
 void spinup_motors();
 void set_color(uint8_t color);
 void kilo_init();
-/* Runs setup() once and loop() for ever when the overhead controller says RUN. Does not return. */
+/* After the overhead controller's RUN: calls setup() once, then loop() for ever. Does not return. */
 void kilo_start(void (*setup)(void), void (*loop)(void));
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* Programs written for Kilombo. They run here as on the robot: every robot has its own globals, mydata points to one of
- * them, and the simulator's callbacks are left out. Programs that compile with SIMULATOR alone find its names here too. */
+/* For programs written for Kilombo. They run here as on the robot: every robot has its own globals, mydata points to one of
+ * them, and no callback of the simulator is called. The names for programs that need SIMULATOR are here too. */
 #ifndef KILOTWIN_KILOMBO_H
 #define KILOTWIN_KILOMBO_H
 

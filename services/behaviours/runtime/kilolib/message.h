@@ -6,8 +6,8 @@
 
 typedef struct message_t {
   uint8_t data[9]; /* payload */
-  uint8_t type;    /* message_type_t; below 0x80 it is the user's to choose */
-  uint16_t crc;    /* message_crc() of the above */
+  uint8_t type;    /* message_type_t; programs may choose any value below 0x80 */
+  uint16_t crc;    /* message_crc() of data and type */
 } __attribute__((packed)) message_t;
 
 typedef enum {

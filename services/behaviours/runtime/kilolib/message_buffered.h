@@ -1,4 +1,4 @@
-/* Buffers between the message callbacks and loop(): include in one source file. */
+/* Message buffers between the callbacks and loop(). Include this header in only one source file. */
 #ifndef KILOTWIN_MESSAGE_BUFFERED_H
 #define KILOTWIN_MESSAGE_BUFFERED_H
 
@@ -30,7 +30,7 @@ void rxbuffer_push(message_t* msg, distance_measurement_t* dist) {
   RB_pushback(rxbuffer);
 }
 
-/* The oldest message received and its strength, or NULL. */
+/* The oldest received message and its strength, or NULL. */
 message_t* rxbuffer_peek(distance_measurement_t* dist) {
   if (RB_empty(rxbuffer)) return NULL;
   *dist = RB_front(rxbuffer).dist;
@@ -48,7 +48,7 @@ void txbuffer_push(message_t* msg) {
   RB_pushback(txbuffer);
 }
 
-/* The oldest message to be sent, or NULL. */
+/* The oldest message that waits to be sent, or NULL. */
 message_t* txbuffer_peek(void) { return RB_empty(txbuffer) ? NULL : &RB_front(txbuffer); }
 
 void txbuffer_pop(void) {

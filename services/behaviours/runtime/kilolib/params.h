@@ -1,4 +1,4 @@
-/* Kilombo's parameters, for programs that read them: all have their defaults. */
+/* Kilombo's parameters. Every parameter has the default that the program passes. */
 #ifndef KILOTWIN_PARAMS_H
 #define KILOTWIN_PARAMS_H
 

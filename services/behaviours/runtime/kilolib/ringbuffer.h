@@ -1,4 +1,4 @@
-/* Ring buffers of fixed size: when full, the oldest element makes room. */
+/* Ring buffers of fixed size. A full buffer overwrites its oldest element. */
 #ifndef KILOTWIN_RINGBUFFER_H
 #define KILOTWIN_RINGBUFFER_H
 

@@ -1,4 +1,4 @@
-/* A failed assertion stops the robot as any fault does. */
+/* A failed assertion stops the robot like any other fault. */
 #undef assert
 #ifdef NDEBUG
 #define assert(condition) ((void)0)

@@ -1,4 +1,4 @@
-/* Mathematics with the same last bit on every machine: core/math/elementary.h under the names of the C library. */
+/* Mathematical functions of the C library with equal bits on every machine; core/math/elementary.h implements them. */
 #ifndef KILOTWIN_MATH_H
 #define KILOTWIN_MATH_H
 

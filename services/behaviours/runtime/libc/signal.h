@@ -1,4 +1,4 @@
-/* A robot gets no signals: handlers are taken and never called. */
+/* A robot gets no signals. Handlers are accepted and never called. */
 #ifndef KILOTWIN_SIGNAL_H
 #define KILOTWIN_SIGNAL_H
 

@@ -1,4 +1,4 @@
-/* The compiler's own fixed-width types; there is no C library beneath. */
+/* The compiler's fixed-width types. There is no other C library. */
 #ifdef __clang__
 #include_next <stdint.h>
 #else

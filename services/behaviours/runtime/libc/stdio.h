@@ -1,5 +1,5 @@
-/* Formatted text as avr-libc has it. What a robot prints goes to its log (docs/reference/programs.md): standard output and standard
- * error alike, and besides to the function of a stream of the program's own. Robots have no files: fopen() finds none. */
+/* Formatted output as in avr-libc. Standard output and standard error go to the robot's log (docs/reference/programs.md). A stream
+ * that the program defines also calls its function. Robots have no files, so fopen() returns NULL. */
 #ifndef KILOTWIN_STDIO_H
 #define KILOTWIN_STDIO_H
 
@@ -28,7 +28,7 @@ extern FILE *stdin, *stdout, *stderr;
 #define SEEK_CUR 1
 #define SEEK_END 2
 
-/* Streams of the program's own. */
+/* Streams that a program defines. */
 #define _FDEV_EOF (-2)
 #define _FDEV_ERR (-1)
 #define _FDEV_SETUP_READ 1
@@ -75,7 +75,7 @@ int sscanf(const char* text, const char* format, ...) __attribute__((format(scan
 int vsscanf(const char* text, const char* format, va_list arguments);
 #define sscanf_P sscanf
 
-/* Nothing to read from. */
+/* Functions for input, which always fail. */
 FILE* fopen(const char* name, const char* mode);
 int fclose(FILE* stream);
 int scanf(const char* format, ...);

@@ -1,4 +1,4 @@
-/* The part of the C library that robots' programs use. rand() is avr-libc's, value for value. */
+/* The part of the C library that robots' programs use. rand() returns the values of avr-libc. */
 #ifndef KILOTWIN_STDLIB_H
 #define KILOTWIN_STDLIB_H
 
@@ -36,12 +36,12 @@ long long strtoll(const char* text, char** end, int base);
 unsigned long long strtoull(const char* text, char** end, int base);
 double strtod(const char* text, char** end);
 float strtof(const char* text, char** end);
-/* avr-libc's: the text of a number in a base of 2..36; with a sign in base 10 only. */
+/* As in avr-libc: a number as text in base 2..36, with a sign only in base 10. */
 char* itoa(int value, char* to, int base);
 char* ltoa(long value, char* to, int base);
 char* utoa(unsigned value, char* to, int base);
 char* ultoa(unsigned long value, char* to, int base);
-/* avr-libc's: fixed point with `decimals`, right-aligned in `width`, left-aligned if that is negative. */
+/* As in avr-libc: fixed point with `decimals` decimals, right-aligned in `width`, or left-aligned if `width` is negative. */
 char* dtostrf(double value, signed char width, unsigned char decimals, char* to);
 int rand(void);
 void srand(unsigned seed);
@@ -52,7 +52,7 @@ long random_r(unsigned long* state);
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*));
 void* bsearch(const void* key, const void* base, size_t count, size_t size,
               int (*compare)(const void*, const void*));
-/* A robot's heap has 8 KiB. */
+/* A robot's heap has 64 KiB. */
 void* malloc(size_t size);
 void* calloc(size_t count, size_t size);
 void* realloc(void* block, size_t size);

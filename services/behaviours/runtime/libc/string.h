@@ -32,7 +32,7 @@ char* strstr(const char* text, const char* part);
 size_t strspn(const char* text, const char* of);
 size_t strcspn(const char* text, const char* not_of);
 char* strpbrk(const char* text, const char* any_of);
-/* The place between two calls is the robot's own. */
+/* Each robot has its own position between two calls. */
 char* strtok(char* text, const char* between);
 char* strtok_r(char* text, const char* between, char** place);
 char* strsep(char** text, const char* between);

@@ -1,4 +1,4 @@
-/* A robot knows no date: time() counts the seconds of its clock since it was started. */
+/* A robot has no date. time() counts the seconds of its clock since its start. */
 #ifndef KILOTWIN_TIME_H
 #define KILOTWIN_TIME_H
 

@@ -1,4 +1,4 @@
-/* Waiting, for programs that were written on a host. */
+/* Delays under POSIX names, for programs that were written on a host. */
 #ifndef KILOTWIN_UNISTD_H
 #define KILOTWIN_UNISTD_H
 

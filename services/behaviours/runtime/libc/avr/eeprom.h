@@ -1,5 +1,5 @@
-/* 1 KiB of EEPROM per robot, with kilolib's calibration in it (core/base/eeprom_layout.h) and erased elsewhere. Addresses are
- * numbers from 0 on, or those of EEMEM variables, which lie in memory of their own. What is written outlives a RESET. */
+/* 1 KiB of EEPROM per robot. It holds kilolib's calibration (core/base/eeprom_layout.h); the rest is erased. An address is an
+ * offset from 0, or that of an EEMEM variable, which lies in separate memory. The content survives a RESET. */
 #ifndef KILOTWIN_AVR_EEPROM_H
 #define KILOTWIN_AVR_EEPROM_H
 

@@ -1,5 +1,5 @@
-/* Callbacks happen only while a program waits or between calls of loop(), so there is nothing to disable. Interrupt
- * routines of the program's own compile and are never called: kilolib has the timers. */
+/* Callbacks run only at a tick's start, so cli() and sei() do nothing. A callback interrupts computing code only if that code has
+ * used up the cycles of a tick. Interrupt routines of a program compile and are never called, because kilolib uses the timers. */
 #ifndef KILOTWIN_AVR_INTERRUPT_H
 #define KILOTWIN_AVR_INTERRUPT_H
 

@@ -1,6 +1,6 @@
-/* The registers of an ATmega328P (data sheet, "register summary"). Motors and analog inputs are connected: OCR2A and OCR2B
- * are the duties of the left and the right motor, and a conversion that ADSC starts reads what the sensors read. All others
- * are plain memory with nothing behind them; the serial line is always ready for the next octet. */
+/* The registers of an ATmega328P (data sheet, "register summary"). OCR2A and OCR2B are the duties of the left and the right motor.
+ * A conversion that ADSC starts reads the robot's sensors. The serial line is always ready for the next octet. All other
+ * registers are plain memory without a function. */
 #ifndef KILOTWIN_AVR_IO_H
 #define KILOTWIN_AVR_IO_H
 
@@ -20,7 +20,7 @@ extern volatile uint8_t PINB, DDRB, PORTB, PINC, DDRC, PORTC, PIND, DDRD, PORTD,
 extern volatile uint16_t EEAR, SP, TCNT1, ICR1, OCR1A, OCR1B, UBRR0;
 /* clang-format on */
 volatile uint8_t* kilotwin_motor_duty(uint8_t right);
-/* The registers of the converter; reading them ends a conversion that has been started. */
+/* The registers of the ADC. An access completes a conversion that has been started. */
 struct kilotwin_adc {
   uint16_t value;
   uint8_t control;

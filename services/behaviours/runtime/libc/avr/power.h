@@ -1,4 +1,4 @@
-/* Clocks that a program switches off to save power. */
+/* Power reduction: the functions do nothing here. */
 #ifndef KILOTWIN_AVR_POWER_H
 #define KILOTWIN_AVR_POWER_H
 

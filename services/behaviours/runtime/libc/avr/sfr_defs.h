@@ -1,4 +1,4 @@
-/* What programs do with registers. */
+/* Operations on registers. */
 #ifndef KILOTWIN_AVR_SFR_DEFS_H
 #define KILOTWIN_AVR_SFR_DEFS_H
 

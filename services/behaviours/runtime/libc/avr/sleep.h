@@ -1,4 +1,4 @@
-/* A robot that sleeps wakes with its next tick. */
+/* A sleeping processor wakes at its robot's next tick. */
 #ifndef KILOTWIN_AVR_SLEEP_H
 #define KILOTWIN_AVR_SLEEP_H
 

@@ -1,4 +1,4 @@
-/* The watchdog timer never fires: a simulated robot whose program does not return is named by its host. */
+/* The watchdog timer never fires. The host reports a simulated robot whose program does not return. */
 #ifndef KILOTWIN_AVR_WDT_H
 #define KILOTWIN_AVR_WDT_H
 

@@ -1,4 +1,4 @@
-/* Callbacks happen only while a program waits or between calls of loop(): every block is atomic. */
+/* Blocks that callbacks do not interrupt, except where the program has used up a tick's cycles (avr/interrupt.h). */
 #ifndef KILOTWIN_UTIL_ATOMIC_H
 #define KILOTWIN_UTIL_ATOMIC_H
 

@@ -1,4 +1,4 @@
-/* One octet's step of the usual cyclic redundancy checks, by their polynomials. */
+/* Cyclic redundancy checks, updated by one octet. Each comment gives the polynomial. */
 #ifndef KILOTWIN_UTIL_CRC16_H
 #define KILOTWIN_UTIL_CRC16_H
 
@@ -12,12 +12,12 @@ static inline uint16_t kilotwin_crc_right(uint16_t crc, uint8_t octet, uint16_t 
 
 /* CRC-16, reversed 0x8005. */
 static inline uint16_t _crc16_update(uint16_t crc, uint8_t octet) { return kilotwin_crc_right(crc, octet, 0xA001); }
-/* CRC-CCITT, reversed 0x1021: what kilolib's messages carry. */
+/* CRC-CCITT, reversed 0x1021, the checksum of kilolib's messages. */
 static inline uint16_t _crc_ccitt_update(uint16_t crc, uint8_t octet) {
   return kilotwin_crc_right(crc, octet, 0x8408);
 }
 
-/* CRC-CCITT as XMODEM has it, 0x1021. */
+/* CRC-CCITT of XMODEM, 0x1021. */
 static inline uint16_t _crc_xmodem_update(uint16_t crc, uint8_t octet) {
   crc = (uint16_t)(crc ^ (uint16_t)octet << 8);
   for (int i = 0; i < 8; ++i) crc = (uint16_t)(crc & 0x8000 ? crc << 1 ^ 0x1021 : crc << 1);

@@ -8,7 +8,7 @@ extern "C" {
 #endif
 void _delay_ms(double ms);
 void _delay_us(double us);
-/* Three and four cycles per count; 0 counts as 256 and 65536. */
+/* Delays of three and of four cycles per count. A count of 0 means 256 and 65536. */
 void _delay_loop_1(uint8_t count);
 void _delay_loop_2(uint16_t count);
 #ifdef __cplusplus

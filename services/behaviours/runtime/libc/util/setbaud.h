@@ -1,5 +1,5 @@
-/* Settings of a serial line at BAUD: normal speed where that is within BAUD_TOL percent, else double speed. Included once
- * per rate, so without a guard. */
+/* Settings of a serial line at BAUD: normal speed if its error is within BAUD_TOL percent, else double speed. No include guard,
+ * because programs include it once per rate. */
 #ifndef BAUD
 #error "setbaud.h needs BAUD; #define BAUD 38400 before it is included"
 #endif
