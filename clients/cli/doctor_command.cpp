@@ -163,7 +163,7 @@ int examine(std::optional<std::uint32_t> domain) {
     healthy = healthy && !finding.fatal;
   }
   fmt::print("{}\n",
-             healthy ? "experiments will run here" : "experiments will not run here until the above is mended");
+             healthy ? "experiments will run here" : "experiments will not run here until the failures above are mended");
   return healthy ? kDone : kFailed;
 }
 

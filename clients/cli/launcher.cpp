@@ -166,7 +166,7 @@ class Launcher {
         !cause_.empty()
             ? cause_
             : fmt::format("{}: {}", service.name(),
-                          line.empty() ? os::in_words(end) + " and said nothing; is the disk full?" : line);
+                          line.empty() ? os::in_words(end) + " and printed nothing; is the disk full?" : line);
     say_error(fmt::format("kilotwin: {}; {}", why, so_far));
   }
 

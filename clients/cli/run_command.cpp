@@ -108,7 +108,7 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
 int run(const RunArguments& arguments, double started_s) {
   if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
   if (arguments.mode == "local" && arguments.domain)
-    throw UserError("--domain: a local run takes part in no DDS domain; leave it away, or give --mode federated");
+    throw UserError("--domain: a local run uses no DDS domain; leave the option out, or give --mode federated");
   // Claim the domain before the first file is written, so that a refused run leaves no files.
   std::optional<dds::DomainClaim> claim;
   if (arguments.mode == "federated" && !arguments.prepare) {

@@ -57,7 +57,7 @@ PartitionId parse_partition(const std::string& text, const PartitionGrid& grid) 
   const auto place = two_numbers(text, ',');
   if (!place || place->first >= grid.columns() || place->second >= grid.rows()) {
     throw UserError(
-        fmt::format("--partition: \"{}\" is none of this run's {}x{} partitions; give COLUMN,ROW counted from 0",
+        fmt::format("--partition: \"{}\" is not one of this run's {}x{} partitions; give COLUMN,ROW counted from 0",
                     text, grid.columns(), grid.rows()));
   }
   return PartitionId{place->second * grid.columns() + place->first};
@@ -141,7 +141,7 @@ int serve(const ServiceArguments& arguments) {
     begin_log(plan, plan.station(), arguments.transport);
     run_station(plan, context, directory, arguments.started_s);
   }
-  say("ends: the run is over");
+  say("ended: the run is over");
   return kDone;
 }
 

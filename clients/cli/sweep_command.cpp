@@ -112,7 +112,7 @@ int sweep(const SweepArguments& arguments) {
   catch_interrupts();
   const bool all = run_all(runs, arguments.jobs > 0 ? arguments.jobs : cores, [&](const SweepRun& run) {
     if (!run.well)
-      return complain(run, run.last_line.empty() ? "it said nothing; is the disk full?" : run.last_line);
+      return complain(run, run.last_line.empty() ? "it printed nothing; is the disk full?" : run.last_line);
     try {
       report.add(run.point, run.directory);
     } catch (const std::exception& error) {

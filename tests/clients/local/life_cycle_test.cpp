@@ -14,7 +14,7 @@ using behaviours::test::message;
 using behaviours::test::program;
 using behaviours::test::Swarm;
 
-/// Notes each tick's life cycles, motors and LEDs.
+/// Records each tick's life cycles, motors and LEDs.
 class Watcher : public RunObserver {
  public:
   void state(Tick, const SwarmView& swarm, bool) override {
@@ -29,7 +29,7 @@ class Watcher : public RunObserver {
   std::vector<ActuationFrame> ticks;
 };
 
-/// The controller repeats `what` from tick `from` on, until the next.
+/// The overhead controller repeats `what` from tick `from` until its next packet.
 Directive repeat(std::int64_t from, const IrMessage& what) {
   Directive directive;
   directive.tick = Tick{from};
@@ -94,7 +94,7 @@ TEST(LifeCycleByRadio, ASleepingSwarmWakesWhenItListens) {
   const auto ticks = watch(swarm, {repeat(40, message(0x84)), silence(60), repeat(250, message(0x85))});
   EXPECT_TRUE(all_are(ticks[100], LifeCycle::kSleeping));
   EXPECT_EQ(ticks[100].led, std::vector<std::uint8_t>(6, 0));
-  // Asleep at about tick 45, they first listen 8 s later, at about 290, and hear.
+  // The robots sleep from about tick 45, first listen 8 s later, at about tick 290, and receive the packet.
   EXPECT_TRUE(all_are(ticks[280], LifeCycle::kSleeping));
   EXPECT_TRUE(all_are(ticks[310], LifeCycle::kIdle));
 }

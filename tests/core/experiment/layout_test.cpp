@@ -16,7 +16,7 @@ class Layouts : public Scratch {
   }
 };
 
-/// The smallest distance of two centres, by all pairs.
+/// The smallest distance of two centres, found by testing all pairs.
 double closest_mm(const PlacedRobots& robots) {
   double least = INFINITY;
   for (std::size_t i = 0; i < robots.x_mm.size(); ++i) {
@@ -46,7 +46,7 @@ TEST_F(Layouts, AGridFromItsFirstRowHangsBelowTheOriginWithEachRowCentred) {
   EXPECT_EQ(row.x_mm, (std::vector<double>{-25, 25}));
 }
 
-TEST_F(Layouts, RandomHeadingsAreUniformAndOfTheSeed) {
+TEST_F(Layouts, RandomHeadingsAreUniformAndDependOnTheSeed) {
   const PlacedRobots one = placed("grid { pitch_mm: 33 }", 2500);
   double sine = 0, cosine = 0;
   for (const double heading : one.heading_rad) {
@@ -101,7 +101,7 @@ TEST_F(Layouts, RandomKeepsClearOfOtherGroups) {
   EXPECT_EQ(robots.x_mm[100], -180);  // ids go by the order of groups, not of placement
 }
 
-TEST_F(Layouts, RandomThatDoesNotFitSaysHowFarItCame) {
+TEST_F(Layouts, RandomReportsHowManyRobotsFit) {
   const std::string error = error_of([&] { placed("random { width_mm: 200 height_mm: 200 min_gap_mm: 5 }", 40); });
   int fitted = 0, read = 0;
   ASSERT_EQ(std::sscanf(error.c_str(), "e.txtpb:1:46: only %d of 40 robots fit at random with gaps of 5 mm;%n",

@@ -12,7 +12,7 @@ TEST_F(Load, NamesTheExperimentAfterItsFile) {
   EXPECT_EQ(load("name: \"other\"").experiment.name(), "other");
 }
 
-TEST_F(Load, RemembersWhereFieldsStand) {
+TEST_F(Load, RemembersThePlacesOfFields) {
   const LoadedExperiment loaded =
       load("seed: 2\nrobots {\n  count: 3\n  layout {\n\tgrid { pitch_mm: 50 }\n  }\n}\nrobots {}\n");
   const auto at = [&](const char* path) { return error_of([&] { throw loaded.locations.error(path, "x"); }); };
@@ -99,7 +99,7 @@ TEST_F(Load, SurvivesDeepAndHugeFiles) {
             "one each");
 }
 
-TEST_F(Load, ModelReplacesWhatItStates) {
+TEST_F(Load, ModelReplacesTheFieldsThatItStates) {
   LoadedExperiment loaded = load(
       "motion { bias_sd_mm_s: 3 wheel_base_mm: 20 }\n"
       "robot_model { robot: 4 bias_left_mm_s: 1 bias_right_mm_s: 2 }\n"
@@ -132,7 +132,7 @@ TEST_F(Load, ModelErrorsNameTheModelFile) {
   EXPECT_EQ(loaded.experiment.robot_model_size(), 0);
 }
 
-TEST(Shipped, ExperimentsAreRight) {
+TEST(Shipped, ExperimentsAreValid) {
   const std::filesystem::path folder = std::filesystem::path{KILOTWIN_SOURCE_DIR} / "experiments";
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator{folder}) {

@@ -1,4 +1,4 @@
-// Whatever the input: success or one line of UserError, never a crash and never another exception.
+// Random changes of input files: each gives success or a UserError of one line, never a crash or another exception.
 #include <random>
 
 #include "scratch.hpp"
@@ -88,7 +88,7 @@ std::string mutated(std::string text, Engine& engine) {
 
 class Mutations : public Scratch {
  protected:
-  /// How many of the attempts succeed. Errors are one line of sensible length.
+  /// Returns the number of attempts that succeed. Checks that errors are one line of limited length.
   template <class Attempt> static int successes(int attempts, unsigned seed, Attempt attempt) {
     int good = 0;
     Engine engine{seed};

@@ -41,7 +41,7 @@ TEST_F(Override, SetsFieldsOfEveryType) {
   EXPECT_EQ(e.station().environment(0).hub().radius_mm(), 7);
 }
 
-TEST_F(Override, MistakesNameTheArgumentAndWhatThereIs) {
+TEST_F(Override, MistakesNameTheArgumentAndTheChoices) {
   const std::pair<std::string, std::string> cases[] = {
       {"arena.widht_mm=3",
        "--set arena.widht_mm=3: unknown field widht_mm in Arena; did you mean width_mm? "

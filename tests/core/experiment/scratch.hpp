@@ -1,4 +1,4 @@
-/// A directory of a test's own, with the files that its experiments name.
+/// A temporary directory of a test, with the files that its experiments name.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ class Scratch : public ::testing::Test {
   }
   LoadedExperiment load(const std::string& text) const { return load_experiment(write("e.txtpb", text)); }
 
-  /// The error that `action` ends in, without the directory; "" if it succeeds.
+  /// The error that `action` throws, without the directory; "" if it succeeds.
   template <class Action> std::string error_of(Action action) const {
     try {
       action();

@@ -1,4 +1,4 @@
-// What validation says about effects and fields: where, what is wrong, what would be right.
+// Validation of effects and fields: errors name the place, what is wrong and what would be right.
 #include "scratch.hpp"
 
 namespace kilotwin::test {
@@ -8,7 +8,7 @@ class ValidateEffects : public Scratch {};
 
 const std::string kRobots = "robots { count: 4 behaviour: 'a.c' }\n";
 
-TEST_F(ValidateEffects, WhatIsRightPasses) {
+TEST_F(ValidateEffects, AcceptsValidEffects) {
   EXPECT_EQ(
       check_error(
           kRobots +
@@ -24,7 +24,7 @@ TEST_F(ValidateEffects, WhatIsRightPasses) {
       "");
 }
 
-TEST_F(ValidateEffects, EpisodesSayHowOftenAndHowLong) {
+TEST_F(ValidateEffects, EpisodesNeedRateAndLength) {
   const std::string head =
       kRobots + "effect { name: 'a' acts_on: WHEEL_GAIN function { constant: -1 }\n function { ";
   EXPECT_EQ(check_error(head + "episodes { mean_apart_s: 100 scale_s: 5 tail: 1.5 } } }"), "");
@@ -45,7 +45,7 @@ struct Bad {
   const char* error;
 };
 
-TEST_F(ValidateEffects, WhatIsWrongIsNamedWithItsPlace) {
+TEST_F(ValidateEffects, ErrorsNameTheirPlace) {
   const Bad cases[] = {
       {"effect { acts_on: WHEEL_GAIN function { constant: 1 } }",
        "e.txtpb:2:1: name is missing; state name: \"...\", one that no other effect has"},
@@ -123,7 +123,7 @@ TEST_F(ValidateEffects, WhatIsWrongIsNamedWithItsPlace) {
   for (const auto& [text, error] : cases) EXPECT_EQ(check_error(kRobots + text), error) << text;
 }
 
-TEST_F(ValidateEffects, AModelsListTakesThePlaceOfTheExperiments) {
+TEST_F(ValidateEffects, AModelsListReplacesThatOfTheExperiment) {
   LoadedExperiment loaded = load(kRobots +
                                  "effect { name: 'a' acts_on: TURN_RATE function { constant: 1 } }\n"
                                  "effect { name: 'b' acts_on: TURN_RATE function { constant: 1 } }");

@@ -10,7 +10,7 @@ struct Bad {
   std::string text, error;
 };
 
-/// A group that is right, to which the cases add what is wrong.
+/// A valid group, to which the cases add an error.
 const std::string kGroup = "robots { count: 4 behaviour: 'a.c' }\n";
 
 TEST_F(Validate, AcceptsTheSmallestExperiment) { EXPECT_EQ(check_error(kGroup), ""); }
@@ -68,7 +68,7 @@ TEST_F(Validate, OneLineForEveryMistake) {
        "smaller than a robot; "
        "it takes at most 30"},
       {kGroup + "deployment { hosts: 5 }", "e.txtpb:2:14: hosts is 5, more than there are robots; it takes 1..4"},
-      // What an engine cannot do.
+      // Features that an engine does not compute.
       {kGroup + "physics { tilt_deg: 3 }",
        "e.txtpb:2:11: tilt_deg is 3, but the floor of the PLANAR engine is level; add engine: ODE, or remove it"},
       {kGroup + "physics { engine: KINEMATIC\n downhill_deg: 3 }",
@@ -101,7 +101,7 @@ TEST_F(Validate, ArkTakes1022Robots) {
   EXPECT_EQ(check_error("robots { count: 1022 behaviour: 'a.c' }\nstation { environment { hub { } } }"), "");
 }
 
-TEST_F(Validate, RobotsInEachOtherOrOutside) {
+TEST_F(Validate, RobotsThatOverlapOrLieOutside) {
   const Bad cases[] = {
       {kGroup + kGroup,
        "e.txtpb:2:1: robot 4 at (-20, 20) mm overlaps robot 0 at (-20, 20) mm; keep centres at least 33 mm apart"},
@@ -117,13 +117,13 @@ TEST_F(Validate, RobotsInEachOtherOrOutside) {
   for (const auto& [text, error] : cases) EXPECT_EQ(check_error(text), error) << text;
 }
 
-TEST_F(Validate, RobotsThatTouchAreRight) {
+TEST_F(Validate, RobotsThatTouchAreValid) {
   EXPECT_EQ(check_error("robots { count: 400 behaviour: 'a.c' layout { grid { pitch_mm: 33 } } }\n"
                         "arena { width_mm: 660 height_mm: 660 }"),
             "");
 }
 
-TEST_F(Validate, PosesFilesNameTheirOwnPlaces) {
+TEST_F(Validate, ErrorsInPosesFilesNameTheirLine) {
   const Bad cases[] = {
       {"x_mm,y_mm\n1,2\n",
        "p.csv:1:1: the column heading_rad is missing, the header has x_mm, y_mm; write x_mm,y_mm,heading_rad or "

@@ -11,7 +11,7 @@
 namespace kilotwin {
 namespace {
 
-TEST(HashSums, ChainsSumsInWhateverOrderSharesCome) {
+TEST(HashSums, DoesNotDependOnTheOrderOfShares) {
   std::mt19937_64 random(1);
   constexpr std::size_t kFederates = 5, kTicks = 100;
   std::vector<std::vector<std::uint64_t>> shares(kFederates, std::vector<std::uint64_t>(kTicks));
@@ -37,7 +37,7 @@ TEST(HashSums, ChainsSumsInWhateverOrderSharesCome) {
   }
 }
 
-TEST(HashSums, RefusesASharePastItsTickAndATooManyeth) {
+TEST(HashSums, RefusesLateAndSurplusShares) {
   HashSums book(1, Tick{0}, 0);
   const std::uint64_t share[] = {1};
   EXPECT_TRUE(book.add(Tick{0}, share));
@@ -47,7 +47,7 @@ TEST(HashSums, RefusesASharePastItsTickAndATooManyeth) {
   EXPECT_FALSE(book.advance());
 }
 
-TEST(HashSums, AResumedChainGoesOn) {
+TEST(HashSums, ContinuesAResumedChain) {
   const std::uint64_t a[] = {3}, b[] = {4};
   HashSums whole(1, first_hashed(Tick{0}), 0);
   whole.add(Tick{0}, a);

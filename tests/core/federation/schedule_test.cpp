@@ -85,7 +85,7 @@ TEST(RunSchedule, AStopBeyondTheEndChangesNothing) {
   EXPECT_FALSE(schedule.stopped_early());
 }
 
-TEST(RunSchedule, GivesInputsToTheirTickAlone) {
+TEST(RunSchedule, GivesInputsOnlyToTheirTick) {
   RunSchedule schedule(Tick{0}, Tick{100}, 0);
   Directive input = directive(0, 4, DirectiveKind::kOverheadInput);
   input.packet.message[0] = 42;
@@ -100,7 +100,7 @@ TEST(RunSchedule, GivesInputsToTheirTickAlone) {
   EXPECT_TRUE(schedule.overhead_inputs().empty());
 }
 
-TEST(RunSchedule, SavesPeriodicallyAndWhenAsked) {
+TEST(RunSchedule, SavesPeriodicallyAndByDirective) {
   RunSchedule schedule(Tick{20}, Tick{100}, 10);
   schedule.add(directive(0, 33, DirectiveKind::kCheckpoint));
   std::vector<std::int64_t> saved;
@@ -121,7 +121,7 @@ TEST(Ingress, StampsAheadAndInOrder) {
   EXPECT_EQ(b.sequence_number, 1u);
 }
 
-TEST(Ingress, StampsForTheInstantAtWhichTheRunStands) {
+TEST(Ingress, StampsForTheTickAtWhichTheRunPauses) {
   Ingress ingress;
   const Directive pause = ingress.stamp(Tick{10}, directive(0, 0, DirectiveKind::kPause));
   const Directive step = ingress.stamp(Tick{12}, directive(0, 0, DirectiveKind::kStep, 2));
@@ -242,7 +242,7 @@ class Federation {
   std::vector<Member> federates_;
 };
 
-TEST(Ingress, GoesOnAfterWhatWasStampedBefore) {
+TEST(Ingress, ContinuesAfterEarlierDirectives) {
   const std::vector<Directive> stamped{directive(0, 7, DirectiveKind::kOverheadInput),
                                        directive(1, 90, DirectiveKind::kOverheadInput)};
   Ingress ingress(stamped);
@@ -264,7 +264,7 @@ TEST(RunSchedule, AllFederatesActAlikeWhateverTheDelays) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     Federation federation(seed, 400);
     federation.run();
-    // When each pauses is its own business; which inputs belong to which tick is not.
+    // Federates may pause at different times, but must give each input to the same tick.
     const std::vector<std::string> histories = federation.histories();
     for (const std::string& other : histories) ASSERT_EQ(other, histories[0]) << "seed " << seed;
     inputs_seen += histories[0].size();

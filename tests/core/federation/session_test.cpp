@@ -1,4 +1,4 @@
-// Real sessions over DDS, in threads of this process, with federates that do next to nothing.
+// Real sessions over DDS, in threads of this process, with minimal federates.
 #include "core/federation/session.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 
 constexpr std::int64_t kLast = 60;
 
-/// What tests do to a federate: all called on its own thread.
+/// Hooks by which tests act on a federate, called on the federate's thread.
 struct Hooks {
   std::function<void(Session&)> on_publish, on_idle;
   std::function<double(Tick)> ahead_s;
@@ -131,7 +131,7 @@ class Tiny : public Federate {
   std::unique_ptr<Output<OverheadFrame>> overhead_;
 };
 
-/// Thrown by a hook: a federate that vanishes without a word.
+/// Thrown by a hook: the federate vanishes without a FAILED sample.
 struct Vanishes {};
 
 class Sessions : public ::testing::Test {
@@ -181,7 +181,7 @@ class Sessions : public ::testing::Test {
       EXPECT_EQ(outcome.last, Tick{tick});
     }
   }
-  /// Every federate but `culprit` says why the run ended, and names it.
+  /// Checks that every other federate reports a failure that names `culprit`.
   void expect_all_name(FederateId culprit, const std::string& text) {
     for (std::uint32_t i = 0; i < outcomes_.size(); ++i) {
       if (i == culprit.value()) continue;
@@ -262,7 +262,7 @@ TEST_F(Sessions, PauseStepSaveAndStopAlike) {
       director->announce(DirectiveKind::kStep, 3);
     } else if (turn == 3 && session.paused() && session.now() == Tick{15}) {
       ++turn;
-      // All at once, while the run stands: saved here, and gone on to the next decision only.
+      // All at once, while the run is paused: it saves at this tick and continues only to the next pause.
       director->announce(DirectiveKind::kCheckpoint);
       director->announce(DirectiveKind::kContinue);
       director->announce(DirectiveKind::kPause);
@@ -314,7 +314,7 @@ TEST_F(Sessions, DoNotCountPauses) {
   EXPECT_LT(while_paused_s, from_pause_s) << "also not while it lasts";
 }
 
-TEST_F(Sessions, NameTheOneThatFails) {
+TEST_F(Sessions, NameTheFederateThatFails) {
   of(host_).on_publish = [](Session& session) {
     if (session.now() == Tick{5}) throw RunError("the disk is full");
   };
@@ -325,7 +325,7 @@ TEST_F(Sessions, NameTheOneThatFails) {
       << outcomes_[1].failure;
 }
 
-TEST_F(Sessions, NameTheOneThatVanishes) {
+TEST_F(Sessions, NameTheFederateThatVanishes) {
   of(host_).on_publish = [](Session& session) {
     if (session.now() == Tick{5}) throw Vanishes{};
   };
@@ -333,8 +333,8 @@ TEST_F(Sessions, NameTheOneThatVanishes) {
   expect_all_name(host_, "behaviours 1/1 was lost");
 }
 
-TEST_F(Sessions, DoNotWaitForOneThatLeftTooEarly) {
-  // It says that it is done, but part of what it owes is missing.
+TEST_F(Sessions, DoNotWaitForAFederateThatLeftTooEarly) {
+  // It writes FINISHED before it has sent all frames.
   const dds::Participant participant({claim_.domain(), {}});
   of(host_).on_publish = [&](Session& session) {
     if (session.now() != Tick{5}) return;
@@ -349,7 +349,7 @@ TEST_F(Sessions, DoNotWaitForOneThatLeftTooEarly) {
       << outcomes_[1].failure;
 }
 
-TEST_F(Sessions, SayForWhomTheyWait) {
+TEST_F(Sessions, PrintForWhomTheyWait) {
   std::atomic<bool> said{false};
   of(plan_.station()).on_idle = [&](Session& session) {
     if (session.waiting_for().find("behaviours 1/1 to arrive") != std::string::npos) said = true;
@@ -410,7 +410,7 @@ TEST_F(Sessions, RefuseAnotherBuild) {
       << failure;
 }
 
-TEST_F(Sessions, StartedTwiceLeaveTheFirstAlone) {
+TEST_F(Sessions, StartedTwiceDoNotDisturbTheFirst) {
   const dds::Participant participant({claim_.domain(), {}});
   dds::Writer<WireMember> first(participant, topics::members());
   first.write(member(host_, kilotwin_wire_STEPPING));
@@ -421,8 +421,8 @@ TEST_F(Sessions, StartedTwiceLeaveTheFirstAlone) {
       << outcomes_[host_.value()].failure;
 }
 
-TEST_F(Sessions, AreNotKeptFromTheirWorkByASecondStart) {
-  // The newcomer says that it arrives, and leaves when it finds its place taken.
+TEST_F(Sessions, ContinueAfterASecondStart) {
+  // The second process writes ARRIVING, and leaves when it hears the first one.
   const dds::Participant participant({claim_.domain(), {}});
   of(plan_.station()).on_publish = [&](Session& session) {
     if (session.now() != Tick{20}) return;
@@ -434,7 +434,7 @@ TEST_F(Sessions, AreNotKeptFromTheirWorkByASecondStart) {
   expect_all_end_at(kLast);
 }
 
-TEST(LikelyCause, TellsWhereOthersAreLookedFor) {
+TEST(LikelyCause, NamesTheAddressesThatAreSearched) {
   const std::string local = likely_cause({7, {}}, 1, 4);
   EXPECT_NE(local.find("1 of 4 services were heard on DDS domain 7"), std::string::npos) << local;
   EXPECT_NE(local.find("without --peer only services of this machine meet"), std::string::npos) << local;
@@ -444,7 +444,7 @@ TEST(LikelyCause, TellsWhereOthersAreLookedFor) {
   EXPECT_NE(likely_cause({7, {}}, 4, 4).find("frames do not come through"), std::string::npos);
 }
 
-// Frames that no engine may see.
+// Frames that are refused before an engine uses them.
 TEST_F(Sessions, RefuseARobotOutOfRange) {
   of(physics_).spoil_bodies = [](BodyFrame& frame) { frame.robot[2] = 1'000'000; };
   run_all();
@@ -465,7 +465,7 @@ TEST_F(Sessions, RefuseAnotherShareOfRobots) {
   run_all();
   expect_malformed("it is not of the host's share");
 }
-TEST_F(Sessions, RefuseAnOfferOfAStranger) {
+TEST_F(Sessions, RefuseAnOfferOfAnotherHostsRobot) {
   of(host_).spoil_actuation = [](ActuationFrame& frame) { frame.offer_robot[1] = 3; };
   run_all();
   expect_malformed("it offers");
@@ -488,7 +488,7 @@ TEST_F(Sessions, RefuseAnUnknownCommand) {
   expect_malformed("a packet's command");
 }
 
-/// Someone who knows the run's id, and writes what he likes.
+/// A program that knows the run's id and writes arbitrary samples.
 class Strangers : public Sessions {
  protected:
   template <class Wire> void interfere(const dds::Channel& channel, const Wire& sample) {
@@ -521,7 +521,7 @@ TEST_F(Strangers, OfAnotherRunAreNotHeard) {
   expect_all_end_at(kLast);
 }
 
-TEST_F(Strangers, CannotDirectARobotThatIsNone) {
+TEST_F(Strangers, CannotMoveARobotThatDoesNotExist) {
   WireDirective directive{};
   directive.run = plan_.run();
   directive.kind = kilotwin_wire_TRACKED_POSE;
@@ -539,7 +539,7 @@ TEST_F(Strangers, CannotSendHalfAPacket) {
   EXPECT_NE(outcomes_[0].failure.find("malformed: its packet"), std::string::npos) << outcomes_[0].failure;
 }
 
-TEST_F(Strangers, OfASecondRunDoNotEndTheRunAtWork) {
+TEST_F(Strangers, OfASecondRunDoNotEndTheActiveRun) {
   for (const auto phase : {kilotwin_wire_ARRIVING, kilotwin_wire_STEPPING, kilotwin_wire_FAILED}) {
     WireMember other = member(host_, phase);
     other.run = plan_.run() + 1;
@@ -548,7 +548,7 @@ TEST_F(Strangers, OfASecondRunDoNotEndTheRunAtWork) {
   }
 }
 
-TEST_F(Strangers, OfARunAtWorkAreNamedByOneThatCameLater) {
+TEST_F(Strangers, OfAnActiveRunAreNamedByALaterRun) {
   WireMember other = member(host_, kilotwin_wire_STEPPING);
   other.run = plan_.run() + 1;
   dds::Writer<WireMember> writer(participant_, topics::members());

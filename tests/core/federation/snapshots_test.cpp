@@ -22,7 +22,7 @@ TEST(Snapshots, AreDueOnceAMinute) {
   EXPECT_EQ(taken, 9);
 }
 
-TEST(Snapshots, AreKeptByTwosAndLeaveOthersAlone) {
+TEST(Snapshots, KeepTheLastTwoAndNoOtherCheckpointIsRemoved) {
   std::string run = (fs::temp_directory_path() / "snapshots-XXXXXX").string();
   ASSERT_NE(mkdtemp(run.data()), nullptr);
   const auto there = [&](std::int64_t tick) { return fs::exists(checkpoint_directory(run, Tick{tick})); };

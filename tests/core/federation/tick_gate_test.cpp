@@ -26,7 +26,7 @@ TEST(TickGate, LetsPublishersRunAhead) {
   EXPECT_EQ(gate.missing(Tick{6}), Ids{FederateId{1}});
 }
 
-TEST(TickGate, RefusesStrangersAndGapsAndPassesOverRepeats) {
+TEST(TickGate, RefusesUnknownPublishersAndGapsAndIgnoresRepeats) {
   TickGate gate({FederateId{1}}, Tick{0});
   EXPECT_EQ(gate.arrival(FederateId{2}, Tick{0}), TickGate::Arrival::kUnexpected);
   EXPECT_EQ(gate.arrival(FederateId{1}, Tick{1}), TickGate::Arrival::kUnexpected);
@@ -35,7 +35,7 @@ TEST(TickGate, RefusesStrangersAndGapsAndPassesOverRepeats) {
   EXPECT_FALSE(gate.hello(FederateId{9}));
 }
 
-TEST(TickGate, RefusesWhoWouldLapTheReader) {
+TEST(TickGate, RefusesAFrameThatWouldOverwriteAnUnreadOne) {
   TickGate gate({FederateId{1}}, Tick{3});
   for (int t = 3; t < 3 + kFrameRing; ++t) EXPECT_TRUE(gate.accept(FederateId{1}, Tick{t}));
   EXPECT_EQ(gate.arrival(FederateId{1}, Tick{3 + kFrameRing}), TickGate::Arrival::kUnexpected);

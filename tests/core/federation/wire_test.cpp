@@ -24,7 +24,7 @@ TEST(Wire, CarriesBodies) {
   EXPECT_EQ(in.y_mm, out.y_mm);
   EXPECT_EQ(in.heading_rad, out.heading_rad);
   EXPECT_EQ(in.spatial, out.spatial);
-  // What comes with robots comes whole.
+  // Check that the columns of the robots arrive complete.
   out.spatial.assign(BodyFrame::kSpatialColumns * out.robot.size(), 0.5);
   ASSERT_TRUE(from_wire(to_wire(kHeader, out), in));
   EXPECT_EQ(in.spatial, out.spatial);

@@ -1,4 +1,4 @@
-// What each robot has of its own: stated, default or drawn.
+// Per-robot parameters: stated, default or drawn at random.
 #include "core/model/robot_parameters.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ TEST(RobotParameters, AreTheDefaultsUnlessStated) {
   EXPECT_EQ(parameters.calibration(2), (Calibration{77, 77, 66, 66}));
 }
 
-TEST(RobotParameters, BiasesAreAPropertyOfSeedAndRobotAlone) {
+TEST(RobotParameters, BiasesDependOnSeedAndRobotOnly) {
   const RunPlan plan = make_plan("seed: 5", kThree), silent = make_plan("seed: 5 motion { noise: false }", kThree),
                 other = make_plan("seed: 6", kThree),
                 longer = make_plan("seed: 5 duration_s: 3 robot_model { robot: 2 bias_left_mm_s: 4 }", kThree);

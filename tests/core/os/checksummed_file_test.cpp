@@ -15,7 +15,7 @@ namespace {
 
 constexpr FileKind kKind{"KTWNTEST", 7, "a test's file", "write it again"};
 
-/// In memory where that is possible: these tests write thousands of files.
+/// A directory in memory if possible, because these tests write thousands of files.
 std::filesystem::path memory() {
   return ::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm")
                                          : std::filesystem::temp_directory_path();
@@ -37,7 +37,7 @@ class ChecksummedFile : public testing::Test {
     return {std::istreambuf_iterator<char>(in), {}};
   }
   void put(const std::string& bytes) const { std::ofstream(file(), std::ios::binary | std::ios::trunc) << bytes; }
-  /// What reading the file complains about; empty where it does not.
+  /// The error of reading the file; empty if there is none.
   [[nodiscard]] std::string complaint(const FileKind& kind = kKind) const {
     try {
       static_cast<void>(read_checksummed(file(), kind));
@@ -65,7 +65,7 @@ TEST_F(ChecksummedFile, ReturnsWhatWasWritten) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), std::filesystem::directory_iterator()), 1);
 }
 
-TEST_F(ChecksummedFile, NoticesEveryFlippedBit) {
+TEST_F(ChecksummedFile, DetectsEveryFlippedBit) {
   write_checksummed(file(), kKind, random_bytes(600, 1));
   const std::string right = bytes();
   for (std::size_t bit = 0; bit < 8 * right.size(); ++bit) {
@@ -79,7 +79,7 @@ TEST_F(ChecksummedFile, NoticesEveryFlippedBit) {
   }
 }
 
-TEST_F(ChecksummedFile, NoticesRandomChangesAndNamesTheBlock) {
+TEST_F(ChecksummedFile, DetectsRandomChangesAndNamesTheBlock) {
   write_checksummed(file(), kKind, random_bytes(50'000, 2));
   const std::string right = bytes();
   std::mt19937_64 random(3);
@@ -98,7 +98,7 @@ TEST_F(ChecksummedFile, NoticesRandomChangesAndNamesTheBlock) {
   }
 }
 
-TEST_F(ChecksummedFile, NoticesEachCutAndWhatIsAppended) {
+TEST_F(ChecksummedFile, DetectsTruncationAndAppendedOctets) {
   write_checksummed(file(), kKind, random_bytes(300, 4));
   const std::string right = bytes();
   for (std::size_t length = 0; length < right.size(); ++length) {
@@ -109,7 +109,7 @@ TEST_F(ChecksummedFile, NoticesEachCutAndWhatIsAppended) {
   EXPECT_NE(complaint().find("goes on after its end"), std::string::npos) << complaint();
 }
 
-TEST_F(ChecksummedFile, NoticesBlocksThatChangedPlaces) {
+TEST_F(ChecksummedFile, DetectsExchangedBlocks) {
   write_checksummed(file(), kKind, random_bytes(2 * 8192, 5));
   const std::string right = bytes();
   put(right.substr(0, 28) + right.substr(28 + 8196) + right.substr(28, 8196));
@@ -130,7 +130,7 @@ TEST_F(ChecksummedFile, RefusesOtherKindsAndFormats) {
   EXPECT_NE(complaint().find("cannot be read: No such file"), std::string::npos) << complaint();
 }
 
-TEST_F(ChecksummedFile, ThatCannotBeWrittenIsAnError) {
+TEST_F(ChecksummedFile, ReportsAFileThatCannotBeWritten) {
   EXPECT_THROW(write_checksummed(folder_ / "none/file", kKind, "content"), RunError);
 }
 

@@ -1,4 +1,4 @@
-// Processes that this one starts: none outlives it, and each end is known in words.
+// Child processes: none outlives this process, and a text describes each end.
 #include "core/os/children.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ class ChildrenTest : public testing::Test {
   }
   void TearDown() override { fs::remove_all(scratch); }
   static std::vector<std::string> shell(const std::string& script) { return {"sh", "-c", script}; }
-  /// Polls until `condition` holds; 30 s is a bound against hanging.
+  /// Polls until `condition` holds, for at most 30 s.
   template <class Condition> static bool eventually(Condition condition) {
     for (int turn = 0; turn < 15000; ++turn) {
       if (condition()) return true;
@@ -40,7 +40,7 @@ class ChildrenTest : public testing::Test {
     EXPECT_TRUE(eventually([&] { return child.process().poll().has_value(); }));
     return child.process().poll().value_or(ProcessEnd{-1, 0});
   }
-  /// A process that nobody has waited for stays in the table as a zombie: it runs no more.
+  /// Whether the process runs. A zombie, which nobody has waited for, does not.
   static bool runs(pid_t process) {
     const std::string status = text_of("/proc/" + std::to_string(process) + "/stat");
     return !status.empty() && status.find(") Z ") == std::string::npos;
@@ -54,7 +54,7 @@ class ChildrenTest : public testing::Test {
   ChildOptions options;
 };
 
-TEST_F(ChildrenTest, TheEndOfAProcessIsKnownInWords) {
+TEST_F(ChildrenTest, DescribesTheEndOfAProcess) {
   Child well("well", shell("exit 0"), options), third("third", shell("exit 3"), options),
       killed("killed", shell("kill -KILL $$"), options), crashed("crashed", shell("kill -SEGV $$"), options);
   EXPECT_TRUE(end_of(well).well());
@@ -64,7 +64,7 @@ TEST_F(ChildrenTest, TheEndOfAProcessIsKnownInWords) {
   EXPECT_TRUE(os::crashed(end_of(crashed)));
 }
 
-TEST_F(ChildrenTest, TheLastLineOfTheLogIsReadAlsoFromARemovedFile) {
+TEST_F(ChildrenTest, ReadsTheLastLineOfARemovedLog) {
   Child child("child", shell("echo first >&2; echo last >&2; echo output"), options);
   end_of(child);
   fs::remove(options.log);
@@ -75,11 +75,11 @@ TEST_F(ChildrenTest, TheLastLineOfTheLogIsReadAlsoFromARemovedFile) {
   EXPECT_EQ(both.last_line(), "output");
 }
 
-TEST_F(ChildrenTest, AProcessWhoseTimeIsOverIsAskedAndThenKilled) {
+TEST_F(ChildrenTest, TerminatesThenKillsAProcessAfterItsDeadline) {
   Children children;
   children.start("obedient", shell("echo ready >&2; exec sleep 600"), options);
   options.log = scratch / "other";
-  options.own_group = true;  // its sleep is a process of its own, which the group's signal ends too
+  options.own_group = true;  // its sleep is a separate process, which the group's signal ends too
   children.start("deaf", shell("trap '' TERM; echo ready >&2; while :; do sleep 600; done"), options);
   ASSERT_TRUE(
       eventually([&] { return text_of(scratch / "log") == "ready\n" && text_of(scratch / "other") == "ready\n"; }));
@@ -94,7 +94,7 @@ TEST_F(ChildrenTest, AProcessWhoseTimeIsOverIsAskedAndThenKilled) {
                                             "deaf was killed by signal 9 (Killed)"}));
 }
 
-TEST_F(ChildrenTest, ASignalReachesAllThatAGroupHasStarted) {
+TEST_F(ChildrenTest, ASignalReachesTheWholeGroup) {
   options.own_group = true;
   pid_t grandchild = -1;
   {
@@ -122,7 +122,7 @@ TEST_F(ChildrenTest, NoneOutlivesItsParent) {
   EXPECT_TRUE(eventually([&] { return !runs(grandchild); }));
 }
 
-TEST_F(ChildrenTest, AProgramThatIsNotThereIsNamed) {
+TEST_F(ChildrenTest, NamesAProgramThatDoesNotExist) {
   options.program = scratch / "none";
   try {
     Child child("radio", {"none"}, options);

@@ -1,4 +1,4 @@
-// Whole files: there or refused with the reason, old or new and nothing in between.
+// Whole files: errors give the reason, and replacing a file is atomic.
 #include "core/os/files.hpp"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ template <class Error, class Action> std::string error_of(Action action) {
   return "";
 }
 
-TEST_F(Files, GiveBackWhatWasWritten) {
+TEST_F(Files, ReturnWhatWasWritten) {
   const std::string content("a\0b\n\xff", 5);
   write_file(folder_ / "a", content);
   EXPECT_EQ(read_file(folder_ / "a"), content);
@@ -44,7 +44,7 @@ TEST_F(Files, GiveBackWhatWasWritten) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1) << "no draft is left";
 }
 
-TEST_F(Files, SayWhyTheyCannotBeRead) {
+TEST_F(Files, ReportWhyTheyCannotBeRead) {
   const std::string name = (folder_ / "none").string();
   EXPECT_EQ(error_of<UserError>([&] { (void)read_file(name); }),
             name + ": cannot be read: No such file or directory");
@@ -54,7 +54,7 @@ TEST_F(Files, SayWhyTheyCannotBeRead) {
   EXPECT_EQ(read_if_there(folder_), std::nullopt);
 }
 
-TEST_F(Files, SayWhyTheyCannotBeWritten) {
+TEST_F(Files, ReportWhyTheyCannotBeWritten) {
   EXPECT_NE(error_of<RunError>([&] { write_file(folder_ / "no" / "file", "x"); }).find("No such file or directory"),
             std::string::npos);
   EXPECT_EQ(error_of<RunError>([] { write_file("/dev/full", "x"); }),

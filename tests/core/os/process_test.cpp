@@ -1,4 +1,4 @@
-// Other programs: what they say, how they end, and that none outlives its owner.
+// Child processes: their output, how they end, and that none outlives its owner.
 #include "core/os/process.hpp"
 
 #include <fcntl.h>
@@ -22,7 +22,7 @@ Command shell(const std::string& script) {
 
 bool alive(pid_t process) { return kill(process, 0) == 0; }
 
-/// Reads to the end of a pipe: no sooner than when all that hold its other end have ended.
+/// Reads a pipe to its end, which comes only after all processes that hold its other end have ended.
 std::string rest_of(int descriptor) {
   std::string text;
   char block[256];
@@ -31,7 +31,7 @@ std::string rest_of(int descriptor) {
   return text;
 }
 
-TEST(Process, GivesWhatAProgramSaysAndItsStatus) {
+TEST(Process, ReturnsOutputAndStatus) {
   const ProcessResult result = run_process({"/bin/sh", "-c", "echo out; echo err >&2; cat; exit 3"});
   EXPECT_EQ(result.output, "out\n");
   EXPECT_EQ(result.errors, "err\n");
@@ -39,7 +39,7 @@ TEST(Process, GivesWhatAProgramSaysAndItsStatus) {
   EXPECT_EQ(result.end.signal, 0);
 }
 
-TEST(Process, TellsASignalFromAnExitStatus) {
+TEST(Process, DistinguishesASignalFromAnExitStatus) {
   const ProcessResult result = run_process({"/bin/sh", "-c", "kill -9 $$"});
   EXPECT_EQ(result.end.signal, SIGKILL);
   EXPECT_FALSE(result.end.well());
@@ -47,7 +47,7 @@ TEST(Process, TellsASignalFromAnExitStatus) {
   EXPECT_EQ(run_process({"/bin/sh", "-c", "exit 137"}).end.signal, 0);
 }
 
-TEST(Process, SaysWhyAProgramCannotBeStarted) {
+TEST(Process, ReportsWhyAProgramCannotBeStarted) {
   try {
     (void)run_process({"/nowhere/at-all"});
     FAIL() << "it was started";

@@ -1,4 +1,4 @@
-// The one pool of threads: every task once, exceptions on the caller, no dead-lock at its end.
+// The worker pool: every task runs once, the caller gets exceptions, the destructor does not dead-lock.
 #include "core/os/worker_pool.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ TEST(WorkerPool, RunsEachTaskOnceOnAnyNumberOfThreads) {
   }
 }
 
-TEST(WorkerPool, ThreadsOfOneCallSeeWhatTheCallBeforeHasWritten) {
+TEST(WorkerPool, ThreadsSeeWritesOfThePreviousCall) {
   WorkerPool pool(4);
   std::vector<std::uint64_t> values(64);
   std::iota(values.begin(), values.end(), 0u);
@@ -43,8 +43,8 @@ TEST(WorkerPool, ThreadsOfOneCallSeeWhatTheCallBeforeHasWritten) {
   EXPECT_EQ(values, alone);
 }
 
-TEST(WorkerPool, EndsWhileItsThreadsStillLookForTasks) {
-  // The thread that finishes the last task is still in its loop when the destructor wakes all: it must take that for the end.
+TEST(WorkerPool, DestructorEndsThreadsThatSearchForTasks) {
+  // The thread that finishes the last task may still be in its loop when the destructor wakes all threads. It must end.
   for (int round = 0; round < 20000; ++round) {
     int calls[8] = {};
     {
@@ -55,7 +55,7 @@ TEST(WorkerPool, EndsWhileItsThreadsStillLookForTasks) {
   }
 }
 
-TEST(WorkerPool, ThrowsTheExceptionThatOneThreadWouldMeetAndGoesOn) {
+TEST(WorkerPool, ThrowsTheExceptionOfTheLowestTaskAndStaysUsable) {
   for (const std::uint32_t threads : {1u, 2u, 5u}) {
     WorkerPool pool(threads);
     for (int round = 0; round < 300; ++round) {
@@ -76,7 +76,7 @@ TEST(WorkerPool, ThrowsTheExceptionThatOneThreadWouldMeetAndGoesOn) {
   }
 }
 
-TEST(WorkerPool, LeavesOutTasksAfterAFailure) {
+TEST(WorkerPool, SkipsTasksAfterAFailure) {
   WorkerPool pool(2);
   std::atomic<int> calls{0};
   const auto task = [&](std::size_t) {
@@ -87,7 +87,7 @@ TEST(WorkerPool, LeavesOutTasksAfterAFailure) {
   EXPECT_LE(calls, 2) << "no more than one for each thread";
 }
 
-TEST(InParallel, PassesExceptionsOnAndMayBeNested) {
+TEST(InParallel, RethrowsExceptionsAndMayBeNested) {
   EXPECT_THROW(in_parallel(8, 4, [](std::size_t) { throw std::runtime_error("no"); }), std::runtime_error);
   std::vector<std::vector<int>> calls(5, std::vector<int>(7, 0));
   in_parallel(5, 3, [&](std::size_t i) { in_parallel(7, 2, [&](std::size_t k) { ++calls[i][k]; }); });

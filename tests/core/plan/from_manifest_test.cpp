@@ -22,7 +22,7 @@ PlanSettings settings(const std::string& experiment) {
   return settings_of(manifest);
 }
 
-TEST(FromManifest, EveryCovariateOfTheSchemaHasItsPlainOne) {
+TEST(FromManifest, EveryCovariateOfTheSchemaHasAnEnumerator) {
   const std::vector<std::pair<F::Covariate, Covariate>> pairs{
       {F::NOTHING, Covariate::kNothing},
       {F::TIME, Covariate::kTime},
@@ -64,7 +64,7 @@ TEST(FromManifest, EveryCovariateOfTheSchemaHasItsPlainOne) {
   }
 }
 
-TEST(FromManifest, EveryTargetAndCommandOfTheSchemaHasItsPlainOne) {
+TEST(FromManifest, EveryTargetAndCommandOfTheSchemaHasAnEnumerator) {
   const std::vector<std::pair<E::Target, Target>> targets{{E::WHEEL_GAIN, Target::kWheelGain},
                                                           {E::WHEEL_OFFSET, Target::kWheelOffset},
                                                           {E::TURN_RATE, Target::kTurnRate},
@@ -93,7 +93,7 @@ TEST(FromManifest, EveryTargetAndCommandOfTheSchemaHasItsPlainOne) {
   }
 }
 
-TEST(FromManifest, WhatIsNotStatedHasTheDefaultOfTheSchema) {
+TEST(FromManifest, AbsentFieldsHaveTheDefaultOfTheSchema) {
   const PlanSettings plain = settings("");
   const proto::Experiment schema;
   EXPECT_EQ(plain.motion.straight_speed_mm_s, schema.motion().straight_speed_mm_s());
@@ -108,7 +108,7 @@ TEST(FromManifest, WhatIsNotStatedHasTheDefaultOfTheSchema) {
   EXPECT_TRUE(plain.robots.empty() && plain.effects.empty() && plain.fields.empty());
 }
 
-TEST(FromManifest, ValuesOfSingleRobotsAreThereWhereTheyAreStated) {
+TEST(FromManifest, SettingsOfSingleRobotsHoldOnlyStatedValues) {
   const PlanSettings some = settings(
       "robot_model { robot: 3 bias_left_mm_s: 0 turn_right: 80 light_gain: 1.5 }"
       "radio { propagation { robot { robot: 2 power_db: -1 ir_high: 9 } power_pattern_db: [1, 2, 3] "

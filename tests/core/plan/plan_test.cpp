@@ -38,7 +38,7 @@ class Grids : public testing::TestWithParam<GridCase> {
  protected:
   PartitionGrid grid_{GetParam().width_mm, GetParam().height_mm, GetParam().columns, GetParam().rows};
 
-  /// The owner contains the point and nobody else does.
+  /// Checks that only the owner's rectangle contains the point.
   void expect_one_owner(double x_mm, double y_mm) const {
     const PartitionId owner = grid_.owner(x_mm, y_mm);
     for (std::uint32_t p = 0; p < grid_.size(); ++p) {
@@ -177,7 +177,7 @@ proto::Manifest some_manifest() {
   return manifest;
 }
 
-TEST(RunPlan, TellsWhatTheManifestTells) {
+TEST(RunPlan, ReturnsTheValuesOfTheManifest) {
   const RunPlan plan(some_manifest());
   EXPECT_EQ(plan.run(), 77u);
   EXPECT_EQ(plan.seed(), 9u);
@@ -209,7 +209,7 @@ TEST(RunPlan, NamesOfFederates) {
   EXPECT_EQ(names.size(), 12u);
 }
 
-TEST(RunPlan, SharesCutTheRobotsWithoutGapAndHostOfAgrees) {
+TEST(RunPlan, SharesCoverTheRobotsWithoutGapAndHostOfAgrees) {
   for (const std::uint32_t robots : {1u, 2u, 3u, 17u, 64u, 65u, 1000u, 9973u}) {
     for (const std::uint32_t hosts : {1u, 2u, 3u, 7u, 63u, 64u}) {
       proto::Manifest manifest = some_manifest();
@@ -241,7 +241,7 @@ TEST(RunPlan, SharesCutTheRobotsWithoutGapAndHostOfAgrees) {
   }
 }
 
-TEST(RunPlan, HashIsOfAllButTheMode) {
+TEST(RunPlan, HashCoversAllFieldsExceptTheMode) {
   const std::uint64_t base = RunPlan(some_manifest()).hash;
   EXPECT_EQ(RunPlan(some_manifest()).hash, base);
 
@@ -252,7 +252,7 @@ TEST(RunPlan, HashIsOfAllButTheMode) {
   EXPECT_EQ(RunPlan(manifest).hash, base);
   EXPECT_EQ(RunPlan(manifest).manifest().mode(), "federated");
 
-  // Written to a file and read again, as the services do.
+  // Write it to a file and read it again, like the services.
   proto::Manifest read;
   ASSERT_TRUE(read.ParseFromString(some_manifest().SerializeAsString()));
   EXPECT_EQ(RunPlan(read).hash, base);
@@ -273,7 +273,7 @@ TEST(RunPlan, HashIsOfAllButTheMode) {
   EXPECT_EQ(hashes.size(), 8u);
 }
 
-TEST(RunPlan, RefusesWhatItCannotRead) {
+TEST(RunPlan, RefusesInvalidManifests) {
   const auto refused = [](auto change) {
     proto::Manifest manifest = some_manifest();
     change(manifest);

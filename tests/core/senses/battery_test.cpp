@@ -17,7 +17,7 @@ RunPlan plan_of(const std::string& battery, std::uint32_t robots = 1) {
   return make_plan("battery { " + battery + " }", testing::grid_crowd(robots, 40, testing::Facing::kRight));
 }
 
-TEST(Battery, DrainsByTheCurrentsThatAreStated) {
+TEST(Battery, DrainsByTheStatedCurrents) {
   const RunPlan plan = plan_of("idle_mA: 5 sleep_mA: 0.5 motor_mA: 20 led_mA: 3 transmission_mA: 40");
   const Battery battery(plan);
   const double hours = 0.032768 / 3600;
@@ -31,8 +31,8 @@ TEST(Battery, DrainsByTheCurrentsThatAreStated) {
   EXPECT_NEAR(mAh({255, 255, 63, true, true}), 0.5 * hours, 1e-15) << "asleep, all else is off";
 }
 
-TEST(Battery, LastsAsLongAsItsMakersSay) {
-  // 3 hours with everything on, a day idle, months asleep.
+TEST(Battery, LastsAsLongAsSpecified) {
+  // The specification: 3 hours with all loads on, a day idle, months asleep.
   const RunPlan plan = plan_of("");
   const Battery battery(plan);
   const auto hours = [&](const Battery::Use& use) {
@@ -80,7 +80,7 @@ TEST(Battery, IsSuppliedOnAChargerAndNowhereElse) {
   EXPECT_NEAR(mA(120, 0), 90, 1e-9) << "the stronger of two";
 }
 
-TEST(Battery, StartsWithTheChargeThatIsStated) {
+TEST(Battery, StartsWithTheStatedCharge) {
   const RunPlan half = plan_of("charge: 0.5");
   const Battery battery(half);
   EXPECT_NEAR(static_cast<double>(battery.initial(0)), 0.5 * 160 * kUnitsPer_mAh, 1);

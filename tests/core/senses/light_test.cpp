@@ -1,4 +1,4 @@
-// Lamps, pictures and the sensor's place against closed forms.
+// Lamps, pictures and the sensor's position against closed forms.
 #include <gtest/gtest.h>
 
 #include <google/protobuf/text_format.h>
@@ -38,7 +38,7 @@ SwarmView swarm_of(const RunPlan& plan, Tick tick = {}) {
   return swarm;
 }
 
-/// What robots read at `tick` in poses of the scene.
+/// The robots' readings at `tick` in the poses of the scene.
 std::vector<double> readings(const std::string& light, const std::vector<ScenePose>& poses, Tick tick = {}) {
   const RunPlan plan = make_plan("light { " + light + " }", poses);
   LightField field(plan, {0, plan.robots()});
@@ -67,7 +67,7 @@ TEST(Light, ReadsItsIntensityAtOneMetre) {
       1e-9);
 }
 
-TEST(Light, ComesAtACosineWhereTheSensorLooksUp) {
+TEST(Light, FallsWithTheCosineIfTheSensorLooksUp) {
   const char* const source = "source { height_mm: 330 intensity: 50 } sensor { radius_mm: 0 gain_sd: 0 cosine: ";
   const double plain = readings(std::string(source) + "false }", {{400, 0, 0}})[0];
   const double cosine = readings(std::string(source) + "true }", {{400, 0, 0}})[0];
@@ -77,8 +77,8 @@ TEST(Light, ComesAtACosineWhereTheSensorLooksUp) {
       << "from below";
 }
 
-TEST(Light, IsSeenAtTheSensorsPlaceOnTheRim) {
-  // The reading of a turning robot tells where the sensor is: 14.5 mm from the centre, at 100 degrees from the heading.
+TEST(Light, IsMeasuredAtTheSensorOnTheRim) {
+  // Readings of a turning robot locate the sensor: 14.5 mm from the centre, at 100 degrees from the heading.
   for (int degrees = -180; degrees < 180; degrees += 15) {
     const double heading = degrees * kPi / 180, angle = heading + 100 * kPi / 180;
     const double x = 60 + 14.5 * std::cos(angle), y = -40 + 14.5 * std::sin(angle);
@@ -154,7 +154,7 @@ TEST(Light, IsSwitchedAtItsTimes) {
   EXPECT_TRUE(on(3));
 }
 
-TEST(Light, GainsDifferBetweenRobotsAsMeasured) {
+TEST(Light, GainsVaryBetweenRobotsAsStated) {
   // 2000 robots: the standard error of a standard deviation of 0.2 is 0.0032.
   const std::vector<ScenePose> poses = testing::grid_crowd(2000, 40, testing::Facing::kRight);
   double sum = 0, squares = 0;
@@ -221,7 +221,7 @@ TEST(LightImage, BrightnessGoesThroughGamma) {
   EXPECT_NEAR(field.light(0, 0, 30, 0), 40, 1e-9);
 }
 
-TEST(LightImage, SequencesGoByTime) {
+TEST(LightImage, SequencesFollowTime) {
   const std::vector<std::string> pictures{std::string("\0", 1), "\x7f", "\xff"};
   for (const bool loop : {true, false}) {
     const RunPlan plan =
@@ -238,7 +238,7 @@ TEST(LightImage, SequencesGoByTime) {
   }
 }
 
-TEST(Light, IsTheSameHoweverBodiesAreDivided) {
+TEST(Light, DoesNotDependOnPartitions) {
   const std::vector<ScenePose> poses = testing::random_crowd(300, 800, 800, 34, 5);
   const std::string light =
       "light { shadows: true source { x_mm: 100 y_mm: 50 height_mm: 35 circle {} } source { x_mm: -400 height_mm: "

@@ -1,4 +1,4 @@
-// Shadows against geometry, and against a search through all bodies.
+// Shadows against closed forms and against a search through all bodies.
 #include "core/senses/shadows.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ bool hides(const Bodies& bodies, const Lamp& lamp, double x, double y, double z 
 }
 
 TEST(Shadows, FallOverTheWidthOfABody) {
-  // A lamp near the floor, a body half-way: the shadow is as wide as the tangents say.
+  // A lamp near the floor and a body half-way: the tangents give the width of the shadow.
   const Lamp lamp{0, 0, 30, 1};
   const Bodies body{{100}, {0}};
   const double half = 200 * std::tan(std::asin(16.5 / 100));
@@ -62,7 +62,7 @@ TEST(Shadows, EqualASearchThroughAllBodies) {
     const auto ends = testing::random_crowd(60, 2 * width, 2 * height, 0, seed + 100);
     for (std::size_t n = 0; n + 1 < ends.size(); n += 2) {
       for (const double lamp_height : {0.0, 30.0, 34.0, 50.0, 400.0}) {
-        // Also straight along the axes.
+        // Include lines along the axes.
         const double to_x = n % 5 == 0 ? ends[n].x_mm : ends[n + 1].x_mm,
                      to_y = n % 7 == 0 ? ends[n].y_mm : ends[n + 1].y_mm;
         const Lamp lamp{to_x, to_y, lamp_height, 1};
@@ -84,7 +84,7 @@ TEST(Shadows, EqualASearchThroughAllBodies) {
   EXPECT_LT(hidden, cases * 9 / 10);
 }
 
-TEST(Shadows, OfNobodyAreNone) { EXPECT_FALSE(hides({}, {1, 2, 3, 1}, 0, 0)); }
+TEST(Shadows, NeedABody) { EXPECT_FALSE(hides({}, {1, 2, 3, 1}, 0, 0)); }
 
 }  // namespace
 }  // namespace kilotwin::senses

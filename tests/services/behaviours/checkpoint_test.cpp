@@ -7,7 +7,7 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-/// What all hosts save, read back from its octets.
+/// The state that all hosts save, serialised and parsed again.
 std::vector<proto::BehavioursState> saved(const Swarm& swarm) {
   std::vector<proto::BehavioursState> parts;
   for (const auto& host : swarm.hosts) {
@@ -67,9 +67,9 @@ TEST(Checkpoint, ContinuesOnOtherHostsAsIfNothingHadHappened) {
   }
 }
 
-TEST(Checkpoint, WhatAHostHasSeenOfLoopsChangesNothing) {
-  // A host that has seen a robot wait looks for loops at once; one that has just loaded it does so later. The tick in which
-  // an endless loop is found is the same for both, and so is what loops with several tests, or that count, have come to.
+TEST(Checkpoint, DoesNotDependOnTheHostsKnowledgeOfBusyWaits) {
+  // A host that has seen a robot in a busy wait looks for it at once; a host that has just loaded the robot looks later. Both
+  // must find an endless loop in the same tick, and loops with several tests or a counter must reach the same state.
   const std::vector<std::string> texts{
       program(
           "static volatile uint8_t go; uint32_t sum;\n"
@@ -105,8 +105,8 @@ TEST(Checkpoint, WhatAHostHasSeenOfLoopsChangesNothing) {
 }
 
 TEST(Checkpoint, HeapsGrowAsTheyAreUsed) {
-  // Lists of a length of each robot's own, in one slot by turns: all blocks keep what was put in, and a robot's memory is what
-  // it has taken.
+  // Robots with lists of different lengths share a slot. All blocks keep their content, and a robot's memory has the size that it
+  // has allocated.
   const std::vector<std::string> texts{program(
       "#include <stdlib.h>\n#include <string.h>\n"
       "typedef struct block { struct block* next; uint32_t check; uint8_t filling[240]; } block;\n"
@@ -132,7 +132,7 @@ TEST(Checkpoint, HeapsGrowAsTheyAreUsed) {
   const ActuationFrame frame = first.frame();
   for (std::uint32_t robot = 0; robot < 26; ++robot) {
     EXPECT_EQ(frame.led[robot], 3 << 2) << robot;
-    // 64 KiB hold 250 blocks of 264 octets with what they need to be found by.
+    // 64 KiB hold 250 blocks of 264 octets with their headers.
     const unsigned wanted = std::min(robot * 12, 201u),
                    blocks = frame.motor_left[robot] | frame.motor_right[robot] << 8;
     EXPECT_EQ(blocks, wanted);
@@ -142,8 +142,8 @@ TEST(Checkpoint, HeapsGrowAsTheyAreUsed) {
   EXPECT_LT(taken, 26u * 201 * 280);
 }
 
-TEST(Checkpoint, ALittleBeyondTheLastArrayIsARobotsOwn) {
-  // As on a robot, where whatever lies there is hardly ever something else.
+TEST(Checkpoint, TheSlackBehindTheLastArrayIsPrivate) {
+  // On a robot the memory behind the last array is usually unused.
   const std::vector<std::string> texts{program(
       "uint8_t last[8];\n"
       "static void loop(void) { volatile uint8_t* beyond = last + sizeof last; set_color(beyond[20] & 63);\n"
@@ -163,7 +163,7 @@ TEST(Checkpoint, SavesWhatItHasLoaded) {
   EXPECT_EQ(saved(second)[0].SerializeAsString(), parts[0].SerializeAsString());
 }
 
-TEST(Checkpoint, RejectsOneThatDoesNotFit) {
+TEST(Checkpoint, RejectsACheckpointThatDoesNotFit) {
   Swarm swarm({program("")}, 2),
       other({program("static uint8_t big[1000]; static void loop(void) { big[rand()%1000]++; }")}, 2);
   swarm.start();

@@ -95,7 +95,7 @@ TEST(Compiler, CodeOnTheStackIsRefusedAsForTheRobot) {
   EXPECT_EQ(nested("1"), "no error");
 }
 
-TEST(Compiler, BadArgumentsAreToldPlainly) {
+TEST(Compiler, BadArgumentsGiveOneLine) {
   const Folder folder;
   const fs::path good = folder.write("good.c", "#include <kilolib.h>\nint main(void) { return 0; }\n");
   EXPECT_NE(error_of({}).find("no program given"), std::string::npos);
@@ -130,7 +130,7 @@ TEST(Compiler, KeepsResultsByContent) {
   EXPECT_NE(compile({source}, options).sha256, first.sha256);
   folder.write("part.h", "#define COLOUR 1\n");
   folder.write(fs::relative(first.file, folder.path()), "damaged");
-  EXPECT_EQ(compile({source}, options).sha256, first.sha256);  // made anew, octet for octet the same
+  EXPECT_EQ(compile({source}, options).sha256, first.sha256);  // compiled again, with equal octets
   EXPECT_EQ(compile({source}, {{}, {}, folder.path() / "elsewhere"}).sha256, first.sha256);
 }
 
@@ -153,7 +153,7 @@ TEST(Compiler, SeveralSourcesAndReadySharedObjects) {
             std::string::npos);
 }
 
-TEST(Compiler, ACompilerThatIsKilledIsAFailureAndNoReasonForAnotherLanguage) {
+TEST(Compiler, AKilledCompilerIsAFailureAndNotRetriedInAnotherLanguage) {
   const Folder folder;
   CompileOptions options = cached();
   options.compiler =
@@ -185,7 +185,7 @@ TEST(Compiler, ACompilerThatIsKilledIsAFailureAndNoReasonForAnotherLanguage) {
 }
 
 TEST(Compiler, ClangGivesTheSameBehaviour) {
-  // Where the machine has clang: the same frames, tick by tick.
+  // If the machine has clang, compare the frames of every tick.
   const fs::path clang = "/usr/bin/clang";
   if (!fs::exists(clang)) return;
   const fs::path source = std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c";

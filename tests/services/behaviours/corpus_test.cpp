@@ -1,4 +1,4 @@
-// Old, odd and foreign programs, each of which checks itself: red is right. They run for 60 s on 50 robots that hear each other.
+// Unusual programs that check themselves: a red LED means success. They run for 60 s on 50 robots that hear each other.
 #include <gtest/gtest.h>
 
 #include <algorithm>

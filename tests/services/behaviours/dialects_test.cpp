@@ -1,4 +1,4 @@
-// Programs as they lie in repositories: several files, copies of kilolib, C++, other simulators' dialects; what they print.
+// Programs as published in repositories: several files, copies of kilolib, C++, dialects of other simulators; and printing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ std::uint8_t led_of(const fs::path& source) {
   return swarm.led(0);
 }
 
-TEST(Dialects, CopiesOfKilolibAreLeftAside) {
+TEST(Dialects, CopiesOfKilolibAreIgnored) {
   const Folder folder;
   folder.write("kilolib/kilolib.h", "#error the copy\nextern volatile uint32_t kilo_ticks;\n");
   folder.write("kilolib/debug.h", "#error the copy\nvoid debug_init();\n");
@@ -45,7 +45,7 @@ TEST(Dialects, CopiesOfKilolibAreLeftAside) {
   EXPECT_TRUE(mentions(program.notes, "kilolib.h: left aside"));
   EXPECT_TRUE(mentions(program.notes, "debug.h: left aside"));
   EXPECT_EQ(led_of(source), 5);
-  // A user's own file of that name stays.
+  // A user's file with such a name is used.
   folder.write("src/debug.h", "#define COLOUR 9\n");
   EXPECT_EQ(led_of(folder.write("src/b.c",
                                 "#include <kilolib.h>\n#include \"debug.h\"\nvoid setup() {} void loop() { "
@@ -117,7 +117,7 @@ TEST(Dialects, FunctionsWhoseNamesMacrosMakeAreFound) {
   EXPECT_EQ(led_of(source), 3);
 }
 
-TEST(Dialects, WhatIsNowhereIsStillAnError) {
+TEST(Dialects, AMissingFunctionIsAnError) {
   const Folder folder;
   folder.write("huge.c", "int operator_plus;\nint others[] = {" + std::string(300'000, '1') + "};\n");
   for (const char* name : {"a.c", "a.cpp"}) {
@@ -180,7 +180,7 @@ TEST(Dialects, KilomboProgramsRunAsOnTheRobot) {
   for (std::uint32_t robot = 0; robot < 3; ++robot) EXPECT_EQ(swarm.led(robot), robot + 1);
 }
 
-TEST(Dialects, KilombosOwnWayWithDataIsTheSecondTry) {
+TEST(Dialects, KilombosUserDataIsTheSecondAttempt) {
   const Folder folder;
   const fs::path source = folder.write(
       "a.c",
@@ -193,7 +193,7 @@ TEST(Dialects, KilombosOwnWayWithDataIsTheSecondTry) {
   EXPECT_EQ(led_of(source), 7);
 }
 
-TEST(Dialects, KilombosRoomForDataIsThereWithoutItsHeader) {
+TEST(Dialects, KilombosUserDataWorksWithoutItsHeader) {
   const Folder folder;
   const std::string text =
       "typedef struct { uint8_t colour; } USERDATA;\nREGISTER_USERDATA(USERDATA)\n"
@@ -205,7 +205,7 @@ TEST(Dialects, KilombosRoomForDataIsThereWithoutItsHeader) {
                           "type* mydata;\n" +
                               text)),
       4);
-  // Data of the program's own remain.
+  // Data that the program defines remain.
   EXPECT_EQ(led_of(folder.write(
                 "both.c",
                 "#define SIMULATOR\n#include <kilombo.h>\nstruct { uint8_t colour; } first = {3};\nvoid* mine = "
@@ -267,7 +267,7 @@ TEST(Dialects, MotorsAndConverterAreReachedByTheirRegisters) {
   EXPECT_EQ(swarm.frame().motor_left[0], 50);
 }
 
-TEST(Printing, GoesToTheHostAtOnceAndInOrder) {
+TEST(Printing, ReachesTheHostImmediatelyAndInOrder) {
   Swarm swarm({"#include <kilolib.h>\n#include <stdio.h>\nvoid setup() { printf(\"%s %5.2f|\", \"pi\", 3.14159); "
                "fprintf(stderr, \"%d\\n\", kilo_uid); }\n"
                "void loop() { if (kilo_ticks > 10) { printf(\"late\\n\"); *(volatile int*)8 = 1; } }\n" +
@@ -284,7 +284,7 @@ TEST(Printing, GoesToTheHostAtOnceAndInOrder) {
   swarm.step();
   EXPECT_TRUE(swarm.hosts[0]->printed().empty());
   for (int k = 0; k < 20 && swarm.hosts[0]->printed().empty(); ++k) swarm.step();
-  // The last words of a robot that fails.
+  // Text that a robot prints in the tick in which it fails.
   ASSERT_EQ(swarm.hosts[0]->printed().size(), 2u);
   EXPECT_EQ(swarm.hosts[0]->printed()[0].text, "late\n");
   EXPECT_EQ(swarm.hosts[0]->robots_failed(), 2u);
@@ -341,7 +341,7 @@ TEST(Printing, ALogThatCannotBeWrittenEndsTheRun) {
   EXPECT_THROW(logs.write(Tick{40}, 2, "b\n"), RunError);
 }
 
-TEST(RobotWarnings, TellWhatAvrComputesOtherwise) {
+TEST(RobotWarnings, NameCodeThatAvrComputesDifferently) {
   if (os::find_executable("avr-gcc").empty()) GTEST_SKIP() << "no avr-gcc";
   const Folder folder;
   const fs::path source = folder.write("a.c",

@@ -1,4 +1,4 @@
-// Division by zero gives what the robot's library gives; the most negative number divided by -1 as well.
+// Division by zero and INT_MIN / -1 give the results of the robot's library.
 #include <gtest/gtest.h>
 
 #include "tests/services/behaviours/swarm.hpp"
@@ -6,7 +6,7 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-/// The LED is red where every line holds; `lines` may use the variables below, of which the compiler knows nothing.
+/// The LED is red if every line holds. `lines` may use the variables below, whose values the compiler does not know.
 void all_hold(const std::string& lines) {
   Swarm swarm(
       {program("volatile int8_t z8; volatile int16_t z16; volatile int32_t z32; volatile int64_t z64;\n"

@@ -28,12 +28,12 @@ TEST(ElfFile, DescribesAProgram) {
   EXPECT_EQ(file.function_at(file.table.leave + 1), "kt_leave");
 }
 
-TEST(ElfFile, EveryCutIsToldPlainly) {
+TEST(ElfFile, ReportsEveryTruncation) {
   const std::string octets = valid();
   for (std::size_t size = 0; size < octets.size(); size += 1 + size / 16) {
     try {
       (void)ElfFile::parse(octets.substr(0, size), "cut.so");
-      EXPECT_GT(size, 2 * kPage);  // what is behind the segments serves debuggers
+      EXPECT_GT(size, 2 * kPage);  // octets behind the segments serve only debuggers
     } catch (const UserError& error) {
       EXPECT_TRUE(std::string(error.what()).starts_with("cut.so: not a program for simulated robots: "))
           << error.what();
@@ -41,9 +41,9 @@ TEST(ElfFile, EveryCutIsToldPlainly) {
   }
 }
 
-TEST(ElfFile, DamageIsNoticedOrHarmless) {
-  // Octets are changed where structures lie: headers, dynamic section, relocations, the table. What is still accepted must
-  // load into its slots.
+TEST(ElfFile, DamageIsDetectedOrHarmless) {
+  // Change octets of structures: headers, dynamic section, relocations, the table. A file that is still accepted must load into
+  // its slots.
   const std::string octets = valid();
   const ElfFile file = ElfFile::parse(octets, "x");
   Elf64_Ehdr header;
@@ -82,7 +82,7 @@ TEST(ElfFile, DamageIsNoticedOrHarmless) {
   EXPECT_GT(rejected, 1000);
 }
 
-TEST(Slot, LiesWhereItIsToldAndNowhereElse) {
+TEST(Slot, IsMappedAtItsAddressOnly) {
   const ElfFile file = ElfFile::parse(valid(), "x");
   const Slot slot(file, kFirstAddress);
   EXPECT_EQ(slot.stack_top() % 16, 0u);

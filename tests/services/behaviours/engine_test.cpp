@@ -16,7 +16,7 @@ Air to_all(const Swarm& swarm, const IrMessage& what) {
   return air;
 }
 
-TEST(Engine, RobotsAreIdleUntilToldToRun) {
+TEST(Engine, RobotsAreIdleUntilRun) {
   Swarm swarm({program("static void setup(void) { set_color(1); set_motors(10, 20); }\nstatic void loop(void) { "
                        "set_color(2); }")},
               3);
@@ -131,7 +131,7 @@ TEST(Engine, CallbacksComeInOrder) {
   EXPECT_EQ(seen, expected);
 }
 
-TEST(Engine, AMessageIsHeldUntilItHasLeft) {
+TEST(Engine, AMessageIsHeldUntilItIsSent) {
   Swarm swarm({program("static message_t m; static message_t* tx(void) { m.data[0]++; return &m; }")}, 2);
   Air ask;
   ask.ask = {0};
@@ -189,7 +189,7 @@ TEST(Engine, ASleepingRobotListensEveryEightSeconds) {
   swarm.start();
   swarm.step(to_all(swarm, message(kSleep)));
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kSleeping);
-  // The radio tells a robot what was on the air in a tick if it was not asleep at the tick's beginning.
+  // The radio delivers a tick's messages to robots that were not asleep at the tick's start.
   int until_it_listens = 0;
   while (swarm.life_cycle(0) == LifeCycle::kSleeping && until_it_listens < 400) {
     swarm.step(to_all(swarm, message(kWakeup)));  // in vain
@@ -246,7 +246,7 @@ TEST(Engine, HostsOnThreadsEqualOneHost) {
   }
 }
 
-TEST(ProgramSet, RejectsWhatIsNotWhatItsNameSays) {
+TEST(ProgramSet, RejectsAFileWhoseHashDiffersFromItsName) {
   Swarm swarm({program("")}, 1);
   const std::string name = "programs/" + swarm.plan->programs()[0].file();
   Folder other;

@@ -5,13 +5,13 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-/// Robot 9 of 18 does `deed` when its clock shows 5; all count in their left motor.
-void one_fails(const std::string& deed, const std::string& told, const std::string& before = "",
+/// Robot 9 of 18 executes `action` when its clock shows 5. All robots count in their left motor.
+void one_fails(const std::string& action, const std::string& told, const std::string& before = "",
                const std::string& after = "") {
   Swarm swarm({program(before +
                        "\nstatic uint8_t n;\nstatic void loop(void) { set_color(5); set_motors(++n, 1);\n"
                        "  if (kilo_uid == 9 && kilo_ticks == 5) { " +
-                       deed + " } }\n" + after)},
+                       action + " } }\n" + after)},
               18);
   swarm.start();
   swarm.steps(10);
@@ -40,7 +40,7 @@ TEST(Faults, EndlessLoop) {
   one_fails("for (volatile int i = 0; i < 10;) {}", "endless loop in loop() at program0.c:4");
 }
 
-TEST(Faults, EndlessLoopThatIsBusy) {
+TEST(Faults, EndlessLoopThatChangesState) {
   Swarm swarm({program("uint32_t counter; static void loop(void) { for (;;) ++counter; }")}, 2);
   swarm.start();
   swarm.steps(20);
@@ -71,7 +71,7 @@ TEST(Faults, StackOverflow) {
 }
 
 TEST(Faults, AStackThatIsAlmostFull) {
-  // Robots wait with so many octets left, from none to hundreds; whoever has room for that goes on.
+  // Each robot waits with another number of octets left on its stack, from 0 to some hundreds. Those with enough room continue.
   Swarm swarm({program("static char* top;\n"
                        "static int deep(void) { volatile char room[8]; room[0] = 0;\n"
                        "  if (top - (char*)room > 65536 - 256 - 16 * kilo_uid) { delay(100); return room[0]; }\n"
@@ -90,7 +90,7 @@ TEST(Faults, AStackThatIsAlmostFull) {
 TEST(Faults, LargeFrame) { one_fails("volatile char room[1000000]; room[n] = 1;", "stack overflow"); }
 
 TEST(Faults, SystemCalls) {
-  // By the three ways that a processor has: exit_group(0) and exit(0), which would end the whole run.
+  // exit_group(0) and exit(0), which would end the whole run, by the three instructions for system calls.
   one_fails("__asm__ volatile(\"syscall\" : : \"a\"(231), \"D\"(0) : \"rcx\", \"r11\", \"memory\");",
             "system call 231, which a robot does not have in loop() at program0.c:4");
   one_fails("__asm__ volatile(\"syscall\" : : \"a\"(60), \"D\"(0) : \"rcx\", \"r11\", \"memory\");",
@@ -106,7 +106,7 @@ TEST(Faults, SingleStepping) {
 }
 
 TEST(Faults, BeyondTheVariables) {
-  // It looks at one octet after the other behind its last variable: 256 are there, the next is not.
+  // It reads octet after octet behind its last variable. 256 are accessible, the next one faults.
   Swarm swarm(
       {program("static uint8_t here; static void loop(void) { if (kilo_uid != 9 || kilo_ticks < 5) return;\n"
                "  uint8_t sum = 0; for (const volatile uint8_t* p = &here;; ++p) { sum += *p; if (sum == 3) "

@@ -1,7 +1,7 @@
-// Programs that do everything wrong cost their robots, and nobody else: random C with loops, wild pointers, recursion, division
-// by zero, smashed stacks, stale jumps. Compiling takes longer than running, so eight of them are one source, of which each
-// robot runs its own. KILOTWIN_FUZZ_PROGRAMS=1000 runs a thousand, KILOTWIN_FUZZ_SEED others, KILOTWIN_FUZZ_ROBOTS more robots
-// of each.
+// Faulty programs end only their own robots: random C with loops, wild pointers, recursion, division by zero, overwritten
+// stacks, stale longjmp. Compiling takes longer than running, so one source holds eight programs, and each robot runs one of
+// them. KILOTWIN_FUZZ_PROGRAMS sets the number of programs, KILOTWIN_FUZZ_SEED the first seed, KILOTWIN_FUZZ_ROBOTS the robots
+// per program.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -13,7 +13,7 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-/// Makes a program of a seed: functions whose names begin with `name`.
+/// Generates a program from a seed. The names of its functions begin with `name`.
 class Generator {
  public:
   Generator(std::uint32_t seed, std::string name) : random_(seed), name_(std::move(name)) {}
@@ -120,7 +120,7 @@ class Generator {
     }
   }
 
-  std::mt19937 random_;  // the same numbers everywhere, as the standard says
+  std::mt19937 random_;  // the C++ standard defines its sequence
   std::string name_;
   std::uint32_t functions_ = 0;
 };
@@ -161,7 +161,7 @@ std::string repaired(std::string text) {
   return text;
 }
 
-TEST(Fuzz, ProgramsOfEveryKindCostNobodyElse) {
+TEST(Fuzz, FaultyProgramsEndOnlyTheirOwnRobots) {
   const std::string decent = program(
       "static uint8_t n; static message_t m; static message_t* tx(void) { m.data[0] = n; return &m; }\n"
       "static void loop(void) { set_motors(++n, kilo_ticks); }");
@@ -178,14 +178,14 @@ TEST(Fuzz, ProgramsOfEveryKindCostNobodyElse) {
     other.start();
     for (int k = 0; k < 80; ++k) {
       Air air = echo(one.frame());
-      // Whose message has come to be one of the overhead controller's would reset its neighbours, as on the robot.
+      // Random messages of the overhead controller's types would reset the receivers, as on the robot. Clear that bit.
       for (Air::Reception& reception : air.receptions) reception.message[9] &= 0x7f;
       one.step(air);
       if (k < 40) {
         other.step(air);
         ASSERT_EQ(one.hash(), other.hash()) << "tick " << k << "\n" << text;
       } else {
-        // What was interrupted in the midst of its code goes on elsewhere.
+        // Preempted programs continue on other hosts.
         if (k == 40) {
           std::vector<proto::BehavioursState> saved(3);
           std::vector<const proto::BehavioursState*> parts;

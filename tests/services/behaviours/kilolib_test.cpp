@@ -1,4 +1,4 @@
-// What programs see of kilolib and the C library. A program reports numbers through the messages that it sends.
+// kilolib and the C library as programs see them. A program reports numbers through the messages that it sends.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,7 +10,7 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-/// Robot 0's message when it is asked now.
+/// Robot 0's message if the radio requests one in this tick.
 IrMessage asked(Swarm& swarm) {
   Air air;
   air.ask = {0};
@@ -49,8 +49,8 @@ TEST(Kilolib, ChecksumsAreThoseOfTheFirmware) {
   EXPECT_EQ(r[8], 5);
 }
 
-TEST(Kilolib, SpinUpIsToldOnceWithTheDutiesThatFollowIt) {
-  // A kick takes 15 ms of the program's time, two of them and a half fit into a tick.
+TEST(Kilolib, SpinUpIsReportedOnceWithTheNextDuties) {
+  // A spin-up takes 15 ms of the program's time, so about two fit into a tick.
   Swarm swarm(
       {program("static void loop(void) { spinup_motors(); set_motors(70, (uint8_t)(kilo_ticks & 1)); }\n"),
        program("static void loop(void) { if (kilo_ticks == 20) spinup_motors(); else set_motors(1, 2); }\n")},
@@ -62,7 +62,7 @@ TEST(Kilolib, SpinUpIsToldOnceWithTheDutiesThatFollowIt) {
     const ActuationFrame frame = swarm.frame();
     kicks += frame.spin_up[0];
     others += frame.spin_up[1];
-    // Never a whole tick at full duty, unless the program leaves it so.
+    // The duty is not 255 for a whole tick unless the program sets it.
     EXPECT_EQ(frame.motor_left[0], 70);
     EXPECT_EQ(frame.motor_left[1] == 255, frame.spin_up[1] == 1);
   }
@@ -156,7 +156,7 @@ TEST(Kilolib, CalibrationAndIdentityAreTheRobotsOwn) {
   EXPECT_EQ(r[8], 1);
 }
 
-TEST(Kilolib, MathematicsAreTheCoresOwn) {
+TEST(Kilolib, MathematicsAreThoseOfCoreMath) {
   const IrMessage r = report(
       "volatile double x = 1.2345; double y = sin(x); memcpy(report, &y, 8); report[8] =\n"
       "round(-2.5) == -3 && floor(-0.5) == -1 && ceil(0.2) == 1 && sqrt(2.25) == 1.5 && fabs(-x) == x\n"
@@ -186,7 +186,7 @@ TEST(Kilolib, CLibraryFormatsSortsAndSearches) {
   for (std::size_t i = 0; i <= 6; ++i) EXPECT_EQ(r[i], 1) << i;
 }
 
-TEST(Kilolib, BuffersBetweenCallbacksAndLoop) {
+TEST(Kilolib, BuffersConnectCallbacksAndLoop) {
   Swarm swarm({"#include <kilolib.h>\n#include <message_buffered.h>\n#include <debug.h>\n"
                "static void setup(void) {}\n"
                "static void loop(void) { distance_measurement_t d; message_t* m;\n"

@@ -1,4 +1,4 @@
-// What a robot's firmware makes of messages, in each of its states, and what outlives a reset.
+// The firmware's reaction to messages in each of its states, and the memory that survives a reset.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ IrMessage calib(std::uint8_t mode, std::uint16_t uid = 0, std::uint8_t turn_left
   return m;
 }
 
-/// Counts: messages that the user's callback has got in tx's data[0], setups in data[1]; drives with 10, 20 while it runs.
+/// Sends the number of received messages in data[0] and of setups in data[1]. Drives with duties 10, 20 while it runs.
 const char* const kProbe =
     "static uint8_t got, setups; static message_t m;\n"
     "static void rx(message_t* r, distance_measurement_t* d) { ++got; set_color(RGB(1, 2, 3)); }\n"
@@ -95,7 +95,7 @@ Then expected(LifeCycle from, const IrMessage& heard_message) {
         case kSave: return runs ? Then{from, 10, 20} : Then{moves ? LifeCycle::kIdle : from};
         case kTurnLeft: return {LifeCycle::kMoving, 71, 0};
         case kTurnRight: return {LifeCycle::kMoving, 0, 72};
-        // The same speeds again: in its motion the robot goes on, from elsewhere nothing tells the motors to start.
+        // The same speeds again: a moving robot continues, and from another state the motors do not start.
         case kStraight: return {LifeCycle::kMoving, 80, 90};
         case kUid: return {LifeCycle::kMoving};
         default: return moves ? Then{from, 80, 90} : Then{LifeCycle::kMoving};  // no mode: no new motion
@@ -149,7 +149,7 @@ TEST_P(LifeCycles, FollowEveryMessageAsTheFirmwareDoes) {
     EXPECT_EQ(frame.motor_left[n], then.left);
     EXPECT_EQ(frame.motor_right[n], then.right);
   }
-  // How often callback and setup() were called a robot can tell while it runs. Whoever sleeps must listen first.
+  // A robot can report its counters only while it runs, and a sleeping robot must listen first.
   swarm.steps(from == LifeCycle::kSleeping ? 250 : 245);
   for (int repeat = 0; repeat < 2; ++repeat) swarm.step(all_hear(swarm, message(kRun)));
   swarm.steps(7);
@@ -174,7 +174,7 @@ std::string name_of(const testing::TestParamInfo<LifeCycle>& tested) {
 
 INSTANTIATE_TEST_SUITE_P(States, LifeCycles, testing::ValuesIn(kStates), name_of);
 
-TEST(LifeCycle, MotorsThatAMessageHasCutOffComeBackWithRunFromAnotherStateOnly) {
+TEST(LifeCycle, RunFromAnotherStateRestoresMotorsThatAMessageSwitchedOff) {
   Swarm swarm({program(kProbe)}, 1);
   swarm.start();
   swarm.step(heard(message(kUnknown)));
@@ -207,7 +207,7 @@ TEST(LifeCycle, RobotsSendWhileTheyRunAndInNoOtherState) {
   }
 }
 
-TEST(LifeCycle, AResetMakesGlobalsAnewAndKeepsWhatIsNotToBeInitialised) {
+TEST(LifeCycle, AResetInitialisesGlobalsAndKeepsNoinitVariables) {
   Swarm swarm(
       {program(
           "#include <avr/eeprom.h>\n"
@@ -247,7 +247,7 @@ TEST(LifeCycle, AResetMakesGlobalsAnewAndKeepsWhatIsNotToBeInitialised) {
   }
 }
 
-TEST(LifeCycle, TheBootloaderWaitsForAnythingThatIsNotItsOwn) {
+TEST(LifeCycle, TheBootloaderEndsWithAnyOtherMessage) {
   Swarm swarm({program(kProbe)}, 1);
   swarm.start();
   swarm.step(heard(message(kBoot)));
@@ -257,13 +257,13 @@ TEST(LifeCycle, TheBootloaderWaitsForAnythingThatIsNotItsOwn) {
   swarm.steps(100);
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kIdle);
   EXPECT_EQ(swarm.frame().motor_left[0], 0);
-  swarm.step(heard(message(kRun)));  // back to the program, which starts anew
+  swarm.step(heard(message(kRun)));  // the program restarts
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kIdle);
   swarm.step(heard(message(kRun)));
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kRunning);
 }
 
-TEST(LifeCycle, ASleepingRobotThatHearsSomethingListensOn) {
+TEST(LifeCycle, ASleepingRobotThatHearsSomethingKeepsListening) {
   Swarm swarm({program("")}, 1);
   swarm.start();
   swarm.step(heard(message(kSleep)));
@@ -279,7 +279,7 @@ TEST(LifeCycle, ASleepingRobotThatHearsSomethingListensOn) {
 
 // EEPROM.
 
-/// What a program reads there, 8 octets from `address` on.
+/// The 8 octets that a program reads from `address`.
 std::array<std::uint8_t, 8> read(Swarm& swarm, std::uint32_t robot, std::uint16_t address) {
   Air air;
   IrMessage where = message(1);
@@ -330,7 +330,7 @@ TEST(Eeprom, IsLaidOutOctetByOctetAsKilolibReadsIt) {
   EXPECT_EQ(swarm.hosts[0]->eeprom(258), nullptr) << "reading allocates nothing";
 }
 
-TEST(Eeprom, WhatIsWrittenIsTheRobotsOwnAndOutlivesAReset) {
+TEST(Eeprom, ContentIsPerRobotAndSurvivesAReset) {
   Swarm swarm({program(kReader)}, 3);
   swarm.start();
   IrMessage write = message(2);

@@ -1,4 +1,4 @@
-// Programs that do not return from loop(): they wait, or are interrupted where the tick is over, and go on later.
+// Programs that do not return from loop() within a tick: they wait, or are preempted and continue in the next tick.
 #include <gtest/gtest.h>
 
 #include "idl/manifest.pb.h"
@@ -93,8 +93,8 @@ TEST(Preemption, LoopAsOnTheRobotRunsAsOftenAsItsCyclesAllow) {
   EXPECT_LT(rounds, 10 * 262.2);
 }
 
-TEST(Preemption, LongComputationsGoOnInLaterTicks) {
-  // About ten million cycles, or forty ticks; messages are heard meanwhile.
+TEST(Preemption, LongComputationsContinueInLaterTicks) {
+  // About ten million cycles, or forty ticks. Callbacks run meanwhile.
   Swarm swarm(
       {program("uint8_t heard; volatile float sum;\n"
                "static void rx(message_t* m, distance_measurement_t* d) { set_color(++heard & 3); }\n"

@@ -1,4 +1,4 @@
-// The ready-made programs of behaviours/ do what they say.
+// The programs in behaviours/ behave as documented.
 #include <gtest/gtest.h>
 
 #include "tests/services/behaviours/swarm.hpp"

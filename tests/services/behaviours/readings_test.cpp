@@ -1,4 +1,4 @@
-// What the converter gives: sensors while a message arrives, and the voltage that takes the place of a message's strength.
+// ADC readings: sensors while a message arrives, and the voltage that replaces a message's strength.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace kilotwin::behaviours::test {
 namespace {
 
-/// Robot 0's message when it is asked now.
+/// Robot 0's message if the radio requests one in this tick.
 IrMessage asked(Swarm& swarm, Air air = {}) {
   air.ask = {0};
   swarm.step(air);
@@ -21,8 +21,8 @@ IrMessage asked(Swarm& swarm, Air air = {}) {
   return said;
 }
 
-TEST(Readings, AVoltageTakesThePlaceOfTheNextMessagesStrength) {
-  // The firmware leaves the converter on the battery; every other reading puts it back.
+TEST(Readings, AVoltageReplacesTheNextMessagesStrength) {
+  // The firmware leaves the ADC on the battery's channel; every other reading restores it.
   const auto high_after = [](const char* reading) {
     Swarm swarm({program(std::string("static message_t m; static int16_t got;\nstatic void rx(message_t* r, "
                                      "distance_measurement_t* d) {\n"
@@ -74,7 +74,7 @@ TEST(Readings, FailForAsLongAsAMessageIsReceived) {
 }
 
 TEST(Readings, ComeOnceTheMessageIsOver) {
-  // Waiting for a reading takes as long as what is left of the message, not for ever.
+  // A wait for a reading ends with the message.
   Swarm swarm(
       {program("static uint8_t n; static void loop(void) { while (get_ambientlight() < 0); set_motors(++n, 0); }")},
       1);
@@ -87,7 +87,7 @@ TEST(Readings, ComeOnceTheMessageIsOver) {
   }
 }
 
-TEST(Readings, FailForTheMessagesPartOfATickWhereLoopRunsAsOnTheRobot) {
+TEST(Readings, FailDuringMessagesIfLoopRunsAsOnTheRobot) {
   // Three messages take 40 % of each tick; the rest is left for readings.
   const auto succeeded = [](int messages) {
     Swarm swarm({program("static uint32_t n; static message_t m;\n"
@@ -127,7 +127,7 @@ TEST(Readings, HardRandomOctetsAreUniform) {
                "  for (int b = 0; b < 8; ++b) ones[b] += r >> b & 1; } }\n")},
       1);
   swarm.start();
-  swarm.steps(3000);  // they take their time
+  swarm.steps(3000);  // rand_hard() takes many cycles
   for (int b = 0; b < 8; ++b) {
     const IrMessage m = asked(swarm);
     ASSERT_EQ(m[0], b);

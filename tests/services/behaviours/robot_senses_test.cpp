@@ -1,4 +1,4 @@
-// Light, battery and temperature as programs meet them.
+// Light, battery and temperature as programs read them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -86,8 +86,8 @@ TEST(RobotSenses, ReadTheTemperature) {
   }
 }
 
-TEST(RobotSenses, BatteriesGiveWhatHasBeenTaken) {
-  // Motors, LED and messages, by a program whose use is known in each tick.
+TEST(RobotSenses, BatteriesLoseTheChargeThatLoadsDraw) {
+  // Motors, LED and messages of a program whose load is known in each tick.
   Swarm swarm(
       {program("static message_t m; static message_t* tx(void) { return &m; }\n"
                "static void loop(void) { set_motors(kilo_ticks, 3 * kilo_ticks); set_color(kilo_ticks); }")},
@@ -116,7 +116,7 @@ TEST(RobotSenses, BatteriesGiveWhatHasBeenTaken) {
   }
 }
 
-TEST(RobotSenses, AFlatRobotIsOffAndStartsAnewOnceItIsCharged) {
+TEST(RobotSenses, AFlatRobotIsOffAndRestartsOnceItIsCharged) {
   // Two robots, one of them on a charger that gives less than its motors take and more than it needs when off.
   Swarm swarm(
       {program("static uint8_t setups; static void setup(void) { ++setups; }\n"
@@ -193,7 +193,7 @@ TEST(RobotSenses, GoThroughCheckpoints) {
   EXPECT_EQ(first.life_cycle(0), LifeCycle::kFlat) << "or the test is about nothing";
 }
 
-TEST(RobotSenses, EepromsAreBroughtAlong) {
+TEST(RobotSenses, EepromsOfTheExperimentAreUsed) {
   Swarm swarm(
       {reporting(
           "#include <avr/eeprom.h>\nstatic void loop(void) { value = kilo_uid | kilo_straight_left << 16; }")},

@@ -1,4 +1,4 @@
-// Whose program brought down its host: told after the host's end, by a process that did not end with it.
+// The robot whose program crashed its host, read by another process after the host's end.
 #include "services/behaviours/running_note.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ pid_t run_in_a_process(Swarm& swarm) {
 const char* const kBusy =
     "static volatile uint32_t n; static void loop(void) { if (kilo_uid == 1) while (++n != 0) {} }";
 
-TEST(RunningNote, ASignalFromAnotherProcessIsNobodysFault) {
+TEST(RunningNote, ASignalFromAnotherProcessNamesNoRobot) {
   for (const int signal : {SIGABRT, SIGABRT, SIGSEGV, SIGBUS, SIGILL}) {
     Swarm swarm({program(kBusy)}, 2);
     const pid_t process = run_in_a_process(swarm);
@@ -51,7 +51,7 @@ TEST(RunningNote, ASignalFromAnotherProcessIsNobodysFault) {
 }
 
 TEST(RunningNote, NamesTheRobotWhoseProgramEndedTheProcess) {
-  // It loses %gs, and with it the way back to its host.
+  // It overwrites %gs, so control cannot return to the host.
   Swarm swarm({program("static void loop(void) { if (kilo_uid == 1 && kilo_ticks == 5) __asm__ volatile(\"mov %0, "
                        "%%gs\" : : \"r\"(0)); }")},
               2);

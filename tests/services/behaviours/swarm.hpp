@@ -1,4 +1,4 @@
-/// A swarm of programmed robots for tests: programs given as text, hosts, and an air that the test writes.
+/// A swarm of robots for tests: programs given as text, hosts, and radio frames that the test writes.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace kilotwin::behaviours::test {
 
-/// A directory that ceases to exist with this object.
+/// A temporary directory, removed by the destructor.
 class Folder {
  public:
   Folder();
@@ -38,7 +38,7 @@ class Folder {
 inline constexpr std::uint8_t kReset = 0x83, kSleep = 0x84, kWakeup = 0x85, kVoltage = 0x87, kRun = 0x88,
                               kReadUid = 0x89;
 
-/// What the radio tells all robots in one tick.
+/// The radio's input to all robots in one tick.
 struct Air {
   struct Reception {
     std::uint32_t robot;
@@ -67,7 +67,7 @@ class Swarm {
     for (int i = 0; i < count; ++i) step();
   }
 
-  /// What all hosts say of the present tick, as one frame.
+  /// The frames of all hosts at the current tick, joined into one.
   [[nodiscard]] ActuationFrame frame() const;
   [[nodiscard]] std::uint64_t hash() const;
   [[nodiscard]] LifeCycle life_cycle(std::uint32_t robot) const { return LifeCycle{frame().life_cycle[robot]}; }
@@ -77,11 +77,12 @@ class Swarm {
   std::unique_ptr<RunPlan> plan;
   std::shared_ptr<ProgramSet> programs;
   std::vector<std::unique_ptr<BehavioursEngine>> hosts;
-  BodyFrame bodies;  ///< where all robots are
+  BodyFrame bodies;  ///< poses of all robots
   Tick tick;
 };
 
-/// A closed loop: robots are asked every 16 ticks, and what one offers reaches the next two ids and has left a tick later.
+/// A simple radio: it requests a message from each robot every 16 ticks. An offered message reaches the next two ids and is sent one
+/// tick later.
 [[nodiscard]] Air echo(const ActuationFrame& frame);
 
 [[nodiscard]] bool equal(const ActuationFrame& a, const ActuationFrame& b);

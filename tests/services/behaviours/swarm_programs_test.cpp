@@ -1,4 +1,4 @@
-// The ready-made programs for swarms do what they say, on an air without collisions: who is within range hears.
+// The swarm programs in behaviours/ behave as documented, with a radio that delivers all messages within range.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -19,7 +19,7 @@ struct Place {
   double x_mm, y_mm;
 };
 
-/// What a sender at this distance is heard like: the calibration's own entry.
+/// The reading of a sender at this distance, an entry of the calibration.
 Air::Reception heard(std::uint32_t receiver, const IrMessage& message, double distance_mm) {
   constexpr std::array<int, KILOTWIN_IR_ENTRIES> kHigh KILOTWIN_IR_HIGH, kLow KILOTWIN_IR_LOW;
   const double steps = (distance_mm - KILOTWIN_IR_CONTACT_MM) / 5;
@@ -27,7 +27,7 @@ Air::Reception heard(std::uint32_t receiver, const IrMessage& message, double di
   return {receiver, message, static_cast<std::int16_t>(kHigh[i]), static_cast<std::int16_t>(kLow[i])};
 }
 
-/// Robots are asked every 16 ticks, in turn; what one offers is heard by all within range a tick later.
+/// The radio requests a message from each robot every 16 ticks. All robots within range receive it one tick later.
 Air ideal(const ActuationFrame& frame, const std::vector<Place>& places, double range_mm) {
   Air air;
   const auto robots = static_cast<std::uint32_t>(places.size());
@@ -66,14 +66,14 @@ TEST(SwarmPrograms, GradientCountsHopsAndHeals) {
   Swarm swarm({ready_made("gradient.c")}, 8);
   swarm.start();
   run(swarm, places, 50, 200);
-  // Each hears its neighbours alone: the colours follow the line.
+  // Each robot hears only its neighbours, so the colours follow the line.
   const std::array<std::uint8_t, 8> colours{kWhite, kRed, 0x0F, kGreen, 0x3C, kBlue, 0x33, kRed};
   for (std::uint32_t robot = 0; robot < 8; ++robot) EXPECT_EQ(swarm.led(robot), colours[robot]) << robot;
-  // With twice the range every second hop is saved.
+  // With twice the range, half the hops suffice.
   run(swarm, places, 90, 200);
   EXPECT_EQ(swarm.led(2), kRed);
   EXPECT_EQ(swarm.led(7), 0x3C);  // four hops
-  // Out of reach all forget.
+  // Out of range, all robots forget their hop counts.
   run(swarm, places, 10, 200);
   EXPECT_EQ(swarm.led(0), kWhite);
   for (std::uint32_t robot = 1; robot < 8; ++robot) EXPECT_EQ(swarm.led(robot), kOff) << robot;
@@ -138,7 +138,7 @@ TEST(SwarmPrograms, SyncMakesAllFlashTogether) {
   EXPECT_LE(spread(beginnings()), 4);
 }
 
-TEST(SwarmPrograms, MajorityGoesOverToTheMoreNumerousOpinion) {
+TEST(SwarmPrograms, MajorityAdoptsTheMoreFrequentOpinion) {
   const std::vector<Place> places = square_of(5, 40);
   Swarm swarm({ready_made("majority.c")}, 25);
   swarm.start();
@@ -176,7 +176,7 @@ TEST(SwarmPrograms, EdgeFollowerMindsTheNearestNeighbour) {
   EXPECT_EQ(swarm.led(1), kWhite);
   EXPECT_EQ(swarm.led(0), kRed);
   EXPECT_GT(swarm.frame().motor_right[0], 0);
-  // The near one is gone; it is forgotten, and the far one counts.
+  // The near robot is gone, so after a while the far one counts.
   run(swarm, {{0, 0}, {500, 0}, {0, 95}}, 100, 80);
   EXPECT_EQ(swarm.led(0), kGreen);
   EXPECT_GT(swarm.frame().motor_left[0], 0);
@@ -212,7 +212,7 @@ TEST(SwarmPrograms, ForagerFetchesAndBringsHome) {
   swarm.step(station(2, 14, 0));
   swarm.steps(2);
   EXPECT_EQ(swarm.led(2), kRed);
-  swarm.step(station(2, 14, 1));  // too soon: the station repeats itself
+  swarm.step(station(2, 14, 1));  // too early: the station repeats its message
   swarm.steps(2);
   EXPECT_EQ(swarm.led(2), kRed);
   swarm.steps(100);
