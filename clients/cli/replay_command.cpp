@@ -21,12 +21,12 @@
 namespace kilotwin::cli {
 namespace {
 
-/// What a recording holds of a run besides its states.
+/// The content of a recording besides its states.
 struct Recorded {
   Tick first_hash;
-  std::vector<std::uint64_t> chain;  ///< H of first_hash, first_hash + 1...
+  std::vector<std::uint64_t> chain;  ///< state hashes H of first_hash, first_hash + 1...
   std::vector<Directive> inputs;
-  std::optional<proto::EndRecord> end;  ///< absent where the run was killed, or still goes on
+  std::optional<proto::EndRecord> end;  ///< absent if the run was killed or is still active
   [[nodiscard]] Tick last() const { return first_hash + static_cast<std::int64_t>(chain.size()) - 1; }
 };
 
@@ -53,7 +53,7 @@ Recorded read_recorded(recorder::Reader& reader) {
   return recorded;
 }
 
-/// Throws RunError where the recording is shorter than the run was. Returns a remark on one that may have been longer.
+/// Throws RunError if the recording is shorter than the run. Returns a note if the run may have been longer than the recording.
 std::string check_length(const Recorded& recorded, const recorder::RunDirectory& directory,
                          const recorder::Reader& reader) {
   const std::string file = reader.path().string();
@@ -129,7 +129,7 @@ class Verifier : public RunObserver {
   }
   [[nodiscard]] std::size_t hashes() const { return hashes_; }
   [[nodiscard]] std::size_t states() const { return states_; }
-  /// Whether recorded states remain that were not compared.
+  /// Whether some recorded states have not been compared.
   [[nodiscard]] bool states_remain() const { return next_ != nullptr; }
 
  private:
@@ -142,7 +142,7 @@ class Verifier : public RunObserver {
   std::size_t hashes_ = 0, states_ = 0;
 };
 
-/// The inputs that a replay repeats, and the stop that ends it where the recording ends.
+/// The recorded inputs that a replay repeats, and a stop at the end of the recording.
 std::vector<Directive> inputs_of_replay(const Recorded& recorded) {
   std::vector<Directive> inputs = recorded.inputs;
   std::erase_if(inputs, [](const Directive& input) { return !changes_results(input); });

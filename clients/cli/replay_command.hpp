@@ -5,8 +5,8 @@
 
 namespace kilotwin::cli {
 
-/// Returns 0 if all agree. Throws RunError that names the first tick that differs, or says why the recording is damaged or too
-/// short; UserError if the directory holds no run.
+/// Returns 0 if all agree. Throws RunError with the first tick that differs, or with the reason if the recording is damaged or too
+/// short. Throws UserError if the directory holds no run.
 int replay_command(const std::filesystem::path& run, bool quiet);
 
 }  // namespace kilotwin::cli

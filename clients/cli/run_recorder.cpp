@@ -89,7 +89,7 @@ void RunRecorder::input(const Directive& directive) {
 void RunRecorder::saved() { writer_.flush(); }
 
 void RunRecorder::idle(const RunProgress& progress) {
-  // An external input cannot be repeated: it must survive the end of this process.
+  // An external input cannot be repeated, so write it to disk at once.
   if (std::exchange(inputs_wait_, false))
     writer_.flush();
   else
@@ -118,7 +118,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
     }
     writer_.radio(radios);
   }
-  // A run that broke before any state hash was known ended where it began.
+  // A run that failed before the first state hash ends at its first tick.
   writer_.end(std::max(totals.last, totals.first), totals.state_hash, totals.failure);
 
   recorder::Summary summary;

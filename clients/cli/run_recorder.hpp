@@ -1,4 +1,4 @@
-/// RunRecorder: the observer that records a run, and writes summary and picture at its end.
+/// RunRecorder: a RunObserver that records a run, and writes summary and picture at its end.
 #pragma once
 
 #include <chrono>
@@ -19,8 +19,8 @@ namespace kilotwin::cli {
 
 class RunRecorder : public RunObserver {
  public:
-  /// `resumed`: where the run starts from a checkpoint. `on_idle` receives the progress of the run; it may be empty. The
-  /// recording continues that of an earlier attempt at this run: recovery.hpp.
+  /// `resumed`: the checkpoint from which the run starts, if any. `on_idle` receives the progress of the run; it may be empty. The
+  /// recording continues that of an earlier attempt at this run, if there was one (recovery.hpp).
   RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory,
               const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle);
 
@@ -32,7 +32,7 @@ class RunRecorder : public RunObserver {
 
   /// Ends the recording, and writes summary and picture. `start_s`: wall time from the command to the first tick.
   recorder::Summary finish(const RunTotals& totals, double start_s);
-  /// Wall time of the first tick.
+  /// Time of the first tick, steady clock.
   [[nodiscard]] std::chrono::steady_clock::time_point first_tick_at() const { return first_tick_at_; }
 
  private:
@@ -49,13 +49,13 @@ class RunRecorder : public RunObserver {
   Tick next_{0};
   Tick recovered_from_{0};
   bool any_state_ = false;
-  bool inputs_wait_ = false;  ///< to be flushed
+  bool inputs_wait_ = false;  ///< inputs wait to be flushed
   std::chrono::steady_clock::time_point first_tick_at_{};
 };
 
 [[nodiscard]] proto::InputRecord to_record(const Directive& directive);
-/// Whether replays repeat the input. Pauses take no simulated time, checkpoints change nothing, and a recording ends where its
-/// run stopped.
+/// Whether a directive affects results, so that a replay must repeat it. Pauses and checkpoints do not, and the recording's end
+/// replaces a stop.
 [[nodiscard]] inline bool changes_results(const Directive& directive) {
   return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kTrackedPose;
 }

@@ -245,7 +245,7 @@ class EffectCheck {
 
   const LoadedExperiment& loaded_;
   const proto::Experiment& experiment_;
-  std::map<std::string, std::string> effects_, fields_;  ///< where each name is
+  std::map<std::string, std::string> effects_, fields_;  ///< name to path in the experiment
 };
 
 }  // namespace

@@ -19,10 +19,10 @@ using pb::FieldDescriptor;
 
 struct Step {
   const FieldDescriptor* field;
-  int index;  ///< 0 where the field is no list
+  int index;  ///< 0 if the field is not a list
 };
 
-/// One `NAME=VALUE` argument on its way into the experiment.
+/// Applies one `PATH=VALUE` argument to the experiment.
 class Override {
  public:
   Override(std::string_view argument, std::string_view option) : argument_(argument), option_(option) {}
@@ -99,7 +99,7 @@ void Override::assign(pb::Message& message, const Step& step, std::string_view v
   const FieldDescriptor* const field = step.field;
   const bool list = field->is_repeated();
   const bool append = list && step.index == reflection.FieldSize(message, field);
-  // One of set, add and set-an-element, which reflection has per type.
+  // Reflection has three functions per type: set a field, add an element, set an element. Call the right one.
   const auto put = [&](auto set, auto add, auto set_element, const auto& content) {
     if (!list)
       (reflection.*set)(&message, field, content);

@@ -65,7 +65,7 @@ bool RunSchedule::checkpoint_at(Tick now) const {
 
 Directive Ingress::stamp(Tick now, Directive directive) {
   if (steps_end_ >= Tick{0} && steps_end_ <= now + kAnnounceAhead) {
-    // The run comes to stand at the end of the steps within the time an announcement takes: stamp for that instant.
+    // The run pauses at steps_end_, before an announcement could reach all federates. So the directive acts at that tick.
     latest_ = std::max(latest_, steps_end_);
     pausing_ = true;
     steps_end_ = Tick{-1};

@@ -1,10 +1,10 @@
-/// When the run pauses, continues, saves and ends, and which external inputs belong to which tick: a pure state machine that
-/// every federate runs on the same directives, and so with the same outcome. Free of clocks and networks.
+/// Run schedule: it decides when the run pauses, continues, saves and ends, and at which ticks external inputs act. It is a pure
+/// state machine without clock and network. Every federate runs it on the same directives, so all decide alike.
 ///
-/// A directive is decided by the ingress, which gives it the next sequence number and the tick from which it counts. It
-/// travels by its own topic; every frame mentions how many directives its publisher knew, and no federate steps past a
-/// frame that mentions one it has not read. A mention needs three ticks from the station to everybody (station -> radio ->
-/// hosts -> physics), so the ingress announces kAnnounceAhead ticks ahead.
+/// The ingress gives each directive the next sequence number and the tick at which it takes effect, and publishes it on a topic of
+/// its own. Every frame mentions how many directives its publisher knew. No federate steps past a frame that mentions a directive
+/// that it has not read. A mention reaches all federates within three ticks (station -> radio -> hosts -> physics), so
+/// kAnnounceAhead = 4 ticks are enough for all to apply the directive at the same tick.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace kilotwin {
 
-/// How far ahead of the ingress' own tick a directive takes effect, ticks.
+/// Ticks from the ingress' current tick to the tick at which a directive takes effect.
 inline constexpr std::int64_t kAnnounceAhead = 4;
 
 enum class DirectiveKind : std::uint8_t {
@@ -47,26 +47,26 @@ class RunSchedule {
   /// after `first`.
   RunSchedule(Tick first, Tick last, std::int64_t checkpoint_every);
 
-  /// Takes a directive, in any order of arrival, repeated or not.
+  /// Adds a directive. Directives may arrive in any order and repeatedly.
   void add(const Directive&);
-  /// A frame mentions that `count` directives exist.
+  /// Registers that a frame has mentioned `count` directives.
   void mention(std::uint64_t count) {
     if (count > mentioned_) mentioned_ = count;
   }
-  /// How many directives are known without a gap: what own frames mention.
+  /// Number of directives known without a gap, which the federate's own frames mention.
   [[nodiscard]] std::uint32_t known() const { return known_; }
 
   enum class Verdict { kStep, kAwaitDirective, kPaused, kFinished };
-  /// What a federate at `now` that has all its inputs does next. Ask with non-decreasing ticks.
+  /// The next action of a federate at `now` that has all its inputs. Successive calls need non-decreasing ticks.
   Verdict verdict(Tick now);
 
-  // What belongs to the step from `now`, once its verdict is kStep.
+  // External inputs of the step from `now`; valid once the verdict at `now` is kStep.
   [[nodiscard]] const std::vector<OverheadPacket>& overhead_inputs() const { return overhead_inputs_; }
   [[nodiscard]] const std::vector<TrackedPoseInput>& tracked_poses() const { return tracked_poses_; }
 
   /// Whether the state at `now` is to be saved; valid once the verdict at `now` is kStep or kFinished.
   [[nodiscard]] bool checkpoint_at(Tick now) const;
-  /// Where the run ends as far as is known.
+  /// The last tick of the run, by the directives known so far.
   [[nodiscard]] Tick last() const { return last_; }
   [[nodiscard]] bool stopped_early() const { return stopped_; }
 
@@ -88,22 +88,22 @@ class RunSchedule {
   std::vector<Tick> checkpoints_;  // by directives
 };
 
-/// Stamps external input: the one place where a tick is chosen for it.
+/// Stamps external input with sequence numbers and ticks.
 class Ingress {
  public:
   Ingress() = default;
-  /// Goes on after what has been stamped already, numbered from 0.
+  /// Continues after the directives `stamped`, which are numbered from 0.
   explicit Ingress(std::span<const Directive> stamped) : next_sequence_number_(stamped.size()) {
     for (const Directive& directive : stamped) latest_ = std::max(latest_, directive.tick);
   }
-  /// Gives `directive` its sequence number and tick; `now` is the tick at which the ingress' own federate stands.
+  /// Gives `directive` its sequence number and tick. `now` is the station's current tick.
   Directive stamp(Tick now, Directive directive);
 
  private:
   std::uint64_t next_sequence_number_ = 0;
   Tick latest_{0};        // no later directive takes effect before an earlier one
-  bool pausing_ = false;  // the run stands, or will stand, at latest_: what comes now takes effect there
-  Tick steps_end_{-1};    // where a kStep pauses again
+  bool pausing_ = false;  // the run is paused, or will pause, at latest_; further directives take effect at latest_
+  Tick steps_end_{-1};    // tick at which the run pauses after a kStep; negative: none
 };
 
 }  // namespace kilotwin

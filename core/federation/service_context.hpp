@@ -1,4 +1,4 @@
-/// What every service is given besides its plan and its own index in it.
+/// Arguments of every service besides the plan and its index in it.
 #pragma once
 
 #include <filesystem>
@@ -14,9 +14,9 @@ namespace kilotwin {
 struct ServiceContext {
   dds::Transport transport;
   std::filesystem::path run_directory;
-  std::optional<Checkpoint> resumed;  ///< where the run starts from a checkpoint
-  std::vector<Directive> inputs;  ///< that were stamped for ticks to come, before the run went back to a checkpoint
-  double give_up_after_s = 0;     ///< how long a service waits for others without progress; 0: for ever
+  std::optional<Checkpoint> resumed;  ///< the checkpoint from which the run starts, if any
+  std::vector<Directive> inputs;      ///< directives of an earlier attempt for ticks after the checkpoint
+  double give_up_after_s = 0;         ///< longest wait for others without progress; 0: no limit
 
   [[nodiscard]] Tick first() const { return resumed ? resumed->tick : Tick{0}; }
 };

@@ -9,7 +9,7 @@ namespace {
 static_assert(sizeof(IrMessage) == 10);
 static_assert(sizeof(OverheadPacket) == 15 && alignof(OverheadPacket) == 1);
 
-// A wire sequence that borrows `count` elements; Cyclone reads it and neither writes nor frees.
+// A wire sequence that borrows `count` elements. Cyclone only reads it.
 template <class Sequence, class T> Sequence borrow(const T* data, std::size_t count) {
   using Element = std::remove_pointer_t<decltype(Sequence::_buffer)>;
   Sequence sequence{};
@@ -23,7 +23,7 @@ template <class Sequence, class T> Sequence borrow(const std::vector<T>& values)
   return borrow<Sequence>(values.data(), values.size());
 }
 
-// Copies a wire sequence into a vector of T; false where it does not hold whole Ts.
+// Copies a wire sequence into a vector of T. Returns false if its size is not a multiple of that of T.
 template <class Sequence, class T> bool copy(const Sequence& sequence, std::vector<T>& values) {
   constexpr std::size_t per_value = sizeof(T) / sizeof(*Sequence::_buffer);
   if (sequence._length % per_value != 0) return false;

@@ -1,6 +1,6 @@
-/// Between engines' frames and DDS samples. Writing borrows the frame's arrays; reading copies into the frame's, whose
-/// capacity is reused. A sample whose arrays disagree in length is refused: it did not come from us. Whether it fits the
-/// plan is for frame_check.hpp to say.
+/// Conversion between engines' frames and DDS samples. to_wire() borrows the frame's arrays. from_wire() copies into the frame's
+/// arrays and reuses their capacity. It refuses a sample whose arrays differ in length. frame_check.hpp compares the frame with
+/// the plan.
 #pragma once
 
 #include "core/federation/schedule.hpp"
@@ -9,7 +9,7 @@
 
 namespace kilotwin {
 
-/// The fields that every frame has on the wire besides its tick.
+/// Fields of every sample besides the tick.
 struct WireHeader {
   std::uint32_t publisher;
   std::uint64_t run;
@@ -23,7 +23,7 @@ WireRadioFrame to_wire(const WireHeader&, const RadioFrame& frame);
 WireOverheadFrame to_wire(const WireHeader&, const OverheadFrame& frame);
 WireDirective to_wire(std::uint64_t run, const Directive& directive);
 
-// False where the sample is malformed; the frame is then unspecified.
+// Returns false if the sample is malformed; the frame is then unspecified.
 bool from_wire(const WireBodyFrame&, BodyFrame& frame);
 bool from_wire(const WireActuationFrame&, ActuationFrame& frame);
 bool from_wire(const WireRadioFrame&, RadioFrame& frame);

@@ -1,4 +1,4 @@
-/// The one place where plain settings are filled from the schema: defaults are the schema's.
+/// Conversion of the schema's messages to settings. Absent fields get the schema's defaults.
 #pragma once
 
 #include "core/plan/settings.hpp"
@@ -14,13 +14,13 @@ class Program;
 class VirtualEnvironment;
 }  // namespace proto
 
-/// Throws UserError where no plan can be made of the manifest.
+/// Throws UserError if the manifest has another format or is inconsistent.
 void check_manifest(const proto::Manifest&);
 
-/// Of a manifest that passes check_manifest.
+/// The settings of a manifest. Requires that check_manifest() accepts it.
 [[nodiscard]] PlanSettings settings_of(const proto::Manifest&);
 
-/// Parts, for those that work on messages of the schema without a manifest.
+/// The settings of single messages, for code that has no manifest.
 [[nodiscard]] EffectSettings settings_of(const proto::Effect&);
 [[nodiscard]] FunctionSettings settings_of(const proto::Function&);
 [[nodiscard]] LightSourceSettings settings_of(const proto::LightSource&);

@@ -49,7 +49,7 @@ __asm__(
     FUNCTION(kt_enter) SAVE
     "mov %rsp, " HOST_STACK "\n"
     "mov " ROBOT_STACK ", %rsp\n" CLEAR CLEAR_VECTORS RESTORE "xor %eax, %eax\n" CONTINUE END(kt_enter)
-    /* Where a robot that waits jumps to, see kilolib.c; goes on there in the next tick. */
+    /* Target of the jump by which a robot waits (kilolib.c). The robot continues after its jump in the next tick. */
     FUNCTION(kt_wait)
     "xor %eax, %eax\n"
     "kt_switch:\n" SAVE

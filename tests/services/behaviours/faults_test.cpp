@@ -6,7 +6,7 @@ namespace kilotwin::behaviours::test {
 namespace {
 
 /// Robot 9 of 18 executes `action` when its clock shows 5. All robots count in their left motor.
-void one_fails(const std::string& action, const std::string& told, const std::string& before = "",
+void one_fails(const std::string& action, const std::string& text, const std::string& before = "",
                const std::string& after = "") {
   Swarm swarm({program(before +
                        "\nstatic uint8_t n;\nstatic void loop(void) { set_color(5); set_motors(++n, 1);\n"
@@ -24,7 +24,7 @@ void one_fails(const std::string& action, const std::string& told, const std::st
   }
   ASSERT_EQ(swarm.hosts[0]->robots_failed(), 1u);
   EXPECT_EQ(swarm.hosts[0]->failures()[0].robot, 9u);
-  EXPECT_NE(swarm.hosts[0]->failures()[0].text.find(told), std::string::npos) << swarm.hosts[0]->failures()[0].text;
+  EXPECT_NE(swarm.hosts[0]->failures()[0].text.find(text), std::string::npos) << swarm.hosts[0]->failures()[0].text;
 }
 
 TEST(Faults, NullWrite) {
@@ -117,10 +117,10 @@ TEST(Faults, BeyondTheVariables) {
   const Program& loaded = swarm.programs->program(0);
   const std::uint64_t end = loaded.slot(9 % kSlots).image_address() + loaded.file.data.last + kSlackOctets;
   ASSERT_EQ(swarm.hosts[0]->robots_failed(), 1u);
-  char told[64];
-  std::snprintf(told, sizeof told, "access to address 0x%llx in loop()", static_cast<unsigned long long>(end));
-  EXPECT_NE(swarm.hosts[0]->failures()[0].text.find(told), std::string::npos)
-      << swarm.hosts[0]->failures()[0].text << "; expected " << told;
+  char text[64];
+  std::snprintf(text, sizeof text, "access to address 0x%llx in loop()", static_cast<unsigned long long>(end));
+  EXPECT_NE(swarm.hosts[0]->failures()[0].text.find(text), std::string::npos)
+      << swarm.hosts[0]->failures()[0].text << "; expected " << text;
 }
 
 TEST(Faults, BeforeTheVariables) {

@@ -156,15 +156,15 @@ TEST_P(LifeCycles, FollowEveryMessageAsTheFirmwareDoes) {
   Air ask;
   for (std::uint32_t n = 0; n < kRobots; ++n) ask.ask.push_back(n);
   swarm.step(ask);
-  const ActuationFrame told = swarm.frame();
-  for (std::uint32_t at = 0; at < told.offer_robot.size(); ++at) {
-    const std::uint32_t n = told.offer_robot[at];
+  const ActuationFrame reported = swarm.frame();
+  for (std::uint32_t at = 0; at < reported.offer_robot.size(); ++at) {
+    const std::uint32_t n = reported.offer_robot[at];
     SCOPED_TRACE(trace(n));
     const bool anew = messages[n][9] == kReset || messages[n][9] == kBoot;
-    EXPECT_EQ(told.offer_message[at][0], messages[n][9] < 0x80 ? 1 : 0);
-    EXPECT_EQ(told.offer_message[at][1], 1) << (anew ? "started anew" : "resumed, not started again");
+    EXPECT_EQ(reported.offer_message[at][0], messages[n][9] < 0x80 ? 1 : 0);
+    EXPECT_EQ(reported.offer_message[at][1], 1) << (anew ? "started anew" : "resumed, not started again");
   }
-  EXPECT_GE(told.offer_robot.size(), from == LifeCycle::kSleeping ? 12u : kRobots - 1);
+  EXPECT_GE(reported.offer_robot.size(), from == LifeCycle::kSleeping ? 12u : kRobots - 1);
 }
 
 std::string name_of(const testing::TestParamInfo<LifeCycle>& tested) {
@@ -359,7 +359,7 @@ TEST(Eeprom, CalibrationIsSavedToItAndHoldsAfterAReset) {
                "  m.data[2] = kilo_turn_left; m.data[3] = kilo_turn_right; m.data[4] = kilo_straight_left;\n"
                "  m.data[5] = kilo_straight_right; return &m; }")},
       1);
-  const auto told = [&] {
+  const auto reported = [&] {
     swarm.step(heard(message(kRun)));
     Air ask;
     ask.ask = {0};
@@ -379,9 +379,9 @@ TEST(Eeprom, CalibrationIsSavedToItAndHoldsAfterAReset) {
   EXPECT_EQ(swarm.life_cycle(0), LifeCycle::kIdle);
   EXPECT_EQ(swarm.frame().motor_left[0], 0);
   const std::vector<int> saved{0x34, 0x12, 61, 62, 63, 64};
-  EXPECT_EQ(told(), saved);
+  EXPECT_EQ(reported(), saved);
   swarm.step(heard(message(kReset)));
-  EXPECT_EQ(told(), saved);
+  EXPECT_EQ(reported(), saved);
   const auto& octets = *swarm.hosts[0]->eeprom(0);
   EXPECT_EQ((std::vector<int>{octets[0xB0], octets[0xB1], octets[5], octets[9], octets[0xC], octets[0x14]}), saved);
 }

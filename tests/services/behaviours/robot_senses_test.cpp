@@ -63,10 +63,10 @@ TEST(RobotSenses, ReadingsAreNormalWithTheStatedSpreadAndEndAt1023) {
               1, 1, "light { ambient: 400 sensor { gain_sd: 0 noise_floor: 0 noise_relative: 0.05 } }");
   swarm.start();
   swarm.steps(250);
-  const std::int32_t told = values(swarm)[0];
-  EXPECT_NEAR(told / 1000 / 100.0, 20 * 20 + 1 / 12.0, 4 * 400 * std::sqrt(2.0 / 20000))
+  const std::int32_t reported = values(swarm)[0];
+  EXPECT_NEAR(reported / 1000 / 100.0, 20 * 20 + 1 / 12.0, 4 * 400 * std::sqrt(2.0 / 20000))
       << "variance, rounding included";
-  EXPECT_NEAR(told % 1000 - 500, 0, 4 * 100 * 20 / std::sqrt(20000.0)) << "mean, hundredths";
+  EXPECT_NEAR(reported % 1000 - 500, 0, 4 * 100 * 20 / std::sqrt(20000.0)) << "mean, hundredths";
   Swarm bright({reporting("static void loop(void) { value = get_ambientlight(); }")}, 1, 1,
                "light { source { height_mm: 31 } }");
   bright.start();
@@ -161,8 +161,8 @@ TEST(RobotSenses, ABatteryWithoutNoiseGivesNoRandomness) {
               1, 1, "battery { reading_sd: 0 }");
   swarm.start();
   swarm.steps(5);
-  const std::int32_t told = values(swarm)[0];
-  EXPECT_TRUE(told == 100 || told == 10000) << told;
+  const std::int32_t reported = values(swarm)[0];
+  EXPECT_TRUE(reported == 100 || reported == 10000) << reported;
 }
 
 TEST(RobotSenses, GoThroughCheckpoints) {
@@ -208,12 +208,12 @@ TEST(RobotSenses, EepromsOfTheExperimentAreUsed) {
         eeprom.set_content(content);
       });
   swarm.start();
-  const auto told = values(swarm);
-  EXPECT_EQ(told[0] & 0xffff, 1000);
-  EXPECT_EQ(told[3] & 0xffff, 1003);
-  EXPECT_EQ(told[3] >> 16, 70);
-  EXPECT_EQ(told[2] & 0xffff, 261);
-  EXPECT_EQ(told[2] >> 16, 99);
+  const auto reported = values(swarm);
+  EXPECT_EQ(reported[0] & 0xffff, 1000);
+  EXPECT_EQ(reported[3] & 0xffff, 1003);
+  EXPECT_EQ(reported[3] >> 16, 70);
+  EXPECT_EQ(reported[2] & 0xffff, 261);
+  EXPECT_EQ(reported[2] >> 16, 99);
 }
 
 }  // namespace

@@ -22,8 +22,8 @@ pid_t run_in_a_process(Swarm& swarm) {
     RunningNote note(swarm.folder.path(), HostId{0});
     swarm.hosts[0]->note_running_in(note.place());
     swarm.start();
-    const bool told = write(ready[1], "x", 1) == 1;
-    for (; told;) swarm.step();
+    const bool written = write(ready[1], "x", 1) == 1;
+    for (; written;) swarm.step();
     _exit(1);
   }
   char octet = 0;
