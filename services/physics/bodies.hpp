@@ -1,4 +1,4 @@
-/// Bodies in ascending order of their robots' ids, structure of arrays. The state of a body is its pose; there is no velocity.
+/// Bodies as a structure of arrays, in ascending order of robot ids. The state of a body is its pose; it has no velocity.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,17 @@ namespace kilotwin::physics {
 struct Bodies {
   std::vector<std::uint32_t> robot;
   std::vector<double> x_mm, y_mm, heading_rad;  ///< heading in [-pi, pi)
-  std::vector<std::uint8_t> tracked;            ///< 1: a real robot; not driven, not moved by others
-  /// 1: the surroundings must be searched in the next step even if the body rests, because it moved, overlapped or came
-  /// new. It spares work and never changes a result.
+  std::vector<std::uint8_t> tracked;  ///< 1: a real robot, posed by a tracker; neither drives nor contacts move it
+  /// 1: the next step must search the body's neighbourhood even if the body is not driven, because the body moved,
+  /// overlaps or has just become known. This flag saves work and never changes a result.
   std::vector<std::uint8_t> awake;
-  /// What the model's effects remember: `remembered` values per body.
+  /// Memory of the model's effects: `remembered` values per body.
   std::vector<double> memory;
   std::size_t remembered = 0;
 
   [[nodiscard]] std::size_t size() const { return robot.size(); }
   void clear();
-  /// Remembers zeros.
+  /// Appends a body with a memory of zeros.
   void add(std::uint32_t id, double x, double y, double heading, std::uint8_t is_tracked, std::uint8_t is_awake);
   void add(const Bodies& other, std::size_t i);
   void resize(std::size_t);

@@ -5,10 +5,10 @@
 namespace kilotwin::physics {
 namespace {
 
-/// A wider one is rebuilt less often and holds more; the cost is flat from 8 to 12 mm.
+/// A wider skin means fewer rebuilds and longer lists. The cost is flat from 8 to 12 mm.
 constexpr double kSkin_mm = 10;
-/// What two bodies may have moved towards each other, less what rounding may hide.
-constexpr double kWay_mm = 0.499 * kSkin_mm;
+/// A list is valid while no body has moved farther, mm: half the skin less a reserve for rounding.
+constexpr double kMostMotion_mm = 0.499 * kSkin_mm;
 
 }  // namespace
 
@@ -21,7 +21,7 @@ bool CandidateList::is_good(const Bodies& bodies) const {
   int moved = 0;
   for (std::size_t i = 0; i < robot_.size(); ++i) {
     const double dx = x[i] - x_mm_[i], dy = y[i] - y_mm_[i];
-    moved |= dx * dx + dy * dy > kWay_mm * kWay_mm;
+    moved |= dx * dx + dy * dy > kMostMotion_mm * kMostMotion_mm;
   }
   return moved == 0;
 }

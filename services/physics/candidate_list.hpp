@@ -1,6 +1,6 @@
-/// Who may come near whom: for each body the others within the cutoff and a skin, ascending. A list stays good until a body
-/// has moved by half of the skin, so it is rebuilt every ten ticks or so. It holds more than the cutoff asks for; readers
-/// look at distances themselves, so that no result depends on when it was built.
+/// Neighbour lists (Verlet lists): for each body, the other bodies within the cutoff plus a skin, ascending. A list is valid
+/// until a body has moved by half the skin, usually for about ten ticks. It holds more pairs than the cutoff requires.
+/// Readers compare distances themselves, so no result depends on when a list was built.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ class CandidateList {
  public:
   explicit CandidateList(double cutoff_mm);
 
-  /// Makes the list good for these bodies.
+  /// Rebuilds the lists unless they are valid for these bodies.
   void update(const Bodies&);
 
   [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t body) const {
@@ -27,9 +27,9 @@ class CandidateList {
   [[nodiscard]] bool is_good(const Bodies&) const;
 
   CellList cells_;
-  std::vector<std::uint32_t> robot_;  ///< when it was built
-  std::vector<double> x_mm_, y_mm_;   ///< when it was built
-  std::vector<std::uint32_t> first_;  ///< per body: where its candidates begin; one more entry at the end
+  std::vector<std::uint32_t> robot_;  ///< at the last rebuild
+  std::vector<double> x_mm_, y_mm_;   ///< at the last rebuild
+  std::vector<std::uint32_t> first_;  ///< per body: index of its first candidate in others_; then the total
   std::vector<std::uint32_t> others_, found_;
 };
 

@@ -18,7 +18,7 @@ ContactSolver::ContactSolver(const RunPlan& plan, const DriveModel& drive)
       cache_(plan.robots()),
       movable_pass_(plan, limits_),
       touching_(plan.movables()),
-      lively_movable_(plan.movables()) {
+      movable_in_motion_(plan.movables()) {
   for (std::uint32_t r = 0; r < plan.robots(); ++r) {
     immobile_[r] = plan.immobile(r);
     has_immobile_ |= plan.immobile(r);
@@ -47,13 +47,13 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
 
   if (own.empty() && !has_shapes_ && !any_overlap_) {
     update_slots(bodies);
-    rest_who_can();
+    rest_idle_batches();
     return true;
   }
   release_slots();
   slot_robot_ = bodies.robot;
-  lively_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) lively_[i] = driven_[i] | cache_.any(bodies.robot[i]);
+  in_motion_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) in_motion_[i] = driven_[i] | cache_.any(bodies.robot[i]);
   candidates_.update(bodies);
   find_specials(bodies);
   search_all(bodies, own, own_movable);
@@ -62,13 +62,13 @@ bool ContactSolver::find(const Bodies& bodies, const std::vector<std::uint8_t>& 
   pass_.rest();
   fill_batches(bodies, 0, false);
   if (has_others_) {
-    asked_.resize(count);
-    for (std::size_t i = 0; i < count; ++i) asked_[i] = driven_[i] & (hops_[i] != kOutOfReach);
+    needs_drive_.resize(count);
+    for (std::size_t i = 0; i < count; ++i) needs_drive_[i] = driven_[i] & (hops_[i] != kOutOfReach);
   }
   return true;
 }
 
-/// Places, drives, normals, gaps and velocities at the tick's start.
+/// Positions, drives, normals, gaps and velocities at the tick's start.
 void ContactSolver::begin(const Bodies& bodies, const BodyColumns& columns) {
   any_overlap_ = any_overlap_ && !slots_are_kept_;
   for (std::size_t b = 1; b < pass_.batches(); ++b) {
@@ -82,7 +82,8 @@ void ContactSolver::begin(const Bodies& bodies, const BodyColumns& columns) {
     batch.overlap = start.nearest_mm - kDiameter_mm < -kOverlapTolerance_mm;
     any_overlap_ |= batch.overlap;
     if (!(start.nearest_mm > 0)) {
-      for (std::size_t lane = 0; lane < kLanes; ++lane) part_lane(bodies, lane, batch, pass_.contacts_of(batch));
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        separate_lane(bodies, lane, batch, pass_.contacts_of(batch));
     }
     if (batch.special) {
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -92,7 +93,7 @@ void ContactSolver::begin(const Bodies& bodies, const BodyColumns& columns) {
       }
     }
     if (!slots_are_kept_) continue;
-    if (batch.used == 0 && !batch.near_wall) batch.passes = 0;  // They roll.
+    if (batch.used == 0 && !batch.near_wall) batch.passes = 0;  // move() advances them as free bodies.
     remember_forces(batch);
   }
 }
@@ -105,14 +106,14 @@ void ContactSolver::move(Bodies& bodies, Drives& drives) {
   for (Special& special : specials_)
     special.normal_impulse_mm = cache_[bodies.robot[special.body]].contact_with(special.key).normal_impulse_mm;
   begin(bodies, columns);
-  pass_.kernel().roll(pass_limits_, columns, bodies.x_mm.data(), bodies.y_mm.data(), bodies.heading_rad.data(),
-                      bodies.size());
+  pass_.kernel().move_free(pass_limits_, columns, bodies.x_mm.data(), bodies.y_mm.data(), bodies.heading_rad.data(),
+                           bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) bodies.awake[i] = driven_[i] | bodies.tracked[i];
   for (std::size_t i = 0; i < bodies.size() && !slots_are_kept_; ++i) {
     if (hops_[i] != 0) {
       bodies.awake[i] = hops_[i] != kOutOfReach;
-    } else if (slot_of_[i] == ContactPass::kStill && active_[i] != 0 && lively_[i] != 0) {
-      cache_.clear(bodies.robot[i]);  // It touches nobody.
+    } else if (slot_of_[i] == ContactPass::kStill && active_[i] != 0 && in_motion_[i] != 0) {
+      cache_.clear(bodies.robot[i]);  // It touches nothing.
     }
   }
   if (slot_movers_.empty() && movable_pass_.empty()) return;
@@ -121,35 +122,35 @@ void ContactSolver::move(Bodies& bodies, Drives& drives) {
     movable_pass_.add_contact(s.movable, {slot_of_[s.body], s.slot, s.normal_x, s.normal_y, s.gap_mm, s.gain,
                                           s.normal_impulse_mm, s.lever_x_mm, s.lever_y_mm});
   }
-  movable_pass_.set_off(movables_, pass_);
+  movable_pass_.start(movables_, pass_);
   pass_.run(pass_limits_, any_overlap_, [&](std::uint32_t step) { movable_pass_.sub_step(step, pass_); });
   movable_pass_.finish(movables_);
   end(bodies);
 }
 
-/// Where the batches have brought the own bodies, and who goes on next tick even where it has not moved: its forces changed, or
-/// it slips, which asks for a drive that may end.
+/// Writes the batches' positions into the own bodies, and marks those awake that must be searched in the next tick. A body
+/// that did not move is awake as well if its impulses changed, or if it slips: its slip decays only under the solver.
 void ContactSolver::end(Bodies& bodies) {
   for (std::size_t b = 1; b < pass_.batches(); ++b) {
     ContactBatch& batch = pass_.batch(b);
     if (batch.passes == 0) continue;
-    if (batch.contacts > CachedContacts::kMost) keep_most(batch);
+    if (batch.contacts > CachedContacts::kMost) drop_excess_contacts(batch);
     for (std::size_t lane = 0; lane < batch.size; ++lane) {
       const std::uint32_t i = batch.body[lane];
       if (hops_[i] != 0) continue;
       const double x = batch.x_mm[lane], y = batch.y_mm[lane];
       double to_x = x + batch.shift_x_mm[lane], to_y = y + batch.shift_y_mm[lane];
-      if (batch.near_wall && !limits_.outside(x, y)) {  // The sum is rounded, a wall is not.
+      if (batch.near_wall && !limits_.outside(x, y)) {  // The rounded sum may lie beyond the wall.
         to_x = std::clamp(to_x, -limits_.x_limit_mm, limits_.x_limit_mm);
         to_y = std::clamp(to_y, -limits_.y_limit_mm, limits_.y_limit_mm);
       }
       bodies.x_mm[i] = to_x;
       bodies.y_mm[i] = to_y;
-      if (driven_[i] != 0 && slots_are_kept_) continue;  // It is awake.
+      if (driven_[i] != 0 && slots_are_kept_) continue;  // It is awake already.
       const bool moved = to_x != x || to_y != y || limits_.outside(to_x, to_y);
       const bool changed =
           slots_are_kept_
-              ? batch.overlap || !stays(batch, lane)
+              ? batch.overlap || !is_steady(batch, lane)
               : store_contacts(bodies.robot[i], slot_movers_[(b - 1) * kLanes + lane]) || overlaps_[i] != 0;
       bodies.awake[i] = static_cast<std::uint8_t>(moved | changed | (driven_[i] != 0));
     }
@@ -157,8 +158,8 @@ void ContactSolver::end(Bodies& bodies) {
   cache_is_current_ = !slots_are_kept_;
 }
 
-/// Contacts beyond what the cache holds end.
-void ContactSolver::keep_most(const ContactBatch& batch) {
+/// Sets the impulses of contacts beyond the cache's capacity to 0.
+void ContactSolver::drop_excess_contacts(const ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     std::size_t n = 0;
@@ -169,7 +170,7 @@ void ContactSolver::keep_most(const ContactBatch& batch) {
   }
 }
 
-/// Of a batch some of whose bodies are not driven: what its forces are compared with, so that they may rest.
+/// Saves the impulses of a batch with undriven bodies at the tick's start; is_steady() compares with them.
 void ContactSolver::remember_forces(ContactBatch& batch) {
   int all_driven = 1;
   for (const std::uint32_t body : batch.body) all_driven &= driven_[body];
@@ -186,8 +187,8 @@ void ContactSolver::remember_forces(ContactBatch& batch) {
   }
 }
 
-/// Whether a body that is not driven has no slip, and its forces are as they were at the tick's start.
-bool ContactSolver::stays(const ContactBatch& batch, std::size_t lane) const {
+/// Whether an undriven body has no slip, and the same impulses as at the tick's start.
+bool ContactSolver::is_steady(const ContactBatch& batch, std::size_t lane) const {
   bool same = !batch.slips[lane] && batch.slip_x_mm[lane] == 0 && batch.slip_y_mm[lane] == 0;
   const double* from = remembered_.data() + 2 * kLanes * batch.first_contact + lane;
   const ContactLanes* const contacts = pass_.contacts_of(batch);

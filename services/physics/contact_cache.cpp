@@ -1,4 +1,4 @@
-// Which body works in which lane of which batch, and what lanes are warm-started with.
+// Assigns bodies to lanes of batches, and warm-starts the lanes.
 #include <algorithm>
 #include <utility>
 
@@ -20,15 +20,15 @@ std::uint64_t contact_hash(std::uint32_t robot, std::uint32_t other, double norm
 }  // namespace
 namespace {
 
-/// What two bodies may have moved towards each other, less what rounding may hide.
-constexpr double kSlotWay_mm = 0.499 * kSkin_mm;
+/// Slots stay assigned while no body has moved farther, mm: half the skin less a reserve for rounding.
+constexpr double kMostSlotMotion_mm = 0.499 * kSkin_mm;
 
 }  // namespace
 
 void ContactSolver::update_slots(const Bodies& bodies) {
   if (slots_are_kept_ && slot_robot_ == bodies.robot &&
       !pass_.kernel().any_moved(bodies.x_mm.data(), bodies.y_mm.data(), slot_x_mm_.data(), slot_y_mm_.data(),
-                                bodies.size(), kSlotWay_mm * kSlotWay_mm)) {
+                                bodies.size(), kMostSlotMotion_mm * kMostSlotMotion_mm)) {
     return;
   }
   const bool same_robots = slots_are_kept_ && slot_robot_ == bodies.robot;
@@ -63,7 +63,7 @@ void ContactSolver::list_near(const Bodies& bodies, std::uint32_t i) {
   const auto candidates = candidates_.of(i);
   if (others_.size() <= other_count_ + candidates.size())
     others_.resize(2 * (other_count_ + candidates.size() + 1));
-  // Those within the cutoff first, both ascending.
+  // First the neighbours within the cutoff, then the others; both ascending.
   const double cutoff_square_mm2 = pass_limits_.cutoff_square_mm2;
   std::uint32_t* const others = others_.data() + other_count_;
   far_.resize(candidates.size() + 1);
@@ -79,7 +79,7 @@ void ContactSolver::list_near(const Bodies& bodies, std::uint32_t i) {
   std::copy_n(far_.begin(), far, others + near);
   const std::uint32_t contacts = near + far;
   if (contacts == 0 && !limits_.near_wall(x, y, kSkin_mm)) {
-    cache_.clear(bodies.robot[i]);  // It touches nobody.
+    cache_.clear(bodies.robot[i]);  // It touches nothing.
     return;
   }
   movers_.push_back({i, static_cast<std::uint32_t>(other_count_), contacts, near});
@@ -87,7 +87,7 @@ void ContactSolver::list_near(const Bodies& bodies, std::uint32_t i) {
 }
 
 void ContactSolver::assign_slots() {
-  // By the number of contacts, so that lanes have work alike; those with equally many stay in the order of hops.
+  // Sort by number of contacts, so that the lanes of a batch have similar work. Equal numbers stay in the order of hops.
   std::array<std::uint32_t, kMostContacts + 2> end{};
   const auto key = [](const Mover& m) { return std::min(m.near, kMostContacts); };
   for (const Mover& m : movers_) ++end[key(m) + 1];
@@ -108,7 +108,7 @@ void ContactSolver::assign_slots() {
   }
 }
 
-/// The touched points of movable bodies have slots of their own; only their body moves them.
+/// Gives the points of contact on movable bodies slots of their own. Only their body moves them.
 void ContactSolver::assign_point_slots() {
   std::size_t lane = kLanes;
   for (Special& special : specials_) {
@@ -132,7 +132,7 @@ void ContactSolver::fill_batches(const Bodies& bodies, double more_mm, bool warm
       const Mover mover = is_body ? slot_movers_[at + lane] : Mover{slot_movers_[at].body, 0, 0, 0};
       const std::uint32_t i = mover.body;
       batch.body[lane] = i;
-      // One that the last hop has reached brings its velocity alone, and that counts.
+      // A body at the last hop contributes its velocity only.
       if (warm_start) {
         warm_start_lane(lane, mover, batch);
       } else if (is_body && (mover.contacts > 0 || hops_[i] == limits_.sub_steps)) {
@@ -149,14 +149,14 @@ void ContactSolver::fill_batches(const Bodies& bodies, double more_mm, bool warm
   }
 }
 
-/// The neighbours of a lane, and their impulses from the cache.
+/// Fills in the neighbours of a lane, and their impulses from the cache.
 void ContactSolver::fill_lane(const Bodies& bodies, std::size_t lane, const Mover& mover, ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
   const CachedContacts& cached = cache_[bodies.robot[mover.body]];
   std::uint32_t p = 0;
   for (; p < mover.contacts; ++p) {
     const std::uint32_t j = others_[mover.first + p];
-    if (j >= bodies.size()) break;  // What is no disc comes last.
+    if (j >= bodies.size()) break;  // Shapes other than discs come last.
     const std::uint32_t id = bodies.robot[j];
     double normal_impulse_mm = 0, tangent_impulse_mm = 0;
     if (cached.contacts != 0) {
@@ -164,7 +164,7 @@ void ContactSolver::fill_lane(const Bodies& bodies, std::size_t lane, const Move
       normal_impulse_mm = own.normal_impulse_mm;
       tangent_impulse_mm = own.tangent_impulse_mm;
     } else if (cache_.any(id)) {
-      // Both robots cache a contact's impulses, unless one has touched nobody before the last tick.
+      // Both robots cache a contact's impulses, unless one of them touched nothing until the last tick.
       const CachedContacts::Contact theirs = cache_[id].contact_with(bodies.robot[mover.body]);
       normal_impulse_mm = theirs.normal_impulse_mm;
       tangent_impulse_mm = theirs.tangent_impulse_mm;
@@ -178,7 +178,7 @@ void ContactSolver::fill_lane(const Bodies& bodies, std::size_t lane, const Move
   batch.discs[lane] = p;
 }
 
-/// The same, and the slip, from the slot that the body had before.
+/// Fills in neighbours, impulses and slip from the body's previous slot.
 void ContactSolver::warm_start_lane(std::size_t lane, const Mover& mover, ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
   const Slot slot = mover.contacts > 0 ? previous_slot_of_[mover.body] : ContactPass::kStill;
@@ -202,7 +202,7 @@ void ContactSolver::warm_start_lane(std::size_t lane, const Mover& mover, Contac
   }
 }
 
-/// Puts those contacts of each body that are within the cutoff before the others, ascending: forces are summed in this order.
+/// Puts the contacts of each body within the cutoff first, ascending: impulses are summed in this order.
 void ContactSolver::order_contacts(const ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -225,7 +225,7 @@ void ContactSolver::order_contacts(const ContactBatch& batch) {
   }
 }
 
-/// Where the body has no such contact, any disc but its own does.
+/// Fills unused contacts of a lane: any disc except the body's own serves as the other.
 void ContactSolver::fill_rest(std::size_t lane, const Mover& mover, ContactBatch& batch) {
   ContactLanes* const contacts = pass_.contacts_of(batch);
   auto p = static_cast<std::uint32_t>(batch.discs[lane]);
@@ -239,9 +239,9 @@ void ContactSolver::fill_rest(std::size_t lane, const Mover& mover, ContactBatch
   }
 }
 
-/// Two in the same place part along x, the lower id to the left.
-void ContactSolver::part_lane(const Bodies& bodies, std::size_t lane, const ContactBatch& batch,
-                              ContactLanes* contacts) const {
+/// Two bodies at the same position separate along x, the lower id to the left.
+void ContactSolver::separate_lane(const Bodies& bodies, std::size_t lane, const ContactBatch& batch,
+                                  ContactLanes* contacts) const {
   const std::uint32_t i = batch.body[lane];
   for (std::uint32_t p = 0; p < static_cast<std::uint32_t>(batch.discs[lane]); ++p) {
     const std::uint32_t j = contacts[p].there[lane];
@@ -287,7 +287,7 @@ void ContactSolver::store_cache() const {
   for (const Mover& m : slot_movers_) store_contacts(slot_robot_[m.body], m);
 }
 
-/// From the slots where these are up to date, so that the cache is not filled in each tick.
+/// Reads slots while they are newer than the cache, so that a hash does not fill the cache in each tick.
 std::uint64_t ContactSolver::hash_contacts(const std::vector<std::uint32_t>& robots) const {
   std::uint64_t sum = 0;
   if (cache_is_current_) {
@@ -325,8 +325,8 @@ void ContactSolver::release_slots() {
   slots_are_kept_ = false;
 }
 
-/// A batch rests if nobody in it, and nobody beside one of it, is driven or awake.
-void ContactSolver::rest_who_can() {
+/// A batch rests if none of its bodies, and no neighbour of them, is driven or awake.
+void ContactSolver::rest_idle_batches() {
   const bool all_active = active_count_ == active_.size();
   for (std::size_t b = 1; b < pass_.batches(); ++b) {
     ContactBatch& batch = pass_.batch(b);

@@ -1,30 +1,30 @@
-/// Constants of contact. docs/explanation/contact.md has the evidence.
+/// Constants of the contact solver. docs/explanation/contact.md states their sources.
 #pragma once
 
 namespace kilotwin::physics {
 
-/// Of a robot's disc, mm.
+/// Diameter of a robot's disc, mm.
 inline constexpr double kDiameter_mm = 33;
-/// An overlap below this is rounding and is left alone, mm.
+/// Overlaps below this are rounding errors and are ignored, mm.
 inline constexpr double kOverlapTolerance_mm = 5e-10;
 
-/// By which the force of a contact grows with what the two close. Six discs around one, each with six, are stable below 1/6: the
-/// sum of n n^T over six normals has the eigenvalue 3, a contact has two ends, and the masses are the unit.
+/// Gain of the normal impulse per closing speed. Six discs around one, each with six contacts, are stable below 1/6: the sum
+/// of n n^T over six normals has the eigenvalue 3, a contact has two ends, and masses are 1.
 inline constexpr double kGain = 0.15;
-/// By which the friction of a contact grows with what the rims slide. Six discs around one, each with six, have
-/// 6 (kGain + kTangentGain) = 1.26, below the 4/3 up to which the iteration converges (Banert et al., 2023).
+/// Gain of the tangent impulse per sliding speed. Six discs around one, each with six contacts, have
+/// 6 (kGain + kTangentGain) = 1.26. The iteration converges below 4/3 (Banert et al., 2023).
 inline constexpr double kTangentGain = 0.06;
-/// How fast a force ends where a gap opens beyond what a contact bridges, over how fast it ends where bodies part. With 1, a chain
-/// of robots hammers on what it pushes, and so moves what its force does not.
+/// Ratio of two decay rates of an impulse: while the gap exceeds the touch distance, and while the bodies part. With 1, a
+/// chain of robots hits the body that it pushes again and again, and so moves a body that its force cannot move.
 inline constexpr double kEase = 0.25;
-/// The inertia of all that moves, over its true one. Kilobots are quasi-static: inertia decides nothing, and forces in a jam find
-/// their balance the sooner the less of them it takes to stop a body.
+/// Ratio of the bodies' inertia in the solver to their true inertia. Kilobots are quasi-static: inertia does not matter.
+/// Forces in a jam balance faster with a smaller inertia, because fewer contacts are needed to stop a body.
 inline constexpr double kInertia = 2;
 
-/// The gap where there is no contact: so wide that it never acts, mm.
+/// Gap that stands for "no contact": so wide that it never acts, mm.
 inline constexpr double kNoContact_mm = 1e100;
-/// Contacts are listed up to so much beyond where they matter, so that a list stays good until somebody has moved by half of it.
-/// A wider one adds contacts that do nothing.
+/// Contacts are listed up to this distance beyond the cutoff. A list is valid until a body has moved by half of it, mm.
+/// A wider skin adds contacts without effect.
 inline constexpr double kSkin_mm = 4;
 
 }  // namespace kilotwin::physics

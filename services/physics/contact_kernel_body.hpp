@@ -1,4 +1,5 @@
-/// The inner loops of contact, for a source that says for which instruction set. contact.hpp states the law.
+/// The inner loops of contact. A source includes this file and is compiled for one instruction set. contact.hpp states the
+/// method.
 #pragma once
 
 #include "services/physics/contact_constants.hpp"
@@ -7,9 +8,9 @@
 namespace kilotwin::physics {
 namespace {
 
-/// By how much a limit may be missed because of rounding, mm. Sliding at a gap of 0 would stop without it.
+/// Tolerance of a limit for rounding, mm. Without it, sliding at a gap of 0 would stop.
 constexpr double kLimitTolerance_mm = 1e-14;
-/// How many limits of a body are met exactly, the one that is missed most first; what is missed then scales all down.
+/// Number of a body's limits that are met exactly, the most violated first. Remaining violations scale the displacement down.
 constexpr int kLimitRounds = 2;
 
 Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, ContactBatch& batch,
@@ -36,7 +37,7 @@ Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, Cont
     store(gap, contact.gap_mm);
     store(within(load(contact.normal_impulse_mm), zero), contact.normal_impulse_mm);
     store(within(load(contact.tangent_impulse_mm), zero), contact.tangent_impulse_mm);
-    // The same number for both, to the last bit.
+    // Both bodies of a contact compute the same bits.
     store((turn + gather(bodies.turn_rad, contact.there)) * rim_mm_per_turn, contact.spin_mm);
     nearest = smaller(nearest, within(distance, no_contact));
   }
@@ -56,8 +57,8 @@ Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, Cont
   store(drive_y, batch.drive_y_mm);
   store(zero, batch.shift_x_mm);
   store(zero, batch.shift_y_mm);
-  store(start.c, batch.swing_x_mm);
-  store(start.d, batch.swing_y_mm);
+  store(start.c, batch.extrapolated_x_mm);
+  store(start.d, batch.extrapolated_y_mm);
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     batch.grip_mm[lane] = limits.grip_mm[bodies.driven[batch.body[lane]]];
   store(gather(bodies.cos_turn, batch.body), batch.cos_turn);
@@ -66,10 +67,10 @@ Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, Cont
   return {-largest(-nearest), any_above(newest, all(kNoContact_mm / 2))};
 }
 
-/// How many contacts batches have for which the loop below is unrolled, so that its values stay in registers.
+/// Largest number of contacts for which the loop below is unrolled, so that its values stay in registers.
 constexpr std::size_t kUnrolled = 4;
 
-/// What a pass keeps of each contact of a batch: in registers, or in memory where there are many.
+/// Values of each contact of a batch within a pass: in registers, or in memory for large counts.
 template <std::size_t kCount> struct ContactValues {
   ContactValues(const ContactLanes*, double*) {}
   Lanes normal_x[kCount], normal_y[kCount], room_mm[kCount];
@@ -94,7 +95,7 @@ template <> struct ContactValues<0> {
   [[nodiscard]] Lanes room(std::size_t p) const { return load(room_mm + p * kLanes); }
 };
 
-/// `kCount`: how many contacts the batch has, if it is not special; 0: as many as it says.
+/// `kCount`: number of contacts of a batch that is not special; 0: read the number from the batch.
 template <bool kWithOverlaps, std::size_t kCount>
 inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* contacts,
                  const SpecialLanes* specials, const double* motion, double* after, double* room_mm) {
@@ -104,11 +105,11 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
   const Lanes disc_gain = all(kGain), disc_friction = all(limits.friction), tolerance_mm = all(kLimitTolerance_mm);
   const bool special = kCount == 0 && batch.special;
   const Lanes shift_x = load(batch.shift_x_mm), shift_y = load(batch.shift_y_mm);
-  const Lanes swing_x = load(batch.swing_x_mm), swing_y = load(batch.swing_y_mm);
+  const Lanes extrapolated_x = load(batch.extrapolated_x_mm), extrapolated_y = load(batch.extrapolated_y_mm);
   const Lanes drive_x = load(batch.drive_x_mm), drive_y = load(batch.drive_y_mm);
   const Lanes old_slip_x = load(batch.slip_x_mm), old_slip_y = load(batch.slip_y_mm);
 
-  // Forces of the contacts; the sum in ascending order.
+  // Impulses of the contacts, summed in ascending order.
   ContactValues<kCount> of{contacts, room_mm};
   Lanes slip_x = old_slip_x, slip_y = old_slip_y, apart_x = zero, apart_y = zero, deepest = zero;
 #pragma GCC unroll 4
@@ -118,13 +119,14 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
     const Lanes normal_x = load(c.normal_x), normal_y = load(c.normal_y);
     of.set_normal(p, normal_x, normal_y);
     const Lanes gap = load(c.gap_mm) + (normal_x * (other.a - shift_x) + normal_y * (other.b - shift_y));
-    const Lanes closing = normal_x * (swing_x - other.c) + normal_y * (swing_y - other.d);
+    const Lanes closing = normal_x * (extrapolated_x - other.c) + normal_y * (extrapolated_y - other.d);
     const Lanes gain = special ? load(specials[p].gain) : disc_gain;
     const Lanes friction = special ? load(specials[p].friction) : disc_friction;
     const Lanes normal_impulse =
         larger(load(c.normal_impulse_mm) + gain * (closing - ease * larger(gap - touch_mm, zero)), zero);
-    // Of the rims, along the normal turned left: the same number for both bodies, to the last bit.
-    const Lanes sliding = (normal_x * (swing_y - other.d) - normal_y * (swing_x - other.c)) + load(c.spin_mm);
+    // Sliding of the rims along the normal turned left. Both bodies compute the same bits.
+    const Lanes sliding =
+        (normal_x * (extrapolated_y - other.d) - normal_y * (extrapolated_x - other.c)) + load(c.spin_mm);
     const Lanes most = friction * normal_impulse;
     const Lanes tangent_impulse = larger(smaller(load(c.tangent_impulse_mm) + tangent_gain * sliding, most), -most);
     store(normal_impulse, c.normal_impulse_mm);
@@ -142,7 +144,7 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
       of.set_room(p, larger(a_half * gap, zero));
     }
   }
-  // The ground takes off as much of the slip as its grip allows.
+  // The ground removes as much of the slip as its grip allows.
   const Lanes grip = load(batch.grip_mm), slip = root(slip_x * slip_x + slip_y * slip_y);
   const Lanes keep = chosen(slip > grip, (slip - grip) / slip, zero);
   slip_x = slip_x * keep;
@@ -166,7 +168,7 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
     slip_y = slip_y + (larger(smaller(y, most_y), least_y) - y);
     x = larger(smaller(x, most_x), least_x);
     y = larger(smaller(y, most_y), least_y);
-    // ExternalInput of a wall it moves inwards, as far as its neighbours let it.
+    // A body outside a wall moves inwards, as far as its neighbours allow.
     x = x + (larger(smaller(high_x, zero), -separation_mm) + smaller(larger(low_x, zero), separation_mm));
     y = y + (larger(smaller(high_y, zero), -separation_mm) + smaller(larger(low_y, zero), separation_mm));
     high_x = larger(high_x, zero);
@@ -186,8 +188,8 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
     y = y * shortening;
   }
 
-  // Takes off what is most beyond a limit, and again; what is beyond another limit then scales down all. Without branches, so
-  // that the processor works on several batches at a time.
+  // Removes the excess beyond the most violated limit, twice; then scales down to meet the others. There are no branches,
+  // so that the processor works on several batches at a time.
   const auto hold_at_walls = [&] {
     if (!batch.near_wall) return;
     x = larger(smaller(x, high_x), low_x);
@@ -226,8 +228,8 @@ inline void move(const PassLimits& limits, ContactBatch& batch, ContactLanes* co
   put_rows(next, after);
   store(next.a, batch.shift_x_mm);
   store(next.b, batch.shift_y_mm);
-  store(next.c, batch.swing_x_mm);
-  store(next.d, batch.swing_y_mm);
+  store(next.c, batch.extrapolated_x_mm);
+  store(next.d, batch.extrapolated_y_mm);
   store(slip_x, batch.slip_x_mm);
   store(slip_y, batch.slip_y_mm);
   store(cos_turn * drive_x - sin_turn * drive_y, batch.drive_x_mm);
@@ -260,10 +262,10 @@ void pass(const PassLimits& limits, std::uint32_t step, bool overlap, ContactBat
                                                  room_mm);
 }
 
-/// The first eight of these columns.
-inline void roll_eight(const PassLimits& limits, const double* drive_x_mm, const double* drive_y_mm,
-                       const double* cos_turn, const double* sin_turn, const double* turn_rad, double* x_mm,
-                       double* y_mm, double* heading_rad) {
+/// Moves the first eight bodies of these columns.
+inline void move_eight_free(const PassLimits& limits, const double* drive_x_mm, const double* drive_y_mm,
+                            const double* cos_turn, const double* sin_turn, const double* turn_rad, double* x_mm,
+                            double* y_mm, double* heading_rad) {
   constexpr double kBelowPi = 0x1.921fb54442d17p+1;  // the double below the one nearest to pi
   const Lanes cosine = load(cos_turn), sine = load(sin_turn), pi = all(0x1.921fb54442d18p+1), whole_turn = pi + pi;
   Lanes x = load(drive_x_mm), y = load(drive_y_mm), shift_x = x, shift_y = y;
@@ -283,11 +285,11 @@ inline void roll_eight(const PassLimits& limits, const double* drive_x_mm, const
   store(heading, heading_rad);
 }
 
-void roll(const PassLimits& limits, const BodyColumns& bodies, double* x_mm, double* y_mm, double* heading_rad,
-          std::size_t count) {
+void move_free(const PassLimits& limits, const BodyColumns& bodies, double* x_mm, double* y_mm, double* heading_rad,
+               std::size_t count) {
   const auto eight = [&](std::size_t i, double* x, double* y, double* heading) {
-    roll_eight(limits, bodies.drive_x_mm + i, bodies.drive_y_mm + i, bodies.cos_turn + i, bodies.sin_turn + i,
-               bodies.turn_rad + i, x, y, heading);
+    move_eight_free(limits, bodies.drive_x_mm + i, bodies.drive_y_mm + i, bodies.cos_turn + i, bodies.sin_turn + i,
+                    bodies.turn_rad + i, x, y, heading);
   };
   std::size_t i = 0;
   for (; i + kLanes <= count; i += kLanes) eight(i, x_mm + i, y_mm + i, heading_rad + i);

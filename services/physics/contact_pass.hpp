@@ -1,4 +1,4 @@
-/// The Jacobi passes of a tick over the bodies in contact. contact.hpp states the law, contact_batch.hpp how they lie.
+/// The Jacobi passes of a tick over the bodies in contact. contact.hpp states the method, contact_batch.hpp the layout.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@ class ContactPass {
 
   ContactPass();
 
-  /// Starts anew with batch 0 alone, in which nothing moves.
+  /// Removes all batches but batch 0, in which nothing moves.
   void clear();
-  /// Puts all batches aside, to be read while new ones are made.
+  /// Moves all batches to previous_batches_, where they can be read while others are built.
   void keep_previous();
   [[nodiscard]] const ContactBatch& previous_batch_of(Slot slot) const { return previous_batches_[slot / kLanes]; }
   [[nodiscard]] const ContactLanes* previous_contacts_of(const ContactBatch& batch) const {
     return previous_contacts_.data() + batch.first_contact;
   }
-  /// Appends a batch; its bodies and contacts are to be filled in.
+  /// Appends a batch; the caller fills in its bodies and contacts.
   void add_batch(std::uint32_t contacts, std::uint32_t passes);
   [[nodiscard]] std::size_t batches() const { return batches_.size(); }
   [[nodiscard]] ContactBatch& batch(std::size_t number) { return batches_[number]; }
@@ -33,20 +33,20 @@ class ContactPass {
   [[nodiscard]] const ContactLanes* contacts_of(const ContactBatch& batch) const {
     return contacts_.data() + batch.first_contact;
   }
-  /// Says that a batch has others than discs.
+  /// Marks a batch that has contacts with other shapes than discs, and reserves its SpecialLanes.
   void make_special(ContactBatch&);
   [[nodiscard]] SpecialLanes* specials_of(const ContactBatch& batch) {
     return specials_.data() + batch.first_special;
   }
   [[nodiscard]] static std::size_t lane_of(Slot slot) { return slot % kLanes; }
   [[nodiscard]] const ContactBatch& batch_of(Slot slot) const { return batches_[slot / kLanes]; }
-  /// Of the batch appended last.
+  /// Slot of a lane of the last batch.
   [[nodiscard]] Slot slot(std::size_t lane) const {
     return static_cast<Slot>((batches_.size() - 1) * kLanes + lane);
   }
-  /// Once all batches are there: nobody moves.
+  /// Sets all batches to rest. Call it after the last add_batch().
   void rest();
-  /// Nobody of a batch moves in this tick.
+  /// Sets the motion of one batch to 0 for this tick.
   void rest(std::size_t number);
   /// See ContactKernel::begin.
   Start begin(const PassLimits& limits, bool kept, const BodyColumns& bodies, std::size_t number) {
@@ -55,8 +55,8 @@ class ContactPass {
   }
   [[nodiscard]] const ContactKernel& kernel() const { return *kernel_; }
 
-  /// All sub-steps. `with_overlaps`: whether any bodies overlap at the tick's start; none do later where none did then.
-  /// `others(step)` moves what is not a disc: it reads now() and writes after().
+  /// Runs all sub-steps. `with_overlaps`: whether any bodies overlap at the tick's start; if none do, none do later.
+  /// `others(step)` moves all shapes but discs: it reads now() and writes after().
   template <class Others> void run(const PassLimits& limits, bool with_overlaps, Others&& others) {
     for (std::uint32_t step = 0; step < limits.sub_steps; ++step) {
       kernel_->pass(limits, step, with_overlaps, batches_.data(), batches_.size(), contacts_.data(),
@@ -65,7 +65,7 @@ class ContactPass {
       now_.swap(after_);
     }
   }
-  /// Of a slot: displacement since the tick's start, x, y; velocity, carried on as it changes, x, y.
+  /// Row of a slot: displacement since the tick's start, x, y; extrapolated velocity, x, y.
   [[nodiscard]] const double* now(Slot slot) const { return now_.data() + kRow * slot; }
   [[nodiscard]] double* after(Slot slot) { return after_.data() + kRow * slot; }
   [[nodiscard]] double* start(Slot slot) { return now_.data() + kRow * slot; }
@@ -81,7 +81,7 @@ class ContactPass {
   std::vector<SpecialLanes> specials_;
   std::size_t contact_count_ = 0;
   std::vector<double> now_, after_;
-  std::vector<double> room_mm_;  ///< of the contacts of the batch at hand
+  std::vector<double> room_mm_;  ///< scratch for the contacts of one batch
 };
 
 }  // namespace kilotwin::physics

@@ -14,7 +14,7 @@ void ContactSolver::find_specials(const Bodies& bodies) {
   const auto robots = static_cast<std::uint32_t>(cache_.size());
   const auto movables = static_cast<std::uint32_t>(movables_.size());
   has_special_.assign(count, 0);
-  const double near_mm = limits_.cutoff_mm - kRobotRadius_mm;  // of a centre, from a rim
+  const double near_mm = limits_.cutoff_mm - kRobotRadius_mm;  // from a robot's centre to a shape's rim
   const auto with_shape = [&](const Convex& shape, const Place& place, std::uint32_t key, std::uint32_t movable) {
     const double far_mm = shape.reach_mm() + near_mm;
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -47,31 +47,31 @@ void ContactSolver::find_specials(const Bodies& bodies) {
     }
   }
   std::sort(specials_.begin(), specials_.end(), [](const Special& a, const Special& b) {
-    return a.body != b.body ? a.body < b.body : a.key < b.key;  // No two are equal.
+    return a.body != b.body ? a.body < b.body : a.key < b.key;  // No two contacts compare equal.
   });
   for (std::uint32_t k = 0; k < specials_.size(); ++k) {
     if (specials_[k].movable != kNone) touching_[specials_[k].movable].push_back(k);
   }
   for (std::uint32_t m = 0; m < movables; ++m) {
-    lively_movable_[m] = movables_[m].moves();
+    movable_in_motion_[m] = movables_[m].moves();
     const double gain = movable_pass_.gain(m, touching_[m].size());
     for (const std::uint32_t k : touching_[m]) {
       specials_[k].gain = gain;
-      lively_movable_[m] |= lively_[specials_[k].body];
+      movable_in_motion_[m] |= in_motion_[specials_[k].body];
     }
   }
-  // What one of them does, all feel that it may touch one by the other.
+  // Movable bodies that may touch each other, directly or through others, pass motion on to all of them.
   std::vector<std::uint32_t>& next = reached_;
   next.clear();
   for (std::uint32_t m = 0; m < movables; ++m) {
-    if (lively_movable_[m] != 0) next.push_back(m);
+    if (movable_in_motion_[m] != 0) next.push_back(m);
   }
   while (!next.empty()) {
     const std::uint32_t m = next.back();
     next.pop_back();
     movable_pass_.for_each_near(m, movables_, [&](std::uint32_t other) {
-      if (lively_movable_[other] != 0) return;
-      lively_movable_[other] = 1;
+      if (movable_in_motion_[other] != 0) return;
+      movable_in_motion_[other] = 1;
       next.push_back(other);
     });
   }

@@ -1,6 +1,6 @@
-/// The state of contact besides poses: what the solver is warm-started with. Units of a sub-step: a velocity is a way per
-/// sub-step. An impulse is the change of a free robot's velocity by it, so that kInertia x robot_mass / sub_step^2 turns it
-/// into newtons.
+/// State of contact besides poses: it warm-starts the solver. Time is measured in sub-steps, so a velocity is a displacement
+/// per sub-step, mm. An impulse is given as the velocity change of a free robot, mm per sub-step; multiply it by
+/// kInertia x robot_mass / sub_step^2 to get a force.
 #pragma once
 
 #include <array>
@@ -9,23 +9,24 @@
 
 namespace kilotwin::physics {
 
-/// A robot that touches others, or that slips against its drive.
+/// Contacts and slip of one robot.
 struct CachedContacts {
-  static constexpr std::size_t kMost = 12;  ///< six equal discs fit around one; the rest is for walls and bodies
+  static constexpr std::size_t kMost =
+      12;  ///< six equal discs fit around one; the others are walls and movable bodies
   struct Contact {
-    double normal_impulse_mm = 0;   ///< of a contact, above 0
-    double tangent_impulse_mm = 0;  ///< friction: on this robot clockwise about it, on the other likewise
-    std::uint32_t other = 0;        ///< robot, or robots + movable body, or beyond: walls
+    double normal_impulse_mm = 0;   ///< above 0 for a contact
+    double tangent_impulse_mm = 0;  ///< friction; positive: clockwise about this robot, and about the other as well
+    std::uint32_t other = 0;        ///< robot id; then robots + index of a movable body; larger keys are walls
 
     bool operator==(const Contact&) const = default;
   };
 
-  double slip_x_mm = 0, slip_y_mm = 0;  ///< velocity less that of the drive
+  double slip_x_mm = 0, slip_y_mm = 0;  ///< velocity minus that of the drive
   std::uint32_t contacts = 0;
-  std::array<Contact, kMost> contact{};  ///< ascending by the other; the first `contacts` count
+  std::array<Contact, kMost> contact{};  ///< ascending by `other`; the first `contacts` are valid
 
   [[nodiscard]] bool any() const { return contacts != 0 || slip_x_mm != 0 || slip_y_mm != 0; }
-  /// The contact with this other; without forces where there is none.
+  /// The contact with this key; impulses 0 if there is none.
   [[nodiscard]] Contact contact_with(std::uint32_t id) const {
     for (std::uint32_t p = 0; p < contacts; ++p) {
       if (contact[p].other == id) return contact[p];
@@ -34,7 +35,7 @@ struct CachedContacts {
   }
 };
 
-/// The cached contacts of all robots, and which robots have any: most robots touch nobody.
+/// The cached contacts of all robots, with a flag per robot: most robots touch nothing.
 class ContactCache {
  public:
   explicit ContactCache(std::size_t robots) : cache_(robots), any_(robots, 0) {}
@@ -52,7 +53,7 @@ class ContactCache {
     cache_[robot].contacts = 0;
     any_[robot] = 0;
   }
-  /// Changes it in place: `change(cached)`, whose result this returns.
+  /// Calls change(cached) on the robot's entry in place, updates the flag, and returns the call's result.
   template <class Change> bool change(std::size_t robot, Change&& change) {
     const bool result = change(cache_[robot]);
     any_[robot] = cache_[robot].any();
@@ -64,7 +65,7 @@ class ContactCache {
   std::vector<std::uint8_t> any_;
 };
 
-/// A movable body: pose of its centre and velocity.
+/// A movable body: pose of its centre, and velocity.
 struct MovableState {
   double x_mm = 0, y_mm = 0, heading_rad = 0;
   double vx_mm = 0, vy_mm = 0, turn_rad = 0;  ///< per sub-step

@@ -10,7 +10,7 @@
 namespace kilotwin::physics {
 namespace {
 
-/// sin(t) / t and (1 - cos(t)) / t^2 from the square of t.
+/// sin(t) / t and (1 - cos(t)) / t^2 as functions of t^2.
 struct TurnSeries {
   double sine, versine;
 };
@@ -30,7 +30,7 @@ inline Arc arc_from(TurnSeries s, double run_mm, double turn_rad, double axle_of
           run_mm * (turn_rad * s.versine) + axle_offset_mm * sin_turn, 1 - one_minus_cos, sin_turn};
 }
 
-/// The same with a motion to the left of the heading as well.
+/// The same, with an additional motion to the left of the heading.
 inline Arc arc_from(TurnSeries s, double run_mm, double sideways_mm, double turn_rad, double axle_offset_mm) {
   Arc arc = arc_from(s, run_mm, turn_rad, axle_offset_mm);
   arc.forward_mm -= sideways_mm * (turn_rad * s.versine);
@@ -38,9 +38,10 @@ inline Arc arc_from(TurnSeries s, double run_mm, double sideways_mm, double turn
   return arc;
 }
 
-/// The drift of the first of 1 / part equal sub-steps, in each of which it turns with the body, such that they add up to
-/// (x, y): in between it is turned back by half of the way, and made up for what is lost by turning.
-void unturn(double turn_rad, double part, double& x, double& y) {
+/// Replaces a drift (x, y) over the tick by the drift of the first of 1 / part equal sub-steps. The drift turns with the body
+/// in each sub-step. The result is such that all sub-steps together give (x, y): it is rotated back by half of the
+/// remaining turn, and lengthened by the loss from turning.
+void drift_of_sub_step(double turn_rad, double part, double& x, double& y) {
   constexpr double kTooSmall_rad = 1e-9;
   if (part == 1) return;
   if (turn_rad < kTooSmall_rad && turn_rad > -kTooSmall_rad) {
@@ -56,7 +57,7 @@ void unturn(double turn_rad, double part, double& x, double& y) {
   x = to_x;
 }
 
-/// The same quantities for turns of any size.
+/// The same quantities for turns of any size, without series.
 TurnSeries large_turn(double turn_rad) {
   double sin_half, cos_half;
   kt_sincos(0.5 * turn_rad, &sin_half, &cos_half);
@@ -126,9 +127,9 @@ DriveModel::DriveModel(const RunPlan& plan)
         std::max({top_straight, curves_[curves.straight_left][255], curves_[curves.straight_right][255]});
     top_turn = std::max({top_turn, curves_[curves.turn_left][255], curves_[curves.turn_right][255]});
   }
-  // The centre's speed is linear in the wheels' speeds, so that of the nominal speeds and that of the biases add up; the
-  // latter is largest with both wheels forward, or one forward and one backward. The factors scale both. Both wheels
-  // forward at different speeds are slower than both at the faster one, or than it alone.
+  // The centre's speed is linear in the wheels' speeds, so the parts of nominal speeds and biases add up. The bias part is
+  // largest with both wheels forward, or one forward and one backward. The factor f scales both parts. Two wheels
+  // forward at different speeds give at most the speed of both at the faster one, or of the faster one alone.
   const double lever = axle_offset_mm_ / wheel_base_mm_;
   const double top_nominal =
       std::max(top_straight, std::max(top_straight, top_turn) * __builtin_sqrt(0.25 + lever * lever));
@@ -137,7 +138,7 @@ DriveModel::DriveModel(const RunPlan& plan)
   top_speed_mm_s_ = top_nominal + top_bias * widest + kTopNormal * factor_sd_ * top_any * widest;
   if (effects_.empty()) return;
   limits_ = effects_.limits(top_any * (1 + kTopNormal * factor_sd_));
-  // A drift has two axes, and is a little faster in sub-steps that turn.
+  // A drift has two components. Within a turning sub-step it is slightly faster than its mean.
   top_speed_mm_s_ += limits_.wheel_mm_s * widest + limits_.sideways_mm_s + 1.5 * limits_.drift_mm_s;
 }
 
@@ -163,8 +164,9 @@ void DriveModel::make_curves(const MotionSettings& motion, const RobotParameters
   }
 }
 
-/// A kick, then the duties; the mean over the tick, whose arc differs from that of one after the other by micrometres.
-DriveModel::Speeds DriveModel::kicked(std::uint32_t robot, Duties duties) const {
+/// Mean wheel speeds over a tick that starts with a kick and continues with the duties. The arc of the mean differs by
+/// micrometres from the two arcs in sequence.
+DriveModel::Speeds DriveModel::speeds_with_kick(std::uint32_t robot, Duties duties) const {
   const Curves& curves = curves_of_[robot];
   const WheelBias& bias = bias_[robot];
   const double kick = motors_.kick_part(), after = (duties.left | duties.right) != 0 ? 1 - kick : 0;
@@ -179,7 +181,7 @@ void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Ti
   left += bias_[robot].left_mm_s;
   right += bias_[robot].right_mm_s;
   if (duties.spin_up != 0) {
-    const Speeds mean = kicked(robot, duties);
+    const Speeds mean = speeds_with_kick(robot, duties);
     left = mean.left_mm_s;
     right = mean.right_mm_s;
   }
@@ -196,7 +198,7 @@ void DriveModel::add(Drives& drives, std::uint32_t body, std::uint32_t robot, Ti
   drives.part[n] = part;
 }
 
-void DriveModel::add(Drives& drives, const std::vector<std::uint8_t>& asked,
+void DriveModel::add(Drives& drives, const std::vector<std::uint8_t>& selected,
                      const std::vector<std::uint32_t>& robot, Tick from, const std::vector<Duties>& duties,
                      const std::vector<double>& heading_rad, double part) const {
   drives.reserve(robot.size());
@@ -205,13 +207,13 @@ void DriveModel::add(Drives& drives, const std::vector<std::uint8_t>& asked,
   double* const left_mm_s = drives.left_mm_s.data();
   double* const right_mm_s = drives.right_mm_s.data();
   for (std::uint32_t i = 0; i < robot.size(); ++i) {
-    if (asked[i] == 0) continue;
+    if (selected[i] == 0) continue;
     const Duties own = duties[i];
     if (!plain || own.spin_up != 0 || own.left == 0 || own.right == 0) {
       add(drives, i, robot[i], from, own, heading_rad[i], part);
       continue;
     }
-    // Most robots, in most ticks.
+    // The common case, inlined.
     const std::size_t n = drives.count++;
     const Curves& of = curves_of_[robot[i]];
     const WheelBias& bias = bias_[robot[i]];
@@ -257,7 +259,7 @@ void DriveModel::integrate(Drives& drives) const {
   }
 }
 
-/// The same as the kernel does, for drifts and for turns of any size.
+/// As the kernel, for drifts and for turns of any size.
 template <bool kDrift> void DriveModel::integrate_one(Drives& drives, std::size_t i) const {
   const double left = drives.left_mm_s[i], right = drives.right_mm_s[i], part = drives.part[i];
   const double whole_turn = (right - left) * (tick_s_ / wheel_base_mm_), turn = whole_turn * part;
@@ -273,7 +275,7 @@ template <bool kDrift> void DriveModel::integrate_one(Drives& drives, std::size_
   double x = c * arc.forward_mm - s * arc.sideways_mm, y = s * arc.forward_mm + c * arc.sideways_mm;
   if constexpr (kDrift) {
     double drift_x = drives.changes.drift_x_mm_s[i] * tick_s_, drift_y = drives.changes.drift_y_mm_s[i] * tick_s_;
-    unturn(whole_turn, part, drift_x, drift_y);
+    drift_of_sub_step(whole_turn, part, drift_x, drift_y);
     x += drift_x;
     y += drift_y;
   }

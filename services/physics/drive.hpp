@@ -1,4 +1,4 @@
-/// The differential drive of a Kilobot: motor duties to the motion of the disc's centre, by exact arcs.
+/// The differential drive of a Kilobot: converts motor duties into the motion of the disc's centre, by exact arcs.
 #pragma once
 
 #include <array>
@@ -15,64 +15,66 @@
 
 namespace kilotwin::physics {
 
-/// Displacement of the disc's centre in the frame that the body had at the start, mm, and its turn, rad.
+/// Displacement of the disc's centre in the body's frame at the start, and the turn.
 struct Arc {
   double forward_mm, sideways_mm;  ///< sideways: to the left
   double cos_turn, sin_turn;
 };
 
-/// The reference point runs `run_mm` along an arc while the body turns by `turn_rad`; the centre lies `axle_offset_mm`
-/// ahead of it.
+/// The midpoint of the axle travels `run_mm` along an arc while the body turns by `turn_rad`. The disc's centre lies
+/// `axle_offset_mm` ahead of the axle.
 [[nodiscard]] Arc arc_of(double run_mm, double turn_rad, double axle_offset_mm);
 
-/// Driven robots of one tick, structure of arrays, ascending; room for whole eights. Kept between ticks for its memory alone.
+/// Driven robots of one tick as a structure of arrays, ascending by body. Columns are padded to multiples of eight. The
+/// object lives across ticks only to reuse its memory.
 struct Drives {
   std::vector<std::uint32_t> body;            ///< index of the body
   std::vector<double> left_mm_s, right_mm_s;  ///< actual speeds of the wheels
   std::vector<double> heading_rad;            ///< at the start of the tick
-  std::vector<double> part;                   ///< of the tick, over which the next four are meant
-  std::vector<double> x_mm, y_mm;             ///< displacement of the centre, if nothing is in the way
+  std::vector<double> part;                   ///< fraction of the tick to which x_mm .. sin_turn apply
+  std::vector<double> x_mm, y_mm;             ///< displacement of the centre without contact
   std::vector<double> cos_turn, sin_turn;
   std::vector<double> turn_rad;  ///< over the whole tick
-  MotionChanges changes;         ///< by effects; where the model has any
+  MotionChanges changes;         ///< by the model's effects; empty if it has none
   std::size_t count = 0;
 
   void reserve(std::size_t bodies);
-  /// Puts what was integrated where the bodies' numbers say, for bodies [0, bodies); zeros for those that are not driven.
+  /// Rearranges the integrated columns so that body i has entry i, for bodies [0, bodies). Undriven bodies get zeros.
   void spread(std::size_t bodies);
 };
 
-/// Actual speed of a wheel = f (v + b) while either motor turns, 0 when both rest (seed, section 2.2). v follows from the
-/// motor's duty and the robot's calibration: idl/model.proto states the curve.
+/// Actual speed of a wheel = f (v + b) while either motor turns, 0 when both rest (the ARGoS paper, section 2.2). f is a
+/// random factor per tick, b the robot's bias. v follows from the motor's duty and the robot's calibration:
+/// idl/model.proto states the curve.
 class DriveModel {
  public:
   explicit DriveModel(const RunPlan&);
 
-  /// Which of a program's duties turn a motor.
+  /// Decides which duties turn a motor.
   [[nodiscard]] const MotorRule& motors() const { return motors_; }
   [[nodiscard]] const MotionEffects& effects() const { return effects_; }
 
-  /// Adds a robot to the drives; its duties are acting. The left motor drives the right-hand wheel.
+  /// Appends a robot with its acting duties. The left motor drives the right-hand wheel.
   void add(Drives&, std::uint32_t body, std::uint32_t robot, Tick from, Duties, double heading_rad,
            double part) const;
-  /// Adds those robots that are `asked` for.
-  void add(Drives&, const std::vector<std::uint8_t>& asked, const std::vector<std::uint32_t>& robot, Tick from,
+  /// Appends the robots with selected[i] = 1.
+  void add(Drives&, const std::vector<std::uint8_t>& selected, const std::vector<std::uint32_t>& robot, Tick from,
            const std::vector<Duties>&, const std::vector<double>& heading_rad, double part) const;
-  /// Applies the model's effects, which must not be empty(); `known` are the bodies that Drives::body counts. See
-  /// Covariates::fill for whom they hold, and for `fields`.
+  /// Applies the model's effects, which must not be empty(). Drives::body indexes `known`. Covariates::fill states which
+  /// robots get exact values, and the meaning of `fields`.
   void change(Drives&, Tick from, const RobotColumns& known, const ArenaFields* fields);
-  /// Fills what follows from the wheels' speeds and the headings.
+  /// Computes displacements and turns from the wheels' speeds and the headings.
   void integrate(Drives&) const;
 
-  /// No disc's centre is ever driven faster, mm/s.
+  /// Upper bound of the speed of a disc's centre by its drive, mm/s.
   [[nodiscard]] double top_speed_mm_s() const { return top_speed_mm_s_; }
   [[nodiscard]] double bias_left_mm_s(std::uint32_t robot) const { return bias_[robot].left_mm_s; }
   [[nodiscard]] double bias_right_mm_s(std::uint32_t robot) const { return bias_[robot].right_mm_s; }
 
  private:
-  /// Speed of a wheel by its motor's duty, mm/s.
+  /// Speed of a wheel over the duty of its motor, mm/s.
   using Curve = std::array<double, 256>;
-  /// Indices into curves_, by motor.
+  /// Indices into curves_, per motor.
   struct Curves {
     std::uint16_t turn_left, turn_right, straight_left, straight_right;
   };
@@ -85,7 +87,7 @@ class DriveModel {
     if (left != 0 && right != 0) return {curves_[of.straight_right][right], curves_[of.straight_left][left]};
     return {curves_[of.turn_right][right], curves_[of.turn_left][left]};
   }
-  [[nodiscard]] Speeds kicked(std::uint32_t robot, Duties) const;
+  [[nodiscard]] Speeds speeds_with_kick(std::uint32_t robot, Duties) const;
   template <bool kDrift> void integrate_one(Drives&, std::size_t i) const;
 
   Random random_;
@@ -94,7 +96,7 @@ class DriveModel {
   MotorRule motors_;
   MotionEffects effects_;
   MotionEffects::Limits limits_;
-  double factor_sd_ = 0;  ///< of f in one tick; 0: f = 1
+  double factor_sd_ = 0;  ///< standard deviation of f in one tick; 0: f = 1
   std::vector<Curve> curves_;
   std::vector<Curves> curves_of_;  ///< per robot
   std::vector<WheelBias> bias_;    ///< per robot

@@ -1,4 +1,4 @@
-/// The loop over driven robots, for a source that says for which instruction set.
+/// The loop over driven robots. A source includes this file and is compiled for one instruction set.
 #pragma once
 
 #include "core/math/sine_series.h"
@@ -8,8 +8,8 @@
 namespace kilotwin::physics {
 namespace {
 
-/// Of angles within [-pi, pi]: the bits of kt_sincos, by its own steps. No such angle but 0 is so near to a multiple of a right
-/// angle that kt_sincos would reduce it otherwise.
+/// For angles in [-pi, pi]: the same steps and bits as kt_sincos. No such angle except 0 is close enough to a multiple of
+/// pi/2 to need kt_sincos' longer argument reduction.
 inline void sines_and_cosines(Lanes angle, Lanes& sine, Lanes& cosine) {
   const Lanes zero = all(0), half = all(0.5), one = all(1), whole = all(kWholeNumbers);
   const Lanes turns = (angle * all(kTwoOverPiRounded) + whole) - whole;
@@ -26,7 +26,7 @@ inline void sines_and_cosines(Lanes angle, Lanes& sine, Lanes& cosine) {
   const Lanes half_z = half * z, most = one - half_z;
   const Lanes cosine_of_r = most + (((one - most) - half_z) + (z * z * cosine_series - r * r_rest));
 
-  // By how many right angles it was turned: -2 .. 2.
+  // Number of right angles removed by the reduction: -2 .. 2.
   const auto odd = (turns * turns > half) & (all(2) > turns * turns);
   const Lanes swapped_sine = chosen(odd, cosine_of_r, sine_of_r),
               swapped_cosine = chosen(odd, sine_of_r, cosine_of_r);

@@ -1,4 +1,4 @@
-// Which of the inner loops this processor can run.
+// Selects the inner loops that this processor can run.
 #include "services/physics/contact_batch.hpp"
 #include "services/physics/drive_kernel.hpp"
 

@@ -1,7 +1,7 @@
-/// The kinematic engine: differential drive without contact, for sweeps of what contact does not touch. Robots pass through
-/// each other; the walls of the arena hold them: the centre of a disc that would come closer to a wall than its radius is put
-/// to that distance, and the way along the wall remains. A robot depends on itself alone, so that ghosts serve the
-/// hand-over only and results are the same for any partitions.
+/// The kinematic engine: differential drive without contact, for sweeps of quantities that contact does not affect. Robots
+/// pass through each other. The arena's walls hold them: a disc closer to a wall than its radius is put back to that
+/// distance, and its motion along the wall remains. A robot depends on itself only. Ghosts therefore serve the hand-over
+/// alone, and results are the same for any partitions.
 #pragma once
 
 #include "services/physics/population.hpp"
@@ -12,7 +12,7 @@ class KinematicEngine final : public PopulationEngine {
  public:
   KinematicEngine(const RunPlan&, PartitionId);
 
-  /// The way of the fastest robot in a tick.
+  /// Largest distance that a robot can travel in a tick.
   [[nodiscard]] static double margin_mm(const RunPlan&, const DriveModel&);
 
  private:

@@ -1,8 +1,8 @@
-/// Eight doubles worked on at a time, in vectors as wide as the instruction set at hand has them. Each lane gets the bits that a
-/// double alone would get, whatever the width.
+/// Vectors of eight doubles, in registers as wide as the instruction set has. Each lane gets the bits that scalar arithmetic
+/// would give, whatever the width.
 ///
-/// For sources that are compiled once per instruction set: everything here has internal linkage, so that no function made for
-/// one of them is linked where another was meant.
+/// This header is for sources that are compiled once per instruction set. Everything here has internal linkage, so that the
+/// linker cannot mix functions of different instruction sets.
 #pragma once
 
 #if defined(__SSE2__)
@@ -17,7 +17,7 @@
 namespace kilotwin::physics {
 namespace {
 
-/// Two of something with the operations of one.
+/// A pair of vectors with the operations of one.
 template <class T> struct Twice { T a, b; };
 using Two = double __attribute__((vector_size(16)));
 #if defined(__AVX512F__)
@@ -107,7 +107,7 @@ inline Lanes gather(const double* column, const std::uint32_t* at) {
   return load(eight);
 }
 
-/// Four columns of rows of four doubles.
+/// The four columns of eight rows of four doubles.
 struct Columns {
   Lanes a, b, c, d;
 };
@@ -143,7 +143,7 @@ inline void put_four_rows(Four a, Four b, Four c, Four d, double* table) {
 }
 
 #if defined(__AVX512F__)
-/// Rows of four of a table, by their numbers.
+/// Gathers the rows at[0..7] of a table with four doubles per row.
 inline Columns rows(const double* table, const std::uint32_t* at) {
   const auto pair = [&](std::size_t r, std::size_t s) {
     return Lanes(__builtin_shufflevector(loaded<Four>(table + 4 * std::size_t{at[r]}),
@@ -159,7 +159,7 @@ inline Columns rows(const double* table, const std::uint32_t* at) {
           __builtin_shufflevector(ac03, ac47, 2, 3, 6, 7, 10, 11, 14, 15),
           __builtin_shufflevector(bd03, bd47, 2, 3, 6, 7, 10, 11, 14, 15)};
 }
-/// Eight rows of four, one after the other.
+/// Writes eight consecutive rows of four doubles.
 inline void put_rows(const Columns& v, double* table) {
   const Lanes ab_even = __builtin_shufflevector(v.a, v.b, 0, 8, 2, 10, 4, 12, 6, 14);
   const Lanes ab_odd = __builtin_shufflevector(v.a, v.b, 1, 9, 3, 11, 5, 13, 7, 15);
@@ -175,12 +175,12 @@ inline void put_rows(const Columns& v, double* table) {
   put_two(__builtin_shufflevector(ab_odd, cd_odd, 4, 5, 12, 13, 6, 7, 14, 15), 5, 7);
 }
 #else
-/// Rows of four of a table, by their numbers.
+/// Gathers the rows at[0..7] of a table with four doubles per row.
 inline Columns rows(const double* table, const std::uint32_t* at) {
   const FourColumns low = four_rows(table, at), high = four_rows(table, at + 4);
   return {{low.a, high.a}, {low.b, high.b}, {low.c, high.c}, {low.d, high.d}};
 }
-/// Eight rows of four, one after the other.
+/// Writes eight consecutive rows of four doubles.
 inline void put_rows(const Columns& v, double* table) {
   put_four_rows(v.a.a, v.b.a, v.c.a, v.d.a, table);
   put_four_rows(v.a.b, v.b.b, v.c.b, v.d.b, table + 16);
@@ -206,13 +206,13 @@ inline void put_two_rows(Two a, Two b, Two c, Two d, double* table) {
   put(Two(__builtin_shufflevector(c, d, 1, 3)), table + 6);
 }
 
-/// Rows of four of a table, by their numbers.
+/// Gathers the rows at[0..7] of a table with four doubles per row.
 inline Columns rows(const double* table, const std::uint32_t* at) {
   const TwoColumns p = two_rows(table, at), q = two_rows(table, at + 2), r = two_rows(table, at + 4),
                    s = two_rows(table, at + 6);
   return {{{p.a, q.a}, {r.a, s.a}}, {{p.b, q.b}, {r.b, s.b}}, {{p.c, q.c}, {r.c, s.c}}, {{p.d, q.d}, {r.d, s.d}}};
 }
-/// Eight rows of four, one after the other.
+/// Writes eight consecutive rows of four doubles.
 inline void put_rows(const Columns& v, double* table) {
   put_two_rows(v.a.a.a, v.b.a.a, v.c.a.a, v.d.a.a, table);
   put_two_rows(v.a.a.b, v.b.a.b, v.c.a.b, v.d.a.b, table + 8);

@@ -1,5 +1,5 @@
-/// Puts entries of several lists into ascending order of their robots. A bit and a slot per robot of the swarm, and no
-/// comparison: the cost is that of the entries and a 64th of the swarm.
+/// Merges several lists into ascending order of robot ids, by a bit and an entry per robot of the swarm, without
+/// comparisons: O(entries + robots / 64).
 #pragma once
 
 #include <bit>
@@ -16,7 +16,7 @@ class Merge {
 
   explicit Merge(std::uint32_t robots) : marks_(robots / 64 + 1, 0), entry_(robots) {}
 
-  /// False, and nothing done, where the robot was added already.
+  /// Returns false and changes nothing if the robot was added already.
   [[nodiscard]] bool add(std::uint32_t robot, Entry entry) {
     std::uint64_t& marks = marks_[robot / 64];
     const std::uint64_t mark = std::uint64_t{1} << robot % 64;
@@ -28,7 +28,7 @@ class Merge {
   }
   [[nodiscard]] std::size_t size() const { return size_; }
 
-  /// Calls take(robot, entry) in ascending order and is empty afterwards.
+  /// Calls take(robot, entry) in ascending order, then clears the list.
   template <class Take> void drain(Take&& take) {
     for (std::uint32_t word = 0; word < marks_.size(); ++word) {
       for (std::uint64_t left = marks_[word]; left != 0; left &= left - 1) {

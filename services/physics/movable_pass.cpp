@@ -7,10 +7,10 @@
 namespace kilotwin::physics {
 namespace {
 
-/// How often limits are met one after the other; what is missed then scales all down.
+/// Number of limits that are met one after the other. Remaining violations scale the displacement down.
 constexpr int kRounds = 8;
-/// Rounds in which bodies that touch each other, and friction, find their forces, and their over-relaxation: with it, bodies
-/// that friction holds come to rest exactly; a light one between heavy ones needs the most rounds.
+/// Rounds of projected Gauss-Seidel over contacts between movable bodies and friction, and their over-relaxation. With
+/// over-relaxation, bodies that friction holds come to rest exactly. A light body between heavy ones needs the most rounds.
 constexpr int kBalanceRounds = 128;
 constexpr double kRelaxation = 1.5;
 constexpr double kTolerance_mm = 1e-14;
@@ -30,8 +30,8 @@ MovablePass::MovablePass(const RunPlan& plan, const ContactLimits& limits)
     grip_mm_.push_back(body.friction * kGravity_m_s2 * 1000 * sub_step_s * sub_step_s / kInertia);
 }
 
-/// Stable whatever touches whatever: below one over the sum, over a contact's two ends, of what a force there moves all the
-/// contacts of that end (Gershgorin): at most 4 at a robot.
+/// A gain for which the iteration is stable in any arrangement: below 1 over the sum, over a contact's two ends, of the
+/// response of all contacts at that end to an impulse (Gershgorin). The sum is at most 4 at a robot.
 double MovablePass::gain(std::uint32_t movable, std::size_t robots) const {
   const MovableBodyModel& body = bodies_[movable];
   const double lever = body.shape.reach_mm() / body.shape.mean_distance_mm();
@@ -124,19 +124,19 @@ void MovablePass::find_stops(Mover& mover, const std::vector<MovableState>& stat
   }
 }
 
-void MovablePass::move_points(const Mover& mover, const Motion& shift, const Motion& swing,
+void MovablePass::move_points(const Mover& mover, const Motion& shift, const Motion& extrapolated,
                               double* (ContactPass::*of)(Slot), ContactPass& pass) const {
   const double rho_mm = bodies_[mover.movable].shape.mean_distance_mm();
   for (const Contact& c : mover.contacts) {
     double* const point = (pass.*of)(c.point);
     point[0] = shift.x_mm - c.lever_y_mm * (shift.turn_mm / rho_mm);
     point[1] = shift.y_mm + c.lever_x_mm * (shift.turn_mm / rho_mm);
-    point[2] = swing.x_mm - c.lever_y_mm * (swing.turn_mm / rho_mm);
-    point[3] = swing.y_mm + c.lever_x_mm * (swing.turn_mm / rho_mm);
+    point[2] = extrapolated.x_mm - c.lever_y_mm * (extrapolated.turn_mm / rho_mm);
+    point[3] = extrapolated.y_mm + c.lever_x_mm * (extrapolated.turn_mm / rho_mm);
   }
 }
 
-void MovablePass::set_off(const std::vector<MovableState>& states, ContactPass& pass) {
+void MovablePass::start(const std::vector<MovableState>& states, ContactPass& pass) {
   for (Mover& mover : movers_) {
     const MovableState& state = states[mover.movable];
     mover.velocity = {state.vx_mm, state.vy_mm, state.turn_rad * bodies_[mover.movable].shape.mean_distance_mm()};
@@ -146,7 +146,7 @@ void MovablePass::set_off(const std::vector<MovableState>& states, ContactPass& 
   find_links();
 }
 
-/// By the bodies' numbers, in which all partitions have them.
+/// In the order of the bodies' indices, which is the same in all partitions.
 void MovablePass::find_links() {
   for (std::uint32_t m = 0; m < mover_of_.size(); ++m) {
     if (mover_of_[m] == kNone) continue;
@@ -154,7 +154,7 @@ void MovablePass::find_links() {
     for (const Stop& s : first.stops) {
       if (s.other == kNone || mover_of_[s.other] == kNone) continue;
       first.linked = true;
-      if (s.other < m) continue;  // Of the two that have it as a stop, the lower one makes it a link.
+      if (s.other < m) continue;  // Both bodies list the contact; the one with the lower index creates the link.
       const Mover& second = movers_[mover_of_[s.other]];
       links_.push_back({mover_of_[m], mover_of_[s.other], s.normal_x, s.normal_y,
                         arm(first, s.lever_x_mm, s.lever_y_mm, s.normal_x, s.normal_y),
@@ -174,12 +174,12 @@ void MovablePass::sub_step(std::uint32_t step, ContactPass& pass) {
   for (Mover& mover : movers_) mover.shift = mover.next_shift;
 }
 
-/// Forces of robots.
+/// Adds the impulses of robots.
 void MovablePass::push(Mover& mover, const ContactPass& pass) const {
   const double share = robot_kg_ / bodies_[mover.movable].mass_kg;
   Motion force;
   for (Contact& c : mover.contacts) {
-    // The same expressions as on the robot's side, and so the same bits.
+    // The same expressions as on the robot's side give the same bits.
     const double* const robot = pass.now(c.robot);
     const double* const point = pass.now(c.point);
     const double gap = c.gap_mm + (c.normal_x * (point[0] - robot[0]) + c.normal_y * (point[1] - robot[1]));
@@ -196,7 +196,7 @@ void MovablePass::push(Mover& mover, const ContactPass& pass) const {
   mover.braked = {};
 }
 
-/// Friction, walls, and what bodies pass on to each other.
+/// Applies friction, walls, and forces between movable bodies.
 void MovablePass::balance(std::uint32_t step) {
   for (Mover& mover : movers_) {
     if (step < mover.passes && !mover.linked) brake(mover);
@@ -209,7 +209,7 @@ void MovablePass::balance(std::uint32_t step) {
   };
   for (Link& link : links_) link.push = 0;
   for (Mover& mover : movers_) mover.changed = true;
-  // Where nothing changes any more, further rounds would not change anything, whatever goes on elsewhere.
+  // Without a change in a round, further rounds would change nothing.
   bool any = true;
   for (int round = 0; round < kBalanceRounds && any; ++round) {
     any = false;
@@ -239,7 +239,7 @@ void MovablePass::balance(std::uint32_t step) {
   }
 }
 
-void MovablePass::take(Motion& m, double nx, double ny, double lever, double excess) {
+void MovablePass::remove_excess(Motion& m, double nx, double ny, double lever, double excess) {
   const double part = excess / (1 + lever * lever);
   m.x_mm -= part * nx;
   m.y_mm -= part * ny;
@@ -255,13 +255,13 @@ double MovablePass::gap_mm(const Mover& mover, const Stop& s) const {
                      arm(other, s.other_lever_x_mm, s.other_lever_y_mm, s.normal_x, s.normal_y));
 }
 
-/// Half of the gap towards what moves as well, all of it towards what does not.
+/// Allowed displacement along the normal: half of the gap towards a movable body, the whole gap otherwise.
 double MovablePass::room_mm(const Mover& mover, const Stop& s) const {
   const double gap = gap_mm(mover, s);
   return std::max(s.other == kNone ? gap : gap / 2, 0.0);
 }
 
-/// The ground takes off as much of the velocity as friction allows; walls hold the rest.
+/// The ground removes as much of the velocity as friction allows; walls and obstacles stop the rest.
 void MovablePass::brake(Mover& mover) const {
   Motion v{mover.velocity.x_mm + mover.braked.x_mm, mover.velocity.y_mm + mover.braked.y_mm,
            mover.velocity.turn_mm + mover.braked.turn_mm};
@@ -275,20 +275,20 @@ void MovablePass::brake(Mover& mover) const {
       if (s.other != kNone && mover_of_[s.other] != kNone) continue;  // a link
       const double lever = arm(mover, s.lever_x_mm, s.lever_y_mm, s.normal_x, s.normal_y);
       const double excess = along(v, s.normal_x, s.normal_y, lever) - room_mm(mover, s);
-      if (excess > kTolerance_mm) take(v, s.normal_x, s.normal_y, lever, excess);
+      if (excess > kTolerance_mm) remove_excess(v, s.normal_x, s.normal_y, lever, excess);
     }
   }
   mover.velocity = v;
 }
 
-/// The way: at most half of each gap towards robots and other bodies.
+/// Computes the displacement: at most half of each gap towards robots and other movable bodies.
 void MovablePass::place(Mover& mover, ContactPass& pass) const {
   const MovableBodyModel& body = bodies_[mover.movable];
   const double rho_mm = body.shape.mean_distance_mm();
   const auto lever = [&](const auto& c) { return arm(mover, c.lever_x_mm, c.lever_y_mm, c.normal_x, c.normal_y); };
   const Motion &v = mover.velocity, &before = mover.before;
-  const Motion swing{(v.x_mm + v.x_mm) - before.x_mm, (v.y_mm + v.y_mm) - before.y_mm,
-                     (v.turn_mm + v.turn_mm) - before.turn_mm};
+  const Motion extrapolated{(v.x_mm + v.x_mm) - before.x_mm, (v.y_mm + v.y_mm) - before.y_mm,
+                            (v.turn_mm + v.turn_mm) - before.turn_mm};
   Motion way = v;
   const auto half_gap = [&](const Contact& c) {
     const double* const robot = pass.now(c.robot);
@@ -299,11 +299,11 @@ void MovablePass::place(Mover& mover, ContactPass& pass) const {
   for (int round = 0; round < kRounds; ++round) {
     for (const Contact& c : mover.contacts) {
       const double excess = -along(way, c.normal_x, c.normal_y, lever(c)) - half_gap(c);
-      if (excess > kTolerance_mm) take(way, -c.normal_x, -c.normal_y, -lever(c), excess);
+      if (excess > kTolerance_mm) remove_excess(way, -c.normal_x, -c.normal_y, -lever(c), excess);
     }
     for (const Stop& s : mover.stops) {
       const double excess = along(way, s.normal_x, s.normal_y, lever(s)) - room_mm(mover, s);
-      if (excess > kTolerance_mm) take(way, s.normal_x, s.normal_y, lever(s), excess);
+      if (excess > kTolerance_mm) remove_excess(way, s.normal_x, s.normal_y, lever(s), excess);
     }
   }
   double scale = 1;
@@ -318,7 +318,7 @@ void MovablePass::place(Mover& mover, ContactPass& pass) const {
   if (scale * farthest > stride_mm_) scale = stride_mm_ / farthest;
   mover.next_shift = {mover.shift.x_mm + scale * way.x_mm, mover.shift.y_mm + scale * way.y_mm,
                       mover.shift.turn_mm + scale * way.turn_mm};
-  move_points(mover, mover.next_shift, swing, &ContactPass::after, pass);
+  move_points(mover, mover.next_shift, extrapolated, &ContactPass::after, pass);
 }
 
 void MovablePass::finish(std::vector<MovableState>& states) const {

@@ -1,13 +1,14 @@
-/// The Jacobi passes of a tick over movable bodies: rigid, convex, held by dry friction on the floor. contact.hpp states the law.
+/// The Jacobi passes of a tick over movable bodies: rigid and convex, with dry friction on the floor. contact.hpp states the
+/// method.
 ///
-/// A velocity is (vx, vy, rho w), with rho the mean distance of the resting area from its centre. Dry friction holds forces and
-/// moments within the ellipsoid |f|^2 + (M / rho)^2 <= (friction m g)^2 (the limit surface of Howe and Cutkosky 1996, whose two
-/// axes are exact where the weight rests evenly). Inertia about the centre is taken as m rho^2, so that friction takes off the
-/// length of the velocity in these coordinates; it matters in the moment of impact alone.
+/// A velocity is (vx, vy, rho w), with rho the mean distance of the base area from its centre. Dry friction limits force
+/// and moment to the ellipsoid |f|^2 + (M / rho)^2 <= (friction m g)^2: the limit surface of Howe and Cutkosky (1996). Its
+/// two axes are exact for an evenly distributed weight. The moment of inertia is taken as m rho^2, so that friction
+/// shortens the velocity vector in these coordinates. It matters only during an impact.
 ///
-/// Forces between movable bodies are found anew in each sub-step, together with friction and for all bodies that can touch
-/// each other at once (over-relaxed projection, Gauss-Seidel in ascending order): so they pass through any chain of bodies
-/// within the sub-step, and such bodies are one hop together.
+/// Forces between movable bodies are solved in each sub-step together with friction, for all bodies that can touch each
+/// other (projected Gauss-Seidel with over-relaxation, in ascending order). So forces pass through any chain of bodies
+/// within the sub-step, and such bodies together form one hop.
 #pragma once
 
 #include <cstdint>
@@ -22,28 +23,28 @@ namespace kilotwin::physics {
 
 class MovablePass {
  public:
-  /// A robot that may touch a body within the tick.
+  /// A contact with a robot that is possible within the tick.
   struct Contact {
-    Slot robot, point;                  ///< of the robot, and of the touched point
-    double normal_x, normal_y, gap_mm;  ///< from the robot, at the tick's start
+    Slot robot, point;                  ///< slots of the robot and of the point of contact on the body
+    double normal_x, normal_y, gap_mm;  ///< normal from the robot; both at the tick's start
     double gain, normal_impulse_mm;
-    double lever_x_mm, lever_y_mm;  ///< of the touched point from the body's centre
+    double lever_x_mm, lever_y_mm;  ///< from the body's centre to the point of contact
   };
 
   MovablePass(const RunPlan&, const ContactLimits&);
 
-  /// Gain of the contacts of a body that so many robots may touch.
+  /// Gain of the contacts of a body that this many robots may touch.
   [[nodiscard]] double gain(std::uint32_t movable, std::size_t robots) const;
 
   void clear();
-  /// The body is moved in the first so many sub-steps.
+  /// Adds a body that moves in the first `passes` sub-steps.
   void add(std::uint32_t movable, std::uint32_t passes);
   [[nodiscard]] bool has(std::uint32_t movable) const { return mover_of_[movable] != kNone; }
   [[nodiscard]] bool empty() const { return movers_.empty(); }
   void add_contact(std::uint32_t movable, const Contact& contact) {
     movers_[mover_of_[movable]].contacts.push_back(contact);
   }
-  /// Calls take(other) for each movable body that this one may touch within the tick.
+  /// Calls take(other) for each movable body that `movable` may touch within the tick.
   template <class Take>
   void for_each_near(std::uint32_t movable, const std::vector<MovableState>& states, Take&& take) const {
     for (std::uint32_t other = 0; other < states.size(); ++other) {
@@ -53,8 +54,8 @@ class MovablePass {
     }
   }
 
-  /// Finds what else the bodies may touch, and gives the touched points their velocities.
-  void set_off(const std::vector<MovableState>&, ContactPass&);
+  /// Finds the bodies' contacts with walls, obstacles and each other, and writes the velocities of the points of contact.
+  void start(const std::vector<MovableState>&, ContactPass&);
   void sub_step(std::uint32_t step, ContactPass&);
   /// Poses and velocities after the tick.
   void finish(std::vector<MovableState>&) const;
@@ -62,11 +63,11 @@ class MovablePass {
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  /// (x, y, rho times the turn).
+  /// Translation x, y and rho times the turn, or their rates per sub-step.
   struct Motion {
     double x_mm = 0, y_mm = 0, turn_mm = 0;
   };
-  /// A point that may touch a wall, an obstacle or another movable body.
+  /// A possible contact with a wall, an obstacle or another movable body.
   struct Stop {
     double normal_x, normal_y;  ///< out of the body
     double lever_x_mm, lever_y_mm;
@@ -77,17 +78,17 @@ class MovablePass {
   struct Mover {
     std::uint32_t movable = 0, passes = 0;
     bool linked = false;   ///< it may touch other movers
-    bool changed = false;  ///< it is to be braked again
+    bool changed = false;  ///< balance() must apply friction again
     Motion shift, next_shift, velocity, before;
-    Motion braked;  ///< what friction has taken off in this sub-step
+    Motion braked;  ///< velocity that friction has removed in this sub-step
     std::vector<Contact> contacts;
     std::vector<Stop> stops;
   };
-  /// A point where two movers may touch; normal out of the first. Arms: as of along().
+  /// A possible contact of two movers. The normal points out of the first. Arms: as for along().
   struct Link {
     std::uint32_t first, second;
     double normal_x, normal_y, first_arm, second_arm, gap_mm;
-    double push = 0;  ///< force times the sub-step: kg mm per sub-step
+    double push = 0;  ///< impulse, kg mm per sub-step
   };
 
   void find_stops(Mover&, const std::vector<MovableState>&) const;
@@ -99,15 +100,15 @@ class MovablePass {
   void brake(Mover&) const;
   [[nodiscard]] double gap_mm(const Mover&, const Stop&) const;
   [[nodiscard]] double room_mm(const Mover&, const Stop&) const;
-  /// Takes off what a motion is beyond a limit along a direction.
-  static void take(Motion&, double nx, double ny, double arm, double excess);
+  /// Removes the excess of a motion beyond a limit along a direction.
+  static void remove_excess(Motion&, double nx, double ny, double arm, double excess);
   void place(Mover&, ContactPass&) const;
   [[nodiscard]] double arm(const Mover& mover, double lever_x_mm, double lever_y_mm, double nx, double ny) const {
     return (lever_x_mm * ny - lever_y_mm * nx) / bodies_[mover.movable].shape.mean_distance_mm();
   }
-  void move_points(const Mover&, const Motion& shift, const Motion& swing, double* (ContactPass::*of)(Slot),
+  void move_points(const Mover&, const Motion& shift, const Motion& extrapolated, double* (ContactPass::*of)(Slot),
                    ContactPass&) const;
-  /// Way of the point at this lever along a direction.
+  /// Displacement of a point along a direction. `arm`: as arm() returns it.
   [[nodiscard]] static double along(const Motion& m, double nx, double ny, double arm) {
     return nx * m.x_mm + ny * m.y_mm + arm * m.turn_mm;
   }
@@ -115,7 +116,7 @@ class MovablePass {
   const World world_;
   const std::vector<MovableBodyModel>& bodies_;
   double stride_mm_, touch_mm_, range_mm_, robot_kg_;
-  std::vector<double> grip_mm_;  ///< per body: what friction takes off a velocity in a sub-step
+  std::vector<double> grip_mm_;  ///< per body: velocity that friction can remove in a sub-step
   std::vector<std::uint32_t> mover_of_;
   std::vector<Mover> movers_;
   std::vector<Link> links_;

@@ -16,15 +16,15 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffff;
 constexpr double kGravity_mm_s2 = 9806.65;
-/// Below these a robot that nothing drives is at rest, and is stopped.
+/// An undriven robot below both values is at rest; its velocity is set to 0.
 constexpr double kRestSpeed_mm_s = 0.01, kRestSpin_rad_s = 0.001;
-/// Bodies at rest may overlap this little, which is rounding and the solver's softness.
+/// Bodies at rest may overlap by this much: rounding, and the solver's softness.
 constexpr double kRestOverlap_mm = 0.001;
 constexpr double kNewton_g_mm_s2 = 1e6;
 
 double square_of(const Vector3& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
-/// Where the next one goes.
+/// Writes a state into columns and returns the position after it.
 double* pack(const RigidState& state, double* columns) {
   *columns++ = state.position_mm[2];
   columns = std::copy(state.rotation.begin(), state.rotation.end(), columns);
@@ -59,7 +59,7 @@ Vector3 gravity_of(const PhysicsSettings& physics) {
   return {kGravity_mm_s2 * sine * downhill[0], kGravity_mm_s2 * sine * downhill[1], -kGravity_mm_s2 * cosine};
 }
 
-/// Whether a body at rest stays so.
+/// Whether a body at rest stays at rest on the tilted floor.
 bool holds(const PhysicsSettings& physics, double grip) {
   double sine, cosine;
   kt_sincos(physics.tilt_deg * (kPi / 180), &sine, &cosine);
@@ -148,7 +148,7 @@ bool OdeEngine::is_own(std::uint32_t i) const {
   return population_.own().empty() || population_.own()[i] != 0;
 }
 
-/// How far a place is from what a partition computes: its rectangle, and the movable bodies that it reaches.
+/// Distance of a point from the region that a partition computes: its rectangle and the movable bodies that it reaches.
 double OdeEngine::distance_mm(const Rectangle& rectangle, double x_mm, double y_mm) const {
   double least_mm = rectangle.distance_mm(x_mm, y_mm);
   for (std::size_t m = 0; m < movable_.size(); ++m) {
@@ -164,7 +164,7 @@ double OdeEngine::distance_mm(const Rectangle& rectangle, double x_mm, double y_
 void OdeEngine::move(Tick from, const Inputs& inputs) {
   read_ghosts(inputs);
   place_bodies();
-  set_off(from);
+  fill_drives(from);
   candidates_.update(population_.known());
   find_near();
   make_groups();
@@ -172,7 +172,7 @@ void OdeEngine::move(Tick from, const Inputs& inputs) {
   for (const std::uint32_t end : group_end_) {
     const std::span<const std::uint32_t> group(order_.data() + first, order_.data() + end);
     first = end;
-    if (stands_[group[0]] != 0) continue;  // These are groups of their own.
+    if (stands_[group[0]] != 0) continue;  // Such bodies form groups of one.
     if (std::none_of(group.begin(), group.end(), [this](std::uint32_t i) { return is_own(i); })) continue;
     if (rests(group)) {
       for (const std::uint32_t i : group) now_[i].velocity_mm_s = now_[i].spin_rad_s = {};
@@ -222,7 +222,7 @@ void OdeEngine::place_bodies() {
   }
 }
 
-void OdeEngine::set_off(Tick from) {
+void OdeEngine::fill_drives(Tick from) {
   const Bodies& known = population_.known();
   const std::vector<Duties>& duties = population_.duties();
   const std::vector<std::uint8_t>& driven = population_.driven();
@@ -258,7 +258,7 @@ void OdeEngine::make_groups() {
   const Bodies& known = population_.known();
   const auto count = static_cast<std::uint32_t>(now_.size());
   const double reach_mm = 2 * kRobotRadius_mm + limits_.reach_mm, reach_square_mm2 = reach_mm * reach_mm;
-  // The leader of a group is its lowest body; found by union with halved paths.
+  // The leader of a group is its lowest body: union-find with path halving.
   leader_.resize(count);
   const auto leader = [this](std::uint32_t i) {
     while (leader_[i] != i) i = leader_[i] = leader_[leader_[i]];
@@ -280,7 +280,7 @@ void OdeEngine::make_groups() {
   for (const auto& [i, m] : near_) {
     if (stands_[i] == 0 && stands_[m] == 0) unite(i, m);
   }
-  // Sorted by leaders, ascending within; a counting sort.
+  // Counting sort by leader; ascending within a group.
   group_end_.assign(count + 1, 0);
   for (std::uint32_t i = 0; i < count; ++i) ++group_end_[(leader_[i] = leader(i)) + 1];
   for (std::uint32_t i = 0; i < count; ++i) group_end_[i + 1] += group_end_[i];
@@ -324,7 +324,7 @@ bool OdeEngine::rests(std::span<const std::uint32_t> group) const {
       if (dx * dx + dy * dy < kNear_mm * kNear_mm) return false;
     }
   }
-  // A tracked robot or a ghost at the rim may move against them, or overlap a movable body.
+  // A tracked robot or a ghost at the rim may move towards a body of the group, or overlap a movable body.
   return std::none_of(near_.begin(), near_.end(), [&](const auto& pair) {
     const bool first = std::binary_search(group.begin(), group.end(), pair.first),
                second = std::binary_search(group.begin(), group.end(), pair.second);
@@ -413,7 +413,7 @@ void OdeEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   frame.tick = population_.tick();
   const Rectangle& rectangle = grid_.rectangle(neighbour);
   const Bodies& listed = population_.listed();
-  // Others' movable bodies are where they were a tick ago.
+  // Other partitions' movable bodies are one tick old here.
   const double margin_mm = population_.ghost_margin_mm() + (movable_.empty() ? 0 : limits_.reach_mm);
   for (std::size_t i = 0; i < listed.size(); ++i) {
     if (listed.tracked[i] == 0 && distance_mm(rectangle, listed.x_mm[i], listed.y_mm[i]) <= margin_mm)

@@ -1,20 +1,19 @@
-/// The ODE engine: rigid bodies in space, solved by the Open Dynamics Engine. A robot is an upright cylinder on three legs; it
-/// has mass, stands by its weight, and drives by friction at its rear legs, whose force is bounded. Movable bodies are
-/// upright prisms that stand by their corners. The floor may be tilted.
+/// The ODE engine: rigid bodies in space, solved by the Open Dynamics Engine. A robot is an upright cylinder on three legs,
+/// with mass and weight. It drives by friction at its rear legs, with limited force. Movable bodies are upright prisms that
+/// stand on their corners. The floor may be tilted.
 ///
-///   move from tick k: groups : known bodies that can touch each other within the tick, by chains
-///                     a group without own bodies is left out; one in which nobody is driven and all rest, stays
-///                     S sub-steps of each group: touch points (ode_touch.cpp), then ODE's solver
-/// Bodies touch each other, obstacles and walls without friction, at half the height of the lower one. Where they touch is
-/// found in the plane, as for bodies that stand upright.
+///   move from tick k: group the known bodies that can touch each other within the tick, directly or through others
+///                     skip groups without own bodies; leave groups at rest without driven bodies unchanged
+///                     per other group, S sub-steps: find touch points (ode_touch.cpp), then call ODE's solver
+/// Contacts with bodies, obstacles and walls have no friction and act at half the height of the lower body. They are found
+/// in the plane, as for upright bodies.
 ///
-/// State is in RigidState alone: ODE's world is filled for each group and emptied after it, always in ascending ids. A
-/// group's next state is a function of its bodies, their motors and the seed: the same in any mode, thread, process and
-/// machine with the same libode, and after a checkpoint. All partitions know all movable bodies. Neighbours' robots within the
-/// margin, or beside a movable body that a partition reaches, are simulated along with the own ones, so a group comes out the
-/// same in any partition that knows all of it. One that reaches farther than kReachHops - 1 robots beyond is cut there, and
-/// the ghosts behind the cut go on at their velocities: over partition grids, and for such groups alone, results are
-/// alike, not the same.
+/// All state is in RigidState: ODE's world is filled for each group in ascending ids, and emptied afterwards. A group's next
+/// state is a function of its bodies, their motors and the seed. It is the same in any mode, thread, process and machine
+/// with the same libode, and after a checkpoint. All partitions know all movable bodies. A partition also simulates
+/// neighbours' robots within the margin, or beside a movable body that it reaches. So every partition that knows a whole
+/// group computes the same result. A group that reaches farther than kReachHops - 1 robots across a border is cut there, and
+/// the ghosts behind the cut keep their velocities. For such groups alone, results differ slightly between partition grids.
 #pragma once
 
 #include <array>
@@ -33,19 +32,19 @@ namespace kilotwin::physics {
 
 /// Height of a robot with its legs, mm (Rubenstein, Ahler and Nagpal, ICRA 2012; K-Team's data sheet).
 inline constexpr double kRobotHeight_mm = 34;
-/// How many robots deep a partition sees into its neighbours.
+/// Depth in robots to which a partition knows its neighbours' bodies.
 inline constexpr double kReachHops = 4;
 
-/// What is fixed for a run.
+/// Constants of a run.
 struct OdeLimits {
   OdeLimits(const RunPlan&, const DriveModel&);
 
   std::uint32_t sub_steps;
   double sub_step_s;
-  double top_speed_mm_s;  ///< nobody is faster: driven, parting, or sliding down the whole arena
-  double reach_mm;        ///< two gaps wider than this do not close within a tick
-  double rim_mm;          ///< ghosts farther than this from what is computed may touch others that are not known
-  double margin_mm;       ///< of ghosts
+  double top_speed_mm_s;  ///< upper bound of any speed: driven, separating, or sliding down the whole arena
+  double reach_mm;        ///< gaps wider than this do not close within a tick
+  double rim_mm;          ///< ghosts farther than this from the computed region may touch unknown bodies
+  double margin_mm;       ///< width of the border in which bodies are ghosts
 };
 
 class OdeEngine final : public PopulationEngine {
@@ -59,12 +58,12 @@ class OdeEngine final : public PopulationEngine {
   void load(Tick, std::span<const proto::PhysicsState* const> parts) override;
 
  private:
-  /// What a robot or a movable body is; all robots are alike.
+  /// Constant properties of a robot or a movable body; all robots have the same.
   struct Kind {
     Convex shape;
     Inertia inertia{};
     double height_mm = 0, friction = 0;
-    bool holds_on_slope = false;  ///< at rest, it stays so
+    bool holds_on_slope = false;  ///< at rest, it does not slide down the tilted floor
   };
 
   OdeEngine(const RunPlan&, PartitionId, const DriveModel&);
@@ -72,7 +71,7 @@ class OdeEngine final : public PopulationEngine {
   void move(Tick from, const Inputs&) override;
   void read_ghosts(const Inputs&);
   void place_bodies();
-  void set_off(Tick from);
+  void fill_drives(Tick from);
   void find_near();
   void make_groups();
   [[nodiscard]] bool rests(std::span<const std::uint32_t> group) const;

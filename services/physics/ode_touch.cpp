@@ -1,4 +1,4 @@
-// Where bodies touch the floor, walls, obstacles and each other.
+// Contacts of bodies with the floor, walls, obstacles and each other.
 #include "services/physics/ode_engine.hpp"
 
 #include <algorithm>
@@ -7,9 +7,9 @@ namespace kilotwin::physics {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffff;
-/// What slides faster than this is braked against its way, a slower body against the slope.
+/// Above this speed, friction acts against the velocity; below it, against the slope.
 constexpr double kSlidingSpeed_mm_s = 0.1;
-/// A cylinder stands on this many points of its rim; cosines and sines of the first three.
+/// Number of rim points on which a cylinder stands, and their x coordinates for radius 1.
 constexpr std::size_t kRimPoints = 8;
 constexpr double kRimX[kRimPoints] = {1,  0.70710678118654752,  0, -0.70710678118654752,
                                       -1, -0.70710678118654752, 0, 0.70710678118654752};
@@ -53,7 +53,7 @@ void OdeEngine::touch_floor(std::uint32_t i) {
 void OdeEngine::touch_floor_driven(TouchPoint& touch, std::uint32_t i, const Vector3& ahead, std::uint32_t d) {
   const RigidState& state = now_[i];
   const Axes axes(state.rotation);
-  // The drive's displacement within a sub-step was computed for the heading at the tick's start.
+  // The drive's displacement within a sub-step refers to the heading at the tick's start.
   const Vector3& start = start_axis_[i];
   const double cosine = start[0] * ahead[0] + start[1] * ahead[1], sine = start[0] * ahead[1] - start[1] * ahead[0];
   const double velocity_x = (cosine * drives_.x_mm[d] - sine * drives_.y_mm[d]) / limits_.sub_step_s;
@@ -65,8 +65,8 @@ void OdeEngine::touch_floor_driven(TouchPoint& touch, std::uint32_t i, const Vec
     const Vector3 arm = axes.to_arena(legs_mm_[leg]);
     for (std::size_t k = 0; k < 3; ++k) touch.at_mm[k] = state.position_mm[k] + arm[k];
     touch.gap_mm = touch.at_mm[2];
-    // The rear legs push along their ways. They lie on the axle, so that one holds it sideways for both; with the front leg
-    // it keeps the robot from turning.
+    // The rear legs push along their direction of travel. They lie on the axle, so one of them holds the robot sideways for
+    // both. Together with the front leg it keeps the robot from turning.
     touch.grip[0] = leg < 2 ? thrust_g_mm_s2_ / 2 : 0;
     touch.grip[1] = leg == 0 ? thrust_g_mm_s2_ * 2 / 3 : leg == 2 ? thrust_g_mm_s2_ / 3 : 0;
     const double x = velocity_x - spin * arm[1], y = velocity_y + spin * arm[0];
@@ -76,7 +76,7 @@ void OdeEngine::touch_floor_driven(TouchPoint& touch, std::uint32_t i, const Vec
   }
 }
 
-/// At the height that the touch point has.
+/// Adds a contact at the height that the touch point has.
 void OdeEngine::add_touch(TouchPoint& touch, double x_mm, double y_mm, double normal_x, double normal_y,
                           double gap_mm) {
   if (gap_mm > limits_.reach_mm) return;
@@ -148,7 +148,7 @@ void OdeEngine::touch_robots(std::uint32_t i, double since_s) {
   }
 }
 
-/// The other may stand, the body does not.
+/// Body i is simulated; body j may be immobile.
 void OdeEngine::touch_pair(std::uint32_t i, std::uint32_t j, double since_s) {
   TouchPoint touch;
   touch.body = in_world_[i];
@@ -164,7 +164,7 @@ void OdeEngine::touch_pair(std::uint32_t i, std::uint32_t j, double since_s) {
   if (a.is_disc() && b.is_disc()) {
     const double dx = here.x_mm - there.x_mm, dy = here.y_mm - there.y_mm;
     const double gap_mm = __builtin_sqrt(dx * dx + dy * dy) - a.radius_mm() - b.radius_mm();
-    // Two in the same place part along x, the lower one to the left.
+    // Two bodies at the same position separate along x, the lower index to the left.
     const Vector3 normal = level(dx, dy, {i < j ? -1.0 : 1.0, 0, 0});
     const double from_mm = b.radius_mm() + gap_mm / 2;
     return add_touch(touch, there.x_mm + normal[0] * from_mm, there.y_mm + normal[1] * from_mm, normal[0],
@@ -173,7 +173,7 @@ void OdeEngine::touch_pair(std::uint32_t i, std::uint32_t j, double since_s) {
   touch_shapes(touch, a, here, b, there);
 }
 
-/// Where the first, the touch point's body, comes near the other: corners near faces, both ways, and centres of discs.
+/// Possible contacts of the touch point's body with the other: corners near faces, both ways, and centres of discs.
 void OdeEngine::touch_shapes(TouchPoint& touch, const Convex& body, const Place& here, const Convex& other,
                              const Place& there) {
   const auto near_other = [&](Point2 p, double radius_mm) {

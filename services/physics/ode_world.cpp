@@ -12,35 +12,35 @@
 namespace kilotwin::physics {
 namespace {
 
-/// The part of an overlap that a step closes (ODE's manual: 0.1..0.8). The solver's error shows as overlap, the less the more
-/// of it is closed: 0.2 mm in a crowd of 1000 that all drive to its centre, 0.8 mm with 0.2.
+/// Fraction of an overlap that a step closes (ODE's manual: 0.1..0.8). The solver's error appears as overlap, which is
+/// smaller for larger fractions. For a crowd of 1000 robots that all drive to its centre: 0.2 mm with 0.8, 0.8 mm with 0.2.
 constexpr double kErrorReduction = 0.8;
-/// Compliance of all constraints, 1/g per step: a millionth of that of a robot's mass, enough to make four points of support
-/// solvable, too little to be seen.
+/// Compliance of all constraints, 1/g per step: a millionth of a robot's inverse mass. It makes four points of
+/// support solvable, and its effect is too small to be seen.
 constexpr double kCompliance_1_g = 1e-7;
-/// The same of dry friction, where compliance is creep: 1e-7 would let four robots move a box of 18 g by 1 um/s.
+/// Compliance of dry friction, where it causes creep: with 1e-7, four robots would move a box of 18 g by 1 um/s.
 constexpr double kGripCompliance_1_g = 1e-12;
-/// Overlapping bodies part at most at this speed, mm/s: as in the planar engine.
-constexpr double kParting_mm_s = 20;
-/// Sweeps of the iterative solver. Where robots push a movable body their forces add up to nearly what friction holds, and what
-/// sweeps leave over is creep (0.2 mm/s with four robots behind each other and 20 sweeps, 2e-4 mm/s with 200); less in
-/// groups of more than 32 bodies, for which there is no time.
+/// Largest speed at which overlapping bodies separate, mm/s: the same as in the planar engine.
+constexpr double kSeparation_mm_s = 20;
+/// Sweeps of the iterative solver. Where robots push a movable body, their forces add up to nearly the friction limit, and the
+/// solver's error is creep: 0.2 mm/s for four robots in a row with 20 sweeps, 2e-4 mm/s with 200. Groups of more than 32
+/// bodies get fewer sweeps, to bound the time.
 constexpr std::size_t kSweeps = 20, kMostSweeps = 200, kSweepsTimesBodies = 6400;
 
-/// ODE's random numbers are one sequence of the process.
+/// ODE's random numbers are one sequence per process.
 std::mutex& random_numbers() {
   static std::mutex mutex;
   return mutex;
 }
 
-/// Set by ODE's message handler. The only message that worlds of contacts give rise to is the exact solver's, when
-/// rounding lets it find no step to go; it then leaves forces out.
+/// Set by ODE's message handler. Worlds of contacts cause one message only: the exact solver finds no further step because
+/// of rounding. It then leaves forces out.
 thread_local bool solver_gave_up = false;
-void take_message(int, const char*, va_list) { solver_gave_up = true; }
+void handle_message(int, const char*, va_list) { solver_gave_up = true; }
 
 void start_ode() {
   static const bool started = [] {
-    dSetMessageHandler(&take_message);
+    dSetMessageHandler(&handle_message);
     return dInitODE2(0) != 0;
   }();
   KILOTWIN_DEMAND(started);
@@ -49,7 +49,7 @@ void start_ode() {
 }  // namespace
 
 Inertia Inertia::prism(double mass_g, const Convex& shape, double height_mm) {
-  // Means of x^2, y^2 and x y over the area; a polygon's from the triangles between its centre and its edges.
+  // Means of x^2, y^2 and x y over the area. A polygon is divided into triangles between its centre and its edges.
   double xx = shape.radius_mm() * shape.radius_mm() / 4, yy = xx, xy = 0;
   const std::vector<Point2>& corners = shape.corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -75,13 +75,13 @@ OdeWorld::OdeWorld(Vector3 gravity_mm_s2, double step_s) : step_s_(step_s), hand
   Handles& h = *handles_;
   h.world = dWorldCreate();
   h.contacts = dJointGroupCreate(0);
-  // Worlds share one work list by default, which two threads must not use at a time.
+  // By default all worlds share one work list, which two threads must not use at the same time.
   h.threading = dThreadingAllocateSelfThreadedImplementation();
   dWorldSetStepThreadingImplementation(h.world, dThreadingImplementationGetFunctions(h.threading), h.threading);
   dWorldSetGravity(h.world, gravity_mm_s2[0], gravity_mm_s2[1], gravity_mm_s2[2]);
   dWorldSetERP(h.world, kErrorReduction);
   dWorldSetCFM(h.world, kCompliance_1_g);
-  dWorldSetContactMaxCorrectingVel(h.world, kParting_mm_s);
+  dWorldSetContactMaxCorrectingVel(h.world, kSeparation_mm_s);
   dWorldSetContactSurfaceLayer(h.world, 0);
   dWorldSetAutoDisableFlag(h.world, 0);
 }

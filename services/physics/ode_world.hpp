@@ -1,9 +1,9 @@
-/// Rigid bodies and contacts in space, solved by the Open Dynamics Engine. This is the only part that knows ODE. Units mm, g,
-/// s: forces come out in g mm/s^2 = 1e-6 N.
+/// Rigid bodies and contacts in space, solved by the Open Dynamics Engine. No other file uses ODE's interface. Units are mm,
+/// g and s; forces are in g mm/s^2 = 1e-6 N.
 ///
-/// A world is filled, stepped and emptied; nothing stays in it, so that all state is in RigidState. Of ODE's arithmetic
-/// only + - * / and square roots are on the path (rotations are integrated to first order and normalised), and worlds
-/// of several threads share nothing but ODE's random numbers, which the iterative solver draws under a lock.
+/// The caller fills a world, steps it and clears it. All state is in RigidState. ODE's code uses only + - * / and square
+/// roots here: rotations are integrated to first order and normalised. Worlds of several threads share ODE's random
+/// numbers and nothing else; the iterative solver draws them under a lock.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace kilotwin::physics {
 
 using Vector3 = std::array<double, 3>;
 
-/// Of a body's centre of mass.
+/// State of a body's centre of mass.
 struct RigidState {
   Vector3 position_mm{};
   std::array<double, 4> rotation{1, 0, 0, 0};  ///< unit quaternion w, x, y, z, from the body's frame to the arena's
@@ -29,34 +29,34 @@ struct Inertia {
   Vector3 moment_g_mm2;
   double product_xy_g_mm2 = 0;
 
-  /// A homogeneous upright prism over the shape, about its centre.
+  /// Inertia of a homogeneous upright prism with this base, about its centre.
   [[nodiscard]] static Inertia prism(double mass_g, const Convex&, double height_mm);
 };
 
-/// Two bodies, or one body and what stands, touch or may touch within the step: they do not close more than the gap.
+/// A possible contact within the step of two bodies, or of a body with an immobile object: they close by at most the gap.
 struct TouchPoint {
   static constexpr std::uint32_t kStanding = 0xffffffff;
   enum class Friction : std::uint8_t {
     kNone,
-    kCoulomb,  ///< along each axis at most its grip times the normal force
-    kBounded,  ///< along each axis at most its grip in g mm/s^2, whatever the normal force
+    kCoulomb,  ///< along each axis, at most `grip` times the normal force
+    kBounded,  ///< along each axis, at most `grip` in g mm/s^2, for any normal force
   };
 
-  std::uint32_t body, other;  ///< indices as add() returned them; `other` may be kStanding
+  std::uint32_t body, other;  ///< indices from add(); `other` may be kStanding: immobile
   Vector3 at_mm;              ///< in the arena's frame
   Vector3 normal;             ///< unit, from the other to the body
   double gap_mm;              ///< negative: overlap
   Friction friction = Friction::kNone;
-  // Along two axes.
-  Vector3 axis{};                  ///< the first: unit, perpendicular to the normal; the second is normal x axis
-  double grip[2] = {0, 0};         ///< 0: none along this axis
-  double motion_mm_s[2] = {0, 0};  ///< the body's velocity against the other that friction works towards
+  // Friction along two axes.
+  Vector3 axis{};           ///< the first, a unit vector perpendicular to the normal; the second is normal x axis
+  double grip[2] = {0, 0};  ///< 0: no friction along this axis
+  double motion_mm_s[2] = {0, 0};  ///< target of friction: the body's velocity relative to the other
 };
 
-/// How the forces at contacts are found.
+/// Method for the contact forces.
 enum class Solver : std::uint8_t {
-  kExact,      ///< Dantzig's method; its time grows with the cube of the contacts that hang together
-  kIterative,  ///< successive over-relaxation; linear time, a little soft
+  kExact,      ///< Dantzig's method; cubic in the number of connected contacts
+  kIterative,  ///< successive over-relaxation; linear, slightly soft
 };
 
 class OdeWorld {
@@ -69,8 +69,9 @@ class OdeWorld {
   void clear();
   std::uint32_t add(const Inertia&, const RigidState&);
   void add(const TouchPoint&);
-  /// Advances all bodies and removes all contacts. Results depend on the order of adding, and with the iterative solver on
-  /// `seed`. `pushes`: a movable body is among them. False: the exact solver met contacts whose forces it cannot tell apart, and the states are to be dropped.
+  /// Advances all bodies and removes all contacts. Results depend on the order of add(); those of the iterative solver also
+  /// on `seed`. `pushes`: a movable body is present. Returns false if the exact solver could not determine the forces; the
+  /// caller must then discard the states.
   [[nodiscard]] bool step(Solver, std::uint64_t seed, bool pushes);
   void read(std::uint32_t body, RigidState&) const;
 

@@ -1,4 +1,4 @@
-/// The physics engine of one partition as a federate: bodies and ghosts out, ghosts and actuation in.
+/// One partition's physics engine as a federate: reads ghosts and actuation, publishes bodies and ghosts.
 #pragma once
 
 #include "core/federation/service_context.hpp"

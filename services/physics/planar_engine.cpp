@@ -29,8 +29,8 @@ void PlanarEngine::list_movables() {
   for (std::size_t m = 0; m < reach_mm_.size(); ++m) listed_movable_[m] = is_own(contact_.movables()[m]);
 }
 
-/// Contacts and movable bodies as their owners have them.
-void PlanarEngine::take(const Inputs& inputs) {
+/// Reads ghosts' contacts and movable bodies from their owners' frames.
+void PlanarEngine::read_ghosts(const Inputs& inputs) {
   Bodies& known = population_.known();
   for (const BodyFrame* frame : inputs.ghosts) {
     const MovableColumns& movable = frame->movable;
@@ -59,19 +59,19 @@ void PlanarEngine::take(const Inputs& inputs) {
 }
 
 void PlanarEngine::move(Tick from, const Inputs& inputs) {
-  take(inputs);
+  read_ghosts(inputs);
   Bodies& known = population_.known();
   for (std::size_t m = 0; m < own_movable_.size(); ++m) own_movable_[m] = is_own(contact_.movables()[m]);
   listed_movable_ = own_movable_;
   if (!contact_.find(known, population_.own(), own_movable_, population_.driven())) return;
-  set_off(from);
+  fill_drives(from);
   contact_.move(known, drives_);
 }
 
-void PlanarEngine::set_off(Tick from) {
+void PlanarEngine::fill_drives(Tick from) {
   const Bodies& known = population_.known();
   drives_.count = 0;
-  population_.drive().add(drives_, contact_.asks_drive(), known.robot, from, population_.duties(),
+  population_.drive().add(drives_, contact_.needs_drive(), known.robot, from, population_.duties(),
                           known.heading_rad, contact_.drive_part());
   population_.complete(from, drives_);
 }
@@ -101,8 +101,8 @@ void PlanarEngine::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   const Bodies& listed = population_.listed();
   const std::vector<MovableState>& movables = contact_.movables();
   if (!movables.empty()) {
-    // The bodies that the neighbour reaches, one by the other, and all robots beside them. Poses of others' bodies are a tick
-    // old here: the slack makes up for it.
+    // Send the movable bodies that the neighbour reaches, directly or through others, and all robots beside them. Poses of
+    // other partitions' bodies are one tick old here; the slack covers their motion.
     const Rectangle& rectangle = grid_.rectangle(neighbour);
     std::vector<std::uint32_t> reached;
     std::vector<std::uint8_t> is_reached(movables.size(), 0);

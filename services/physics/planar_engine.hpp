@@ -1,10 +1,11 @@
 /// The planar engine: differential drive and contact of discs, over a partition of the arena.
 ///
-///   move from tick k: find   : who may touch whom, and which of the others own bodies depend on
-///                     drive  : motors of k -> wanted motion of these
-///                     contact: S Jacobi passes over these
-/// Own bodies come out bit for bit as if one partition computed all: a body depends on one hop of neighbours per sub-step,
-/// and the margin holds S hops. Others are computed as far as own ones depend on them, and their poses are not used.
+///   move from tick k: find   : possible contacts, and the other bodies that own bodies depend on
+///                     drive  : motors of k -> velocity of each of these bodies without contact
+///                     contact: S Jacobi passes over these bodies
+/// Own bodies get the same bits as with a single partition: a body depends on one hop of neighbours per sub-step, and the
+/// margin covers S hops. Bodies of other partitions are computed only as far as own bodies depend on them; their resulting
+/// poses are not used.
 #pragma once
 
 #include "services/physics/contact.hpp"
@@ -26,8 +27,8 @@ class PlanarEngine final : public PopulationEngine {
  private:
   PlanarEngine(const RunPlan&, PartitionId, const DriveModel&);
   void move(Tick from, const Inputs&) override;
-  void take(const Inputs&);
-  void set_off(Tick from);
+  void read_ghosts(const Inputs&);
+  void fill_drives(Tick from);
   void list_movables();
   void add_movables(BodyFrame&) const;
   [[nodiscard]] bool is_own(const MovableState& body) const { return rectangle_.contains(body.x_mm, body.y_mm); }
@@ -37,7 +38,7 @@ class PlanarEngine final : public PopulationEngine {
   double margin_mm_, slack_mm_;
   std::vector<double> reach_mm_;              ///< per movable body
   std::vector<std::uint8_t> own_movable_;     ///< per movable body, by its pose before the step
-  std::vector<std::uint8_t> listed_movable_;  ///< per movable body: whose state the partition publishes and hashes
+  std::vector<std::uint8_t> listed_movable_;  ///< per movable body: this partition publishes and hashes its state
   ContactSolver contact_;
   Drives drives_;  ///< within a step
 };

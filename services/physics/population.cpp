@@ -10,9 +10,9 @@
 namespace kilotwin::physics {
 
 double Population::margin_mm(const RunPlan& plan, const DriveModel& drive, double reach_mm) {
-  const double look_mm = std::max(drive.effects().radius_mm(), ArenaFields::margin_mm(plan));
-  // By way of movable bodies it can matter what robots anywhere look at.
-  return look_mm > 0 && plan.movables() > 0 ? 1e300 : reach_mm + look_mm;
+  const double effects_mm = std::max(drive.effects().radius_mm(), ArenaFields::margin_mm(plan));
+  // Movable bodies can carry the influence of robots anywhere.
+  return effects_mm > 0 && plan.movables() > 0 ? 1e300 : reach_mm + effects_mm;
 }
 
 Population::Population(const RunPlan& plan, PartitionId partition, DriveModel drive, double reach_mm)
@@ -94,7 +94,7 @@ void Population::gather(std::span<const BodyFrame* const> ghosts) {
     known_.swap(listed_);
     return;
   }
-  // List 0 is what was listed, 1 the tracked ones, the others are ghosts.
+  // List 0 has the listed robots, list 1 the tracked ones; the others are ghosts.
   const auto add = [this](std::uint32_t robot, Merge::Entry entry) {
     if (!merge_.add(robot, entry))
       throw RunError("two partitions claim robot " + std::to_string(robot) + " at tick " +
@@ -125,7 +125,7 @@ void Population::gather(std::span<const BodyFrame* const> ghosts) {
       const BodyFrame& frame = *ghosts[from.list - 2];
       const double x = frame.x_mm[from.index], y = frame.y_mm[from.index];
       while (before < previous_.size() && previous_.robot[before] < robot) ++before;
-      // One that the last step did not move here, and that is where it was, was not moved anywhere.
+      // A body that the last step left at rest, and whose pose no input changed, is still asleep.
       const bool asleep = before < previous_.size() && previous_.robot[before] == robot &&
                           previous_.awake[before] == 0 && previous_.x_mm[before] == x &&
                           previous_.y_mm[before] == y;
@@ -192,7 +192,7 @@ void Population::emit_ghosts(PartitionId neighbour, BodyFrame& frame) const {
   const Rectangle& rectangle = grid_.rectangle(neighbour);
   for (std::size_t i = 0; i < listed_.size(); ++i) {
     const double x = listed_.x_mm[i], y = listed_.y_mm[i];
-    // Most lie far off; the distance itself takes a root.
+    // Most robots are far away. This test avoids the square root of the distance.
     if (x < rectangle.x_min_mm - margin_mm_ || x > rectangle.x_max_mm + margin_mm_ ||
         y < rectangle.y_min_mm - margin_mm_ || y > rectangle.y_max_mm + margin_mm_) {
       continue;

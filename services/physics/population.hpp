@@ -1,10 +1,10 @@
-/// The bodies that one partition has to do with, and what is common to all engines: who is whose, what goes to neighbours,
-/// hashing, saving and loading. An engine moves bodies; the population says which.
+/// The bodies that one partition knows, and the tasks that all engines share: ownership, ghosts for neighbours, hashing,
+/// saving and loading. An engine moves the bodies.
 ///
 ///   begin(k): known = bodies listed at k + ghosts of k + tracked robots, within the margin of the rectangle
-///             own   = those of the known whose pose at k lies in the rectangle
+///             own   = known bodies whose pose at k lies in the rectangle
 ///   (the engine moves the own bodies among the known from k to k+1)
-///   end():    listed at k+1 = own; what the model's effects remember
+///   end():    listed at k+1 = own; updates the memory of the model's effects
 #pragma once
 
 #include <cstdint>
@@ -23,37 +23,38 @@ namespace kilotwin::physics {
 
 class Population {
  public:
-  /// `reach_mm`: how far from the rectangle a robot can be and still matter to own ones within a tick, effects aside.
+  /// `reach_mm`: largest distance from the rectangle at which a robot can affect own ones within a tick, without effects.
   Population(const RunPlan&, PartitionId, DriveModel, double reach_mm);
 
-  /// How far from the rectangle robots must be known, mm: those within reach look at others and at what places remember.
+  /// Distance from the rectangle within which robots must be known, mm. It exceeds `reach_mm` if effects read neighbours or
+  /// fields.
   [[nodiscard]] static double margin_mm(const RunPlan&, const DriveModel&, double reach_mm);
 
-  /// Applies tracked poses, gathers the known bodies and reads their motors. `from` must be the present tick.
+  /// Applies tracked poses, gathers the known bodies and reads their motors. `from` must be the current tick.
   void begin(Tick from, const Inputs&);
-  /// The present tick is the next one.
+  /// Advances the current tick by one.
   void end();
 
-  // Between begin() and end(): ascending ids.
+  // Valid between begin() and end(); ascending ids.
   [[nodiscard]] Bodies& known() { return known_; }
   [[nodiscard]] const Bodies& known() const { return known_; }
   /// Per known body, whether the partition owns it; empty: all of them.
   [[nodiscard]] const std::vector<std::uint8_t>& own() const { return own_; }
-  /// Per known body; 0 for tracked ones and those that no frame covers.
+  /// Per known body; 0 for tracked robots and robots in no frame.
   [[nodiscard]] const std::vector<Duties>& duties() const { return duties_; }
-  /// Per known body, 1: it moves by itself.
+  /// Per known body, 1: its drive moves it.
   [[nodiscard]] const std::vector<std::uint8_t>& driven() const { return driven_; }
   [[nodiscard]] const DriveModel& drive() const { return drive_; }
-  /// Drives, to which known bodies were added, with the model's effects and all that follows; exact for those within reach.
+  /// Applies the model's effects to drives of known bodies, and integrates them. Exact for bodies within `reach_mm`.
   void complete(Tick from, Drives&);
 
-  // At the present tick.
+  // At the current tick.
   [[nodiscard]] Tick tick() const { return tick_; }
   [[nodiscard]] const Bodies& listed() const { return listed_; }
   [[nodiscard]] const std::vector<PartitionId>& neighbours() const { return neighbours_; }
   void emit_bodies(BodyFrame&) const;
   void emit_ghosts(PartitionId neighbour, BodyFrame&) const;
-  /// How far from a neighbour's rectangle robots are ghosts there, mm.
+  /// Distance from a neighbour's rectangle within which this partition's robots are ghosts there, mm.
   [[nodiscard]] double ghost_margin_mm() const { return margin_mm_; }
   /// Adds a listed robot to a frame of ghosts.
   void add_ghost(std::size_t listed, BodyFrame&) const;
@@ -66,7 +67,7 @@ class Population {
   void gather(std::span<const BodyFrame* const> ghosts);
   void read_motors(Tick from, std::span<const ActuationFrame* const>);
   [[nodiscard]] bool is_own(double x_mm, double y_mm) const { return rectangle_.contains(x_mm, y_mm); }
-  /// The known bodies at the start of the step.
+  /// The known bodies at the start of the step, as columns for the effects.
   [[nodiscard]] RobotColumns known_columns() const;
   void remember();
 
@@ -77,7 +78,7 @@ class Population {
   Rectangle rectangle_;
   double margin_mm_;
   std::uint32_t robots_;
-  std::vector<std::uint8_t> is_tracked_;  ///< per robot; empty where there is none
+  std::vector<std::uint8_t> is_tracked_;  ///< per robot; empty if no robot is tracked
   std::vector<PartitionId> neighbours_;
 
   Tick tick_;
@@ -85,17 +86,17 @@ class Population {
   Bodies tracked_;  ///< all tracked robots, wherever they are
 
   // Within a step.
-  Bodies known_, previous_;        ///< of the present step and of the one before
+  Bodies known_, previous_;        ///< of the current step and of the one before
   std::vector<std::uint8_t> own_;  ///< per known body, by its pose before the step; empty with one partition
   Merge merge_;
   std::vector<const ActuationFrame*> frames_;
   std::vector<Duties> duties_;        ///< per known body
   std::vector<std::uint8_t> driven_;  ///< per known body
   std::vector<double> x_mm_, y_mm_,
-      heading_rad_;  ///< per known body, before the step, where something is remembered
+      heading_rad_;  ///< per known body, before the step; filled if effects have memory
 };
 
-/// An engine over a population; what is left to do is to move it.
+/// Base class of engines over a population: a derived class only moves the bodies.
 class PopulationEngine : public Engine {
  public:
   void step(Tick from, const Inputs& inputs) final {
@@ -115,10 +116,10 @@ class PopulationEngine : public Engine {
   }
 
  protected:
-  /// `reach_mm`: as Population takes it.
+  /// `reach_mm`: as for Population.
   PopulationEngine(const RunPlan& plan, PartitionId partition, DriveModel drive, double reach_mm)
       : population_(plan, partition, std::move(drive), reach_mm) {}
-  /// From tick `from` to the next: own bodies get their new poses; those of others may be left as they are.
+  /// Moves own bodies from tick `from` to the next. It may leave other bodies' poses unchanged.
   virtual void move(Tick from, const Inputs&) = 0;
 
   Population population_;

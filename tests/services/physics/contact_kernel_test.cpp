@@ -119,7 +119,7 @@ std::vector<double> results(const ContactKernel& kernel, std::uint32_t seed) {
     }
   }
   const BodyColumns bodies = scene.bodies();
-  kernel.roll(kLimits, bodies, scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(), kSlots - 3);
+  kernel.move_free(kLimits, bodies, scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(), kSlots - 3);
   for (const auto* column : {&scene.x_mm, &scene.y_mm, &scene.heading_rad})
     all.insert(all.end(), column->begin(), column->end());
   return all;
@@ -164,16 +164,16 @@ TEST(ContactKernel, RollsAsABatchDoes) {
       scene.now.swap(scene.after);
     }
     const Scene before = scene;
-    constexpr std::uint32_t kRolled = kSlots - 3;
-    kernels[k]->roll(kLimits, before.bodies(), scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(),
-                     kRolled);
+    constexpr std::uint32_t kFree = kSlots - 3;
+    kernels[k]->move_free(kLimits, before.bodies(), scene.x_mm.data(), scene.y_mm.data(), scene.heading_rad.data(),
+                          kFree);
     for (std::uint32_t i = kLanes; i < kSlots; ++i) {
-      const bool rolled = i < kRolled;
-      EXPECT_EQ(scene.x_mm[i], before.x_mm[i] + (rolled ? scene.now[4 * i] : 0)) << kernels[k]->name << ' ' << i;
-      EXPECT_EQ(scene.y_mm[i], before.y_mm[i] + (rolled ? scene.now[4 * i + 1] : 0))
+      const bool is_free = i < kFree;
+      EXPECT_EQ(scene.x_mm[i], before.x_mm[i] + (is_free ? scene.now[4 * i] : 0)) << kernels[k]->name << ' ' << i;
+      EXPECT_EQ(scene.y_mm[i], before.y_mm[i] + (is_free ? scene.now[4 * i + 1] : 0))
           << kernels[k]->name << ' ' << i;
       EXPECT_EQ(scene.heading_rad[i],
-                rolled ? wrapped(before.heading_rad[i] + before.turn_rad[i]) : before.heading_rad[i]);
+                is_free ? wrapped(before.heading_rad[i] + before.turn_rad[i]) : before.heading_rad[i]);
     }
   }
 }
