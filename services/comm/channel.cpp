@@ -5,15 +5,15 @@ namespace kilotwin::comm {
 void Channel::locate() {
   newest_.assign(newest_.size(), kNone);
   older_.clear();
-  for (std::uint32_t i = 0; i < all_.size(); ++i) file(i);
+  for (std::uint32_t i = 0; i < all_.size(); ++i) index(i);
 }
 
 void Channel::add(const Transmission& transmission) {
   all_.push_back(transmission);
-  file(static_cast<std::uint32_t>(all_.size() - 1));
+  index(static_cast<std::uint32_t>(all_.size() - 1));
 }
 
-void Channel::file(std::uint32_t index) {
+void Channel::index(std::uint32_t index) {
   std::uint32_t& newest = newest_[neighbourhood_.cell_of(all_[index].sender)];
   older_.push_back(newest);
   newest = index;

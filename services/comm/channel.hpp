@@ -1,4 +1,4 @@
-/// The robots' transmissions of now and just before, found by place.
+/// The robots' current and recent transmissions, indexed by position.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,10 @@ class Channel {
   Channel(const Neighbourhood& neighbourhood, LinkTable& links)
       : neighbourhood_(neighbourhood), links_(links), newest_(neighbourhood.cells(), kNone) {}
 
-  /// Files all transmissions by where their senders are now.
+  /// Rebuilds the index from the senders' current positions.
   void locate();
   void add(const Transmission&);
-  /// Forgets what is over at `t`. Call locate() before the next search.
+  /// Removes transmissions that ended by `t`. Call locate() before the next search.
   void forget(Cycles t) {
     std::erase_if(all_, [t](const Transmission& x) { return x.end <= t; });
   }
@@ -27,7 +27,7 @@ class Channel {
   [[nodiscard]] std::vector<Transmission>& all() { return all_; }
   [[nodiscard]] const std::vector<Transmission>& all() const { return all_; }
 
-  /// Whether `robot` notices at `t` that another one sends.
+  /// Carrier sense: whether `robot` detects another robot's transmission at `t`.
   [[nodiscard]] bool busy(std::uint32_t robot, Cycles t) {
     bool found = false;
     visit_near(robot, 1, [&](const Transmission& x) {
@@ -35,14 +35,14 @@ class Channel {
     });
     return found;
   }
-  /// Calls f(transmission) for the transmissions whose senders notice a start pulse of `robot` at `t`, in no particular order.
+  /// Calls f(transmission) for the transmissions whose senders detect a start pulse of `robot` at `t`, in any order.
   template <class F> void visit_interrupted(std::uint32_t robot, Cycles t, F f) {
     visit_near(robot, 1, [&](Transmission& x) {
       if (x.notices(t) && x.sender != robot && links_.notices(x.sender, robot)) f(x);
     });
   }
-  /// The senders that transmit in [from, until) so close to `robot` that a third robot may hear both; `robot` itself is
-  /// left out, in `found`.
+  /// Sets `found` to the other senders that transmit in [from, until) close enough to `robot` that a third robot may hear
+  /// both.
   void find_rivals(std::uint32_t robot, Cycles from, Cycles until, std::vector<std::uint32_t>& found);
 
  private:
@@ -53,13 +53,13 @@ class Channel {
       for (std::uint32_t i = newest_[cell]; i != kNone; i = older_[i]) f(all_[i]);
     });
   }
-  void file(std::uint32_t index);
+  void index(std::uint32_t index);
 
   const Neighbourhood& neighbourhood_;
   LinkTable& links_;
   std::vector<Transmission> all_;
-  std::vector<std::uint32_t> older_;   ///< per transmission: the next one in its cell
-  std::vector<std::uint32_t> newest_;  ///< per cell: its first transmission
+  std::vector<std::uint32_t> older_;   ///< per transmission: index of the next one in its cell, or kNone
+  std::vector<std::uint32_t> newest_;  ///< per cell: index of its first transmission, or kNone
 };
 
 }  // namespace kilotwin::comm

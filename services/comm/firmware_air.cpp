@@ -14,7 +14,7 @@ namespace kilotwin::comm {
 namespace {
 
 constexpr std::uint32_t kLastDraw = (1u << 17) - 1;
-/// Bits after which any packet is over: its octets may be some bits apart.
+/// Number of bits after which any packet has ended: there may be gaps of some bits between its octets.
 constexpr Cycles kLongestPacket = 13 * (kBitsPerOctet + 2);
 
 }  // namespace
@@ -46,7 +46,7 @@ FirmwareAir::FirmwareAir(const RunPlan& plan, FirmwareRobots& robots, const Tick
   flash_starts_.resize(count);
   all_.resize(count);
   std::iota(all_.begin(), all_.end(), 0u);
-  show();
+  read_outputs();
 }
 
 void FirmwareAir::begin_tick(const SwarmView& swarm) {
@@ -61,8 +61,8 @@ void FirmwareAir::begin_tick(const SwarmView& swarm) {
   }
 }
 
-/// What a firmware robot reads of a sender that it hears. The noise of single packets and readings is left out: a processor
-/// takes pulses for what they are.
+/// Readings of a firmware robot for a sender in range. They are without the noise of packets and readings: a processor
+/// measures the pulses as they are.
 Gains FirmwareAir::gains(std::uint32_t sender, std::uint32_t receiver) {
   if (links_.is_disc()) return ranging_.gains(__builtin_sqrt(neighbourhood_.square(receiver, sender)));
   return links_.gains(links_.margin_db(neighbourhood_, sender, receiver));
@@ -70,10 +70,10 @@ Gains FirmwareAir::gains(std::uint32_t sender, std::uint32_t receiver) {
 
 void FirmwareAir::end_tick() {
   robots_.end_tick();
-  show();
+  read_outputs();
 }
 
-void FirmwareAir::show() {
+void FirmwareAir::read_outputs() {
   for (std::uint32_t i = 0; i < outputs_.size(); ++i) {
     outputs_[i] = robots_.outputs(i);
     if (outputs_[i].fault != 0)
@@ -81,7 +81,7 @@ void FirmwareAir::show() {
     else if (outputs_[i].flat)
       life_cycle_[i] = LifeCycle::kFlat;
     else if (life_cycle_[i] == LifeCycle::kFlat)
-      life_cycle_[i] = LifeCycle::kIdle;  // switched on anew
+      life_cycle_[i] = LifeCycle::kIdle;  // The robot has been switched on again.
   }
 }
 
@@ -90,11 +90,11 @@ const std::vector<FirmwareAir::Event>& FirmwareAir::advance(Cycles from, Cycles 
   collect_packets(from, until, channel, overhead);
   for (auto& flashes : flashes_) flashes.clear();
   find_starts();
-  shine(from, until, light_);
+  collect_light(from, until, light_);
   robots_.run(until, all_, light_, flashes_);
   for (;;) {
     find_starts();
-    shine(from, until, next_light_);
+    collect_light(from, until, next_light_);
     again_.clear();
     for (const std::uint32_t i : all_) {
       if (light_[i] == next_light_[i]) continue;
@@ -105,11 +105,11 @@ const std::vector<FirmwareAir::Event>& FirmwareAir::advance(Cycles from, Cycles 
     robots_.run(until, again_, light_, flashes_);
   }
   robots_.commit();
-  settle(from, until);
+  decode_flashes(from, until);
   return events_;
 }
 
-/// What others than firmware robots have on the air.
+/// Collects packets on the air from all senders but firmware robots.
 void FirmwareAir::collect_packets(Cycles from, Cycles until, const Channel& channel,
                                   const OverheadController& overhead) {
   packets_.clear();
@@ -127,7 +127,7 @@ void FirmwareAir::collect_packets(Cycles from, Cycles until, const Channel& chan
   }
 }
 
-/// When packets of firmware robots start, by the flashes that are known at present.
+/// Finds the starts of firmware robots' packets from their current flashes.
 void FirmwareAir::find_starts() {
   starts_.clear();
   for (const std::uint32_t i : all_) {
@@ -142,8 +142,8 @@ void FirmwareAir::find_starts() {
   }
 }
 
-/// The light on every firmware robot.
-void FirmwareAir::shine(Cycles from, Cycles until, std::vector<std::vector<Pulse>>& light) {
+/// Collects the light on every firmware robot.
+void FirmwareAir::collect_light(Cycles from, Cycles until, std::vector<std::vector<Pulse>>& light) {
   for (auto& pulses : light) pulses.clear();
   for (const Packet& packet : packets_) {
     Cycles ends = until;
@@ -189,10 +189,10 @@ bool FirmwareAir::fades(std::uint32_t receiver, std::uint32_t sender, Cycles sta
   return random_.uniform(Stream::kReception, receiver, Tick{tick}, draw) < loss_;
 }
 
-/// The flashes are final: what they are to others, span by span.
-void FirmwareAir::settle(Cycles from, Cycles until) {
+/// Decodes the final flashes into events, in order of time.
+void FirmwareAir::decode_flashes(Cycles from, Cycles until) {
   events_.clear();
-  settled_.assign(all_.size(), 0);
+  decoded_.assign(all_.size(), 0);
   for (Cycles begin = from; begin < until; begin += kSpan) {
     const Cycles end = std::min(begin + kSpan, until);
     const std::size_t first = events_.size();
@@ -205,14 +205,14 @@ void FirmwareAir::settle(Cycles from, Cycles until) {
           case PulseDecoder::Event::kStarted: ends += decoder.bits(kLongestPacket); break;
           case PulseDecoder::Event::kReceived:
             robots_.note_sent(i);
-            ends += decoder.bits(1);  // its last stop bit
+            ends += decoder.bits(1);  // the last stop bit
             break;
           case PulseDecoder::Event::kAborted: ends = decoder.state().start + kStartPulse; break;
           case PulseDecoder::Event::kGarbled: break;
         }
         events_.push_back({kind, robots_.ids()[i], time, ends, decoder.message()});
       };
-      for (std::size_t& n = settled_[i]; n < flashes_[i].size() && flashes_[i][n] < end; ++n) {
+      for (std::size_t& n = decoded_[i]; n < flashes_[i].size() && flashes_[i][n] < end; ++n) {
         note(decoder.pass(flashes_[i][n], true), flashes_[i][n]);
         note(decoder.feed(flashes_[i][n]), flashes_[i][n]);
       }
@@ -225,7 +225,7 @@ void FirmwareAir::settle(Cycles from, Cycles until) {
 
 void FirmwareAir::note_reception(std::uint32_t robot, const IrMessage& message) {
   LifeCycle& life = life_cycle_[index_[robot]];
-  constexpr std::uint8_t kSave = 0;  // kilolib's calibration: the mode in which it is stored
+  constexpr std::uint8_t kSave = 0;  // kilolib's calibration: the mode that stores its result
   switch (message[9]) {
     case 0x80:                                                                             // BOOT
     case 0x83:                                                                             // RESET
@@ -283,7 +283,7 @@ void FirmwareAir::load(const proto::RadioState& part) {
     decoders_[i].restore(
         {state.packet_start(), state.octet_start(), std::min(state.octet(), 12u), true, PacketBits(bits)});
   }
-  show();
+  read_outputs();
 }
 
 }  // namespace kilotwin::comm

@@ -1,11 +1,11 @@
-/// The air between firmware robots and all others, pulse by pulse.
+/// The channel between firmware robots and all others, pulse by pulse.
 ///
-/// Time goes on in short spans. Within one, every robot runs on its own; then the light that each was given is compared with
-/// what the others have made of the span, and whoever was given too little or too much runs again, until nothing changes. A
-/// pulse acts on later ones only, so that this ends, and with one result whatever the order: that of robots which run
-/// together, cycle by cycle. It is repeated where somebody transmits and nowhere else.
+/// Time advances in short spans. Within a span every robot first runs on its own. The engine then compares the light that
+/// each robot was given with the light that the others produced. Robots with different light run the span again, until
+/// nothing changes. The iteration ends because a pulse affects later pulses only. Its result does not depend on the order:
+/// it is that of robots that run together, cycle by cycle. Spans without transmissions need no repetition.
 ///
-/// Others hear of a firmware robot as of a transmission: when one starts, is given up, or ends with its message.
+/// Other robots see a firmware robot's packet as a Transmission: its start, its abort, or its end with the message.
 #pragma once
 
 #include <cstdint>
@@ -29,19 +29,19 @@ namespace kilotwin::comm {
 
 class FirmwareAir {
  public:
-  /// Length of a span, 0.26 ms. A native robot that wants to send hears firmware robots' packets that started in earlier
-  /// spans only; the start pulse of one of the same span makes the firmware robot give up.
+  /// Length of a span, 0.26 ms. A native robot's carrier sense detects firmware robots' packets of earlier spans only. If both
+  /// start in the same span, the native start pulse makes the firmware robot give up.
   static constexpr Cycles kSpan = FirmwareRobots::kSpan;
-  /// So many spans may go together, with the same result, where only firmware robots send or are about to: threads meet less
-  /// often.
+  /// Up to this number of spans may run as one, with the same result, if only firmware robots send or are about to send.
+  /// Threads then synchronise less often.
   static constexpr int kMostSpans = 4;
 
-  /// Of a firmware robot's transmissions.
+  /// An event of a firmware robot's transmission.
   struct Event {
     PulseDecoder::Event kind;
     std::uint32_t robot;  ///< id
     Cycles time;
-    Cycles end;         ///< of what it has on the air; kStarted: when it has certainly ended
+    Cycles end;         ///< end of the transmission; kStarted: an upper bound of it
     IrMessage message;  ///< kReceived
   };
 
@@ -52,23 +52,23 @@ class FirmwareAir {
   [[nodiscard]] bool listening(std::uint32_t robot) const { return outputs_[index_[robot]].listening; }
   [[nodiscard]] std::span<const std::uint32_t> ids() const { return robots_.ids(); }
   [[nodiscard]] const FirmwareRobots::Outputs& outputs(std::uint32_t i) const { return outputs_[i]; }
-  /// As the overhead messages that a robot has heard should have it.
+  /// Life cycle that the robot should have after the overhead messages that it received.
   [[nodiscard]] LifeCycle life_cycle(std::uint32_t i) const { return life_cycle_[i]; }
 
-  /// Poses are those of the tick that begins.
+  /// Takes the poses of the tick that begins.
   void begin_tick(const SwarmView&);
-  /// From `from` to `until`, one span or several. Returns what happened, in the order of time, valid until the next call.
+  /// Simulates [from, until): one span or several. Returns the events in order of time, valid until the next call.
   const std::vector<Event>& advance(Cycles from, Cycles until, const Channel&, const OverheadController&);
-  /// Reads what the robots show.
+  /// Reads the robots' outputs.
   void end_tick();
   /// A robot has received a message.
   void note_reception(std::uint32_t robot, const IrMessage&);
-  /// Whether what starts at `start` fades at a firmware robot; `sender`: an id, or kOverhead.
+  /// Whether a packet that starts at `start` is lost at a firmware robot by radio.loss; `sender`: an id, or kOverhead.
   [[nodiscard]] bool fades(std::uint32_t receiver, std::uint32_t sender, Cycles start) const;
 
   [[nodiscard]] std::uint64_t hash() const;
   void save(proto::RadioState&) const;
-  /// Throws RunError where the part does not fit.
+  /// Throws RunError if the part does not fit.
   void load(const proto::RadioState&);
 
   static constexpr std::uint32_t kOverhead = 0xffffffffu;
@@ -76,7 +76,7 @@ class FirmwareAir {
  private:
   static constexpr std::uint32_t kNobody = 0xffffffffu;
   struct Neighbour {
-    std::uint32_t index;  ///< of one that is heard
+    std::uint32_t index;  ///< of a firmware robot within range
     Gains gains;
   };
   struct Start {
@@ -87,9 +87,9 @@ class FirmwareAir {
   [[nodiscard]] Gains gains(std::uint32_t sender, std::uint32_t receiver);
   void collect_packets(Cycles from, Cycles until, const Channel&, const OverheadController&);
   void find_starts();
-  void shine(Cycles from, Cycles until, std::vector<std::vector<Pulse>>& light);
-  void settle(Cycles from, Cycles until);
-  void show();
+  void collect_light(Cycles from, Cycles until, std::vector<std::vector<Pulse>>& light);
+  void decode_flashes(Cycles from, Cycles until);
+  void read_outputs();
 
   FirmwareRobots& robots_;
   const Neighbourhood& neighbourhood_;
@@ -99,28 +99,28 @@ class FirmwareAir {
   const Cycles cycles_per_tick_;
   const double loss_;
   const Random random_;
-  std::vector<std::uint32_t> index_;  ///< per robot of the run: its index here, or kNobody
+  std::vector<std::uint32_t> index_;  ///< per robot of the run: its index among the firmware robots, or kNobody
 
   // Per firmware robot.
   std::vector<PulseDecoder> decoders_;
   std::vector<FirmwareRobots::Outputs> outputs_;
   std::vector<LifeCycle> life_cycle_;
-  std::vector<std::vector<Neighbour>> neighbours_;  ///< firmware robots that it hears, ascending
+  std::vector<std::vector<Neighbour>> neighbours_;  ///< firmware robots within range, ascending
   std::vector<std::vector<Pulse>> light_, next_light_;
   std::vector<std::vector<Cycles>> flashes_;
-  std::vector<std::vector<Cycles>> flash_starts_;  ///< of each flash: when its packet started
+  std::vector<std::vector<Cycles>> flash_starts_;  ///< per flash: start of its packet
 
-  // Of the span at hand.
+  // Of the current span.
   struct Packet {
     Cycles start;
     std::uint32_t sender;  ///< id, or kOverhead
-    bool fragile;          ///< a start pulse in its leading byte ends it
+    bool fragile;          ///< a start pulse in its leading octet aborts it
     PacketBits bits;
   };
-  std::vector<Packet> packets_;  ///< of robots with native programs, and copies of the overhead controller
+  std::vector<Packet> packets_;  ///< of native robots and of the overhead controller
   std::vector<Start> starts_;
   std::vector<std::uint32_t> all_, again_;
-  std::vector<std::size_t> settled_;  ///< per robot: flashes that are done with
+  std::vector<std::size_t> decoded_;  ///< per robot: number of flashes that are decoded
   std::vector<Event> events_;
 };
 

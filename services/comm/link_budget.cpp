@@ -12,10 +12,10 @@ namespace {
 
 /// Standard deviation of the sum of four octets: sqrt(4 (256^2 - 1) / 12).
 constexpr double kOctetSum_sd = 147.801, kOctetSum_mean = 510;
-/// What is remembered of pairs, octets in all: it stays in a cache of the processor's.
+/// Size of the cache of pair offsets, octets: small enough for the processor's cache.
 constexpr std::size_t kRemembered = 8u << 20;
 constexpr std::uint32_t kNobody = 0xffffffffu;
-/// ln 10 / 10: from dB to a factor.
+/// ln 10 / 10: from dB to the exponent of a power ratio.
 constexpr double kPerDecibel = 0.2302585092994046;
 
 }  // namespace
@@ -29,7 +29,7 @@ LinkBudget::LinkBudget(const RunPlan& plan)
       decay_db_per_mm_(plan.radio_settings().propagation.decay_db_per_mm),
       mm_per_db_(1 / decay_db_per_mm_),
       reach_mm_(range_mm_),
-      surely_square_(range_square_) {
+      certain_square_(range_square_) {
   if (is_disc_) return;
   const PropagationSettings& model = plan.radio_settings().propagation;
   body_loss_db_ = model.body_loss_db;
@@ -71,41 +71,41 @@ LinkBudget::LinkBudget(const RunPlan& plan)
   find_reach();
 }
 
-double LinkBudget::Pattern::swing_db() const {
+double LinkBudget::Pattern::amplitude_db() const {
   double sum = 0;
   for (const Vector& v : harmonics) sum += __builtin_sqrt(v.x * v.x + v.y * v.y);
   return sum;
 }
 
-/// The greatest gain over the nominal robot that any pair can have bounds the reach; the greatest loss, the distance within
-/// which everybody is heard.
+/// The largest gain of any pair over the nominal robot bounds the reach. The largest loss bounds the distance within which
+/// every robot is heard.
 void LinkBudget::find_reach() {
   double power_most = 0, power_least = 0, sensitivity_most = 0, sensitivity_least = 0;
   for (std::uint32_t i = 0; i < heading_rad_.size(); ++i) {
     const auto widen = [](double level, const RadioParameters::Bearing& own, const Pattern& pattern, double& most,
                           double& least) {
-      const double swing =
-          __builtin_sqrt(own.ahead_db * own.ahead_db + own.left_db * own.left_db) + pattern.swing_db();
-      most = std::max(most, level + swing);
-      least = std::min(least, level - swing);
+      const double amplitude_db =
+          __builtin_sqrt(own.ahead_db * own.ahead_db + own.left_db * own.left_db) + pattern.amplitude_db();
+      most = std::max(most, level + amplitude_db);
+      least = std::min(least, level - amplitude_db);
     };
     widen(robots_.power_db(i), robots_.power_bearing(i), power_pattern_, power_most, power_least);
     widen(robots_.sensitivity_db(i), robots_.sensitivity_bearing(i), sensitivity_pattern_, sensitivity_most,
           sensitivity_least);
   }
-  double link_most = most_spread_db(), link_least = -link_most;
+  double link_most = max_spread_db(), link_least = -link_most;
   for (const Link& link : links_) {
     link_most = std::max(link_most, link.offset_db + kMostNoise * run_sd_db_);
     link_least = std::min(link_least, link.offset_db - kMostNoise * run_sd_db_);
   }
   reach_mm_ = range_mm_ + (power_most + sensitivity_most + link_most - floor_db()) / decay_db_per_mm_;
-  // Between discs that touch there is no room for another: a shadow needs a distance of two diameters.
-  const double surely_mm = range_mm_ + (power_least + sensitivity_least + link_least) / decay_db_per_mm_;
-  const double clear_mm = body_loss_db_ > 0 ? std::min(surely_mm, 3 * kRobotRadius_mm) : surely_mm;
-  surely_square_ = clear_mm > 0 ? clear_mm * clear_mm : 0;
+  // No disc fits between two discs that touch: a shadow needs a distance of two diameters.
+  const double certain_mm = range_mm_ + (power_least + sensitivity_least + link_least) / decay_db_per_mm_;
+  const double clear_mm = body_loss_db_ > 0 ? std::min(certain_mm, 3 * kRobotRadius_mm) : certain_mm;
+  certain_square_ = clear_mm > 0 ? clear_mm * clear_mm : 0;
 }
 
-double LinkBudget::most_spread_db() const {
+double LinkBudget::max_spread_db() const {
   return kMostNoise *
          __builtin_sqrt(pair_sd_db_ * pair_sd_db_ + link_sd_db_ * link_sd_db_ + run_sd_db_ * run_sd_db_);
 }
@@ -114,17 +114,17 @@ double LinkBudget::span_mm() const {
   return casts_shadows() ? __builtin_sqrt(reach_mm_ * reach_mm_ + kRobotRadius_mm * kRobotRadius_mm) : reach_mm_;
 }
 
-void LinkBudget::face(std::uint32_t robot) {
+void LinkBudget::update_facing(std::uint32_t robot) {
   const double heading = heading_rad_[robot];
   if (faced_rad_[robot] == heading) return;
   faced_rad_[robot] = heading;
   facing_[robot] = {kt_cos(heading), kt_sin(heading)};
 }
 
-/// Level of a robot in the direction of the unit vector (x, y) of the arena: its own vector and the pattern of all.
+/// Level of a robot towards the unit vector (x, y) of the arena: its own vector plus the pattern that all robots share.
 double LinkBudget::bearing_db(const Pattern& pattern, const RadioParameters::Bearing& own, std::uint32_t robot,
                               double x, double y) {
-  face(robot);
+  update_facing(robot);
   const Vector f = facing_[robot];
   const double cosine = f.x * x + f.y * y, sine = f.x * y - f.y * x;
   double sum = own.ahead_db * cosine + own.left_db * sine;
@@ -154,7 +154,7 @@ double LinkBudget::margin_db(const Neighbourhood& robots, std::uint32_t sender, 
   return margin;
 }
 
-/// What a pair has of its own in this run.
+/// Random offset of a pair, constant within the run.
 float LinkBudget::spread_db(std::uint32_t sender, std::uint32_t receiver) {
   Known& known = known_[std::size_t{receiver} * row_ + (sender & (row_ - 1))];
   if (known.other != sender) known = {sender, drawn_spread_db(sender, receiver)};
@@ -176,13 +176,13 @@ float LinkBudget::drawn_spread_db(std::uint32_t sender, std::uint32_t receiver) 
     sum += pair_sd_db_ * noise(word[0]) + link_sd_db_ * noise(word[direction]);
   }
   if (run_sd_db_ > 0) sum += run_sd_db_ * noise(random_.block(Stream::kLink, low, Tick{high}, 1)[direction]);
-  if (!known) sum = std::clamp(sum, -most_spread_db(), most_spread_db());
+  if (!known) sum = std::clamp(sum, -max_spread_db(), max_spread_db());
   return static_cast<float>(sum);
 }
 
 double LinkBudget::packet_noise_db(std::uint32_t sender, std::uint32_t receiver, std::int64_t instant) const {
   if (!(packet_sd_db_ > 0)) return 0;
-  // The sender goes into the draw, where the numbers of a robot and an instant have room for 2^16 blocks.
+  // The sender selects the block of the draw: a robot and an instant have 2^16 blocks.
   return packet_sd_db_ * noise(random_.block(Stream::kPacket, receiver, Tick{instant}, sender & 0xffffu)[0]);
 }
 

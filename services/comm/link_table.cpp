@@ -22,7 +22,7 @@ void LinkTable::move(std::uint32_t robot, double x_mm, double y_mm, double headi
 }
 
 void LinkTable::refresh(std::uint32_t sender) {
-  // All receivers, and all bodies between them and the sender, are in the cells around it.
+  // All receivers, and all bodies between them and the sender, are in the cells around the sender.
   std::uint32_t latest = 0;
   neighbourhood_.visit_cells(sender, 1, [&](std::uint32_t cell) { latest = std::max(latest, touched_[cell]); });
   checked_[sender] = now_;

@@ -1,5 +1,5 @@
-/// Whom each robot's light reaches, and with what margin: computed when a robot is asked for, and remembered while nobody
-/// around it moves. What is remembered is a pure function of poses, so that it never shows in a result.
+/// Receivers of each robot's light, with their margins: computed on demand, and cached while no robot nearby moves. Entries
+/// are pure functions of poses, so the cache never affects a result.
 #pragma once
 
 #include <cstdint>
@@ -20,18 +20,18 @@ class LinkTable {
 
   LinkTable(Neighbourhood&, LinkBudget&);
 
-  /// Whether links are tabled at all: where distance alone decides, there is nothing to remember.
+  /// Whether the table is in use: if distance alone decides, there is nothing to cache.
   [[nodiscard]] bool used() const { return !row_.empty(); }
-  /// A tick begins. Then robots move, and when they have the neighbourhood is sorted.
+  /// Begins a tick. Call move() for the robots that moved next, then sort the neighbourhood.
   void begin_tick() { ++now_; }
   void move(std::uint32_t robot, double x_mm, double y_mm, double heading_rad);
-  /// The robots that notice a sender, or may receive single packets of it; in no particular order.
+  /// Robots that sense a sender, or may receive single packets from it; in any order.
   [[nodiscard]] std::span<const Link> of(std::uint32_t sender) {
     if (checked_[sender] != now_) refresh(sender);
     return row_[sender];
   }
   [[nodiscard]] bool notices(std::uint32_t receiver, std::uint32_t sender);
-  /// Forgets everything.
+  /// Empties the cache.
   void clear();
 
  private:
@@ -39,10 +39,10 @@ class LinkTable {
 
   Neighbourhood& neighbourhood_;
   LinkBudget& links_;
-  std::uint32_t now_ = 1;               ///< counts ticks
-  std::vector<std::uint32_t> touched_;  ///< per cell: when something last changed there
-  std::vector<std::uint32_t> built_;    ///< per robot: when its row was computed; 0: never
-  std::vector<std::uint32_t> checked_;  ///< per robot: when its row was last known to hold
+  std::uint32_t now_ = 1;               ///< number of ticks
+  std::vector<std::uint32_t> touched_;  ///< per cell: tick of the last change there
+  std::vector<std::uint32_t> built_;    ///< per robot: tick in which its row was computed; 0: never
+  std::vector<std::uint32_t> checked_;  ///< per robot: last tick in which its row was known to be valid
   std::vector<std::vector<Link>> row_;  ///< per sender
 };
 

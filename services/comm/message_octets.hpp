@@ -1,4 +1,4 @@
-/// Messages as strings of octets, ten each, and as words.
+/// Messages as strings of octets, ten octets each, and as 64-bit words.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace kilotwin::comm {
 
 inline void append(std::string& octets, const IrMessage& message) { octets.append(message.begin(), message.end()); }
 
-/// Message `i` of a string of messages. Throws RunError where the string ends before.
+/// Message `i` of a string of messages. Throws RunError if the string is too short.
 inline IrMessage message_at(const std::string& octets, std::size_t i) {
   IrMessage message;
   if (octets.size() < (i + 1) * message.size()) throw RunError("the radio's part of the checkpoint lacks messages");

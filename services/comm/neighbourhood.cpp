@@ -3,12 +3,12 @@
 namespace kilotwin::comm {
 namespace {
 
-/// Cells are this much larger than the range, so that rounding of a coordinate cannot put two robots in range of each other
-/// two cells apart.
+/// Ratio of the cell size to the range. It exceeds 1, so that rounding of a coordinate cannot put two robots in range of
+/// each other two cells apart.
 constexpr double kCellSlack = 1 + 1e-6;
-/// Eight cells a side, so that the 5 x 5 cells around a robot are distinct.
+/// At least eight cells per side, so that the 5 x 5 cells around a robot are distinct.
 constexpr std::uint32_t kLeastSideBits = 3;
-/// The table has one cell for so many robots: the experiments that matter put several into the reach of each other.
+/// Robots per cell of the table: in typical experiments several robots are within range of each other.
 constexpr std::uint32_t kRobotsPerCell = 4;
 
 }  // namespace
@@ -41,7 +41,7 @@ void Neighbourhood::sort() {
     sum += f;
     f = sum;
   }
-  // From the end, so that robots within a cell ascend and each entry of first_ ends at its cell's first robot.
+  // In descending order, so that robots within a cell ascend, and first_ ends at the first robot of each cell.
   for (std::uint32_t i = robots; i-- > 0;) {
     const std::uint32_t place = --first_[cell_of_[i]];
     sorted_[place] = i;

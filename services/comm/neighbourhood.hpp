@@ -1,6 +1,6 @@
-/// Who is near whom: robots in the cells of a square grid whose pitch is the range or a little more. The grid covers the plane and is folded
-/// onto a table of 2^k x 2^k cells, so that its memory depends on the number of robots alone; robots far apart may share a
-/// cell and are told apart by their distance.
+/// Neighbour search: robots in the cells of a square grid whose pitch is the range or slightly more. The grid covers the
+/// plane and is folded onto a table of 2^k x 2^k cells, so that memory depends on the number of robots only. Robots far
+/// apart may share a cell; distances separate them.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ class Neighbourhood {
   /// `cell_mm`: pitch of the cells, at least the range.
   Neighbourhood(double range_mm, double cell_mm, std::uint32_t robots);
 
-  /// Whether the place is another than before.
+  /// Sets a robot's position. Returns whether it differs from the previous one.
   bool place(std::uint32_t robot, double x_mm, double y_mm) {
     const bool moved = x_mm_[robot] != x_mm || y_mm_[robot] != y_mm;
     x_mm_[robot] = x_mm;
@@ -59,13 +59,13 @@ class Neighbourhood {
     }
   }
 
-  /// How much of the line between two robots' centres lies within the discs of others, in diameters. Call sort() first.
+  /// Length of the line between two robots' centres within the discs of others, in diameters. Call sort() first.
   [[nodiscard]] double bodies_between(std::uint32_t a, std::uint32_t b, double radius_mm) const;
 
   /// Number of cells.
   [[nodiscard]] std::uint32_t cells() const { return 1u << (2 * side_bits_); }
   [[nodiscard]] std::uint32_t cell_of(std::uint32_t robot) const { return cell_of(x_mm_[robot], y_mm_[robot]); }
-  /// Calls f(cell) for the cells of all places within `ranges` (1 or 2) ranges of a robot.
+  /// Calls f(cell) for all cells within `ranges` (1 or 2) ranges of a robot.
   template <class F> void visit_cells(std::uint32_t robot, std::uint32_t ranges, F f) const {
     const std::uint32_t column = coordinate(x_mm_[robot]), row = coordinate(y_mm_[robot]);
     for (std::uint32_t r = row - ranges; r != row + ranges + 1; ++r) {
@@ -76,11 +76,11 @@ class Neighbourhood {
   }
 
  private:
-  /// Coordinates are clamped here, mm; far outside any arena (1e6 mm wide).
+  /// Coordinates are clamped to +-this value, mm; arenas are at most 1e6 mm wide.
   static constexpr double kFar_mm = 1e7;
 
   [[nodiscard]] std::uint32_t coordinate(double mm) const {
-    // The offset makes it positive, so that the conversion rounds down.
+    // The offset makes the value positive, so that the conversion rounds down.
     return static_cast<std::uint32_t>(
         static_cast<std::int32_t>((std::min(std::max(mm, -kFar_mm), kFar_mm) + kFar_mm) * cells_per_mm_));
   }
@@ -91,11 +91,11 @@ class Neighbourhood {
   double range_square_, cells_per_mm_;
   bool sorted_now_ = false;
   std::uint32_t side_bits_, mask_;
-  std::vector<double> x_mm_, y_mm_;                ///< per robot
-  std::vector<std::uint32_t> cell_of_;             ///< per robot
-  std::vector<std::uint32_t> first_;               ///< per cell: where its robots begin; one more entry at the end
-  std::vector<std::uint32_t> sorted_;              ///< robots by cell
-  std::vector<double> sorted_x_mm_, sorted_y_mm_;  ///< their places
+  std::vector<double> x_mm_, y_mm_;     ///< per robot
+  std::vector<std::uint32_t> cell_of_;  ///< per robot
+  std::vector<std::uint32_t> first_;    ///< per cell: index of its first robot in sorted_; then the total
+  std::vector<std::uint32_t> sorted_;   ///< robots by cell
+  std::vector<double> sorted_x_mm_, sorted_y_mm_;  ///< positions of sorted_
 };
 
 }  // namespace kilotwin::comm

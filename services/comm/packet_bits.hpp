@@ -1,5 +1,5 @@
-/// A packet as pulses of light: 13 octets, the first one zero, the last two the CRC, each with a start and a stop bit; a
-/// pulse is a 1.
+/// A packet as light pulses: 13 octets, the first of zeros, the last two the CRC, each with a start and a stop bit. A pulse
+/// is a 1.
 #pragma once
 
 #include <bitset>
@@ -17,49 +17,49 @@ using PacketBits = std::bitset<kPacketBits>;
 /// CRC-16/MCRF4XX of data and type, as kilolib computes it.
 [[nodiscard]] std::uint16_t message_crc(const IrMessage&);
 [[nodiscard]] PacketBits packet_bits(const IrMessage&);
-/// The message, unless a robot would drop the packet.
+/// The message; nullopt if a robot would drop the packet.
 [[nodiscard]] std::optional<IrMessage> message_of(const PacketBits&);
 
-/// Follows the pulses of one sender, as a receiver does: it counts bits anew from every octet's start bit.
+/// Decodes the pulses of one sender as a receiver does: it synchronises to the start bit of each octet.
 class PulseDecoder {
  public:
   enum class Event : std::uint8_t {
     kNone,
-    kStarted,   ///< with this pulse
-    kAborted,   ///< the packet was given up in its leading octet
-    kReceived,  ///< message() is whole
-    kGarbled    ///< it was no packet
+    kStarted,   ///< this pulse starts a packet
+    kAborted,   ///< the sender gave up in the leading octet
+    kReceived,  ///< message() is complete
+    kGarbled    ///< the pulses are no valid packet
   };
   struct State {
     Cycles start = 0;         ///< of the packet
-    Cycles octet_start = 0;   ///< of the octet at hand
+    Cycles octet_start = 0;   ///< of the current octet
     std::uint32_t octet = 0;  ///< 0..12
-    bool busy = false;        ///< with a packet
-    PacketBits bits;          ///< pulses so far
+    bool busy = false;        ///< within a packet
+    PacketBits bits;          ///< pulses up to the current time
   };
 
-  /// The sender's bits last kBit * period / 2^18 nominal cycles.
+  /// `period`: the sender's timer period. Its bits last kBit * period / 2^18 nominal cycles.
   explicit PulseDecoder(Cycles period) : period_(period) {}
 
-  /// What is known at `now`, after all pulses before it; `flash`: a pulse begins there, which feed() is to take next.
+  /// Advances to `now`, after all earlier pulses. `flash`: a pulse begins at `now`; pass it to feed() next.
   Event pass(Cycles now, bool flash);
-  /// A pulse begins, after pass() of the same instant. kStarted, kReceived or kNone.
+  /// Takes a pulse that begins at `now`, after pass() of the same time. Returns kStarted, kReceived or kNone.
   Event feed(Cycles now);
 
   [[nodiscard]] const State& state() const { return state_; }
   void restore(const State& state) { state_ = state; }
   [[nodiscard]] const IrMessage& message() const { return message_; }
-  /// So many bits of this sender, nominal cycles.
+  /// Duration of `count` bits of this sender, nominal cycles.
   [[nodiscard]] Cycles bits(Cycles count) const { return count * kBit * period_ / kRegularPeriod; }
 
  private:
   static constexpr Cycles kRegularPeriod = kTimerCounts * kTimerCount;
-  /// Number of the octet's bit that is nearest to `now`.
+  /// Index of the octet's bit that is nearest to `now`.
   [[nodiscard]] Cycles nearest(Cycles now) const {
     const Cycles own = (now - state_.octet_start) * kRegularPeriod / period_;
     return (own + kBit / 2) / kBit;
   }
-  /// Whether pulse `bit` of the octet at hand has come.
+  /// Whether pulse `bit` of the current octet has arrived.
   [[nodiscard]] bool has(std::size_t bit) const { return state_.bits[state_.octet * kBitsPerOctet + bit]; }
 
   Cycles period_;

@@ -1,4 +1,4 @@
-/// How often each pair of robots communicated since the start.
+/// Number of messages per pair of robots since the start.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ class PairCounts {
     }
     counts[at].count += count;
   }
-  /// By receiver, then by sender.
+  /// Sorted by receiver, then by sender.
   [[nodiscard]] std::vector<PairCount> all() const {
     std::vector<PairCount> result;
     for (std::uint32_t receiver = 0; receiver < of_receiver_.size(); ++receiver) {
@@ -40,7 +40,7 @@ class PairCounts {
   struct Count {
     std::uint32_t sender, count;
   };
-  std::vector<std::vector<Count>> of_receiver_;  ///< ascending senders
+  std::vector<std::vector<Count>> of_receiver_;  ///< per receiver, in ascending order of senders
 };
 
 }  // namespace kilotwin::comm

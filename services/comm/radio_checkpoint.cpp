@@ -1,4 +1,4 @@
-// Saving and loading of the radio engine.
+// Saves and restores the radio engine.
 #include "core/base/error.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/message_octets.hpp"

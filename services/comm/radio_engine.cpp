@@ -10,9 +10,10 @@
 namespace kilotwin::comm {
 namespace {
 
-/// Readings of an overhead controller's copy: it hangs far above the arena, so robots read the weakest calibrated signal.
+/// Distance whose readings stand for the overhead controller's. It hangs far above the arena, so robots read the weakest
+/// calibrated signal.
 constexpr double kOverheadDistance_mm = 33 + 65;
-/// Draws of Stream::kReception: a sender's id for its packet, counted down from here for the copies of a tick.
+/// Draw index of Stream::kReception: the sender's id for its packet, and this value downwards for a tick's overhead packets.
 constexpr std::uint32_t kLastDraw = (1u << 17) - 1;
 
 std::vector<Share> all_shares(const RunPlan& plan) {
@@ -52,15 +53,15 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
   for (std::uint32_t i = 0; i < plan.robots(); ++i) {
     const Pose pose = plan.initial_pose(i);
     neighbourhood_.place(i, pose.x_mm, pose.y_mm);
-    apart_.push_back(plan.tracked(i) || plan.firmware(i));
+    is_external_.push_back(plan.tracked(i) || plan.firmware(i));
   }
   KILOTWIN_DEMAND(!divided_ || !plan.has_firmware());
   if (divided_) {
     owned_.assign(plan.robots(), 0);
     known_.assign(plan.robots(), 1);
-    divide();
+    update_ownership();
   }
-  // Nobody has sent just now: the first times are spread over the interval.
+  // The robots' first times of sending are spread over the interval.
   for (std::uint32_t i = 0; i < next_send_.size(); ++i)
     next_send_[i] = static_cast<Cycles>(simple_model_.interval_s * kNominalClockHz *
                                         random_.uniform(Stream::kBackOff, i, Tick{-1}, 0));
@@ -74,7 +75,7 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
   if (divided_) take_ghosts(inputs.ghosts);
   forget(begin_of(from));
   read_poses(inputs.swarm);
-  if (divided_) divide();
+  if (divided_) update_ownership();
   read_life_cycles(inputs.swarm);
   take_offers(inputs.swarm);
   overhead_.advance(inputs.overhead.packets, begin_of(from), begin_of(from + 1));
@@ -104,9 +105,9 @@ void RadioEngine::read_life_cycles(const SwarmView& swarm) {
     if (divided_ && known_[robot] == 0) continue;
     const auto life_cycle = static_cast<LifeCycle>(swarm.life_cycle[robot]);
     const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed ||
-                      life_cycle == LifeCycle::kFlat || apart_[robot] != 0;
-    const bool running = life_cycle == LifeCycle::kRunning && apart_[robot] == 0;
-    const int kept = state_[robot] & (kHolding | kFlying);
+                      life_cycle == LifeCycle::kFlat || is_external_[robot] != 0;
+    const bool running = life_cycle == LifeCycle::kRunning && is_external_[robot] == 0;
+    const int kept = state_[robot] & (kHolding | kSending);
     state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));
     if (!running && kept != 0) drop_message(robot);
     if (firmware_ && firmware_->has(robot) && firmware_->listening(robot)) state_[robot] |= kFirmware;
@@ -125,13 +126,13 @@ void RadioEngine::take_offers(const SwarmView& swarm) {
 
 void RadioEngine::drop_message(std::uint32_t robot) {
   state_[robot] &= static_cast<std::uint8_t>(~kHolding);
-  if (!is(robot, kFlying)) return;
+  if (!is(robot, kSending)) return;
   for (Transmission& transmission : channel_.all()) {
     if (transmission.sender == robot && !transmission.aborted) transmission.orphaned = true;
   }
 }
 
-/// What is over and overlaps nothing that is on the air at `begin` matters no more.
+/// Removes transmissions that ended and overlap nothing that is on the air at `begin`.
 void RadioEngine::forget(Cycles begin) {
   Cycles oldest = begin;
   for (const Transmission& transmission : channel_.all()) {
@@ -148,18 +149,18 @@ bool RadioEngine::later(const Attempt& a, const Attempt& b) {
   return a.time != b.time ? a.time > b.time : a.robot > b.robot;
 }
 
-/// A packet that ends at `end` arrives in the tick that begins there, so that nothing in a tick is of a later instant.
+/// A packet that ends at `end` arrives in the tick that begins there, so that a tick contains no later event.
 void RadioEngine::contend(Tick now, const SwarmView& swarm) {
   const Cycles end = begin_of(now + 1);
   channel_.locate();
   if (table_.used()) neighbourhood_.sort();
   timers_.begin_tick();
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
-    switch (state_[i] & (kRunning | kHolding | kFlying)) {
+    switch (state_[i] & (kRunning | kHolding | kSending)) {
       case kRunning | kHolding: schedule(i, end); break;
       case kRunning:
       case 0: timers_.pass(i, end); break;
-      default: break;  // flying: its timer waits for its packet
+      default: break;  // It is sending: its timer waits for the end of its packet.
     }
   }
   const std::vector<OverheadController::Copy>& copies = overhead_.copies();
@@ -169,7 +170,7 @@ void RadioEngine::contend(Tick now, const SwarmView& swarm) {
   if (!firmware_) return contend_until(end, now);
   firmware_->begin_tick(swarm);
   while (simulated_ < end) {
-    const Cycles until = next_meeting(end);
+    const Cycles until = next_exchange(end);
     contend_until(until, now);
     run_firmware(simulated_, until, now);
     simulated_ = until;
@@ -177,7 +178,7 @@ void RadioEngine::contend(Tick now, const SwarmView& swarm) {
   firmware_->end_tick();
 }
 
-/// Start pulses in the order of time: those of robots come about as we go, the overhead controller's are fixed.
+/// Processes start pulses in order of time. Those of robots arise on the way; the overhead controller's are known in advance.
 void RadioEngine::contend_until(Cycles end, Tick now) {
   const std::vector<OverheadController::Copy>& copies = overhead_.copies();
   for (;;) {
@@ -199,9 +200,9 @@ void RadioEngine::contend_until(Cycles end, Tick now) {
   }
 }
 
-/// How far firmware robots may run by themselves: a span, or several where no native program sends within them, nor has begun
-/// to and may yet give up.
-Cycles RadioEngine::next_meeting(Cycles end) const {
+/// Time until which firmware robots may run without interaction: one span, or several if no native robot sends within them, nor
+/// has a packet that it may still give up.
+Cycles RadioEngine::next_exchange(Cycles end) const {
   Cycles until = std::min(simulated_ + FirmwareAir::kSpan, end);
   for (const Transmission& x : channel_.all()) {
     if (!firmware_->has(x.sender) && !x.aborted && x.start + kListening > simulated_) return until;
@@ -214,14 +215,14 @@ Cycles RadioEngine::next_meeting(Cycles end) const {
   return until;
 }
 
-/// What firmware robots have on the air becomes transmissions; they themselves see to when they give up.
+/// Turns firmware robots' events into transmissions. Firmware robots decide themselves when to give up.
 void RadioEngine::run_firmware(Cycles from, Cycles until, Tick now) {
   using Kind = PulseDecoder::Event;
   for (const FirmwareAir::Event& event : firmware_->advance(from, until, channel_, overhead_)) {
     if (event.kind == Kind::kStarted) {
       ++counters_.attempted;
       ++radio_counts_[event.robot].attempted;
-      abort_who_notices(event.robot, event.time, now);
+      abort_interrupted(event.robot, event.time, now);
       channel_.add({event.time, event.end, event.robot, false, false, {}});
       continue;
     }
@@ -238,7 +239,7 @@ void RadioEngine::run_firmware(Cycles from, Cycles until, Tick now) {
   }
 }
 
-/// Puts the next interrupt at which the robot may send on the heap; those before it take place.
+/// Processes the robot's interrupts before its next possible attempt, and puts the attempt on the heap.
 void RadioEngine::schedule(std::uint32_t robot, Cycles end) {
   for (; timers_.next(robot) < end; timers_.interrupt(robot)) {
     if (timers_.next_clock(robot) <= tx_period_[robot]) continue;
@@ -249,7 +250,7 @@ void RadioEngine::schedule(std::uint32_t robot, Cycles end) {
 }
 
 void RadioEngine::attempt(std::uint32_t robot, Tick now) {
-  // Where a firmware robot has made it give up, the next attempt may be due in a span that has been simulated already.
+  // After a firmware robot has made it give up, the next attempt may fall into a span that is already simulated.
   const Cycles t = std::max(timers_.next(robot), simulated_);
   timers_.interrupt(robot);
   if (senses(robot, t)) return schedule(robot, begin_of(now + 1));
@@ -257,13 +258,13 @@ void RadioEngine::attempt(std::uint32_t robot, Tick now) {
     ++counters_.attempted;
     ++radio_counts_[robot].attempted;
   }
-  state_[robot] |= kFlying;
-  abort_who_notices(robot, t, now);
+  state_[robot] |= kSending;
+  abort_interrupted(robot, t, now);
   channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
 }
 
-/// A start pulse of `robot`: robots that hear it and are about to begin a packet give up.
-void RadioEngine::abort_who_notices(std::uint32_t robot, Cycles t, Tick now) {
+/// A start pulse of `robot`: senders in their leading octet that detect it give up.
+void RadioEngine::abort_interrupted(std::uint32_t robot, Cycles t, Tick now) {
   channel_.visit_interrupted(robot, t, [&](Transmission& other) { abort(other, t, now); });
 }
 
@@ -276,15 +277,15 @@ bool RadioEngine::senses(std::uint32_t robot, Cycles t) {
 
 void RadioEngine::abort(Transmission& transmission, Cycles t, Tick now) {
   const std::uint32_t robot = transmission.sender;
-  if (firmware_ && firmware_->has(robot)) return;  // it notices by itself
+  if (firmware_ && firmware_->has(robot)) return;  // Its firmware detects the pulse itself.
   if (owns(robot)) {
     ++counters_.aborted;
     ++radio_counts_[robot].backed_off;
   }
   transmission.aborted = true;
   transmission.end = transmission.start + kStartPulse;
-  state_[robot] &= static_cast<std::uint8_t>(~kFlying);
-  // A robot aborts at most once between two of its interrupts, so their count tells its aborts in a tick apart.
+  state_[robot] &= static_cast<std::uint8_t>(~kSending);
+  // A robot aborts at most once between two interrupts, so their count distinguishes its aborts within a tick.
   const std::uint64_t bits = random_.bits(Stream::kBackOff, robot, now, timers_.counts()[robot]);
   timers_.back_off(robot, t, static_cast<std::uint8_t>(bits >> 56));
   if (is(robot, kRunning | kHolding))
@@ -300,7 +301,7 @@ void RadioEngine::arrive(Tick now) {
   const std::vector<Transmission>& transmissions = channel_.all();
   for (std::uint32_t i = 0; i < transmissions.size(); ++i) {
     const Transmission& x = transmissions[i];
-    if (!x.aborted && x.end >= begin && x.end < end && (x.over || !apart_[x.sender]))
+    if (!x.aborted && x.end >= begin && x.end < end && (x.over || !is_external_[x.sender]))
       arrivals_.push_back({x.end, x.sender, i});
   }
   const std::vector<OverheadController::Copy>& copies = overhead_.copies();
@@ -326,7 +327,7 @@ void RadioEngine::arrive(Tick now) {
   std::sort(sent_.begin(), sent_.end());
 }
 
-/// Success: the sender's timer goes on. An interrupt that fell into the packet takes place now.
+/// A packet's success: the sender's timer continues. An interrupt during the packet is processed at its end.
 void RadioEngine::finish(std::uint32_t index, Cycles end) {
   const Transmission& transmission = channel_.all()[index];
   const std::uint32_t robot = transmission.sender;
@@ -336,7 +337,7 @@ void RadioEngine::finish(std::uint32_t index, Cycles end) {
     if (counts_pairs_) pairs_.add(robot, robot);
   }
   if (firmware_ && firmware_->has(robot)) return;
-  state_[robot] &= static_cast<std::uint8_t>(~kFlying);
+  state_[robot] &= static_cast<std::uint8_t>(~kSending);
   timers_.restart_clock(robot);
   timers_.pass(robot, end);
   if (transmission.orphaned) return;
@@ -345,30 +346,30 @@ void RadioEngine::finish(std::uint32_t index, Cycles end) {
 }
 
 void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
-  bool drowned = false;
+  bool jammed = false;
   for (const OverheadController::Copy& copy : overhead_.copies()) {
-    drowned = drowned || copy.overlaps(packet.start, packet.end);
+    jammed = jammed || copy.overlaps(packet.start, packet.end);
   }
   channel_.find_rivals(packet.sender, packet.start, packet.end, rivals_);
   receptions_.begin_message(packet.message);
   if (table_.used())
-    receive_by_strength(packet, drowned, now);
+    receive_by_strength(packet, jammed, now);
   else
-    receive_in_range(packet, drowned, now);
+    receive_in_range(packet, jammed, now);
 }
 
-void RadioEngine::receive_in_range(const Transmission& packet, bool drowned, Tick now) {
+void RadioEngine::receive_in_range(const Transmission& packet, bool jammed, Tick now) {
   neighbourhood_.visit(packet.sender, [&](std::uint32_t receiver, double square_mm2) {
     if ((state_[receiver] & (kReceptive | kFirmware)) == 0) return;
-    const bool spoilt = drowned || std::any_of(rivals_.begin(), rivals_.end(), [&](std::uint32_t rival) {
-                          return rival == receiver || neighbourhood_.in_range(receiver, rival);
-                        });
-    take(packet, receiver, spoilt, now, [&] { return ranging_.gains(__builtin_sqrt(square_mm2)); });
+    const bool is_lost = jammed || std::any_of(rivals_.begin(), rivals_.end(), [&](std::uint32_t rival) {
+                           return rival == receiver || neighbourhood_.in_range(receiver, rival);
+                         });
+    receive(packet, receiver, is_lost, now, [&] { return ranging_.gains(__builtin_sqrt(square_mm2)); });
   });
 }
 
-void RadioEngine::receive_by_strength(const Transmission& packet, bool drowned, Tick now) {
-  constexpr float kOwn_db = 1e6F;  // while it sends, a robot receives nothing
+void RadioEngine::receive_by_strength(const Transmission& packet, bool jammed, Tick now) {
+  constexpr float kOwn_db = 1e6F;  // A robot that sends receives nothing.
   ++packets_;
   const auto disturb = [&](std::uint32_t receiver, float margin_db) {
     Rival& rival = strongest_rival_[receiver];
@@ -381,7 +382,7 @@ void RadioEngine::receive_by_strength(const Transmission& packet, bool drowned, 
       if (link.margin_db > noticed_db) disturb(link.receiver, link.margin_db);
     }
   }
-  const double noise_db = links_.most_packet_noise_db();
+  const double noise_db = links_.max_packet_noise_db();
   for (const LinkTable::Link& link : table_.of(packet.sender)) {
     const std::uint32_t receiver = link.receiver;
     if ((state_[receiver] & (kReceptive | kFirmware)) == 0) continue;
@@ -392,18 +393,18 @@ void RadioEngine::receive_by_strength(const Transmission& packet, bool drowned, 
     const Rival& rival = strongest_rival_[receiver];
     const bool overlapped =
         rival.packet == packets_ && margin_db < static_cast<double>(rival.margin_db) + links_.capture_db();
-    take(packet, receiver, drowned || overlapped, now,
-         [&] { return links_.readings(packet.sender, receiver, now.count(), margin_db); });
+    receive(packet, receiver, jammed || overlapped, now,
+            [&] { return links_.readings(packet.sender, receiver, now.count(), margin_db); });
   }
 }
 
-/// A packet that is heard arrives.
+/// A packet reaches a receiver that hears it.
 template <class Readings>
-void RadioEngine::take(const Transmission& packet, std::uint32_t receiver, bool spoilt, Tick now,
-                       Readings readings) {
+void RadioEngine::receive(const Transmission& packet, std::uint32_t receiver, bool is_lost, Tick now,
+                          Readings readings) {
   if (!owns(receiver)) return;
   const bool firmware = is(receiver, kFirmware);
-  if (spoilt) {
+  if (is_lost) {
     ++counters_.collided;
     ++radio_counts_[receiver].collided;
   } else if (firmware ? firmware_->fades(receiver, packet.sender, packet.start)
@@ -459,7 +460,7 @@ void RadioEngine::emit(HostId host, RadioFrame& frame) const {
   frame.ask.clear();
   const Cycles from = begin_of(tick_ + 1), until = begin_of(tick_ + 2);
   for (std::uint32_t i = share.first; i < share.last; ++i) {
-    if ((state_[i] & (kRunning | kHolding | kFlying)) != kRunning || !owns(i)) continue;
+    if ((state_[i] & (kRunning | kHolding | kSending)) != kRunning || !owns(i)) continue;
     if (simple_ ? next_send_[i] < until : timers_.exceeds(i, tx_period_[i], from, until)) frame.ask.push_back(i);
   }
   frame.sent.clear();
@@ -499,7 +500,7 @@ void RadioEngine::emit_firmware(Share share, RadioFrame& frame) const {
 }
 
 std::uint64_t RadioEngine::hash_part() const {
-  // The overhead controller, which all regions have alike, counts in the one of the origin.
+  // All regions have the same overhead controller; only the region of the origin hashes it.
   std::uint64_t sum = (region_.contains(0, 0) ? overhead_.hash() : 0) + (firmware_ ? firmware_->hash() : 0);
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     if (!owns(i)) continue;

@@ -1,15 +1,15 @@
-// The radio engine of a region: what it tells its neighbours, and takes from them.
+// Ghosts of a region's radio engine: what it sends to neighbours, and reads from them.
 #include "core/base/error.hpp"
 #include "services/comm/radio_engine.hpp"
 
 namespace kilotwin::comm {
 namespace {
 
-/// Within a tick, who sends decides who waits, and who waits decides who sends after it: a chain of so many links, each of one
-/// reach, is followed across a border. A robot has one interrupt in a tick, and a packet takes an eighth of it; longer
-/// chains through ever other robots in the order of time do not come about where robots are not made to.
+/// Within a tick, a sender makes its neighbours wait, and their waiting decides who sends next. Chains of up to this number of
+/// links, each of one reach, are computed exactly across a border. A robot has one interrupt per tick, and a packet takes
+/// an eighth of a tick; longer chains through distinct robots in order of time arise only by design.
 constexpr double kHops = 4;
-/// A body moves less within a tick, mm.
+/// Upper bound of a body's motion within a tick, mm.
 constexpr double kMostMove_mm = 20;
 
 }  // namespace
@@ -58,8 +58,8 @@ void RadioEngine::take_ghosts(std::span<const RadioGhosts* const> frames) {
   }
 }
 
-/// Robots belong to where they are now. One that comes in must have been a ghost.
-void RadioEngine::divide() {
+/// Decides ownership from current positions. A robot that enters the region must have been a ghost.
+void RadioEngine::update_ownership() {
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
     owned_[i] = region_.contains(neighbourhood_.x_mm(i), neighbourhood_.y_mm(i));
     KILOTWIN_DEMAND(!owned_[i] || known_[i]);

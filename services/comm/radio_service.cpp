@@ -84,7 +84,7 @@ class CommFederate : public Federate {
   Input<OverheadFrame> overhead_;
   SwarmView swarm_;
   std::vector<std::unique_ptr<Output<RadioFrame>>> radio_out_;
-  // What the last metrics lends.
+  // Columns that the last metrics sample points to.
   std::vector<std::uint32_t> receiver_, sender_, count_;
   std::vector<std::uint32_t> attempted_, robot_sent_, received_, collided_, backed_off_;
 };

@@ -1,4 +1,4 @@
-/// The radio engine as a federate: bodies, actuation and overhead packets in, radio frames to every host out.
+/// The radio engine as a federate: reads bodies, actuation and overhead packets; publishes a radio frame to every host.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace kilotwin::comm {
 
-/// Returns at the end of the run. `firmware`: the plan's firmware robots, null where there are none. Throws as Session::run
+/// Returns at the end of the run. `firmware`: the plan's firmware robots, or null if it has none. Throws as Session::run
 /// does.
 void run_service(const RunPlan& plan, const ServiceContext& context, std::unique_ptr<FirmwareRobots> firmware);
 

@@ -21,7 +21,7 @@ void ReceptionLog::close() {
     sum += f;
     f = sum;
   }
-  // From the end, so that the order of arrival is kept and each entry of first_ ends at its robot's first reception.
+  // In descending order, so that the order of arrival is kept, and first_ ends at the first reception of each robot.
   for (std::size_t n = arrived_.size(); n-- > 0;) sorted_[--first_[arrived_[n].robot]] = arrived_[n];
 }
 

@@ -1,6 +1,6 @@
-// The radio of the ARGoS paper (Pinciroli 2018, section 2.3): no clocks, no carrier sense, no packets in time. Whoever holds a message and
-// has not sent for the interval sends it within the tick, at once; those in range receive it unless it is dropped, or lost to
-// another sender of the tick.
+// The radio model of the ARGoS paper (Pinciroli 2018, section 2.3): no clocks, carrier sense or packets in time. A robot that
+// holds a message and has not sent for the interval sends it within the tick. Robots in range receive the message, unless
+// it is dropped, or lost to another sender of the tick.
 #include <algorithm>
 
 #include "services/comm/radio_engine.hpp"
@@ -8,8 +8,8 @@
 namespace kilotwin::comm {
 namespace {
 
-/// Draws of Stream::kReception at a receiver in a tick, for each sender: drop, loss, and one for each rival. Beyond 2048
-/// senders they recur.
+/// Draws of Stream::kReception per receiver and tick, for each sender: drop, loss, and one per rival. With more than 2048
+/// senders they repeat.
 constexpr std::uint32_t kDrawsPerSender = 64, kDraws = 1u << 17;
 
 }  // namespace
@@ -59,14 +59,14 @@ void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
     const auto happens = [&](double probability, std::uint32_t draw) {
       return probability > 0 && random_.uniform(Stream::kReception, receiver, now, draw % kDraws) < probability;
     };
-    bool spoilt = false;
+    bool is_lost = false;
     const std::uint32_t first_draw = sender * kDrawsPerSender;
     std::uint32_t draw = first_draw + 2;
     for (const std::uint32_t rival : sent_) {
       if (rival == sender || (rival != receiver && !neighbourhood_.in_range(receiver, rival))) continue;
-      spoilt = spoilt || happens(model.contention, draw++);
+      is_lost = is_lost || happens(model.contention, draw++);
     }
-    if (spoilt) {
+    if (is_lost) {
       ++counters_.collided;
       ++radio_counts_[receiver].collided;
     } else if (happens(model.drop_probability, first_draw) || happens(loss_, first_draw + 1)) {

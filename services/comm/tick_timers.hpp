@@ -1,11 +1,11 @@
-/// The robots' oscillators and what the firmware's timer interrupt counts with them.
+/// The robots' oscillators, and the counters of the firmware's timer interrupt.
 ///
-/// Timer 0 counts 0..255 for ever, 1024 cycles of the robot's own clock per count, and interrupts where it equals the
-/// compare register. That register holds 255, so that an interrupt comes every 256 counts; after an aborted attempt it
-/// holds a random value for once, which puts one more interrupt between two regular ones. Each interrupt is one kilo_tick,
-/// and adds the value that matched to tx_clock, a 16-bit number. tx_clock runs from the reset on, whatever the robot does, and
-/// only a message sent sets it back: robots that have been on for a while find it anywhere, and so send at once, all of them,
-/// when they are told to RUN. With `model: PROPAGATION` they have been; else they are reset at tick 0.
+/// Timer 0 counts 0..255 cyclically, 1024 cycles of the robot's own clock per count. It interrupts when it equals the compare
+/// register. The register normally holds 255, so an interrupt comes every 256 counts. After an aborted attempt it holds a
+/// random value once, which inserts one interrupt between two regular ones. Each interrupt is one kilo_tick and adds the
+/// compare value to the 16-bit tx_clock. tx_clock runs from the reset on in any state; only a sent message sets it to 0.
+/// So robots that have been on for a while have arbitrary values, and most send as soon as they are set to RUN. With `model:
+/// PROPAGATION` robots start so; otherwise all are reset at tick 0.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,13 @@ class TickTimers {
  public:
   static constexpr std::uint8_t kRegular = 255;
 
-  /// Rates and phases are drawn from the plan's seed; what is known of a robot's rate is added. The first interrupt of a robot comes within its first period.
+  /// Draws rates and phases from the plan's seed, and adds measured rates of the model. A robot's first interrupt comes within
+  /// its first period.
   explicit TickTimers(const RunPlan&);
 
-  /// When robot `i` is interrupted next.
+  /// Time of the robot's next interrupt.
   [[nodiscard]] Cycles next(std::uint32_t i) const { return next_[i]; }
-  /// tx_clock as the next interrupt will find it.
+  /// Value of tx_clock at the next interrupt.
   [[nodiscard]] std::uint16_t next_clock(std::uint32_t i) const { return sum(clock_[i], compare_[i]); }
   /// Nominal cycles between two regular interrupts.
   [[nodiscard]] Cycles period(std::uint32_t i) const { return period_[i]; }
@@ -33,27 +34,27 @@ class TickTimers {
   [[nodiscard]] const std::vector<std::uint8_t>& counts() const { return count_; }
 
   void begin_tick() { count_.assign(count_.size(), 0); }
-  /// The next interrupt takes place.
+  /// Processes the next interrupt.
   void interrupt(std::uint32_t i) {
     count_[i] = static_cast<std::uint8_t>(count_[i] + (count_[i] != 255));
     clock_[i] = next_clock(i);
     next_[i] += until_regular(i, compare_[i]);
     compare_[i] = kRegular;
   }
-  /// All interrupts before `end` take place.
+  /// Processes all interrupts before `end`.
   void pass(std::uint32_t i, Cycles end) {
     while (next_[i] < end) interrupt(i);
   }
-  /// A message has left: tx_clock starts again.
+  /// Sets tx_clock to 0 after a message was sent.
   void restart_clock(std::uint32_t i) { clock_[i] = 0; }
-  /// The attempt of the last interrupt is given up at `now`: the compare register becomes `value`. A value that the timer
-  /// has passed already matches one round later.
+  /// Gives up the attempt of the last interrupt at `now`, and sets the compare register to `value`. If the timer has already
+  /// passed that value, it matches one period later.
   void back_off(std::uint32_t i, Cycles now, std::uint8_t value) {
     compare_[i] = value;
     next_[i] -= until_regular(i, value) % period_[i];
     if (next_[i] <= now) next_[i] += period_[i];
   }
-  /// Whether tx_clock exceeds `tx_period` at an interrupt in [from, until), if nothing is sent before.
+  /// Whether tx_clock exceeds `tx_period` at an interrupt in [from, until), if the robot sends nothing before.
   [[nodiscard]] bool exceeds(std::uint32_t i, std::uint16_t tx_period, Cycles from, Cycles until) const {
     std::uint16_t clock = clock_[i];
     if (until - next_[i] <= kLookAhead * shortest_period_ && clock + kMostAhead <= tx_period) return false;
@@ -65,7 +66,7 @@ class TickTimers {
     }
     return false;
   }
-  /// The state of robot `i` in two words.
+  /// State of robot `i` in two words.
   [[nodiscard]] std::uint64_t time_word(std::uint32_t i) const { return static_cast<std::uint64_t>(next_[i]); }
   [[nodiscard]] std::uint32_t count_word(std::uint32_t i) const {
     return std::uint32_t{clock_[i]} | std::uint32_t{compare_[i]} << 16 | std::uint32_t{count_[i]} << 24;
@@ -81,13 +82,13 @@ class TickTimers {
   static std::uint16_t sum(std::uint16_t clock, std::uint8_t compare) {
     return static_cast<std::uint16_t>(clock + compare);
   }
-  /// Nominal cycles from where the timer equals `compare` to where it equals 255 next.
+  /// Nominal cycles from the match of `compare` to the next match of 255.
   [[nodiscard]] Cycles until_regular(std::uint32_t i, std::uint8_t compare) const {
     return compare == kRegular ? period_[i] : period_[i] * Cycles{kRegular - compare} / kTimerCounts;
   }
 
-  /// In so many periods of a timer come at most so many interrupts, one of them for a back-off, and so tx_clock rises by at
-  /// most kMostAhead: most robots need no closer look.
+  /// Within kLookAhead periods tx_clock rises by at most kMostAhead, with one extra interrupt for a back-off. Most robots need no
+  /// closer look.
   static constexpr Cycles kLookAhead = 3;
   static constexpr int kMostAhead = (kLookAhead + 2) * kRegular;
 
