@@ -1,6 +1,6 @@
-/* What a Kilobot's EEPROM holds, and where (kilolib). C and C++: robots' programs, hosts and firmware robots have it from here.
+/* Layout of a Kilobot's EEPROM (kilolib), in C and C++: for robots' programs, hosts and firmware robots.
  *
- *   0x01        OSCCAL, the oscillator's trim; 0xFF: the factory's
+ *   0x01        OSCCAL, trim of the oscillator; 0xFF: the factory's value
  *   0x05, 0x09  kilo_turn_left, kilo_turn_right
  *   0x0C, 0x14  kilo_straight_left, kilo_straight_right
  *   0x20..0x3B  kilo_irlow, 14 words, high octet first
@@ -8,7 +8,7 @@
  *   0x90        mask of the pins of the infrared transmitter
  *   0xB0, 0xB1  kilo_uid, low octet first
  *
- * Everything else is erased, 0xFF. */
+ * All other octets are erased, 0xFF. */
 #ifndef KILOTWIN_CORE_BASE_EEPROM_LAYOUT_H
 #define KILOTWIN_CORE_BASE_EEPROM_LAYOUT_H
 
@@ -29,13 +29,13 @@ enum {
   KILOTWIN_EEPROM_UID = 0xB0
 };
 
-/* What calibration has found out about one robot. */
+/* Calibration of one robot. */
 struct KilotwinCalibration {
   uint16_t uid;
   uint8_t turn_left, turn_right, straight_left, straight_right; /* duties */
 };
 
-/* The two ranging tables. */
+/* Writes the two ranging tables. */
 static inline void kilotwin_fill_ranging(uint8_t* eeprom, const uint16_t* high, const uint16_t* low) {
   for (int i = 0; i < KILOTWIN_IR_ENTRIES; ++i) {
     eeprom[KILOTWIN_EEPROM_IR_LOW + 2 * i] = (uint8_t)(low[i] >> 8);
@@ -45,7 +45,7 @@ static inline void kilotwin_fill_ranging(uint8_t* eeprom, const uint16_t* high, 
   }
 }
 
-/* The EEPROM of a robot that has been calibrated, with the nominal ranging tables: 1024 octets. */
+/* Writes the EEPROM of a calibrated robot with the nominal ranging tables: 1024 octets. */
 static inline void kilotwin_fill_eeprom(uint8_t* eeprom, struct KilotwinCalibration robot) {
   const uint16_t low[] = KILOTWIN_IR_LOW, high[] = KILOTWIN_IR_HIGH;
   for (int i = 0; i < KILOTWIN_EEPROM_OCTETS; ++i) eeprom[i] = 0xff;

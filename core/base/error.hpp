@@ -1,7 +1,7 @@
-/// How errors are told. Three kinds, and no others:
-///   UserError     bad input or arguments: one line for a person, exit status 2
+/// Error reporting. There are three kinds of errors:
+///   UserError     bad input or arguments: one line for the user, exit status 2
 ///   RunError      the run or a check failed: one line, exit status 1
-///   KILOTWIN_DEMAND(condition)   a promise between our own parts was broken: a defect; names file and line, aborts
+///   KILOTWIN_DEMAND(condition)   an internal contract is broken, a defect: prints file and line, and aborts
 #pragma once
 
 #include <stdexcept>

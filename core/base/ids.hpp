@@ -1,4 +1,4 @@
-/// Strong ids: an index of one thing cannot be used for another.
+/// Typed ids: an index of one kind cannot be used for another.
 #pragma once
 
 #include <compare>
@@ -22,7 +22,7 @@ using PartitionId = Id<struct PartitionTag>;  ///< row * columns + column
 using HostId = Id<struct HostTag>;            ///< 0..hosts-1
 using FederateId = Id<struct FederateTag>;    ///< index in the plan: partitions, radio, station, hosts
 
-/// What a robot is doing, as kilolib numbers it, and what no firmware knows: FLAT, and FAILED: its
+/// State of a robot, numbered as in kilolib. Two values are Kilotwin's own: FLAT, and FAILED: the robot's
 /// program faulted in simulation.
 enum class LifeCycle : std::uint8_t {
   kSleeping = 0,
@@ -32,7 +32,7 @@ enum class LifeCycle : std::uint8_t {
   kRunning = 4,
   kCharging = 5,
   kMoving = 6,
-  kFlat = 254,  ///< off: its battery is empty
+  kFlat = 254,  ///< off because its battery is empty
   kFailed = 255
 };
 

@@ -1,5 +1,5 @@
-/* The infrared ranging curve of a nominal robot: readings of the two amplifiers for the distance d beyond contact (disc
- * centres 33 mm + d apart). C and C++: the radio engine makes readings of it, and robots' programs invert it.
+/* Infrared ranging curve of a nominal robot: readings of the two amplifiers over the distance d between the rims (disc
+ * centres are 33 mm + d apart). In C and C++: the radio engine computes readings from it, robots' programs invert it.
  *
  *   low(d)  = 880 exp(-d / 31.2 mm)
  *   high(d) = min(1000, 1.353 low(d))

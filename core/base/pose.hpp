@@ -13,7 +13,7 @@ struct Pose {
   double heading_rad = 0;  ///< in [-pi, pi)
 };
 
-/// The same angle in [-pi, pi), for |angle| up to a few turns.
+/// The equivalent angle in [-pi, pi), for |angle| up to a few turns.
 [[nodiscard]] inline double wrapped(double angle_rad) {
   while (angle_rad >= kPi) angle_rad -= 2 * kPi;
   while (angle_rad < -kPi) angle_rad += 2 * kPi;

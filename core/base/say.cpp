@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::string_view kProgram = "kilotwin: ";
 
-/// Not spdlog's default logger, which writes to stdout. Lines of several threads or processes do not mix: each is one write.
+/// Own logger, because spdlog's default logger writes to stdout. Each line is one write, so lines of threads and processes do not mix.
 spdlog::logger& logger() {
   static spdlog::logger lines = [] {
     spdlog::logger made("", std::make_shared<spdlog::sinks::stderr_sink_mt>());

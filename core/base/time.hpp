@@ -1,5 +1,5 @@
-/// Simulated time: a count of ticks. It has no clock, does not convert to or from std::chrono, and so cannot mix with
-/// wall time (for which the services use std::chrono::steady_clock).
+/// Simulated time: a number of ticks. It has no clock and no conversion from or to std::chrono, so it cannot be mixed with
+/// wall time, for which services use std::chrono::steady_clock.
 #pragma once
 
 #include <compare>
@@ -7,8 +7,8 @@
 
 namespace kilotwin {
 
-/// An instant of simulated time, in ticks since the start of the experiment. Tick 0 is the initial state; negative values
-/// are used for hellos only.
+/// A point in simulated time, in ticks since the start of the experiment. Tick 0 is the initial state. Negative values
+/// mark hello samples.
 class Tick {
  public:
   constexpr Tick() = default;
@@ -30,7 +30,7 @@ class Tick {
 /// The robots' nominal clock, Hz (kilolib: F_CPU).
 inline constexpr double kNominalClockHz = 8.0e6;
 
-/// How long a tick is. Fixed for a run; 2^18 cycles = 32.768 ms unless the experiment says otherwise.
+/// Duration of a tick, constant within a run: 2^18 cycles = 32.768 ms unless the experiment sets another value.
 class TickLength {
  public:
   constexpr explicit TickLength(std::uint32_t cycles) : cycles_(cycles) {}

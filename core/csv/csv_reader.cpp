@@ -28,7 +28,7 @@ std::string shown(std::string_view text) {
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
-/// A tab where the first row that is not blank holds one outside of quotes, and no comma there.
+/// A tab if the first row that is not blank has one outside quotes, and no comma outside quotes; otherwise a comma.
 char separator_of_header(std::string_view content) {
   bool quoted = false, tab = false, any = false;
   for (const char c : content) {
@@ -67,7 +67,7 @@ std::string read_all(const std::filesystem::path& file) {
   return content;
 }
 
-/// gzip, of one member or several.
+/// Unpacks gzip data of one or several members.
 std::string inflated(const std::string& name, const std::string& packed) {
   z_stream stream{};
   constexpr int kGzipOnly = 16 + MAX_WBITS;
@@ -108,7 +108,7 @@ CsvReader::CsvReader(std::string name, std::string content, const CsvLayout& lay
   begin();
 }
 
-/// Skips the byte order mark, finds the separator, reads the header.
+/// Skips the byte order mark, determines the separator and reads the header.
 void CsvReader::begin() {
   if (content_.starts_with("\xef\xbb\xbf")) at_ = 3;
   if (layout_.separator != '\0') {
@@ -189,7 +189,7 @@ bool CsvReader::read_row() {
   return false;
 }
 
-/// A row without quotes, up to `end`.
+/// Reads a row without quotes, up to `end`.
 void CsvReader::read_plain_row(std::size_t end) {
   const char *at = content_.data() + row_at_, *const last = content_.data() + end;
   const bool runs = separator_ == ' ';
@@ -232,9 +232,9 @@ std::size_t CsvReader::read_quoted_cell(std::size_t at) {
   }
 }
 
-/// A row with quotes in its first line: cell by cell, over as many lines as its quoted cells take.
+/// Reads a row with quotes in its first line, cell by cell, over as many lines as its quoted cells have.
 void CsvReader::read_quoted_row() {
-  std::vector<std::size_t> doubled;  // cells whose text is the next of unquoted_
+  std::vector<std::size_t> doubled;  // cells whose texts are in unquoted_, in the same order
   while (true) {
     while (at_ < content_.size() && is_blank(content_[at_]) && !(separator_ == '\t' && content_[at_] == '\t'))
       ++at_;
@@ -270,7 +270,7 @@ void CsvReader::read_quoted_row() {
     }
     break;
   }
-  // Only now no text moves any more.
+  // Texts are linked at the end, because unquoted_ moves them while it grows.
   for (std::size_t i = 0; i < doubled.size(); ++i) cells_[doubled[i]].text = unquoted_[i];
 }
 

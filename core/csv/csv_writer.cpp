@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kWriteAbove_bytes = std::size_t{1} << 20;
 
-/// Writes all of it. Returns errno, 0 where it went well.
+/// Writes all octets. Returns errno, 0 on success.
 int write_all(int descriptor, const char* at, std::size_t length) {
   while (length > 0) {
     const ssize_t written = ::write(descriptor, at, length);
@@ -35,7 +35,7 @@ struct CsvWriter::Gzip {
   std::string packed = std::string(std::size_t{1} << 16, '\0');
 
   Gzip() {
-    // 16: a gzip header, in which zlib leaves name and time out, so that equal tables are equal files.
+    // 16 selects a gzip header. zlib leaves name and time out of it, so equal tables give equal files.
     constexpr int kGzip = 16 + MAX_WBITS, kMemory = 8;
     if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kGzip, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)
       throw RunError("zlib has no memory");
@@ -44,7 +44,7 @@ struct CsvWriter::Gzip {
   Gzip(const Gzip&) = delete;
   Gzip& operator=(const Gzip&) = delete;
 
-  /// Returns errno.
+  /// Returns errno, 0 on success.
   int write(int descriptor, std::string& text, bool last) {
     stream.next_in = reinterpret_cast<Bytef*>(text.data());
     stream.avail_in = static_cast<uInt>(text.size());
@@ -113,7 +113,7 @@ void CsvWriter::close() {
   } else {
     flush();
   }
-  // Network file systems report a full disk here at the latest.
+  // Network file systems may report a full disk only here.
   if (::close(std::exchange(descriptor_, -1)) != 0 && errno != EINTR) fail("written", errno);
 }
 

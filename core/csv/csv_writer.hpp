@@ -1,4 +1,4 @@
-/// CsvWriter: a table as text (RFC 4180, rows end in LF), to a file, a gzipped file (.gz) or standard output (-).
+/// CsvWriter: writes a table (RFC 4180, rows end in LF) to a file, a gzipped file (.gz) or standard output (-).
 #pragma once
 
 #include <cstdint>
@@ -9,22 +9,22 @@
 
 namespace kilotwin {
 
-/// `text` as a cell: in quotes where it holds a comma, a quote, a line end, or blanks at an end.
+/// `text` as a cell: quoted if it contains a comma, a quote, a line end, or leading or trailing blanks.
 [[nodiscard]] std::string csv_cell(std::string_view text);
 
 class CsvWriter {
  public:
-  /// Creates or replaces the file and writes the header, "time_s,robot". Throws RunError.
+  /// Creates or replaces the file and writes the header, e.g. "time_s,robot". Throws RunError.
   CsvWriter(std::filesystem::path file, std::string_view header);
   ~CsvWriter();
   CsvWriter(const CsvWriter&) = delete;
   CsvWriter& operator=(const CsvWriter&) = delete;
 
-  /// Where rows are appended, each with its line end.
+  /// Buffer of rows: append rows here, each with its line end.
   [[nodiscard]] std::string& rows() { return rows_; }
-  /// Writes what waits where that is much. Throws RunError.
+  /// Writes the buffer if it is long. Throws RunError.
   void flush_if_long();
-  /// Writes all and closes the file. Only then it is whole. Throws RunError.
+  /// Writes the rest and closes the file. Without this call the file is incomplete. Throws RunError.
   void close();
 
  private:

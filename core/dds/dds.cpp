@@ -15,8 +15,8 @@ std::string cyclone_configuration(const Transport& transport) {
   std::string peers;
   if (local) peers = R"(<Peer Address="127.0.0.1"/>)";
   for (const std::string& peer : transport.peers) peers += fmt::format(R"(<Peer Address="{}"/>)", peer);
-  // Unicast only: `lo` has no multicast, and laboratories' switches often drop it. Messages as large as UDP allows, so
-  // that a frame is one datagram; indices beyond Cyclone's default of 9, which is the limit of processes per machine.
+  // Unicast only: `lo` has no multicast, and laboratory switches often drop it. Messages are as large as UDP allows, so
+  // that a frame is one datagram. Participant indices go beyond 9, Cyclone's default limit of processes per machine.
   return fmt::format(
       R"(<CycloneDDS><Domain id="any"><General>{}<AllowMulticast>false</AllowMulticast>)"
       R"(<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>64000B</FragmentSize></General>)"
@@ -29,7 +29,7 @@ std::string cyclone_configuration(const Transport& transport) {
 
 namespace {
 
-/// What Cyclone has said last; it belongs into the one line that tells of an error.
+/// Cyclone's last log message; error lines include it.
 std::mutex log_mutex;
 std::string last_log;
 
@@ -120,7 +120,7 @@ Qos make_qos(const Channel& channel) {
     case Delivery::kMembership:
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
       dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-      // One that leaves takes nobody else of the same key along.
+      // When one writer leaves, others of the same key keep their instance.
       dds_qset_writer_data_lifecycle(qos.get(), false);
       break;
     case Delivery::kMetrics:
@@ -152,7 +152,7 @@ Qos make_qos(const Channel& channel) {
   return qos;
 }
 
-// A topic's QoS must agree between all who make it, so routing by partition is set on the endpoint alone.
+// All definitions of a topic must have the same QoS, so the partition is set on the endpoint only.
 Entity make_topic(const Participant& participant, const Channel& channel, const dds_topic_descriptor_t* type) {
   return {dds_create_topic(participant.get(), type, channel.topic.c_str(), nullptr, nullptr),
           "topic " + channel.topic};

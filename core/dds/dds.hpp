@@ -1,5 +1,5 @@
-/// RAII over the Cyclone DDS C API: a participant, typed writers and readers, and the few QoS profiles that the project
-/// uses. Errors are RunError with Cyclone's own words.
+/// RAII wrapper of the Cyclone DDS C API: a participant, typed writers and readers, and the QoS profiles of the project.
+/// Errors are RunErrors with Cyclone's own text.
 #pragma once
 
 #include <dds/dds.h>
@@ -14,49 +14,49 @@
 
 namespace kilotwin::dds {
 
-/// How a participant reaches others.
+/// How a participant reaches other participants.
 struct Transport {
   std::uint32_t domain = 0;
-  /// Addresses of the machines that take part, this one included. Empty: everybody is on this machine, and all traffic
-  /// stays on the loopback interface.
+  /// Addresses of all machines of the run, including this one. Empty: all processes are on this machine, and all traffic
+  /// uses the loopback interface.
   std::vector<std::string> peers;
 };
 
 /// Highest domain whose UDP ports (7400 + 250 domain + ...) exist.
 inline constexpr std::uint32_t kLastDomain = 230;
-/// Participants of one domain on one machine, at most. Index i listens at UDP ports 7400 + 250 domain + 10 + 2i and + 11 + 2i
-/// (RTPS 9.6.1.1): those of index 120 would be the next domain's.
+/// Largest number of participants of one domain on one machine. Index i listens at UDP ports 7400 + 250 domain + 10 + 2i and
+/// + 11 + 2i (RTPS 9.6.1.1). The ports of index 120 would belong to the next domain.
 inline constexpr std::uint32_t kMostParticipants = 120;
-/// Services of a run on one machine, at most: the launcher and some that watch or steer take part as well.
+/// Largest number of services of a run on one machine. The rest is for the launcher and for clients.
 inline constexpr std::uint32_t kMostServices = kMostParticipants - 10;
-/// For how long a federate may be silent until the others take it for lost, s; longer on crowded machines.
+/// Silence after which a federate counts as lost, s; crowded machines get longer.
 inline constexpr double kSilence_s = 2.0;
-/// For how long a process may be silent until DDS forgets it, s. Longer than the busiest start; who takes part in a run is
-/// known sooner (core/federation/session.hpp).
+/// Silence after which DDS removes a process, s. It is longer than the slowest start. Members of a run are detected sooner
+/// (core/federation/session.hpp).
 inline constexpr double kLease_s = 30.0;
-/// How often a participant tells others that it is there, s.
+/// Interval at which a participant announces itself, s.
 inline constexpr double kAnnounceEvery_s = 2.0;
 
-/// The configuration that the transport gives Cyclone, as XML.
+/// Cyclone's configuration for this transport, as XML.
 [[nodiscard]] std::string cyclone_configuration(const Transport&);
 
-/// Who may hear what, for how long.
+/// QoS profiles: reliability, history and durability.
 enum class Delivery {
   kFrame,       ///< reliable, keep-last 8 per publisher, volatile: tick topics
-  kMembership,  ///< reliable, keep-last 1, transient-local: who is here. An instance lives while any writer does
-  kMetrics,     ///< reliable, keep-all; of what was read, late readers get the last sample
-  kLog,         ///< reliable, keep-all, transient-local: late readers get everything
+  kMembership,  ///< reliable, keep-last 1, transient-local: members. An instance lives while any writer of it does
+  kMetrics,     ///< reliable, keep-all; late readers get the last sample that others have read
+  kLog,         ///< reliable, keep-all, transient-local: late readers get all samples
   kStatus,      ///< reliable, keep-last 1, transient-local
-  kRequest,     ///< reliable, keep-last 16, volatile: what outsiders ask
+  kRequest,     ///< reliable, keep-last 16, volatile: requests of outsiders
   kTelemetry,   ///< best effort, keep-last 1, volatile
-  kSensor,  ///< best effort, keep-last 16, volatile: frames of sensors; a late frame is worth less than the next
+  kSensor,      ///< best effort, keep-last 16, volatile: sensor frames; a late frame is worth less than the next
 };
 
-/// An entity handle that deletes what it names.
+/// An entity handle that deletes its entity.
 class Entity {
  public:
   Entity() = default;
-  /// `what` says in an error what could not be made.
+  /// Throws RunError if `handle` is an error code; `what` names the entity in the message.
   Entity(dds_entity_t handle, const std::string& what);
   Entity(Entity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
   Entity& operator=(Entity&& other) noexcept;
@@ -67,7 +67,7 @@ class Entity {
   dds_entity_t handle_ = 0;
 };
 
-/// Cyclone knows a domain once per process, with one configuration: participants share it, and the last one ends it.
+/// Cyclone has a domain once per process, with one configuration. Participants share it; the last one deletes it.
 class Domain {
  public:
   explicit Domain(const Transport&);
@@ -80,7 +80,7 @@ class Domain {
 
 class Participant {
  public:
-  /// Where the process has a participant in the domain already, that one's peers count.
+  /// If the process has a participant in the domain already, that participant's peers apply.
   explicit Participant(const Transport&);
   [[nodiscard]] dds_entity_t get() const { return participant_.get(); }
 
@@ -103,12 +103,12 @@ struct Endpoint {
 Endpoint make_writer(const Participant&, const Channel&, const dds_topic_descriptor_t*);
 Endpoint make_reader(const Participant&, const Channel&, const dds_topic_descriptor_t*, const dds_listener_t*);
 void write(dds_entity_t writer, const void* sample);
-/// Takes what there is and hands over every sample (valid or, where an instance went away, its key alone).
+/// Takes all samples and passes each on: a valid one, or, for a disposed instance, its key alone.
 void take_all(dds_entity_t reader, void* context,
               void (*each)(void* context, const void* sample, const dds_sample_info_t&));
 }  // namespace detail
 
-/// The descriptor that idlc made for T; specialised in core/federation/topics.hpp.
+/// The descriptor that idlc generates for T; specialised in core/federation/topics.hpp.
 template <class T> const dds_topic_descriptor_t* descriptor();
 
 template <class T> class Writer {
@@ -116,13 +116,13 @@ template <class T> class Writer {
   Writer(const Participant& participant, const Channel& channel)
       : endpoint_(detail::make_writer(participant, channel, descriptor<T>())) {}
   void write(const T& sample) { detail::write(endpoint_.endpoint.get(), &sample); }
-  /// How many readers are matched at the moment.
+  /// Number of currently matched readers.
   [[nodiscard]] std::uint32_t readers() const {
     dds_publication_matched_status_t status{};
     dds_get_publication_matched_status(endpoint_.endpoint.get(), &status);
     return status.current_count;
   }
-  /// Waits until every matched reader has got everything, or `seconds` have passed.
+  /// Waits until every matched reader has acknowledged all samples. Returns false after `seconds`.
   bool flush(double seconds) const {
     return dds_wait_for_acks(endpoint_.endpoint.get(), static_cast<dds_duration_t>(seconds * 1e9)) ==
            DDS_RETCODE_OK;
@@ -132,10 +132,10 @@ template <class T> class Writer {
   detail::Endpoint endpoint_;
 };
 
-/// What a reader is told besides the sample.
+/// State of a sample at its reader.
 struct SampleState {
-  bool valid;  ///< all fields are set; else only the key fields
-  bool alive;  ///< the instance has a writer that lives
+  bool valid;  ///< all fields are set; otherwise only the key fields
+  bool alive;  ///< the instance has a living writer
 };
 
 /// Calls back on Cyclone's receive thread for every sample. The callback must be short and must not throw.
@@ -152,7 +152,7 @@ template <class T> class Reader {
     endpoint_ = detail::make_reader(participant, channel, descriptor<T>(), listener.get());
   }
   Reader(const Reader&) = delete;
-  /// Returns when the last callback has returned.
+  /// Returns after the last callback has returned.
   ~Reader() {
     endpoint_ = {};
     static_cast<void>(receiver_->turn.load(std::memory_order_acquire));
@@ -162,8 +162,8 @@ template <class T> class Reader {
   struct Receiver {
     explicit Receiver(Callback given) : callback(std::move(given)) {}
     const Callback callback;
-    /// Orders construction, callbacks and destruction. Cyclone's own locks do so too, but a checker of races cannot look
-    /// into them.
+    /// Orders construction, callbacks and destruction. Cyclone's locks do so too, but race detectors do not see
+    /// them.
     std::atomic<std::uint64_t> turn{0};
   };
 
@@ -182,11 +182,11 @@ template <class T> class Reader {
   detail::Endpoint endpoint_;
 };
 
-/// Whether every participant index of the domain is taken on this machine.
+/// Whether all participant indices of the domain are taken on this machine.
 [[nodiscard]] bool domain_is_full(std::uint32_t domain);
 
-/// Picks a domain that nobody on this machine uses and keeps it for this process; freed when the process ends, however it
-/// ends. Throws UserError where `wanted` is in use, RunError where all are.
+/// Claims a domain that no process on this machine uses. The claim ends with the process, however it ends. Throws UserError
+/// if `wanted` is in use, RunError if all domains are.
 class DomainClaim {
  public:
   static DomainClaim any();

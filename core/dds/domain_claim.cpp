@@ -13,7 +13,7 @@
 namespace kilotwin::dds {
 namespace {
 
-// An abstract socket name is a lock that the kernel frees with the process and that leaves no file.
+// An abstract socket name serves as a lock: the kernel frees it with the process, and it leaves no file.
 int claim_name(std::uint32_t domain) {
   const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return -1;
@@ -27,8 +27,8 @@ int claim_name(std::uint32_t domain) {
   return -1;
 }
 
-// Every participant of a domain takes the first free discovery port (RTPS 9.6.1.1): if that of index 0 is taken, somebody's
-// DDS, ours or not, is on the domain.
+// Every participant of a domain takes the first free discovery port (RTPS 9.6.1.1). So if the port of index 0 is taken, some
+// DDS program, Kilotwin or another, uses the domain.
 bool discovery_port_is_free(std::uint32_t domain, std::uint32_t index) {
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return false;
@@ -51,7 +51,7 @@ bool domain_is_full(std::uint32_t domain) {
 }
 
 DomainClaim DomainClaim::any() {
-  // Others start at 0; starting elsewhere keeps two runs that start at once from trying the same ones.
+  // Runs start their search at different domains, so that two simultaneous starts do not try the same ones.
   const auto start = static_cast<std::uint32_t>(getpid()) % (kLastDomain - 1);
   for (std::uint32_t i = 0; i < kLastDomain; ++i) {
     const std::uint32_t domain = 1 + (start + i) % kLastDomain;
@@ -68,7 +68,7 @@ DomainClaim DomainClaim::exactly(std::uint32_t wanted) {
     throw UserError(fmt::format("--domain: {} does not exist; domains are 0 to {}", wanted, kLastDomain));
   }
   const int fd = claim_name(wanted);
-  if (fd >= 0) return {wanted, fd};  // outsiders may have joined already: that the port is taken says nothing here
+  if (fd >= 0) return {wanted, fd};  // Clients may have joined before, so a taken port is no error here.
   throw UserError(
       fmt::format("--domain: {} is in use by another run; choose another, or leave --domain away", wanted));
 }

@@ -53,7 +53,7 @@ ArenaFields::ArenaFields(const RunPlan& plan, PartitionId partition, double reac
 double ArenaFields::margin_mm(const RunPlan& plan) {
   double widest_mm = 0;
   for (const ArenaFieldSettings& field : plan.fields()) widest_mm = std::max(widest_mm, field.cell_mm);
-  return 1.5 * widest_mm;  // more than a cell's diagonal
+  return 1.5 * widest_mm;  // exceeds a cell's diagonal
 }
 
 std::uint32_t ArenaFields::cell_of(const Field& field, double x_mm, double y_mm) {
@@ -64,7 +64,7 @@ std::uint32_t ArenaFields::cell_of(const Field& field, double x_mm, double y_mm)
 std::int64_t ArenaFields::index_of(const Field& field, std::uint32_t cell) {
   const std::uint32_t column = cell % field.columns - field.first_column,
                       row = cell / field.columns - field.first_row;
-  // What lies before the first one is huge, by wrapping around.
+  // Unsigned subtraction makes cells before the first one huge, so one comparison suffices.
   return column < field.width && row < field.height ? std::int64_t{row} * field.width + column : -1;
 }
 

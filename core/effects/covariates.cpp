@@ -11,7 +11,7 @@ using Kind = MemorySlot::Kind;
 
 namespace {
 
-/// The slot of memory that a covariate is read from, if any.
+/// The memory slot that stores a covariate, if any.
 std::optional<MemorySlot> slot_of(Covariate covariate, double forget_s) {
   switch (covariate) {
     case Covariate::kTimeSinceCommand: return MemorySlot{Kind::kTimeSinceCommand};
@@ -29,11 +29,11 @@ std::optional<MemorySlot> slot_of(Covariate covariate, double forget_s) {
   }
 }
 
-/// Whether neighbours are added up.
+/// Whether the covariate is a sum over neighbours.
 bool is_sum(Covariate covariate) { return covariate == Covariate::kNeighbours || covariate == Covariate::kDensity; }
 
-/// What of a robot counts whose direction is off by an angle of that cosine.
-double focused(double cosine, std::uint32_t focus) {
+/// Weight of a neighbour in a direction whose angle from the focus has this cosine: ((1 + cosine) / 2)^focus.
+double focus_weight(double cosine, std::uint32_t focus) {
   const double once = (1 + cosine) / 2;
   double share = 1;
   for (std::uint32_t i = 0; i < focus; ++i) share *= once;
@@ -89,7 +89,7 @@ Range Covariates::range(std::uint32_t index) const {
   const double duration_s = plan_.duration_s;
   const double most_neighbours =
       (column.radius_mm / kRobotRadius_mm + 1) * (column.radius_mm / kRobotRadius_mm + 1);
-  constexpr double kFast_mm_s = 200, kFast_rad_s = 20;  // beyond what the limits of models allow
+  constexpr double kFast_mm_s = 200, kFast_rad_s = 20;  // beyond the limits of models
   switch (column.covariate) {
     case Covariate::kTime:
     case Covariate::kTimeSinceCommand:
@@ -212,7 +212,7 @@ void Covariates::fill(Column& column, Tick now, const RobotColumns& robots, std:
     case Covariate::kNeighbours:
     case Covariate::kNearest:
     case Covariate::kDensity:
-    case Covariate::kNearestBearing:  // fill_neighbours
+    case Covariate::kNearestBearing:  // set by fill_neighbours
     case Covariate::kNothing:
     case Covariate::kDuty:
     case Covariate::kMotorTime: return;
@@ -235,15 +235,15 @@ void Covariates::fill_neighbours(const RobotColumns& robots, std::span<const std
         const double dx = robots.x_mm[found_[k]] - x, dy = robots.y_mm[found_[k]] - y, square = dx * dx + dy * dy;
         if (square > radius_square_mm2) continue;
         double share = 1;
-        // Of one that stands at the same place there is no direction.
+        // A neighbour at the same position has no direction; its cosine counts as 0.
         if (column.focus > 0) {
           const double d = __builtin_sqrt(square);
-          share = focused(d > 0 ? (dx * toward_x + dy * toward_y) / d : 0, column.focus);
+          share = focus_weight(d > 0 ? (dx * toward_x + dy * toward_y) / d : 0, column.focus);
         }
         neighbours += share;
         const double weight = 1 - square / radius_square_mm2;
         density += share * (weight * weight);
-        // Of several that are equally near, the first.
+        // Of several equally near neighbours, the first counts.
         if (square < nearest_square_mm2 || nearest == self) {
           nearest_square_mm2 = square;
           nearest = found_[k];

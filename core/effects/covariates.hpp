@@ -1,4 +1,4 @@
-/// Covariates of robots, a column for each that some effect looks at. A column is filled once per tick, whoever asks for it.
+/// Covariates of robots: a column per covariate that some effect uses. Each column is computed once per tick.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +16,20 @@ class Covariates {
  public:
   explicit Covariates(const RunPlan&);
 
-  /// The column of a covariate with the parameters of the function; MOTOR_TIME and DUTY are those of no wheel, see of_wheel().
+  /// Requests the column of a covariate with the function's parameters and returns its index. MOTOR_TIME and DUTY need
+  /// of_wheel() first.
   [[nodiscard]] std::uint32_t need(Covariate, const FunctionSettings&);
-  /// How far away robots count, mm; 0 where none do.
+  /// Radius within which neighbours affect covariates, mm; 0 if no covariate uses neighbours.
   [[nodiscard]] double radius_mm() const { return radius_mm_; }
-  /// Where the values of a column can lie.
+  /// Range of a column's values.
   [[nodiscard]] Range range(std::uint32_t column) const;
 
-  /// Fills all columns for the robots robots[who[0]], robots[who[1]]... `robots` hold all robots within radius_mm() of
-  /// those. `fields`: null where no column is of PLACE.
+  /// Computes all columns for the robots robots[who[0]], robots[who[1]]... `robots` must have all robots within radius_mm() of
+  /// those. `fields` may be null if no column is of PLACE.
   void fill(Tick, const RobotColumns& robots, std::span<const std::uint32_t> who, const ArenaFields* fields);
   [[nodiscard]] std::span<const double> values(std::uint32_t column) const { return columns_[column].values; }
 
-  /// The number of a MotionCommand as a bit, per robot of who.
+  /// Per robot of `who`: a mask with the bit of its MotionCommand.
   [[nodiscard]] std::span<const std::uint8_t> command_bits() const { return command_bits_; }
 
   [[nodiscard]] static bool is_of_neighbours(Covariate covariate) {
@@ -41,7 +42,7 @@ class Covariates {
     double radius_mm = 0, forget_s = 0, toward_rad = 0;
     std::uint32_t focus = 0;
     std::uint32_t field = 0;
-    std::uint32_t slot = 0;  ///< of memory, where it is remembered
+    std::uint32_t slot = 0;  ///< of the memory, for covariates that are stored there
     std::vector<double> values;
   };
 
@@ -56,7 +57,7 @@ class Covariates {
   std::vector<std::uint32_t> found_;
 };
 
-/// The covariate as the left (0) or the right (1) wheel has it: the right motor drives the left wheel.
+/// The covariate of one wheel: 0 left, 1 right. The right motor drives the left wheel.
 [[nodiscard]] Covariate of_wheel(Covariate, std::uint32_t wheel);
 
 }  // namespace kilotwin

@@ -8,13 +8,13 @@
 namespace kilotwin {
 namespace {
 
-/// exp() of more is taken as that: values stay finite, whatever a model says.
+/// Exponents are limited to this value, so that results stay finite for any model.
 constexpr double kLargestExponent = 60;
 
 double magnitude(double v) { return v < 0 ? -v : v; }
 
-/// The ends of the range, and the knots within it with places between them.
-std::vector<double> trials(Range range, std::span<const double> knots) {
+/// Sample points for largest(): the ends of the range, the knots within it, and points between the knots.
+std::vector<double> sample_points(Range range, std::span<const double> knots) {
   std::vector<double> all{range.min, range.max};
   for (std::size_t i = 0; i < knots.size(); ++i) {
     all.push_back(knots[i]);
@@ -107,14 +107,14 @@ double EffectFunction::largest(Range first, Range second) const {
     return largest;
   }
   if (const auto* const two = std::get_if<Spline2d>(&shape_)) {
-    for (const double d : trials(second, two->second_knots())) {
-      for (const double c : trials(first, two->first_knots())) look(c, d);
+    for (const double d : sample_points(second, two->second_knots())) {
+      for (const double c : sample_points(first, two->first_knots())) look(c, d);
     }
     return largest;
   }
   std::span<const double> knots;
   if (const auto* const one = std::get_if<One>(&shape_)) knots = one->spline.knots();
-  for (const double c : trials(first, knots)) look(c, 0);
+  for (const double c : sample_points(first, knots)) look(c, 0);
   return largest;
 }
 

@@ -1,4 +1,4 @@
-/// A function of an effect, compiled: numbers of its covariates in, values out.
+/// The compiled function of an effect: computes values from covariates.
 #pragma once
 
 #include <cstdint>
@@ -10,20 +10,20 @@
 
 namespace kilotwin {
 
-/// Where a covariate can lie.
+/// Range of a covariate.
 struct Range {
   double min, max;
 };
 
 class EffectFunction {
  public:
-  /// The shape of a function that validation has passed. Noise counts as the constant sd.
+  /// Compiles a validated function. Noise becomes the constant sd.
   explicit EffectFunction(const FunctionSettings&);
 
   /// value[i] *= f(first[i]), or f(first[i], second[i]). Finite for finite covariates.
   void multiply(std::span<const double> first, std::span<const double> second, std::span<double> value) const;
   [[nodiscard]] double operator()(double first, double second = 0) const;
-  /// About the largest |f| over the ranges, never below by more than a few per cent.
+  /// Approximate maximum of |f| over the ranges; it may be a few per cent too small.
   [[nodiscard]] double largest(Range first, Range second) const;
 
  private:

@@ -1,6 +1,6 @@
-/// Effects on what is measured: poses as a camera tracker sees them. They never act on physics. A measured position is
+/// Effects on measurement: poses as a camera tracker reports them. They never act on physics. A measured position is
 ///   (p + body offsets) (1 + s1) (1 + s2)... + offsets,
-/// p being the disc's centre, s the scales; lengths mm, angles rad.
+/// with the disc's centre p and scales s. Lengths in mm, angles in rad.
 #pragma once
 
 #include <span>
@@ -11,7 +11,7 @@
 
 namespace kilotwin {
 
-/// Of all robots, by id.
+/// Measured poses of all robots, by id.
 struct MeasuredPoses {
   std::vector<double> x_mm, y_mm, heading_rad;  ///< heading in [-pi, pi)
 };
@@ -20,9 +20,9 @@ class Measurement {
  public:
   explicit Measurement(const RunPlan&);
 
-  /// False: what is measured is how things are.
+  /// False: measured poses equal true poses.
   [[nodiscard]] bool any() const { return !terms_.empty(); }
-  /// What the tracker sees of a swarm. Real robots are seen by their own tracker and stay as they are.
+  /// Measured poses of a swarm. Real robots keep the poses of their own tracker.
   void measure(const SwarmView&, MeasuredPoses&);
 
  private:

@@ -10,7 +10,7 @@ namespace {
 
 std::uint32_t draw_of(const MemorySlot& slot) { return (slot.index * 8 + slot.function) * 2 + slot.wheel; }
 
-/// At least a tick, so that no phase is lost.
+/// Time until the next episode; at least a tick, so that no phase is skipped.
 double wait_s(const EpisodesShape& e, double uniform, double tick_s) {
   return std::max(-e.mean_apart_s * kt_log(uniform), tick_s);
 }
@@ -51,7 +51,7 @@ void EffectMemory::start(std::uint32_t robot, std::span<double> memory) const {
 }
 
 double EffectMemory::next_episode(const MemorySlot& slot, std::uint32_t robot, Tick now, double left_s) const {
-  // Half a tick at most is neither counted twice nor lost.
+  // A remainder of up to half a tick counts to the current phase.
   if (left_s > tick_s_ * 1.5) return left_s - tick_s_;
   if (left_s < -tick_s_ * 1.5) return left_s + tick_s_;
   const EpisodesShape& episodes = *plan_.effects()[slot.index].functions[slot.function].episodes();
@@ -77,7 +77,7 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
   for (std::size_t s = 0; s < stride; ++s) {
     switch (slots[s].kind) {
       case Kind::kCommand:
-        // What belongs to it has to see the command before.
+        // Slots of the previous command must read the memory before this slot changes.
         each(s, [&](std::size_t i, double was) {
           const double command = static_cast<double>(command_of(robots.duties[i]));
           double* const own = memory.data() + i * stride;
@@ -110,12 +110,12 @@ void EffectMemory::advance(Tick from, const RobotColumns& robots, std::span<cons
       case Kind::kEpisode:
         each(s, [&](std::size_t i, double was) { return next_episode(slots[s], robots.robot[i], from + 1, was); });
         break;
-      case Kind::kTimeSinceCommand:  // with the command
+      case Kind::kTimeSinceCommand:  // set with the command
       case Kind::kPreviousCommand:
       case Kind::kPreviousLasted:
       case Kind::kPreviousForward:
       case Kind::kPreviousSideways:
-      case Kind::kPreviousTurn:      // below
+      case Kind::kPreviousTurn:      // set below
       case Kind::kFieldCell: break;  // ArenaFields::count
     }
   }

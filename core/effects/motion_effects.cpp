@@ -44,7 +44,7 @@ MotionEffects::Limits MotionEffects::limits(double top_wheel_mm_s) const {
     }
   }
   limits.wheel_mm_s += (gain - 1) * top_wheel_mm_s;
-  // What was estimated may be a little too small; what it limits is rarely as large.
+  // TermList::largest() may be slightly too small, so the limits get a reserve.
   constexpr double kRoom = 1.05;
   for (double* const limit : {&limits.wheel_mm_s, &limits.sideways_mm_s, &limits.drift_mm_s})
     *limit = std::min(*limit * kRoom, limit_mm_s_);

@@ -1,4 +1,4 @@
-/// Effects on motion: what they add to the wheels' speeds and to the motion of the body.
+/// Effects on motion: changes of the wheels' speeds and of the body's velocity.
 #pragma once
 
 #include <span>
@@ -8,7 +8,7 @@
 
 namespace kilotwin {
 
-/// Per robot, structure of arrays.
+/// Changes per robot, structure of arrays.
 struct MotionChanges {
   std::vector<double> left_gain, right_gain;       ///< factor on a wheel's speed
   std::vector<double> left_mm_s, right_mm_s;       ///< added to a wheel's speed
@@ -21,20 +21,20 @@ class MotionEffects {
   explicit MotionEffects(const RunPlan&);
 
   [[nodiscard]] bool empty() const { return terms_.empty(); }
-  /// Whether some move robots whose motors are off.
+  /// Whether some effects move robots whose motors are off.
   [[nodiscard]] bool act_at_rest() const { return act_at_rest_; }
   [[nodiscard]] bool drift() const { return drift_; }
-  /// How far away robots count, mm.
+  /// Radius within which neighbours affect effects, mm.
   [[nodiscard]] double radius_mm() const { return terms_.covariates().radius_mm(); }
 
-  /// No larger change is ever made: to a wheel's speed, to the sideways speed, to the drift along an axis, mm/s.
+  /// Upper bounds of the changes: of a wheel's speed, of the sideways speed, of the drift along an axis, mm/s.
   struct Limits {
     double wheel_mm_s = 0, sideways_mm_s = 0, drift_mm_s = 0;
   };
-  /// Where no wheel is driven faster than this before effects.
+  /// `top_wheel_mm_s`: largest speed of a wheel before effects.
   [[nodiscard]] Limits limits(double top_wheel_mm_s) const;
 
-  /// Changes of the robots robots[who[i]]; see Covariates::fill for `robots` and `fields`.
+  /// Computes the changes of the robots robots[who[i]]. Covariates::fill explains `robots` and `fields`.
   void evaluate(Tick from, const RobotColumns& robots, std::span<const std::uint32_t> who,
                 const ArenaFields* fields, MotionChanges&);
 

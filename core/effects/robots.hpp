@@ -1,4 +1,4 @@
-/// What effects look at: robots at one instant.
+/// Inputs of effects: robots at one tick.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,15 @@
 
 namespace kilotwin {
 
-/// What turns a robot's motors in a tick. The left motor drives the right-hand wheel.
+/// Motor duties of a robot in a tick. The left motor drives the right-hand wheel.
 struct Duties {
   std::uint8_t left = 0, right = 0;
-  std::uint8_t spin_up = 0;  ///< 1: both run at full duty before
+  std::uint8_t spin_up = 0;  ///< 1: both motors start with full duty
 
   [[nodiscard]] bool any() const { return (left | right | spin_up) != 0; }
 };
 
-/// Which of a program's duties turn a motor: none in the dead band, and no kick where the model has none.
+/// Decides which duties of a program turn a motor: none in the dead band, and no kick if the model has none.
 class MotorRule {
  public:
   explicit MotorRule(const RunPlan&);
@@ -27,7 +27,7 @@ class MotorRule {
             kick_part_ > 0 ? spin_up : std::uint8_t{0}};
   }
   [[nodiscard]] std::uint8_t dead_band_duty() const { return dead_band_duty_; }
-  /// Of a tick, for which a kick lasts.
+  /// Fraction of a tick for which a kick lasts.
   [[nodiscard]] double kick_part() const { return kick_part_; }
 
  private:
@@ -35,14 +35,14 @@ class MotorRule {
   double kick_part_;
 };
 
-/// As its motors show; a kick alone counts as STRAIGHT.
+/// The motion command that these duties represent. A kick alone counts as STRAIGHT.
 [[nodiscard]] inline MotionCommand command_of(Duties duties) {
   if (duties.left != 0) return duties.right != 0 ? MotionCommand::kStraight : MotionCommand::kTurnLeft;
   if (duties.right != 0) return MotionCommand::kTurnRight;
   return duties.spin_up != 0 ? MotionCommand::kStraight : MotionCommand::kStop;
 }
 
-/// Of a set of commands.
+/// Bit of a command in a set of commands.
 [[nodiscard]] constexpr std::uint8_t bit_of(MotionCommand command) {
   return static_cast<std::uint8_t>(1u << static_cast<unsigned>(command));
 }
@@ -51,13 +51,13 @@ class MotorRule {
   return command == MotionCommand::kTurnLeft || command == MotionCommand::kTurnRight;
 }
 
-/// Robots at one instant, structure of arrays, ascending ids: a view of somebody's columns, all of one length.
+/// Robots at one tick in ascending ids: a view of columns of equal length.
 struct RobotColumns {
   std::span<const std::uint32_t> robot;
   std::span<const double> x_mm, y_mm, heading_rad;
-  std::span<const double> memory;         ///< RunPlan::memory.size() per robot
-  std::span<const Duties> duties;         ///< acting in the coming tick; 0 of real robots
-  std::span<const std::uint8_t> tracked;  ///< 1: a real robot, on which no effect acts
+  std::span<const double> memory;         ///< RunPlan::memory.size() values per robot
+  std::span<const Duties> duties;         ///< of the coming tick; 0 for real robots
+  std::span<const std::uint8_t> tracked;  ///< 1: a real robot; effects do not act on it
 
   [[nodiscard]] std::size_t size() const { return robot.size(); }
 };

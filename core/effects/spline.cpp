@@ -7,7 +7,7 @@ namespace kilotwin {
 std::vector<double> spline_curvatures(std::span<const double> knots, std::span<const double> values) {
   const std::size_t n = knots.size();
   std::vector<double> curvature(n, 0);
-  // A tridiagonal system, diagonally dominant: eliminate downwards, substitute upwards.
+  // A tridiagonal, diagonally dominant system: forward elimination, back substitution.
   std::vector<double> ratio(n, 0);
   for (std::size_t i = 1; i + 1 < n; ++i) {
     const double before = knots[i] - knots[i - 1], after = knots[i + 1] - knots[i];
@@ -44,7 +44,7 @@ double Spline::operator()(double c) const {
 Spline2d::Spline2d(std::vector<double> first, std::vector<double> second, std::vector<double> values)
     : first_(std::move(first)), second_(std::move(second)), nodes_(values.size()) {
   const std::size_t columns = first_.size(), rows = second_.size();
-  // Along the first variable in each row, then values and these curvatures along the second in each column.
+  // Curvatures along the first variable in each row; then curvatures of these and of the values along each column.
   std::vector<double> along_first(values.size());
   for (std::size_t j = 0; j < rows; ++j) {
     const auto row = spline_curvatures(first_, std::span(values).subspan(j * columns, columns));

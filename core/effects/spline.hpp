@@ -1,4 +1,4 @@
-/// Natural cubic splines through given points, in one variable and in two. Beyond the outermost knots the value there.
+/// Natural cubic splines in one and two variables. Beyond the outermost knots they are constant.
 #pragma once
 
 #include <cstddef>
@@ -7,14 +7,14 @@
 
 namespace kilotwin {
 
-/// Second derivatives at the knots of the natural cubic spline through (knot, value): 0 at both ends. At least two knots,
-/// ascending.
+/// Second derivatives at the knots of the natural cubic spline through (knot, value); they are 0 at both ends. At least two
+/// knots, ascending.
 [[nodiscard]] std::vector<double> spline_curvatures(std::span<const double> knots, std::span<const double> values);
 
-/// Where c lies among the knots, and the weights of value and curvature at the two knots around it.
+/// Interval of c among the knots, and the weights of values and second derivatives at its two ends.
 struct SplinePlace {
-  std::size_t index;          ///< of the knot before
-  double value[2], curve[2];  ///< weights, of the knot before and of the one after
+  std::size_t index;          ///< of the interval's lower knot
+  double value[2], curve[2];  ///< weights at the lower and at the upper knot
 };
 [[nodiscard]] SplinePlace spline_place(std::span<const double> knots, double c);
 
@@ -30,7 +30,7 @@ class Spline {
 
 class Spline2d {
  public:
-  /// values[j * first.size() + i] is that at (first[i], second[j]).
+  /// values[j * first.size() + i] is the value at (first[i], second[j]).
   Spline2d(std::vector<double> first, std::vector<double> second, std::vector<double> values);
   [[nodiscard]] double operator()(double c, double d) const;
   [[nodiscard]] std::span<const double> first_knots() const { return first_; }
@@ -38,7 +38,7 @@ class Spline2d {
 
  private:
   std::vector<double> first_, second_;
-  /// Per pair of knots: the value, its second derivatives along each variable, and that along both.
+  /// Per pair of knots: the value, its second derivatives along each variable, and the mixed fourth derivative.
   struct Node {
     double value, along_first, along_second, along_both;
   };

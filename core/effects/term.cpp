@@ -12,7 +12,7 @@ constexpr std::uint8_t kDriven =
     bit_of(MotionCommand::kStraight) | bit_of(MotionCommand::kTurnLeft) | bit_of(MotionCommand::kTurnRight);
 constexpr std::uint8_t kAlways = kDriven | bit_of(MotionCommand::kStop);
 
-/// Draws of one effect: 2 per function, for the wheels.
+/// Draws per effect: 2 per function, one for each wheel.
 constexpr std::uint32_t kDrawsPerEffect = 16;
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// The effects of an experiment, compiled: those on motion or those on what is measured. An effect that is each wheel's own
-/// becomes a term per wheel, any other one term.
+/// The compiled effects of an experiment, on motion or on measurement. An effect that applies to each wheel by itself becomes
+/// one term per wheel; any other effect becomes one term.
 #pragma once
 
 #include <cstdint>
@@ -19,14 +19,14 @@ struct Term {
     std::uint32_t first = 0, second = 0;  ///< columns of Covariates
     bool has_first = false, has_second = false;
     bool is_noise = false, is_episodes = false;
-    std::optional<std::uint32_t> slot;  ///< of memory, of correlated noise and episodes
-    std::uint32_t draw = 0;             ///< of independent noise
+    std::optional<std::uint32_t> slot;  ///< of the memory, for correlated noise and episodes
+    std::uint32_t draw = 0;             ///< draw index of independent noise
   };
 
   EffectSettings::Target target;
-  bool left = false, right = false;   ///< which wheels, with effects on them
+  bool left = false, right = false;   ///< for effects on wheels: which ones
   double along = 1, across = 0;       ///< cosine and sine of the direction
-  std::uint8_t commands = 0;          ///< bits of the MotionCommands during which it acts
+  std::uint8_t commands = 0;          ///< bits of the MotionCommands during which the term acts
   std::vector<std::uint8_t> applies;  ///< per robot; empty: to all
   std::vector<Factor> factors;
 };
@@ -39,11 +39,11 @@ class TermList {
   [[nodiscard]] bool empty() const { return terms_.empty(); }
   [[nodiscard]] const std::vector<Term>& terms() const { return terms_; }
   [[nodiscard]] const Covariates& covariates() const { return covariates_; }
-  /// About the largest size of a term's value.
+  /// Approximate maximum of a term's magnitude.
   [[nodiscard]] double largest(const Term&) const;
 
-  /// Calls take(term, values) for each term in order; values[i] belongs to robots[who[i]] and is 0 where the term does not
-  /// act. See Covariates::fill for `robots` and `fields`.
+  /// Calls take(term, values) for each term in order. values[i] belongs to robots[who[i]]; it is 0 where the term does not
+  /// act. Covariates::fill explains `robots` and `fields`.
   template <class Take>
   void evaluate(Tick now, const RobotColumns& robots, std::span<const std::uint32_t> who, const ArenaFields* fields,
                 Take&& take) {
@@ -61,14 +61,13 @@ class TermList {
   const RunPlan& plan_;
   const Of of_;
   const Random random_;
-  double
-      noise_per_tick_;  ///< of independent noise: what the standard deviation in a tick is, for one over a second
+  double noise_per_tick_;  ///< independent noise: standard deviation per tick for one per root second
   Covariates covariates_;
   std::vector<Term> terms_;
   std::vector<double> values_;
 };
 
-/// Above what Random::normal can return: its argument has 52 bits, and the normal distribution has less than 2^-54 beyond.
+/// Exceeds any value of Random::normal: its argument has 52 bits, and the normal tail beyond is less than 2^-54.
 inline constexpr double kTopNormal = 8.4;
 
 }  // namespace kilotwin

@@ -11,21 +11,21 @@ namespace {
 double length(double x, double y) { return __builtin_sqrt(x * x + y * y); }
 double cross(Point2 a, Point2 b) { return a.x_mm * b.y_mm - a.y_mm * b.x_mm; }
 
-/// Integral of the distance from the origin over the triangle of the origin and an edge. With d the distance of the edge's
-/// line, t along it and R = sqrt(d^2 + t^2), it is (d t R + d^3 ln((R + t) / d)) / 6 from one end to the other.
+/// Integral of the distance from the origin over the triangle of the origin and an edge. With the distance d of the edge's
+/// line, t along it, and R = sqrt(d^2 + t^2), it is (d t R + d^3 ln((R + t) / d)) / 6 between the ends.
 double distance_integral(Point2 from, Point2 to) {
   const double ux = to.x_mm - from.x_mm, uy = to.y_mm - from.y_mm, side = length(ux, uy);
   const double d = cross(from, to) / side;
   const auto primitive = [&](Point2 p) {
     const double t = (p.x_mm * ux + p.y_mm * uy) / side, r = length(p.x_mm, p.y_mm);
-    // (R + t) (R - t) = d^2: the sum without cancellation.
+    // (R + t) (R - t) = d^2 gives the sum without cancellation.
     const double sum = t >= 0 ? r + t : d * d / (r - t);
     return (d * t * r + d * d * d * kt_log(sum / d)) / 6;
   };
   return primitive(to) - primitive(from);
 }
 
-/// The least distance of any of b's points from the line of an edge of a, outwards; over all edges of a the largest.
+/// Least distance of b's points from the line of an edge of a, outwards; the maximum over all edges of a.
 double separation_by_edges(const Convex& a, const Place& at_a, const Convex& b, const Place& at_b) {
   double best = -1e300;
   for (std::size_t i = 0; i < a.corners().size(); ++i) {
@@ -75,7 +75,7 @@ Convex Convex::polygon(std::vector<Point2> corners, Point2* centre) {
     twice_area = -twice_area;
   }
   if (!(twice_area > 1e-6 * extent * extent)) throw std::invalid_argument("its corners lie on a line");
-  double turned = 0;  // Counts a star as what it is.
+  double turned = 0;  // A star turns by more than 2 pi.
   for (std::size_t i = 0; i < count; ++i) {
     const Point2 in = minus(at(i + 1), at(i)), out = minus(at(i + 2), at(i + 1));
     const double in_mm = length(in.x_mm, in.y_mm), out_mm = length(out.x_mm, out.y_mm);
@@ -124,7 +124,7 @@ Nearest Convex::nearest(Point2 p) const {
     const double nx = distance > 0 ? p.x_mm / distance : 1, ny = distance > 0 ? p.y_mm / distance : 0;
     return {nx, ny, distance - radius_mm_, {nx * radius_mm_, ny * radius_mm_}};
   }
-  // The edge beyond whose line the point lies farthest is the nearest one, or ends in the nearest corner.
+  // The nearest edge, or one that ends in the nearest corner, is the edge whose line the point exceeds most.
   std::size_t edge = 0;
   double beyond = -1e300;
   for (std::size_t i = 0; i < corners_.size(); ++i) {

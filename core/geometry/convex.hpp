@@ -10,7 +10,7 @@ struct Point2 {
   double x_mm = 0, y_mm = 0;
 };
 
-/// Where a shape's centre lies and how it is turned.
+/// Position and orientation of a shape.
 struct Place {
   double x_mm = 0, y_mm = 0;
   double cosine = 1, sine = 0;
@@ -37,8 +37,8 @@ struct Nearest {
 class Convex {
  public:
   [[nodiscard]] static Convex disc(double radius_mm);
-  /// Corners in order, either way round. Throws std::invalid_argument where they are not those of a convex polygon; corners
-  /// may lie on a line between others. `centre`, where given, gets the centroid, which becomes the origin.
+  /// Corners in order, in either direction. Corners may be collinear with their neighbours. Throws std::invalid_argument if
+  /// the polygon is not convex. If `centre` is given, it is set to the centroid, which becomes the origin.
   [[nodiscard]] static Convex polygon(std::vector<Point2> corners, Point2* centre = nullptr);
   [[nodiscard]] static Convex box(double width_mm, double length_mm);
 
@@ -48,16 +48,16 @@ class Convex {
   [[nodiscard]] const std::vector<Point2>& corners() const { return corners_; }
   /// Outward normals of the edges, unit.
   [[nodiscard]] const std::vector<Point2>& normals() const { return normals_; }
-  /// The farthest that any point lies from the centre.
+  /// Largest distance of any point from the centre.
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
   [[nodiscard]] double area_mm2() const { return area_mm2_; }
-  /// Mean distance of the area from its centre: what the moment of dry friction has for a lever, where the weight rests
-  /// evenly on the area and the body turns about its centre.
+  /// Mean distance of the area from its centre: the lever of dry friction's moment, for an evenly distributed weight and a
+  /// rotation about the centre.
   [[nodiscard]] double mean_distance_mm() const { return mean_distance_mm_; }
 
-  /// In the shape's own frame.
+  /// For a point in the shape's own frame.
   [[nodiscard]] Nearest nearest(Point2) const;
-  /// In the arena's frame.
+  /// For a point in the arena's frame.
   [[nodiscard]] Nearest nearest(const Place&, Point2) const;
 
  private:
@@ -65,8 +65,8 @@ class Convex {
   std::vector<Point2> corners_, normals_;
 };
 
-/// The distance by which the two can be told apart along the best of their edges' normals (or along the line of centres):
-/// their distance where an edge faces the other, less where corner faces corner; negative: how deep they overlap.
+/// Separation of two shapes along the best of their edges' normals, or along the line of centres. It equals the distance if an
+/// edge faces the other shape, and is smaller if corner faces corner. Negative: depth of the overlap.
 [[nodiscard]] double separation_mm(const Convex& a, const Place& at_a, const Convex& b, const Place& at_b);
 
 }  // namespace kilotwin

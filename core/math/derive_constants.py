@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Prints the constants of elementary.c. Needs python3-mpmath. Nothing here runs in a build; it is the constants' source.
+"""Prints the constants of elementary.c. Needs python3-mpmath. The build does not run it; it documents the constants' origin.
 
 Polynomials interpolate the function at Chebyshev points of the range, which is within a small factor of the best
-approximation; rational functions are the best ones. The error printed with each is the largest one found on a dense
-grid, with the coefficients as rounded to double.
+approximation. Rational functions are minimax approximations. The error printed with each is the largest one found on a
+dense grid, with coefficients rounded to double.
 """
 from mpmath import mp, mpf, matrix, lu_solve, cos, pi, sqrt, log, exp, atan, sin, erfinv, floor, nint, frexp, ldexp
 

@@ -1,6 +1,6 @@
-/* Method, alike for all: reduce the argument without error to a small range, approximate there by a polynomial, and
- * carry what was rounded off (a pair `value, rest`) up to the last addition, so that the error is little more than half a
- * unit in the last place. derive_constants.py prints every constant and table. */
+/* Method of all functions: reduce the argument exactly to a small range, and approximate there by a polynomial. A pair
+ * (value, rest) carries rounding errors up to the last addition, so the total error is little more than half a unit in the
+ * last place. derive_constants.py prints every constant and table. */
 #include "elementary.h"
 
 #include <stdint.h>
@@ -18,7 +18,7 @@ static const Pair kNone = {0, 0};
 static const Pair kPi = {0x1.921fb54442d18p+1, 0x1.1a62633145c07p-53};
 static const Pair kHalfPi = {0x1.921fb54442d18p+0, 0x1.1a62633145c07p-54};
 
-/* Every NaN that leaves this file is this one: which NaN an operation yields differs between processors. */
+/* All functions return this NaN, because the NaN that an operation yields differs between processors. */
 static double not_a_number(void) { return __builtin_nan(""); }
 
 static uint64_t bits_of(double x) {
@@ -43,16 +43,16 @@ static double power_of_two(int n) { return double_of((uint64_t)(n + 1023) << 52)
 /* The nearest integer to x, |x| < 2^51. */
 static double nearest(double x) { return (x + kWholeNumbers) - kWholeNumbers; }
 
-/* x with the lower 27 bits of its significand cleared; products of two such are exact. */
+/* x with the lower 27 bits of its significand cleared; products of two such values are exact. */
 static double upper(double x) { return double_of(bits_of(x) & ~(uint64_t)0x7ffffff); }
 
-/* a * b - product, where product is a * b rounded. */
+/* The exact error a * b - product, where product is a * b rounded. */
 static double product_rest(double a, double b, double product) {
   const double a_up = upper(a), b_up = upper(b), a_low = a - a_up, b_low = b - b_up;
   return ((a_up * b_up - product) + (a_up * b_low + a_low * b_up)) + a_low * b_low;
 }
 
-/* ---- Polynomials: pairs of terms side by side, to keep the chain of dependent operations short. */
+/* ---- Polynomials: pairs of terms side by side, which shortens the chain of dependent operations. */
 
 static double polynomial5(const double c[5], double x) {
   const double x2 = x * x;
@@ -76,7 +76,7 @@ static double polynomial8(const double c[8], double x) {
 
 /* ---- sin, cos, tan */
 
-/* 2/pi after one word of zeros, 64 bits a word. */
+/* 2/pi after one word of zeros, 64 bits per word. */
 static const uint64_t kTwoOverPi[21] = {0,
                                         0xa2f9836e4e441529u,
                                         0xfc2757d1f534ddc0u,
@@ -99,14 +99,14 @@ static const uint64_t kTwoOverPi[21] = {0,
                                         0x56033046fc7b6babu,
                                         0xf0cfbc209af4361du};
 
-/* An angle less `quadrant` right angles; |remainder| <= pi/4. */
+/* An angle minus `quadrant` right angles; |remainder| <= pi/4. */
 typedef struct {
   Pair remainder;
   unsigned quadrant;
 } Reduced;
 
-/* For 1 <= |x|, finite: x 2/pi in whole numbers, from those 192 bits of 2/pi that count; the bits before them add
- * multiples of four right angles, and those behind less than 2^-137. */
+/* For finite |x| >= 1: multiplies x by the 192 relevant bits of 2/pi in integer arithmetic. The bits before them contribute
+ * multiples of four right angles, the bits after them less than 2^-137. */
 static Reduced reduced_exactly(double x) {
   const uint64_t mantissa = (bits_of(x) & 0xfffffffffffffu) | 0x10000000000000u;
   const int exponent = (int)(bits_of(x) >> 52 & 0x7ff) - 1075;
@@ -116,7 +116,7 @@ static Reduced reduced_exactly(double x) {
     const uint64_t* word = kTwoOverPi + start / 64 + i;
     window[i] = shift == 0 ? word[0] : word[0] << shift | word[1] >> (64 - shift);
   }
-  /* The product modulo 2^192, as high, middle, low; 2^190 is one right angle. */
+  /* The product modulo 2^192 as high, middle and low word; 2^190 is one right angle. */
   const Wide last = (Wide)mantissa * window[2];
   const Wide centre = (Wide)mantissa * window[1] + (uint64_t)(last >> 64);
   uint64_t low = (uint64_t)last, middle = (uint64_t)centre, high = mantissa * window[0] + (uint64_t)(centre >> 64);
@@ -151,14 +151,14 @@ static Reduced reduced_exactly(double x) {
   return result;
 }
 
-/* For any finite x. */
+/* Reduction for any finite x. */
 static Reduced reduced(double x) {
   if (magnitude(x) <= 0x1p20) {
     const double turns = nearest(x * kTwoOverPiRounded);
     const double first = x - turns * kHalfPi1, second = turns * kHalfPi2;
     const double value = first - second;
     const double rest = ((first - value) - second) - turns * kHalfPi3;
-    /* Next to a multiple of pi/2, so much may cancel that the third part is too short. */
+    /* Next to a multiple of pi/2, cancellation may be so large that the third part is too short. */
     if (!(magnitude(value) < magnitude(turns) * 0x1p-60)) {
       const double sum = value + rest;
       const Reduced result = {{sum, (value - sum) + rest}, (unsigned)((int)turns & 3)};
@@ -267,7 +267,7 @@ static const Pair kArcTable[33] = {
     {0x1.921fb54442d18p-1, 0x1.1a62633145c07p-55},
 };
 
-/* The angle of the point (x, y), or (-x, y) if left, from the x axis: x, y >= 0, not both infinite; in [0, pi]. */
+/* The angle of the point (x, y), or of (-x, y) if `left`, from the x axis, in [0, pi]. x, y >= 0, not both infinite. */
 static double angle_of(Pair y, Pair x, int left) {
   const int steep = y.value > x.value;
   Pair top = steep ? x : y, bottom = steep ? y : x;
@@ -278,7 +278,7 @@ static double angle_of(Pair y, Pair x, int left) {
     if (bottom.value > 0x1p500 || bottom.value < 0x1p-500) {
       const double scale = bottom.value > 1 ? 0x1p-600 : 0x1p600;
       top.value *= scale;
-      bottom.value *= scale; /* The rests are 0: only sides of 1 or less and of usual size have any. */
+      bottom.value *= scale; /* The rests are 0: only sides up to 1 and of usual magnitude have any. */
     }
     const double inverse = 1 / bottom.value;
     const double ratio = top.value / bottom.value, product = ratio * bottom.value;
@@ -409,11 +409,11 @@ static const double kLogarithm[8] = {0x1.5555555555555p-2, -0x1p-2,
                                      0x1.2492483bc1f1ap-3, -0x1.fffffe552c2ddp-4,
                                      0x1.c74b00ccb2ce3p-4, -0x1.99c447690a909p-4};
 
-/* ln2 to a multiple of 2^-42, and the rest. */
+/* ln2 rounded to a multiple of 2^-42, and the rest. */
 static const Pair kLn2 = {0x1.62e42fefa38p-1, 0x1.ef35793c7673p-45};
 
-/* For significands in [1 + j/64, 1 + (j+1)/64): c, about the reciprocal, a multiple of 2^-9; -log c, less ln2 from
- * j = 27 (sqrt 2) on, to a multiple of 2^-42; the rest. No reduction at either side of 1, where the logarithm is small. */
+/* For significands in [1 + j/64, 1 + (j+1)/64): c, close to the reciprocal, a multiple of 2^-9; then -log c, minus ln2 for
+ * j >= 27 (sqrt 2), rounded to a multiple of 2^-42; then the rest. c = 1 on both sides of 1, where the logarithm is small. */
 static const struct {
   double c, value, rest;
 } kLogarithmTable[64] = {
@@ -493,7 +493,7 @@ static Pair logarithm(double x) {
   const uint64_t bits = bits_of(x);
   const unsigned j = (unsigned)(bits >> 46) & 63;
   exponent += (int)(bits >> 52) + (j >= 27);
-  /* r = m c - 1 without error: the upper 44 bits of m times the 9 of c, then the lower ones. */
+  /* r = m c - 1 without error: the upper 44 bits of m times the 9 bits of c, then the lower ones. */
   const double m = double_of((bits & 0xfffffffffffffu) | 0x3ff0000000000000u);
   const double m_up = double_of(bits_of(m) & ~(uint64_t)0x1ff), c = kLogarithmTable[j].c;
   const double r_up = m_up * c - 1, r_low = (m - m_up) * c;
@@ -557,7 +557,7 @@ double kt_fmod(double x, double y) {
   int exponent, divisor_exponent;
   uint64_t mantissa = mantissa_of(size, &exponent);
   const uint64_t divisor_mantissa = mantissa_of(divisor, &divisor_exponent);
-  /* Long division, eleven binary digits at a time: 53 + 11 bits are a word. */
+  /* Long division, eleven binary digits at a time: 53 + 11 bits fit into a word. */
   int digits = exponent - divisor_exponent;
   mantissa %= divisor_mantissa;
   while (digits > 0 && mantissa != 0) {
@@ -565,7 +565,7 @@ double kt_fmod(double x, double y) {
     mantissa = (mantissa << now) % divisor_mantissa;
     digits -= now;
   }
-  /* mantissa 2^divisor_exponent is a double, in two factors where the power alone is not. */
+  /* mantissa 2^divisor_exponent is a double; the power alone may not be, so it is applied in two factors. */
   const int half = divisor_exponent / 2;
   const double result = (double)(int64_t)mantissa * power_of_two(half) * power_of_two(divisor_exponent - half);
   return with_sign(result, is_negative(x));

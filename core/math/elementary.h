@@ -1,8 +1,8 @@
-/* Elementary functions whose last bit is the same on every CPU, compiler and optimisation level: only + - * / and sqrt,
- * no libm, no fused multiply-add. C, so that robots' programs link the very same code. Needs IEEE doubles, rounding to
- * nearest and -ffp-contract=off; with -fno-math-errno sqrt is an instruction (else it may be a call, to the same bits).
- * Special values are those of C (Annex F), but every NaN returned is the positive quiet one, 0x7ff8000000000000.
- * Errors stated below, in units in the last place, bound what tests/core/math finds. */
+/* Elementary functions with the same bits on every CPU, compiler and optimisation level. They use + - * / and sqrt only: no
+ * libm, no fused multiply-add. They are in C, so that robots' programs link the same code. Requirements: IEEE doubles,
+ * rounding to nearest, -ffp-contract=off. With -fno-math-errno, sqrt is an instruction; without, it may be a call with the
+ * same result. Special values are those of C, Annex F, but every NaN returned is the positive quiet one,
+ * 0x7ff8000000000000. Comments state bounds of the error in units in the last place, which tests/core/math checks. */
 #ifndef KILOTWIN_CORE_MATH_ELEMENTARY_H
 #define KILOTWIN_CORE_MATH_ELEMENTARY_H
 
@@ -12,7 +12,7 @@ extern "C" {
 
 double kt_sin(double x);                        /* 0.85 ulp for every finite x: the reduction is exact */
 double kt_cos(double x);                        /* 0.85 */
-void kt_sincos(double x, double* s, double* c); /* the same bits as kt_sin and kt_cos, for the price of one */
+void kt_sincos(double x, double* s, double* c); /* the same bits as kt_sin and kt_cos, at the cost of one */
 double kt_tan(double x);                        /* 1.0 */
 double kt_atan(double x);                       /* 0.7 */
 double kt_atan2(double y, double x);            /* 0.75, in [-pi, pi] */

@@ -1,5 +1,5 @@
-/* Constants of sine and cosine, for elementary.c and for code that computes many at a time to the same bits.
- * derive_constants.py prints them. */
+/* Constants of sine and cosine, for elementary.c and for vector code that computes the same bits. derive_constants.py prints
+ * them. */
 #ifndef KILOTWIN_CORE_MATH_SINE_SERIES_H
 #define KILOTWIN_CORE_MATH_SINE_SERIES_H
 
@@ -12,10 +12,10 @@ static const double kCosine[6] = {0x1.5555555555555p-5,   -0x1.6c16c16c1696p-10,
 
 static const double kTwoOverPiRounded = 0x1.45f306dc9c883p-1;
 
-/* pi/2 in parts of 33, 33 and 53 bits: the first two times a whole number below 2^20 are exact. */
+/* pi/2 in parts of 33, 33 and 53 bits. The products of the first two with an integer below 2^20 are exact. */
 static const double kHalfPi1 = 0x1.921fb544p+0, kHalfPi2 = 0x1.0b4611a6p-34, kHalfPi3 = 0x1.3198a2e037073p-69;
 
-/* Added and taken off again, it rounds |x| < 2^51 to the nearest integer: ulp is 1 in [2^52, 2^53). */
+/* Adding and then subtracting it rounds |x| < 2^51 to the nearest integer: the ulp is 1 in [2^52, 2^53). */
 static const double kWholeNumbers = 0x1.8p52;
 
 #endif

@@ -1,5 +1,5 @@
-/// Counter-based random numbers: every draw is a pure function of (seed, stream, entity, tick, draw), so that no order of
-/// evaluation, thread, partition or host can change it. Philox4x32-10 (Salmon et al., SC 2011).
+/// Counter-based random numbers: every draw is a pure function of (seed, stream, entity, tick, draw). It does not depend on
+/// evaluation order, threads, partitions or hosts. Generator: Philox4x32-10 (Salmon et al., SC 2011).
 #pragma once
 
 #include <array>
@@ -10,25 +10,25 @@
 
 namespace kilotwin {
 
-/// One name per purpose; a value, once released, keeps its meaning.
+/// One stream per purpose. A released value never changes its meaning.
 enum class Stream : std::uint16_t {
-  kWheelBias = 1,    ///< draw 0 left, 1 right; tick 0
-  kWheelFactor = 2,  ///< draw 0 left, 1 right; per tick
-  kLayout = 3,       ///< placement of robots
-  kOscillator = 4,   ///< draw 0 rate, 1 phase; tick 0
-  kBackOff = 5,      ///< per aborted attempt
-  kReception = 6,    ///< loss at a receiver
-  kProgram = 7,      ///< what a robot's program calls hardware noise (rand_hard, readings)
-  kLink = 8,         ///< what robots and pairs add to the infrared signal; once per run
-  kPacket = 9,       ///< what a packet adds to it at a receiver
-  kSolver = 20,      ///< what ODE's iterative solver starts from; per sub-step, of the lowest robot that takes part
+  kWheelBias = 1,          ///< draw 0 left, 1 right; tick 0
+  kWheelFactor = 2,        ///< draw 0 left, 1 right; per tick
+  kLayout = 3,             ///< placement of robots
+  kOscillator = 4,         ///< draw 0 rate, 1 phase; tick 0
+  kBackOff = 5,            ///< per aborted attempt
+  kReception = 6,          ///< loss at a receiver
+  kProgram = 7,            ///< hardware noise that a robot's program reads: rand_hard, readings
+  kLink = 8,               ///< offsets of robots and pairs in infrared strength; once per run
+  kPacket = 9,             ///< noise of a packet's strength at a receiver
+  kSolver = 20,            ///< seed of ODE's iterative solver; per sub-step; entity: lowest robot of the group
   kLightSensor = 25,       ///< draw 0 logarithm of the gain, 1 offset; tick 0
   kBattery = 26,           ///< draw 0 charge at the start
   kTemperature = 27,       ///< draw 0 offset of a robot's sensor
   kEffectNoise = 30,       ///< independent noise of effects on motion, per tick
   kCorrelatedNoise = 31,   ///< correlated noise of effects, per tick
-  kMeasurementNoise = 32,  ///< independent noise of effects on what is measured, per tick
-  kEpisodes = 90,          ///< when episodes of effects begin and end, at the tick before; effect's draw
+  kMeasurementNoise = 32,  ///< independent noise of effects on measurements, per tick
+  kEpisodes = 90,          ///< begin and end of effects' episodes, drawn at the previous tick; the effect's draw
   kConverter = 35,         ///< noise of a firmware robot's analogue converter; tick: its conversions / 2^16
 };
 
@@ -51,9 +51,9 @@ enum class Stream : std::uint16_t {
   return {c0, c1, c2, c3};
 }
 
-/// Numbers of one seed. The seed is the key; (stream, entity, tick, block) fill the 128 bits of the counter and no two of
-/// them share one. A block holds two draws: draws 2b and 2b+1 are the halves of block b. The calls with `pair` yield
-/// both for the price of one.
+/// Random numbers of one seed. The seed is the key. (stream, entity, tick, block) fill the 128 bits of the counter without
+/// overlap. A block holds two draws: draws 2b and 2b+1 are the halves of block b. The functions with `pair` return both
+/// for the cost of one.
 class Random {
  public:
   explicit Random(std::uint64_t seed)

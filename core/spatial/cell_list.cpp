@@ -5,10 +5,10 @@
 namespace kilotwin {
 namespace {
 
-/// Cells are this much larger than the cutoff, so that rounding of a coordinate cannot put two bodies within the cutoff two
-/// cells apart.
+/// Ratio of the cell size to the cutoff. It exceeds 1, so that rounding of a coordinate cannot put two bodies within the
+/// cutoff two cells apart.
 constexpr double kCellSlack = 1 + 1e-6;
-/// Coordinates are clamped here, mm; far outside any arena (1e6 mm wide).
+/// Coordinates are clamped to +-this value, mm; arenas are at most 1e6 mm wide.
 constexpr double kFar_mm = 1e7;
 
 }  // namespace
@@ -18,7 +18,7 @@ CellList::CellList(double cutoff_mm)
 
 inline std::uint32_t CellList::coordinate(double mm) const {
   const double clamped = std::min(std::max(mm, -kFar_mm), kFar_mm);
-  // The offset makes it positive, so that the conversion rounds down.
+  // The offset makes the value positive, so that the conversion rounds down.
   return static_cast<std::uint32_t>(static_cast<std::int32_t>((clamped + kFar_mm) * cells_per_mm_));
 }
 
@@ -43,7 +43,7 @@ void CellList::build(std::span<const double> x_mm, std::span<const double> y_mm)
     sum += f;
     f = sum;
   }
-  // From the end, so that bodies within a cell ascend and each entry of first_ ends at its cell's first body.
+  // In descending order, so that bodies within a cell ascend, and first_ ends at the first body of each cell.
   for (std::size_t i = count; i-- > 0;) {
     const std::uint32_t place = --first_[cell_of_[i]];
     body_[place] = static_cast<std::uint32_t>(i);
@@ -74,7 +74,7 @@ std::size_t CellList::find(double x_mm, double y_mm, std::uint32_t self, std::ve
         scan(first_[line + (c & mask_)], first_[line + (c & mask_) + 1]);
     }
   }
-  // Few entries, almost in order: insertion.
+  // Insertion sort: few entries, almost sorted.
   for (std::size_t i = 1; i < count; ++i) {
     const std::uint32_t body = found[i];
     std::size_t k = i;

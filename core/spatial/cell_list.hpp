@@ -1,6 +1,6 @@
-/// Neighbour search: bodies sorted by the cell of a square grid, ascending within a cell. The grid covers the plane and is
-/// folded onto a table of 2^k x 2^k cells, so that its memory depends on the number of bodies alone, wherever they are;
-/// bodies far apart may share a cell and are told apart by their distance.
+/// Neighbour search: bodies sorted by the cells of a square grid, ascending within a cell. The grid covers the plane and is
+/// folded onto a table of 2^k x 2^k cells, so that memory depends on the number of bodies only. Bodies far apart may share a
+/// cell; distances separate them.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@ class CellList {
   /// For searches up to `cutoff_mm`.
   explicit CellList(double cutoff_mm);
 
-  /// Sorts the bodies; |x|, |y| below 10^7 mm are told apart, others share the outermost cells.
+  /// Sorts the bodies. Coordinates beyond 10^7 mm share the outermost cells.
   void build(std::span<const double> x_mm, std::span<const double> y_mm);
 
-  /// Writes the bodies whose centre lies within the cutoff of (x, y), without `self`, in ascending order; returns their
-  /// number. `found` grows as needed.
+  /// Writes the bodies whose centres lie within the cutoff of (x, y), without `self`, to `found` in ascending order. Returns
+  /// their number; `found` may have more entries.
   std::size_t find(double x_mm, double y_mm, std::uint32_t self, std::vector<std::uint32_t>& found) const;
 
  private:
@@ -26,10 +26,10 @@ class CellList {
 
   double cutoff_square_mm2_, cells_per_mm_;
   std::uint32_t side_bits_ = 0, mask_ = 0;
-  std::vector<std::uint32_t> first_;    ///< per cell: where its bodies begin; one more entry at the end
+  std::vector<std::uint32_t> first_;    ///< per cell: index of its first body in body_; then the total
   std::vector<std::uint32_t> cell_of_;  ///< per body
-  std::vector<std::uint32_t> body_;     ///< sorted
-  std::vector<double> x_mm_, y_mm_;     ///< sorted
+  std::vector<std::uint32_t> body_;     ///< sorted by cell
+  std::vector<double> x_mm_, y_mm_;     ///< in the order of body_
 };
 
 }  // namespace kilotwin
