@@ -7,7 +7,7 @@
 namespace kilotwin::recorder {
 namespace {
 
-/// For quotients that rounding takes just above a whole number.
+/// Tolerance for quotients that rounding raises just above an integer.
 constexpr double kSlack = 1e-9;
 
 }  // namespace

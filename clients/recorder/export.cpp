@@ -16,7 +16,7 @@
 namespace kilotwin::recorder {
 namespace {
 
-/// Of one robot's row behind its time: its number, pose and LED.
+/// Longest text of a row's numbers after its time: id, pose and LED.
 constexpr std::size_t kLongestNumbers = 84;
 
 std::string state_name(std::uint8_t life_cycle) {
@@ -34,7 +34,7 @@ std::string state_name(std::uint8_t life_cycle) {
   return fmt::format("{}", life_cycle);
 }
 
-/// ",GROUP," per robot; groups are numbered as the experiment lists them.
+/// ",GROUP," per robot; groups are numbered in the experiment's order.
 std::vector<std::string> group_cells(const proto::RecordingHeader& header) {
   std::vector<std::string> cells;
   for (int group = 0; group < header.group_robots_size(); ++group)
@@ -66,7 +66,7 @@ template <int decimals> char* put_fixed(char* to, double value) {
   return to + decimals;
 }
 
-/// Simulated time of a tick in s without rounding: cycles of 125 ns, zeros at the end left out.
+/// Exact simulated time of a tick in s: multiples of 125 ns, without trailing zeros.
 std::string exact_seconds(Tick tick, TickLength length) {
   __extension__ using Wide = unsigned __int128;
   const Wide ns = static_cast<Wide>(tick.count()) * length.cycles() * 125;
@@ -77,13 +77,13 @@ std::string exact_seconds(Tick tick, TickLength length) {
   return text;
 }
 
-/// The multiple of the recorded interval that is nearest to `asked_s`.
-std::string suggested_interval(double recorded_s, double asked_s) {
-  return fmt::format("{:.10g}", recorded_s * std::max(1.0, std::round(asked_s / recorded_s)));
+/// The multiple of the recorded interval that is nearest to `requested_s`.
+std::string suggested_interval(double recorded_s, double requested_s) {
+  return fmt::format("{:.10g}", recorded_s * std::max(1.0, std::round(requested_s / recorded_s)));
 }
 
-/// Throws if the recording's schedule has no state within one tick after a wanted time. Both schedules are periodic, so a
-/// thousand times suffice.
+/// Throws UserError if the recording's schedule has no state within one tick after a time of the export. Both schedules are
+/// periodic, so a thousand times suffice.
 void check_interval(const Reader& recording, const RecordingSchedule& wanted, double every_s) {
   const double recorded_s = recording.header().every_s();
   const RecordingSchedule recorded(recording.tick_length(), recorded_s);
@@ -202,7 +202,7 @@ std::uint64_t export_messages(Reader& recording, const std::filesystem::path& cs
     }
   }
   if (!found) throw refuse("the run did not come to the end where it writes them");
-  // Of several counts of a pair the last one holds: equal pairs keep their order, and the last is printed.
+  // The last of several counts of a pair holds. Sorting keeps the order of equal pairs, so the last one is printed.
   const auto pair = [](const Row& row) { return std::pair(row.receiver, row.sender); };
   std::stable_sort(rows.begin(), rows.end(), [&](const Row& a, const Row& b) { return pair(a) < pair(b); });
   CsvWriter output(csv, kMessageColumns);

@@ -16,7 +16,7 @@ double mean_nearest_distance_mm(std::span<const double> x_mm, std::span<const do
   if (robots < 2) return std::numeric_limits<double>::quiet_NaN();
   const auto [low_x, high_x] = std::minmax_element(x_mm.begin(), x_mm.end());
   const auto [low_y, high_y] = std::minmax_element(y_mm.begin(), y_mm.end());
-  // Columns of robots sorted by y, about as wide as robots are far apart.
+  // Robots in columns, sorted by y. A column is about as wide as the mean distance of neighbours.
   const double width_mm = *high_x - *low_x, height_mm = *high_y - *low_y;
   const auto count = static_cast<double>(robots);
   const double column_mm = std::max({std::sqrt(width_mm * height_mm / count), width_mm / count, 1e-6});

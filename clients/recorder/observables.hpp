@@ -1,13 +1,13 @@
-/// Observables: quantities over time that are defined for any swarm, from a recording.
+/// Observables: quantities over time that are defined for any swarm, computed from a recording.
 ///
-///   msd            mean over robots of the squared distance from where each was in the first state, mm^2
+///   msd            mean over robots of the squared distance from their position in the first state, mm^2
 ///   displacement   mean over robots of that distance, mm
 ///   spread         root mean square distance of the robots from their centroid, mm
-///   nearest        mean over robots of the distance to the nearest other, centre to centre, mm
-///   pushed         mean over movable bodies of the distance from where each was in the first state, mm
-///   polarisation   length of the mean of all heading vectors, 0 (no common direction) .. 1 (all alike)
+///   nearest        mean over robots of the distance to their nearest neighbour, centre to centre, mm
+///   pushed         mean over movable bodies of the distance from their position in the first state, mm
+///   polarisation   length of the mean of all heading vectors: 0 (no common direction) .. 1 (all equal)
 ///
-/// A quantity that is undefined for a run is NaN: the nearest other of a single robot, or bodies in a run without any.
+/// An undefined quantity is NaN: the nearest neighbour of a single robot, or movable bodies in a run without any.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ enum class Observable : std::uint8_t { kMsd, kDisplacement, kSpread, kNearest, k
 struct ObservableInfo {
   std::string_view name;   ///< in tables and on the command line
   std::string_view title;  ///< in plots
-  std::string_view unit;   ///< in plots; empty where there is none
+  std::string_view unit;   ///< in plots; empty for a pure number
   std::string_view column_suffix;
 };
 
@@ -39,7 +39,7 @@ inline constexpr std::array<ObservableInfo, 6> kObservables = {{
     {"pushed", "displacement of movable bodies", "mm", "_mm"},
 }};
 
-/// Of one run, per recorded state.
+/// Observables of one run, one value per recorded state.
 struct ObservableCurves {
   std::vector<double> time_s;
   std::array<std::vector<double>, kObservables.size()> value;
@@ -47,7 +47,7 @@ struct ObservableCurves {
   [[nodiscard]] const std::vector<double>& of(Observable o) const { return value[static_cast<std::size_t>(o)]; }
 };
 
-/// Collects them state by state; every state has the same robots.
+/// Computes observables state by state; every state must have the same robots.
 class ObservableObserver {
  public:
   void add(double time_s, std::span<const double> x_mm, std::span<const double> y_mm,
@@ -60,10 +60,10 @@ class ObservableObserver {
   ObservableCurves curves_;
 };
 
-/// Of all states that remain in a recording.
+/// Observables of all remaining states of a recording.
 [[nodiscard]] ObservableCurves observe(Reader& recording);
 
-/// Mean over robots of the distance to the nearest other; NaN for fewer than two.
+/// Mean over robots of the distance to their nearest neighbour; NaN for fewer than two robots.
 [[nodiscard]] double mean_nearest_distance_mm(std::span<const double> x_mm, std::span<const double> y_mm);
 
 }  // namespace kilotwin::recorder

@@ -40,7 +40,7 @@ Paths::Paths(Reader& recording, std::size_t points) {
 
 void Paths::keep(const proto::StateRecord& state, std::size_t most) {
   if (kept_.size() == most) {
-    // Every other one goes, and from here on twice as many are passed over.
+    // Drop every second state, and double the stride.
     for (std::size_t i = 0; 2 * i < kept_.size(); ++i) std::swap(kept_[i], kept_[2 * i]);
     kept_.resize((kept_.size() + 1) / 2);
     stride_ *= 2;

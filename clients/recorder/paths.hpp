@@ -10,7 +10,7 @@
 
 namespace kilotwin::recorder {
 
-/// All robots at one instant.
+/// State of all robots at one time.
 struct Snapshot {
   double time_s = 0;
   std::vector<double> x_mm, y_mm, heading_rad;
@@ -22,10 +22,10 @@ struct Point {
   float x_mm, y_mm;
 };
 
-/// The first state, the last, and evenly spaced ones in between.
+/// The first state, the last one, and evenly spaced states in between.
 class Paths {
  public:
-  /// Reads all states that remain. Keeps at most about `points` places over all robots, yet at least 8 per robot.
+  /// Reads all remaining states. Keeps about `points` positions at most over all robots, but at least 8 per robot.
   Paths(Reader& recording, std::size_t points);
 
   [[nodiscard]] bool empty() const { return states_ == 0; }
@@ -33,7 +33,7 @@ class Paths {
   [[nodiscard]] std::size_t robots() const { return first_.x_mm.size(); }
   [[nodiscard]] const Snapshot& first() const { return first_; }
   [[nodiscard]] const Snapshot& last() const { return last_; }
-  /// A robot's path from its first to its last place.
+  /// A robot's path from its first to its last position.
   [[nodiscard]] std::vector<Point> path(std::size_t robot) const;
 
  private:
@@ -44,7 +44,7 @@ class Paths {
   std::vector<std::vector<Point>> kept_;  // per kept state, all robots
 };
 
-/// The path with fewer points; no omitted point lies further than `tolerance_mm` from it (Douglas and Peucker 1973).
+/// The path with fewer points; every omitted point lies within `tolerance_mm` of it (Douglas and Peucker 1973).
 [[nodiscard]] std::vector<Point> simplified(std::span<const Point> path, double tolerance_mm);
 
 }  // namespace kilotwin::recorder

@@ -28,15 +28,15 @@ namespace {
 
 constexpr double kMargin_px = 28, kGap_px = 26, kTitle_px = 56, kPanelTitle_px = 26, kPanelFoot_px = 48;
 constexpr double kCaption_px = 12;
-/// Places kept for the paths of all robots together.
+/// Number of positions kept for the paths of all robots together.
 constexpr std::size_t kPathPoints = 160'000;
-/// Drawings inside a panel have integer coordinates of a tenth of a pixel, which makes them short.
+/// Drawings inside a panel have integer coordinates in tenths of a pixel, which keeps them short.
 constexpr double kUnitsPerPx = 10;
-/// Discs are not drawn smaller than this.
+/// Least diameter of a drawn disc.
 constexpr double kLeastDisc_px = 1.8;
 
 constexpr std::string_view kFailedRim = "#d0021b", kStartDot = "#b4bcc6", kLamp = "#f5a623";
-/// Paths and ends by where in the swarm the robot began, from left to right.
+/// Colours of paths and ends by the robot's x at the start, from left to right.
 constexpr std::array<std::string_view, 6> kByStart = {"#2b4c9b", "#2387b5", "#2aa58a",
                                                       "#d9a21b", "#e0702a", "#b8336a"};
 
@@ -55,7 +55,7 @@ struct Box {
   [[nodiscard]] double height_mm() const { return y_max_mm - y_min_mm; }
 };
 
-/// How a part of the arena lies in a panel of width x height px. y points up in the arena and down on paper.
+/// Maps a part of the arena to a panel of width x height px. y points up in the arena and down on paper.
 class View {
  public:
   View(const Box& box, double width_px, double height_px)
@@ -95,8 +95,8 @@ double disc_units(const View& view) {
   return std::max(view.length(2 * kRobotRadius_mm), kUnitsPerPx * kLeastDisc_px);
 }
 
-/// Robots as discs with their LED's colour and a tick towards the heading; failed ones with a red rim. A disc is a
-/// line of no length with round ends as thick as the disc: ten bytes.
+/// Robots as discs in their LED's colour with a tick towards the heading; failed robots have a red rim. A disc is a line of
+/// length 0 with round caps, as thick as the disc: ten bytes.
 std::string draw_discs(const Snapshot& at, const View& view) {
   std::map<std::uint8_t, std::string> by_led;
   std::string rims, failed_rims, ticks;
@@ -123,7 +123,7 @@ std::string draw_discs(const Snapshot& at, const View& view) {
   return out;
 }
 
-/// Paths of all robots. Colours follow x at the start, so that mixing is visible.
+/// Paths of all robots. Colours follow x at the start, which makes mixing visible.
 std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
   std::array<std::string, kByStart.size()> ways, ends;
   std::string starts;
@@ -140,7 +140,7 @@ std::string draw_paths(const Paths& paths, const View& view, const Box& start) {
     for (std::size_t k = 1; k < way.size(); ++k) {
       const long next_x = view.x(way[k].x_mm), next_y = view.y(way[k].y_mm);
       if (next_x == x && next_y == y) continue;
-      // A minus sign separates as well as a space does.
+      // A minus sign separates numbers, as a space does.
       put(d, "{}{}{}{}", command, next_x - x, next_y < y ? "" : " ", next_y - y);
       command = ' ';
       x = next_x;
@@ -185,7 +185,7 @@ std::string draw_shape(const View& view, const Convex& shape, const Place& place
   return fmt::format("<path d=\"{}\" {}/>\n", outline(view, corners), style);
 }
 
-/// Obstacles, and the movable bodies where they are in this state.
+/// Obstacles, and movable bodies with their poses in this state.
 std::string draw_bodies(const World& world, const Snapshot& at, const View& view) {
   std::string out;
   for (const ObstacleBody& body : world.obstacles)
@@ -198,7 +198,7 @@ std::string draw_bodies(const World& world, const Snapshot& at, const View& view
   return out;
 }
 
-/// Walls that are not a rectangle, on ground of another colour than the outside.
+/// Walls of an arena that is not a rectangle. The ground inside has another colour than outside.
 std::string draw_walls(const View& view, const ArenaShape& arena) {
   const std::string style = fmt::format("fill=\"#fbfcfd\" stroke=\"{}\" stroke-width=\"16\"", svg::kInk);
   if (arena.kind() == ArenaShape::Kind::kCircle)
@@ -206,7 +206,7 @@ std::string draw_walls(const View& view, const ArenaShape& arena) {
   return fmt::format("<path d=\"{}\" {}/>\n", outline(view, arena.corners()), style);
 }
 
-/// The arena's walls within the view, on ground of another colour than the outside.
+/// The arena's walls within the view. The ground inside has another colour than outside.
 std::string draw_arena(const View& view, const World& world, double width_mm, double height_mm) {
   if (world.arena.kind() != ArenaShape::Kind::kRectangle) return draw_walls(view, world.arena);
   const auto clipped = [](long value, double px) {
@@ -221,7 +221,7 @@ std::string draw_arena(const View& view, const World& world, double width_mm, do
       left, top, right - left, bottom - top, svg::kInk);
 }
 
-/// A circle that exists in the station alone: food, home, a hub.
+/// A circle of a virtual environment: food, home, a hub.
 struct VirtualCircle {
   double x_mm, y_mm, radius_mm;
   std::string_view name, fill, stroke;
@@ -245,7 +245,7 @@ std::vector<VirtualCircle> virtual_circles(const proto::RecordingHeader& header)
   return circles;
 }
 
-/// As they are at the start: the food shrinks and the home grows with every load.
+/// Circles at the start of the run: later the food shrinks and the home grows with every load.
 std::string draw_circles(const std::vector<VirtualCircle>& circles, const View& view) {
   constexpr double kText = 130;
   std::string out;
@@ -256,7 +256,7 @@ std::string draw_circles(const std::vector<VirtualCircle>& circles, const View& 
         "<circle cx=\"{}\" cy=\"{}\" r=\"{:.1f}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"14\" "
         "stroke-dasharray=\"50 30\"/>\n",
         x, y, radius, circle.fill, circle.stroke);
-    // Above the circle, or within it where the panel ends.
+    // The name stands above the circle, or inside it at the panel's edge.
     const double above = static_cast<double>(y) - radius - 40;
     out += svg::text(static_cast<double>(x), above > kText ? above : static_cast<double>(y) - radius + 1.2 * kText,
                      kText, circle.name, circle.stroke, svg::Anchor::kMiddle);
@@ -264,7 +264,7 @@ std::string draw_circles(const std::vector<VirtualCircle>& circles, const View& 
   return out;
 }
 
-/// The lamps as they are at an instant: suns, hollow where they are off.
+/// The lamps at a given time as suns; hollow if they are off.
 std::string draw_lamps(const proto::Light& light, double time_s, const View& view) {
   constexpr double kRadius = 55, kRay = 100;
   std::string out;
@@ -284,7 +284,7 @@ std::string draw_lamps(const proto::Light& light, double time_s, const View& vie
   return out;
 }
 
-/// The dashed outline of what another panel shows enlarged, on a light line that parts it from the paths below.
+/// The dashed outline of the region that another panel enlarges, on a light line that separates it from the paths below.
 std::string draw_frame(const View& view, const Box& box) {
   std::string out;
   for (const auto& [colour, width, dashes] :
@@ -307,7 +307,7 @@ std::string scale_bar(const View& view, double x, double y) {
   return out + svg::text(x + length_px + 8, y + 4, kCaption_px, fmt::format("{:g} mm", length_mm));
 }
 
-/// The legend of failed robots and of LEDs, the most frequent first, as many as fit.
+/// The legend of failed robots and of LED colours, the most frequent first, as many as fit.
 std::string led_legend(const Snapshot& at, double x, double y, double width_px) {
   std::map<std::uint8_t, std::size_t> counts;
   std::size_t failures = 0;
@@ -350,7 +350,7 @@ std::string path_legend(double x, double y) {
   return out + svg::text(x, y, kCaption_px, "end, coloured by x at the start", svg::kFaint);
 }
 
-/// A drawing clipped to its frame: title and time above it, scale bar and remark below.
+/// A drawing in a frame: title and time above it, scale bar and remark below.
 struct Panel {
   std::string title, when, drawing, remark;
 };
@@ -376,7 +376,7 @@ Box extent(const Snapshot& at) {
   return box;
 }
 
-/// `box` widened to the shape of a panel, so that a panel shows it and no more.
+/// `box` widened to the aspect ratio of a panel, so that the panel shows exactly this box.
 Box fitted(const Box& box, double width_px, double height_px) {
   const double px_per_mm = std::min(width_px / box.width_mm(), height_px / box.height_mm());
   const double wider_mm = width_px / px_per_mm - box.width_mm(),
@@ -395,7 +395,7 @@ Box moved_into(const Box& box, const Box& outer) {
   return {box.x_min_mm + x, box.y_min_mm + y, box.x_max_mm + x, box.y_max_mm + y};
 }
 
-/// The bodies whole, wherever they are turned to.
+/// Extends the box by whole movable bodies, in any orientation.
 void add_movables(Box& box, const World& world, const Snapshot& at) {
   for (std::size_t i = 0; i < world.movables.size(); ++i) {
     const double reach_mm = world.movables[i].shape.reach_mm();
@@ -404,11 +404,11 @@ void add_movables(Box& box, const World& world, const Snapshot& at) {
   }
 }
 
-/// `inner` with some ground around it if that is much smaller than `outer`, else `outer`.
+/// `inner` with a margin if it is much smaller than `outer`, otherwise `outer`.
 Box zoomed(const Box& inner, const Box& outer) {
   const double size = std::max({inner.width_mm(), inner.height_mm(), 8 * kRobotRadius_mm});
   Box wide = inner.widened(0.06 * size + 2 * kRobotRadius_mm);
-  // A single robot or a row of them gets ground on all sides.
+  // A single robot or a row of robots gets a margin on all sides.
   const double least = 0.6 * size;
   if (wide.width_mm() < least)
     wide = {wide.x_min_mm - least / 2, wide.y_min_mm, wide.x_max_mm + least / 2, wide.y_max_mm};

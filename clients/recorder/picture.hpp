@@ -8,11 +8,11 @@
 
 namespace kilotwin::recorder {
 
-/// SVG with three panels, from all states that remain in the recording; about 100 to 250 bytes per robot for large
-/// swarms. Throws UserError where the recording has no state.
+/// SVG with three panels, from all remaining states of the recording. Its size is about 100 to 250 bytes per robot for large
+/// swarms. Throws UserError if the recording has no state.
 [[nodiscard]] std::string picture_svg(Reader& recording);
 
-/// Throws UserError as above, RunError where the file cannot be written.
+/// Throws UserError as picture_svg(), RunError if the file cannot be written.
 void write_picture(Reader& recording, const std::filesystem::path& file);
 
 }  // namespace kilotwin::recorder

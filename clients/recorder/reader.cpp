@@ -21,7 +21,7 @@ namespace kilotwin::recorder {
 namespace {
 
 constexpr std::size_t kBlock_bytes = 1 << 20;
-/// Ticks lie in this range: 1e6 s of the shortest tick are 2.5e8, and 2^53 keeps products with doubles exact.
+/// Upper bound of ticks: 1e6 s of the shortest tick are 2.5e8, and products with doubles are exact below 2^53.
 constexpr std::int64_t kLastTick = std::int64_t{1} << 40;
 
 std::uint32_t get_u32(std::span<const std::uint8_t> from) {
@@ -51,7 +51,7 @@ bool valid_world(const proto::RecordingHeader& header) {
   return true;
 }
 
-/// Whether the groups hold all robots; recordings that know of no groups have none.
+/// Whether the groups contain all robots. Recordings without groups are valid, too.
 bool valid_groups(const proto::RecordingHeader& header) {
   const auto& groups = header.group_robots();
   return groups.empty() || std::accumulate(groups.begin(), groups.end(), std::uint64_t{0}) == header.robots();
@@ -124,7 +124,7 @@ void Reader::warn_of_damage(std::string_view what) {
   warn(what.empty() ? "damaged" : fmt::format("damaged: {}", what));
 }
 
-/// Whether the file begins with a length and the CRC of a record of that length, as format 1 did.
+/// Whether the file begins with a length and the CRC of a record of that length, as format 1 does.
 bool Reader::begins_as_format_1() {
   constexpr std::size_t kPrefix_bytes = 8;
   offset_ = 0;
@@ -138,14 +138,14 @@ std::span<const std::uint8_t> Reader::waiting() const {
   return std::span(block_).subspan(static_cast<std::size_t>(offset_ - block_from_));
 }
 
-/// Whether so many bytes from offset_ on are there, and then in waiting().
+/// Whether the file has this number of bytes from offset_ on; if so, waiting() contains them.
 bool Reader::fill(std::size_t bytes) {
   const std::uint64_t block_end = block_from_ + block_.size();
   if (offset_ >= block_from_ && offset_ <= block_end && block_end - offset_ >= bytes) return true;
   struct stat about {};
   if (::fstat(descriptor_, &about) != 0) return false;
   const auto size = static_cast<std::uint64_t>(about.st_size);
-  if (offset_ > size || size - offset_ < bytes) return false;  // before any memory is asked for
+  if (offset_ > size || size - offset_ < bytes) return false;  // before allocating memory
   block_from_ = offset_;
   block_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(size - offset_, std::max(bytes, kBlock_bytes))));
   std::size_t got = 0;
@@ -164,7 +164,8 @@ bool Reader::fill(std::size_t bytes) {
   return got >= bytes;
 }
 
-/// Reads the frame at offset_ into record_ and moves behind it. False at the end, with a warning if the end is within a frame.
+/// Reads the frame at offset_ into record_ and advances offset_. Returns false at the end; a warning is set if the end is
+/// within a frame.
 bool Reader::read_record() {
   warning_.clear();
   damaged_ = false;
@@ -174,7 +175,7 @@ bool Reader::read_record() {
   }
   const std::uint32_t length = get_u32(waiting());
   const std::uint32_t crc = get_u32(waiting().subspan(4));
-  // A length is believed only with its own checksum: a changed one would else look like a file that was cut off.
+  // The length has its own checksum: otherwise a changed length would look like a file that was cut off.
   if (::crc32_z(0, waiting().data(), 8) != get_u32(waiting().subspan(8)) || length == 0 ||
       length > kLongestRecord_bytes) {
     warn_of_damage();
@@ -195,7 +196,7 @@ bool Reader::read_record() {
   return true;
 }
 
-/// Why record_ is not valid; nullptr where it is.
+/// Reason why record_ is invalid; nullptr if it is valid.
 const char* Reader::defect_of_record() const {
   const auto robots = static_cast<int>(header_.robots());
   switch (record_.kind_case()) {
@@ -261,7 +262,7 @@ const proto::Record* Reader::next() {
       warn_of_damage(defect);
       return nullptr;
     }
-    if (record_.kind_case() == proto::Record::KIND_NOT_SET) continue;  // of a kind that this version does not know
+    if (record_.kind_case() == proto::Record::KIND_NOT_SET) continue;  // a kind that this version does not know
     if (record_.has_state()) last_state_ = record_.state().tick();
     if (record_.has_end()) ended_ = true;
     return &record_;

@@ -1,5 +1,5 @@
-/// Reader: the records of a recording, in order. It checks every record before it hands it out, so that it also reads
-/// recordings that still grow, that were cut off, or that are damaged.
+/// Reader: the records of a recording, in order. It checks every record before returning it. It therefore also reads
+/// recordings that are still growing, cut off or damaged.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace kilotwin::recorder {
 
 /// Bounds of valid recordings.
 inline constexpr std::uint32_t kMostRobots = 100'000;  ///< idl/experiment.proto
-inline constexpr double kFarthest_mm = 1e7;            ///< of a robot from the origin; arenas are at most 1e6 wide
+inline constexpr double kFarthest_mm = 1e7;            ///< largest distance of a robot from the origin
 
 class Reader {
  public:
@@ -31,22 +31,22 @@ class Reader {
   [[nodiscard]] const std::filesystem::path& path() const { return file_; }
 
   /// The next record after the header, valid until the next call; nullptr at the end. If the file has grown, a later call
-  /// continues. States have one entry per robot in every field, finite poses and ascending ticks; messages name
-  /// robots.
+  /// continues. The reader guarantees: states have one entry per robot in every field, finite poses and ascending ticks;
+  /// messages have valid robot ids.
   [[nodiscard]] const proto::Record* next();
   /// The next state among the records, nullptr at the end.
   [[nodiscard]] const proto::StateRecord* next_state();
-  /// To the first record after the header again.
+  /// Returns to the first record after the header.
   void rewind();
 
-  /// After next() gave nullptr: whether the end mark of the run was reached. Without it and without a warning, the run
-  /// was killed, or goes on.
+  /// After next() returned nullptr: whether the end mark of the run was reached. Without end mark and warning, the run was
+  /// killed or is still running.
   [[nodiscard]] bool ended() const { return ended_; }
-  /// After next() gave nullptr: empty, or one line that says where and how the file breaks off:
+  /// After next() returned nullptr: empty, or one line that says where and how the file breaks off:
   /// "FILE: cut off at byte N; read up to there".
   [[nodiscard]] const std::string& warning() const { return warning_; }
-  /// After next() gave nullptr: whether the warning is about bytes that changed since they were written. A file that is
-  /// merely cut off is not damaged: a run that is killed leaves one.
+  /// After next() returned nullptr: whether the warning is about bytes that changed after they were written. A file that is
+  /// only cut off, e.g. of a killed run, is not damaged.
   [[nodiscard]] bool damaged() const { return damaged_; }
 
  private:

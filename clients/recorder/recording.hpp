@@ -1,4 +1,4 @@
-/// The format of recordings beyond idl/recording.proto: frames, header, schedule.
+/// Parts of the recording format beyond idl/recording.proto: frames, header, schedule.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +14,12 @@ namespace kilotwin::recorder {
 
 /// Format 1 had no checksum of a frame's length.
 inline constexpr std::uint32_t kRecordingFormat = 2;
-/// In front of each record: its length, its CRC, and the CRC of these two.
+/// A prefix precedes each record: the record's length, its CRC, and the CRC of these two.
 inline constexpr std::size_t kFramePrefix_bytes = 12;
-/// No record is longer: a state of 100,000 robots takes 2.6 MB, and protobuf ends at 2 GiB.
+/// Largest length of a record. A state of 100,000 robots has 2.6 MB; protobuf's limit is 2 GiB.
 inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
 
-/// The header that belongs to a run which starts at `first_tick` with the state hash `first_hash`.
+/// The header of a run that starts at `first_tick` with the state hash `first_hash`.
 [[nodiscard]] inline proto::RecordingHeader recording_header(const proto::Manifest& manifest,
                                                              Tick first_tick = Tick{0},
                                                              std::uint64_t first_hash = 0) {
@@ -52,7 +52,7 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   return {field.data(), static_cast<std::size_t>(field.size())};
 }
 
-/// The first tick at or after `seconds` (>= 0). A multiple of an interval that rounding has moved some nanoseconds behind a
+/// The first tick at or after `seconds` (>= 0). A multiple of an interval that rounding raises by some nanoseconds above a
 /// tick counts as that tick.
 [[nodiscard]] inline Tick tick_at_or_after(TickLength length, double seconds) {
   constexpr double kSlack_ticks = 1e-6;
@@ -62,8 +62,8 @@ inline constexpr std::uint32_t kLongestRecord_bytes = 1u << 30;
   return Tick{static_cast<double>(whole) < ticks ? whole + 1 : whole};
 }
 
-/// At which ticks states are recorded: the first tick at or after 0, every_s, 2 every_s... A run's first and last
-/// states are recorded besides.
+/// Ticks at which states are recorded: the first tick at or after 0, every_s, 2 every_s... The first and last states of a
+/// run are recorded in addition.
 class RecordingSchedule {
  public:
   RecordingSchedule(TickLength tick_length, double every_s) : tick_length_(tick_length), every_s_(every_s) {}
@@ -74,7 +74,7 @@ class RecordingSchedule {
   }
   /// The first instant whose tick is `from` (>= 0) or later.
   [[nodiscard]] std::int64_t number_from(Tick from) const {
-    // The quotient lies within one of it; where an interval is shorter than a tick, several have the same tick.
+    // The quotient is exact to +-1. If an interval is shorter than a tick, several instants have the same tick.
     auto number = static_cast<std::int64_t>(tick_length_.seconds_at(from) / every_s_);
     while (number > 0 && tick(number - 1) >= from) --number;
     while (tick(number) < from) ++number;

@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 /// Format 1 had no checksums.
 constexpr FileKind kManifestFile{"KTWNMANI", 2, "the manifest of a run", "prepare the run again"};
 
-/// Whether the directory is this run's from now on. The mark is `programs`, which only one of several can make, so
-/// that also an empty directory that was there before goes to one run alone.
+/// Whether this run has claimed the directory. The mark is the subdirectory `programs`, which only one of several processes
+/// can create. So an existing empty directory also goes to one run only.
 bool claim(const fs::path& directory) {
   const auto refuse = [](const fs::path& what) {
     return RunError(fmt::format("{}: cannot be created: {}; choose another place with --out", what.string(),
@@ -42,7 +42,7 @@ bool claim(const fs::path& directory) {
   return false;
 }
 
-/// Whether Kilotwin has written the directory: a run, a sweep of runs, or what `identify` found.
+/// Whether Kilotwin wrote the directory: a run, a sweep of runs, or results of `identify`.
 bool is_result(const fs::path& directory) {
   constexpr const char* kMarks[] = {"manifest.pb", "programs", "sweep.csv", "result.json"};
   std::error_code ignored;

@@ -1,9 +1,9 @@
 /// RunDirectory: the files of one run.
-///   manifest.pb      the experiment as resolved, for machines: idl/manifest.proto
-///   experiment.txtpb the experiment as run; it runs again from there
-///   programs/        the behaviours as built, SHA256.so, and firmware as given, SHA256.elf or .hex
+///   manifest.pb      the resolved experiment, for programs: idl/manifest.proto
+///   experiment.txtpb the experiment as run; it can be run again from there
+///   programs/        the built behaviours, SHA256.so, and the given firmware, SHA256.elf or .hex
 ///   recording.ktrec  states and events over time: idl/recording.proto
-///   provenance.json  by what, when and where the run was prepared: clients/recorder/provenance.hpp
+///   provenance.json  clients/recorder/provenance.hpp
 ///   summary.json     clients/recorder/summary.hpp
 ///   picture.svg      clients/recorder/picture.hpp
 ///   checkpoints/     one directory per checkpoint, named by its tick
@@ -21,21 +21,21 @@ namespace kilotwin::recorder {
 
 class RunDirectory {
  public:
-  /// What create() does where the directory that is wanted exists and is not empty.
+  /// Behaviour of create() if the directory exists and is not empty.
   enum class Existing {
-    kNumber,   ///< it takes the first of wanted-2, wanted-3... that does not exist or is empty
-    kRefuse,   ///< it throws UserError
-    kReplace,  ///< it removes the directory first, where Kilotwin has written it, else it throws UserError
+    kNumber,   ///< use the first of wanted-2, wanted-3... that does not exist or is empty
+    kRefuse,   ///< throw UserError
+    kReplace,  ///< remove the directory first if Kilotwin wrote it, otherwise throw UserError
   };
-  /// Makes a directory for new results, and `programs` in it. Of several that start at the same time each gets its own.
-  /// Throws RunError where none can be made, UserError where `wanted` is a file.
+  /// Makes a directory for results, with the subdirectory `programs`. Concurrent calls get distinct directories.
+  /// Throws RunError if no directory can be made, UserError if `wanted` is a file.
   [[nodiscard]] static RunDirectory create(const std::filesystem::path& wanted, Existing = Existing::kNumber);
-  /// runs/NAME-SEED: the directory of runs without --out.
+  /// runs/NAME-SEED: the default directory, without --out.
   [[nodiscard]] static std::filesystem::path default_path(std::string_view name, std::uint64_t seed);
 
   enum class Needs { kRecording, kManifest };
-  /// A run that exists: its directory, or the recording in it (under whatever name). Throws UserError with what was
-  /// expected where the file in need is not there.
+  /// Opens an existing run by its directory, or by the recording in it under any name. Throws UserError, with the expected
+  /// file, if the file in `needs` does not exist.
   [[nodiscard]] static RunDirectory open(const std::filesystem::path& run, Needs needs);
 
   [[nodiscard]] const std::filesystem::path& path() const { return directory_; }
@@ -48,9 +48,9 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }
 
-  /// Throws RunError where it cannot be written.
+  /// Throws RunError if it cannot be written.
   void write_manifest(const proto::Manifest& manifest) const;
-  /// Throws UserError that names the file, and the place where it is damaged.
+  /// Throws UserError with the file and the position of the damage.
   [[nodiscard]] proto::Manifest read_manifest() const;
 
  private:

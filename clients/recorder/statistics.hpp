@@ -15,7 +15,7 @@ class Sample {
   [[nodiscard]] double mean() const { return mean_; }  ///< 0 without values
   /// With n - 1 in the denominator; 0 for fewer than two values.
   [[nodiscard]] double standard_deviation() const;
-  /// Of the mean: standard deviation / sqrt(n); 0 for fewer than two values.
+  /// Standard error of the mean: standard deviation / sqrt(n); 0 for fewer than two values.
   [[nodiscard]] double standard_error() const;
 
  private:
@@ -23,11 +23,11 @@ class Sample {
   double mean_ = 0, squares_ = 0;
 };
 
-/// Distances of robots from their first recorded places. Every state has the same robots.
+/// Distances of robots from their first recorded positions. Every state must have the same robots.
 class DisplacementObserver {
  public:
   void add(std::span<const double> x_mm, std::span<const double> y_mm);
-  /// Distances between first and last place; 0 before the second state.
+  /// Distances between first and last position; 0 before the second state.
   [[nodiscard]] double mean_distance_mm() const { return mean_distance_mm_; }
   [[nodiscard]] double max_distance_mm() const { return max_distance_mm_; }
 

@@ -151,7 +151,7 @@ Summary read_summary(const std::filesystem::path& file) {
     messages.at("collided").get_to(s.messages.collided);
     json.at("robots_failed").get_to(s.robots_failed);
     json.at("recoveries").get_to(s.recoveries);
-    // The rest is not part of the contract and may be missing.
+    // The other fields are not part of the contract and may be missing.
     s.hosts = json.value("hosts", 1u);
     s.resumed_from_tick = json.value("resumed_from_tick", std::int64_t{0});
     s.recovered_from_tick = json.value("recovered_from_tick", std::int64_t{0});

@@ -1,4 +1,4 @@
-/// Summary: facts and counts of a run, as summary.json for scripts and as a few lines for people.
+/// Summary: facts and counts of a run, as summary.json for scripts and as a few lines for users.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace kilotwin::recorder {
 
-/// The fields carry the names that they have in the file.
+/// Fields have the same names as in the file.
 struct Summary {
   std::string name;
   std::uint64_t seed = 0;
@@ -20,7 +20,7 @@ struct Summary {
   std::uint32_t robots = 0;
   std::int64_t ticks = 0;                ///< the run's last tick
   std::int64_t resumed_from_tick = 0;    ///< 0 if the run started at tick 0
-  std::int64_t recovered_from_tick = 0;  ///< tick of the checkpoint of the last recovery; 0: none
+  std::int64_t recovered_from_tick = 0;  ///< tick of the last recovery's checkpoint; 0: no recovery
   double simulated_s = 0;                ///< at the last tick
   double start_s = 0;                    ///< wall time from the command to the first tick of this attempt
   double wall_s = 0;                     ///< wall time from that tick to the last tick
@@ -30,7 +30,7 @@ struct Summary {
   struct Messages {
     std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   } messages;
-  /// Least, mean and most over the robots of what their radios did; messages_per_robot in the file.
+  /// Least, mean and greatest value over robots of the radio counts; messages_per_robot in the file.
   struct PerRobot {
     struct Spread {
       std::uint32_t least = 0, most = 0;
@@ -43,7 +43,7 @@ struct Summary {
   Provenance provenance;
   std::uint32_t robots_failed = 0;
   std::uint32_t recoveries = 0;
-  /// Distance between a robot's first and last recorded place.
+  /// Distance between a robot's first and last recorded position.
   struct Moved {
     double mean = 0, max = 0;
   } moved_mm;
@@ -53,19 +53,18 @@ struct Summary {
     [[nodiscard]] double total() const { return behaviours + physics + radio + station + exchange + recording; }
   } cost_ns_per_robot_tick;
 
-  /// Simulated over wall time, of the ticks that this run stepped itself; 0 where it stepped none.
+  /// Simulated time per wall time, over the ticks that this run itself stepped; 0 if there are none.
   [[nodiscard]] double realtime_factor() const;
 };
 
 /// Writes summary.json. Throws RunError.
 void write_summary(const Summary& summary, const std::filesystem::path& file);
 
-/// Reads one. Throws UserError where a field of the contract is missing or of another type: "FILE: not a summary;
+/// Reads summary.json. Throws UserError if a field of the contract is missing or of another type: "FILE: not a summary;
 /// ...".
 [[nodiscard]] Summary read_summary(const std::filesystem::path& file);
 
-/// 8 to 12 lines: what happened, and where the results are.
-/// `place`: the directory of the results, in words.
+/// 8 to 12 lines: what happened, and where the results are. `place`: the directory of the results, in words.
 [[nodiscard]] std::string summary_text(const Summary& summary, const std::string& place);
 
 }  // namespace kilotwin::recorder

@@ -7,7 +7,7 @@
 namespace kilotwin::recorder::svg {
 namespace {
 
-/// Length of the UTF-8 character at the front, 0 where the bytes are none.
+/// Length of the UTF-8 character at the front; 0 if the bytes are invalid.
 std::size_t character_bytes(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
@@ -95,7 +95,7 @@ std::string document(double width_px, double height_px, std::string_view title, 
 
 std::string led_colour(std::uint8_t led) {
   if ((led & 63) == 0) return "#dde3ea";
-  // Even full blue keeps some lightness, so that the tick which shows the heading can be seen on it.
+  // Full blue keeps some lightness, so that the tick of the heading is visible on it.
   const auto level = [led](int shift) { return 60 + 65 * (led >> shift & 3); };
   return fmt::format("#{:02x}{:02x}{:02x}", level(0), level(2), level(4));
 }

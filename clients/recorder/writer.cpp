@@ -10,14 +10,14 @@
 namespace kilotwin::recorder {
 namespace {
 
-/// Half of the promised second: a record that closely follows a flush waits for the next call.
+/// Half of the promised second: a record shortly after a flush waits for the next call.
 constexpr std::int64_t kFlushEvery_ns = 500'000'000;
 /// Hashes in one record.
 constexpr int kHashesPerRecord = 4096;
-/// The promised 256 KiB less the hashes that may wait.
+/// The promised 256 KiB minus the hashes that may be in the buffer.
 constexpr std::size_t kMostUnflushed_bytes = 256 * 1024 - kHashesPerRecord * sizeof(std::uint64_t);
 
-/// Wall time. The coarse clock (about 4 ms) costs 5 ns, which counts in runs of a few robots.
+/// Wall time. The coarse clock, with a resolution of about 4 ms, costs 5 ns per call, which matters in runs of a few robots.
 std::int64_t now_ns() {
   timespec t{};
   ::clock_gettime(CLOCK_MONOTONIC_COARSE, &t);

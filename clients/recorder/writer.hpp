@@ -1,7 +1,7 @@
-/// Writer: writes the recording of a run while it runs. For one thread.
+/// Writer: writes the recording of a run as it proceeds. For one thread.
 ///
-/// At most about one second or 256 KiB of records are lost if the process is killed: every call checks both. A run that
-/// records nothing for long, because it is paused or waits, calls flush_if_due() meanwhile.
+/// If the process is killed, about one second or 256 KiB of records are lost at most: every call checks both limits. A run
+/// that records nothing for long, because it is paused or waits, must call flush_if_due() in the meantime.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace kilotwin::recorder {
 
-/// All robots at one instant, ids ascending from 0.
+/// State of all robots at one tick, ids ascending from 0.
 struct StateView {
   Tick tick;
   std::span<const double> x_mm, y_mm, heading_rad;
@@ -25,28 +25,27 @@ struct StateView {
   std::span<const double> measured_x_mm = {}, measured_y_mm = {}, measured_heading_rad = {};
 };
 
-/// Every function throws RunError where the file cannot be written, e.g. on a full disk: "FILE: cannot be written:
-/// reason".
+/// Every function throws RunError if the file cannot be written, e.g. on a full disk: "FILE: cannot be written: reason".
 class Writer {
  public:
   /// Creates the file, which must not exist, and writes the header at once.
   Writer(std::filesystem::path file, const proto::RecordingHeader& header);
 
-  /// A state, or a state hash H(tick). Ticks at or before the last recorded one are ignored: a run that returned to a
-  /// checkpoint repeats them bit for bit.
+  /// Appends a state, or a state hash H(tick). Ticks up to the last recorded one are ignored: after its return to a
+  /// checkpoint, a run repeats them with the same bits.
   void state(const StateView& state);
   void hash(Tick tick, std::uint64_t chain);
   void input(const proto::InputRecord& input);
-  /// Counts since the start. They replace earlier counts of the same pairs.
+  /// Counts since the start. They replace earlier counts of the same pair.
   void messages(const proto::MessagesRecord& messages);
   /// One entry per robot in every field.
   void radio(const proto::RadioRecord& radio);
-  /// The end mark of a run that came to its end. `failure`: one line, empty if the run succeeded. Closes the file.
+  /// The end mark of a run that reached its end. `failure`: one line, empty if the run succeeded. Closes the file.
   void end(Tick tick, std::uint64_t state_hash, const std::string& failure = {});
 
-  /// Writes everything to the file.
+  /// Writes the buffer to the file.
   void flush();
-  /// The same if the last flush was half a second ago, or if the buffer is long.
+  /// As flush(), if the last flush was half a second ago or the buffer is long.
   void flush_if_due();
   /// Bytes recorded so far.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }

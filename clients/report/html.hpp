@@ -21,10 +21,10 @@ namespace kilotwin::html {
 /// An inline image.
 [[nodiscard]] std::string image(std::string_view svg, std::string_view alt);
 
-/// What a template is filled with.
+/// Values for the names of a template.
 using Data = kainjow::mustache::data;
 
-/// A mustache template, filled. {{names}} are escaped, {{{names}}} are markup.
+/// Fills a mustache template. {{names}} are escaped, {{{names}}} are markup.
 [[nodiscard]] std::string rendered(std::string_view text, const Data& data);
 
 class Table {

@@ -18,9 +18,9 @@ using recorder::svg::kPalette;
 
 constexpr int kWidth_px = 720, kHeight_px = 460;
 constexpr double kText_px = 12;
-/// With more points than these their symbols would hide the line.
+/// Above this number of points, symbols would hide the line.
 constexpr std::size_t kMostPoints = 40;
-/// Beyond these bounds differences of values could overflow.
+/// Values beyond these bounds are omitted; their differences could overflow.
 constexpr double kLargest = 1e100, kSmallestLogarithmic = 1e-100;
 constexpr std::size_t kLongestTitle = 64, kLongestSubtitle = 100, kLongestName = 40;
 
@@ -41,7 +41,7 @@ double error_at(const PlotSeries& series, std::size_t i) {
   return i < series.error.size() && std::abs(series.error[i]) < kLargest ? std::abs(series.error[i]) : 0;
 }
 
-/// What the data span, error bars included, and whether both axes can be logarithmic.
+/// Range of the data, error bars included, and whether both axes can be logarithmic.
 struct Extent {
   Range x, y, bars;
   explicit Extent(const Plot& plot) {
@@ -58,7 +58,7 @@ struct Extent {
   }
 };
 
-/// `set xrange [...]`: wide enough to have a length, from 0 where the data come near it.
+/// `set xrange [...]`: never of length 0, and from 0 if the data come near it.
 std::string range_command(char axis, Range data, bool logarithmic, bool towards_zero) {
   if (data.empty()) data = {0, 1};
   if (logarithmic) {
@@ -100,7 +100,7 @@ std::string data_block(const PlotSeries& series, std::size_t number, const Exten
   return block + "EOD\n";
 }
 
-/// The elements of `plot` that draw one series, the first of which stands in the legend.
+/// The elements of `plot` that draw one series; the first one appears in the legend.
 std::vector<std::string> elements(const PlotSeries& series, std::size_t number, bool in_legend) {
   const std::string data = fmt::format("$d{}", number);
   const std::string colour = fmt::format("lc rgb '{}'", kPalette[number % kPalette.size()]);
@@ -137,7 +137,7 @@ std::string commands_of(const Plot& plot) {
       fmt::format("set label 2 {} at screen 0.04,0.885 textcolor rgb '{}'\n",
                   gnuplot_text(recorder::svg::shortened(plot.subtitle, kLongestSubtitle)), recorder::svg::kFaint);
   if (legend) {
-    // The title stands beside the key: within it gnuplot would give it a line of its own.
+    // The title is a label beside the key: inside the key, gnuplot would give it a line of its own.
     const std::string title = plot.legend_title.empty() ? "" : plot.legend_title + ":";
     const double from = 0.03 + recorder::svg::text_width_px(title, kText_px) / kWidth_px;
     out += fmt::format("set label 3 {} at screen 0.04,0.83 textcolor rgb '{}'\n", gnuplot_text(title),

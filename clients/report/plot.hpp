@@ -10,8 +10,8 @@
 namespace kilotwin {
 
 struct PlotSeries {
-  std::string name;           ///< in the legend, which is left out for one series without a name
-  std::vector<double> x, y;   ///< of equal length; points that are not finite are left out
+  std::string name;           ///< in the legend, which is omitted for one series without a name
+  std::vector<double> x, y;   ///< of equal length; points that are not finite are omitted
   std::vector<double> error;  ///< half length of the bars; empty: none
   bool points = true;
   bool line = true;
@@ -20,20 +20,20 @@ struct PlotSeries {
 
 struct Plot {
   std::string title;
-  std::string subtitle;        ///< small, below the title: what the bars are, how many runs
-  std::string legend_title;    ///< what the names of the series have in common
-  std::string x_name, x_unit;  ///< unit "" where there is none
+  std::string subtitle;        ///< small, below the title: meaning of the bars, number of runs
+  std::string legend_title;    ///< common heading of the series' names
+  std::string x_name, x_unit;  ///< unit "": none
   std::string y_name, y_unit;
-  std::vector<std::string> x_categories;  ///< where x is no number: the names of x = 0, 1, 2...
-  bool x_logarithmic = false;             ///< ignored where some x <= 0
-  bool y_logarithmic = false;             ///< ignored where some y <= 0
+  std::vector<std::string> x_categories;  ///< names of x = 0, 1, 2... if x is no number
+  bool x_logarithmic = false;             ///< ignored if some x <= 0
+  bool y_logarithmic = false;             ///< ignored if some y <= 0
   std::vector<PlotSeries> series;
 };
 
-/// Adds the plot to those that one gnuplot process draws; returns its number.
+/// Adds the plot to `plots` and returns its number.
 std::size_t add_plot(Gnuplot& plots, const Plot& plot);
 
-/// Throws RunError where gnuplot is missing.
+/// Throws RunError if gnuplot is missing.
 [[nodiscard]] std::string plot_svg(const Plot& plot);
 
 /// Throws RunError.
