@@ -21,7 +21,6 @@ struct FitOptions {
 
 /// Writes model.txtpb (range, pattern, variances), model-SET.txtpb (with the robots of that set), result.json,
 /// effects.md (table) and figures. Throws UserError on unreadable data.
-/// table) and figures. Throws UserError where the data cannot be read.
 void fit_radio(const FitOptions& options);
 
 }  // namespace kilotwin::radio_fit
