@@ -1,5 +1,5 @@
-// Nothing that does not belong to the experiment changes a result: division over partitions and hosts, saving and loading.
-// And whatever programs do, the books balance.
+// Results do not depend on the division over partitions and hosts, or on saving and loading. Message counts are consistent for
+// any programs.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ RadioFrame merged(const std::vector<RadioFrame>& frames) {
     append(all.reception_robot, frame.reception_robot);
     append(all.reception_high_gain, frame.reception_high_gain);
     append(all.reception_low_gain, frame.reception_low_gain);
-    // One message per reception, so that numbering does not matter.
+    // One message per reception, so that the numbering of messages does not matter.
     for (const std::uint32_t index : frame.reception_message) all.messages.push_back(frame.messages.at(index));
   }
   return all;
@@ -58,7 +58,7 @@ RunPlan crowd_plan(const std::string& experiment, std::uint32_t columns = 1, std
                    testing::random_crowd(kRobots, 800, 800, 33, 7), columns, rows, hosts);
 }
 
-/// Robots wander over borders, change their minds, sleep and wake; the overhead controller shouts now and then. A pure
+/// Robots cross borders, change their motors, sleep and wake; the overhead controller sends packets now and then. A pure
 /// function of the tick.
 void stir(testing::FakeHosts& hosts, Tick now) {
   std::mt19937_64 random(static_cast<std::uint64_t>(now.count()) * 7919 + 1);
@@ -108,8 +108,8 @@ TEST(Determinism, PartitionsAndHostsChangeNothing) {
   EXPECT_GT(whole.radio.counters().aborted, 50u);
 }
 
-/// The same chain of hashes from every compiler, at every optimisation level, on every machine. It changes with the model
-/// of the channel only.
+/// The chain of hashes is the same for every compiler, optimisation level and machine. It changes only with the model of the
+/// channel.
 TEST(Determinism, HasItsGoldenHash) {
   const RunPlan plan = crowd_plan("radio { range_mm: 120 loss: 0.1 oscillator_sd: 0.02 } ");
   Swarm swarm(plan);
@@ -189,7 +189,7 @@ TEST(Determinism, SeedAndInputsShowInTheHash) {
   EXPECT_TRUE(differs);
 }
 
-/// Random lives, periods, messages and tick lengths: frames stay well-formed, nothing is lost or made up.
+/// Random life cycles, periods, messages and tick lengths: frames stay well-formed, and every message is accounted for.
 TEST(Fuzz, TheBooksBalance) {
   for (std::uint32_t round = 0; round < 12; ++round) {
     const std::uint32_t cycles[] = {262144, 32768, 1048576, 200001};
@@ -204,7 +204,7 @@ TEST(Fuzz, TheBooksBalance) {
       IrMessage message;
       for (std::uint8_t& octet : message) octet = static_cast<std::uint8_t>(random());
       message[0] = static_cast<std::uint8_t>(robot);
-      message[9] = static_cast<std::uint8_t>(message[9] & 0x7e);  // the overhead controller's are 0x7f
+      message[9] = static_cast<std::uint8_t>(message[9] & 0x7e);  // 0x7f is reserved for the overhead controller
       given[robot].push_back(message);
       return message;
     };

@@ -1,6 +1,6 @@
-/// Stands in for physics and for the hosts of behaviours, so that tests and benchmarks can drive the radio engine alone:
-/// robots at rest whose programs answer every ask. Follows the timeline of core/frames/frames.hpp: an ask of tick k is
-/// answered in actuation frame k+1, and a slot stays full until its message is reported as sent.
+/// Stand-in for physics and behaviours hosts, so that tests and benchmarks can run the radio engine alone: robots at rest
+/// whose programs answer every request for a message. Timeline as in core/frames/frames.hpp: actuation frame k+1 answers a
+/// request of tick k, and a slot stays full until its message is reported as sent.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ class FakeHosts {
   FakeHosts(const FakeHosts&) = delete;
   FakeHosts& operator=(const FakeHosts&) = delete;
 
-  // What the programs do; a change counts from the next answer() on.
+  // Outputs of the programs; a change takes effect at the next answer().
   std::vector<std::uint8_t> life_cycle;
   std::vector<std::uint16_t> tx_period;
   std::vector<std::uint8_t> sends;  ///< 0: kilo_message_tx returns NULL
@@ -60,14 +60,14 @@ class FakeHosts {
   std::vector<ScenePose> poses;
   OverheadFrame overhead;
 
-  /// What the radio reads in its step from `now`.
+  /// Inputs of the radio's step from `now`.
   [[nodiscard]] comm::RadioEngine::Inputs inputs(Tick now) {
     swarm_.gather(now, body_frames_);
     swarm_.gather(actuation_frames_);
     return {swarm_, overhead};
   }
 
-  /// Lists the robots in the frames of the partitions that own their places.
+  /// Lists the robots in the frames of the partitions that contain their positions.
   void place() {
     for (BodyFrame& frame : bodies_) frame.clear();
     for (std::uint32_t i = 0; i < poses.size(); ++i) {
@@ -121,7 +121,7 @@ class Swarm {
   Tick now;
   std::vector<RadioFrame> frames;  ///< of `now`, per host
 
-  /// One tick. Packets given in hosts.overhead are taken once.
+  /// Advances by one tick. Packets in hosts.overhead are sent once.
   void step() {
     radio.step(now, hosts.inputs(now));
     hosts.overhead.packets.clear();

@@ -1,4 +1,4 @@
-// How strong whom hears whom: every term of the propagation model, its bounds, and what comes of it on the air.
+// Link margins: every term of the propagation model, its bounds, and its effect on reception.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-/// No spread of anything, 0.1 dB/mm, half heard at 100 mm.
+/// A model without spread: 0.1 dB/mm, margin 0 at 100 mm.
 const std::string kNominal =
     "decay_db_per_mm: 0.1 power_sd_db: 0 sensitivity_sd_db: 0 power_bearing_sd_db: 0 sensitivity_bearing_sd_db: 0 "
     "link_sd_db: 0 packet_sd_db: 0 ";
@@ -60,7 +60,7 @@ TEST(LinkBudget, KnowsSingleRobotsAndPairs) {
   EXPECT_NEAR(air.margin(1, 0), 5 - 1 - 2 + 0.25, 1e-12);
 }
 
-/// A sender that is 2 dB stronger ahead than aside, heard from all around; it is turned by 30 degrees.
+/// A sender that is 2 dB stronger ahead than aside, turned by 30 degrees; receivers in all directions.
 TEST(LinkBudget, DependsOnTheBearing) {
   const double turn = 3.14159265358979 / 6;
   std::vector<ScenePose> poses{{0, 0, turn}};
@@ -76,7 +76,7 @@ TEST(LinkBudget, DependsOnTheBearing) {
 }
 
 TEST(LinkBudget, LosesWhatBodiesOnTheLineTake) {
-  // On the line; beside it by half a radius; beside it by more than a radius; beyond the receiver.
+  // Positions: on the line; half a radius beside it; more than a radius beside it; beyond the receiver.
   const RunPlan plan = make_plan(radio(kNominal + "body_loss_db: 2"),
                                  {{0, 0, 0}, {160, 0, 0}, {40, 0, 0}, {80, 8.25, 0}, {120, -17, 0}, {200, 0, 0}});
   Air air(plan);
@@ -87,7 +87,7 @@ TEST(LinkBudget, LosesWhatBodiesOnTheLineTake) {
   EXPECT_NEAR(air.margin(0, 2), 6, 1e-12);
 }
 
-/// A column of discs, and the same anywhere else in the plane, where the grid of cells falls otherwise.
+/// A column of discs here and elsewhere in the plane, where the cells of the grid lie otherwise.
 TEST(LinkBudget, ShadowsDoNotDependOnThePlace) {
   for (const double x : {0.0, 77.3, -901.4}) {
     std::vector<ScenePose> poses;
@@ -110,7 +110,7 @@ std::vector<ScenePose> random_poses(std::uint32_t count, double side_mm) {
   return poses;
 }
 
-/// The short cuts by distance decide as the margin does, and nobody is heard from beyond the reach.
+/// Short cuts by distance agree with the margin, and no robot is heard beyond the reach.
 TEST(LinkBudget, HearsWhereTheMarginIsAboveZero) {
   for (const std::string extra : {"", "body_loss_db: 3", "link { sender: 3 receiver: 4 offset_db: 40 }"}) {
     const RunPlan plan = make_plan(radio(extra), random_poses(150, 800));
@@ -129,8 +129,8 @@ TEST(LinkBudget, HearsWhereTheMarginIsAboveZero) {
   }
 }
 
-/// Robots and pairs spread as the model says. The margin of a pair at 50 mm is 5 + power + sensitivity + both bearings
-/// + link; disjoint pairs are independent. 2000 of them; bounds of 4.5 standard errors.
+/// The spread over robots and pairs is as the model states. The margin of a pair at 50 mm is 5 + power + sensitivity + both
+/// bearings + link. 2000 disjoint, hence independent, pairs; bounds of 4.5 standard errors.
 TEST(LinkBudget, SpreadsAsStated) {
   constexpr std::uint32_t kPairs = 2000;
   std::vector<ScenePose> poses;
@@ -155,8 +155,8 @@ TEST(LinkBudget, SpreadsAsStated) {
   EXPECT_NEAR(squares / kPairs, variance, 4.5 * variance * std::sqrt(2.0 / kPairs));
 }
 
-/// At a margin of 0 every other packet gets through, at one standard deviation above it 84 % do: one receiver around each of
-/// 400 lone senders, 25 packets each.
+/// At a margin of 0, half of the packets are received; at one standard deviation above it, 84 %. One receiver per sender, 400
+/// isolated senders, 25 packets each.
 TEST(LinkBudget, PacketsFadeOneByOne) {
   for (const auto& [distance, share] : {std::pair{100.0, 0.5}, std::pair{90.0, 0.8413}}) {
     std::vector<ScenePose> poses;
@@ -177,7 +177,7 @@ TEST(LinkBudget, PacketsFadeOneByOne) {
   }
 }
 
-/// Robot 1 shouts, robot 0 whispers: each hears what arrives, not what it could answer.
+/// Robot 1 is strong, robot 0 weak: each link depends on its own direction only.
 TEST(LinkBudget, LinksMayBeOneWay) {
   const RunPlan plan = make_plan(radio(kNominal + "robot { robot: 0 power_db: -3 } robot { robot: 1 power_db: 3 }"),
                                  {{0, 0, 0}, {100, 0, 0}});
@@ -192,8 +192,8 @@ TEST(LinkBudget, LinksMayBeOneWay) {
   EXPECT_EQ(heard[1], 0);
 }
 
-/// A - B - C, A and C hidden from each other, A 30 mm closer to B: without capture they spoil each other's packets; with
-/// 2 dB, A's are heard all the same and C's are not.
+/// A - B - C in a row; A and C are hidden from each other, and A is 30 mm closer to B. Without capture they destroy each
+/// other's packets. With a capture threshold of 2 dB, B receives A's packets and not C's.
 TEST(LinkBudget, TheStrongerIsCaptured) {
   const auto collided_of = [](const std::string& capture) {
     std::vector<ScenePose> poses;

@@ -1,4 +1,4 @@
-// Links that are remembered are those that would be computed; and what is noticed without being heard.
+// The cache of links agrees with direct computation; carrier sense below the reception threshold.
 #include "services/comm/link_table.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ TEST(LinkTable, RemembersWhatWouldBeComputed) {
     table.begin_tick();
     for (std::uint32_t i = 0; i < kRobots; ++i) {
       const auto draw = [&](std::uint32_t n) { return random.uniform(Stream::kLayout, i, Tick{tick}, n); };
-      // Few move, one far, and one only turns.
+      // Few robots move, one of them far, and one only turns.
       if (draw(0) < 0.03) poses[i].x_mm += 6 * (draw(1) - 0.5);
       if (draw(2) < 0.01) poses[i].y_mm += 400 * (draw(3) - 0.5);
       if (draw(4) < 0.02) poses[i].heading_rad += draw(5);
@@ -65,7 +65,7 @@ TEST(LinkTable, RemembersWhatWouldBeComputed) {
   EXPECT_GT(found, 5000u);
 }
 
-/// A and C are 1.39 dB too far from each other to be heard. B, between them, hears both.
+/// A and C miss each other's reception threshold by 1.39 dB. B, between them, hears both.
 TEST(Notice, KeepsFromSendingAtTheSameTime) {
   std::vector<testing::ScenePose> poses;
   for (int i = 0; i < 200; ++i) {
@@ -84,12 +84,12 @@ TEST(Notice, KeepsFromSendingAtTheSameTime) {
     const auto& c = swarm.radio.counters();
     return static_cast<double>(c.collided) / static_cast<double>(c.received + c.collided);
   };
-  // All want to send when the run begins, so that twice the two packets in 32.8 ms collide: more than evenly spread ones do.
+  // All robots attempt to send when the run begins, so the two packets per 32.8 ms collide more often than evenly spread ones.
   EXPECT_GT(lost("1.3"), 2 * 4.371 / 524.288);
   EXPECT_LT(lost("1.5"), 0.003);
 }
 
-/// Robots that have been on for a while: 94 % of their transmit clocks are beyond kilo_tx_period.
+/// Robots that have been on for a while: 94 % of their transmit clocks exceed kilo_tx_period.
 TEST(Notice, ClocksRunFromPowerOn) {
   const RunPlan plan =
       make_plan("radio { model: PROPAGATION }", testing::grid_crowd(2000, 300, testing::Facing::kRight));
@@ -102,8 +102,8 @@ TEST(Notice, ClocksRunFromPowerOn) {
   for (std::uint32_t i = 0; i < 20; ++i) EXPECT_EQ(TickTimers(fresh).next_clock(i), 255);
 }
 
-/// Real listeners' largest estimates of a distance, in a static group, are 110..113 mm (data/radio-log): what is farther is not
-/// received. Estimates beyond the tables go on as their last step.
+/// Real receivers' largest distance estimates in a static group are 110..113 mm (data/radio-log): farther robots are not
+/// received. Beyond their tables, estimates continue with the slope of the last step.
 TEST(CutOff, IsNearThoseOfRealListeners) {
   constexpr std::uint32_t kListeners = 1000;
   const RunPlan plan = make_plan("radio { model: PROPAGATION propagation { sensitivity_sd_db: 0.5 } }",

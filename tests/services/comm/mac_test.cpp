@@ -1,4 +1,4 @@
-// When robots send: tx_clock and period, carrier sense, giving up and back-off, the slot.
+// Medium access: tx_clock and period, carrier sense, abort and back-off, the slot.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,8 @@ RunPlan seeded(const std::string& experiment, std::uint64_t seed, const std::vec
   return make_plan(experiment + " seed: " + std::to_string(seed), poses);
 }
 
-/// A plan of two robots 40 mm apart whose timers have the same rate and phases so many cycles apart: robot `earlier` first.
+/// A plan of two robots 40 mm apart. Their timers have the same rate and differ in phase by this number of cycles; robot
+/// `earlier` is first.
 struct Duel {
   RunPlan plan;
   std::uint32_t earlier;
@@ -47,7 +48,7 @@ TEST(Mac, LoneRobotSendsOncePerSixteenTicks) {
       kilo_ticks += swarm.frames[0].kilo_ticks[0];
       sent += swarm.frames[0].sent.size();
     }
-    swarm.step();  // the last packet may still be on the air
+    swarm.step();  // The last packet may still be on the air.
     sent += swarm.frames[0].sent.size();
     EXPECT_EQ(sent, 300u);
     EXPECT_EQ(swarm.radio.counters().attempted, 300u);
@@ -82,7 +83,7 @@ TEST(Mac, StartsOfOneInstantAreNotNoticed) {
   EXPECT_EQ(counters.collided, 2u);
 }
 
-/// Robot 1 does not hear robot 0, so that it starts while robot 0 polls its receiver.
+/// Robot 1 does not detect robot 0, so it starts while robot 0 polls its receiver.
 TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
   const std::string one_way =
       "radio { model: PROPAGATION oscillator_sd: 0 propagation { packet_sd_db: 0 link { sender: 0 receiver: 1 "
@@ -94,7 +95,7 @@ TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
     return timers.next(1) - timers.next(0);
   };
   std::uint64_t seed = 1;
-  // Both find their clocks far on, and so send at their first interrupts.
+  // Both clocks exceed the period, so both robots send at their first interrupts.
   const auto ready = [&](std::uint64_t s) {
     const TickTimers timers(seeded(one_way, s, poses));
     return timers.next_clock(0) > 3906 && timers.next_clock(1) > 3906 && timers.next(0) < kTick &&
@@ -114,7 +115,7 @@ TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
   EXPECT_EQ(swarm.radio.counters().attempted, 3u);
   EXPECT_EQ(swarm.radio.counters().aborted, 1u);
   EXPECT_EQ(swarm.radio.counters().received, 1u);
-  // Same rate, almost the same phase: one more tick is the back-off's.
+  // Same rate, almost the same phase: the back-off causes one additional tick.
   EXPECT_EQ(kilo_ticks[0], kilo_ticks[1] + 1);
 }
 
@@ -154,12 +155,12 @@ TEST(Mac, TouchingRobotsThatAlwaysSendLoseNothingSilently) {
   EXPECT_GT(c.sent, 40000u);
   EXPECT_LE(c.attempted - c.sent - c.aborted, poses.size());
   EXPECT_EQ(c.received + c.collided, c.sent);
-  // Both must start within 16 of the 262144 cycles of a tick to collide, and a start pulse is never overheard.
+  // Robots collide only if both start within 16 of the 262144 cycles of a tick; start pulses are always detected.
   EXPECT_LT(static_cast<double>(c.collided), 0.002 * static_cast<double>(c.sent));
   EXPECT_EQ(c.aborted, 0u);
 }
 
-/// With a program that never sends, tx_clock runs through its 16 bits; the robot is asked exactly when it exceeds.
+/// A program never sends, so tx_clock runs through its 16 bits. The radio asks the robot exactly when it exceeds tx_period.
 TEST(Mac, AsksExactlyWhereAnAttemptCouldTakePlace) {
   const RunPlan plan =
       make_plan("radio { oscillator_sd: 0.05 }", testing::grid_crowd(20, 200, testing::Facing::kRight));
@@ -187,7 +188,7 @@ TEST(Mac, AsksExactlyWhereAnAttemptCouldTakePlace) {
   EXPECT_EQ(swarm.radio.counters().attempted, 0u);
 }
 
-/// The robot is stopped at each of the ticks around its first message: asked, answered, on the air, reported.
+/// The robot is stopped at each tick around its first message: requested, answered, on the air, reported.
 TEST(Mac, SlotIsEmptiedOutsideRunning) {
   std::uint64_t unreported = 0;
   for (std::int64_t stop = 10; stop < 20; ++stop) {
@@ -202,7 +203,7 @@ TEST(Mac, SlotIsEmptiedOutsideRunning) {
     };
     run(stop);
     swarm.hosts.life_cycle[0] = kIdle;
-    run(3);  // what was on the air is over
+    run(3);  // Transmissions on the air have ended.
     const auto stopped = swarm.radio.counters();
     EXPECT_EQ(stopped.attempted, stopped.sent);
     unreported += stopped.sent - sent;
@@ -216,8 +217,8 @@ TEST(Mac, SlotIsEmptiedOutsideRunning) {
   EXPECT_LE(unreported, 1u);
 }
 
-/// The robot is stopped at the border of the ticks between which its packet is on the air: the packet is whole and heard, but
-/// its success belongs to nobody.
+/// The robot is stopped at the border of the ticks between which its packet is on the air. The packet is received completely,
+/// but its success is not reported.
 TEST(Mac, WhatIsOnTheAirEndsUnreported) {
   int straddling = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
@@ -229,7 +230,7 @@ TEST(Mac, WhatIsOnTheAirEndsUnreported) {
     Swarm swarm(plan);
     swarm.hosts.sends[1] = 0;
     while (swarm.now.count() < start / kTick) swarm.step();
-    swarm.hosts.life_cycle[0] = kIdle;  // counts from the next tick on
+    swarm.hosts.life_cycle[0] = kIdle;  // from the next tick on
     std::size_t reported = 0;
     RadioEngine loaded(plan);
     for (int k = 0; k < 20; ++k) {

@@ -1,4 +1,4 @@
-// Whatever programs hand over, whenever, and wherever robots are: the books of the channel balance. Meant to run with sanitizers.
+// Counts are consistent for any messages, periods and positions. Meant to run with sanitizers.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -30,7 +30,7 @@ TEST_P(RadioFuzz, BooksBalance) {
         {static_cast<double>(below(400)), static_cast<double>(below(400)), 0.01 * static_cast<double>(below(700))});
   const RunPlan plan = testing::make_plan(GetParam().radio, poses);
   testing::Swarm swarm(plan);
-  // Periods of 0 and of 65535, and all between; contents and types of any kind, those of the overhead controller included.
+  // Periods from 0 to 65535, and messages of any content and type, including those of the overhead controller.
   constexpr std::array<std::uint16_t, 7> kPeriods{0, 1, 254, 255, 3906, 65534, 65535};
   std::set<IrMessage> offered;
   swarm.hosts.message = [&](std::uint32_t, Tick) {
@@ -50,7 +50,7 @@ TEST_P(RadioFuzz, BooksBalance) {
           below(2) == 0 ? kPeriods[below(kPeriods.size())] : static_cast<std::uint16_t>(below(65536));
       swarm.hosts.sends[robot] = below(8) != 0;
       if (below(10) == 0) swarm.hosts.life_cycle[robot] = static_cast<std::uint8_t>(lives[below(lives.size())]);
-      // On top of each other, and out of the arena.
+      // Positions that coincide, or lie outside the arena.
       if (below(20) == 0) swarm.hosts.poses[robot] = swarm.hosts.poses[below(kRobots)];
       if (below(50) == 0) swarm.hosts.poses[robot].x_mm = below(2) == 0 ? 1e6 : -1e9;
       if (below(10) == 0)
@@ -79,7 +79,7 @@ TEST_P(RadioFuzz, BooksBalance) {
     ASSERT_LE(c.sent + c.aborted, c.attempted);
     ASSERT_LE(c.attempted, c.sent + c.aborted + kRobots);
     if (k % 100 != 50) continue;
-    // What was saved goes on as what was not.
+    // A restored engine continues like the saved one.
     proto::RadioState saved;
     swarm.radio.save(saved);
     RadioEngine loaded(plan);

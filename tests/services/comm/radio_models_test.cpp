@@ -18,7 +18,7 @@ using testing::make_plan;
 using testing::ScenePose;
 using testing::Swarm;
 
-/// `count` copies of a row of robots at these places, out of each other's range.
+/// `count` copies of a row of robots at these positions, out of each other's range.
 std::vector<ScenePose> rows_of(int count, const std::vector<double>& x_mm) {
   std::vector<ScenePose> poses;
   for (int i = 0; i < count; ++i) {
@@ -33,8 +33,8 @@ double sum_of(const std::vector<RadioCount>& counts, std::uint32_t RadioCount::*
   return sum;
 }
 
-/// A and C do not hear each other, B between hears both. With equal rates and uniform phases in a tick of length T they collide
-/// at B always or never: with probability 1 - (1 - P / T)^2, P being the packet's length.
+/// A and C do not hear each other, B between them hears both. With equal rates and uniform phases in a tick of length T, they
+/// collide at B always or never: with probability 1 - (1 - P / T)^2, with the packet's length P.
 TEST(HiddenTerminals, CollideAsTheirPhasesSay) {
   constexpr int kRows = 600;
   const RunPlan plan = make_plan("radio { range_mm: 100 oscillator_sd: 0 }", rows_of(kRows, {-80, 0, 80}));
@@ -49,7 +49,7 @@ TEST(HiddenTerminals, CollideAsTheirPhasesSay) {
   EXPECT_EQ(c.aborted, 0u);
 }
 
-/// Where everybody hears everybody, a robot waits for others, and nothing is lost.
+/// If all robots hear each other, each waits for the others, and no packet is lost.
 TEST(CarrierSense, LosesNothingWhereAllHearEachOther) {
   const RunPlan plan = make_plan("radio { range_mm: 1000 }", testing::grid_crowd(20, 40, testing::Facing::kRight));
   Swarm swarm(plan);
@@ -142,7 +142,7 @@ const std::string kExact =
     "decay_db_per_mm: 0.1 power_sd_db: 0 sensitivity_sd_db: 0 power_bearing_sd_db: 0 sensitivity_bearing_sd_db: 0 "
     "packet_sd_db: 0 ";
 
-/// Nothing is drawn but what `model` names.
+/// Only parameters that `model` states have random values.
 std::string propagation(const std::string& model) {
   const std::string link = model.find("link_sd_db") == std::string::npos ? "link_sd_db: 0 " : "";
   return "radio { model: PROPAGATION range_mm: 100 propagation { " + kExact + link + model + " } }";
@@ -183,7 +183,7 @@ TEST(LinkBudget, DrawsPairsLinksAndRuns) {
   EXPECT_NE(margins(known + "run_sd_db: 0.5", 1, false)[2], margins(known + "run_sd_db: 0.5", 2, false)[2]);
 }
 
-/// A sensitive robot reads more, and its table knows: a nominal sender's distance is right all the same.
+/// A sensitive robot has higher readings, and its own table accounts for them: estimates of a nominal sender are correct.
 TEST(Ranging, OwnTablesUndoOwnSensitivity) {
   const RunPlan plan =
       make_plan(propagation("robot { robot: 1 sensitivity_db: 1.5 }"), {{0, 0, 0}, {63, 0, 0}, {0, 500, 0}});
@@ -200,7 +200,7 @@ TEST(Ranging, OwnTablesUndoOwnSensitivity) {
   EXPECT_EQ(std::memcmp(nominal.high.data(), high, sizeof high), 0);
 }
 
-/// Readings spread by so many dB around what they are without noise.
+/// Readings have the stated standard deviation, in dB, about their values without noise.
 TEST(Ranging, ReadingsAreAsNoisyAsStated) {
   const RunPlan plan = make_plan(propagation("reading_sd_db: 0.2"), {{0, 0, 0}, {60, 0, 0}});
   const LinkBudget links(plan);

@@ -1,4 +1,4 @@
-// Who receives what: range, overlap, loss, readings.
+// Reception: range, overlap, loss, readings.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 using testing::make_plan;
 using testing::Swarm;
 
-/// Runs a swarm and hands every reception to f(frame, index).
+/// Runs a swarm and calls f(frame, index) for every reception.
 template <class F> void run(Swarm& swarm, std::int64_t ticks, F f) {
   for (std::int64_t k = 0; k < ticks; ++k) {
     swarm.step();
@@ -62,9 +62,9 @@ TEST(Reception, DeliversWhatWasSentAndCountsPairs) {
   EXPECT_EQ(table[2] + table[11] + table[14], swarm.radio.counters().sent);
 }
 
-/// A - B - C with the outer two out of each other's range. Their first attempts fall into the same kilo_tick with
-/// independent uniform phases, and so overlap with probability 2 q - q^2, q = air time / period. 3000 lines; the bound of
-/// 4.5 standard deviations is passed by chance once in 150000 seeds.
+/// A - B - C; A and C are out of each other's range. Their first attempts fall into the same kilo_tick with independent uniform
+/// phases. They overlap with probability 2 q - q^2, with q = air time / period. 3000 rows of three robots; a true generator
+/// exceeds the bound of 4.5 standard deviations once in 150000 seeds.
 TEST(Reception, HiddenTerminalsLoseAsOftenAsTheyOverlap) {
   constexpr std::uint32_t kLines = 3000;
   std::vector<testing::ScenePose> poses;
@@ -82,7 +82,7 @@ TEST(Reception, HiddenTerminalsLoseAsOftenAsTheyOverlap) {
   EXPECT_EQ(c.sent, 2 * kLines);
   EXPECT_EQ(c.received, received);
   EXPECT_EQ(c.received + c.collided, 2 * kLines);
-  // Exactly those whose phases say so: also where one ends a tick before the other.
+  // Exactly the rows with overlapping phases, also if one packet ends a tick before the other.
   const TickTimers timers(plan);
   std::uint64_t overlaps = 0;
   for (std::uint32_t i = 0; i < kLines; ++i)
@@ -93,7 +93,7 @@ TEST(Reception, HiddenTerminalsLoseAsOftenAsTheyOverlap) {
 }
 
 TEST(Reception, IsLostAtTheStatedRate) {
-  // Senders far apart, each with a listener.
+  // Senders far apart, each with one receiver.
   std::vector<testing::ScenePose> poses;
   for (int i = 0; i < 200; ++i) {
     poses.push_back({400.0 * i, 0, 0});
@@ -122,7 +122,7 @@ TEST(Reception, NeedsSomebodyWhoListens) {
   run(swarm, 320, [](const RadioFrame& frame, std::size_t n) { EXPECT_EQ(frame.reception_robot[n], 1u); });
   const auto& c = swarm.radio.counters();
   EXPECT_GE(c.sent, 19u);
-  EXPECT_EQ(c.received, c.sent);  // by the idle one; the sleeper and the real robot neither hear nor send
+  EXPECT_EQ(c.received, c.sent);  // By the idle robot; the sleeping and the real robot neither receive nor send.
   EXPECT_EQ(c.collided, 0u);
 }
 

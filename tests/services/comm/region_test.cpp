@@ -1,4 +1,4 @@
-// A channel split by space is the channel in one piece: same frames, same counts.
+// A channel divided into regions gives the same frames and counts as an undivided one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint32_t kRobots = 300;
 constexpr double kWide_mm = 2400, kHigh_mm = 300;
 
-/// A receipt: who, what, how strong.
+/// A reception: receiver, message, readings.
 using Receipt = std::tuple<std::uint32_t, IrMessage, std::int16_t, std::int16_t>;
 
 struct Seen {
@@ -41,7 +41,7 @@ struct Seen {
     counters.aborted += c.aborted;
     std::sort(ask.begin(), ask.end());
     std::sort(sent.begin(), sent.end());
-    // Receptions of one robot stay in their order.
+    // Receptions of one robot keep their order.
     std::stable_sort(receipts.begin(), receipts.end(),
                      [](const Receipt& a, const Receipt& b) { return std::get<0>(a) < std::get<0>(b); });
   }

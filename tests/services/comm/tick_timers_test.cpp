@@ -47,14 +47,14 @@ TEST(TickTimers, CountOneTickPerPeriodOfTheirOwnOscillator) {
   }
 }
 
-/// The timer is a counter of 8 bits: whatever the compare register held in between, regular interrupts keep their phase.
+/// The timer is a counter of 8 bits. Regular interrupts keep their phase for any value of the compare register in between.
 TEST(TickTimers, BackOffPutsOneInterruptBetweenRegularOnes) {
   for (int value = 0; value < 256; ++value) {
     TickTimers timers(plan_of(1, 0));
     const Cycles first = timers.next(0), period = timers.period(0);
     timers.interrupt(0);
     timers.back_off(0, first + kListening - 1, static_cast<std::uint8_t>(value));
-    // The counter stands at 2 when the start pulse is heard at the latest: 0 and 1 match one round later.
+    // The counter is at most 2 when the start pulse is detected: the values 0 and 1 match one period later.
     const Cycles expected = first + (value < 2 ? period : 0) + (value + 1) * kTimerCount;
     EXPECT_EQ(timers.next(0), expected) << value;
     EXPECT_EQ(timers.next_clock(0), 255 + value);

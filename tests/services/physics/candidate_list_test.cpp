@@ -1,4 +1,4 @@
-// Candidate lists hold everybody within the cutoff, however the bodies moved since they were built.
+// Candidate lists contain all bodies within the cutoff, however bodies moved since the last rebuild.
 #include "services/physics/candidate_list.hpp"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ TEST(CandidateList, FollowsAChangeOfRobots) {
 
 TEST(Merge, GivesRobotsInAscendingOrderWithTheirEntries) {
   physics::Merge merge(200);
-  for (int round = 0; round < 2; ++round) {  // It is empty again after each.
+  for (int round = 0; round < 2; ++round) {  // drain() empties the list.
     for (const std::uint32_t robot : {199u, 0u, 63u, 64u, 128u})
       EXPECT_TRUE(merge.add(robot, {robot % 3, robot + 7}));
     EXPECT_FALSE(merge.add(63, {0, 0})) << "each robot once";

@@ -1,5 +1,5 @@
-// What every physics engine promises, whichever it is. An engine is described by what it can do; each law is tested on all
-// engines to which it applies, and whoever adds an engine adds a line to kEngines.
+// Laws that every physics engine obeys. kEngines describes each engine by its capabilities; each law is tested on all engines to
+// which it applies. A further engine needs one more line in kEngines.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,10 +25,10 @@ struct Tested {
   const char* name;
   bool contact;               ///< robots do not pass through each other
   bool any_partitions;        ///< the same bits over partition grids
-  double relative_tolerance;  ///< of speeds and turn rates against the drive's closed form
-  double place_tolerance_mm;  ///< of places, and of overlaps
-  double balance_mm;          ///< how far two that push against each other with the same force may drift in 10 s
-  double rest_gap_mm;         ///< between robots that rest against each other, at most
+  double relative_tolerance;  ///< of speeds and turn rates relative to the drive's closed form
+  double place_tolerance_mm;  ///< of positions and overlaps
+  double balance_mm;          ///< largest drift in 10 s of two robots that push against each other with equal force
+  double rest_gap_mm;         ///< largest gap between robots that rest against each other
 };
 void PrintTo(const Tested& engine, std::ostream* out) { *out << engine.name; }
 
@@ -51,7 +51,7 @@ class Conformance : public ::testing::TestWithParam<Tested> {
 INSTANTIATE_TEST_SUITE_P(Engines, Conformance, ::testing::ValuesIn(kEngines),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
-/// Motors that change now and then: most run straight or turn, some rest.
+/// Motors that change from time to time: most run straight or turn, some rest.
 void drive(Swarm& swarm, std::uint32_t robots, std::uint32_t tick) {
   for (std::uint32_t r = 0; r < robots; ++r) {
     const std::uint32_t phase = (r * 2654435761u + tick / 40 * 40503u) >> 7 & 7;
@@ -90,7 +90,7 @@ TEST_P(Conformance, AFullTurnTakesWheelBaseTimesTwoPiOverSpeed) {
     const double turn_s = kTicks * kTick_s * 2 * kPi / std::abs(turned_rad);
     EXPECT_NEAR(turn_s / 7.853981633974483, 1, GetParam().relative_tolerance);
     EXPECT_EQ(turned_rad > 0, left);
-    // It went round the opposite leg, and comes back to where it was.
+    // It went round the opposite leg and returns to its start.
     EXPECT_NEAR(distance_mm(swarm.poses()[0], {0, 0, 0}), 0,
                 17.0 * std::abs(std::abs(turned_rad) - 4 * kPi) + tolerance_mm());
   }
@@ -115,7 +115,7 @@ TEST_P(Conformance, BiasesActOnDrivenRobotsAlone) {
 }
 
 TEST_P(Conformance, AtRestNothingMoves) {
-  // Robots that touch, robots at walls, robots that no frame covers.
+  // Robots in contact, robots at walls, robots in no frame.
   auto crowd = testing::grid_crowd(36, 33, testing::Facing::kRandom);
   crowd.push_back({483.5, 0, 1});
   crowd.push_back({-483.5, -483.5, 2});
@@ -209,7 +209,7 @@ TEST_P(Conformance, TrackedRobotsAreWhereTheTrackerSaysAndAreNotMoved) {
   if (GetParam().contact) {
     EXPECT_NEAR(swarm.poses()[0].x_mm, -33, GetParam().rest_gap_mm);
   }
-  // It jumps, its heading comes wrapped, and its partition with it.
+  // The robot jumps, its heading exceeds a turn, and its partition changes.
   swarm.step({{2, 200, -150, 7}});
   const ScenePose jumped = swarm.poses(&by)[2];
   EXPECT_EQ(jumped.x_mm, 200);
@@ -297,7 +297,7 @@ TEST_P(Conformance, TheSameRunGivesTheSameBitsForAnyPartitions) {
   }
 }
 
-/// Every frame that the swarms emit at their present tick, and their hash.
+/// All frames that the swarms emit at the current tick, and their hash.
 void expect_same_frames(Swarm& a, Swarm& b, std::uint32_t partitions) {
   ASSERT_EQ(a.hash(), b.hash());
   for (std::uint32_t p = 0; p < partitions; ++p) {
@@ -390,7 +390,7 @@ TEST_P(Conformance, FiveRobotsDriveTheBoxOf18GramsAndFourDoNot) {
     Swarm swarm(p);
     swarm.set_all_motors(70, 70);
     swarm.run(305);
-    const double way_mm = swarm.movables()[0].x_mm;  // Throws where it is not listed exactly once.
+    const double way_mm = swarm.movables()[0].x_mm;  // Throws if it is not listed exactly once.
     if (robots == 4) {
       EXPECT_LT(way_mm, 1);
     } else {
@@ -417,7 +417,7 @@ TEST_P(Conformance, MovableBodiesAreSavedOnManyPartitionsAndContinue) {
       drive(*s, 6, k);
       s->step();
     }
-    // Few bodies: no engine cuts anything here.
+    // With few bodies, no engine cuts a group.
     ASSERT_EQ(a.hash(), b.hash()) << k;
   }
   EXPECT_GT(distance_mm(b.movables()[0], {0, 0, 0}), 1);

@@ -1,4 +1,4 @@
-// The inner loops of contact give the same bits for every instruction set that this processor has.
+// The inner loops of contact give the same bits for every instruction set of this processor.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -82,7 +82,7 @@ Scene make_scene(std::uint32_t seed) {
   return scene;
 }
 
-/// All that the loops write.
+/// All values that the loops write.
 std::vector<double> results(const ContactKernel& kernel, std::uint32_t seed) {
   Scene scene = make_scene(seed);
   std::vector<double> room_mm(kMostContacts * kLanes), all;
@@ -96,7 +96,7 @@ std::vector<double> results(const ContactKernel& kernel, std::uint32_t seed) {
     for (std::uint32_t p = 0; p < batch.contacts; ++p) {
       ContactLanes& contact = scene.contacts[batch.first_contact + p];
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        // Near enough to act, on both sides of a touch.
+        // Close enough for contact, on both sides of the touch distance.
         if (contact.gap_mm[lane] < 100) contact.gap_mm[lane] = std::fmod(contact.gap_mm[lane], 0.5);
         if (!std::isfinite(contact.normal_x[lane])) contact.normal_x[lane] = 1, contact.normal_y[lane] = 0;
       }
@@ -144,7 +144,7 @@ TEST(ContactKernel, EveryInstructionSetGivesTheSameBits) {
   }
 }
 
-/// A body without contacts comes out of a batch as it does without one, and headings stay in their range.
+/// A body without contacts moves with the same bits inside and outside a batch, and headings stay in their range.
 TEST(ContactKernel, RollsAsABatchDoes) {
   const ContactKernel* kernels[3];
   const std::size_t count = contact_kernels(kernels);

@@ -24,7 +24,7 @@ TEST(Contact, HeadOnRobotsStopWhereTheyMeet) {
   swarm.set_all_motors(70, 70);
   swarm.run(300);
   const auto poses = swarm.poses();
-  // A contact carries force up to a gap of two strides, and they rest where their forces first balance.
+  // A contact carries force up to a gap of two strides, and robots rest where their forces first balance.
   EXPECT_NEAR(poses[0].x_mm, -16.5, 0.2);
   EXPECT_NEAR(poses[1].x_mm, -poses[0].x_mm, 1e-9);
   EXPECT_NEAR(poses[0].y_mm, 0, 1e-9);
@@ -51,11 +51,11 @@ TEST(Contact, APushEndsWithTheDrive) {
   const auto before = swarm.poses();
   swarm.run(100);
   EXPECT_EQ(swarm.poses()[1].x_mm, before[1].x_mm);
-  EXPECT_NEAR(swarm.poses()[0].x_mm, before[0].x_mm, 0.02);  // The force it pushed with ends within a tick or two.
+  EXPECT_NEAR(swarm.poses()[0].x_mm, before[0].x_mm, 0.02);  // The contact force decays within a tick or two.
 }
 
 TEST(Contact, OneRobotDoesNotPushTwoInARow) {
-  // The force of one drive is spent on one resting robot: motors in ARGoS and Kilombo hold with the force they push with.
+  // The force of one drive holds one resting robot: motors in ARGoS and Kilombo hold with the force with which they push.
   const RunPlan plan = make_plan(kQuiet, {{-33, 0, 0}, {0, 0, 0}, {33, 0, 0}});
   Swarm swarm(plan);
   swarm.set_motors(0, 70, 70);
@@ -87,7 +87,7 @@ TEST(Contact, ARobotSlidesRoundAnImmovableOne) {
     least_mm = std::min(least_mm, std::hypot(poses[0].x_mm, poses[0].y_mm));
   }
   EXPECT_GE(least_mm, 33 - 1e-9);
-  EXPECT_LE(least_mm, 33.1);  // Contacts carry force a little before rims meet.
+  EXPECT_LE(least_mm, 33.1);  // Contacts carry force slightly before rims touch.
   const auto poses = swarm.poses();
   EXPECT_GT(poses[0].x_mm, 60);    // past it
   EXPECT_GT(poses[0].y_mm, 32.9);  // at the height to which it slid
@@ -96,7 +96,7 @@ TEST(Contact, ARobotSlidesRoundAnImmovableOne) {
 }
 
 TEST(Contact, FrictionHoldsARobotUpToItsAngle) {
-  // It meets the other 14.03 degrees off its way: friction below tan(14.03 degrees) = 0.2499 lets it slide past.
+  // It meets the other robot 14.03 degrees off its course: friction below tan(14.03 degrees) = 0.2499 lets it slide past.
   for (const double friction : {0.24, 0.26, 6.25}) {
     const RunPlan plan = make_plan(kQuiet + "physics { rim_friction: " + std::to_string(friction) +
                                        " } robots { count: 1 } robots { count: 1 body: TRACKED }",
@@ -117,7 +117,7 @@ TEST(Contact, FrictionHoldsARobotUpToItsAngle) {
 }
 
 TEST(Contact, ATurningRobotTakesAlongWhomItPresses) {
-  // They press on each other, and one turns to its left besides: where its rim meets the other's, it goes towards -y.
+  // Two robots press on each other, and one also turns to its left: at the contact its rim moves towards -y.
   const auto sideways_mm = [](const std::string& friction) {
     const RunPlan plan =
         make_plan(kQuiet + "physics { rim_friction: " + friction + " }", {{-16.6, 0, 0}, {16.6, 0, -kPi}});
@@ -195,7 +195,7 @@ TEST_P(Crowd, DrivingInwardsForAMinuteNeverOverlaps) {
   RecordProperty("largest_overlap_mm", std::to_string(largest));
   std::printf("largest overlap %.3g mm\n", largest);
   EXPECT_LE(largest, 1e-9);
-  EXPECT_GE(largest, -0.01);  // They did meet.
+  EXPECT_GE(largest, -0.01);  // They did touch.
 }
 
 INSTANTIATE_TEST_SUITE_P(SubSteps, Crowd, ::testing::Values(1, 2, 4));
@@ -221,7 +221,7 @@ TEST(Contact, NobodyLeavesTheArena) {
 
 TEST(Contact, OverlappingRobotsPartSmoothly) {
   auto crowd = testing::random_crowd(100, 300, 300, 5, 3);
-  crowd[17] = crowd[42];  // two at the same place
+  crowd[17] = crowd[42];  // two robots at the same position
   const RunPlan plan = make_plan(kQuiet, crowd);
   const physics::ContactLimits limits(plan, physics::DriveModel(plan));
   Swarm swarm(plan);

@@ -1,4 +1,4 @@
-// The loop over driven robots: the same bits for every instruction set, and those of the functions for one robot.
+// The loop over driven robots gives the same bits for every instruction set, and those of the functions for one robot.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -37,7 +37,7 @@ struct Columns {
   }
 };
 
-/// Angles of any size, those next to multiples of an eighth turn, and the ends.
+/// Angles of any size, angles next to multiples of an eighth turn, and the ends of the range.
 std::vector<double> angles() {
   std::vector<double> found{0.0, -0.0, kPi, -kPi, 1e-300, -1e-300, 0x1p-27, -0x1p-27, 0x1p-28};
   for (int k = -4; k <= 4; ++k) {

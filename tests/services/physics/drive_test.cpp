@@ -61,7 +61,7 @@ TEST(Drive, DutiesUpToTheDeadBandTurnNothing) {
   const RunPlan plan = make_plan("motion { dead_band_duty: 60 }", {{0, 0, 0}, {200, 0, 0}, {400, 0, 0}});
   Swarm swarm(plan);
   swarm.set_motors(0, 60, 60);
-  swarm.set_motors(1, 61, 60);  // a turn: the other motor rests
+  swarm.set_motors(1, 61, 60);  // a turn: the other motor is in the dead band
   swarm.run(10);
   const auto poses = swarm.poses();
   EXPECT_EQ(poses[0].x_mm, 0);
@@ -124,7 +124,7 @@ TEST(Drive, AKickIsFifteenMillisecondsAtFullDuty) {
     const auto poses = swarm.poses();
     EXPECT_NEAR(poses[0].x_mm, 15 * kick_s + 10 * (kTick_s - kick_s), 1e-12);
     EXPECT_NEAR(poses[1].heading_rad, 20 / kWheelBase_mm * (kTick_s - kick_s), 1e-13);
-    EXPECT_NEAR(poses[2].x_mm, 15 * kick_s, 1e-12);  // nothing is set after the kick
+    EXPECT_NEAR(poses[2].x_mm, 15 * kick_s, 1e-12);  // no duties after the kick
     EXPECT_EQ(poses[2].heading_rad, 0);
   }
 }
@@ -142,7 +142,7 @@ TEST(Drive, LeftMotorTurnsLeftAndFullTurnTakesTwoPiWheelBasesPerSpeed) {
   const double turned_rad = 20 / kWheelBase_mm * static_cast<double>(ticks) * kTick_s;
   EXPECT_NEAR(poses[0].heading_rad, turned_rad - 2 * kPi, 1e-9);
   EXPECT_NEAR(poses[1].heading_rad, 2 * kPi - turned_rad, 1e-9);
-  // What is left of the turn at this rate takes the rest of the time.
+  // The rest of the time covers the remaining turn at this rate.
   EXPECT_NEAR(static_cast<double>(ticks) * kTick_s - poses[0].heading_rad / 0.8, turn_s, 1e-9);
 }
 
@@ -184,7 +184,7 @@ TEST(Drive, ArcOfABiasedRobotIsTheExactCircle) {
 }
 
 TEST(Drive, LargeTurnsPerTickFollowTheSameCircle) {
-  // 2^20 cycles and fast wheels: 3.15 rad a tick, beyond the series.
+  // 2^20 cycles and fast wheels: 3.15 rad per tick, beyond the series.
   const std::string text = "tick_cycles: 1048576 motion { noise: false turn_speed_mm_s: 600 }";
   const RunPlan plan = make_plan(text, {{0, 0, 0}});
   Swarm swarm(plan);
@@ -215,7 +215,7 @@ TEST(Drive, BiasActsOnBothWheelsWhileEitherIsDrivenAndOnNoneAtStop) {
   turning.set_all_motors(70, 0);
   turning.step();
   EXPECT_NEAR(turning.poses()[0].heading_rad, 20 / kWheelBase_mm * kTick_s,
-              1e-14);  // 21 - 1: the still wheel creeps
+              1e-14);  // 21 - 1: the wheel at rest still has its bias
   resting.run(100);
   EXPECT_EQ(resting.poses()[0].x_mm, 0);
   EXPECT_EQ(resting.poses()[0].heading_rad, 0);
@@ -249,7 +249,7 @@ TEST(Drive, BiasesFollowTheSeedsDistribution) {
     product += left * right;
     within_one_sd += (std::abs(left) < 1) + (std::abs(right) < 1);
   }
-  // Each bound is 4.4 standard errors: a right generator fails one of the four with probability 5e-5, at one fixed seed.
+  // Each bound is 4.4 standard errors: a correct generator fails one of the four with probability 5e-5; the seed is fixed.
   constexpr double n = 2 * kRobots;
   EXPECT_NEAR(sum / n, 0, 4.4 / std::sqrt(n));
   EXPECT_NEAR(square / n, 1, 4.4 * std::sqrt(2 / n));
@@ -257,7 +257,7 @@ TEST(Drive, BiasesFollowTheSeedsDistribution) {
   EXPECT_NEAR(within_one_sd / n, 0.682689, 4.4 * std::sqrt(0.682689 * 0.317311 / n));
 }
 
-// Variance of the way after 4.194304 s for a tick length, in mm^2.
+// Variance of the displacement after 4.194304 s for a tick length, mm^2.
 double way_variance(std::uint32_t tick_cycles, double variance_s) {
   constexpr std::uint32_t kRobots = 4000;
   const std::string text = "tick_cycles: " + std::to_string(tick_cycles) +
@@ -280,9 +280,9 @@ double way_variance(std::uint32_t tick_cycles, double variance_s) {
 }
 
 TEST(Drive, StepNoiseVarianceDoesNotDependOnTheTickLength) {
-  // Each wheel's way has variance v^2 q t; their mean half of that. q is small, so that the turn does not shorten the way.
+  // Each wheel's travel has the variance v^2 q t; their mean has half of it. q is small, so the turn does not shorten the path.
   const double q = 2e-5, expected = 100 * q * 4.194304 / 2;
-  // Relative standard error of a variance of 4000 is 2.24 %: 4.4 of them.
+  // The relative standard error of a variance of 4000 samples is 2.24 %; the bound is 4.4 of them.
   for (const std::uint32_t cycles : {1u << 16, 1u << 18, 1u << 20}) {
     EXPECT_NEAR(way_variance(cycles, q) / expected, 1, 4.4 * 0.0224) << cycles;
   }

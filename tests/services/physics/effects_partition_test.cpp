@@ -1,5 +1,4 @@
-// Effects do not depend on how the arena is cut, nor on a checkpoint in between: one list with all targets and covariates,
-// and lists drawn at random.
+// Effects do not depend on the partition grid or on a checkpoint: one list with all targets and covariates, and random lists.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +24,7 @@ const std::vector<std::string> kCovariates = [] {
 
 bool is_own_motors(const std::string& covariate) { return covariate == "DUTY" || covariate == "MOTOR_TIME"; }
 
-/// What goes with a covariate.
+/// Parameters that a covariate needs.
 std::string with(const std::string& covariate, const std::string& radius_mm = "80") {
   if (covariate == "PLACE") return " field: 'driven'";
   const bool of_neighbours = covariate == "NEIGHBOURS" || covariate == "NEAREST" || covariate == "DENSITY" ||
@@ -37,7 +36,7 @@ const std::string kFields =
     "field { name: 'driven' cell_mm: 45 } field { name: 'visits' counts: VISITS cell_mm: 70 forget_s: 3 } "
     "field { name: 'present' counts: PRESENT_TIME cell_mm: 120 forget_s: 20 } ";
 
-/// An effect for each covariate, acting on one target after the other, and one for each shape.
+/// One effect per covariate, cycling through the targets, and one per shape.
 std::string everything() {
   const char* const targets[] = {"WHEEL_GAIN", "WHEEL_OFFSET", "TURN_RATE", "BODY_DRIFT direction_deg: 70",
                                  "WORLD_DRIFT direction_deg: -20"};
@@ -74,7 +73,7 @@ void drive(Swarm& swarm, std::uint32_t tick) {
   }
 }
 
-/// Of the tick before the step: a real robot that goes about.
+/// Input before each step: a real robot that moves.
 std::vector<TrackedPoseInput> tracked(std::uint32_t tick) {
   if (tick % 5 != 0) return {};
   return {{kRobots, 280 * std::cos(tick * 0.01), 280 * std::sin(tick * 0.013), 0.1 * tick - 3}};
@@ -156,7 +155,7 @@ TEST_P(EffectPartitions, EveryEffectChangesTheHash) {
   }
 }
 
-/// A list of effects that validation would pass, with numbers of all sizes.
+/// A random list of effects that validation accepts, with numbers of all magnitudes.
 std::string random_effects(std::mt19937& engine) {
   const auto below = [&](std::size_t n) { return engine() % n; };
   const auto number = [&] {
@@ -226,7 +225,7 @@ TEST_P(EffectPartitions, RandomListsGiveTheSameBitsAndStayFinite) {
 }
 
 TEST(EffectContacts, RobotsThatPushBodiesGiveTheSameBits) {
-  // A beam over many partitions: what robots at one end look at matters at the other.
+  // A beam across many partitions carries the influence of neighbours from one end to the other.
   std::vector<testing::ScenePose> start;
   for (int i = 0; i < 40; ++i)
     start.push_back({-1170 + 60.0 * i, i % 2 == 0 ? 40.0 : -40.0, i % 2 == 0 ? -1.5 : 1.5});

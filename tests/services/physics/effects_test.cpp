@@ -23,7 +23,7 @@ std::string effect(const std::string& what, const std::string& function) {
   return "effect { name: \"e\" " + what + " function { " + function + " } } ";
 }
 
-/// An effect that moves a robot whatever it does along x, at as many mm/s as its function says.
+/// An effect that moves a robot along x in any state, with its function as the speed in mm/s.
 std::string shown(const std::string& function, const std::string& more = "") {
   return kQuiet + more + effect("acts_on: WORLD_DRIFT during: [STOP, STRAIGHT, LEFT, RIGHT]", function);
 }
@@ -70,7 +70,7 @@ TEST(Effects, ATurnRateMakesACircleOfTheReferencePoint) {
 }
 
 TEST(Effects, ABodyDriftToTheSideGoesAroundWithTheBody) {
-  // At rest but for the effects: sideways at 5 mm/s while turning at 0.2 rad/s.
+  // The effects alone: sideways at 5 mm/s while turning at 0.2 rad/s.
   const std::string text =
       kQuiet +
       "effect { name: 'a' acts_on: BODY_DRIFT direction_deg: 90 during: STOP function { constant: 5 } } "
@@ -85,7 +85,7 @@ TEST(Effects, ABodyDriftToTheSideGoesAroundWithTheBody) {
 }
 
 TEST(Effects, AWorldDriftAddsUpAlsoWhereOthersAreNear) {
-  // Both turn; the second pair is so close that its ticks are divided into sub-steps, but never touches.
+  // Both robots turn. The second pair is so close that its ticks have sub-steps, but the robots never touch.
   const std::string text = kQuiet + effect("acts_on: WORLD_DRIFT direction_deg: 30", "constant: 4");
   const std::vector<ScenePose> start = {{-300, 0, 1}, {300, 0, 1}, {300, 38.5, 1}};
   const RunPlan plan = make_plan(text, start), plain = make_plan(kQuiet, start);
@@ -127,7 +127,7 @@ TEST(Effects, FunctionsOfTimeAddUpTickByTick) {
   }
 }
 
-/// What a covariate is in the coming step, read from how far robot 0 goes.
+/// Value of a covariate in the coming step, measured by the displacement of robot 0.
 double seen(Swarm& swarm, std::uint32_t robot = 0) {
   const double before = swarm.poses()[robot].x_mm;
   swarm.step();
@@ -141,7 +141,7 @@ std::string thousandth(const std::string& covariate, const std::string& more = "
 TEST(Effects, CovariatesOfPoseAndCommand) {
   const ScenePose start{-30, 40, 0.7};
   const auto value = [&](const std::string& covariate, std::uint8_t left, std::uint8_t right) {
-    // The motors themselves move nothing here.
+    // The motors themselves cause no motion here.
     const RunPlan plan =
         make_plan("motion { noise: false straight_speed_mm_s: 0 turn_speed_mm_s: 0 } run_number: 6 " +
                       effect("acts_on: WORLD_DRIFT during: [STOP, STRAIGHT, LEFT, RIGHT]", thousandth(covariate)),
@@ -191,7 +191,7 @@ TEST(Effects, TimesCountWhatTheMotorsDid) {
       if (!l && !r) expected[5] = 0;
       swarms[s].set_all_motors(l ? 70 : 0, r ? 70 : 0);
       const double before = swarms[s].poses()[0].x_mm;
-      // What the motors alone would do in this step is subtracted: a robot of the same pose without effects.
+      // Subtracts the motion by the motors alone: that of a robot with the same pose without effects.
       const RunPlan plain = make_plan(kQuiet, {swarms[s].poses()[0]});
       Swarm twin(plain);
       twin.set_all_motors(l ? 70 : 0, r ? 70 : 0);
@@ -211,7 +211,7 @@ TEST(Effects, TimesCountWhatTheMotorsDid) {
 }
 
 TEST(Effects, NeighboursAreCountedWeighedAndFound) {
-  // From the robot in question: at 50 mm ahead, 70 mm to the left, 99 and 101 mm.
+  // Neighbours of the robot: 50 mm ahead, 70 mm to the left, at 99 mm and at 101 mm.
   const std::vector<ScenePose> start = {{0, 0, 0.5},
                                         {50 * std::cos(0.5), 50 * std::sin(0.5), 0},
                                         {-70 * std::sin(0.5), 70 * std::cos(0.5), 0},
@@ -231,7 +231,7 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
   EXPECT_NEAR(value("NEAREST_BEARING", start), 0, 1e-7);
   const auto weight = [](double d) { return (1 - d * d / 1e4) * (1 - d * d / 1e4); };
   EXPECT_NEAR(value("DENSITY", start), weight(50) + weight(70) + weight(99), 1e-8);
-  // By where they are: 0, 90 and 180 - 0.5 rad = 151.4 degrees from the heading.
+  // Their bearings: 0, 90 and 180 - 0.5 rad = 151.4 degrees.
   const auto share = [](double degrees) { return (1 + std::cos(degrees * kPi / 180)) / 2; };
   EXPECT_NEAR(value("NEIGHBOURS", start, "focus: 2"), 1 + std::pow(share(90), 2) + std::pow(share(151.3521), 2),
               1e-6);
@@ -246,7 +246,7 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
 }
 
 TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
-  // 200 robots for 1000 s: 40 000 s apart by 8 s on average, of a mean length of 4 / (3 - 1) s, so on for a fifth of the time.
+  // 200 robots for 1000 s: mean interval 8 s, mean duration 4 / (3 - 1) s, so an episode is on for a fifth of the time.
   constexpr std::uint32_t kRobots = 200;
   constexpr int kTicks = 30518;
   const double mean_apart_s = 8, scale_s = 4, tail = 3;
@@ -283,7 +283,7 @@ TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
     return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
   };
   ASSERT_GT(lengths.size(), 15000u);
-  // Three standard errors, and a tick for phases that are rounded up to one; the ends of the run cut long ones.
+  // Three standard errors, plus a tick for phases rounded up to one; the run's end cuts long phases.
   EXPECT_NEAR(mean(waits), mean_apart_s, 3 * mean_apart_s / std::sqrt(waits.size()) + kTick_s + 0.1);
   EXPECT_NEAR(mean(lengths), scale_s / (tail - 1), 3 * 3.5 / std::sqrt(lengths.size()) + kTick_s);
   EXPECT_NEAR(on / kTicks / kRobots, 0.2, 0.01);
@@ -298,7 +298,7 @@ TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
 }
 
 TEST(Effects, CommandsOfThePastAreRemembered) {
-  // What is seen while the robot does the last of these commands, in its first tick and later ones.
+  // Covariates during the last of these commands, in its first tick and later ones.
   struct Case {
     std::vector<std::pair<std::uint8_t, std::uint8_t>> duties;
     double previous, turn;
@@ -330,7 +330,7 @@ TEST(Effects, CommandsOfThePastAreRemembered) {
 }
 
 TEST(Effects, PreviousMotionIsInTheBodyOfThen) {
-  // Robot 0 drives along y; the effect shows on robot 1, which turns, and is that of its own tick before.
+  // Robot 0 drives along y. The effect acts on robot 1, which turns, and uses its own previous tick.
   for (const auto& [covariate, straight, turning] : {std::tuple{"PREVIOUS_FORWARD", 10.0, 10.0},
                                                      {"PREVIOUS_SIDEWAYS", 0.0, 0.8 * kOffset_mm},
                                                      {"PREVIOUS_TURN", 0.0, 0.8}}) {
@@ -343,7 +343,7 @@ TEST(Effects, PreviousMotionIsInTheBodyOfThen) {
     swarm.set_all_motors(0, 0);
     const auto before = swarm.poses();
     swarm.step();
-    // In a tick of 0.026 rad the mean direction is half of that off.
+    // In a tick with a turn of 0.026 rad, the mean direction differs by half of it.
     EXPECT_NEAR(1000 * (swarm.poses()[0].x_mm - before[0].x_mm) / kTick_s, straight, 1e-7) << covariate;
     EXPECT_NEAR(1000 * (swarm.poses()[1].x_mm - before[1].x_mm) / kTick_s, turning, 0.15) << covariate;
     swarm.step();
@@ -354,7 +354,7 @@ TEST(Effects, PreviousMotionIsInTheBodyOfThen) {
 }
 
 TEST(Effects, PlacesRemember) {
-  // Two robots in one cell, one of them driven; what the place remembers shows on a third, at rest in it.
+  // Two robots are in one cell, one of them driven. A third one, at rest in the cell, shows the cell's value.
   const std::vector<ScenePose> start = {{10, 10, kPi / 2}, {60, 10, 0}, {10, 60, 0}, {-200, 0, 0}};
   const auto field = [](const std::string& counts) {
     return "motion { noise: false straight_speed_mm_s: 0 } field { name: 'f' cell_mm: 100 " + counts +
@@ -410,8 +410,8 @@ TEST(Effects, AreLimitedTogether) {
   EXPECT_LT(drive.top_speed_mm_s(), 40);
 }
 
-/// Variance of the way along x after 4.194304 s, mm^2, and the mean over robots of products of ways of following ticks,
-/// over their mean square.
+/// Variance of the displacement along x after 4.194304 s, mm^2, and the correlation of displacements in successive ticks over
+/// robots.
 struct Spread {
   double variance, neighbouring;
 };
@@ -454,8 +454,8 @@ TEST(Effects, NoiseDoesNotDependOnTheTickLength) {
     const Spread white = spread_of("sd: 2", cycles);
     EXPECT_NEAR(white.variance / (4 * t), 1, bound) << cycles;
     EXPECT_NEAR(white.neighbouring, 0, 4.4 / std::sqrt(2000 * t / tick_s));
-    // The integral of a process with correlation exp(-t / c): 2 sd^2 c (t - c (1 - exp(-t / c))); summed by ticks it
-    // is a little more, by (tick / c)^2 / 6 or so.
+    // The variance of the integral of a process with correlation exp(-t / c) is 2 sd^2 c (t - c (1 - exp(-t / c))). The sum over
+    // ticks exceeds it by a relative amount of about (tick / c)^2 / 6.
     const double c = 1.5, expected = 2 * 4 * c * (t - c * (1 - std::exp(-t / c)));
     const Spread slow = spread_of("sd: 2 correlation_s: 1.5", cycles);
     EXPECT_NEAR(slow.variance / expected, 1, bound + 0.005) << cycles;

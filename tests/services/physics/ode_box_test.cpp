@@ -15,7 +15,7 @@ using testing::Swarm;
 
 const std::string kOde = "motion { noise: false } physics { engine: ODE } ";
 
-/// k robots against the box's left face, 1 mm away: abreast, or three abreast and the others behind.
+/// k robots 1 mm from the box's left face: side by side, or three side by side and the others behind.
 std::vector<ScenePose> pushers(int k, bool columns, double face_mm) {
   std::vector<ScenePose> poses;
   for (int i = 0; i < k; ++i) {
@@ -27,8 +27,8 @@ std::vector<ScenePose> pushers(int k, bool columns, double face_mm) {
   return poses;
 }
 
-// The ARGoS paper (Pinciroli 2018, section 3.3): an 18 g box needs five robots. ARGoS' figures for this set-up: 0.04, 0.2, 0.6,
-// 1.5 and 394 mm.
+// The ARGoS paper (Pinciroli 2018, section 3.3): a box of 18 g needs five robots. ARGoS' displacements for this set-up: 0.04,
+// 0.2, 0.6, 1.5 and 394 mm.
 TEST(OdeBox, FourRobotsDoNotMoveItAndFiveDo) {
   for (const bool columns : {false, true}) {
     for (int k = 1; k <= 5; ++k) {
@@ -94,7 +94,7 @@ TEST(OdeBox, ABoxSlidesDownASlopeAsTheLawSaysAndStopsAtTheWall) {
 }
 
 TEST(OdeBox, PartitionsAndCheckpointsKeepTheBits) {
-  // Five robots push a box over the border of two partitions; nothing is cut.
+  // Five robots push a box across the border of two partitions; no group is cut.
   const std::string box =
       "arena { width_mm: 1000 height_mm: 1000 } movable { box { width_mm: 100 length_mm: 300 } mass_g: 18 } ";
   const auto robots = pushers(5, false, -50);

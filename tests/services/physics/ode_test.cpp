@@ -1,4 +1,4 @@
-// The ODE engine's own laws: friction on a slope in closed form, bounded thrust, what partitions change, threads.
+// Laws of the ODE engine: friction on a slope in closed form, limited thrust, partitions, threads.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ using testing::Swarm;
 
 constexpr double kTick_s = 0.032768;
 constexpr double kGravity_mm_s2 = 9806.65;
-/// The experiment's defaults: friction of resting legs, thrust over mass.
+/// The experiment's defaults: friction of resting legs, and thrust over mass.
 constexpr double kFriction = 0.3, kThrust_mm_s2 = 1177;
 
 std::string tilted(double tilt_deg, double downhill_deg) {
@@ -25,14 +25,14 @@ std::string tilted(double tilt_deg, double downhill_deg) {
          std::to_string(tilt_deg) + " downhill_deg: " + std::to_string(downhill_deg) + " }";
 }
 
-/// Robots that look all ways, far from each other.
+/// Robots with various headings, far from each other.
 std::vector<ScenePose> compass() {
   std::vector<ScenePose> poses;
   for (int i = 0; i < 8; ++i) poses.push_back({200.0 * i, -100.0 * i, wrapped(i * 0.8)});
   return poses;
 }
 
-/// How far a robot went along the direction, mm.
+/// Displacement of a robot along the direction, mm.
 double along_mm(const ScenePose& from, const ScenePose& to, double direction_deg) {
   const double direction = direction_deg * kPi / 180;
   return (to.x_mm - from.x_mm) * std::cos(direction) + (to.y_mm - from.y_mm) * std::sin(direction);
@@ -63,7 +63,7 @@ TEST(OdeSlope, AboveTheFrictionAngleRobotsSlideAsTheLawSays) {
       swarm.run(kTicks);
       const auto end = swarm.poses();
       const double tilt = tilt_deg * kPi / 180, time_s = kTicks * kTick_s;
-      // The velocity of a sub-step is that of its end, so the way is that of half a sub-step more.
+      // A sub-step uses the velocity at its end, so the displacement exceeds the closed form by half a sub-step.
       const double acceleration = kGravity_mm_s2 * (std::sin(tilt) - kFriction * std::cos(tilt));
       const double way_mm = acceleration * time_s * (time_s + kTick_s / 4) / 2;
       for (std::size_t r = 0; r < start.size(); ++r)
@@ -73,7 +73,7 @@ TEST(OdeSlope, AboveTheFrictionAngleRobotsSlideAsTheLawSays) {
 }
 
 TEST(OdeSlope, ThrustIsBounded) {
-  // Up a slope a robot comes as long as its thrust exceeds its weight's part along it; beyond, it slides down.
+  // A robot climbs a slope as long as its thrust exceeds the component of its weight along it; on steeper slopes it slides down.
   const double steepest_deg = std::asin(kThrust_mm_s2 / kGravity_mm_s2) * 180 / kPi;
   const std::vector<ScenePose> start = {{0, 0, kPi}};
   const RunPlan easy = make_plan(tilted(steepest_deg - 1, 0), start),
@@ -138,8 +138,8 @@ struct Crowd {
   double most_rms_mm;
 };
 
-// Where groups are cut, the two sides of a border compute with forces of their own, which the iterative solver does not find
-// to the last digit; in a crowd that is pressed together such differences grow, as those from another seed do. Printed for
+// At a cut group, the two sides of a border compute with their own forces, which the iterative solver finds only to a tolerance.
+// In a compressed crowd such differences grow like those of another seed. The test prints them for
 // docs/explanation/contact.md.
 TEST(OdePartitions, CutGroupsComeOutAlike) {
   for (const Crowd& tested :
@@ -168,7 +168,7 @@ TEST(OdePartitions, CutGroupsComeOutAlike) {
 }
 
 TEST(OdeThreads, WorldsOfSeveralThreadsDoNotDisturbEachOther) {
-  // Crowds for the iterative solver and its random numbers; robots alone for the exact one.
+  // Crowds use the iterative solver and its random numbers; single robots use the exact solver.
   const auto crowd = testing::random_crowd(120, 700, 700, 33, 9);
   const std::string text = "arena { width_mm: 800 height_mm: 800 } physics { engine: ODE }";
   const auto hash_of = [&](std::uint64_t seed) {

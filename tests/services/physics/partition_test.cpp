@@ -1,4 +1,4 @@
-// Results do not depend on how the arena is cut, on the number of hosts, or on a checkpoint in between.
+// Results do not depend on the partition grid, on the number of hosts, or on a checkpoint.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +30,7 @@ void expect_same(const Swarm& a, const Swarm& b) {
   ASSERT_EQ(a.hash(), b.hash());
 }
 
-// Motors that change now and then: a third runs straight, some turn, some rest.
+// Motors that change from time to time: a third runs straight, some turn, some rest.
 void drive(Swarm& swarm, std::uint32_t robots, std::uint32_t tick) {
   for (std::uint32_t r = 0; r < robots; ++r) {
     const std::uint32_t phase = (r * 2654435761u + tick / 40 * 40503u) >> 7 & 7;
@@ -49,7 +49,7 @@ class Partitions : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Partitions, AnyGridGivesTheSameBits) {
   const Case c = GetParam();
-  // The spacing may be less than a diameter: overlaps must part alike as well.
+  // The spacing may be less than a diameter: overlaps must separate in the same way, too.
   const auto crowd = testing::random_crowd(c.robots, c.side_mm - 34, c.side_mm - 34, c.spacing_mm, c.seed);
   const std::string text = "seed: " + std::to_string(c.seed) + " arena { width_mm: " + std::to_string(c.side_mm) +
                            " height_mm: " + std::to_string(c.side_mm) +
@@ -109,7 +109,7 @@ TEST(Partition, ARobotIsHandedOverAndBack) {
   EXPECT_EQ(by[0], 0u);
   int changes = 0;
   for (int k = 0; k < 1200; ++k) {
-    // It drives circles over the border.
+    // It drives in circles across the border.
     for (Swarm* s : {&a, &b}) {
       s->set_motors(0, 70, 0);
       s->step();

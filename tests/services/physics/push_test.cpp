@@ -1,4 +1,4 @@
-// Forces: thresholds of friction, chains, moments, symmetry, walls; and movable bodies over partitions.
+// Pushing: friction thresholds, chains, moments, symmetry, walls; and movable bodies over partitions.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ const std::string kQuiet = "motion { noise: false } ";
 const std::string kBox = "movable { box { width_mm: 100 length_mm: 100 } mass_g: 18 x_mm: 50 } ";
 const std::string kWide = "movable { box { width_mm: 100 length_mm: 300 } mass_g: 18 x_mm: 50 } ";
 
-/// k robots in columns of 33.2 mm pitch, at most 3 abreast, 1 mm from the face at x = 0.
+/// k robots in columns of 33.2 mm pitch, at most 3 side by side, 1 mm from the face at x = 0.
 std::vector<ScenePose> columns(int k) {
   std::vector<ScenePose> poses;
   for (int first = 0, row = 0; first < k; first += 3, ++row) {
@@ -38,7 +38,7 @@ std::vector<ScenePose> abreast(int k) {
 }
 
 struct Shift {
-  double x_mm, y_mm, turn_rad, creep_mm;  ///< creep: of the second half
+  double x_mm, y_mm, turn_rad, creep_mm;  ///< creep: displacement in the second half
 };
 Shift shift_of_box(const std::string& text, const std::vector<ScenePose>& poses, std::int64_t ticks = k40_s) {
   const RunPlan plan = make_plan(kQuiet + text, poses);
@@ -125,8 +125,8 @@ TEST(Push, ARestingRobotYieldsToMoreThanItsFriction) {
 }
 
 TEST(Push, AnOffCentrePushTurnsTheBoxItsWay) {
-  // Far off the centre the moment decides: friction holds |f|^2 + (M / rho)^2 <= (mu m g)^2, so that F moves the box where
-  // F sqrt(1 + (d / rho)^2) > mu m g. For a square of 100 mm rho is 38.26 mm.
+  // Far from the centre, the moment decides: friction holds |f|^2 + (M / rho)^2 <= (mu m g)^2, so F moves the box if
+  // F sqrt(1 + (d / rho)^2) > mu m g. For a square of 100 mm, rho is 38.26 mm.
   const double rho_mm = 100 * (std::sqrt(2.0) + std::log(1 + std::sqrt(2.0))) / 6, offset_mm = 40;
   const double ratio = std::sqrt(1 + std::pow(offset_mm / rho_mm, 2));
   for (const double part : {0.95, 1.05}) {
@@ -134,10 +134,10 @@ TEST(Push, AnOffCentrePushTurnsTheBoxItsWay) {
                              std::to_string(ratio / part * 0.01177 / (0.3 * 9.80665) * 1000) + " } ";
     const Shift s = shift_of_box(text, {{-17.5, offset_mm, 0}}, 300);
     if (part < 1) {
-      EXPECT_NEAR(s.turn_rad, 0, 0.02);  // by impact
+      EXPECT_NEAR(s.turn_rad, 0, 0.02);  // caused by the impact
       EXPECT_EQ(s.creep_mm, 0);
     } else {
-      EXPECT_LT(s.turn_rad, -0.05);  // Clockwise: pushed along x above the centre.
+      EXPECT_LT(s.turn_rad, -0.05);  // Clockwise: pushed along x on the side of positive y.
     }
   }
 }
@@ -164,8 +164,8 @@ TEST(Push, MirroredPushesMirror) {
 }
 
 TEST(Push, ForcesPassThroughARowOfBoxes) {
-  // Two boxes of 4.5 thrusts each, 5 mm apart: eight robots push the first against the second, which holds; ten drive both.
-  // Then one box between them that is lighter, and a cylinder at the end.
+  // Two boxes with a friction of 4.5 thrusts each, 5 mm apart: eight robots push the first one against the second, which holds;
+  // ten move both. The second part has a lighter box between them, and a cylinder at the end.
   const std::string two =
       "movable { box { width_mm: 60 length_mm: 400 } mass_g: 18 x_mm: 30 } "
       "movable { box { width_mm: 60 length_mm: 400 } mass_g: 18 x_mm: 95 } ";
@@ -187,7 +187,7 @@ TEST(Push, ForcesPassThroughARowOfBoxes) {
                   end[0].x_mm - start[0].x_mm, end.back().x_mm - start.back().x_mm);
       for (std::size_t m = 0; m < end.size(); ++m) {
         if (k == 8) {
-          // What is left where a light body lies between heavy ones is what the rounds leave.
+          // The remaining creep of a light body between heavy ones is the solver's error.
           EXPECT_NEAR(end[m].x_mm, middle[m].x_mm, row == two ? 0 : 1e-3) << "it creeps";
           EXPECT_LT(end[m].x_mm - start[m].x_mm, 15);
         } else {
@@ -201,7 +201,7 @@ TEST(Push, ForcesPassThroughARowOfBoxes) {
   }
 }
 
-/// Robots all about with movable bodies of each shape, obstacles and beacons among them.
+/// Random robots, movable bodies of each shape, obstacles and beacons.
 std::string mixed_world(const std::string& arena) {
   return "arena { " + arena +
          " } robots { count: 70 } robots { count: 3 immobile: true } "
@@ -212,7 +212,7 @@ std::string mixed_world(const std::string& arena) {
          "obstacle { cylinder { radius_mm: 25 } x_mm: 30 y_mm: 160 } ";
 }
 std::vector<ScenePose> mixed_robots(const std::string& text, std::uint64_t seed) {
-  // Where they overlap no body: candidates are taken in order.
+  // Candidates are accepted in order if they overlap no body.
   proto::Experiment experiment;
   const RunPlan world =
       make_plan("robots { count: 1 } " + text.substr(0, text.find("robots")) + text.substr(text.find("movable")),
@@ -301,7 +301,7 @@ TEST_P(Mixed, NothingOverlapsOrTunnelsAndAllPartitionsAgree) {
           std::hypot(swarms[0]->movables()[m].x_mm - start.x_mm, swarms[0]->movables()[m].y_mm - start.y_mm) > 3;
     }
     EXPECT_TRUE(moved);
-    // What nine partitions saved goes on, on one and on two, as if nothing had happened.
+    // The state of nine partitions continues unchanged on one and on two.
     const auto saved = swarms[2]->save();
     for (auto& swarm : swarms) swarm->load(swarm->tick(), saved);
     for (int k = 0; k < 50; ++k) {

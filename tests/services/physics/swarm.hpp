@@ -1,4 +1,4 @@
-/// All partitions of a plan, stepped together in one thread by hand-made motors.
+/// All partitions of a plan, stepped in one thread with given motors.
 #pragma once
 
 #include <functional>
@@ -31,7 +31,7 @@ class Swarm {
   }
 
   void step(const std::vector<TrackedPoseInput>& tracked = {}) {
-    // What every partition sends is taken before any of them steps.
+    // All partitions' ghosts are collected before any partition steps.
     std::map<std::pair<std::uint32_t, std::uint32_t>, BodyFrame> ghosts;
     for (std::uint32_t p = 0; p < engines_.size(); ++p) {
       for (const PartitionId q : engines_[p]->neighbours()) engines_[p]->emit_ghosts(q, ghosts[{p, q.value()}]);
@@ -59,7 +59,7 @@ class Swarm {
     for (std::int64_t k = 0; k < ticks; ++k) step();
   }
 
-  /// Poses of all robots; `listed_by` gets the partition of each. A robot that is listed twice or not at all is an error.
+  /// Poses of all robots; `listed_by` gets the partition of each. Throws if a robot is not listed exactly once.
   [[nodiscard]] std::vector<ScenePose> poses(std::vector<std::uint32_t>* listed_by = nullptr) const {
     std::vector<ScenePose> all(plan_.robots());
     std::vector<std::uint32_t> by(plan_.robots(), kNobody);
@@ -80,7 +80,7 @@ class Swarm {
     return all;
   }
 
-  /// Poses of all movable bodies; one that is listed twice or not at all is an error.
+  /// Poses of all movable bodies. Throws if one is not listed exactly once.
   [[nodiscard]] std::vector<ScenePose> movables() const {
     std::vector<ScenePose> all(plan_.movables());
     std::size_t found = 0;

@@ -1,4 +1,4 @@
-// Firmware files: what they hold, and what is refused.
+// Firmware files: the resulting flash image, and errors in files.
 #include "services/comm/firmware/flash_image.hpp"
 
 #include <gtest/gtest.h>

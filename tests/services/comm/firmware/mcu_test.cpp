@@ -21,7 +21,7 @@ Mcu make(const FlashImage& image, std::uint32_t robot = 5) {
   return Mcu(image, make_eeprom(robot, kDuties, kNominal), Random(1), robot);
 }
 
-/// The light of a message that starts at a cycle.
+/// The light pulses of a message that starts at a cycle.
 std::vector<Light> light(std::uint8_t type, OwnCycles at, std::int16_t high = 627, std::int16_t low = 464,
                          std::uint8_t first = 0) {
   IrMessage message{};
@@ -192,7 +192,7 @@ TEST(Mcu, StopsAtAFaultAndSaysWhere) {
                                   "static void loop(void) { __asm__ volatile(\".word 0x940b\"); }")));
   mcu.run(kSecond / 2, {});
   tell(mcu, kRun);
-  // What is no instruction, or a jump to nowhere, must not take anybody else along.
+  // An illegal instruction or a jump out of the flash affects this robot only.
   mcu.run(mcu.now() + kSecond, {});
   EXPECT_GE(mcu.now(), kSecond);
   Mcu wild = make(firmware(whole_program(
@@ -228,7 +228,7 @@ TEST(Mcu, TossesBitsWithTheNoiseOfItsConverter) {
                                   "static void loop(void) { set_motors(rand_hard(), 0); delay(1); }")));
   mcu.run(kSecond / 2, {});
   tell(mcu, kRun);
-  // Ones among 8 x 1000 bits: 4000 +- 45; 6 of those.
+  // Number of ones among 8 x 1000 bits: 4000 +- 45; the bound is 6 standard deviations.
   int ones = 0;
   std::vector<int> seen(256, 0);
   for (int i = 0; i < 1000; ++i) {
@@ -271,7 +271,7 @@ TEST(Mcu, StoresItsCalibration) {
   EXPECT_EQ(mcu.eeprom()[0x05], 99);
 }
 
-/// An image of these instructions, and erased flash behind them.
+/// An image of these instructions, followed by erased flash.
 FlashImage image_of(const std::vector<std::uint16_t>& words) {
   FlashImage image;
   image.flash.fill(0xff);
@@ -306,7 +306,7 @@ TEST(Mcu, EepromAddressesHaveTenBits) {
 }
 
 TEST(Mcu, NoProgramLeavesItsProcessor) {
-  // Instructions at random, and a real program with octets changed: each runs or stops its robot, and harms nobody else.
+  // Random instructions, and a real program with changed octets: each runs or stops its own robot and affects no other.
   std::mt19937 random(3);
   const FlashImage& real = talker();
   int halted = 0;
@@ -314,7 +314,7 @@ TEST(Mcu, NoProgramLeavesItsProcessor) {
     FlashImage image = real;
     if (n % 2 == 0) {
       for (std::uint8_t& octet : image.flash) octet = static_cast<std::uint8_t>(random());
-      // Half of all are of the groups that name addresses: loads, stores, jumps, calls, I/O.
+      // Half of all instructions have addresses: loads, stores, jumps, calls, I/O.
       for (std::size_t at = 1; at < image.flash.size(); at += 4)
         image.flash[at] = static_cast<std::uint8_t>(0x90 + random() % 0x30);
     } else {
@@ -324,7 +324,7 @@ TEST(Mcu, NoProgramLeavesItsProcessor) {
     for (int k = 0; k < 4; ++k) mcu.run(mcu.now() + 40'000, light(kRun, mcu.now() + 1000));
     halted += mcu.halt() != Halt::kNone ? 1 : 0;
     EXPECT_EQ(mcu.now() >= 160'000, true);
-    // What it has come to is as good as any state.
+    // Any resulting state must be valid for save and load.
     Mcu other = make(image);
     other.load(mcu.save());
     EXPECT_EQ(other.now(), mcu.now());

@@ -13,7 +13,7 @@
 
 namespace kilotwin::firmware {
 
-/// A program of which only this part is given.
+/// A complete program around the given part.
 inline std::string whole_program(const std::string& functions, const std::string& callbacks = {}) {
   return "#include <kilolib.h>\n#include <avr/io.h>\n" + functions + "\nint main(void) { kilo_init(); " +
          callbacks + " kilo_start(setup, loop); return 0; }\n";

@@ -1,4 +1,4 @@
-// Firmware robots among others: they act as robots with native programs do, and the same on any number of threads.
+// Firmware robots beside native ones: both behave alike, with the same result on any number of threads.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -32,7 +32,7 @@ class FirmwareRun : public testing::Test {
   int runs_ = 0;
 };
 
-/// Shows in its motors what it has sent and heard, and in its LED who spoke last.
+/// A program that shows the numbers of its sent and received messages in its motors, and the last sender in its LED.
 const std::string kTalker = whole_program(
     "static message_t hello; static uint8_t sent, heard;\n"
     "static message_t* send(void) { return &hello; }\n"
@@ -109,7 +109,7 @@ TEST_F(FirmwareRun, FailsAloneAndSaysSo) {
 }
 
 TEST_F(FirmwareRun, ReadsWhatANativeRobotReads) {
-  // The first duties that a robot shows tell what setup() has read where it stood, once no message was arriving.
+  // A robot's first duties show its reading in setup() at its start, while no message was arriving.
   const std::string reader = program(
       "reader.c",
       whole_program(
@@ -140,7 +140,7 @@ TEST_F(FirmwareRun, ReadsWhatANativeRobotReads) {
 }
 
 TEST_F(FirmwareRun, AnEmptyBatterySwitchesItOff) {
-  // Some 20 s of white light; then the charger, which gives more than an idle robot takes, brings it back, idle.
+  // After some 20 s of white light the battery is empty. A charger, which gives more than an idle robot draws, restarts the robot.
   const std::string lamp = program("lamp.c", whole_program("static void setup(void) { set_color(RGB(3, 3, 3)); }\n"
                                                            "static void loop(void) {}\n"));
   const auto dark_at = [&](const std::string& kind) {

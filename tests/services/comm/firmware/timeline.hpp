@@ -1,4 +1,4 @@
-/// What robots show over a run, so that runs of the same source, native and as firmware, can be compared.
+/// Changes of robots' outputs over a run, to compare runs of the same source as native program and as firmware.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace kilotwin::firmware {
 
-/// From this tick on a robot shows another duty of its motors, or another colour.
+/// A change of a robot's motor duties or LED colour, at its tick.
 struct Change {
   std::int64_t tick;
   std::uint32_t value;
@@ -32,7 +32,7 @@ class TimelineObserver : public RunObserver {
   }
   void state(Tick tick, const SwarmView& swarm, bool) override {
     for (std::uint32_t robot = 0; robot < swarm.robots(); ++robot) {
-      // A kick is shorter than a tick: whether its duties are those at a tick's end is by chance.
+      // A kick is shorter than a tick, so the duty at the tick's end may or may not include it.
       const bool kick = swarm.motor_left[robot] == 255 && swarm.motor_right[robot] == 255;
       if (!kick)
         note(timeline.motors[robot], tick, std::uint32_t{swarm.motor_left[robot]} << 8 | swarm.motor_right[robot]);
@@ -50,7 +50,7 @@ class TimelineObserver : public RunObserver {
   }
 };
 
-/// Runs an experiment locally. `folder`: for the experiment and its run.
+/// Runs an experiment locally. `folder`: directory for the experiment and its run.
 inline Timeline run_timeline(const std::string& experiment, const std::filesystem::path& folder,
                              std::uint32_t threads = 1, const std::vector<std::string>& set = {}) {
   std::filesystem::create_directories(folder);
@@ -72,7 +72,7 @@ inline Timeline run_timeline(const std::string& experiment, const std::filesyste
   return observer.timeline;
 }
 
-/// How many changes two histories have, and how many of them are the same, in the same order, within a tick.
+/// Number of changes in two histories, and number of changes that agree in order within a tick.
 struct Agreement {
   std::size_t first = 0, second = 0, same = 0;
   [[nodiscard]] bool whole() const { return same == first && same == second; }
@@ -84,7 +84,7 @@ struct Agreement {
   }
 };
 
-/// Changes in the last tick are left out: the other's may come one later.
+/// Omits changes in the last tick: the other history may have them one tick later.
 inline Agreement agreement(const std::vector<Change>& first, const std::vector<Change>& second, std::int64_t end) {
   const auto length = [end](const std::vector<Change>& changes) {
     std::size_t n = changes.size();
