@@ -82,7 +82,7 @@ TEST(Export, WantedTimesTakeTheFirstStateAtOrAfter) {
   EXPECT_EQ(times_of(scratch / "t.csv"), (std::vector<std::string>{"0", "2.031616", "4.030464"}));
 }
 
-TEST(Export, EveryTickRecordedServesAnyInterval) {
+TEST(Export, RecordingsOfEveryTickServeAnyInterval) {
   const Scratch scratch;
   write_synthetic(scratch / "r.ktrec", synthetic_header(1, 0.032768), 100);
   Reader reader(scratch / "r.ktrec");
@@ -94,7 +94,7 @@ TEST(Export, EveryTickRecordedServesAnyInterval) {
   EXPECT_EQ(export_trajectories(reader, scratch / "t.csv", 0.01), 101u);
 }
 
-TEST(Export, OtherIntervalsAreRefusedWithWhatWasRecorded) {
+TEST(Export, OtherIntervalsAreRefusedWithTheRecordedOne) {
   const Scratch scratch;
   write_synthetic(scratch / "r.ktrec", synthetic_header(1, 2), 200);
   for (const double every : {1.0, 3.0, 2.5, 0.1}) {
@@ -114,7 +114,7 @@ TEST(Export, OtherIntervalsAreRefusedWithWhatWasRecorded) {
   EXPECT_THROW(export_trajectories(reader, scratch / "t.csv", std::nan("")), UserError);
 }
 
-TEST(Export, AResumedRunKeepsTheTimesOfTheWhole) {
+TEST(Export, AResumedRunKeepsTheTimesOfTheWholeRun) {
   const Scratch scratch;
   proto::RecordingHeader header = synthetic_header(1);
   header.set_first_tick(40);
@@ -151,7 +151,7 @@ TEST(Export, MessagesByReceiverAndSender) {
             "receiver,sender,count,sent_if_receiver_is_sender\n0,0,9,1\n0,1,4,0\n1,0,7,0\n");
 }
 
-TEST(Export, LaterCountsOfAPairTakeThePlaceOfEarlier) {
+TEST(Export, LaterCountsOfAPairReplaceEarlierOnes) {
   const Scratch scratch;
   {
     Writer writer(scratch / "r.ktrec", synthetic_header(3));
@@ -169,7 +169,7 @@ TEST(Export, LaterCountsOfAPairTakeThePlaceOfEarlier) {
   EXPECT_EQ(content(scratch / "m.csv"), "receiver,sender,count,sent_if_receiver_is_sender\n0,1,8,0\n0,2,6,0\n");
 }
 
-TEST(Export, MessagesThatWereNotRecordedAreAskedFor) {
+TEST(Export, MissingMessageCountsAreAnErrorWithItsRemedy) {
   const Scratch scratch;
   proto::RecordingHeader header = synthetic_header(2);
   header.set_messages(false);

@@ -46,7 +46,7 @@ TEST(Observables, PolarisationIsOneForACommonDirectionAndZeroForNone) {
   EXPECT_NEAR(observer.curves().of(Observable::kPolarisation)[1], 0, 1e-12);
 }
 
-TEST(Observables, PushedIsTheWayOfMovableBodies) {
+TEST(Observables, PushedIsTheDisplacementOfMovableBodies) {
   const std::vector<double> robot{0};
   ObservableObserver with, without;
   with.add(0, robot, robot, robot, std::array{1.0, 5.0}, std::array{2.0, 5.0});
@@ -57,7 +57,7 @@ TEST(Observables, PushedIsTheWayOfMovableBodies) {
   EXPECT_TRUE(std::isnan(without.curves().of(Observable::kPushed)[0]));
 }
 
-TEST(Observables, ALoneRobotHasNoNearest) {
+TEST(Observables, NearestIsUndefinedForASingleRobot) {
   EXPECT_TRUE(std::isnan(mean_nearest_distance_mm(std::array{1.0}, std::array{2.0})));
 }
 

@@ -34,7 +34,7 @@ std::size_t discs(const Xml& xml, const std::string& colour) {
   return count;
 }
 
-TEST(Picture, ShowsWhatThePersonMustKnow) {
+TEST(Picture, ShowsTitleTimesLegendAndScale) {
   const Scratch scratch;
   const Xml xml(picture_of(scratch, synthetic_header(40), 300));
   ASSERT_FALSE(xml.elements().empty());
@@ -156,7 +156,7 @@ TEST(Picture, ShowsMovableBodiesWholeWhereItEnlarges) {
   EXPECT_EQ(frames, 1);
 }
 
-TEST(Picture, OddRunsAreDrawnToo) {
+TEST(Picture, DegenerateRunsAreDrawn) {
   const Scratch scratch;
   proto::RecordingHeader header = synthetic_header(1);
   header.set_name("<a & \"b\">\x01\xff \xc3\xa9");
@@ -178,7 +178,7 @@ TEST(ScaleBar, StepsAreRound) {
   EXPECT_DOUBLE_EQ(round_step(6e6, 6), 1e6);
 }
 
-TEST(Picture, WithoutAStateThereIsNone) {
+TEST(Picture, NeedsAState) {
   const Scratch scratch;
   Writer(scratch / "r.ktrec", synthetic_header(1)).end(Tick{0}, 0);
   Reader reader(scratch / "r.ktrec");

@@ -42,7 +42,7 @@ std::vector<std::size_t> frame_ends(const std::string& bytes) {
   return ends;
 }
 
-TEST(Recording, ComesBackAsItWasWritten) {
+TEST(Recording, ReadsBackWhatWasWritten) {
   const Scratch scratch;
   const auto header = synthetic_header(7);
   write_synthetic(scratch / "r.ktrec", header, 100);
@@ -208,7 +208,7 @@ void use_in_every_way(const std::filesystem::path& file, const Scratch& scratch)
   }
 }
 
-TEST(Recording, FuzzedFilesEndInDataOrOneLine) {
+TEST(Recording, FuzzedFilesGiveDataOrOneErrorLine) {
   const Scratch scratch;
   write_synthetic(scratch / "r.ktrec", synthetic_header(5), 95);
   const std::string bytes = content(scratch / "r.ktrec");
@@ -280,7 +280,7 @@ TEST(Recording, WrongStatesUnderARightChecksumAreRefused) {
   EXPECT_NE(warning_with(messages).find("robots that do not exist"), std::string::npos);
 }
 
-TEST(Recording, RecordsOfUnknownKindsArePassedOver) {
+TEST(Recording, RecordsOfUnknownKindsAreSkipped) {
   const Scratch scratch;
   write_synthetic(scratch / "r.ktrec", synthetic_header(2), 10);
   const std::string bytes = content(scratch / "r.ktrec");
@@ -296,7 +296,7 @@ TEST(Recording, RecordsOfUnknownKindsArePassedOver) {
   EXPECT_TRUE(reader.ended());
 }
 
-TEST(Recording, OtherFilesAreToldInOneLine) {
+TEST(Recording, OtherFilesAreRefusedInOneLine) {
   const Scratch scratch;
   const auto file = scratch / "f";
   EXPECT_EQ(error_of(file),
@@ -379,7 +379,7 @@ template <class Work> int in_child(Work work) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 
-TEST(Writer, WhatIsOlderThanASecondOutlivesAKilledProcess) {
+TEST(Writer, RecordsOlderThanASecondSurviveAKilledProcess) {
   const Scratch scratch;
   const auto file = scratch / "r.ktrec";
   const int status = in_child([&] {
@@ -398,7 +398,7 @@ TEST(Writer, WhatIsOlderThanASecondOutlivesAKilledProcess) {
   EXPECT_GE(hashes, 50);  // of the first half second at least, of 1.5 s in all
 }
 
-TEST(Writer, WhatExceeds256KiBOutlivesAKilledProcess) {
+TEST(Writer, RecordsBeyond256KiBSurviveAKilledProcess) {
   const Scratch scratch;
   const auto file = scratch / "r.ktrec";
   constexpr std::uint32_t kRobots = 1000;
@@ -415,7 +415,7 @@ TEST(Writer, WhatExceeds256KiBOutlivesAKilledProcess) {
   EXPECT_GE(states, kStates - 256 * 1024 / (26 * kRobots) - 1);
 }
 
-TEST(Writer, TellsWhenTheDiskIsFullAndGoesOnWhenThereIsRoomAgain) {
+TEST(Writer, ReportsAFullDiskAndContinuesWhenThereIsSpace) {
   const Scratch scratch;
   const auto file = scratch / "r.ktrec";
   // A limit on the size of files stands for a full disk: a write is cut short, then fails.

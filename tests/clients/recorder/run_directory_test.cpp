@@ -32,7 +32,7 @@ TEST(RunDirectory, NamesItsFiles) {
   EXPECT_EQ(RunDirectory::default_path("disperse", 3), "runs/disperse-3");
 }
 
-TEST(RunDirectory, NeverTakesWhatIsThere) {
+TEST(RunDirectory, NeverUsesAnExistingRun) {
   const Scratch scratch;
   EXPECT_EQ(RunDirectory::create(scratch / "run").path(), scratch / "run");
   EXPECT_EQ(RunDirectory::create(scratch / "run/").path(), scratch / "run-2");
@@ -132,7 +132,7 @@ TEST(RunDirectory, OpensByDirectoryAndByRecording) {
             scratch / "run/kept.ktrec");
 }
 
-TEST(RunDirectory, TellsWhatItExpected) {
+TEST(RunDirectory, ErrorsNameTheExpectedFile) {
   const Scratch scratch;
   const auto error_of = [](const fs::path& run, RunDirectory::Needs needs) -> std::string {
     try {

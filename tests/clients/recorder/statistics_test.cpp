@@ -22,7 +22,7 @@ TEST(Sample, MeanAndStandardError) {
   EXPECT_DOUBLE_EQ(sample.standard_error(), std::sqrt(20.0 / 3) / 2);
 }
 
-TEST(Sample, DoesNotCancel) {
+TEST(Sample, HasNoCancellation) {
   Sample sample;
   for (const double value : {1e9 + 4, 1e9 + 7, 1e9 + 13, 1e9 + 16}) sample.add(value);
   EXPECT_DOUBLE_EQ(sample.standard_deviation() * sample.standard_deviation(), 30);

@@ -75,7 +75,7 @@ TEST(Summary, HasTheFieldsOfTheContract) {
   EXPECT_EQ(json.size(), 28u);
 }
 
-TEST(Summary, ComesBackAsItWasWritten) {
+TEST(Summary, ReadsBackWhatWasWritten) {
   const Scratch scratch;
   write_summary(example(), scratch / "a.json");
   write_summary(read_summary(scratch / "a.json"), scratch / "b.json");
@@ -85,7 +85,7 @@ TEST(Summary, ComesBackAsItWasWritten) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 2);
 }
 
-TEST(Summary, RefusesWhatIsNone) {
+TEST(Summary, RefusesOtherFiles) {
   const Scratch scratch;
   const auto refused = [&](const std::string& text) {
     put_content(scratch / "s.json", text);
@@ -121,7 +121,7 @@ TEST(Summary, RunsWithoutTimeHaveNoInfinities) {
   EXPECT_EQ(nlohmann::json::parse(content(scratch / "s.json"))["realtime_factor"], 0.0);
 }
 
-TEST(Summary, TellsPeopleWhatHappenedInFewLines) {
+TEST(Summary, TextSummarisesTheRunInFewLines) {
   Summary s = example();
   for (const bool local : {false, true}) {
     if (local) s.mode = "local";

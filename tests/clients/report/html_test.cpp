@@ -26,7 +26,7 @@ TEST(Html, APageHoldsTitleStyleAndBody) {
   EXPECT_NE(whole.find("@media print"), std::string::npos);
 }
 
-TEST(Html, TemplatesEscapeWhatIsNoMarkup) {
+TEST(Html, TemplatesEscapeText) {
   Data data{Data::type::object};
   data.set("name", "<i>\x01\xff&\"");
   EXPECT_EQ(rendered("{{name}} {{{name}}}", data), "&lt;i&gt;??&amp;&quot; <i>\x01\xff&\"");

@@ -41,7 +41,7 @@ TEST(Plot, HasTitlesUnitsTicksBarsAndLegend) {
             8);
 }
 
-TEST(Plot, OddDataAreDrawnToo) {
+TEST(Plot, DegenerateDataAreDrawn) {
   const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
   const std::vector<std::pair<std::vector<double>, std::vector<double>>> cases{{{}, {}},
                                                                                {{1}, {5}},

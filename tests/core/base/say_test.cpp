@@ -6,14 +6,14 @@
 namespace kilotwin {
 namespace {
 
-TEST(Say, TheTextOfAnErrorIsReadFromALog) {
+TEST(Say, ErrorTextIsReadFromALog) {
   EXPECT_EQ(error_text("[2026-11-22T21:30:12.123Z] [physics 0,0] [error] the disk is full"), "the disk is full");
   EXPECT_EQ(error_text("[2026-11-22T21:30:12.123Z] [physics 0,0] [info] starts"), "");
   EXPECT_EQ(error_text("the disk is full"), "the disk is full");
   EXPECT_EQ(error_text("[0] is no stamp"), "[0] is no stamp");
 }
 
-TEST(Say, LinesAreBareUntilTheProcessBecomesAService) {
+TEST(Say, LinesArePlainUntilLogAs) {
   testing::internal::CaptureStderr();
   say("kilotwin: interrupted");
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "kilotwin: interrupted\n");

@@ -79,7 +79,7 @@ TEST(StateHash, ChainAvalanche) {
   EXPECT_LT(worst_avalanche(128, of), 6);
 }
 
-TEST(StateHash, ChainNeverLosesADifference) {
+TEST(StateHash, ChainPreservesDifferences) {
   // A bijection of either argument: 2^16 neighbouring values stay apart, whatever the other one is.
   std::mt19937_64 random(4);
   for (const std::uint64_t fixed : {std::uint64_t{0}, ~std::uint64_t{0}, random(), random()}) {
@@ -93,7 +93,7 @@ TEST(StateHash, ChainNeverLosesADifference) {
   }
 }
 
-TEST(StateHash, NoWordWipesOutWhatCameBefore) {
+TEST(StateHash, NoWordErasesEarlierWords) {
   // A product with zero would: for every state some word leads to it. Words that are near the id, or the id itself, are
   // the ones most likely to do so.
   EXPECT_NE(entity_hash(HashDomain::kBody, 5, {5, 1}), entity_hash(HashDomain::kRadio, 5, {5, 1}));
@@ -108,7 +108,7 @@ TEST(StateHash, NoWordWipesOutWhatCameBefore) {
   EXPECT_EQ(seen.size(), 256u * 64 * 16);
 }
 
-TEST(StateHash, OrderNumberAndPlaceOfWordsCount) {
+TEST(StateHash, OrderNumberAndPositionOfWordsMatter) {
   std::set<std::uint64_t> seen;
   std::size_t cases = 0;
   const auto add = [&](std::uint64_t h) {
@@ -148,7 +148,7 @@ TEST(StateHash, MinusZeroIsZero) {
   EXPECT_EQ(hash_bits(std::numeric_limits<double>::denorm_min()), 1u);
 }
 
-TEST(StateHash, BytesCountOneByOne) {
+TEST(StateHash, EveryOctetMatters) {
   std::set<std::uint64_t> seen;
   std::string bytes;
   for (int i = 0; i < 40; ++i) {

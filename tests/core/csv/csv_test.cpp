@@ -98,7 +98,7 @@ TEST(CsvReader, ErrorsNameFileLineAndColumn) {
   }
 }
 
-TEST(CsvReader, NamesMissingColumnsAndWhatIsThere) {
+TEST(CsvReader, NamesMissingAndExistingColumns) {
   const CsvReader reader("t.csv", "x,y\n1,2\n");
   try {
     reader.require({"run", "x", "time_s"}, "run,time_s,x");
@@ -160,7 +160,7 @@ std::string random_cell(std::mt19937_64& random) {
   return cell;
 }
 
-TEST(Csv, WhatIsWrittenIsReadAgainWhateverTheCellsHold) {
+TEST(Csv, ReadsBackAnyCellsThatWereWritten) {
   const Folder folder;
   std::mt19937_64 random(1);
   for (int round = 0; round < 400; ++round) {
@@ -188,7 +188,7 @@ TEST(Csv, WhatIsWrittenIsReadAgainWhateverTheCellsHold) {
   }
 }
 
-TEST(Csv, LineEndsAndMarksMakeNoDifference) {
+TEST(Csv, LineEndsAndByteOrderMarkDoNotMatter) {
   std::mt19937_64 random(2);
   for (int round = 0; round < 300; ++round) {
     std::string plain = "a,b\n";
@@ -200,7 +200,7 @@ TEST(Csv, LineEndsAndMarksMakeNoDifference) {
   }
 }
 
-TEST(Csv, AnyBytesEndInRowsOrOneLine) {
+TEST(Csv, AnyOctetsGiveRowsOrOneErrorLine) {
   std::mt19937_64 random(3);
   constexpr std::string_view kLikely = ",\"\n\r\t a1.\xef\x1f\x8b";
   for (int round = 0; round < 10'000; ++round) {
@@ -237,7 +237,7 @@ TEST(Csv, GzippedTablesAreReadAndDamagedOnesRefused) {
   EXPECT_NE(error_of(damaged).find("the gzip stream is damaged"), std::string::npos) << error_of(damaged);
 }
 
-TEST(CsvWriter, TellsWhatCannotBeWritten) {
+TEST(CsvWriter, ErrorsNameTheFileAndTheReason) {
   const Folder folder;
   try {
     const CsvWriter writer(folder / "none/t.csv", "a");

@@ -49,7 +49,7 @@ PublicRunStatus status_of(std::uint64_t run) {
   return status;
 }
 
-TEST(Dds, KeepsMetricsUntilTheyAreReadAndTheLastOfThem) {
+TEST(Dds, KeepsUnreadMetricsAndTheLastSample) {
   const DomainClaim claim = DomainClaim::any();
   const Participant participant({claim.domain(), {}});
   Writer<WireMetrics> writer(participant, topics::metrics());
@@ -76,7 +76,7 @@ TEST(Dds, KeepsMetricsUntilTheyAreReadAndTheLastOfThem) {
   EXPECT_EQ(late.values(), std::vector<std::int64_t>{kSamples - 1});
 }
 
-TEST(Dds, SaysThatADomainIsFull) {
+TEST(Dds, ReportsAFullDomain) {
   const DomainClaim claim = DomainClaim::any();
   EXPECT_FALSE(domain_is_full(claim.domain()));
   std::vector<int> sockets;
@@ -97,7 +97,7 @@ TEST(Dds, SaysThatADomainIsFull) {
   const Participant participant({claim.domain(), {}});
 }
 
-TEST(Dds, CarriesSamplesToALateReader) {
+TEST(Dds, DeliversSamplesToALateReader) {
   const DomainClaim claim = DomainClaim::any();
   const Participant participant({claim.domain(), {}});
   Writer<PublicRunStatus> writer(participant, topics::run_status());
@@ -135,7 +135,7 @@ TEST(Dds, RoutesByPartition) {
   EXPECT_EQ(second.values(), std::vector<std::uint64_t>{2});
 }
 
-TEST(Dds, TellsThatAProcessThatEndsIsGone) {
+TEST(Dds, ReportsTheEndOfAProcess) {
   const DomainClaim claim = DomainClaim::any();
   int stay[2];
   ASSERT_EQ(pipe(stay), 0);

@@ -44,7 +44,7 @@ TEST(EffectFunction, SimpleShapesAreTheirFormulas) {
   }
 }
 
-TEST(EffectFunction, StepsHoldFromTheirPlaceOn) {
+TEST(EffectFunction, StepsHoldFromTheirKnotOn) {
   const EffectFunction steps = function("steps { at: [10, 20] value: [1, 5, -2] }");
   EXPECT_EQ(steps(-1e9), 1);
   EXPECT_EQ(steps(9.999), 1);
@@ -81,7 +81,7 @@ TEST(EffectFunction, SplinesPassThroughTheirPointsAndStayAtTheirEnds) {
   EXPECT_NEAR(bend(9 - 2 * h), 0, 1e-2);
 }
 
-TEST(EffectFunction, ASplineOfALineIsTheLineAndOneOfASineComesNearIt) {
+TEST(EffectFunction, SplinesReproduceALineAndApproximateASine) {
   std::vector<double> knots, lines, sines;
   for (int i = 0; i <= 40; ++i) {
     knots.push_back(i * 0.2 + 0.05 * std::sin(i));
@@ -111,7 +111,7 @@ TEST(EffectFunction, ASplineInTwoVariablesOfAProductIsTheProductOfSplines) {
   }
 }
 
-TEST(EffectFunction, TheColumnFormMultipliesTheSameNumbers) {
+TEST(EffectFunction, MultiplyAgreesWithTheScalarForm) {
   for (const char* const text : {"constant: 3", "linear { slope: 2 }", "spline { knot: [0, 1] value: [2, 4] }",
                                  "steps { at: 0.5 value: [1, 2] }", "harmonic { sine: 1 }",
                                  "table { key: 0 value: 9 }", "exponential { at_zero: 1 scale: 2 }"}) {
@@ -141,7 +141,7 @@ TEST(EffectFunction, ValuesAreFiniteWhateverTheCovariate) {
   }
 }
 
-TEST(EffectFunction, TheLargestValueIsNotFarBelowAnyOther) {
+TEST(EffectFunction, LargestBoundsTheFunction) {
   const struct {
     EffectFunction f;
     Range range;

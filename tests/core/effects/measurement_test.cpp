@@ -36,7 +36,7 @@ MeasuredPoses seen(const RunPlan& plan, const std::vector<ScenePose>& poses, Tic
   return measured;
 }
 
-TEST(Measurement, NoneWithoutEffectsOnIt) {
+TEST(Measurement, IsEmptyWithoutEffects) {
   EXPECT_FALSE(
       Measurement(make_plan("effect { name: 'a' acts_on: TURN_RATE function { constant: 1 } }", kTwo)).any());
 }
@@ -60,7 +60,7 @@ TEST(Measurement, OffsetsScaleAndHeadingCompose) {
   }
 }
 
-TEST(Measurement, NoiseIsThatOfEachPosition) {
+TEST(Measurement, NoiseIsIndependentPerPosition) {
   const auto crowd = testing::grid_crowd(5000, 50, testing::Facing::kRight);
   const std::string text =
       "effect { name: 'x' acts_on: MEASURED_OFFSET function { noise { sd: 0.7 } } } "
@@ -85,7 +85,7 @@ TEST(Measurement, NoiseIsThatOfEachPosition) {
   }
 }
 
-TEST(Measurement, LooksAtCommandsAndSparesRealRobots) {
+TEST(Measurement, DependsOnCommandsAndExcludesRealRobots) {
   const RunPlan plan = make_plan(
       "robots { count: 1 } robots { count: 1 body: TRACKED } "
       "effect { name: 'a' acts_on: MEASURED_OFFSET during: LEFT function { constant: 3 } }",

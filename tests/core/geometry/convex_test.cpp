@@ -32,7 +32,7 @@ TEST(Convex, PolygonIsAboutItsCentroidEitherWayRound) {
   EXPECT_NEAR(y, 0, 1e-12);
 }
 
-TEST(Convex, RefusesWhatIsNoConvexPolygon) {
+TEST(Convex, RefusesPolygonsThatAreNotConvex) {
   EXPECT_THROW(static_cast<void>(Convex::polygon({{0, 0}, {1, 0}})), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(Convex::polygon({{0, 0}, {1, 0}, {2, 0}})), std::invalid_argument);
   EXPECT_THROW(static_cast<void>(Convex::polygon({{0, 0}, {4, 0}, {1, 1}, {0, 4}})), std::invalid_argument);
@@ -42,7 +42,7 @@ TEST(Convex, RefusesWhatIsNoConvexPolygon) {
   EXPECT_THROW(static_cast<void>(Convex::polygon(star)), std::invalid_argument);
 }
 
-TEST(Convex, NearestIsWhatSamplingTheRimFinds) {
+TEST(Convex, NearestAgreesWithSamplingTheRim) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> at(-90, 90);
   for (const Convex& shape :
@@ -79,7 +79,7 @@ TEST(Convex, NearestIsWhatSamplingTheRimFinds) {
   }
 }
 
-TEST(Convex, SeparationTellsTouchingFromOverlap) {
+TEST(Convex, SeparationDistinguishesContactFromOverlap) {
   const Convex box = Convex::box(100, 100), disc = Convex::disc(20);
   EXPECT_NEAR(separation_mm(box, Place::at(0, 0, 0), box, Place::at(101, 30, 0)), 1, 1e-12);
   EXPECT_NEAR(separation_mm(box, Place::at(0, 0, 0), box, Place::at(99, 30, 0)), -1, 1e-12);

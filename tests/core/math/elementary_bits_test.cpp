@@ -47,7 +47,7 @@ std::uint64_t hash_of(double (*f)(double, double)) {
   return state.finish();
 }
 
-TEST(Bits, AreThoseOfEveryCompiler) {
+TEST(Bits, AreTheSameForEveryCompiler) {
   EXPECT_EQ(hash_of(kt_sin), 0x12ef8dc8d712391cu);
   EXPECT_EQ(hash_of(kt_cos), 0xcd5b017bfeae48f1u);
   EXPECT_EQ(hash_of(kt_tan), 0x0228b4d3c5ca626bu);

@@ -21,7 +21,7 @@ std::uint64_t bits(double x) { return std::bit_cast<std::uint64_t>(x); }
 /// Equal to the bit: zeros by their sign, and any NaN is the one positive quiet NaN.
 #define EXPECT_BITS(value, expected) EXPECT_EQ(bits(value), bits(expected)) << #value " is " << (value)
 
-TEST(Special, OneNanForAll) {
+TEST(Special, AllNansAreThePositiveQuietOne) {
   const double other = std::bit_cast<double>(std::uint64_t{0xfff8000000001234u});
   for (const double x : {kNan, -kNan, other}) {
     double s = 0, c = 0;
@@ -84,7 +84,7 @@ TEST(Special, Circle) {
   EXPECT_EQ(kt_atan(-kInf), -M_PI / 2);
 }
 
-TEST(Special, SineAndCosineOfAPairAreThoseAlone) {
+TEST(Special, SincosAgreesWithSineAndCosine) {
   for (double x = -40; x < 40; x += 0.0371) {
     double s = 0, c = 0;
     kt_sincos(x, &s, &c);

@@ -28,7 +28,7 @@ TEST(Philox, KnownAnswers) {  // Salmon et al., Random123 1.14, kat_vectors.
             (Block{0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}));
 }
 
-TEST(Random, EveryPartOfThePlaceReachesTheCounter) {
+TEST(Random, EveryCoordinateReachesTheCounter) {
   // For one key Philox is a bijection of the counter: places whose blocks all differ have counters that all differ.
   const Random random(42);
   std::vector<std::tuple<Stream, std::uint32_t, std::int64_t, std::uint32_t>> places{{Stream::kWheelBias, 0, 0, 0}};
@@ -164,7 +164,7 @@ TEST(Random, NormalIsNormal) {
   EXPECT_LT(kolmogorov_smirnov(values, [](double v) { return std::erfc(-v / std::sqrt(2.0)) / 2; }), 2.2);
 }
 
-TEST(Random, PlacesAreIndependent) {
+TEST(Random, DrawsAreIndependentAcrossCoordinates) {
   // The same places but for one coordinate: uncorrelated, in value and in distance from the middle.
   const Random random(3), other_seed(4);
   const auto draw = [&](Stream stream, auto e, Tick t, auto i) { return random.uniform(stream, e, t, i); };

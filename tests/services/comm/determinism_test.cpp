@@ -84,7 +84,7 @@ void stir(testing::FakeHosts& hosts, Tick now) {
   }
 }
 
-TEST(Determinism, PartitionsAndHostsChangeNothing) {
+TEST(Determinism, ResultsDoNotDependOnPartitionsAndHosts) {
   const std::string experiment = "radio { range_mm: 120 loss: 0.1 oscillator_sd: 0.02 } ";
   const RunPlan one = crowd_plan(experiment);
   Swarm whole(one);
@@ -110,7 +110,7 @@ TEST(Determinism, PartitionsAndHostsChangeNothing) {
 
 /// The chain of hashes is the same for every compiler, optimisation level and machine. It changes only with the model of the
 /// channel.
-TEST(Determinism, HasItsGoldenHash) {
+TEST(Determinism, MatchesTheGoldenHash) {
   const RunPlan plan = crowd_plan("radio { range_mm: 120 loss: 0.1 oscillator_sd: 0.02 } ");
   Swarm swarm(plan);
   std::uint64_t chain = 0;
@@ -124,7 +124,7 @@ TEST(Determinism, HasItsGoldenHash) {
   EXPECT_EQ(chain, 0x7ec06c30bb2bfe06u);
 }
 
-TEST(Determinism, LoadedEngineGoesOnAsTheSavedOne) {
+TEST(Determinism, LoadedEngineContinuesLikeTheSavedOne) {
   for (const char* cycles : {"262144", "32768", "100003", "1048576"}) {
     const RunPlan plan = crowd_plan("tick_cycles: " + std::string(cycles) + " radio { range_mm: 120 loss: 0.05 } ");
     Swarm swarm(plan);
@@ -175,7 +175,7 @@ TEST(Determinism, RejectsAnotherExperimentsState) {
   EXPECT_THROW(engine.load(Tick{0}, {}), RunError);
 }
 
-TEST(Determinism, SeedAndInputsShowInTheHash) {
+TEST(Determinism, HashDependsOnSeedAndInputs) {
   const RunPlan plan = crowd_plan("seed: 1"), other = crowd_plan("seed: 2");
   EXPECT_NE(RadioEngine(plan).hash_part(), RadioEngine(other).hash_part());
   Swarm a(plan), b(plan);
@@ -190,7 +190,7 @@ TEST(Determinism, SeedAndInputsShowInTheHash) {
 }
 
 /// Random life cycles, periods, messages and tick lengths: frames stay well-formed, and every message is accounted for.
-TEST(Fuzz, TheBooksBalance) {
+TEST(Fuzz, CountsAreConsistent) {
   for (std::uint32_t round = 0; round < 12; ++round) {
     const std::uint32_t cycles[] = {262144, 32768, 1048576, 200001};
     const RunPlan plan =

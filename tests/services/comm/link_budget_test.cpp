@@ -40,7 +40,7 @@ struct Air {
   Neighbourhood robots;
 };
 
-TEST(LinkBudget, FallsWithTheDistance) {
+TEST(LinkBudget, MarginDecreasesWithDistance) {
   const RunPlan plan = make_plan(radio(kNominal), {{0, 0, 0}, {60, 80, 0}, {0, -40, 0}});
   Air air(plan);
   EXPECT_NEAR(air.margin(0, 1), 0, 1e-12);
@@ -49,7 +49,7 @@ TEST(LinkBudget, FallsWithTheDistance) {
   EXPECT_DOUBLE_EQ(air.links.reach_mm(), 100);
 }
 
-TEST(LinkBudget, KnowsSingleRobotsAndPairs) {
+TEST(LinkBudget, AppliesParametersOfRobotsAndPairs) {
   const RunPlan plan =
       make_plan(radio(kNominal +
                       "robot { robot: 0 power_db: 1.5 sensitivity_db: -2 } robot { robot: 1 power_db: -1 } "
@@ -61,7 +61,7 @@ TEST(LinkBudget, KnowsSingleRobotsAndPairs) {
 }
 
 /// A sender that is 2 dB stronger ahead than aside, turned by 30 degrees; receivers in all directions.
-TEST(LinkBudget, DependsOnTheBearing) {
+TEST(LinkBudget, MarginDependsOnTheBearing) {
   const double turn = 3.14159265358979 / 6;
   std::vector<ScenePose> poses{{0, 0, turn}};
   for (int k = 0; k < 12; ++k) poses.push_back({50 * std::cos(k * turn), 50 * std::sin(k * turn), 1.0 * k});
@@ -75,7 +75,7 @@ TEST(LinkBudget, DependsOnTheBearing) {
   }
 }
 
-TEST(LinkBudget, LosesWhatBodiesOnTheLineTake) {
+TEST(LinkBudget, BodiesOnTheLineReduceTheMargin) {
   // Positions: on the line; half a radius beside it; more than a radius beside it; beyond the receiver.
   const RunPlan plan = make_plan(radio(kNominal + "body_loss_db: 2"),
                                  {{0, 0, 0}, {160, 0, 0}, {40, 0, 0}, {80, 8.25, 0}, {120, -17, 0}, {200, 0, 0}});
@@ -88,7 +88,7 @@ TEST(LinkBudget, LosesWhatBodiesOnTheLineTake) {
 }
 
 /// A column of discs here and elsewhere in the plane, where the cells of the grid lie otherwise.
-TEST(LinkBudget, ShadowsDoNotDependOnThePlace) {
+TEST(LinkBudget, ShadowsDoNotDependOnThePosition) {
   for (const double x : {0.0, 77.3, -901.4}) {
     std::vector<ScenePose> poses;
     for (int i = 0; i < 6; ++i) poses.push_back({x + 33.5 * i, x / 2, 0});
@@ -131,7 +131,7 @@ TEST(LinkBudget, HearsWhereTheMarginIsAboveZero) {
 
 /// The spread over robots and pairs is as the model states. The margin of a pair at 50 mm is 5 + power + sensitivity + both
 /// bearings + link. 2000 disjoint, hence independent, pairs; bounds of 4.5 standard errors.
-TEST(LinkBudget, SpreadsAsStated) {
+TEST(LinkBudget, SpreadsMatchTheModel) {
   constexpr std::uint32_t kPairs = 2000;
   std::vector<ScenePose> poses;
   for (std::uint32_t i = 0; i < kPairs; ++i) {
@@ -157,7 +157,7 @@ TEST(LinkBudget, SpreadsAsStated) {
 
 /// At a margin of 0, half of the packets are received; at one standard deviation above it, 84 %. One receiver per sender, 400
 /// isolated senders, 25 packets each.
-TEST(LinkBudget, PacketsFadeOneByOne) {
+TEST(LinkBudget, PacketsFadeIndependently) {
   for (const auto& [distance, share] : {std::pair{100.0, 0.5}, std::pair{90.0, 0.8413}}) {
     std::vector<ScenePose> poses;
     for (int i = 0; i < 400; ++i) {
@@ -194,7 +194,7 @@ TEST(LinkBudget, LinksMayBeOneWay) {
 
 /// A - B - C in a row; A and C are hidden from each other, and A is 30 mm closer to B. Without capture they destroy each
 /// other's packets. With a capture threshold of 2 dB, B receives A's packets and not C's.
-TEST(LinkBudget, TheStrongerIsCaptured) {
+TEST(LinkBudget, CapturesTheStrongerPacket) {
   const auto collided_of = [](const std::string& capture) {
     std::vector<ScenePose> poses;
     for (int i = 0; i < 300; ++i) {

@@ -16,7 +16,7 @@ namespace {
 
 using testing::make_plan;
 
-TEST(LinkTable, RemembersWhatWouldBeComputed) {
+TEST(LinkTable, CacheAgreesWithComputation) {
   constexpr std::uint32_t kRobots = 120;
   const RunPlan plan = make_plan(
       "radio { model: PROPAGATION range_mm: 100 propagation { body_loss_db: 0.7 notice_db: 1 run_sd_db: 0.5 "
@@ -66,7 +66,7 @@ TEST(LinkTable, RemembersWhatWouldBeComputed) {
 }
 
 /// A and C miss each other's reception threshold by 1.39 dB. B, between them, hears both.
-TEST(Notice, KeepsFromSendingAtTheSameTime) {
+TEST(Notice, PreventsSimultaneousSending) {
   std::vector<testing::ScenePose> poses;
   for (int i = 0; i < 200; ++i) {
     for (const double x : {-80.0, 0.0, 80.0}) poses.push_back({2000.0 * (i % 20) + x, 2000.0 * (i / 20), 0});
@@ -104,7 +104,7 @@ TEST(Notice, ClocksRunFromPowerOn) {
 
 /// Real receivers' largest distance estimates in a static group are 110..113 mm (data/radio-log): farther robots are not
 /// received. Beyond their tables, estimates continue with the slope of the last step.
-TEST(CutOff, IsNearThoseOfRealListeners) {
+TEST(CutOff, IsCloseToThatOfRealReceivers) {
   constexpr std::uint32_t kListeners = 1000;
   const RunPlan plan = make_plan("radio { model: PROPAGATION propagation { sensitivity_sd_db: 0.5 } }",
                                  testing::grid_crowd(kListeners, 300, testing::Facing::kRight));

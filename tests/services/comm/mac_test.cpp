@@ -71,7 +71,7 @@ TEST(Mac, PacketTakesItsAirTime) {
   EXPECT_GT(straddling, 10);
 }
 
-TEST(Mac, StartsOfOneInstantAreNotNoticed) {
+TEST(Mac, SimultaneousStartsAreNotDetected) {
   const Duel duel = make_duel(0, kNoticed - 1);
   Swarm swarm(duel.plan);
   while (swarm.now.count() < 20) swarm.step();
@@ -84,7 +84,7 @@ TEST(Mac, StartsOfOneInstantAreNotNoticed) {
 }
 
 /// Robot 1 does not detect robot 0, so it starts while robot 0 polls its receiver.
-TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
+TEST(Mac, StartPulseInTheLeadingOctetAbortsTheEarlierPacket) {
   const std::string one_way =
       "radio { model: PROPAGATION oscillator_sd: 0 propagation { packet_sd_db: 0 link { sender: 0 receiver: 1 "
       "offset_db: "
@@ -119,7 +119,7 @@ TEST(Mac, StartPulseInTheLeadingByteMakesTheEarlierGiveUp) {
   EXPECT_EQ(kilo_ticks[0], kilo_ticks[1] + 1);
 }
 
-TEST(Mac, LaterOneWaitsForItsNextTick) {
+TEST(Mac, LaterRobotWaitsForItsNextTick) {
   for (const auto& [least, most] : {std::pair{kNoticed, kNoticed + 100}, std::pair{kListening, kListening + 500},
                                     std::pair{kPacket - 3000, kPacket - 1}}) {
     const Duel duel = make_duel(least, most);
@@ -141,7 +141,7 @@ TEST(Mac, LaterOneWaitsForItsNextTick) {
   }
 }
 
-TEST(Mac, TouchingRobotsThatAlwaysSendLoseNothingSilently) {
+TEST(Mac, RobotsInContactThatAlwaysSendDetectEveryConflict) {
   std::vector<testing::ScenePose> poses;
   for (int pair = 0; pair < 50; ++pair) {
     poses.push_back({500.0 * pair, 0, 0});
@@ -161,7 +161,7 @@ TEST(Mac, TouchingRobotsThatAlwaysSendLoseNothingSilently) {
 }
 
 /// A program never sends, so tx_clock runs through its 16 bits. The radio asks the robot exactly when it exceeds tx_period.
-TEST(Mac, AsksExactlyWhereAnAttemptCouldTakePlace) {
+TEST(Mac, AsksExactlyBeforePossibleAttempts) {
   const RunPlan plan =
       make_plan("radio { oscillator_sd: 0.05 }", testing::grid_crowd(20, 200, testing::Facing::kRight));
   Swarm swarm(plan);
@@ -219,7 +219,7 @@ TEST(Mac, SlotIsEmptiedOutsideRunning) {
 
 /// The robot is stopped at the border of the ticks between which its packet is on the air. The packet is received completely,
 /// but its success is not reported.
-TEST(Mac, WhatIsOnTheAirEndsUnreported) {
+TEST(Mac, TransmissionsOfStoppedRobotsEndUnreported) {
   int straddling = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     const RunPlan plan = seeded(kExact, seed, {{0, 0, 0}, {40, 0, 0}});

@@ -21,7 +21,7 @@ void PrintTo(const Case& c, std::ostream* out) { *out << c.radio << ", seed " <<
 
 class RadioFuzz : public ::testing::TestWithParam<Case> {};
 
-TEST_P(RadioFuzz, BooksBalance) {
+TEST_P(RadioFuzz, CountsAreConsistent) {
   std::mt19937_64 random(GetParam().seed);
   const auto below = [&](std::uint64_t n) { return random() % n; };
   std::vector<testing::ScenePose> poses;

@@ -35,7 +35,7 @@ double sum_of(const std::vector<RadioCount>& counts, std::uint32_t RadioCount::*
 
 /// A and C do not hear each other, B between them hears both. With equal rates and uniform phases in a tick of length T, they
 /// collide at B always or never: with probability 1 - (1 - P / T)^2, with the packet's length P.
-TEST(HiddenTerminals, CollideAsTheirPhasesSay) {
+TEST(HiddenTerminals, CollideAsPredictedFromPhases) {
   constexpr int kRows = 600;
   const RunPlan plan = make_plan("radio { range_mm: 100 oscillator_sd: 0 }", rows_of(kRows, {-80, 0, 80}));
   Swarm swarm(plan);
@@ -50,7 +50,7 @@ TEST(HiddenTerminals, CollideAsTheirPhasesSay) {
 }
 
 /// If all robots hear each other, each waits for the others, and no packet is lost.
-TEST(CarrierSense, LosesNothingWhereAllHearEachOther) {
+TEST(CarrierSense, LosesNoPacketIfAllRobotsHearEachOther) {
   const RunPlan plan = make_plan("radio { range_mm: 1000 }", testing::grid_crowd(20, 40, testing::Facing::kRight));
   Swarm swarm(plan);
   for (int k = 0; k < 3000; ++k) swarm.step();
@@ -93,7 +93,7 @@ TEST(SimpleRadio, LimitsTheRate) {
   EXPECT_NEAR(static_cast<double>(swarm.radio.counters().sent), 1000, 2);
 }
 
-TEST(SimpleRadio, FailsAndDropsAsOftenAsStated) {
+TEST(SimpleRadio, FailsAndDropsAtTheStatedRates) {
   const RunPlan plan = make_plan(simple("interval_s: 0 sending_error: 0.2 drop_probability: 0.3 contention: 0"),
                                  rows_of(300, {0, 50}));
   Swarm swarm(plan);
@@ -113,7 +113,7 @@ TEST(SimpleRadio, FailsAndDropsAsOftenAsStated) {
 }
 
 /// Two senders in range of a third, all in the same ticks: each is lost with the probability of contention.
-TEST(SimpleRadio, ContendsAsStated) {
+TEST(SimpleRadio, ContentionHasTheStatedProbability) {
   const RunPlan plan =
       make_plan(simple("interval_s: 0 sending_error: 0 contention: 0.4"), rows_of(300, {0, 60, 120}));
   Swarm swarm(plan);
@@ -148,7 +148,7 @@ std::string propagation(const std::string& model) {
   return "radio { model: PROPAGATION range_mm: 100 propagation { " + kExact + link + model + " } }";
 }
 
-TEST(LinkBudget, HasAPatternOfAllRobots) {
+TEST(LinkBudget, AppliesTheCommonPattern) {
   std::vector<ScenePose> poses{{0, 0, 0.4}};
   for (int k = 0; k < 8; ++k) poses.push_back({50 * std::cos(0.8 * k), 50 * std::sin(0.8 * k), -0.3 * k});
   const RunPlan plan =
@@ -184,7 +184,7 @@ TEST(LinkBudget, DrawsPairsLinksAndRuns) {
 }
 
 /// A sensitive robot has higher readings, and its own table accounts for them: estimates of a nominal sender are correct.
-TEST(Ranging, OwnTablesUndoOwnSensitivity) {
+TEST(Ranging, OwnTablesCompensateOwnSensitivity) {
   const RunPlan plan =
       make_plan(propagation("robot { robot: 1 sensitivity_db: 1.5 }"), {{0, 0, 0}, {63, 0, 0}, {0, 500, 0}});
   Air air(plan);
@@ -201,7 +201,7 @@ TEST(Ranging, OwnTablesUndoOwnSensitivity) {
 }
 
 /// Readings have the stated standard deviation, in dB, about their values without noise.
-TEST(Ranging, ReadingsAreAsNoisyAsStated) {
+TEST(Ranging, ReadingNoiseMatchesTheModel) {
   const RunPlan plan = make_plan(propagation("reading_sd_db: 0.2"), {{0, 0, 0}, {60, 0, 0}});
   const LinkBudget links(plan);
   const double exact = links.gains(4).low;

@@ -36,7 +36,7 @@ TEST(Reception, ReachesToTheRangeAndNoFarther) {
   EXPECT_EQ(heard, (std::vector<int>{0, heard[1], 0, heard[1]}));
 }
 
-TEST(Reception, DeliversWhatWasSentAndCountsPairs) {
+TEST(Reception, DeliversMessagesAndCountsPairs) {
   const RunPlan plan =
       make_plan("radio { range_mm: 100 } recording { messages: true }", {{0, 0, 0}, {50, 0, 0}, {500, 0, 0}});
   Swarm swarm(plan);
@@ -111,7 +111,7 @@ TEST(Reception, IsLostAtTheStatedRate) {
   EXPECT_NEAR(static_cast<double>(c.faded), 0.3 * n, 4.5 * std::sqrt(n * 0.3 * 0.7));
 }
 
-TEST(Reception, NeedsSomebodyWhoListens) {
+TEST(Reception, NeedsAReceiverThatListens) {
   const std::string groups = "robots { count: 3 } robots { count: 1 body: TRACKED } radio { range_mm: 100 }";
   const RunPlan plan = make_plan(groups, {{0, 0, 0}, {50, 0, 0}, {0, 50, 0}, {-50, 0, 0}});
   Swarm swarm(plan);

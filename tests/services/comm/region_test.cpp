@@ -56,7 +56,7 @@ struct Seen {
 
 class Regions : public ::testing::TestWithParam<std::tuple<const char*, std::vector<Region>>> {};
 
-TEST_P(Regions, AddUpToTheWhole) {
+TEST_P(Regions, SumToTheUndividedChannel) {
   const auto& [radio, regions] = GetParam();
   const Random random(7);
   const auto draw = [&](std::uint32_t robot, int tick, std::uint32_t number) {

@@ -48,7 +48,7 @@ TEST(TickTimers, CountOneTickPerPeriodOfTheirOwnOscillator) {
 }
 
 /// The timer is a counter of 8 bits. Regular interrupts keep their phase for any value of the compare register in between.
-TEST(TickTimers, BackOffPutsOneInterruptBetweenRegularOnes) {
+TEST(TickTimers, BackOffInsertsOneInterrupt) {
   for (int value = 0; value < 256; ++value) {
     TickTimers timers(plan_of(1, 0));
     const Cycles first = timers.next(0), period = timers.period(0);
@@ -64,7 +64,7 @@ TEST(TickTimers, BackOffPutsOneInterruptBetweenRegularOnes) {
   }
 }
 
-TEST(TickTimers, PredictExactlyWhatHappens) {
+TEST(TickTimers, PredictInterruptsExactly) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     TickTimers timers(plan_of(1, 0.05, seed));
     timers.interrupt(0);

@@ -32,7 +32,7 @@ void expect_holds_all(const physics::CandidateList& list, const physics::Bodies&
   }
 }
 
-TEST(CandidateList, HoldsWhoeverCameNear) {
+TEST(CandidateList, ContainsEveryBodyThatCameNear) {
   physics::Bodies bodies = bodies_of(testing::random_crowd(200, 800, 800, 20, 6));
   physics::CandidateList list(kCutoff_mm);
   for (std::uint32_t k = 0; k < 100; ++k) {

@@ -114,7 +114,7 @@ TEST_P(Conformance, BiasesActOnDrivenRobotsAlone) {
               GetParam().relative_tolerance * 10 + 1e-12);
 }
 
-TEST_P(Conformance, AtRestNothingMoves) {
+TEST_P(Conformance, RobotsAtRestDoNotMove) {
   // Robots in contact, robots at walls, robots in no frame.
   auto crowd = testing::grid_crowd(36, 33, testing::Facing::kRandom);
   crowd.push_back({483.5, 0, 1});
@@ -129,7 +129,7 @@ TEST_P(Conformance, AtRestNothingMoves) {
   }
 }
 
-TEST_P(Conformance, RobotsThatNoFrameCoversRest) {
+TEST_P(Conformance, RobotsInNoFrameRest) {
   const RunPlan p = plan(kQuiet, {{-200, 0, 0}, {200, 0, 0}});
   const auto engine = physics::make_engine(p, PartitionId{0});
   for (std::int64_t k = 0; k < 60; ++k) {
@@ -195,7 +195,7 @@ TEST_P(Conformance, ACrowdDrivenInwardsDoesNotOverlap) {
   }
 }
 
-TEST_P(Conformance, TrackedRobotsAreWhereTheTrackerSaysAndAreNotMoved) {
+TEST_P(Conformance, TrackedRobotsKeepTheTrackersPoses) {
   const std::string text = kQuiet + " robots { count: 2 } robots { count: 1 body: TRACKED }";
   const RunPlan p = plan(text, {{-60, 0, 0}, {300, 300, 0}, {0, 0, 0}}, 2, 2);
   Swarm swarm(p);
@@ -242,7 +242,7 @@ TEST_P(Conformance, EachRobotIsListedOnceWhileItCrossesBorders) {
   EXPECT_GT(handed_over, 20);
 }
 
-TEST_P(Conformance, GhostsAreThoseWithinTheMargin) {
+TEST_P(Conformance, GhostsAreTheRobotsWithinTheMargin) {
   const auto crowd = testing::random_crowd(100, 900, 900, 34, 4);
   const RunPlan p = plan("arena { width_mm: 1000 height_mm: 1000 }", crowd, 6, 4);
   Swarm swarm(p);
@@ -318,7 +318,7 @@ void expect_same_frames(Swarm& a, Swarm& b, std::uint32_t partitions) {
   }
 }
 
-TEST_P(Conformance, ACheckpointContinuesOnTheSameBits) {
+TEST_P(Conformance, ACheckpointContinuesWithTheSameBits) {
   const auto crowd = testing::random_crowd(100, 460, 460, 33, 21);
   const RunPlan p = plan("arena { width_mm: 500 height_mm: 500 }", crowd);
   Swarm a(p), b(p);
@@ -366,7 +366,7 @@ TEST_P(Conformance, SavedOnManyPartitionsContinuesOnOthers) {
   }
 }
 
-TEST_P(Conformance, BeaconsStayAndStandInTheWay) {
+TEST_P(Conformance, BeaconsDoNotMoveAndBlockRobots) {
   if (!GetParam().contact) GTEST_SKIP() << "no immobile robots";
   const RunPlan p =
       plan(kQuiet + " robots { count: 1 } robots { count: 1 immobile: true }", {{-60, 0, 0}, {0, 0, 1}}, 2, 1);

@@ -145,7 +145,7 @@ TEST(ContactKernel, EveryInstructionSetGivesTheSameBits) {
 }
 
 /// A body without contacts moves with the same bits inside and outside a batch, and headings stay in their range.
-TEST(ContactKernel, RollsAsABatchDoes) {
+TEST(ContactKernel, FreeBodiesMoveAsInABatch) {
   const ContactKernel* kernels[3];
   const std::size_t count = contact_kernels(kernels);
   for (std::size_t k = 0; k < count; ++k) {
@@ -178,7 +178,7 @@ TEST(ContactKernel, RollsAsABatchDoes) {
   }
 }
 
-TEST(ContactKernel, SeesWhoMoved) {
+TEST(ContactKernel, DetectsBodiesThatMoved) {
   const ContactKernel* kernels[3];
   const std::size_t count = contact_kernels(kernels);
   for (std::size_t k = 0; k < count; ++k) {

@@ -63,7 +63,7 @@ TEST(Contact, OneRobotDoesNotPushTwoInARow) {
   EXPECT_NEAR(swarm.poses()[2].x_mm, 33, 1e-9);
 }
 
-TEST(Contact, AFollowerNeitherCatchesNorKicksItsLeader) {
+TEST(Contact, AFollowerNeitherCatchesNorPushesItsLeader) {
   const RunPlan plan = make_plan(kQuiet, {{0, 0, 0}, {33, 0, 0}});
   Swarm swarm(plan);
   swarm.set_all_motors(70, 70);
@@ -116,7 +116,7 @@ TEST(Contact, FrictionHoldsARobotUpToItsAngle) {
   }
 }
 
-TEST(Contact, ATurningRobotTakesAlongWhomItPresses) {
+TEST(Contact, ATurningRobotDragsTheRobotItPresses) {
   // Two robots press on each other, and one also turns to its left: at the contact its rim moves towards -y.
   const auto sideways_mm = [](const std::string& friction) {
     const RunPlan plan =
@@ -200,7 +200,7 @@ TEST_P(Crowd, DrivingInwardsForAMinuteNeverOverlaps) {
 
 INSTANTIATE_TEST_SUITE_P(SubSteps, Crowd, ::testing::Values(1, 2, 4));
 
-TEST(Contact, NobodyLeavesTheArena) {
+TEST(Contact, NoRobotLeavesTheArena) {
   const auto crowd = testing::random_crowd(120, 460, 460, 33.1, 9);
   const RunPlan plan = make_plan("arena { width_mm: 500 height_mm: 500 }", crowd);
   Swarm swarm(plan);
@@ -219,7 +219,7 @@ TEST(Contact, NobodyLeavesTheArena) {
   EXPECT_LE(largest_overlap_mm(swarm.poses()), 1e-9);
 }
 
-TEST(Contact, OverlappingRobotsPartSmoothly) {
+TEST(Contact, OverlappingRobotsSeparateSmoothly) {
   auto crowd = testing::random_crowd(100, 300, 300, 5, 3);
   crowd[17] = crowd[42];  // two robots at the same position
   const RunPlan plan = make_plan(kQuiet, crowd);

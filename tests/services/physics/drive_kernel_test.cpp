@@ -58,7 +58,7 @@ std::vector<double> angles() {
   return found;
 }
 
-TEST(DriveKernel, GivesTheBitsOfOneRobotAtATime) {
+TEST(DriveKernel, GivesTheBitsOfTheScalarFunctions) {
   const DriveKernel* kernels[3];
   const std::size_t count = drive_kernels(kernels);
   const std::vector<double> headings = angles();
@@ -87,7 +87,7 @@ TEST(DriveKernel, GivesTheBitsOfOneRobotAtATime) {
   }
 }
 
-TEST(DriveKernel, SaysWhereATurnIsTooLargeForTheSeries) {
+TEST(DriveKernel, ReportsTurnsTooLargeForTheSeries) {
   const DriveKernel* kernels[3];
   const std::size_t count = drive_kernels(kernels);
   for (std::size_t k = 0; k < count; ++k) {

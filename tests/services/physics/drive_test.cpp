@@ -288,7 +288,7 @@ TEST(Drive, StepNoiseVarianceDoesNotDependOnTheTickLength) {
   }
 }
 
-TEST(Drive, NobodyIsDrivenFasterThanTheTopSpeed) {
+TEST(Drive, NoRobotExceedsTheTopSpeed) {
   const auto start = testing::grid_crowd(500, 300, testing::Facing::kRandom);
   const RunPlan plan =
       make_plan("arena { width_mm: 100000 height_mm: 100000 } motion { factor_variance_s: 0.01 }", start);

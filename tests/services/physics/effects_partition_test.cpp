@@ -108,7 +108,7 @@ TEST_P(EffectPartitions, AnyGridGivesTheSameBits) {
   }
 }
 
-TEST_P(EffectPartitions, ACheckpointOfOneGridGoesOnOnAnother) {
+TEST_P(EffectPartitions, ACheckpointOfOneGridContinuesOnAnother) {
   const std::string text = experiment(GetParam(), everything());
   const auto start = crowd(6);
   const RunPlan columns = make_plan(text, start, 2, 1), rows = make_plan(text, start, 1, 2),
@@ -244,7 +244,7 @@ TEST(EffectContacts, RobotsThatPushBodiesGiveTheSameBits) {
   }
 }
 
-TEST(EffectContacts, RobotsThatAreBlownTogetherDoNotOverlap) {
+TEST(EffectContacts, RobotsThatDriftTogetherDoNotOverlap) {
   const RunPlan plan = make_plan(
       "arena { width_mm: 500 height_mm: 500 } motion { noise: false } "
       "effect { name: 'x' acts_on: WORLD_DRIFT during: STOP function { of: X linear { slope: -0.3 } } } "

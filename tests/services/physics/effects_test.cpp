@@ -57,7 +57,7 @@ TEST(Effects, GainsMultiplyAndOffsetsAdd) {
   EXPECT_NEAR(swarm.poses()[0].x_mm, (12 * 1.5 * 0.5 - 1.5) * 10 * kTick_s, 1e-11);
 }
 
-TEST(Effects, ATurnRateMakesACircleOfTheReferencePoint) {
+TEST(Effects, ATurnRateMovesTheReferencePointOnACircle) {
   const RunPlan plan = make_plan(kQuiet + effect("acts_on: TURN_RATE", "constant: 0.1"), {{0, 0, 0}});
   Swarm swarm(plan);
   swarm.set_all_motors(70, 70);
@@ -69,7 +69,7 @@ TEST(Effects, ATurnRateMakesACircleOfTheReferencePoint) {
   EXPECT_NEAR(pose.y_mm, 100 - 100 * std::cos(heading) + kOffset_mm * std::sin(heading), 1e-9);
 }
 
-TEST(Effects, ABodyDriftToTheSideGoesAroundWithTheBody) {
+TEST(Effects, ABodyDriftTurnsWithTheBody) {
   // The effects alone: sideways at 5 mm/s while turning at 0.2 rad/s.
   const std::string text =
       kQuiet +
@@ -84,7 +84,7 @@ TEST(Effects, ABodyDriftToTheSideGoesAroundWithTheBody) {
   EXPECT_NEAR(pose.y_mm, radius_mm * std::sin(turn) + kOffset_mm * std::sin(turn), 1e-9);
 }
 
-TEST(Effects, AWorldDriftAddsUpAlsoWhereOthersAreNear) {
+TEST(Effects, AWorldDriftAddsUpNearOtherRobots) {
   // Both robots turn. The second pair is so close that its ticks have sub-steps, but the robots never touch.
   const std::string text = kQuiet + effect("acts_on: WORLD_DRIFT direction_deg: 30", "constant: 4");
   const std::vector<ScenePose> start = {{-300, 0, 1}, {300, 0, 1}, {300, 38.5, 1}};
@@ -173,7 +173,7 @@ TEST(Effects, OwnMotorsAreThoseOfEachWheel) {
   EXPECT_NEAR(swarm.poses()[0].heading_rad, (right - left) / kBase_mm * kTick_s, 1e-14);
 }
 
-TEST(Effects, TimesCountWhatTheMotorsDid) {
+TEST(Effects, TimesFollowTheMotors) {
   const auto plan_of = [](const std::string& function) { return make_plan(shown(function), {{0, 0, kPi / 2}}); };
   const RunPlan left = plan_of(thousandth("LEFT_MOTOR_TIME")), right = plan_of(thousandth("RIGHT_MOTOR_TIME")),
                 driven = plan_of(thousandth("DRIVEN_TIME")), since = plan_of(thousandth("TIME_SINCE_COMMAND")),
@@ -210,7 +210,7 @@ TEST(Effects, TimesCountWhatTheMotorsDid) {
   }
 }
 
-TEST(Effects, NeighboursAreCountedWeighedAndFound) {
+TEST(Effects, NeighbourCovariatesMatchTheirDefinitions) {
   // Neighbours of the robot: 50 mm ahead, 70 mm to the left, at 99 mm and at 101 mm.
   const std::vector<ScenePose> start = {{0, 0, 0.5},
                                         {50 * std::cos(0.5), 50 * std::sin(0.5), 0},
@@ -245,7 +245,7 @@ TEST(Effects, NeighboursAreCountedWeighedAndFound) {
   EXPECT_EQ(value("NEAREST_BEARING", alone), 0);
 }
 
-TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
+TEST(Effects, EpisodesHaveTheStatedRateAndDuration) {
   // 200 robots for 1000 s: mean interval 8 s, mean duration 4 / (3 - 1) s, so an episode is on for a fifth of the time.
   constexpr std::uint32_t kRobots = 200;
   constexpr int kTicks = 30518;
@@ -297,7 +297,7 @@ TEST(Effects, EpisodesLastAsLongAndComeAsOftenAsStated) {
   }
 }
 
-TEST(Effects, CommandsOfThePastAreRemembered) {
+TEST(Effects, CovariatesOfPastCommandsMatchTheirDefinitions) {
   // Covariates during the last of these commands, in its first tick and later ones.
   struct Case {
     std::vector<std::pair<std::uint8_t, std::uint8_t>> duties;
@@ -329,7 +329,7 @@ TEST(Effects, CommandsOfThePastAreRemembered) {
   }
 }
 
-TEST(Effects, PreviousMotionIsInTheBodyOfThen) {
+TEST(Effects, PreviousMotionIsInTheThenBodyFrame) {
   // Robot 0 drives along y. The effect acts on robot 1, which turns, and uses its own previous tick.
   for (const auto& [covariate, straight, turning] : {std::tuple{"PREVIOUS_FORWARD", 10.0, 10.0},
                                                      {"PREVIOUS_SIDEWAYS", 0.0, 0.8 * kOffset_mm},
@@ -353,7 +353,7 @@ TEST(Effects, PreviousMotionIsInTheBodyOfThen) {
   }
 }
 
-TEST(Effects, PlacesRemember) {
+TEST(Effects, ArenaFieldsAccumulate) {
   // Two robots are in one cell, one of them driven. A third one, at rest in the cell, shows the cell's value.
   const std::vector<ScenePose> start = {{10, 10, kPi / 2}, {60, 10, 0}, {10, 60, 0}, {-200, 0, 0}};
   const auto field = [](const std::string& counts) {
@@ -377,7 +377,7 @@ TEST(Effects, PlacesRemember) {
   EXPECT_EQ(swarms[0].poses()[3].x_mm, -200);
 }
 
-TEST(Effects, ActDuringWhatTheyNameOnWhomTheyName) {
+TEST(Effects, ActDuringTheStatedCommandsOnTheStatedRobots) {
   const RunPlan plan =
       make_plan(kQuiet + effect("acts_on: WHEEL_GAIN during: LEFT robot: [1, 2, 77]", "constant: 1"),
                 {{-300, 0, 0}, {0, 0, 0}, {300, 0, 0}});

@@ -54,7 +54,7 @@ TEST(OdeBox, FourRobotsDoNotMoveItAndFiveDo) {
   }
 }
 
-TEST(OdeBox, ObstaclesWallsAndBeaconsHold) {
+TEST(OdeBox, ObstaclesWallsAndBeaconsDoNotMove) {
   const RunPlan plan = make_plan(
       kOde +
           "arena { circle { radius_mm: 300 } } obstacle { box { width_mm: 40 length_mm: 200 } x_mm: 100 } "
@@ -70,7 +70,7 @@ TEST(OdeBox, ObstaclesWallsAndBeaconsHold) {
   EXPECT_EQ(end[2].y_mm, 150);
 }
 
-TEST(OdeBox, ABoxSlidesDownASlopeAsTheLawSaysAndStopsAtTheWall) {
+TEST(OdeBox, ABoxSlidesDownASlopeInClosedFormAndStopsAtTheWall) {
   const std::string text =
       "arena { width_mm: 4000 height_mm: 4000 } physics { engine: ODE tilt_deg: 25 } "
       "movable { box { width_mm: 60 length_mm: 80 } mass_g: 30 friction: 0.2 } "

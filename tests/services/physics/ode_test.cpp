@@ -53,7 +53,7 @@ TEST(OdeSlope, BelowTheFrictionAngleRobotsRest) {
   }
 }
 
-TEST(OdeSlope, AboveTheFrictionAngleRobotsSlideAsTheLawSays) {
+TEST(OdeSlope, AboveTheFrictionAngleRobotsSlideInClosedForm) {
   for (const double tilt_deg : {18.0, 25.0}) {
     for (const double downhill_deg : {0.0, 50.0, 200.0}) {
       const auto start = compass();
@@ -90,7 +90,7 @@ TEST(OdeSlope, ThrustIsBounded) {
   EXPECT_NEAR(down.poses()[0].x_mm / (acceleration * time_s * (time_s + kTick_s / 4) / 2), 1, 0.02);
 }
 
-TEST(OdeSlope, WhatSlidesStopsAtTheWall) {
+TEST(OdeSlope, SlidingBodiesStopAtTheWall) {
   const RunPlan plan = make_plan(
       "motion { noise: false } arena { width_mm: 600 height_mm: 600 } physics { engine: ODE tilt_deg: 40 }",
       {{-200, 0, 1}, {-200, 100, 2}, {-240, 5, 0}}, 3, 1);
@@ -110,7 +110,7 @@ void drive(Swarm& swarm, std::uint32_t robots, std::uint32_t tick) {
   }
 }
 
-TEST(OdePartitions, SmallGroupsComeOutTheSame) {
+TEST(OdePartitions, SmallGroupsGiveTheSameBits) {
   const auto crowd = testing::random_crowd(60, 960, 960, 60, 3);
   const std::string text = "arena { width_mm: 1000 height_mm: 1000 } physics { engine: ODE }";
   const RunPlan whole = make_plan(text, crowd), cut = make_plan(text, crowd, 3, 2);
@@ -141,7 +141,7 @@ struct Crowd {
 // At a cut group, the two sides of a border compute with their own forces, which the iterative solver finds only to a tolerance.
 // In a compressed crowd such differences grow like those of another seed. The test prints them for
 // docs/explanation/contact.md.
-TEST(OdePartitions, CutGroupsComeOutAlike) {
+TEST(OdePartitions, CutGroupsGiveSimilarResults) {
   for (const Crowd& tested :
        {Crowd{"that disperses from a 36 mm grid", 36, testing::Facing::kRandom, 8},
         Crowd{"driven to its centre from a 33.5 mm grid", 33.5, testing::Facing::kInwards, 16}}) {

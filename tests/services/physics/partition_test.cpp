@@ -90,7 +90,7 @@ TEST(Partition, ATightGridDrivenInwardsGivesTheSameBits) {
   }
 }
 
-TEST(Partition, CellsSmallerThanTheMarginExchangeBeyondTheNext) {
+TEST(Partition, PartitionsSmallerThanTheMarginExchangeBeyondTheirNeighbours) {
   const std::string text = "arena { width_mm: 600 height_mm: 600 }";
   const RunPlan plan = make_plan(text, {{0, 0, 0}}, 12, 1);
   EXPECT_GT(physics::ghost_margin_mm(plan), 2 * 50);
@@ -234,7 +234,7 @@ TEST(Partition, TrackedRobotsJumpBetweenPartitions) {
   }
 }
 
-TEST(Partition, GhostsAreExactlyWhatLiesWithinTheMargin) {
+TEST(Partition, GhostsAreExactlyTheRobotsWithinTheMargin) {
   const auto crowd = testing::random_crowd(100, 900, 900, 34, 4);
   const RunPlan plan = make_plan("", crowd, 2, 2);
   Swarm swarm(plan);

@@ -17,7 +17,7 @@ const std::string kHex =
     ":03001000010203E7\n"
     ":00000001FF\n";
 
-TEST(FlashImage, HoldsWhatTheRecordsSayAndElseErasedFlash) {
+TEST(FlashImage, ContainsTheRecordsAndOtherwiseErasedFlash) {
   const FlashImage image = parse_firmware(kHex, "a.hex");
   EXPECT_EQ(image.flash[0], 0x0c);
   EXPECT_EQ(image.flash[1], 0x94);
@@ -26,7 +26,7 @@ TEST(FlashImage, HoldsWhatTheRecordsSayAndElseErasedFlash) {
   EXPECT_EQ(image.used_octets, 0x13u);
 }
 
-TEST(FlashImage, IsTheSameOfElfAndHex) {
+TEST(FlashImage, ElfAndHexGiveTheSameImage) {
   const FlashImage elf = firmware(whole_program("static void setup(void) {} static void loop(void) {}"));
   std::string hex;
   for (std::uint32_t at = 0; at < elf.used_octets; at += 16) {
@@ -49,7 +49,7 @@ TEST(FlashImage, IsTheSameOfElfAndHex) {
   EXPECT_EQ(image.used_octets, elf.used_octets);
 }
 
-TEST(FlashImage, RefusesWhatItIsNotWithTheLine) {
+TEST(FlashImage, RefusesOtherFilesAndNamesTheLine) {
   const auto error = [](const std::string& text) -> std::string {
     try {
       static_cast<void>(parse_firmware(text, "a.hex"));
@@ -67,7 +67,7 @@ TEST(FlashImage, RefusesWhatItIsNotWithTheLine) {
             std::string::npos);
 }
 
-TEST(FlashImage, SurvivesDamage) {
+TEST(FlashImage, DamagedFilesAreRefusedOrLoaded) {
   const std::filesystem::path file =
       compiled(whole_program("static void setup(void) {} static void loop(void) {}"));
   const std::string elf = os::read_if_there(file).value();

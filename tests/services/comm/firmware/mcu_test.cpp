@@ -51,7 +51,7 @@ const FlashImage& talker() {
   return image;
 }
 
-TEST(Mcu, RunsWhenToldAndDrivesMotorsAndLight) {
+TEST(Mcu, RunsOnCommandAndDrivesMotorsAndLed) {
   Mcu mcu =
       make(firmware(whole_program("static void setup(void) { set_color(RGB(1, 2, 3)); }\n"
                                   "static void loop(void) { set_motors(kilo_turn_left, kilo_straight_right); }")));
@@ -92,7 +92,7 @@ TEST(Mcu, SendsWholePacketsEverySixteenTicks) {
   }
 }
 
-TEST(Mcu, MeasuresTheDistanceOfWhoItHears) {
+TEST(Mcu, MeasuresTheDistanceOfASender) {
   Mcu mcu = make(talker());
   mcu.run(kSecond / 2, {});
   tell(mcu, kRun);
@@ -117,7 +117,7 @@ TEST(Mcu, HearsASenderWhoseClockIsTwoPercentOff) {
   }
 }
 
-TEST(Mcu, GivesUpWhereItNoticesAnotherPacket) {
+TEST(Mcu, GivesUpWhenItDetectsAnotherPacket) {
   Mcu mcu = make(talker());
   mcu.run(kSecond / 2, {});
   tell(mcu, kRun);
@@ -136,7 +136,7 @@ TEST(Mcu, GivesUpWhereItNoticesAnotherPacket) {
   }
 }
 
-TEST(Mcu, IsTheSameHoweverTimeIsCut) {
+TEST(Mcu, ResultDoesNotDependOnTheSpansOfRuns) {
   const auto run = [](std::uint32_t seed) {
     Mcu mcu = make(talker());
     std::mt19937 random(seed);
@@ -161,7 +161,7 @@ TEST(Mcu, IsTheSameHoweverTimeIsCut) {
   EXPECT_EQ(run(2), whole);
 }
 
-TEST(Mcu, GoesBackToItsMarkAndGoesOnFromWhatWasSaved) {
+TEST(Mcu, ReturnsToTheLastCommitAndContinuesFromASavedState) {
   Mcu mcu = make(talker());
   mcu.run(kSecond / 2, {});
   tell(mcu, kRun);
@@ -185,7 +185,7 @@ TEST(Mcu, GoesBackToItsMarkAndGoesOnFromWhatWasSaved) {
   EXPECT_THROW(other.load(before.substr(0, before.size() / 2)), RunError);
 }
 
-TEST(Mcu, StopsAtAFaultAndSaysWhere) {
+TEST(Mcu, StopsAtAFaultAndReportsTheAddress) {
   Mcu mcu =
       make(firmware(whole_program("static void setup(void) { __asm__ volatile(\".word 0xff0f\\n.word "
                                   "0x9409\\n.word 0x0001\\n.word 0x95a7\"); }\n"
@@ -222,7 +222,7 @@ TEST(Mcu, SleepsWithItsClocksOffAndWakesAfterEightSeconds) {
   EXPECT_FALSE(mcu.flashes().empty());
 }
 
-TEST(Mcu, TossesBitsWithTheNoiseOfItsConverter) {
+TEST(Mcu, DrawsRandomBitsFromConverterNoise) {
   Mcu mcu =
       make(firmware(whole_program("static void setup(void) {}\n"
                                   "static void loop(void) { set_motors(rand_hard(), 0); delay(1); }")));
@@ -283,7 +283,7 @@ FlashImage image_of(const std::vector<std::uint16_t>& words) {
   return image;
 }
 
-TEST(Mcu, ExtendedLoadsAreNoInstructionsOfThisProcessor) {
+TEST(Mcu, ExtendedLoadsAreIllegalInstructions) {
   // elpm r0, Z; elpm r16, Z; elpm r16, Z+: libsimavr takes the upper octet of the address from r0, here 255.
   for (const std::uint16_t elpm : {std::uint16_t{0x95d8}, std::uint16_t{0x9106}, std::uint16_t{0x9107}}) {
     Mcu mcu = make(image_of({0xef0f /* ldi r16, 255 */, 0x2e00 /* mov r0, r16 */, elpm}));
@@ -305,7 +305,7 @@ TEST(Mcu, EepromAddressesHaveTenBits) {
   EXPECT_EQ(mcu.outputs().motor_left, 255);
 }
 
-TEST(Mcu, NoProgramLeavesItsProcessor) {
+TEST(Mcu, NoProgramAffectsAnotherProcessor) {
   // Random instructions, and a real program with changed octets: each runs or stops its own robot and affects no other.
   std::mt19937 random(3);
   const FlashImage& real = talker();

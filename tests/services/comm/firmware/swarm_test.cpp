@@ -49,7 +49,7 @@ std::string pair_of(const std::string& behaviour, const std::string& kind) {
          behaviour + kind + " layout { grid { pitch_mm: 100 heading: HEADING_FIXED } } }\n";
 }
 
-TEST_F(FirmwareRun, SendsAndHearsWhenANativeRobotDoes) {
+TEST_F(FirmwareRun, SendsAndReceivesWhenANativeRobotDoes) {
   const std::string talker = program("talker.c", kTalker);
   const Timeline native = run(pair_of(talker, "")), firmware = run(pair_of(talker, "avr: true"));
   const std::int64_t end = native.totals.last.count();
@@ -74,7 +74,7 @@ TEST_F(FirmwareRun, MovesWhenANativeRobotDoes) {
   EXPECT_TRUE(led.whole()) << led.first << ' ' << led.second << ' ' << led.same;
 }
 
-TEST_F(FirmwareRun, IsTheSameOnAnyNumberOfThreadsAndHosts) {
+TEST_F(FirmwareRun, ResultDoesNotDependOnThreadsAndHosts) {
   const std::string talker = program("talker.c", kTalker);
   const std::string experiment =
       "duration_s: 6 radio { range_mm: 300 loss: 0.05 } recording { messages: true }\n"
@@ -93,7 +93,7 @@ TEST_F(FirmwareRun, IsTheSameOnAnyNumberOfThreadsAndHosts) {
   EXPECT_NE(run(experiment, 1, {"seed=2"}).totals.state_hash, one.totals.state_hash);
 }
 
-TEST_F(FirmwareRun, FailsAloneAndSaysSo) {
+TEST_F(FirmwareRun, FailsAloneAndReportsIt) {
   const std::string wild = program("wild.c", whole_program("static void setup(void) {} static void loop(void) { if "
                                                            "(kilo_ticks > 60) *(volatile uint8_t*)0xabcd = 1; }"));
   const std::string talker = program("talker.c", kTalker);
@@ -163,7 +163,7 @@ TEST_F(FirmwareRun, AnEmptyBatterySwitchesItOff) {
   EXPECT_NEAR(native, firmware, 5);
 }
 
-TEST_F(FirmwareRun, IsHeardByNativeRobotsAndHearsThem) {
+TEST_F(FirmwareRun, ExchangesMessagesWithNativeRobots) {
   const std::string talker = program("talker.c", kTalker);
   const Timeline timeline =
       run("duration_s: 10 radio { range_mm: 300 } recording { messages: true }\n"
