@@ -1,6 +1,6 @@
-# Writes build_identity.cpp: who built this program from what. Run by cmake -P with SOURCES (the project's folder), OUTPUT,
-# VERSION and COMPILER. The identity covers the contents of everything that can change a result or what crosses the wire,
-# the compiler and its version; not paths, times or machines: the same sources and compiler give the same identity anywhere.
+# Writes build_identity.cpp: sources and compiler of this program. Run by cmake -P with SOURCES (the project's folder), OUTPUT,
+# VERSION and COMPILER. The identity covers the compiler with its version, and all files that can change a result or the wire
+# format. It does not cover paths, times or machines: the same sources and compiler give the same identity anywhere.
 set(patterns "")
 foreach(folder core services idl)
   foreach(ending cpp hpp h c S proto idl txt)

@@ -7,7 +7,7 @@ option(KILOTWIN_PCH "Precompile the headers of the standard library and of the p
 add_library(kilotwin_flags INTERFACE)
 target_compile_options(kilotwin_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion
-  # Results must have the same bits whatever compiler and level built them: docs/explanation/determinism.md.
+  # Results must have the same bits for any compiler and level: docs/explanation/determinism.md.
   -ffp-contract=off -fno-fast-math -fno-math-errno)
 if(KILOTWIN_WERROR)
   target_compile_options(kilotwin_flags INTERFACE -Werror)
@@ -18,8 +18,8 @@ if(KILOTWIN_SANITIZE)
   target_link_options(kilotwin_flags INTERFACE -fsanitize=${KILOTWIN_SANITIZE})
 endif()
 
-# The headers that most units include, precompiled once for libraries and once for tests. A unit still includes what it uses:
-# with -DKILOTWIN_PCH=OFF everything builds too, and scripts/test --debug builds so.
+# Headers that most units include, precompiled once for libraries and once for tests. A unit still includes what it uses: with
+# -DKILOTWIN_PCH=OFF everything builds too, as in scripts/test --debug.
 set(kilotwin_precompiled
   <algorithm> <array> <charconv> <chrono> <cmath> <condition_variable> <cstdint> <cstring> <deque> <filesystem> <fstream>
   <functional> <limits> <map> <memory> <mutex> <numeric> <optional> <random> <set> <span> <sstream> <string> <string_view>
@@ -35,7 +35,7 @@ if(KILOTWIN_PCH)
   target_precompile_headers(kilotwin_precompiled PRIVATE ${kilotwin_precompiled})
 endif()
 
-# kilotwin_precompile(NAME FROM TARGET): NAME uses the headers that TARGET has precompiled.
+# kilotwin_precompile(NAME FROM TARGET): NAME uses the precompiled headers of TARGET.
 function(kilotwin_precompile name)
   cmake_parse_arguments(arg "" "FROM" "" ${ARGN})
   get_target_property(sources ${name} SOURCES)
@@ -44,8 +44,8 @@ function(kilotwin_precompile name)
   endif()
 endfunction()
 
-# kilotwin_library(NAME SOURCES a.cpp ... DEPENDS target ...): a static library of one folder. It brings the path under which
-# its headers are included; tests/layers says which folder may include which.
+# kilotwin_library(NAME SOURCES a.cpp ... DEPENDS target ...): a static library of one folder, with the include path of its
+# headers. tests/layers defines which folder may include which.
 function(kilotwin_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
@@ -63,9 +63,9 @@ function(kilotwin_program name)
   kilotwin_precompile(${name} FROM kilotwin_precompiled)
 endfunction()
 
-# kilotwin_test(NAME SOURCES a_test.cpp ... DEPENDS target ... [TIMEOUT s] [LABELS label ...]): one GoogleTest program; ctest
-# knows each of its cases. Labels: fast (the default; all of them together take some 20 s), dds (federates over Cyclone DDS),
-# system (the program as users run it), slow (statistics, fuzzing, identification).
+# kilotwin_test(NAME SOURCES a_test.cpp ... DEPENDS target ... [TIMEOUT s] [LABELS label ...]): one GoogleTest program, each
+# case of which is a ctest. Labels: fast (the default; all together take about 20 s), dds (federates over Cyclone DDS), system
+# (the program as users run it), slow (statistics, fuzzing, identification).
 function(kilotwin_test name)
   cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
@@ -77,7 +77,7 @@ function(kilotwin_test name)
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${arg_DEPENDS} kilotwin_flags GTest::gtest GTest::gtest_main)
-  # gcc 12 sees copies beyond a std::string that do not happen (its defect 105651), once the string is a precompiled header's.
+  # gcc 12 reports copies beyond a std::string that do not happen (its defect 105651), if the string is in a precompiled header.
   target_compile_options(${name} PRIVATE
     "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread;-Wno-restrict>")
   kilotwin_precompile(${name} FROM kilotwin_precompiled_test)

@@ -1,7 +1,7 @@
-// What robots' programs cost their host: ns per robot and tick on one core, switch included, for programs that return from
-// loop(), that are blocked in delay(), that wait busily, that compute for longer than a tick; and their memory. Each figure is
-// the fastest of several rounds of one second of simulated time.
-// Usage: behaviours_bench [ROBOTS [CASE [ROUNDS]]]     default: 1000, all whose name holds CASE, 30
+// Cost of robots' programs in their host: ns per robot and tick on one core, context switch included, and memory. Programs return
+// from loop(), block in delay(), wait busily, or compute for longer than a tick. Each figure is the fastest of several rounds
+// of one second of simulated time.
+// Usage: behaviours_bench [ROBOTS [CASE [ROUNDS]]]     default: 1000 robots, all cases whose name contains CASE, 30 rounds
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 struct Case {
   const char* name;
-  std::string source;  ///< a file, or the text of setup, loop and what they need
+  std::string source;  ///< a file, or a text with setup, loop and declarations
   bool as_on_robot = false;
 };
 
@@ -33,7 +33,7 @@ std::string with_main(const std::string& text) {
          "int main(void) { kilo_init(); kilo_message_rx = rx; kilo_start(setup, loop); return 0; }\n";
 }
 
-/// The radio of a crowd: a message per robot and tick on average, one attempt in 16 ticks, RUN at first.
+/// Radio frames of a crowd: a message per robot and tick on average, an attempt in every 16th tick, RUN at the start.
 RadioFrame air(Tick tick, std::uint32_t robots, bool run) {
   RadioFrame frame;
   frame.tick = tick;

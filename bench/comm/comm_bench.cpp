@@ -1,5 +1,5 @@
-// Cost of the radio engine per robot and tick on one core: step, emit and hash, and the fake hosts (2 to 3 ns
-// of it). The counter ns_per_robot_tick, of CPU time, is what to watch. All robots send as often as the firmware lets them.
+// Cost of the radio engine per robot and tick on one core: step, emit and hash, plus 2 to 3 ns for the fake hosts. The result
+// is the counter ns_per_robot_tick, of CPU time. All robots send as often as the firmware allows.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
@@ -15,7 +15,7 @@ using testing::Facing;
 /// 128 ticks are 4.2 s: eight messages of each robot.
 constexpr int kWarmUp = 64, kTicks = 128;
 
-/// `moving`: all robots move forward in every tick, back again after some.
+/// `moving`: all robots move forward in every tick, and back again after a while.
 void run(benchmark::State& state, const std::string& experiment, double pitch_mm, bool broadcast,
          bool moving = false) {
   const auto robots = static_cast<std::uint32_t>(state.range(0));
@@ -47,7 +47,7 @@ void run(benchmark::State& state, const std::string& experiment, double pitch_mm
 
 const std::string kArena = "arena { width_mm: 10000 height_mm: 10000 } radio { range_mm: 100 }";
 
-/// The same with the strength of the signal, and the range of the default: a robot has about twice as many in reach.
+/// The same with model PROPAGATION and the default range: a robot has about twice as many robots in reach.
 const std::string kStrength =
     "arena { width_mm: 10000 height_mm: 10000 } radio { model: PROPAGATION range_mm: 100 }";
 const std::string kStrengthFar = "arena { width_mm: 10000 height_mm: 10000 } radio { model: PROPAGATION }";

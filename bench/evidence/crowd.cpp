@@ -1,6 +1,6 @@
-// What in a contact law decides how a crowd of Kilobots diffuses? The crowd of experiments/diffusion.txtpb under the law of the peer
-// (ARGoS' Kilobot plugin on dynamics2d, as its sources state it: rigid discs on a Chipmunk space, each pulled towards its
-// drive's velocity with a bounded force and torque), written anew so that one constant can be changed at a time.
+// Which constants of a contact law decide how a crowd of Kilobots diffuses? Simulates the crowd of experiments/diffusion.txtpb
+// under the contact law of ARGoS' Kilobot plugin (dynamics2d): rigid discs in a Chipmunk space, each pulled towards its drive's
+// velocity with a bounded force and torque. Every constant can be set.
 // Usage: crowd [NAME=VALUE]...     names and defaults: the table below. Prints the mean square displacement of the crowd.
 #include <chipmunk/chipmunk.h>
 
@@ -16,13 +16,13 @@ namespace {
 
 std::map<std::string, double> constants = {
     {"seeds", 20},           //
-    {"friction", 2.5},       // of each disc; the solver multiplies those of a pair
-    {"max_force_N", 0.001},  // with which a robot is pulled towards its drive's velocity
+    {"friction", 2.5},       // per disc; the solver multiplies those of a pair
+    {"max_force_N", 0.001},  // largest force that pulls a robot towards its drive's velocity
     {"max_torque_Nm", 0.001},
     {"mass_kg", 0.010},
     {"bias_sd_mm_s", 1.86},
     {"bias_mean_mm_s", 0.015},
-    {"steps_per_tick", 10},  // of the physics, and iterations of the solver
+    {"steps_per_tick", 10},  // physics steps, and solver iterations per step
 };
 
 constexpr double kPi = 3.14159265358979323846, kTicksPerSecond = 31, kRadius_m = 0.0165, kAxleOffset_m = 0.0092,
@@ -33,7 +33,7 @@ constexpr double kRingRadius_m[] = {0.035, 0.070, 0.105, 0.140};
 
 struct Robot {
   cpBody* body;   // its origin lies between the rear legs
-  cpBody* drive;  // of infinite mass, with the velocity that the wheels ask for
+  cpBody* drive;  // of infinite mass, with the velocity of the wheels
   double bias_left_m_s, bias_right_m_s, start_x_m, start_y_m;
   enum { kStraight, kLeft, kRight } leg = kStraight;
   int leg_ends_at = kStraightTicks;
@@ -115,7 +115,7 @@ void run(std::uint64_t seed, std::vector<std::vector<double>>& msd_mm2) {
     msd_mm2[static_cast<std::size_t>((tick + 1) / (10 * kTicksPerSecond)) - 1].push_back(
         1e6 * sum / static_cast<double>(robots.size()));
   }
-  // A space of this size is left to the end of the process.
+  // The space is not freed: it lives until the process ends.
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // Figures of firmware robots:
-//   firmware_figures agreement    six programs, native and as firmware, 120 s: changes of motors and LED within a tick
-//   firmware_figures contention   25 robots in earshot of each other: messages per robot, native against firmware
-//   firmware_figures speed        simulated over wall time, for numbers of robots and threads
+//   firmware_figures agreement    six programs, native and as firmware, 120 s: agreement of motors and LED within a tick
+//   firmware_figures contention   25 robots in range of each other: messages per robot, native and firmware
+//   firmware_figures speed        simulated time per wall time, over numbers of robots and threads
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -58,7 +58,7 @@ int show_agreement() {
   return status;
 }
 
-/// Two-sample Kolmogorov-Smirnov: the distance, and the one that equal distributions exceed with probability 1 %.
+/// Two-sample Kolmogorov-Smirnov test: the distance, and its critical value at 1 %.
 std::pair<double, double> kolmogorov_smirnov(std::vector<double> a, std::vector<double> b) {
   std::sort(a.begin(), a.end());
   std::sort(b.begin(), b.end());

@@ -1,5 +1,5 @@
-// What a model costs: the drive alone, and with effects of each kind, in ns per robot and tick. Compare with "none";
-// 1000 robots in the open, kinematic engine, so that nothing else varies.
+// Cost of a model in ns per robot and tick: the drive alone ("none"), and with effects of each kind. 1000 robots in the open
+// with the kinematic engine, so that nothing else varies.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>

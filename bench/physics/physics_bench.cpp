@@ -1,6 +1,6 @@
-// Cost of the physics engines (planar unless the name says otherwise) per robot and tick, sub-steps included, on one core. The counter ns_per_robot_tick is what to
-// watch; of several partitions it is the sum, with the ghosts that they send each other. Each scene is run for some ticks per
-// iteration from the same start.
+// Cost of the physics engines per robot and tick on one core, sub-steps included; planar unless the name says otherwise. The
+// result is the counter ns_per_robot_tick. For several partitions it is their sum, with the exchange of ghosts. Each iteration
+// runs a scene for some ticks from the same start.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
@@ -40,7 +40,7 @@ void run(benchmark::State& state, const std::string& experiment, const std::vect
       benchmark::Counter(steps / 1e9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-/// Disperses from a 40 mm grid over 2 x 2 partitions; all of them in turn.
+/// Disperses from a 40 mm grid over 2 x 2 partitions, stepped one after the other.
 void run_partitions(benchmark::State& state, std::uint32_t robots, std::int64_t ticks) {
   const RunPlan plan = testing::make_plan("arena { width_mm: 10000 height_mm: 10000 }",
                                           testing::grid_crowd(robots, 40, Facing::kRandom), 2, 2);

@@ -1,4 +1,4 @@
-// What light costs: per robot and tick, with k sources, with and without shadows, and a picture.
+// Cost of light per robot and tick: with k sources, with and without shadows, and with an image.
 #include <benchmark/benchmark.h>
 
 #include "core/frames/swarm_view.hpp"
@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint32_t kRobots = 1000;
 
-/// Arguments: number of sources; 1: shadows; height of the sources, mm.
+/// Arguments: number of sources; 1 for shadows; height of the sources, mm.
 void light(benchmark::State& state) {
   std::string text = "light { shadows: " + std::string(state.range(1) != 0 ? "true " : "false ");
   for (std::int64_t i = 0; i < state.range(0); ++i) {

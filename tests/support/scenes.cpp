@@ -11,7 +11,7 @@
 namespace kilotwin::testing {
 namespace {
 
-/// A small generator of its own, so that scenes do not depend on what they test (splitmix64).
+/// A generator of its own (splitmix64), so that scenes do not depend on the tested code.
 class Scatter {
  public:
   explicit Scatter(std::uint64_t seed) : state_(seed) {}

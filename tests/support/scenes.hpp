@@ -1,5 +1,5 @@
-/// Scenes for tests and benchmarks: a RunPlan from the text of an experiment and a list of poses, and the poses of a few
-/// usual crowds.
+/// Scenes for tests and benchmarks: a RunPlan from an experiment's text and a list of poses, and the poses of some common
+/// crowds.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@ struct ScenePose {
   double x_mm, y_mm, heading_rad;
 };
 
-/// The plan of an experiment in protobuf text format. Robots come from `poses`: where the text names no group, one group
-/// of simulated robots is added; where it does, the counts must add up to the number of poses. Throws std::runtime_error
-/// where the text does not parse.
+/// The plan of an experiment in protobuf text format, with robots at `poses`. If the text has no group, one group of simulated
+/// robots is added; otherwise the groups' counts must add up to the number of poses. Throws std::runtime_error if the
+/// text does not parse.
 [[nodiscard]] RunPlan make_plan(const std::string& experiment, const std::vector<ScenePose>& poses);
 
 /// The same with another partition grid and number of hosts.

@@ -43,10 +43,10 @@ TEST(Picture, ShowsTitleTimesLegendAndScale) {
        {"synthetic", "40 robots", "seed 42", "9.83 s simulated", "Start", "Paths", "End", "failed 1", " mm"}) {
     EXPECT_TRUE(xml.has_text(text)) << text;
   }
-  // Robot 1 has a dim red LED: once in the start panel, once in the end panel. One failed robot in each, too.
+  // Robot 1 has a dim red LED: once in the start panel, once in the end panel. Each panel also has one failed robot.
   EXPECT_EQ(discs(xml, svg::led_colour(1)), 2u);
   EXPECT_EQ(discs(xml, "#d0021b"), 2u);
-  // Background of its own, for light and dark pages.
+  // A background of its own, for light and dark pages.
   const auto ground =
       std::find_if(xml.elements().begin(), xml.elements().end(), [](const Element& e) { return e.name == "rect"; });
   EXPECT_EQ(ground->attribute("fill"), "#ffffff");
@@ -90,7 +90,7 @@ TEST(Picture, ShowsFoodAndHomeOfTheStation) {
   for (const char* const name : {"food", "home", "hub"}) {
     EXPECT_TRUE(xml.has_text(name)) << name;
   }
-  // The food's circle, far from all robots, lies within the panels of paths and of the end. The start is enlarged.
+  // The food's circle, far from all robots, lies within the panels of paths and of the end. The start panel is enlarged.
   int circles = 0, within = 0;
   for (const Element& element : xml.elements()) {
     if (element.name != "circle" || element.attribute("stroke") != "#b8860b") continue;
@@ -101,7 +101,7 @@ TEST(Picture, ShowsFoodAndHomeOfTheStation) {
   EXPECT_GE(within, 2);
 }
 
-/// The numbers of a path or a rectangle.
+/// The coordinates in a path or a rectangle.
 std::vector<double> numbers_of(std::string text) {
   for (char& c : text) c = (c >= '0' && c <= '9') || c == '-' || c == '.' ? c : ' ';
   std::istringstream in(text);
@@ -127,7 +127,7 @@ TEST(Picture, ShowsMovableBodiesWholeWhereItEnlarges) {
   Reader reader(scratch / "r.ktrec");
   const Xml xml(picture_svg(reader));
   EXPECT_TRUE(xml.has_text("see dashed frame"));
-  std::vector<double> panel;  // viewBox of the panel that the element lies in
+  std::vector<double> panel;  // viewBox of the current panel
   int bodies = 0, frames = 0;
   for (const Element& element : xml.elements()) {
     if (element.name == "svg") panel = numbers_of(element.attribute("viewBox"));
@@ -192,7 +192,7 @@ TEST(Picture, TenThousandRobotsStayBelowThreeMegabytes) {
   header.set_arena_width_mm(5000);
   header.set_arena_height_mm(5000);
   {
-    // Ways as crooked as can be: straight ones would be short.
+    // Paths with many bends: straight ones would have short texts.
     Writer writer(scratch / "r.ktrec", header);
     SyntheticState state(kRobots, Tick{0});
     for (std::int64_t t = 0; t < 100; ++t) {

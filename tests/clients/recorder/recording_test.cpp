@@ -29,7 +29,7 @@ std::string error_of(const std::filesystem::path& file) {
   return {};
 }
 
-/// Where each frame ends, the header's first.
+/// End of each frame in the file, the header's first.
 std::vector<std::size_t> frame_ends(const std::string& bytes) {
   std::vector<std::size_t> ends;
   for (std::size_t at = 0; at + kFramePrefix_bytes <= bytes.size();) {
@@ -76,7 +76,7 @@ TEST(Recording, ReadsBackWhatWasWritten) {
       EXPECT_EQ(record->end().state_hash(), synthetic_hash(100));
     }
   }
-  EXPECT_EQ(states, (std::vector<std::int64_t>{0, 31, 62, 92, 100}));  // ceil(k / 0.032768), and the last
+  EXPECT_EQ(states, (std::vector<std::int64_t>{0, 31, 62, 92, 100}));  // ceil(k / 0.032768), and the last tick
   EXPECT_EQ(hashes, 101);
   EXPECT_EQ(inputs, 1);
   EXPECT_EQ(messages, 1);
@@ -101,7 +101,7 @@ TEST(Recording, ManyHashesAndLargeStatesKeepTheirOrder) {
     hashes += record->hash().chain_size();
   }
   EXPECT_EQ(hashes, 10'001);
-  EXPECT_EQ(states, 5);  // 0, 100, 200, 300 s and the end at 327.68 s
+  EXPECT_EQ(states, 5);  // at 0, 100, 200, 300 s and at the end, 327.68 s
   EXPECT_TRUE(reader.ended());
 }
 
@@ -218,11 +218,11 @@ TEST(Recording, FuzzedFilesGiveDataOrOneErrorLine) {
   for (int round = 0; round < 1500; ++round) {
     std::string wrong;
     if (round % 3 == 0) {
-      // Any bytes behind a sound header.
+      // Random bytes after a valid header.
       wrong = bytes.substr(0, ends[random() % 2]);
       for (std::uint64_t i = random() % 300; i > 0; --i) wrong += static_cast<char>(random());
     } else {
-      // Records with wrong bytes under a right checksum: what a foreign writer could make.
+      // Records with wrong bytes and a correct checksum, as another writer could produce.
       std::size_t from = 0;
       for (const std::size_t end : ends) {
         std::string record = bytes.substr(from + kFramePrefix_bytes, end - from - kFramePrefix_bytes);
@@ -314,7 +314,7 @@ TEST(Recording, OtherFilesAreRefusedInOneLine) {
   put_content(file, framed(newer.SerializeAsString()));
   EXPECT_EQ(error_of(file),
             file.string() + ": not a Kilotwin recording; it has format 3, this program reads format 2");
-  // Format 1: length and CRC, no checksum of them.
+  // Format 1: length and CRC, without a checksum of both.
   std::string older = framed(newer.SerializeAsString());
   older.erase(8, 4);
   put_content(file, older);
@@ -367,7 +367,7 @@ TEST(Writer, IsNotInheritedByOtherPrograms) {
   EXPECT_TRUE(found);
 }
 
-/// Runs `work` in a process of its own and gives its exit status, or minus the signal that ended it.
+/// Runs `work` in a child process and returns its exit status, or minus the signal that ended it.
 template <class Work> int in_child(Work work) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -395,7 +395,7 @@ TEST(Writer, RecordsOlderThanASecondSurviveAKilledProcess) {
   std::int64_t hashes = 0;
   while (const proto::Record* record = reader.next()) hashes += record->hash().chain_size();
   EXPECT_EQ(reader.warning(), "");
-  EXPECT_GE(hashes, 50);  // of the first half second at least, of 1.5 s in all
+  EXPECT_GE(hashes, 50);  // those of the first half second at least; the process runs for 1.5 s
 }
 
 TEST(Writer, RecordsBeyond256KiBSurviveAKilledProcess) {
@@ -418,7 +418,7 @@ TEST(Writer, RecordsBeyond256KiBSurviveAKilledProcess) {
 TEST(Writer, ReportsAFullDiskAndContinuesWhenThereIsSpace) {
   const Scratch scratch;
   const auto file = scratch / "r.ktrec";
-  // A limit on the size of files stands for a full disk: a write is cut short, then fails.
+  // A limit on file size stands for a full disk: a write is cut short, then fails.
   const int status = in_child([&] {
     ::signal(SIGXFSZ, SIG_IGN);
     const rlimit little{10'000, RLIM_INFINITY}, much{RLIM_INFINITY, RLIM_INFINITY};

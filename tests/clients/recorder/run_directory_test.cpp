@@ -36,7 +36,7 @@ TEST(RunDirectory, NeverUsesAnExistingRun) {
   const Scratch scratch;
   EXPECT_EQ(RunDirectory::create(scratch / "run").path(), scratch / "run");
   EXPECT_EQ(RunDirectory::create(scratch / "run/").path(), scratch / "run-2");
-  fs::create_directory(scratch / "run-3");  // empty: free to take
+  fs::create_directory(scratch / "run-3");  // empty, so it may be used
   put_content(scratch / "run-4", "a file");
   EXPECT_EQ(RunDirectory::create(scratch / "run").path(), scratch / "run-3");
   EXPECT_EQ(RunDirectory::create(scratch / "run").path(), scratch / "run-5");
@@ -46,7 +46,7 @@ TEST(RunDirectory, NeverUsesAnExistingRun) {
 TEST(RunDirectory, RefusesAnExistingDirectoryThatIsNotEmpty) {
   const Scratch scratch;
   using Existing = RunDirectory::Existing;
-  fs::create_directory(scratch / "run");  // empty: free to take
+  fs::create_directory(scratch / "run");  // empty, so it may be used
   EXPECT_EQ(RunDirectory::create(scratch / "run", Existing::kRefuse).path(), scratch / "run");
   EXPECT_THROW((void)RunDirectory::create(scratch / "run", Existing::kRefuse), UserError);
   EXPECT_FALSE(fs::exists(scratch / "run-2"));
@@ -99,7 +99,7 @@ TEST(RunDirectory, ProcessesThatStartTogetherGetDifferentOnes) {
     const pid_t child = ::fork();
     if (child == 0) {
       for (int k = 0; k < kEach; ++k) {
-        // Each leaves its mark; a directory that two got would refuse the second.
+        // Each process leaves its mark; the mark of a second process in the same directory would fail.
         Writer(RunDirectory::create(scratch / "run").recording(), synthetic_header(1)).end(Tick{0}, 0);
       }
       ::_exit(0);

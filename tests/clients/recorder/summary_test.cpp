@@ -81,7 +81,7 @@ TEST(Summary, ReadsBackWhatWasWritten) {
   write_summary(read_summary(scratch / "a.json"), scratch / "b.json");
   EXPECT_EQ(content(scratch / "a.json"), content(scratch / "b.json"));
   EXPECT_EQ(read_summary(scratch / "a.json").state_hash, 0x00ab'cdef'0123'4567u);
-  // Nothing else stays behind.
+  // No other file remains.
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 2);
 }
 

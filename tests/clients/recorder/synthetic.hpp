@@ -18,8 +18,8 @@
 
 namespace kilotwin::recorder {
 
-/// A folder of its own that goes with the object. In memory where possible: file systems on disks write a file that was
-/// cut and filled again to the disk when it is closed, and thousands of those take minutes.
+/// A scratch folder that is removed with the object. It is in memory if possible: disk file systems write a file that was
+/// truncated and rewritten to the disk when it is closed, and thousands of those take minutes.
 class Scratch {
  public:
   Scratch() {
@@ -89,7 +89,7 @@ inline std::uint64_t synthetic_hash(std::int64_t tick) {
   return static_cast<std::uint64_t>(tick) * 0x9e3779b97f4a7c15u;
 }
 
-/// A whole run: a state as the schedule says and one at the end, a hash per tick, an input, messages, an end.
+/// A complete run: scheduled states and one at the end, a hash per tick, an input, messages, an end mark.
 inline void write_synthetic(const std::filesystem::path& file, const proto::RecordingHeader& header,
                             std::int64_t ticks) {
   Writer writer(file, header);
@@ -117,7 +117,7 @@ inline void write_synthetic(const std::filesystem::path& file, const proto::Reco
   writer.end(Tick{ticks}, synthetic_hash(ticks));
 }
 
-/// A frame: the record behind its length and checksums.
+/// A frame: length, checksums, record.
 inline std::string framed(const std::string& record) {
   const auto length = static_cast<std::uint32_t>(record.size());
   const auto crc = static_cast<std::uint32_t>(

@@ -1,4 +1,4 @@
-/// Pictures seen through an XML parser.
+/// Parses pictures as XML.
 #pragma once
 
 #include <libxml/parser.h>
@@ -10,7 +10,7 @@
 
 namespace kilotwin::recorder {
 
-/// A well-formed document's elements in order: name, attributes by name, text. Empty where it is not well-formed.
+/// Elements of a well-formed document in order: name, attributes by name, text. Empty if it is not well-formed.
 struct Element {
   std::string name, text;
   xmlNode* node;

@@ -1,4 +1,4 @@
-// Lines for people: bare on a terminal, stamped in a service's log.
+// Messages for users: plain on a terminal, with a time stamp in a service's log.
 #include "core/base/say.hpp"
 
 #include <gtest/gtest.h>

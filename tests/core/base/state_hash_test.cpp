@@ -14,8 +14,8 @@
 namespace kilotwin {
 namespace {
 
-/// `of(bit)` is a function's value with that input bit flipped, `of(-1)` without. Counts, for each input and output bit, how
-/// often the one flips the other; returns the largest distance of the frequency from 1/2, in standard errors.
+/// `of(bit)` is the value of a function with that input bit flipped, `of(-1)` without a flip. Counts how often each input bit
+/// flips each output bit. Returns the largest distance of a frequency from 1/2, in standard errors.
 template <class Function> double worst_avalanche(int inputs, const Function& of) {
   constexpr int kRounds = 4096;
   std::mt19937_64 random(9);
@@ -37,7 +37,7 @@ template <class Function> double worst_avalanche(int inputs, const Function& of)
   return worst;
 }
 
-// 16 000 frequencies of a fair coin stay within 6 standard errors but for once in 30 000.
+// 16 000 frequencies of a fair coin exceed 6 standard errors with probability 1 / 30 000.
 TEST(StateHash, EntityHashAvalanche) {
   const auto of = [](const std::array<std::uint64_t, 4>& w, int bit) {
     std::array<std::uint64_t, 4> v = w;
@@ -48,7 +48,7 @@ TEST(StateHash, EntityHashAvalanche) {
 }
 
 TEST(StateHash, EntityHashAvalancheFromZeros) {
-  // Real fields are far from random: mostly zeros and small counts.
+  // Real fields are not random: mostly zeros and small counts.
   const auto of = [](const std::array<std::uint64_t, 4>& w, int bit) {
     std::array<std::uint64_t, 2> v = {w[0] & 0xff, 0};
     if (bit >= 0) v[static_cast<std::size_t>(bit / 64)] ^= std::uint64_t{1} << bit % 64;
@@ -80,7 +80,7 @@ TEST(StateHash, ChainAvalanche) {
 }
 
 TEST(StateHash, ChainPreservesDifferences) {
-  // A bijection of either argument: 2^16 neighbouring values stay apart, whatever the other one is.
+  // The chain is a bijection of either argument: 2^16 neighbouring values stay distinct for any other argument.
   std::mt19937_64 random(4);
   for (const std::uint64_t fixed : {std::uint64_t{0}, ~std::uint64_t{0}, random(), random()}) {
     std::set<std::uint64_t> from_previous, from_sum;
@@ -94,8 +94,8 @@ TEST(StateHash, ChainPreservesDifferences) {
 }
 
 TEST(StateHash, NoWordErasesEarlierWords) {
-  // A product with zero would: for every state some word leads to it. Words that are near the id, or the id itself, are
-  // the ones most likely to do so.
+  // A multiplication by zero would erase them: for every state there would be such a word. The words most likely to have that
+  // effect are the id and words close to it.
   EXPECT_NE(entity_hash(HashDomain::kBody, 5, {5, 1}), entity_hash(HashDomain::kRadio, 5, {5, 1}));
   std::set<std::uint64_t> seen;
   for (std::uint32_t id = 0; id < 256; ++id) {
@@ -166,7 +166,7 @@ TEST(StateHash, EveryOctetMatters) {
 }
 
 TEST(StateHash, GoldenValues) {
-  // These values are in recordings: to change them is to change the format of a recording.
+  // Recordings contain these values: a change of them changes the format of recordings.
   EXPECT_EQ(entity_hash(HashDomain::kBody, 0, {}), 0x0543679098986549u);
   EXPECT_EQ(entity_hash(HashDomain::kRadio, 7, {hash_bits(12.5), hash_bits(-3), 42}), 0xc2874eff4220f895u);
   EXPECT_EQ(hash_chain(0, 0x0123456789abcdefu), 0x6d8b8688be5302a9u);

@@ -16,7 +16,7 @@ namespace {
 
 using Table = std::vector<std::vector<std::string>>;
 
-/// All rows, the header's names first.
+/// All rows, preceded by the header's names.
 Table table_of(CsvReader reader) {
   Table table{reader.columns()};
   while (reader.next()) {
@@ -177,7 +177,7 @@ TEST(Csv, ReadsBackAnyCellsThatWereWritten) {
       table.emplace_back();
       for (std::size_t i = 0; i < columns; ++i) {
         std::string cell = random_cell(random);
-        if (columns == 1 && cell.empty()) cell = "x";  // a blank line is no row
+        if (columns == 1 && cell.empty()) cell = "x";  // A blank line is no row.
         writer.rows() += (i == 0 ? "" : ",") + csv_cell(cell);
         table.back().push_back(std::move(cell));
       }
@@ -229,7 +229,7 @@ TEST(Csv, GzippedTablesAreReadAndDamagedOnesRefused) {
   std::uint32_t rows = 0;
   while (reader.next()) ASSERT_EQ(reader.whole(0), rows++);
   EXPECT_EQ(rows, 300'000u);
-  // Two members, as `cat a.gz b.gz` makes.
+  // Two gzip members, as `cat a.gz b.gz` produces.
   EXPECT_EQ(table_of(CsvReader("t.csv", packed + packed)).size(), 2u * 300'001);
   EXPECT_NE(error_of(packed.substr(0, packed.size() / 2)).find("the gzip stream is cut off"), std::string::npos);
   std::string damaged = packed;

@@ -19,7 +19,7 @@
 namespace kilotwin::dds {
 namespace {
 
-/// Values that a receive thread collects and a test waits for.
+/// Values that a receive thread collects and for which a test waits.
 template <class T> class Mailbox {
  public:
   void put(T value) {
@@ -27,7 +27,7 @@ template <class T> class Mailbox {
     values_.push_back(std::move(value));
     arrived_.notify_all();
   }
-  /// False where `count` values have not come within 20 s: a bound against hanging, not a measurement.
+  /// Returns false if fewer than `count` values arrive within 20 s. The limit prevents a hang; it is no measurement.
   bool wait_for(std::size_t count) {
     std::unique_lock lock(mutex_);
     return arrived_.wait_for(lock, std::chrono::seconds(20), [&] { return values_.size() >= count; });

@@ -69,7 +69,7 @@ TEST(EffectFunction, SplinesPassThroughTheirPointsAndStayAtTheirEnds) {
   for (std::size_t i = 0; i < knots.size(); ++i) EXPECT_NEAR(spline(knots[i]), values[i], 1e-14);
   EXPECT_EQ(spline(-100), 2);
   EXPECT_EQ(spline(100), 0.5);
-  // Its first and second derivatives are continuous, the second one is 0 at the ends.
+  // The first and second derivatives are continuous; the second one is 0 at the ends.
   const double h = 1e-4;
   const auto slope = [&](double c) { return (spline(c + h) - spline(c - h)) / (2 * h); };
   const auto bend = [&](double c) { return (spline(c + h) - 2 * spline(c) + spline(c - h)) / (h * h); };
@@ -91,7 +91,7 @@ TEST(EffectFunction, SplinesReproduceALineAndApproximateASine) {
   const EffectFunction line = function("spline { knot: " + list(knots) + " value: " + list(lines) + " }"),
                        sine = function("spline { knot: " + list(knots) + " value: " + list(sines) + " }");
   for (double c = 1; c < 7; c += 0.013) {
-    EXPECT_NEAR(line(c), 3 - 2 * c, 1e-5);    // the points are printed with six places
+    EXPECT_NEAR(line(c), 3 - 2 * c, 1e-5);    // knots are printed with six decimals
     EXPECT_NEAR(sine(c), std::sin(c), 5e-5);  // the error of a cubic spline is 5/384 h^4
   }
 }

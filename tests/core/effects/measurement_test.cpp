@@ -1,4 +1,4 @@
-// What a tracker sees, against closed forms.
+// Poses as a tracker measures them, against closed forms.
 #include "core/effects/measurement.hpp"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ using testing::ScenePose;
 
 const std::vector<ScenePose> kTwo = {{300, -400, 0.6}, {-100, 50, 3.1}};
 
-/// As seen at a tick with these motors.
+/// Measured poses at a tick with these motors.
 MeasuredPoses seen(const RunPlan& plan, const std::vector<ScenePose>& poses, Tick tick = Tick{0},
                    std::uint8_t left = 0) {
   Measurement measurement(plan);

@@ -13,7 +13,7 @@ TEST(Convex, MeanDistanceOfAreaIsTheClosedForm) {
   EXPECT_NEAR(Convex::disc(30).mean_distance_mm(), 20, 1e-12);
   // A square of side 1: (sqrt 2 + ln(1 + sqrt 2)) / 6.
   EXPECT_NEAR(Convex::box(1, 1).mean_distance_mm(), (std::sqrt(2.0) + std::log(1 + std::sqrt(2.0))) / 6, 1e-12);
-  // A thin rod of length 100: a quarter of it.
+  // A thin rod of length 100: a quarter of its length.
   EXPECT_NEAR(Convex::box(100, 1e-3).mean_distance_mm(), 25, 1e-3);
 }
 
@@ -28,7 +28,7 @@ TEST(Convex, PolygonIsAboutItsCentroidEitherWayRound) {
     x += corner.x_mm;
     y += corner.y_mm;
   }
-  EXPECT_NEAR(x, 0, 1e-12);  // The centroid of a triangle is that of its corners.
+  EXPECT_NEAR(x, 0, 1e-12);  // The centroid of a triangle is the mean of its corners.
   EXPECT_NEAR(y, 0, 1e-12);
 }
 
@@ -68,7 +68,7 @@ TEST(Convex, NearestAgreesWithSamplingTheRim) {
         }
       }
       if (found.distance_mm < 0) {
-        // Inside, the nearest edge counts; a sampled rim is no nearer than it.
+        // Inside, the nearest edge decides; no sampled point of the rim is nearer.
         EXPECT_NEAR(-found.distance_mm, least, 0.3);
       } else {
         EXPECT_NEAR(found.distance_mm, least, 0.3);

@@ -21,7 +21,7 @@ constexpr double kMax = std::numeric_limits<double>::max();
 constexpr double kMin = std::numeric_limits<double>::min();
 constexpr double kSmallest = std::numeric_limits<double>::denorm_min();
 
-/// Units in the last place of the double nearest to `exact` between `value` and `exact`.
+/// Distance of `value` from `exact` in units in the last place of the double nearest to `exact`.
 double error_ulp(double value, long double exact) {
   const auto rounded = static_cast<double>(exact);
   if (std::isnan(value) || std::isnan(rounded)) return std::isnan(value) == std::isnan(rounded) ? 0 : 1e300;
@@ -32,7 +32,7 @@ double error_ulp(double value, long double exact) {
   return static_cast<double>(std::fabs(static_cast<long double>(value) - exact) / ulp);
 }
 
-/// Draws of one range: `uniform` in value, or `spread` evenly over exponents (low and high of one sign).
+/// Arguments in one range: `uniform` in value, or `spread` evenly over exponents (both limits of one sign).
 class Range {
  public:
   static Range uniform(double low, double high) { return Range(low, high, false); }
@@ -117,7 +117,7 @@ TEST(Accuracy, NextToMultiplesOfAQuarterTurn) {
     check(-std::nextafter(x, 0.0));
     check(std::nextafter(x, 1e9));
   }
-  // The double that comes nearest to a multiple of pi/2: 2^-60 of it remain.
+  // The double nearest to a multiple of pi/2: the remainder is 2^-60 of it.
   check(0x1.6ac5b262ca1ffp+849);
   EXPECT_LE(worst, 1.0);
   EXPECT_EQ(kt_cos(0x1.6ac5b262ca1ffp+849), -4.6871659242546277e-19);
@@ -194,7 +194,7 @@ TEST(Accuracy, FloorAndRemainderAreExact) {
   }
 }
 
-/// The quantile by Newton's method on the logarithm of the tail probability (tail <= 1/2), from a good start.
+/// The quantile by Newton's method on the logarithm of the tail probability (tail <= 1/2), from a close start.
 long double tail_quantile(long double tail, long double start) {
   long double x = start;
   for (int i = 0; i < 4; ++i) {
@@ -228,7 +228,7 @@ TEST(Accuracy, InverseNormal) {
   EXPECT_LE(worst_relative(Range::uniform(1e-9, 0.49), true, "upper"), 1e-15);
   EXPECT_LE(worst_relative(Range::spread(1e-16, 0.1), false, "tail"), 1e-15);
   EXPECT_LE(worst_relative(Range::spread(kMin, 1e-9), false, "far tail"), 1e-15);
-  // About the median the quantile is sqrt(2 pi) q (1 + pi q^2 / 3 + 7 pi^2 q^4 / 30 + ...).
+  // Near the median the quantile is sqrt(2 pi) q (1 + pi q^2 / 3 + 7 pi^2 q^4 / 30 + ...).
   std::mt19937_64 random(78);
   for (int i = 0; i < 10000; ++i) {
     const double q =
@@ -242,7 +242,7 @@ TEST(Accuracy, InverseNormal) {
 }
 
 TEST(Accuracy, InverseNormalGrows) {
-  // A quantile that stepped back where two approximations meet would make draws depend on how they were compared.
+  // If the quantile decreased where two approximations meet, the order of draws could differ from that of probabilities.
   for (const double seam : {0.078125, 0.921875, 1.6052280551856116e-09, 0.5}) {
     double x = seam;
     for (int i = 0; i < 2000; ++i) x = std::nextafter(x, 0.0);

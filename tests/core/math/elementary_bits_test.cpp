@@ -1,5 +1,5 @@
-// Every compiler, optimisation level and processor has to find these very bits. One constant per function: the hash of the
-// results over a fixed set of arguments. A constant changes only when the function is changed on purpose.
+// Every compiler, optimisation level and processor must give the same bits. One constant per function: the hash of its results
+// over a fixed set of arguments. A constant changes only with a deliberate change of its function.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -10,7 +10,7 @@
 
 namespace {
 
-/// Arguments from a 64-bit congruential sequence (Knuth's MMIX), half of them any bit pattern, half of usual size.
+/// Arguments from a 64-bit congruential sequence (Knuth's MMIX): half with random bit patterns, half of usual magnitude.
 class Arguments {
  public:
   double next() {

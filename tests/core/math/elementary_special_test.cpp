@@ -1,4 +1,4 @@
-// Values that have to be exact, and those at the ends of the ranges.
+// Results that must be exact, and results at the ends of the ranges.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -18,7 +18,7 @@ constexpr double kMax = std::numeric_limits<double>::max();
 
 std::uint64_t bits(double x) { return std::bit_cast<std::uint64_t>(x); }
 
-/// Equal to the bit: zeros by their sign, and any NaN is the one positive quiet NaN.
+/// Equality of bits: the sign of zero matters, and any NaN must be the positive quiet NaN.
 #define EXPECT_BITS(value, expected) EXPECT_EQ(bits(value), bits(expected)) << #value " is " << (value)
 
 TEST(Special, AllNansAreThePositiveQuietOne) {
@@ -97,7 +97,7 @@ TEST(Special, SincosAgreesWithSineAndCosine) {
 }
 
 TEST(Special, AngleOfAPointAgreesWithTheStandard) {
-  // IEEE 754 fixes these results, so that libm is a reference to the bit but for rounding of multiples of pi/4.
+  // IEEE 754 fixes these results, so libm is a reference for every bit, except for the rounding of multiples of pi/4.
   const double values[] = {0.0, -0.0, 1, -1, 3, -3, kInf, -kInf, kSmallest, -kSmallest, kMax, -kMax};
   for (const double y : values) {
     for (const double x : values) {

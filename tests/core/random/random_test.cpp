@@ -1,5 +1,5 @@
-// Statistics are tested on fixed seeds, so that the tests have one outcome. Limits are stated in standard errors: 4.5 of
-// them are exceeded once in 150 000 by a true generator, and each limit was set before the seed was tried.
+// Statistics use fixed seeds, so that the tests are deterministic. Limits are in standard errors. A true generator exceeds 4.5 of
+// them once in 150 000 tests. Each limit was set before its seed was tried.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ TEST(Philox, KnownAnswers) {  // Salmon et al., Random123 1.14, kat_vectors.
 }
 
 TEST(Random, EveryCoordinateReachesTheCounter) {
-  // For one key Philox is a bijection of the counter: places whose blocks all differ have counters that all differ.
+  // For one key, Philox is a bijection of the counter: if all blocks differ, all counters differ.
   const Random random(42);
   std::vector<std::tuple<Stream, std::uint32_t, std::int64_t, std::uint32_t>> places{{Stream::kWheelBias, 0, 0, 0}};
   for (unsigned bit = 0; bit < 16; ++bit) places.emplace_back(static_cast<Stream>((1u << bit) ^ 1u), 0, 0, 0);
@@ -116,7 +116,7 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b) {
   return ab / std::sqrt(aa * bb);
 }
 
-/// Largest distance of the empirical distribution from `distribution`, times sqrt(n): above 2.2 once in 8 000.
+/// Kolmogorov-Smirnov statistic times sqrt(n): exceeds 2.2 once in 8 000 tests.
 template <class Distribution>
 double kolmogorov_smirnov(std::vector<double> values, const Distribution& distribution) {
   std::sort(values.begin(), values.end());
@@ -165,7 +165,7 @@ TEST(Random, NormalIsNormal) {
 }
 
 TEST(Random, DrawsAreIndependentAcrossCoordinates) {
-  // The same places but for one coordinate: uncorrelated, in value and in distance from the middle.
+  // Draws that differ in one coordinate are uncorrelated, in value and in distance from the mean.
   const Random random(3), other_seed(4);
   const auto draw = [&](Stream stream, auto e, Tick t, auto i) { return random.uniform(stream, e, t, i); };
   const auto base = sample([&](auto e, Tick t, auto i) { return draw(Stream::kReception, e, t, i); });
@@ -183,7 +183,7 @@ TEST(Random, DrawsAreIndependentAcrossCoordinates) {
     return values;
   };
   for (std::size_t i = 0; i < others.size(); ++i) {
-    // Exchanging neighbours counts each pair twice.
+    // Exchanged neighbours would count each pair twice.
     const double twice = i == 2 || i == 4 ? std::sqrt(2.0) : 1;
     EXPECT_LT(std::fabs(correlation(base, others[i])), twice * limit) << i;
     EXPECT_LT(std::fabs(correlation(spread(base), spread(others[i]))), twice * limit) << i;
