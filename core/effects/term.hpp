@@ -61,7 +61,8 @@ class TermList {
   const RunPlan& plan_;
   const Of of_;
   const Random random_;
-  double noise_per_tick_;  ///< independent noise: standard deviation per tick for one per root second
+  double
+      noise_per_tick_;  ///< independent noise: standard deviation in a tick over that of the mean over one second
   Covariates covariates_;
   std::vector<Term> terms_;
   std::vector<double> values_;

@@ -147,36 +147,36 @@ class ContactSolver {
   double sub_step_part_;
   CandidateList candidates_;
   ContactPass pass_;
-  std::vector<Mover> movers_, slot_movers_;  ///< by hops; by slots
-  std::vector<std::uint32_t> others_;        ///< the contacts of the movers
+  std::vector<Mover> movers_, slot_movers_;  ///< in the order of hops; in the order of slots
+  std::vector<std::uint32_t> others_;        ///< contacts of the movers: indices of bodies, then of specials_
   std::size_t other_count_ = 0;
   bool any_overlap_ = true, has_others_ = false;
   std::size_t active_count_ = 0;
   const World world_;
   bool has_immobile_ = false;
-  bool has_shapes_;                     ///< anything but robots and straight walls
+  bool has_shapes_;                     ///< there are other shapes than robots and straight walls
   std::vector<std::uint8_t> immobile_;  ///< per robot
-  mutable ContactCache cache_;          ///< out of date while slots are kept, until it is read
+  mutable ContactCache cache_;          ///< while slots are kept, filled only when it is read
   mutable bool cache_is_current_ = true;
   std::vector<MovableState> movables_;
   MovablePass movable_pass_;
-  std::vector<Special> specials_;                     ///< by body, then by key
+  std::vector<Special> specials_;                     ///< sorted by body, then by key
   std::vector<std::vector<std::uint32_t>> touching_;  ///< per movable body, indices into specials_
   std::vector<std::uint8_t> movable_in_motion_, has_special_;
   // Per body.
-  std::vector<std::uint8_t> hops_;  ///< by contacts from the own bodies, or kOutOfReach
+  std::vector<std::uint8_t> hops_;  ///< number of contacts from the nearest own body, or kOutOfReach
   std::vector<std::uint8_t> driven_, active_, overlaps_,
       in_motion_;  ///< in_motion: driven, or with cached contacts
   std::vector<Slot> slot_of_;
-  std::vector<std::uint8_t> needs_drive_;  ///< driven, and within reach; where there are others
-  std::vector<std::uint32_t> reached_;     ///< others' bodies, by hops
+  std::vector<std::uint8_t> needs_drive_;  ///< driven, and within reach; used if there are other partitions' bodies
+  std::vector<std::uint32_t> reached_;     ///< bodies of other partitions that contacts reach, by hops
   std::vector<std::uint32_t> far_;         ///< scratch
   // While slots are kept.
   std::vector<Slot> previous_slot_of_;  ///< slot_of_ before slots were assigned
   bool slots_are_kept_ = false;
-  std::vector<std::uint32_t> slot_robot_;      ///< per body, when slots were assigned
-  std::vector<double> slot_x_mm_, slot_y_mm_;  ///< per body, when slots were assigned
-  std::vector<double> remembered_;             ///< forces at the tick's start, of batches that may come to rest
+  std::vector<std::uint32_t> slot_robot_;      ///< per body, at the last assignment of slots
+  std::vector<double> slot_x_mm_, slot_y_mm_;  ///< per body, at the last assignment of slots
+  std::vector<double> remembered_;             ///< impulses at the tick's start, of batches with undriven bodies
 };
 
 }  // namespace kilotwin::physics

@@ -18,7 +18,7 @@ inline constexpr double kTangentGain = 0.06;
 /// chain of robots hits the body that it pushes again and again, and so moves a body that its force cannot move.
 inline constexpr double kEase = 0.25;
 /// Ratio of the bodies' inertia in the solver to their true inertia. Kilobots are quasi-static: inertia does not matter.
-/// Forces in a jam balance faster with a smaller inertia, because fewer contacts are needed to stop a body.
+/// Forces in a jam balance faster with a smaller inertia, because less force stops a body.
 inline constexpr double kInertia = 2;
 
 /// Gap that stands for "no contact": so wide that it never acts, mm.

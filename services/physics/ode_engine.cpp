@@ -172,7 +172,7 @@ void OdeEngine::move(Tick from, const Inputs& inputs) {
   for (const std::uint32_t end : group_end_) {
     const std::span<const std::uint32_t> group(order_.data() + first, order_.data() + end);
     first = end;
-    if (stands_[group[0]] != 0) continue;  // Such bodies form groups of one.
+    if (not_simulated_[group[0]] != 0) continue;  // Such bodies form groups of one.
     if (std::none_of(group.begin(), group.end(), [this](std::uint32_t i) { return is_own(i); })) continue;
     if (rests(group)) {
       for (const std::uint32_t i : group) now_[i].velocity_mm_s = now_[i].spin_rad_s = {};
@@ -204,21 +204,21 @@ void OdeEngine::place_bodies() {
   const Bodies& known = population_.known();
   const std::size_t count = known.size() + movable_.size();
   now_.resize(count);
-  stands_.resize(count);
+  not_simulated_.resize(count);
   in_world_.resize(count);
   start_axis_.resize(count);
   for (std::size_t i = 0; i < known.size(); ++i) {
     const double x = known.x_mm[i], y = known.y_mm[i];
     now_[i] =
         known.tracked[i] != 0 ? upright(x, y, known.heading_rad[i], kRobotHeight_mm) : states_[known.robot[i]];
-    stands_[i] = known.tracked[i] != 0 || immobile_[known.robot[i]] != 0 ||
-                 (grid_.size() > 1 && distance_mm(rectangle_, x, y) > limits_.rim_mm);
+    not_simulated_[i] = known.tracked[i] != 0 || immobile_[known.robot[i]] != 0 ||
+                        (grid_.size() > 1 && distance_mm(rectangle_, x, y) > limits_.rim_mm);
   }
   for (std::size_t m = 0; m < movable_.size(); ++m) {
     const RigidState& state = movable_states_[m];
     now_[known.size() + m] = state;
-    stands_[known.size() + m] = rectangle_.distance_mm(state.position_mm[0], state.position_mm[1]) >
-                                movable_[m].shape.reach_mm() + limits_.margin_mm;
+    not_simulated_[known.size() + m] = rectangle_.distance_mm(state.position_mm[0], state.position_mm[1]) >
+                                       movable_[m].shape.reach_mm() + limits_.margin_mm;
   }
 }
 
@@ -230,7 +230,7 @@ void OdeEngine::fill_drives(Tick from) {
   drives_.count = 0;
   drive_of_.assign(now_.size(), kNone);
   for (std::uint32_t i = 0; i < known.size(); ++i) {
-    if (driven[i] == 0 || stands_[i] != 0) continue;
+    if (driven[i] == 0 || not_simulated_[i] != 0) continue;
     drive_of_[i] = static_cast<std::uint32_t>(drives_.count);
     population_.drive().add(drives_, i, known.robot[i], from, duties[i], known.heading_rad[i],
                             1.0 / limits_.sub_steps);
@@ -244,7 +244,7 @@ void OdeEngine::find_near() {
   for (std::uint32_t m = robots; m < now_.size(); ++m) {
     const Vector3& at = now_[m].position_mm;
     for (std::uint32_t i = 0; i < m; ++i) {
-      if (stands_[i] != 0 && stands_[m] != 0) continue;
+      if (not_simulated_[i] != 0 && not_simulated_[m] != 0) continue;
       const double dx = now_[i].position_mm[0] - at[0], dy = now_[i].position_mm[1] - at[1];
       const double near_mm = kind(i).shape.reach_mm() + kind(m).shape.reach_mm() + limits_.reach_mm;
       if (dx * dx + dy * dy > near_mm * near_mm) continue;
@@ -270,15 +270,15 @@ void OdeEngine::make_groups() {
   };
   for (std::uint32_t i = 0; i < count; ++i) {
     leader_[i] = i;
-    if (stands_[i] != 0 || !is_robot(i)) continue;
+    if (not_simulated_[i] != 0 || !is_robot(i)) continue;
     for (const std::uint32_t j : candidates_.of(i)) {
       if (j >= i) break;
       const double dx = known.x_mm[i] - known.x_mm[j], dy = known.y_mm[i] - known.y_mm[j];
-      if (stands_[j] == 0 && dx * dx + dy * dy <= reach_square_mm2) unite(i, j);
+      if (not_simulated_[j] == 0 && dx * dx + dy * dy <= reach_square_mm2) unite(i, j);
     }
   }
   for (const auto& [i, m] : near_) {
-    if (stands_[i] == 0 && stands_[m] == 0) unite(i, m);
+    if (not_simulated_[i] == 0 && not_simulated_[m] == 0) unite(i, m);
   }
   // Counting sort by leader; ascending within a group.
   group_end_.assign(count + 1, 0);
@@ -362,7 +362,7 @@ bool OdeEngine::step_group(Tick from, std::span<const std::uint32_t> group, Solv
     }
     for (const auto& [i, m] : near_) {
       if (leader_[i] != leader && leader_[m] != leader) continue;
-      if (stands_[i] != 0) {
+      if (not_simulated_[i] != 0) {
         touch_pair(m, i, since_s);
       } else {
         touch_pair(i, m, since_s);

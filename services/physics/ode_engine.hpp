@@ -111,28 +111,29 @@ class OdeEngine final : public PopulationEngine {
   const World scene_;
   Kind robot_;
   std::vector<Kind> movable_;
-  double thrust_g_mm_s2_;           ///< the force of a driven robot at most
+  double thrust_g_mm_s2_;           ///< largest force of a driven robot
   std::array<Vector3, 3> legs_mm_;  ///< tips, in the body's frame: rear left, rear right, front
   Vector3 downhill_;                ///< unit
   OdeWorld world_;
   CandidateList candidates_;
-  std::vector<std::uint8_t> immobile_;      ///< per robot
-  std::vector<RigidState> states_;          ///< per robot; of those that are listed, current
-  std::vector<RigidState> movable_states_;  ///< per movable body; of those that are not listed, a tick old
+  std::vector<std::uint8_t> immobile_;  ///< per robot
+  std::vector<RigidState> states_;      ///< per robot; current for listed robots
+  std::vector<RigidState>
+      movable_states_;  ///< per movable body; current for listed ones, a tick old for the others
   std::vector<std::uint8_t> listed_movable_, own_movable_;
 
   // Within a step; per body: known robots, then all movable bodies.
   Drives drives_;
   std::vector<std::uint32_t> drive_of_, leader_, in_world_;
-  /// 1: it is not simulated: immobile, where a tracker says, or a ghost at the rim, which moves on as it does.
-  std::vector<std::uint8_t> stands_;
+  /// 1: the body is not simulated: immobile, tracked, or a ghost at the rim, which keeps its velocity.
+  std::vector<std::uint8_t> not_simulated_;
   std::vector<RigidState> now_;
-  std::vector<Vector3> start_axis_;                            ///< where a body looked at the tick's start, level
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> near_;  ///< body and movable body, within reach; ascending
-  std::vector<std::uint32_t> order_, group_end_;               ///< bodies sorted by group
+  std::vector<Vector3> start_axis_;  ///< horizontal direction of the heading at the tick's start
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> near_;  ///< (body, movable body) within reach, ascending
+  std::vector<std::uint32_t> order_, group_end_;  ///< bodies sorted by group, and the end of each group
 };
 
-/// The unit vector along (x, y), or the fallback where that is 0.
+/// The unit vector along (x, y); `fallback` if both are 0.
 [[nodiscard]] inline Vector3 level(double x, double y, const Vector3& fallback) {
   const double length = __builtin_sqrt(x * x + y * y);
   if (!(length > 0)) return fallback;

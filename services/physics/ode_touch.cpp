@@ -143,7 +143,7 @@ void OdeEngine::touch_obstacles(std::uint32_t i) {
 
 void OdeEngine::touch_robots(std::uint32_t i, double since_s) {
   for (const std::uint32_t j : candidates_.of(i)) {
-    if (stands_[j] == 0 && (j < i || leader_[j] != leader_[i])) continue;
+    if (not_simulated_[j] == 0 && (j < i || leader_[j] != leader_[i])) continue;
     touch_pair(i, j, since_s);
   }
 }
@@ -152,11 +152,11 @@ void OdeEngine::touch_robots(std::uint32_t i, double since_s) {
 void OdeEngine::touch_pair(std::uint32_t i, std::uint32_t j, double since_s) {
   TouchPoint touch;
   touch.body = in_world_[i];
-  touch.other = stands_[j] != 0 ? TouchPoint::kStanding : in_world_[j];
+  touch.other = not_simulated_[j] != 0 ? TouchPoint::kStanding : in_world_[j];
   touch.at_mm[2] = std::min(kind(i).height_mm, kind(j).height_mm) / 2;
   const Place here = place(i);
   Place there = place(j);
-  if (stands_[j] != 0) {
+  if (not_simulated_[j] != 0) {
     there.x_mm += now_[j].velocity_mm_s[0] * since_s;
     there.y_mm += now_[j].velocity_mm_s[1] * since_s;
   }
