@@ -92,7 +92,7 @@ TEST_F(ImportTest, ADataDirectoryIsLeftAsItIs) {
   EXPECT_TRUE(importable(folder_ / "from").empty());
 }
 
-TEST_F(ImportTest, SaysWhereALineIsWrong) {
+TEST_F(ImportTest, NamesTheWrongLine) {
   const std::string file = (folder_ / "from" / "x.tsv").string();
   give("x.tsv", "0\t1\t0\t5\t5\t0\n1\t1\t0\tleft\t5\t0\n");
   EXPECT_EQ(complaint(), file + ":2:7: x is \"left\"; give pixels");
@@ -106,7 +106,7 @@ TEST_F(ImportTest, SaysWhereALineIsWrong) {
   EXPECT_NE(complaint().find("has no rows"), std::string::npos);
 }
 
-TEST_F(ImportTest, RefusesWhatIsAmbiguousOrNothing) {
+TEST_F(ImportTest, RefusesAmbiguousAndEmptyDirectories) {
   EXPECT_NE(complaint().find("holds neither"), std::string::npos);
   give("README.txt", "Robots on a table.\nt\tid\n");
   give("other.csv", "a,b\n1,2\n");
@@ -120,7 +120,7 @@ TEST_F(ImportTest, RefusesWhatIsAmbiguousOrNothing) {
   EXPECT_NE(complaint().find("not both"), std::string::npos);
 }
 
-TEST_F(ImportTest, WhateverIsInAFileItIsReadOrComplainedOf) {
+TEST_F(ImportTest, AnyFileIsReadOrRefused) {
   std::mt19937 dice(11);
   const std::string ark =
       "t\tid\tcolour\tx\ty\torientation\n0.1\t3\t0\t1000\t1000\t90\n0.1\t12\t2\t1250\t900\t-45.5\n0.6\t3\t0\t1001."

@@ -82,7 +82,7 @@ TEST_F(MeasuredSetFiles, SavedAndLoadedIsTheSame) {
   EXPECT_EQ(again.runs[0].tracks[0].commands[2].time_s, 0.25);
 }
 
-TEST_F(MeasuredSetFiles, WhatIsWrongIsNamedWithItsPlace) {
+TEST_F(MeasuredSetFiles, ErrorsNameTheirPosition) {
   EXPECT_NE(complaint().find("trajectories.csv"), std::string::npos);
   write("trajectories.csv", "run,robot,time_s,x_mm\n");
   EXPECT_EQ(complaint(),

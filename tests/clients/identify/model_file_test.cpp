@@ -251,7 +251,7 @@ class WrittenModel : public testing::Test {
   mutable std::vector<OtherRobot> list_;  ///< neighbours at one instant
 };
 
-TEST_F(WrittenModel, GoesWhereTheFittedOneSays) {
+TEST_F(WrittenModel, PredictsLikeTheFittedModel) {
   const Random random(31);
   std::uint32_t combination = 0;
   for (int t = 0; t <= static_cast<int>(Target::kMeasuredHeading); ++t) {
