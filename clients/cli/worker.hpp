@@ -1,5 +1,8 @@
 /// The worker: the process in which a local run is executed. If a robot's program crashes it, the parent process survives and
 /// restarts the run from its last checkpoint.
+///
+/// It is a fork() of its own and no os::Process: that starts another program, but the worker continues in this one, with the
+/// plan, the claimed run directory and standard input as they are.
 #pragma once
 
 #include <optional>

@@ -27,7 +27,7 @@ class Parser {
     read_table();
     read_functions();
     find_sections();
-    read_lines();
+    file_.lines.elf = octets_;
     return std::move(file_);
   }
 
@@ -264,24 +264,6 @@ class Parser {
     }
     std::stable_sort(file_.functions.begin(), file_.functions.end(),
                      [](const ElfFile::Function& a, const ElfFile::Function& b) { return a.offset < b.offset; });
-  }
-
-  /// Reads the line tables, which only messages use. Damaged tables are skipped.
-  void read_lines() {
-    const auto names = at<Elf64_Shdr>(octets_, header_.e_shoff + header_.e_shstrndx * sizeof(Elf64_Shdr));
-    if (!names) return;
-    for (std::uint64_t i = 0; i < header_.e_shnum; ++i) {
-      const auto section = at<Elf64_Shdr>(octets_, header_.e_shoff + i * sizeof(Elf64_Shdr));
-      if (!section || section->sh_type != SHT_PROGBITS || section->sh_offset > octets_.size()) continue;
-      const std::uint64_t at_name = names->sh_offset + section->sh_name;
-      if (at_name >= octets_.size()) continue;
-      const std::string_view rest = octets_.substr(at_name, 32), name = rest.substr(0, rest.find('\0'));
-      for (const auto& [wanted, octets] : {std::pair{".debug_line", &file_.lines.debug_line},
-                                           {".debug_line_str", &file_.lines.debug_line_str},
-                                           {".debug_str", &file_.lines.debug_str}}) {
-        if (name == wanted) *octets = octets_.substr(section->sh_offset, section->sh_size);
-      }
-    }
   }
 
   std::string_view octets_;

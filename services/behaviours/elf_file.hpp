@@ -1,4 +1,8 @@
 /// Reader of compiled robots' programs: self-contained ELF64 shared objects for x86-64.
+///
+/// The reader is the project's own, because it is the loader: the program runs in this process, so every offset that is used
+/// later must be checked for this runtime's layout. libelf checks the format only. Line tables serve error messages alone;
+/// libdw reads them (line_table.hpp).
 #pragma once
 
 #include <cstdint>

@@ -3,7 +3,9 @@
 #include <elf.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
+#include <sstream>
 
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
@@ -26,6 +28,53 @@ TEST(ElfFile, DescribesAProgram) {
   EXPECT_LT(file.pad.last - file.pad.first, kPage);
   EXPECT_EQ(file.function_at(file.table.interrupts), "interrupts");
   EXPECT_EQ(file.function_at(file.table.leave + 1), "kt_leave");
+}
+
+TEST(ElfFile, NamesTheLinesOfFunctions) {
+  const ElfFile file = ElfFile::parse(valid(), "disperse.so");
+  for (const char* const name : {"setup", "loop"}) {
+    const auto function = std::find_if(file.functions.begin(), file.functions.end(),
+                                       [&](const ElfFile::Function& f) { return f.name == name; });
+    ASSERT_NE(function, file.functions.end()) << name;
+    const auto place = file.lines.find(function->offset);
+    ASSERT_TRUE(place) << name;
+    EXPECT_EQ(place->file, "disperse.c");
+    // The first instruction belongs to a statement of the function, not always to its first one.
+    std::istringstream source(os::read_if_there(std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c").value());
+    std::uint32_t number = 0, first = 0, last = 0;
+    for (std::string line; last == 0 && std::getline(source, line);) {
+      ++number;
+      if (line.find(std::string("void ") + name + "(") != std::string::npos) first = number;
+      if (first != 0 && line == "}") last = number;
+    }
+    ASSERT_GT(last, first) << name;
+    EXPECT_GE(place->line, first) << name;
+    EXPECT_LE(place->line, last) << name;
+  }
+  EXPECT_FALSE(file.lines.find(file.memory.size()));
+}
+
+TEST(ElfFile, DamagedLineTablesAreHarmless) {
+  const std::string octets = valid();
+  const ElfFile file = ElfFile::parse(octets, "disperse.so");
+  const std::uint64_t offset = file.table.interrupts;
+  // Sections and their headers lie behind the segments.
+  const std::size_t first = 2 * kPage;
+  ASSERT_GT(octets.size(), first);
+  const Random random(11);
+  int found = 0, missing = 0;
+  for (std::uint32_t round = 0; round < 4000; ++round) {
+    LineTables tables{octets};
+    const auto draw = random.block(Stream::kLayout, round, Tick{0}, 0);
+    for (std::uint32_t n = 0; n <= draw[0] % 8; ++n) {
+      const auto change = random.block(Stream::kLayout, round, Tick{1}, n);
+      tables.elf[first + change[0] % (octets.size() - first)] = static_cast<char>(change[1] & 0xff);
+    }
+    if (draw[1] % 8 == 0) tables.elf.resize(draw[2] % octets.size());
+    ++(tables.find(offset) ? found : missing);
+  }
+  EXPECT_GT(found, 100);
+  EXPECT_GT(missing, 100);
 }
 
 TEST(ElfFile, ReportsEveryTruncation) {
