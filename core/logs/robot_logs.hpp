@@ -15,8 +15,8 @@ namespace kilotwin {
 
 class RobotLogs {
  public:
-  static constexpr std::uint64_t kMostOctets =
-      1 << 20;  ///< per file; the file's last line says that its log ends there
+  /// Limit per file. A log that reaches it ends with a line that says so.
+  static constexpr std::uint64_t kMostOctets = 1 << 20;
 
   /// Prepares the logs of an attempt that starts at tick `first`, which is 0 or a checkpoint's tick. Removes the lines that
   /// earlier attempts wrote at `first` or later. Touches only the files of robots for which own(robot) is true, because other

@@ -130,8 +130,8 @@ class Executor {
   struct Main {
     const Fault* fault = nullptr;
     bool preempted = false;  ///< it used up its budget and was stopped within its code
-    std::int32_t wait_period =
-        0;                  ///< cycles per round of a loop that only an interrupt can end; 0: in no such loop
+    /// Cycles per round of a busy wait, a loop that only an interrupt can end; 0: it is in no such loop.
+    std::int32_t wait_period = 0;
     std::int32_t left = 0;  ///< cycles left of the budget; negative: exceeded
   };
   /// Runs the main program until it waits or has used up `cycles`. `previous_period` is Main::wait_period of the last tick, or 0; it
