@@ -162,8 +162,8 @@ int examine(std::optional<std::uint32_t> domain) {
     fmt::print("{} {}{}{}\n", mark, finding.found, finding.remedy.empty() ? "" : "; remedy: ", finding.remedy);
     healthy = healthy && !finding.fatal;
   }
-  fmt::print("{}\n",
-             healthy ? "experiments will run here" : "experiments will not run here until the failures above are mended");
+  fmt::print("{}\n", healthy ? "experiments will run here"
+                             : "experiments will not run here until the failures above are mended");
   return healthy ? kDone : kFailed;
 }
 
