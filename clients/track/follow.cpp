@@ -1,0 +1,148 @@
+#include "clients/track/follow.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/track/assignment.hpp"
+#include "core/base/pose.hpp"
+
+namespace kilotwin::track {
+namespace {
+
+/// Gate: quantile 0.9997 of the chi-squared distribution with two degrees of freedom.
+constexpr double kGate = 16.2;
+/// Assignments whose log likelihoods differ by less are ambiguous (a ratio of about 90).
+constexpr double kMargin = 9;
+/// A new robot is confirmed when it was seen in so many frames, and given up when it was missed in so many before.
+constexpr int kConfirm = 3, kGiveUp = 3;
+/// Share of the radius by which a fitted centre may be off for reasons that its deviation does not know.
+constexpr double kShift = 0.07;
+/// No robot is faster.
+constexpr double kTopSpeed_mm_s = 35;
+
+Led most_frequent(const std::array<Led, 5>& leds, int count) {
+  std::array<int, 8> votes{};
+  for (int i = 0; i < count; ++i) ++votes[static_cast<std::size_t>(leds[static_cast<std::size_t>(i)])];
+  return static_cast<Led>(std::max_element(votes.begin(), votes.end()) - votes.begin());
+}
+
+}  // namespace
+
+Follower::Follower(FollowLimits limits) : limits_(limits) {}
+
+void Follower::predict(double time_s) {
+  time_s_ = std::max(time_s_, time_s);
+  for (Track& track : tracks_) track.position.predict(time_s_);
+}
+
+double Follower::reach_mm(const Track& track) const {
+  const Covariance c = track.position.covariance();
+  const double by_filter = std::sqrt(kGate * std::max(c.xx, c.yy)) + 1;
+  const double by_speed = kTopSpeed_mm_s * std::max(0.0, time_s_ - track.seen_s) + 0.15 * limits_.robot_radius_mm;
+  return std::min(by_filter, by_speed);
+}
+
+void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
+  track.position.update(sighting.x_mm, sighting.y_mm, sighting.sd_mm);
+  track.sighting = index;
+  track.seen_s = time_s_;
+  track.state = track.doubt ? TrackState::kDoubt : TrackState::kSeen;
+  track.leds[static_cast<std::size_t>(track.led_count % 5)] = sighting.led;
+  ++track.led_count;
+  track.led = most_frequent(track.leds, std::min(track.led_count, 5));
+  track.path.add(time_s_, sighting.x_mm, sighting.y_mm);
+  std::optional<double> by_led;
+  double by_led_sd = 0;
+  if (sighting.led_bearing_rad) {
+    if (const std::optional<double> heading = track.path.heading_rad())
+      led_bearing_.add(*sighting.led_bearing_rad, *heading);
+    if (const std::optional<LedMount> mount = led_bearing_.mount()) {
+      by_led = wrapped(*sighting.led_bearing_rad - mount->from_heading_rad);
+      // Errors of successive frames go together: each counts for less.
+      by_led_sd = 3 * mount->sd_rad;
+    }
+  }
+  track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sighting.sd_mm, by_led, by_led_sd);
+}
+
+void Follower::miss(Track& track) const {
+  track.sighting.reset();
+  track.state = time_s_ - track.seen_s > limits_.predict_s ? TrackState::kLost : TrackState::kPredicted;
+}
+
+void Follower::begin(std::size_t index, const Sighting& sighting) {
+  Track track(PositionFilter(time_s_, sighting.x_mm, sighting.y_mm, sighting.sd_mm));
+  take(track, index, sighting);
+  track.frames = track.hits = 1;
+  // The robots of the first picture are there from the beginning.
+  track.confirmed = first_;
+  track.id = first_ ? next_id_++ : UINT32_MAX;
+  tracks_.push_back(track);
+}
+
+void Follower::update(const std::vector<Sighting>& sightings) {
+  std::vector<Pair> pairs;
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    const double reach = reach_mm(tracks_[t]);
+    const Covariance c = tracks_[t].position.covariance();
+    for (std::size_t s = 0; s < sightings.size(); ++s) {
+      const Sighting& seen = sightings[s];
+      if (std::hypot(seen.x_mm - tracks_[t].position.x_mm(), seen.y_mm - tracks_[t].position.y_mm()) > reach)
+        continue;
+      // Discs do not overlap, so the gate may be wide: a lamp that goes on shifts the fitted centre for once.
+      const double sd_mm = std::hypot(seen.sd_mm, kShift * limits_.robot_radius_mm);
+      const double distance2 = tracks_[t].position.distance2(seen.x_mm, seen.y_mm, sd_mm);
+      if (distance2 > kGate) continue;
+      const double spread = (c.xx + sd_mm * sd_mm) * (c.yy + sd_mm * sd_mm);
+      // A track that was seen just before is preferred: log of the likelihood, and of its normalisation.
+      const double unsure = std::clamp(std::log(spread / 16), 0.0, 8.0);
+      pairs.push_back({t, s, distance2 + unsure + (tracks_[t].confirmed ? 0 : 4)});
+    }
+  }
+  constexpr double kAlone = kGate + 13;
+  const Assignment assignment = assign(tracks_.size(), sightings.size(), pairs, kAlone, kMargin);
+  std::vector<bool> taken(sightings.size(), false);
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    Track& track = tracks_[t];
+    const std::optional<std::size_t> s = assignment.of_track[t];
+    if (assignment.ambiguous[t] && track.confirmed && !track.doubt) {
+      track.doubt = true;
+      ++doubts_;
+    }
+    if (s) {
+      taken[*s] = true;
+      take(track, *s, sightings[*s]);
+    } else {
+      miss(track);
+    }
+    if (track.confirmed) continue;
+    ++track.frames;
+    if (s) ++track.hits;
+    if (track.hits >= kConfirm) {
+      track.confirmed = true;
+      track.id = next_id_++;
+    }
+  }
+  std::erase_if(tracks_, [&](const Track& track) {
+    return track.confirmed ? time_s_ - track.seen_s > limits_.forget_s : track.frames - track.hits >= kGiveUp;
+  });
+  for (std::size_t s = 0; s < sightings.size(); ++s) {
+    // Two robots cannot be in one place.
+    const bool free = std::none_of(tracks_.begin(), tracks_.end(), [&](const Track& track) {
+      return track.state != TrackState::kLost &&
+             std::hypot(track.position.x_mm() - sightings[s].x_mm, track.position.y_mm() - sightings[s].y_mm) <
+                 1.2 * limits_.robot_radius_mm;
+    });
+    if (!taken[s] && free) begin(s, sightings[s]);
+  }
+  first_ = first_ && sightings.empty();
+  std::stable_sort(tracks_.begin(), tracks_.end(), [](const Track& a, const Track& b) { return a.id < b.id; });
+}
+
+void Follower::clear_doubt(std::uint32_t id) {
+  for (Track& track : tracks_) {
+    if (track.id == id) track.doubt = false;
+  }
+}
+
+}  // namespace kilotwin::track

@@ -1,0 +1,220 @@
+#include "clients/track/heading_filter.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/pose.hpp"
+
+namespace kilotwin::track {
+namespace {
+
+/// The disc's centre ahead of the middle of the rear legs: docs/explanation/motion.md, axle_offset_mm.
+constexpr double kAhead_mm = 9.2;
+
+/// What a mode begins with. Speeds: docs/explanation/motion.md; the spread is that of uncalibrated robots.
+struct Mode {
+  double speed_mm_s, turn_rad_s, speed_sd, turn_sd;
+};
+constexpr std::array<Mode, 4> kModesOfMotion{{
+    {0, 0, 0.05, 0.002},
+    {10, 0, 2.5, 0.12},
+    {10, 0.8, 2.5, 0.15},
+    {10, -0.8, 2.5, 0.15},
+}};
+/// Rate at which a robot changes its mode, 1/s.
+constexpr double kSwitching_1_s = 0.5;
+/// Densities of the noise while a mode lasts, per second: position mm^2, heading rad^2, speed (mm/s)^2, turn rate (rad/s)^2.
+constexpr double kPositionNoise = 0.02, kHeadingNoise = 4e-4, kSpeedNoise = 0.3, kTurnNoise = 1e-3;
+/// A robot that moved by this much moves: mm, and in standard deviations.
+constexpr double kMoved_mm = 1.5, kMovedDeviations = 6;
+/// While its heading is not known, the origin follows drift with this time constant, s.
+constexpr double kForget_s = 3;
+/// Weights do not fall below: a mode that was impossible may begin.
+constexpr double kLeastWeight = 1e-4;
+
+}  // namespace
+
+void HeadingFilter::start(double time_s, double x_mm, double y_mm, double sd_mm, std::optional<double> bearing_rad,
+                          double bearing_sd_rad) {
+  if (!origin_) origin_ = {time_s, x_mm, y_mm};
+  auto& [since_s, from_x, from_y] = *origin_;
+  const double dx = x_mm - from_x, dy = y_mm - from_y, moved = std::hypot(dx, dy);
+  const bool moves = moved > std::max(kMoved_mm, kMovedDeviations * sd_mm);
+  if (!moves && !bearing_rad) {
+    const double share = std::min(1.0, std::max(0.0, time_s - since_s) / kForget_s);
+    origin_ = {time_s, from_x + share * dx, from_y + share * dy};
+    return;
+  }
+  started_ = true;
+  time_s_ = time_s;
+  const double direction = std::atan2(dy, dx);
+  for (std::size_t i = 0; i < kModes; ++i) {
+    const Mode& mode = kModesOfMotion[i];
+    const double offset = mode.speed_mm_s > 0 ? std::atan2(kAhead_mm * mode.turn_rad_s, mode.speed_mm_s) : 0;
+    const double heading = bearing_rad ? *bearing_rad : wrapped(direction - offset);
+    const double heading_sd = bearing_rad ? bearing_sd_rad : (i == 0 ? 0.7 : 0.35);
+    hypotheses_[i].state << x_mm, y_mm, heading, mode.speed_mm_s, mode.turn_rad_s;
+    hypotheses_[i].covariance = Matrix::Zero();
+    hypotheses_[i].covariance.diagonal() << sd_mm * sd_mm, sd_mm * sd_mm, heading_sd * heading_sd,
+        mode.speed_sd * mode.speed_sd, mode.turn_sd * mode.turn_sd;
+  }
+  weights_ = moves ? std::array<double, 4>{0.01, 0.53, 0.23, 0.23} : std::array<double, 4>{0.7, 0.1, 0.1, 0.1};
+}
+
+void HeadingFilter::mix(double dt_s) {
+  const double leaves = 1 - std::exp(-kSwitching_1_s * dt_s);
+  std::array<Hypothesis, kModes> mixed;
+  std::array<double, 4> weights{};
+  for (std::size_t to = 0; to < kModes; ++to) {
+    const Mode& mode = kModesOfMotion[to];
+    std::array<double, kModes> shares{};
+    for (std::size_t from = 0; from < kModes; ++from)
+      shares[from] = (from == to ? 1 - leaves : leaves / (kModes - 1)) * weights_[from];
+    for (const double share : shares) weights[to] += share;
+    std::array<Hypothesis, kModes> entering = hypotheses_;
+    for (std::size_t from = 0; from < kModes; ++from) {
+      if (from == to) continue;
+      // A mode begins with its own speeds.
+      entering[from].state.tail<2>() << mode.speed_mm_s, mode.turn_rad_s;
+      entering[from].covariance.rightCols<2>().setZero();
+      entering[from].covariance.bottomRows<2>().setZero();
+      entering[from].covariance(3, 3) = mode.speed_sd * mode.speed_sd;
+      entering[from].covariance(4, 4) = mode.turn_sd * mode.turn_sd;
+    }
+    const Vector& reference = entering[to].state;
+    Vector mean = Vector::Zero();
+    std::array<Vector, kModes> off;
+    for (std::size_t from = 0; from < kModes; ++from) {
+      off[from] = entering[from].state - reference;
+      off[from](2) = wrapped(off[from](2));
+      mean += shares[from] / weights[to] * off[from];
+    }
+    mixed[to].state = reference + mean;
+    mixed[to].state(2) = wrapped(mixed[to].state(2));
+    mixed[to].covariance.setZero();
+    for (std::size_t from = 0; from < kModes; ++from) {
+      const Vector spread = off[from] - mean;
+      mixed[to].covariance +=
+          shares[from] / weights[to] * (entering[from].covariance + spread * spread.transpose());
+    }
+  }
+  hypotheses_ = mixed;
+  weights_ = weights;
+}
+
+void HeadingFilter::predict(double dt_s) {
+  for (std::size_t i = 0; i < kModes; ++i) {
+    Hypothesis& h = hypotheses_[i];
+    const double v = h.state(3), w = h.state(4);
+    const double middle = h.state(2) + 0.5 * w * dt_s;
+    const double c = std::cos(middle), s = std::sin(middle);
+    const double vx = v * c - kAhead_mm * w * s, vy = v * s + kAhead_mm * w * c;
+    h.state(0) += vx * dt_s;
+    h.state(1) += vy * dt_s;
+    h.state(2) = wrapped(h.state(2) + w * dt_s);
+    Matrix jacobian = Matrix::Identity();
+    jacobian(0, 2) = -vy * dt_s;
+    jacobian(1, 2) = vx * dt_s;
+    jacobian(0, 3) = c * dt_s;
+    jacobian(1, 3) = s * dt_s;
+    jacobian(0, 4) = (-kAhead_mm * s - 0.5 * dt_s * vy) * dt_s;
+    jacobian(1, 4) = (kAhead_mm * c + 0.5 * dt_s * vx) * dt_s;
+    jacobian(2, 4) = dt_s;
+    h.covariance = jacobian * h.covariance * jacobian.transpose();
+    const bool moves = i != 0;
+    h.covariance(0, 0) += (moves ? kPositionNoise : 1e-4) * dt_s;
+    h.covariance(1, 1) += (moves ? kPositionNoise : 1e-4) * dt_s;
+    h.covariance(2, 2) += (moves ? kHeadingNoise : 1e-6) * dt_s;
+    if (moves) {
+      h.covariance(3, 3) += kSpeedNoise * dt_s;
+      h.covariance(4, 4) += kTurnNoise * dt_s;
+    }
+  }
+}
+
+void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
+  std::array<double, 4> likelihoods{};
+  for (std::size_t i = 0; i < kModes; ++i) {
+    Hypothesis& h = hypotheses_[i];
+    Eigen::Matrix2d total = h.covariance.topLeftCorner<2, 2>();
+    total.diagonal().array() += sd_mm * sd_mm;
+    const Eigen::Vector2d innovation(x_mm - h.state(0), y_mm - h.state(1));
+    const Eigen::Matrix2d inverse = total.inverse();
+    const Eigen::Matrix<double, 5, 2> gain = h.covariance.leftCols<2>() * inverse;
+    h.state += gain * innovation;
+    h.state(2) = wrapped(h.state(2));
+    h.covariance -= gain * h.covariance.topRows<2>();
+    h.covariance = 0.5 * (h.covariance + h.covariance.transpose()).eval();
+    likelihoods[i] = -0.5 * innovation.dot(inverse * innovation) - 0.5 * std::log(total.determinant());
+    // Robots do not drive backwards: a negative speed is the wrong heading.
+    if (i != 0 && h.state(3) < 0) likelihoods[i] -= 0.5 * h.state(3) * h.state(3);
+  }
+  weigh(likelihoods);
+}
+
+void HeadingFilter::measure_bearing(double bearing_rad, double sd_rad) {
+  std::array<double, 4> likelihoods{};
+  for (std::size_t i = 0; i < kModes; ++i) {
+    Hypothesis& h = hypotheses_[i];
+    const double innovation = wrapped(bearing_rad - h.state(2));
+    const double total = h.covariance(2, 2) + sd_rad * sd_rad;
+    const Vector gain = h.covariance.col(2) / total;
+    h.state += gain * innovation;
+    h.state(2) = wrapped(h.state(2));
+    const Matrix change = gain * h.covariance.row(2);
+    h.covariance -= change;
+    h.covariance = 0.5 * (h.covariance + h.covariance.transpose()).eval();
+    likelihoods[i] = -0.5 * innovation * innovation / total - 0.5 * std::log(total);
+  }
+  weigh(likelihoods);
+}
+
+void HeadingFilter::weigh(const std::array<double, 4>& log_likelihoods) {
+  const double most = *std::max_element(log_likelihoods.begin(), log_likelihoods.end());
+  double sum = 0;
+  for (std::size_t i = 0; i < kModes; ++i) {
+    weights_[i] = std::max(kLeastWeight, weights_[i] * std::exp(log_likelihoods[i] - most));
+    sum += weights_[i];
+  }
+  for (double& weight : weights_) weight /= sum;
+}
+
+void HeadingFilter::update(double time_s, double x_mm, double y_mm, double sd_mm, std::optional<double> bearing_rad,
+                           double bearing_sd_rad) {
+  if (!started_) {
+    start(time_s, x_mm, y_mm, sd_mm, bearing_rad, bearing_sd_rad);
+    return;
+  }
+  // Long gaps in steps: the path between is an arc.
+  double left_s = time_s - time_s_;
+  constexpr double kStep_s = 0.2;
+  constexpr int kMostSteps = 50;
+  for (int step = 0; left_s > 1e-9 && step < kMostSteps; ++step) {
+    const double dt_s = step + 1 == kMostSteps ? left_s : std::min(kStep_s, left_s);
+    mix(dt_s);
+    predict(dt_s);
+    left_s -= dt_s;
+  }
+  time_s_ = std::max(time_s_, time_s);
+  measure(x_mm, y_mm, sd_mm);
+  if (bearing_rad) measure_bearing(*bearing_rad, bearing_sd_rad);
+}
+
+std::optional<Heading> HeadingFilter::heading() const {
+  if (!started_) return std::nullopt;
+  double c = 0, s = 0;
+  for (std::size_t i = 0; i < kModes; ++i) {
+    c += weights_[i] * std::cos(hypotheses_[i].state(2));
+    s += weights_[i] * std::sin(hypotheses_[i].state(2));
+  }
+  const double mean = std::atan2(s, c);
+  double variance = 0;
+  for (std::size_t i = 0; i < kModes; ++i) {
+    const double off = wrapped(hypotheses_[i].state(2) - mean);
+    variance += weights_[i] * (hypotheses_[i].covariance(2, 2) + off * off);
+  }
+  return Heading{wrapped(mean), variance};
+}
+
+}  // namespace kilotwin::track

@@ -1,0 +1,58 @@
+/// A robot's heading from the path of its disc's centre: an interacting multiple model filter over what a Kilobot can do.
+///
+/// The centre of the disc lies a = 9.2 mm ahead of the middle between the rear legs. When the robot turns about a leg, the centre
+/// moves sideways too: its direction of motion is some 36 degrees off the heading. Per mode (stop, straight, left, right) an
+/// extended Kalman filter holds (x, y, heading, speed, turn rate) with
+///   x' = v cos h - a w sin h,  y' = v sin h + a w cos h,  h' = w.
+/// The modes differ in what v and w are at their beginning, and exchange weight as in Blom and Bar-Shalom (1988).
+/// docs/explanation/tracking.md has the equations.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+namespace kilotwin::track {
+
+struct Heading {
+  double heading_rad = 0;  ///< anticlockwise from x, in [-pi, pi)
+  double variance_rad2 = 0;
+};
+
+class HeadingFilter {
+ public:
+  /// Takes a measured centre. Times ascend. Where `bearing_rad` (a measured heading, from the LED) is given, it has the standard
+  /// deviation `bearing_sd_rad`.
+  void update(double time_s, double x_mm, double y_mm, double sd_mm,
+              std::optional<double> bearing_rad = std::nullopt, double bearing_sd_rad = 0);
+  /// Nothing until the robot has moved, or its heading was measured.
+  [[nodiscard]] std::optional<Heading> heading() const;
+  /// Probabilities of stop, straight, left, right; nothing before heading().
+  [[nodiscard]] const std::array<double, 4>& modes() const { return weights_; }
+
+ private:
+  static constexpr int kModes = 4;
+  using Vector = Eigen::Matrix<double, 5, 1>;
+  using Matrix = Eigen::Matrix<double, 5, 5>;
+  struct Hypothesis {
+    Vector state = Vector::Zero();  ///< x, y, heading, speed, turn rate
+    Matrix covariance = Matrix::Zero();
+  };
+
+  void start(double time_s, double x_mm, double y_mm, double sd_mm, std::optional<double> bearing_rad,
+             double bearing_sd_rad);
+  void mix(double dt_s);
+  void predict(double dt_s);
+  void measure(double x_mm, double y_mm, double sd_mm);
+  void measure_bearing(double bearing_rad, double sd_rad);
+  void weigh(const std::array<double, 4>& log_likelihoods);
+
+  bool started_ = false;
+  double time_s_ = 0;
+  std::array<Hypothesis, kModes> hypotheses_;
+  std::array<double, 4> weights_{};
+  /// Where the robot was while its heading is not known.
+  std::optional<std::array<double, 3>> origin_;  ///< time_s, x_mm, y_mm
+};
+
+}  // namespace kilotwin::track

@@ -1,0 +1,123 @@
+// The heading filter against robots that drive by the exact kinematics, with the biases of the ARGoS paper.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "clients/track/heading_filter.hpp"
+#include "core/base/pose.hpp"
+
+namespace kilotwin::track {
+namespace {
+
+constexpr double kWheelBase_mm = 25, kAhead_mm = 9.2;
+
+/// The kinematics of docs/explanation/motion.md, integrated in small steps.
+struct Robot {
+  double x_mm = 0, y_mm = 0, heading_rad = 0;
+  void drive(double left_mm_s, double right_mm_s, double dt_s) {
+    constexpr int kSteps = 10;
+    for (int i = 0; i < kSteps; ++i) {
+      const double speed = 0.5 * (left_mm_s + right_mm_s), h = dt_s / kSteps;
+      heading_rad += (right_mm_s - left_mm_s) / kWheelBase_mm * h / 2;
+      x_mm += speed * std::cos(heading_rad) * h;
+      y_mm += speed * std::sin(heading_rad) * h;
+      heading_rad += (right_mm_s - left_mm_s) / kWheelBase_mm * h / 2;
+    }
+  }
+  [[nodiscard]] double centre_x() const { return x_mm + kAhead_mm * std::cos(heading_rad); }
+  [[nodiscard]] double centre_y() const { return y_mm + kAhead_mm * std::sin(heading_rad); }
+};
+
+TEST(Headings, PivotsAreNotTakenForTheDirectionOfMotion) {
+  // About the left leg the centre's velocity is atan(a w / v) = 36.3 degrees off the heading.
+  for (const double side : {-1.0, 1.0}) {
+    Robot robot;
+    HeadingFilter filter;
+    constexpr double kStep_s = 1.0 / 30;
+    for (int i = 0; i < 90; ++i) {
+      robot.drive(side > 0 ? 0 : 20, side > 0 ? 20 : 0, kStep_s);
+      filter.update(i * kStep_s, robot.centre_x(), robot.centre_y(), 0.1);
+    }
+    ASSERT_TRUE(filter.heading());
+    EXPECT_NEAR(wrapped(filter.heading()->heading_rad - robot.heading_rad), 0, 0.05);
+    EXPECT_GT(filter.modes()[side > 0 ? 2 : 3], 0.9);
+  }
+}
+
+TEST(Headings, IsUnknownWhileTheRobotRests) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 0.2);
+  HeadingFilter filter;
+  for (int i = 0; i < 3000; ++i) filter.update(i / 30.0, noise(random), noise(random), 0.2);
+  EXPECT_FALSE(filter.heading());
+}
+
+TEST(Headings, ALedReadingGivesItAtRest) {
+  HeadingFilter filter;
+  for (int i = 0; i < 30; ++i) filter.update(i / 30.0, 5, 5, 0.1, 2.0, 0.1);
+  ASSERT_TRUE(filter.heading());
+  EXPECT_NEAR(filter.heading()->heading_rad, 2.0, 0.02);
+}
+
+struct Condition {
+  double sd_mm, step_s;
+};
+
+class HeadingOf : public testing::TestWithParam<Condition> {};
+
+TEST_P(HeadingOf, IsWithinFiveDegreesAfterStraightMotionAndTenOverall) {
+  const auto [sd_mm, step_s] = GetParam();
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal(0, 1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  double all = 0, straight = 0, normalised = 0;
+  int count = 0, straight_count = 0;
+  constexpr int kRobots = 60;
+  for (int i = 0; i < kRobots; ++i) {
+    const double bias_left = 1.86 * normal(random), bias_right = 1.86 * normal(random);
+    Robot robot;
+    robot.heading_rad = 2 * std::numbers::pi * uniform(random);
+    HeadingFilter filter;
+    int mode = 1;
+    double until_s = 0, since_s = 0;
+    for (double t = 0; t < 40; t += step_s) {
+      if (t >= until_s) {
+        since_s = t;
+        mode = static_cast<int>(4 * uniform(random));
+        until_s = t + 1 + 6 * uniform(random);
+      }
+      const double left = mode == 0 ? 0 : (mode == 1 ? 10 : mode == 2 ? 0 : 20) + bias_left;
+      const double right = mode == 0 ? 0 : (mode == 1 ? 10 : mode == 2 ? 20 : 0) + bias_right;
+      robot.drive(left, right, step_s);
+      filter.update(t, robot.centre_x() + sd_mm * normal(random), robot.centre_y() + sd_mm * normal(random), sd_mm);
+      const std::optional<Heading> heading = filter.heading();
+      if (!heading) continue;
+      const double error = wrapped(heading->heading_rad - robot.heading_rad);
+      all += error * error;
+      normalised += error * error / heading->variance_rad2;
+      ++count;
+      if (mode != 1 || t - since_s < 2) continue;
+      straight += error * error;
+      ++straight_count;
+    }
+  }
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  const double all_deg = kDegrees * std::sqrt(all / count);
+  const double straight_deg = kDegrees * std::sqrt(straight / straight_count);
+  RecordProperty("overall_deg", std::to_string(all_deg));
+  RecordProperty("straight_deg", std::to_string(straight_deg));
+  EXPECT_LT(all_deg, 10);
+  EXPECT_LT(straight_deg, 5);
+  // The stated variance is of the size of the errors.
+  EXPECT_LT(normalised / count, 3);
+  EXPECT_GT(normalised / count, 0.05);
+}
+
+INSTANTIATE_TEST_SUITE_P(Conditions, HeadingOf,
+                         testing::Values(Condition{0.1, 1 / 30.0}, Condition{0.3, 1 / 30.0}, Condition{0.3, 0.1},
+                                         Condition{0.6, 1 / 30.0}));
+
+}  // namespace
+}  // namespace kilotwin::track
