@@ -171,8 +171,7 @@ proto::InputRecord to_record(const Directive& directive) {
   record.set_kind(static_cast<proto::InputRecord::Kind>(directive.kind));
   if (directive.kind == DirectiveKind::kStep) record.set_steps(directive.steps);
   if (directive.kind == DirectiveKind::kOverheadInput) {
-    record.mutable_packet()->push_back(static_cast<char>(directive.packet.command));
-    record.mutable_packet()->append(directive.packet.message.begin(), directive.packet.message.end());
+    record.set_packet(octets_of(directive.packet));
     if (const std::uint32_t offset = directive.packet.offset_cycles(); offset != 0)
       record.set_packet_offset_cycles(offset);
   }
@@ -191,11 +190,7 @@ Directive from_record(const proto::InputRecord& record) {
   directive.tick = Tick{record.tick()};
   directive.kind = static_cast<DirectiveKind>(record.kind());
   directive.steps = record.steps();
-  if (record.packet().size() == 1 + directive.packet.message.size()) {
-    directive.packet.command = static_cast<OverheadCommand>(record.packet()[0]);
-    std::copy(record.packet().begin() + 1, record.packet().end(), directive.packet.message.begin());
-    directive.packet = directive.packet.at(record.packet_offset_cycles());
-  }
+  directive.packet = packet_of(record.packet()).value_or(OverheadPacket{}).at(record.packet_offset_cycles());
   directive.tracked_pose = {record.robot(), record.x_mm(), record.y_mm(), record.heading_rad()};
   return directive;
 }

@@ -58,11 +58,6 @@ bool are_rigid_states(std::span<const double> columns) {
   return true;
 }
 
-bool known(OverheadCommand command) {
-  return command == OverheadCommand::kStop || command == OverheadCommand::kRepeat ||
-         command == OverheadCommand::kOnce;
-}
-
 }  // namespace
 
 const char* defect(const BodyFrame& frame, const RunPlan& plan, FederateId, FederateId reader) {
@@ -136,7 +131,7 @@ const char* defect(const RadioFrame& frame, const RunPlan& plan, FederateId, Fed
 }
 
 const char* defect(const OverheadFrame& frame, const RunPlan& plan, FederateId, FederateId) {
-  const auto sound = [](const OverheadPacket& packet) { return known(packet.command); };
+  const auto sound = [](const OverheadPacket& packet) { return is_known(packet.command); };
   if (!std::all_of(frame.packets.begin(), frame.packets.end(), sound)) return "a packet's command is unknown";
   const auto earlier = [](const OverheadPacket& a, const OverheadPacket& b) {
     return a.offset_cycles() < b.offset_cycles();
@@ -158,7 +153,7 @@ const char* defect(const Directive& directive, const RunPlan& plan) {
     case DirectiveKind::kStop:
     case DirectiveKind::kCheckpoint: return nullptr;
     case DirectiveKind::kOverheadInput:
-      if (!known(directive.packet.command)) return "its packet's command is unknown";
+      if (!is_known(directive.packet.command)) return "its packet's command is unknown";
       return directive.packet.offset_cycles() < plan.tick_length.cycles()
                  ? nullptr
                  : "its packet's offset lies beyond the tick";

@@ -7,7 +7,7 @@ namespace kilotwin {
 namespace {
 
 static_assert(sizeof(IrMessage) == 10);
-static_assert(sizeof(OverheadPacket) == 15 && alignof(OverheadPacket) == 1);
+static_assert(sizeof(OverheadPacket) == 134 && alignof(OverheadPacket) == 1);
 
 // A wire sequence that borrows `count` elements. Cyclone only reads it.
 template <class Sequence, class T> Sequence borrow(const T* data, std::size_t count) {

@@ -7,11 +7,9 @@
 #include <vector>
 
 #include "core/base/time.hpp"
+#include "core/frames/overhead_packet.hpp"
 
 namespace kilotwin {
-
-/// An infrared message without its CRC: data[9], type.
-using IrMessage = std::array<std::uint8_t, 10>;
 
 /// Movable bodies, structure of arrays, ascending numbers.
 struct MovableColumns {
@@ -105,30 +103,6 @@ struct RadioFrame {
   std::vector<std::uint8_t> firmware_motor_left, firmware_motor_right, firmware_spin_up, firmware_led,
       firmware_life_cycle;
   std::vector<std::uint32_t> firmware_fault;  ///< 0, or cause << 24 | address in flash
-};
-
-enum class OverheadCommand : std::uint8_t { kStop = 0, kRepeat = 2, kOnce = 6 };
-
-/// Laid out as on the wire: 15 octets without padding.
-struct OverheadPacket {
-  OverheadCommand command = OverheadCommand::kStop;
-  IrMessage message{};
-  std::array<std::uint8_t, 4> offset{};  ///< offset_cycles(), least octet first
-
-  /// When within its tick it reaches the overhead controller, cycles from the tick's start, below the tick's length.
-  [[nodiscard]] constexpr std::uint32_t offset_cycles() const {
-    return offset[0] | std::uint32_t{offset[1]} << 8 | std::uint32_t{offset[2]} << 16 |
-           std::uint32_t{offset[3]} << 24;
-  }
-  /// The same packet at another offset.
-  [[nodiscard]] constexpr OverheadPacket at(std::uint32_t offset_cycles) const {
-    OverheadPacket packet = *this;
-    for (std::uint8_t& octet : packet.offset) {
-      octet = static_cast<std::uint8_t>(offset_cycles & 255);
-      offset_cycles >>= 8;
-    }
-    return packet;
-  }
 };
 
 /// What the station sends down to the overhead controller within one tick, by ascending offset.

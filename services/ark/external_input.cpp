@@ -61,13 +61,10 @@ void ExternalInput::on_overhead_packet(const PublicOverheadPacket& sample) {
   if (!ours(sample.run) || !is_new(std::string("overhead ") + sample.client, sample.request)) return;
   Directive directive;
   directive.kind = DirectiveKind::kOverheadInput;
-  switch (sample.command) {
-    case 0: directive.packet.command = OverheadCommand::kStop; break;
-    case 2: directive.packet.command = OverheadCommand::kRepeat; break;
-    case 6: directive.packet.command = OverheadCommand::kOnce; break;
-    default: return;
-  }
+  directive.packet.command = static_cast<OverheadCommand>(sample.command);
+  if (!is_known(directive.packet.command)) return;
   std::copy_n(sample.message, directive.packet.message.size(), directive.packet.message.begin());
+  std::copy_n(sample.rest, directive.packet.rest.size(), directive.packet.rest.begin());
   waiting_.push_back(directive);
 }
 

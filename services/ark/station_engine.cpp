@@ -141,6 +141,11 @@ std::uint64_t StationEngine::hash_part() const {
     sum += entity_hash(HashDomain::kStation, 1 + i,
                        {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0),
                         word_of(packets_[i], 8) | std::uint64_t{packets_[i].offset_cycles()} << 16});
+    if (packets_[i].is_short()) continue;
+    constexpr std::uint32_t kRest = 1u << 30;
+    std::uint64_t rest = 0;
+    for (const std::uint8_t octet : packets_[i].rest) rest = hash_mix(rest, octet);
+    sum += entity_hash(HashDomain::kStation, kRest + i, {rest});
   }
   for (std::uint32_t i = 0; i < environments_.size(); ++i) {
     // Apart from the packets, of which there are few.
@@ -155,8 +160,7 @@ void StationEngine::save(proto::StationState& state) const {
   state.set_next_packet_cycle(next_packet_);
   state.set_repeating_own(repeating_);
   for (const OverheadPacket& packet : packets_) {
-    state.mutable_packets()->push_back(static_cast<char>(packet.command));
-    state.mutable_packets()->append(packet.message.begin(), packet.message.end());
+    state.add_packets(octets_of(packet));
     state.add_packet_offset_cycles(packet.offset_cycles());
   }
   for (const Cycles served : served_) state.add_served_cycle(served);
@@ -165,12 +169,10 @@ void StationEngine::save(proto::StationState& state) const {
 }
 
 void StationEngine::load(Tick tick, std::span<const proto::StationState* const> parts) {
-  constexpr std::size_t kPacketOctets = 11;
   if (parts.size() != 1 || static_cast<std::size_t>(parts[0]->served_cycle_size()) != served_.size() ||
       static_cast<std::size_t>(parts[0]->turns_size()) != turns_.size() ||
       static_cast<std::size_t>(parts[0]->environment_size()) != environments_.size() ||
-      parts[0]->packets().size() !=
-          kPacketOctets * static_cast<std::size_t>(parts[0]->packet_offset_cycles_size())) {
+      parts[0]->packets_size() != parts[0]->packet_offset_cycles_size()) {
     throw RunError("the checkpoint holds no station's state of this experiment");
   }
   const proto::StationState& state = *parts[0];
@@ -178,13 +180,10 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
   next_packet_ = state.next_packet_cycle();
   repeating_ = state.repeating_own();
   packets_.clear();
-  for (const std::uint32_t offset : state.packet_offset_cycles()) {
-    const std::size_t from = packets_.size() * kPacketOctets;
-    OverheadPacket packet = OverheadPacket{}.at(offset);
-    packet.command = static_cast<OverheadCommand>(state.packets()[from]);
-    std::copy_n(state.packets().begin() + static_cast<std::ptrdiff_t>(from) + 1, packet.message.size(),
-                packet.message.begin());
-    packets_.push_back(packet);
+  for (int i = 0; i < state.packets_size(); ++i) {
+    const std::optional<OverheadPacket> packet = packet_of(state.packets(i));
+    if (!packet) throw RunError("the checkpoint's station holds a damaged packet; resume from another one");
+    packets_.push_back(packet->at(state.packet_offset_cycles(i)));
   }
   for (std::size_t i = 0; i < served_.size(); ++i) {
     served_[i] = state.served_cycle(static_cast<int>(i));
