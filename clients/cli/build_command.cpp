@@ -20,7 +20,7 @@ struct BuildArguments {
   std::vector<fs::path> sources;
   fs::path out;
   std::vector<std::string> define;
-  bool avr = false;
+  bool avr = false, boot_loader = false;
 };
 
 void write_program(const fs::path& compiled, const fs::path& out) {
@@ -45,6 +45,7 @@ int build_for_robot(const BuildArguments& arguments, const behaviours::CompileOp
 int build(const BuildArguments& arguments) {
   behaviours::CompileOptions options;
   options.defines = arguments.define;
+  options.boot_loader = arguments.boot_loader;
   if (arguments.avr) return build_for_robot(arguments, options);
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
   for (const std::string& note : compiled.notes) say("note: " + note);
@@ -69,6 +70,8 @@ Command add_build(CLI::App& program) {
       "--avr", arguments->avr,
       "compile for the ATmega328P and print flash and RAM; with -o, also link firmware (.elf) with a kilolib "
       "that runs on the robot");
+  app.add_flag("--boot-loader", arguments->boot_loader,
+               "with --avr and -o: put a boot loader at 0x7000, which takes programs from an overhead controller");
   return {&app, [arguments] { return build(*arguments); }};
 }
 

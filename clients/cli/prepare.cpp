@@ -83,6 +83,7 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
       throw UserError(fmt::format("{}: firmware is one file; link its parts first", sources.front().string()));
     behaviours::CompileOptions options;
     options.defines = arguments.define;
+    options.boot_loader = true;
     const behaviours::CompiledProgram compiled = is_linked     ? checked_firmware(sources.front())
                                                  : group.avr() ? behaviours::compile_firmware(sources, options)
                                                                : behaviours::compile(sources, options);

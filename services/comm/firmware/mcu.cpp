@@ -4,6 +4,7 @@
 #include <simavr/avr_adc.h>
 #include <simavr/avr_eeprom.h>
 #include <simavr/avr_extint.h>
+#include <simavr/avr_flash.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_timer.h>
 #include <simavr/avr_uart.h>
@@ -16,6 +17,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
+#include <utility>
 
 #include "core/base/error.hpp"
 
@@ -40,6 +42,7 @@ enum Register : std::uint16_t {
   kEearh = 0x42,
   kSmcr = 0x53,
   kMcucr = 0x55,
+  kSpmcsr = 0x57,
   kAdcsra = 0x7a,
   kAdcsrb = 0x7b,
   kAdmux = 0x7c,
@@ -52,6 +55,11 @@ constexpr std::uint8_t kIvsel = 0x02;                                // MCUCR
 constexpr std::uint8_t kAutoTrigger = 0x20;                          // ADCSRA: ADATE
 constexpr std::uint8_t kTriggerSource = 0x07, kByComparator = 0x01;  // ADCSRB: ADTS2..0
 constexpr std::uint8_t kChannel = 0x0f, kReference = 0xc0;           // ADMUX: MUX3..0, REFS1..0
+constexpr std::uint8_t kSelfProgramming = 0x01, kPageWrite = 0x04,
+                       kPageErase = 0x02;  // SPMCSR: SELFPRGEN, PGWRT, PGERS
+constexpr int kPointerZ = 30;              // r30, r31
+/// How long erasing or writing a page takes, cycles: 4 ms (data sheet: 3.7 to 4.5 ms).
+constexpr avr_cycle_count_t kPageTime = 32000;
 /// Where the Kilobot's boot loader begins (fuses BOOTSZ = 2048 words).
 constexpr std::uint32_t kBootSection = 0x7000;
 
@@ -108,6 +116,7 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
 
   for (avr_io_t* module = avr_->io_port; module != nullptr; module = module->next) {
     if (std::strcmp(module->kind, "watchdog") == 0) watchdog_ = module;
+    if (std::strcmp(module->kind, "flash") == 0) write_flash_ = std::exchange(module->ioctl, on_flash);
     if (std::strcmp(module->kind, "timer") == 0 && reinterpret_cast<avr_timer_t*>(module)->name == '2') {
       // Mode 1, phase-correct PWM of 8 bits, which drives the motors, is not in libsimavr's table for timer 2.
       avr_timer_wgm_t& mode = reinterpret_cast<avr_timer_t*>(module)->wgm_op[1];
@@ -180,6 +189,7 @@ void Mcu::power_on() {
   state.conversions = state_.conversions;
   std::array<std::uint8_t, kEepromOctets> kept = eeprom();
   marked_ = pristine_;
+  replaced_.clear();
   rewind();
   state_ = state;
   avr_eeprom_desc_t description{kept.data(), 0, kEepromOctets};
@@ -327,6 +337,48 @@ std::array<std::uint8_t, kEepromOctets> Mcu::eeprom() const {
   avr_eeprom_desc_t description{octets.data(), 0, kEepromOctets};
   avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &description);
   return octets;
+}
+
+std::span<const std::uint8_t, kFlashOctets> Mcu::flash() const {
+  return std::span<const std::uint8_t, kFlashOctets>(avr_->flash, kFlashOctets);
+}
+
+/// The flash repeats in program space.
+void Mcu::put_page(std::uint32_t address, const std::uint8_t* octets) {
+  for (std::uint32_t at = address; at < kProgramSpace; at += kFlashOctets)
+    std::memmove(avr_->flash + at, octets, kPageOctets);
+}
+
+void Mcu::keep_page(std::uint32_t address) {
+  const auto is_there = [address](const Page& page) { return page.address == address; };
+  if (std::any_of(replaced_.begin(), replaced_.end(), is_there)) return;
+  Page& page = replaced_.emplace_back();
+  page.address = address;
+  std::copy_n(avr_->flash + address, kPageOctets, page.octets.begin());
+}
+
+/// The instruction SPM. libsimavr erases and writes at once, and in one of the flash's repetitions.
+int Mcu::on_flash(avr_io_t* module, std::uint32_t request, void* parameter) {
+  avr_t* const avr = module->avr;
+  auto& self = *static_cast<Mcu*>(avr->custom.data);
+  const std::uint8_t control = avr->data[kSpmcsr];
+  const bool changes = request == AVR_IOCTL_FLASH_SPM && (control & kSelfProgramming) != 0 &&
+                       (control & (kPageErase | kPageWrite)) != 0;
+  if (!changes) return self.write_flash_(module, request, parameter);
+  const std::uint32_t place =
+      (avr->data[kPointerZ] | std::uint32_t{avr->data[kPointerZ + 1]} << 8) / kPageOctets * kPageOctets;
+  self.keep_page(place % kFlashOctets);
+  const int result = self.write_flash_(module, request, parameter);
+  self.put_page(place % kFlashOctets, avr->flash + place);
+  avr->data[kSpmcsr] |= kSelfProgramming;
+  avr_cycle_timer_register(
+      avr, kPageTime,
+      [](avr_t* done, avr_cycle_count_t, void*) -> avr_cycle_count_t {
+        done->data[kSpmcsr] &= static_cast<std::uint8_t>(~kSelfProgramming);
+        return 0;
+      },
+      module);
+  return result;
 }
 
 void Mcu::on_led(avr_irq_t* pin, std::uint32_t value, void* mcu) {

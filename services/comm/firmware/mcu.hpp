@@ -5,7 +5,8 @@
 /// which light arrives and on nothing else: not on how a span of time is cut into calls of run().
 ///
 /// Bridged here, as libsimavr 1.6 lacks them: conversions that the comparator starts, interrupt vectors in the boot section
-/// (IVSEL), program addresses that wrap at the end of the flash, power-down that stops all clocks but the watchdog's.
+/// (IVSEL), program addresses that wrap at the end of the flash, power-down that stops all clocks but the watchdog's, and the
+/// time that erasing and writing a page of flash takes.
 #pragma once
 
 #include <array>
@@ -21,6 +22,7 @@
 #include "services/comm/firmware/flash_image.hpp"
 
 struct avr_t;
+struct avr_io_t;
 struct avr_irq_t;
 
 namespace kilotwin::firmware {
@@ -77,7 +79,8 @@ class Mcu {
   /// Address in flash, octets, of the instruction that it is at or at which it stopped.
   [[nodiscard]] std::uint32_t program_counter() const;
 
-  /// Remembers the present state in memory; rewind() goes back to it. What was flashed and printed is not part of it.
+  /// Remembers the present state in memory; rewind() goes back to it. What the LED flashed and what was printed is not part of
+  /// it.
   void mark();
   void rewind();
 
@@ -89,6 +92,8 @@ class Mcu {
   /// Own memory, as the program sees it: address 0x100 is the first of RAM.
   [[nodiscard]] std::uint8_t memory(std::uint16_t address) const;
   [[nodiscard]] std::array<std::uint8_t, kEepromOctets> eeprom() const;
+  /// The program in flash: that of the image, unless a boot loader has written pages.
+  [[nodiscard]] std::span<const std::uint8_t, kFlashOctets> flash() const;
 
  private:
   static constexpr OwnCycles kNever = std::numeric_limits<OwnCycles>::max();
@@ -106,7 +111,15 @@ class Mcu {
     std::size_t octets;
   };
 
+  /// A page of flash before it was erased or written.
+  struct Page {
+    std::uint32_t address;
+    std::array<std::uint8_t, kPageOctets> octets;
+  };
+
   void execute(OwnCycles until);
+  void put_page(std::uint32_t address, const std::uint8_t* octets);
+  void keep_page(std::uint32_t address);
   void run_burst(OwnCycles budget);
   void power_down(OwnCycles until);
   void doze(OwnCycles until);
@@ -120,6 +133,7 @@ class Mcu {
   static void on_led(avr_irq_t*, std::uint32_t value, void* mcu);
   static void on_conversion(avr_irq_t*, std::uint32_t, void* mcu);
   static void on_serial(avr_irq_t*, std::uint32_t octet, void* mcu);
+  static int on_flash(avr_io_t*, std::uint32_t request, void* parameter);
   static void on_log(avr_t*, int level, const char* format, void* arguments);
   friend struct LogHook;
 
@@ -130,12 +144,14 @@ class Mcu {
   State state_, marked_state_;
   std::vector<OwnCycles> flashes_;
   std::string printed_;
-  void* watchdog_ = nullptr;  ///< libsimavr's module, as its timers name it
+  void* watchdog_ = nullptr;                                       ///< libsimavr's module, as its timers name it
+  int (*write_flash_)(avr_io_t*, std::uint32_t, void*) = nullptr;  ///< libsimavr's own on_flash()
   std::array<avr_irq_t*, 2> comparator_{};
   avr_irq_t* converter_ = nullptr;
   std::vector<avr_irq_t*> lines_;                         ///< all of libsimavr's signals
   std::vector<Range> ranges_;                             ///< all that changes but signals and flash
   std::vector<std::uint8_t> marked_;                      ///< the ranges, then the signals
+  std::vector<Page> replaced_;                            ///< pages written since the mark, as of the mark
   std::vector<std::uint8_t> pristine_;                    ///< the same as of cycle 0
   const std::array<std::uint8_t, kFlashOctets> program_;  ///< flash as of cycle 0
 };

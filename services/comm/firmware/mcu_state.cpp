@@ -104,6 +104,7 @@ void Mcu::mark() {
     at += kLine;
   }
   marked_state_ = state_;
+  replaced_.clear();
 }
 
 void Mcu::rewind() {
@@ -118,6 +119,8 @@ void Mcu::rewind() {
     at += kLine;
   }
   state_ = marked_state_;
+  for (const Page& page : replaced_) put_page(page.address, page.octets.data());
+  replaced_.clear();
 }
 
 std::string Mcu::save() const {
@@ -177,6 +180,7 @@ void Mcu::load(const std::string& octets) {
         "the checkpoint's firmware robots were saved by another build of this program; resume with that one");
   }
   marked_ = pristine_;
+  replaced_.clear();
   rewind();
   state_.dark_at = reader.next<OwnCycles>();
   state_.powered_down = reader.next<OwnCycles>();
@@ -207,7 +211,9 @@ void Mcu::load(const std::string& octets) {
   for (auto pages = reader.next<std::uint32_t>(); pages > 0; --pages) {
     const auto page = reader.next<std::uint32_t>();
     if (page % kPageOctets != 0 || page >= kFlashOctets) throw RunError("a firmware robot's checkpoint is damaged");
-    reader.take(avr_->flash + page, kPageOctets);
+    std::array<std::uint8_t, kPageOctets> written{};
+    reader.take(written.data(), written.size());
+    put_page(page, written.data());
   }
   flashes_.clear();
   printed_.clear();

@@ -19,13 +19,15 @@ inline std::string whole_program(const std::string& functions, const std::string
          callbacks + " kilo_start(setup, loop); return 0; }\n";
 }
 
-inline std::filesystem::path compiled(const std::string& source) {
+inline std::filesystem::path compiled(const std::string& source, bool boot_loader = false) {
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("kilotwin-firmware-test-" + std::to_string(getpid()));
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / "program.c";
   std::ofstream(file) << source;
-  return behaviours::compile_firmware({file}).file;
+  behaviours::CompileOptions options;
+  options.boot_loader = boot_loader;
+  return behaviours::compile_firmware({file}, options).file;
 }
 
 inline FlashImage firmware(const std::string& source) {
