@@ -18,6 +18,7 @@ using WireDirective = kilotwin_wire_Directive;
 using WireMetrics = kilotwin_wire_Metrics;
 using PublicRunControl = kilotwin_open_RunControl;
 using PublicOverheadPacket = kilotwin_open_OverheadPacket;
+using PublicStationPacket = kilotwin_open_StationPacket;
 using PublicTrackedPose = kilotwin_open_TrackedPose;
 using PublicTrackerFrame = kilotwin_open_TrackerFrame;
 using PublicRunStatus = kilotwin_open_RunStatus;
@@ -45,6 +46,7 @@ inline Channel metrics() { return {"kilotwin/metrics", Delivery::kMetrics, ""}; 
 
 inline Channel run_control() { return {"kilotwin/run_control", Delivery::kRequest, ""}; }
 inline Channel overhead_packets() { return {"kilotwin/overhead_packets", Delivery::kRequest, ""}; }
+inline Channel station_packets() { return {"kilotwin/station_packets", Delivery::kRequest, ""}; }
 inline Channel tracked_poses() { return {"kilotwin/tracked_poses", Delivery::kRequest, ""}; }
 inline Channel tracker_frames() { return {"kilotwin/tracker_frames", Delivery::kSensor, ""}; }
 inline Channel run_status() { return {"kilotwin/run_status", Delivery::kStatus, ""}; }
@@ -75,6 +77,9 @@ template <> inline const dds_topic_descriptor_t* descriptor<PublicRunControl>() 
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicOverheadPacket>() {
   return &kilotwin_open_OverheadPacket_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicStationPacket>() {
+  return &kilotwin_open_StationPacket_desc;
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackedPose>() {
   return &kilotwin_open_TrackedPose_desc;

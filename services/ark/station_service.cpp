@@ -42,12 +42,14 @@ class StationFederate : public Federate {
         actuation_(session, topics::actuation(), session.plan().all_behaviours()),
         overhead_(session, topics::overhead()),
         status_(session.participant(), topics::run_status()),
-        robots_(session.participant(), topics::robots()) {}
+        robots_(session.participant(), topics::robots()),
+        station_packets_(session.participant(), topics::station_packets()) {}
 
   void publish(Tick now) override {
     announce(now);
     engine_.emit(overhead_.frame);
     overhead_.write();
+    if (!overhead_.frame.packets.empty() && station_packets_.readers() > 0) publish_packets(now);
   }
 
   [[nodiscard]] bool hears_all() override { return metrics_.heard_all(); }
@@ -162,6 +164,19 @@ class StationFederate : public Federate {
     return directive.tick;
   }
 
+  void publish_packets(Tick now) {
+    PublicStationPacket sample{};
+    sample.run = session_.plan().run();
+    for (const OverheadPacket& packet : overhead_.frame.packets) {
+      sample.number = packets_published_++;
+      sample.time_s = session_.plan().tick_length.seconds_at(now) + packet.offset_cycles() / kNominalClockHz;
+      sample.command = static_cast<std::uint8_t>(packet.command);
+      std::copy(packet.message.begin(), packet.message.end(), sample.message);
+      std::copy(packet.rest.begin(), packet.rest.end(), sample.rest);
+      station_packets_.write(sample);
+    }
+  }
+
   void publish_robots(Tick now) {
     PublicRobotState state{};
     state.run = session_.plan().run();
@@ -190,6 +205,8 @@ class StationFederate : public Federate {
   SwarmView swarm_{session_.plan().robots(), session_.plan().movables(), session_.plan().memory.size()};
   dds::Writer<PublicRunStatus> status_;
   dds::Writer<PublicRobotState> robots_;
+  dds::Writer<PublicStationPacket> station_packets_;
+  std::uint64_t packets_published_ = 0;
   Clock::time_point next_robots_{};
   Pace pace_{session_.plan()};
   std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash

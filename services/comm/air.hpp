@@ -30,6 +30,9 @@ inline constexpr Cycles kTimerCounts = 256;
 
 /// Period of the overhead controller's packets: a packet, then 6 ms of LED. 10.409 ms.
 inline constexpr Cycles kOverheadPeriod = 83272;
+/// From one message of a page of flash to the next: a packet, and the controller's loop between two of them as in
+/// kOverheadPeriod. A GPS frame waits 50 us more. After either the controller's LED is on for 10 ms and off for 10 ms.
+inline constexpr Cycles kBurstPeriod = kPacket + 302, kGpsPause = 400, kBurstPause = 160'000;
 
 /// A robot's packet on the air, in [start, end).
 struct Transmission {

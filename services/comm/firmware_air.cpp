@@ -123,7 +123,8 @@ void FirmwareAir::collect_packets(Cycles from, Cycles until, const Channel& chan
     packets_.push_back({x.start, x.sender, !x.aborted && x.start + kListening > from, bits});
   }
   for (const OverheadController::Copy& copy : overhead.copies()) {
-    if (copy.overlaps(from, until)) packets_.push_back({copy.start, kOverhead, false, packet_bits(copy.message)});
+    if (copy.overlaps(from, until))
+      packets_.push_back({copy.start, kOverhead, false, packet_bits(copy.message, copy.crc)});
   }
 }
 
@@ -183,9 +184,8 @@ bool FirmwareAir::fades(std::uint32_t receiver, std::uint32_t sender, Cycles sta
   if (!(loss_ > 0)) return false;
   const Cycles tick = start / cycles_per_tick_;
   const std::uint32_t draw =
-      sender != kOverhead
-          ? sender
-          : kLastDraw - static_cast<std::uint32_t>((start - tick * cycles_per_tick_) / kOverheadPeriod);
+      sender != kOverhead ? sender
+                          : kLastDraw - static_cast<std::uint32_t>((start - tick * cycles_per_tick_) / kPacket);
   return random_.uniform(Stream::kReception, receiver, Tick{tick}, draw) < loss_;
 }
 

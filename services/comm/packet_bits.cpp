@@ -14,10 +14,11 @@ constexpr std::size_t kStopBit = kBitsPerOctet - 1;
 
 std::uint16_t message_crc(const IrMessage& message) { return kilotwin_message_crc(message.data()); }
 
-PacketBits packet_bits(const IrMessage& message) {
+PacketBits packet_bits(const IrMessage& message) { return packet_bits(message, message_crc(message)); }
+
+PacketBits packet_bits(const IrMessage& message, std::uint16_t crc) {
   std::array<std::uint8_t, 13> octets{};
   std::copy(message.begin(), message.end(), octets.begin() + 1);
-  const std::uint16_t crc = message_crc(message);
   octets[11] = static_cast<std::uint8_t>(crc & 0xff);
   octets[12] = static_cast<std::uint8_t>(crc >> 8);
   PacketBits bits;

@@ -17,6 +17,8 @@ using PacketBits = std::bitset<kPacketBits>;
 /// CRC-16/MCRF4XX of data and type, as kilolib computes it.
 [[nodiscard]] std::uint16_t message_crc(const IrMessage&);
 [[nodiscard]] PacketBits packet_bits(const IrMessage&);
+/// With a CRC that may be wrong.
+[[nodiscard]] PacketBits packet_bits(const IrMessage&, std::uint16_t crc);
 /// The message; nullopt if a robot would drop the packet.
 [[nodiscard]] std::optional<IrMessage> message_of(const PacketBits&);
 

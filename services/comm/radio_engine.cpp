@@ -422,6 +422,7 @@ void RadioEngine::receive(const Transmission& packet, std::uint32_t receiver, bo
 }
 
 void RadioEngine::receive_copy(const OverheadController::Copy& copy, std::uint32_t ordinal, Tick now) {
+  if (!copy.is_sound()) return;
   std::fill(jammed_.begin(), jammed_.end(), std::uint8_t{0});
   for (const Transmission& transmission : channel_.all()) {
     if (!transmission.overlaps(copy.start, copy.end())) continue;

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "idl/checkpoint.pb.h"
+#include "services/comm/packet_bits.hpp"
 #include "tests/services/comm/fake_hosts.hpp"
 
 namespace kilotwin::comm {
@@ -121,6 +123,131 @@ TEST(Overhead, PacketsActAtTheirOffsets) {
   messages.clear();
   EXPECT_EQ(heard_after({packet(OverheadCommand::kOnce, 7, kTick - 1)}, 2, &messages),
             (std::vector<std::size_t>{0, 1}));
+}
+
+OverheadPacket page_packet(std::uint8_t page) {
+  OverheadPacket packet;
+  packet.command = OverheadCommand::kBootPage;
+  std::array<std::uint8_t, 129> payload{page};
+  for (std::size_t i = 0; i < 128; ++i) payload[1 + i] = static_cast<std::uint8_t>(i * 7 + page);
+  packet.set_payload(payload);
+  return packet;
+}
+
+TEST(Overhead, TheLedTogglesInSilence) {
+  std::vector<IrMessage> messages;
+  heard_after({{OverheadCommand::kRepeat, {1}}, {OverheadCommand::kLedToggle, {2}}}, 5, &messages);
+  ASSERT_EQ(messages.size(), 1u) << "it ends the repetition";
+  EXPECT_EQ(messages[0][0], 1);
+}
+
+TEST(Overhead, APageIsTwentyTwoMessagesBackToBack) {
+  std::vector<IrMessage> messages;
+  const std::vector<std::size_t> heard =
+      heard_after({page_packet(17), {OverheadCommand::kOnce, kWord}}, 6, &messages);
+  ASSERT_EQ(messages.size(), 23u);
+  std::array<std::uint8_t, 128> page{};
+  for (std::size_t n = 0; n < 22; ++n) {
+    EXPECT_EQ(messages[n][0], 17);
+    EXPECT_EQ(messages[n][1], 3 * n) << "offset in words";
+    EXPECT_EQ(messages[n][9], 0x81);
+    for (std::size_t i = 0; i < 6 && 6 * n + i < 128; ++i) page[6 * n + i] = messages[n][2 + i];
+  }
+  for (std::size_t i = 0; i < 128; ++i) EXPECT_EQ(page[i], static_cast<std::uint8_t>(i * 7 + 17));
+  // Message n ends (n + 1) packets and n gaps after the start; 20 ms after the 22nd, the next packet's message begins.
+  std::vector<std::size_t> expected(6, 0);
+  for (Cycles n = 0; n < 22; ++n) ++expected[static_cast<std::size_t>((n * (kPacket + 302) + kPacket) / kTick)];
+  ++expected[static_cast<std::size_t>((22 * (kPacket + 302) + 160'000 + kPacket) / kTick)];
+  EXPECT_EQ(heard, expected);
+  EXPECT_NEAR(22.0 * (kPacket + 302) / kNominalClockHz, 0.097, 0.001);
+}
+
+/// Neither STOP nor another page cuts a page short; what repeats is not kept.
+TEST(Overhead, PagesGoOnToTheirEnd) {
+  const RunPlan plan = make_plan("", {{0, 0, 0}});
+  Swarm swarm(plan);
+  swarm.hosts.sends[0] = 0;
+  swarm.hosts.overhead.packets = {page_packet(0)};
+  std::vector<int> count(4, 0);
+  for (int k = 0; k < 30; ++k) {
+    if (k == 1)
+      swarm.hosts.overhead.packets = {page_packet(1),
+                                      {OverheadCommand::kRepeat, {3, 0, 0, 0, 0, 0, 0, 0, 0, 0x81}}};
+    if (k == 2) swarm.hosts.overhead.packets = {page_packet(2), {OverheadCommand::kStop, {}}};
+    swarm.step();
+    for (const std::uint32_t index : swarm.frames[0].reception_message) ++count[swarm.frames[0].messages[index][0]];
+  }
+  EXPECT_EQ(count, (std::vector<int>{22, 22, 22, 0}));
+}
+
+TEST(Overhead, ARawMessageWithAWrongCrcReachesNobodyAndJams) {
+  const auto raw = [](std::uint16_t error) {
+    OverheadPacket packet{OverheadCommand::kRaw, kWord};
+    const auto crc = static_cast<std::uint16_t>(message_crc(kWord) ^ error);
+    packet.rest[0] = static_cast<std::uint8_t>(crc & 255);
+    packet.rest[1] = static_cast<std::uint8_t>(crc >> 8);
+    return packet;
+  };
+  std::vector<IrMessage> messages;
+  heard_after({raw(0)}, 10, &messages);
+  EXPECT_EQ(messages.size(), static_cast<std::size_t>(copies_until(0, 10))) << "it repeats";
+  for (const IrMessage& message : messages) EXPECT_EQ(message, kWord);
+  messages.clear();
+  heard_after({raw(0x0100)}, 10, &messages);
+  EXPECT_TRUE(messages.empty());
+  // Two robots that talk all the time lose as much to it as to a sound one.
+  const auto received = [&](std::uint16_t error) {
+    const RunPlan plan = make_plan("radio { range_mm: 100 }", {{0, 0, 0}, {50, 0, 0}});
+    Swarm swarm(plan);
+    swarm.hosts.overhead.packets = {raw(error)};
+    for (int k = 0; k < 2000; ++k) swarm.step();
+    return swarm.radio.counters().received;
+  };
+  EXPECT_EQ(received(0), received(0x8000));
+}
+
+TEST(Overhead, AGpsFrameIsItsRecordsUpToTheZeros) {
+  OverheadPacket packet;
+  packet.command = OverheadCommand::kGpsFrame;
+  for (const std::size_t records : {0, 1, 5, 16}) {
+    std::vector<std::uint8_t> payload(129, 0);
+    for (std::size_t i = 0; i < 8 * records; ++i) payload[i] = static_cast<std::uint8_t>(i + 1);
+    if (records < 15) payload[8 * records + 8] = 9;  // beyond the zeros
+    packet.set_payload(payload);
+    std::vector<IrMessage> messages;
+    heard_after({packet}, 8, &messages);
+    ASSERT_EQ(messages.size(), records);
+    for (std::size_t n = 0; n < records; ++n) {
+      EXPECT_EQ(messages[n][0], 8 * n + 1);
+      EXPECT_EQ(messages[n][7], 8 * n + 8);
+      EXPECT_EQ(messages[n][8], 0);
+      EXPECT_EQ(messages[n][9], 1) << "type GPS";
+    }
+  }
+}
+
+TEST(Overhead, AStateWithAPageInItGoesOnFromACheckpoint) {
+  const RunPlan plan = make_plan("", {{0, 0, 0}});
+  const auto run = [&](Swarm& swarm, int ticks) {
+    std::vector<std::uint64_t> hashes;
+    for (int k = 0; k < ticks; ++k) {
+      swarm.step();
+      hashes.push_back(swarm.radio.hash_part());
+    }
+    return hashes;
+  };
+  Swarm first(plan), second(plan);
+  OverheadPacket raw{OverheadCommand::kRaw, kWord};
+  raw.rest[0] = 1;
+  first.hosts.overhead.packets = {page_packet(3), raw};
+  run(first, 2);
+  proto::RadioState state;
+  first.radio.save(state);
+  const proto::RadioState* const parts[] = {&state};
+  second.radio.load(first.now, parts);
+  second.now = first.now;
+  second.emit();
+  EXPECT_EQ(run(first, 20), run(second, 20));
 }
 
 /// Lone robots, each with a silent listener; their first attempt is predicted from the phase of the copies, which run from

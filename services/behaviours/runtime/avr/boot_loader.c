@@ -104,6 +104,7 @@ int main(void) {
   set_vectors(_BV(IVSEL));
   kilo_message_rx = keep;
   kilo_init();
+  TIMSK0 = 0; /* the clock's interrupt can make the receiver late by half a bit, and nobody asks for the time */
   /* A blue flash of 5 ms every second, until pages come. */
   for (uint16_t ms = 0;;) {
     if (has_message) {
