@@ -169,7 +169,8 @@ class StationFederate : public Federate {
     sample.run = session_.plan().run();
     for (const OverheadPacket& packet : overhead_.frame.packets) {
       sample.number = packets_published_++;
-      sample.time_s = session_.plan().tick_length.seconds_at(now) + packet.offset_cycles() / kNominalClockHz;
+      sample.offset_s = packet.offset_cycles() / kNominalClockHz;
+      sample.time_s = session_.plan().tick_length.seconds_at(now) + sample.offset_s;
       sample.command = static_cast<std::uint8_t>(packet.command);
       std::copy(packet.message.begin(), packet.message.end(), sample.message);
       std::copy(packet.rest.begin(), packet.rest.end(), sample.rest);

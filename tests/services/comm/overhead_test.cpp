@@ -209,7 +209,7 @@ TEST(Overhead, ARawMessageWithAWrongCrcReachesNobodyAndJams) {
 TEST(Overhead, AGpsFrameIsItsRecordsUpToTheZeros) {
   OverheadPacket packet;
   packet.command = OverheadCommand::kGpsFrame;
-  for (const std::size_t records : {0, 1, 5, 16}) {
+  for (const std::size_t records : std::array<std::size_t, 4>{0, 1, 5, 16}) {
     std::vector<std::uint8_t> payload(129, 0);
     for (std::size_t i = 0; i < 8 * records; ++i) payload[i] = static_cast<std::uint8_t>(i + 1);
     if (records < 15) payload[8 * records + 8] = 9;  // beyond the zeros

@@ -32,13 +32,19 @@ const FlashImage& blank() {
 const FlashImage& large() {
   static const FlashImage image = [] {
     std::string table;
-    for (int i = 0; i < 5000; ++i) table += std::to_string(i * 37 % 251) + ",";
+    int sum = 0;
+    for (int i = 0; i < 5000; ++i) {
+      table += std::to_string(i * 37 % 251) + ",";
+      sum += i * 37 % 251;
+    }
     return image_of(
         "#include <avr/pgmspace.h>\n" +
             whole_program(
                 "static const uint8_t table[] PROGMEM = {" + table +
                 "};\nstatic void setup(void) { uint8_t sum = 0; for (uint16_t i = 0; i < sizeof table; ++i) "
-                "sum += pgm_read_byte(table + i); set_color(sum == 10 ? RGB(0, 3, 3) : RGB(3, 3, 3)); }\n"
+                "sum += pgm_read_byte(table + i); set_color(sum == " +
+                std::to_string(sum % 256) +
+                " ? RGB(0, 3, 3) : RGB(3, 3, 3)); }\n"
                 "static void loop(void) {}"),
         false);
   }();

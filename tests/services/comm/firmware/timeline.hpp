@@ -50,9 +50,10 @@ class TimelineObserver : public RunObserver {
   }
 };
 
-/// Runs an experiment locally. `folder`: directory for the experiment and its run.
+/// Runs an experiment locally. `folder`: directory for the experiment and its run; `inputs`: external ones.
 inline Timeline run_timeline(const std::string& experiment, const std::filesystem::path& folder,
-                             std::uint32_t threads = 1, const std::vector<std::string>& set = {}) {
+                             std::uint32_t threads = 1, const std::vector<std::string>& set = {},
+                             const std::vector<Directive>& inputs = {}) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / "experiment.txtpb";
   std::ofstream(file) << experiment;
@@ -66,6 +67,7 @@ inline Timeline run_timeline(const std::string& experiment, const std::filesyste
   local::LocalOptions options;
   options.threads = threads;
   options.run_directory = prepared.directory.path();
+  options.inputs = inputs;
   TimelineObserver observer(plan.robots());
   const auto programs = behaviours::ProgramSet::load(plan, options.run_directory);
   observer.timeline.totals = local::run(plan, programs, options, observer);

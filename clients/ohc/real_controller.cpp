@@ -1,0 +1,162 @@
+#include "clients/ohc/real_controller.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+
+#include "clients/ohc/guard.hpp"
+#include "clients/ohc/packet_log.hpp"
+#include "clients/ohc/run_watch.hpp"
+#include "clients/ohc/serial_port.hpp"
+#include "core/base/error.hpp"
+#include "core/base/say.hpp"
+#include "core/federation/topics.hpp"
+#include "core/os/interrupt.hpp"
+
+namespace kilotwin::ohc {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Packets of the station, each at its offset within the tick.
+class StationPackets {
+ public:
+  explicit StationPackets(const dds::Participant& participant)
+      : reader_(participant, topics::station_packets(),
+                [this](const PublicStationPacket& sample, dds::SampleState state) {
+                  if (state.valid) receive(sample);
+                }) {}
+
+  /// The next packet that is due. Waits for one until `until`.
+  std::optional<OverheadPacket> take(Clock::time_point until) {
+    std::unique_lock lock(mutex_);
+    while (queue_.empty() || queue_.front().due > Clock::now()) {
+      const Clock::time_point wake = queue_.empty() ? until : std::min(until, queue_.front().due);
+      arrived_.wait_until(lock, wake);
+      if (Clock::now() >= until && (queue_.empty() || queue_.front().due > until)) return std::nullopt;
+    }
+    const OverheadPacket packet = queue_.front().packet;
+    queue_.pop_front();
+    return packet;
+  }
+  /// Packets that were dropped because the line is slower than the station.
+  [[nodiscard]] std::uint64_t dropped() const {
+    const std::lock_guard lock(mutex_);
+    return dropped_;
+  }
+  /// Packets that did not come: gaps in the station's count.
+  [[nodiscard]] std::uint64_t lost() const {
+    const std::lock_guard lock(mutex_);
+    return lost_;
+  }
+
+ private:
+  struct Due {
+    Clock::time_point due;
+    OverheadPacket packet;
+  };
+
+  void receive(const PublicStationPacket& sample) {
+    constexpr std::size_t kMost = 16;
+    constexpr double kLongestOffset_s = 1.0;
+    Due entry;
+    entry.packet.command = static_cast<OverheadCommand>(sample.command);
+    if (!is_known(entry.packet.command) || !(sample.offset_s >= 0 && sample.offset_s < kLongestOffset_s)) return;
+    std::copy_n(sample.message, entry.packet.message.size(), entry.packet.message.begin());
+    std::copy_n(sample.rest, entry.packet.rest.size(), entry.packet.rest.begin());
+    entry.due = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(sample.offset_s * 1e9));
+    const std::lock_guard lock(mutex_);
+    if (run_ == sample.run && sample.number > next_) lost_ += sample.number - next_;
+    run_ = sample.run;
+    next_ = sample.number + 1;
+    if (!queue_.empty()) entry.due = std::max(entry.due, queue_.back().due);
+    queue_.push_back(entry);
+    if (queue_.size() > kMost) {
+      queue_.pop_front();
+      ++dropped_;
+    }
+    arrived_.notify_one();
+  }
+
+  mutable std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::deque<Due> queue_;
+  std::uint64_t run_ = 0, next_ = 0, dropped_ = 0, lost_ = 0;
+  dds::Reader<PublicStationPacket> reader_;
+};
+
+class RealController {
+ public:
+  RealController(Guard& guard, std::string device, std::uint32_t domain)
+      : guard_(guard),
+        device_(std::move(device)),
+        participant_({domain, {}}),
+        watch_(participant_),
+        announcer_(watch_, domain),
+        station_(participant_) {}
+
+  void work() {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    const Clock::time_point begun = Clock::now();
+    bool had_run = false;
+    while (interrupted() == 0) {
+      const bool has_run = announcer_.look();
+      if (had_run && !has_run) forward({}, begun);  // the run is over: nothing of it goes on
+      had_run = has_run;
+      const Clock::time_point until = Clock::now() + kLook;
+      while (const auto packet = station_.take(until)) forward(*packet, begun);
+      if (!guard_.runs()) take_over();
+    }
+  }
+
+  void report() const {
+    say(fmt::format("kilotwin: {}, {} dropped as the line was busy, {} lost on the way", log_.counts(),
+                    station_.dropped(), station_.lost()));
+  }
+
+ private:
+  void forward(const OverheadPacket& packet, Clock::time_point begun) {
+    log_.note(packet, std::chrono::duration<double>(Clock::now() - begun).count());
+    if (!send_packet(guard_.socket(), packet) && !guard_.runs()) take_over();
+  }
+
+  /// The guard has been killed: nobody but this process can send STOP.
+  [[noreturn]] void take_over() const {
+    SerialPort port(device_);
+    const bool stopped = port.open().empty() && port.send({});
+    throw RunError(device_ + ": the guard process of the port was killed; " +
+                   (stopped ? "STOP was sent" : "STOP could not be sent: switch the controller off"));
+  }
+
+  Guard& guard_;
+  const std::string device_;
+  dds::Participant participant_;
+  RunWatch watch_;
+  RunAnnouncer announcer_;
+  StationPackets station_;
+  PacketLog log_;
+};
+
+}  // namespace
+
+void run_real_controller(const std::filesystem::path& device, std::uint32_t domain) {
+  SerialPort port(device);
+  if (const std::string reason = port.open(); !reason.empty()) {
+    throw UserError(device.string() + ": cannot be opened: " + reason +
+                    "; name the controller's port, and see that no other program has it");
+  }
+  Guard guard([&](int socket) { serve_port(port, socket); });
+  port.close();
+  catch_interrupts();
+  RealController controller(guard, device.string(), domain);
+  say(fmt::format("kilotwin: {}: the station's packets go to this port", device.string()));
+  controller.work();
+  controller.report();
+}
+
+}  // namespace kilotwin::ohc

@@ -1,0 +1,215 @@
+// `kilotwin ohc` among a run, a station program on its port, and a physical controller played by a pseudo-terminal.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <random>
+
+#include "clients/ohc/pseudo_terminal.hpp"
+#include "clients/ohc/serial_packet.hpp"
+#include "clients/ohc/serial_port.hpp"
+#include "clients/recorder/reader.hpp"
+#include "core/federation/topics.hpp"
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Ohc : public testing::Test {
+ protected:
+  Ohc() : domain_(dds::DomainClaim::any().domain()) {}
+
+  std::unique_ptr<Process> start_ohc(const Words& where) {
+    Words words{program(), "ohc", "--domain", std::to_string(domain_)};
+    words.insert(words.end(), where.begin(), where.end());
+    return std::make_unique<Process>(words, ohc_scratch_.path());
+  }
+  std::unique_ptr<Process> start_run(const Words& more = {}) {
+    Words words{program(),
+                "run",
+                source("experiments/disperse.txtpb"),
+                "--robots",
+                "20",
+                "--duration",
+                "600",
+                "--pace",
+                "1",
+                "--quiet",
+                "--domain",
+                std::to_string(domain_),
+                "--out",
+                scratch_ / "run"};
+    words.insert(words.end(), more.begin(), more.end());
+    return std::make_unique<Process>(words, scratch_.path());
+  }
+  [[nodiscard]] bool life_cycles_become(char state) const {
+    const std::string wanted(20, state);
+    std::string last;
+    try {
+      recorder::Reader reader(scratch_ / "run/recording.ktrec");
+      while (const proto::StateRecord* record = reader.next_state()) last = record->life_cycle();
+    } catch (const std::exception&) {
+      return false;  // not written yet
+    }
+    return last == wanted;
+  }
+
+  Scratch scratch_, ohc_scratch_;
+  const std::uint32_t domain_;
+};
+
+constexpr std::uint8_t kWakeup = 0x85;
+constexpr char kIdle = 1;
+
+TEST_F(Ohc, AStationProgramCommandsTheRobotsOfARun) {
+  const fs::path link = scratch_.path() / "ttyUSB0";
+  auto ohc = start_ohc({"--pty", link.string()});
+  ASSERT_TRUE(ohc->says("waiting for a run", 30));
+  ASSERT_TRUE(fs::is_symlink(link));
+  const auto run = start_run();
+  ASSERT_TRUE(ohc->says("run disperse", 60));
+  ASSERT_TRUE(eventually([&] { return fs::exists(scratch_.path() / "run/recording.ktrec"); }));
+
+  // Noise, a cut packet, a packet with a wrong checksum, then WAKEUP again and again, each time by a program that opens the
+  // port anew.
+  const int port = open(link.c_str(), O_RDWR | O_NOCTTY);
+  ASSERT_GE(port, 0);
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> noise(500);
+  for (std::uint8_t& octet : noise) octet = static_cast<std::uint8_t>(random());
+  ohc::SerialPacket wrong = ohc::encode({OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0x83}});
+  noise.insert(noise.end(), wrong.begin(), wrong.begin() + 60);
+  wrong[7] ^= 4;
+  noise.insert(noise.end(), wrong.begin(), wrong.end());
+  ASSERT_EQ(write(port, noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
+  close(port);
+  const OverheadPacket wakeup{OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, kWakeup}};
+  EXPECT_TRUE(eventually(
+      [&] {
+        ohc::SerialPort serial(link);
+        EXPECT_EQ(serial.open(), "");
+        EXPECT_TRUE(serial.send(wakeup));
+        return life_cycles_become(kIdle);
+      },
+      90));
+  ohc->signal(SIGTERM);
+  const Outcome outcome = ohc->wait(30);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_FALSE(fs::is_symlink(link)) << "the link goes with it";
+  EXPECT_NE(outcome.out.find("WAKEUP, repeated"), std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find("RESET"), std::string::npos) << "wrong and cut packets count for nothing";
+  EXPECT_NE(outcome.err.find(" wrong checksums"), std::string::npos) << outcome.err;
+  run->signal(SIGINT);
+  run->wait(60);
+  EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
+}
+
+TEST_F(Ohc, TheLinkGoesWithAKilledController) {
+  const fs::path link = scratch_.path() / "port";
+  auto ohc = start_ohc({"--pty", link.string()});
+  ASSERT_TRUE(ohc->says("virtual overhead controller", 30));
+  EXPECT_TRUE(fs::is_symlink(link));
+  const Outcome second = kilotwin({"ohc", "--pty", link.string(), "--domain", std::to_string(domain_)}, scratch_);
+  EXPECT_EQ(second.status, 2);
+  EXPECT_NE(second.err.find("exists"), std::string::npos) << second.err;
+  EXPECT_TRUE(fs::is_symlink(link));
+  ohc->signal(SIGKILL);
+  ohc->wait(30);
+  EXPECT_TRUE(eventually([&] { return !fs::is_symlink(link); }));
+}
+
+TEST_F(Ohc, BadArgumentsAreRefused) {
+  EXPECT_EQ(kilotwin({"ohc"}, scratch_).status, 2);
+  EXPECT_EQ(kilotwin({"ohc", "--pty", "a", "--serial", "b"}, scratch_).status, 2);
+  const Outcome missing = kilotwin({"ohc", "--serial", "/nonexistent", "--domain", "3"}, scratch_);
+  EXPECT_EQ(missing.status, 2);
+  EXPECT_NE(missing.err.find("/nonexistent: cannot be opened"), std::string::npos) << missing.err;
+}
+
+/// Packets as the physical controller would take them.
+class Controller {
+ public:
+  [[nodiscard]] const std::string& port() const { return terminal_.path(); }
+  /// Whether such a packet arrives within a bound against hanging.
+  [[nodiscard]] bool gets(const OverheadPacket& wanted) {
+    return eventually(
+        [&] {
+          for (const std::uint8_t octet : terminal_.read(0.05)) {
+            const auto packet = decoder_.take(octet);
+            if (!packet) continue;
+            last_ = *packet;
+            if (*packet == wanted) return true;
+          }
+          return false;
+        },
+        60);
+  }
+  /// Reads until nothing comes for a second; the last packet of all.
+  [[nodiscard]] OverheadPacket last() {
+    for (double quiet_s = now_s(); now_s() < quiet_s + 1;) {
+      for (const std::uint8_t octet : terminal_.read(0.05)) {
+        quiet_s = now_s();
+        if (const auto packet = decoder_.take(octet)) last_ = *packet;
+      }
+    }
+    return last_;
+  }
+  [[nodiscard]] const ohc::PacketDecoder::Counters& counters() const { return decoder_.counters(); }
+
+ private:
+  ohc::PseudoTerminal terminal_;
+  ohc::PacketDecoder decoder_;
+  OverheadPacket last_{OverheadCommand::kOnce, {}};
+};
+
+const OverheadPacket kRunPacket{OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, 0x88}};
+const OverheadPacket kStopPacket{};
+
+TEST_F(Ohc, APhysicalControllerDoesAsTheStationDoesAndStopsAtEveryEnding) {
+  Controller controller;
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    auto ohc = start_ohc({"--serial", controller.port()});
+    ASSERT_TRUE(ohc->says("waiting for a run", 30));
+    const auto run = start_run({"--force"});
+    EXPECT_TRUE(controller.gets(kRunPacket)) << "the station starts the robots";
+    EXPECT_TRUE(controller.gets(kStopPacket)) << "and frees the air";
+    dds::Participant participant({domain_, {}});
+    dds::Writer<PublicOverheadPacket> packets(participant, topics::overhead_packets());
+    ASSERT_TRUE(eventually([&] { return packets.readers() > 0; }));
+    PublicOverheadPacket page{};
+    std::string("test").copy(page.client, sizeof page.client - 1);
+    page.request = static_cast<std::uint32_t>(signal);
+    page.command = 4;
+    page.message[0] = 12;
+    page.rest[118] = 99;
+    packets.write(page);
+    OverheadPacket expected;
+    expected.command = OverheadCommand::kBootPage;
+    expected.message[0] = 12;
+    expected.rest[118] = 99;
+    EXPECT_TRUE(controller.gets(expected)) << "external input too";
+    ++page.request;
+    page.command = 2;
+    page.message[9] = kWakeup;
+    page.rest[118] = 0;
+    packets.write(page);
+    EXPECT_TRUE(controller.gets({OverheadCommand::kRepeat, {12, 0, 0, 0, 0, 0, 0, 0, 0, kWakeup}}));
+    ohc->signal(signal);
+    EXPECT_TRUE(controller.gets(kStopPacket)) << signal;
+    EXPECT_EQ(controller.last(), kStopPacket);
+    EXPECT_EQ(ohc->wait(30).status, signal == SIGTERM ? 0 : 128 + SIGKILL);
+    run->signal(SIGINT);
+    run->wait(60);
+  }
+  EXPECT_EQ(controller.counters().bad_checksums, 0u);
+}
+
+}  // namespace
+}  // namespace kilotwin::test
