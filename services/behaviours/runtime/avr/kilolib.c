@@ -9,6 +9,7 @@
 #include <avr/wdt.h>
 #include <kilolib.h>
 #include <stdlib.h>
+#include <util/crc16.h>
 #include <util/delay.h>
 
 #include "../core/base/message_crc.h"
@@ -304,6 +305,7 @@ static void obey(void) {
 static uint8_t in_octet;    /* 1: the octet's start bit has arrived */
 static uint8_t octet_count; /* complete octets, the leading one included */
 static uint8_t octet;
+static uint16_t crc; /* of the octets so far: messages may follow each other with 600 cycles in between */
 
 static void stop_receiving(void) {
   TCCR1B = 0;
@@ -323,12 +325,14 @@ static void take_octet(void) {
     }
     rx_dist.low_gain = (int16_t)conversion();
     listen_to(0);
+    crc = 0xffff;
   } else {
     ((uint8_t*)&rx_msg)[octet_count - 1] = octet;
+    if (octet_count <= PACKET_OCTETS - sizeof rx_msg.crc) crc = _crc_ccitt_update(crc, octet);
   }
   if (++octet_count <= PACKET_OCTETS) return;
   stop_receiving();
-  if (rx_msg.crc != message_crc(&rx_msg)) return;
+  if (rx_msg.crc != crc) return;
   if (IS_BOOT_LOADER || rx_msg.type < BOOT)
     kilo_message_rx(&rx_msg, &rx_dist);
   else

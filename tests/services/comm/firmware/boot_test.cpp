@@ -1,6 +1,7 @@
 // The boot loader of this project in a simulated processor: a whole upload, and what it does when messages are lost.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <random>
 
@@ -74,19 +75,24 @@ class Robot {
     message[9] = type;
     hear(message);
   }
-  /// The 22 messages of a page, back to back, then 20 ms; `lost` says which do not arrive.
+  /// The 22 messages of a page, as the overhead controller sends them, then 20 ms; `lost` says which do not arrive.
   void hear_page(const FlashImage& image, std::uint8_t page, const std::function<bool()>& lost) {
+    std::vector<Light> pulses;
+    const double begin = static_cast<double>(mcu.now()) + 100;
     for (std::uint32_t at = 0; at < kPageOctets; at += 6) {
       IrMessage message{page, static_cast<std::uint8_t>(at / 2)};
       for (std::uint32_t n = 0; n < 6 && at + n < kPageOctets; ++n)
         message[2 + n] = image.flash[page * kPageOctets + at + n];
       message[9] = kPagePart;
-      if (lost())
-        mcu.run(mcu.now() + comm::kPacket, {});
-      else
-        hear(message, 300);
+      if (lost()) continue;
+      const comm::PacketBits bits = comm::packet_bits(message);
+      for (std::size_t b = 0; b < bits.size(); ++b) {
+        const auto cycle =
+            static_cast<double>(at / 6 * comm::kBurstPeriod + static_cast<comm::Cycles>(b) * comm::kBit);
+        if (bits[b]) pulses.push_back({static_cast<OwnCycles>(begin + rate * cycle), 627, 464});
+      }
     }
-    mcu.run(mcu.now() + kSecond / 50, {});
+    mcu.run(mcu.now() + static_cast<OwnCycles>(rate * 22 * comm::kBurstPeriod + comm::kBurstPause), pulses);
   }
   /// Pages whose octets in flash are those of the image.
   [[nodiscard]] int pages_of(const FlashImage& image, int pages) const {
@@ -101,6 +107,7 @@ class Robot {
   [[nodiscard]] bool in_boot_section() const { return mcu.program_counter() >= kSection; }
 
   Mcu mcu;
+  double rate = 1;  ///< of its oscillator
 };
 
 int pages_of(const FlashImage& image) { return static_cast<int>(image.used_octets / kPageOctets) + 1; }
@@ -136,6 +143,17 @@ TEST(BootLoader, TakesAWholeProgramAndStartsIt) {
   EXPECT_EQ(robot.mcu.halt(), Halt::kNone);
   robot.hear(kBoot);
   EXPECT_TRUE(robot.in_boot_section()) << "and can be replaced in turn";
+}
+
+/// Messages of a page follow each other with 571 cycles between their pulses, and clocks differ.
+TEST(BootLoader, KeepsUpWithTheControllerAtAnyRateOfItsClock) {
+  for (const double rate : {0.98, 0.99, 1.0, 1.01, 1.02}) {
+    Robot robot(blank());
+    robot.rate = rate;
+    robot.hear(kBoot);
+    for (std::uint8_t page = 0; page < 6; ++page) robot.hear_page(large(), page, never);
+    EXPECT_EQ(robot.pages_of(large(), 6), 6) << rate;
+  }
 }
 
 TEST(BootLoader, LostMessagesCostAPassAndNoPage) {
