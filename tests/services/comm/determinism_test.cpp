@@ -76,8 +76,10 @@ void stir(testing::FakeHosts& hosts, Tick now) {
   hosts.place();
   if (draw(20) == 0) {
     for (std::uint64_t n = draw(4); n-- > 0;) {
-      hosts.overhead.packets.push_back({static_cast<OverheadCommand>(draw(7)),
-                                        {static_cast<std::uint8_t>(draw(256)), 1, 2, 3, 4, 5, 6, 7, 8, 0x7f}});
+      constexpr OverheadCommand kCommands[] = {OverheadCommand::kStop, OverheadCommand::kRepeat,
+                                               OverheadCommand::kOnce};
+      hosts.overhead.packets.push_back(
+          {kCommands[draw(3)], {static_cast<std::uint8_t>(draw(256)), 1, 2, 3, 4, 5, 6, 7, 8, 0x7f}});
     }
   }
 }
