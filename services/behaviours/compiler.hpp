@@ -12,7 +12,7 @@ struct CompileOptions {
   std::vector<std::string> defines;       ///< macros, NAME or NAME=VALUE
   std::filesystem::path compiler;         ///< empty: the first of cc, gcc, clang on the PATH
   std::filesystem::path cache_directory;  ///< empty: os::cache_directory()
-  bool boot_loader = false;               ///< firmware gets this project's boot loader at 0x7000, as a robot has one
+  bool boot_loader = false;  ///< firmware gets this project's boot loader at 0x7000, as a robot has one
 };
 
 struct CompiledProgram {
