@@ -18,12 +18,18 @@ std::string big_endian(std::uint32_t value, int bytes) {
   return text;
 }
 
-/// After the first marker of the file, as a segment COM.
+/// As a segment COM behind the JFIF header, which must be the first segment.
 std::string jpeg_with_comment(std::string_view file, const std::string& comment) {
-  constexpr std::size_t kMarker = 2;
-  std::string result(file.substr(0, kMarker));
+  constexpr std::size_t kMarker = 2, kLengthAt = 4;
+  std::size_t at = kMarker;
+  if (file.substr(at, kMarker) == "\xff\xe0") {
+    const auto high = static_cast<std::uint8_t>(file[kLengthAt]),
+               low = static_cast<std::uint8_t>(file[kLengthAt + 1]);
+    at += kMarker + (std::size_t{high} << 8 | low);
+  }
+  std::string result(file.substr(0, at));
   result += "\xff\xfe" + big_endian(static_cast<std::uint32_t>(comment.size() + kMarker), 2) + comment;
-  return result.append(file.substr(kMarker));
+  return result.append(file.substr(at));
 }
 
 /// After the header chunk, as a chunk tEXt.
