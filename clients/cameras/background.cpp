@@ -83,11 +83,12 @@ cv::Mat paint_background(const World& world, const CameraModel& camera, const Lo
   cv::Mat picture(camera.height_px, camera.width_px, CV_8UC3);
   const cv::Point2d middle = camera.at_height({camera.width_px / 2.0, camera.height_px / 2.0}, 0);
   const double px_per_mm = scale_at(camera, middle.x, middle.y);
+  const CameraModel::ToPlane floor(camera, 0);
   for (int row = 0; row < picture.rows; ++row) {
     auto* const pixels = picture.ptr<cv::Vec3b>(row);
     for (int column = 0; column < picture.cols; ++column) {
       const cv::Point2d pixel(column, row);
-      const cv::Point2d at = camera.at_height(pixel, 0);
+      const cv::Point2d at = floor(pixel);
       const double light = camera.gain * camera.lens_share(pixel) * camera.room_light(at.x, at.y);
       pixels[column] = lit(surface_at(world, look, at.x, at.y, px_per_mm), light);
     }
@@ -104,11 +105,12 @@ void paint_movable(cv::Mat& picture, const Convex& shape, const Pose& pose, cons
   const cv::Rect box = cv::Rect(static_cast<int>(centre.x) - reach_px, static_cast<int>(centre.y) - reach_px,
                                 2 * reach_px + 1, 2 * reach_px + 1) &
                        cv::Rect(0, 0, picture.cols, picture.rows);
+  const CameraModel::ToPlane floor(camera, 0);
   for (int row = box.y; row < box.y + box.height; ++row) {
     auto* const pixels = picture.ptr<cv::Vec3b>(row);
     for (int column = box.x; column < box.x + box.width; ++column) {
       const cv::Point2d pixel(column, row);
-      const cv::Point2d at = camera.at_height(pixel, 0);
+      const cv::Point2d at = floor(pixel);
       const double inside_mm = -shape.nearest(place, {at.x, at.y}).distance_mm;
       const double share = coverage(inside_mm, px_per_mm);
       if (share == 0) continue;

@@ -61,13 +61,24 @@ cv::Matx22d CameraModel::jacobian(const cv::Vec3d& p_mm) const {
 }
 
 cv::Point2d CameraModel::at_height(const cv::Point2d& pixel, double height_mm) const {
-  const cv::Vec3d normalised = K.inv() * cv::Vec3d{pixel.x, pixel.y, 1};
+  return ToPlane(*this, height_mm)(pixel);
+}
+
+CameraModel::ToPlane::ToPlane(const CameraModel& camera, double height_mm)
+    : to_normalised_(camera.K.inv()),
+      to_arena_(camera.R.t()),
+      position_mm_(camera.position_mm),
+      height_mm_(height_mm),
+      distortion_(camera.distortion) {}
+
+cv::Point2d CameraModel::ToPlane::operator()(const cv::Point2d& pixel) const {
+  const cv::Vec3d normalised = to_normalised_ * cv::Vec3d{pixel.x, pixel.y, 1};
   cv::Point2d seen{normalised[0], normalised[1]};
-  if (!distortion.none()) seen = undistorted(distortion, seen);
-  const cv::Vec3d ray = R.t() * cv::Vec3d{seen.x, seen.y, 1};
-  const double along = (height_mm - position_mm[2]) / ray[2];
+  if (!distortion_.none()) seen = undistorted(distortion_, seen);
+  const cv::Vec3d ray = to_arena_ * cv::Vec3d{seen.x, seen.y, 1};
+  const double along = (height_mm_ - position_mm_[2]) / ray[2];
   if (!(along > 0) || !std::isfinite(along)) throw RunError("a pixel of the camera does not show the floor");
-  return {position_mm[0] + along * ray[0], position_mm[1] + along * ray[1]};
+  return {position_mm_[0] + along * ray[0], position_mm_[1] + along * ray[1]};
 }
 
 double CameraModel::lens_share(const cv::Point2d& pixel) const {

@@ -45,10 +45,26 @@ struct CameraModel {
   [[nodiscard]] cv::Matx22d jacobian(const cv::Vec3d& p_mm) const;
   /// The point at `height_mm` above the floor that appears at the pixel. RunError where the pixel shows none.
   [[nodiscard]] cv::Point2d at_height(const cv::Point2d& pixel, double height_mm) const;
+  /// The same for many pixels.
+  class ToPlane;
   /// The share of light that the lens lets through to a pixel.
   [[nodiscard]] double lens_share(const cv::Point2d& pixel) const;
   /// Room light at a point of the floor, as a multiple of that at the centre.
   [[nodiscard]] double room_light(double x_mm, double y_mm) const;
+};
+
+/// From pixels to the points of the plane at one height.
+class CameraModel::ToPlane {
+ public:
+  ToPlane(const CameraModel& camera, double height_mm);
+  /// RunError where the pixel shows no point of the plane.
+  [[nodiscard]] cv::Point2d operator()(const cv::Point2d& pixel) const;
+
+ private:
+  cv::Matx33d to_normalised_, to_arena_;
+  cv::Vec3d position_mm_;
+  double height_mm_;
+  Distortion distortion_;
 };
 
 }  // namespace kilotwin::cameras

@@ -23,6 +23,8 @@ using PublicTrackedPose = kilotwin_open_TrackedPose;
 using PublicTrackerFrame = kilotwin_open_TrackerFrame;
 using PublicRunStatus = kilotwin_open_RunStatus;
 using PublicRobotState = kilotwin_open_RobotState;
+using PublicRunDescription = kilotwin_open_RunDescription;
+using PublicSwarmState = kilotwin_open_SwarmState;
 
 namespace topics {
 
@@ -51,6 +53,8 @@ inline Channel tracked_poses() { return {"kilotwin/tracked_poses", Delivery::kRe
 inline Channel tracker_frames() { return {"kilotwin/tracker_frames", Delivery::kSensor, ""}; }
 inline Channel run_status() { return {"kilotwin/run_status", Delivery::kStatus, ""}; }
 inline Channel robots() { return {"kilotwin/robots", Delivery::kTelemetry, ""}; }
+inline Channel run_description() { return {"kilotwin/run_description", Delivery::kStatus, ""}; }
+inline Channel swarm() { return {"kilotwin/swarm", Delivery::kTelemetry, ""}; }
 
 }  // namespace topics
 
@@ -92,6 +96,12 @@ template <> inline const dds_topic_descriptor_t* descriptor<PublicRunStatus>() {
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicRobotState>() {
   return &kilotwin_open_RobotState_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicRunDescription>() {
+  return &kilotwin_open_RunDescription_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicSwarmState>() {
+  return &kilotwin_open_SwarmState_desc;
 }
 }  // namespace dds
 

@@ -15,6 +15,7 @@
 #include "services/ark/external_input.hpp"
 #include "services/ark/run_metrics.hpp"
 #include "services/ark/station_engine.hpp"
+#include "services/ark/swarm_stream.hpp"
 
 namespace kilotwin::ark {
 namespace {
@@ -43,7 +44,8 @@ class StationFederate : public Federate {
         overhead_(session, topics::overhead()),
         status_(session.participant(), topics::run_status()),
         robots_(session.participant(), topics::robots()),
-        station_packets_(session.participant(), topics::station_packets()) {}
+        station_packets_(session.participant(), topics::station_packets()),
+        swarm_stream_(session.plan(), session.participant()) {}
 
   void publish(Tick now) override {
     announce(now);
@@ -65,6 +67,7 @@ class StationFederate : public Federate {
     recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());
     if (begun >= next_robots_ && robots_.readers() > 0) publish_robots(now);
     if (begun >= next_robots_) next_robots_ = begun + kRobotsPeriod;
+    swarm_stream_.offer(swarm_, last);
   }
 
   void step(Tick from) override { engine_.step(from, {swarm_, session_.schedule().overhead_inputs()}); }
@@ -83,6 +86,7 @@ class StationFederate : public Federate {
     settle();
     const RunProgress progress = this->progress();
     observer_.idle(progress);
+    if (progress.paused) swarm_stream_.repeat(swarm_);
     publish_status(!session_.started() ? kilotwin_open_STARTING
                    : progress.paused   ? kilotwin_open_PAUSED
                                        : kilotwin_open_RUNNING,
@@ -209,6 +213,7 @@ class StationFederate : public Federate {
   dds::Writer<PublicStationPacket> station_packets_;
   std::uint64_t packets_published_ = 0;
   Clock::time_point next_robots_{};
+  SwarmStream swarm_stream_;
   Pace pace_{session_.plan()};
   std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash
   std::uint64_t recording_ns_ = 0;
