@@ -60,7 +60,9 @@ TEST(RobotNames, ARobotHasTheNumberThatMeansIt) {
   EXPECT_EQ(d.names.of_number(2), 9u);
   for (std::uint32_t robot = 0; robot < 12; ++robot) {
     const auto number = d.names.number_of(robot);
-    if (number) EXPECT_EQ(d.names.of_number(*number), robot);
+    if (number) {
+      EXPECT_EQ(d.names.of_number(*number), robot);
+    }
     EXPECT_EQ(number.has_value(), robot >= 2 && robot < 10) << robot;
   }
 }
