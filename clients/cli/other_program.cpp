@@ -1,0 +1,44 @@
+#include "clients/cli/other_program.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <filesystem>
+#include <vector>
+
+#include "core/base/error.hpp"
+
+namespace kilotwin::cli {
+namespace {
+
+int become(const std::string& name, const std::string& command, const std::vector<std::string>& arguments) {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  std::vector<std::string> words{"kilotwin", command};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  execv(program.c_str(), argv.data());
+  if (errno != ENOENT)
+    throw RunError(
+        fmt::format("{} cannot be started: {}", program.string(), std::generic_category().message(errno)));
+  throw RunError(
+      fmt::format("{} is not there; scripts/demo builds the simulator alone. Build the rest: scripts/setup && "
+                  "cmake --preset release && cmake --build --preset release",
+                  program.string()));
+}
+
+}  // namespace
+
+Command add_other_program(CLI::App& app, const std::string& command, const std::string& description,
+                          const std::string& program) {
+  CLI::App& parser = *app.add_subcommand(command, description);
+  // The other program parses the arguments.
+  parser.set_help_flag();
+  parser.prefix_command();
+  return {&parser, [&parser, command, program] { return become(program, command, parser.remaining()); }};
+}
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,12 @@
+// The program `kilotwin-vision`, which `kilotwin track` starts. It is a program of its own so that the simulator builds and
+// runs without OpenCV.
+
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/program.hpp"
+
+int main(int argc, char** argv) {
+  using namespace kilotwin::cli;
+  return run_program(argc, argv, "Pictures of robots. Start: kilotwin track SOURCE --out F.csv",
+                     [](CLI::App& program) -> std::vector<Command> { return {add_track(program)}; });
+}
