@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
                                add_identify(program),       add_service(program, started_s),
                                add_ros2(program),           add_play(program),
                                add_config(program),         add_ohc(program),
-                               add_cameras(program),        add_doctor(program)};
+                               add_cameras(program),        add_track(program),
+                               add_doctor(program)};
                      });
 }
