@@ -1,6 +1,5 @@
 // The program `kilotwin-vision`, which `kilotwin cameras` and `kilotwin track` start. It is a program of its own so that the
-// simulator builds and
-// runs without OpenCV.
+// simulator builds and runs without OpenCV.
 
 #include <CLI/CLI.hpp>
 
