@@ -22,6 +22,8 @@ void check_station_files(const LoadedExperiment& loaded);
 
 /// Checks `door` as far as no poses of robots are needed.
 void check_doors(const LoadedExperiment& loaded);
+/// Trackers, and what tracked robots say.
+void check_tracking(const LoadedExperiment& loaded);
 
 /// Number of robots in the group by its `count`, or by its rings if `count` is absent. 0: its CSV file gives the number.
 [[nodiscard]] std::uint64_t stated_count(const proto::RobotGroup& group);

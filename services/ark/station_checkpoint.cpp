@@ -15,6 +15,7 @@ void StationEngine::save(proto::StationState& state) const {
     state.add_packets(octets_of(packet));
     state.add_packet_offset_cycles(packet.offset_cycles());
   }
+  tracked_.save(state);
   if (plugins_.empty()) return;
   queue_.save(*state.mutable_queue());
   if (camera_) camera_->save(*state.mutable_camera());
@@ -48,6 +49,7 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
   }
   const proto::StationState& state = *parts[0];
   now_ = tick;
+  tracked_.load(tick, state);
   next_packet_ = state.next_packet_cycle();
   repeating_ = state.repeating_own();
   packets_.clear();

@@ -61,6 +61,7 @@ StationEngine::StationEngine(const RunPlan& plan, const std::filesystem::path& r
       is_limited_(setting_.packet_interval_s > 0),
       packet_interval_(cycles_of(is_limited_ ? setting_.packet_interval_s : kCopyPeriod_s)),
       queue_(plan.robots(), setting_.environments, cycles_of(robot_interval_s(setting_, plan.robots()))),
+      tracked_(plan),
       packets_{run_packet()},
       next_packet_(begin_of(start_ends_) + begin_of(plan.tick_length.at_or_after(setting_.packet_interval_s))),
       measurement_(plan) {
@@ -230,6 +231,7 @@ void StationEngine::send_waiting() {
 void StationEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == now_);
   ++now_;
+  tracked_.commit(inputs.memberships);
   outputs_ = std::exchange(outputs_of_set_up_, {});
   if (!plugins_.empty()) {
     see(inputs.swarm);
@@ -268,6 +270,7 @@ std::uint64_t StationEngine::hash_part() const {
     for (const std::uint8_t octet : packets_[i].rest) rest = hash_mix(rest, octet);
     sum += entity_hash(HashDomain::kStation, kRest + i, {rest});
   }
+  sum += tracked_.hash_part();
   if (plugins_.empty()) return sum;
   // Apart from the packets, of which there are few.
   constexpr std::uint32_t kQueue = 1u << 30, kCameraModel = kQueue + 1, kEnvironments = 1u << 31;

@@ -24,6 +24,7 @@
 #include "services/ark/message_queue.hpp"
 #include "services/ark/plugin_host.hpp"
 #include "services/ark/seen_robots.hpp"
+#include "services/ark/tracking/tracked_swarm.hpp"
 
 namespace kilotwin::proto {
 class StationState;
@@ -34,7 +35,8 @@ namespace kilotwin::ark {
 /// What a step from tick k reads; all of it is of tick k.
 struct Inputs {
   const SwarmView& swarm;
-  std::span<const OverheadPacket> external;  ///< stamped by the ingress for this tick, in order
+  std::span<const OverheadPacket> external;         ///< stamped by the ingress for this tick, in order
+  std::span<const MembershipChange> memberships{};  ///< that take effect in this step, in order
 };
 
 /// What plugins gave in the last step beside messages; for people and files, no part of the state.
@@ -54,6 +56,12 @@ class StationEngine {
   explicit StationEngine(const RunPlan& plan, const std::filesystem::path& run_directory = {});
 
   void step(Tick from, const Inputs& inputs);
+  /// The trackers' samples of the present tick; before its frame, once at most, and only where the experiment has tracked
+  /// robots.
+  void take(std::span<const TrackerSample> samples) { tracked_.take(now_, samples); }
+  /// Where tracked robots are: a function of the state at the present tick and of its samples.
+  void emit(TrackingFrame& frame) const { tracked_.emit(now_, frame); }
+  [[nodiscard]] const TrackedSwarm& tracked() const { return tracked_; }
   /// The packets of the present tick.
   void emit(OverheadFrame& frame) const;
   [[nodiscard]] std::uint64_t hash_part() const;
@@ -106,6 +114,7 @@ class StationEngine {
   std::vector<Plugin> plugins_;
 
   Tick now_;
+  TrackedSwarm tracked_;
   std::vector<OverheadPacket> packets_;  ///< of now_
   Cycles next_packet_;                   ///< when the next own packet may leave
   bool repeating_ = true;                ///< the controller repeats an own packet
