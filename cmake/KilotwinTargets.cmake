@@ -2,6 +2,7 @@
 
 set(KILOTWIN_SANITIZE "" CACHE STRING "Sanitizers to build with, as for -fsanitize=")
 option(KILOTWIN_WERROR "Treat warnings as errors" OFF)
+option(KILOTWIN_UNITY "Compile the sources of targets with many templates several to a unit" ON)
 option(KILOTWIN_PCH "Precompile the headers of the standard library and of the packages" ON)
 
 add_library(kilotwin_flags INTERFACE)
@@ -44,30 +45,44 @@ function(kilotwin_precompile name)
   endif()
 endfunction()
 
-# kilotwin_library(NAME SOURCES a.cpp ... DEPENDS target ...): a static library of one folder, with the include path of its
-# headers. tests/layers defines which folder may include which.
+# kilotwin_unite(NAME): compiles the sources of NAME several to a unit, so that they share the templates that they instantiate.
+# Names in anonymous namespaces must then be unique among the library's files.
+function(kilotwin_unite name)
+  if(KILOTWIN_UNITY)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  endif()
+endfunction()
+
+# kilotwin_library(NAME [UNITE] SOURCES a.cpp ... DEPENDS target ...): a static library of one folder, with the include path of
+# its headers. tests/layers defines which folder may include which.
 function(kilotwin_library name)
-  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(arg "UNITE" "" "SOURCES;DEPENDS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PUBLIC ${arg_DEPENDS} kilotwin_flags)
   kilotwin_precompile(${name} FROM kilotwin_precompiled)
+  if(arg_UNITE)
+    kilotwin_unite(${name})
+  endif()
 endfunction()
 
 # kilotwin_program(NAME SOURCES a.cpp ... DEPENDS target ...): an executable that is not a test.
 function(kilotwin_program name)
-  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(arg "UNITE" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${arg_DEPENDS} kilotwin_flags)
   kilotwin_precompile(${name} FROM kilotwin_precompiled)
+  if(arg_UNITE)
+    kilotwin_unite(${name})
+  endif()
 endfunction()
 
 # kilotwin_test(NAME SOURCES a_test.cpp ... DEPENDS target ... [TIMEOUT s] [LABELS label ...]): one GoogleTest program, each
 # case of which is a ctest. Labels: fast (the default; all together take about 20 s), dds (federates over Cyclone DDS), system
 # (the program as users run it), slow (statistics, fuzzing, identification).
 function(kilotwin_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "UNITE" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -81,5 +96,8 @@ function(kilotwin_test name)
   target_compile_options(${name} PRIVATE
     "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread;-Wno-restrict>")
   kilotwin_precompile(${name} FROM kilotwin_precompiled_test)
+  if(arg_UNITE)
+    kilotwin_unite(${name})
+  endif()
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()

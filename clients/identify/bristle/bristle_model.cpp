@@ -10,6 +10,7 @@
 #include <set>
 
 #include "clients/identify/bristle/velocity_circle.hpp"
+#include "core/math/median.hpp"
 
 namespace kilotwin::bristle {
 namespace {
@@ -25,13 +26,6 @@ constexpr std::size_t kFewestRuns = 4;
 constexpr std::complex<double> kI(0, 1);
 
 std::complex<double> unit(double angle_rad) { return std::exp(kI * angle_rad); }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Least-squares line through rows first..last: value at `at_s`, and slope.
 std::pair<double, double> line(const std::vector<double>& t, const std::vector<double>& v, std::size_t first,
@@ -142,7 +136,9 @@ struct RunEstimates {
   [[nodiscard]] std::complex<double> own_velocity(std::complex<double> way, bool drifting) const {
     return drifting ? way - circle.drift * circle.speed_mm_s : way;
   }
-  [[nodiscard]] double own_speed(bool drifting) const { return drifting ? circle.speed_mm_s : median(speeds); }
+  [[nodiscard]] double own_speed(bool drifting) const {
+    return drifting ? circle.speed_mm_s : upper_median(speeds);
+  }
   [[nodiscard]] double own_mount() const { return std::arg(mount + kPrior) / 2; }
   [[nodiscard]] double own_turn() const { return turn / (turns + kPrior); }
   /// Direction of motion without drift.
@@ -203,7 +199,7 @@ BristleModel::BristleModel(const std::vector<BristleInstant>& train) {
     same_axis += unit(2 * (way - i.axis_rad));
   }
   const double n = std::max<double>(static_cast<double>(train.size()), 1);
-  speed_mm_s = median(speeds);
+  speed_mm_s = upper_median(speeds);
   aligned = std::abs(same) / n;
   aligned_turned = std::abs(turned) / n;
   aligned_axis = std::abs(turned_axis) / n;
@@ -225,14 +221,14 @@ BristleModel::BristleModel(const std::vector<BristleInstant>& train) {
     for (const BristleInstant& i : train) {
       std::vector<double> own;
       for (const std::complex<double>& way : ways_of[i.run]) own.push_back(std::abs(way));
-      all.push_back({i.run, {i.vx_mm_s, i.vy_mm_s}, unit(sense_rad - i.axis_rad), median(own)});
+      all.push_back({i.run, {i.vx_mm_s, i.vy_mm_s}, unit(sense_rad - i.axis_rad), upper_median(own)});
     }
     drift_across_headings(all, xs, ys);
   }
   drift_runs = xs.size();
   if (xs.empty()) return;
   const auto middle = [&](const std::vector<double>& v) {
-    return across ? std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size()) : median(v);
+    return across ? std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size()) : upper_median(v);
   };
   drift_x = middle(xs);
   drift_y = middle(ys);

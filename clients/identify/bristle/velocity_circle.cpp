@@ -5,16 +5,10 @@
 #include <cmath>
 #include <vector>
 
+#include "core/math/median.hpp"
+
 namespace kilotwin::bristle {
-namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 VelocityCircle fit_circle(std::span<const std::complex<double>> velocities, std::complex<double> prior_drift,
                           double instants) {
@@ -27,14 +21,14 @@ VelocityCircle fit_circle(std::span<const std::complex<double>> velocities, std:
     if (std::abs(v) > 0) directions += v / std::abs(v);
   }
   circle.prior_share = std::abs(directions) / static_cast<double>(velocities.size());
-  double radius = std::max(median(sizes), 1e-9);
+  double radius = std::max(upper_median(sizes), 1e-9);
   std::complex<double> centre = prior_drift * radius;
   // Gauss-Newton on the distances from the circle, with Huber weights beyond 1.5 standard deviations.
   constexpr int kIterations = 15;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     for (std::size_t i = 0; i < velocities.size(); ++i)
       off[i] = std::abs(std::abs(velocities[i] - centre) - radius);
-    const double limit = 1.5 * std::max(1.48 * median(off), 1e-6 * radius);
+    const double limit = 1.5 * std::max(1.48 * upper_median(off), 1e-6 * radius);
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     for (const std::complex<double>& v : velocities) {

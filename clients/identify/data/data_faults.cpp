@@ -9,18 +9,13 @@
 #include <map>
 
 #include "clients/identify/data/command_response.hpp"
+#include "core/math/median.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
 double distance(const Sample& a, const Sample& b) { return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm); }
 bool same_place(const Sample& a, const Sample& b) { return a.x_mm == b.x_mm && a.y_mm == b.y_mm; }
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Removes the marked samples from a track. Returns their number.
 std::size_t take_out(Track& track, const std::vector<bool>& out) {
@@ -81,7 +76,7 @@ void exclude_duplicates(MeasuredSet& set, std::vector<DataFault>& faults) {
         Track& copy = run.tracks[first ? a : b];
         const Track& origin = run.tracks[first ? b : a];
         faults.push_back({DataFault::Kind::kDuplicate, run.name, copy.robot, origin.robot,
-                          copy.samples.front().time_s, copy.samples.back().time_s, median(common.distance_mm),
+                          copy.samples.front().time_s, copy.samples.back().time_s, upper_median(common.distance_mm),
                           copy.samples.size()});
         copy.samples.clear();
       }
@@ -225,7 +220,7 @@ void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
     // The length of a two-dimensional normal vector has a median of 1.18 standard deviations.
     const auto fast = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() * 19 / 20);
     std::nth_element(speeds.begin(), fast, speeds.end());
-    const Bounds bounds{std::max(kOutlierSds * median(course) / 1.18, kLeastOutlier_mm), kTooFast * *fast};
+    const Bounds bounds{std::max(kOutlierSds * upper_median(course) / 1.18, kLeastOutlier_mm), kTooFast * *fast};
     DataFault fault{DataFault::Kind::kOutliers,
                     run.name,
                     std::nullopt,

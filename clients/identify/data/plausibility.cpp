@@ -8,26 +8,21 @@
 
 #include "clients/identify/data/command_clock.hpp"
 #include "core/base/error.hpp"
+#include "core/math/median.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
 // Longest plausible run: eleven days.
-constexpr double kLongest_s = 1e6;
+constexpr double kLongestRun_s = 1e6;
 constexpr double kSlowestSampling_s = 60;
 // Largest plausible coordinate: one kilometre.
 constexpr double kFarthest_mm = 1e6;
 // Smallest plausible extent of all positions. Two discs of 33 mm need more.
 constexpr double kSmallestRoom_mm = 15;
 // Kilobots drive at 10 mm/s. Bounds of a plausible median speed.
-constexpr double kFastest_mm_s = 150, kSlowest_mm_s = 0.1;
+constexpr double kFastestMedian_mm_s = 150, kSlowestMedian_mm_s = 0.1;
 constexpr double kLook_s = 5;
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::string of(const Run& run, const Track& track) {
   return fmt::format("run {}, robot {}", run.name, track.robot);
@@ -38,7 +33,7 @@ void demand_seconds(const MeasuredSet& set, const std::string& from) {
   for (const Run& run : set.runs) {
     for (const Track& track : run.tracks) {
       for (const Sample& s : track.samples) {
-        if (std::abs(s.time_s) > kLongest_s)
+        if (std::abs(s.time_s) > kLongestRun_s)
           throw UserError(
               fmt::format("{}: {}: time_s is {:g}; give seconds since the start of the run (not since 1970, "
                           "nor milliseconds)",
@@ -49,7 +44,7 @@ void demand_seconds(const MeasuredSet& set, const std::string& from) {
     }
   }
   if (steps.size() < 5) return;
-  const double step = median(steps);
+  const double step = upper_median(steps);
   if (step > kSlowestSampling_s)
     throw UserError(fmt::format(
         "{}: the sampling interval is {:g} s; give time_s in seconds (not milliseconds or frames), about one "
@@ -127,13 +122,13 @@ void demand_motion(const MeasuredSet& set, const std::string& from) {
         "or omit it if robots always drive straight",
         from));
   if (speeds.size() < 5) return;
-  const double speed = median(speeds);
-  if (speed > kFastest_mm_s)
+  const double speed = upper_median(speeds);
+  if (speed > kFastestMedian_mm_s)
     throw UserError(fmt::format(
         "{}: robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm in mm (not pixels), "
         "time_s in seconds",
         from, speed));
-  if (speed < kSlowest_mm_s)
+  if (speed < kSlowestMedian_mm_s)
     throw UserError(
         fmt::format("{}: commanded robots drive at {:.3g} mm/s, Kilobots at about 10 mm/s; give x_mm and y_mm "
                     "in mm (not metres), time_s in seconds (not milliseconds)",

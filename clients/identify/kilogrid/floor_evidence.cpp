@@ -10,7 +10,7 @@ namespace {
 /// Share of each statistic's variance treated as independent: regularises the correlation matrix, so that
 /// combinations with small variance do not dominate. Of 0, 0.2, 0.5, 0.8 and 1 (no correlations), 0.5 separated
 /// planted effects best from similar ones (tests/clients/identify/kilogrid/floor_alarms.cpp).
-constexpr double kOwn = 0.5;
+constexpr double kOwnShare = 0.5;
 /// Robust weights: deviations beyond this many tolerances count less, since no parameter may reach such a
 /// statistic.
 constexpr double kFar = 6;
@@ -64,7 +64,7 @@ Eigen::MatrixXd correlation_of(std::span<const FloorSet> sets) {
 FloorMisfit::FloorMisfit(const FloorSet& measured, const FloorStatistics& simulated, const Eigen::MatrixXd& slopes,
                          const Eigen::MatrixXd& correlation) {
   const auto statistics = static_cast<Eigen::Index>(statistic_count());
-  Eigen::MatrixXd covariance = (1 - kOwn) * correlation;
+  Eigen::MatrixXd covariance = (1 - kOwnShare) * correlation;
   Eigen::VectorXd off = Eigen::VectorXd::Zero(statistics);
   Eigen::MatrixXd scaled = Eigen::MatrixXd::Zero(statistics, slopes.cols());
   Eigen::VectorXd widen = Eigen::VectorXd::Ones(statistics);

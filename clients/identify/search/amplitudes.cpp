@@ -12,7 +12,7 @@ constexpr int kMostTurns = 3;
 /// Convergence: gain in log likelihood of one more alternation.
 constexpr double kSettled = 2;
 /// The merged term has far fewer degrees of freedom, so its log likelihood may be lower by this much.
-constexpr double kAsGood = 10;
+constexpr double kLikelihoodSlack = 10;
 
 /// Whether `known` is `open` with fixed coefficients.
 bool is_known_of(const Factor& known, const Factor& open) {
@@ -168,7 +168,7 @@ std::optional<std::size_t> merge_amplitudes(const Fitter& fitter, MotionModel& m
   const double likelihood = fitter.log_likelihood(was);
   CurveTimesAmplitudes one(fitter, model, *source);
   one.fit();
-  if (one.log_likelihood() > likelihood - kAsGood) {
+  if (one.log_likelihood() > likelihood - kLikelihoodSlack) {
     extend_targets(fitter, model, model.terms.size() - 1);
     return source;
   }

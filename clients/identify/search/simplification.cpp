@@ -14,13 +14,13 @@ using Shape = Factor::Shape;
 
 constexpr int kScales = 12, kSteps = 30, kHarmonics = 3;
 /// Largest loss of log evidence of a simple form.
-constexpr double kAsGood = 1;
+constexpr double kMostEvidenceLost = 1;
 /// The same before the refit, absolute and as a share of the evidence: parameters lie on a coarse raster, and the
 /// quadratic approximation is rough.
 constexpr double kRoughly = 40, kRoughShare = 0.04;
 
 /// One simple form for all blocks of a term.
-struct Form {
+struct SimpleForm {
   Basis basis;
   double log_choices = 0;  ///< log of the number of alternatives
   Eigen::Index first = 0;  ///< first column among those of all forms
@@ -41,8 +41,8 @@ const Factor* curve_of(const Term& term) {
   return curve;
 }
 
-Form form(const Factor& like, Shape shape, double choices, std::vector<double> points = {},
-          std::uint32_t first = 1) {
+SimpleForm form(const Factor& like, Shape shape, double choices, std::vector<double> points = {},
+                std::uint32_t first = 1) {
   Factor f;
   f.shape = shape;
   f.axis = like.axis;
@@ -53,8 +53,8 @@ Form form(const Factor& like, Shape shape, double choices, std::vector<double> p
   return {Basis{{f}}, std::log(choices)};
 }
 
-std::vector<Form> forms_of(const Factor& curve, Target target) {
-  std::vector<Form> forms;
+std::vector<SimpleForm> forms_of(const Factor& curve, Target target) {
+  std::vector<SimpleForm> forms;
   // A constant gain is not identifiable: base speeds absorb it.
   if (target != Target::kGain && target != Target::kGainLeft && target != Target::kGainRight) forms.push_back({});
   if (curve.shape == Shape::kHarmonics) {
@@ -74,16 +74,16 @@ std::vector<Form> forms_of(const Factor& curve, Target target) {
   return forms;
 }
 
-struct Chosen {
-  const Form* form = nullptr;
+struct BestForm {
+  const SimpleForm* form = nullptr;
   double evidence = 0;
   Eigen::VectorXd sd;
   std::vector<Eigen::Index> columns;  ///< among those of all forms
 };
 
-Chosen best_of(const std::vector<Form>& forms, const ReducedColumns& data, std::size_t blocks) {
-  Chosen best;
-  for (const Form& one : forms) {
+BestForm best_of(const std::vector<SimpleForm>& forms, const ReducedColumns& data, std::size_t blocks) {
+  BestForm best;
+  for (const SimpleForm& one : forms) {
     std::vector<Eigen::Index> columns(one.basis.size() * blocks);
     std::iota(columns.begin(), columns.end(), one.first);
     const Eigen::MatrixXd information = data.information(columns, columns);
@@ -100,10 +100,10 @@ Chosen best_of(const std::vector<Form>& forms, const ReducedColumns& data, std::
 }
 
 /// Blocks of all forms for all targets of the term. Assigns the forms their columns.
-std::vector<Block> blocks_of(std::vector<Form>& forms, const Term& term) {
+std::vector<Block> blocks_of(std::vector<SimpleForm>& forms, const Term& term) {
   std::vector<Block> blocks;
   Eigen::Index next = 0;
-  for (Form& one : forms) {
+  for (SimpleForm& one : forms) {
     one.first = next;
     for (const Block& block : term.blocks) {
       blocks.push_back({block.target, one.basis, block.during});
@@ -114,14 +114,14 @@ std::vector<Block> blocks_of(std::vector<Form>& forms, const Term& term) {
 }
 
 /// Replaces the term by the best form if its evidence suffices, or in any case. Returns false if it does not.
-bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::vector<Form>& forms,
+bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::vector<SimpleForm>& forms,
               bool in_any_case) {
   const Term& term = model.terms[place];
   const LocalQuadratic l = local_quadratic(fitter, model, place, blocks_of(forms, term));
   const Eigen::VectorXd score = l.score_without(term.coefficients);
   const ReducedColumns now = reduced_columns(l, score, l.term_columns());
   const double had = log_evidence(now.information, now.score, term.precision.cwiseInverse().cwiseSqrt());
-  const Chosen best = best_of(forms, reduced_columns(l, score, l.added_columns()), term.blocks.size());
+  const BestForm best = best_of(forms, reduced_columns(l, score, l.added_columns()), term.blocks.size());
   if (best.form == nullptr) return false;
   if (!in_any_case && best.evidence < had - kRoughly - kRoughShare * std::abs(had)) return false;
   std::vector<Eigen::Index> columns;
@@ -145,7 +145,7 @@ double cost_of(const Fitter& fitter, const MotionModel& model, std::size_t place
 bool simplify(const Fitter& fitter, MotionModel& model, std::size_t place) {
   const Factor* const curve = curve_of(model.terms[place]);
   if (curve == nullptr || model.terms[place].coefficients.size() < 2) return false;
-  std::vector<Form> forms = forms_of(*curve, model.terms[place].blocks.front().target);
+  std::vector<SimpleForm> forms = forms_of(*curve, model.terms[place].blocks.front().target);
   MotionModel simple = model;
   if (!put_best(fitter, simple, place, forms, false)) return false;
   const std::vector<Factor>& factors = simple.terms[place].blocks.front().basis.factors;
@@ -153,7 +153,7 @@ bool simplify(const Fitter& fitter, MotionModel& model, std::size_t place) {
       (factors.front().shape == Shape::kExponential || factors.front().shape == Shape::kAtLeast)) {
     // A finer raster around the optimum.
     const Factor found = factors.front();
-    std::vector<Form> finer;
+    std::vector<SimpleForm> finer;
     for (int i = -6; i <= 6; ++i) {
       const double at = found.shape == Shape::kExponential
                             ? found.points[0] * std::pow(1.07, i)
@@ -164,7 +164,7 @@ bool simplify(const Fitter& fitter, MotionModel& model, std::size_t place) {
   }
   fitter.fit(simple, 2);
   const double lost = fitter.log_likelihood(model) - fitter.log_likelihood(simple);
-  if (lost > cost_of(fitter, model, place) - cost_of(fitter, simple, place) + kAsGood) return false;
+  if (lost > cost_of(fitter, model, place) - cost_of(fitter, simple, place) + kMostEvidenceLost) return false;
   model = simple;
   return true;
 }

@@ -12,7 +12,7 @@ namespace {
 using Shape = Factor::Shape;
 
 /// Least gain in log evidence of one more target.
-constexpr double kLeastEvidence = 10;
+constexpr double kLeastGain = 10;
 constexpr int kMostExtensions = 3;
 
 /// The same covariates with fewer columns, which suffice for detection.
@@ -108,7 +108,7 @@ void extend_targets(const Fitter& fitter, MotionModel& model, std::size_t place)
     std::vector<Block> blocks;
     for (const Extension& w : all) blocks.insert(blocks.end(), w.blocks.begin(), w.blocks.end());
     const LocalQuadratic l = local_quadratic(fitter, model, model.terms.size(), blocks, true);
-    double best = kLeastEvidence;
+    double best = kLeastGain;
     const Extension* chosen = nullptr;
     Eigen::VectorXd chosen_sd;
     Eigen::Index next = l.own;
@@ -142,7 +142,7 @@ void extend_targets(const Fitter& fitter, MotionModel& model, std::size_t place)
     term.precision.conservativeResize(had + chosen->size());
     term.precision.tail(chosen->size()) = chosen_sd.array().square().inverse();
     fitter.fit(model, 2);
-    if (fitter.log_likelihood(model) > likelihood + kLeastEvidence) continue;
+    if (fitter.log_likelihood(model) > likelihood + kLeastGain) continue;
     model = was;
     return;
   }

@@ -17,7 +17,7 @@ using Shape = Factor::Shape;
 
 constexpr std::size_t kFolds = 4;
 /// Least cross-validated gain in log likelihood.
-constexpr double kLeastEvidence = 15;
+constexpr double kLeastMapEvidence = 15;
 
 /// Normal equations of the nodes near a robot's path, from the innovations.
 class FineSums {
@@ -309,7 +309,7 @@ void fit_total_variation_map(const Fitter& fitter, MotionModel& model, std::size
         if (pass == 0) try_it(weight, 0.04, 1);
       }
       const double gain = choose(folds, all, tried, fitter.threads(), map);
-      if (pass == 0 && gain < kLeastEvidence) return;
+      if (pass == 0 && gain < kLeastMapEvidence) return;
     }
     map.f = solve(all, map.f, map.by, {6, 30});
     MotionModel next = trial;
@@ -319,7 +319,7 @@ void fit_total_variation_map(const Fitter& fitter, MotionModel& model, std::size
     next.terms[place].blocks.front() = block_of(map.grid, map.f);
     next.terms[place].coefficients[0] = 1;
     const double found = fitter.log_likelihood(next);
-    if (found < likelihood + kLeastEvidence) break;
+    if (found < likelihood + kLeastMapEvidence) break;
     likelihood = found;
     trial = next;
     model = trial;
