@@ -6,10 +6,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
+#include <charconv>
 #include <cstring>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
@@ -29,12 +30,23 @@ struct FrameName {
   std::uint32_t frame, camera;
 };
 
-std::optional<FrameName> parsed(const std::string& name) {
-  unsigned frame = 0, camera = 0;
-  int used = 0;
-  if (std::sscanf(name.c_str(), "frame_%5u_%1u.jpg%n", &frame, &camera, &used) != 2) return std::nullopt;
-  if (used == 0 || static_cast<std::size_t>(used) != name.size()) return std::nullopt;
-  return FrameName{frame, camera};
+/// frame_TTTTT_C.jpg, five digits and one.
+std::optional<FrameName> parsed(std::string_view name) {
+  constexpr std::string_view kBegins = "frame_", kEnds = ".jpg";
+  constexpr std::size_t kFrameDigits = 5, kCameraAt = kBegins.size() + kFrameDigits + 1;
+  if (name.size() != kCameraAt + 1 + kEnds.size() || !name.starts_with(kBegins) || !name.ends_with(kEnds) ||
+      name[kCameraAt - 1] != '_')
+    return std::nullopt;
+  FrameName parts{};
+  const auto number = [](std::string_view digits, std::uint32_t& value) {
+    const char* const last = digits.data() + digits.size();
+    const auto [end, error] = std::from_chars(digits.data(), last, value);
+    return error == std::errc() && end == last;
+  };
+  if (!number(name.substr(kBegins.size(), kFrameDigits), parts.frame) ||
+      !number(name.substr(kCameraAt, 1), parts.camera))
+    return std::nullopt;
+  return parts;
 }
 
 }  // namespace

@@ -211,7 +211,7 @@ class MjpegServer::Service {
 MjpegServer::MjpegServer(std::uint16_t port) : service_(std::make_unique<Service>(port)) {}
 MjpegServer::~MjpegServer() = default;
 std::uint16_t MjpegServer::port() const { return service_->port(); }
-void MjpegServer::post(std::string jpeg, const FrameStamp& stamp) { service_->post(jpeg, stamp); }
+void MjpegServer::post(const std::string& jpeg, const FrameStamp& stamp) { service_->post(jpeg, stamp); }
 std::uint32_t MjpegServer::clients() const { return service_->clients(); }
 
 }  // namespace kilotwin::cameras

@@ -24,7 +24,7 @@ class MjpegServer {
 
   [[nodiscard]] std::uint16_t port() const;
   /// The newest picture, a JPEG. Returns at once.
-  void post(std::string jpeg, const FrameStamp& stamp);
+  void post(const std::string& jpeg, const FrameStamp& stamp);
   /// Clients that read the stream at the moment.
   [[nodiscard]] std::uint32_t clients() const;
 

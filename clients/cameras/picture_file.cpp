@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include <cstdio>
+#include <charconv>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
@@ -43,6 +43,17 @@ std::string png_with_comment(std::string_view file, const std::string& comment) 
   return result.append(file.substr(kSignatureAndHeader));
 }
 
+/// Takes a name and the number behind it off the front of a text; false where they are not there.
+template <class Number, class... Base>
+bool take(std::string_view& text, std::string_view name, Number& number, Base... base) {
+  if (!text.starts_with(name)) return false;
+  text.remove_prefix(name.size());
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base...);
+  if (error != std::errc()) return false;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return true;
+}
+
 }  // namespace
 
 std::string FrameStamp::text() const {
@@ -70,16 +81,17 @@ std::string encoded(const cv::Mat& picture, PictureFormat format, const FrameSta
 std::optional<FrameStamp> stamp_of(std::string_view file) {
   // The stamp lies in front of the picture's own data.
   constexpr std::size_t kWithin = 512;
-  const std::string head(file.substr(0, kWithin));
-  const std::size_t at = head.find("kilotwin frame=");
-  if (at == std::string::npos) return std::nullopt;
-  unsigned long long frame = 0, run = 0;
-  long long tick = 0, capture_ns = 0;
-  double simulated_s = 0;
-  if (std::sscanf(head.c_str() + at, "kilotwin frame=%llu run=%llx tick=%lld simulated_s=%lf capture_ns=%lld",
-                  &frame, &run, &tick, &simulated_s, &capture_ns) != 5)
+  std::string_view text = file.substr(0, kWithin);
+  const std::size_t at = text.find("kilotwin frame=");
+  if (at == std::string_view::npos) return std::nullopt;
+  text.remove_prefix(at);
+  FrameStamp stamp;
+  constexpr int kDecimal = 10, kHexadecimal = 16;
+  if (!take(text, "kilotwin frame=", stamp.frame, kDecimal) || !take(text, " run=", stamp.run, kHexadecimal) ||
+      !take(text, " tick=", stamp.tick, kDecimal) || !take(text, " simulated_s=", stamp.simulated_s) ||
+      !take(text, " capture_ns=", stamp.capture_ns, kDecimal))
     return std::nullopt;
-  return FrameStamp{frame, run, tick, simulated_s, capture_ns};
+  return stamp;
 }
 
 }  // namespace kilotwin::cameras

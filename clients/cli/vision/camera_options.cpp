@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
+#include <charconv>
 
 #include "core/base/error.hpp"
 
@@ -13,8 +13,8 @@ namespace {
 
 /// Floor beyond the walls that a picture of the whole arena shows.
 constexpr double kMargin_mm = 40;
-/// Width and height of a picture, at most.
-constexpr int kMost_px = 16384;
+/// Bounds of a picture's width and height.
+constexpr int kLeast_px = 16, kMost_px = 16384;
 
 CLI::Range share() { return CLI::Range(0.0, 1.0); }
 
@@ -81,12 +81,15 @@ cameras::CameraModel model_of(const CameraOptions& options) {
 }
 
 cameras::CameraModel big_camera(const CameraOptions& options, const World& world) {
-  int width = 0, height = 0, used = 0;
-  if (std::sscanf(options.size.c_str(), "%5dx%5d%n", &width, &height, &used) != 2 ||
-      static_cast<std::size_t>(used) != options.size.size() || width < 16 || height < 16 || width > kMost_px ||
-      height > kMost_px)
-    throw UserError(fmt::format("--size: \"{}\" is no size; give WIDTHxHEIGHT, each 16 to {}, such as 1920x1080",
-                                options.size, kMost_px));
+  int width = 0, height = 0;
+  const char* const last = options.size.data() + options.size.size();
+  const auto [middle, error] = std::from_chars(options.size.data(), last, width);
+  const bool has_x = error == std::errc() && middle != last && *middle == 'x';
+  const auto [end, second_error] = std::from_chars(has_x ? middle + 1 : last, last, height);
+  if (!has_x || second_error != std::errc() || end != last || width < kLeast_px || height < kLeast_px ||
+      width > kMost_px || height > kMost_px)
+    throw UserError(fmt::format("--size: \"{}\" is no size; give WIDTHxHEIGHT, each {} to {}, such as 1920x1080",
+                                options.size, kLeast_px, kMost_px));
   const double fit = std::min(width / (2 * (world.arena.half_width_mm() + kMargin_mm)),
                               height / (2 * (world.arena.half_height_mm() + kMargin_mm)));
   cameras::CameraModel model = model_of(options);

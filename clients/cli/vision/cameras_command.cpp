@@ -76,7 +76,7 @@ Command add_cameras(CLI::App& program) {
       ->type_name("PORT");
   app.add_flag("--one-run", arguments->live.one_run, "end with the run (default: wait for the next one)");
   app.add_option("--run", arguments->run, "a recorded run, instead of a live one")->type_name("RUN");
-  add_output_options(app, arguments->output, "with --run: pictures, with a number added if it exists");
+  add_output_options(app, arguments->output, "pictures, with a number added if it exists; with --run only");
   app.add_option("--video", arguments->video, "with --run: a video instead of pictures: .avi or .mp4")
       ->type_name("FILE");
   app.add_flag("--ark", arguments->recorded.ark, "with --run: the four cameras of ARK");

@@ -161,7 +161,7 @@ class Live {
                                         ? cameras::encoded(picture_, PictureFormat::kPng, stamp_)
                                         : jpeg);
     }
-    if (server_) server_->post(std::move(jpeg), stamp_);
+    if (server_) server_->post(jpeg, stamp_);
   }
 
   /// The four cameras at once, on as many threads.

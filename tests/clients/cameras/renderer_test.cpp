@@ -62,7 +62,8 @@ cv::Point2d rim_centre(const cv::Mat& picture, const cv::Point2d& guess, double 
     const double angle = 2 * CV_PI * ray / kRays;
     const cv::Point2d along(std::cos(angle), std::sin(angle));
     double last = 0, crossing = radius_px;
-    for (double r = radius_px - 3; r < radius_px + 4; r += 0.05) {
+    for (int step = 0; step < 140; ++step) {
+      const double r = radius_px - 3 + 0.05 * step;
       cv::Mat one;
       cv::getRectSubPix(picture, {1, 1}, guess + r * along, one, CV_32F);
       const double level = one.at<cv::Vec3f>(0, 0)[0];
@@ -135,9 +136,9 @@ TEST(Renderer, ATiltedCameraWithALensStillShowsCentresWhereItProjectsThem) {
 TEST(CameraModel, ProjectionAndItsInverseAgree) {
   CameraModel camera = CameraModel::overhead(1200, 900, 0.6, 40, -30, 1500);
   camera.distortion = {-0.25, 0.08, 0.001, 0.002, -0.001};
-  for (double x = -700; x <= 700; x += 100) {
-    for (double y = -500; y <= 500; y += 100) {
-      const cv::Point2d back = camera.at_height(camera.project({x, y, 15}), 15);
+  for (int x = -700; x <= 700; x += 100) {
+    for (int y = -500; y <= 500; y += 100) {
+      const cv::Point2d back = camera.at_height(camera.project({1.0 * x, 1.0 * y, 15}), 15);
       EXPECT_NEAR(back.x, x, 1e-4);
       EXPECT_NEAR(back.y, y, 1e-4);
     }
