@@ -1,6 +1,6 @@
 /// Robots in one picture, without options: their common radius is found from the picture itself.
 ///
-/// docs/explanation/tracking.md states the method: votes of edges for centres, a fitted circle for each candidate, the radius
+/// docs/explanation/camera-tracker.md states the method: votes of edges for centres, a fitted circle for each candidate, the radius
 /// that explains most circles, and no two discs that overlap.
 #pragma once
 

@@ -5,7 +5,7 @@
 /// extended Kalman filter holds (x, y, heading, speed, turn rate) with
 ///   x' = v cos h - a w sin h,  y' = v sin h + a w cos h,  h' = w.
 /// The modes differ in what v and w are at their beginning, and exchange weight as in Blom and Bar-Shalom (1988).
-/// docs/explanation/tracking.md has the equations.
+/// docs/explanation/camera-tracker.md has the equations.
 #pragma once
 
 #include <Eigen/Core>
