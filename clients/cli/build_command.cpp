@@ -45,14 +45,20 @@ int build_for_robot(const BuildArguments& arguments, const behaviours::CompileOp
 int build(const BuildArguments& arguments) {
   behaviours::CompileOptions options;
   options.defines = arguments.define;
+  const fs::path object =
+      arguments.out.empty() ? fs::path(arguments.sources.front().stem().string() + ".so") : arguments.out;
+  if (behaviours::is_station_plugin(arguments.sources)) {
+    if (arguments.avr) throw UserError("--avr: a plugin of the station runs on no robot; leave --avr out");
+    write_program(behaviours::compile_station_plugin(arguments.sources, options).file, object);
+    return kDone;
+  }
   if (arguments.avr) return build_for_robot(arguments, options);
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
   for (const std::string& note : compiled.notes) say("note: " + note);
   if (arguments.sources.front().extension() != ".so") {
     for (const std::string& warning : behaviours::robot_warnings(arguments.sources, options)) say(warning);
   }
-  write_program(compiled.file, arguments.out.empty() ? fs::path(arguments.sources.front().stem().string() + ".so")
-                                                     : arguments.out);
+  write_program(compiled.file, object);
   return kDone;
 }
 
@@ -60,9 +66,11 @@ int build(const BuildArguments& arguments) {
 
 Command add_build(CLI::App& program) {
   const auto arguments = std::make_shared<BuildArguments>();
-  CLI::App& app =
-      *program.add_subcommand("build", "compile a behaviour for simulation, or check it for the real robot");
-  app.add_option("PROGRAM", arguments->sources, "C sources of one program")->required()->type_name("");
+  CLI::App& app = *program.add_subcommand(
+      "build", "compile a behaviour or a station plugin for simulation, or check a behaviour for the real robot");
+  app.add_option("PROGRAM", arguments->sources, "C or C++ sources of one program, or of one plugin of the station")
+      ->required()
+      ->type_name("");
   app.add_option("-o", arguments->out, "file to write (default: PROGRAM.so in this directory)")->type_name("FILE");
   app.add_option("--define", arguments->define, "a macro")->allow_extra_args(false)->type_name("NAME=VALUE");
   app.add_flag(

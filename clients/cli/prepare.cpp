@@ -103,6 +103,47 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
   return objects;
 }
 
+/// Compiles the station's plugins, and the program that runs them; records both. Returns the compiled files.
+std::vector<fs::path> build_plugins(const LoadedExperiment& loaded, const RunArguments& arguments,
+                                    proto::Manifest& manifest) {
+  std::vector<fs::path> objects;
+  behaviours::CompileOptions options;
+  options.defines = arguments.define;
+  for (const proto::VirtualEnvironment& environment : loaded.experiment.station().environment()) {
+    if (environment.plugin().source_size() == 0) {
+      manifest.add_station_plugin();
+      continue;
+    }
+    std::vector<fs::path> sources;
+    for (const std::string& source : environment.plugin().source()) sources.push_back(loaded.resolve(source));
+    const behaviours::CompiledProgram compiled = behaviours::compile_station_plugin(sources, options);
+    manifest.add_station_plugin(compiled.sha256);
+    objects.push_back(compiled.file);
+  }
+  if (objects.empty()) return objects;
+  const behaviours::CompiledProgram host = behaviours::compile_plugin_host();
+  manifest.set_station_host(host.sha256);
+  objects.push_back(host.file);
+  return objects;
+}
+
+/// The plugins as built, and their sources for readers. Throws filesystem_error.
+void copy_plugins(const LoadedExperiment& loaded, const proto::Manifest& manifest,
+                  const std::vector<fs::path>& objects, const fs::path& to) {
+  if (objects.empty()) return;
+  fs::create_directories(to);
+  std::size_t next = 0;
+  for (int i = 0; i < manifest.station_plugin_size(); ++i) {
+    if (manifest.station_plugin(i).empty()) continue;
+    fs::copy_file(objects[next++], to / (manifest.station_plugin(i) + ".so"), fs::copy_options::overwrite_existing);
+    for (const std::string& source : loaded.experiment.station().environment(i).plugin().source()) {
+      const fs::path from = loaded.resolve(source);
+      if (from.extension() != ".so") fs::copy_file(from, to / from.filename(), fs::copy_options::skip_existing);
+    }
+  }
+  fs::copy_file(objects[next], to / manifest.station_host(), fs::copy_options::overwrite_existing);
+}
+
 /// Copies the source files of the programs, for readers. Of two files with the same name from different folders, the second is
 /// called NAME-2. Throws filesystem_error.
 void copy_sources(const LoadedExperiment& loaded, const fs::path& to) {
@@ -145,6 +186,13 @@ std::string experiment_as_run(const LoadedExperiment& loaded, const proto::Manif
     group.clear_behaviour();
     const fs::path object = directory.program(settings_of(manifest.program(static_cast<int>(program))));
     group.add_behaviour(object.lexically_relative(directory.path()).string());
+  }
+  for (int i = 0; i < manifest.station_plugin_size(); ++i) {
+    if (manifest.station_plugin(i).empty()) continue;
+    proto::StationPlugin& plugin = *experiment.mutable_station()->mutable_environment(i)->mutable_plugin();
+    text += fmt::format("# station.environment[{}] runs {}\n", i, plugin.source(0));
+    plugin.clear_source();
+    plugin.add_source("plugins/" + manifest.station_plugin(i) + ".so");
   }
   for (int i = 0; i < experiment.light().image_size(); ++i) {
     proto::LightImage& image = *experiment.mutable_light()->mutable_image(i);
@@ -232,13 +280,14 @@ Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, 
   manifest.set_pace(parse_pace(arguments.pace));
   manifest.set_resumed(!arguments.resume.empty());
   resolved.objects = build_programs(loaded, arguments, manifest, notes);
+  resolved.plugins = build_plugins(loaded, arguments, manifest);
   return resolved;
 }
 
 Prepared prepare(const RunArguments& arguments) {
   const LoadedExperiment loaded = load_with_overrides(arguments);
   if (arguments.mode == "federated" && !arguments.prepare) check_processes(loaded.experiment.deployment());
-  auto [manifest, objects] = resolve(loaded, arguments, Notes::kPrinted);
+  auto [manifest, objects, plugins] = resolve(loaded, arguments, Notes::kPrinted);
   fs::path checkpoint;
   if (manifest.resumed()) {
     checkpoint = checkpoint_directory(arguments.resume);
@@ -255,6 +304,9 @@ Prepared prepare(const RunArguments& arguments) {
   for (const proto::RobotGroup& group : loaded.experiment.robots()) {
     for (const std::string& source : group.behaviour()) inputs.push_back(loaded.resolve(source));
   }
+  for (const proto::VirtualEnvironment& environment : loaded.experiment.station().environment()) {
+    for (const std::string& source : environment.plugin().source()) inputs.push_back(loaded.resolve(source));
+  }
   auto directory = make_output(arguments.output,
                                recorder::RunDirectory::default_path(experiment.name(), experiment.seed()), inputs);
   try {
@@ -263,6 +315,7 @@ Prepared prepare(const RunArguments& arguments) {
                     fs::copy_options::overwrite_existing);
     }
     copy_sources(loaded, directory.programs());
+    copy_plugins(loaded, manifest, plugins, directory.path() / "plugins");
     if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
     os::write_file(directory.experiment(), experiment_as_run(loaded, manifest, directory));
     recorder::write_provenance(recorder::provenance_of_this_process(), directory.provenance());

@@ -17,6 +17,7 @@ enum class Notes { kPrinted, kSilent };
 struct Resolved {
   proto::Manifest manifest;
   std::vector<std::filesystem::path> objects;  ///< the compiled programs, in the manifest's order
+  std::vector<std::filesystem::path> plugins;  ///< those of the station that have sources, and last what runs them
 };
 /// Makes all checks that are possible before a run: places robots, reads images and EEPROMs, compiles programs or takes them from the
 /// cache. Writes nothing else. Throws UserError with the place of the first error.

@@ -61,6 +61,8 @@ void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
         if (tick <= until) writer_.hash(tick, chain);
         ++tick;
       }
+    } else if (record->has_floor() && Tick{record->floor().tick()} <= until) {
+      writer_.floor(record->floor());
     } else if (record->has_input()) {
       const Directive input = from_record(record->input());
       if (input.tick < until || changes_results(input)) writer_.input(record->input());
@@ -84,6 +86,21 @@ void RunRecorder::hash(Tick tick, std::uint64_t chain) { writer_.hash(tick, chai
 void RunRecorder::input(const Directive& directive) {
   writer_.input(to_record(directive));
   inputs_wait_ = true;
+}
+
+void RunRecorder::floor(Tick tick, const FloorPicture& floor) {
+  proto::FloorRecord record;
+  record.set_tick(tick.count());
+  record.set_environment(floor.environment);
+  record.set_columns(floor.columns);
+  record.set_rows(floor.rows);
+  record.set_rgba(floor.rgba);
+  for (const FloorPicture::Circle& circle : floor.circles) {
+    for (const double value : {circle.x_mm, circle.y_mm, circle.radius_mm}) record.add_circle_mm(value);
+    record.mutable_circle_rgba()->append(circle.rgba.begin(), circle.rgba.end());
+    record.add_circle_name(circle.name);
+  }
+  writer_.floor(record);
 }
 
 void RunRecorder::saved() { writer_.flush(); }
@@ -141,6 +158,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
   for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
   summary.robots_failed = totals.robots_failed;
+  summary.station = totals.station;
   summary.recoveries = static_cast<std::uint32_t>(plan_.program_failures().size());
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
   const double steps =

@@ -27,6 +27,7 @@ class RunRecorder : public RunObserver {
   void state(Tick, const SwarmView&, bool last) override;
   void hash(Tick, std::uint64_t chain) override;
   void input(const Directive&) override;
+  void floor(Tick, const FloorPicture&) override;
   void saved() override;
   void idle(const RunProgress&) override;
 

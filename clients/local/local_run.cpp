@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_sums.hpp"
@@ -15,6 +16,7 @@
 #include "core/os/interrupt.hpp"
 #include "core/os/worker_pool.hpp"
 #include "services/ark/station_engine.hpp"
+#include "services/ark/station_outputs.hpp"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
 #include "services/behaviours/running_note.hpp"
@@ -57,7 +59,9 @@ class LocalRun {
         radio_(plan, firmware::make_firmware_robots(plan, options.run_directory, options.threads,
                                                     options.resumed ? options.resumed->tick : Tick{0},
                                                     options.save_checkpoints)),
-        station_(plan),
+        station_(plan, options.run_directory),
+        station_outputs_(plan, options.save_checkpoints ? options.run_directory : std::filesystem::path{},
+                         options.resumed ? options.resumed->tick : Tick{0}),
         swarm_(plan.robots(), plan.movables(), plan.memory.size()),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()),
@@ -101,7 +105,7 @@ class LocalRun {
       const auto wall_s = [begun] { return static_cast<double>(ns(begun, Clock::now())) * 1e-9; };
       pace.hold(now - first_, wall_s, [&] { observer_.idle(progress(now, wall_s())); });
       const bool finished = schedule_.verdict(now) == RunSchedule::Verdict::kFinished;
-      if (!finished && interrupted() != 0) totals.failure = "interrupted";
+      if (!finished && interrupted() != 0 && totals.failure.empty()) totals.failure = "interrupted";
       const bool last = finished || !totals.failure.empty();
       if (options_.save_checkpoints && schedule_.checkpoint_at(now)) save(now, chain);
       const auto recorded_from = Clock::now();
@@ -122,6 +126,11 @@ class LocalRun {
       step(workers, now);
       print_faults(now);
       chain = close_tick(now + 1, chain);
+      try {
+        station_outputs_.take(now, station_, observer_);
+      } catch (const RunError& error) {
+        totals.failure = error.what();
+      }
     }
     totals.wall_s = static_cast<double>(ns(begun, Clock::now())) * 1e-9;
     totals.first = first_;
@@ -134,6 +143,7 @@ class LocalRun {
         behaviours::write_eeproms(*hosts_[h], plan_.share(HostId{h}), options_.run_directory);
     }
     fill(totals);
+    totals.station = ark::station_totals(plan_, station_, now);
     return totals;
   }
 
@@ -311,6 +321,7 @@ class LocalRun {
   std::vector<std::unique_ptr<physics::Engine>> physics_;
   comm::RadioEngine radio_;
   ark::StationEngine station_;
+  ark::StationOutputs station_outputs_;
   SwarmView swarm_;  // at the current tick
   std::vector<std::unique_ptr<behaviours::BehavioursEngine>> hosts_;
   // One per host; empty without a run directory.

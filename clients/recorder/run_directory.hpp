@@ -2,6 +2,8 @@
 ///   manifest.pb      the resolved experiment, for programs: idl/manifest.proto
 ///   experiment.txtpb the experiment as run; it can be run again from there
 ///   programs/        the built behaviours, SHA256.so, and the given firmware, SHA256.elf or .hex
+///   plugins/         plugins of the station as built, SHA256.so, and SHA256, the program that runs them
+///   station-N.*      log (.tsv) and report (.json) of virtual environment N
 ///   recording.ktrec  states and events over time: idl/recording.proto
 ///   provenance.json  clients/recorder/provenance.hpp
 ///   summary.json     clients/recorder/summary.hpp

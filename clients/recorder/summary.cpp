@@ -61,6 +61,22 @@ Json spread_json(const Summary::PerRobot::Spread& spread, std::uint32_t robots) 
               {"most", spread.most}};
 }
 
+Json station_json(const StationTotals& station) {
+  Json plugins = Json::array();
+  for (const StationTotals::Plugin& plugin : station.plugins)
+    plugins.push_back(Json{{"name", plugin.name}, {"failure", plugin.failure}});
+  const double rate = station.sending_s > 0 ? static_cast<double>(station.robot_messages) / station.sending_s : 0;
+  return Json{{"packets", station.packets},
+              {"robot_messages", station.robot_messages},
+              {"broadcasts", station.broadcasts},
+              {"robot_messages_per_s", rate},
+              {"replaced", station.replaced},
+              {"too_wide", station.too_wide},
+              {"queueing_delay_s",
+               Json{{"mean", station.mean_delay_s}, {"p99", station.p99_delay_s}, {"max", station.max_delay_s}}},
+              {"plugins", plugins}};
+}
+
 }  // namespace
 
 void Summary::PerRobot::add(const RadioCount& radio) {
@@ -84,7 +100,7 @@ double Summary::realtime_factor() const {
 }
 
 void write_summary(const Summary& s, const std::filesystem::path& file) {
-  const Json json{
+  Json json{
       {"name", s.name},
       {"seed", s.seed},
       {"mode", s.mode},
@@ -126,6 +142,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"host", s.provenance.host},
       {"cores", s.provenance.cores},
   };
+  if (!s.station.plugins.empty()) json["station"] = station_json(s.station);
   os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
@@ -201,6 +218,9 @@ std::string summary_text(const Summary& s, const std::string& place) {
                                s.messages.attempted, s.messages.received, s.messages.collided,
                                percentage(s.messages.collided, s.messages.received + s.messages.collided)));
   line("failed", counted(s.robots_failed, "robot"));
+  for (const StationTotals::Plugin& plugin : s.station.plugins) {
+    if (!plugin.failure.empty()) line("failed", fmt::format("plugin {}: {}", plugin.name, plugin.failure));
+  }
   const Summary::Cost& c = s.cost_ns_per_robot_tick;
   std::vector<std::pair<std::string_view, double>> parts{{"behaviours", c.behaviours}, {"physics", c.physics},
                                                          {"radio", c.radio},           {"station", c.station},

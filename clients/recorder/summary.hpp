@@ -41,6 +41,7 @@ struct Summary {
     void add(const RadioCount& radio);
   } per_robot;
   Provenance provenance;
+  StationTotals station;  ///< in the file where there are virtual environments
   std::uint32_t robots_failed = 0;
   std::uint32_t recoveries = 0;
   /// Distance between a robot's first and last recorded position.

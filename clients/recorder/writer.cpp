@@ -135,6 +135,12 @@ void Writer::radio(const proto::RadioRecord& radio) {
   flush_if_due();
 }
 
+void Writer::floor(const proto::FloorRecord& floor) {
+  *other_.mutable_floor() = floor;
+  append(other_);
+  other_.clear_floor();
+}
+
 void Writer::end(Tick tick, std::uint64_t state_hash, const std::string& failure) {
   append_hashes();
   proto::EndRecord& record = *other_.mutable_end();

@@ -40,6 +40,7 @@ class Writer {
   void messages(const proto::MessagesRecord& messages);
   /// One entry per robot in every field.
   void radio(const proto::RadioRecord& radio);
+  void floor(const proto::FloorRecord& floor);
   /// The end mark of a run that reached its end. `failure`: one line, empty if the run succeeded. Closes the file.
   void end(Tick tick, std::uint64_t state_hash, const std::string& failure = {});
 

@@ -323,16 +323,6 @@ void check_engine(const LoadedExperiment& loaded) {
   }
 }
 
-void check_station(const LoadedExperiment& loaded) {
-  const proto::Station& station = loaded.experiment.station();
-  for (int i = 0; i < station.environment_size(); ++i) {
-    if (station.environment(i).kind_case() != proto::VirtualEnvironment::KIND_NOT_SET) continue;
-    throw loaded.locations.error(
-        fmt::format("station.environment[{}]", i),
-        "environment has no kind; it takes " + field_names(*proto::VirtualEnvironment::descriptor()) + " { ... }");
-  }
-}
-
 }  // namespace
 
 std::uint64_t stated_count(const proto::RobotGroup& group) {
@@ -400,6 +390,7 @@ void check_fields(const LoadedExperiment& loaded) {
     total += stated_count(group);
     known = known && stated_count(group) > 0;
   }
+  check_station_files(loaded);
   if (known) check_total(loaded, total);
 }
 

@@ -16,6 +16,9 @@ void check_values(const LoadedExperiment& loaded);
 void check_effects(const LoadedExperiment& loaded);
 /// Checks dependencies between fields of the infrared channel.
 void check_radio(const LoadedExperiment& loaded);
+/// Those of the base station that the table of ranges cannot express; and that its plugins' files exist.
+void check_station(const LoadedExperiment& loaded);
+void check_station_files(const LoadedExperiment& loaded);
 
 /// Number of robots in the group by its `count`, or by its rings if `count` is absent. 0: its CSV file gives the number.
 [[nodiscard]] std::uint64_t stated_count(const proto::RobotGroup& group);

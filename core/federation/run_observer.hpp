@@ -24,6 +24,21 @@ struct RunProgress {
   std::string waiting_for;  ///< the federates for which the run waits, one line; empty if it does not wait
 };
 
+/// What a virtual environment of the station paints on the floor, for viewers: FloorRecord in idl/recording.proto.
+struct FloorPicture {
+  std::uint32_t environment = 0;
+  std::uint32_t columns = 0, rows = 0;
+  std::string rgba;  ///< 4 octets per cell, row by row from the top
+  struct Circle {
+    double x_mm = 0, y_mm = 0, radius_mm = 0;
+    std::array<std::uint8_t, 4> rgba{};
+    std::string name;
+    bool operator==(const Circle&) const = default;
+  };
+  std::vector<Circle> circles;
+  bool operator==(const FloorPicture&) const = default;
+};
+
 /// All functions are called on one thread. The ticks passed to each function ascend.
 class RunObserver {
  public:
@@ -34,6 +49,11 @@ class RunObserver {
   virtual void hash(Tick, std::uint64_t chain) = 0;
   /// A directive with its tick and sequence number was announced.
   virtual void input(const Directive&) = 0;
+  /// The floor of an environment has changed at this tick.
+  virtual void floor(Tick tick, const FloorPicture& floor) {
+    static_cast<void>(tick);
+    static_cast<void>(floor);
+  }
   /// A checkpoint is about to be complete. The recording up to its tick must be on disk when this returns.
   virtual void saved() {}
   /// Called a few times a second, also while the run pauses or waits.
@@ -42,6 +62,19 @@ class RunObserver {
 
 /// Categories of computing time.
 enum class Work : std::uint8_t { kBehaviours, kPhysics, kRadio, kStation, kExchange, kRecording, kCount };
+
+/// What the station sent for its virtual environments.
+struct StationTotals {
+  std::uint64_t packets = 0, robot_messages = 0, broadcasts = 0;
+  std::uint64_t replaced = 0, too_wide = 0;  ///< messages that were never sent: replaced by newer ones; too wide for their bits
+  double sending_s = 0;                      ///< simulated time since the start broadcast
+  /// Time that messages waited beyond their robot's least interval.
+  double mean_delay_s = 0, p99_delay_s = 0, max_delay_s = 0;
+  struct Plugin {
+    std::string name, failure;  ///< failure: empty where it is well
+  };
+  std::vector<Plugin> plugins;
+};
 
 /// Totals of a run.
 struct RunTotals {
@@ -53,6 +86,7 @@ struct RunTotals {
   std::uint64_t attempted = 0, sent = 0, received = 0, collided = 0;
   std::uint32_t robots_failed = 0;
   std::array<std::uint64_t, static_cast<std::size_t>(Work::kCount)> work_ns{};
+  StationTotals station;           ///< empty without virtual environments
   std::vector<PairCount> pairs;    ///< empty unless RecordingSettings::messages
   std::vector<RadioCount> radios;  ///< per robot; empty if the run failed before the radio's report
   bool stopped_early = false;      ///< a directive ended the run

@@ -1,6 +1,10 @@
 #include "core/plan/from_manifest.hpp"
 
+#include <google/protobuf/descriptor.h>
+
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <string>
 #include <utility>
 
@@ -138,11 +142,43 @@ RadioSettings radio_of(const proto::Radio& radio) {
   return out;
 }
 
-StationSettings station_of(const proto::Station& station) {
+StationSettings station_of(const proto::Manifest& manifest) {
+  const proto::Station& station = manifest.experiment().station();
   StationSettings out;
   out.start_broadcast_s = station.start_broadcast_s();
   out.packet_interval_s = station.packet_interval_s();
+  if (station.has_robot_interval_s()) out.robot_interval_s = station.robot_interval_s();
+  out.log_every_s = station.log_every_s();
+  out.floor_every_s = station.floor_every_s();
+  if (station.has_camera()) {
+    const proto::Camera& camera = station.camera();
+    out.camera = {camera.frame_rate_hz(), camera.latency_s(),        camera.position_noise_mm(),
+                  camera.led_error(),     camera.dropped_frames(),   camera.losses_per_hour(),
+                  camera.lost_s(),        camera.swap_distance_mm(), camera.swaps_per_hour()};
+  }
   out.environments = each<EnvironmentSettings>(station.environment(), settings_of);
+  out.host_sha256 = manifest.station_host();
+  for (std::size_t i = 0; i < out.environments.size(); ++i) {
+    if (static_cast<int>(i) < manifest.station_plugin_size())
+      out.environments[i].sha256 = manifest.station_plugin(static_cast<int>(i));
+  }
+  return out;
+}
+
+/// All fields as parameters of a built-in plugin, defaults included.
+std::map<std::string, std::string> parameters_of(const google::protobuf::Message& message) {
+  std::map<std::string, std::string> out;
+  const google::protobuf::Descriptor& type = *message.GetDescriptor();
+  for (int i = 0; i < type.field_count(); ++i) {
+    const google::protobuf::FieldDescriptor* const field = type.field(i);
+    if (field->cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_UINT32) {
+      out[field->name()] = std::to_string(message.GetReflection()->GetUInt32(message, field));
+      continue;
+    }
+    std::array<char, 32> text{};
+    const double value = message.GetReflection()->GetDouble(message, field);
+    out[field->name()] = std::string(text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr);
+  }
   return out;
 }
 
@@ -305,24 +341,24 @@ LightSourceSettings settings_of(const proto::LightSource& source) {
 }
 
 EnvironmentSettings settings_of(const proto::VirtualEnvironment& environment) {
+  EnvironmentSettings out;
+  if (environment.has_bits()) out.bits = {environment.bits().first(), environment.bits().count()};
   if (environment.has_hub()) {
-    const proto::HubEnvironment& hub = environment.hub();
-    return HubSettings{hub.x_mm(), hub.y_mm(), hub.radius_mm()};
+    out.built_in = "hub";
+    out.parameters = parameters_of(environment.hub());
+  } else if (environment.has_foraging()) {
+    out.built_in = "foraging";
+    out.parameters = parameters_of(environment.foraging());
+  } else if (environment.has_plugin()) {
+    const proto::StationPlugin& plugin = environment.plugin();
+    out.built_in = plugin.built_in();
+    if (plugin.source_size() > 0) out.name = plugin.source(0);
+    for (const proto::PluginParameter& parameter : plugin.parameter())
+      out.parameters[parameter.name()] = parameter.value();
+    out.ends_run = plugin.on_failure() == proto::StationPlugin::END_RUN;
   }
-  if (environment.has_foraging()) {
-    const proto::ForagingEnvironment& foraging = environment.foraging();
-    ForagingSettings out;
-    out.home_x_mm = foraging.home_x_mm();
-    out.home_y_mm = foraging.home_y_mm();
-    out.home_radius_mm = foraging.home_radius_mm();
-    out.food_x_mm = foraging.food_x_mm();
-    out.food_y_mm = foraging.food_y_mm();
-    out.food_radius_mm = foraging.food_radius_mm();
-    out.scent_radius_mm = foraging.scent_radius_mm();
-    out.loads = foraging.loads();
-    return out;
-  }
-  return std::monostate{};
+  if (out.name.empty()) out.name = out.built_in;
+  return out;
 }
 
 Program settings_of(const proto::Program& program) {
@@ -368,6 +404,9 @@ void check_manifest(const proto::Manifest& manifest) {
     require(pixels > 0 && raster.brightness().size() == pixels, "a picture of light is damaged",
             "as many octets as pixels");
   }
+  const int plugins = manifest.station_plugin_size();
+  require(plugins == 0 || plugins == experiment.station().environment_size(),
+          "station_plugin does not match the virtual environments", "one entry per environment");
   for (const proto::RobotEeprom& eeprom : manifest.eeprom()) {
     require(eeprom.robot() < robots && eeprom.content().size() == 1024, "an EEPROM is damaged", "1024 octets");
   }
@@ -384,7 +423,7 @@ PlanSettings settings_of(const proto::Manifest& manifest) {
   out.fields = each(experiment.field(), field_of);
   out.physics = physics_of(experiment.physics());
   out.radio = radio_of(experiment.radio());
-  out.station = station_of(experiment.station());
+  out.station = station_of(manifest);
   if (experiment.has_light()) out.light = light_of(experiment.light(), manifest);
   if (experiment.has_battery()) out.battery = battery_of(experiment.battery());
   if (experiment.has_temperature()) {

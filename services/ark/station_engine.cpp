@@ -1,9 +1,11 @@
 #include "services/ark/station_engine.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/math/elementary.h"
 #include "core/plan/station_settings.hpp"
 #include "idl/checkpoint.pb.h"
 
@@ -11,7 +13,12 @@ namespace kilotwin::ark {
 namespace {
 
 constexpr std::uint8_t kRunMessage = 0x88;  // kilolib's message types: RUN
+constexpr std::uint8_t kStopType = 250;     // of ARK's broadcasts
 constexpr double kArkSecondsPerPacket = 0.05, kShortestPerRobot_s = 1.0;
+/// From the start of one copy of a message on the air to that of the next (measured on the overhead controller).
+constexpr double kCopyPeriod_s = 0.010409;
+/// Speed in the direction of the heading that robots at rest are said to have, mm/s.
+constexpr double kLeastSpeed_mm = 1e-3;
 
 OverheadPacket run_packet() {
   OverheadPacket packet{OverheadCommand::kRepeat, {}};
@@ -19,15 +26,10 @@ OverheadPacket run_packet() {
   return packet;
 }
 
-double robot_interval_s(std::uint32_t robots) {
-  return std::max(kShortestPerRobot_s, robots * kArkSecondsPerPacket / static_cast<double>(kArkSlots));
-}
-
-/// The least whole number of cycles that is not shorter.
-std::int64_t cycles_of(double seconds) {
-  const double cycles = seconds * kNominalClockHz;
-  const auto whole = static_cast<std::int64_t>(cycles);
-  return whole + static_cast<std::int64_t>(static_cast<double>(whole) < cycles);
+double robot_interval_s(const StationSettings& setting, std::uint32_t robots) {
+  const double rule_s =
+      std::max(kShortestPerRobot_s, robots * kArkSecondsPerPacket / static_cast<double>(kArkSlots));
+  return setting.robot_interval_s.value_or(rule_s);
 }
 
 std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
@@ -37,78 +39,190 @@ std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
   return word;
 }
 
+/// The least whole number of cycles that is not shorter.
+std::int64_t cycles_of(double seconds) {
+  const double cycles = seconds * kNominalClockHz;
+  const auto whole = static_cast<std::int64_t>(cycles);
+  return whole + static_cast<std::int64_t>(static_cast<double>(whole) < cycles);
+}
+
+/// Whether a multiple of `every_s` lies in (before, now].
+bool is_due(double before_s, double now_s, double every_s) {
+  return every_s > 0 && (before_s < 0 || kt_floor(now_s / every_s) > kt_floor(before_s / every_s));
+}
+
 }  // namespace
 
-StationEngine::StationEngine(const RunPlan& plan)
+StationEngine::StationEngine(const RunPlan& plan, const std::filesystem::path& run_directory)
     : plan_(plan),
-      start_ends_(plan.tick_length.at_or_after(plan.station_settings().start_broadcast_s)),
-      packet_interval_(cycles_of(plan.station_settings().packet_interval_s)),
-      robot_interval_(cycles_of(robot_interval_s(plan.robots()))),
+      setting_(plan.station_settings()),
+      run_directory_(run_directory),
+      start_ends_(plan.tick_length.at_or_after(setting_.start_broadcast_s)),
+      is_limited_(setting_.packet_interval_s > 0),
+      packet_interval_(cycles_of(is_limited_ ? setting_.packet_interval_s : kCopyPeriod_s)),
+      queue_(plan.robots(), setting_.environments, cycles_of(robot_interval_s(setting_, plan.robots()))),
       packets_{run_packet()},
-      next_packet_(begin_of(start_ends_) +
-                   begin_of(plan.tick_length.at_or_after(plan.station_settings().packet_interval_s))),
+      next_packet_(begin_of(start_ends_) + begin_of(plan.tick_length.at_or_after(setting_.packet_interval_s))),
       measurement_(plan) {
-  for (const EnvironmentSettings& description : plan.station_settings().environments) {
-    environments_.push_back(make_environment(description, plan.robots()));
+  if (setting_.environments.empty()) return;
+  if (setting_.camera) camera_.emplace(plan, *setting_.camera);
+  seen_.resize(plan.robots());
+  see_initial_poses();
+  plugins_.resize(setting_.environments.size());
+  for (std::uint32_t i = 0; i < plugins_.size(); ++i) set_up(i, false);
+  outputs_of_set_up_ = std::move(outputs_);
+}
+
+void StationEngine::see_initial_poses() {
+  SwarmView start(plan_.robots(), plan_.movables(), plan_.memory.size());
+  start.tick = Tick{0};
+  for (std::uint32_t robot = 0; robot < plan_.robots(); ++robot) {
+    const Pose pose = plan_.initial_pose(robot);
+    start.x_mm[robot] = pose.x_mm;
+    start.y_mm[robot] = pose.y_mm;
+    start.heading_rad[robot] = pose.heading_rad;
   }
-  if (!environments_.empty()) {
-    served_.resize(plan.robots(), -robot_interval_);
-    turns_.resize(plan.robots(), 0);
-    seen_.resize(plan.robots());
-  }
+  seen_.x_mm = start.x_mm;
+  seen_.y_mm = start.y_mm;
+  see(start);
 }
 
 void StationEngine::see(const SwarmView& swarm) {
   if (measurement_.any()) measurement_.measure(swarm, measured_);
-  for (std::uint32_t robot = 0; robot < seen_.size(); ++robot) {
-    TrackedRobot& seen = seen_[robot];
-    seen.robot = robot;
-    if (measurement_.any()) {
-      seen.p_WR = {measured_.x_mm[robot], measured_.y_mm[robot], measured_.heading_rad[robot]};
-    } else {
-      seen.p_WR = {swarm.x_mm[robot], swarm.y_mm[robot], swarm.heading_rad[robot]};
-    }
-    seen.led = swarm.led[robot];
+  if (camera_) return camera_->step(swarm, measurement_.any() ? &measured_ : nullptr);
+  const auto& x_mm = measurement_.any() ? measured_.x_mm : swarm.x_mm;
+  const auto& y_mm = measurement_.any() ? measured_.y_mm : swarm.y_mm;
+  const auto& heading_rad = measurement_.any() ? measured_.heading_rad : swarm.heading_rad;
+  for (std::uint32_t robot = 0; robot < plan_.robots(); ++robot) {
+    const double dx_mm = x_mm[robot] - seen_.x_mm[robot], dy_mm = y_mm[robot] - seen_.y_mm[robot];
+    const double moved_mm = __builtin_sqrt(dx_mm * dx_mm + dy_mm * dy_mm);
+    const double speed_mm = std::max(kLeastSpeed_mm, moved_mm / plan_.tick_length.seconds());
+    seen_.x_mm[robot] = x_mm[robot];
+    seen_.y_mm[robot] = y_mm[robot];
+    seen_.heading_rad[robot] = heading_rad[robot];
+    seen_.vx_mm[robot] = speed_mm * kt_cos(heading_rad[robot]);
+    seen_.vy_mm[robot] = speed_mm * kt_sin(heading_rad[robot]);
+    seen_.led[robot] = led_class(swarm.led[robot]);
   }
 }
 
-void StationEngine::send_own(const SwarmView& swarm) {
-  if (now_ == start_ends_ && repeating_) {
-    push({OverheadCommand::kStop, {}}, begin_of(now_));
-    repeating_ = false;
-  } else if (!environments_.empty() && next_packet_ < begin_of(now_ + 1)) {
-    send_readings(swarm);
+station::Request StationEngine::request(station::Call call, Tick at) const {
+  station::Request request;
+  request.call = call;
+  request.tick = at.count();
+  request.time_s = plan_.tick_length.seconds_at(at);
+  const SeenRobots& seen = this->seen();
+  request.robots.resize(plan_.robots());
+  for (std::uint32_t robot = 0; robot < plan_.robots(); ++robot) {
+    station::SeenRobot& it = request.robots[robot];
+    it.x_mm = seen.x_mm[robot];
+    it.y_mm = seen.y_mm[robot];
+    it.vx_mm = seen.vx_mm[robot];
+    it.vy_mm = seen.vy_mm[robot];
+    if (it.vx_mm * it.vx_mm + it.vy_mm * it.vy_mm < kLeastSpeed_mm * kLeastSpeed_mm) {
+      it.vx_mm = kLeastSpeed_mm * kt_cos(seen.heading_rad[robot]);
+      it.vy_mm = kLeastSpeed_mm * kt_sin(seen.heading_rad[robot]);
+    }
+    it.colour = static_cast<station::lightColour>(seen.led[robot]);
+    it.seen = seen.seen[robot] != 0;
   }
+  return request;
+}
+
+void StationEngine::set_up(std::uint32_t environment, bool resumed) {
+  const EnvironmentSettings& setting = setting_.environments[environment];
+  Plugin& plugin = plugins_[environment];
+  plugin = {};
+  plugin.host = make_plugin_host(setting, setting_.host_sha256, run_directory_);
+  station::Request request = this->request(station::Call::kSetup, now_);
+  request.resumed = resumed;
+  request.seed = plan_.seed();
+  request.index = environment;
+  request.width_mm = 2 * plan_.world.arena.half_width_mm();
+  request.height_mm = 2 * plan_.world.arena.half_height_mm();
+  request.parameters = setting.parameters;
+  station::Reply reply = plugin.host->ask(request);
+  if (!reply.failure.empty() && !reply.crashed)
+    throw UserError("the station's plugin " + setting.name + ": " + reply.failure);
+  plugin.interval_ms = reply.interval_ms;
+  take(environment, std::move(reply), now_);
+}
+
+void StationEngine::run_plugins(Tick from) {
+  for (std::uint32_t i = 0; i < plugins_.size(); ++i) {
+    Plugin& plugin = plugins_[i];
+    if (!plugin.failure.empty() || plugin.complete) continue;
+    const double interval_s = plugin.interval_ms * 1e-3;
+    const double now_s = static_cast<double>(plugin.services) * interval_s;
+    if (plan_.tick_length.at_or_after(now_s) > from) continue;
+    // An interval below a tick runs once per tick.
+    ++plugin.services;
+    while (plan_.tick_length.at_or_after(static_cast<double>(plugin.services) * interval_s) <= from)
+      ++plugin.services;
+    station::Request request = this->request(station::Call::kStep, from);
+    request.log = is_due(now_s - interval_s, now_s, setting_.log_every_s);
+    request.paint = is_due(now_s - interval_s, now_s, setting_.floor_every_s);
+    take(i, plugin.host->ask(request), now_);
+  }
+}
+
+void StationEngine::take(std::uint32_t environment, station::Reply reply, Tick now) {
+  Plugin& plugin = plugins_[environment];
+  PluginOutput output;
+  output.environment = environment;
+  if (!reply.failure.empty()) {
+    plugin.failure = reply.failure;
+    plugin.host.reset();
+    output.failure = reply.failure;
+    output.ends_run = setting_.environments[environment].ends_run;
+    outputs_.push_back(std::move(output));
+    return;
+  }
+  plugin.word = reply.word;
+  plugin.complete = reply.complete;
+  for (const station::Sent& sent : reply.sent) {
+    if (!sent.to_all) {
+      queue_.put(environment, {sent.id, sent.type, sent.data}, begin_of(now));
+      continue;
+    }
+    IrMessage message{};
+    std::copy(sent.octets.begin(), sent.octets.end(), message.begin());
+    message.back() = sent.type;
+    // The station stops a repetition by itself; ARK's STOP only ends it a packet earlier.
+    if (sent.type != kStopType) queue_.put_broadcast(message);
+  }
+  output.log_rows = std::move(reply.rows);
+  output.reports = std::move(reply.reports);
+  if (reply.painted) output.floor = std::move(reply.floor);
+  if (!output.log_rows.empty() || !output.reports.empty() || output.floor) outputs_.push_back(std::move(output));
 }
 
 void StationEngine::push(const OverheadPacket& packet, Cycles t) {
   packets_.push_back(packet.at(static_cast<std::uint32_t>(t - begin_of(now_))));
 }
 
-std::vector<ArkMessage> StationEngine::readings(Cycles t) {
-  std::vector<ArkMessage> messages;
-  while (messages.size() < kArkSlots && t - served_[next_robot_] >= robot_interval_) {
-    VirtualEnvironment& environment = *environments_[turns_[next_robot_] % environments_.size()];
-    if (const auto message = environment.sense(seen_[next_robot_])) messages.push_back(*message);
-    served_[next_robot_] = t;
-    ++turns_[next_robot_];
-    next_robot_ = (next_robot_ + 1) % plan_.robots();
+void StationEngine::send_own() {
+  if (now_ == start_ends_ && repeating_) {
+    push({OverheadCommand::kStop, {}}, begin_of(now_));
+    repeating_ = false;
+  } else if (!plugins_.empty() && next_packet_ < begin_of(now_ + 1)) {
+    send_waiting();
   }
-  return messages;
 }
 
-void StationEngine::send_readings(const SwarmView& swarm) {
-  see(swarm);
+void StationEngine::send_waiting() {
+  const Cycles end = begin_of(now_ + 1);
   Cycles t = std::max(next_packet_, begin_of(now_));
-  while (t < begin_of(now_ + 1)) {
-    const std::vector<ArkMessage> messages = readings(t);
-    if (messages.empty() && !repeating_) {
+  while (t < end) {
+    const auto message = queue_.take(t);
+    if (!message && !repeating_) {
       // The air is free until somebody's turn comes.
-      t = std::max(t + 1, served_[next_robot_] + robot_interval_);
+      t = std::max(t + 1, queue_.earliest().value_or(end));
       continue;
     }
-    push(messages.empty() ? OverheadPacket{} : OverheadPacket{OverheadCommand::kRepeat, pack(messages)}, t);
-    repeating_ = !messages.empty();
+    const auto command = is_limited_ ? OverheadCommand::kRepeat : OverheadCommand::kOnce;
+    push(message ? OverheadPacket{command, *message} : OverheadPacket{}, t);
+    repeating_ = message && is_limited_;
     t = next_packet_ = t + packet_interval_;
   }
 }
@@ -116,8 +230,13 @@ void StationEngine::send_readings(const SwarmView& swarm) {
 void StationEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == now_);
   ++now_;
+  outputs_ = std::exchange(outputs_of_set_up_, {});
+  if (!plugins_.empty()) {
+    see(inputs.swarm);
+    run_plugins(from);
+  }
   packets_.assign(inputs.external.begin(), inputs.external.end());
-  if (packets_.empty()) return send_own(inputs.swarm);
+  if (packets_.empty()) return send_own();
   std::stable_sort(packets_.begin(), packets_.end(), [](const OverheadPacket& a, const OverheadPacket& b) {
     return a.offset_cycles() < b.offset_cycles();
   });
@@ -132,69 +251,30 @@ void StationEngine::emit(OverheadFrame& frame) const {
 }
 
 std::uint64_t StationEngine::hash_part() const {
-  std::uint64_t sum = entity_hash(
-      HashDomain::kStation, 0,
-      {next_robot_, static_cast<std::uint64_t>(next_packet_ / begin_of(Tick{1})),
-       static_cast<std::uint64_t>(next_packet_ % begin_of(Tick{1})) << 1 | static_cast<std::uint64_t>(repeating_),
-       packets_.size()});
+  constexpr std::uint64_t kNoTurn = 0;
+  const Cycles tick = begin_of(Tick{1});
+  std::uint64_t sum =
+      entity_hash(HashDomain::kStation, 0,
+                  {kNoTurn, static_cast<std::uint64_t>(next_packet_ / tick),
+                   static_cast<std::uint64_t>(next_packet_ % tick) << 1 | static_cast<std::uint64_t>(repeating_),
+                   packets_.size()});
   for (std::uint32_t i = 0; i < packets_.size(); ++i) {
     sum += entity_hash(HashDomain::kStation, 1 + i,
                        {static_cast<std::uint64_t>(packets_[i].command), word_of(packets_[i], 0),
                         word_of(packets_[i], 8) | std::uint64_t{packets_[i].offset_cycles()} << 16});
   }
-  for (std::uint32_t i = 0; i < environments_.size(); ++i) {
-    // Apart from the packets, of which there are few.
-    constexpr std::uint32_t kEnvironments = 1u << 31;
-    if (const std::uint64_t word = environments_[i]->word(); word != 0)
-      sum += entity_hash(HashDomain::kStation, kEnvironments + i, {word});
+  if (plugins_.empty()) return sum;
+  // Apart from the packets, of which there are few.
+  constexpr std::uint32_t kQueue = 1u << 30, kCameraModel = kQueue + 1, kEnvironments = 1u << 31;
+  sum += entity_hash(HashDomain::kStation, kQueue, {queue_.word()});
+  if (camera_) sum += entity_hash(HashDomain::kStation, kCameraModel, {camera_->word()});
+  for (std::uint32_t i = 0; i < plugins_.size(); ++i) {
+    const Plugin& plugin = plugins_[i];
+    const std::uint64_t flags = (plugin.failure.empty() ? 0u : 1u) | (plugin.complete ? 2u : 0u);
+    sum += entity_hash(HashDomain::kStation, kEnvironments + i,
+                       {plugin.word, static_cast<std::uint64_t>(plugin.services), flags});
   }
   return sum;
-}
-
-void StationEngine::save(proto::StationState& state) const {
-  state.set_next_packet_cycle(next_packet_);
-  state.set_repeating_own(repeating_);
-  for (const OverheadPacket& packet : packets_) {
-    state.mutable_packets()->push_back(static_cast<char>(packet.command));
-    state.mutable_packets()->append(packet.message.begin(), packet.message.end());
-    state.add_packet_offset_cycles(packet.offset_cycles());
-  }
-  for (const Cycles served : served_) state.add_served_cycle(served);
-  for (const std::uint32_t turns : turns_) state.add_turns(turns);
-  for (const auto& environment : environments_) environment->save(*state.add_environment());
-}
-
-void StationEngine::load(Tick tick, std::span<const proto::StationState* const> parts) {
-  constexpr std::size_t kPacketOctets = 11;
-  if (parts.size() != 1 || static_cast<std::size_t>(parts[0]->served_cycle_size()) != served_.size() ||
-      static_cast<std::size_t>(parts[0]->turns_size()) != turns_.size() ||
-      static_cast<std::size_t>(parts[0]->environment_size()) != environments_.size() ||
-      parts[0]->packets().size() !=
-          kPacketOctets * static_cast<std::size_t>(parts[0]->packet_offset_cycles_size())) {
-    throw RunError("the checkpoint holds no station's state of this experiment");
-  }
-  const proto::StationState& state = *parts[0];
-  now_ = tick;
-  next_packet_ = state.next_packet_cycle();
-  repeating_ = state.repeating_own();
-  packets_.clear();
-  for (const std::uint32_t offset : state.packet_offset_cycles()) {
-    const std::size_t from = packets_.size() * kPacketOctets;
-    OverheadPacket packet = OverheadPacket{}.at(offset);
-    packet.command = static_cast<OverheadCommand>(state.packets()[from]);
-    std::copy_n(state.packets().begin() + static_cast<std::ptrdiff_t>(from) + 1, packet.message.size(),
-                packet.message.begin());
-    packets_.push_back(packet);
-  }
-  for (std::size_t i = 0; i < served_.size(); ++i) {
-    served_[i] = state.served_cycle(static_cast<int>(i));
-    turns_[i] = state.turns(static_cast<int>(i));
-  }
-  for (std::size_t i = 0; i < environments_.size(); ++i)
-    environments_[i]->load(state.environment(static_cast<int>(i)));
-  // Robots are served in a circle: those before the next one have had one turn more.
-  next_robot_ = 0;
-  while (next_robot_ < turns_.size() && turns_[next_robot_] > turns_.back()) ++next_robot_;
 }
 
 }  // namespace kilotwin::ark

@@ -15,6 +15,7 @@
 #include "services/ark/external_input.hpp"
 #include "services/ark/run_metrics.hpp"
 #include "services/ark/station_engine.hpp"
+#include "services/ark/station_outputs.hpp"
 
 namespace kilotwin::ark {
 namespace {
@@ -65,7 +66,10 @@ class StationFederate : public Federate {
     if (begun >= next_robots_) next_robots_ = begun + kRobotsPeriod;
   }
 
-  void step(Tick from) override { engine_.step(from, {swarm_, session_.schedule().overhead_inputs()}); }
+  void step(Tick from) override {
+    engine_.step(from, {swarm_, session_.schedule().overhead_inputs()});
+    outputs_.take(from, engine_, observer_);
+  }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 
@@ -181,6 +185,7 @@ class StationFederate : public Federate {
   StationEngine& engine_;
   RunMetrics& metrics_;
   RunObserver& observer_;
+  StationOutputs outputs_{session_.plan(), context_.run_directory, context_.first()};
   Ingress ingress_;
   Snapshots snapshots_;
   ExternalInput external_input_;
@@ -200,7 +205,7 @@ class StationFederate : public Federate {
 }  // namespace
 
 RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObserver& observer) {
-  StationEngine engine(plan);
+  StationEngine engine(plan, context.run_directory);
   if (context.resumed) engine.load(context.first(), context.resumed->station());
   Session session(plan, plan.station(), context.transport, context.first(), context.inputs,
                   context.give_up_after_s);
@@ -231,6 +236,7 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   totals.state_hash = metrics.chain();
   totals.wall_s = session.wall_s();
   metrics.fill(totals);
+  totals.station = station_totals(plan, engine, totals.last);
   // The recorder works within the station's step.
   std::uint64_t& station_ns = totals.work_ns[static_cast<std::size_t>(Work::kStation)];
   station_ns -= std::min(station_ns, federate.recording_ns());

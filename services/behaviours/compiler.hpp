@@ -33,6 +33,17 @@ struct CompiledProgram {
 [[nodiscard]] CompiledProgram compile_firmware(const std::vector<std::filesystem::path>& sources,
                                                const CompileOptions& options = {});
 
+/// Whether these are sources of a station plugin: one of them defines createExpt().
+[[nodiscard]] bool is_station_plugin(const std::vector<std::filesystem::path>& sources);
+
+/// Compiles C++ sources of one station plugin (services/ark/plugin/kilotwin_station.hpp) into a shared object, kept in the cache
+/// by the content of everything that goes into it. A single .so is returned as it is. Throws UserError as compile() does.
+[[nodiscard]] CompiledProgram compile_station_plugin(const std::vector<std::filesystem::path>& sources,
+                                                     const CompileOptions& options = {});
+
+/// The program in which plugins run, services/ark/plugin/host.cpp, compiled with the same compiler as they are.
+[[nodiscard]] CompiledProgram compile_plugin_host(const CompileOptions& options = {});
+
 /// Memory that a program occupies in an ATmega328P (32 KiB of flash, 2 KiB of RAM), including the functions of the C library that
 /// it uses, excluding kilolib.
 struct AvrSize {

@@ -11,6 +11,7 @@
 #include "core/base/error.hpp"
 #include "core/plan/station_settings.hpp"
 #include "idl/checkpoint.pb.h"
+#include "tests/services/ark/plugin_bench.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace kilotwin::ark {
@@ -149,13 +150,14 @@ TEST(StationEngine, TellsWhatTheTrackerSaw) {
   const RunPlan plan = plan_of(9, "station { environment { hub { x_mm: 40 y_mm: 0 radius_mm: 30 } } }");
   Scene scene(plan);
   std::size_t inside = 0;
-  const auto hub = make_environment(plan.station_settings().environments[0], 9);
+  PluginBench hub(plan.station_settings().environments[0].built_in,
+                  plan.station_settings().environments[0].parameters, 9);
   for (int k = 0; k < 40; ++k) {
     scene.step();
     if (scene.frame.packets.empty() || scene.frame.packets[0].command != OverheadCommand::kRepeat) continue;
     for (const ArkMessage& message : unpack(scene.frame.packets[0].message)) {
       if (message.id == kArkNobody) continue;
-      EXPECT_EQ(message, hub->sense({message.id, plan.initial_pose(message.id), 0}).value());
+      EXPECT_EQ(message, hub.sense({message.id, plan.initial_pose(message.id)}).value());
       inside += message.type;
     }
   }
