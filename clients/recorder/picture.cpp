@@ -264,6 +264,61 @@ std::string draw_circles(const std::vector<VirtualCircle>& circles, const View& 
   return out;
 }
 
+/// What virtual environments have painted, by environment.
+using Floors = std::map<std::uint32_t, proto::FloorRecord>;
+
+struct FirstAndLastFloors {
+  Floors first, last;
+};
+
+/// In a pass of its own over the recording.
+FirstAndLastFloors floors_of(const std::filesystem::path& recording) {
+  FirstAndLastFloors floors;
+  Reader reader(recording);
+  while (const proto::Record* const record = reader.next()) {
+    if (!record->has_floor()) continue;
+    floors.first.try_emplace(record->floor().environment(), record->floor());
+    floors.last[record->floor().environment()] = record->floor();
+  }
+  return floors;
+}
+
+std::string fill_of(const std::string& rgba, std::size_t index) {
+  const auto octet = [&](std::size_t k) {
+    return static_cast<unsigned>(static_cast<unsigned char>(rgba[4 * index + k]));
+  };
+  return fmt::format("fill=\"#{:02x}{:02x}{:02x}\" fill-opacity=\"{:.2f}\"", octet(0), octet(1), octet(2),
+                     octet(3) / 255.0);
+}
+
+/// The raster cell by cell, without transparent cells; then the circles with their names.
+std::string draw_floor(const proto::FloorRecord& floor, const View& view, double width_mm, double height_mm) {
+  constexpr double kText = 130;
+  std::string out;
+  const std::size_t cells = std::size_t{floor.columns()} * floor.rows();
+  for (std::size_t i = 0; i < cells && floor.rgba().size() == 4 * cells; ++i) {
+    if (floor.rgba()[4 * i + 3] == 0) continue;
+    const double x_mm = (static_cast<double>(i % floor.columns()) / floor.columns() - 0.5) * width_mm;
+    const double y_mm = (0.5 - static_cast<double>(i / floor.columns()) / floor.rows()) * height_mm;
+    const long x = view.x(x_mm), y = view.y(y_mm);
+    put(out, "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" {}/>\n", x, y,
+        view.x(x_mm + width_mm / floor.columns()) - x, view.y(y_mm - height_mm / floor.rows()) - y,
+        fill_of(floor.rgba(), i));
+  }
+  const int circles = floor.circle_name_size();
+  if (floor.circle_mm_size() != 3 * circles || floor.circle_rgba().size() != 4 * static_cast<std::size_t>(circles))
+    return out;
+  for (int i = 0; i < circles; ++i) {
+    const double radius = view.length(floor.circle_mm(3 * i + 2));
+    const long x = view.x(floor.circle_mm(3 * i)), y = view.y(floor.circle_mm(3 * i + 1));
+    put(out, "<circle cx=\"{}\" cy=\"{}\" r=\"{:.1f}\" {} stroke=\"{}\" stroke-width=\"14\"/>\n", x, y, radius,
+        fill_of(floor.circle_rgba(), static_cast<std::size_t>(i)), svg::kFaint);
+    out += svg::text(static_cast<double>(x), static_cast<double>(y) - radius - 40, kText,
+                     svg::shortened(floor.circle_name(i), 20), svg::kFaint, svg::Anchor::kMiddle);
+  }
+  return out;
+}
+
 /// The lamps at a given time as suns; hollow if they are off.
 std::string draw_lamps(const proto::Light& light, double time_s, const View& view) {
   constexpr double kRadius = 55, kRay = 100;
@@ -433,10 +488,14 @@ std::string picture_svg(Reader& recording) {
   *stated.mutable_obstacle() = header.obstacle();
   *stated.mutable_movable() = header.movable();
   const World world(stated);
-  const std::vector<VirtualCircle> circles = virtual_circles(header);
+  const FirstAndLastFloors floors = floors_of(recording.path());
+  std::vector<VirtualCircle> circles;
+  if (floors.last.empty()) circles = virtual_circles(header);
   const auto ground = [&](const View& of, const Snapshot& at) {
-    return draw_arena(of, world, arena_width, arena_height) + draw_circles(circles, of) +
-           draw_bodies(world, at, of);
+    std::string out = draw_arena(of, world, arena_width, arena_height) + draw_circles(circles, of);
+    for (const auto& [environment, floor] : &at == &paths.first() ? floors.first : floors.last)
+      out += draw_floor(floor, of, arena_width, arena_height);
+    return out + draw_bodies(world, at, of);
   };
   Box everything;
   for (std::size_t i = 0; i < paths.robots(); ++i) {

@@ -1,5 +1,6 @@
 #include "services/ark/plugin_host.hpp"
 
+#include <array>
 #include <utility>
 
 #include "core/base/error.hpp"
@@ -7,8 +8,11 @@
 
 // createExpt() of each built-in plugin, under a name of its own: CMakeLists.txt.
 extern "C" {
-kilotwin::station::KilobotExperiment* kilotwin_plugin_hub();
+kilotwin::station::KilobotExperiment* kilotwin_plugin_assign_ids();
+kilotwin::station::KilobotExperiment* kilotwin_plugin_calibrate();
 kilotwin::station::KilobotExperiment* kilotwin_plugin_foraging();
+kilotwin::station::KilobotExperiment* kilotwin_plugin_hub();
+kilotwin::station::KilobotExperiment* kilotwin_plugin_identify();
 }
 
 namespace kilotwin::ark {
@@ -29,8 +33,12 @@ class BuiltIn final : public PluginHost {
 std::unique_ptr<PluginHost> make_plugin_host(const EnvironmentSettings& setting, const std::string& host_sha256,
                                              const std::filesystem::path& run_directory) {
   using Create = station::KilobotExperiment* (*)();
-  for (const auto& [name, create] : {std::pair<const char*, Create>{"hub", kilotwin_plugin_hub},
-                                     std::pair<const char*, Create>{"foraging", kilotwin_plugin_foraging}}) {
+  constexpr std::array<std::pair<const char*, Create>, 5> kBuiltIn{{{"assign_ids", kilotwin_plugin_assign_ids},
+                                                                    {"calibrate", kilotwin_plugin_calibrate},
+                                                                    {"foraging", kilotwin_plugin_foraging},
+                                                                    {"hub", kilotwin_plugin_hub},
+                                                                    {"identify", kilotwin_plugin_identify}}};
+  for (const auto& [name, create] : kBuiltIn) {
     if (setting.built_in == name) return std::make_unique<BuiltIn>(create());
   }
   if (!setting.built_in.empty())
