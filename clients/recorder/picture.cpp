@@ -296,7 +296,7 @@ std::string draw_floor(const proto::FloorRecord& floor, const View& view, double
   constexpr double kText = 130;
   std::string out;
   const std::size_t cells = std::size_t{floor.columns()} * floor.rows();
-  for (std::size_t i = 0; i < cells && floor.rgba().size() == 4 * cells; ++i) {
+  for (std::size_t i = 0; i < cells; ++i) {
     if (floor.rgba()[4 * i + 3] == 0) continue;
     const double x_mm = (static_cast<double>(i % floor.columns()) / floor.columns() - 0.5) * width_mm;
     const double y_mm = (0.5 - static_cast<double>(i / floor.columns()) / floor.rows()) * height_mm;
@@ -306,8 +306,6 @@ std::string draw_floor(const proto::FloorRecord& floor, const View& view, double
         fill_of(floor.rgba(), i));
   }
   const int circles = floor.circle_name_size();
-  if (floor.circle_mm_size() != 3 * circles || floor.circle_rgba().size() != 4 * static_cast<std::size_t>(circles))
-    return out;
   for (int i = 0; i < circles; ++i) {
     const double radius = view.length(floor.circle_mm(3 * i + 2));
     const long x = view.x(floor.circle_mm(3 * i)), y = view.y(floor.circle_mm(3 * i + 1));

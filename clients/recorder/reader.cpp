@@ -229,6 +229,16 @@ const char* Reader::defect_of_record() const {
     }
     case proto::Record::kHash:
       return valid_tick(record_.hash().first_tick()) ? nullptr : "hashes of ticks out of range";
+    case proto::Record::kFloor: {
+      constexpr std::uint32_t kMostCells = 256;
+      const proto::FloorRecord& floor = record_.floor();
+      const auto circles = static_cast<std::size_t>(floor.circle_name_size());
+      const bool right = floor.columns() <= kMostCells && floor.rows() <= kMostCells &&
+                         floor.rgba().size() == std::size_t{4} * floor.columns() * floor.rows() &&
+                         static_cast<std::size_t>(floor.circle_mm_size()) == 3 * circles &&
+                         floor.circle_rgba().size() == 4 * circles && all_within(floor.circle_mm(), kFarthest_mm);
+      return right && valid_tick(floor.tick()) ? nullptr : "a floor out of range";
+    }
     case proto::Record::kInput:
       return valid_tick(record_.input().tick()) ? nullptr : "an input at a tick out of range";
     case proto::Record::kMessages: {

@@ -66,7 +66,8 @@ class PluginProcess final : public PluginHost {
     os::Command command;
     command.arguments = {program.string(), object.string()};
     command.output = theirs_.get();
-    // Not by the end of the thread that starts it, which may be one of a pool: the socket's end tells the plugin as well.
+    // One that hangs does not outlive the station, however that ends.
+    command.at_death = SIGKILL;
     command.own_group = true;
     return command;
   }

@@ -146,7 +146,8 @@ CompiledProgram compile_station_plugin(const std::vector<fs::path>& sources, con
   std::error_code error;
   if (fs::is_regular_file(kept, error)) return finished(kept);
   const Arguments hidden_c{"-x", "c", "-std=gnu11", "-fno-builtin", "-fvisibility=hidden"};
-  append(arguments, {"-shared", "-Wl,--build-id=none", "-Wl,--no-undefined", "-Wl,-z,now"});
+  // Its own copies of what the interface defines inline, not those of the program that loads it.
+  append(arguments, {"-shared", "-Wl,--build-id=none", "-Wl,--no-undefined", "-Wl,-z,now", "-Wl,-Bsymbolic", "-s"});
   for (const fs::path& source : sources) arguments.push_back(source.string());
   for (const fs::path& object :
        {toolchain.object("core/math/elementary.c", hidden_c),

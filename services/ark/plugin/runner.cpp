@@ -254,6 +254,12 @@ void Runner::paint() {
     for (Floor::Circle& circle : reply_.floor.circles)
       circle.centre = {circle.centre.x() - arena_mm_.x() / 2, arena_mm_.y() / 2 - circle.centre.y()};
   }
+  constexpr double kFarthest_mm = 1e6;
+  for (const Floor::Circle& circle : reply_.floor.circles) {
+    for (const double length : {circle.centre.x(), circle.centre.y(), circle.radius}) {
+      if (!(length >= -kFarthest_mm && length <= kFarthest_mm)) throw std::runtime_error("a circle out of range");
+    }
+  }
   reply_.painted = !reply_.floor.empty();
 }
 

@@ -44,7 +44,7 @@ class PluginBench {
         robot.pose.x_mm, robot.pose.y_mm, kt_cos(robot.pose.heading_rad), kt_sin(robot.pose.heading_rad),
         robot.colour,    robot.seen};
     request.tick = ++ticks_;
-    request.time_s = 0.1 * ticks_;
+    request.time_s = 0.1 * static_cast<double>(ticks_);
     request.log = true;
     request.paint = true;
     station::Reply reply = host->ask(request);
