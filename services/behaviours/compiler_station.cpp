@@ -42,7 +42,7 @@ CppCompiler find_cpp_compiler(const fs::path& wanted) {
 /// As robots' programs are compiled, where that applies: no contraction, wrapping integers, locals that start as zero, one CPU.
 Arguments flags_for(const fs::path& runtime) {
   return {"-O2",
-          "-g1",
+          "-g0",
           "-w",
           "-fdiagnostics-color=never",
           "-march=x86-64",
