@@ -17,38 +17,48 @@ Colour mixed(const Colour& under, const Colour& over, double share) {
   return result;
 }
 
-/// A value in [-1, 1) for each point of a lattice.
-double lattice(std::int64_t column, std::int64_t row, std::uint64_t octave) {
-  // The finaliser of SplitMix64 (Steele, Lea and Flood, 2014).
-  std::uint64_t z = static_cast<std::uint64_t>(column) * 0x9e3779b97f4a7c15u ^
-                    static_cast<std::uint64_t>(row) * 0xc2b2ae3d27d4eb4fu ^ octave * 0x165667b19e3779f9u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  z ^= z >> 31;
-  return static_cast<double>(z >> 11) * 0x1p-52 - 1;
-}
+/// Values in [-1, 1) on a lattice that repeats after kPeriod points, which is seen by nobody.
+class Lattice {
+ public:
+  static constexpr int kPeriod = 512;
 
-/// Smooth noise between lattice points `cell_mm` apart.
-double noise_at(double x_mm, double y_mm, double cell_mm, std::uint64_t octave) {
-  const double u = x_mm / cell_mm, v = y_mm / cell_mm;
-  const double column = std::floor(u), row = std::floor(v);
-  const auto eased = [](double t) { return t * t * (3 - 2 * t); };
-  const double fu = eased(u - column), fv = eased(v - row);
-  const auto c = static_cast<std::int64_t>(column), r = static_cast<std::int64_t>(row);
-  const double top = std::lerp(lattice(c, r, octave), lattice(c + 1, r, octave), fu);
-  const double bottom = std::lerp(lattice(c, r + 1, octave), lattice(c + 1, r + 1, octave), fu);
-  return std::lerp(top, bottom, fv);
-}
+  Lattice() : values_(static_cast<std::size_t>(kPeriod) * kPeriod) {
+    constexpr std::uint64_t kFloorSeed = 4711;
+    cv::Mat table(kPeriod, kPeriod, CV_32F, values_.data());
+    cv::RNG(kFloorSeed).fill(table, cv::RNG::UNIFORM, -1, 1);
+  }
+  /// Smooth noise between lattice points `cell_mm` apart.
+  [[nodiscard]] double at(double x_mm, double y_mm, double cell_mm) const {
+    const double u = x_mm / cell_mm, v = y_mm / cell_mm;
+    const double column = std::floor(u), row = std::floor(v);
+    const auto eased = [](double t) { return t * t * (3 - 2 * t); };
+    const double fu = eased(u - column), fv = eased(v - row);
+    const int c = static_cast<int>(column), r = static_cast<int>(row);
+    const double top = point(c, r) + fu * (point(c + 1, r) - point(c, r));
+    const double bottom = point(c, r + 1) + fu * (point(c + 1, r + 1) - point(c, r + 1));
+    return top + fv * (bottom - top);
+  }
 
-double texture_at(const Look& look, double x_mm, double y_mm) {
+ private:
+  [[nodiscard]] double point(int column, int row) const {
+    constexpr unsigned kMask = kPeriod - 1;
+    const unsigned c = static_cast<unsigned>(column) & kMask, r = static_cast<unsigned>(row) & kMask;
+    return static_cast<double>(values_[r * kPeriod + c]);
+  }
+  std::vector<float> values_;
+};
+
+/// Stains, blotches and grain.
+double texture_at(const Lattice& lattice, const Look& look, double x_mm, double y_mm) {
   if (look.floor_texture == 0) return 0;
-  return look.floor_texture * (0.5 * noise_at(x_mm, y_mm, 90, 1) + 0.3 * noise_at(x_mm, y_mm, 14, 2) +
-                               0.2 * noise_at(x_mm, y_mm, 2.5, 3));
+  return look.floor_texture *
+         (0.5 * lattice.at(x_mm, y_mm, 90) + 0.3 * lattice.at(x_mm, y_mm, 14) + 0.2 * lattice.at(x_mm, y_mm, 2.5));
 }
 
 /// The colour of the floor plane at a point, without light.
-Colour surface_at(const World& world, const Look& look, double x_mm, double y_mm, double px_per_mm) {
-  const double texture = texture_at(look, x_mm, y_mm);
+Colour surface_at(const World& world, const Lattice& lattice, const Look& look, double x_mm, double y_mm,
+                  double px_per_mm) {
+  const double texture = texture_at(lattice, look, x_mm, y_mm);
   Colour colour = look.floor;
   for (double& level : colour) level += texture;
   const double clearance_mm = world.arena.clearance_mm({x_mm, y_mm});
@@ -84,13 +94,14 @@ cv::Mat paint_background(const World& world, const CameraModel& camera, const Lo
   const cv::Point2d middle = camera.at_height({camera.width_px / 2.0, camera.height_px / 2.0}, 0);
   const double px_per_mm = scale_at(camera, middle.x, middle.y);
   const CameraModel::ToPlane floor(camera, 0);
+  const Lattice lattice;
   for (int row = 0; row < picture.rows; ++row) {
     auto* const pixels = picture.ptr<cv::Vec3b>(row);
     for (int column = 0; column < picture.cols; ++column) {
       const cv::Point2d pixel(column, row);
       const cv::Point2d at = floor(pixel);
       const double light = camera.gain * camera.lens_share(pixel) * camera.room_light(at.x, at.y);
-      pixels[column] = lit(surface_at(world, look, at.x, at.y, px_per_mm), light);
+      pixels[column] = lit(surface_at(world, lattice, look, at.x, at.y, px_per_mm), light);
     }
   }
   return picture;

@@ -75,7 +75,9 @@ std::string encoded(const cv::Mat& picture, PictureFormat format, const FrameSta
   if (!cv::imencode(jpeg ? ".jpg" : ".png", picture, bytes, parameters))
     throw RunError("a picture could not be encoded");
   const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  return jpeg ? jpeg_with_comment(file, stamp.text()) : png_with_comment(file, stamp.text());
+  // The line's end separates the last number from the bytes behind it, which may be digits.
+  const std::string comment = stamp.text() + "\n";
+  return jpeg ? jpeg_with_comment(file, comment) : png_with_comment(file, comment);
 }
 
 std::optional<FrameStamp> stamp_of(std::string_view file) {

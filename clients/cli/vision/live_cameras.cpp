@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <future>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -63,8 +64,12 @@ class Studio {
     if (!live.picture.empty() || live.mjpeg)
       big_ = std::make_unique<Renderer>(world, big_camera(live.camera, world), live.camera.look);
     if (live.directory.empty()) return;
+    // Backgrounds take long: they are painted at the same time.
+    std::vector<std::future<Renderer>> painted;
     for (const cameras::CameraModel& camera : cameras::ark_cameras(model_of(live.camera)))
-      ark_.emplace_back(world, camera, live.camera.look);
+      painted.push_back(std::async(std::launch::async,
+                                   [&world, &live, camera] { return Renderer(world, camera, live.camera.look); }));
+    for (std::future<Renderer>& one : painted) ark_.push_back(one.get());
     if (std::max(world.arena.half_width_mm(), world.arena.half_height_mm()) > cameras::kArkHalf_mm)
       warn(
           fmt::format("kilotwin: --dir: the arena ({}) is larger than the 2000 mm x 2000 mm that ARK sees; robots "

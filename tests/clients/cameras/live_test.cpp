@@ -76,7 +76,7 @@ TEST_F(LiveCamerasTest, PicturesShowWhatWasRecordedAtTheirTick) {
   while (cameras.running()) {
     if (const auto file = os::read_if_there(scratch / "arena.png")) {
       const auto stamp = stamp_of(*file);
-      ASSERT_TRUE(stamp);
+      ASSERT_TRUE(stamp) << file->size() << " bytes: " << file->substr(0, 200);
       const auto now =
           std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
               .count();

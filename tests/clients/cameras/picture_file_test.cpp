@@ -39,6 +39,18 @@ TEST(PictureFile, BothFormatsCarryTheStampAndDecode) {
   }
 }
 
+TEST(PictureFile, AStampIsReadWhateverBytesFollowIt) {
+  // A PNG has the checksum of the stamp behind it, whose first byte is a digit for some stamps.
+  FrameStamp stamp = kStamp;
+  for (int i = 0; i < 500; ++i) {
+    ++stamp.capture_ns;
+    const std::optional<FrameStamp> read =
+        stamp_of(encoded(cv::Mat::zeros(2, 2, CV_8UC3), PictureFormat::kPng, stamp));
+    ASSERT_TRUE(read) << i;
+    ASSERT_EQ(read->capture_ns, stamp.capture_ns);
+  }
+}
+
 TEST(PictureFile, FilesWithoutAStampHaveNone) {
   std::vector<std::uint8_t> plain;
   ASSERT_TRUE(cv::imencode(".jpg", gradient(), plain));
