@@ -185,6 +185,7 @@ void Renderer::draw_led(cv::Mat& picture, const RobotView& robot) const {
   // A little of the light is white: the plastic scatters it, and the filters of a sensor overlap.
   constexpr double kScattered = 0.1;
   std::vector<FromPixel> from;
+  from.reserve(static_cast<std::size_t>(steps));
   for (int step = 0; step < steps; ++step)
     from.emplace_back(camera_, jacobian, led_pose(pose_at(robot, step, steps)), look_.body_height_mm);
   for (int row = box.y; row < box.y + box.height; ++row) {
