@@ -199,6 +199,11 @@ Summary read_summary(const std::filesystem::path& file) {
     messages.at("received").get_to(s.messages.received);
     messages.at("collided").get_to(s.messages.collided);
     json.at("robots_failed").get_to(s.robots_failed);
+    if (const auto station = json.find("station"); station != json.end()) {
+      for (const Json& plugin : station->at("plugins"))
+        s.station.plugins.push_back(
+            {plugin.at("name").get<std::string>(), plugin.at("failure").get<std::string>()});
+    }
     json.at("recoveries").get_to(s.recoveries);
     // The other fields are not part of the contract and may be missing.
     s.hosts = json.value("hosts", 1u);
