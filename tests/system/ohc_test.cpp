@@ -66,7 +66,7 @@ class Ohc : public testing::Test {
 };
 
 constexpr std::uint8_t kWakeup = 0x85;
-constexpr char kIdle = 1;
+constexpr char kIdle = 1, kRunning = 4;  // kilolib's states
 
 TEST_F(Ohc, AStationProgramCommandsTheRobotsOfARun) {
   const fs::path link = scratch_.path() / "ttyUSB0";
@@ -75,7 +75,7 @@ TEST_F(Ohc, AStationProgramCommandsTheRobotsOfARun) {
   ASSERT_TRUE(fs::is_symlink(link));
   const auto run = start_run();
   ASSERT_TRUE(ohc->says("run disperse", 60));
-  ASSERT_TRUE(eventually([&] { return fs::exists(scratch_.path() / "run/recording.ktrec"); }));
+  ASSERT_TRUE(eventually([&] { return life_cycles_become(kRunning); }, 60));
 
   // Noise, a cut packet, a packet with a wrong checksum, then WAKEUP again and again, each time by a program that opens the
   // port anew.
@@ -88,7 +88,7 @@ TEST_F(Ohc, AStationProgramCommandsTheRobotsOfARun) {
   noise.insert(noise.end(), wrong.begin(), wrong.begin() + 60);
   wrong[7] ^= 4;
   noise.insert(noise.end(), wrong.begin(), wrong.end());
-  ASSERT_EQ(write(port, noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
+  ASSERT_EQ(::write(port, noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
   close(port);
   const OverheadPacket wakeup{OverheadCommand::kRepeat, {0, 0, 0, 0, 0, 0, 0, 0, 0, kWakeup}};
   EXPECT_TRUE(eventually(
