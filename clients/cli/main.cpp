@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
                                add_build(program),          add_sweep(program),
                                add_export(program),         add_replay(program),
                                add_identify(program),       add_service(program, started_s),
+                               add_ros2(program),           add_play(program),
                                add_config(program),         add_doctor(program),
                                add_cameras(program)};
                      });

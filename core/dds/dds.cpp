@@ -11,6 +11,7 @@
 namespace kilotwin::dds {
 
 std::string cyclone_configuration(const Transport& transport) {
+  if (!transport.configuration.empty()) return transport.configuration;
   const bool local = transport.peers.empty();
   std::string peers;
   if (local) peers = R"(<Peer Address="127.0.0.1"/>)";
@@ -95,20 +96,31 @@ Domain::~Domain() {
   if (--domains[id_].users == 0) domains.erase(id_);
 }
 
-Participant::Participant(const Transport& transport)
-    : domain_(transport),
-      participant_(dds_create_participant(transport.domain, nullptr, nullptr),
-                   fmt::format("a participant in domain {}", transport.domain)) {}
-
-static_assert(10 + 2 * (kMostParticipants - 1) + 1 < 250, "the last index stays below the next domain's ports");
-
-namespace detail {
 namespace {
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
 };
 using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
+
+Qos participant_qos(const Transport& transport) {
+  Qos qos(dds_create_qos());
+  if (!transport.user_data.empty())
+    dds_qset_userdata(qos.get(), transport.user_data.data(), transport.user_data.size());
+  return qos;
+}
+
+}  // namespace
+
+Participant::Participant(const Transport& transport)
+    : domain_(transport),
+      participant_(dds_create_participant(transport.domain, participant_qos(transport).get(), nullptr),
+                   fmt::format("a participant in domain {}", transport.domain)) {}
+
+static_assert(10 + 2 * (kMostParticipants - 1) + 1 < 250, "the last index stays below the next domain's ports");
+
+namespace detail {
+namespace {
 
 constexpr int kFrameDepth = 8;  // federates are at most 4 ticks apart: core/federation/schedule.hpp
 
@@ -144,6 +156,10 @@ Qos make_qos(const Channel& channel) {
       dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
       break;
+    case Delivery::kNode:
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 10);
+      dds_qset_writer_data_lifecycle(qos.get(), false);
+      break;
     case Delivery::kSensor:
       dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 16);
@@ -161,6 +177,7 @@ Entity make_topic(const Participant& participant, const Channel& channel, const 
 Qos endpoint_qos(const Channel& channel) {
   Qos qos = make_qos(channel);
   if (!channel.partition.empty()) dds_qset_partition1(qos.get(), channel.partition.c_str());
+  if (!channel.user_data.empty()) dds_qset_userdata(qos.get(), channel.user_data.data(), channel.user_data.size());
   return qos;
 }
 

@@ -20,6 +20,10 @@ struct Transport {
   /// Addresses of all machines of the run, including this one. Empty: all processes are on this machine, and all traffic
   /// uses the loopback interface.
   std::vector<std::string> peers;
+  /// The whole configuration, as CYCLONEDDS_URI has it, in place of what `peers` makes. Empty: what `peers` makes.
+  std::string configuration = {};
+  /// USER_DATA of the participant: what other participants are told of it.
+  std::string user_data = {};
 };
 
 /// Highest domain whose UDP ports (7400 + 250 domain + ...) exist.
@@ -49,6 +53,7 @@ enum class Delivery {
   kStatus,      ///< reliable, keep-last 1, transient-local
   kRequest,     ///< reliable, keep-last 16, volatile: requests of outsiders
   kTelemetry,   ///< best effort, keep-last 1, volatile
+  kNode,        ///< reliable, keep-last 10, volatile; a writer that ends disposes nothing: as nodes of ROS 2 write
   kSensor,      ///< best effort, keep-last 16, volatile: sensor frames; a late frame is worth less than the next
 };
 
@@ -94,6 +99,8 @@ struct Channel {
   std::string topic;
   Delivery delivery;
   std::string partition;
+  /// USER_DATA of the endpoint.
+  std::string user_data = {};
 };
 
 namespace detail {

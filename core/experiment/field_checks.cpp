@@ -379,6 +379,7 @@ void check_values(const LoadedExperiment& loaded) {
   check_surroundings(loaded);
   check_effects(loaded);
   check_radio(loaded);
+  check_doors(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",

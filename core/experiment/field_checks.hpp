@@ -17,6 +17,9 @@ void check_effects(const LoadedExperiment& loaded);
 /// Checks dependencies between fields of the infrared channel.
 void check_radio(const LoadedExperiment& loaded);
 
+/// Checks `door` as far as no poses of robots are needed.
+void check_doors(const LoadedExperiment& loaded);
+
 /// Number of robots in the group by its `count`, or by its rings if `count` is absent. 0: its CSV file gives the number.
 [[nodiscard]] std::uint64_t stated_count(const proto::RobotGroup& group);
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/experiment/limits.hpp"
+#include "idl/door.pb.h"
 #include "idl/experiment.pb.h"
 #include "idl/model.pb.h"
 
@@ -238,6 +239,23 @@ constexpr FieldRule kRules[] = {
 
     {"Recording.every_s", 0, kLongest_s, "s", Lower::kExcluded},
 
+    {"Door.position_sd_mm", 0, 1000, "mm", Lower::kExcluded},
+    {"Door.heading_sd_deg", 0, 180, "degrees", Lower::kExcluded},
+    {"DoorRobots.first_number", 0, kUnlimited, ""},
+    {"DoorRobots.first_robot", 0, kMostRobots - 1, ""},
+    {"NamedRobot.robot", 0, kMostRobots - 1, ""},
+    {"Placement.x_mm", -kLongest_mm, kLongest_mm, "mm"},
+    {"Placement.y_mm", -kLongest_mm, kLongest_mm, "mm"},
+    {"Placement.turn_deg", -360, 360, "degrees"},
+    {"Placement.unit_mm", 0, 1e6, "mm", Lower::kExcluded},
+    {"Placement.heading_offset_deg", -360, 360, "degrees"},
+    {"Ros2Door.domain", 0, 230, ""},
+    {"Ros2Door.gather_ms", 0, 1000, "ms"},
+    {"Ros2Door.max_tilt_deg", 0, 180, "degrees"},
+    {"ArkDoor.interval_ms", 10, 10000, "ms"},
+    {"LogDoor.columns", 3, 6, ""},
+    {"LogDoor.time_unit_s", 0, 3600, "s", Lower::kExcluded},
+
     {"Deployment.partition_columns", 1, 64, ""},
     {"Deployment.partition_rows", 1, 64, ""},
     {"Deployment.hosts", 1, 64, ""},
@@ -248,7 +266,7 @@ using RuleTable = std::map<const FieldDescriptor*, const FieldRule*>;
 
 RuleTable rules_by_field() {
   const pb::FileDescriptor* const files[] = {proto::Experiment::descriptor()->file(),
-                                             proto::Model::descriptor()->file(),
+                                             proto::Door::descriptor()->file(), proto::Model::descriptor()->file(),
                                              proto::Effect::descriptor()->file()};
   RuleTable table;
   for (const FieldRule& rule : kRules) {

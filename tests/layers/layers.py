@@ -22,7 +22,7 @@ SOURCES = (".c", ".cpp", ".h", ".hpp")
 SKIPPED = ("tests/services/behaviours/corpus/", "bench/cycles/", "services/behaviours/runtime/")
 # Folders in which a source with its header and another one may refer to each other, as a factory does to what it makes.
 CIRCLES_ALLOWED = ("core/federation/", "services/", "clients/", "tests/", "bench/")
-GENERATED = {"frames.h": "wire", "session.h": "wire", "public.h": "wire"}
+GENERATED = {"frames.h": "wire", "session.h": "wire", "public.h": "wire", "ros2.h": "wire"}
 INCLUDE = re.compile(r'\s*#\s*include\s+(?:"([^"]+)"|(<[^>]+>))')
 
 

@@ -94,7 +94,7 @@ std::string anchor(std::string_view title) {
 
 /// The page that has the section of a type.
 std::string page_of(const pb::FileDescriptor& file) {
-  return file.name() == "experiment.proto" ? "experiment.md" : "model.md";
+  return file.name() == "experiment.proto" || file.name() == "door.proto" ? "experiment.md" : "model.md";
 }
 
 template <typename Type> std::string link_to(const Type& type, const pb::FileDescriptor& from) {

@@ -7,7 +7,7 @@
 
 namespace kilotwin::reference {
 
-/// Every message that idl/experiment.proto defines. `descriptors`: the .proto files as protoc --include_source_info wrote them.
+/// Every message that idl/experiment.proto and idl/door.proto define. `descriptors`: the .proto files as protoc --include_source_info wrote them.
 /// Throws std::runtime_error where the file cannot be read.
 [[nodiscard]] std::string experiment_schema(const std::filesystem::path& descriptors);
 /// The same of idl/model.proto and idl/effects.proto.
