@@ -188,7 +188,7 @@ def options_of(kilotwin, *command):
 def commands_of(kilotwin):
     """{command: its options}."""
     _, text = options_of(kilotwin)
-    names = re.findall(r"^  ([a-z]+) ", text[text.lower().find("subcommands"):], re.M)
+    names = re.findall(r"^  ([a-z][a-z0-9]*) ", text[text.lower().find("subcommands"):], re.M)
     return {name: options_of(kilotwin, name)[0] for name in names}
 
 
