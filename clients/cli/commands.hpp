@@ -26,6 +26,7 @@ struct Command {
 [[nodiscard]] Command add_replay(CLI::App& program);
 [[nodiscard]] Command add_identify(CLI::App& program);
 [[nodiscard]] Command add_cameras(CLI::App& program);
+[[nodiscard]] Command add_track(CLI::App& program);
 [[nodiscard]] Command add_service(CLI::App& program, double started_s);
 [[nodiscard]] Command add_config(CLI::App& program);
 [[nodiscard]] Command add_doctor(CLI::App& program);

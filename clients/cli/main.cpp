@@ -17,6 +17,6 @@ int main(int argc, char** argv) {
                                add_export(program),         add_replay(program),
                                add_identify(program),       add_service(program, started_s),
                                add_config(program),         add_doctor(program),
-                               add_cameras(program)};
+                               add_cameras(program),        add_track(program)};
                      });
 }

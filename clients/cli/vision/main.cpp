@@ -1,4 +1,4 @@
-// The program `kilotwin-vision`, which `kilotwin cameras` starts. It is a program of its own so that the simulator builds and
+// The program `kilotwin-vision`, which `kilotwin cameras` and `kilotwin track` start. It is a program of its own so that the simulator builds and
 // runs without OpenCV.
 
 #include <CLI/CLI.hpp>
@@ -9,5 +9,7 @@ int main(int argc, char** argv) {
   using namespace kilotwin::cli;
   return run_program(argc, argv,
                      "Pictures of Kilotwin's arenas. Start: kilotwin cameras --domain N --picture F.jpg",
-                     [](CLI::App& program) -> std::vector<Command> { return {add_cameras(program)}; });
+                     [](CLI::App& program) -> std::vector<Command> {
+                       return {add_cameras(program), add_track(program)};
+                     });
 }
