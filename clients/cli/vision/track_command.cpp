@@ -200,10 +200,10 @@ void add_calibration_options(CLI::App& app, TrackArguments& arguments) {
 Command add_track(CLI::App& program) {
   const auto arguments = std::make_shared<TrackArguments>();
   CLI::App& app = *program.add_subcommand("track", "poses and LEDs of real robots from a camera or from pictures");
-  app.add_option("source", arguments->source,
+  app.add_option("SOURCE", arguments->source,
                  "picture, video file, directory of pictures, index of a camera, or URL of a stream")
       ->required()
-      ->type_name("SOURCE");
+      ->type_name("");
   app.add_option("--out", arguments->out, "table with a row per robot and frame; - for standard output")
       ->type_name("F.csv");
   app.add_flag("--force", arguments->force, "replace the table where it exists");
