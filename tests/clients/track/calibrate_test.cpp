@@ -17,7 +17,7 @@ namespace kilotwin::track {
 namespace {
 
 constexpr int kColumns = 9, kRows = 6;
-constexpr double kSquare_mm = 40;
+constexpr double kSquare_mm = 85;
 const cv::Size kPicture(960, 720);
 
 /// A camera above the floor with a lens; the first pose looks straight down from 1500 mm.
