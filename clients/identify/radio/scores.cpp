@@ -10,7 +10,7 @@
 namespace kilotwin::radio_fit {
 namespace {
 
-constexpr double kSilent = 0.02, kWhole = 0.6, kFar_mm = 125;
+constexpr double kSilent = 0.02, kWhole = 0.6, kFarLink_mm = 125;
 /// Shrinks a pair's mean and dispersion towards its displacement class, with the weight of this many runs.
 constexpr double kPriorRuns = 0.5;
 
@@ -66,7 +66,7 @@ Statistics statistics(const GridSet& set) {
         senders[static_cast<std::size_t>(j)].add(share, 1);
         silent += share < kSilent;
         entries += 1;
-        if (set.distance_mm(i, j) > kFar_mm && set.distance_mm(i, j) < kNeverHeard_mm) {
+        if (set.distance_mm(i, j) > kFarLink_mm && set.distance_mm(i, j) < kNeverHeard_mm) {
           partial += share > kSilent && share < kWhole;
           far_entries += 1;
         }
@@ -148,7 +148,7 @@ Errors compare(const GridSet& measured, const GridSet& simulated, const GridSet&
   for (std::size_t c = 0; c < real.classes.size(); ++c) {
     const double difference = std::abs(e.simulated.classes[c].reception - real.classes[c].reception);
     double& worst = real.classes[c].distance_mm <= kSurelyHeard_mm ? e.near_worst : e.far_worst;
-    if (real.classes[c].distance_mm <= kSurelyHeard_mm || real.classes[c].distance_mm > kFar_mm)
+    if (real.classes[c].distance_mm <= kSurelyHeard_mm || real.classes[c].distance_mm > kFarLink_mm)
       worst = std::max(worst, difference);
   }
   e.log_likelihood = log_likelihood(measured, simulated);
