@@ -72,7 +72,7 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
                                      proto::Manifest& manifest, Notes notes) {
   std::vector<fs::path> objects;
   for (const proto::RobotGroup& group : loaded.experiment.robots()) {
-    if (group.body() == proto::RobotGroup::TRACKED) {
+    if (group.body() == proto::RobotGroup::TRACKED && !group.says().shadow()) {
       manifest.add_group_program(kNoProgram);
       continue;
     }
@@ -81,6 +81,8 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
     const bool is_linked = firmware::is_firmware(sources.front()), is_firmware = is_linked || group.avr();
     if (is_linked && sources.size() > 1)
       throw UserError(fmt::format("{}: firmware is one file; link its parts first", sources.front().string()));
+    if (is_linked && group.says().shadow())
+      throw UserError(fmt::format("{}: a shadow runs natively; give C source", sources.front().string()));
     behaviours::CompileOptions options;
     options.defines = arguments.define;
     const behaviours::CompiledProgram compiled = is_linked     ? checked_firmware(sources.front())
@@ -230,6 +232,9 @@ Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, 
   for (proto::RobotEeprom& eeprom : read_eeproms(loaded, counts)) *manifest.add_eeprom() = std::move(eeprom);
   manifest.set_mode(arguments.mode);
   manifest.set_pace(parse_pace(arguments.pace));
+  if (arguments.max_lateness_ms > 0 && manifest.pace() == 0)
+    throw UserError("--max-lateness: a run without a pace is never late; give --pace 1 as well, or leave it away");
+  if (arguments.max_lateness_ms > 0) manifest.set_max_lateness_ms(arguments.max_lateness_ms);
   manifest.set_resumed(!arguments.resume.empty());
   resolved.objects = build_programs(loaded, arguments, manifest, notes);
   return resolved;

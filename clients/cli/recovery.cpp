@@ -117,6 +117,8 @@ Beginning beginning_of(const RunPlan& plan, const recorder::RunDirectory& direct
   const Tick first = beginning.resumed ? beginning.resumed->tick : Tick{0};
   recorder::Reader reader(recording);
   while (const proto::Record* record = reader.next()) {
+    if (record->has_tracker() && Tick{record->tracker().tick()} >= first)
+      beginning.tracker_samples.emplace_back(Tick{record->tracker().tick()}, from_record(record->tracker()));
     if (!record->has_input()) continue;
     Directive input = from_record(record->input());
     if (!changes_results(input) || input.tick < first || defect(input, plan) != nullptr) continue;

@@ -7,11 +7,13 @@
 
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "clients/recorder/run_directory.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/schedule.hpp"
+#include "core/frames/tracker_sample.hpp"
 #include "core/plan/plan.hpp"
 #include "services/behaviours/running_note.hpp"
 
@@ -27,6 +29,8 @@ void recover(const recorder::RunDirectory& directory, proto::Manifest& manifest,
 struct Beginning {
   std::optional<Checkpoint> resumed;  ///< absent: the attempt starts at tick 0
   std::vector<Directive> inputs;      ///< directives of an earlier attempt for later ticks, numbered from 0
+  /// Of trackers, stamped in an earlier attempt for later ticks, by ascending tick.
+  std::vector<std::pair<Tick, TrackerSample>> tracker_samples;
 };
 [[nodiscard]] Beginning beginning_of(const RunPlan& plan, const recorder::RunDirectory& directory);
 

@@ -142,6 +142,28 @@ class Verifier : public RunObserver {
   std::size_t hashes_ = 0, states_ = 0;
 };
 
+/// The recorded samples of trackers, tick by tick: one pass through the recording.
+class RecordedSamples {
+ public:
+  explicit RecordedSamples(const std::filesystem::path& recording) : reader_(recording) { advance(); }
+
+  std::vector<TrackerSample> of(Tick tick) {
+    std::vector<TrackerSample> samples;
+    for (; next_ != nullptr && Tick{next_->tick()} <= tick; advance()) samples.push_back(from_record(*next_));
+    return samples;
+  }
+
+ private:
+  void advance() {
+    const proto::Record* record = reader_.next();
+    while (record != nullptr && !record->has_tracker()) record = reader_.next();
+    next_ = record != nullptr ? &record->tracker() : nullptr;
+  }
+
+  recorder::Reader reader_;
+  const proto::TrackerRecord* next_ = nullptr;
+};
+
 /// The recorded inputs that a replay repeats, and a stop at the end of the recording.
 std::vector<Directive> inputs_of_replay(const Recorded& recorded) {
   std::vector<Directive> inputs = recorded.inputs;
@@ -158,11 +180,17 @@ std::vector<Directive> inputs_of_replay(const Recorded& recorded) {
 
 }  // namespace
 
-int replay_command(const std::filesystem::path& run, bool quiet) {
+int replay_command(const std::filesystem::path& run, const std::string& partitions, bool quiet) {
   const auto directory = recorder::RunDirectory::open(run, recorder::RunDirectory::Needs::kManifest);
   recorder::Reader reader(directory.recording());
   const Recorded recorded = read_recorded(reader);
-  const RunPlan plan(read_manifest(directory));
+  proto::Manifest manifest = read_manifest(directory);
+  if (!partitions.empty()) {
+    const auto [columns, rows] = parse_partitions(partitions);
+    manifest.mutable_experiment()->mutable_deployment()->set_partition_columns(columns);
+    manifest.mutable_experiment()->mutable_deployment()->set_partition_rows(rows);
+  }
+  const RunPlan plan(std::move(manifest));
   if (reader.header().robots() != plan.robots() || reader.header().tick_cycles() != plan.tick_length.cycles() ||
       reader.header().movable_size() != static_cast<int>(plan.movables())) {
     throw RunError(
@@ -179,6 +207,8 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
   local::LocalOptions options;
   if (plan.resumed) options.resumed = read_checkpoint(directory.path() / "resumed", plan.manifest());
   options.inputs = inputs_of_replay(recorded);
+  const auto samples = std::make_shared<RecordedSamples>(directory.recording());
+  options.tracker_samples = [samples](Tick tick) { return samples->of(tick); };
   options.save_checkpoints = false;
   options.run_directory = directory.path();
 
@@ -207,14 +237,18 @@ int replay_command(const std::filesystem::path& run, bool quiet) {
 Command add_replay(CLI::App& program) {
   struct Arguments {
     std::filesystem::path run;
+    std::string partitions;
     bool verify = false, quiet = false;
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App& app = *program.add_subcommand("replay", "step a recorded run again and compare it with the recording");
   app.add_option("RUN", arguments->run, "run directory")->required()->type_name("");
   app.add_flag("--verify", arguments->verify, "compare every state hash and every recorded state")->required();
+  app.add_option("--partitions", arguments->partitions,
+                 "columns and rows of physics partitions, such as 2x1 (default: as recorded)")
+      ->type_name("CxR");
   app.add_flag("--quiet", arguments->quiet, "no progress and no result on the screen");
-  return {&app, [arguments] { return replay_command(arguments->run, arguments->quiet); }};
+  return {&app, [arguments] { return replay_command(arguments->run, arguments->partitions, arguments->quiet); }};
 }
 
 }  // namespace kilotwin::cli

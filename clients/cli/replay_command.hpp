@@ -2,11 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace kilotwin::cli {
 
 /// Returns 0 if all agree. Throws RunError with the first tick that differs, or with the reason if the recording is damaged or too
-/// short. Throws UserError if the directory holds no run.
-int replay_command(const std::filesystem::path& run, bool quiet);
+/// short; UserError if the directory holds no run. `partitions`: "CxR", or empty for those of the recorded run.
+int replay_command(const std::filesystem::path& run, const std::string& partitions, bool quiet);
 
 }  // namespace kilotwin::cli

@@ -59,6 +59,12 @@ void run_in_this_process(const RunPlan& plan, const recorder::RunDirectory& dire
   Beginning beginning = beginning_of(plan, directory);
   options.resumed = std::move(beginning.resumed);
   options.inputs = std::move(beginning.inputs);
+  options.tracker_samples = [stamped = std::move(beginning.tracker_samples),
+                             next = std::size_t{0}](Tick tick) mutable {
+    std::vector<TrackerSample> samples;
+    for (; next < stamped.size() && stamped[next].first <= tick; ++next) samples.push_back(stamped[next].second);
+    return samples;
+  };
   const auto programs = behaviours::ProgramSet::load(plan, directory.path());
   ProgressBar progress(plan, !quiet);
   RunRecorder run_recorder(plan, directory, options.resumed, [&](const RunProgress& now) { progress.show(now); });
@@ -179,6 +185,11 @@ Command add_run(CLI::App& program, double started_s) {
   app.add_option("--pace", arguments->pace, "max, or simulated time over wall time: 1 is real time")
       ->capture_default_str()
       ->type_name("FACTOR");
+  app.add_option("--max-lateness", arguments->max_lateness_ms,
+                 "with --pace: end the run with status 1 when a tick begins so much behind the pace; 0: never")
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->capture_default_str()
+      ->type_name("MS");
   app.add_option("--checkpoint-every", arguments->checkpoint_every_s, "simulated time between checkpoints, s")
       ->type_name("SECONDS");
   app.add_option("--resume", arguments->resume, "start from the newest checkpoint of that run")->type_name("RUN");

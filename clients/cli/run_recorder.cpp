@@ -1,11 +1,14 @@
 #include "clients/cli/run_recorder.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
 #include "clients/cli/recovery.hpp"
 #include "clients/recorder/picture.hpp"
 #include "clients/recorder/reader.hpp"
+#include "core/base/error.hpp"
 
 namespace kilotwin::cli {
 namespace {
@@ -19,6 +22,11 @@ proto::RecordingHeader header_of(const RunPlan& plan, const recorder::RunDirecto
   }
   return recorder::recording_header(plan.manifest(), resumed ? resumed->tick : Tick{0},
                                     resumed ? resumed->hash_chain() : 0);
+}
+
+proto::InputRecord::Kind kind_of(DirectiveKind kind) {
+  return kind == DirectiveKind::kMembership ? proto::InputRecord::MEMBERSHIP
+                                            : static_cast<proto::InputRecord::Kind>(kind);
 }
 
 }  // namespace
@@ -64,6 +72,8 @@ void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
     } else if (record->has_input()) {
       const Directive input = from_record(record->input());
       if (input.tick < until || changes_results(input)) writer_.input(record->input());
+    } else if (record->has_tracker() && Tick{record->tracker().tick()} < until) {
+      writer_.tracker(record->tracker());  // later ones are inputs of this attempt, and come by tracker_sample()
     }
   }
   // This attempt may end before its first flush, and its recording replaces the earlier one.
@@ -83,6 +93,11 @@ void RunRecorder::hash(Tick tick, std::uint64_t chain) { writer_.hash(tick, chai
 
 void RunRecorder::input(const Directive& directive) {
   writer_.input(to_record(directive));
+  inputs_wait_ = true;
+}
+
+void RunRecorder::tracker_sample(Tick tick, const TrackerSample& sample) {
+  writer_.tracker(to_record(tick, sample));
   inputs_wait_ = true;
 }
 
@@ -142,6 +157,10 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
   summary.robots_failed = totals.robots_failed;
   summary.recoveries = static_cast<std::uint32_t>(plan_.program_failures().size());
+  summary.paced = plan_.pace > 0;
+  summary.lateness = totals.lateness;
+  summary.tracked = plan_.any_tracked();
+  summary.tracking = totals.tracking;
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
   const double steps =
       static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());
@@ -168,7 +187,7 @@ proto::InputRecord to_record(const Directive& directive) {
   proto::InputRecord record;
   record.set_sequence_number(directive.sequence_number);
   record.set_tick(directive.tick.count());
-  record.set_kind(static_cast<proto::InputRecord::Kind>(directive.kind));
+  record.set_kind(kind_of(directive.kind));
   if (directive.kind == DirectiveKind::kStep) record.set_steps(directive.steps);
   if (directive.kind == DirectiveKind::kOverheadInput) {
     record.mutable_packet()->push_back(static_cast<char>(directive.packet.command));
@@ -176,11 +195,9 @@ proto::InputRecord to_record(const Directive& directive) {
     if (const std::uint32_t offset = directive.packet.offset_cycles(); offset != 0)
       record.set_packet_offset_cycles(offset);
   }
-  if (directive.kind == DirectiveKind::kTrackedPose) {
-    record.set_robot(directive.tracked_pose.robot);
-    record.set_x_mm(directive.tracked_pose.x_mm);
-    record.set_y_mm(directive.tracked_pose.y_mm);
-    record.set_heading_rad(directive.tracked_pose.heading_rad);
+  if (directive.kind == DirectiveKind::kMembership) {
+    record.set_robot(directive.membership.robot);
+    record.set_membership(static_cast<proto::InputRecord::Membership>(directive.membership.membership));
   }
   return record;
 }
@@ -189,15 +206,62 @@ Directive from_record(const proto::InputRecord& record) {
   Directive directive;
   directive.sequence_number = record.sequence_number();
   directive.tick = Tick{record.tick()};
-  directive.kind = static_cast<DirectiveKind>(record.kind());
+  directive.kind = record.kind() == proto::InputRecord::MEMBERSHIP ? DirectiveKind::kMembership
+                                                                   : static_cast<DirectiveKind>(record.kind());
   directive.steps = record.steps();
   if (record.packet().size() == 1 + directive.packet.message.size()) {
     directive.packet.command = static_cast<OverheadCommand>(record.packet()[0]);
     std::copy(record.packet().begin() + 1, record.packet().end(), directive.packet.message.begin());
     directive.packet = directive.packet.at(record.packet_offset_cycles());
   }
-  directive.tracked_pose = {record.robot(), record.x_mm(), record.y_mm(), record.heading_rad()};
+  directive.membership = {record.robot(), static_cast<Membership>(record.membership())};
   return directive;
+}
+
+proto::TrackerRecord to_record(Tick tick, const TrackerSample& sample) {
+  proto::TrackerRecord record;
+  record.set_tick(tick.count());
+  record.set_source(sample.source);
+  record.set_frame(sample.frame);
+  record.set_capture_cycle(sample.capture_cycle);
+  record.mutable_robot()->Add(sample.robot.begin(), sample.robot.end());
+  record.mutable_state()->assign(sample.state.begin(), sample.state.end());
+  record.mutable_x()->Add(sample.x.begin(), sample.x.end());
+  record.mutable_y()->Add(sample.y.begin(), sample.y.end());
+  record.mutable_heading_rad()->Add(sample.heading_rad.begin(), sample.heading_rad.end());
+  record.mutable_xx()->Add(sample.xx.begin(), sample.xx.end());
+  record.mutable_xy()->Add(sample.xy.begin(), sample.xy.end());
+  record.mutable_yy()->Add(sample.yy.begin(), sample.yy.end());
+  record.mutable_heading_variance_rad2()->Add(sample.heading_variance_rad2.begin(),
+                                              sample.heading_variance_rad2.end());
+  record.mutable_led()->assign(sample.led.begin(), sample.led.end());
+  return record;
+}
+
+TrackerSample from_record(const proto::TrackerRecord& record) {
+  TrackerSample sample;
+  sample.source = record.source();
+  sample.frame = record.frame();
+  sample.capture_cycle = record.capture_cycle();
+  sample.robot.assign(record.robot().begin(), record.robot().end());
+  sample.state.assign(record.state().begin(), record.state().end());
+  sample.x.assign(record.x().begin(), record.x().end());
+  sample.y.assign(record.y().begin(), record.y().end());
+  sample.heading_rad.assign(record.heading_rad().begin(), record.heading_rad().end());
+  sample.xx.assign(record.xx().begin(), record.xx().end());
+  sample.xy.assign(record.xy().begin(), record.xy().end());
+  sample.yy.assign(record.yy().begin(), record.yy().end());
+  sample.heading_variance_rad2.assign(record.heading_variance_rad2().begin(), record.heading_variance_rad2().end());
+  sample.led.assign(record.led().begin(), record.led().end());
+  const std::size_t n = sample.robot.size();
+  for (const std::size_t size :
+       {sample.state.size(), sample.x.size(), sample.y.size(), sample.heading_rad.size(), sample.xx.size(),
+        sample.xy.size(), sample.yy.size(), sample.heading_variance_rad2.size(), sample.led.size()}) {
+    if (size != n)
+      throw UserError(fmt::format("the recorded tracker sample of tick {} is damaged: its columns differ in length",
+                                  record.tick()));
+  }
+  return sample;
 }
 
 }  // namespace kilotwin::cli

@@ -27,6 +27,7 @@ class RunRecorder : public RunObserver {
   void state(Tick, const SwarmView&, bool last) override;
   void hash(Tick, std::uint64_t chain) override;
   void input(const Directive&) override;
+  void tracker_sample(Tick tick, const TrackerSample& sample) override;
   void saved() override;
   void idle(const RunProgress&) override;
 
@@ -57,8 +58,11 @@ class RunRecorder : public RunObserver {
 /// Whether a directive affects results, so that a replay must repeat it. Pauses and checkpoints do not, and the recording's end
 /// replaces a stop.
 [[nodiscard]] inline bool changes_results(const Directive& directive) {
-  return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kTrackedPose;
+  return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kMembership;
 }
 [[nodiscard]] Directive from_record(const proto::InputRecord& record);
+[[nodiscard]] proto::TrackerRecord to_record(Tick tick, const TrackerSample& sample);
+/// Throws UserError where its columns differ in length.
+[[nodiscard]] TrackerSample from_record(const proto::TrackerRecord& record);
 
 }  // namespace kilotwin::cli

@@ -123,6 +123,7 @@ int serve(const ServiceArguments& arguments) {
   Beginning beginning = beginning_of(plan, directory);
   context.resumed = std::move(beginning.resumed);
   context.inputs = std::move(beginning.inputs);
+  if (arguments.service == "station") context.tracker_samples = std::move(beginning.tracker_samples);
 
   if (arguments.service == "physics") {
     const PartitionId partition = parse_partition(arguments.partition, plan.grid);

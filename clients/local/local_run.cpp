@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/federation/hash_sums.hpp"
@@ -41,6 +42,7 @@ struct Frames {
   std::vector<RadioFrame> radio;               // per host
   std::vector<ActuationFrame> actuation;       // per host
   OverheadFrame overhead;
+  TrackingFrame tracking;
   // Views of the frames above, in the form that engines take.
   std::vector<const BodyFrame*> all_bodies;
   std::vector<const ActuationFrame*> all_actuation;
@@ -84,6 +86,7 @@ class LocalRun {
   }
 
   RunTotals run() {
+    take_tracker_samples(first_);
     std::uint64_t chain = options_.resumed ? options_.resumed->hash_chain() : 0;
     for (std::uint32_t task = 0; task < plan_.federates(); ++task) emit(task, frames_of(first_));
     if (first_hashed(first_) == first_) chain = close_tick(first_, chain);
@@ -97,9 +100,17 @@ class LocalRun {
     Tick now = first_;
     RunTotals totals;
     const Pace pace(plan_);
+    Lateness lateness(plan_);
     for (;; ++now) {
       const auto wall_s = [begun] { return static_cast<double>(ns(begun, Clock::now())) * 1e-9; };
       pace.hold(now - first_, wall_s, [&] { observer_.idle(progress(now, wall_s())); });
+      if (now > first_ && totals.failure.empty()) {
+        try {
+          lateness.tick_begins(now, pace.ahead_s(now - first_, wall_s()));
+        } catch (const RunError& error) {
+          totals.failure = error.what();
+        }
+      }
       const bool finished = schedule_.verdict(now) == RunSchedule::Verdict::kFinished;
       if (!finished && interrupted() != 0) totals.failure = "interrupted";
       const bool last = finished || !totals.failure.empty();
@@ -128,6 +139,7 @@ class LocalRun {
     totals.last = now;
     totals.state_hash = chain;
     totals.stopped_early = schedule_.stopped_early();
+    totals.lateness = lateness.totals();
     if (totals.failure.empty()) snapshots_.remove_all();
     if (!options_.run_directory.empty()) {
       for (std::uint32_t h = 0; h < plan_.hosts; ++h)
@@ -140,6 +152,7 @@ class LocalRun {
  private:
   /// Steps all engines from `from` to the next tick. A task steps one engine. Hosts start first because they take longest.
   void step(os::WorkerPool& workers, Tick from) {
+    take_tracker_samples(from + 1);
     const std::uint32_t tasks = plan_.federates();
     workers.for_each(tasks, [this, from, tasks](std::size_t i) {
       const auto task = tasks - 1 - static_cast<std::uint32_t>(i);
@@ -148,6 +161,13 @@ class LocalRun {
       emit(task, frames_of(from + 1));
       task_ns_[task] += ns(begun, Clock::now());
     });
+  }
+
+  void take_tracker_samples(Tick tick) {
+    tracker_samples_.clear();
+    if (!options_.tracker_samples) return;
+    tracker_samples_ = options_.tracker_samples(tick);
+    for (const TrackerSample& sample : tracker_samples_) observer_.tracker_sample(tick, sample);
   }
 
   static std::uint64_t ns(Clock::time_point from, Clock::time_point to) {
@@ -180,14 +200,16 @@ class LocalRun {
     const Frames& in = frames_of(from);
     const auto partitions = static_cast<std::uint32_t>(physics_.size());
     if (task < partitions) {
-      physics_[task]->step(from, {in.ghosts_for[task], in.all_actuation, schedule_.tracked_poses()});
+      physics_[task]->step(from, {in.ghosts_for[task], in.all_actuation,
+                                  plan_.any_tracked() ? &in.tracking : nullptr, schedule_.memberships()});
     } else if (task == partitions) {
       radio_.step(from, {swarm_, in.overhead});
     } else if (task == partitions + 1) {
-      station_.step(from, {swarm_, schedule_.overhead_inputs()});
+      station_.step(from, {swarm_, schedule_.overhead_inputs(), schedule_.memberships()});
     } else {
       const std::size_t host = task - partitions - 2;
-      hosts_[host]->step(from, in.radio[host], &swarm_);
+      hosts_[host]->step(from, in.radio[host], &swarm_,
+                         {plan_.any_tracked() ? &in.tracking : nullptr, schedule_.memberships()});
       if (logs_.empty()) return;
       for (const auto& printed : hosts_[host]->printed()) logs_[host]->write(from, printed.robot, printed.text);
     }
@@ -206,6 +228,10 @@ class LocalRun {
       hash_parts_[task] = radio_.hash_part();
     } else if (task == partitions + 1) {
       station_.emit(out.overhead);
+      if (plan_.any_tracked()) {
+        station_.take(tracker_samples_);
+        station_.emit(out.tracking);
+      }
       hash_parts_[task] = station_.hash_part();
     } else {
       hosts_[task - partitions - 2]->emit(out.actuation[task - partitions - 2]);
@@ -296,6 +322,8 @@ class LocalRun {
     totals.pairs = radio_.pair_counts();
     totals.radios = radio_.radio_counts();
     for (const auto& engine : hosts_) totals.robots_failed += engine->robots_failed();
+    for (const auto& engine : physics_) totals.tracking.bodies_without_space += engine->bodies_without_space();
+    totals.tracking.jumps = station_.tracked().jumps();
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     const auto seconds = [](const timeval& t) {
@@ -319,6 +347,7 @@ class LocalRun {
   const Tick first_;
   RunSchedule schedule_;
   Snapshots snapshots_;
+  std::vector<TrackerSample> tracker_samples_;  // of the tick whose frames are to be made
   Frames frames_[2];  // double buffer, indexed by the tick's parity: a step reads one and writes the other
   std::vector<std::uint64_t> task_ns_, hash_parts_;
   std::vector<std::pair<std::size_t, std::size_t>> printed_;  // per host: number of printed failures and warnings

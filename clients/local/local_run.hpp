@@ -19,6 +19,8 @@ struct LocalOptions {
   std::optional<Checkpoint> resumed;    ///< the checkpoint from which the run continues
   /// Recorded external inputs, applied at their ticks. Pauses are ignored.
   std::vector<Directive> inputs;
+  /// The samples of trackers that were stamped for a tick; asked once per tick, in order. Empty: there are none.
+  std::function<std::vector<TrackerSample>(Tick)> tracker_samples;
   bool save_checkpoints = true;  ///< false: writes neither checkpoints nor logs
 };
 

@@ -28,6 +28,7 @@ std::string state_name(std::uint8_t life_cycle) {
     case LifeCycle::kRunning: return "running";
     case LifeCycle::kCharging: return "charging";
     case LifeCycle::kMoving: return "moving";
+    case LifeCycle::kAbsent: return "absent";
     case LifeCycle::kFlat: return "flat";
     case LifeCycle::kFailed: return "failed";
   }

@@ -196,6 +196,29 @@ bool Reader::read_record() {
   return true;
 }
 
+/// Why a tracker's sample is not valid; nullptr where it is.
+const char* Reader::defect_of_sample(const proto::TrackerRecord& sample) const {
+  const int n = sample.robot_size();
+  const auto octets = static_cast<std::size_t>(n);
+  if (!valid_tick(sample.tick())) return "a tracker's sample at a tick out of range";
+  if (sample.state().size() != octets || sample.led().size() != octets || sample.x_size() != n ||
+      sample.y_size() != n || sample.heading_rad_size() != n || sample.xx_size() != n || sample.xy_size() != n ||
+      sample.yy_size() != n || sample.heading_variance_rad2_size() != n) {
+    return "a tracker's sample whose columns differ in length";
+  }
+  const auto known = [&](std::uint32_t robot) { return robot < header_.robots(); };
+  if (!std::all_of(sample.robot().begin(), sample.robot().end(), known))
+    return "a tracker's sample of unknown robots";
+  const auto finite = [](const auto& values) {
+    return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+  };
+  if (!finite(sample.x()) || !finite(sample.y()) || !finite(sample.heading_rad()) || !finite(sample.xx()) ||
+      !finite(sample.xy()) || !finite(sample.yy())) {
+    return "a tracker's sample with values out of range";
+  }
+  return nullptr;
+}
+
 /// Reason why record_ is invalid; nullptr if it is valid.
 const char* Reader::defect_of_record() const {
   const auto robots = static_cast<int>(header_.robots());
@@ -231,6 +254,7 @@ const char* Reader::defect_of_record() const {
       return valid_tick(record_.hash().first_tick()) ? nullptr : "hashes of ticks out of range";
     case proto::Record::kInput:
       return valid_tick(record_.input().tick()) ? nullptr : "an input at a tick out of range";
+    case proto::Record::kTracker: return defect_of_sample(record_.tracker());
     case proto::Record::kMessages: {
       const proto::MessagesRecord& messages = record_.messages();
       const auto known = [&](std::uint32_t robot) { return robot < header_.robots(); };

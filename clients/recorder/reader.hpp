@@ -53,6 +53,7 @@ class Reader {
   [[nodiscard]] bool fill(std::size_t bytes);
   [[nodiscard]] bool read_record();
   [[nodiscard]] const char* defect_of_record() const;
+  [[nodiscard]] const char* defect_of_sample(const proto::TrackerRecord& sample) const;
   [[nodiscard]] std::span<const std::uint8_t> waiting() const;
   void warn(std::string_view what);
   void warn_of_damage(std::string_view what = {});

@@ -83,8 +83,35 @@ double Summary::realtime_factor() const {
   return simulated_s * static_cast<double>(ticks - from) / static_cast<double>(ticks) / wall_s;
 }
 
+namespace {
+
+Json tracking_json(const TrackingTotals& t) {
+  Json trackers = Json::array();
+  for (const TrackerReport& tracker : t.trackers) {
+    trackers.push_back(
+        Json{{"source", tracker.source},
+             {"frames", tracker.frames},
+             {"dropped", tracker.dropped},
+             {"refused", tracker.refused},
+             {"restarts", tracker.restarts},
+             {"offset_s", tracker.offset_s},
+             {"drift_ppm", tracker.drift_ppm},
+             {"exposure_to_sent_ms", Json{{"p50", tracker.own_p50_s * 1e3}, {"p99", tracker.own_p99_s * 1e3}}},
+             {"queueing_ms", Json{{"p50", tracker.way_p50_s * 1e3}, {"p99", tracker.way_p99_s * 1e3}}}});
+  }
+  return Json{{"arrival_to_effect_ms", Json{{"p50", t.effect_p50_s * 1e3}, {"p99", t.effect_p99_s * 1e3}}},
+              {"joined", t.joined},
+              {"left", t.left},
+              {"lost", t.lost},
+              {"jumps", t.jumps},
+              {"bodies_without_space", t.bodies_without_space},
+              {"trackers", trackers}};
+}
+
+}  // namespace
+
 void write_summary(const Summary& s, const std::filesystem::path& file) {
-  const Json json{
+  Json json{
       {"name", s.name},
       {"seed", s.seed},
       {"mode", s.mode},
@@ -126,6 +153,11 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"host", s.provenance.host},
       {"cores", s.provenance.cores},
   };
+  if (s.paced) {
+    json["late_ticks"] = s.lateness.late_ticks;
+    json["worst_lateness_ms"] = s.lateness.worst_s * 1e3;
+  }
+  if (s.tracked) json["tracking"] = tracking_json(s.tracking);
   os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
@@ -201,6 +233,16 @@ std::string summary_text(const Summary& s, const std::string& place) {
                                s.messages.attempted, s.messages.received, s.messages.collided,
                                percentage(s.messages.collided, s.messages.received + s.messages.collided)));
   line("failed", counted(s.robots_failed, "robot"));
+  if (s.paced && s.lateness.late_ticks > 0) {
+    line("late", fmt::format("{} of {} ticks began behind the pace, {} ms at most", s.lateness.late_ticks, s.ticks,
+                             short_number(s.lateness.worst_s * 1e3)));
+  }
+  if (s.tracked) {
+    line("tracked",
+         fmt::format("{} joined, {} left, {} lost; samples act after {} ms (p50), {} ms (p99)", s.tracking.joined,
+                     s.tracking.left, s.tracking.lost, short_number(s.tracking.effect_p50_s * 1e3),
+                     short_number(s.tracking.effect_p99_s * 1e3)));
+  }
   const Summary::Cost& c = s.cost_ns_per_robot_tick;
   std::vector<std::pair<std::string_view, double>> parts{{"behaviours", c.behaviours}, {"physics", c.physics},
                                                          {"radio", c.radio},           {"station", c.station},

@@ -43,6 +43,10 @@ struct Summary {
   Provenance provenance;
   std::uint32_t robots_failed = 0;
   std::uint32_t recoveries = 0;
+  bool paced = false;       ///< `lateness` says something
+  LatenessTotals lateness;  ///< late_ticks and worst_lateness_ms in the file
+  bool tracked = false;     ///< `tracking` says something
+  TrackingTotals tracking;  ///< tracking in the file; times there are ms
   /// Distance between a robot's first and last recorded position.
   struct Moved {
     double mean = 0, max = 0;

@@ -115,6 +115,12 @@ void Writer::input(const proto::InputRecord& input) {
   flush_if_due();
 }
 
+void Writer::tracker(const proto::TrackerRecord& sample) {
+  *other_.mutable_tracker() = sample;
+  append(other_);
+  flush_if_due();
+}
+
 void Writer::messages(const proto::MessagesRecord& messages) {
   KILOTWIN_DEMAND(messages.receiver_size() == messages.sender_size() &&
                   messages.sender_size() == messages.count_size());

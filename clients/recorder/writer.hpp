@@ -36,6 +36,7 @@ class Writer {
   void state(const StateView& state);
   void hash(Tick tick, std::uint64_t chain);
   void input(const proto::InputRecord& input);
+  void tracker(const proto::TrackerRecord& sample);
   /// Counts since the start. They replace earlier counts of the same pair.
   void messages(const proto::MessagesRecord& messages);
   /// One entry per robot in every field.

@@ -32,7 +32,8 @@ enum class LifeCycle : std::uint8_t {
   kRunning = 4,
   kCharging = 5,
   kMoving = 6,
-  kFlat = 254,  ///< off because its battery is empty
+  kAbsent = 253,  ///< a tracked robot that is not there
+  kFlat = 254,    ///< off because its battery is empty
   kFailed = 255
 };
 

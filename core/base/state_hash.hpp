@@ -22,7 +22,8 @@ enum class HashDomain : std::uint64_t {
   kContact = 5,
   kMovable = 6,
   kArenaField = 30,
-  kMemory = 31
+  kMemory = 31,
+  kTracked = 60
 };
 
 /// A double as a word. The state never holds a NaN, whose bits would differ between CPUs.

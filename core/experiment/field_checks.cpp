@@ -160,8 +160,12 @@ void check_count(const LoadedExperiment& loaded, const proto::RobotGroup& group,
 
 void check_behaviour(const LoadedExperiment& loaded, const proto::RobotGroup& group, const std::string& path) {
   if (group.body() == proto::RobotGroup::TRACKED) {
-    if (group.behaviour_size() == 0) return;
-    throw loaded.locations.error(path + ".behaviour", "a tracked group runs no program here; remove behaviour");
+    if (!group.says().shadow()) {
+      if (group.behaviour_size() == 0) return;
+      throw loaded.locations.error(
+          path + ".behaviour",
+          "a tracked group runs no program here; remove behaviour, or add says { shadow: true }");
+    }
   }
   if (group.behaviour_size() == 0) {
     throw loaded.locations.error(path, "behaviour is missing; state behaviour: \"FILE.c\", the robots' program");
@@ -379,6 +383,7 @@ void check_values(const LoadedExperiment& loaded) {
   check_surroundings(loaded);
   check_effects(loaded);
   check_radio(loaded);
+  check_tracking(loaded);
   if (experiment.robots_size() == 0 || experiment.robots_size() > kMostGroups) {
     throw loaded.locations.error("robots",
                                  fmt::format("there are {} groups of robots; it takes 1..{}, robots {{ ... }}",

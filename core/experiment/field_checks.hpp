@@ -16,6 +16,8 @@ void check_values(const LoadedExperiment& loaded);
 void check_effects(const LoadedExperiment& loaded);
 /// Checks dependencies between fields of the infrared channel.
 void check_radio(const LoadedExperiment& loaded);
+/// Trackers, and what tracked robots say.
+void check_tracking(const LoadedExperiment& loaded);
 
 /// Number of robots in the group by its `count`, or by its rings if `count` is absent. 0: its CSV file gives the number.
 [[nodiscard]] std::uint64_t stated_count(const proto::RobotGroup& group);

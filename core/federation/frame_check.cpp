@@ -36,7 +36,7 @@ bool all_within(const std::vector<double>& values, double most) {
 bool all_life_cycles(const std::vector<std::uint8_t>& values) {
   return std::all_of(values.begin(), values.end(), [](std::uint8_t value) {
     return value <= static_cast<std::uint8_t>(LifeCycle::kMoving) ||
-           value >= static_cast<std::uint8_t>(LifeCycle::kFlat);
+           value >= static_cast<std::uint8_t>(LifeCycle::kAbsent);
   });
 }
 
@@ -148,6 +148,22 @@ const char* defect(const OverheadFrame& frame, const RunPlan& plan, FederateId, 
   return nullptr;
 }
 
+const char* defect(const TrackingFrame& frame, const RunPlan& plan, FederateId, FederateId) {
+  if (!ascending_within(frame.robot, {0, plan.robots()}) ||
+      !std::all_of(frame.robot.begin(), frame.robot.end(),
+                   [&](std::uint32_t robot) { return plan.tracked(robot); }))
+    return "its robots are not ascending ids of tracked robots";
+  const auto known_state = [](std::uint8_t state) {
+    return state <= static_cast<std::uint8_t>(TrackedState::kInDoubt);
+  };
+  if (!std::all_of(frame.state.begin(), frame.state.end(), known_state)) return "a robot's state is unknown";
+  if (!all_within(frame.x_mm, kFarthest_mm) || !all_within(frame.y_mm, kFarthest_mm) ||
+      !all_within(frame.heading_rad, kPi))
+    return "a pose is out of range";
+  const auto colour = [](std::uint8_t led) { return led < 64 || led == kUnknownLed; };
+  return std::all_of(frame.led.begin(), frame.led.end(), colour) ? nullptr : "an LED has no such colour";
+}
+
 const char* defect(const Directive& directive, const RunPlan& plan) {
   if (directive.tick < Tick{0}) return "its tick is negative";
   if (directive.tick > plan.last_tick + kAnnounceAhead) return "its tick lies after the run's end";
@@ -162,12 +178,10 @@ const char* defect(const Directive& directive, const RunPlan& plan) {
       return directive.packet.offset_cycles() < plan.tick_length.cycles()
                  ? nullptr
                  : "its packet's offset lies beyond the tick";
-    case DirectiveKind::kTrackedPose: {
-      const TrackedPoseInput& pose = directive.tracked_pose;
-      if (pose.robot >= plan.robots() || !plan.tracked(pose.robot)) return "its robot is none that is tracked";
-      if (!std::isfinite(pose.x_mm) || !std::isfinite(pose.y_mm) || !std::isfinite(pose.heading_rad))
-        return "its pose is not finite";
-      return nullptr;
+    case DirectiveKind::kMembership: {
+      const std::uint32_t robot = directive.membership.robot;
+      if (robot >= plan.robots() || !plan.tracked(robot)) return "its robot is none that is tracked";
+      return directive.membership.membership <= Membership::kLost ? nullptr : "its membership is unknown";
     }
   }
   return "its kind is unknown";

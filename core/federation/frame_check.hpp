@@ -13,6 +13,7 @@ namespace kilotwin {
 [[nodiscard]] const char* defect(const ActuationFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 [[nodiscard]] const char* defect(const RadioFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 [[nodiscard]] const char* defect(const OverheadFrame&, const RunPlan&, FederateId publisher, FederateId reader);
+[[nodiscard]] const char* defect(const TrackingFrame&, const RunPlan&, FederateId publisher, FederateId reader);
 /// The first defect of a directive, or nullptr.
 [[nodiscard]] const char* defect(const Directive&, const RunPlan&);
 

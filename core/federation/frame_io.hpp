@@ -36,6 +36,7 @@ template <class Frame> class Input : public InputBase {
   Input(Session& session, const dds::Channel& channel, std::vector<FederateId> publishers)
       : InputBase(session, std::move(publishers)),
         rings_(gate_.publishers().size()),
+        arrivals_(gate_.publishers().size()),
         current_(gate_.publishers().size()),
         topic_(channel.topic) {
     reader_ = std::make_unique<dds::Reader<Wire>>(
@@ -51,6 +52,14 @@ template <class Frame> class Input : public InputBase {
     return current_;
   }
 
+  /// When the last frame of `tick` came; as long as at() holds.
+  [[nodiscard]] std::chrono::steady_clock::time_point arrived(Tick tick) const {
+    auto last = std::chrono::steady_clock::time_point::min();
+    for (const auto& times : arrivals_)
+      last = std::max(last, times[static_cast<std::size_t>(tick.count() % kFrameRing)]);
+    return last;
+  }
+
  private:
   /// Called on a receive thread, one sample of this topic at a time. Decodes and checks a frame without the session's mutex: its
   /// ring slot is ahead of the tick that the session reads, and the session reads it only after the gate has accepted it.
@@ -59,6 +68,7 @@ template <class Frame> class Input : public InputBase {
     const FederateId publisher{wire.publisher};
     const auto index = static_cast<std::size_t>(gate_.index_of(publisher));
     Frame& frame = rings_[index][static_cast<std::size_t>(wire.tick % kFrameRing)];
+    arrivals_[index][static_cast<std::size_t>(wire.tick % kFrameRing)] = std::chrono::steady_clock::now();
     const char* const wrong = from_wire(wire, frame) ? defect(frame, session_.plan(), publisher, session_.self())
                                                      : "its arrays differ in length";
     const std::lock_guard lock(session_.mutex());
@@ -92,6 +102,7 @@ template <class Frame> class Input : public InputBase {
   }
 
   std::vector<std::array<Frame, kFrameRing>> rings_;
+  std::vector<std::array<std::chrono::steady_clock::time_point, kFrameRing>> arrivals_;
   std::vector<const Frame*> current_;
   std::string topic_;
   std::unique_ptr<dds::Reader<Wire>>

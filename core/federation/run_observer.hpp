@@ -8,9 +8,11 @@
 #include <vector>
 
 #include "core/base/time.hpp"
+#include "core/federation/pace.hpp"
 #include "core/federation/schedule.hpp"
 #include "core/frames/radio_counts.hpp"
 #include "core/frames/swarm_view.hpp"
+#include "core/frames/tracker_sample.hpp"
 
 namespace kilotwin {
 
@@ -34,6 +36,10 @@ class RunObserver {
   virtual void hash(Tick, std::uint64_t chain) = 0;
   /// A directive with its tick and sequence number was announced.
   virtual void input(const Directive&) = 0;
+  /// A tracker's sample was stamped for a tick: an input of it. Called in the order in which samples count.
+  virtual void tracker_sample(Tick tick, const TrackerSample& sample) {
+    static_cast<void>(tick), static_cast<void>(sample);
+  }
   /// A checkpoint is about to be complete. The recording up to its tick must be on disk when this returns.
   virtual void saved() {}
   /// Called a few times a second, also while the run pauses or waits.
@@ -42,6 +48,29 @@ class RunObserver {
 
 /// Categories of computing time.
 enum class Work : std::uint8_t { kBehaviours, kPhysics, kRadio, kStation, kExchange, kRecording, kCount };
+
+/// A tracker as the ingress saw it. Times: s.
+struct TrackerReport {
+  std::string source;
+  std::uint64_t frames = 0;             ///< that arrived
+  std::uint64_t dropped = 0;            ///< missing between those that arrived
+  std::uint64_t refused = 0;            ///< not used because of their time
+  std::uint32_t restarts = 0;           ///< of the source or its clock
+  double offset_s = 0;                  ///< station's steady time less source's, at the end
+  double drift_ppm = 0;                 ///< how much slower the source's clock runs
+  double own_p50_s = 0, own_p99_s = 0;  ///< exposure to writing, where the source states both
+  double way_p50_s = 0, way_p99_s = 0;  ///< writing to arrival, beyond the least delay
+};
+
+/// What the ingress and the station saw of tracked robots.
+struct TrackingTotals {
+  std::vector<TrackerReport> trackers;
+  /// From the arrival of a sample to the arrival of the poses on which it acted, s.
+  double effect_p50_s = 0, effect_p99_s = 0;
+  std::uint64_t joined = 0, left = 0, lost = 0;
+  std::uint64_t jumps = 0;                 ///< samples contradicted an estimate, which began anew
+  std::uint64_t bodies_without_space = 0;  ///< how often a tracked robot came to stand on another body
+};
 
 /// Totals of a run.
 struct RunTotals {
@@ -56,6 +85,8 @@ struct RunTotals {
   std::vector<PairCount> pairs;    ///< empty unless RecordingSettings::messages
   std::vector<RadioCount> radios;  ///< per robot; empty if the run failed before the radio's report
   bool stopped_early = false;      ///< a directive ended the run
+  LatenessTotals lateness;         ///< where the run was paced
+  TrackingTotals tracking;         ///< where robots are tracked
   std::string failure;             ///< one line if the run failed, else empty
 };
 

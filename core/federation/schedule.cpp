@@ -21,7 +21,7 @@ void RunSchedule::apply_until(Tick now) {
   if (inputs_tick_ != now) {
     inputs_tick_ = now;
     overhead_inputs_.clear();
-    tracked_poses_.clear();
+    memberships_.clear();
     if (pause_again_ == now) {
       paused_ = true;
       pause_again_ = Tick{-1};
@@ -45,7 +45,7 @@ void RunSchedule::apply_until(Tick now) {
         break;
       case DirectiveKind::kCheckpoint: checkpoints_.push_back(directive.tick); break;
       case DirectiveKind::kOverheadInput: overhead_inputs_.push_back(directive.packet); break;
-      case DirectiveKind::kTrackedPose: tracked_poses_.push_back(directive.tracked_pose); break;
+      case DirectiveKind::kMembership: memberships_.push_back(directive.membership); break;
     }
   }
 }

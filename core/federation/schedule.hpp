@@ -29,16 +29,16 @@ enum class DirectiveKind : std::uint8_t {
   kStop,
   kCheckpoint,
   kOverheadInput,
-  kTrackedPose
+  kMembership
 };
 
 struct Directive {
   std::uint64_t sequence_number = 0;
   Tick tick;  ///< takes effect before the step from this tick
   DirectiveKind kind = DirectiveKind::kPause;
-  std::uint32_t steps = 0;        ///< with kStep: ticks until the next pause
-  OverheadPacket packet;          ///< with kOverheadInput
-  TrackedPoseInput tracked_pose;  ///< with kTrackedPose
+  std::uint32_t steps = 0;      ///< with kStep: ticks until the next pause
+  OverheadPacket packet;        ///< with kOverheadInput
+  MembershipChange membership;  ///< with kMembership
 };
 
 class RunSchedule {
@@ -62,7 +62,7 @@ class RunSchedule {
 
   // External inputs of the step from `now`; valid once the verdict at `now` is kStep.
   [[nodiscard]] const std::vector<OverheadPacket>& overhead_inputs() const { return overhead_inputs_; }
-  [[nodiscard]] const std::vector<TrackedPoseInput>& tracked_poses() const { return tracked_poses_; }
+  [[nodiscard]] const std::vector<MembershipChange>& memberships() const { return memberships_; }
 
   /// Whether the state at `now` is to be saved; valid once the verdict at `now` is kStep or kFinished.
   [[nodiscard]] bool checkpoint_at(Tick now) const;
@@ -84,7 +84,7 @@ class RunSchedule {
   Tick pause_again_{-1};  // after a kStep; negative: never
   Tick inputs_tick_{-1};  // of the two lists below
   std::vector<OverheadPacket> overhead_inputs_;
-  std::vector<TrackedPoseInput> tracked_poses_;
+  std::vector<MembershipChange> memberships_;
   std::vector<Tick> checkpoints_;  // by directives
 };
 

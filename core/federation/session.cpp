@@ -335,7 +335,8 @@ void Session::assemble(Federate& federate) {
   waiting_for_.clear();
 }
 
-/// Waits while the run is ahead of its pace.
+/// Waits while the run is ahead of its pace. The wait lies before the frames are published, so that what
+/// arrives from outside meanwhile still counts for the tick.
 void Session::hold(Federate& federate, Tick now) {
   constexpr double kLongest_s = 1.0;
   while (interrupted() == 0) {
@@ -475,11 +476,12 @@ void Session::run(Federate& federate) {
     write_member(kilotwin_wire_STEPPING);
     if (hash_first_ == now_) hash_parts_.push_back(federate.hash_part());
     for (;;) {
+      const auto free = Clock::now();
+      hold(federate, now_);
       const auto begun = Clock::now();
       federate.publish(now_);
       const auto published = Clock::now();
       const RunSchedule::Verdict verdict = await(federate, now_);
-      hold(federate, now_);
       const auto released = Clock::now();
       federate.inputs_complete(now_, verdict == RunSchedule::Verdict::kFinished);
       if (schedule_.checkpoint_at(now_)) save_once(federate, now_);
@@ -490,7 +492,7 @@ void Session::run(Federate& federate) {
       if (hash_parts_.size() >= kMetricsTicks) write_metrics(federate, Report::kNext);
       const auto stepped = Clock::now();
       exchange_ns_ += elapsed_ns(begun, published);
-      wait_ns_ += elapsed_ns(published, released);
+      wait_ns_ += elapsed_ns(free, begun) + elapsed_ns(published, released);
       step_ns_ += elapsed_ns(released, stepped);
       if (stepped >= next_idle_) idle(federate);
     }

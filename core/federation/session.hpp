@@ -2,7 +2,7 @@
 ///
 ///   assemble   write hello samples on all outputs until all federates hear each other (a reliable reader drops samples that
 ///              arrive before the writer's first heartbeat, so no frame may be sent earlier)
-///   loop       publish the frames of tick k, wait for the inputs of tick k, step
+///   loop       wait for the pace, publish frames of tick k, wait for the inputs of tick k, step
 ///   leave      wait until all samples are acknowledged, then write FINISHED
 ///
 /// A wait of more than 1 s prints the federates for which it waits; after 60 s without progress it also prints the likely cause.
@@ -45,7 +45,8 @@ class Federate {
   virtual void publish(Tick now) = 0;
   /// Whether all topics other than the inputs' frames are connected, as required for the start.
   [[nodiscard]] virtual bool hears_all() { return true; }
-  /// Seconds by which the run is ahead of its pace at `now`; the session waits for them before the step. 0 or less: no wait.
+  /// Seconds by which the run is ahead of its pace at `now`; the session waits for them before it publishes the frames. 0 or
+  /// less: no wait.
   [[nodiscard]] virtual double ahead_s(Tick now) { return static_cast<void>(now), 0.0; }
   /// Called when all inputs of `now` have arrived. `last`: the run ends at `now`; else the step from `now` follows.
   virtual void inputs_complete(Tick now, bool last) { static_cast<void>(now), static_cast<void>(last); }

@@ -12,13 +12,13 @@ namespace kilotwin {
 using WireBodyFrame = kilotwin_wire_BodyFrame;
 using WireActuationFrame = kilotwin_wire_ActuationFrame;
 using WireRadioFrame = kilotwin_wire_RadioFrame;
+using WireTrackingFrame = kilotwin_wire_TrackingFrame;
 using WireOverheadFrame = kilotwin_wire_OverheadFrame;
 using WireMember = kilotwin_wire_Member;
 using WireDirective = kilotwin_wire_Directive;
 using WireMetrics = kilotwin_wire_Metrics;
 using PublicRunControl = kilotwin_open_RunControl;
 using PublicOverheadPacket = kilotwin_open_OverheadPacket;
-using PublicTrackedPose = kilotwin_open_TrackedPose;
 using PublicTrackerFrame = kilotwin_open_TrackerFrame;
 using PublicRunStatus = kilotwin_open_RunStatus;
 using PublicRobotState = kilotwin_open_RobotState;
@@ -39,6 +39,8 @@ inline Channel ghosts(std::uint32_t to) {
 inline Channel actuation() { return {"kilotwin/actuation", Delivery::kFrame, ""}; }
 /// Receptions, clocks and requests for messages, only for host `to`.
 inline Channel radio(std::uint32_t to) { return {"kilotwin/radio", Delivery::kFrame, "to." + std::to_string(to)}; }
+/// Poses of tracked robots, from the station to physics and hosts, where RunPlan::any_tracked().
+inline Channel tracking() { return {"kilotwin/tracking", Delivery::kFrame, ""}; }
 inline Channel overhead() { return {"kilotwin/overhead", Delivery::kFrame, ""}; }
 
 inline Channel members() { return {"kilotwin/members", Delivery::kMembership, ""}; }
@@ -47,7 +49,6 @@ inline Channel metrics() { return {"kilotwin/metrics", Delivery::kMetrics, ""}; 
 
 inline Channel run_control() { return {"kilotwin/run_control", Delivery::kRequest, ""}; }
 inline Channel overhead_packets() { return {"kilotwin/overhead_packets", Delivery::kRequest, ""}; }
-inline Channel tracked_poses() { return {"kilotwin/tracked_poses", Delivery::kRequest, ""}; }
 inline Channel tracker_frames() { return {"kilotwin/tracker_frames", Delivery::kSensor, ""}; }
 inline Channel run_status() { return {"kilotwin/run_status", Delivery::kStatus, ""}; }
 inline Channel robots() { return {"kilotwin/robots", Delivery::kTelemetry, ""}; }
@@ -69,6 +70,9 @@ template <> inline const dds_topic_descriptor_t* descriptor<WireRadioFrame>() {
 template <> inline const dds_topic_descriptor_t* descriptor<WireOverheadFrame>() {
   return &kilotwin_wire_OverheadFrame_desc;
 }
+template <> inline const dds_topic_descriptor_t* descriptor<WireTrackingFrame>() {
+  return &kilotwin_wire_TrackingFrame_desc;
+}
 template <> inline const dds_topic_descriptor_t* descriptor<WireMember>() { return &kilotwin_wire_Member_desc; }
 template <> inline const dds_topic_descriptor_t* descriptor<WireDirective>() {
   return &kilotwin_wire_Directive_desc;
@@ -79,9 +83,6 @@ template <> inline const dds_topic_descriptor_t* descriptor<PublicRunControl>() 
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicOverheadPacket>() {
   return &kilotwin_open_OverheadPacket_desc;
-}
-template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackedPose>() {
-  return &kilotwin_open_TrackedPose_desc;
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackerFrame>() {
   return &kilotwin_open_TrackerFrame_desc;

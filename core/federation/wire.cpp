@@ -185,6 +185,27 @@ WireOverheadFrame to_wire(const WireHeader& header, const OverheadFrame& frame) 
   return wire;
 }
 
+WireTrackingFrame to_wire(const WireHeader& header, const TrackingFrame& frame) {
+  auto wire = headed<WireTrackingFrame>(header, frame.tick);
+  wire.robot = borrow<ULongs>(frame.robot);
+  wire.state = borrow<Octets>(frame.state);
+  wire.x_mm = borrow<Doubles>(frame.x_mm);
+  wire.y_mm = borrow<Doubles>(frame.y_mm);
+  wire.heading_rad = borrow<Doubles>(frame.heading_rad);
+  wire.led = borrow<Octets>(frame.led);
+  return wire;
+}
+
+bool from_wire(const WireTrackingFrame& wire, TrackingFrame& frame) {
+  frame.tick = Tick{wire.tick};
+  const bool whole = copy(wire.robot, frame.robot) && copy(wire.state, frame.state) &&
+                     copy(wire.x_mm, frame.x_mm) && copy(wire.y_mm, frame.y_mm) &&
+                     copy(wire.heading_rad, frame.heading_rad) && copy(wire.led, frame.led);
+  const std::size_t n = frame.robot.size();
+  return whole && frame.state.size() == n && frame.x_mm.size() == n && frame.y_mm.size() == n &&
+         frame.heading_rad.size() == n && frame.led.size() == n;
+}
+
 WireDirective to_wire(std::uint64_t run, const Directive& directive) {
   WireDirective wire{};
   wire.sequence_number = directive.sequence_number;
@@ -195,10 +216,8 @@ WireDirective to_wire(std::uint64_t run, const Directive& directive) {
   if (directive.kind == DirectiveKind::kOverheadInput) {
     wire.packet = borrow<decltype(wire.packet)>(&directive.packet, 1);
   }
-  wire.robot = directive.tracked_pose.robot;
-  wire.x_mm = directive.tracked_pose.x_mm;
-  wire.y_mm = directive.tracked_pose.y_mm;
-  wire.heading_rad = directive.tracked_pose.heading_rad;
+  wire.robot = directive.membership.robot;
+  wire.membership = static_cast<std::uint8_t>(directive.membership.membership);
   return wire;
 }
 
@@ -207,7 +226,7 @@ bool from_wire(const WireDirective& wire, Directive& directive) {
   directive.tick = Tick{wire.tick};
   directive.kind = static_cast<DirectiveKind>(wire.kind);
   directive.steps = wire.steps;
-  directive.tracked_pose = {wire.robot, wire.x_mm, wire.y_mm, wire.heading_rad};
+  directive.membership = {wire.robot, static_cast<Membership>(wire.membership)};
   if (directive.kind != DirectiveKind::kOverheadInput) return true;
   if (wire.packet._length != sizeof(OverheadPacket)) return false;
   std::memcpy(static_cast<void*>(&directive.packet), wire.packet._buffer, sizeof(OverheadPacket));

@@ -21,6 +21,7 @@ WireBodyFrame to_wire(const WireHeader&, const BodyFrame& frame);
 WireActuationFrame to_wire(const WireHeader&, const ActuationFrame& frame);
 WireRadioFrame to_wire(const WireHeader&, const RadioFrame& frame);
 WireOverheadFrame to_wire(const WireHeader&, const OverheadFrame& frame);
+WireTrackingFrame to_wire(const WireHeader&, const TrackingFrame& frame);
 WireDirective to_wire(std::uint64_t run, const Directive& directive);
 
 // Returns false if the sample is malformed; the frame is then unspecified.
@@ -28,6 +29,7 @@ bool from_wire(const WireBodyFrame&, BodyFrame& frame);
 bool from_wire(const WireActuationFrame&, ActuationFrame& frame);
 bool from_wire(const WireRadioFrame&, RadioFrame& frame);
 bool from_wire(const WireOverheadFrame&, OverheadFrame& frame);
+bool from_wire(const WireTrackingFrame&, TrackingFrame& frame);
 bool from_wire(const WireDirective&, Directive& directive);
 
 /// The wire type of a frame.
@@ -35,6 +37,7 @@ template <class Frame> struct WireOf;
 template <> struct WireOf<BodyFrame> { using Type = WireBodyFrame; };
 template <> struct WireOf<ActuationFrame> { using Type = WireActuationFrame; };
 template <> struct WireOf<RadioFrame> { using Type = WireRadioFrame; };
+template <> struct WireOf<TrackingFrame> { using Type = WireTrackingFrame; };
 template <> struct WireOf<OverheadFrame> { using Type = WireOverheadFrame; };
 
 }  // namespace kilotwin

@@ -137,10 +137,40 @@ struct OverheadFrame {
   std::vector<OverheadPacket> packets;
 };
 
-/// The pose of a real robot, stamped by the ingress; applied before the step from the tick at hand.
-struct TrackedPoseInput {
+/// How a tracked robot is known; the numbers are those of the trackers' samples.
+enum class TrackedState : std::uint8_t { kSeen = 0, kPredicted = 1, kLost = 2, kInDoubt = 3 };
+
+/// An LED that no tracker has told.
+inline constexpr std::uint8_t kUnknownLed = 255;
+
+/// What the station tells of tracked robots: those that a tracker has seen and that are not lost. Ascending ids.
+struct TrackingFrame {
+  Tick tick;
+  std::vector<std::uint32_t> robot;
+  std::vector<std::uint8_t> state;              ///< TrackedState
+  std::vector<double> x_mm, y_mm, heading_rad;  ///< predicted for tick + 1
+  std::vector<std::uint8_t> led;                ///< r | g << 2 | b << 4, or kUnknownLed
+
+  void clear() {
+    robot.clear();
+    state.clear();
+    x_mm.clear();
+    y_mm.clear();
+    heading_rad.clear();
+    led.clear();
+  }
+};
+
+enum class Membership : std::uint8_t {
+  kJoined = 0,
+  kLeft = 1,  ///< it was seen outside the arena
+  kLost = 2   ///< no tracker has seen it for the bridging time
+};
+
+/// From a tick on a tracked robot is there, or is absent: without a body, silent and deaf.
+struct MembershipChange {
   std::uint32_t robot = 0;
-  double x_mm = 0, y_mm = 0, heading_rad = 0;
+  Membership membership = Membership::kJoined;
 };
 
 }  // namespace kilotwin

@@ -146,6 +146,43 @@ StationSettings station_of(const proto::Station& station) {
   return out;
 }
 
+SaysRuleSettings rule_of(const proto::SaysRule& rule) {
+  constexpr double kPeriodCount_s = 128e-6;
+  SaysRuleSettings out;
+  out.robots = list(rule.robot());
+  std::sort(out.robots.begin(), out.robots.end());
+  if (rule.has_circle()) out.circle = {rule.circle().x_mm(), rule.circle().y_mm(), rule.circle().radius_mm()};
+  if (rule.led_size() == 3) out.led = static_cast<std::uint8_t>(rule.led(0) | rule.led(1) << 2 | rule.led(2) << 4);
+  for (int i = 0; i < rule.data_size(); ++i)
+    out.message[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(rule.data(i));
+  out.message.back() = static_cast<std::uint8_t>(rule.type());
+  if (rule.has_id_octet()) out.id_octet = rule.id_octet();
+  out.tx_period = static_cast<std::uint16_t>(rule.period_s() / kPeriodCount_s);
+  return out;
+}
+
+TrackingSettings tracking_of(const proto::Experiment& experiment) {
+  constexpr double kDegree = kPi / 180;
+  TrackingSettings out;
+  for (const proto::Tracker& tracker : experiment.tracker()) {
+    out.trackers.push_back({tracker.source(), tracker.x_mm(), tracker.y_mm(), tracker.heading_deg() * kDegree,
+                            tracker.scale(), tracker.mirrored(), tracker.first_robot(), tracker.position_sd_mm(),
+                            tracker.heading_sd_deg() * kDegree});
+  }
+  const proto::Tracking& tracking = experiment.tracking();
+  out.bridge_s = tracking.bridge_s();
+  out.present_at_start = tracking.start() == proto::Tracking::PRESENT;
+  out.speed_change_mm_s = tracking.speed_change_mm_s();
+  out.turn_change_rad_s = tracking.turn_change_deg_s() * kDegree;
+  std::uint32_t first = 0;
+  for (const proto::RobotGroup& group : experiment.robots()) {
+    out.rules.push_back(each(group.says().rule(), rule_of));
+    out.first_robots.push_back(first);
+    first += group.count();
+  }
+  return out;
+}
+
 LightWaypointSettings waypoint_of(const proto::LightWaypoint& point) {
   LightWaypointSettings out{point.time_s(), point.x_mm(), point.y_mm(), {}};
   if (point.has_height_mm()) out.height_mm = point.height_mm();
@@ -385,6 +422,7 @@ PlanSettings settings_of(const proto::Manifest& manifest) {
   out.physics = physics_of(experiment.physics());
   out.radio = radio_of(experiment.radio());
   out.station = station_of(experiment.station());
+  out.tracking = tracking_of(experiment);
   if (experiment.has_light()) out.light = light_of(experiment.light(), manifest);
   if (experiment.has_battery()) out.battery = battery_of(experiment.battery());
   if (experiment.has_temperature()) {

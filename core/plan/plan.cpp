@@ -130,6 +130,7 @@ RunPlan::RunPlan(proto::Manifest given)
       hash(hash_of(*manifest_)),
       resumed(manifest_->resumed()),
       pace(manifest_->pace()),
+      max_lateness_s(manifest_->max_lateness_ms() / 1000),
       mode(manifest_->mode()),
       build(manifest_->build()),
       run_(manifest_->run()),
@@ -144,6 +145,9 @@ RunPlan::RunPlan(proto::Manifest given)
   for (int g = 0; g < manifest_->experiment().robots_size(); ++g) {
     const proto::RobotGroup& group = manifest_->experiment().robots(g);
     program_of_.insert(program_of_.end(), group.count(), manifest_->group_program(g));
+    const bool tracked = group.body() == proto::RobotGroup::TRACKED;
+    any_tracked_ = any_tracked_ || tracked;
+    tracked_.insert(tracked_.end(), group.count(), static_cast<std::uint8_t>(tracked));
     immobile_.insert(immobile_.end(), group.count(), group.immobile());
     loop_rate_.insert(
         loop_rate_.end(), group.count(),
@@ -165,6 +169,7 @@ const StationSettings& RunPlan::station_settings() const { return settings_->sta
 const std::optional<LightSettings>& RunPlan::light_settings() const { return settings_->light; }
 const std::optional<BatterySettings>& RunPlan::battery_settings() const { return settings_->battery; }
 const std::optional<TemperatureSettings>& RunPlan::temperature_settings() const { return settings_->temperature; }
+const TrackingSettings& RunPlan::tracking_settings() const { return settings_->tracking; }
 const RecordingSettings& RunPlan::recording_settings() const { return settings_->recording; }
 const std::vector<Program>& RunPlan::programs() const { return settings_->programs; }
 const std::vector<RobotEeprom>& RunPlan::eeproms() const { return settings_->eeproms; }
@@ -176,7 +181,7 @@ std::string Program::file() const {
 }
 
 bool RunPlan::firmware(std::uint32_t robot) const {
-  return !tracked(robot) && settings_->programs[program_of_[robot]].firmware;
+  return program_of_[robot] != kNoProgram && settings_->programs[program_of_[robot]].firmware;
 }
 
 bool RunPlan::has_firmware() const {

@@ -34,6 +34,7 @@ struct RadioSettings;
 struct RobotSettings;
 struct StationSettings;
 struct TemperatureSettings;
+struct TrackingSettings;
 
 /// A half-open rectangle of the arena, mm. Outer edges of the outermost partitions are infinite, so that every pose has an owner.
 struct Rectangle {
@@ -93,8 +94,9 @@ class RunPlan {
   const std::uint64_t hash;   ///< hash of all that determines results and topology; alike in all federates of a run
   const bool resumed;         ///< the run starts from the checkpoint in resumed/ of the run directory
   const double pace;          ///< upper limit of simulated time over wall time; 0: none
-  const std::string mode;     ///< "local" or "federated"
-  const std::string build;    ///< build identity of the program that prepared the run: core/base/build_identity.hpp
+  const double max_lateness_s;  ///< of a tick behind the pace before the run stops; 0: any
+  const std::string mode;       ///< "local" or "federated"
+  const std::string build;  ///< build identity of the program that prepared the run: core/base/build_identity.hpp
 
   /// The manifest of which the plan was made. Callers include idl/manifest.pb.h.
   [[nodiscard]] const proto::Manifest& manifest() const { return *manifest_; }
@@ -116,6 +118,7 @@ class RunPlan {
   [[nodiscard]] const std::optional<LightSettings>& light_settings() const;
   [[nodiscard]] const std::optional<BatterySettings>& battery_settings() const;
   [[nodiscard]] const std::optional<TemperatureSettings>& temperature_settings() const;
+  [[nodiscard]] const TrackingSettings& tracking_settings() const;
   [[nodiscard]] const RecordingSettings& recording_settings() const;
   [[nodiscard]] const std::vector<Program>& programs() const;
   [[nodiscard]] const std::vector<RobotEeprom>& eeproms() const;  ///< the EEPROMs that the experiment states
@@ -123,9 +126,12 @@ class RunPlan {
 
   [[nodiscard]] std::uint32_t robots() const { return static_cast<std::uint32_t>(program_of_.size()); }
   [[nodiscard]] Pose initial_pose(std::uint32_t robot) const;
-  /// Index of the robot's program in programs(), or kNoProgram if its group is tracked.
+  /// Index of the robot's program in programs(), or kNoProgram where it runs none.
   [[nodiscard]] std::uint32_t program_of(std::uint32_t robot) const { return program_of_[robot]; }
-  [[nodiscard]] bool tracked(std::uint32_t robot) const { return program_of_[robot] == kNoProgram; }
+  /// Whether the robot is a real one. It may have a program, its shadow.
+  [[nodiscard]] bool tracked(std::uint32_t robot) const { return tracked_[robot] != 0; }
+  /// Whether any robot is.
+  [[nodiscard]] bool any_tracked() const { return any_tracked_; }
   /// Whether the robot is immobile: motors have no effect, and nothing moves it.
   [[nodiscard]] bool immobile(std::uint32_t robot) const { return immobile_[robot] != 0; }
   /// Number of bodies that robots can push: world.movables.
@@ -164,9 +170,10 @@ class RunPlan {
 
   std::uint64_t run_, seed_;
   std::int64_t checkpoint_every_;
+  bool any_tracked_ = false;
   // Per robot.
   std::vector<std::uint32_t> program_of_;
-  std::vector<std::uint8_t> immobile_;
+  std::vector<std::uint8_t> immobile_, tracked_;
   std::vector<LoopRate> loop_rate_;
   std::vector<std::uint16_t> uid_of_;
 };

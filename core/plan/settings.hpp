@@ -15,6 +15,7 @@
 #include "core/plan/run_settings.hpp"
 #include "core/plan/senses_settings.hpp"
 #include "core/plan/station_settings.hpp"
+#include "core/plan/tracking_settings.hpp"
 
 namespace kilotwin {
 
@@ -28,6 +29,7 @@ struct PlanSettings {
   PhysicsSettings physics;
   RadioSettings radio;
   StationSettings station;
+  TrackingSettings tracking;
   std::optional<LightSettings> light;
   std::optional<BatterySettings> battery;
   std::optional<TemperatureSettings> temperature;

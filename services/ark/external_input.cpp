@@ -1,15 +1,8 @@
 #include "services/ark/external_input.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace kilotwin::ark {
-namespace {
-
-/// A tracker that sees a robot farther from the arena's centre is wrong: arenas are at most 1e6 mm wide.
-constexpr double kFarthest_mm = 1e7;
-
-}  // namespace
 
 ExternalInput::ExternalInput(const RunPlan& plan, const dds::Participant& participant)
     : plan_(plan),
@@ -20,11 +13,7 @@ ExternalInput::ExternalInput(const RunPlan& plan, const dds::Participant& partic
       overhead_packets_(participant, topics::overhead_packets(),
                         [this](const PublicOverheadPacket& sample, dds::SampleState state) {
                           if (state.valid) on_overhead_packet(sample);
-                        }),
-      tracked_poses_(participant, topics::tracked_poses(),
-                     [this](const PublicTrackedPose& sample, dds::SampleState state) {
-                       if (state.valid) on_tracked_pose(sample);
-                     }) {}
+                        }) {}
 
 std::vector<Directive> ExternalInput::take() {
   const std::lock_guard lock(mutex_);
@@ -68,18 +57,6 @@ void ExternalInput::on_overhead_packet(const PublicOverheadPacket& sample) {
     default: return;
   }
   std::copy_n(sample.message, directive.packet.message.size(), directive.packet.message.begin());
-  waiting_.push_back(directive);
-}
-
-void ExternalInput::on_tracked_pose(const PublicTrackedPose& sample) {
-  const std::lock_guard lock(mutex_);
-  // False where a value is not finite, too.
-  const bool sound = std::abs(sample.x_mm) <= kFarthest_mm && std::abs(sample.y_mm) <= kFarthest_mm &&
-                     std::abs(sample.heading_rad) < 100;
-  if (!ours(sample.run) || !sound || sample.robot >= plan_.robots() || !plan_.tracked(sample.robot)) return;
-  Directive directive;
-  directive.kind = DirectiveKind::kTrackedPose;
-  directive.tracked_pose = {sample.robot, sample.x_mm, sample.y_mm, wrapped(sample.heading_rad)};
   waiting_.push_back(directive);
 }
 

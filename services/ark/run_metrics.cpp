@@ -50,6 +50,7 @@ void RunMetrics::on_metrics(const WireMetrics& metrics) {
   account.cpu_ns = metrics.cpu_ns;
   account.peak_memory_kib = metrics.peak_memory_kib;
   account.robots_failed = metrics.robots_failed;
+  account.bodies_without_space = metrics.bodies_without_space;
   account.attempted = metrics.attempted;
   account.sent = metrics.sent;
   account.received = metrics.received;
@@ -102,6 +103,7 @@ void RunMetrics::fill(RunTotals& totals) {
   totals.cpu_s = totals.peak_memory_mib = 0;
   totals.attempted = totals.sent = totals.received = totals.collided = 0;
   totals.robots_failed = 0;
+  totals.tracking.bodies_without_space = 0;
   totals.work_ns = {};
   totals.pairs.clear();
   totals.radios.clear();
@@ -114,6 +116,7 @@ void RunMetrics::fill(RunTotals& totals) {
     totals.received += account.received;
     totals.collided += account.collided;
     totals.robots_failed += account.robots_failed;
+    totals.tracking.bodies_without_space += account.bodies_without_space;
     totals.work_ns[static_cast<std::size_t>(work_of(i))] += account.step_ns;
     totals.work_ns[static_cast<std::size_t>(Work::kExchange)] += account.exchange_ns;
     totals.pairs.insert(totals.pairs.end(), account.pairs.begin(), account.pairs.end());

@@ -44,6 +44,7 @@ StationEngine::StationEngine(const RunPlan& plan)
       start_ends_(plan.tick_length.at_or_after(plan.station_settings().start_broadcast_s)),
       packet_interval_(cycles_of(plan.station_settings().packet_interval_s)),
       robot_interval_(cycles_of(robot_interval_s(plan.robots()))),
+      tracked_(plan),
       packets_{run_packet()},
       next_packet_(begin_of(start_ends_) +
                    begin_of(plan.tick_length.at_or_after(plan.station_settings().packet_interval_s))),
@@ -116,6 +117,7 @@ void StationEngine::send_readings(const SwarmView& swarm) {
 void StationEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == now_);
   ++now_;
+  tracked_.commit(inputs.memberships);
   packets_.assign(inputs.external.begin(), inputs.external.end());
   if (packets_.empty()) return send_own(inputs.swarm);
   std::stable_sort(packets_.begin(), packets_.end(), [](const OverheadPacket& a, const OverheadPacket& b) {
@@ -148,7 +150,7 @@ std::uint64_t StationEngine::hash_part() const {
     if (const std::uint64_t word = environments_[i]->word(); word != 0)
       sum += entity_hash(HashDomain::kStation, kEnvironments + i, {word});
   }
-  return sum;
+  return sum + tracked_.hash_part();
 }
 
 void StationEngine::save(proto::StationState& state) const {
@@ -162,6 +164,7 @@ void StationEngine::save(proto::StationState& state) const {
   for (const Cycles served : served_) state.add_served_cycle(served);
   for (const std::uint32_t turns : turns_) state.add_turns(turns);
   for (const auto& environment : environments_) environment->save(*state.add_environment());
+  tracked_.save(state);
 }
 
 void StationEngine::load(Tick tick, std::span<const proto::StationState* const> parts) {
@@ -175,6 +178,7 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
   }
   const proto::StationState& state = *parts[0];
   now_ = tick;
+  tracked_.load(tick, state);
   next_packet_ = state.next_packet_cycle();
   repeating_ = state.repeating_own();
   packets_.clear();

@@ -15,6 +15,7 @@
 #include "core/effects/measurement.hpp"
 #include "core/frames/swarm_view.hpp"
 #include "core/plan/plan.hpp"
+#include "services/ark/tracking/tracked_swarm.hpp"
 #include "services/ark/virtual_environment.hpp"
 
 namespace kilotwin::proto {
@@ -26,7 +27,8 @@ namespace kilotwin::ark {
 /// What a step from tick k reads; all of it is of tick k.
 struct Inputs {
   const SwarmView& swarm;
-  std::span<const OverheadPacket> external;  ///< stamped by the ingress for this tick, in order
+  std::span<const OverheadPacket> external;         ///< stamped by the ingress for this tick, in order
+  std::span<const MembershipChange> memberships{};  ///< that take effect in this step, in order
 };
 
 class StationEngine {
@@ -35,6 +37,12 @@ class StationEngine {
   explicit StationEngine(const RunPlan& plan);
 
   void step(Tick from, const Inputs& inputs);
+  /// The trackers' samples of the present tick; before its frame, once at most, and only where the experiment has tracked
+  /// robots.
+  void take(std::span<const TrackerSample> samples) { tracked_.take(now_, samples); }
+  /// Where tracked robots are: a function of the state at the present tick and of its samples.
+  void emit(TrackingFrame& frame) const { tracked_.emit(now_, frame); }
+  [[nodiscard]] const TrackedSwarm& tracked() const { return tracked_; }
   /// The packets of the present tick.
   void emit(OverheadFrame& frame) const;
   [[nodiscard]] std::uint64_t hash_part() const;
@@ -62,6 +70,7 @@ class StationEngine {
   std::vector<std::unique_ptr<VirtualEnvironment>> environments_;
 
   Tick now_;
+  TrackedSwarm tracked_;
   std::vector<OverheadPacket> packets_;  ///< of now_
   std::uint32_t next_robot_ = 0;         ///< whose turn it is: robots are served in a circle
   Cycles next_packet_;

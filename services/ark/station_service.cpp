@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <optional>
 #include <thread>
 
 #include "core/base/error.hpp"
@@ -16,6 +17,7 @@
 #include "services/ark/run_metrics.hpp"
 #include "services/ark/station_engine.hpp"
 #include "services/ark/swarm_stream.hpp"
+#include "services/ark/tracked_robots.hpp"
 
 namespace kilotwin::ark {
 namespace {
@@ -44,10 +46,20 @@ class StationFederate : public Federate {
         overhead_(session, topics::overhead()),
         status_(session.participant(), topics::run_status()),
         robots_(session.participant(), topics::robots()),
-        swarm_stream_(session.plan(), session.participant()) {}
+        swarm_stream_(session.plan(), session.participant()) {
+    if (!session.plan().any_tracked()) return;
+    tracked_.emplace(session.plan(), session.participant(), context);
+    tracking_.emplace(session, topics::tracking());
+  }
 
   void publish(Tick now) override {
+    if (now > session_.first()) lateness_.tick_begins(now, ahead_s(now));
     announce(now);
+    if (tracked_) {
+      follow_tracked(now);
+      engine_.emit(tracking_->frame);
+      tracking_->write();
+    }
     engine_.emit(overhead_.frame);
     overhead_.write();
   }
@@ -60,6 +72,7 @@ class StationFederate : public Federate {
   void inputs_complete(Tick now, bool last) override {
     swarm_.gather(now, bodies_.at(now));
     swarm_.gather(actuation_.at(now));
+    if (tracked_) tracked_->acted(now, bodies_.arrived(now));
     const auto begun = Clock::now();
     observer_.state(now, swarm_, last);
     recording_ns_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begun).count());
@@ -68,7 +81,9 @@ class StationFederate : public Federate {
     swarm_stream_.offer(swarm_, last);
   }
 
-  void step(Tick from) override { engine_.step(from, {swarm_, session_.schedule().overhead_inputs()}); }
+  void step(Tick from) override {
+    engine_.step(from, {swarm_, session_.schedule().overhead_inputs(), session_.schedule().memberships()});
+  }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
 
@@ -128,10 +143,32 @@ class StationFederate : public Federate {
   void finish() { snapshots_.remove_all(); }
   void flush_status() const { status_.flush(1.0); }
 
+  void fill(RunTotals& totals) const {
+    totals.lateness = lateness_.totals();
+    if (!tracked_) return;
+    tracked_->fill(totals.tracking);
+    totals.tracking.jumps = engine_.tracked().jumps();
+  }
   [[nodiscard]] std::uint64_t recording_ns() const { return recording_ns_; }
   [[nodiscard]] bool was_interrupted() const { return stop_announced_; }
 
  private:
+  /// Samples that came until now count for this tick; memberships that they end or begin are announced.
+  void follow_tracked(Tick now) {
+    const RunPlan& plan = session_.plan();
+    const double pace = plan.pace > 0 ? plan.pace : 1;
+    const double since_first_s =
+        plan.pace > 0 ? session_.wall_s() * plan.pace : plan.tick_length.seconds_at(Tick{now - session_.first()});
+    const double now_s = plan.tick_length.seconds_at(session_.first()) + since_first_s;
+    engine_.take(tracked_->samples_of(now, static_cast<std::int64_t>(now_s * kNominalClockHz), pace, observer_));
+    for (const MembershipChange& change : tracked_->changes(engine_.tracked())) {
+      Directive directive;
+      directive.kind = DirectiveKind::kMembership;
+      directive.membership = change;
+      announce(now, directive);
+    }
+  }
+
   /// Writes the part of the checkpoint of the tick whose state hash is the last one known, if there is one. The state hash
   /// is known of no tick beyond that at which the station stands, so a part that comes to be saved is never too late.
   void write_checkpoint() {
@@ -191,12 +228,16 @@ class StationFederate : public Federate {
   Input<BodyFrame> bodies_;
   Input<ActuationFrame> actuation_;
   Output<OverheadFrame> overhead_;
+  // Only where there are tracked robots.
+  std::optional<TrackedRobots> tracked_;
+  std::optional<Output<TrackingFrame>> tracking_;
   SwarmView swarm_{session_.plan().robots(), session_.plan().movables(), session_.plan().memory.size()};
   dds::Writer<PublicRunStatus> status_;
   dds::Writer<PublicRobotState> robots_;
   Clock::time_point next_robots_{};
   SwarmStream swarm_stream_;
   Pace pace_{session_.plan()};
+  Lateness lateness_{session_.plan()};
   std::deque<std::pair<Tick, proto::CheckpointPart>> unfinished_;  // without their state hash
   std::uint64_t recording_ns_ = 0;
   bool stop_announced_ = false;
@@ -240,6 +281,7 @@ RunTotals run_service(const RunPlan& plan, const ServiceContext& context, RunObs
   std::uint64_t& station_ns = totals.work_ns[static_cast<std::size_t>(Work::kStation)];
   station_ns -= std::min(station_ns, federate.recording_ns());
   totals.work_ns[static_cast<std::size_t>(Work::kRecording)] = federate.recording_ns();
+  federate.fill(totals);
   totals.stopped_early = session.schedule().stopped_early();
   if (totals.failure.empty() && federate.was_interrupted()) totals.failure = "interrupted";
   if (totals.failure.empty() && totals.last != session.schedule().last()) {

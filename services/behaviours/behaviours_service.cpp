@@ -30,6 +30,7 @@ class BehavioursFederate : public Federate {
                 return plan.share(host).contains(robot) && !plan.firmware(robot);
               }) {
     const RunPlan& plan = session.plan();
+    if (plan.any_tracked()) tracking_.emplace(session, topics::tracking(), std::vector{plan.station()});
     if (!plan.hosts_see_bodies()) return;
     bodies_.emplace(session, topics::bodies(), plan.all_physics());
     swarm_.emplace(plan.robots(), plan.movables(), plan.memory.size());
@@ -42,7 +43,8 @@ class BehavioursFederate : public Federate {
 
   void step(Tick from) override {
     if (swarm_) swarm_->gather(from, bodies_->at(from));
-    engine_.step(from, *radio_.at(from)[0], swarm_ ? &*swarm_ : nullptr);
+    engine_.step(from, *radio_.at(from)[0], swarm_ ? &*swarm_ : nullptr,
+                 {tracking_ ? tracking_->at(from)[0] : nullptr, session_.schedule().memberships()});
     for (const auto& printed : engine_.printed()) logs_.write(from, printed.robot, printed.text);
     for (; printed_failures_ < engine_.failures().size(); ++printed_failures_) {
       const auto& failure = engine_.failures()[printed_failures_];
@@ -79,6 +81,7 @@ class BehavioursFederate : public Federate {
   // Only if RunPlan::hosts_see_bodies().
   std::optional<Input<BodyFrame>> bodies_;
   std::optional<SwarmView> swarm_;
+  std::optional<Input<TrackingFrame>> tracking_;  // only where there are tracked robots
   Output<ActuationFrame> actuation_;
   std::size_t
       printed_failures_;  // a resumed engine starts with the failures of its checkpoint, printed by the earlier run

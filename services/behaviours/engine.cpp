@@ -6,6 +6,7 @@
 #include "core/base/error.hpp"
 #include "core/base/message_crc.h"
 #include "core/base/state_hash.hpp"
+#include "core/plan/tracking_settings.hpp"
 
 namespace kilotwin::behaviours {
 namespace {
@@ -39,6 +40,8 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       spin_up_(share_.size()),
       led_(share_.size()),
       life_cycle_(share_.size(), static_cast<std::uint8_t>(LifeCycle::kIdle)),
+      absent_(share_.size()),
+      seen_led_(share_.size(), kUnknownLed),
       tx_period_(share_.size(), kInitialTxPeriod),
       holds_(share_.size()),
       offers_(share_.size()),
@@ -53,6 +56,11 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
     if (!share_.contains(brought.robot)) continue;
     auto& eeprom = eeprom_[brought.robot - share_.first] = std::make_unique<Eeprom>();
     std::copy_n(brought.content.begin(), eeprom->size(), eeprom->begin());
+  }
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (!plan.tracked(share_.first + i) || plan.tracking_settings().present_at_start) continue;
+    absent_[i] = 1;
+    life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kAbsent);
   }
   if (const RadioParameters radios(plan); radios.own_tables()) calibrate_ranging(radios);
   // Hosts in one process start at different slots, so that they seldom wait for each other's mutex.
@@ -103,12 +111,14 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
   while (next < first_reception_.size()) first_reception_[next++] = static_cast<std::uint32_t>(receptions_.size());
 }
 
-void BehavioursEngine::step(Tick from, const RadioFrame& radio, const SwarmView* swarm) {
+void BehavioursEngine::step(Tick from, const RadioFrame& radio, const SwarmView* swarm,
+                            const TrackedInputs& tracked) {
   KILOTWIN_DEMAND(from == now_ && radio.tick == from && radio.first_robot == share_.first &&
                   radio.kilo_ticks.size() == share_.size());
   ++now_;
   gather(radio);
   if (swarm != nullptr) senses_.at(*swarm);
+  take_memberships(tracked);
   printed_.clear();
   std::fill(offers_.begin(), offers_.end(), std::uint8_t{0});
   running_->tick.store(from.count(), std::memory_order_relaxed);
@@ -124,14 +134,74 @@ void BehavioursEngine::step(Tick from, const RadioFrame& radio, const SwarmView*
       // Other engines have replaced the caches' content since the last tick.
       if (n + kAhead < group.robots.size()) memory_[group.robots[n + kAhead]].prefetch();
       const std::uint32_t i = group.robots[n];
+      if (absent_[i] != 0) continue;
       run_robot(from, i, radio.kilo_ticks[i], program, slot, executor);
       if (slot.exchange()->log_length != 0) take_log(i, slot);
     }
     running_->robot.store(kNobody, std::memory_order_relaxed);
   }
   relay_firmware(radio);
+  if (tracked.frame != nullptr) follow(*tracked.frame);
   if (!senses_.has_batteries()) return;
   for (std::uint32_t i = 0; i < share_.size(); ++i) use_battery(i);
+}
+
+void BehavioursEngine::take_memberships(const TrackedInputs& tracked) {
+  for (const MembershipChange& change : tracked.memberships) {
+    if (!share_.contains(change.robot)) continue;
+    const std::uint32_t i = change.robot - share_.first;
+    absent_[i] = static_cast<std::uint8_t>(change.membership != Membership::kJoined);
+    if (absent_[i] != 0) {
+      life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kAbsent);
+      motor_left_[i] = motor_right_[i] = spin_up_[i] = led_[i] = holds_[i] = 0;
+    } else if (presence_[i] == Presence::kFailed) {
+      life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kFailed);
+    } else {
+      life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kIdle);
+    }
+  }
+}
+
+/// Tracked robots show the LED that was seen, and say what rules have for them.
+void BehavioursEngine::follow(const TrackingFrame& frame) {
+  KILOTWIN_DEMAND(frame.tick + 1 == now_);
+  for (std::size_t n = 0; n < frame.robot.size(); ++n) {
+    if (!share_.contains(frame.robot[n])) continue;
+    const std::uint32_t i = frame.robot[n] - share_.first;
+    if (frame.led[n] != kUnknownLed) seen_led_[i] = frame.led[n];
+    if (absent_[i] != 0) continue;
+    if (presence_[i] == Presence::kNone) say_by_rule(i, {frame.x_mm[n], frame.y_mm[n], frame.heading_rad[n]});
+  }
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    if (absent_[i] == 0 && plan_.tracked(share_.first + i))
+      led_[i] = seen_led_[i] == kUnknownLed ? std::uint8_t{0} : seen_led_[i];
+  }
+}
+
+void BehavioursEngine::say_by_rule(std::uint32_t i, const Pose& p_WR) {
+  const std::uint32_t robot = share_.first + i;
+  const std::uint8_t led = seen_led_[i];
+  const auto applies = [&](const SaysRuleSettings& rule) {
+    if (!rule.robots.empty() && !std::binary_search(rule.robots.begin(), rule.robots.end(), robot)) return false;
+    if (rule.led && *rule.led != led) return false;
+    if (!rule.circle) return true;
+    const double dx = p_WR.x_mm - rule.circle->x_mm, dy = p_WR.y_mm - rule.circle->y_mm;
+    return dx * dx + dy * dy <= rule.circle->radius_mm * rule.circle->radius_mm;
+  };
+  if (sent_[i] != 0) holds_[i] = 0;
+  const std::vector<SaysRuleSettings>& rules = plan_.tracking_settings().rules_of(robot);
+  const auto rule = std::find_if(rules.begin(), rules.end(), applies);
+  if (rule == rules.end()) {
+    life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kIdle);
+    holds_[i] = 0;
+    return;
+  }
+  life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kRunning);
+  tx_period_[i] = rule->tx_period;
+  if (requested_[i] == 0 || holds_[i] != 0) return;
+  message_[i] = rule->message;
+  if (rule->id_octet) message_[i][*rule->id_octet] = static_cast<std::uint8_t>(robot & 255);
+  holds_[i] = offers_[i] = 1;
 }
 
 /// Copies the outputs of firmware robots at tick k into the frame of tick k + 1. Programs that run here have the same delay, so
@@ -306,7 +376,7 @@ void BehavioursEngine::keep_eeprom(std::uint32_t i, const Slot& slot) {
 void BehavioursEngine::calibrate_ranging(const RadioParameters& radios) {
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
     const std::uint32_t id = share_.first + i;
-    if (eeprom_[i] || plan_.tracked(id) || plan_.firmware(id)) continue;
+    if (eeprom_[i] || plan_.program_of(id) == kNoProgram || plan_.firmware(id)) continue;
     const Calibration& calibration = parameters_.calibration(id);
     const RangingTable table = radios.table(id);
     eeprom_[i] = std::make_unique<Eeprom>();
@@ -409,7 +479,9 @@ void BehavioursEngine::emit(ActuationFrame& frame) const {
 std::uint64_t BehavioursEngine::hash_part() const {
   std::uint64_t sum = 0;
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
-    if (presence_[i] == Presence::kNone) continue;
+    // A robot without a program has nothing of its own here, unless it says something or is absent.
+    constexpr auto kIdle = static_cast<std::uint8_t>(LifeCycle::kIdle);
+    if (presence_[i] == Presence::kNone && life_cycle_[i] == kIdle && led_[i] == 0) continue;
     const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 |
                                   std::uint64_t{led_[i]} << 16 | std::uint64_t{life_cycle_[i]} << 24 |
                                   std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48 |

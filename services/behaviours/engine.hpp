@@ -28,14 +28,22 @@ namespace kilotwin::behaviours {
 
 /// A step does for each robot, in this order:
 ///   1. advance the robot's clock;
+/// What the station and the schedule say of tracked robots; needed where RunPlan::any_tracked().
+struct TrackedInputs {
+  const TrackingFrame* frame = nullptr;
+  std::span<const MembershipChange> memberships{};  ///< that take effect in the step, in order
+};
+
 ///   2. call kilo_message_tx_success if its message has been sent;
 ///   3. call kilo_message_rx for each reception, in order of arrival;
 ///   4. run the main program until it has used up the tick;
 ///   5. call kilo_message_tx if the radio requests a message, the robot is running, and it holds no message.
 /// A robot holds a message until it is sent or the robot stops running.
 ///
-/// The radio runs the processors of firmware robots; this engine copies their motors and LEDs from the radio's frame. Robots of
-/// tracked groups have no program: motors 0, LED 0, life cycle IDLE. A sleeping robot wakes every 8 s to listen and meanwhile has
+/// The radio runs the processors of firmware robots; this engine copies their motors and LEDs from the radio's frame.
+/// Robots of tracked groups show the LED that a tracker saw. Without a program they are IDLE, or RUNNING while a rule says
+/// something for them. With one, their shadow, they have its life cycle; its motors are shown and move nothing. A robot that
+/// is absent runs no program and is ABSENT. A sleeping robot wakes every 8 s to listen and meanwhile has
 /// the life cycle IDLE. A robot with a flat battery has the life cycle FLAT and restarts once it is charged.
 ///
 /// The engine is a pure function of its inputs. A fault in a robot's code stops that robot and adds a Failure. Engines of one
@@ -49,7 +57,8 @@ class BehavioursEngine {
 
   /// Steps from tick `from` to the next. `radio` is the frame for this host at tick `from`. `swarm` is at tick `from` too; it may
   /// be null unless RunPlan::hosts_see_bodies().
-  void step(Tick from, const RadioFrame& radio, const SwarmView* swarm = nullptr);
+  void step(Tick from, const RadioFrame& radio, const SwarmView* swarm = nullptr,
+            const TrackedInputs& tracked = {});
   void emit(ActuationFrame& frame) const;
   /// Sum of entity_hash over the host's robots. It covers motors, LED, life cycle, transmission period, whether a message is held,
   /// and the charge if the experiment has batteries.
@@ -103,6 +112,9 @@ class BehavioursEngine {
 
   void gather(const RadioFrame& radio);
   void relay_firmware(const RadioFrame& radio);
+  void take_memberships(const TrackedInputs& tracked);
+  void follow(const TrackingFrame& frame);
+  void say_by_rule(std::uint32_t i, const Pose& p_WR);
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
   void use_battery(std::uint32_t i);
   void set_surroundings(std::uint32_t i, const Slot&, std::uint32_t receptions);
@@ -140,6 +152,8 @@ class BehavioursEngine {
   std::vector<std::unique_ptr<Eeprom>> eeprom_;  ///< null: the default content, uid and motor calibration
   std::vector<Presence> presence_;
   std::vector<std::uint8_t> motor_left_, motor_right_, spin_up_, led_, life_cycle_;
+  std::vector<std::uint8_t> absent_;    ///< 1: a tracked robot that is not there
+  std::vector<std::uint8_t> seen_led_;  ///< of tracked robots, or kUnknownLed
   std::vector<std::uint16_t> tx_period_;
   std::vector<std::uint8_t> holds_;   ///< 1: the robot holds a message that is not sent yet
   std::vector<std::uint8_t> offers_;  ///< 1: the robot offers a further message in this tick

@@ -30,6 +30,7 @@ enum Field : std::size_t {
   kOffers,
   kMessage,
   kSpinUp = kMessage + 10,
+  kSeenLed,
   kFields
 };
 
@@ -51,6 +52,7 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
     fields[kLifeCycle] = life_cycle_[i];
     fields[kPeriodLow] = static_cast<std::uint8_t>(tx_period_[i] & 0xff);
     fields[kPeriodHigh] = static_cast<std::uint8_t>(tx_period_[i] >> 8);
+    fields[kSeenLed] = seen_led_[i];
     fields[kHolds] = holds_[i];
     fields[kOffers] = offers_[i];
     std::copy(message_[i].begin(), message_[i].end(), fields.begin() + kMessage);
@@ -77,13 +79,13 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
   failures_.clear();
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
     const std::uint32_t id = share_.first + i;
-    const bool tracked = plan_.tracked(id);
+    const bool has_none = plan_.program_of(id) == kNoProgram;
     if (saved[i] == nullptr || saved[i]->host().size() < kFields) {
       throw RunError("robot " + std::to_string(id) + " is missing in the checkpoint");
     }
     const auto fields = octets(saved[i]->host());
     const auto presence = Presence{fields[kPresence]};
-    if (presence > Presence::kFirmware || (presence == Presence::kNone) != tracked ||
+    if (presence > Presence::kFirmware || (presence == Presence::kNone) != has_none ||
         (presence == Presence::kFirmware) != plan_.firmware(id)) {
       throw RunError("robot " + std::to_string(id) +
                      " is firmware, tracked or a program here, and another of these in the checkpoint");
@@ -108,6 +110,8 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     led_[i] = fields[kLed];
     life_cycle_[i] = fields[kLifeCycle];
     tx_period_[i] = static_cast<std::uint16_t>(fields[kPeriodLow] | fields[kPeriodHigh] << 8);
+    seen_led_[i] = fields[kSeenLed];
+    absent_[i] = static_cast<std::uint8_t>(fields[kLifeCycle] == static_cast<std::uint8_t>(LifeCycle::kAbsent));
     holds_[i] = fields[kHolds];
     offers_[i] = fields[kOffers];
     std::copy_n(fields.begin() + kMessage, 10, message_[i].begin());

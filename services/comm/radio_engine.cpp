@@ -5,6 +5,7 @@
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/plan/radio_settings.hpp"
+#include "core/plan/tracking_settings.hpp"
 #include "services/comm/message_octets.hpp"
 
 namespace kilotwin::comm {
@@ -53,7 +54,10 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
   for (std::uint32_t i = 0; i < plan.robots(); ++i) {
     const Pose pose = plan.initial_pose(i);
     neighbourhood_.place(i, pose.x_mm, pose.y_mm);
-    is_external_.push_back(plan.tracked(i) || plan.firmware(i));
+    // A real robot receives by itself; its shadow hears what it would hear here.
+    const bool is_real = plan.tracked(i) && plan.program_of(i) == kNoProgram;
+    deaf_.push_back(is_real);
+    is_external_.push_back(plan.firmware(i) || (is_real && plan.tracking_settings().rules_of(i).empty()));
   }
   KILOTWIN_DEMAND(!divided_ || !plan.has_firmware());
   if (divided_) {
@@ -105,7 +109,8 @@ void RadioEngine::read_life_cycles(const SwarmView& swarm) {
     if (divided_ && known_[robot] == 0) continue;
     const auto life_cycle = static_cast<LifeCycle>(swarm.life_cycle[robot]);
     const bool deaf = life_cycle == LifeCycle::kSleeping || life_cycle == LifeCycle::kFailed ||
-                      life_cycle == LifeCycle::kFlat || is_external_[robot] != 0;
+                      life_cycle == LifeCycle::kFlat || life_cycle == LifeCycle::kAbsent ||
+                      is_external_[robot] != 0 || deaf_[robot] != 0;
     const bool running = life_cycle == LifeCycle::kRunning && is_external_[robot] == 0;
     const int kept = state_[robot] & (kHolding | kSending);
     state_[robot] = static_cast<std::uint8_t>(kept | (running ? kRunning : 0) | (deaf ? 0 : kReceptive));

@@ -171,7 +171,9 @@ class RadioEngine {
 
   Tick tick_;
   TickTimers timers_;
-  std::vector<std::uint8_t> state_, is_external_;  ///< per robot; external: it runs firmware, or it is real
+  /// Per robot; external: it runs firmware, or it is real and says nothing here.
+  std::vector<std::uint8_t> state_, is_external_;
+  std::vector<std::uint8_t> deaf_;  ///< per robot: it is real, and no shadow of it runs here
   std::vector<std::uint8_t> owned_,
       known_;                             ///< per robot of a divided channel; known: owned, or a ghost
   std::vector<std::uint16_t> tx_period_;  ///< per robot

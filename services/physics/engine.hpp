@@ -22,7 +22,8 @@ namespace kilotwin::physics {
 struct Inputs {
   std::span<const BodyFrame* const> ghosts;          ///< one per neighbour, in any order
   std::span<const ActuationFrame* const> actuation;  ///< in any order; a robot in no frame is at rest
-  std::span<const TrackedPoseInput> tracked;  ///< the same for all partitions; the last entry of a robot counts
+  const TrackingFrame* tracking = nullptr;           ///< where RunPlan::any_tracked(); alike for all partitions
+  std::span<const MembershipChange> memberships{};   ///< that take effect in this step, in order
 };
 
 /// Ownership: in the step from tick k, the partition whose rectangle contains a robot's pose at k owns the robot. It
@@ -35,6 +36,8 @@ class Engine {
 
   /// Advances from tick `from`, which must be the current one, to `from` + 1.
   virtual void step(Tick from, const Inputs&) = 0;
+  /// How often a tracked robot that this partition owns came to stand on another body since the start, or since load.
+  [[nodiscard]] virtual std::uint32_t bodies_without_space() const = 0;
   /// Writes the robots listed at the current tick, in ascending ids.
   virtual void emit_bodies(BodyFrame&) const = 0;
   /// Writes the listed robots that `neighbour` must know, without tracked ones: every partition knows those from its inputs.

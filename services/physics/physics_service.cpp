@@ -1,5 +1,7 @@
 #include "services/physics/physics_service.hpp"
 
+#include <optional>
+
 #include "core/federation/frame_io.hpp"
 #include "services/physics/engine.hpp"
 
@@ -23,6 +25,8 @@ class PhysicsFederate : public Federate {
         ghosts_(session, topics::ghosts(partition.value()), federates_of(session.plan(), engine_->neighbours())),
         actuation_(session, topics::actuation(), session.plan().all_behaviours()),
         bodies_(session, topics::bodies()) {
+    if (session.plan().any_tracked())
+      tracking_.emplace(session, topics::tracking(), std::vector{session.plan().station()});
     for (const PartitionId neighbour : engine_->neighbours()) {
       ghosts_out_.push_back(std::make_unique<Output<BodyFrame>>(session, topics::ghosts(neighbour.value())));
     }
@@ -38,10 +42,14 @@ class PhysicsFederate : public Federate {
   }
 
   void step(Tick from) override {
-    engine_->step(from, {ghosts_.at(from), actuation_.at(from), session_.schedule().tracked_poses()});
+    engine_->step(from, {ghosts_.at(from), actuation_.at(from), tracking_ ? tracking_->at(from)[0] : nullptr,
+                         session_.schedule().memberships()});
   }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_->hash_part(); }
+  void count(WireMetrics& metrics, bool) override {
+    metrics.bodies_without_space = engine_->bodies_without_space();
+  }
 
   void save(Tick now) override {
     proto::CheckpointPart part;
@@ -56,6 +64,7 @@ class PhysicsFederate : public Federate {
   std::unique_ptr<Engine> engine_;
   Input<BodyFrame> ghosts_;
   Input<ActuationFrame> actuation_;
+  std::optional<Input<TrackingFrame>> tracking_;
   Output<BodyFrame> bodies_;
   std::vector<std::unique_ptr<Output<BodyFrame>>> ghosts_out_;
 };

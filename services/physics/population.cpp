@@ -4,7 +4,9 @@
 #include <string>
 
 #include "core/base/error.hpp"
+#include "core/base/pose.hpp"
 #include "core/base/state_hash.hpp"
+#include "core/plan/tracking_settings.hpp"
 #include "idl/checkpoint.pb.h"
 
 namespace kilotwin::physics {
@@ -35,6 +37,9 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
       is_tracked_.resize(robots_, 0);
       is_tracked_[robot] = 1;
       tracked_.add(robot, x, y, heading, 1, 1);
+      absent_.push_back(!plan.tracking_settings().present_at_start);
+      absentees_ += absent_.back();
+      on_other_.push_back(0);
       memory_.start(robot, tracked_.memory_of(tracked_.size() - 1));
     }
     if (!is_own(x, y)) continue;
@@ -45,7 +50,7 @@ Population::Population(const RunPlan& plan, PartitionId partition, DriveModel dr
 
 void Population::begin(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == tick_);
-  take_tracked(inputs.tracked);
+  take_tracked(inputs);
   for (const BodyFrame* frame : inputs.ghosts) KILOTWIN_DEMAND(frame->tick == from);
   gather(inputs.ghosts);
   read_motors(from, inputs.actuation);
@@ -78,15 +83,60 @@ void Population::remember() {
   memory_.advance(tick_, before, known_.x_mm, known_.y_mm, known_.heading_rad, known_.memory);
 }
 
-void Population::take_tracked(std::span<const TrackedPoseInput> inputs) {
-  for (const TrackedPoseInput& input : inputs) {
-    const auto found = std::lower_bound(tracked_.robot.begin(), tracked_.robot.end(), input.robot);
-    KILOTWIN_DEMAND(found != tracked_.robot.end() && *found == input.robot);
-    const auto i = static_cast<std::size_t>(found - tracked_.robot.begin());
-    tracked_.x_mm[i] = input.x_mm;
-    tracked_.y_mm[i] = input.y_mm;
-    tracked_.heading_rad[i] = wrapped(input.heading_rad);
+void Population::take_tracked(const Inputs& inputs) {
+  const auto entry_of = [this](std::uint32_t robot) {
+    const auto found = std::lower_bound(tracked_.robot.begin(), tracked_.robot.end(), robot);
+    KILOTWIN_DEMAND(found != tracked_.robot.end() && *found == robot);
+    return static_cast<std::size_t>(found - tracked_.robot.begin());
+  };
+  for (const MembershipChange& change : inputs.memberships) {
+    std::uint8_t& absent = absent_[entry_of(change.robot)];
+    absentees_ -= absent;
+    absent = static_cast<std::uint8_t>(change.membership != Membership::kJoined);
+    absentees_ += absent;
   }
+  if (inputs.tracking == nullptr) return;
+  const TrackingFrame& frame = *inputs.tracking;
+  KILOTWIN_DEMAND(frame.tick == tick_);
+  for (std::size_t n = 0; n < frame.robot.size(); ++n) {
+    const std::size_t i = entry_of(frame.robot[n]);
+    if (absent_[i] != 0) continue;
+    tracked_.x_mm[i] = frame.x_mm[n];
+    tracked_.y_mm[i] = frame.y_mm[n];
+    tracked_.heading_rad[i] = wrapped(frame.heading_rad[n]);
+  }
+}
+
+/// Counts own tracked robots that have come to stand on another body in this step. Known bodies are few.
+void Population::count_without_space() {
+  constexpr double kTolerance_mm = 1, kLeast_mm = 2 * kRobotRadius_mm - kTolerance_mm;
+  for (std::size_t i = 0; i < known_.size(); ++i) {
+    if (known_.tracked[i] == 0) continue;
+    bool overlaps = false;
+    for (std::size_t j = 0; j < known_.size() && !overlaps; ++j) {
+      const double dx = known_.x_mm[j] - known_.x_mm[i], dy = known_.y_mm[j] - known_.y_mm[i];
+      overlaps = j != i && dx * dx + dy * dy < kLeast_mm * kLeast_mm;
+    }
+    const auto entry = static_cast<std::size_t>(
+        std::lower_bound(tracked_.robot.begin(), tracked_.robot.end(), known_.robot[i]) - tracked_.robot.begin());
+    const bool own = own_.empty() || own_[i] != 0;
+    without_space_ += static_cast<std::uint32_t>(own && overlaps && on_other_[entry] == 0);
+    on_other_[entry] = static_cast<std::uint8_t>(overlaps);
+  }
+}
+
+/// Absent robots have their place in the list, among the others.
+void Population::list_absent() {
+  Bodies all;
+  all.remembered = memory_.size();
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < tracked_.size(); ++i) {
+    if (absent_[i] == 0 || !is_own(tracked_.x_mm[i], tracked_.y_mm[i])) continue;
+    while (next < listed_.size() && listed_.robot[next] < tracked_.robot[i]) all.add(listed_, next++);
+    all.add(tracked_, i);
+  }
+  while (next < listed_.size()) all.add(listed_, next++);
+  listed_.swap(all);
 }
 
 void Population::gather(std::span<const BodyFrame* const> ghosts) {
@@ -104,7 +154,7 @@ void Population::gather(std::span<const BodyFrame* const> ghosts) {
     if (listed_.tracked[i] == 0) add(listed_.robot[i], {0, i});
   }
   for (std::uint32_t i = 0; i < tracked_.size(); ++i) {
-    if (rectangle_.distance_mm(tracked_.x_mm[i], tracked_.y_mm[i]) <= margin_mm_) {
+    if (absent_[i] == 0 && rectangle_.distance_mm(tracked_.x_mm[i], tracked_.y_mm[i]) <= margin_mm_) {
       add(tracked_.robot[i], {1, i});
     }
   }
@@ -167,14 +217,16 @@ void Population::read_motors(Tick from, std::span<const ActuationFrame* const> f
 void Population::end() {
   if (memory_.size() > 0 || fields_.any()) remember();
   ++tick_;
+  if (tracked_.size() > 0) count_without_space();
   if (grid_.size() == 1) {
     listed_.swap(known_);
-    return;
+  } else {
+    listed_.clear();
+    for (std::size_t i = 0; i < known_.size(); ++i) {
+      if (own_[i] != 0) listed_.add(known_, i);
+    }
   }
-  listed_.clear();
-  for (std::size_t i = 0; i < known_.size(); ++i) {
-    if (own_[i] != 0) listed_.add(known_, i);
-  }
+  if (absentees_ > 0) list_absent();
 }
 
 void Population::emit_bodies(BodyFrame& frame) const {
@@ -230,6 +282,9 @@ void Population::save(proto::PhysicsState& state) const {
   state.mutable_heading_rad()->Add(listed_.heading_rad.begin(), listed_.heading_rad.end());
   state.mutable_memory()->Add(listed_.memory.begin(), listed_.memory.end());
   KILOTWIN_DEMAND(state.robot_size() == size && state.heading_rad_size() == size);
+  for (std::size_t i = 0; i < tracked_.size(); ++i) {
+    if (absent_[i] != 0 && is_own(tracked_.x_mm[i], tracked_.y_mm[i])) state.add_absent(tracked_.robot[i]);
+  }
   fields_.save(state);
 }
 
@@ -266,6 +321,18 @@ void Population::load(Tick tick, std::span<const proto::PhysicsState* const> par
     if (all.tracked[from.index] != 0) tracked_.add(all, from.index);
     if (is_own(all.x_mm[from.index], all.y_mm[from.index])) listed_.add(all, from.index);
   });
+  absent_.assign(tracked_.size(), 0);
+  on_other_.assign(tracked_.size(), 0);
+  without_space_ = 0;
+  for (const proto::PhysicsState* part : parts) {
+    for (const std::uint32_t robot : part->absent()) {
+      const auto found = std::lower_bound(tracked_.robot.begin(), tracked_.robot.end(), robot);
+      if (found == tracked_.robot.end() || *found != robot)
+        throw RunError("checkpoint: physics: robot " + std::to_string(robot) + " is absent and not tracked");
+      absent_[static_cast<std::size_t>(found - tracked_.robot.begin())] = 1;
+    }
+  }
+  absentees_ = static_cast<std::size_t>(std::count(absent_.begin(), absent_.end(), std::uint8_t{1}));
   fields_.load(parts);
   tick_ = tick;
 }

@@ -1,10 +1,12 @@
 /// The bodies that one partition knows, and the tasks that all engines share: ownership, ghosts for neighbours, hashing,
 /// saving and loading. An engine moves the bodies.
 ///
-///   begin(k): known = bodies listed at k + ghosts of k + tracked robots, within the margin of the rectangle
+///   begin(k): known = bodies listed at k + ghosts of k + present tracked robots, within the margin of the rectangle
 ///             own   = known bodies whose pose at k lies in the rectangle
 ///   (the engine moves the own bodies among the known from k to k+1)
-///   end():    listed at k+1 = own; updates the memory of the model's effects
+///   end():    listed at k+1 = own, and absent tracked robots where they were last; what the model's effects remember
+///
+/// A tracked robot that is absent has no body: it is listed, so that every robot has a pose, and known to no engine.
 #pragma once
 
 #include <cstdint>
@@ -50,6 +52,7 @@ class Population {
 
   // At the current tick.
   [[nodiscard]] Tick tick() const { return tick_; }
+  [[nodiscard]] std::uint32_t bodies_without_space() const { return without_space_; }
   [[nodiscard]] const Bodies& listed() const { return listed_; }
   [[nodiscard]] const std::vector<PartitionId>& neighbours() const { return neighbours_; }
   void emit_bodies(BodyFrame&) const;
@@ -63,7 +66,9 @@ class Population {
   void load(Tick, std::span<const proto::PhysicsState* const> parts);
 
  private:
-  void take_tracked(std::span<const TrackedPoseInput>);
+  void take_tracked(const Inputs&);
+  void count_without_space();
+  void list_absent();
   void gather(std::span<const BodyFrame* const> ghosts);
   void read_motors(Tick from, std::span<const ActuationFrame* const>);
   [[nodiscard]] bool is_own(double x_mm, double y_mm) const { return rectangle_.contains(x_mm, y_mm); }
@@ -83,7 +88,11 @@ class Population {
 
   Tick tick_;
   Bodies listed_;
-  Bodies tracked_;  ///< all tracked robots, wherever they are
+  Bodies tracked_;                      ///< all tracked robots, wherever they are
+  std::vector<std::uint8_t> absent_;    ///< per entry of tracked_
+  std::vector<std::uint8_t> on_other_;  ///< per entry of tracked_, 1: it stood on another body after the last step
+  std::uint32_t without_space_ = 0;
+  std::size_t absentees_ = 0;  ///< how many of absent_
 
   // Within a step.
   Bodies known_, previous_;        ///< of the current step and of the one before
@@ -109,6 +118,7 @@ class PopulationEngine : public Engine {
     population_.emit_ghosts(neighbour, frame);
   }
   [[nodiscard]] const std::vector<PartitionId>& neighbours() const override { return population_.neighbours(); }
+  [[nodiscard]] std::uint32_t bodies_without_space() const override { return population_.bodies_without_space(); }
   [[nodiscard]] std::uint64_t hash_part() const override { return population_.hash_part(); }
   void save(proto::PhysicsState& state) const override { population_.save(state); }
   void load(Tick tick, std::span<const proto::PhysicsState* const> parts) override {

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -124,7 +125,7 @@ class Outsider {
       : participant_(domain),
         control_(participant_.writer<RunControlPubSubType>("kilotwin/run_control")),
         overhead_(participant_.writer<OverheadPacketPubSubType>("kilotwin/overhead_packets")),
-        tracker_(participant_.writer<TrackedPosePubSubType>("kilotwin/tracked_poses")),
+        tracker_(participant_.writer<TrackerFramePubSubType>("kilotwin/tracker_frames")),
         status_reader_(participant_.reader<RunStatusPubSubType>(
             "kilotwin/run_status", fast::RELIABLE_RELIABILITY_QOS, fast::TRANSIENT_LOCAL_DURABILITY_QOS)),
         robots_reader_(participant_.reader<RobotStatePubSubType>(
@@ -186,22 +187,38 @@ class Outsider {
   }
 
   void track() {
-    // Values that no rounding would leave as they are.
-    struct {
+    struct Place {
       double x_mm, y_mm, heading_rad;
-    } const places[] = {{-201.1, 123.7, 0.3}, {250 / 3.0, -311.9, -2.9}};
-    for (const auto& place : places) {
-      TrackedPose pose;
-      pose.robot(kTrackedRobot);
-      pose.x_mm(place.x_mm);
-      pose.y_mm(place.y_mm);
-      pose.heading_rad(place.heading_rad);
+    };
+    const Place places[] = {{-201.1, 123.7, 0.3}, {250 / 3.0, -311.9, -2.9}};
+    std::uint64_t number = 0;
+    for (const Place& place : places) {
       const auto is_there = [&] {
         const RobotState& robot = robots_.at(kTrackedRobot);
-        return robot.x_mm() == place.x_mm && robot.y_mm() == place.y_mm && robot.heading_rad() == place.heading_rad;
+        return std::abs(robot.x_mm() - place.x_mm) < 1 && std::abs(robot.y_mm() - place.y_mm) < 1 &&
+               std::abs(robot.heading_rad() - place.heading_rad) < 0.05;
       };
-      await("the tracked robot to be where the tracker sees it", 10s, is_there, [&] { write(tracker_, pose); });
-      proven("publishes kilotwin/tracked_poses: robot %u is at (%.17g, %.17g) mm, to the last bit", kTrackedRobot,
+      const auto see = [&] {
+        const auto now = std::chrono::steady_clock::now().time_since_epoch();
+        TrackerFrame frame;
+        frame.source("outsider");
+        frame.frame(++number);
+        frame.capture_ns(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+        frame.sent_ns(frame.capture_ns());
+        frame.robot({kTrackedRobot});
+        frame.state({0});
+        frame.x_mm({place.x_mm});
+        frame.y_mm({place.y_mm});
+        frame.heading_rad({place.heading_rad});
+        frame.xx_mm2({0.04f});
+        frame.xy_mm2({0.0f});
+        frame.yy_mm2({0.04f});
+        frame.heading_variance_rad2({0.0004f});
+        frame.led({255});
+        write(tracker_, frame);
+      };
+      await("the tracked robot to be where the tracker sees it", 10s, is_there, see);
+      proven("publishes kilotwin/tracker_frames: robot %u is at (%.1f, %.1f) mm", kTrackedRobot,
              robots_.at(kTrackedRobot).x_mm(), robots_.at(kTrackedRobot).y_mm());
     }
   }

@@ -160,49 +160,5 @@ TEST_F(Control, RobotStatesArePublished) {
   EXPECT_EQ(process_->wait(30).status, 0);
 }
 
-TEST_F(Control, ATrackedRobotIsAtThePoseOfTheTracker) {
-  write(scratch_ / "hybrid.txtpb",
-        "arena { width_mm: 600 height_mm: 600 }\n"
-        "robots { count: 4 behaviour: \"" +
-            source("behaviours/disperse.c") +
-            "\" layout { grid { pitch_mm: 50 } } }\n"
-            "robots { count: 1 body: TRACKED layout { x_mm: 200 y_mm: 200 grid {} } }\n");
-  dds::Writer<PublicTrackedPose> poses(participant_, topics::tracked_poses());
-  Words words{program(),
-              "run",
-              scratch_ / "hybrid.txtpb",
-              "--duration",
-              "600",
-              "--pace",
-              "1",
-              "--partitions",
-              "2x2",
-              "--domain",
-              std::to_string(domain_),
-              "--out",
-              scratch_ / "run"};
-  process_ = std::make_unique<Process>(words, scratch_.path());
-  ASSERT_TRUE(eventually([&] { return poses.readers() > 0 && latest().phase == kilotwin_open_RUNNING; }));
-  PublicTrackedPose pose{};
-  pose.robot = 4;
-  pose.x_mm = -150;  // across two partition borders at once
-  pose.y_mm = -120;
-  pose.heading_rad = 1;
-  poses.write(pose);
-  const std::int64_t at = latest().tick;
-  ASSERT_TRUE(eventually([&] { return latest().tick > at + 20; }));
-  ask(kilotwin_open_STOP_RUN);
-  EXPECT_EQ(process_->wait(30).status, 0);
-  recorder::Reader reader(scratch_ / "run/recording.ktrec");
-  double x = 0, y = 0;
-  while (const proto::StateRecord* state = reader.next_state()) {
-    x = state->x_mm(4);
-    y = state->y_mm(4);
-  }
-  EXPECT_EQ(x, -150);
-  EXPECT_EQ(y, -120);
-  EXPECT_EQ(kilotwin({"replay", scratch_ / "run", "--verify"}, scratch_).status, 0);
-}
-
 }  // namespace
 }  // namespace kilotwin::test

@@ -95,11 +95,32 @@ TEST(Wire, CarriesDirectives) {
   wire.packet._length = 10;
   EXPECT_FALSE(from_wire(wire, in));
 
-  out.kind = DirectiveKind::kTrackedPose;
-  out.tracked_pose = {4, 1, 2, 3};
+  out.kind = DirectiveKind::kMembership;
+  out.membership = {4, Membership::kLost};
   ASSERT_TRUE(from_wire(to_wire(3, out), in));
-  EXPECT_EQ(in.tracked_pose.robot, 4u);
-  EXPECT_EQ(in.tracked_pose.heading_rad, 3);
+  EXPECT_EQ(in.membership.robot, 4u);
+  EXPECT_EQ(in.membership.membership, Membership::kLost);
+}
+
+TEST(Wire, CarriesTrackedRobots) {
+  TrackingFrame out;
+  out.tick = Tick{9};
+  out.robot = {3, 5};
+  out.state = {0, 3};
+  out.x_mm = {1.5, -2};
+  out.y_mm = {3, 4};
+  out.heading_rad = {0.1, -0.2};
+  out.led = {7, kUnknownLed};
+  TrackingFrame in;
+  WireTrackingFrame wire = to_wire(kHeader, out);
+  ASSERT_TRUE(from_wire(wire, in));
+  EXPECT_EQ(in.tick, out.tick);
+  EXPECT_EQ(in.robot, out.robot);
+  EXPECT_EQ(in.state, out.state);
+  EXPECT_EQ(in.x_mm, out.x_mm);
+  EXPECT_EQ(in.led, out.led);
+  wire.led._length = 1;
+  EXPECT_FALSE(from_wire(wire, in));
 }
 
 TEST(Wire, RefusesArraysThatDisagree) {

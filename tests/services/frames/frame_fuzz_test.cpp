@@ -37,6 +37,10 @@ template <class Visit> void each_field(ActuationFrame& f, Visit visit) {
   visit(f.offer_message), visit(f.spin_up);
 }
 
+template <class Visit> void each_field(TrackingFrame& f, Visit visit) {
+  visit(f.robot), visit(f.state), visit(f.x_mm), visit(f.y_mm), visit(f.heading_rad), visit(f.led);
+}
+
 template <class Visit> void each_field(OverheadFrame& f, Visit visit) { visit(f.packets); }
 
 std::size_t below(Random& random, std::size_t count) {
@@ -164,6 +168,18 @@ class FrameFuzz : public ::testing::TestWithParam<Scene> {
           physics[p]->emit_ghosts(physics[p]->neighbours()[i], ghosts[p][i]);
       }
       station.emit(overhead);
+      tracking.clear();
+      tracking.tick = now;
+      for (std::uint32_t robot = 0; robot < plan.robots(); ++robot) {
+        if (!plan.tracked(robot)) continue;
+        const Pose pose = plan.initial_pose(robot);
+        tracking.robot.push_back(robot);
+        tracking.state.push_back(0);
+        tracking.x_mm.push_back(pose.x_mm);
+        tracking.y_mm.push_back(pose.y_mm);
+        tracking.heading_rad.push_back(wrapped(pose.heading_rad));
+        tracking.led.push_back(kUnknownLed);
+      }
       actuation.tick = now;
     }
     void step() {
@@ -182,7 +198,7 @@ class FrameFuzz : public ::testing::TestWithParam<Scene> {
           for (std::size_t i = 0; i < ghosts[from].size(); ++i)
             if (physics[from]->neighbours()[i] == PartitionId{p}) in.push_back(&ghosts[from][i]);
         }
-        physics[p]->step(now, {in, hosts, {}});
+        physics[p]->step(now, {in, hosts, &tracking});
       }
       ++now;
       emit();
@@ -198,6 +214,7 @@ class FrameFuzz : public ::testing::TestWithParam<Scene> {
     std::vector<std::vector<BodyFrame>> ghosts;
     ActuationFrame actuation;
     OverheadFrame overhead;
+    TrackingFrame tracking;
   };
 
   /// Mutates the frame that `pick` finds, as a publisher would send it to `reader`.
@@ -245,6 +262,10 @@ TEST_P(FrameFuzz, ActuationToAll) {
 TEST_P(FrameFuzz, OverheadPacketsToTheRadio) {
   fuzz(FederateId{3}, FederateId{2}, [](Run& run) -> OverheadFrame& { return run.overhead; });
 }
+TEST_P(FrameFuzz, TrackedRobotsToPhysics) {
+  if (std::string_view(GetParam().name) != "Tracked") GTEST_SKIP() << "nobody is tracked";
+  fuzz(FederateId{3}, FederateId{0}, [](Run& run) -> TrackingFrame& { return run.tracking; });
+}
 
 INSTANTIATE_TEST_SUITE_P(
     Engines, FrameFuzz,
@@ -254,6 +275,7 @@ INSTANTIATE_TEST_SUITE_P(
               "radius_mm: 300 } } } light { shadows: true source { height_mm: 250 intensity: 88 } }"},
         Scene{"Ode",
               "physics { engine: ODE } movable { box { width_mm: 100 length_mm: 40 } y_mm: 100 mass_g: 20 }"},
+        Scene{"Tracked", "robots { count: 8 } robots { count: 4 body: TRACKED }"},
         Scene{"Kinematic", "physics { engine: KINEMATIC } radio { model: SIMPLE }"},
         Scene{"Memory",
               "effect { name: 'a' acts_on: WHEEL_GAIN function { of: MOTOR_TIME linear { slope: -1e-4 } } } "

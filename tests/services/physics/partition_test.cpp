@@ -207,7 +207,7 @@ TEST(Partition, TrackedRobotsJumpBetweenPartitions) {
   Swarm a(whole), b(cut);
   std::vector<std::uint32_t> by;
   for (std::uint32_t k = 0; k < 300; ++k) {
-    std::vector<TrackedPoseInput> tracked;
+    std::vector<TrackedPlace> tracked;
     if (k % 50 == 20) tracked.push_back({60, k % 100 == 20 ? -200.0 : 230.0, 30.0 - k / 10.0, 0.25});
     if (k % 7 == 0) tracked.push_back({61, -480.0 + 2.5 * k, 20, -0.5});
     for (Swarm* s : {&a, &b}) {
@@ -216,7 +216,7 @@ TEST(Partition, TrackedRobotsJumpBetweenPartitions) {
     }
     ASSERT_EQ(a.hash(), b.hash()) << k;
     const auto poses = b.poses(&by);
-    for (const TrackedPoseInput& t : tracked) {
+    for (const TrackedPlace& t : tracked) {
       EXPECT_EQ(poses[t.robot].x_mm, t.x_mm);
       EXPECT_EQ(by[t.robot], cut.grid.owner(t.x_mm, t.y_mm).value());
     }
@@ -231,6 +231,63 @@ TEST(Partition, TrackedRobotsJumpBetweenPartitions) {
       s->step();
     }
     ASSERT_EQ(b.hash(), c.hash());
+  }
+}
+
+/// Robots that leave and join again, alike for every grid; a checkpoint knows who is absent.
+TEST(Partition, AbsentRobotsHaveNoBodyOnAnyGrid) {
+  const std::string text =
+      "arena { width_mm: 1000 height_mm: 1000 } robots { count: 60 } robots { count: 2 body: TRACKED }";
+  auto crowd = testing::random_crowd(62, 500, 500, 34, 8);
+  const RunPlan whole = make_plan(text, crowd), cut = make_plan(text, crowd, 4, 3);
+  Swarm a(whole), b(cut);
+  for (std::uint32_t k = 0; k < 300; ++k) {
+    const std::vector<TrackedPlace> tracked{{60, 3.0 * (k % 90) - 120, 0.5 * k - 70, 0.25}};
+    std::vector<MembershipChange> memberships;
+    if (k % 60 == 10) memberships.push_back({60, Membership::kLost});
+    if (k % 60 == 40) memberships.push_back({60, Membership::kJoined});
+    if (k == 100) memberships.push_back({61, Membership::kLeft});
+    for (Swarm* s : {&a, &b}) {
+      drive(*s, 62, k);
+      s->step(tracked, memberships);
+    }
+    ASSERT_EQ(a.hash(), b.hash()) << k;
+    if (k % 60 != 25) continue;
+    Swarm c(whole);
+    c.load(b.tick(), b.save());
+    expect_same(b, c);
+    Swarm d(cut);
+    d.load(a.tick(), a.save());
+    drive(c, 62, k + 1);
+    drive(d, 62, k + 1);
+    c.step(tracked);
+    d.step(tracked);
+    ASSERT_EQ(c.hash(), d.hash()) << k;
+  }
+}
+
+TEST(Partition, OnlyPresentRobotsBlockTheWay) {
+  const std::string text = "robots { count: 1 } robots { count: 1 body: TRACKED } motion { noise: false }";
+  const RunPlan plan = make_plan(text, {{0, 0, 0}, {60, 0, 0}});
+  for (const bool present : {true, false}) {
+    Swarm swarm(plan);
+    swarm.set_motors(0, 255, 255);
+    swarm.step({}, {{1, present ? Membership::kJoined : Membership::kLost}});
+    swarm.run(400);
+    const double x_mm = swarm.poses()[0].x_mm;
+    if (present) {
+      EXPECT_LT(x_mm, 60 - 2 * kRobotRadius_mm + 1);
+    } else {
+      EXPECT_GT(x_mm, 100);
+    }
+    EXPECT_EQ(swarm.engine(0).bodies_without_space(), 0u);
+    // One that joins on occupied ground is counted, and the simulated robot makes way.
+    const double on_mm = swarm.poses()[0].x_mm + 10;
+    swarm.set_motors(0, 0, 0);
+    swarm.step({{1, on_mm, swarm.poses()[0].y_mm, 0}}, {{1, Membership::kJoined}});
+    swarm.run(100);
+    EXPECT_EQ(swarm.engine(0).bodies_without_space(), 1u);
+    EXPECT_LT(swarm.poses()[0].x_mm, on_mm - 2 * kRobotRadius_mm + 1);
   }
 }
 

@@ -12,6 +12,12 @@
 
 namespace kilotwin::testing {
 
+/// Where a tracked robot is from now on.
+struct TrackedPlace {
+  std::uint32_t robot = 0;
+  double x_mm = 0, y_mm = 0, heading_rad = 0;
+};
+
 class Swarm {
  public:
   explicit Swarm(const RunPlan& plan)
@@ -30,7 +36,16 @@ class Swarm {
     for (std::uint32_t r = 0; r < plan_.robots(); ++r) set_motors(r, left, right);
   }
 
-  void step(const std::vector<TrackedPoseInput>& tracked = {}) {
+  /// `tracked`: by ascending robot.
+  void step(const std::vector<TrackedPlace>& tracked = {}, const std::vector<MembershipChange>& memberships = {}) {
+    TrackingFrame tracking;
+    tracking.tick = tick_;
+    for (const TrackedPlace& place : tracked) {
+      tracking.robot.push_back(place.robot);
+      tracking.x_mm.push_back(place.x_mm);
+      tracking.y_mm.push_back(place.y_mm);
+      tracking.heading_rad.push_back(place.heading_rad);
+    }
     // All partitions' ghosts are collected before any partition steps.
     std::map<std::pair<std::uint32_t, std::uint32_t>, BodyFrame> ghosts;
     for (std::uint32_t p = 0; p < engines_.size(); ++p) {
@@ -51,7 +66,7 @@ class Swarm {
       for (const auto& [pair, frame] : ghosts) {
         if (pair.second == p) in.push_back(&frame);
       }
-      engines_[p]->step(tick_, {in, actuation, tracked});
+      engines_[p]->step(tick_, {in, actuation, &tracking, memberships});
     }
     ++tick_;
   }

@@ -1,0 +1,51 @@
+/// Trackers and tracked robots, as plain values. Meaning, units and defaults: Tracker, Tracking and Says in
+/// idl/experiment.proto.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace kilotwin {
+
+struct TrackerSettings {
+  std::string source;
+  double x_mm = 0, y_mm = 0, heading_rad = 0;
+  double scale = 1;
+  bool mirrored = false;
+  std::uint32_t first_robot = 0;
+  double position_sd_mm = 1, heading_sd_rad = 0.1;
+};
+
+/// What a tracked robot says where the conditions hold.
+struct SaysRuleSettings {
+  struct Circle {
+    double x_mm = 0, y_mm = 0, radius_mm = 0;
+  };
+  std::vector<std::uint32_t> robots;  ///< ascending; empty: all
+  std::optional<Circle> circle;
+  std::optional<std::uint8_t> led;         ///< r | g << 2 | b << 4
+  std::array<std::uint8_t, 10> message{};  ///< data[9], type
+  std::optional<std::uint32_t> id_octet;   ///< of the message: it holds the robot's number modulo 256
+  std::uint16_t tx_period = 0;             ///< between two messages, counts of 128 us
+};
+
+struct TrackingSettings {
+  std::vector<TrackerSettings> trackers;  ///< empty: every source, as if its block held nothing but its name
+  double bridge_s = 0.5;
+  bool present_at_start = true;
+  double speed_change_mm_s = 10, turn_change_rad_s = 0.8;
+  std::vector<std::vector<SaysRuleSettings>> rules;  ///< per group of the experiment
+  std::vector<std::uint32_t> first_robots;           ///< per group
+
+  /// Of the robot's group; the robot must be one of the experiment.
+  [[nodiscard]] const std::vector<SaysRuleSettings>& rules_of(std::uint32_t robot) const {
+    const auto group = std::upper_bound(first_robots.begin(), first_robots.end(), robot) - first_robots.begin() - 1;
+    return rules[static_cast<std::size_t>(group)];
+  }
+};
+
+}  // namespace kilotwin

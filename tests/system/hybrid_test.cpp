@@ -1,0 +1,255 @@
+// Hybrid runs: simulated robots among tracked ones, which a synthetic tracker plays over the public topic.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <csignal>
+#include <limits>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
+#include <thread>
+
+#include "clients/recorder/reader.hpp"
+#include "core/federation/topics.hpp"
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+using Json = nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::uint32_t kFirst = 6;  // ids 0..5 are simulated
+constexpr double kFrames_per_s = 30, kClockAhead_s = 37, kDrift = 50e-6, kExposureToSent_s = 0.008;
+
+/// A camera tracker of three robots that circle. Its clock is 37 s ahead and 50 ppm fast; positions have 0.3 mm of noise.
+/// Robot 8 is seen from the second second on, robot 7 no more after the fourth.
+class SyntheticTracker {
+ public:
+  SyntheticTracker(const dds::Participant& participant, std::string source)
+      : writer_(participant, topics::tracker_frames()), source_(std::move(source)) {}
+  ~SyntheticTracker() { stop(); }
+  [[nodiscard]] bool is_heard() { return writer_.readers() > 0; }
+  void start() {
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  }
+  void stop() {
+    thread_.request_stop();
+    if (thread_.joinable()) thread_.join();
+  }
+  [[nodiscard]] std::uint64_t written() const { return written_; }
+
+ private:
+  void run(const std::stop_token& stop) {
+    std::mutex mutex;
+    std::condition_variable_any wake;
+    const auto begun = Clock::now();
+    std::mt19937_64 random(11);
+    std::exponential_distribution<double> queue(1 / 0.002);
+    for (std::uint64_t frame = 1; !stop.stop_requested(); ++frame) {
+      const double sent_s = static_cast<double>(frame) / kFrames_per_s;
+      const auto due = begun + std::chrono::duration_cast<Clock::duration>(
+                                   std::chrono::duration<double>(sent_s + std::min(queue(random), 0.02)));
+      std::unique_lock lock(mutex);
+      wake.wait_until(lock, stop, due, [] { return false; });
+      write(frame, sent_s, random);
+    }
+  }
+
+  void write(std::uint64_t frame, double sent_s, std::mt19937_64& random) {
+    std::normal_distribution<double> noise(0, 0.3);
+    const double capture_s = sent_s - kExposureToSent_s;
+    std::vector<std::uint32_t> robot;
+    std::vector<std::uint8_t> state, led;
+    std::vector<double> x, y, heading;
+    std::vector<float> xx, xy, heading_variance;
+    for (std::uint32_t n = 0; n < 3; ++n) {
+      if ((n == 2 && capture_s < 2) || (n == 1 && capture_s > 4)) continue;
+      const double angle = 0.1 * capture_s + 2.1 * n;
+      robot.push_back(kFirst + n);
+      state.push_back(0);
+      x.push_back(100 * std::cos(angle) + noise(random));
+      y.push_back(100 * std::sin(angle) + noise(random));
+      heading.push_back(std::remainder(angle + 1.5708, 6.283185307));
+      xx.push_back(0.09f);
+      xy.push_back(0);
+      heading_variance.push_back(0.01f);
+      led.push_back(static_cast<std::uint8_t>(n + 1));
+    }
+    const auto reading_ns = [](double t_s) { return std::llround((kClockAhead_s + (1 + kDrift) * t_s) * 1e9); };
+    PublicTrackerFrame sample{};
+    source_.copy(sample.source, sizeof sample.source - 1);
+    sample.frame = frame;
+    sample.capture_ns = reading_ns(capture_s);
+    sample.sent_ns = reading_ns(sent_s);
+    const auto lend = [](auto& sequence, auto& values) {
+      sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
+      sequence._buffer = values.data();
+    };
+    lend(sample.robot, robot);
+    lend(sample.state, state);
+    lend(sample.x_mm, x);
+    lend(sample.y_mm, y);
+    lend(sample.heading_rad, heading);
+    lend(sample.xx_mm2, xx);
+    lend(sample.xy_mm2, xy);
+    lend(sample.yy_mm2, xx);
+    lend(sample.heading_variance_rad2, heading_variance);
+    lend(sample.led, led);
+    writer_.write(sample);
+    ++written_;
+  }
+
+  dds::Writer<PublicTrackerFrame> writer_;
+  std::string source_;
+  std::atomic<std::uint64_t> written_{0};
+  std::jthread thread_;
+};
+
+class Hybrid : public testing::Test {
+ protected:
+  Hybrid() : domain_(dds::DomainClaim::any().domain()), participant_({domain_, {}}) {}
+
+  /// Runs `experiment` in real time with a tracker that sees from the start; returns its summary.
+  Json run(const std::string& experiment, const Words& more) {
+    write(scratch_ / "hybrid.txtpb", experiment);
+    SyntheticTracker tracker(participant_, "ceiling");
+    Words words{program(),
+                "run",
+                scratch_ / "hybrid.txtpb",
+                "--pace",
+                "1",
+                "--domain",
+                std::to_string(domain_),
+                "--out",
+                scratch_ / "run",
+                "--quiet"};
+    words.insert(words.end(), more.begin(), more.end());
+    Process process(words, scratch_.path());
+    EXPECT_TRUE(eventually([&] { return tracker.is_heard(); }));
+    tracker.start();
+    const Outcome outcome = process.wait(60);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    tracker.stop();
+    written_ = tracker.written();
+    return Json::parse(read(scratch_ / "run/summary.json"));
+  }
+
+  void verify(const Words& more = {}) {
+    Words words{"replay", scratch_ / "run", "--verify"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = kilotwin(words, scratch_);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+  }
+
+  Scratch scratch_;
+  std::uint32_t domain_;
+  dds::Participant participant_;
+  std::uint64_t written_ = 0;
+};
+
+std::string experiment(const std::string& tracked, const std::string& more = {}) {
+  return "arena { width_mm: 600 height_mm: 600 } recording { every_s: 0.2 }\n"
+         "tracker { source: \"ceiling\" }\n"
+         "robots { count: 6 behaviour: \"" +
+         source("behaviours/disperse.c") +
+         "\" layout { grid { pitch_mm: 50 } } }\n"
+         "robots { count: 3 body: TRACKED layout { x_mm: 230 y_mm: 230 grid { pitch_mm: 40 } } " +
+         tracked + " }\n" + more;
+}
+
+TEST_F(Hybrid, SamplesAreFollowedRecordedAndReplayedOnAnyGrid) {
+  const Json summary = run(experiment("", "tracking { start: WHEN_SEEN }"),
+                           {"--duration", "6", "--partitions", "2x1", "--hosts", "2"});
+  const Json& tracking = summary.at("tracking");
+  EXPECT_EQ(tracking.at("joined"), 3);
+  EXPECT_EQ(tracking.at("lost"), 1);
+  EXPECT_EQ(tracking.at("left"), 0);
+  const Json& tracker = tracking.at("trackers").at(0);
+  EXPECT_EQ(tracker.at("source"), "ceiling");
+  EXPECT_GT(tracker.at("frames"), 150);
+  EXPECT_EQ(tracker.at("restarts"), 0);
+  EXPECT_NEAR(tracker.at("exposure_to_sent_ms").at("p50").get<double>(), kExposureToSent_s * 1e3, 0.5);
+  const Json& effect = tracking.at("arrival_to_effect_ms");
+  EXPECT_GT(effect.at("p99").get<double>(), 0);
+  RecordProperty("arrival_to_effect_p50_us", static_cast<int>(1e3 * effect.at("p50").get<double>()));
+  RecordProperty("arrival_to_effect_p99_us", static_cast<int>(1e3 * effect.at("p99").get<double>()));
+  EXPECT_TRUE(summary.contains("late_ticks"));
+  EXPECT_EQ(summary.at("messages_per_robot").at("sent").at("least"), 0)
+      << "nothing is declared: real robots are silent";
+
+  // Robots are where the circles are, the one that is lost is absent, LEDs are those that were seen.
+  recorder::Reader reader(scratch_ / "run/recording.ktrec");
+  double radius_mm = 0;
+  int states = 0;
+  std::string life_cycles, leds;
+  std::set<char> first_life_cycles;
+  while (const proto::StateRecord* state = reader.next_state()) {
+    life_cycles = state->life_cycle();
+    leds = state->led();
+    if (states++ == 0) first_life_cycles = {life_cycles[kFirst], life_cycles[kFirst + 1], life_cycles[kFirst + 2]};
+    radius_mm = std::hypot(state->x_mm(kFirst), state->y_mm(kFirst));
+  }
+  constexpr char kAbsent = '\xfd';
+  EXPECT_EQ(first_life_cycles, std::set{kAbsent});
+  EXPECT_NEAR(radius_mm, 100, 2);
+  EXPECT_NE(life_cycles[kFirst], kAbsent);
+  EXPECT_EQ(life_cycles[kFirst + 1], kAbsent);
+  EXPECT_NE(life_cycles[kFirst + 2], kAbsent);
+  EXPECT_EQ(leds[kFirst], 1);
+  EXPECT_EQ(leds[kFirst + 1], 0);
+  EXPECT_EQ(leds[kFirst + 2], 3);
+
+  verify();
+  verify({"--partitions", "2x2"});
+  verify({"--partitions", "1x1"});
+}
+
+TEST_F(Hybrid, TrackedRobotsSayWhatRulesHaveForThem) {
+  // Two messages a second from each of the tracked robots that are seen.
+  const Json summary = run(experiment("says { rule { data: [1, 2] id_octet: 8 } }"), {"--duration", "4"});
+  EXPECT_GE(summary.at("messages_per_robot").at("sent").at("least").get<int>(), 2);
+  verify();
+}
+
+TEST_F(Hybrid, AShadowSaysWhatItsProgramSays) {
+  const Json summary =
+      run(experiment("says { shadow: true } behaviour: \"" + source("behaviours/disperse.c") + "\""),
+          {"--duration", "4", "--partitions", "2x1"});
+  EXPECT_GE(summary.at("messages_per_robot").at("sent").at("least").get<int>(), 2);
+  EXPECT_EQ(summary.at("robots_failed"), 0);
+  verify();
+  verify({"--partitions", "2x2"});
+}
+
+TEST_F(Hybrid, ARunThatFallsBehindItsPaceEndsWithStatus1) {
+  write(scratch_ / "late.txtpb", experiment(""));
+  Process process({program(), "run", scratch_ / "late.txtpb", "--pace", "1", "--max-lateness", "300", "--domain",
+                   std::to_string(domain_), "--out", scratch_ / "run"},
+                  scratch_.path());
+  std::atomic<std::int64_t> tick{0};
+  const dds::Reader<PublicRunStatus> status(participant_, topics::run_status(),
+                                            [&](const PublicRunStatus& sample, dds::SampleState state) {
+                                              if (state.valid) tick = sample.tick;
+                                            });
+  ASSERT_TRUE(eventually([&] { return tick > 10; }));
+  std::vector<pid_t> hosts = processes_with(scratch_ / "run");
+  std::erase_if(hosts, [](pid_t id) {
+    return read("/proc/" + std::to_string(id) + "/cmdline").find("behaviours") == std::string::npos;
+  });
+  ASSERT_EQ(hosts.size(), 1u);
+  for (const pid_t host : hosts) kill(host, SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::milliseconds(800));
+  for (const pid_t host : hosts) kill(host, SIGCONT);
+  const Outcome outcome = process.wait(60);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("behind the pace"), std::string::npos) << outcome.err;
+}
+
+}  // namespace
+}  // namespace kilotwin::test
