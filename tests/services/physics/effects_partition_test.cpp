@@ -74,7 +74,7 @@ void drive(Swarm& swarm, std::uint32_t tick) {
 }
 
 /// Input before each step: a real robot that moves.
-std::vector<TrackedPlace> tracked(std::uint32_t tick) {
+std::vector<testing::TrackedPlace> tracked(std::uint32_t tick) {
   if (tick % 5 != 0) return {};
   return {{kRobots, 280 * std::cos(tick * 0.01), 280 * std::sin(tick * 0.013), 0.1 * tick - 3}};
 }

@@ -207,7 +207,7 @@ TEST(Partition, TrackedRobotsJumpBetweenPartitions) {
   Swarm a(whole), b(cut);
   std::vector<std::uint32_t> by;
   for (std::uint32_t k = 0; k < 300; ++k) {
-    std::vector<TrackedPlace> tracked;
+    std::vector<testing::TrackedPlace> tracked;
     if (k % 50 == 20) tracked.push_back({60, k % 100 == 20 ? -200.0 : 230.0, 30.0 - k / 10.0, 0.25});
     if (k % 7 == 0) tracked.push_back({61, -480.0 + 2.5 * k, 20, -0.5});
     for (Swarm* s : {&a, &b}) {
@@ -216,7 +216,7 @@ TEST(Partition, TrackedRobotsJumpBetweenPartitions) {
     }
     ASSERT_EQ(a.hash(), b.hash()) << k;
     const auto poses = b.poses(&by);
-    for (const TrackedPlace& t : tracked) {
+    for (const testing::TrackedPlace& t : tracked) {
       EXPECT_EQ(poses[t.robot].x_mm, t.x_mm);
       EXPECT_EQ(by[t.robot], cut.grid.owner(t.x_mm, t.y_mm).value());
     }
@@ -242,7 +242,7 @@ TEST(Partition, AbsentRobotsHaveNoBodyOnAnyGrid) {
   const RunPlan whole = make_plan(text, crowd), cut = make_plan(text, crowd, 4, 3);
   Swarm a(whole), b(cut);
   for (std::uint32_t k = 0; k < 300; ++k) {
-    const std::vector<TrackedPlace> tracked{{60, 3.0 * (k % 90) - 120, 0.5 * k - 70, 0.25}};
+    const std::vector<testing::TrackedPlace> tracked{{60, 3.0 * (k % 90) - 120, 0.5 * k - 70, 0.25}};
     std::vector<MembershipChange> memberships;
     if (k % 60 == 10) memberships.push_back({60, Membership::kLost});
     if (k % 60 == 40) memberships.push_back({60, Membership::kJoined});
