@@ -521,10 +521,10 @@ TEST_F(Strangers, OfAnotherRunAreNotHeard) {
   expect_all_end_at(kLast);
 }
 
-TEST_F(Strangers, CannotMoveARobotThatDoesNotExist) {
+TEST_F(Strangers, CannotAdmitARobotThatDoesNotExist) {
   WireDirective directive{};
   directive.run = plan_.run();
-  directive.kind = kilotwin_wire_TRACKED_POSE;
+  directive.kind = kilotwin_wire_MEMBERSHIP;
   directive.tick = 30;
   directive.robot = 1'000'000'000;
   interfere(topics::directives(), directive);
