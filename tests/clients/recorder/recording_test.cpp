@@ -285,9 +285,9 @@ TEST(Recording, RecordsOfUnknownKindsAreSkipped) {
   write_synthetic(scratch / "r.ktrec", synthetic_header(2), 10);
   const std::string bytes = content(scratch / "r.ktrec");
   const std::size_t first = frame_ends(bytes)[0];
-  // Field 100, length-delimited, three bytes.
+  // Field 200, length-delimited, three bytes.
   put_content(scratch / "r.ktrec", bytes.substr(0, first) +
-                                       framed("\xa2\x06\x03"
+                                       framed("\xc2\x0c\x03"
                                               "abc") +
                                        bytes.substr(first));
   Reader reader(scratch / "r.ktrec");

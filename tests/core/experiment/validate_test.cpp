@@ -48,7 +48,7 @@ TEST_F(Validate, OneLineForEveryMistake) {
       {"robots { count: 3 behaviour: '.' }",
        "e.txtpb:1:19: there is no file .; name a program, relative to the experiment file"},
       {"robots { count: 3 behaviour: 'a.c' body: TRACKED }",
-       "e.txtpb:1:19: a tracked group runs no program here; remove behaviour"},
+       "e.txtpb:1:19: a tracked group runs no program here; remove behaviour, or add says { shadow: true }"},
       // Layouts.
       {"robots { behaviour: 'a.c' layout { rings { count: [3, 4] radius_mm: 50 } } }",
        "e.txtpb:1:36: rings has 2 count and 1 radius_mm; give as many of one as of the other, at least one each"},

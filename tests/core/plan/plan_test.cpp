@@ -166,6 +166,7 @@ proto::Manifest some_manifest() {
   experiment.mutable_deployment()->set_partition_rows(2);
   experiment.mutable_deployment()->set_hosts(4);
   for (const std::uint32_t count : {5u, 3u, 9u}) experiment.add_robots()->set_count(count);
+  experiment.mutable_robots(1)->set_body(proto::RobotGroup::TRACKED);
   manifest.add_program()->set_path("a.c");
   manifest.add_program()->set_path("b.c");
   for (const std::uint32_t program : {1u, kNoProgram, 0u}) manifest.add_group_program(program);

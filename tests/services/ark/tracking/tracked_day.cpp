@@ -37,9 +37,9 @@ TrackerSample seen_at(double t_s, std::int64_t cycle, std::mt19937_64& random) {
     const double angle = 0.2 * t_s + robot;
     sample.robot.push_back(robot);
     sample.state.push_back(0);
-    sample.x.push_back(static_cast<float>(100 * (robot % 10) - 450 + 40 * std::cos(angle)) + noise(random));
-    sample.y.push_back(static_cast<float>(100.0 * (robot / 10) - 450 + 40 * std::sin(angle)) +
-                       noise(random));  // NOLINT
+    sample.x.push_back(static_cast<float>(100.0 * (robot % 10) - 450 + 40 * std::cos(angle)) + noise(random));
+    sample.y.push_back(static_cast<float>(100.0 * std::floor(robot / 10.0) - 450 + 40 * std::sin(angle)) +
+                       noise(random));
     sample.heading_rad.push_back(static_cast<float>(std::remainder(angle, 2 * M_PI)));
     sample.xx.push_back(0.25F);
     sample.xy.push_back(0);
