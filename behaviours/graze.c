@@ -9,7 +9,7 @@
 
 #define GRASS_TO_STOP 4
 #define GRASS_TO_LEAVE 1
-#define FULL 40 /* readings on grass */
+#define FULL 40        /* readings on grass */
 #define AHEAD_STEPS 18 /* of 3 degrees */
 #define ALL_STEPS 120
 #define IN_NEST 127
@@ -74,9 +74,7 @@ static void wander(void) {
   }
 }
 
-static void setup(void) {
-  rand_seed(rand_hard());
-}
+static void setup(void) { rand_seed(rand_hard()); }
 
 static void loop(void) {
   set_color(grazes ? RGB(0, 3, 0) : is_full ? RGB(3, 0, 0) : RGB(0, 0, 0));

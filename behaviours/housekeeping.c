@@ -6,7 +6,17 @@
 #include <avr/eeprom.h>
 #include <kilolib.h>
 
-enum { DRAW = 1, SET = 2, RETRY = 3, DIGIT = 4, CONFIRM = 5, METHOD = 10, STORE_TURN = 110, STORE_STRAIGHT = 111, IDENTIFY = 120 };
+enum {
+  DRAW = 1,
+  SET = 2,
+  RETRY = 3,
+  DIGIT = 4,
+  CONFIRM = 5,
+  METHOD = 10,
+  STORE_TURN = 110,
+  STORE_STRAIGHT = 111,
+  IDENTIFY = 120
+};
 enum { LEFT = 1, RIGHT = 2, STOP = 3, STRAIGHT_L = 4, STRAIGHT_R = 5 };
 
 #define BINARY_DIGITS 11

@@ -72,8 +72,9 @@ enum class Work : std::uint8_t { kBehaviours, kPhysics, kRadio, kStation, kExcha
 /// What the station sent for its virtual environments.
 struct StationTotals {
   std::uint64_t packets = 0, robot_messages = 0, broadcasts = 0;
-  std::uint64_t replaced = 0, too_wide = 0;  ///< messages that were never sent: replaced by newer ones; too wide for their bits
-  double sending_s = 0;                      ///< simulated time since the start broadcast
+  std::uint64_t replaced = 0,
+                too_wide = 0;  ///< messages that were never sent: replaced by newer ones; too wide for their bits
+  double sending_s = 0;        ///< simulated time since the start broadcast
   /// Time that messages waited beyond their robot's least interval.
   double mean_delay_s = 0, p99_delay_s = 0, max_delay_s = 0;
   struct Plugin {

@@ -7,8 +7,7 @@
 
 int main(int argc, char** argv) {
   using namespace kilotwin::cli;
-  return run_program(argc, argv,
-                     "Pictures of arenas: drawn and tracked. Start: kilotwin track SOURCE --out F.csv",
+  return run_program(argc, argv, "Pictures of arenas: drawn and tracked. Start: kilotwin track SOURCE --out F.csv",
                      [](CLI::App& program) -> std::vector<Command> {
                        return {add_cameras(program), add_track(program)};
                      });
