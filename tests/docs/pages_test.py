@@ -205,7 +205,7 @@ def options(kilotwin, pages):
     for page in pages:
         name = name_of(page)
         for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
-            for found in re.finditer(r"(?:^|[\s`(/])kilotwin ([a-z]+)((?: +[^\s`|&;#)]+)*)", line):
+            for found in re.finditer(r"(?:^|[\s`(/])kilotwin ([a-z][a-z0-9]*)((?: +[^\s`|&;#)]+)*)", line):
                 command, rest = found.groups()
                 if command not in commands:
                     # "kilotwin" followed by a word of running text is no command, but in code it is.
