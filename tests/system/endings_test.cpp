@@ -125,7 +125,8 @@ TEST_F(Endings, AServiceStartedTwiceLeavesTheRunAlone) {
   EXPECT_NE(second.err.find("was started already"), std::string::npos) << second.err;
   EXPECT_TRUE(process.running());
   process.signal(SIGINT);
-  EXPECT_NE(process.wait(20).err.find("interrupted"), std::string::npos);
+  // What an interrupted run prints is for InterruptsEndARunInOrder.
+  static_cast<void>(process.wait(20));
   expect_usable_recording();
 }
 
