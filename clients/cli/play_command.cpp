@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "clients/cli/commands.hpp"
+#include "clients/cli/door_options.hpp"
 #include "clients/doors/logs/log_player.hpp"
 #include "core/base/say.hpp"
 #include "core/os/interrupt.hpp"
@@ -18,10 +19,8 @@ namespace {
 using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
 
-struct PlayArguments {
-  std::filesystem::path experiment, log;
-  std::string door;
-  dds::Transport run;
+struct PlayArguments : DoorArguments {
+  std::filesystem::path log;
   double speed = 1;
   bool loop = false;
 };
@@ -75,22 +74,10 @@ int play(const PlayArguments& arguments) {
 
 Command add_play(CLI::App& program) {
   const auto arguments = std::make_shared<PlayArguments>();
-  CLI::App& app = *program.add_subcommand("play", "play a log of a tracker into a run, as if it happened");
-  app.add_option("EXPERIMENT", arguments->experiment, "experiment file with a block door { log { ... } }")
-      ->required()
-      ->type_name("");
+  CLI::App& app =
+      *program.add_subcommand("play", "play a log of a tracker into a run, as if it happened; wait for the run");
+  add_door_options(app, *arguments, "log");
   app.add_option("LOG", arguments->log, "log of ARK or LARS")->required()->type_name("");
-  app.add_option("--door", arguments->door, "name of the door, where the experiment has several")
-      ->type_name("NAME");
-  app.add_option("--domain", arguments->run.domain, "DDS domain of the run; the play begins when a run is there")
-      ->required()
-      ->check(CLI::Range(0u, dds::kLastDomain).description(""))
-      ->type_name("N");
-  app.add_option(
-         "--peer", arguments->run.peers,
-         "address of a machine of the run; give each of them, this machine too (default: all on this machine)")
-      ->allow_extra_args(false)
-      ->type_name("ADDRESS");
   app.add_option("--speed", arguments->speed, "how many times faster than it was logged")
       ->check(CLI::Range(0.001, 1000.0).description(""))
       ->capture_default_str()

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "clients/cli/commands.hpp"
+#include "clients/cli/door_options.hpp"
 #include "clients/doors/ros2/ros2_door.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -19,10 +20,7 @@ namespace {
 using doors::ros2::Discovery;
 using doors::ros2::Ros2Door;
 
-struct Ros2Arguments {
-  std::filesystem::path experiment;
-  std::string door;
-  dds::Transport run;
+struct Ros2Arguments : DoorArguments {
   Discovery ros;
   std::optional<std::uint32_t> ros_domain;
   double seconds = 0;  ///< 0: until interrupted
@@ -96,20 +94,7 @@ Command add_ros2(CLI::App& program) {
   const auto arguments = std::make_shared<Ros2Arguments>();
   CLI::App& app = *program.add_subcommand(
       "ros2", "a door to ROS 2: its poses of real robots enter a run, and it sees the run's robots");
-  app.add_option("EXPERIMENT", arguments->experiment, "experiment file with a block door { ros2 { ... } }")
-      ->required()
-      ->type_name("");
-  app.add_option("--door", arguments->door, "name of the door, where the experiment has several")
-      ->type_name("NAME");
-  app.add_option("--domain", arguments->run.domain, "DDS domain of the run")
-      ->required()
-      ->check(CLI::Range(0u, dds::kLastDomain).description(""))
-      ->type_name("N");
-  app.add_option(
-         "--peer", arguments->run.peers,
-         "address of a machine of the run; give each of them, this machine too (default: all on this machine)")
-      ->allow_extra_args(false)
-      ->type_name("ADDRESS");
+  add_door_options(app, *arguments, "ros2");
   app.add_option("--ros-domain", arguments->ros_domain, "ROS_DOMAIN_ID (default: the door's)")
       ->check(CLI::Range(0u, dds::kLastDomain).description(""))
       ->type_name("N");

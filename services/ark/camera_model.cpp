@@ -7,7 +7,6 @@
 #include "core/base/state_hash.hpp"
 #include "core/math/elementary.h"
 #include "idl/checkpoint.pb.h"
-#include "services/ark/plugin/streams.hpp"
 
 namespace kilotwin::ark {
 namespace {
@@ -89,8 +88,8 @@ Tick CameraModel::shown_at(std::int64_t frame) const {
 
 void CameraModel::step(const SwarmView& swarm, const MeasuredPoses* measured) {
   for (; exposed_at(frame_) <= swarm.tick; ++frame_) {
-    const bool is_dropped =
-        frame_ > 0 && random_.uniform(kCameraStream, kWholeFrame, Tick{frame_}, 0) < setting_.dropped_frames;
+    const bool is_dropped = frame_ > 0 && random_.uniform(Stream::kStationCamera, kWholeFrame, Tick{frame_}, 0) <
+                                              setting_.dropped_frames;
     if (is_dropped) continue;
     expose(swarm, measured);
     if (frame_ == 0)
@@ -120,8 +119,8 @@ void CameraModel::lose(std::uint32_t track) {
   Track& it = tracks_[track];
   const double per_frame = setting_.losses_per_hour / (kSecondsPerHour * setting_.frame_rate_hz);
   if (frame_ > 0 && it.lost_until <= frame_ &&
-      random_.uniform(kCameraStream, track, Tick{frame_}, kLoss) < per_frame) {
-    const double u = random_.uniform(kCameraStream, track, Tick{frame_}, kLossLength);
+      random_.uniform(Stream::kStationCamera, track, Tick{frame_}, kLoss) < per_frame) {
+    const double u = random_.uniform(Stream::kStationCamera, track, Tick{frame_}, kLossLength);
     it.lost_until = frame_ + 1 + static_cast<std::int64_t>(-kt_log(u) * setting_.lost_s * setting_.frame_rate_hz);
     it.positions.clear();
     it.motions.clear();
@@ -132,7 +131,7 @@ void CameraModel::lose(std::uint32_t track) {
 
 void CameraModel::see(std::uint32_t track, Place truth, std::uint8_t led) {
   Track& it = tracks_[track];
-  const auto noise = random_.normal_pair(kCameraStream, track, Tick{frame_}, 0);
+  const auto noise = random_.normal_pair(Stream::kStationCamera, track, Tick{frame_}, 0);
   const Place place{truth.x + setting_.position_noise_mm * noise[0],
                     truth.y + setting_.position_noise_mm * noise[1]};
   tracked_.x_mm[track] = place.x;
@@ -161,8 +160,8 @@ void CameraModel::see(std::uint32_t track, Place truth, std::uint8_t led) {
     if (sum.x != 0 || sum.y != 0) tracked_.heading_rad[track] = kt_atan2(sum.y, sum.x);
   }
   auto colour = static_cast<unsigned>(led_class(led));
-  if (random_.uniform(kCameraStream, track, Tick{frame_}, kLedError) < setting_.led_error) {
-    const double other = random_.uniform(kCameraStream, track, Tick{frame_}, kLedOther);
+  if (random_.uniform(Stream::kStationCamera, track, Tick{frame_}, kLedError) < setting_.led_error) {
+    const double other = random_.uniform(Stream::kStationCamera, track, Tick{frame_}, kLedOther);
     colour = (colour + 1 + static_cast<unsigned>(other * 3)) % 4;
   }
   push(it.colours, static_cast<LedClass>(colour), kColours);
@@ -178,7 +177,7 @@ void CameraModel::exchange_identities() {
     for (std::uint32_t b = a + 1; b < tracks_.size(); ++b) {
       const double dx = tracked_.x_mm[a] - tracked_.x_mm[b], dy = tracked_.y_mm[a] - tracked_.y_mm[b];
       if (dx * dx + dy * dy >= limit || tracked_.seen[b] == 0) continue;
-      if (random_.uniform(kCameraStream, a, Tick{frame_}, kFirstPair + b) < per_frame)
+      if (random_.uniform(Stream::kStationCamera, a, Tick{frame_}, kFirstPair + b) < per_frame)
         std::swap(tracks_[a].follows, tracks_[b].follows);
     }
   }

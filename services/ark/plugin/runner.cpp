@@ -3,8 +3,6 @@
 #include <charconv>
 #include <exception>
 
-#include "streams.hpp"
-
 namespace kilotwin::station {
 namespace {
 
@@ -220,13 +218,13 @@ std::optional<std::string> Runner::parameter(const std::string& name) {
 
 double Runner::uniform() {
   const std::uint32_t draw = draws_++;
-  return random_.uniform(kStationPluginStream, index_ | draw / kDrawsPerEntity << 16, Tick{request_->tick},
+  return random_.uniform(Stream::kStationPlugin, index_ | draw / kDrawsPerEntity << 16, Tick{request_->tick},
                          draw % kDrawsPerEntity);
 }
 
 double Runner::normal() {
   const std::uint32_t draw = draws_++;
-  return random_.normal(kStationPluginStream, index_ | draw / kDrawsPerEntity << 16, Tick{request_->tick},
+  return random_.normal(Stream::kStationPlugin, index_ | draw / kDrawsPerEntity << 16, Tick{request_->tick},
                         draw % kDrawsPerEntity);
 }
 
