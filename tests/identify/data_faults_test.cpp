@@ -209,6 +209,16 @@ TEST(DataFaults, SeveralAtOnce) {
   EXPECT_EQ(faults.size(), 4U);
 }
 
+TEST(DataFaults, SlowSamplingIsNoFault) {
+  // The path between two samples is unknown where they are far apart.
+  for (const double sample_s : {2.5, 4.0}) {
+    truth::Scene scene = truth::scenario("nothing-tidy");
+    scene.sample_s = sample_s;
+    MeasuredSet set = set_of(scene);
+    EXPECT_TRUE(exclude_faults(set).empty()) << sample_s;
+  }
+}
+
 TEST(DataFaults, DocumentSaysWhoAndWhen) {
   MeasuredSet set = set_of(truth::scenario("duplicate"));
   const auto document = document_of(exclude_faults(set));

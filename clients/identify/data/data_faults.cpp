@@ -213,10 +213,11 @@ void exclude_outliers(MeasuredSet& set, std::vector<DataFault>& faults) {
         if (const double off = off_course_mm(track.samples, k); off > 0) course.push_back(off);
         if (k == 0) continue;
         const double dt = track.samples[k].time_s - track.samples[k - 1].time_s;
-        if (dt > 0 && dt < kLongestStep_s) speeds.push_back(distance(track.samples[k - 1], track.samples[k]) / dt);
+        if (dt > 0 && dt <= kLongestStep_s) speeds.push_back(distance(track.samples[k - 1], track.samples[k]) / dt);
       }
     }
-    if (course.size() < 20) continue;
+    // Sampled more slowly, a robot's path between two samples is unknown: no position is an outlier.
+    if (course.size() < 20 || speeds.empty()) continue;
     // The length of a two-dimensional normal vector has a median of 1.18 standard deviations.
     const auto fast = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() * 19 / 20);
     std::nth_element(speeds.begin(), fast, speeds.end());

@@ -217,6 +217,7 @@ class Choice {
 
   Chosen choose(std::size_t most_forms) const {
     Chosen chosen;
+    if (columns_.empty()) return chosen;
     const double price = std::log(static_cast<double>(columns_.size()));
     while (chosen.forms.size() < most_forms) {
       // Residual information and score, given the selected forms.
@@ -274,6 +275,8 @@ bool refine_neighbour_shape(const Fitter& fitter, MotionModel& model, std::size_
   double likelihood = fitter.log_likelihood(model);
   // Replaces the term by some of the forms if the gain exceeds `least_gain`.
   const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double least_gain) {
+    // Robots that stay apart have no neighbours within any radius, and refined radii may lie beyond the listed ones.
+    if (of.empty()) return std::vector<Form>{};
     std::vector<Block> all;
     for (const Form& form : of) all.insert(all.end(), form.begin(), form.end());
     MotionModel trial = model;

@@ -9,6 +9,7 @@
 
 #include "clients/identify/search/amplitudes.hpp"
 #include "clients/identify/search/change_points.hpp"
+#include "clients/identify/search/neighbour_shape.hpp"
 #include "clients/identify/search/simplification.hpp"
 #include "clients/identify/search/target_extension.hpp"
 #include "core/random/random.hpp"
@@ -293,6 +294,22 @@ TEST(ChangePoints, ACameraShiftIsNoDrift) {
   for (std::size_t i = 0; i < steps.points.size(); ++i)
     if (steps.points[i] < 45) shift_mm += model.terms[0].coefficients[static_cast<Eigen::Index>(i)];
   EXPECT_NEAR(shift_mm, 6, 0.5);
+}
+
+TEST(NeighbourShape, RobotsThatStayApartOfferNoForm) {
+  // Robots 3 m apart are no neighbours at any radius.
+  const MeasuredSet set = played(TargetGroup{}, 11, 4, 40);
+  PreparedSet prepared(set);
+  const Fitter fitter(prepared, 1);
+  MotionModel model;
+  fitter.fit_base(model);
+  Factor nearest;
+  nearest.shape = Factor::Shape::kTaper;
+  nearest.axis = {Covariate::kNearest, 3};
+  nearest.high = kNeighbourRadii_mm[3];
+  model.terms.push_back(unfitted("turn-by-neighbours", {{Target::kTurn, Basis{{nearest}}, kDriven}}));
+  EXPECT_FALSE(refine_neighbour_shape(fitter, model, 0));
+  EXPECT_EQ(model.terms.size(), 1U);
 }
 
 TEST(Amplitudes, OfOneCurveDifferBetweenRobots) {
