@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "clients/cli/recovery.hpp"
+#include "clients/recorder/animation.hpp"
 #include "clients/recorder/picture.hpp"
 #include "clients/recorder/reader.hpp"
 #include "core/base/error.hpp"
@@ -196,7 +197,10 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   recorder::write_summary(summary, directory_.summary());
   if (any_state_) {
     recorder::Reader recording(directory_.recording());
-    recorder::write_picture(recording, directory_.picture());
+    const recorder::RunOverview overview = recorder::read_overview(recording);
+    os::write_file(directory_.picture(), recorder::picture_svg(overview));
+    if (const std::string animation = recorder::animation_svg(overview); !animation.empty())
+      os::write_file(directory_.animation(), animation);
   }
   return summary;
 }

@@ -7,6 +7,15 @@
 namespace kilotwin::recorder {
 namespace {
 
+double distance_from_segment_mm(Point p, Point a, Point b) {
+  const double ux = b.x_mm - a.x_mm, uy = b.y_mm - a.y_mm, vx = p.x_mm - a.x_mm, vy = p.y_mm - a.y_mm;
+  const double square = ux * ux + uy * uy;
+  const double along = square > 0 ? std::clamp((ux * vx + uy * vy) / square, 0.0, 1.0) : 0;
+  return std::hypot(vx - along * ux, vy - along * uy);
+}
+
+}  // namespace
+
 void take(Snapshot& snapshot, const proto::StateRecord& state, TickLength length) {
   snapshot.time_s = length.seconds_at(Tick{state.tick()});
   snapshot.x_mm.assign(state.x_mm().begin(), state.x_mm().end());
@@ -19,44 +28,23 @@ void take(Snapshot& snapshot, const proto::StateRecord& state, TickLength length
   snapshot.movable_heading_rad.assign(state.movable_heading_rad().begin(), state.movable_heading_rad().end());
 }
 
-double distance_from_segment_mm(Point p, Point a, Point b) {
-  const double ux = b.x_mm - a.x_mm, uy = b.y_mm - a.y_mm, vx = p.x_mm - a.x_mm, vy = p.y_mm - a.y_mm;
-  const double square = ux * ux + uy * uy;
-  const double along = square > 0 ? std::clamp((ux * vx + uy * vy) / square, 0.0, 1.0) : 0;
-  return std::hypot(vx - along * ux, vy - along * uy);
-}
+Paths::Paths(std::size_t robots, std::size_t points) : kept_(std::max<std::size_t>(8, points / robots)) {}
 
-}  // namespace
-
-Paths::Paths(Reader& recording, std::size_t points) {
-  const std::size_t most = std::max<std::size_t>(8, points / recording.header().robots());
-  while (const proto::StateRecord* state = recording.next_state()) {
-    if (states_ == 0) take(first_, *state, recording.tick_length());
-    take(last_, *state, recording.tick_length());
-    if (states_ % stride_ == 0) keep(*state, most);
-    ++states_;
-  }
-}
-
-void Paths::keep(const proto::StateRecord& state, std::size_t most) {
-  if (kept_.size() == most) {
-    // Drop every second state, and double the stride.
-    for (std::size_t i = 0; 2 * i < kept_.size(); ++i) std::swap(kept_[i], kept_[2 * i]);
-    kept_.resize((kept_.size() + 1) / 2);
-    stride_ *= 2;
-    if (states_ % stride_ != 0) return;
-  }
-  std::vector<Point>& places = kept_.emplace_back();
+void Paths::add(const proto::StateRecord& state, TickLength length) {
+  if (states_++ == 0) take(first_, state, length);
+  take(last_, state, length);
+  if (!kept_.wants_next()) return;
+  std::vector<Point> places;
   places.reserve(static_cast<std::size_t>(state.x_mm_size()));
-  for (int i = 0; i < state.x_mm_size(); ++i) {
+  for (int i = 0; i < state.x_mm_size(); ++i)
     places.push_back({static_cast<float>(state.x_mm(i)), static_cast<float>(state.y_mm(i))});
-  }
+  kept_.keep(std::move(places));
 }
 
 std::vector<Point> Paths::path(std::size_t robot) const {
   std::vector<Point> path;
-  path.reserve(kept_.size() + 1);
-  for (const std::vector<Point>& places : kept_) path.push_back(places[robot]);
+  path.reserve(kept_.values().size() + 1);
+  for (const std::vector<Point>& places : kept_.values()) path.push_back(places[robot]);
   path.push_back({static_cast<float>(last_.x_mm[robot]), static_cast<float>(last_.y_mm[robot])});
   return path;
 }

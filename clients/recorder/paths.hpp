@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "clients/recorder/evenly_spaced.hpp"
 #include "clients/recorder/reader.hpp"
 
 namespace kilotwin::recorder {
@@ -18,6 +19,9 @@ struct Snapshot {
   std::vector<double> movable_x_mm, movable_y_mm, movable_heading_rad;
 };
 
+/// The state of a record.
+void take(Snapshot& snapshot, const proto::StateRecord& state, TickLength length);
+
 struct Point {
   float x_mm, y_mm;
 };
@@ -25,8 +29,9 @@ struct Point {
 /// The first state, the last one, and evenly spaced states in between.
 class Paths {
  public:
-  /// Reads all remaining states. Keeps about `points` positions at most over all robots, but at least 8 per robot.
-  Paths(Reader& recording, std::size_t points);
+  /// Keeps about `points` positions at most over all robots, but at least 8 per robot.
+  Paths(std::size_t robots, std::size_t points);
+  void add(const proto::StateRecord& state, TickLength length);
 
   [[nodiscard]] bool empty() const { return states_ == 0; }
   [[nodiscard]] std::uint64_t states() const { return states_; }
@@ -37,11 +42,9 @@ class Paths {
   [[nodiscard]] std::vector<Point> path(std::size_t robot) const;
 
  private:
-  void keep(const proto::StateRecord& state, std::size_t most);
-
-  std::uint64_t states_ = 0, stride_ = 1;
+  std::uint64_t states_ = 0;
   Snapshot first_, last_;
-  std::vector<std::vector<Point>> kept_;  // per kept state, all robots
+  EvenlySpaced<std::vector<Point>> kept_;  // per kept state, all robots
 };
 
 /// The path with fewer points; every omitted point lies within `tolerance_mm` of it (Douglas and Peucker 1973).

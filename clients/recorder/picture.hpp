@@ -1,18 +1,13 @@
 /// The picture of a run in three panels: start, paths and end of all robots.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
-#include "clients/recorder/reader.hpp"
+#include "clients/recorder/overview.hpp"
 
 namespace kilotwin::recorder {
 
-/// SVG with three panels, from all remaining states of the recording. Its size is about 100 to 250 bytes per robot for large
-/// swarms. Throws UserError if the recording has no state.
-[[nodiscard]] std::string picture_svg(Reader& recording);
-
-/// Throws UserError as picture_svg(), RunError if the file cannot be written.
-void write_picture(Reader& recording, const std::filesystem::path& file);
+/// SVG with three panels. Its size is about 100 to 250 bytes per robot for large swarms.
+[[nodiscard]] std::string picture_svg(const RunOverview& run);
 
 }  // namespace kilotwin::recorder

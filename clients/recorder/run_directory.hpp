@@ -8,6 +8,7 @@
 ///   provenance.json  clients/recorder/provenance.hpp
 ///   summary.json     clients/recorder/summary.hpp
 ///   picture.svg      clients/recorder/picture.hpp
+///   animation.svg    clients/recorder/animation.hpp
 ///   checkpoints/     one directory per checkpoint, named by its tick
 #pragma once
 
@@ -49,6 +50,7 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path provenance() const { return directory_ / "provenance.json"; }
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }
+  [[nodiscard]] std::filesystem::path animation() const { return directory_ / "animation.svg"; }
 
   /// Throws RunError if it cannot be written.
   void write_manifest(const proto::Manifest& manifest) const;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "clients/recorder/film.hpp"
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 
@@ -281,7 +282,9 @@ std::string summary_text(const Summary& s, const std::string& place) {
   line("used",
        fmt::format("{} s of CPU time, {} MiB of memory", short_number(s.cpu_s), short_number(s.peak_memory_mib)));
   line("hash", fmt::format("{:016x}", s.state_hash));
-  line("results", fmt::format("{}: summary.json, picture.svg, recording.ktrec", place));
+  const bool moves = s.robots <= Film::kMostRobots;
+  line("results",
+       fmt::format("{}: summary.json, picture.svg, {}recording.ktrec", place, moves ? "animation.svg, " : ""));
   return text;
 }
 

@@ -1,4 +1,4 @@
-/// The overhead controller: turns the station's packets into messages on the air, which every robot hears. It never listens.
+/// The overhead controller: sends the station's packets as infrared messages, which every robot can hear. It does not receive.
 #pragma once
 
 #include <cstdint>
@@ -20,18 +20,18 @@ class OverheadController {
   struct Copy {
     Cycles start;
     IrMessage message;
-    std::uint16_t crc;  ///< as sent
+    std::uint16_t crc;  ///< the checksum that it carries, right or wrong
     [[nodiscard]] Cycles end() const { return start + kPacket; }
     [[nodiscard]] bool overlaps(Cycles from, Cycles until) const { return start < until && from < end(); }
     [[nodiscard]] bool sensed_at(Cycles t) const { return t - start >= kNoticed && t < end(); }
-    /// A robot takes it: its CRC is right.
+    /// Whether its checksum is right. Robots drop messages with a wrong one.
     [[nodiscard]] bool is_sound() const;
   };
 
-  /// Takes the packets of a tick, by ascending offset, and starts all copies that are due before `end`, where the tick
-  /// that begins at `begin` ends. A packet ends what earlier offsets have left, but for pages and GPS frames that wait. Of
-  /// the packets with one offset, each message goes out at least once, in order. A page or a GPS frame goes on to its end.
-  /// A copy on the air, and the pause after it, are brought to their end.
+  /// Takes the packets of the tick from `begin` to `end`, in ascending order of their offsets, and starts all copies that are
+  /// due before `end`. A packet replaces all messages of earlier offsets, except waiting pages and GPS frames. Messages of
+  /// packets with the same offset are each sent at least once, in order. A page or a GPS frame is always sent to its end, and
+  /// so are a copy on the air and the pause after it.
   void advance(std::span<const OverheadPacket> packets, Cycles begin, Cycles end);
   /// Copies in the order of their start.
   [[nodiscard]] const std::vector<Copy>& copies() const { return copies_; }
@@ -48,8 +48,8 @@ class OverheadController {
   struct Item {
     IrMessage message;
     std::uint16_t crc;
-    Cycles
-        pace;  ///< from its start to the earliest start of what follows; kOverheadPeriod unless of a page or GPS frame
+    /// From its start to the earliest start of the next message. kOverheadPeriod, except within a page or a GPS frame.
+    Cycles pace;
   };
 
   void command(std::span<const OverheadPacket> packets, Cycles now);
@@ -58,11 +58,11 @@ class OverheadController {
   void add_gps_frame(const OverheadPacket& packet);
   void start_copies(Cycles end);
 
-  Cycles next_ = 0;  ///< when a copy can start
+  Cycles next_ = 0;  ///< the earliest start of the next copy
   bool repeating_ = false;
-  IrMessage message_{};  ///< what is repeated
+  IrMessage message_{};  ///< the message that is repeated
   std::uint16_t crc_ = 0;
-  std::vector<Item> waiting_;  ///< goes first, once each
+  std::vector<Item> waiting_;  ///< sent before any repetition, once each
   std::vector<Copy> copies_;
 };
 

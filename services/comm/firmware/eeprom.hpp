@@ -1,4 +1,4 @@
-/// What a firmware robot finds in its EEPROM when it is switched on.
+/// The initial EEPROM of a firmware robot.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace kilotwin::firmware {
 
-/// As a calibrated robot has it: core/base/eeprom_layout.h. kilo_uid is the robot's id.
+/// The content that a calibrated robot has: core/base/eeprom_layout.h. kilo_uid is the robot's id.
 [[nodiscard]] inline std::array<std::uint8_t, kEepromOctets> make_eeprom(std::uint32_t robot,
                                                                          const Calibration& calibration,
                                                                          const RangingTable& ranging) {

@@ -17,13 +17,13 @@ class WorkerPool;
 
 namespace kilotwin::firmware {
 
-/// Each robot was switched on within the last tick of its own clock before the run began, such that its first timer interrupt
-/// comes when that of a robot with a native program would: rate and phase of clocks are those of comm::TickTimers.
+/// Each robot is switched on less than one tick of its own clock before the run begins. Its first timer interrupt then comes
+/// at the same time as for a robot with a native program. Rate and phase of the clocks are those of comm::TickTimers.
 class FirmwareSwarm final : public comm::FirmwareRobots {
  public:
-  /// Reads programs/ of the run directory. `threads`: how many run robots at a time; results do not depend on it.
-  /// With `keeps_logs`, what robots print goes to their logs there (core/logs/robot_logs.hpp). `first`: the tick at which the run
-  /// starts; load() follows where that is not 0. Throws UserError where a program is missing or damaged.
+  /// Reads the programs in programs/ of the run directory. `threads`: number of threads; results do not depend on it.
+  /// With `keeps_logs`, the robots' printed text goes to their logs in that directory (core/logs/robot_logs.hpp). `first`: the
+  /// first tick of the run; if it is not 0, the caller must call load(). Throws UserError if a program is missing or damaged.
   FirmwareSwarm(const RunPlan&, const std::filesystem::path& run_directory, std::uint32_t threads, Tick first,
                 bool keeps_logs);
   ~FirmwareSwarm() override;
@@ -48,9 +48,9 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
   struct Robot {
     std::unique_ptr<Mcu> mcu;
     comm::Cycles switched_on;  ///< at most 0
-    comm::Cycles period;       ///< nominal cycles of 2^18 own ones
+    comm::Cycles period;       ///< nominal cycles in which its own clock counts 2^18 cycles
     bool has_run = false;      ///< since the last commit
-    // Full duty of both motors: now, during all of this tick, at some time in it or in a kick that it continues.
+    // Whether both motors have full duty: now; during the whole tick; at some time in it, or in a spin-up that goes on.
     bool full = false, full_throughout = false, kicked = false;
     bool kick_goes_on = false;  ///< at the end of the last tick
     std::uint8_t shown_left = 0, shown_right = 0;

@@ -1,10 +1,10 @@
-/// One robot's ATmega328P with what the Kilobot's board puts around it, simulated by libsimavr: infrared light in and out,
-/// motors, LED, sensors, EEPROM. Source of pins and registers: kilolib and the Kilobot's circuit.
+/// A simulated Kilobot board: the ATmega328P (by libsimavr), infrared transmitter and receiver, motors, LED, sensors, EEPROM.
+/// Source of pins and registers: kilolib and the Kilobot's circuit.
 ///
-/// Time is counted in cycles of the robot's own oscillator since it was switched on. What it does depends on the cycles at
-/// which light arrives and on nothing else: not on how a span of time is cut into calls of run().
+/// Time is counted in cycles of the robot's own oscillator since it was switched on. The result depends only on the cycles at
+/// which light arrives. It does not depend on how the time is divided into calls of run().
 ///
-/// Bridged here, as libsimavr 1.6 lacks them: conversions that the comparator starts, interrupt vectors in the boot section
+/// Added here, because libsimavr 1.6 lacks them: conversions that the comparator starts, interrupt vectors in the boot section
 /// (IVSEL), program addresses that wrap at the end of the flash, power-down that stops all clocks but the watchdog's, and the
 /// time that erasing and writing a page of flash takes.
 #pragma once
@@ -29,7 +29,7 @@ namespace kilotwin::firmware {
 
 using OwnCycles = std::uint64_t;
 
-/// A pulse of light on the receiver and what the two amplifiers make of it, 10-bit ADC counts.
+/// An infrared pulse at the receiver, as the two amplifiers give it to the converter, in 10-bit counts.
 struct Light {
   OwnCycles at;
   std::int16_t high_gain, low_gain;
@@ -44,14 +44,14 @@ struct Outputs {
 enum class Halt : std::uint8_t {
   kNone = 0,
   kIllegalInstruction = 1,
-  kBadAddress = 2,  ///< it read or wrote where there is no memory, or ran out of the flash
-  kEnded = 3,       ///< its program has returned from main, or sleeps with interrupts off: no fault
-  kFlat = 4         ///< its battery is empty: no fault
+  kBadAddress = 2,  ///< the program accessed an address without memory, or ran beyond the end of the flash
+  kEnded = 3,       ///< the program returned from main, or sleeps with interrupts disabled: not a fault
+  kFlat = 4         ///< the battery is empty: not a fault
 };
 
 class Mcu {
  public:
-  /// Switched on, at cycle 0. The random numbers of `robot` are the noise of its converter.
+  /// A robot that is switched on at cycle 0. The random stream of `robot` gives the noise of its converter.
   Mcu(const FlashImage&, const std::array<std::uint8_t, kEepromOctets>& eeprom, const Random&, std::uint32_t robot);
   ~Mcu();
   Mcu(const Mcu&) = delete;
@@ -60,33 +60,32 @@ class Mcu {
   /// Runs to the first instruction boundary at or after `until`. `light`: ascending, not before now().
   void run(OwnCycles until, std::span<const Light> light);
   [[nodiscard]] OwnCycles now() const;
-  /// What its sensors give from now on.
+  /// Sets the readings of its sensors from now on.
   void set_readings(const senses::Readings&);
-  /// Its battery is empty; it is charged again. What memory and registers held is lost, the EEPROM stays.
+  /// The battery runs empty; the battery is charged again. Memory and registers are lost, the EEPROM is kept.
   void power_off();
   void power_on();
 
   /// Rising edges of the infrared LED since the last clear, ascending.
   [[nodiscard]] const std::vector<OwnCycles>& flashes() const { return flashes_; }
   void clear_flashes() { flashes_.clear(); }
-  /// What it has written to its serial port (38400 baud, PD1) since the last clear.
+  /// The text that it wrote to its serial port (38400 baud, PD1) since the last clear.
   [[nodiscard]] std::string& printed() { return printed_; }
 
   [[nodiscard]] Outputs outputs() const;
   [[nodiscard]] Halt halt() const { return state_.halt; }
-  /// Whether its comparator works: it is neither halted nor asleep with its clocks off.
+  /// Whether it can receive: it is neither halted nor asleep with its clocks off.
   [[nodiscard]] bool listening() const;
-  /// Address in flash, octets, of the instruction that it is at or at which it stopped.
+  /// Address in flash, octets, of the next instruction, or of the instruction at which it stopped.
   [[nodiscard]] std::uint32_t program_counter() const;
 
-  /// Remembers the present state in memory; rewind() goes back to it. What the LED flashed and what was printed is not part of
-  /// it.
+  /// mark() saves the present state in memory, and rewind() restores it. flashes() and printed() are not part of the state.
   void mark();
   void rewind();
 
-  /// The state as octets, for another process that runs the same build.
+  /// The state as octets, for another process of the same build.
   [[nodiscard]] std::string save() const;
-  /// Into a robot that was made with the same arguments. Throws RunError where the octets do not fit.
+  /// Restores the state of a robot that was constructed with the same arguments. Throws RunError if the octets do not fit.
   void load(const std::string& octets);
 
   /// Own memory, as the program sees it: address 0x100 is the first of RAM.
@@ -97,15 +96,15 @@ class Mcu {
 
  private:
   static constexpr OwnCycles kNever = std::numeric_limits<OwnCycles>::max();
-  /// What libsimavr does not keep.
+  /// The part of the state that libsimavr does not hold.
   struct State {
     OwnCycles dark_at = kNever;     ///< when the receiver's pulse ends
     OwnCycles powered_down = 0;     ///< cycles that the processor's clock has missed
-    std::uint32_t conversions = 0;  ///< that took noise
+    std::uint32_t conversions = 0;  ///< number of conversions, each with its own noise
     std::uint32_t fault_at = 0;
     Halt halt = Halt::kNone;
   };
-  /// A range of octets that changes as it runs.
+  /// A range of memory that changes while the processor runs.
   struct Range {
     std::uint8_t* begin;
     std::size_t octets;
@@ -144,16 +143,16 @@ class Mcu {
   State state_, marked_state_;
   std::vector<OwnCycles> flashes_;
   std::string printed_;
-  void* watchdog_ = nullptr;                                       ///< libsimavr's module, as its timers name it
+  void* watchdog_ = nullptr;  ///< libsimavr's module, as libsimavr's timers name it
   int (*write_flash_)(avr_io_t*, std::uint32_t, void*) = nullptr;  ///< libsimavr's own on_flash()
   std::array<avr_irq_t*, 2> comparator_{};
   avr_irq_t* converter_ = nullptr;
-  std::vector<avr_irq_t*> lines_;                         ///< all of libsimavr's signals
-  std::vector<Range> ranges_;                             ///< all that changes but signals and flash
-  std::vector<std::uint8_t> marked_;                      ///< the ranges, then the signals
-  std::vector<Page> replaced_;                            ///< pages written since the mark, as of the mark
-  std::vector<std::uint8_t> pristine_;                    ///< the same as of cycle 0
-  const std::array<std::uint8_t, kFlashOctets> program_;  ///< flash as of cycle 0
+  std::vector<avr_irq_t*> lines_;       ///< all of libsimavr's signals
+  std::vector<Range> ranges_;           ///< all that changes but signals and flash
+  std::vector<std::uint8_t> marked_;    ///< contents of the ranges, then of the signals
+  std::vector<Page> replaced_;          ///< pages written since the mark, with their content at the mark
+  std::vector<std::uint8_t> pristine_;  ///< ranges and signals at cycle 0
+  const std::array<std::uint8_t, kFlashOctets> program_;  ///< content of the flash at cycle 0
 };
 
 }  // namespace kilotwin::firmware

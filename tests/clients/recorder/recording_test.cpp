@@ -189,7 +189,7 @@ void use_in_every_way(const std::filesystem::path& file, const Scratch& scratch)
       if (way == 0) export_trajectories(reader, scratch / "t.csv");
       if (way == 1) export_messages(reader, scratch / "m.csv");
       if (way == 2) {
-        const std::string svg = picture_svg(reader);
+        const std::string svg = picture_svg(read_overview(reader));
         EXPECT_EQ(svg.find("nan"), std::string::npos);
         EXPECT_EQ(svg.substr(svg.size() - 7), "</svg>\n");
       }

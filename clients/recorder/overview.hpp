@@ -1,0 +1,26 @@
+/// What the pictures of a run need of its recording, read in one pass.
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+#include "clients/recorder/film.hpp"
+#include "clients/recorder/paths.hpp"
+#include "clients/recorder/reader.hpp"
+
+namespace kilotwin::recorder {
+
+/// What virtual environments have painted, by environment.
+using Floors = std::map<std::uint32_t, proto::FloorRecord>;
+
+struct RunOverview {
+  proto::RecordingHeader header;
+  Paths paths;
+  Film film;
+  Floors first_floors, last_floors;
+};
+
+/// Reads all remaining records. Throws UserError if there is no state among them.
+[[nodiscard]] RunOverview read_overview(Reader& recording);
+
+}  // namespace kilotwin::recorder
