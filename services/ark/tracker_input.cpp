@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <set>
 #include <span>
@@ -18,6 +19,8 @@ constexpr std::size_t kMostWaiting = 1024;
 constexpr std::size_t kMostSources = 16;
 /// Numbers of a tracker beyond this are no places.
 constexpr double kFarthest = 1e9;
+/// Times beyond this, about 127 years around the epoch of the source's clock, are no times.
+constexpr std::int64_t kFarthest_ns = 4'000'000'000'000'000'000;
 
 template <class Sequence> auto values(const Sequence& sequence) {
   return std::span(sequence._buffer, sequence._length);
@@ -44,9 +47,10 @@ std::ptrdiff_t TrackerInput::source_of(const char* name) {
   }
   if (!known.empty()) return -1;
   const auto found = std::find(names_.begin(), names_.end(), name);
-  if (found == names_.end() && names_.size() == kMostSources) return -1;
-  if (found == names_.end()) return static_cast<std::ptrdiff_t>(names_.insert(names_.end(), name) - names_.begin());
-  return found - names_.begin();
+  if (found != names_.end()) return found - names_.begin();
+  if (names_.size() == kMostSources) return -1;
+  names_.emplace_back(name);
+  return static_cast<std::ptrdiff_t>(names_.size()) - 1;
 }
 
 /// Takes the entries of tracked robots. False where the columns differ in length.
@@ -94,6 +98,11 @@ void TrackerInput::on_sample(const PublicTrackerFrame& sample) {
   const std::lock_guard lock(mutex_);
   const std::ptrdiff_t source = source_of(sample.source);
   if (source < 0) return;
+  const auto is_time = [](std::int64_t ns) { return ns >= -kFarthest_ns && ns <= kFarthest_ns; };
+  if (!is_time(sample.capture_ns) || !is_time(sample.sent_ns)) {
+    ++malformed_;
+    return;
+  }
   const auto& trackers = plan_.tracking_settings().trackers;
   Waiting waiting{};
   waiting.source = static_cast<std::uint32_t>(source);
@@ -121,7 +130,12 @@ void TrackerInput::watch(Source& source, const Waiting& waiting) {
   source.last_frame = waiting.time.frame;
   if (source.clock.restarts() != source.restarts) {
     source.restarts = source.clock.restarts();
-    say(fmt::format("tracker {}: it started anew, or its clock was set; its time is estimated again", source.name));
+    // Of a clock that is set again and again, fewer and fewer lines.
+    if (std::has_single_bit(source.restarts)) {
+      say(fmt::format(
+          "tracker {}: it started anew, or its clock was set ({} times so far); its time is estimated again",
+          source.name, source.restarts));
+    }
   }
   if (source.clock.wrong_utc_s() == 0 || source.told_utc) return;
   source.told_utc = true;
