@@ -56,7 +56,7 @@ std::array<CameraModel, kArkCameras> ark_cameras(const CameraModel& like) {
   return cameras;
 }
 
-std::string ark_calibration_xml() {
+std::string ark_calibration_xml(const Distortion& lens) {
   cv::FileStorage file("calibration.xml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
   const double side_px = 2 * kArkHalf_mm * kPxPerMm;
   for (int corner = 0; corner < 4; ++corner) {
@@ -66,13 +66,23 @@ std::string ark_calibration_xml() {
                              static_cast<float>((at.y + 0.5) * kShrinkY - 0.5));
     file << "corner" + std::to_string(corner + 1) << shrunk;
   }
-  std::vector<cv::Mat> rotations, intrinsics;
+  std::vector<cv::Mat> rotations, intrinsics, exact;
   for (int i = 0; i < kArkCameras; ++i) {
     rotations.push_back(cv::Mat::eye(3, 3, CV_64F));
     const double x = i % 2 * kStepX_px, y = i / 2 * kStepY_px;
     intrinsics.push_back((cv::Mat_<double>(3, 3) << kFocal_px, 0, -x, 0, kFocal_px, -y, 0, 0, 1));
+    const cv::Point2d at = effective_offset_px(i);
+    exact.push_back((cv::Mat_<double>(3, 3) << kFocal_px, 0, -at.x, 0, kFocal_px, -at.y, 0, 0, 1));
   }
-  file << "R" << rotations << "K" << intrinsics;
+  file << "R" << rotations << "K" << intrinsics << "exact_K" << exact;
+  if (!lens.none()) {
+    std::vector<cv::Mat> lenses, distortions;
+    for (const CameraModel& camera : ark_cameras({})) {
+      lenses.push_back(cv::Mat(camera.K).clone());
+      distortions.push_back((cv::Mat_<double>(1, 5) << lens.k1, lens.k2, lens.p1, lens.p2, lens.k3));
+    }
+    file << "lens_K" << lenses << "distortion" << distortions;
+  }
   return file.releaseAndGetString();
 }
 

@@ -23,7 +23,8 @@ inline constexpr int kArkCameras = 4;
 /// K, R and position are replaced, its seed is counted up.
 [[nodiscard]] std::array<CameraModel, kArkCameras> ark_cameras(const CameraModel& like);
 
-/// The calibration as OpenCV's FileStorage writes it in XML: corner1..4, R[4], K[4].
-[[nodiscard]] std::string ark_calibration_xml();
+/// The calibration as OpenCV's FileStorage writes it in XML: corner1..4, R[4], K[4]. ARK ignores the rest, which `kilotwin track`
+/// reads: exact_K[4], where the cameras are without ARK's truncation; with a lens also lens_K[4] and distortion[4].
+[[nodiscard]] std::string ark_calibration_xml(const Distortion& lens = {});
 
 }  // namespace kilotwin::cameras

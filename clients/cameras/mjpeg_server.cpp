@@ -147,7 +147,11 @@ class MjpegServer::Service {
       client.sending = new PostedPicture(now);
       client.sent = now->picture_at;
     }
-    if (stream) ++streams_;
+    if (stream) {
+      ++streams_;
+      // The library ends answers after some seconds; a stream lasts as long as its client wants it.
+      lws_set_timeout(connection, NO_PENDING_TIMEOUT, 0);
+    }
     lws_callback_on_writable(connection);
     return 0;
   }
@@ -179,6 +183,7 @@ class MjpegServer::Service {
     delete client.sending;
     client.sending = nullptr;
     if (!stream) return lws_http_transaction_completed(connection) != 0 ? -1 : 0;
+    lws_set_timeout(connection, NO_PENDING_TIMEOUT, 0);
     lws_callback_on_writable(connection);
     return 0;
   }

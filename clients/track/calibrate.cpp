@@ -171,6 +171,14 @@ FloorMap read_calibration(const std::filesystem::path& file, const cv::Size2d& a
       const std::vector<cv::Point2f> floor{{-w, h}, {w, h}, {-w, -h}, {w, -h}};
       return FloorMap::plane(cv::Matx33d(cv::getPerspectiveTransform(floor, pixels)));
     }
+    if (!storage["position_mm"].empty()) {
+      CameraPose pose;
+      pose.intrinsic = matrix_at<cv::Matx33d>(storage, "K", name);
+      pose.rotation = matrix_at<cv::Matx33d>(storage, "R", name);
+      pose.translation_mm = -(pose.rotation * matrix_at<cv::Vec3d>(storage, "position_mm", name));
+      storage["distortion"] >> pose.distortion;
+      return FloorMap::camera(pose);
+    }
     std::string kind;
     storage["kilotwin_calibration"] >> kind;
     if (kind == "plane") return FloorMap::plane(matrix_at<cv::Matx33d>(storage, "to_px", name));

@@ -17,6 +17,10 @@ constexpr double kLeastContrast = 0.5;
 /// How far the radii of one picture differ from their median: perspective, lens.
 constexpr double kRadiusSpread = 0.13;
 constexpr double kRungs = 1.13;  ///< ratio of the radii that are tried in turn
+/// Error of a centre, px, that the edge points do not show.
+constexpr double kLeastError_px = 0.016;
+/// Rays per independent one, times the radius. Measured: docs/results/camera-tracker.md, "Stated uncertainty".
+constexpr double kTogether_px = 52;
 /// Centres of two robots are two radii apart. The seen radius is a bit smaller or larger than the body's.
 constexpr double kLeastDistance = 1.55;
 
@@ -169,10 +173,12 @@ void add_hidden(const cv::Mat& grey, const std::vector<Candidate>& candidates, d
 }
 
 Detection detection_of(const FittedCircle& circle) {
-  // Errors of neighbouring rays go together: some sixteen are independent.
-  const double independent = std::max(4.0, 16.0 * circle.seen);
-  return {circle.circle, circle.coverage, circle.contrast,
-          std::max(0.02, circle.residual_px * std::sqrt(2.0 / independent))};
+  // Errors of neighbouring rays go together: a rim has as many independent points as pixels, about.
+  const double together = std::max(1.0, kTogether_px / circle.circle.radius_px);
+  const double ray_px2 = circle.residual_px * circle.residual_px;
+  const cv::Matx22d& spread = circle.spread;
+  const Covariance by_rays = Covariance{spread(0, 0), spread(0, 1), spread(1, 1)}.times(together * ray_px2);
+  return {circle.circle, circle.coverage, circle.contrast, by_rays.plus(Covariance::round(kLeastError_px))};
 }
 
 }  // namespace

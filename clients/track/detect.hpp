@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "clients/track/covariance.hpp"
 #include "clients/track/edge_circle.hpp"
 
 namespace kilotwin::track {
@@ -20,8 +21,8 @@ struct Detection {
   Circle disc;
   double coverage = 0;  ///< share of the visible rim that has an edge, 0..1
   double contrast = 0;  ///< rise of log brightness from the body to the floor
-  /// Standard deviation of the centre along each axis, px, from the edge points' distances from the circle.
-  double sd_px = 0;
+  /// Covariance of the centre, px^2, with y down: docs/explanation/camera-tracker.md, "Errors of a position".
+  Covariance error_px2;
 };
 
 /// What the discs of one camera have in common.

@@ -164,6 +164,19 @@ Circle improved(const Circle& circle, const std::array<EdgePoint, kRays>& points
   return {{circle.centre.x_px + change[0], circle.centre.y_px + change[1]}, circle.radius_px + change[2]};
 }
 
+/// Covariance of the centre and the radius, from the edge points that are on the circle; the centre's part.
+cv::Matx22d spread_of(const std::vector<Point>& directions) {
+  cv::Matx33d normal = cv::Matx33d::zeros();
+  for (const Point& d : directions) {
+    const cv::Vec3d row(d.x_px, d.y_px, 1);
+    normal += row * row.t();
+  }
+  bool regular = false;
+  const cv::Matx33d inverse = normal.inv(cv::DECOMP_CHOLESKY, &regular);
+  if (!regular) return cv::Matx22d::eye();
+  return {inverse(0, 0), inverse(0, 1), inverse(1, 0), inverse(1, 1)};
+}
+
 /// Marks the rays on which a neighbour or something brighter than the floor covers the rim.
 void mark_hidden(std::array<EdgePoint, kRays>& points, const Patch& patch, const Circle& circle,
                  const std::vector<Circle>& neighbours) {
@@ -226,20 +239,24 @@ std::optional<FittedCircle> fit_circle(const cv::Mat& grey, const Circle& guess,
   FittedCircle fitted;
   fitted.circle = circle;
   std::vector<double> rises;
+  std::vector<Point> directions;
   double squares = 0;
   int visible = 0;
-  for (const EdgePoint& p : points) {
+  for (std::size_t i = 0; i < kRays; ++i) {
+    const EdgePoint& p = points[i];
     const double off =
         std::hypot(p.at.x_px - circle.centre.x_px, p.at.y_px - circle.centre.y_px) - circle.radius_px;
     const bool on_circle = p.there && std::abs(off) < 0.07 * circle.radius_px + 0.3;
     if (on_circle || !p.hidden) ++visible;
     if (!on_circle) continue;
     rises.push_back(p.rise);
+    directions.push_back({rays()[i].cos, rays()[i].sin});
     squares += off * off;
   }
   if (rises.size() < kRays / 4) return std::nullopt;
   fitted.seen = static_cast<double>(rises.size()) / kRays;
   fitted.coverage = static_cast<double>(rises.size()) / std::max(visible, kRays / 2);
+  fitted.spread = spread_of(directions);
   fitted.residual_px = std::sqrt(squares / static_cast<double>(rises.size()));
   const auto middle = rises.begin() + static_cast<std::ptrdiff_t>(rises.size() / 2);
   std::nth_element(rises.begin(), middle, rises.end());

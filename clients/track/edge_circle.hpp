@@ -35,6 +35,8 @@ struct FittedCircle {
   double contrast = 0;
   /// Root mean square of the edge points' distances from the circle, px.
   double residual_px = 0;
+  /// Covariance of the centre, where each edge point has an independent error of variance 1 along its ray.
+  cv::Matx22d spread = cv::Matx22d::eye();
 };
 
 /// What the fit may assume.

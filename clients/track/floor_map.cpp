@@ -67,6 +67,14 @@ double FloorMap::mm_per_px(const Point& pixel) const {
   return std::sqrt(std::abs(area));
 }
 
+Covariance FloorMap::covariance(const Point& pixel, const Covariance& px2) const {
+  const FloorPoint at = floor(pixel), right = floor({pixel.x_px + 1, pixel.y_px}),
+                   down = floor({pixel.x_px, pixel.y_px + 1});
+  const cv::Matx22d jacobian(right.x_mm - at.x_mm, down.x_mm - at.x_mm, right.y_mm - at.y_mm, down.y_mm - at.y_mm);
+  const cv::Matx22d on_floor = jacobian * cv::Matx22d(px2.xx, px2.xy, px2.xy, px2.yy) * jacobian.t();
+  return {on_floor(0, 0), on_floor(0, 1), on_floor(1, 1)};
+}
+
 double FloorMap::floor_direction(const Point& pixel, double direction_rad) const {
   const FloorPoint from = floor(pixel),
                    to = floor({pixel.x_px + std::cos(direction_rad), pixel.y_px - std::sin(direction_rad)});

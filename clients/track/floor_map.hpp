@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "clients/track/covariance.hpp"
 #include "clients/track/edge_circle.hpp"
 
 namespace kilotwin::track {
@@ -37,6 +38,8 @@ class FloorMap {
   [[nodiscard]] Point pixel(const FloorPoint& point) const;
   /// Scale near a pixel: square root of the area of a pixel, mm.
   [[nodiscard]] double mm_per_px(const Point& pixel) const;
+  /// A covariance at a pixel, px^2 with y down, as one on the floor, mm^2.
+  [[nodiscard]] Covariance covariance(const Point& pixel, const Covariance& px2) const;
   /// A direction at a pixel, anticlockwise with y up in the picture, as a direction on the floor.
   [[nodiscard]] double floor_direction(const Point& pixel, double direction_rad) const;
 

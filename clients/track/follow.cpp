@@ -43,7 +43,7 @@ double Follower::reach_mm(const Track& track) const {
 }
 
 void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
-  track.position.update(sighting.x_mm, sighting.y_mm, sighting.sd_mm);
+  track.position.update(sighting.x_mm, sighting.y_mm, sighting.error);
   track.sighting = index;
   track.seen_s = time_s_;
   track.state = track.doubt ? TrackState::kDoubt : TrackState::kSeen;
@@ -62,7 +62,8 @@ void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
       by_led_sd = 3 * mount->sd_rad;
     }
   }
-  track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sighting.sd_mm, by_led, by_led_sd);
+  const double sd_mm = std::sqrt(0.5 * (sighting.error.xx + sighting.error.yy));
+  track.heading_filter.update(time_s_, sighting.x_mm, sighting.y_mm, sd_mm, by_led, by_led_sd);
 }
 
 void Follower::miss(Track& track) const {
@@ -71,7 +72,7 @@ void Follower::miss(Track& track) const {
 }
 
 void Follower::begin(std::size_t index, const Sighting& sighting) {
-  Track track(PositionFilter(time_s_, sighting.x_mm, sighting.y_mm, sighting.sd_mm));
+  Track track(PositionFilter(time_s_, sighting.x_mm, sighting.y_mm, sighting.error));
   take(track, index, sighting);
   track.frames = track.hits = 1;
   // The robots of the first picture are there from the beginning.
@@ -90,12 +91,12 @@ void Follower::update(const std::vector<Sighting>& sightings) {
       if (std::hypot(seen.x_mm - tracks_[t].position.x_mm(), seen.y_mm - tracks_[t].position.y_mm()) > reach)
         continue;
       // Discs do not overlap, so the gate may be wide: a lamp that goes on shifts the fitted centre for once.
-      const double sd_mm = std::hypot(seen.sd_mm, kShift * limits_.robot_radius_mm);
-      const double distance2 = tracks_[t].position.distance2(seen.x_mm, seen.y_mm, sd_mm);
+      const Covariance error = seen.error.plus(Covariance::round(kShift * limits_.robot_radius_mm));
+      const double distance2 = tracks_[t].position.distance2(seen.x_mm, seen.y_mm, error);
       if (distance2 > kGate) continue;
-      const double spread = (c.xx + sd_mm * sd_mm) * (c.yy + sd_mm * sd_mm);
+      const double spread = c.plus(error).determinant();
       // A track that was seen just before is preferred: log of the likelihood, and of its normalisation.
-      const double unsure = std::clamp(std::log(spread / 16), 0.0, 8.0);
+      const double unsure = std::clamp(std::log(std::max(spread, 1e-9) / 16), 0.0, 8.0);
       pairs.push_back({t, s, distance2 + unsure + (tracks_[t].confirmed ? 0 : 4)});
     }
   }

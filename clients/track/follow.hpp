@@ -16,7 +16,8 @@ namespace kilotwin::track {
 
 /// A robot in one frame.
 struct Sighting {
-  double x_mm = 0, y_mm = 0, sd_mm = 0.2;
+  double x_mm = 0, y_mm = 0;
+  Covariance error = Covariance::round(0.2);  ///< of the position, mm^2
   Led led = Led::kOff;
   std::optional<double> led_bearing_rad;  ///< from the centre, anticlockwise from x
 };

@@ -1,5 +1,7 @@
 #include "clients/track/position_filter.hpp"
 
+#include <Eigen/LU>
+
 namespace kilotwin::track {
 namespace {
 
@@ -9,52 +11,58 @@ constexpr double kAcceleration_mm2_s3 = 150;
 /// A robot that is not seen may be anywhere it can drive to, but not faster than this.
 constexpr double kMostVelocityVariance = 20.0 * 20.0;
 
-}  // namespace
-
-PositionFilter::PositionFilter(double time_s, double x_mm, double y_mm, double sd_mm)
-    : time_s_(time_s),
-      x_{x_mm, 0, sd_mm * sd_mm, 0, kSpeed_mm_s * kSpeed_mm_s},
-      y_{y_mm, 0, sd_mm * sd_mm, 0, kSpeed_mm_s * kSpeed_mm_s} {}
-
-void PositionFilter::Axis::predict(double dt_s) {
-  position += velocity * dt_s;
-  pp += 2 * dt_s * pv + dt_s * dt_s * vv + kAcceleration_mm2_s3 * dt_s * dt_s * dt_s / 3;
-  pv += dt_s * vv + kAcceleration_mm2_s3 * dt_s * dt_s / 2;
-  vv += kAcceleration_mm2_s3 * dt_s;
-  if (vv > kMostVelocityVariance) {
-    // The correlation stays as it is.
-    const double share = kMostVelocityVariance / vv;
-    pv *= share;
-    vv = kMostVelocityVariance;
-  }
+Eigen::Matrix2d matrix(const Covariance& c) {
+  Eigen::Matrix2d m;
+  m << c.xx, c.xy, c.xy, c.yy;
+  return m;
 }
 
-void PositionFilter::Axis::update(double measured, double variance) {
-  const double innovation = measured - position, total = pp + variance;
-  const double gain_p = pp / total, gain_v = pv / total;
-  position += gain_p * innovation;
-  velocity += gain_v * innovation;
-  vv -= gain_v * pv;
-  pv -= gain_p * pv;
-  pp -= gain_p * pp;
+}  // namespace
+
+PositionFilter::PositionFilter(double time_s, double x_mm, double y_mm, const Covariance& error_mm2)
+    : time_s_(time_s), state_(x_mm, y_mm, 0, 0), p_(Eigen::Matrix4d::Zero()) {
+  p_.topLeftCorner<2, 2>() = matrix(error_mm2);
+  p_(2, 2) = p_(3, 3) = kSpeed_mm_s * kSpeed_mm_s;
 }
 
 void PositionFilter::predict(double time_s) {
   const double dt_s = time_s - time_s_;
   if (dt_s <= 0) return;
-  x_.predict(dt_s);
-  y_.predict(dt_s);
   time_s_ = time_s;
+  state_.head<2>() += dt_s * state_.tail<2>();
+  Eigen::Matrix4d step = Eigen::Matrix4d::Identity();
+  step.topRightCorner<2, 2>() = dt_s * Eigen::Matrix2d::Identity();
+  p_ = step * p_ * step.transpose();
+  constexpr double q = kAcceleration_mm2_s3;
+  for (const int axis : {0, 1}) {
+    p_(axis, axis) += q * dt_s * dt_s * dt_s / 3;
+    p_(axis, axis + 2) += q * dt_s * dt_s / 2;
+    p_(axis + 2, axis) += q * dt_s * dt_s / 2;
+    double& speed = p_(axis + 2, axis + 2);
+    speed += q * dt_s;
+    if (speed <= kMostVelocityVariance) continue;
+    // Correlations are multiplied alike, so that the matrix stays a covariance.
+    const double share = kMostVelocityVariance / speed;
+    for (int other = 0; other < 4; ++other) {
+      if (other == axis + 2) continue;
+      p_(axis + 2, other) *= share;
+      p_(other, axis + 2) *= share;
+    }
+    speed = kMostVelocityVariance;
+  }
 }
 
-void PositionFilter::update(double x_mm, double y_mm, double sd_mm) {
-  x_.update(x_mm, sd_mm * sd_mm);
-  y_.update(y_mm, sd_mm * sd_mm);
+void PositionFilter::update(double x_mm, double y_mm, const Covariance& error_mm2) {
+  const Eigen::Matrix2d inverse = (p_.topLeftCorner<2, 2>() + matrix(error_mm2)).inverse();
+  const Eigen::Matrix<double, 4, 2> gain = p_.leftCols<2>() * inverse;
+  state_ += gain * (Eigen::Vector2d(x_mm, y_mm) - state_.head<2>());
+  p_ -= (gain * p_.topRows<2>()).eval();
+  p_ = (0.5 * (p_ + p_.transpose())).eval();
 }
 
-double PositionFilter::distance2(double x_mm, double y_mm, double sd_mm) const {
-  const double dx = x_mm - x_.position, dy = y_mm - y_.position;
-  return dx * dx / (x_.pp + sd_mm * sd_mm) + dy * dy / (y_.pp + sd_mm * sd_mm);
+double PositionFilter::distance2(double x_mm, double y_mm, const Covariance& error_mm2) const {
+  const Eigen::Vector2d off(x_mm - state_(0), y_mm - state_(1));
+  return off.dot((p_.topLeftCorner<2, 2>() + matrix(error_mm2)).inverse() * off);
 }
 
 }  // namespace kilotwin::track

@@ -129,7 +129,7 @@ std::unique_ptr<Source> open_directory(const fs::path& place, const SourceOption
   }
   std::sort(files.begin(), files.end());
   // ARK's directories hold the pictures of four cameras.
-  const std::string suffix = fmt::format("_{}.jpg", options.camera);
+  const std::string suffix = fmt::format("_{}.jpg", options.camera.value_or(0));
   const bool ark = std::any_of(files.begin(), files.end(), [](const fs::path& file) {
     const std::string name = file.filename().string();
     return name.starts_with("frame_") && name.size() == 17 && name[11] == '_' && name.ends_with(".jpg");

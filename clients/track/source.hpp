@@ -33,9 +33,9 @@ class Source {
 };
 
 struct SourceOptions {
-  double rate_hz = 30;  ///< of a directory of pictures, and of a video file without one of its own
-  bool watch = false;   ///< a directory grows: wait for pictures to come
-  int camera = 0;       ///< which camera's pictures of an ARK directory, frame_%05d_%d.jpg
+  double rate_hz = 30;          ///< of a directory of pictures, and of a video file without one of its own
+  bool watch = false;           ///< a directory grows: wait for pictures to come
+  std::optional<int> camera{};  ///< whose pictures of an ARK directory, frame_%05d_%d.jpg; none: camera 0
 };
 
 /// By what `place` is: digits: a camera's index; with "://": a stream; else a file or a directory. Throws UserError where there

@@ -46,6 +46,16 @@ cv::Rect PictureTracker::next_strip(const cv::Size& picture, double time_s) {
 }
 
 std::vector<Detection> PictureTracker::look(const cv::Mat& grey, double time_s) {
+  if (calibrated_ && !detector_.look()) {
+    // The calibration tells the robots' size. One that is wrong shall not hide them.
+    const Point middle{0.5 * grey.cols, 0.5 * grey.rows};
+    Detector sized(kRobotRadius_mm / floor_->mm_per_px(middle));
+    std::vector<Detection> found = sized.find(grey);
+    if (!found.empty()) {
+      detector_ = sized;
+      return found;
+    }
+  }
   if (!detector_.look() || follower_.tracks().empty()) return detector_.find(grey);
   follower_.predict(time_s);
   const double radius = detector_.look()->radius_px;
@@ -84,7 +94,7 @@ Sighting PictureTracker::sighting_of(const cv::Mat& picture, const std::vector<D
   }
   const LedReading led = read_led(picture, detection.disc, others);
   const FloorPoint at = floor_->floor(detection.disc.centre);
-  Sighting sighting{at.x_mm, at.y_mm, detection.sd_px * floor_->mm_per_px(detection.disc.centre), led.led,
+  Sighting sighting{at.x_mm, at.y_mm, floor_->covariance(detection.disc.centre, detection.error_px2), led.led,
                     std::nullopt};
   if (led.bearing_rad) sighting.led_bearing_rad = floor_->floor_direction(detection.disc.centre, *led.bearing_rad);
   return sighting;

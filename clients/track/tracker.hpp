@@ -18,6 +18,7 @@ namespace kilotwin::track {
 /// A robot after one frame.
 struct TrackedRobot {
   std::uint32_t track = 0;
+  std::optional<std::uint16_t> number;  ///< of the robot itself; known after an identification
   TrackState state = TrackState::kSeen;
   Circle disc;                     ///< as seen, or where it is predicted
   FloorPoint position;             ///< filtered

@@ -93,7 +93,8 @@ class Live {
     }
     if (!live.directory.empty()) {
       directory_ = std::make_unique<cameras::FrameDirectory>(live.directory, cameras::kArkCameras);
-      os::write_file(live.directory / "calibration.xml", cameras::ark_calibration_xml());
+      os::write_file(live.directory / "calibration.xml",
+                     cameras::ark_calibration_xml(model_of(live.camera).distortion));
       tell(fmt::format("kilotwin: four cameras for ARK in {}, with calibration.xml", live.directory.string()));
     }
   }

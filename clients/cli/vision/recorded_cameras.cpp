@@ -35,7 +35,8 @@ class Film {
     if (recorded.ark) {
       for (const cameras::CameraModel& camera : cameras::ark_cameras(model_of(recorded.camera)))
         renderers_.emplace_back(world, camera, recorded.camera.look);
-      os::write_file(recorded.out / "calibration.xml", cameras::ark_calibration_xml());
+      os::write_file(recorded.out / "calibration.xml",
+                     cameras::ark_calibration_xml(model_of(recorded.camera).distortion));
     } else {
       renderers_.emplace_back(world, big_camera(recorded.camera, world), recorded.camera.look);
       os::write_file(recorded.out / "camera.xml", camera_xml(renderers_.front().camera()));

@@ -15,8 +15,11 @@
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/vision/calibration_steps.hpp"
+#include "clients/cli/vision/station_questions.hpp"
 #include "clients/cli/vision/tracker_stream.hpp"
+#include "clients/track/ark_mosaic.hpp"
 #include "clients/track/calibrate.hpp"
+#include "clients/track/identification.hpp"
 #include "clients/track/source.hpp"
 #include "clients/track/tracker.hpp"
 #include "core/base/error.hpp"
@@ -37,16 +40,17 @@ struct TrackArguments {
   std::vector<std::string> peers;
   track::SourceOptions of_source;
   double square_mm = 0, disc_height_mm = 0;
-  bool force = false, quiet = false;
+  bool force = false, quiet = false, identify = false;
 };
 
 /// The table of contract: a row per robot that is seen, or predicted over a short gap.
 class Table {
  public:
-  Table(const fs::path& file, bool calibrated)
+  Table(const fs::path& file, bool calibrated, bool identifies)
       : calibrated_(calibrated),
-        writer_(file, fmt::format("frame,time_s,track,x_px,y_px,radius_px,heading_rad,led{}",
-                                  calibrated ? ",x_mm,y_mm" : "")) {}
+        identifies_(identifies),
+        writer_(file, fmt::format("frame,time_s,track,x_px,y_px,radius_px,heading_rad,led{}{}",
+                                  calibrated ? ",x_mm,y_mm" : "", identifies ? ",robot" : "")) {}
 
   void add(const track::CapturedFrame& frame, const std::vector<track::TrackedRobot>& robots) {
     for (const track::TrackedRobot& robot : robots) {
@@ -57,6 +61,7 @@ class Table {
                      robot.heading ? fmt::format("{:.5f}", robot.heading->heading_rad) : "nan",
                      track::name_of(robot.led));
       if (calibrated_) fmt::format_to(to, ",{:.3f},{:.3f}", robot.position.x_mm, robot.position.y_mm);
+      if (identifies_) fmt::format_to(to, ",{}", robot.number ? static_cast<int>(*robot.number) : -1);
       fmt::format_to(to, "\n");
     }
     writer_.flush_if_long();
@@ -64,7 +69,7 @@ class Table {
   void close() { writer_.close(); }
 
  private:
-  bool calibrated_;
+  bool calibrated_, identifies_;
   CsvWriter writer_;
 };
 
@@ -107,6 +112,37 @@ class Report {
   std::ptrdiff_t most_ = 0;
 };
 
+/// Numbers of robots by the station's identification.
+class Identifier {
+ public:
+  explicit Identifier(const dds::Participant& participant) : questions_(participant) {}
+
+  void take(const track::CapturedFrame& frame, std::vector<track::TrackedRobot>& robots,
+            track::Follower& follower) {
+    for (const track::Question& question : questions_.until(frame.capture_ns)) {
+      identification_.take(question);
+      if (identification_.ended() != ended_) report(robots.size());
+    }
+    identification_.take(1e-9 * static_cast<double>(frame.capture_ns), robots, follower);
+  }
+
+ private:
+  void report(std::size_t robots) {
+    ended_ = identification_.ended();
+    const auto list = [](const auto& numbers) {
+      return numbers.empty() ? "none" : fmt::format("{}", fmt::join(numbers, ", "));
+    };
+    say(fmt::format(
+        "track: identification: {} of {} robots have their numbers; asked without answer: {}; answered by several "
+        "or twice: {}",
+        identification_.identified(), robots, list(identification_.missing()), list(identification_.doubtful())));
+  }
+
+  StationQuestions questions_;
+  track::Identification identification_;
+  std::uint64_t ended_ = 0;
+};
+
 void check(const TrackArguments& arguments) {
   if (!arguments.calibrate.empty()) {
     if (arguments.board.empty() || !(arguments.square_mm > 0))
@@ -115,6 +151,8 @@ void check(const TrackArguments& arguments) {
   }
   if (arguments.out.empty() && !arguments.domain)
     throw UserError("kilotwin track: state where the robots go: --out F.csv, --domain N, or both");
+  if (arguments.identify && !arguments.domain)
+    throw UserError("--identify: the station's questions come over DDS; state the run's domain with --domain N");
   std::error_code ignored;
   if (!arguments.out.empty() && arguments.out != "-" && fs::exists(arguments.out, ignored) && !arguments.force)
     throw UserError(
@@ -131,18 +169,54 @@ void keep_pace(track::CapturedFrame& frame, Clock::time_point start) {
   frame.capture_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(due.time_since_epoch()).count();
 }
 
-int follow_robots(const TrackArguments& arguments) {
+/// What is looked at, and where its pixels lie on the floor.
+struct View {
+  std::unique_ptr<track::Source> source;
   std::optional<track::FloorMap> floor;
+};
+
+View open_view(const TrackArguments& arguments) {
+  View view;
   if (!arguments.calibration.empty()) {
     const cv::Size2d arena = arguments.arena.empty() ? cv::Size2d() : two_numbers("--arena", arguments.arena);
-    floor = track::read_calibration(arguments.calibration, arena);
+    if (const auto ark = track::read_ark_calibration(arguments.calibration, arena)) {
+      if (arguments.of_source.camera)
+        throw UserError(fmt::format("--camera: {} is of four cameras together; leave --camera out",
+                                    arguments.calibration.string()));
+      std::error_code ignored;
+      if (!fs::is_directory(arguments.source, ignored) ||
+          (!arguments.of_source.watch && !track::is_ark_directory(arguments.source)))
+        throw UserError(
+            fmt::format("{}: {} is of ARK's four cameras; expected a directory with frame_00000_0.jpg to "
+                        "frame_00000_3.jpg",
+                        arguments.source, arguments.calibration.string()));
+      auto directory = std::make_unique<track::ArkDirectory>(arguments.source, arguments.of_source, *ark);
+      view.floor = directory->floor();
+      view.source = std::move(directory);
+      return view;
+    }
+    view.floor = track::read_calibration(arguments.calibration, arena);
   }
-  std::unique_ptr<track::Source> source = track::open_source(arguments.source, arguments.of_source);
+  view.source = track::open_source(arguments.source, arguments.of_source);
+  return view;
+}
+
+int follow_robots(const TrackArguments& arguments) {
+  View view = open_view(arguments);
+  const std::optional<track::FloorMap> floor = view.floor;
+  std::unique_ptr<track::Source> source = std::move(view.source);
   const bool live = source->live();
   std::optional<Table> table;
-  if (!arguments.out.empty()) table.emplace(arguments.out, floor.has_value());
+  // A source that fails at once leaves no table.
+  const auto begin_table = [&] {
+    if (!table && !arguments.out.empty()) table.emplace(arguments.out, floor.has_value(), arguments.identify);
+  };
   std::optional<TrackerStream> stream;
-  if (arguments.domain) stream.emplace(dds::Transport{*arguments.domain, arguments.peers}, arguments.name);
+  std::optional<Identifier> identifier;
+  if (arguments.domain)
+    stream.emplace(dds::Transport{*arguments.domain, arguments.peers}, arguments.name,
+                   arguments.identify ? SampleIds::kNumbers : SampleIds::kTracks);
+  if (arguments.identify) identifier.emplace(stream->participant());
 
   catch_interrupts();
   track::PictureTracker tracker(floor);
@@ -151,12 +225,15 @@ int follow_robots(const TrackArguments& arguments) {
   const Clock::time_point start = Clock::now();
   while (std::optional<track::CapturedFrame> frame = frames.next([] { return interrupted() != 0; })) {
     if (stream && !live) keep_pace(*frame, start);
-    const std::vector<track::TrackedRobot> robots = tracker.process(frame->picture, frame->time_s);
+    std::vector<track::TrackedRobot> robots = tracker.process(frame->picture, frame->time_s);
+    if (identifier) identifier->take(*frame, robots, tracker.follower());
     if (stream) stream->publish(frame->number, frame->capture_ns, robots);
+    begin_table();
     if (table) table->add(*frame, robots);
     report.add(robots, frames.dropped());
   }
   frames.stop();
+  begin_table();
   if (table) table->close();
   report.end(frames.dropped());
   return kDone;
@@ -175,7 +252,7 @@ int track_robots(const TrackArguments& arguments) {
 void add_calibration_options(CLI::App& app, TrackArguments& arguments) {
   const std::string group = "Calibration";
   app.add_option("--calibration", arguments.calibration,
-                 "file of --calibrate, or a file with corner1..corner4 as ARK writes them; then the table has mm")
+                 "file of --calibrate, camera.xml of kilotwin cameras, or ARK's calibration; then the table has mm")
       ->type_name("F.yaml")
       ->group(group);
   app.add_option("--arena", arguments.arena, "size of the arena whose corners the calibration states, mm")
@@ -215,14 +292,16 @@ Command add_track(CLI::App& program) {
   app.add_option("--name", arguments->name, "name of this tracker in its samples")
       ->capture_default_str()
       ->type_name("NAME");
+  app.add_flag("--identify", arguments->identify,
+               "robots get the numbers to which they answer when the station of the run asks for them");
   app.add_option("--rate", arguments->of_source.rate_hz, "pictures per second of a directory")
       ->check(CLI::PositiveNumber.description(""))
       ->capture_default_str()
       ->type_name("HZ");
   app.add_flag("--watch", arguments->of_source.watch, "a directory grows: wait for its next picture");
-  app.add_option("--camera", arguments->of_source.camera, "camera whose pictures of an ARK directory are taken")
+  app.add_option("--camera", arguments->of_source.camera,
+                 "camera whose pictures of an ARK directory are taken; else 0, or all four with ARK's calibration")
       ->check(CLI::Range(0, 3).description(""))
-      ->capture_default_str()
       ->type_name("0..3");
   app.add_flag("--quiet", arguments->quiet, "no progress on the screen");
   add_calibration_options(app, *arguments);

@@ -20,8 +20,11 @@ template <class Sequence, class Value> void refer(Sequence& sequence, std::vecto
 
 }  // namespace
 
-TrackerStream::TrackerStream(const dds::Transport& transport, std::string source)
-    : source_(std::move(source)), participant_(transport), writer_(participant_, topics::tracker_frames()) {}
+TrackerStream::TrackerStream(const dds::Transport& transport, std::string source, SampleIds ids)
+    : source_(std::move(source)),
+      ids_(ids),
+      participant_(transport),
+      writer_(participant_, topics::tracker_frames()) {}
 
 void TrackerStream::publish(std::uint64_t frame, std::int64_t capture_ns,
                             const std::vector<track::TrackedRobot>& robots) {
@@ -30,7 +33,8 @@ void TrackerStream::publish(std::uint64_t frame, std::int64_t capture_ns,
   std::vector<double> x, y, heading;
   std::vector<float> xx, xy, yy, variance;
   for (const track::TrackedRobot& robot : robots) {
-    ids.push_back(robot.track);
+    if (ids_ == SampleIds::kNumbers && !robot.number) continue;
+    ids.push_back(ids_ == SampleIds::kNumbers ? *robot.number : robot.track);
     states.push_back(static_cast<std::uint8_t>(robot.state));
     x.push_back(robot.position.x_mm);
     y.push_back(robot.position.y_mm);

@@ -11,16 +11,21 @@
 
 namespace kilotwin::cli {
 
+/// What the ids of samples are: tracks, or the robots' own numbers. Robots whose number is not known are then left out.
+enum class SampleIds { kTracks, kNumbers };
+
 class TrackerStream {
  public:
   /// `source`: the tracker's name, at most 64 characters.
-  TrackerStream(const dds::Transport& transport, std::string source);
+  TrackerStream(const dds::Transport& transport, std::string source, SampleIds ids = SampleIds::kTracks);
 
   /// `capture_ns`: steady clock.
   void publish(std::uint64_t frame, std::int64_t capture_ns, const std::vector<track::TrackedRobot>& robots);
+  [[nodiscard]] const dds::Participant& participant() const { return participant_; }
 
  private:
   std::string source_;
+  SampleIds ids_;
   dds::Participant participant_;
   dds::Writer<PublicTrackerFrame> writer_;
 };

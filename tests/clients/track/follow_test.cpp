@@ -9,7 +9,7 @@
 namespace kilotwin::track {
 namespace {
 
-Sighting at(double x_mm, double y_mm) { return {x_mm, y_mm, 0.2, Led::kOff, std::nullopt}; }
+Sighting at(double x_mm, double y_mm) { return {x_mm, y_mm, Covariance::round(0.2), Led::kOff, std::nullopt}; }
 
 const Track* track_of(const Follower& follower, std::uint32_t id) {
   for (const Track& track : follower.tracks()) {
@@ -29,7 +29,7 @@ TEST(Follow, TracksKeepTheirRobotsAndTheErrorShrinks) {
     std::vector<Sighting> sightings;
     for (int i = 0; i < 20; ++i) {
       const double x = 40.0 * i + 10 * t * std::cos(i), y = 10 * t * std::sin(i);
-      sightings.push_back({x + noise(random), y + noise(random), 0.3, Led::kOff, std::nullopt});
+      sightings.push_back({x + noise(random), y + noise(random), Covariance::round(0.3), Led::kOff, std::nullopt});
     }
     follower.predict(t);
     follower.update(sightings);
