@@ -30,6 +30,7 @@ struct Command {
 [[nodiscard]] Command add_service(CLI::App& program, double started_s);
 [[nodiscard]] Command add_ros2(CLI::App& program);
 [[nodiscard]] Command add_play(CLI::App& program);
+[[nodiscard]] Command add_listen(CLI::App& program);
 [[nodiscard]] Command add_config(CLI::App& program);
 [[nodiscard]] Command add_ohc(CLI::App& program);
 [[nodiscard]] Command add_doctor(CLI::App& program);

@@ -81,6 +81,7 @@ class Launcher {
     words.insert(words.end(), {"--run", directory_.path().string(), "--domain", std::to_string(options_.domain),
                                "--start-monotonic", fmt::format("{:.6f}", options_.start_monotonic_s),
                                "--give-up-after", fmt::format("{}", options_.give_up_after_s)});
+    if (options_.realtime) words.emplace_back("--realtime");
     os::ChildOptions options;
     options.log = directory_.path() / "logs" / (file + ".log");
     options.own_group = true;  // the terminal's Ctrl-C must reach only the launcher, which ends the run in order

@@ -12,13 +12,21 @@ int main(int argc, char** argv) {
   return run_program(argc, argv,
                      "Kilotwin simulates swarms of Kilobots as services over DDS. Start: kilotwin run EXPERIMENT",
                      [started_s](CLI::App& program) -> std::vector<Command> {
-                       return {add_run(program, started_s), add_check(program),
-                               add_build(program),          add_sweep(program),
-                               add_export(program),         add_replay(program),
-                               add_identify(program),       add_service(program, started_s),
-                               add_ros2(program),           add_play(program),
-                               add_config(program),         add_ohc(program),
-                               add_cameras(program),        add_track(program),
+                       return {add_run(program, started_s),
+                               add_check(program),
+                               add_build(program),
+                               add_sweep(program),
+                               add_export(program),
+                               add_replay(program),
+                               add_identify(program),
+                               add_service(program, started_s),
+                               add_ros2(program),
+                               add_play(program),
+                               add_listen(program),
+                               add_config(program),
+                               add_ohc(program),
+                               add_cameras(program),
+                               add_track(program),
                                add_doctor(program)};
                      });
 }

@@ -27,6 +27,8 @@ struct PlayArguments : DoorArguments {
 
 /// How often an interrupt is looked for.
 constexpr nanoseconds kNap{20'000'000};
+/// How long the run may take to get the last frames, s.
+constexpr double kLast_s = 2;
 
 /// False where it was interrupted first.
 bool wait_until(steady_clock::time_point due) {
@@ -55,7 +57,7 @@ int play(const PlayArguments& arguments) {
   const doors::LogExtent extent = doors::check_log(arguments.log, door.settings.log());
   doors::LogPlayer player(door, arguments.log, extent, arguments.speed, arguments.loop);
   const dds::Participant participant(arguments.run);
-  doors::FrameWriter writer(participant, door.settings.name());
+  doors::FrameWriter writer(participant, door.settings.name(), topics::played_frames());
   if (!wait_for_run(writer, arguments.run.domain)) return kDone;
   say(fmt::format("kilotwin: plays {} rows, {:.1f} s, as \"{}\" on domain {}", extent.rows,
                   (extent.last_s - extent.first_s) / arguments.speed, one_line(door.settings.name(), 64),
@@ -66,6 +68,7 @@ int play(const PlayArguments& arguments) {
     due->frame.sent_ns = (steady_clock::now() - began) / nanoseconds(1);
     writer.write(due->frame);
   }
+  if (!writer.flush(kLast_s)) say("kilotwin: the run did not confirm the last frames");
   say("kilotwin: played " + player.tally().in_words());
   return kDone;
 }

@@ -30,6 +30,7 @@ struct RunArguments {
   std::filesystem::path model;
   std::string pace = "max";
   double max_lateness_ms = 0;  ///< of a tick behind the pace before the run ends; 0: any
+  bool realtime = false;       ///< services take precedence over other programs of the machine
   std::optional<double> checkpoint_every_s;
   std::filesystem::path resume;  ///< a run, or one of its checkpoints; empty: from tick 0
   bool prepare = false;          ///< write the run directory and stop

@@ -132,7 +132,8 @@ int run(const RunArguments& arguments, double started_s) {
       return *status;
   } else {
     const int status =
-        launch(plan, prepared.directory, {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet});
+        launch(plan, prepared.directory,
+               {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet, arguments.realtime});
     if (status != 0) return status;
   }
   if (!arguments.quiet) {
@@ -190,6 +191,8 @@ Command add_run(CLI::App& program, double started_s) {
       ->check(CLI::NonNegativeNumber.description(""))
       ->capture_default_str()
       ->type_name("MS");
+  app.add_flag("--realtime", arguments->realtime,
+               "services take precedence over other programs of the machine, where the system allows it");
   app.add_option("--checkpoint-every", arguments->checkpoint_every_s, "simulated time between checkpoints, s")
       ->type_name("SECONDS");
   app.add_option("--resume", arguments->resume, "start from the newest checkpoint of that run")->type_name("RUN");

@@ -252,6 +252,12 @@ proto::TrackerRecord to_record(Tick tick, const TrackerSample& sample) {
   record.mutable_heading_variance_rad2()->Add(sample.heading_variance_rad2.begin(),
                                               sample.heading_variance_rad2.end());
   record.mutable_led()->assign(sample.led.begin(), sample.led.end());
+  for (const HeardMessage& heard : sample.heard) {
+    record.add_heard_robot(heard.robot);
+    record.add_heard_listener(heard.listener);
+    record.add_heard_distance_mm(heard.distance_mm);
+    record.mutable_heard_message()->append(heard.message.begin(), heard.message.end());
+  }
   return record;
 }
 
@@ -270,6 +276,16 @@ TrackerSample from_record(const proto::TrackerRecord& record) {
   sample.yy.assign(record.yy().begin(), record.yy().end());
   sample.heading_variance_rad2.assign(record.heading_variance_rad2().begin(), record.heading_variance_rad2().end());
   sample.led.assign(record.led().begin(), record.led().end());
+  const int messages = record.heard_robot_size();
+  if (record.heard_listener_size() != messages || record.heard_distance_mm_size() != messages ||
+      record.heard_message().size() != static_cast<std::size_t>(messages) * IrMessage{}.size()) {
+    throw UserError(fmt::format("the recorded messages of listeners of tick {} are damaged", record.tick()));
+  }
+  for (int i = 0; i < messages; ++i) {
+    HeardMessage heard{record.heard_robot(i), record.heard_listener(i), record.heard_distance_mm(i), {}};
+    std::copy_n(record.heard_message().begin() + static_cast<std::ptrdiff_t>(i) * 10, 10, heard.message.begin());
+    sample.heard.push_back(heard);
+  }
   const std::size_t n = sample.robot.size();
   for (const std::size_t size :
        {sample.state.size(), sample.x.size(), sample.y.size(), sample.heading_rad.size(), sample.xx.size(),

@@ -19,6 +19,7 @@
 #include "core/base/say.hpp"
 #include "core/os/interrupt.hpp"
 #include "core/os/limits.hpp"
+#include "core/os/precedence.hpp"
 #include "services/ark/station_service.hpp"
 #include "services/behaviours/behaviours_service.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
@@ -35,7 +36,8 @@ struct ServiceArguments {
   std::string share;          ///< behaviours: "I/N"
   dds::Transport transport;
   double give_up_after_s = 0;  ///< longest wait for others without progress; 0: no limit
-  double started_s = 0;        ///< start time of the user's command, steady clock, s; for start_s of the summary
+  bool realtime = false;
+  double started_s = 0;  ///< start time of the user's command, steady clock, s; for start_s of the summary
 };
 
 /// Upper limit of a service's open files and sockets.
@@ -111,6 +113,11 @@ void begin_log(const RunPlan& plan, FederateId self, const dds::Transport& trans
 
 int serve(const ServiceArguments& arguments) {
   catch_interrupts();
+  if (arguments.realtime && !os::take_precedence()) {
+    warn(
+        "kilotwin: --realtime: this user may not have real-time priority; allow it by `ulimit -r 1` or as root, or "
+        "leave --realtime away");
+  }
   require_peers(arguments.transport.peers);
   require_open_files(kServiceFiles, "a service");
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
@@ -186,6 +193,7 @@ Command add_service(CLI::App& program, double started_s) {
       ->check(CLI::NonNegativeNumber.description(""))
       ->capture_default_str()
       ->type_name("SECONDS");
+  app.add_flag("--realtime", arguments->realtime, "take precedence over other programs of the machine");
   app.add_option("--start-monotonic", arguments->started_s, "when the run was asked for")->group("");
   return {&app, [arguments] { return serve(*arguments); }};
 }

@@ -15,6 +15,7 @@ const char* word_of(proto::Door::KindCase kind) {
   switch (kind) {
     case proto::Door::kRos2: return "ros2";
     case proto::Door::kArk: return "ark";
+    case proto::Door::kListener: return "listener";
     default: return "log";
   }
 }
@@ -60,7 +61,14 @@ void check_listed(const LoadedExperiment& loaded, int index, const std::vector<b
         fmt::format("door[{}].robots.{}", index, field),
         fmt::format("robot {} is not tracked; name a robot of a group with body: TRACKED", robot));
   };
-  const proto::DoorRobots& robots = loaded.experiment.door(index).robots();
+  const proto::Door& door = loaded.experiment.door(index);
+  const auto number = door.listener().robot();
+  if (door.listener().has_robot() && (number >= tracked.size() || !tracked[number])) {
+    throw loaded.locations.error(
+        fmt::format("door[{}].listener.robot", index),
+        fmt::format("robot {} is not tracked; name the listener, a robot of a group with body: TRACKED", number));
+  }
+  const proto::DoorRobots& robots = door.robots();
   if (robots.has_first_robot()) refuse("first_robot", robots.first_robot());
   for (int i = 0; i < robots.robot_size(); ++i) refuse(fmt::format("robot[{}].robot", i), robots.robot(i).robot());
 }
@@ -74,8 +82,10 @@ Door open_door(const LoadedExperiment& loaded, proto::Door::KindCase kind, const
   const int index = find_door(loaded, kind, name);
   const proto::Door& settings = loaded.experiment.door(index);
   if (reads_poses(settings) && std::find(tracked.begin(), tracked.end(), true) == tracked.end()) {
-    throw loaded.locations.error(fmt::format("door[{}]", index),
-                                 "the door reads poses, but no robot is tracked; add a group with body: TRACKED");
+    throw loaded.locations.error(
+        fmt::format("door[{}]", index),
+        fmt::format("the door {}, but no robot is tracked; add a group with body: TRACKED",
+                    settings.has_listener() ? "tells what real robots say" : "reads poses"));
   }
   check_listed(loaded, index, tracked);
   return {settings, Placement(settings), RobotNames(settings.robots(), std::move(tracked))};

@@ -19,8 +19,8 @@ std::vector<Value> column(const TrackedFrame& frame, Value TrackedRobot::*field,
 
 }  // namespace
 
-FrameWriter::FrameWriter(const dds::Participant& participant, std::string source)
-    : source_(std::move(source)), writer_(participant, topics::tracker_frames()) {}
+FrameWriter::FrameWriter(const dds::Participant& participant, std::string source, const dds::Channel& channel)
+    : source_(std::move(source)), writer_(participant, channel) {}
 
 void FrameWriter::write(const TrackedFrame& frame) {
   PublicTrackerFrame sample{};

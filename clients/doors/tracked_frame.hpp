@@ -33,10 +33,13 @@ struct TrackedFrame {
 
 class FrameWriter {
  public:
-  /// `source`: at most 64 characters.
-  FrameWriter(const dds::Participant& participant, std::string source);
+  /// `source`: at most 64 characters. `channel`: tracker_frames(), or played_frames(), of which nothing is lost.
+  FrameWriter(const dds::Participant& participant, std::string source,
+              const dds::Channel& channel = topics::tracker_frames());
   /// Throws RunError where DDS refuses the sample.
   void write(const TrackedFrame& frame);
+  /// Waits until every reader that acknowledges has all frames; false after `seconds`.
+  [[nodiscard]] bool flush(double seconds) const { return writer_.flush(seconds); }
   /// How many readers are matched at the moment.
   [[nodiscard]] std::uint32_t readers() const { return writer_.readers(); }
 

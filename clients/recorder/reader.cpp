@@ -216,6 +216,19 @@ const char* Reader::defect_of_sample(const proto::TrackerRecord& sample) const {
       !finite(sample.xy()) || !finite(sample.yy())) {
     return "a tracker's sample with values out of range";
   }
+  constexpr std::size_t kMessageOctets = 10;
+  const int messages = sample.heard_robot_size();
+  if (sample.heard_listener_size() != messages || sample.heard_distance_mm_size() != messages ||
+      sample.heard_message().size() != static_cast<std::size_t>(messages) * kMessageOctets) {
+    return "messages of listeners whose columns differ in length";
+  }
+  constexpr std::uint32_t kUnknown = 0xffffffffu;
+  const auto known_or_none = [&](std::uint32_t robot) { return robot == kUnknown || known(robot); };
+  if (!std::all_of(sample.heard_robot().begin(), sample.heard_robot().end(), known_or_none) ||
+      !std::all_of(sample.heard_listener().begin(), sample.heard_listener().end(), known_or_none) ||
+      !finite(sample.heard_distance_mm())) {
+    return "messages of listeners with values out of range";
+  }
   return nullptr;
 }
 

@@ -116,7 +116,11 @@ Json tracking_json(const TrackingTotals& t) {
              {"exposure_to_sent_ms", Json{{"p50", tracker.own_p50_s * 1e3}, {"p99", tracker.own_p99_s * 1e3}}},
              {"queueing_ms", Json{{"p50", tracker.way_p50_s * 1e3}, {"p99", tracker.way_p99_s * 1e3}}}});
   }
-  return Json{{"arrival_to_effect_ms", Json{{"p50", t.effect_p50_s * 1e3}, {"p99", t.effect_p99_s * 1e3}}},
+  const auto ms = [](double p50_s, double p99_s) { return Json{{"p50", p50_s * 1e3}, {"p99", p99_s * 1e3}}; };
+  return Json{{"arrival_to_effect_ms", ms(t.effect_p50_s, t.effect_p99_s)},
+              {"arrival_to_publication_ms", ms(t.wait_p50_s, t.wait_p99_s)},
+              {"publication_to_effect_ms", ms(t.step_p50_s, t.step_p99_s)},
+              {"heard_messages", t.heard},
               {"joined", t.joined},
               {"left", t.left},
               {"lost", t.lost},

@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "clients/cameras/picture_file.hpp"
 #include "core/base/error.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::track {
 namespace fs = std::filesystem;
@@ -18,6 +20,29 @@ namespace {
 std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
       .count();
+}
+
+/// On the steady clock: the capture time that the picture's stamp tells, if that was just now; else the present.
+std::int64_t capture_of(const std::optional<cameras::FrameStamp>& stamp) {
+  constexpr std::int64_t kOldest_ns = 2'000'000'000;
+  if (!stamp) return now_ns();
+  const std::int64_t utc_ns =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+          .count();
+  const std::int64_t age_ns = utc_ns - stamp->capture_ns;
+  return age_ns >= 0 && age_ns <= kOldest_ns ? now_ns() - age_ns : now_ns();
+}
+
+/// A live picture from a file; an empty one where it cannot be decoded.
+CapturedFrame live_picture(const fs::path& file) {
+  CapturedFrame frame;
+  const std::optional<std::string> content = os::read_if_there(file);
+  if (!content || content->empty()) return frame;
+  frame.capture_ns = capture_of(cameras::stamp_of(*content));
+  // OpenCV takes the octets as they are; it does not write them.
+  const cv::Mat octets(1, static_cast<int>(content->size()), CV_8UC1, const_cast<char*>(content->data()));
+  frame.picture = cv::imdecode(octets, cv::IMREAD_COLOR);
+  return frame;
 }
 
 bool is_picture(const fs::path& file) {
@@ -60,9 +85,10 @@ class GrowingDirectory : public Source {
       while (!waiting_.empty()) {
         const fs::path file = waiting_.front();
         waiting_.pop_front();
-        CapturedFrame frame{cv::imread(file.string(), cv::IMREAD_COLOR), number_, 0, now_ns()};
+        CapturedFrame frame = live_picture(file);
         if (frame.picture.empty()) continue;
-        if (number_++ == 0) start_ns_ = frame.capture_ns;
+        frame.number = number_++;
+        if (frame.number == 0) start_ns_ = frame.capture_ns;
         frame.time_s = 1e-9 * static_cast<double>(frame.capture_ns - start_ns_);
         return frame;
       }
@@ -93,6 +119,42 @@ class GrowingDirectory : public Source {
   std::deque<fs::path> waiting_;
   std::uint64_t number_ = 0;
   std::int64_t start_ns_ = 0;
+};
+
+/// One file that is replaced by each new picture.
+class RewrittenPicture : public Source {
+ public:
+  explicit RewrittenPicture(fs::path file) : file_(std::move(file)) {}
+  std::optional<CapturedFrame> next(const std::atomic<bool>& stop) override {
+    while (!stop) {
+      if (is_new()) {
+        CapturedFrame frame = live_picture(file_);
+        if (!frame.picture.empty() && frame.capture_ns > last_ns_) {
+          frame.number = number_++;
+          if (frame.number == 0) start_ns_ = frame.capture_ns;
+          last_ns_ = frame.capture_ns;
+          frame.time_s = 1e-9 * static_cast<double>(frame.capture_ns - start_ns_);
+          return frame;
+        }
+      }
+      constexpr std::chrono::milliseconds kPause{2};
+      std::this_thread::sleep_for(kPause);
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] bool live() const override { return true; }
+
+ private:
+  bool is_new() {
+    std::error_code none;
+    const fs::file_time_type written = fs::last_write_time(file_, none);
+    return !none && std::exchange(written_, written) != written;
+  }
+
+  fs::path file_;
+  fs::file_time_type written_{};
+  std::uint64_t number_ = 0;
+  std::int64_t start_ns_ = 0, last_ns_ = 0;
 };
 
 class Video : public Source {
@@ -155,6 +217,7 @@ std::unique_ptr<Source> open_source(const std::string& place, const SourceOption
     return std::make_unique<Video>(std::move(capture), true, options.rate_hz);
   }
   if (fs::is_directory(place, ignored)) return open_directory(place, options);
+  if (options.watch && is_picture(place)) return std::make_unique<RewrittenPicture>(place);
   if (!fs::exists(place, ignored))
     throw UserError(fmt::format(
         "{}: does not exist; expected a picture, a video, a directory of pictures, a camera's index or a "

@@ -34,7 +34,7 @@ class Source {
 
 struct SourceOptions {
   double rate_hz = 30;          ///< of a directory of pictures, and of a video file without one of its own
-  bool watch = false;           ///< a directory grows: wait for pictures to come
+  bool watch = false;           ///< a directory grows, or a picture is replaced again and again: wait for new ones
   std::optional<int> camera{};  ///< whose pictures of an ARK directory, frame_%05d_%d.jpg; none: camera 0
 };
 

@@ -122,6 +122,7 @@ static_assert(10 + 2 * (kMostParticipants - 1) + 1 < 250, "the last index stays 
 namespace detail {
 namespace {
 
+constexpr int kPlaybackDepth = 64;
 constexpr int kFrameDepth = 8;  // federates are at most 4 ticks apart: core/federation/schedule.hpp
 
 Qos make_qos(const Channel& channel) {
@@ -163,6 +164,14 @@ Qos make_qos(const Channel& channel) {
     case Delivery::kSensor:
       dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
       dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 16);
+      break;
+    case Delivery::kPlayback:
+      dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kPlaybackDepth);
+      dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+      // Depth of what readers get that match later than the writer believes.
+      dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, kPlaybackDepth, DDS_LENGTH_UNLIMITED,
+                                  DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+      dds_qset_writer_data_lifecycle(qos.get(), false);
       break;
   }
   return qos;

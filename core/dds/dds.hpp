@@ -55,6 +55,7 @@ enum class Delivery {
   kTelemetry,   ///< best effort, keep-last 1, volatile
   kNode,        ///< reliable, keep-last 10, volatile; a writer that ends disposes nothing: as nodes of ROS 2 write
   kSensor,      ///< best effort, keep-last 16, volatile: sensor frames; a late frame is worth less than the next
+  kPlayback,    ///< reliable, keep-last 64, transient-local: what is played or heard once and must not be lost
 };
 
 /// An entity handle that deletes its entity.

@@ -7,6 +7,7 @@
 
 #include "core/base/say.hpp"
 #include "core/experiment/field_checks.hpp"
+#include "core/experiment/line_pattern.hpp"
 
 namespace kilotwin {
 namespace {
@@ -25,10 +26,13 @@ class DoorCheck {
 
   void check() const {
     check_name();
-    if (door_.kind_case() == Door::KIND_NOT_SET) fail("", "door has no kind; it takes ros2, ark or log { ... }");
+    if (door_.kind_case() == Door::KIND_NOT_SET)
+      fail("", "door has no kind; it takes ros2, ark, log or listener { ... }");
     check_robots();
     if (door_.has_ros2()) check_ros2();
     if (door_.has_log()) check_log();
+    if (door_.has_listener()) check_listener();
+    check_source();
   }
 
  private:
@@ -39,6 +43,8 @@ class DoorCheck {
   void check_robots() const;
   void check_ros2() const;
   void check_log() const;
+  void check_listener() const;
+  void check_source() const;
   void check_topic_name(const std::string& field, std::string name, bool takes_name) const;
 
   const LoadedExperiment& loaded_;
@@ -142,6 +148,31 @@ void DoorCheck::check_log() const {
     fail(".log.columns", fmt::format("columns is {}; a log of {} takes {}", columns, lars ? "LARS" : "ARK",
                                      lars ? "3, 4 or 6" : "5 or 6"));
   }
+}
+
+void DoorCheck::check_listener() const {
+  const proto::ListenerDoor& listener = door_.listener();
+  const std::string wrong = defect_of_line_pattern(listener.line());
+  if (!wrong.empty()) fail(".listener.line", wrong);
+  const bool tells_sender = listener.has_id_octet() || listener.line().find("{sender}") != std::string::npos;
+  if (!tells_sender && !listener.has_robot()) {
+    fail(".listener",
+         "nothing tells who sent a message; state robot: NUMBER, the listener's own, or id_octet, or {sender} in "
+         "line");
+  }
+}
+
+/// Where the experiment lists trackers, samples of others do not count.
+void DoorCheck::check_source() const {
+  const auto& trackers = loaded_.experiment.tracker();
+  const bool reads_poses = !door_.has_listener() && (!door_.has_ros2() || door_.ros2().topic_size() > 0);
+  if (trackers.empty() || !reads_poses) return;
+  const auto is_this = [this](const proto::Tracker& tracker) { return tracker.source() == door_.name(); };
+  if (std::any_of(trackers.begin(), trackers.end(), is_this)) return;
+  fail(".name",
+       fmt::format("the experiment lists its trackers, and \"{0}\" is none of them, so its poses would not "
+                   "count; add tracker {{ source: \"{0}\" }}",
+                   one_line(door_.name(), 64)));
 }
 
 }  // namespace

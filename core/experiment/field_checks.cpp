@@ -4,6 +4,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <algorithm>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -345,6 +346,16 @@ void check_total(const LoadedExperiment& loaded, std::uint64_t robots) {
         "station.environment",
         fmt::format("environment is given with {} robots, but ARK's messages address 10-bit ids; it "
                     "takes at most {} robots",
+                    robots, kMostArkRobots));
+  }
+  const auto& groups = loaded.experiment.robots();
+  const auto hears = std::find_if(groups.begin(), groups.end(),
+                                  [](const proto::RobotGroup& group) { return group.has_hears_simulated(); });
+  if (hears != groups.end() && robots > kMostArkRobots) {
+    throw loaded.locations.error(
+        fmt::format("robots[{}].hears_simulated", hears - groups.begin()),
+        fmt::format("hears_simulated is given with {} robots, but ARK's messages address 10-bit ids; it takes at "
+                    "most {} robots",
                     robots, kMostArkRobots));
   }
   if (loaded.experiment.deployment().hosts() > robots) {

@@ -267,6 +267,9 @@ constexpr FieldRule kRules[] = {
     {"SaysRule.type", 0, 127, ""},
     {"SaysRule.id_octet", 0, 8, ""},
     {"SaysRule.period_s", 0.01, 8, "s"},
+    {"HearsSimulated.range_mm", 0, 1000, "mm", Lower::kExcluded},
+    {"HearsSimulated.type", 0, 15, ""},
+    {"HearsSimulated.octet", 0, 8, ""},
     {"CircleRegion.x_mm", -kLongest_mm, kLongest_mm, "mm"},
     {"CircleRegion.y_mm", -kLongest_mm, kLongest_mm, "mm"},
     {"CircleRegion.radius_mm", 0, kLongest_mm, "mm", Lower::kExcluded},
@@ -287,6 +290,8 @@ constexpr FieldRule kRules[] = {
     {"Ros2Door.gather_ms", 0, 1000, "ms"},
     {"Ros2Door.max_tilt_deg", 0, 180, "degrees"},
     {"ArkDoor.interval_ms", 10, 10000, "ms"},
+    {"ListenerDoor.robot", 0, kMostRobots - 1, ""},
+    {"ListenerDoor.id_octet", 0, 8, ""},
     {"LogDoor.columns", 3, 6, ""},
     {"LogDoor.time_unit_s", 0, 3600, "s", Lower::kExcluded},
 

@@ -1,6 +1,7 @@
 // Trackers, and what tracked robots say: what the table of ranges cannot say.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
 #include <string>
 
@@ -58,6 +59,26 @@ void check_rule(const LoadedExperiment& loaded, const proto::SaysRule& rule, con
   }
 }
 
+bool has_listener(const proto::Experiment& experiment) {
+  return std::any_of(experiment.door().begin(), experiment.door().end(),
+                     [](const proto::Door& door) { return door.has_listener(); });
+}
+
+void check_hearing(const LoadedExperiment& loaded, const proto::RobotGroup& group, const std::string& path) {
+  if (!group.has_hears_simulated()) return;
+  if (group.body() != proto::RobotGroup::TRACKED) {
+    throw loaded.locations.error(
+        path, "simulated robots hear by their own radio; remove hears_simulated, or set body: TRACKED");
+  }
+  const auto& environments = loaded.experiment.station().environment();
+  if (std::any_of(environments.begin(), environments.end(), [](const auto& each) { return each.has_bits(); })) {
+    throw loaded.locations.error(
+        path,
+        "its messages take all bits of a message, and environments of the station have bits of their own; "
+        "remove bits from the environments, or hears_simulated");
+  }
+}
+
 }  // namespace
 
 void check_tracking(const LoadedExperiment& loaded) {
@@ -73,8 +94,14 @@ void check_tracking(const LoadedExperiment& loaded) {
           path, "simulated robots say what their program says; remove says, or set body: TRACKED");
     }
     const proto::Says& says = group.says();
-    if (says.shadow() && says.rule_size() > 0)
-      throw loaded.locations.error(path, "says has rules and a shadow; keep one of them");
+    if ((says.shadow() ? 1 : 0) + (says.heard() ? 1 : 0) + (says.rule_size() > 0 ? 1 : 0) > 1)
+      throw loaded.locations.error(path, "says has more than one of rule, shadow and heard; keep one of them");
+    if (says.heard() && !has_listener(experiment)) {
+      throw loaded.locations.error(
+          path + ".heard",
+          "no listener tells what the robots say; add door { name: \"NAME\" listener { robot: NUMBER } }");
+    }
+    check_hearing(loaded, group, fmt::format("robots[{}].hears_simulated", g));
     if (says.shadow() && group.avr())
       throw loaded.locations.error(path + ".shadow", "a shadow runs natively; remove avr");
     if (says.rule_size() > kMostRules) {

@@ -148,6 +148,10 @@ const char* defect(const TrackingFrame& frame, const RunPlan& plan, FederateId, 
       !std::all_of(frame.robot.begin(), frame.robot.end(),
                    [&](std::uint32_t robot) { return plan.tracked(robot); }))
     return "its robots are not ascending ids of tracked robots";
+  if (!ascending_within(frame.said_robot, {0, plan.robots()}) ||
+      !std::all_of(frame.said_robot.begin(), frame.said_robot.end(),
+                   [&](std::uint32_t robot) { return plan.tracked(robot); }))
+    return "its senders are not ascending ids of tracked robots";
   const auto known_state = [](std::uint8_t state) {
     return state <= static_cast<std::uint8_t>(TrackedState::kInDoubt);
   };

@@ -336,20 +336,21 @@ void Session::assemble(Federate& federate) {
 }
 
 /// Waits while the run is ahead of its pace. The wait lies before the frames are published, so that what
-/// arrives from outside meanwhile still counts for the tick.
+/// arrives from outside meanwhile still counts for the tick. Nothing else is done shortly before the tick is due.
 void Session::hold(Federate& federate, Tick now) {
-  constexpr double kLongest_s = 1.0;
+  constexpr double kLongest_s = 1.0, kNear_s = 0.02;
   while (interrupted() == 0) {
     const double ahead_s = federate.ahead_s(now);
     if (ahead_s <= 0) return;
+    const bool is_near = ahead_s < kNear_s;
     {
       std::unique_lock lock(mutex_);
       check();
-      const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                            std::chrono::duration<double>(std::min(ahead_s, kLongest_s)));
-      arrived_.wait_until(lock, std::min(until, next_idle_));
+      const auto due = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                          std::chrono::duration<double>(std::min(ahead_s, kLongest_s)));
+      arrived_.wait_until(lock, is_near ? due : std::min(due, next_idle_));
     }
-    if (Clock::now() >= next_idle_) idle(federate);
+    if (!is_near && Clock::now() >= next_idle_) idle(federate);
   }
 }
 

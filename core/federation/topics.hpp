@@ -21,6 +21,7 @@ using PublicRunControl = kilotwin_open_RunControl;
 using PublicOverheadPacket = kilotwin_open_OverheadPacket;
 using PublicStationPacket = kilotwin_open_StationPacket;
 using PublicTrackerFrame = kilotwin_open_TrackerFrame;
+using PublicHeardMessage = kilotwin_open_HeardMessage;
 using PublicRunStatus = kilotwin_open_RunStatus;
 using PublicRobotState = kilotwin_open_RobotState;
 using PublicRunDescription = kilotwin_open_RunDescription;
@@ -52,6 +53,9 @@ inline Channel run_control() { return {"kilotwin/run_control", Delivery::kReques
 inline Channel overhead_packets() { return {"kilotwin/overhead_packets", Delivery::kRequest, ""}; }
 inline Channel station_packets() { return {"kilotwin/station_packets", Delivery::kRequest, ""}; }
 inline Channel tracker_frames() { return {"kilotwin/tracker_frames", Delivery::kSensor, ""}; }
+/// The same topic, for readers that know writers that repeat what was lost.
+inline Channel played_frames() { return {"kilotwin/tracker_frames", Delivery::kPlayback, ""}; }
+inline Channel heard_messages() { return {"kilotwin/heard_messages", Delivery::kPlayback, ""}; }
 inline Channel run_status() { return {"kilotwin/run_status", Delivery::kStatus, ""}; }
 inline Channel robots() { return {"kilotwin/robots", Delivery::kTelemetry, ""}; }
 inline Channel run_description() { return {"kilotwin/run_description", Delivery::kStatus, ""}; }
@@ -91,6 +95,9 @@ template <> inline const dds_topic_descriptor_t* descriptor<PublicStationPacket>
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicTrackerFrame>() {
   return &kilotwin_open_TrackerFrame_desc;
+}
+template <> inline const dds_topic_descriptor_t* descriptor<PublicHeardMessage>() {
+  return &kilotwin_open_HeardMessage_desc;
 }
 template <> inline const dds_topic_descriptor_t* descriptor<PublicRunStatus>() {
   return &kilotwin_open_RunStatus_desc;

@@ -193,6 +193,8 @@ WireTrackingFrame to_wire(const WireHeader& header, const TrackingFrame& frame) 
   wire.y_mm = borrow<Doubles>(frame.y_mm);
   wire.heading_rad = borrow<Doubles>(frame.heading_rad);
   wire.led = borrow<Octets>(frame.led);
+  wire.said_robot = borrow<ULongs>(frame.said_robot);
+  wire.said_message = borrow<Octets>(frame.said_message);
   return wire;
 }
 
@@ -200,10 +202,11 @@ bool from_wire(const WireTrackingFrame& wire, TrackingFrame& frame) {
   frame.tick = Tick{wire.tick};
   const bool whole = copy(wire.robot, frame.robot) && copy(wire.state, frame.state) &&
                      copy(wire.x_mm, frame.x_mm) && copy(wire.y_mm, frame.y_mm) &&
-                     copy(wire.heading_rad, frame.heading_rad) && copy(wire.led, frame.led);
+                     copy(wire.heading_rad, frame.heading_rad) && copy(wire.led, frame.led) &&
+                     copy(wire.said_robot, frame.said_robot) && copy(wire.said_message, frame.said_message);
   const std::size_t n = frame.robot.size();
-  return whole && frame.state.size() == n && frame.x_mm.size() == n && frame.y_mm.size() == n &&
-         frame.heading_rad.size() == n && frame.led.size() == n;
+  return whole && frame.said_message.size() == frame.said_robot.size() && frame.state.size() == n &&
+         frame.x_mm.size() == n && frame.y_mm.size() == n && frame.heading_rad.size() == n && frame.led.size() == n;
 }
 
 WireDirective to_wire(std::uint64_t run, const Directive& directive) {

@@ -124,6 +124,8 @@ struct TrackingFrame {
   std::vector<std::uint8_t> state;              ///< TrackedState
   std::vector<double> x_mm, y_mm, heading_rad;  ///< predicted for tick + 1
   std::vector<std::uint8_t> led;                ///< r | g << 2 | b << 4, or kUnknownLed
+  std::vector<std::uint32_t> said_robot;        ///< real robots that listeners heard; ascending ids
+  std::vector<IrMessage> said_message;          ///< per entry of said_robot: what it said last
 
   void clear() {
     robot.clear();
@@ -132,6 +134,8 @@ struct TrackingFrame {
     y_mm.clear();
     heading_rad.clear();
     led.clear();
+    said_robot.clear();
+    said_message.clear();
   }
 };
 

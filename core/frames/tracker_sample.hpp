@@ -1,10 +1,22 @@
-/// One camera frame of a tracker, stamped by the ingress: an input of the frames of one tick.
+/// One camera frame of a tracker, or what listeners heard, stamped by the ingress: an input of the frames of one tick.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "core/frames/overhead_packet.hpp"
+
 namespace kilotwin {
+
+/// A message of a real robot that a listener, another real robot, heard. HeardMessage of idl/public.idl says what the fields
+/// mean.
+struct HeardMessage {
+  static constexpr std::uint32_t kUnknown = 0xffffffffu;
+  std::uint32_t robot = kUnknown;     ///< the sender, a tracked robot of the plan
+  std::uint32_t listener = kUnknown;  ///< a tracked robot of the plan
+  float distance_mm = -1;
+  IrMessage message{};
+};
 
 /// Columns have one entry per robot that the tracker told of: tracked robots of the plan, each at most once. Lengths are the
 /// tracker's own; TrackerFrame of idl/public.idl says what the columns mean.
@@ -17,6 +29,7 @@ struct TrackerSample {
   std::vector<float> x, y, heading_rad;
   std::vector<float> xx, xy, yy, heading_variance_rad2;
   std::vector<std::uint8_t> led;
+  std::vector<HeardMessage> heard;  ///< in the order of arrival; a sample has these or robots
 };
 
 }  // namespace kilotwin

@@ -197,6 +197,11 @@ SaysRuleSettings rule_of(const proto::SaysRule& rule) {
   return out;
 }
 
+HearsSettings hears_of(const proto::HearsSimulated& hears) {
+  return {hears.range_mm(), static_cast<std::uint8_t>(hears.type()), static_cast<HearsSettings::Data>(hears.data()),
+          hears.octet()};
+}
+
 TrackingSettings tracking_of(const proto::Experiment& experiment) {
   constexpr double kDegree = kPi / 180;
   TrackingSettings out;
@@ -213,6 +218,9 @@ TrackingSettings tracking_of(const proto::Experiment& experiment) {
   std::uint32_t first = 0;
   for (const proto::RobotGroup& group : experiment.robots()) {
     out.rules.push_back(each(group.says().rule(), rule_of));
+    out.heard.push_back(group.says().heard() ? 1 : 0);
+    out.hears.emplace_back();
+    if (group.has_hears_simulated()) out.hears.back() = hears_of(group.hears_simulated());
     out.first_robots.push_back(first);
     first += group.count();
   }

@@ -16,8 +16,8 @@ void StationEngine::save(proto::StationState& state) const {
     state.add_packet_offset_cycles(packet.offset_cycles());
   }
   tracked_.save(state);
+  if (uses_queue()) queue_.save(*state.mutable_queue());
   if (plugins_.empty()) return;
-  queue_.save(*state.mutable_queue());
   if (camera_) camera_->save(*state.mutable_camera());
   for (std::size_t robot = 0; !camera_ && robot < plan_.robots(); ++robot) {
     state.add_seen_mm(seen_.x_mm[robot]);
@@ -58,7 +58,10 @@ void StationEngine::load(Tick tick, std::span<const proto::StationState* const> 
     if (!packet) throw RunError("the checkpoint's station holds a damaged packet; resume from another one");
     packets_.push_back(packet->at(state.packet_offset_cycles(i)));
   }
-  if (plugins_.empty()) return;
+  if (plugins_.empty()) {
+    if (hearing_.any()) queue_.load(state.queue());
+    return;
+  }
   outputs_of_set_up_.clear();
   if (camera_) camera_->load(state.camera());
   if (!camera_) {

@@ -32,6 +32,13 @@ double robot_interval_s(const StationSettings& setting, std::uint32_t robots) {
   return setting.robot_interval_s.value_or(rule_s);
 }
 
+/// Who puts messages into the queue.
+std::vector<EnvironmentSettings> places_of(const StationSettings& setting, const SimulatedHearing& hearing) {
+  std::vector<EnvironmentSettings> places = setting.environments;
+  if (hearing.any()) places.emplace_back();
+  return places;
+}
+
 std::uint64_t word_of(const OverheadPacket& packet, std::size_t from) {
   std::uint64_t word = 0;
   for (std::size_t i = from; i < std::min(from + 8, packet.message.size()); ++i)
@@ -60,7 +67,8 @@ StationEngine::StationEngine(const RunPlan& plan, const std::filesystem::path& r
       start_ends_(plan.tick_length.at_or_after(setting_.start_broadcast_s)),
       is_limited_(setting_.packet_interval_s > 0),
       packet_interval_(cycles_of(is_limited_ ? setting_.packet_interval_s : kCopyPeriod_s)),
-      queue_(plan.robots(), setting_.environments, cycles_of(robot_interval_s(setting_, plan.robots()))),
+      hearing_(plan),
+      queue_(plan.robots(), places_of(setting_, hearing_), cycles_of(robot_interval_s(setting_, plan.robots()))),
       tracked_(plan),
       packets_{run_packet()},
       next_packet_(begin_of(start_ends_) + begin_of(plan.tick_length.at_or_after(setting_.packet_interval_s))),
@@ -167,6 +175,11 @@ void StationEngine::run_plugins(Tick from) {
   }
 }
 
+void StationEngine::pass_on_hearing(const SwarmView& swarm) {
+  const auto place = static_cast<std::uint32_t>(setting_.environments.size());
+  for (const ArkMessage& message : hearing_.heard(swarm)) queue_.put(place, message, begin_of(now_));
+}
+
 void StationEngine::take(std::uint32_t environment, station::Reply reply, Tick now) {
   Plugin& plugin = plugins_[environment];
   PluginOutput output;
@@ -206,7 +219,7 @@ void StationEngine::send_own() {
   if (now_ == start_ends_ && repeating_) {
     push({OverheadCommand::kStop, {}}, begin_of(now_));
     repeating_ = false;
-  } else if (!plugins_.empty() && next_packet_ < begin_of(now_ + 1)) {
+  } else if (uses_queue() && next_packet_ < begin_of(now_ + 1)) {
     send_waiting();
   }
 }
@@ -237,6 +250,7 @@ void StationEngine::step(Tick from, const Inputs& inputs) {
     see(inputs.swarm);
     run_plugins(from);
   }
+  if (hearing_.any()) pass_on_hearing(inputs.swarm);
   packets_.assign(inputs.external.begin(), inputs.external.end());
   if (packets_.empty()) return send_own();
   std::stable_sort(packets_.begin(), packets_.end(), [](const OverheadPacket& a, const OverheadPacket& b) {
@@ -271,10 +285,9 @@ std::uint64_t StationEngine::hash_part() const {
     sum += entity_hash(HashDomain::kStation, kRest + i, {rest});
   }
   sum += tracked_.hash_part();
-  if (plugins_.empty()) return sum;
   // Apart from the packets, of which there are few.
   constexpr std::uint32_t kQueue = 1u << 30, kCameraModel = kQueue + 1, kEnvironments = 1u << 31;
-  sum += entity_hash(HashDomain::kStation, kQueue, {queue_.word()});
+  if (uses_queue()) sum += entity_hash(HashDomain::kStation, kQueue, {queue_.word()});
   if (camera_) sum += entity_hash(HashDomain::kStation, kCameraModel, {camera_->word()});
   for (std::uint32_t i = 0; i < plugins_.size(); ++i) {
     const Plugin& plugin = plugins_[i];

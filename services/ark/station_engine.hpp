@@ -24,6 +24,7 @@
 #include "services/ark/message_queue.hpp"
 #include "services/ark/plugin_host.hpp"
 #include "services/ark/seen_robots.hpp"
+#include "services/ark/simulated_hearing.hpp"
 #include "services/ark/tracking/tracked_swarm.hpp"
 
 namespace kilotwin::proto {
@@ -72,6 +73,8 @@ class StationEngine {
   /// Of the last step; those of set-ups with the first step.
   [[nodiscard]] const std::vector<PluginOutput>& outputs() const { return outputs_; }
   [[nodiscard]] const QueueCounts& counts() const { return queue_.counts(); }
+  /// Whether anything sends messages of its own: environments, or simulated robots for real ones.
+  [[nodiscard]] bool uses_queue() const { return !plugins_.empty() || hearing_.any(); }
   /// Of one environment; empty: it is well.
   [[nodiscard]] const std::string& failure(std::uint32_t environment) const {
     return plugins_[environment].failure;
@@ -92,6 +95,7 @@ class StationEngine {
   void see_initial_poses();
   void set_up(std::uint32_t environment, bool resumed);
   void run_plugins(Tick from);
+  void pass_on_hearing(const SwarmView&);
   void take(std::uint32_t environment, station::Reply reply, Tick now);
   [[nodiscard]] station::Request request(station::Call, Tick at) const;
   /// An instant or a length of simulated time, cycles of the robots' nominal clock; the start is 0.
@@ -110,7 +114,8 @@ class StationEngine {
   const bool is_limited_;         ///< false: packets follow each other as they fit on the air
   const Cycles packet_interval_;  ///< at least, between two packets
   std::optional<CameraModel> camera_;
-  MessageQueue queue_;
+  const SimulatedHearing hearing_;
+  MessageQueue queue_;  ///< behind the environments' places one for hearing_, if it is in use
   std::vector<Plugin> plugins_;
 
   Tick now_;

@@ -111,7 +111,7 @@ void StationOutputs::take(Tick from, const StationEngine& engine, RunObserver& o
 StationTotals station_totals(const RunPlan& plan, const StationEngine& engine, Tick last) {
   StationTotals totals;
   const auto& environments = plan.station_settings().environments;
-  if (environments.empty()) return totals;
+  if (!engine.uses_queue()) return totals;
   const QueueCounts& counts = engine.counts();
   totals.packets = counts.packets;
   totals.robot_messages = counts.robot_messages;

@@ -5,6 +5,7 @@ namespace kilotwin::ark {
 TrackedRobots::TrackedRobots(const RunPlan& plan, const dds::Participant& participant,
                              const ServiceContext& context)
     : input_(plan, participant),
+      heard_input_(plan, participant),
       stamped_(context.tracker_samples.begin(), context.tracker_samples.end()),
       announced_(plan.robots()) {
   for (const Directive& directive : context.inputs) {
@@ -18,14 +19,22 @@ std::span<const TrackerSample> TrackedRobots::samples_of(Tick now, std::int64_t 
                                                          RunObserver& observer) {
   samples_.clear();
   // The model of the clocks learns from all samples, also from those that another attempt has forestalled.
-  std::vector<TrackerInput::Stamped> arrived = input_.take(Clock::now(), now_cycle, pace);
+  const Clock::time_point taken = Clock::now();
+  std::vector<TrackerInput::Stamped> arrived = input_.take(taken, now_cycle, pace);
+  std::vector<HeardMessage> heard = heard_input_.take();
   if (!stamped_.empty()) {
     for (; !stamped_.empty() && stamped_.front().first <= now; stamped_.pop_front())
       samples_.push_back(std::move(stamped_.front().second));
   } else {
     for (TrackerInput::Stamped& stamped : arrived) {
-      underway_.push_back({now + 1, stamped.arrival});
+      underway_.push_back({now + 1, stamped.arrival, taken});
       samples_.push_back(std::move(stamped.sample));
+    }
+    heard_ += heard.size();
+    if (!heard.empty()) {
+      TrackerSample& sample = samples_.emplace_back();
+      sample.capture_cycle = now_cycle;
+      sample.heard = std::move(heard);
     }
   }
   for (const TrackerSample& sample : samples_) observer.tracker_sample(now, sample);
@@ -53,14 +62,24 @@ std::vector<MembershipChange> TrackedRobots::changes(const TrackedSwarm& swarm) 
 }
 
 void TrackedRobots::acted(Tick now, Clock::time_point at) {
-  for (; !underway_.empty() && underway_.front().acts <= now; underway_.pop_front())
-    effect_.add(std::chrono::duration<double>(at - underway_.front().arrival).count());
+  const auto seconds = [](Clock::duration time) { return std::chrono::duration<double>(time).count(); };
+  for (; !underway_.empty() && underway_.front().acts <= now; underway_.pop_front()) {
+    const Underway& sample = underway_.front();
+    effect_.add(seconds(at - sample.arrival));
+    wait_.add(seconds(sample.published - sample.arrival));
+    step_.add(seconds(at - sample.published));
+  }
 }
 
 void TrackedRobots::fill(TrackingTotals& totals) const {
   totals.trackers = input_.report();
   totals.effect_p50_s = effect_.quantile_s(0.5);
   totals.effect_p99_s = effect_.quantile_s(0.99);
+  totals.wait_p50_s = wait_.quantile_s(0.5);
+  totals.wait_p99_s = wait_.quantile_s(0.99);
+  totals.step_p50_s = step_.quantile_s(0.5);
+  totals.step_p99_s = step_.quantile_s(0.99);
+  totals.heard = heard_;
   totals.joined = joined_;
   totals.left = left_;
   totals.lost = lost_;

@@ -8,6 +8,7 @@
 
 #include "core/federation/run_observer.hpp"
 #include "core/federation/service_context.hpp"
+#include "services/ark/heard_input.hpp"
 #include "services/ark/tracker_input.hpp"
 #include "services/ark/tracking/latency_histogram.hpp"
 #include "services/ark/tracking/tracked_swarm.hpp"
@@ -32,17 +33,18 @@ class TrackedRobots {
  private:
   struct Underway {
     Tick acts;  ///< in the poses of this tick
-    Clock::time_point arrival;
+    Clock::time_point arrival, published;
   };
 
   TrackerInput input_;
+  HeardInput heard_input_;
   std::deque<std::pair<Tick, TrackerSample>> stamped_;  ///< in an earlier attempt
   std::vector<TrackerSample> samples_;
   std::vector<std::uint8_t>
       announced_;  ///< per robot: 1 + Membership that is announced and has not taken effect; 0: none
   std::deque<Underway> underway_;
-  LatencyHistogram effect_;
-  std::uint64_t joined_ = 0, left_ = 0, lost_ = 0;
+  LatencyHistogram effect_, wait_, step_;  ///< arrival to effect, and its parts: to the publication, and from there
+  std::uint64_t joined_ = 0, left_ = 0, lost_ = 0, heard_ = 0;
 };
 
 }  // namespace kilotwin::ark

@@ -17,6 +17,8 @@ namespace {
 /// Samples that may wait for the station: two seconds of 16 trackers at 30 Hz.
 constexpr std::size_t kMostWaiting = 1024;
 constexpr std::size_t kMostSources = 16;
+/// As many frames as a writer repeats.
+constexpr std::size_t kRecent = 64;
 /// Numbers of a tracker beyond this are no places.
 constexpr double kFarthest = 1e9;
 /// Times beyond this, about 127 years around the epoch of the source's clock, are no times.
@@ -37,7 +39,22 @@ TrackerInput::TrackerInput(const RunPlan& plan, const dds::Participant& particip
       reader_(participant, topics::tracker_frames(),
               [this](const PublicTrackerFrame& sample, dds::SampleState state) {
                 if (state.valid) on_sample(sample);
-              }) {}
+              }),
+      repeated_reader_(participant, topics::played_frames(),
+                       [this](const PublicTrackerFrame& sample, dds::SampleState state) {
+                         if (state.valid) on_sample(sample);
+                       }) {}
+
+/// Whether this very frame came already, by the other reader.
+bool TrackerInput::is_repeated(std::size_t source, const PublicTrackerFrame& sample) {
+  if (source >= recent_.size()) recent_.resize(source + 1);
+  auto& recent = recent_[source];
+  const std::pair frame(sample.frame, sample.capture_ns);
+  if (std::find(recent.begin(), recent.end(), frame) != recent.end()) return true;
+  recent.push_back(frame);
+  if (recent.size() > kRecent) recent.pop_front();
+  return false;
+}
 
 /// The index of a source; -1 where the experiment does not name it, or where there are too many. With the mutex held.
 std::ptrdiff_t TrackerInput::source_of(const char* name) {
@@ -103,6 +120,7 @@ void TrackerInput::on_sample(const PublicTrackerFrame& sample) {
     ++malformed_;
     return;
   }
+  if (is_repeated(static_cast<std::size_t>(source), sample)) return;
   const auto& trackers = plan_.tracking_settings().trackers;
   Waiting waiting{};
   waiting.source = static_cast<std::uint32_t>(source);

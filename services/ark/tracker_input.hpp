@@ -53,6 +53,7 @@ class TrackerInput {
   };
 
   void on_sample(const PublicTrackerFrame& sample);
+  [[nodiscard]] bool is_repeated(std::size_t source, const PublicTrackerFrame& sample);
   [[nodiscard]] std::ptrdiff_t source_of(const char* name);
   [[nodiscard]] bool copy(const PublicTrackerFrame& from, TrackerSample& to, std::uint32_t first_robot) const;
   void watch(Source& source, const Waiting& waiting);
@@ -63,7 +64,9 @@ class TrackerInput {
   std::deque<Waiting> waiting_;
   std::uint64_t flooded_ = 0, malformed_ = 0;
   std::vector<Source> sources_;  // own thread
-  dds::Reader<PublicTrackerFrame> reader_;
+  /// Numbers of the frames that came last, per source: what both readers get counts once. With the mutex held.
+  std::vector<std::deque<std::pair<std::uint64_t, std::int64_t>>> recent_;
+  dds::Reader<PublicTrackerFrame> reader_, repeated_reader_;
 };
 
 }  // namespace kilotwin::ark

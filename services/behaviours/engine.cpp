@@ -46,6 +46,8 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       holds_(share_.size()),
       offers_(share_.size()),
       message_(share_.size()),
+      is_due_(share_.size()),
+      due_(share_.size()),
       requested_(share_.size()),
       sent_(share_.size()),
       first_reception_(share_.size() + 1),
@@ -153,7 +155,7 @@ void BehavioursEngine::take_memberships(const TrackedInputs& tracked) {
     absent_[i] = static_cast<std::uint8_t>(change.membership != Membership::kJoined);
     if (absent_[i] != 0) {
       life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kAbsent);
-      motor_left_[i] = motor_right_[i] = spin_up_[i] = led_[i] = holds_[i] = 0;
+      motor_left_[i] = motor_right_[i] = spin_up_[i] = led_[i] = holds_[i] = is_due_[i] = 0;
     } else if (presence_[i] == Presence::kFailed) {
       life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kFailed);
     } else {
@@ -170,11 +172,36 @@ void BehavioursEngine::follow(const TrackingFrame& frame) {
     const std::uint32_t i = frame.robot[n] - share_.first;
     if (frame.led[n] != kUnknownLed) seen_led_[i] = frame.led[n];
     if (absent_[i] != 0) continue;
-    if (presence_[i] == Presence::kNone) say_by_rule(i, {frame.x_mm[n], frame.y_mm[n], frame.heading_rad[n]});
+    if (presence_[i] == Presence::kNone && !plan_.tracking_settings().says_heard(frame.robot[n]))
+      say_by_rule(i, {frame.x_mm[n], frame.y_mm[n], frame.heading_rad[n]});
   }
+  for (std::size_t n = 0; n < frame.said_robot.size(); ++n) {
+    const std::uint32_t i = frame.said_robot[n] - share_.first;
+    if (!share_.contains(frame.said_robot[n]) || absent_[i] != 0) continue;
+    due_[i] = frame.said_message[n];
+    is_due_[i] = 1;
+  }
+  say_what_was_heard();
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
     if (absent_[i] == 0 && plan_.tracked(share_.first + i))
       led_[i] = seen_led_[i] == kUnknownLed ? std::uint8_t{0} : seen_led_[i];
+  }
+}
+
+/// A message that was heard is said once, as soon as the channel is free. A newer one takes the place of one that waits.
+void BehavioursEngine::say_what_was_heard() {
+  for (std::uint32_t i = 0; i < share_.size(); ++i) {
+    const std::uint32_t robot = share_.first + i;
+    if (!plan_.tracked(robot) || presence_[i] != Presence::kNone || absent_[i] != 0 ||
+        !plan_.tracking_settings().says_heard(robot))
+      continue;
+    if (sent_[i] != 0) holds_[i] = 0;
+    life_cycle_[i] = static_cast<std::uint8_t>(LifeCycle::kRunning);
+    tx_period_[i] = 0;
+    if (is_due_[i] == 0 || requested_[i] == 0 || holds_[i] != 0) continue;
+    message_[i] = due_[i];
+    is_due_[i] = 0;
+    holds_[i] = offers_[i] = 1;
   }
 }
 
@@ -485,7 +512,7 @@ std::uint64_t BehavioursEngine::hash_part() const {
     const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 |
                                   std::uint64_t{led_[i]} << 16 | std::uint64_t{life_cycle_[i]} << 24 |
                                   std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48 |
-                                  std::uint64_t{spin_up_[i]} << 49;
+                                  std::uint64_t{spin_up_[i]} << 49 | std::uint64_t{is_due_[i]} << 50;
     if (senses_.has_batteries()) {
       const auto charge = static_cast<std::uint64_t>(senses_.charge(i));
       sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs, charge});

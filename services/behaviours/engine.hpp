@@ -42,7 +42,7 @@ struct TrackedInputs {
 ///
 /// The radio runs the processors of firmware robots; this engine copies their motors and LEDs from the radio's frame.
 /// Robots of tracked groups show the LED that a tracker saw. Without a program they are IDLE, or RUNNING while a rule says
-/// something for them. With one, their shadow, they have its life cycle; its motors are shown and move nothing. A robot that
+/// something for them, or if they say what listeners hear of them. With one, their shadow, they have its life cycle; its motors are shown and move nothing. A robot that
 /// is absent runs no program and is ABSENT. A sleeping robot wakes every 8 s to listen and meanwhile has
 /// the life cycle IDLE. A robot with a flat battery has the life cycle FLAT and restarts once it is charged.
 ///
@@ -115,6 +115,7 @@ class BehavioursEngine {
   void take_memberships(const TrackedInputs& tracked);
   void follow(const TrackingFrame& frame);
   void say_by_rule(std::uint32_t i, const Pose& p_WR);
+  void say_what_was_heard();
   void run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_ticks, const Program&, const Slot&, const Executor&);
   void use_battery(std::uint32_t i);
   void set_surroundings(std::uint32_t i, const Slot&, std::uint32_t receptions);
@@ -158,6 +159,9 @@ class BehavioursEngine {
   std::vector<std::uint8_t> holds_;   ///< 1: the robot holds a message that is not sent yet
   std::vector<std::uint8_t> offers_;  ///< 1: the robot offers a further message in this tick
   std::vector<IrMessage> message_;    ///< the offered message; valid if offers_
+  // Of tracked robots that say what listeners heard of them.
+  std::vector<std::uint8_t> is_due_;  ///< 1: a message that was heard waits to be offered
+  std::vector<IrMessage> due_;        ///< that message; valid if is_due_
 
   std::vector<Failure> failures_, warnings_;
   std::vector<Printed> printed_;

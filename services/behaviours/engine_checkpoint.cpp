@@ -31,7 +31,9 @@ enum Field : std::size_t {
   kMessage,
   kSpinUp = kMessage + 10,
   kSeenLed,
-  kFields
+  kIsDue,
+  kDue,
+  kFields = kDue + 10
 };
 
 }  // namespace
@@ -53,6 +55,8 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
     fields[kPeriodLow] = static_cast<std::uint8_t>(tx_period_[i] & 0xff);
     fields[kPeriodHigh] = static_cast<std::uint8_t>(tx_period_[i] >> 8);
     fields[kSeenLed] = seen_led_[i];
+    fields[kIsDue] = is_due_[i];
+    std::copy(due_[i].begin(), due_[i].end(), fields.begin() + kDue);
     fields[kHolds] = holds_[i];
     fields[kOffers] = offers_[i];
     std::copy(message_[i].begin(), message_[i].end(), fields.begin() + kMessage);
@@ -112,6 +116,8 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     tx_period_[i] = static_cast<std::uint16_t>(fields[kPeriodLow] | fields[kPeriodHigh] << 8);
     seen_led_[i] = fields[kSeenLed];
     absent_[i] = static_cast<std::uint8_t>(fields[kLifeCycle] == static_cast<std::uint8_t>(LifeCycle::kAbsent));
+    is_due_[i] = fields[kIsDue];
+    std::copy_n(fields.begin() + kDue, 10, due_[i].begin());
     holds_[i] = fields[kHolds];
     offers_[i] = fields[kOffers];
     std::copy_n(fields.begin() + kMessage, 10, message_[i].begin());

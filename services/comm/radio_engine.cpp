@@ -57,7 +57,9 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
     // A real robot receives by itself; its shadow hears what it would hear here.
     const bool is_real = plan.tracked(i) && plan.program_of(i) == kNoProgram;
     deaf_.push_back(is_real);
-    is_external_.push_back(plan.firmware(i) || (is_real && plan.tracking_settings().rules_of(i).empty()));
+    const bool is_silent =
+        is_real && plan.tracking_settings().rules_of(i).empty() && !plan.tracking_settings().says_heard(i);
+    is_external_.push_back(plan.firmware(i) || is_silent);
   }
   KILOTWIN_DEMAND(!divided_ || !plan.has_firmware());
   if (divided_) {

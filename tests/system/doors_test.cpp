@@ -85,7 +85,7 @@ TEST_F(Doors, ALogIsPlayedOnceSomebodyReads) {
   std::vector<std::pair<std::uint32_t, double>> seen;  // robot, x
   std::vector<std::int64_t> captured;
   const dds::Reader<PublicTrackerFrame> frames(
-      reader, topics::tracker_frames(), [&](const PublicTrackerFrame& sample, dds::SampleState state) {
+      reader, topics::played_frames(), [&](const PublicTrackerFrame& sample, dds::SampleState state) {
         if (!state.valid) return;
         const std::lock_guard lock(mutex);
         captured.push_back(sample.capture_ns);
@@ -97,14 +97,10 @@ TEST_F(Doors, ALogIsPlayedOnceSomebodyReads) {
   const Outcome outcome = play.wait();
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("played 3 frames with 3 poses"), std::string::npos) << outcome.err;
-  // Delivery is best effort: the last frames may be lost as the player leaves.
-  EXPECT_TRUE(eventually([&] {
-    const std::lock_guard lock(mutex);
-    return !captured.empty();
-  }));
+  // The player leaves after this reader has confirmed all frames.
   const std::lock_guard lock(mutex);
-  const std::vector<std::pair<std::uint32_t, double>> all{{2, 0}, {2, 10}, {4, 20}};
-  for (const auto& one : seen) EXPECT_NE(std::find(all.begin(), all.end(), one), all.end());
+  EXPECT_EQ(seen, (std::vector<std::pair<std::uint32_t, double>>{{2, 0}, {2, 10}, {4, 20}}));
+  EXPECT_EQ(captured, (std::vector<std::int64_t>{0, 50'000'000, 100'000'000}));
 }
 
 TEST_F(Doors, MistakesAreOneLineWithStatus2) {

@@ -2,11 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <regex>
 
 #include "clients/recorder/reader.hpp"
-#include "core/dds/dds.hpp"
+#include "core/federation/topics.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -118,15 +119,43 @@ TEST_F(Endings, AnEndlessLoopFailsItsRobotAlone) {
 }
 
 TEST_F(Endings, AServiceStartedTwiceLeavesTheRunAlone) {
-  Process process(long_run({"--domain", "229"}), scratch.path());
+  const std::string domain = std::to_string(dds::DomainClaim::any().domain());
+  Process process(long_run({"--domain", domain}), scratch.path());
   ASSERT_TRUE(recorded(5));
-  const Outcome second = kilotwin({"service", "comm", "--run", scratch / "run", "--domain", "229"}, scratch);
+  const Outcome second = kilotwin({"service", "comm", "--run", scratch / "run", "--domain", domain}, scratch);
   EXPECT_EQ(second.status, 2);
   EXPECT_NE(second.err.find("was started already"), std::string::npos) << second.err;
   EXPECT_TRUE(process.running());
   process.signal(SIGINT);
-  // What an interrupted run prints is for InterruptsEndARunInOrder.
-  static_cast<void>(process.wait(20));
+  EXPECT_NE(process.wait(20).err.find("interrupted"), std::string::npos);
+  expect_usable_recording();
+}
+
+TEST_F(Endings, TheFirstSampleOfASecondProcessIsNotCounted) {
+  const std::uint32_t domain = dds::DomainClaim::any().domain();
+  Process process(long_run({"--domain", std::to_string(domain)}), scratch.path());
+  const dds::Participant participant({domain, {}});
+  std::atomic<std::uint64_t> run{0};
+  std::atomic<std::int64_t> tick{0};
+  const dds::Reader<PublicRunStatus> status(participant, topics::run_status(),
+                                            [&](const PublicRunStatus& sample, dds::SampleState state) {
+                                              if (!state.valid) return;
+                                              run = sample.run;
+                                              tick = sample.tick;
+                                            });
+  ASSERT_TRUE(eventually([&] { return tick > 40; })) << "beyond a first sample of the radio's metrics";
+  // A process that begins as the radio writes this before it hears that the radio is there.
+  dds::Writer<WireMetrics> metrics(participant, topics::metrics());
+  ASSERT_TRUE(eventually([&] { return metrics.readers() > 0; }));
+  WireMetrics first{};
+  first.publisher = 2;
+  first.run = run;
+  metrics.write(first);
+  ASSERT_TRUE(metrics.flush(10));
+  const std::int64_t written = tick;
+  ASSERT_TRUE(eventually([&] { return tick > written + 64; }));
+  process.signal(SIGINT);
+  EXPECT_NE(process.wait(20).err.find("interrupted"), std::string::npos);
   expect_usable_recording();
 }
 

@@ -298,7 +298,8 @@ Command add_track(CLI::App& program) {
       ->check(CLI::PositiveNumber.description(""))
       ->capture_default_str()
       ->type_name("HZ");
-  app.add_flag("--watch", arguments->of_source.watch, "a directory grows: wait for its next picture");
+  app.add_flag("--watch", arguments->of_source.watch,
+               "a directory grows, or a picture is rewritten: wait for the next one");
   app.add_option("--camera", arguments->of_source.camera,
                  "camera whose pictures of an ARK directory are taken; else 0, or all four with ARK's calibration")
       ->check(CLI::Range(0, 3).description(""))

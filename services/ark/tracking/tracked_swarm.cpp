@@ -1,6 +1,7 @@
 #include "services/ark/tracking/tracked_swarm.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "core/base/error.hpp"
@@ -72,8 +73,37 @@ TrackerSettings TrackedSwarm::tracker(std::uint32_t source) const {
 
 void TrackedSwarm::take(Tick now, std::span<const TrackerSample> samples) {
   next_ = state_;
+  said_.clear();
   for (const TrackerSample& sample : samples) apply(sample);
   expire(now);
+  for (const TrackerSample& sample : samples) {
+    for (const HeardMessage& heard : sample.heard) hear(heard);
+  }
+}
+
+void TrackedSwarm::hear(const HeardMessage& heard) {
+  if (const auto sender = sender_of(heard)) said_[*sender] = heard.message;
+}
+
+/// The robot that the message names, else the one whose place fits best to what the listener heard.
+std::optional<std::uint32_t> TrackedSwarm::sender_of(const HeardMessage& heard) const {
+  if (heard.robot != HeardMessage::kUnknown)
+    return index_of(heard.robot) < next_.size() ? std::optional(heard.robot) : std::nullopt;
+  const std::size_t listener = index_of(heard.listener);
+  if (listener >= next_.size() || !next_[listener].known) return std::nullopt;
+  const auto& at = next_[listener].v;
+  std::optional<std::uint32_t> best;
+  double least_mm = kFarthest_mm;
+  for (std::size_t i = 0; i < next_.size(); ++i) {
+    if (i == listener || !next_[i].known || !settings_.says_heard(robots_[i])) continue;
+    const double dx_mm = next_[i].v[kX] - at[kX], dy_mm = next_[i].v[kY] - at[kY];
+    const double distance_mm = __builtin_sqrt(dx_mm * dx_mm + dy_mm * dy_mm);
+    const double off_mm = heard.distance_mm < 0 ? distance_mm : std::abs(distance_mm - double{heard.distance_mm});
+    if (off_mm >= least_mm) continue;
+    least_mm = off_mm;
+    best = robots_[i];
+  }
+  return best;
 }
 
 void TrackedSwarm::apply(const TrackerSample& sample) {
@@ -225,7 +255,7 @@ void TrackedSwarm::measure(Track& track, const Measurement& measured) {
   v[kVxvx] -= hxx * old[kXvx] + hxy * old[kYvx];
   v[kVxvy] -= hxx * old[kXvy] + hxy * old[kYvy];
   v[kVyvy] -= hyx * old[kXvy] + hyy * old[kYvy];
-  if (measured.in_doubt) return;
+  // A sample near the estimate is of this body, whatever its name: its heading and its LED count, too.
   if (measured.led != kUnknownLed) track.led = measured.led;
   if (measured.heading_variance < kNoHeading_rad2) {
     measure_heading(track, measured.heading_rad, measured.heading_variance);
@@ -265,6 +295,10 @@ void TrackedSwarm::emit(Tick now, TrackingFrame& frame) const {
     frame.heading_rad.push_back(track.v[kHeading]);
     frame.led.push_back(track.led);
   }
+  for (const auto& [robot, message] : said_) {
+    frame.said_robot.push_back(robot);
+    frame.said_message.push_back(message);
+  }
 }
 
 void TrackedSwarm::commit(std::span<const MembershipChange> memberships) {
@@ -275,6 +309,7 @@ void TrackedSwarm::commit(std::span<const MembershipChange> memberships) {
     state_[i].is_member = change.membership == Membership::kJoined;
   }
   next_ = state_;
+  said_.clear();
 }
 
 void TrackedSwarm::changes_due(std::vector<MembershipChange>& changes) const {

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -91,6 +92,8 @@ class TrackedSwarm {
 
   [[nodiscard]] std::size_t index_of(std::uint32_t robot) const;
   void apply(const TrackerSample& sample);
+  void hear(const HeardMessage& heard);
+  [[nodiscard]] std::optional<std::uint32_t> sender_of(const HeardMessage& heard) const;
   void measure(Track& track, const Measurement& measured);
   void begin(Track& track, const Measurement& measured) const;
   void measure_heading(Track& track, double heading_rad, double variance) const;
@@ -101,9 +104,10 @@ class TrackedSwarm {
   const RunPlan& plan_;
   const TrackingSettings& settings_;
   const std::int64_t bridge_cycles_;
-  std::vector<std::uint32_t> robots_;  ///< ascending
-  std::vector<Track> state_;           ///< per entry of robots_
-  std::vector<Track> next_;            ///< with the samples of the present tick
+  std::vector<std::uint32_t> robots_;        ///< ascending
+  std::vector<Track> state_;                 ///< per entry of robots_
+  std::vector<Track> next_;                  ///< with the samples of the present tick
+  std::map<std::uint32_t, IrMessage> said_;  ///< in the present tick, by robots that listeners heard
   std::uint64_t jumps_ = 0;
 };
 

@@ -15,6 +15,8 @@ TEST_F(DoorChecks, AcceptsEveryKind) {
   EXPECT_EQ(check_error(with("name: 'a' ros2 { publish { poses: '/kilotwin/poses' } }")), "");
   EXPECT_EQ(check_error(with("name: 'a' ark {}")), "");
   EXPECT_EQ(check_error(with("name: 'a' log {}")), "");
+  EXPECT_EQ(check_error(with("name: 'a' listener { robot: 2 }")), "");
+  EXPECT_EQ(check_error(with("name: 'a' listener { id_octet: 0 line: 'heard {data}' }")), "");
   EXPECT_EQ(check_error(with("name: 'a' log { format: LARS columns: 4 } placement { unit_mm: 1.1 }")), "");
   EXPECT_EQ(check_error(with("name: 'a' ark {} robots { pattern: 'k{number}' robot { name: 'x' robot: 1 } }")), "");
 }
@@ -22,7 +24,7 @@ TEST_F(DoorChecks, AcceptsEveryKind) {
 TEST_F(DoorChecks, OneLineForEveryMistake) {
   const std::pair<const char*, const char*> cases[] = {
       {"ark {}", "e.txtpb:2:1: name is missing; state name: \"NAME\", the source that tracker frames name"},
-      {"name: 'a'", "e.txtpb:2:1: door has no kind; it takes ros2, ark or log { ... }"},
+      {"name: 'a'", "e.txtpb:2:1: door has no kind; it takes ros2, ark, log or listener { ... }"},
       {"name: 'a' ark { interval_ms: 1 }", "e.txtpb:2:24: interval_ms is 1; it takes a whole number, 10..10000 ms"},
       {"name: 'a' ark {} robots { pattern: 'kilobot' }",
        "e.txtpb:2:34: pattern is \"kilobot\"; it takes a name with {number} once, where the number stands"},
@@ -48,6 +50,15 @@ TEST_F(DoorChecks, OneLineForEveryMistake) {
        "e.txtpb:2:1: placement.unit_mm is missing; a log of LARS is in pixels of its camera: state unit_mm, "
        "millimetres per pixel"},
       {"name: 'a' log { columns: 4 }", "e.txtpb:2:24: columns is 4; a log of ARK takes 5 or 6"},
+      {"name: 'a' listener {}",
+       "e.txtpb:2:18: nothing tells who sent a message; state robot: NUMBER, the listener's own, or id_octet, or "
+       "{sender} in line"},
+      {"name: 'a' listener { robot: 1 line: '{type}' }",
+       "e.txtpb:2:38: {data} is missing; it stands for the octets of the message"},
+      {"name: 'a' log {} }\ntracker { source: 'b'",
+       "e.txtpb:2:8: the experiment lists its trackers, and \"a\" is none of them, so its poses would not count; "
+       "add "
+       "tracker { source: \"a\" }"},
       {"name: 'a' ark {} }\ndoor { name: 'a' ark {}",
        "e.txtpb:3:8: a door has this name already, at e.txtpb:2:1; "
        "choose another"},

@@ -243,6 +243,51 @@ TEST(TrackedSwarm, ShowsTheLedThatWasSeenLast) {
   }
 }
 
+/// Robots 0, 1, 2 and 3 lie on the x axis at 0, 60, 120 and 180 mm; robot 0 listens.
+TEST(TrackedSwarm, WhatAListenerHeardIsSaidByTheRobotThatSentIt) {
+  const RunPlan plan =
+      testing::make_plan("robots { count: 3 body: TRACKED says { heard: true } } robots { count: 1 body: TRACKED }",
+                         {{0, 0, 0}, {60, 0, 0}, {120, 0, 0}, {180, 0, 0}});
+  TrackedSwarm swarm(plan);
+  TrackerSample seen;
+  for (std::uint32_t robot = 0; robot < 4; ++robot) {
+    const TrackerSample one = sample_of({60.0 * robot, 0, 0}, 0);
+    seen.robot.push_back(robot);
+    for (const auto& [to, from] :
+         {std::pair{&seen.x, &one.x}, std::pair{&seen.y, &one.y}, std::pair{&seen.heading_rad, &one.heading_rad},
+          std::pair{&seen.xx, &one.xx}, std::pair{&seen.xy, &one.xy}, std::pair{&seen.yy, &one.yy},
+          std::pair{&seen.heading_variance_rad2, &one.heading_variance_rad2}})
+      to->push_back(from->front());
+    seen.state.push_back(0);
+    seen.led.push_back(0);
+  }
+  Tick now;
+  const auto said = [&](const std::vector<HeardMessage>& heard) {
+    TrackerSample sample;
+    sample.heard = heard;
+    std::vector<TrackerSample> samples;
+    if (now == Tick{0}) samples.push_back(seen);
+    samples.push_back(sample);
+    swarm.take(now, samples);
+    TrackingFrame frame;
+    swarm.emit(now, frame);
+    swarm.commit({});
+    ++now;
+    std::vector<std::pair<std::uint32_t, int>> result;
+    for (std::size_t n = 0; n < frame.said_robot.size(); ++n)
+      result.emplace_back(frame.said_robot[n], frame.said_message[n][0]);
+    return result;
+  };
+  using Said = std::vector<std::pair<std::uint32_t, int>>;
+  constexpr std::uint32_t kNobody = HeardMessage::kUnknown;
+  EXPECT_EQ(said({{2, 0, -1, {7}}}), (Said{{2, 7}})) << "the message names the sender";
+  EXPECT_EQ(said({{kNobody, 0, -1, {8}}}), (Said{{1, 8}})) << "else it is the nearest robot";
+  EXPECT_EQ(said({{kNobody, 0, 110, {9}}}), (Said{{2, 9}})) << "or the one at that distance";
+  EXPECT_EQ(said({{kNobody, 0, 300, {9}}}), (Said{{2, 9}})) << "of those whose messages are declared";
+  EXPECT_EQ(said({{2, 0, -1, {1}}, {1, 0, -1, {2}}, {2, 0, -1, {3}}}), (Said{{1, 2}, {2, 3}})) << "the last counts";
+  EXPECT_EQ(said({}), Said{});
+}
+
 /// The state of a tick is without its samples: whoever loads it and takes them again comes to the same, once.
 TEST(TrackedSwarm, LoadedStateTakesTheTicksSamplesOnce) {
   const RunPlan plan = plan_of("", 3);
