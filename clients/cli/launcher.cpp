@@ -12,10 +12,12 @@
 #include "clients/cli/commands.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/cli/recovery.hpp"
+#include "clients/cli/run_monitor.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/session.hpp"
 #include "core/os/children.hpp"
+#include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
 #include "services/behaviours/running_note.hpp"
 
@@ -46,7 +48,9 @@ class Launcher {
   int run() {
     std::error_code ignored;
     fs::create_directories(directory_.path() / "logs", ignored);
-    start(plan_.station(), {"station"});
+    std::vector<std::string> station{"station"};
+    station.insert(station.end(), options_.monitor.begin(), options_.monitor.end());
+    start(plan_.station(), station);
     start(plan_.radio(), {"comm"});
     for (std::uint32_t p = 0; p < plan_.grid.size(); ++p) {
       start(plan_.physics(PartitionId{p}),
@@ -128,6 +132,19 @@ class Launcher {
     }
   }
 
+  /// Prints lines that the station's monitor has added to its file.
+  void show_alarms() {
+    const fs::path file = alarm_lines(directory_.alarms());
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(file, error);
+    if (error || size == alarm_octets_) return;
+    const std::string lines = os::read_file(file);
+    if (lines.size() < alarm_octets_) alarm_octets_ = 0;  // a further attempt at the run
+    progress_.clear();
+    for (std::size_t end; (end = lines.find('\n', alarm_octets_)) != std::string::npos; alarm_octets_ = end + 1)
+      say(lines.substr(alarm_octets_, end - alarm_octets_));
+  }
+
   int watch() {
     while (services_.running() > 0) {
       reap();
@@ -136,12 +153,14 @@ class Launcher {
         services_.signal(plan_.station().value(), SIGTERM);  // the station ends the run by a directive
         services_.allow_until(Clock::now() + kGrace);
       }
+      if (!options_.monitor.empty()) show_alarms();
       {
         const std::lock_guard lock(mutex_);
         if (started_ && !interrupted_ && !broken_) progress_.show(latest_);
       }
       std::this_thread::sleep_for(kPoll);
     }
+    if (!options_.monitor.empty()) show_alarms();
     progress_.clear();
     if (broken_) return refused_ ? kBadInput : kFailed;
     if (interrupted_) {
@@ -177,6 +196,7 @@ class Launcher {
   ProgressBar progress_;
   os::Children services_;
   std::optional<behaviours::Culprit> corrupted_by_;
+  std::size_t alarm_octets_ = 0;  ///< of the lines of alarms that were printed
   bool interrupted_ = false, broken_ = false, refused_ = false;
   std::mutex mutex_;  // guards the members below
   RunProgress latest_;

@@ -2,6 +2,9 @@
 /// services. It is not a federate; services started by hand give the same run.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "clients/cli/prepare.hpp"
 #include "core/plan/plan.hpp"
 
@@ -13,6 +16,7 @@ struct LaunchOptions {
   double give_up_after_s = 0;    ///< longest wait of services for each other without progress; 0: no limit
   bool show_progress = true;
   bool realtime = false;  ///< services take precedence over other programs of the machine
+  std::vector<std::string> monitor;  ///< options of the residual monitor, for the station; empty: none
 };
 
 /// Runs the services until all have ended, and returns the exit status. Prints the first service that was lost or failed to stderr

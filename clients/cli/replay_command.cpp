@@ -100,6 +100,7 @@ class Verifier : public RunObserver {
         next_(reader_.next_state()) {}
 
   void state(Tick tick, const SwarmView& swarm, bool) override {
+    if (monitor_ != nullptr) monitor_->state(swarm);
     const bool due = schedule_.due(tick) || states_ == 0;
     if (next_ == nullptr || tick < Tick{next_->tick()}) {
       const bool ended = recorded_.end && recorded_.end->failure().empty();
@@ -115,6 +116,10 @@ class Verifier : public RunObserver {
     next_ = reader_.next_state();
   }
   void input(const Directive&) override {}
+  void tracker_sample(Tick, const TrackerSample& sample) override {
+    if (monitor_ != nullptr) monitor_->tracker_sample(sample);
+  }
+  void watch_with(RunMonitor& monitor) { monitor_ = &monitor; }
   void idle(const RunProgress& now) override { progress_.show(now); }
   void hash(Tick tick, std::uint64_t chain) override {
     const std::int64_t index = tick - recorded_.first_hash;
@@ -140,6 +145,7 @@ class Verifier : public RunObserver {
   RecordedState state_;
   const proto::StateRecord* next_;
   std::size_t hashes_ = 0, states_ = 0;
+  RunMonitor* monitor_ = nullptr;
 };
 
 /// The recorded samples of trackers, tick by tick: one pass through the recording.
@@ -180,7 +186,15 @@ std::vector<Directive> inputs_of_replay(const Recorded& recorded) {
 
 }  // namespace
 
-int replay_command(const std::filesystem::path& run, const std::string& partitions, bool quiet) {
+std::string monitored_text(const RunMonitor& watching) {
+  const std::size_t count = watching.alarms().size();
+  return fmt::format("monitor: {}\n", count == 0   ? "no alarm"
+                                      : count == 1 ? "1 alarm"
+                                                   : fmt::format("{} alarms", count));
+}
+
+int replay_command(const std::filesystem::path& run, const std::string& partitions, bool quiet,
+                   const MonitorOptions& monitor) {
   const auto directory = recorder::RunDirectory::open(run, recorder::RunDirectory::Needs::kManifest);
   recorder::Reader reader(directory.recording());
   const Recorded recorded = read_recorded(reader);
@@ -216,6 +230,8 @@ int replay_command(const std::filesystem::path& run, const std::string& partitio
   const auto programs = behaviours::ProgramSet::load(plan, directory.path());
   ProgressBar progress(plan, !quiet);
   Verifier verifier(plan, recorded, directory.recording(), progress);
+  std::optional<RunMonitor> watching;
+  if (monitor.on) verifier.watch_with(watching.emplace(plan, monitor, directory.path() / "alarms-replayed.csv"));
   const RunTotals totals = local::run(plan, programs, options, verifier);
   progress.clear();
   if (!totals.failure.empty()) throw RunError(totals.failure);
@@ -224,6 +240,7 @@ int replay_command(const std::filesystem::path& run, const std::string& partitio
   // The hashes of a federated run that was killed may lag behind its states.
   if (verifier.states_remain() && recorded.end && recorded.end->failure().empty())
     throw RunError(fmt::format("{}: it holds states after its last tick", directory.recording().string()));
+  if (!quiet && watching) fmt::print("{}", monitored_text(*watching));
   if (!quiet) {
     fmt::print(
         "verified: {} ticks, up to tick {} at {:g} s; every state hash ({:016x} at the end) and {} recorded "
@@ -239,16 +256,22 @@ Command add_replay(CLI::App& program) {
     std::filesystem::path run;
     std::string partitions;
     bool verify = false, quiet = false;
+    MonitorOptions monitor;
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App& app = *program.add_subcommand("replay", "step a recorded run again and compare it with the recording");
   app.add_option("RUN", arguments->run, "run directory")->required()->type_name("");
-  app.add_flag("--verify", arguments->verify, "compare every state hash and every recorded state")->required();
+  app.add_flag("--verify", arguments->verify, "compare every state hash and every recorded state");
+  add_monitor_options(app, arguments->monitor);
   app.add_option("--partitions", arguments->partitions,
                  "columns and rows of physics partitions, such as 2x1 (default: as recorded)")
       ->type_name("CxR");
   app.add_flag("--quiet", arguments->quiet, "no progress and no result on the screen");
-  return {&app, [arguments] { return replay_command(arguments->run, arguments->partitions, arguments->quiet); }};
+  return {&app, [arguments] {
+            if (!arguments->verify && !arguments->monitor.on)
+              throw UserError("replay: nothing to do; give --verify, --monitor or both");
+            return replay_command(arguments->run, arguments->partitions, arguments->quiet, arguments->monitor);
+          }};
 }
 
 }  // namespace kilotwin::cli

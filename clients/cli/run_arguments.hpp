@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/cli/output.hpp"
+#include "clients/cli/run_monitor.hpp"
 
 namespace CLI {
 class App;
@@ -36,6 +37,7 @@ struct RunArguments {
   bool prepare = false;          ///< write the run directory and stop
   std::optional<std::uint32_t> domain;
   double give_up_after_s = 0;  ///< longest wait of services for each other without progress; 0: no limit
+  MonitorOptions monitor;
   Output output;
   bool quiet = false;  ///< print neither progress nor summary
 };

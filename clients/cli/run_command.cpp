@@ -33,7 +33,8 @@ std::string quoted(const std::string& word) {
   return result + "'";
 }
 
-std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& directory) {
+std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& directory,
+                          const MonitorOptions& monitor) {
   std::string text = fmt::format(
       "prepared {}; start these services with the same --domain N, on several machines also with --peer ADDRESS of "
       "each:\n",
@@ -47,7 +48,9 @@ std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& dir
   for (std::uint32_t h = 0; h < plan.hosts; ++h) {
     text += fmt::format("  kilotwin service behaviours --run {} --share {}/{}\n", run, h + 1, plan.hosts);
   }
-  text += fmt::format("  kilotwin service station --run {}\n", run);
+  text += fmt::format("  kilotwin service station --run {}", run);
+  for (const std::string& word : monitor_words(monitor)) text += " " + quoted(word);
+  text += "\n";
   return text;
 }
 
@@ -111,10 +114,27 @@ std::optional<int> run_locally(proto::Manifest manifest, const recorder::RunDire
   }
 }
 
+/// Throws UserError, and removes the run directory, if the monitor would have nothing to watch.
+void require_watchable(const RunPlan& plan, const recorder::RunDirectory& directory,
+                       const MonitorOptions& options) {
+  try {
+    const RunMonitor monitor(plan, options, {});
+  } catch (const UserError&) {
+    std::error_code ignored;
+    std::filesystem::remove_all(directory.path(), ignored);
+    throw;
+  }
+}
+
 int run(const RunArguments& arguments, double started_s) {
   if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
   if (arguments.mode == "local" && arguments.domain)
     throw UserError("--domain: a local run uses no DDS domain; leave the option out, or give --mode federated");
+  if (arguments.monitor.on && arguments.mode == "local") {
+    throw UserError(
+        "--monitor: a local run hears no tracker; leave --mode local out, or give --monitor to `kilotwin replay`");
+  }
+  check_monitor_options(arguments.monitor);
   // Claim the domain before the first file is written, so that a refused run leaves no files.
   std::optional<dds::DomainClaim> claim;
   if (arguments.mode == "federated" && !arguments.prepare) {
@@ -122,8 +142,9 @@ int run(const RunArguments& arguments, double started_s) {
   }
   const Prepared prepared = prepare(arguments);
   const RunPlan plan(prepared.manifest);
+  if (arguments.monitor.on) require_watchable(plan, prepared.directory, arguments.monitor);
   if (arguments.prepare) {
-    fmt::print("{}", prepared_text(plan, prepared.directory));
+    fmt::print("{}", prepared_text(plan, prepared.directory, arguments.monitor));
     return kDone;
   }
   catch_interrupts();
@@ -131,9 +152,9 @@ int run(const RunArguments& arguments, double started_s) {
     if (const auto status = run_locally(prepared.manifest, prepared.directory, arguments, started_s))
       return *status;
   } else {
-    const int status =
-        launch(plan, prepared.directory,
-               {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet, arguments.realtime});
+    const int status = launch(plan, prepared.directory,
+                              {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet, arguments.realtime,
+                               monitor_words(arguments.monitor)});
     if (status != 0) return status;
   }
   if (!arguments.quiet) {
@@ -205,6 +226,7 @@ Command add_run(CLI::App& program, double started_s) {
       ->check(CLI::NonNegativeNumber.description(""))
       ->capture_default_str()
       ->type_name("SECONDS");
+  add_monitor_options(app, arguments->monitor);
   add_output_options(app, arguments->output, "runs/NAME-SEED, with a number added if it exists");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
   return {&app, [arguments, started_s] { return run(*arguments, started_s); }};

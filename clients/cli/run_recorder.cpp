@@ -85,6 +85,7 @@ void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
 
 void RunRecorder::state(Tick tick, const SwarmView& swarm, bool last) {
   if (first_tick_at_ == std::chrono::steady_clock::time_point{}) first_tick_at_ = std::chrono::steady_clock::now();
+  if (monitor_) monitor_->state(swarm);
   if (any_state_ && tick < next_ && !last) return;
   any_state_ = true;
   next_ = when_.at_or_after(tick + 1);
@@ -116,6 +117,7 @@ void RunRecorder::floor(Tick tick, const FloorPicture& floor) {
 
 void RunRecorder::tracker_sample(Tick tick, const TrackerSample& sample) {
   writer_.tracker(to_record(tick, sample));
+  if (monitor_) monitor_->tracker_sample(sample);
   inputs_wait_ = true;
 }
 
@@ -180,6 +182,7 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.lateness = totals.lateness;
   summary.tracked = plan_.any_tracked();
   summary.tracking = totals.tracking;
+  if (monitor_) summary.monitor = monitor_->report();
   summary.moved_mm = {displacement_.mean_distance_mm(), displacement_.max_distance_mm()};
   const double steps =
       static_cast<double>(std::max<std::int64_t>(1, totals.last - totals.first)) * std::max(1u, plan_.robots());

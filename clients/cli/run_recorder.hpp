@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "clients/cli/recorded_state.hpp"
+#include "clients/cli/run_monitor.hpp"
 #include "clients/recorder/run_directory.hpp"
 #include "clients/recorder/statistics.hpp"
 #include "clients/recorder/summary.hpp"
@@ -23,6 +24,8 @@ class RunRecorder : public RunObserver {
   /// recording continues that of an earlier attempt at this run, if there was one (recovery.hpp).
   RunRecorder(const RunPlan& plan, const recorder::RunDirectory& directory,
               const std::optional<Checkpoint>& resumed, std::function<void(const RunProgress&)> on_idle);
+  /// Compares tracked robots with the model from now on. Throws UserError if there is nothing to watch.
+  void monitor(const MonitorOptions& options) { monitor_.emplace(plan_, options, directory_.alarms()); }
 
   void state(Tick, const SwarmView&, bool last) override;
   void hash(Tick, std::uint64_t chain) override;
@@ -51,6 +54,7 @@ class RunRecorder : public RunObserver {
   Tick next_{0};
   Tick recovered_from_{0};
   bool any_state_ = false;
+  std::optional<RunMonitor> monitor_;
   bool inputs_wait_ = false;  ///< inputs wait to be flushed
   std::chrono::steady_clock::time_point first_tick_at_{};
 };

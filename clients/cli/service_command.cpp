@@ -35,6 +35,7 @@ struct ServiceArguments {
   std::string partition;      ///< physics: "C,R"
   std::string share;          ///< behaviours: "I/N"
   dds::Transport transport;
+  MonitorOptions monitor;      ///< of the station
   double give_up_after_s = 0;  ///< longest wait for others without progress; 0: no limit
   bool realtime = false;
   double started_s = 0;  ///< start time of the user's command, steady clock, s; for start_s of the summary
@@ -96,8 +97,9 @@ void require_peers(const std::vector<std::string>& peers) {
 }
 
 void run_station(const RunPlan& plan, const ServiceContext& context, const recorder::RunDirectory& directory,
-                 double started_s) {
+                 const MonitorOptions& monitor, double started_s) {
   RunRecorder run_recorder(plan, directory, context.resumed, {});
+  if (monitor.on) run_recorder.monitor(monitor);
   const RunTotals totals = ark::run_service(plan, context, run_recorder);
   const double first_tick_s =
       std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
@@ -112,6 +114,8 @@ void begin_log(const RunPlan& plan, FederateId self, const dds::Transport& trans
 }
 
 int serve(const ServiceArguments& arguments) {
+  if (arguments.monitor.on && arguments.service != "station")
+    throw UserError("--monitor: the station watches; give it to the service station");
   catch_interrupts();
   if (arguments.realtime && !os::take_precedence()) {
     warn(
@@ -147,7 +151,7 @@ int serve(const ServiceArguments& arguments) {
     behaviours::run_service(plan, host, context);
   } else {
     begin_log(plan, plan.station(), arguments.transport);
-    run_station(plan, context, directory, arguments.started_s);
+    run_station(plan, context, directory, arguments.monitor, arguments.started_s);
   }
   say("ended: the run is over");
   return kDone;
@@ -194,6 +198,7 @@ Command add_service(CLI::App& program, double started_s) {
       ->capture_default_str()
       ->type_name("SECONDS");
   app.add_flag("--realtime", arguments->realtime, "take precedence over other programs of the machine");
+  add_monitor_options(app, arguments->monitor);
   app.add_option("--start-monotonic", arguments->started_s, "when the run was asked for")->group("");
   return {&app, [arguments] { return serve(*arguments); }};
 }

@@ -7,6 +7,7 @@
 ///   recording.ktrec  states and events over time: idl/recording.proto
 ///   provenance.json  clients/recorder/provenance.hpp
 ///   summary.json     clients/recorder/summary.hpp
+///   alarms.csv, .txt alarms of the residual monitor as a table and as lines; alarms-replayed.*: of the last replay
 ///   picture.svg      clients/recorder/picture.hpp
 ///   animation.svg    clients/recorder/animation.hpp
 ///   checkpoints/     one directory per checkpoint, named by its tick
@@ -49,6 +50,7 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path program(const Program& program) const { return programs() / program.file(); }
   [[nodiscard]] std::filesystem::path provenance() const { return directory_ / "provenance.json"; }
   [[nodiscard]] std::filesystem::path summary() const { return directory_ / "summary.json"; }
+  [[nodiscard]] std::filesystem::path alarms() const { return directory_ / "alarms.csv"; }
   [[nodiscard]] std::filesystem::path picture() const { return directory_ / "picture.svg"; }
   [[nodiscard]] std::filesystem::path animation() const { return directory_ / "animation.svg"; }
 

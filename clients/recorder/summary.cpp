@@ -180,6 +180,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
     json["worst_lateness_ms"] = s.lateness.worst_s * 1e3;
   }
   if (s.tracked) json["tracking"] = tracking_json(s.tracking);
+  if (!s.monitor.empty()) json["monitor"] = Json::parse(s.monitor);
   os::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

@@ -48,6 +48,7 @@ struct Summary {
   LatenessTotals lateness;  ///< late_ticks and worst_lateness_ms in the file
   bool tracked = false;     ///< `tracking` says something
   TrackingTotals tracking;  ///< tracking in the file; times there are ms
+  std::string monitor;      ///< the monitor's report, a JSON object; empty without one
   /// Distance between a robot's first and last recorded position.
   struct Moved {
     double mean = 0, max = 0;

@@ -40,7 +40,8 @@ RunPlan make_plan(const std::string& experiment, const std::vector<ScenePose>& p
   manifest.add_program()->set_path("scene.c");
   std::size_t robots = 0;
   for (const proto::RobotGroup& group : e.robots()) {
-    manifest.add_group_program(group.body() == proto::RobotGroup::TRACKED ? kNoProgram : 0);
+    const bool has_program = group.body() != proto::RobotGroup::TRACKED || group.says().shadow();
+    manifest.add_group_program(has_program ? 0 : kNoProgram);
     robots += group.count();
   }
   if (robots != poses.size()) throw std::runtime_error("scene: groups and poses differ in number");

@@ -23,26 +23,10 @@ constexpr std::uint32_t kJump = 3;
 constexpr std::uint32_t kSamplesToJoin = 3;
 /// Heading from motion: from this speed on, mm/s, with this error of a robot that turns about a leg, rad.
 constexpr double kMoving_mm_s = 4, kPivotError_rad = 0.35;
-/// What is known of a heading that nobody told: nothing.
-constexpr double kNoHeading_rad2 = 10;
-/// Bounds of what a tracker may state as variances.
-constexpr double kLeastVariance_mm2 = 1e-4, kMostVariance_mm2 = 1e6, kLeastVariance_rad2 = 1e-6;
-/// Samples farther from the centre are no robots': arenas are at most 1e6 mm wide.
-constexpr double kFarthest_mm = 1e7;
 
 double seconds(std::int64_t cycles) { return static_cast<double>(cycles) / kNominalClockHz; }
 
 }  // namespace
-
-/// What one tracker says of one robot, in the arena's frame.
-struct TrackedSwarm::Measurement {
-  std::int64_t cycle;
-  double x_mm, y_mm, xx, xy, yy;
-  double heading_rad;
-  double heading_variance;  ///< above kNoHeading_rad2: none
-  std::uint8_t led;
-  bool in_doubt;
-};
 
 TrackedSwarm::TrackedSwarm(const RunPlan& plan)
     : plan_(plan),
@@ -65,10 +49,6 @@ std::size_t TrackedSwarm::index_of(std::uint32_t robot) const {
 bool TrackedSwarm::is_member(std::uint32_t robot) const {
   const std::size_t i = index_of(robot);
   return i < state_.size() && state_[i].is_member;
-}
-
-TrackerSettings TrackedSwarm::tracker(std::uint32_t source) const {
-  return source < settings_.trackers.size() ? settings_.trackers[source] : TrackerSettings{};
 }
 
 void TrackedSwarm::take(Tick now, std::span<const TrackerSample> samples) {
@@ -107,41 +87,17 @@ std::optional<std::uint32_t> TrackedSwarm::sender_of(const HeardMessage& heard) 
 }
 
 void TrackedSwarm::apply(const TrackerSample& sample) {
-  const TrackerSettings tracker = this->tracker(sample.source);
-  const double c = tracker.scale * kt_cos(tracker.heading_rad), s = tracker.scale * kt_sin(tracker.heading_rad);
-  const double side = tracker.mirrored ? -1 : 1;
+  const TrackerSettings tracker = tracker_of(settings_, sample.source);
   for (std::size_t n = 0; n < sample.robot.size(); ++n) {
     const std::size_t i = index_of(sample.robot[n]);
     const auto state = TrackedState{sample.state[n]};
     if (i >= next_.size() || (state != TrackedState::kSeen && state != TrackedState::kInDoubt)) continue;
-    const double u = sample.x[n], v = side * sample.y[n];
-    Measurement measured{};
-    measured.cycle = sample.capture_cycle;
-    measured.x_mm = tracker.x_mm + c * u - s * v;
-    measured.y_mm = tracker.y_mm + s * u + c * v;
-    const double uu = sample.xx[n], uv = side * sample.xy[n], vv = sample.yy[n];
-    if (uu > 0 && vv > 0 && uv * uv < uu * vv) {
-      measured.xx = c * c * uu - 2 * c * s * uv + s * s * vv;
-      measured.yy = s * s * uu + 2 * c * s * uv + c * c * vv;
-      measured.xy = c * s * (uu - vv) + (c * c - s * s) * uv;
-    } else {
-      measured.xx = measured.yy = tracker.position_sd_mm * tracker.position_sd_mm;
-    }
-    measured.xx = std::clamp(measured.xx, kLeastVariance_mm2, kMostVariance_mm2);
-    measured.yy = std::clamp(measured.yy, kLeastVariance_mm2, kMostVariance_mm2);
-    measured.heading_rad = wrapped(kt_fmod(side * sample.heading_rad[n] + tracker.heading_rad, 2 * kPi));
-    const double stated = sample.heading_variance_rad2[n];
-    measured.heading_variance =
-        stated > 0 ? std::max(stated, kLeastVariance_rad2) : tracker.heading_sd_rad * tracker.heading_sd_rad;
-    measured.led = sample.led[n];
-    measured.in_doubt = state == TrackedState::kInDoubt;
-    const bool is_near = measured.x_mm > -kFarthest_mm && measured.x_mm < kFarthest_mm &&
-                         measured.y_mm > -kFarthest_mm && measured.y_mm < kFarthest_mm;
-    if (is_near) measure(next_[i], measured);
+    const MeasuredPose measured = measured_pose(tracker, sample, n);
+    if (measured.is_near()) measure(next_[i], measured);
   }
 }
 
-void TrackedSwarm::begin(Track& track, const Measurement& measured) const {
+void TrackedSwarm::begin(Track& track, const MeasuredPose& measured) const {
   const bool is_member = track.is_member;
   const std::uint8_t led = track.led;
   const double old_heading = track.v[kHeading];
@@ -212,7 +168,7 @@ void TrackedSwarm::measure_heading(Track& track, double heading_rad, double vari
   track.has_heading = true;
 }
 
-void TrackedSwarm::measure(Track& track, const Measurement& measured) {
+void TrackedSwarm::measure(Track& track, const MeasuredPose& measured) {
   if (!track.known) return begin(track, measured);
   predict(track, measured.cycle);
   auto& v = track.v;

@@ -21,6 +21,7 @@
 #include "core/frames/tracker_sample.hpp"
 #include "core/plan/plan.hpp"
 #include "core/plan/tracking_settings.hpp"
+#include "services/ark/tracking/measured_pose.hpp"
 
 namespace kilotwin::proto {
 class StationState;
@@ -88,18 +89,16 @@ class TrackedSwarm {
     bool in_doubt = false;
     bool is_member = false;
   };
-  struct Measurement;
 
   [[nodiscard]] std::size_t index_of(std::uint32_t robot) const;
   void apply(const TrackerSample& sample);
   void hear(const HeardMessage& heard);
   [[nodiscard]] std::optional<std::uint32_t> sender_of(const HeardMessage& heard) const;
-  void measure(Track& track, const Measurement& measured);
-  void begin(Track& track, const Measurement& measured) const;
+  void measure(Track& track, const MeasuredPose& measured);
+  void begin(Track& track, const MeasuredPose& measured) const;
   void measure_heading(Track& track, double heading_rad, double variance) const;
   void predict(Track& track, std::int64_t cycle) const;
   void expire(Tick now);
-  [[nodiscard]] TrackerSettings tracker(std::uint32_t source) const;
 
   const RunPlan& plan_;
   const TrackingSettings& settings_;

@@ -1,0 +1,83 @@
+#include "clients/cli/run_monitor.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <utility>
+
+#include "clients/monitor/report.hpp"
+#include "core/base/error.hpp"
+#include "core/base/say.hpp"
+#include "core/os/files.hpp"
+
+namespace kilotwin::cli {
+
+void add_monitor_options(CLI::App& app, MonitorOptions& options) {
+  using monitor::kLeastFalseAlarms_per_hour, monitor::kMostFalseAlarms_per_hour;
+  CLI::Option* const on =
+      app.add_flag("--monitor", options.on, "compare tracked robots with the model, and raise alarms");
+  app.add_option("--false-alarms", options.settings.false_alarms_per_hour,
+                 "with --monitor: bound of the mean rate of false alarms, per hour")
+      ->check(CLI::Range(kLeastFalseAlarms_per_hour, kMostFalseAlarms_per_hour).description(""))
+      ->capture_default_str()
+      ->type_name("RATE")
+      ->needs(on);
+  app.add_option("--warm-up", options.settings.warm_up_s,
+                 "with --monitor: motor-on time in which each robot's bias is learned")
+      ->check(CLI::Range(monitor::kLeastWarmUp_s, monitor::kMostWarmUp_s).description(""))
+      ->capture_default_str()
+      ->type_name("SECONDS")
+      ->needs(on);
+  app.add_option("--commands", options.commands,
+                 "with --monitor: declared commands of tracked robots, a table of robot,time_s,motion")
+      ->type_name("FILE")
+      ->needs(on);
+}
+
+void check_monitor_options(const MonitorOptions& options) {
+  if (!options.commands.empty()) static_cast<void>(monitor::CommandTable(options.commands));
+}
+
+std::vector<std::string> monitor_words(const MonitorOptions& options) {
+  if (!options.on) return {};
+  std::vector<std::string> words{"--monitor", "--false-alarms",
+                                 fmt::format("{}", options.settings.false_alarms_per_hour), "--warm-up",
+                                 fmt::format("{}", options.settings.warm_up_s)};
+  if (!options.commands.empty())
+    words.insert(words.end(), {"--commands", std::filesystem::absolute(options.commands).string()});
+  return words;
+}
+
+RunMonitor::RunMonitor(const RunPlan& plan, const MonitorOptions& options, std::filesystem::path table)
+    : settings_(options.settings),
+      table_(std::move(table)),
+      monitor_(plan, options.settings,
+               options.commands.empty() ? monitor::CommandTable() : monitor::CommandTable(options.commands)),
+      rows_(monitor::table_header() + "\n") {
+  if (table_.empty()) return;
+  os::write_file(table_, rows_);
+  os::write_file(alarm_lines(table_), lines_);
+}
+
+void RunMonitor::state(const SwarmView& swarm) {
+  monitor_.advance(swarm);
+  std::vector<monitor::Alarm> fresh = monitor_.take_alarms();
+  if (fresh.empty()) return;
+  for (monitor::Alarm& alarm : fresh) {
+    const std::string line = monitor::line_of(alarm);
+    say(line);
+    lines_ += line + "\n";
+    rows_ += monitor::table_row(alarm) + "\n";
+    alarms_.push_back(std::move(alarm));
+  }
+  if (table_.empty()) return;
+  // Alarms are rare: the files are written anew, each whole at any time.
+  os::write_file(table_, rows_);
+  os::write_file(alarm_lines(table_), lines_);
+}
+
+std::string RunMonitor::report() const { return monitor::report_json(settings_, monitor_.totals(), alarms_); }
+
+std::filesystem::path alarm_lines(std::filesystem::path table) { return table.replace_extension(".txt"); }
+
+}  // namespace kilotwin::cli

@@ -1,0 +1,272 @@
+// The residual monitor in a hybrid run: a second, independent experiment plays the real robots, whose recorded poses a player
+// publishes as a tracker would. What the monitor says while the run lasts, it says again of the recording.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
+
+#include "core/csv/csv_reader.hpp"
+#include "core/federation/topics.hpp"
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+using Json = nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kPace = 4, kFrames_per_s = 30, kDuration_s = 100;
+constexpr std::uint32_t kRobots = 6;
+
+/// Robots of both experiments: two rows that drive to the right, turning a little to and fro.
+constexpr const char* kProgram = R"(#include "kilolib.h"
+void setup(void) {}
+void loop(void) {
+  uint32_t phase = kilo_ticks % 704;
+  if ((phase >= 128 && phase < 144) || phase >= 688) set_motors(kilo_turn_left, 0);
+  else if (phase >= 400 && phase < 432) set_motors(0, kilo_turn_right);
+  else set_motors(kilo_straight_left, kilo_straight_right);
+}
+int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
+)";
+constexpr const char* kArena =
+    "arena { width_mm: 2400 height_mm: 1200 } radio { oscillator_sd: 0 }\n"
+    "motion { bias_sd_mm_s: 0.05 factor_variance_s: 0.0005 spin_up_s: 0 }\n";
+constexpr const char* kLayout = "layout { x_mm: -600 grid { pitch_mm: 150 heading: HEADING_FIXED } }";
+
+struct Shift {
+  double from_s = 1e9, x_mm = 0, y_mm = 0;
+};
+
+struct Pose {
+  double x_mm, y_mm, heading_rad;
+};
+
+/// What a tracker would see of the other experiment: its table of trajectories, frame by frame.
+std::vector<std::vector<Pose>> frames_of(const std::filesystem::path& table) {
+  CsvReader rows(table);
+  const std::size_t robot = rows.column("robot"), time = rows.column("time_s"), x = rows.column("x_mm"),
+                    y = rows.column("y_mm"), heading = rows.column("heading_rad");
+  std::map<double, std::vector<Pose>> by_time;
+  while (rows.next()) {
+    std::vector<Pose>& poses = by_time[rows.number(time)];
+    poses.resize(kRobots);
+    poses.at(rows.whole(robot)) = {rows.number(x), rows.number(y), rows.number(heading)};
+  }
+  std::vector<std::vector<Pose>> frames;
+  for (auto& [at, poses] : by_time) frames.push_back(std::move(poses));
+  return frames;
+}
+
+/// Publishes the frames at the pace of the run, which it learns from the run's status.
+class Player {
+ public:
+  Player(const dds::Participant& participant, std::vector<std::vector<Pose>> frames, Shift knock)
+      : frames_(std::move(frames)),
+        knock_(knock),
+        writer_(participant, topics::tracker_frames()),
+        status_(participant, topics::run_status(), [this](const PublicRunStatus& sample, dds::SampleState state) {
+          if (state.valid && sample.phase == kilotwin_open_RUNNING) hear(sample.wall_s);
+        }) {
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  }
+  ~Player() {
+    thread_.request_stop();
+    wake_.notify_all();
+  }
+
+ private:
+  /// The earliest begin that the samples of the status allow: the least delay counts.
+  void hear(double wall_s) {
+    const std::lock_guard lock(mutex_);
+    begin_ = std::min(
+        begin_, Clock::now() - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(wall_s)));
+    ++heard_;
+    wake_.notify_all();
+  }
+
+  void run(const std::stop_token& stop) {
+    constexpr int kStatusSamples = 10;
+    std::unique_lock lock(mutex_);
+    if (!wake_.wait(lock, stop, [this] { return heard_ >= kStatusSamples; })) return;
+    const Clock::time_point begin = begin_;
+    const auto due = [&](std::size_t frame) {
+      return begin + std::chrono::duration_cast<Clock::duration>(
+                         std::chrono::duration<double>(static_cast<double>(frame) / kFrames_per_s / kPace));
+    };
+    for (std::size_t frame = 0; frame < frames_.size() && !stop.stop_requested(); ++frame) {
+      if (due(frame) < Clock::now() - std::chrono::milliseconds(50)) continue;
+      wake_.wait_until(lock, stop, due(frame), [] { return false; });
+      write(frame, due(frame).time_since_epoch());
+    }
+  }
+
+  void write(std::size_t frame, Clock::duration capture) {
+    std::normal_distribution<double> noise(0, 1);
+    constexpr double kPosition_mm = 0.4, kHeading_rad = 0.03;
+    const double time_s = static_cast<double>(frame) / kFrames_per_s;
+    std::vector<std::uint32_t> robot;
+    std::vector<double> x, y, heading;
+    for (std::uint32_t n = 0; n < kRobots; ++n) {
+      const Pose& pose = frames_[frame][n];
+      const bool shifted = time_s >= knock_.from_s;
+      robot.push_back(n);
+      x.push_back(pose.x_mm + (shifted ? knock_.x_mm : 0) + kPosition_mm * noise(random_));
+      y.push_back(pose.y_mm + (shifted ? knock_.y_mm : 0) + kPosition_mm * noise(random_));
+      heading.push_back(std::remainder(pose.heading_rad + kHeading_rad * noise(random_), 6.283185307179586));
+    }
+    std::vector<std::uint8_t> state(kRobots, 0), led(kRobots, 0);
+    std::vector<float> variance(kRobots, static_cast<float>(kPosition_mm * kPosition_mm)), none(kRobots, 0),
+        heading_variance(kRobots, static_cast<float>(kHeading_rad * kHeading_rad));
+    PublicTrackerFrame sample{};
+    std::string("other arena").copy(sample.source, sizeof sample.source - 1);
+    sample.frame = frame + 1;
+    sample.capture_ns = sample.sent_ns = std::chrono::nanoseconds(capture).count();
+    const auto lend = [](auto& sequence, auto& values) {
+      sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
+      sequence._buffer = values.data();
+    };
+    lend(sample.robot, robot);
+    lend(sample.state, state);
+    lend(sample.x_mm, x);
+    lend(sample.y_mm, y);
+    lend(sample.heading_rad, heading);
+    lend(sample.xx_mm2, variance);
+    lend(sample.xy_mm2, none);
+    lend(sample.yy_mm2, variance);
+    lend(sample.heading_variance_rad2, heading_variance);
+    lend(sample.led, led);
+    writer_.write(sample);
+  }
+
+  std::vector<std::vector<Pose>> frames_;
+  const Shift knock_;
+  dds::Writer<PublicTrackerFrame> writer_;
+  std::mt19937_64 random_{3};
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  Clock::time_point begin_ = Clock::time_point::max();
+  int heard_ = 0;
+  const dds::Reader<PublicRunStatus> status_;
+  std::jthread thread_;
+};
+
+class MonitoredRun : public testing::Test {
+ protected:
+  MonitoredRun() : domain_(dds::DomainClaim::any().domain()), participant_({domain_, {}}) {
+    write(scratch_ / "wander.c", kProgram);
+  }
+
+  /// Plays the other experiment with `faults` into a hybrid run; returns the alarms of its summary.
+  Json alarms_of(const std::string& faults, Shift knock = {}) {
+    const std::string robots = "robots { count: " + std::to_string(kRobots) + " behaviour: \"wander.c\" " + kLayout;
+    write(scratch_ / "other.txtpb", std::string("seed: 7 ") + kArena + robots + " }\n" + faults);
+    write(scratch_ / "watched.txtpb", kArena + robots +
+                                          " body: TRACKED says { shadow: true } }\n"
+                                          "tracker { source: \"other arena\" } tracking { bridge_s: 2 }\n");
+    run({"run", scratch_ / "other.txtpb", "--mode", "local", "--duration", std::to_string(kDuration_s), "--out",
+         scratch_ / "other", "--set", "recording.every_s=0.033333333"});
+    run({"export", scratch_ / "other", "--trajectories", scratch_ / "other.csv", "--every", "0.033333333"});
+    Outcome outcome;
+    {
+      const Player player(participant_, frames_of(scratch_ / "other.csv"), knock);
+      Process process({program(), "run", scratch_ / "watched.txtpb", "--pace", std::to_string(kPace), "--duration",
+                       std::to_string(kDuration_s), "--domain", std::to_string(domain_), "--out", scratch_ / "run",
+                       "--quiet", "--monitor"},
+                      scratch_.path());
+      outcome = process.wait(200);
+    }
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    printed_ = outcome.err;
+    const Json summary = Json::parse(read(scratch_ / "run/summary.json"));
+    const Json& monitor = summary.at("monitor");
+    EXPECT_EQ(monitor.at("robots_watched"), kRobots);
+    EXPECT_GT(monitor.at("measurements").get<int>(), 5000);
+    RecordProperty("innovation_variance", monitor.at("innovation_variance").dump());
+    return monitor.at("alarms");
+  }
+
+  void run(const Words& words) {
+    const Outcome outcome = kilotwin(words, scratch_);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+  }
+
+  /// The recording raises the same alarms, and the run's hash is that of a replay without the monitor.
+  void expect_the_same_of_the_recording() {
+    run({"replay", scratch_ / "run", "--verify"});
+    run({"replay", scratch_ / "run", "--monitor"});
+    EXPECT_EQ(read(scratch_ / "run/alarms.csv"), read(scratch_ / "run/alarms-replayed.csv"));
+  }
+
+  Scratch scratch_;
+  std::uint32_t domain_;
+  dds::Participant participant_;
+  std::string printed_;
+};
+
+const Json* alarm_with(const Json& alarms, const std::string& suspect) {
+  for (const Json& alarm : alarms) {
+    if (alarm.at("suspect") == suspect) return &alarm;
+  }
+  return nullptr;
+}
+
+TEST_F(MonitoredRun, AMotorThatFailsAndNothingElseIsAnAlarm) {
+  const Json alarms = alarms_of(
+      "effect { name: \"failed\" acts_on: WHEEL_GAIN wheel: LEFT_WHEEL robot: 2 function { of: TIME steps { at: 70 "
+      "value: 0 value: -1 } } }");
+  ASSERT_FALSE(alarms.empty());
+  const Json& first = alarms[0];
+  EXPECT_EQ(first.at("suspect"), "gain_left") << alarms.dump(1);
+  EXPECT_EQ(first.at("robots"), Json::array({2}));
+  const double time_s = first.at("time_s");
+  EXPECT_GT(time_s, 70);
+  EXPECT_LT(time_s, 80);
+  EXPECT_NE(printed_.find("robot 2 leaves the model: gain of the left wheel"), std::string::npos) << printed_;
+  for (const Json& alarm : alarms) EXPECT_EQ(alarm.at("robots"), Json::array({2})) << alarms.dump(1);
+  expect_the_same_of_the_recording();
+}
+
+TEST_F(MonitoredRun, AKnockedCameraIsOneAlarmOfItsTracker) {
+  const Json alarms = alarms_of("", {75, 6, -4});
+  ASSERT_EQ(alarms.size(), 1u) << alarms.dump(1);
+  EXPECT_EQ(alarms[0].at("suspect"), "calibration_shift") << alarms.dump(1);
+  EXPECT_EQ(alarms[0].at("tracker"), "other arena");
+  EXPECT_GT(alarms[0].at("time_s").get<double>(), 75);
+  EXPECT_LT(alarms[0].at("time_s").get<double>(), 78);
+  expect_the_same_of_the_recording();
+}
+
+TEST_F(MonitoredRun, ASlowPatchIsAnAlarmOfTheArena) {
+  const Json alarms = alarms_of(
+      "effect { name: \"patch\" acts_on: WHEEL_GAIN function { constant: -0.5 } function { of: X steps { at: 0 at: "
+      "120 "
+      "value: 0 value: 1 value: 0 } } }");
+  const Json* const patch = alarm_with(alarms, "patch");
+  ASSERT_NE(patch, nullptr) << alarms.dump(1);
+  EXPECT_GT(patch->at("x_mm").get<double>(), -50) << patch->dump();
+  EXPECT_LT(patch->at("x_mm").get<double>(), 170) << patch->dump();
+  EXPECT_LT(patch->at("sizes")[0].at("value").get<double>(), -0.2);
+  EXPECT_GE(patch->at("robots").size(), 2u);
+  expect_the_same_of_the_recording();
+}
+
+TEST_F(MonitoredRun, WithoutKnownCommandsItIsRefused) {
+  write(scratch_ / "silent.txtpb", std::string(kArena) + "robots { count: 2 body: TRACKED }");
+  const Outcome outcome =
+      kilotwin({"run", scratch_ / "silent.txtpb", "--monitor", "--out", scratch_ / "silent"}, scratch_);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("no tracked robot has known commands"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "silent"));
+}
+
+}  // namespace
+}  // namespace kilotwin::test
