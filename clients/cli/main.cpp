@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "clients/cli/program.hpp"
+#include "clients/cli/view_command.hpp"
 
 int main(int argc, char** argv) {
   using namespace kilotwin::cli;
@@ -27,6 +28,7 @@ int main(int argc, char** argv) {
                                add_ohc(program),
                                add_cameras(program),
                                add_track(program),
+                               add_view(program),
                                add_doctor(program)};
                      });
 }

@@ -14,23 +14,26 @@ namespace kilotwin::cli {
 namespace {
 
 int become(const std::string& name, const std::string& command, const std::vector<std::string>& arguments) {
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  const std::filesystem::path program = program_beside(name);
   std::vector<std::string> words{"kilotwin", command};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   execv(program.c_str(), argv.data());
-  if (errno != ENOENT)
-    throw RunError(
-        fmt::format("{} cannot be started: {}", program.string(), std::generic_category().message(errno)));
+  throw RunError(fmt::format("{} cannot be started: {}", program.string(), std::generic_category().message(errno)));
+}
+
+}  // namespace
+
+std::filesystem::path program_beside(const std::string& name) {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  if (std::filesystem::exists(program)) return program;
   throw RunError(
       fmt::format("{} is not there; scripts/demo builds the simulator alone. Build the rest: scripts/setup && "
                   "cmake --preset release && cmake --build --preset release",
                   program.string()));
 }
-
-}  // namespace
 
 Command add_other_program(CLI::App& app, const std::string& command, const std::string& description,
                           const std::string& program) {

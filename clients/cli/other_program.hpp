@@ -1,11 +1,15 @@
 /// Commands that are programs of their own, beside `kilotwin`: what simulates builds without them.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "clients/cli/commands.hpp"
 
 namespace kilotwin::cli {
+
+/// A program in the folder of this one. Throws RunError where it is not there.
+[[nodiscard]] std::filesystem::path program_beside(const std::string& name);
 
 /// Adds a command that starts `program` (from the folder of this one) with the same arguments, --help included. The work throws
 /// RunError where it is not there.

@@ -3,11 +3,15 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <csignal>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <thread>
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/launcher.hpp"
+#include "clients/cli/other_program.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/progress.hpp"
 #include "clients/cli/recovery.hpp"
@@ -16,9 +20,11 @@
 #include "clients/cli/worker.hpp"
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
+#include "core/base/say.hpp"
 #include "core/dds/dds.hpp"
 #include "core/os/children.hpp"
 #include "core/os/interrupt.hpp"
+#include "core/os/process.hpp"
 #include "services/behaviours/program_set.hpp"
 
 namespace kilotwin::cli {
@@ -126,10 +132,35 @@ void require_watchable(const RunPlan& plan, const recorder::RunDirectory& direct
   }
 }
 
-int run(const RunArguments& arguments, double started_s) {
+/// The web page of the run: live, then recorded.
+os::Process start_view(const recorder::RunDirectory& directory, std::uint32_t domain) {
+  os::Command command;
+  command.arguments = {"kilotwin", "view", directory.path().string(), "--domain", std::to_string(domain)};
+  command.program = program_beside("kilotwin-view");
+  command.at_death = SIGTERM;
+  return os::Process(command);
+}
+
+void view_until_interrupted(os::Process& page) {
+  say("kilotwin: the page now shows the recording; Ctrl-C ends it");
+  while (interrupted() == 0 && !page.poll()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  page.signal(SIGTERM);
+  page.wait();
+}
+
+struct RunOptions : RunArguments {
+  bool view = false;  ///< with a web page
+};
+
+int run(const RunOptions& arguments, double started_s) {
   if (arguments.mode == "local") warn_beyond_cores("--threads", arguments.threads);
   if (arguments.mode == "local" && arguments.domain)
     throw UserError("--domain: a local run uses no DDS domain; leave the option out, or give --mode federated");
+  if (arguments.mode == "local" && arguments.view)
+    throw UserError(
+        "--view: shows federated runs; give --mode federated, or `kilotwin view RUN` once the run has begun");
+  if (arguments.prepare && arguments.view)
+    throw UserError("--view: --prepare starts no run; leave one of them out");
   if (arguments.monitor.on && arguments.mode == "local") {
     throw UserError(
         "--monitor: a local run hears no tracker; leave --mode local out, or give --monitor to `kilotwin replay`");
@@ -148,6 +179,8 @@ int run(const RunArguments& arguments, double started_s) {
     return kDone;
   }
   catch_interrupts();
+  std::optional<os::Process> page;
+  if (arguments.view) page.emplace(start_view(prepared.directory, claim->domain()));
   if (arguments.mode == "local") {
     if (const auto status = run_locally(prepared.manifest, prepared.directory, arguments, started_s))
       return *status;
@@ -163,6 +196,7 @@ int run(const RunArguments& arguments, double started_s) {
                                                                     recorder::RunDirectory::default_path(
                                                                         summary.name, summary.seed))));
   }
+  if (page) view_until_interrupted(*page);
   return kDone;
 }
 
@@ -182,7 +216,7 @@ std::string decimal_seed(std::string& text) {
 }  // namespace
 
 Command add_run(CLI::App& program, double started_s) {
-  const auto arguments = std::make_shared<RunArguments>();
+  const auto arguments = std::make_shared<RunOptions>();
   CLI::App& app = *program.add_subcommand("run", "run an experiment to its end");
   add_experiment_options(app, *arguments);
   app.add_option("--mode", arguments->mode, "federated: services as processes over DDS; local: all in one process")
@@ -229,6 +263,8 @@ Command add_run(CLI::App& program, double started_s) {
   add_monitor_options(app, arguments->monitor);
   add_output_options(app, arguments->output, "runs/NAME-SEED, with a number added if it exists");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
+  app.add_flag("--view", arguments->view,
+               "a web page of the run, live and then recorded, until Ctrl-C; its address is printed");
   return {&app, [arguments, started_s] { return run(*arguments, started_s); }};
 }
 

@@ -108,8 +108,10 @@ Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
 
 Reader::~Reader() { ::close(descriptor_); }
 
-void Reader::rewind() {
-  offset_ = records_from_;
+void Reader::rewind() { go_to(records_from_); }
+
+void Reader::go_to(std::uint64_t offset) {
+  offset_ = offset;
   ended_ = damaged_ = false;
   warning_.clear();
   last_state_ = header_.first_tick() - 1;

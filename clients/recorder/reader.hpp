@@ -38,6 +38,8 @@ class Reader {
   [[nodiscard]] const proto::StateRecord* next_state();
   /// Returns to the first record after the header.
   void rewind();
+  /// Continues with the record whose frame begins at `offset`: StateIndex knows where. The order of states begins anew.
+  void go_to(std::uint64_t offset);
 
   /// After next() returned nullptr: whether the end mark of the run was reached. Without end mark and warning, the run was
   /// killed or is still running.

@@ -1,0 +1,441 @@
+#include "clients/view/gateway.hpp"
+
+#include <fmt/format.h>
+#include <libwebsockets.h>
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "clients/view/run_text.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::view {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Bytes of a file that are handed to the library at once.
+constexpr std::size_t kChunk_bytes = 65536;
+/// Lines that wait for one viewer; further ones are dropped.
+constexpr std::size_t kMostWaitingLines = 8;
+/// A viewer that answers no ping for so long is disconnected.
+constexpr std::uint16_t kPingAfter_s = 20, kHangUpAfter_s = 40;
+/// Bounds of clients that open connections and say nothing.
+constexpr int kMostConnections = 400, kMostHeaders = 300;
+constexpr unsigned kHeaderTimeout_s = 5;
+
+constexpr std::array<std::pair<const char*, const char*>, 6> kHeaders{
+    {{"cache-control:", "no-cache"},
+     {"content-security-policy:",
+      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+      "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+     {"x-content-type-options:", "nosniff"},
+     {"referrer-policy:", "no-referrer"},
+     {"cross-origin-opener-policy:", "same-origin"},
+     {"cross-origin-resource-policy:", "same-origin"}}};
+
+using Message = std::shared_ptr<const std::string>;
+
+/// The newest message of a kind. Viewers remember the number that they have seen.
+struct Newest {
+  Message message;
+  std::uint64_t number = 0;
+  void set(std::string text) {
+    message = std::make_shared<const std::string>(std::move(text));
+    ++number;
+  }
+};
+
+struct Viewer {
+  bool may_steer = false, wants_frame = false;
+  std::uint64_t run_seen = 0, status_seen = 0, frame_seen = 0, floors_seen = 0;
+  std::optional<Request> at, trail, robot;
+  std::deque<std::string> lines;
+  std::string incoming;
+  double allowance = kMostRequestsPerSecond;  // requests that it may send now
+  Clock::time_point counted = Clock::now();
+
+  /// Counts a request; false where there were too many.
+  bool allowed() {
+    const auto now = Clock::now();
+    allowance += kMostRequestsPerSecond * std::chrono::duration<double>(now - counted).count();
+    allowance = std::min(allowance, kMostRequestsPerSecond) - 1;
+    counted = now;
+    return allowance >= 0;
+  }
+  void tell(std::string line) {
+    if (lines.size() < kMostWaitingLines) lines.push_back(std::move(line));
+  }
+};
+
+/// What libwebsockets keeps per connection, as zeroed memory.
+struct Download {
+  const PageFile* file;
+  std::size_t sent;
+};
+struct Session {
+  Viewer* viewer;
+};
+
+std::string header_of(lws* connection, lws_token_indexes token) {
+  std::array<char, 256> text{};
+  const int length = lws_hdr_copy(connection, text.data(), static_cast<int>(text.size()), token);
+  return length > 0 ? std::string(text.data(), static_cast<std::size_t>(length)) : std::string();
+}
+
+/// Whether a `Host` names this machine: a page of another origin could reach the port under a name of its own.
+bool is_this_machine(const std::string& host) {
+  const std::string name = host.substr(0, host.rfind(':'));
+  return name == "127.0.0.1" || name == "localhost";
+}
+
+bool is_allowed(lws* connection) {
+  const std::string host = header_of(connection, WSI_TOKEN_HOST);
+  if (!is_this_machine(host)) return false;
+  // Browsers always state the origin of a page that opens a WebSocket; other programs have none.
+  const std::string origin = header_of(connection, WSI_TOKEN_ORIGIN);
+  return lws_hdr_total_length(connection, WSI_TOKEN_ORIGIN) == 0 || origin == "http://" + host;
+}
+
+/// Takes the same time for every wrong token.
+bool equal_tokens(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
+  unsigned difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) difference |= static_cast<unsigned>(a[i] ^ b[i]);
+  return difference == 0;
+}
+
+}  // namespace
+
+class Gateway::Service {
+ public:
+  Service(std::uint16_t port, std::string token, PageFiles page)
+      : token_(std::move(token)), page_(std::move(page)) {
+    lws_set_log_level(0, nullptr);
+    static const std::array<lws_protocols, 3> protocols{
+        {{"http", &Service::on_http, sizeof(Download), 0, 0, nullptr, 0},
+         {kSubprotocol, &Service::on_socket, sizeof(Session), kLongestRequest_bytes, 0, nullptr, 0},
+         {nullptr, nullptr, 0, 0, 0, nullptr, 0}}};
+    static const lws_retry_bo_t patience{nullptr, 0, 0, kPingAfter_s, kHangUpAfter_s, 0};
+    lws_context_creation_info info{};
+    info.port = port;
+    info.iface = "127.0.0.1";
+    info.protocols = protocols.data();
+    info.user = this;
+    info.gid = -1;
+    info.uid = -1;
+    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_DISABLE_IPV6;
+    info.timeout_secs = kHeaderTimeout_s;
+    info.max_http_header_pool = kMostHeaders;
+    info.fd_limit_per_thread = kMostConnections;
+    info.retry_and_idle_policy = &patience;
+    context_ = lws_create_context(&info);
+    lws_vhost* const host = context_ == nullptr ? nullptr : lws_create_vhost(context_, &info);
+    if (host == nullptr) {
+      if (context_ != nullptr) lws_context_destroy(context_);
+      throw UserError(fmt::format(
+          "--port {}: cannot be served on 127.0.0.1; choose a port that is free, or leave the option out", port));
+    }
+    port_ = static_cast<std::uint16_t>(lws_get_vhost_listen_port(host));
+    thread_ = std::thread([this] {
+      while (!ends_ && lws_service(context_, 0) >= 0) {}
+    });
+  }
+  ~Service() {
+    ends_ = true;
+    lws_cancel_service(context_);
+    thread_.join();
+    lws_context_destroy(context_);
+  }
+  Service(const Service&) = delete;
+
+  void show(Answers& answers, std::string run_text) {
+    {
+      const std::scoped_lock lock(answering_, mutex_);
+      answers_ = &answers;
+      run_.set(std::move(run_text));
+      status_.message.reset();
+      frame_.message.reset();
+    }
+    lws_cancel_service(context_);
+  }
+  void post(Newest Service::*which, std::string message) {
+    {
+      const std::lock_guard lock(mutex_);
+      (this->*which).set(std::move(message));
+    }
+    lws_cancel_service(context_);
+  }
+
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] const std::string& token() const { return token_; }
+  [[nodiscard]] Traffic traffic() const { return {viewers_, frames_, bytes_, refused_}; }
+
+  Newest run_, status_, frame_;  // guarded by mutex_
+
+ private:
+  static Service& of(lws* connection) {
+    return *static_cast<Service*>(lws_context_user(lws_get_context(connection)));
+  }
+
+  // The page.
+
+  static int on_http(lws* connection, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
+    auto* const download = static_cast<Download*>(user);
+    switch (reason) {
+      case LWS_CALLBACK_HTTP:
+        return of(connection).begin_file(connection, *download, {static_cast<char*>(in), length});
+      case LWS_CALLBACK_HTTP_WRITEABLE: return of(connection).go_on_with_file(connection, *download);
+      // A WebSocket that names no subprotocol, or another one.
+      case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: ++of(connection).refused_; return -1;
+      default: return lws_callback_http_dummy(connection, reason, user, in, length);
+    }
+  }
+
+  int refuse(lws* connection, unsigned status, const char* why) {
+    ++refused_;
+    if (lws_return_http_status(connection, status, why) < 0) return -1;
+    return lws_http_transaction_completed(connection);
+  }
+
+  int begin_file(lws* connection, Download& download, const std::string& path) {
+    if (!is_this_machine(header_of(connection, WSI_TOKEN_HOST)))
+      return refuse(connection, HTTP_STATUS_FORBIDDEN, "open the page as http://127.0.0.1");
+    if (lws_hdr_total_length(connection, WSI_TOKEN_GET_URI) == 0)
+      return refuse(connection, HTTP_STATUS_METHOD_NOT_ALLOWED, "only GET");
+    const PageFile* const file = page_.find(path);
+    if (file == nullptr) return refuse(connection, HTTP_STATUS_NOT_FOUND, "no such file");
+    std::array<unsigned char, LWS_PRE + 2048> headers{};
+    unsigned char* const start = headers.data() + LWS_PRE;
+    unsigned char* at = start;
+    unsigned char* const most = headers.data() + headers.size() - 1;
+    if (lws_add_http_common_headers(connection, HTTP_STATUS_OK, file->type, file->content.size(), &at, most) != 0)
+      return 1;
+    for (const auto& [name, value] : kHeaders) {
+      if (lws_add_http_header_by_name(connection, reinterpret_cast<const unsigned char*>(name),
+                                      reinterpret_cast<const unsigned char*>(value),
+                                      static_cast<int>(std::string_view(value).size()), &at, most) != 0)
+        return 1;
+    }
+    if (lws_finalize_write_http_header(connection, start, &at, most) != 0) return 1;
+    download = {file, 0};
+    lws_callback_on_writable(connection);
+    return 0;
+  }
+
+  int go_on_with_file(lws* connection, Download& download) {
+    if (download.file == nullptr) return 0;
+    const std::string& content = download.file->content;
+    const std::size_t count = std::min(kChunk_bytes, content.size() - download.sent);
+    const bool last = download.sent + count == content.size();
+    if (!write(connection, std::string_view(content).substr(download.sent, count),
+               last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP))
+      return -1;
+    download.sent += count;
+    if (!last) {
+      lws_callback_on_writable(connection);
+      return 0;
+    }
+    download.file = nullptr;
+    return lws_http_transaction_completed(connection) != 0 ? -1 : 0;
+  }
+
+  // Viewers.
+
+  static int on_socket(lws* connection, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
+    Service& service = of(connection);
+    auto* const session = static_cast<Session*>(user);
+    switch (reason) {
+      case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+        if (is_allowed(connection) && service.viewers_ < kMostViewers) return 0;
+        ++service.refused_;
+        return -1;
+      case LWS_CALLBACK_ESTABLISHED:
+        session->viewer = new Viewer;
+        ++service.viewers_;
+        lws_callback_on_writable(connection);
+        return 0;
+      case LWS_CALLBACK_RECEIVE:
+        return service.receive(connection, *session->viewer, {static_cast<char*>(in), length});
+      case LWS_CALLBACK_SERVER_WRITEABLE: return service.send_next(connection, *session->viewer);
+      case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
+        lws_callback_on_writable_all_protocol(service.context_, lws_get_protocol(connection));
+        return 0;
+      case LWS_CALLBACK_CLOSED:
+        if (session != nullptr && session->viewer != nullptr) {
+          delete std::exchange(session->viewer, nullptr);
+          --service.viewers_;
+        }
+        return 0;
+      default: return 0;
+    }
+  }
+
+  int disconnect(lws* connection, lws_close_status status, std::string_view why) {
+    ++refused_;
+    std::string reason(why);
+    lws_close_reason(connection, status, reinterpret_cast<unsigned char*>(reason.data()), reason.size());
+    return -1;
+  }
+
+  int receive(lws* connection, Viewer& viewer, std::string_view part) {
+    if (viewer.incoming.size() + part.size() > kLongestRequest_bytes)
+      return disconnect(connection, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the request is too long");
+    viewer.incoming += part;
+    if (lws_is_final_fragment(connection) == 0 || lws_remaining_packet_payload(connection) > 0) return 0;
+    if (!viewer.allowed()) return disconnect(connection, LWS_CLOSE_STATUS_POLICY_VIOLATION, "too many requests");
+    const std::optional<Request> request = parse_request(viewer.incoming);
+    viewer.incoming.clear();
+    if (!request) return disconnect(connection, LWS_CLOSE_STATUS_INVALID_PAYLOAD, "that is no request");
+    take(viewer, *request);
+    lws_callback_on_writable(connection);
+    return 0;
+  }
+
+  void take(Viewer& viewer, const Request& request) {
+    switch (request.kind) {
+      case Request::Kind::kHello:
+        viewer.may_steer = equal_tokens(request.token, token_);
+        viewer.tell(fmt::format("{{\"type\":\"grant\",\"steer\":{}}}", viewer.may_steer));
+        return;
+      case Request::Kind::kNext: viewer.wants_frame = true; return;
+      case Request::Kind::kAt: viewer.at = request; return;
+      case Request::Kind::kTrail: viewer.trail = request; return;
+      case Request::Kind::kRobot: viewer.robot = request; return;
+      default: break;
+    }
+    if (!viewer.may_steer)
+      return viewer.tell(notice_text("Steering needs the whole address that `kilotwin view` has printed."));
+    const std::lock_guard lock(answering_);
+    const std::string refusal = answers_ == nullptr ? "There is no run yet." : answers_->steer(request);
+    if (!refusal.empty()) viewer.tell(notice_text(refusal));
+  }
+
+  /// Sends one message, the most urgent one.
+  int send_next(lws* connection, Viewer& viewer) {
+    const auto [message, binary] = next_message(viewer);
+    if (!message) return 0;
+    if (!write(connection, *message, binary ? LWS_WRITE_BINARY : LWS_WRITE_TEXT)) return -1;
+    bytes_ += message->size();
+    if (binary) ++frames_;
+    lws_callback_on_writable(connection);
+    return 0;
+  }
+
+  struct Outgoing {
+    Message message;
+    bool binary = false;
+  };
+
+  [[nodiscard]] Outgoing next_message(Viewer& viewer) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (run_.message && viewer.run_seen != run_.number) {
+        viewer.run_seen = run_.number;
+        viewer.floors_seen = 0;
+        viewer.at.reset();
+        return {run_.message};
+      }
+      if (status_.message && viewer.status_seen != status_.number) {
+        viewer.status_seen = status_.number;
+        return {status_.message};
+      }
+      if (viewer.wants_frame && frame_.message && viewer.frame_seen != frame_.number) {
+        viewer.frame_seen = frame_.number;
+        viewer.wants_frame = false;
+        return {frame_.message, true};
+      }
+    }
+    if (viewer.lines.empty()) answer(viewer);
+    if (!viewer.lines.empty()) {
+      Outgoing line{std::make_shared<const std::string>(std::move(viewer.lines.front()))};
+      viewer.lines.pop_front();
+      return line;
+    }
+    return answered_frame(viewer);
+  }
+
+  /// Turns one request into a line.
+  void answer(Viewer& viewer) {
+    const std::lock_guard lock(answering_);
+    if (answers_ == nullptr) return;
+    if (viewer.at) {
+      if (const std::uint64_t version = answers_->floors_version(viewer.at->tick); version != viewer.floors_seen) {
+        viewer.floors_seen = version;
+        return viewer.tell(answers_->floors_at(viewer.at->tick));
+      }
+      return;  // the frame comes first
+    }
+    std::string line;
+    if (viewer.trail) {
+      line = answers_->trail(viewer.trail->robot, viewer.trail->tick);
+      viewer.trail.reset();
+    } else if (viewer.robot) {
+      line = answers_->robot(viewer.robot->robot);
+      viewer.robot.reset();
+    }
+    if (!line.empty()) viewer.tell(std::move(line));
+  }
+
+  [[nodiscard]] Outgoing answered_frame(Viewer& viewer) {
+    if (!viewer.at) return {};
+    const std::lock_guard lock(answering_);
+    std::string frame =
+        answers_ == nullptr ? std::string() : answers_->frame_at(viewer.at->tick, viewer.at->number);
+    viewer.at.reset();
+    if (frame.empty()) return {};
+    return {std::make_shared<const std::string>(std::move(frame)), true};
+  }
+
+  /// The library wants room in front of what it writes. It keeps what the socket does not take at once.
+  [[nodiscard]] bool write(lws* connection, std::string_view text, lws_write_protocol protocol) {
+    buffer_.resize(LWS_PRE + text.size());
+    std::copy(text.begin(), text.end(), buffer_.begin() + LWS_PRE);
+    return lws_write(connection, buffer_.data() + LWS_PRE, text.size(), protocol) >= static_cast<int>(text.size());
+  }
+
+  const std::string token_;
+  const PageFiles page_;
+  lws_context* context_ = nullptr;
+  std::uint16_t port_ = 0;
+  std::atomic<bool> ends_{false};
+  std::atomic<std::uint32_t> viewers_{0};
+  std::atomic<std::uint64_t> frames_{0}, bytes_{0}, refused_{0};
+  mutable std::mutex mutex_;
+  std::mutex answering_;               // held during calls of answers_
+  Answers* answers_ = nullptr;         // guarded by answering_
+  std::vector<unsigned char> buffer_;  // of the service's thread
+  std::thread thread_;
+};
+
+Gateway::Gateway(std::uint16_t port, std::string token, PageFiles page)
+    : service_(std::make_unique<Service>(port, std::move(token), std::move(page))) {}
+Gateway::~Gateway() = default;
+std::uint16_t Gateway::port() const { return service_->port(); }
+std::string Gateway::address() const {
+  return fmt::format("http://127.0.0.1:{}/#token={}", service_->port(), service_->token());
+}
+void Gateway::show(Answers& answers, std::string run_text) { service_->show(answers, std::move(run_text)); }
+void Gateway::post_status(std::string text) { service_->post(&Service::status_, std::move(text)); }
+void Gateway::post_frame(std::string frame) { service_->post(&Service::frame_, std::move(frame)); }
+Gateway::Traffic Gateway::traffic() const { return service_->traffic(); }
+
+std::string random_token() {
+  std::array<unsigned char, 16> bytes{};
+  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw RunError("the system has no random numbers; expected getrandom() to give 16 octets");
+  std::string token;
+  for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
+  return token;
+}
+
+}  // namespace kilotwin::view

@@ -1,0 +1,72 @@
+/// Gateway: the page over HTTP and runs over a WebSocket, on 127.0.0.1.
+///
+/// A viewer gets text messages, JSON objects with a `type`, and binary frames (frame_code.hpp); it sends requests (request.hpp).
+/// A viewer gets one frame per request, so a slow one gets fewer frames, and one that stalls gets none. Requests that it has not
+/// been answered replace each other. A viewer that breaks the rules is disconnected: a message that is too long or no request,
+/// or more than kMostRequestsPerSecond. No viewer delays post_frame() or another viewer.
+///
+/// Browsers let pages of any origin open a WebSocket. The gateway therefore serves only requests whose `Host` is this machine
+/// and whose `Origin` is the page's own. To steer a run, a viewer shows the token that its address carries.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "clients/view/page_files.hpp"
+#include "clients/view/request.hpp"
+
+namespace kilotwin::view {
+
+inline constexpr const char* kSubprotocol = "kilotwin-view.1";
+inline constexpr std::uint32_t kMostViewers = 64;
+inline constexpr double kMostRequestsPerSecond = 500;
+
+/// Answers what viewers ask. The gateway calls it from its own thread, one call at a time.
+class Answers {
+ public:
+  virtual ~Answers() = default;
+  /// The state at or before a tick, as a frame; empty: there is none.
+  [[nodiscard]] virtual std::string frame_at(std::int64_t tick, std::uint32_t request) = 0;
+  /// What lies on the floor at that tick: a number that changes with it, and a message of type "floors".
+  [[nodiscard]] virtual std::uint64_t floors_version(std::int64_t tick) = 0;
+  [[nodiscard]] virtual std::string floors_at(std::int64_t tick) = 0;
+  /// A text message, or empty: there is none.
+  [[nodiscard]] virtual std::string trail(std::uint32_t robot, std::int64_t tick) = 0;
+  [[nodiscard]] virtual std::string robot(std::uint32_t robot) = 0;
+  /// Steers the run. Returns empty, or why it cannot.
+  [[nodiscard]] virtual std::string steer(const Request& request) = 0;
+};
+
+class Gateway {
+ public:
+  struct Traffic {
+    std::uint32_t viewers = 0;
+    std::uint64_t frames = 0, bytes = 0, refused = 0;  ///< since the start; refused: connections and broken rules
+  };
+
+  /// Serves from a thread of its own. Port 0: one that is free. `token`: 16 characters or more. Throws UserError where the port
+  /// is taken.
+  Gateway(std::uint16_t port, std::string token, PageFiles page);
+  ~Gateway();
+  Gateway(const Gateway&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const;
+  /// The address of the page, with the token.
+  [[nodiscard]] std::string address() const;
+  /// Begins a run: every viewer gets its description, and `answers` answers. It must outlive the gateway, or the next call.
+  void show(Answers& answers, std::string run_text);
+  /// Every viewer gets it; of several, the newest counts. `frame` answers "next".
+  void post_status(std::string text);
+  void post_frame(std::string frame);
+  [[nodiscard]] Traffic traffic() const;
+
+ private:
+  class Service;
+  std::unique_ptr<Service> service_;
+};
+
+/// 32 hexadecimal digits from the system's random numbers.
+[[nodiscard]] std::string random_token();
+
+}  // namespace kilotwin::view

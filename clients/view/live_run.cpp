@@ -1,0 +1,150 @@
+#include "clients/view/live_run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "clients/view/run_text.hpp"
+#include "core/base/say.hpp"
+#include "idl/experiment.pb.h"
+
+namespace kilotwin::view {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Unique among processes that steer a run.
+std::string client_name() { return fmt::format("kilotwin view {} {}", getpid(), random_token().substr(0, 8)); }
+
+const char* phase_name(kilotwin_open_RunPhase phase) {
+  switch (phase) {
+    case kilotwin_open_STARTING: return "starting";
+    case kilotwin_open_RUNNING: return "running";
+    case kilotwin_open_PAUSED: return "paused";
+    case kilotwin_open_ENDED: return "ended";
+    default: return "broken";
+  }
+}
+
+std::string status_text(const PublicRunStatus& status, bool ended) {
+  const nlohmann::json text{{"type", "status"},
+                            {"phase", ended ? "ended" : phase_name(status.phase)},
+                            {"tick", status.tick},
+                            {"lastTick", status.last_tick},
+                            {"simulatedSeconds", status.simulated_s},
+                            {"wallSeconds", status.wall_s},
+                            {"failed", status.robots_failed},
+                            {"sent", status.sent},
+                            {"received", status.received},
+                            {"note", status.note}};
+  return text.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+LiveRun::LiveRun(const dds::Transport& transport, bool tells)
+    : tells_(tells),
+      observer_(transport),
+      participant_(transport),
+      control_(participant_, topics::run_control()),
+      statuses_(participant_, topics::run_status(),
+                [this](const PublicRunStatus& sample, dds::SampleState state) {
+                  if (!state.valid) return;
+                  const std::lock_guard lock(mutex_);
+                  status_ = sample;
+                  ++status_number_;
+                }),
+      client_(client_name()) {}
+
+LiveRun::~LiveRun() = default;
+
+void LiveRun::serve(Gateway& gateway) {
+  switch (observer_.wait(50ms)) {
+    case observe::News::kRunBegan: begin(gateway); break;
+    case observe::News::kState: post_state(gateway); break;
+    case observe::News::kRunEnded:
+      post_status(gateway, true);
+      ended_run_ = run_.exchange(0);
+      if (tells_) say("kilotwin: the run has ended");
+      return;
+    case observe::News::kNothing: break;
+  }
+  if (observer_.run() != nullptr) post_status(gateway, false);
+}
+
+void LiveRun::begin(Gateway& gateway) {
+  const observe::RunFacts& facts = *observer_.run();
+  RunOutline outline;
+  outline.live = true;
+  outline.name = facts.name;
+  outline.run = facts.run;
+  outline.seed = facts.seed;
+  outline.tick_s = facts.tick_s;
+  outline.last_tick = facts.last_tick;
+  outline.robots = facts.robots;
+  for (const proto::RobotGroup& group : facts.experiment->robots()) {
+    const std::string program = group.behaviour_size() > 0 ? group.behaviour(0) : "";
+    outline.firmware.push_back(program.ends_with(".hex") || program.ends_with(".elf"));
+  }
+  try {
+    const std::string text = run_text(outline, *facts.experiment);
+    grid_ = grid_of(*facts.experiment);
+    run_ = facts.run;
+    gateway.show(*this, text);
+    if (tells_) say(fmt::format("kilotwin: sees run {}, {} robots", one_line(facts.name, 128), facts.robots));
+  } catch (const std::invalid_argument& error) {
+    warn(fmt::format("kilotwin: run {} cannot be shown: {}", one_line(facts.name, 128), one_line(error.what())));
+  }
+}
+
+void LiveRun::post_state(Gateway& gateway) {
+  const SwarmView& swarm = observer_.state()->swarm;
+  if (run_ == 0) return;
+  FrameColumns columns;
+  columns.x_mm = swarm.x_mm;
+  columns.y_mm = swarm.y_mm;
+  columns.heading_rad = swarm.heading_rad;
+  columns.led = swarm.led;
+  columns.life_cycle = swarm.life_cycle;
+  columns.motor_left = swarm.motor_left;
+  columns.motor_right = swarm.motor_right;
+  columns.movable_x_mm = swarm.movable_x_mm;
+  columns.movable_y_mm = swarm.movable_y_mm;
+  columns.movable_heading_rad = swarm.movable_heading_rad;
+  gateway.post_frame(encode_frame({0, swarm.tick.count(), swarm.tick.count()}, columns, grid_));
+}
+
+void LiveRun::post_status(Gateway& gateway, bool ended) {
+  PublicRunStatus status{};
+  {
+    const std::lock_guard lock(mutex_);
+    if (!ended && (status_.run != run_ || posted_status_ == status_number_)) return;
+    posted_status_ = status_number_;
+    status = status_;
+  }
+  gateway.post_status(status_text(status, ended));
+}
+
+std::string LiveRun::steer(const Request& request) {
+  if (run_ == 0) return "The run has ended.";
+  PublicRunControl sample{};
+  client_.copy(sample.client, sizeof sample.client - 1);
+  sample.run = run_;
+  sample.request = ++request_;
+  switch (request.kind) {
+    case Request::Kind::kPause: sample.command = kilotwin_open_PAUSE_RUN; break;
+    case Request::Kind::kContinue: sample.command = kilotwin_open_CONTINUE_RUN; break;
+    case Request::Kind::kStep:
+      sample.command = kilotwin_open_STEP_RUN;
+      sample.steps = request.steps;
+      break;
+    default: sample.command = kilotwin_open_STOP_RUN; break;
+  }
+  control_.write(sample);
+  return {};
+}
+
+}  // namespace kilotwin::view

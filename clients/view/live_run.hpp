@@ -1,0 +1,58 @@
+/// LiveRun: runs on a domain as they happen. States come from an observer, which can never slow a run; requests go out as
+/// RunControl, as any other program's would.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "clients/observe/observer.hpp"
+#include "clients/view/frame_code.hpp"
+#include "clients/view/gateway.hpp"
+#include "core/federation/topics.hpp"
+
+namespace kilotwin::view {
+
+class LiveRun : public Answers {
+ public:
+  /// `tells`: lines about the beginning and the end of runs, on stderr.
+  LiveRun(const dds::Transport& transport, bool tells);
+  ~LiveRun() override;
+
+  /// Looks at the domain for up to 50 ms and passes on what is new. Call it again and again.
+  void serve(Gateway& gateway);
+  /// The last run that was seen to end; 0: none.
+  [[nodiscard]] std::uint64_t ended_run() const { return ended_run_; }
+
+  // Answers.
+  [[nodiscard]] std::string frame_at(std::int64_t, std::uint32_t) override { return {}; }
+  [[nodiscard]] std::uint64_t floors_version(std::int64_t) override { return 0; }
+  [[nodiscard]] std::string floors_at(std::int64_t) override { return {}; }
+  [[nodiscard]] std::string trail(std::uint32_t, std::int64_t) override { return {}; }
+  [[nodiscard]] std::string robot(std::uint32_t) override { return {}; }
+  [[nodiscard]] std::string steer(const Request& request) override;
+
+ private:
+  void begin(Gateway& gateway);
+  void post_state(Gateway& gateway);
+  void post_status(Gateway& gateway, bool ended);
+
+  const bool tells_;
+  observe::Observer observer_;
+  dds::Participant participant_;
+  dds::Writer<PublicRunControl> control_;
+  std::mutex mutex_;
+  PublicRunStatus status_{};  // the newest, of any run; guarded by mutex_
+  std::uint64_t status_number_ = 0;
+  dds::Reader<PublicRunStatus> statuses_;
+
+  std::uint64_t posted_status_ = 0, ended_run_ = 0;
+  std::atomic<std::uint64_t> run_{0};  // at hand; 0: none
+  PositionGrid grid_;
+  const std::string client_;   // how requests are signed
+  std::uint32_t request_ = 0;  // of the gateway's thread
+};
+
+}  // namespace kilotwin::view

@@ -1,0 +1,446 @@
+// The page: one run, live or recorded, from above. It draws when something has changed.
+import { Camera } from "./camera.ts";
+import { Connection } from "./connection.ts";
+import { Labels } from "./labels.ts";
+import { element, notice, setText, showConnection, showFrame, showRobot, showRun, showScale } from "./panels.ts";
+import { Playback } from "./playback.ts";
+import { listenToPointer } from "./pointer.ts";
+import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type Message, type RobotCounts, type Run, type Status } from "./protocol.ts";
+import { Renderer } from "./renderer.ts";
+import { Theme } from "./theme.ts";
+
+const PANEL_EVERY_MS = 200;
+const TRAIL_EVERY_S = 1;
+const TRAIL_SEGMENTS = 30;
+/** Robots further than this from a click are not selected. */
+const CLICK_REACH_PX = 14;
+const SEEK_S = 5;
+
+class Page {
+  #stale = true;
+  readonly #picture = element<HTMLCanvasElement>("picture");
+  readonly #line = element<HTMLInputElement>("line");
+  readonly #camera = new Camera();
+  readonly #renderer = new Renderer(this.#picture);
+  readonly #labels = new Labels(element<HTMLCanvasElement>("labels"));
+  readonly #theme = new Theme(() => (this.#stale = true));
+  readonly #playback = new Playback((request) => this.#connection.send(request));
+  readonly #connection: Connection;
+
+  #run: Run | undefined;
+  #status: Status | undefined;
+  #counts: RobotCounts | undefined;
+  #selected: number | undefined;
+  #trail: [number, number][] = [];
+  #mayTrail = 0; // when the trail of the selected robot may be asked for again
+  #trails = true;
+  #trailFrom: Frame | undefined;
+  #maySteer = false;
+  #fitted = true;
+  #shown: Frame | undefined;
+  #drawnAt = 0;
+  #panelsAt = 0;
+  #bytes: { at: number; bytes: number }[] = [];
+  #pace: { at: number; tick: number }[] = [];
+  /** What tests measure. */
+  readonly counters = { drawn: 0, received: 0, bytes: 0, drawMs: 0 };
+
+  constructor() {
+    this.#listen();
+    this.#connection = new Connection({
+      connected: () => this.#connected(),
+      lost: () => this.#lost(),
+      message: (message) => this.#message(message),
+      frame: (frame) => this.#frame(frame),
+    });
+    requestAnimationFrame((now) => this.#tick(now));
+  }
+
+  // The connection.
+
+  #connected(): void {
+    showConnection("open");
+    const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem("token");
+    if (!token) return;
+    sessionStorage.setItem("token", token);
+    this.#connection.send({ do: "hello", token });
+  }
+
+  #lost(): void {
+    showConnection("lost");
+    this.#playback.lost();
+  }
+
+  #message(message: Message): void {
+    this.#stale = true;
+    switch (message.type) {
+      case "run": return this.#begin(message);
+      case "status":
+        this.#status = message;
+        return this.#buttons();
+      case "extent":
+        if (this.#run) {
+          this.#run.lastTick = message.lastTick;
+          this.#run.states = message.states;
+          this.#line.max = String(message.lastTick);
+        }
+        return;
+      case "floors": return this.#renderer.setFloors(message.floors);
+      case "trail":
+        if (message.robot === this.#selected) {
+          this.#trail = [];
+          for (let i = 0; i + 1 < message.xy.length; i += 2) this.#trail.push([message.xy[i]!, message.xy[i + 1]!]);
+        }
+        return;
+      case "robot":
+        this.#counts = message;
+        return;
+      case "grant":
+        this.#maySteer = message.steer;
+        return this.#buttons();
+      case "notice": return notice(message.text);
+    }
+  }
+
+  #begin(run: Run): void {
+    const another = this.#run?.run !== run.run;
+    this.#run = run;
+    this.#status = this.#counts = this.#shown = this.#trailFrom = undefined;
+    this.#pace = [];
+    if (another || (this.#selected ?? 0) >= run.robots) this.#select(undefined);
+    this.#renderer.begin(run, kindsOf(run));
+    if (another) this.#fitted = true;
+    this.#line.min = String(run.firstTick);
+    this.#line.max = String(run.lastTick);
+    this.#playback.begin(run);
+    this.#line.disabled = this.#playback.live;
+    element("speed").parentElement!.hidden = this.#playback.live;
+    element("back").hidden = this.#playback.live;
+    this.#picture.setAttribute("aria-label", `The arena of ${run.name} from above, ${run.robots} robots`);
+    if (this.#selected !== undefined) this.#connection.send({ do: "robot", robot: this.#selected });
+    this.#buttons();
+  }
+
+  #frame(frame: Frame): void {
+    if (!this.#run || frame.robots !== this.#run.robots) return;
+    this.counters.received += 1;
+    this.counters.bytes += frame.bytes;
+    this.#bytes.push({ at: performance.now(), bytes: frame.bytes });
+    this.#playback.take(frame);
+    this.#stale = true;
+  }
+
+  // Drawing.
+
+  #tick(now: number): void {
+    requestAnimationFrame((next) => this.#tick(next));
+    const seconds = Math.min(0.25, (now - this.#drawnAt) / 1000);
+    this.#drawnAt = now;
+    if (this.#playback.advance(seconds)) this.#stale = true;
+    const main = this.#picture.parentElement!;
+    if (main.clientWidth !== this.#camera.width || main.clientHeight !== this.#camera.height) {
+      this.#camera.resize(main.clientWidth, main.clientHeight);
+      this.#stale = true;
+    }
+    if (this.#stale) this.#draw();
+    if (now - this.#panelsAt > PANEL_EVERY_MS) {
+      this.#panelsAt = now;
+      this.#panels(now);
+    }
+  }
+
+  #draw(): void {
+    const began = performance.now();
+    this.#stale = false;
+    const run = this.#run;
+    if (run && this.#fitted) this.#camera.fit(run.arena.halfWidth, run.arena.halfHeight);
+    const { current: frame, next, part } = this.#playback;
+    if (frame && (frame !== this.#shown || part > 0 || this.#playback.playing)) this.#renderer.setFrame(frame, next, part);
+    if (frame && frame !== this.#shown) {
+      this.#follow(frame);
+      this.#shown = frame;
+    }
+    const selected = frame && this.#selected !== undefined ? this.#placeOf(this.#selected) : undefined;
+    if (selected && element<HTMLInputElement>("follow").checked) {
+      this.#fitted = false;
+      [this.#camera.x, this.#camera.y] = selected;
+    }
+    const trail = selected && this.#trail.length > 0 ? [...this.#trail, selected] : [];
+    const range = element<HTMLInputElement>("range").checked ? (run?.radioRange ?? 0) : 0;
+    this.#renderer.draw(this.#camera, this.#theme.palette, frame, frame?.movables ?? new Float32Array(), { selected, trail, range });
+    showScale(this.#camera.pxPerMm);
+    if (run && frame) this.#labels.draw(run, frame, this.#camera, this.#selected, (robot) => this.#placeOf(robot));
+    this.counters.drawn += 1;
+    this.counters.drawMs += performance.now() - began;
+  }
+
+  /** Where a robot is drawn, mm. */
+  #placeOf(robot: number): [number, number] {
+    const { current, next, part } = this.#playback;
+    const run = this.#run!;
+    let x = current!.x[robot]!;
+    let y = current!.y[robot]!;
+    if (next && part > 0) {
+      x += (next.x[robot]! - x) * part;
+      y += (next.y[robot]! - y) * part;
+    }
+    return [run.gridLowest + run.gridStep * x, run.gridLowest + run.gridStep * y];
+  }
+
+  /** Trails go on with a new state; a jump in time cuts them. */
+  #follow(frame: Frame): void {
+    const run = this.#run!;
+    const from = this.#trailFrom;
+    const passed = from ? (frame.tick - from.tick) * run.tickSeconds : Infinity;
+    const longest = 20 * Math.max(TRAIL_EVERY_S, (frame.nextTick - frame.tick) * run.tickSeconds) * Math.max(1, this.#playback.speed);
+    if (passed < 0 || passed > longest) {
+      this.#renderer.forgetTrails();
+      this.#trailFrom = frame;
+    } else if (from && passed >= TRAIL_EVERY_S) {
+      if (this.#trails) this.#renderer.addTrailSegment(from, frame, TRAIL_SEGMENTS);
+      this.#trailFrom = frame;
+      if (this.#playback.live && this.#selected !== undefined) this.#trail.push(this.#placeOf(this.#selected));
+      if (this.#trail.length > 2000) this.#trail = this.#trail.filter((_, i) => i % 2 === 0);
+    }
+    if (!this.#playback.live) this.#askTrail();
+  }
+
+  #askTrail(): void {
+    if (this.#selected === undefined || performance.now() < this.#mayTrail) return;
+    this.#mayTrail = performance.now() + 500;
+    this.#connection.send({ do: "trail", robot: this.#selected, tick: Math.floor(this.#playback.time) });
+  }
+
+  #panels(now: number): void {
+    const run = this.#run;
+    const frame = this.#playback.current;
+    if (!run) return;
+    this.#bytes = this.#bytes.filter((entry) => now - entry.at < 2000);
+    showRun(run, this.#status, this.#bytes.reduce((sum, entry) => sum + entry.bytes, 0) / 2);
+    if (!frame) return;
+    const time = this.#playback.playing ? this.#playback.time : frame.tick;
+    this.#pace.push({ at: now, tick: time });
+    this.#pace = this.#pace.filter((entry) => now - entry.at < 2000);
+    const first = this.#pace[0]!;
+    const moving = this.#pace.length > 2 && now > first.at;
+    const speed = moving ? ((time - first.tick) * run.tickSeconds * 1000) / (now - first.at) : undefined;
+    showFrame(run, frame, time, speed === undefined || speed < 0 ? undefined : speed);
+    setText("clock", `${(time * run.tickSeconds).toFixed(2)} / ${(run.lastTick * run.tickSeconds).toFixed(1)} s`);
+    if (document.activeElement !== this.#line || this.#playback.playing || this.#playback.live) this.#line.value = String(time);
+    this.#line.setAttribute("aria-valuetext", `${(time * run.tickSeconds).toFixed(1)} seconds`);
+    if (this.#selected !== undefined) showRobot(run, frame, this.#selected, this.#counts);
+    this.#buttons();
+  }
+
+  // What the viewer does.
+
+  get #paused(): boolean {
+    return this.#playback.live ? this.#status?.phase === "paused" : !this.#playback.playing;
+  }
+
+  #buttons(): void {
+    const live = this.#playback.live;
+    const phase = this.#status?.phase;
+    const steers = !live || (this.#maySteer && (phase === "running" || phase === "paused"));
+    const play = element<HTMLButtonElement>("play");
+    const label = this.#paused ? (live ? "Continue" : "Play") : "Pause";
+    if (play.getAttribute("aria-label") !== label) {
+      play.setAttribute("aria-label", label);
+      play.classList.toggle("paused", this.#paused);
+    }
+    play.disabled = !steers;
+    element<HTMLButtonElement>("forward").disabled = !steers || (live && phase !== "paused");
+    element("stop").hidden = !live || !steers;
+    const badge = element("phase");
+    badge.hidden = !this.#run;
+    setText("phase", live ? `live: ${phase ?? "waiting"}` : "recorded");
+  }
+
+  #playOrPause(): void {
+    if (this.#playback.live) this.#connection.send({ do: this.#paused ? "continue" : "pause" });
+    else this.#playback.toggle();
+    this.#stale = true;
+    this.#buttons();
+  }
+
+  #seek(tick: number): void {
+    this.#playback.seek(tick);
+    this.#pace = [];
+    this.#stale = true;
+  }
+
+  #step(direction: 1 | -1): void {
+    this.#pace = [];
+    if (!this.#playback.live) this.#playback.step(direction);
+    else if (direction > 0 && this.#paused) this.#connection.send({ do: "step", steps: 1 });
+    this.#stale = true;
+  }
+
+  #select(robot: number | undefined): void {
+    this.#selected = robot;
+    this.#trail = [];
+    this.#mayTrail = 0;
+    this.#stale = true;
+    if (robot === undefined) {
+      element("robot").hidden = true;
+      return;
+    }
+    this.#connection.send({ do: "robot", robot });
+    if (!this.#playback.live) this.#askTrail();
+    if (this.#run && this.#playback.current) showRobot(this.#run, this.#playback.current, robot, this.#counts);
+  }
+
+  #clicked(px: number, py: number): void {
+    const frame = this.#playback.current;
+    if (!this.#run || !frame) return;
+    const [x, y] = this.#camera.toArena(px, py);
+    let nearest: number | undefined;
+    let least = Math.max(this.#run.robotRadius, CLICK_REACH_PX / this.#camera.pxPerMm);
+    for (let robot = 0; robot < frame.robots; ++robot) {
+      if (lifeOf(frame.state[robot]!) === LIFE_ABSENT) continue;
+      const [a, b] = this.#placeOf(robot);
+      const distance = Math.hypot(a - x, b - y);
+      if (distance < least) [nearest, least] = [robot, distance];
+    }
+    this.#select(nearest);
+  }
+
+  #find(): void {
+    const robot = element<HTMLInputElement>("find-id").valueAsNumber;
+    if (!this.#run || !(robot >= 0 && robot < this.#run.robots)) {
+      notice(`There is no such robot; robots are numbered from 0 to ${(this.#run?.robots ?? 1) - 1}.`);
+      return;
+    }
+    this.#select(robot);
+  }
+
+  #zoom(factor: number): void {
+    this.#fitted = false;
+    this.#camera.zoomAt(this.#camera.width / 2, this.#camera.height / 2, factor);
+    this.#stale = true;
+  }
+
+  #fit(): void {
+    this.#fitted = true;
+    element<HTMLInputElement>("follow").checked = false;
+    this.#stale = true;
+  }
+
+  #toggleTrails(): void {
+    this.#trails = !this.#trails;
+    element("trails").setAttribute("aria-pressed", String(this.#trails));
+    if (!this.#trails) this.#renderer.forgetTrails();
+    this.#stale = true;
+  }
+
+  #toggleHelp(show?: boolean): void {
+    const panel = element("help-panel");
+    panel.hidden = show === undefined ? !panel.hidden : !show;
+    element("help").setAttribute("aria-expanded", String(!panel.hidden));
+  }
+
+  /** Saves picture and labels as one PNG. */
+  #save(): void {
+    this.#draw(); // the picture's memory lasts until the browser shows it
+    const copy = document.createElement("canvas");
+    [copy.width, copy.height] = [this.#picture.width, this.#picture.height];
+    const context = copy.getContext("2d")!;
+    context.drawImage(this.#picture, 0, 0);
+    const labels = element<HTMLCanvasElement>("labels");
+    if (labels.width > 0 && labels.height > 0) context.drawImage(labels, 0, 0, copy.width, copy.height);
+    copy.toBlob((blob) => {
+      if (!blob) return;
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(blob);
+      link.download = `${this.#run?.name ?? "kilotwin"}-${Math.floor(this.#playback.time)}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    });
+  }
+
+  #listen(): void {
+    const on = (id: string, act: () => void): void => element(id).addEventListener("click", act);
+    on("play", () => this.#playOrPause());
+    on("back", () => this.#step(-1));
+    on("forward", () => this.#step(1));
+    on("stop", () => {
+      if (confirm("Stop the run for good? What was recorded stays.")) this.#connection.send({ do: "stop" });
+    });
+    on("zoom-in", () => this.#zoom(1.4));
+    on("zoom-out", () => this.#zoom(1 / 1.4));
+    on("fit", () => this.#fit());
+    on("trails", () => this.#toggleTrails());
+    on("save", () => this.#save());
+    on("theme", () => this.#theme.toggle());
+    on("help", () => this.#toggleHelp());
+    for (const id of ["follow", "range"]) element(id).addEventListener("change", () => (this.#stale = true));
+    element("find").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#find();
+    });
+    element<HTMLSelectElement>("speed").addEventListener("change", (event) => {
+      this.#playback.speed = Number((event.target as HTMLSelectElement).value);
+    });
+    this.#line.addEventListener("input", () => {
+      this.#seek(Number(this.#line.value));
+    });
+    listenToPointer(this.#picture, this.#camera, {
+      moved: () => {
+        this.#fitted = false;
+        this.#stale = true;
+      },
+      dragged: () => (element<HTMLInputElement>("follow").checked = false),
+      clicked: (px, py) => this.#clicked(px, py),
+    });
+    window.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  #key(event: KeyboardEvent): void {
+    const typing = event.target instanceof HTMLInputElement && event.target.type === "number";
+    const onControl = event.target instanceof HTMLButtonElement || event.target instanceof HTMLSelectElement || event.target === this.#line;
+    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    const run = this.#run;
+    const jump = run ? SEEK_S / run.tickSeconds : 0;
+    const keys: Record<string, () => void> = {
+      ".": () => this.#step(1),
+      ",": () => this.#step(-1),
+      "+": () => this.#zoom(1.4),
+      "=": () => this.#zoom(1.4),
+      "-": () => this.#zoom(1 / 1.4),
+      "0": () => this.#fit(),
+      t: () => this.#toggleTrails(),
+      d: () => this.#theme.toggle(),
+      s: () => this.#save(),
+      f: () => element("follow").click(),
+      "?": () => this.#toggleHelp(),
+      Escape: () => {
+        this.#toggleHelp(false);
+        this.#select(undefined);
+      },
+    };
+    // These belong to the control that has the focus.
+    if (!onControl || event.target === this.#line) keys[" "] = () => this.#playOrPause();
+    if (!onControl) {
+      keys["ArrowLeft"] = () => this.#seek(this.#playback.time - jump);
+      keys["ArrowRight"] = () => this.#seek(this.#playback.time + jump);
+    }
+    const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act) return;
+    event.preventDefault();
+    act();
+    this.#stale = true;
+  }
+}
+
+declare global {
+  interface Window {
+    /** For tests: what the page has drawn and received. */
+    kilotwin?: Page["counters"];
+  }
+}
+
+try {
+  window.kilotwin = new Page().counters;
+} catch (error) {
+  notice(`The page cannot start: ${error instanceof Error ? error.message : String(error)}.`);
+}

@@ -1,0 +1,170 @@
+// What the gateway sends: JSON messages and binary frames. clients/view/frame_code.hpp and run_text.cpp write them.
+
+export interface Group {
+  first: number;
+  count: number;
+  kind: "native" | "firmware" | "tracked";
+  immobile: boolean;
+  program: string;
+}
+
+/** A convex shape about its centre, mm: a disc or a polygon. */
+export interface Shape {
+  radius?: number;
+  corners?: [number, number][];
+}
+
+export interface Circle {
+  x: number;
+  y: number;
+  radius: number;
+  name: string;
+}
+
+/** What stays the same during a run. Lengths in mm. */
+export interface Run {
+  type: "run";
+  source: "live" | "recorded";
+  name: string;
+  run: string;
+  seed: string;
+  tickSeconds: number;
+  firstTick: number;
+  lastTick: number;
+  robots: number;
+  states: number;
+  gridLowest: number;
+  gridStep: number;
+  robotRadius: number;
+  radioRange: number;
+  arena: { halfWidth: number; halfHeight: number; radius?: number; corners?: [number, number][] };
+  obstacles: (Shape & { pose: [number, number, number] })[];
+  movables: Shape[];
+  lamps: { x: number; y: number }[];
+  circles: Circle[];
+  groups: Group[];
+}
+
+export interface Status {
+  type: "status";
+  phase: "starting" | "running" | "paused" | "ended" | "broken";
+  tick: number;
+  lastTick: number;
+  simulatedSeconds: number;
+  wallSeconds: number;
+  failed: number;
+  sent: number;
+  received: number;
+  note: string;
+}
+
+/** `rgba` is base64: the raster row by row from the top, and the colour of each circle. */
+export interface Floor {
+  columns: number;
+  rows: number;
+  rgba: string;
+  circles: (Circle & { rgba: string })[];
+}
+
+export interface RobotCounts {
+  type: "robot";
+  robot: number;
+  radio?: { attempted: number; sent: number; received: number; collided: number; backedOff: number };
+  heard?: { robot: number; count: number }[];
+  heardBy?: { robot: number; count: number }[];
+}
+
+export type Message =
+  | Run
+  | Status
+  | RobotCounts
+  | { type: "extent"; lastTick: number; states: number }
+  | { type: "floors"; floors: Floor[] }
+  | { type: "trail"; robot: number; xy: number[] }
+  | { type: "grant"; steer: boolean }
+  | { type: "notice"; text: string };
+
+/** The state of all robots at one tick: views into the message's own memory. */
+export interface Frame {
+  request: number;
+  tick: number;
+  nextTick: number;
+  robots: number;
+  /** x, y and heading of movable bodies, column after column. */
+  movables: Float32Array;
+  x: Uint16Array;
+  y: Uint16Array;
+  headingLed: Uint16Array;
+  state: Uint8Array;
+  bytes: number;
+}
+
+const MAGIC = 0x3156544b;
+const HEADER_BYTES = 32;
+const MOVABLE_BYTES = 12;
+const ROBOT_BYTES = 7;
+
+/** Undefined where the message is no frame. */
+export function decodeFrame(data: ArrayBuffer): Frame | undefined {
+  if (data.byteLength < HEADER_BYTES) return undefined;
+  const header = new DataView(data);
+  const robots = header.getUint32(24, true);
+  const movables = header.getUint32(28, true);
+  if (header.getUint32(0, true) !== MAGIC) return undefined;
+  if (data.byteLength !== HEADER_BYTES + movables * MOVABLE_BYTES + robots * ROBOT_BYTES) return undefined;
+  const columns = HEADER_BYTES + movables * MOVABLE_BYTES;
+  return {
+    request: header.getUint32(4, true),
+    tick: header.getFloat64(8, true),
+    nextTick: header.getFloat64(16, true),
+    robots,
+    movables: new Float32Array(data, HEADER_BYTES, 3 * movables),
+    x: new Uint16Array(data, columns, robots),
+    y: new Uint16Array(data, columns + 2 * robots, robots),
+    headingLed: new Uint16Array(data, columns + 4 * robots, robots),
+    state: new Uint8Array(data, columns + 6 * robots, robots),
+    bytes: data.byteLength,
+  };
+}
+
+export const headingOf = (headingLed: number): number => ((headingLed >> 6) / 1024) * 2 * Math.PI;
+/** Red, green and blue, 0 to 3 each. */
+export const ledOf = (headingLed: number): [number, number, number] => [
+  headingLed & 3,
+  (headingLed >> 2) & 3,
+  (headingLed >> 4) & 3,
+];
+
+export const LIFE_ABSENT = 13;
+export const LIFE_FLAT = 14;
+export const LIFE_FAILED = 15;
+export const lifeOf = (state: number): number => state & 15;
+export const leftMotorOn = (state: number): boolean => (state & 16) !== 0;
+export const rightMotorOn = (state: number): boolean => (state & 32) !== 0;
+
+const LIFE_NAMES: Record<number, string> = {
+  0: "sleeping",
+  1: "idle",
+  2: "shows its battery",
+  3: "setup",
+  4: "running",
+  5: "charging",
+  6: "moving",
+  [LIFE_ABSENT]: "absent",
+  [LIFE_FLAT]: "battery flat",
+  [LIFE_FAILED]: "failed",
+};
+export const lifeName = (life: number): string => LIFE_NAMES[life] ?? `life cycle ${life}`;
+
+export const KINDS = { native: 0, firmware: 1, tracked: 2 } as const;
+
+/** The kind of each robot, as a number of KINDS. */
+export function kindsOf(run: Run): Uint8Array {
+  const kinds = new Uint8Array(run.robots);
+  for (const group of run.groups) kinds.fill(KINDS[group.kind], group.first, group.first + group.count);
+  return kinds;
+}
+
+export function groupOf(run: Run, robot: number): Group | undefined {
+  return run.groups.find((group) => robot >= group.first && robot < group.first + group.count);
+}

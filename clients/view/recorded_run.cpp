@@ -1,0 +1,228 @@
+#include "clients/view/recorded_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.hpp"
+#include "idl/manifest.pb.h"
+
+namespace kilotwin::view {
+namespace fs = std::filesystem;
+namespace {
+
+using recorder::StateIndex;
+
+/// A trail has so many points at most, and reads so many bytes of states at most.
+constexpr std::size_t kTrailPoints = 400, kTrailBytes = 48'000'000, kStateBytesPerRobot = 26;
+/// Pairs of robots that are listed for one robot.
+constexpr std::size_t kMostPartners = 8;
+
+fs::path recording_of(const fs::path& run) {
+  return recorder::RunDirectory::open(run, recorder::RunDirectory::Needs::kRecording).recording();
+}
+
+/// What the header says of an experiment, for recordings without their run directory.
+proto::Experiment experiment_of(const proto::RecordingHeader& header) {
+  proto::Experiment experiment;
+  if (header.has_arena()) {
+    *experiment.mutable_arena() = header.arena();
+  } else {
+    experiment.mutable_arena()->set_width_mm(header.arena_width_mm());
+    experiment.mutable_arena()->set_height_mm(header.arena_height_mm());
+  }
+  *experiment.mutable_obstacle() = header.obstacle();
+  *experiment.mutable_movable() = header.movable();
+  *experiment.mutable_light() = header.light();
+  *experiment.mutable_station()->mutable_environment() = header.environment();
+  for (const std::uint32_t count : header.group_robots()) experiment.add_robots()->set_count(count);
+  return experiment;
+}
+
+std::vector<bool> firmware_of(const proto::Manifest& manifest) {
+  std::vector<bool> firmware;
+  for (const std::uint32_t program : manifest.group_program()) {
+    firmware.push_back(program < static_cast<std::uint32_t>(manifest.program_size()) &&
+                       manifest.program(static_cast<int>(program)).firmware());
+  }
+  return firmware;
+}
+
+std::span<const std::uint8_t> octets(const std::string& bytes) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
+}
+
+/// The robots that `robot` exchanged most messages with: {"robot", "count"} in descending order.
+nlohmann::json partners(const std::map<std::uint32_t, std::uint32_t>& counts) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> list(counts.begin(), counts.end());
+  std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  if (list.size() > kMostPartners) list.resize(kMostPartners);
+  nlohmann::json text = nlohmann::json::array();
+  for (const auto& [robot, count] : list) text.push_back({{"robot", robot}, {"count", count}});
+  return text;
+}
+
+}  // namespace
+
+RecordedRun::RecordedRun(const fs::path& run) : reader_(recording_of(run)), index_(reader_.path()) {
+  index_.update();
+  if (index_.states().empty())
+    throw UserError(fmt::format("{}: has no state yet; expected a run that has begun", reader_.path().string()));
+  const fs::path manifest = reader_.path().parent_path() / "manifest.pb";
+  auto experiment = std::make_unique<proto::Experiment>(experiment_of(reader_.header()));
+  if (fs::exists(manifest)) {
+    const auto directory = recorder::RunDirectory::open(run, recorder::RunDirectory::Needs::kManifest);
+    const proto::Manifest resolved = directory.read_manifest();
+    // A recording under another name may lie in the directory of another run.
+    if (resolved.run() == reader_.header().run()) {
+      *experiment = resolved.experiment();
+      firmware_ = firmware_of(resolved);
+    }
+  }
+  grid_ = grid_of(*experiment);
+  experiment_ = std::move(experiment);
+}
+
+RecordedRun::~RecordedRun() = default;
+
+std::string RecordedRun::text() const {
+  const std::lock_guard lock(mutex_);
+  const proto::RecordingHeader& header = reader_.header();
+  RunOutline outline;
+  outline.name = header.name();
+  outline.run = header.run();
+  outline.seed = header.seed();
+  outline.tick_s = reader_.tick_length().seconds();
+  outline.first_tick = index_.states().front().tick;
+  outline.last_tick = index_.states().back().tick;
+  outline.robots = header.robots();
+  outline.states = index_.states().size();
+  outline.firmware = firmware_;
+  return run_text(outline, *experiment_);
+}
+
+std::size_t RecordedRun::states() const {
+  const std::lock_guard lock(mutex_);
+  return index_.states().size();
+}
+
+std::string RecordedRun::grown() {
+  const std::lock_guard lock(mutex_);
+  const std::size_t before = index_.states().size();
+  index_.update();
+  if (index_.states().size() == before) return {};
+  return fmt::format("{{\"type\":\"extent\",\"lastTick\":{},\"states\":{}}}", index_.states().back().tick,
+                     index_.states().size());
+}
+
+/// Valid until the next call; nullptr where the file is damaged there.
+const proto::Record* RecordedRun::record_at(std::uint64_t offset) {
+  reader_.go_to(offset);
+  return reader_.next();
+}
+
+const proto::StateRecord* RecordedRun::state(std::size_t number) {
+  const proto::Record* const record = record_at(index_.states()[number].offset);
+  return record != nullptr && record->has_state() ? &record->state() : nullptr;
+}
+
+std::string RecordedRun::frame_at(std::int64_t tick, std::uint32_t request) {
+  const std::lock_guard lock(mutex_);
+  const std::size_t number = index_.at_or_before(tick);
+  const proto::StateRecord* const at = state(number);
+  if (at == nullptr) return {};
+  FrameColumns columns;
+  columns.x_mm = recorder::values(at->x_mm());
+  columns.y_mm = recorder::values(at->y_mm());
+  columns.heading_rad = recorder::values(at->heading_rad());
+  columns.led = octets(at->led());
+  columns.life_cycle = octets(at->life_cycle());
+  columns.movable_x_mm = recorder::values(at->movable_x_mm());
+  columns.movable_y_mm = recorder::values(at->movable_y_mm());
+  columns.movable_heading_rad = recorder::values(at->movable_heading_rad());
+  const std::vector<StateIndex::Entry>& states = index_.states();
+  const std::int64_t next = number + 1 < states.size() ? states[number + 1].tick : at->tick();
+  return encode_frame({request, at->tick(), next}, columns, grid_);
+}
+
+std::uint64_t RecordedRun::floors_version(std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  const auto& floors = index_.floors();
+  return static_cast<std::uint64_t>(
+      std::count_if(floors.begin(), floors.end(), [tick](const auto& entry) { return entry.tick <= tick; }));
+}
+
+std::string RecordedRun::floors_at(std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  std::map<std::uint32_t, proto::FloorRecord> newest;  // by environment
+  // Backwards: most environments paint often, and only their newest floor counts.
+  const auto environments = static_cast<std::size_t>(std::max(1, experiment_->station().environment_size()));
+  for (auto entry = index_.floors().rbegin(); entry != index_.floors().rend(); ++entry) {
+    if (entry->tick > tick) continue;
+    if (newest.size() == environments) break;
+    const proto::Record* const record = record_at(entry->offset);
+    if (record != nullptr && record->has_floor())
+      newest.try_emplace(record->floor().environment(), record->floor());
+  }
+  std::vector<proto::FloorRecord> list;
+  for (auto& [environment, floor] : newest) list.push_back(std::move(floor));
+  return floors_text(list);
+}
+
+std::string RecordedRun::trail(std::uint32_t robot, std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  if (robot >= reader_.header().robots()) return notice_text(fmt::format("There is no robot {}.", robot));
+  const std::size_t affordable =
+      std::clamp<std::size_t>(kTrailBytes / (kStateBytesPerRobot * reader_.header().robots()), 2, kTrailPoints);
+  const std::size_t last = index_.at_or_before(tick);
+  const std::size_t stride = last / affordable + 1;
+  std::vector<double> xy_mm;
+  // The last point is the state at the tick.
+  for (std::size_t number = last % stride; number <= last; number += stride) {
+    const proto::StateRecord* const at = state(number);
+    if (at == nullptr) continue;
+    xy_mm.push_back(at->x_mm(static_cast<int>(robot)));
+    xy_mm.push_back(at->y_mm(static_cast<int>(robot)));
+  }
+  return trail_text(robot, xy_mm);
+}
+
+std::string RecordedRun::robot(std::uint32_t robot) {
+  const std::lock_guard lock(mutex_);
+  if (robot >= reader_.header().robots()) return notice_text(fmt::format("There is no robot {}.", robot));
+  nlohmann::json text{{"type", "robot"}, {"robot", robot}};
+  const auto i = static_cast<int>(robot);
+  if (index_.radio()) {
+    const proto::Record* const record = record_at(*index_.radio());
+    if (record != nullptr && record->has_radio() && i < record->radio().attempted_size()) {
+      const proto::RadioRecord& radio = record->radio();
+      const auto at = [i](const auto& column) { return i < column.size() ? column[i] : 0u; };
+      text["radio"] = {{"attempted", at(radio.attempted())},
+                       {"sent", at(radio.sent())},
+                       {"received", at(radio.received())},
+                       {"collided", at(radio.collided())},
+                       {"backedOff", at(radio.backed_off())}};
+    }
+  }
+  if (index_.messages()) {
+    const proto::Record* const record = record_at(*index_.messages());
+    if (record != nullptr && record->has_messages()) {
+      const proto::MessagesRecord& messages = record->messages();
+      std::map<std::uint32_t, std::uint32_t> heard, heard_by;
+      for (int k = 0; k < messages.receiver_size(); ++k) {
+        if (messages.receiver(k) == messages.sender(k)) continue;
+        if (messages.receiver(k) == robot) heard[messages.sender(k)] += messages.count(k);
+        if (messages.sender(k) == robot) heard_by[messages.receiver(k)] += messages.count(k);
+      }
+      text["heard"] = partners(heard);
+      text["heardBy"] = partners(heard_by);
+    }
+  }
+  return text.dump();
+}
+
+std::string RecordedRun::steer(const Request&) { return "A recorded run cannot be steered."; }
+
+}  // namespace kilotwin::view

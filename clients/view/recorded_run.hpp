@@ -1,0 +1,51 @@
+/// RecordedRun: a recording at any time, by the index of its states. A recording may still grow.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <mutex>
+
+#include "clients/recorder/reader.hpp"
+#include "clients/recorder/run_directory.hpp"
+#include "clients/recorder/state_index.hpp"
+#include "clients/view/frame_code.hpp"
+#include "clients/view/gateway.hpp"
+#include "clients/view/run_text.hpp"
+
+namespace kilotwin::view {
+
+class RecordedRun : public Answers {
+ public:
+  /// Opens a run directory, or a recording alone. Throws UserError if it is none, or has no state.
+  explicit RecordedRun(const std::filesystem::path& run);
+  ~RecordedRun() override;
+
+  /// The message of type "run".
+  [[nodiscard]] std::string text() const;
+  /// Looks for new states. Returns a message of type "extent" where there are some, else empty.
+  [[nodiscard]] std::string grown();
+  [[nodiscard]] std::size_t states() const;
+  [[nodiscard]] const std::string& name() const { return reader_.header().name(); }
+  [[nodiscard]] std::uint32_t robots() const { return reader_.header().robots(); }
+
+  // Answers.
+  [[nodiscard]] std::string frame_at(std::int64_t tick, std::uint32_t request) override;
+  [[nodiscard]] std::uint64_t floors_version(std::int64_t tick) override;
+  [[nodiscard]] std::string floors_at(std::int64_t tick) override;
+  [[nodiscard]] std::string trail(std::uint32_t robot, std::int64_t tick) override;
+  [[nodiscard]] std::string robot(std::uint32_t robot) override;
+  [[nodiscard]] std::string steer(const Request&) override;
+
+ private:
+  [[nodiscard]] const proto::StateRecord* state(std::size_t number);
+  [[nodiscard]] const proto::Record* record_at(std::uint64_t offset);
+
+  mutable std::mutex mutex_;  // the gateway's thread answers, another one looks whether the recording grows
+  recorder::Reader reader_;
+  recorder::StateIndex index_;
+  std::unique_ptr<const proto::Experiment> experiment_;
+  std::vector<bool> firmware_;
+  PositionGrid grid_;
+};
+
+}  // namespace kilotwin::view

@@ -1,0 +1,77 @@
+#include "clients/view/request.hpp"
+
+#include <array>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+namespace kilotwin::view {
+namespace {
+
+using nlohmann::json;
+using Kind = Request::Kind;
+
+constexpr std::array<std::pair<std::string_view, Kind>, 9> kKinds{{{"hello", Kind::kHello},
+                                                                   {"next", Kind::kNext},
+                                                                   {"at", Kind::kAt},
+                                                                   {"trail", Kind::kTrail},
+                                                                   {"robot", Kind::kRobot},
+                                                                   {"pause", Kind::kPause},
+                                                                   {"continue", Kind::kContinue},
+                                                                   {"step", Kind::kStep},
+                                                                   {"stop", Kind::kStop}}};
+
+/// A whole number of the object, at least `lowest`; nothing where it is absent or another value.
+template <class Whole> std::optional<Whole> whole(const json& object, const char* key, std::int64_t lowest) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_number_integer()) return std::nullopt;
+  if (found->is_number_unsigned() &&
+      found->get<std::uint64_t>() > static_cast<std::uint64_t>(std::numeric_limits<Whole>::max()))
+    return std::nullopt;
+  const auto value = found->get<std::int64_t>();
+  if (value < lowest) return std::nullopt;
+  return static_cast<Whole>(value);
+}
+
+/// Takes a field that the request must have.
+template <class Whole> bool take(const json& object, const char* key, std::int64_t lowest, Whole& to) {
+  const std::optional<Whole> value = whole<Whole>(object, key, lowest);
+  if (value) to = *value;
+  return value.has_value();
+}
+
+bool take_fields(const json& object, Request& request) {
+  switch (request.kind) {
+    case Kind::kHello: {
+      const auto token = object.find("token");
+      if (token == object.end() || !token->is_string()) return false;
+      request.token = token->get<std::string>();
+      return true;
+    }
+    case Kind::kAt: return take(object, "tick", 0, request.tick) && take(object, "request", 1, request.number);
+    case Kind::kTrail: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
+    case Kind::kRobot: return take(object, "robot", 0, request.robot);
+    case Kind::kStep: return take(object, "steps", 1, request.steps) && request.steps <= kMostSteps;
+    default: return true;
+  }
+}
+
+}  // namespace
+
+std::optional<Request> parse_request(std::string_view text) {
+  if (text.size() > kLongestRequest_bytes) return std::nullopt;
+  const json object = json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!object.is_object()) return std::nullopt;
+  const auto word = object.find("do");
+  if (word == object.end() || !word->is_string()) return std::nullopt;
+  for (const auto& [name, kind] : kKinds) {
+    if (word->get_ref<const std::string&>() != name) continue;
+    Request request;
+    request.kind = kind;
+    if (!take_fields(object, request)) return std::nullopt;
+    return request;
+  }
+  return std::nullopt;
+}
+
+}  // namespace kilotwin::view

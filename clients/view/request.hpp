@@ -1,0 +1,37 @@
+/// What a viewer asks for: one JSON object per message, at most kLongestRequest_bytes.
+///
+///   {"do": "hello", "token": "..."}      shows that it may steer the run
+///   {"do": "next"}                       the next state of a live run, once
+///   {"do": "at", "tick": T, "request": N}    the recorded state at or before tick T
+///   {"do": "trail", "robot": R, "tick": T}   the recorded path of a robot up to tick T
+///   {"do": "robot", "robot": R}          counters of a robot
+///   {"do": "pause"} {"do": "continue"} {"do": "step", "steps": N} {"do": "stop"}
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace kilotwin::view {
+
+inline constexpr std::size_t kLongestRequest_bytes = 512;
+inline constexpr std::uint32_t kMostSteps = 1'000'000;
+
+struct Request {
+  enum class Kind : std::uint8_t { kHello, kNext, kAt, kTrail, kRobot, kPause, kContinue, kStep, kStop };
+  Kind kind = Kind::kNext;
+  std::string token;         ///< with kHello
+  std::int64_t tick = 0;     ///< with kAt and kTrail
+  std::uint32_t number = 0;  ///< with kAt
+  std::uint32_t robot = 0;   ///< with kTrail and kRobot
+  std::uint32_t steps = 1;   ///< with kStep
+
+  [[nodiscard]] bool steers() const { return kind >= Kind::kPause; }
+};
+
+/// Nothing where the text is no request.
+[[nodiscard]] std::optional<Request> parse_request(std::string_view text);
+
+}  // namespace kilotwin::view

@@ -1,0 +1,177 @@
+#include "clients/view/run_text.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/base/pose.hpp"
+#include "core/plan/world.hpp"
+#include "idl/experiment.pb.h"
+#include "idl/recording.pb.h"
+
+namespace kilotwin::view {
+namespace {
+
+using nlohmann::json;
+
+/// Bytes that are no UTF-8 become replacement characters.
+std::string text_of(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+json corners_of(const std::vector<Point2>& corners) {
+  json list = json::array();
+  for (const Point2 corner : corners) list.push_back({corner.x_mm, corner.y_mm});
+  return list;
+}
+
+json shape_of_body(const Convex& shape) {
+  if (shape.is_disc()) return {{"radius", shape.radius_mm()}};
+  return {{"corners", corners_of(shape.corners())}};
+}
+
+json arena_of(const ArenaShape& arena) {
+  json text{{"halfWidth", arena.half_width_mm()}, {"halfHeight", arena.half_height_mm()}};
+  if (arena.kind() == ArenaShape::Kind::kCircle) text["radius"] = arena.radius_mm();
+  if (arena.kind() == ArenaShape::Kind::kPolygon) text["corners"] = corners_of(arena.corners());
+  return text;
+}
+
+json obstacles_of(const World& world) {
+  json list = json::array();
+  for (const ObstacleBody& body : world.obstacles) {
+    json one = shape_of_body(body.shape);
+    one["pose"] = {body.place.x_mm, body.place.y_mm, body.heading_rad};
+    list.push_back(std::move(one));
+  }
+  return list;
+}
+
+json movables_of(const World& world) {
+  json list = json::array();
+  for (const MovableBodyModel& body : world.movables) list.push_back(shape_of_body(body.shape));
+  return list;
+}
+
+const char* kind_of(const proto::RobotGroup& group, bool firmware) {
+  if (group.body() == proto::RobotGroup::TRACKED) return "tracked";
+  return firmware ? "firmware" : "native";
+}
+
+json groups_of(const RunOutline& outline, const proto::Experiment& experiment) {
+  json list = json::array();
+  std::uint64_t first = 0;
+  for (int i = 0; i < experiment.robots_size(); ++i) {
+    const proto::RobotGroup& group = experiment.robots(i);
+    const auto number = static_cast<std::size_t>(i);
+    const bool firmware = group.avr() || (number < outline.firmware.size() && outline.firmware[number]);
+    list.push_back({{"first", first},
+                    {"count", group.count()},
+                    {"kind", kind_of(group, firmware)},
+                    {"immobile", group.immobile()},
+                    {"program", group.behaviour_size() > 0 ? group.behaviour(0) : ""}});
+    first += group.count();
+  }
+  return list;
+}
+
+/// Lamps that stand still.
+json lamps_of(const proto::Experiment& experiment) {
+  json list = json::array();
+  for (const proto::LightSource& source : experiment.light().source()) {
+    if (!source.has_circle() && source.waypoint_size() == 0)
+      list.push_back({{"x", source.x_mm()}, {"y", source.y_mm()}});
+  }
+  return list;
+}
+
+/// Circles of the environments that Kilotwin brings: food, home, a hub.
+json circles_of(const proto::Experiment& experiment) {
+  json list = json::array();
+  const auto add = [&list](double x, double y, double radius, const char* name) {
+    list.push_back({{"x", x}, {"y", y}, {"radius", radius}, {"name", name}});
+  };
+  for (const proto::VirtualEnvironment& environment : experiment.station().environment()) {
+    if (environment.has_hub()) {
+      const proto::HubEnvironment& hub = environment.hub();
+      add(hub.x_mm(), hub.y_mm(), hub.radius_mm(), "hub");
+    }
+    if (environment.has_foraging()) {
+      const proto::ForagingEnvironment& foraging = environment.foraging();
+      add(foraging.food_x_mm(), foraging.food_y_mm(), foraging.food_radius_mm(), "food");
+      add(foraging.home_x_mm(), foraging.home_y_mm(), foraging.home_radius_mm(), "home");
+    }
+  }
+  return list;
+}
+
+std::string base64(const std::string& bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      three = three << 8 | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : kDigits[three >> (18 - 6 * k) & 63u];
+  }
+  return text;
+}
+
+json floor_of(const proto::FloorRecord& floor) {
+  json circles = json::array();
+  for (int i = 0; i < floor.circle_name_size(); ++i) {
+    circles.push_back({{"x", floor.circle_mm(3 * i)},
+                       {"y", floor.circle_mm(3 * i + 1)},
+                       {"radius", floor.circle_mm(3 * i + 2)},
+                       {"rgba", base64(floor.circle_rgba().substr(static_cast<std::size_t>(4 * i), 4))},
+                       {"name", floor.circle_name(i)}});
+  }
+  return {
+      {"columns", floor.columns()}, {"rows", floor.rows()}, {"rgba", base64(floor.rgba())}, {"circles", circles}};
+}
+
+}  // namespace
+
+std::string run_text(const RunOutline& outline, const proto::Experiment& experiment) {
+  const World world(experiment);
+  const PositionGrid grid = grid_of(experiment);
+  return text_of({{"type", "run"},
+                  {"source", outline.live ? "live" : "recorded"},
+                  {"name", outline.name},
+                  {"run", fmt::format("{:016x}", outline.run)},
+                  {"seed", std::to_string(outline.seed)},
+                  {"tickSeconds", outline.tick_s},
+                  {"firstTick", outline.first_tick},
+                  {"lastTick", outline.last_tick},
+                  {"robots", outline.robots},
+                  {"states", outline.states},
+                  {"gridLowest", grid.lowest_mm},
+                  {"gridStep", grid.step_mm},
+                  {"robotRadius", kRobotRadius_mm},
+                  {"radioRange", experiment.radio().range_mm()},
+                  {"arena", arena_of(world.arena)},
+                  {"obstacles", obstacles_of(world)},
+                  {"movables", movables_of(world)},
+                  {"lamps", lamps_of(experiment)},
+                  {"circles", circles_of(experiment)},
+                  {"groups", groups_of(outline, experiment)}});
+}
+
+PositionGrid grid_of(const proto::Experiment& experiment) {
+  const ArenaShape arena(experiment.arena());
+  return PositionGrid::over(arena.half_width_mm(), arena.half_height_mm());
+}
+
+std::string floors_text(const std::vector<proto::FloorRecord>& floors) {
+  json list = json::array();
+  for (const proto::FloorRecord& floor : floors) list.push_back(floor_of(floor));
+  return text_of({{"type", "floors"}, {"floors", list}});
+}
+
+std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm) {
+  return text_of({{"type", "trail"}, {"robot", robot}, {"xy", xy_mm}});
+}
+
+std::string notice_text(const std::string& line) { return text_of({{"type", "notice"}, {"text", line}}); }
+
+}  // namespace kilotwin::view

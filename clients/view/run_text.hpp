@@ -1,0 +1,42 @@
+/// What viewers are told of a run, as JSON: its arena and bodies, its groups, and how frames are coded. Text in it may come
+/// from anywhere: it is valid UTF-8 and escaped, and the page shows it as text only.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "clients/view/frame_code.hpp"
+
+namespace kilotwin {
+namespace proto {
+class Experiment;
+class FloorRecord;
+}  // namespace proto
+
+namespace view {
+
+struct RunOutline {
+  bool live = false;
+  std::string name;
+  std::uint64_t run = 0, seed = 0;
+  double tick_s = 0;
+  std::int64_t first_tick = 0, last_tick = 0;
+  std::uint32_t robots = 0;
+  std::size_t states = 0;      ///< of a recording
+  std::vector<bool> firmware;  ///< per group: runs on the simulated processor; may be shorter
+};
+
+/// A message of type "run". Throws std::invalid_argument if a shape of the experiment is invalid.
+[[nodiscard]] std::string run_text(const RunOutline&, const proto::Experiment&);
+/// The grid of the frames of a run in this arena. Throws as run_text().
+[[nodiscard]] PositionGrid grid_of(const proto::Experiment&);
+/// A message of type "floors": what virtual environments paint.
+[[nodiscard]] std::string floors_text(const std::vector<proto::FloorRecord>&);
+/// A message of type "trail": where a robot was, oldest first, x and y in turn.
+[[nodiscard]] std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm);
+/// A message of type "notice": one line for whoever looks.
+[[nodiscard]] std::string notice_text(const std::string& line);
+
+}  // namespace view
+}  // namespace kilotwin

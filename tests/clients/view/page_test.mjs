@@ -1,0 +1,204 @@
+// node page_test.mjs KILOTWIN VIEW SAMPLES NPM SOURCES [PICTURES]: the page in headless Chromium, as people use it. With PICTURES,
+// screenshots go to that directory. Status 77: there is no Chromium or playwright-core.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import fs from "node:fs";
+import os from "node:os";
+import path from "node:path";
+import { Served, eventually, launchBrowser } from "./browser.mjs";
+
+const [kilotwin, viewProgram, samples, npm, sources, pictures] = process.argv.slice(2);
+const { browser, reason } = await launchBrowser(npm);
+if (reason) {
+  console.log(`skipped: ${reason}`);
+  process.exit(77);
+}
+const scratch = fs.mkdtempSync(path.join(os.tmpdir(), "kilotwin-page-"));
+const HALF_MM = 1000; // of the arena
+const started = [];
+
+async function serve(words) {
+  const served = await Served.start(words, scratch);
+  started.push(served);
+  return served;
+}
+
+/** A page that fails the test on any error, and on any request to another address. */
+async function open(address) {
+  const page = await browser.newPage({ viewport: { width: 1280, height: 720 } });
+  page.faults = [];
+  page.on("pageerror", (error) => page.faults.push(error.message));
+  page.on("console", (message) => {
+    // The browser reports every refused connection; the page tries again.
+    if (message.type() === "error" && !message.text().includes("ERR_CONNECTION_REFUSED")) page.faults.push(message.text());
+  });
+  page.on("request", (request) => {
+    if (new URL(request.url()).host !== new URL(address).host && !request.url().startsWith("blob:")) page.faults.push(request.url());
+  });
+  await page.goto(address);
+  await connected(page);
+  return page;
+}
+const text = (page, id) => page.locator(`#${id}`).textContent();
+const connected = (page) => eventually("connected", async () => (await page.locator("body").getAttribute("data-connection")) === "open");
+const received = (page) => page.evaluate(() => window.kilotwin.received);
+const drawn = (page) => page.evaluate(() => window.kilotwin.drawn);
+const clock = async (page) => Number.parseFloat(await text(page, "clock"));
+const press = (page, name) => page.getByRole("button", { name, exact: true }).click();
+const picture = async (page, name) => pictures && page.screenshot({ path: path.join(pictures, `${name}.png`) });
+
+/** Where a place of the arena is while the whole arena is shown. */
+async function onScreen(page, x, y) {
+  const box = await page.locator("#picture").boundingBox();
+  const pxPerMm = Math.min(box.width, box.height) / (2 * 1.06 * HALF_MM);
+  return [box.x + box.width / 2 + x * pxPerMm, box.y + box.height / 2 - y * pxPerMm];
+}
+
+/** Where robot `i` of the sample is: tests/clients/view/recordings.hpp. */
+function circling(i, time) {
+  const radius = 0.95 * HALF_MM * Math.sqrt((i + 0.5) / 1000);
+  const angle = 2.399963 * i + 0.02 * time;
+  return [radius * Math.cos(angle), radius * Math.sin(angle)];
+}
+
+async function recordedRun() {
+  const recording = path.join(scratch, "recording.ktrec");
+  execFileSync(samples, ["recording", recording, "1000", "200", "0.5"]);
+  const words = [viewProgram, "view", recording];
+  let served = await serve(words);
+  const page = await open(served.address);
+  await eventually("a picture", async () => (await received(page)) > 1 && (await drawn(page)) > 1);
+  assert.equal(await text(page, "name"), "circling");
+  assert.equal(await text(page, "count"), "1000");
+  assert.equal(await text(page, "phase"), "recorded");
+
+  // It plays by itself; pause stands still at a recorded state.
+  const before = await clock(page);
+  await eventually("time goes on", async () => (await clock(page)) > before + 0.2);
+  await press(page, "Pause");
+  await eventually("paused", async () => (await page.locator("#play").getAttribute("aria-label")) === "Play");
+  await page.locator("#line").fill("610"); // tick
+  await eventually("sought", async () => Math.abs((await clock(page)) - 610 * 0.032768) < 0.5);
+  const at = await clock(page);
+
+  // One state forward and back: half a second, to the tick.
+  await press(page, "One step forward");
+  await eventually("a step forward", async () => Math.abs((await clock(page)) - at - 0.5) < 0.034);
+  await page.keyboard.press(",");
+  await eventually("a step back", async () => Math.abs((await clock(page)) - at) < 0.001);
+
+  // A click selects the robot that is drawn there; a click beside robots selects none.
+  await page.locator("#picture").click({ position: { x: 5, y: 5 } });
+  assert.ok(await page.locator("#robot").isHidden());
+  const click = async (robot, dx = 0, dy = 0) => {
+    const [x, y] = await onScreen(page, ...circling(robot, await clock(page)));
+    await page.mouse.click(x + dx, y + dy);
+    await eventually(`robot ${robot}`, async () => (await text(page, "robot-title")) === `Robot ${robot}`);
+  };
+  await click(700);
+  await eventually("its counters", async () => (await text(page, "robot-facts")).includes("messages sent703"));
+  await picture(page, "recorded");
+
+  // Dragging moves the picture with the pointer: the robot is now 120 px further right and 40 px lower.
+  const box = await page.locator("#picture").boundingBox();
+  await page.mouse.move(box.x + 40, box.y + 300);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 100, box.y + 320, { steps: 4 });
+  await page.mouse.move(box.x + 160, box.y + 340, { steps: 4 });
+  await page.mouse.up();
+  await page.keyboard.press("Escape");
+  await click(701, 120, 40);
+
+  // Zoom, the other theme, and back to the whole arena.
+  const [x, y] = await onScreen(page, ...circling(701, await clock(page)));
+  await page.mouse.move(x + 120, y + 40);
+  for (let i = 0; i < 6; ++i) await page.mouse.wheel(0, -240);
+  const theme = () => page.locator("html").getAttribute("data-theme");
+  const was = await theme();
+  await page.keyboard.press("d");
+  assert.notEqual(await theme(), was);
+  await picture(page, "zoomed");
+  await page.keyboard.press("d");
+  await page.keyboard.press("0");
+  await click(3);
+  await page.locator("#find-id").fill("5000");
+  await press(page, "Select");
+  await eventually("no such robot", async () => (await text(page, "notice")).includes("0 to 999"));
+  const download = page.waitForEvent("download");
+  await press(page, "Save the picture as PNG");
+  const file = await (await download).path();
+  assert.equal(fs.readFileSync(file).subarray(1, 4).toString(), "PNG");
+
+  // The gateway ends and comes back: the page goes on where it was, without a reload.
+  const sought = await clock(page);
+  await served.stop();
+  await eventually("lost", async () => (await page.locator("body").getAttribute("data-connection")) === "lost");
+  const known = await received(page);
+  served = await serve([...words, "--port", String(served.port)]);
+  await connected(page);
+  await eventually("frames again", async () => (await received(page)) > known);
+  assert.equal(await clock(page), sought);
+  assert.equal(await text(page, "robot-title"), "Robot 3");
+  assert.deepEqual(page.faults, []);
+  await page.close();
+  assert.equal(await served.stop(), 0);
+}
+
+async function liveRun() {
+  const served = await serve([kilotwin, "run", path.join(sources, "experiments/disperse.txtpb"), "--duration", "600", "--pace", "1",
+    "--partitions", "1x1", "--out", path.join(scratch, "run"), "--view"]);
+  const page = await open(served.address);
+  const phase = (wanted) => eventually(`phase ${wanted}`, async () => (await text(page, "phase")) === wanted);
+  await phase("live: running");
+  await eventually("states", async () => (await received(page)) > 5);
+  assert.equal(await text(page, "count"), "100");
+
+  // Without the token nothing steers.
+  const stranger = await (await browser.newContext()).newPage();
+  await stranger.goto(served.address.replace(/#.*/, ""));
+  await eventually("the stranger watches", async () => (await received(stranger)) > 1);
+  assert.ok(await stranger.locator("#play").isDisabled());
+  assert.ok(await stranger.locator("#stop").isHidden());
+  await stranger.context().close();
+
+  await press(page, "Pause");
+  await phase("live: paused");
+  const tickOf = async () => Math.round((await clock(page)) / 0.032768);
+  let tick = -1;
+  await eventually("time stands still", async () => {
+    const now = await tickOf();
+    const same = now === tick;
+    tick = now;
+    await page.waitForTimeout(600); // a paused run repeats its state every half second
+    return same;
+  });
+  await page.keyboard.press(".");
+  await eventually("one tick", async () => (await tickOf()) === tick + 1);
+  await page.locator("#find-id").fill("7");
+  await press(page, "Select");
+  await eventually("the robot", async () => (await text(page, "robot-facts")).includes("motors on"));
+  await picture(page, "live");
+  await page.keyboard.press("Escape");
+  await press(page, "Continue");
+  await phase("live: running");
+  await eventually("it goes on", async () => (await tickOf()) > tick + 20);
+
+  // Stopped, the run becomes a recording in the same page.
+  page.once("dialog", (dialog) => dialog.accept());
+  await press(page, "Stop the run for good");
+  await phase("recorded");
+  await eventually("its recording", async () => (await text(page, "run-facts")).includes("states"));
+  assert.deepEqual(page.faults, []);
+  await page.close();
+  assert.equal(await served.stop(), 0);
+}
+
+try {
+  await recordedRun();
+  await liveRun();
+  console.log("the page does what it should");
+} finally {
+  await browser.close();
+  for (const served of started) await served.stop();
+  fs.rmSync(scratch, { recursive: true, force: true });
+}
