@@ -233,7 +233,7 @@ class Exporter {
       field->set_name(name);
       field->set_offset(offset);
       field->set_type(place ? foxglove::PackedElementField::FLOAT32 : foxglove::PackedElementField::UINT8);
-      offset += place ? sizeof(float) : 1;
+      offset += place ? std::uint32_t{sizeof(float)} : 1u;
     }
     std::string& data = *cloud.mutable_data();
     data.resize(sizeof(Point) * static_cast<std::size_t>(state.x_mm_size()));

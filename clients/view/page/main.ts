@@ -12,6 +12,8 @@ import { Theme } from "./theme.ts";
 const PANEL_EVERY_MS = 200;
 const TRAIL_EVERY_S = 1;
 const TRAIL_SEGMENTS = 30;
+/** Swarms larger than this begin without trails. */
+const MOST_TRAILS = 5000;
 /** Robots further than this from a click are not selected. */
 const CLICK_REACH_PX = 14;
 const SEEK_S = 5;
@@ -109,7 +111,10 @@ class Page {
     this.#pace = [];
     if (another || (this.#selected ?? 0) >= run.robots) this.#select(undefined);
     this.#renderer.begin(run, kindsOf(run));
-    if (another) this.#fitted = true;
+    if (another) {
+      this.#fitted = true;
+      this.#showTrails(run.robots <= MOST_TRAILS);
+    }
     this.#line.min = String(run.firstTick);
     this.#line.max = String(run.lastTick);
     this.#playback.begin(run);
@@ -326,10 +331,10 @@ class Page {
     this.#stale = true;
   }
 
-  #toggleTrails(): void {
-    this.#trails = !this.#trails;
-    element("trails").setAttribute("aria-pressed", String(this.#trails));
-    if (!this.#trails) this.#renderer.forgetTrails();
+  #showTrails(show: boolean): void {
+    this.#trails = show;
+    element("trails").setAttribute("aria-pressed", String(show));
+    if (!show) this.#renderer.forgetTrails();
     this.#stale = true;
   }
 
@@ -369,7 +374,7 @@ class Page {
     on("zoom-in", () => this.#zoom(1.4));
     on("zoom-out", () => this.#zoom(1 / 1.4));
     on("fit", () => this.#fit());
-    on("trails", () => this.#toggleTrails());
+    on("trails", () => this.#showTrails(!this.#trails));
     on("save", () => this.#save());
     on("theme", () => this.#theme.toggle());
     on("help", () => this.#toggleHelp());
@@ -408,7 +413,7 @@ class Page {
       "=": () => this.#zoom(1.4),
       "-": () => this.#zoom(1 / 1.4),
       "0": () => this.#fit(),
-      t: () => this.#toggleTrails(),
+      t: () => this.#showTrails(!this.#trails),
       d: () => this.#theme.toggle(),
       s: () => this.#save(),
       f: () => element("follow").click(),
