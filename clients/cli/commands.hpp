@@ -31,6 +31,7 @@ struct Command {
 [[nodiscard]] Command add_ros2(CLI::App& program);
 [[nodiscard]] Command add_play(CLI::App& program);
 [[nodiscard]] Command add_listen(CLI::App& program);
+[[nodiscard]] Command add_control(CLI::App& program);
 [[nodiscard]] Command add_config(CLI::App& program);
 [[nodiscard]] Command add_ohc(CLI::App& program);
 [[nodiscard]] Command add_doctor(CLI::App& program);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/export_model.hpp"
@@ -12,6 +14,8 @@
 #include "clients/identify/kilogrid/export_cells.hpp"
 #include "clients/mcap/export_mcap.hpp"
 #include "clients/recorder/export.hpp"
+#include "clients/recorder/provenance.hpp"
+#include "clients/recorder/summary.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 
@@ -20,55 +24,86 @@ namespace {
 
 struct ExportArguments {
   std::filesystem::path run, trajectories, bodies, messages, radio, cells, mcap, model;
+  std::filesystem::path variables, events, commands, observables, environment;
   double every_s = 1;
   bool measured = false;
 };
 
+/// What scripts need to know of a table's run.
+recorder::TableMetadata metadata_of(const recorder::RunDirectory& directory) {
+  recorder::TableMetadata about;
+  const recorder::Reader reader(directory.recording());
+  about.emplace_back("experiment", reader.header().name());
+  about.emplace_back("seed", std::to_string(reader.header().seed()));
+  about.emplace_back("run", fmt::format("{:016x}", reader.header().run()));
+  if (std::filesystem::exists(directory.summary())) {
+    about.emplace_back("state_hash", fmt::format("{:016x}", recorder::read_summary(directory.summary()).state_hash));
+  }
+  if (const auto origin = recorder::read_provenance(directory.provenance())) {
+    about.emplace_back("version", origin->version);
+    about.emplace_back("build", origin->build);
+    about.emplace_back("date", origin->date);
+  }
+  return about;
+}
+
 int export_run(const ExportArguments& arguments) {
-  const bool rows_wanted = !arguments.trajectories.empty() || !arguments.bodies.empty() ||
-                           !arguments.messages.empty() || !arguments.radio.empty() || !arguments.cells.empty() ||
-                           !arguments.mcap.empty();
+  const std::vector<const std::filesystem::path*> tables{
+      &arguments.trajectories, &arguments.bodies, &arguments.messages, &arguments.radio,       &arguments.cells,
+      &arguments.variables,    &arguments.events, &arguments.commands, &arguments.observables, &arguments.environment,
+      &arguments.mcap};
+  const bool rows_wanted = std::any_of(tables.begin(), tables.end(), [](const auto* table) { return !table->empty(); });
   if (!rows_wanted && arguments.model.empty()) {
     throw UserError(
-        "export: nothing to export; give --trajectories FILE.csv, --bodies FILE.csv, --messages FILE.csv, "
-        "--radio FILE.csv, --cells FILE.csv, --mcap FILE.mcap, --model FILE.txtpb or several");
+        "export: nothing to export; give --trajectories FILE, --variables FILE, --events FILE, --commands FILE, "
+        "--observables FILE, --environment FILE, --bodies FILE, --messages FILE, --radio FILE, --cells FILE, --mcap FILE, "
+        "--model FILE or several; a table ends in .csv, .csv.gz or .npz");
   }
   if (!arguments.model.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
     fmt::print("{}: {} robots\n", arguments.model.string(), export_model(read_manifest(run), arguments.model));
     if (!rows_wanted) return kDone;
   }
-  const auto tables = {&arguments.trajectories, &arguments.bodies, &arguments.messages, &arguments.radio,
-                       &arguments.cells};
   if (arguments.mcap == "-") throw UserError("--mcap -: needs a file; give --mcap FILE.mcap");
   if (std::count_if(tables.begin(), tables.end(), [](const auto* table) { return *table == "-"; }) > 1)
     throw UserError("export: two tables to standard output; give a file for all but one");
   const auto directory = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kRecording);
+  const recorder::TableMetadata about = metadata_of(directory);
   bool damaged = false;
-  const auto each = [&](const std::filesystem::path& csv, auto&& write, const char* what = "rows") {
-    if (csv.empty()) return;
+  const auto each = [&](const std::filesystem::path& file, auto&& write, const char* what = "rows") {
+    if (file.empty()) return;
     recorder::Reader reader(directory.recording());
-    const std::uint64_t rows = write(reader, csv);
+    const std::uint64_t rows = write(reader, file);
     if (!reader.warning().empty()) say("kilotwin: " + reader.warning());
     damaged = damaged || reader.damaged();
-    if (csv != "-") fmt::print("{}: {} {}\n", csv.string(), rows, what);
+    if (file != "-") fmt::print("{}: {} {}\n", file.string(), rows, what);
   };
-  each(arguments.trajectories, [&](recorder::Reader& reader, const auto& csv) {
-    return recorder::export_trajectories(reader, csv, arguments.every_s,
-                                         arguments.measured ? recorder::Poses::kMeasured : recorder::Poses::kTrue);
+  using recorder::Reader;
+  each(arguments.trajectories, [&](Reader& reader, const auto& file) {
+    return recorder::export_trajectories(reader, file, arguments.every_s,
+                                         arguments.measured ? recorder::Poses::kMeasured : recorder::Poses::kTrue,
+                                         about);
   });
-  each(arguments.bodies, [&](recorder::Reader& reader, const auto& csv) {
-    return recorder::export_bodies(reader, csv, arguments.every_s);
+  each(arguments.bodies, [&](Reader& reader, const auto& file) {
+    return recorder::export_bodies(reader, file, arguments.every_s, about);
   });
   each(arguments.messages,
-       [&](recorder::Reader& reader, const auto& csv) { return recorder::export_messages(reader, csv); });
-  each(arguments.radio,
-       [&](recorder::Reader& reader, const auto& csv) { return recorder::export_radio(reader, csv); });
-  each(arguments.cells,
-       [&](recorder::Reader& reader, const auto& csv) { return kilogrid::export_cells(reader, csv); });
+       [&](Reader& reader, const auto& file) { return recorder::export_messages(reader, file, about); });
+  each(arguments.radio, [&](Reader& reader, const auto& file) { return recorder::export_radio(reader, file, about); });
+  each(arguments.variables,
+       [&](Reader& reader, const auto& file) { return recorder::export_variables(reader, file, about); });
+  each(arguments.events, [&](Reader& reader, const auto& file) { return recorder::export_events(reader, file, about); });
+  each(arguments.commands,
+       [&](Reader& reader, const auto& file) { return recorder::export_commands(reader, file, about); });
+  each(arguments.observables,
+       [&](Reader& reader, const auto& file) { return recorder::export_observables(reader, file, about); });
+  each(arguments.environment, [&](Reader& reader, const auto& file) {
+    return recorder::export_environment(directory.path(), reader.header(), file, about);
+  });
+  each(arguments.cells, [&](Reader& reader, const auto& file) { return kilogrid::export_cells(reader, file); });
   each(
       arguments.mcap,
-      [&](recorder::Reader& reader, const auto& file) {
+      [&](Reader& reader, const auto& file) {
         return mcap::export_mcap(reader, file, arguments.every_s);
       },
       "states");
@@ -81,9 +116,26 @@ int export_run(const ExportArguments& arguments) {
 Command add_export(CLI::App& program) {
   const auto arguments = std::make_shared<ExportArguments>();
   CLI::App& app = *program.add_subcommand(
-      "export", "write tables (CSV) from a recorded run; FILE.csv.gz is gzipped, - is standard output");
+      "export", "write tables from a recorded run: FILE.csv, FILE.csv.gz, FILE.npz for NumPy, or - for standard output");
   app.add_option("RUN", arguments->run, "run directory or recording")->required()->type_name("");
   app.add_option("--trajectories", arguments->trajectories, fmt::format("columns {}", recorder::kTrajectoryColumns))
+      ->type_name("FILE");
+  app.add_option("--variables", arguments->variables,
+                 "recorded variables of programs: columns time_s,robot,group and one per variable")
+      ->type_name("FILE");
+  app.add_option("--events", arguments->events,
+                 "recorded events: columns time_s,event,robot,group,led_r,led_g,led_b,motor_left,motor_right,state,"
+                 "sender,distance_mm,text")
+      ->type_name("FILE");
+  app.add_option("--commands", arguments->commands,
+                 "changes of motion, as `kilotwin identify` reads them: columns run,robot,time_s,motion")
+      ->type_name("FILE");
+  app.add_option("--observables", arguments->observables,
+                 "observables over time: columns time_s, the experiment's own, msd_mm2, displacement_mm...")
+      ->type_name("FILE");
+  app.add_option("--environment", arguments->environment,
+                 "logs of the station's environments: columns environment,name,time_s,robot,colour,x,y,"
+                 "orientation_deg,value_1...")
       ->type_name("FILE");
   app.add_option("--bodies", arguments->bodies, "movable bodies: columns time_s,body,x_mm,y_mm,heading_rad")
       ->type_name("FILE");

@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
                                add_cameras(program),
                                add_track(program),
                                add_view(program),
-                               add_doctor(program)};
+                               add_doctor(program),
+                               add_control(program)};
                      });
 }

@@ -17,6 +17,7 @@
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_arguments.hpp"
 #include "clients/cli/run_recorder.hpp"
+#include "clients/cli/shell_words.hpp"
 #include "clients/cli/worker.hpp"
 #include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
@@ -30,22 +31,13 @@
 namespace kilotwin::cli {
 namespace {
 
-/// Quotes a word for a shell.
-std::string quoted(const std::string& word) {
-  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+,:=@%";
-  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
-  std::string result = "'";
-  for (const char c : word) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result + "'";
-}
-
 std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& directory,
                           const MonitorOptions& monitor) {
   std::string text = fmt::format(
       "prepared {}; start these services with the same --domain N, on several machines also with --peer ADDRESS of "
       "each:\n",
       directory.path().string());
-  const std::string run = quoted(directory.path().string());
+  const std::string run = shell_word(directory.path().string());
   for (std::uint32_t p = 0; p < plan.grid.size(); ++p) {
     text += fmt::format("  kilotwin service physics --run {} --partition {},{}\n", run, p % plan.grid.columns(),
                         p / plan.grid.columns());
@@ -55,7 +47,7 @@ std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& dir
     text += fmt::format("  kilotwin service behaviours --run {} --share {}/{}\n", run, h + 1, plan.hosts);
   }
   text += fmt::format("  kilotwin service station --run {}", run);
-  for (const std::string& word : monitor_words(monitor)) text += " " + quoted(word);
+  for (const std::string& word : monitor_words(monitor)) text += " " + shell_word(word);
   text += "\n";
   return text;
 }
@@ -181,6 +173,9 @@ int run(const RunOptions& arguments, double started_s) {
   catch_interrupts();
   std::optional<os::Process> page;
   if (arguments.view) page.emplace(start_view(prepared.directory, claim->domain()));
+  if (claim && !arguments.quiet)
+    say(fmt::format("kilotwin: runs on DDS domain {}; kilotwin control status --domain {} says how it goes",
+                    claim->domain(), claim->domain()));
   if (arguments.mode == "local") {
     if (const auto status = run_locally(prepared.manifest, prepared.directory, arguments, started_s))
       return *status;
@@ -190,11 +185,16 @@ int run(const RunOptions& arguments, double started_s) {
                                monitor_words(arguments.monitor)});
     if (status != 0) return status;
   }
-  if (!arguments.quiet) {
+  if (!arguments.quiet || arguments.strict) {
     const recorder::Summary summary = recorder::read_summary(prepared.directory.summary());
-    fmt::print("{}", recorder::summary_text(summary, place_in_words(prepared.directory.path(), arguments.output,
-                                                                    recorder::RunDirectory::default_path(
-                                                                        summary.name, summary.seed))));
+    const std::string place = place_in_words(prepared.directory.path(), arguments.output,
+                                             recorder::RunDirectory::default_path(summary.name, summary.seed));
+    if (!arguments.quiet) fmt::print("{}", recorder::summary_text(summary, place));
+    if (arguments.strict && summary.robots_failed > 0) {
+      throw RunError(fmt::format("{} of {} robots failed, and --strict was given; \"failures\" of {} says who, when and "
+                                 "where",
+                                 summary.robots_failed, summary.robots, prepared.directory.summary().string()));
+    }
   }
   if (page) view_until_interrupted(*page);
   return kDone;
@@ -262,6 +262,7 @@ Command add_run(CLI::App& program, double started_s) {
       ->type_name("SECONDS");
   add_monitor_options(app, arguments->monitor);
   add_output_options(app, arguments->output, "runs/NAME-SEED, with a number added if it exists");
+  app.add_flag("--strict", arguments->strict, "end with status 1 where a robot's program has failed");
   app.add_flag("--quiet", arguments->quiet, "no progress and no summary on the screen");
   app.add_flag("--view", arguments->view,
                "a web page of the run, live and then recorded, until Ctrl-C; its address is printed");

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "clients/cli/recovery.hpp"
 #include "clients/recorder/animation.hpp"
+#include "clients/recorder/observables.hpp"
 #include "clients/recorder/picture.hpp"
 #include "clients/recorder/reader.hpp"
 #include "core/base/error.hpp"
@@ -40,7 +42,8 @@ RunRecorder::RunRecorder(const RunPlan& plan, const recorder::RunDirectory& dire
       writer_(directory.recording(), header_),
       when_(plan.tick_length, plan.recording_settings().every_s),
       on_idle_(std::move(on_idle)),
-      state_(plan) {
+      state_(plan),
+      changes_(plan) {
   if (const auto earlier = earlier_recording(directory); !earlier.empty())
     take_over(earlier, resumed ? resumed->tick : Tick{0});
 }
@@ -72,6 +75,11 @@ void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
       }
     } else if (record->has_floor() && Tick{record->floor().tick()} <= until) {
       writer_.floor(record->floor());
+    } else if (record->has_variable() && Tick{record->variable().tick()} < until) {
+      writer_.variable(record->variable());
+    } else if (record->has_event() && Tick{record->event().tick()} < until) {
+      changes_.take(record->event(), plan_.robots());
+      take_event(record->event());
     } else if (record->has_input()) {
       const Directive input = from_record(record->input());
       if (input.tick < until || changes_results(input)) writer_.input(record->input());
@@ -86,6 +94,11 @@ void RunRecorder::take_over(const std::filesystem::path& earlier, Tick until) {
 void RunRecorder::state(Tick tick, const SwarmView& swarm, bool last) {
   if (first_tick_at_ == std::chrono::steady_clock::time_point{}) first_tick_at_ = std::chrono::steady_clock::now();
   if (monitor_) monitor_->state(swarm);
+  if (changes_.any()) {
+    proto::Observations changed;
+    changes_.observe(swarm, changed);
+    observed(changed);
+  }
   if (any_state_ && tick < next_ && !last) return;
   any_state_ = true;
   next_ = when_.at_or_after(tick + 1);
@@ -119,6 +132,18 @@ void RunRecorder::tracker_sample(Tick tick, const TrackerSample& sample) {
   writer_.tracker(to_record(tick, sample));
   if (monitor_) monitor_->tracker_sample(sample);
   inputs_wait_ = true;
+}
+
+void RunRecorder::observed(const proto::Observations& observations) {
+  for (const proto::VariableRecord& variable : observations.variable()) writer_.variable(variable);
+  for (const proto::EventRecord& event : observations.event()) take_event(event);
+}
+
+void RunRecorder::take_event(const proto::EventRecord& event) {
+  writer_.event(event);
+  if (event.kind() != proto::FAILURE) return;
+  for (int i = 0; i < event.robot_size(); ++i)
+    failures_.push_back({event.robot(i), plan_.tick_length.seconds_at(Tick{event.tick()}), event.text(i)});
 }
 
 void RunRecorder::saved() { writer_.flush(); }
@@ -176,6 +201,8 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
   for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
   summary.robots_failed = totals.robots_failed;
+  std::stable_sort(failures_.begin(), failures_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+  summary.failures = std::move(failures_);
   summary.station = totals.station;
   summary.recoveries = static_cast<std::uint32_t>(plan_.program_failures().size());
   summary.paced = plan_.pace > 0;
@@ -197,6 +224,11 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   costs.exchange = cost(Work::kExchange);
   costs.recording = cost(Work::kRecording);
   summary.provenance = recorder::read_provenance(directory_.provenance()).value_or(recorder::Provenance{});
+  if (header_.observable_size() > 0 && any_state_) {
+    recorder::Reader recording(directory_.recording());
+    for (const recorder::OwnCurve& own : recorder::observe(recording).own)
+      summary.observables.emplace_back(own.name, own.value.empty() ? std::nan("") : own.value.back());
+  }
   recorder::write_summary(summary, directory_.summary());
   if (any_state_) {
     recorder::Reader recording(directory_.recording());

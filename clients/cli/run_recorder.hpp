@@ -14,6 +14,7 @@
 #include "clients/recorder/writer.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/federation/run_observer.hpp"
+#include "core/observations/events.hpp"
 #include "core/plan/plan.hpp"
 
 namespace kilotwin::cli {
@@ -32,6 +33,7 @@ class RunRecorder : public RunObserver {
   void input(const Directive&) override;
   void floor(Tick, const FloorPicture&) override;
   void tracker_sample(Tick tick, const TrackerSample& sample) override;
+  void observed(const proto::Observations& observations) override;
   void saved() override;
   void idle(const RunProgress&) override;
 
@@ -42,6 +44,7 @@ class RunRecorder : public RunObserver {
 
  private:
   void take_over(const std::filesystem::path& earlier, Tick until);
+  void take_event(const proto::EventRecord& event);
 
   const RunPlan& plan_;
   const recorder::RunDirectory directory_;
@@ -51,6 +54,8 @@ class RunRecorder : public RunObserver {
   recorder::DisplacementObserver displacement_;
   std::function<void(const RunProgress&)> on_idle_;
   RecordedState state_;
+  ChangeObserver changes_;
+  std::vector<recorder::Summary::Failure> failures_;
   Tick next_{0};
   Tick recovered_from_{0};
   bool any_state_ = false;

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "clients/cli/commands.hpp"
@@ -12,10 +13,11 @@
 #include "clients/cli/sweep_points.hpp"
 #include "clients/cli/sweep_report.hpp"
 #include "clients/cli/sweep_runs.hpp"
+#include "clients/cli/sweep_slurm.hpp"
+#include "clients/cli/sweep_state.hpp"
 #include "clients/recorder/provenance.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
-#include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
 
 namespace kilotwin::cli {
@@ -26,22 +28,39 @@ namespace fs = std::filesystem;
 struct SweepArguments {
   RunArguments run;              ///< arguments of all runs; its output is that of the sweep
   std::string seeds;             ///< "A..B", or one number; empty: the seed of the experiment
-  std::vector<std::string> set;  ///< FIELD=V1,V2,... or FIELD=A..B: one run per value, all combinations
-  /// The observable in the plots: clients/recorder/observables.hpp. Empty: pushed if there are movable bodies, else msd.
+  std::vector<std::string> set;  ///< FIELD=VALUES, sweep_points.hpp: all combinations
+  std::size_t latin = 0;         ///< points of a Latin hypercube over the ranges in `set`; 0: all combinations
+  std::uint64_t latin_seed = 1;
+  /// The observable in the plots: clients/recorder/observables.hpp, or one of the experiment. Empty: pushed if there are movable bodies,
+  /// else msd.
   std::string plot;
   std::uint32_t jobs = 0;  ///< runs at a time; 0: one per core
+  fs::path resume;         ///< a sweep to go on with
+  bool slurm = false;
+  std::vector<std::string> slurm_options;  ///< for sbatch
 };
 
 /// Failed runs that are reported one by one; the others are counted.
 constexpr std::size_t kMostComplaints = 5;
 
-recorder::Observable observable_of(const std::string& name) {
-  std::string names;
+std::optional<recorder::Observable> built_in(const std::string& name) {
   for (std::size_t o = 0; o < recorder::kObservables.size(); ++o) {
     if (recorder::kObservables[o].name == name) return static_cast<recorder::Observable>(o);
-    names += fmt::format("{}{}", o == 0 ? "" : ", ", recorder::kObservables[o].name);
   }
-  throw UserError(fmt::format("--plot: no observable \"{}\"; there are {}", name, names));
+  return std::nullopt;
+}
+
+/// Throws UserError where `plot` names no observable.
+void check_plot(const std::string& plot, const proto::Experiment& experiment) {
+  if (plot.empty() || built_in(plot)) return;
+  std::string names;
+  for (const recorder::ObservableInfo& info : recorder::kObservables)
+    names += (names.empty() ? "" : ", ") + std::string(info.name);
+  for (const proto::Observable& own : experiment.observable()) {
+    if (own.name() == plot) return;
+    names += ", " + own.name();
+  }
+  throw UserError(fmt::format("--plot: no observable \"{}\"; there are {}", plot, names));
 }
 
 std::vector<std::string> words_of(const SweepArguments& arguments, const SweepPoint& point, const SweepRun& run) {
@@ -65,71 +84,142 @@ std::vector<std::string> words_of(const SweepArguments& arguments, const SweepPo
   return words;
 }
 
-int sweep(const SweepArguments& arguments) {
-  const std::uint32_t cores = std::max(1u, std::thread::hardware_concurrency());
-  warn_beyond_cores("--jobs", arguments.jobs);
-  const std::vector<SweepPoint> points = sweep_points(arguments.set);
-  recorder::Observable plotted = recorder::Observable::kMsd;
-  if (!arguments.plot.empty()) plotted = observable_of(arguments.plot);
-  std::vector<std::uint64_t> seeds;
-  if (!arguments.seeds.empty()) seeds = parse_seeds(arguments.seeds);
-  if (points.size() * std::max<std::size_t>(1, seeds.size()) > kMostSweepRuns)
-    throw UserError(
-        fmt::format("{} points with {} seeds are more than {} runs", points.size(), seeds.size(), kMostSweepRuns));
-  // Check every point before the first run starts.
+/// What a sweep consists of.
+struct Sweep {
   std::string name;
-  std::vector<std::uint64_t> own_seeds;
-  for (const SweepPoint& point : points) {
+  std::vector<SweepPoint> points;
+  std::vector<std::uint64_t> own_seeds;  ///< per point: the seed that the experiment states
+  recorder::Observable plotted = recorder::Observable::kMsd;
+  fs::path directory, fallback;
+  std::vector<SweepRun> runs;
+};
+
+/// Checks every point before the first run starts.
+Sweep checked(const SweepArguments& arguments) {
+  Sweep sweep;
+  sweep.points = arguments.latin > 0 ? latin_points(arguments.set, arguments.latin, arguments.latin_seed)
+                                     : sweep_points(arguments.set);
+  for (const SweepPoint& point : sweep.points) {
     RunArguments one = arguments.run;
     one.set = point;
     const LoadedExperiment loaded = load_with_overrides(one);
     static_cast<void>(resolve(loaded, one, Notes::kSilent));
-    name = loaded.experiment.name();
-    if (arguments.plot.empty() && loaded.experiment.movable_size() > 0) plotted = recorder::Observable::kPushed;
-    own_seeds.push_back(loaded.experiment.seed());
+    sweep.name = loaded.experiment.name();
+    check_plot(arguments.plot, loaded.experiment);
+    if (loaded.experiment.movable_size() > 0) sweep.plotted = recorder::Observable::kPushed;
+    sweep.own_seeds.push_back(loaded.experiment.seed());
   }
-  const fs::path fallback = fs::path("runs") / (name + "-sweep");
-  const fs::path directory = make_plain_output(
-      arguments.run.output, fallback, {arguments.run.experiment, arguments.run.model, arguments.run.behaviour});
-  std::vector<SweepRun> runs;
-  for (std::size_t point = 0; point < points.size(); ++point) {
-    for (const std::uint64_t seed : seeds.empty() ? std::vector{own_seeds[point]} : seeds) {
-      SweepRun& run = runs.emplace_back();
+  if (const auto wanted = built_in(arguments.plot)) sweep.plotted = *wanted;
+  return sweep;
+}
+
+void add_runs(const SweepArguments& arguments, Sweep& sweep) {
+  std::vector<std::uint64_t> seeds;
+  if (!arguments.seeds.empty()) seeds = parse_seeds(arguments.seeds);
+  if (sweep.points.size() * std::max<std::size_t>(1, seeds.size()) > kMostSweepRuns)
+    throw UserError(fmt::format("{} points with {} seeds are more than {} runs", sweep.points.size(), seeds.size(),
+                                kMostSweepRuns));
+  for (std::size_t point = 0; point < sweep.points.size(); ++point) {
+    for (const std::uint64_t seed : seeds.empty() ? std::vector{sweep.own_seeds[point]} : seeds) {
+      SweepRun& run = sweep.runs.emplace_back();
       run.point = point;
       run.seed = seed;
-      run.directory = directory / fmt::format("{:04}-{}", point, seed);
-      run.words = words_of(arguments, points[point], run);
+      run.directory = sweep.directory / fmt::format("{:04}-{}", point, seed);
+      run.words = words_of(arguments, sweep.points[point], run);
     }
   }
+}
 
-  SweepReport report(name, points, plotted);
-  std::size_t failed = 0;
-  const auto complain = [&](const SweepRun& run, const std::string& why) {
-    if (++failed > kMostComplaints) return;
-    const SweepPoint& point = points[run.point];
-    say(fmt::format("kilotwin: {} with seed {} failed: {}", point.empty() ? name : label(point), run.seed, why));
-  };
-  catch_interrupts();
-  const bool all = run_all(runs, arguments.jobs > 0 ? arguments.jobs : cores, [&](const SweepRun& run) {
+/// The results of a sweep as they come.
+class Results {
+ public:
+  Results(const SweepArguments& arguments, const Sweep& sweep)
+      : sweep_(sweep), report_(sweep.name, sweep.points, sweep.plotted) {
+    report_.plot_own(arguments.plot);
+  }
+  void take(const SweepRun& run) {
     if (!run.well)
       return complain(run, run.last_line.empty() ? "it printed nothing; is the disk full?" : run.last_line);
     try {
-      report.add(run.point, run.directory);
+      report_.add(run.point, run.seed, run.directory);
     } catch (const std::exception& error) {
       complain(run, error.what());
     }
-  });
-  if (failed > kMostComplaints) say(fmt::format("kilotwin: and {} more runs failed", failed - kMostComplaints));
-  if (!all) say(fmt::format("kilotwin: interrupted; {} of {} runs were done", report.runs(), runs.size()));
-  if (report.runs() == 0) return 1;
+  }
+  [[nodiscard]] const SweepReport& report() const { return report_; }
+  [[nodiscard]] std::size_t failed() const { return failed_; }
+  void say_how_many_failed() const {
+    if (failed_ > kMostComplaints) say(fmt::format("kilotwin: and {} more runs failed", failed_ - kMostComplaints));
+    if (failed_ > 0) say("kilotwin: runs.csv lists the runs that failed, and why");
+  }
 
-  report.write(directory, recorder::provenance_of_this_process());
+ private:
+  void complain(const SweepRun& run, const std::string& why) {
+    report_.add_failed(run.point, run.seed, run.directory, why);
+    if (++failed_ > kMostComplaints) return;
+    const SweepPoint& point = sweep_.points[run.point];
+    say(fmt::format("kilotwin: {} with seed {} failed: {}", point.empty() ? sweep_.name : label(point), run.seed, why));
+  }
+
+  const Sweep& sweep_;
+  SweepReport report_;
+  std::size_t failed_ = 0;
+};
+
+void print_results(const SweepArguments& arguments, const Sweep& sweep, const SweepReport& report) {
+  const fs::path& directory = sweep.directory;
   std::string plots = (directory / "sweep.svg").string();
   if (report.has_response()) plots += " and " + (directory / "response.svg").string();
-  fmt::print("{}table   {}\ncurves  {}\nplot    {}\nreport  {}\nresults {}\n", report.table(),
-             (directory / "sweep.csv").string(), (directory / "curves.csv").string(), plots,
-             (directory / "report.html").string(), place_in_words(directory, arguments.run.output, fallback));
-  return failed == 0 && all ? kDone : kFailed;
+  fmt::print("{}runs    {}\ntable   {}\ncurves  {}\nplot    {}\nreport  {}\nresults {}\n", report.table(),
+             (directory / "runs.csv").string(), (directory / "sweep.csv").string(), (directory / "curves.csv").string(),
+             plots, (directory / "report.html").string(),
+             arguments.resume.empty() ? place_in_words(directory, arguments.run.output, sweep.fallback)
+                                      : directory.string());
+}
+
+int sweep(const SweepArguments& arguments) {
+  const std::uint32_t cores = std::max(1u, std::thread::hardware_concurrency());
+  warn_beyond_cores("--jobs", arguments.jobs);
+  Sweep sweep = checked(arguments);
+  sweep.fallback = fs::path("runs") / (sweep.name + "-sweep");
+  if (arguments.resume.empty()) {
+    sweep.directory = make_plain_output(arguments.run.output, sweep.fallback,
+                                        {arguments.run.experiment, arguments.run.model, arguments.run.behaviour});
+    add_runs(arguments, sweep);
+    write_plan(sweep.directory, plan_text(arguments.run.experiment, sweep.points, words_of(arguments, {}, {})));
+  } else {
+    sweep.directory = arguments.resume;
+    check_plan(sweep.directory, plan_text(arguments.run.experiment, sweep.points, words_of(arguments, {}, {})));
+    add_runs(arguments, sweep);
+  }
+
+  Results results(arguments, sweep);
+  std::vector<SweepRun> waiting;
+  for (SweepRun& run : sweep.runs) {
+    run.well = !arguments.resume.empty() && is_complete(run);
+    if (run.well)
+      results.take(run);
+    else
+      waiting.push_back(run);
+  }
+  if (!arguments.resume.empty())
+    say(fmt::format("kilotwin: {} of {} runs were done before", sweep.runs.size() - waiting.size(), sweep.runs.size()));
+  for (const SweepRun& run : waiting) remove_unfinished(run);
+  catch_interrupts();
+  const auto ended = [&](const SweepRun& run) { results.take(run); };
+  const bool all = arguments.slurm ? run_on_slurm(waiting, sweep.directory, arguments.slurm_options, ended)
+                                   : run_all(waiting, arguments.jobs > 0 ? arguments.jobs : cores, ended);
+  results.say_how_many_failed();
+  const SweepReport& report = results.report();
+  if (!all) {
+    say(fmt::format("kilotwin: interrupted; {} of {} runs were done; the same command with --resume {} in place of --out "
+                    "does the others",
+                    report.runs(), sweep.runs.size(), sweep.directory.string()));
+  }
+  if (report.runs() == 0) return kFailed;
+  report.write(sweep.directory, recorder::provenance_of_this_process());
+  print_results(arguments, sweep, report);
+  return results.failed() == 0 && all ? kDone : kFailed;
 }
 
 }  // namespace
@@ -141,14 +231,30 @@ Command add_sweep(CLI::App& program) {
   add_experiment_options(app, arguments->run);
   app.add_option("--seeds", arguments->seeds, "every variant runs with each of these seeds")->type_name("A..B");
   app.add_option("--set", arguments->set,
-                 "V1,V2,... or A..B: the values of a field; several --set give all combinations")
+                 "values of a field: V1,V2,... or A..B, A..B:STEP, log:A..B:N; several --set give all combinations")
       ->allow_extra_args(false)
       ->type_name("FIELD=VALUES");
   app.add_option("--plot", arguments->plot,
-                 "what the plots show: msd, displacement, spread, nearest, polarisation or pushed (default: pushed "
-                 "where there are movable bodies, else msd)")
+                 "what the plots show: an observable of the experiment, or msd, displacement, spread, nearest, "
+                 "polarisation or pushed (default: pushed where there are movable bodies, else msd)")
       ->type_name("OBSERVABLE");
   app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)")->type_name("N");
+  app.add_option("--latin", arguments->latin,
+                 "in place of all combinations, so many points that cover the ranges of --set evenly: a Latin hypercube")
+      ->check(CLI::Range(std::size_t{1}, kMostSweepRuns).description(""))
+      ->type_name("N");
+  app.add_option("--latin-seed", arguments->latin_seed, "seed of the points of --latin")
+      ->capture_default_str()
+      ->type_name("N");
+  app.add_option("--resume", arguments->resume,
+                 "go on with the sweep in this directory: runs that are done stay; --seeds may be more")
+      ->type_name("DIR");
+  CLI::Option* const slurm = app.add_flag(
+      "--slurm", arguments->slurm, "run as one array job of Slurm, wait for it, and merge its results");
+  app.add_option("--slurm-option", arguments->slurm_options, "an option for sbatch, such as --time=1:00:00")
+      ->needs(slurm)
+      ->allow_extra_args(false)
+      ->type_name("OPTION");
   add_output_options(app, arguments->run.output, "runs/NAME-sweep, with a number added if it exists");
   app.footer("Example: kilotwin sweep experiments/disperse.txtpb --seeds 1..20 --set motion.noise=true,false");
   return {&app, [arguments] { return sweep(*arguments); }};

@@ -11,6 +11,7 @@
 #include "clients/recorder/summary.hpp"
 #include "clients/report/html.hpp"
 #include "clients/report/templates.hpp"
+#include "core/base/error.hpp"
 #include "core/csv/csv_writer.hpp"
 #include "core/os/files.hpp"
 
@@ -35,12 +36,7 @@ std::string csv_pair(const Sample& sample) {
   return fmt::format(",{:.10g},{:.4g}", sample.mean(), sample.standard_error());
 }
 
-std::string csv_header(const std::string& first) {
-  std::string text = first;
-  for (const recorder::ObservableInfo& o : kObservables)
-    text += fmt::format(",{0}{1},{0}_se{1}", o.name, o.column_suffix);
-  return text;
-}
+std::string csv_number(double value) { return std::isfinite(value) ? fmt::format(",{:.10g}", value) : ","; }
 
 /// Formats rows as columns, the first left-aligned and the others right-aligned. "±" is one character of two bytes.
 std::string aligned(const std::vector<std::vector<std::string>>& rows) {
@@ -89,11 +85,16 @@ SweepReport::SweepReport(std::string name, std::vector<SweepPoint> points, recor
   }
 }
 
-void SweepReport::add(std::size_t point, const std::filesystem::path& run) {
+void SweepReport::add(std::size_t point, std::uint64_t seed, const std::filesystem::path& run) {
   const recorder::Summary summary = recorder::read_summary(run / "summary.json");
   recorder::Reader reader(run / "recording.ktrec");
   const recorder::ObservableCurves curves = recorder::observe(reader);
+  std::vector<std::string> own;
+  for (const recorder::OwnCurve& curve : curves.own) own.push_back(curve.name);
+  if (runs_ == 0) own_ = own;
+  if (own != own_) throw RunError(run.string() + ": its observables are not those of the other runs");
   Observed& at = observed_[point];
+  at.at_end.resize(observables());
   ++runs_;
   at.sent.add(static_cast<double>(summary.messages.sent));
   at.received.add(static_cast<double>(summary.messages.received));
@@ -102,15 +103,56 @@ void SweepReport::add(std::size_t point, const std::filesystem::path& run) {
   at.realtime.add(summary.realtime_factor());
   const std::size_t states = curves.time_s.size();
   if (states > at.time_s.size()) at.time_s = curves.time_s;
-  if (states > at.over_time.size()) at.over_time.resize(states);
-  for (std::size_t o = 0; o < kObservables.size(); ++o) {
+  if (states > at.over_time.size()) at.over_time.resize(states, Samples(observables()));
+  Run& entry = all_runs_.emplace_back(Run{point, seed, run.string(), {}, {}, summary.messages.sent,
+                                          summary.messages.received, summary.messages.collided, summary.state_hash,
+                                          summary.robots_failed});
+  for (std::size_t o = 0; o < observables(); ++o) {
+    const std::vector<double>& values =
+        o < kObservables.size() ? curves.value[o] : curves.own[o - kObservables.size()].value;
+    entry.at_end.push_back(values.empty() ? std::nan("") : values.back());
     for (std::size_t i = 0; i < states; ++i) {
-      const double value = curves.value[o][i];
+      const double value = values[i];
       if (!std::isfinite(value)) continue;
       at.over_time[i][o].add(value);
       if (i + 1 == states) at.at_end[o].add(value);
     }
   }
+}
+
+void SweepReport::add_failed(std::size_t point, std::uint64_t seed, const std::filesystem::path& run,
+                             const std::string& why) {
+  Run& entry = all_runs_.emplace_back();
+  entry.point = point;
+  entry.seed = seed;
+  entry.directory = run.string();
+  entry.failure = why;
+}
+
+std::size_t SweepReport::plotted() const {
+  const auto own = std::find(own_.begin(), own_.end(), plotted_own_);
+  if (own == own_.end()) return static_cast<std::size_t>(plotted_);
+  return kObservables.size() + static_cast<std::size_t>(own - own_.begin());
+}
+
+std::string SweepReport::csv_header(const std::string& first) const {
+  std::string text = first;
+  for (const recorder::ObservableInfo& o : kObservables)
+    text += fmt::format(",{0}{1},{0}_se{1}", o.name, o.column_suffix);
+  for (const std::string& own : own_) text += fmt::format(",{0},{0}_se", own);
+  return text;
+}
+
+std::string SweepReport::fields_header() const {
+  std::string text;
+  for (const std::string& set : points_[0]) text += "," + csv_cell(field_of(set));
+  return text;
+}
+
+std::string SweepReport::fields_of(std::size_t point) const {
+  std::string text;
+  for (const std::string& set : points_[point]) text += "," + csv_cell(set.substr(set.find('=') + 1));
+  return text;
 }
 
 std::string SweepReport::name_of(std::size_t point) const {
@@ -138,13 +180,20 @@ std::string SweepReport::constant() const {
 std::vector<std::vector<std::string>> SweepReport::rows() const {
   std::vector<std::string> header{"at the end", "runs"};
   // Omit observables that no run has.
-  std::array<bool, kObservables.size()> shown{};
-  for (std::size_t o = 0; o < kObservables.size(); ++o) {
-    for (const Observed& at : observed_) shown[o] = shown[o] || at.at_end[o].count() > 0;
+  std::vector<std::uint8_t> shown(observables(), 0);
+  for (std::size_t o = 0; o < observables(); ++o) {
+    for (const Observed& at : observed_) {
+      if (!at.at_end.empty() && at.at_end[o].count() > 0) shown[o] = 1;
+    }
+    if (shown[o] == 0) continue;
+    if (o >= kObservables.size()) {
+      header.push_back(own_[o - kObservables.size()]);
+      continue;
+    }
     const recorder::ObservableInfo& info = kObservables[o];
-    if (shown[o])
-      header.push_back(info.unit.empty() ? std::string(info.name) : fmt::format("{}, {}", info.name, info.unit));
+    header.push_back(info.unit.empty() ? std::string(info.name) : fmt::format("{}, {}", info.name, info.unit));
   }
+  const Samples none(observables());
   const bool messages =
       std::any_of(observed_.begin(), observed_.end(), [](const Observed& at) { return at.sent.mean() > 0; });
   const bool failures =
@@ -156,8 +205,8 @@ std::vector<std::vector<std::string>> SweepReport::rows() const {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Observed& at = observed_[i];
     std::vector<std::string> row{name_of(i), std::to_string(at.realtime.count())};
-    for (std::size_t o = 0; o < kObservables.size(); ++o) {
-      if (shown[o]) row.push_back(with_error(at.at_end[o]));
+    for (std::size_t o = 0; o < observables(); ++o) {
+      if (shown[o] != 0) row.push_back(with_error((at.at_end.empty() ? none : at.at_end)[o]));
     }
     if (messages) row.insert(row.end(), {with_error(at.sent), with_error(at.received)});
     if (failures) row.push_back(with_error(at.failed));
@@ -197,7 +246,7 @@ std::string SweepReport::page(const recorder::Provenance& provenance) const {
   for (const auto& [fact, value] : {std::pair<const char*, std::string>{"command line", words},
                                     {"version", provenance.build},
                                     {"machine", fmt::format("{}, {} cores", provenance.host, provenance.cores)},
-                                    {"tables", "sweep.csv (at the end), curves.csv (over time)"}}) {
+                                    {"tables", "runs.csv (a row per run), sweep.csv (at the end), curves.csv (over time)"}}) {
     facts << object({{"fact", fact}, {"value", value}});
   }
   Data page = object({{"name", name_}, {"date", provenance.date}, {"runs", runs_text()}, {"table", table.text()}});
@@ -214,6 +263,7 @@ void SweepReport::write(const std::filesystem::path& directory, const recorder::
     writer.rows() += csv.substr(header + 1);
     writer.close();
   };
+  table("runs.csv", runs_csv());
   table("sweep.csv", table_csv());
   table("curves.csv", curves_csv());
   write_plot(curves(), directory / "sweep.svg");
@@ -223,13 +273,39 @@ void SweepReport::write(const std::filesystem::path& directory, const recorder::
 
 std::string SweepReport::table_csv() const {
   std::string csv = csv_header("point,runs") +
-                    ",sent,sent_se,received,received_se,collided,collided_se,robots_failed,realtime_factor\n";
+                    ",sent,sent_se,received,received_se,collided,collided_se,robots_failed,realtime_factor" + fields_header() + "\n";
+  const Samples none(observables());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Observed& at = observed_[i];
     csv += fmt::format("{},{}", csv_cell(name_of(i)), at.realtime.count());
-    for (const Sample& sample : at.at_end) csv += csv_pair(sample);
+    for (const Sample& sample : at.at_end.empty() ? none : at.at_end) csv += csv_pair(sample);
     for (const Sample* sample : {&at.sent, &at.received, &at.collided}) csv += csv_pair(*sample);
-    csv += fmt::format(",{:.6g},{:.6g}\n", at.failed.mean(), at.realtime.mean());
+    csv += fmt::format(",{:.6g},{:.6g}{}\n", at.failed.mean(), at.realtime.mean(), fields_of(i));
+  }
+  return csv;
+}
+
+std::string SweepReport::runs_csv() const {
+  std::string csv = "directory,point,seed,well" + fields_header();
+  for (const recorder::ObservableInfo& o : kObservables) csv += fmt::format(",{}{}", o.name, o.column_suffix);
+  for (const std::string& own : own_) csv += "," + own;
+  csv += ",sent,received,collided,robots_failed,state_hash,failure\n";
+  std::vector<const Run*> sorted;
+  for (const Run& run : all_runs_) sorted.push_back(&run);
+  std::sort(sorted.begin(), sorted.end(), [](const Run* a, const Run* b) {
+    return std::pair(a->point, a->seed) < std::pair(b->point, b->seed);
+  });
+  for (const Run* run : sorted) {
+    const bool well = run->failure.empty();
+    csv += fmt::format("{},{},{},{}{}", csv_cell(run->directory), run->point, run->seed, well ? 1 : 0,
+                       fields_of(run->point));
+    for (std::size_t o = 0; o < observables(); ++o) csv += well ? csv_number(run->at_end[o]) : ",";
+    if (well) {
+      csv += fmt::format(",{},{},{},{},{:016x},\n", run->sent, run->received, run->collided, run->robots_failed,
+                         run->state_hash);
+    } else {
+      csv += ",,,,,," + csv_cell(run->failure) + "\n";
+    }
   }
   return csv;
 }
@@ -259,8 +335,13 @@ std::string SweepReport::runs_text() const {
 }
 
 Plot SweepReport::plot() const {
-  const recorder::ObservableInfo& observable = kObservables[static_cast<std::size_t>(plotted_)];
   Plot plot;
+  if (plotted() >= kObservables.size()) {
+    plot.title = fmt::format("{}: {}", name_, plotted_own_);
+    plot.y_name = plotted_own_;
+    return plot;
+  }
+  const recorder::ObservableInfo& observable = kObservables[plotted()];
   plot.title = fmt::format("{}: {}", name_, observable.title);
   plot.y_name = observable.title;
   if (plotted_ == recorder::Observable::kMsd) plot.y_name = "MSD";
@@ -287,7 +368,7 @@ Plot SweepReport::curves() const {
     series.name = short_name_of(i);
     series.x = at.time_s;
     for (const Samples& samples : at.over_time) {
-      const Sample& sample = samples[static_cast<std::size_t>(plotted_)];
+      const Sample& sample = samples[plotted()];
       series.y.push_back(sample.count() > 0 ? sample.mean() : std::nan(""));
       series.error.push_back(sample.standard_error());
     }
@@ -307,7 +388,7 @@ Plot SweepReport::response() const {
   plot.x_name = field_of(points_[0][response_field_]);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Sample& sample = observed_[i].at_end[static_cast<std::size_t>(plotted_)];
+    const Sample sample = observed_[i].at_end.empty() ? Sample() : observed_[i].at_end[plotted()];
     SweepPoint others;
     for (const std::size_t field : varying_) {
       if (field != response_field_) others.push_back(points_[i][field]);

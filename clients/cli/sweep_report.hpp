@@ -1,7 +1,7 @@
 /// SweepReport: tables of observables with standard errors over runs, curves over time, plots, and a page.
 #pragma once
 
-#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -18,9 +18,13 @@ class SweepReport {
  public:
   /// `plotted`: the observable that the plots show.
   SweepReport(std::string name, std::vector<SweepPoint> points, recorder::Observable plotted);
+  /// The plots show this observable of the experiment instead.
+  void plot_own(const std::string& observable) { plotted_own_ = observable; }
 
-  /// Adds a run that succeeded. Throws if its files cannot be read.
-  void add(std::size_t point, const std::filesystem::path& run);
+  /// Adds a run that succeeded. Throws if its files cannot be read, or it has other observables than the runs before.
+  void add(std::size_t point, std::uint64_t seed, const std::filesystem::path& run);
+  /// Adds a run that failed, for runs.csv.
+  void add_failed(std::size_t point, std::uint64_t seed, const std::filesystem::path& run, const std::string& why);
   /// Number of runs added.
   [[nodiscard]] std::size_t runs() const { return runs_; }
 
@@ -28,11 +32,13 @@ class SweepReport {
   [[nodiscard]] std::string table() const;
   /// A page with the table, the plots and the provenance.
   [[nodiscard]] std::string page(const recorder::Provenance& provenance) const;
-  /// Writes sweep.csv, curves.csv, sweep.svg, response.svg if has_response(), and report.html. Throws RunError; the tables are
+  /// Writes runs.csv, sweep.csv, curves.csv, sweep.svg, response.svg if has_response(), and report.html. Throws RunError; the tables are
   /// written first.
   void write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const;
   /// One row per point: every observable at the end of the runs and the summaries' counts, each with mean and standard error.
   [[nodiscard]] std::string table_csv() const;
+  /// One row per run: its directory, the swept fields, seed, whether it is well, every observable at its end, counts, state hash.
+  [[nodiscard]] std::string runs_csv() const;
   /// One row per point and recorded state: every observable with mean and standard error.
   [[nodiscard]] std::string curves_csv() const;
   /// The plotted observable over time, one curve per point.
@@ -44,7 +50,8 @@ class SweepReport {
 
  private:
   static constexpr std::size_t most_fields_ = static_cast<std::size_t>(-1);
-  using Samples = std::array<recorder::Sample, recorder::kObservables.size()>;
+  /// Per observable: those of observables.hpp, then the experiment's.
+  using Samples = std::vector<recorder::Sample>;
 
   struct Observed {
     Samples at_end;
@@ -62,9 +69,26 @@ class SweepReport {
   [[nodiscard]] std::string runs_text() const;
   [[nodiscard]] Plot plot() const;
 
+  struct Run {
+    std::size_t point = 0;
+    std::uint64_t seed = 0;
+    std::string directory, failure;  ///< failure: empty where it is well
+    std::vector<double> at_end;      ///< per observable
+    std::uint64_t sent = 0, received = 0, collided = 0, state_hash = 0;
+    std::uint32_t robots_failed = 0;
+  };
+  [[nodiscard]] std::size_t observables() const { return recorder::kObservables.size() + own_.size(); }
+  [[nodiscard]] std::size_t plotted() const;
+  [[nodiscard]] std::string csv_header(const std::string& first) const;
+  [[nodiscard]] std::string fields_header() const;
+  [[nodiscard]] std::string fields_of(std::size_t point) const;
+
   std::string name_;
   std::vector<SweepPoint> points_;
   recorder::Observable plotted_;
+  std::string plotted_own_;
+  std::vector<std::string> own_;  ///< observables of the experiment
+  std::vector<Run> all_runs_;
   std::vector<Observed> observed_;
   std::size_t runs_ = 0;
   std::size_t response_field_ = most_fields_;  // index into a point

@@ -13,16 +13,20 @@
 #include "core/federation/pace.hpp"
 #include "core/federation/snapshots.hpp"
 #include "core/logs/robot_logs.hpp"
+#include "core/observations/events.hpp"
 #include "core/os/interrupt.hpp"
 #include "core/os/worker_pool.hpp"
+#include "idl/recording.pb.h"
 #include "services/ark/station_engine.hpp"
 #include "services/ark/station_outputs.hpp"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
+#include "services/behaviours/host_observer.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
 #include "services/comm/firmware/firmware_swarm.hpp"
 #include "services/comm/radio_engine.hpp"
+#include "services/comm/radio_observer.hpp"
 #include "services/physics/engine.hpp"
 
 namespace kilotwin::local {
@@ -64,6 +68,8 @@ class LocalRun {
         station_outputs_(plan, options.save_checkpoints ? options.run_directory : std::filesystem::path{},
                          options.resumed ? options.resumed->tick : Tick{0}),
         swarm_(plan.robots(), plan.movables(), plan.memory.size()),
+        radio_observer_(plan, radio_),
+        records_packets_(RecordedEvents(plan).station),
         first_(options.resumed ? options.resumed->tick : Tick{0}),
         schedule_(first_, plan.last_tick, plan.checkpoint_every()),
         snapshots_(options.run_directory,
@@ -81,6 +87,7 @@ class LocalRun {
       hosts_.back()->note_running_in(notes_.back()->place());
     }
     if (options.resumed) load(*options.resumed);
+    for (std::uint32_t h = 0; h < plan.hosts; ++h) host_observers_.emplace_back(plan, HostId{h}, *hosts_[h]);
     for (const Directive& directive : options.inputs) schedule_.add(directive);
     for (Frames& frames : frames_) connect(frames);
     task_ns_.resize(plan.federates());
@@ -121,6 +128,7 @@ class LocalRun {
       const auto recorded_from = Clock::now();
       swarm_.gather(now, frames_of(now).all_bodies);
       swarm_.gather(frames_of(now).all_actuation);
+      observe(now);
       observer_.state(now, swarm_, last);
       const auto recorded_to = Clock::now();
       recording_ns_ += ns(recorded_from, recorded_to);
@@ -170,6 +178,20 @@ class LocalRun {
       emit(task, frames_of(from + 1));
       task_ns_[task] += ns(begun, Clock::now());
     });
+  }
+
+  /// What hosts, radio and station observed: in the step to `now`, and at it.
+  void observe(Tick now) {
+    for (behaviours::HostObserver& host : host_observers_) {
+      if (now > first_) host.stepped(now - 1, observed_);
+      host.at(now, observed_);
+    }
+    if (now > first_) radio_observer_.stepped(now - 1, observed_);
+    radio_observer_.at(now, observed_);
+    if (records_packets_) note_packets(frames_of(now).overhead, observed_);
+    if (observed_.variable_size() == 0 && observed_.event_size() == 0) return;
+    observer_.observed(observed_);
+    observed_.Clear();
   }
 
   void take_tracker_samples(Tick tick) {
@@ -354,6 +376,10 @@ class LocalRun {
   // One per host; empty without a run directory.
   std::vector<std::unique_ptr<RobotLogs>> logs_;
   std::vector<std::unique_ptr<behaviours::RunningNote>> notes_;
+  std::vector<behaviours::HostObserver> host_observers_;
+  comm::RadioObserver radio_observer_;
+  const bool records_packets_;
+  proto::Observations observed_;  // not yet handed on
   const Tick first_;
   RunSchedule schedule_;
   Snapshots snapshots_;

@@ -1,11 +1,14 @@
-/// Tables from a recording as CSV: to a file, to a gzipped file (.gz), or to standard output ("-").
+/// Tables from a recording: table.hpp has the formats.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "clients/recorder/reader.hpp"
+#include "clients/recorder/table.hpp"
 
 namespace kilotwin::recorder {
 
@@ -23,21 +26,51 @@ inline constexpr std::string_view kMessageColumns = "receiver,sender,count,sent_
 /// first recorded state at or after its time; time_s is the exact simulated time of that state's tick. Lengths have 4
 /// decimals, angles 6. Without recorded measured poses, `which` has no effect.
 /// Returns the number of rows. Throws UserError if the recording has no state within one tick after each of these times, i.e.
-/// every_s is no multiple of the recorded interval. Throws RunError if the file cannot be written.
-std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& csv, double every_s = 1,
-                                  Poses which = Poses::kTrue);
+/// every_s is no multiple of the recorded interval. All throw RunError if the file cannot be written.
+std::uint64_t export_trajectories(Reader& recording, const std::filesystem::path& file, double every_s = 1,
+                                  Poses which = Poses::kTrue, const TableMetadata& metadata = {});
 
 /// Columns time_s,body,x_mm,y_mm,heading_rad: the same for movable bodies; x, y is a body's centre. Throws UserError if the
 /// experiment has none.
-std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& csv, double every_s = 1);
+std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& file, double every_s = 1,
+                            const TableMetadata& metadata = {});
 
 /// Columns kMessageColumns: number of messages per pair, sorted by receiver and then by sender. A robot's row with itself has
 /// the number of messages that it sent successfully. Returns the number of rows. Throws UserError if no messages were
 /// recorded.
-std::uint64_t export_messages(Reader& recording, const std::filesystem::path& csv);
+std::uint64_t export_messages(Reader& recording, const std::filesystem::path& file,
+                            const TableMetadata& metadata = {});
 
 /// Columns robot,attempted,sent,received,collided,backed_off: counts of each robot's radio. Returns the number of rows. Throws
 /// UserError if the run did not reach its end.
-std::uint64_t export_radio(Reader& recording, const std::filesystem::path& csv);
+std::uint64_t export_radio(Reader& recording, const std::filesystem::path& file,
+                            const TableMetadata& metadata = {});
+
+/// Columns time_s,robot,group and one per recorded variable, under its name: one row per robot and tick at which it has a value of any
+/// of them, sorted by time and then by robot. Throws UserError if the run recorded no variables.
+std::uint64_t export_variables(Reader& recording, const std::filesystem::path& file,
+                               const TableMetadata& metadata = {});
+
+/// Columns time_s,event,robot,group,led_r,led_g,led_b,motor_left,motor_right,state,sender,distance_mm,text: one row per event, by
+/// ascending time. Cells that say nothing about the event are empty. Times of messages are exact to the cycle, others to the tick.
+std::uint64_t export_events(Reader& recording, const std::filesystem::path& file, const TableMetadata& metadata = {});
+
+/// Columns run,robot,time_s,motion, as `kilotwin identify` reads commands: every change of a robot's motion, exact to the tick. Throws
+/// UserError if the run did not record the event MOTION.
+std::uint64_t export_commands(Reader& recording, const std::filesystem::path& file, const TableMetadata& metadata = {});
+
+/// Columns time_s, one per observable of the experiment, and those of observables.hpp: one row per recorded state.
+std::uint64_t export_observables(Reader& recording, const std::filesystem::path& file,
+                                 const TableMetadata& metadata = {});
+
+/// Columns environment,name,time_s,robot,colour,x,y,orientation_deg,value_1...: the logs station-N.tsv of a run directory. Throws
+/// UserError if there are none.
+std::uint64_t export_environment(const std::filesystem::path& run_directory, const proto::RecordingHeader& header,
+                                 const std::filesystem::path& file, const TableMetadata& metadata = {});
+
+/// A life cycle's name: "running", "failed"...
+[[nodiscard]] std::string state_name(std::uint8_t life_cycle);
+/// Per robot: number of its group, in the experiment's order.
+[[nodiscard]] std::vector<std::uint32_t> groups_of(const proto::RecordingHeader& header);
 
 }  // namespace kilotwin::recorder

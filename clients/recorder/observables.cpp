@@ -5,7 +5,9 @@
 #include <limits>
 #include <numeric>
 
+#include "clients/recorder/ordered_records.hpp"
 #include "clients/recorder/statistics.hpp"
+#include "clients/recorder/swarm_observables.hpp"
 #include "core/base/error.hpp"
 #include "core/math/elementary.h"
 
@@ -110,12 +112,24 @@ void ObservableObserver::add(double time_s, std::span<const double> x_mm, std::s
 
 ObservableCurves observe(Reader& recording) {
   ObservableObserver observer;
-  while (const proto::StateRecord* state = recording.next_state()) {
-    observer.add(recording.tick_length().seconds_at(Tick{state->tick()}), values(state->x_mm()),
-                 values(state->y_mm()), values(state->heading_rad()), values(state->movable_x_mm()),
-                 values(state->movable_y_mm()));
+  SwarmObservables own(recording.header());
+  std::vector<OwnCurve> curves;
+  for (const std::string& name : own.names()) curves.push_back({name, {}});
+  OrderedRecords ordered(recording, OrderedRecords::kStates | (own.any() ? OrderedRecords::kVariables : 0u));
+  while (ordered.next()) {
+    for (const proto::VariableRecord& variable : ordered.records().variables) own.take(variable);
+    if (!ordered.records().state) continue;
+    const proto::StateRecord& state = *ordered.records().state;
+    const double time_s = recording.tick_length().seconds_at(ordered.tick());
+    observer.add(time_s, values(state.x_mm()), values(state.y_mm()), values(state.heading_rad()),
+                 values(state.movable_x_mm()), values(state.movable_y_mm()));
+    if (!own.any()) continue;
+    const std::vector<double> at = own.values(time_s, state, observer.curves());
+    for (std::size_t i = 0; i < curves.size(); ++i) curves[i].value.push_back(at[i]);
   }
-  return observer.curves();
+  ObservableCurves all = observer.curves();
+  all.own = std::move(curves);
+  return all;
 }
 
 }  // namespace kilotwin::recorder

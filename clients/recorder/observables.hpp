@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -39,8 +40,15 @@ inline constexpr std::array<ObservableInfo, 6> kObservables = {{
     {"pushed", "displacement of movable bodies", "mm", "_mm"},
 }};
 
+/// An observable of the experiment.
+struct OwnCurve {
+  std::string name;
+  std::vector<double> value;
+};
+
 /// Observables of one run, one value per recorded state.
 struct ObservableCurves {
+  std::vector<OwnCurve> own;
   std::vector<double> time_s;
   std::array<std::vector<double>, kObservables.size()> value;
 
@@ -60,7 +68,8 @@ class ObservableObserver {
   ObservableCurves curves_;
 };
 
-/// Observables of all remaining states of a recording.
+/// Observables of all remaining states of a recording, those of the experiment included. Throws UserError where the recording holds an
+/// expression that cannot be read.
 [[nodiscard]] ObservableCurves observe(Reader& recording);
 
 /// Mean over robots of the distance to their nearest neighbour; NaN for fewer than two robots.

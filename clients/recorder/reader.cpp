@@ -234,6 +234,47 @@ const char* Reader::defect_of_sample(const proto::TrackerRecord& sample) const {
   return nullptr;
 }
 
+const char* Reader::defect_of_variable(const proto::VariableRecord& variable) const {
+  if (!valid_tick(variable.tick())) return "a variable at a tick out of range";
+  if (variable.variable() >= static_cast<std::uint32_t>(header_.variable_size())) return "a variable without a name";
+  const bool integer = header_.variable(static_cast<int>(variable.variable())).integer();
+  const int values = integer ? variable.integer_size() : variable.number_size();
+  if (values != variable.robot_size() || variable.integer_size() + variable.number_size() != values)
+    return "a variable whose columns differ in length";
+  std::int64_t last = -1;
+  for (const std::uint32_t robot : variable.robot()) {
+    if (robot >= header_.robots() || robot <= last) return "a variable of robots out of order";
+    last = robot;
+  }
+  return nullptr;
+}
+
+const char* Reader::defect_of_event(const proto::EventRecord& event) const {
+  if (!valid_tick(event.tick())) return "an event at a tick out of range";
+  const auto known = [&](std::uint32_t robot) { return robot < header_.robots(); };
+  if (!std::all_of(event.robot().begin(), event.robot().end(), known) ||
+      !std::all_of(event.sender().begin(), event.sender().end(), known))
+    return "an event of unknown robots";
+  struct Sizes {
+    int robot, value, sender, distance, offset, text;
+  };
+  const int n = event.kind() == proto::STATION ? event.value_size() : event.robot_size();
+  const Sizes found{event.robot_size(),       event.value_size(),         event.sender_size(),
+                    event.distance_mm_size(), event.offset_cycles_size(), event.text_size()};
+  const auto are = [&](const Sizes& wanted) { return std::memcmp(&found, &wanted, sizeof found) == 0; };
+  bool right = false;
+  switch (event.kind()) {
+    case proto::LED:
+    case proto::MOTION:
+    case proto::STATE: right = are({n, n, 0, 0, 0, 0}); break;
+    case proto::SENT: right = are({n, 0, 0, 0, n, 0}); break;
+    case proto::RECEIVED: right = are({n, 0, n, n, n, 0}); break;
+    case proto::STATION: right = are({0, n, 0, 0, n, n}); break;
+    case proto::FAILURE: right = are({n, 0, 0, 0, 0, n}); break;
+  }
+  return right ? nullptr : "an event whose columns differ in length";
+}
+
 /// Reason why record_ is invalid; nullptr if it is valid.
 const char* Reader::defect_of_record() const {
   const auto robots = static_cast<int>(header_.robots());
@@ -280,6 +321,8 @@ const char* Reader::defect_of_record() const {
     case proto::Record::kInput:
       return valid_tick(record_.input().tick()) ? nullptr : "an input at a tick out of range";
     case proto::Record::kTracker: return defect_of_sample(record_.tracker());
+    case proto::Record::kVariable: return defect_of_variable(record_.variable());
+    case proto::Record::kEvent: return defect_of_event(record_.event());
     case proto::Record::kMessages: {
       const proto::MessagesRecord& messages = record_.messages();
       const auto known = [&](std::uint32_t robot) { return robot < header_.robots(); };

@@ -32,7 +32,7 @@ class Reader {
 
   /// The next record after the header, valid until the next call; nullptr at the end. If the file has grown, a later call
   /// continues. The reader guarantees: states have one entry per robot in every field, finite poses and ascending ticks;
-  /// messages have valid robot ids.
+  /// messages, variables and events have valid robot ids, and columns that suit their kind.
   [[nodiscard]] const proto::Record* next();
   /// The next state among the records, nullptr at the end.
   [[nodiscard]] const proto::StateRecord* next_state();
@@ -55,6 +55,8 @@ class Reader {
   [[nodiscard]] bool fill(std::size_t bytes);
   [[nodiscard]] bool read_record();
   [[nodiscard]] const char* defect_of_record() const;
+  [[nodiscard]] const char* defect_of_variable(const proto::VariableRecord& variable) const;
+  [[nodiscard]] const char* defect_of_event(const proto::EventRecord& event) const;
   [[nodiscard]] const char* defect_of_sample(const proto::TrackerRecord& sample) const;
   [[nodiscard]] std::span<const std::uint8_t> waiting() const;
   void warn(std::string_view what);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
@@ -102,6 +103,15 @@ double Summary::realtime_factor() const {
 
 namespace {
 
+Json failures_json(const std::vector<Summary::Failure>& failures) {
+  Json json = Json::array();
+  for (std::size_t i = 0; i < std::min(failures.size(), Summary::kMostFailures); ++i) {
+    json.push_back(
+        Json{{"robot", failures[i].robot}, {"time_s", failures[i].time_s}, {"what", failures[i].text}});
+  }
+  return json;
+}
+
 Json tracking_json(const TrackingTotals& t) {
   Json trackers = Json::array();
   for (const TrackerReport& tracker : t.trackers) {
@@ -159,6 +169,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
                                   {"collided", spread_json(s.per_robot.collided, s.per_robot.robots)},
                                   {"backed_off", spread_json(s.per_robot.backed_off, s.per_robot.robots)}}},
       {"robots_failed", s.robots_failed},
+      {"failures", failures_json(s.failures)},
       {"recoveries", s.recoveries},
       {"moved_mm", Json{{"mean", s.moved_mm.mean}, {"max", s.moved_mm.max}}},
       {"cost_ns_per_robot_tick", Json{{"behaviours", s.cost_ns_per_robot_tick.behaviours},
@@ -174,6 +185,7 @@ void write_summary(const Summary& s, const std::filesystem::path& file) {
       {"host", s.provenance.host},
       {"cores", s.provenance.cores},
   };
+  for (const auto& [name, value] : s.observables) json["observables"][name] = value;
   if (!s.station.plugins.empty()) json["station"] = station_json(s.station);
   if (s.paced) {
     json["late_ticks"] = s.lateness.late_ticks;
@@ -205,6 +217,10 @@ Summary read_summary(const std::filesystem::path& file) {
     messages.at("received").get_to(s.messages.received);
     messages.at("collided").get_to(s.messages.collided);
     json.at("robots_failed").get_to(s.robots_failed);
+    if (json.contains("observables")) {
+      for (const auto& [name, value] : json.at("observables").items())
+        s.observables.emplace_back(name, value.is_number() ? value.get<double>() : std::nan(""));
+    }
     if (const auto station = json.find("station"); station != json.end()) {
       for (const Json& plugin : station->at("plugins"))
         s.station.plugins.push_back(
@@ -261,6 +277,8 @@ std::string summary_text(const Summary& s, const std::string& place) {
                                s.messages.attempted, s.messages.received, s.messages.collided,
                                percentage(s.messages.collided, s.messages.received + s.messages.collided)));
   line("failed", counted(s.robots_failed, "robot"));
+  for (const auto& [name, value] : s.observables)
+    line("observed", std::isnan(value) ? name + " has no value" : fmt::format("{} = {:.6g}", name, value));
   for (const StationTotals::Plugin& plugin : s.station.plugins) {
     if (!plugin.failure.empty()) line("failed", fmt::format("plugin {}: {}", plugin.name, plugin.failure));
   }

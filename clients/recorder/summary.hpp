@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "clients/recorder/provenance.hpp"
 #include "core/federation/run_observer.hpp"
@@ -43,6 +45,15 @@ struct Summary {
   Provenance provenance;
   StationTotals station;  ///< in the file where there are virtual environments
   std::uint32_t robots_failed = 0;
+  /// The observables that the experiment names, at the end of the run; NaN, null in the file: it has no value.
+  std::vector<std::pair<std::string, double>> observables;
+  struct Failure {
+    std::uint32_t robot = 0;
+    double time_s = 0;  ///< begin of the tick in which it failed
+    std::string text;   ///< one line: what happened, and where in the program
+  };
+  std::vector<Failure> failures;  ///< by ascending time; the first kMostFailures are in the file
+  static constexpr std::size_t kMostFailures = 1000;
   std::uint32_t recoveries = 0;
   bool paced = false;       ///< `lateness` says something
   LatenessTotals lateness;  ///< late_ticks and worst_lateness_ms in the file

@@ -147,6 +147,21 @@ void Writer::floor(const proto::FloorRecord& floor) {
   other_.clear_floor();
 }
 
+void Writer::variable(const proto::VariableRecord& variable) {
+  KILOTWIN_DEMAND(variable.integer_size() + variable.number_size() == variable.robot_size());
+  *other_.mutable_variable() = variable;
+  append(other_);
+  other_.clear_variable();
+  flush_if_due();
+}
+
+void Writer::event(const proto::EventRecord& event) {
+  *other_.mutable_event() = event;
+  append(other_);
+  other_.clear_event();
+  flush_if_due();
+}
+
 void Writer::end(Tick tick, std::uint64_t state_hash, const std::string& failure) {
   append_hashes();
   proto::EndRecord& record = *other_.mutable_end();

@@ -42,6 +42,8 @@ class Writer {
   /// One entry per robot in every field.
   void radio(const proto::RadioRecord& radio);
   void floor(const proto::FloorRecord& floor);
+  void variable(const proto::VariableRecord& variable);
+  void event(const proto::EventRecord& event);
   /// The end mark of a run that reached its end. `failure`: one line, empty if the run succeeded. Closes the file.
   void end(Tick tick, std::uint64_t state_hash, const std::string& failure = {});
 

@@ -199,6 +199,20 @@ void check_tick_multiples(const LoadedExperiment& loaded) {
                                  fmt::format("every_s is {}, shorter than a tick; it takes at least {} s",
                                              number_text(experiment.recording().every_s()), number_text(tick_s)));
   }
+  for (int i = 0; i < experiment.recording().variable_size(); ++i) {
+    const proto::RecordedVariable& variable = experiment.recording().variable(i);
+    const std::string path = fmt::format("recording.variable[{}]", i);
+    if (i >= kMostVariables)
+      throw loaded.locations.error(path, fmt::format("there are {} variables; it takes at most {}",
+                                                     experiment.recording().variable_size(), kMostVariables));
+    if (variable.name().empty())
+      throw loaded.locations.error(path, "a variable without a name; give name: \"hops\"");
+    if (variable.every_s() < tick_s) {
+      throw loaded.locations.error(path + ".every_s",
+                                   fmt::format("every_s is {}, shorter than a tick; it takes at least {} s",
+                                               number_text(variable.every_s()), number_text(tick_s)));
+    }
+  }
   const double checkpoint_s = experiment.deployment().checkpoint_every_s();
   if (checkpoint_s > 0 && checkpoint_s < tick_s) {
     throw loaded.locations.error(

@@ -275,6 +275,7 @@ constexpr FieldRule kRules[] = {
     {"CircleRegion.radius_mm", 0, kLongest_mm, "mm", Lower::kExcluded},
 
     {"Recording.every_s", 0, kLongest_s, "s", Lower::kExcluded},
+    {"RecordedVariable.every_s", 0, kLongest_s, "s", Lower::kExcluded},
 
     {"Door.position_sd_mm", 0, 1000, "mm", Lower::kExcluded},
     {"Door.heading_sd_deg", 0, 180, "degrees", Lower::kExcluded},

@@ -10,6 +10,7 @@ namespace kilotwin {
 inline constexpr std::uint32_t kMostRobots = 100'000;  ///< in all groups together
 inline constexpr int kMostGroups = 256;
 inline constexpr int kMostMovables = 1000, kMostObstacles = 1000;
+inline constexpr int kMostVariables = 64;
 inline constexpr int kMostEffects = 256, kMostFields = 16;
 /// ARK messages carry 10-bit robot ids, and 1023 marks an unused slot.
 inline constexpr std::uint32_t kMostArkRobots = 1022;

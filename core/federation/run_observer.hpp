@@ -15,6 +15,9 @@
 #include "core/frames/tracker_sample.hpp"
 
 namespace kilotwin {
+namespace proto {
+class Observations;
+}
 
 /// Progress of a run.
 struct RunProgress {
@@ -60,6 +63,9 @@ class RunObserver {
   virtual void tracker_sample(Tick tick, const TrackerSample& sample) {
     static_cast<void>(tick), static_cast<void>(sample);
   }
+  /// What hosts, radio and station observed for the recording: variables and events. Those of a tick come before the state hash of
+  /// the next tick but one.
+  virtual void observed(const proto::Observations& observations) { static_cast<void>(observations); }
   /// A checkpoint is about to be complete. The recording up to its tick must be on disk when this returns.
   virtual void saved() {}
   /// Called a few times a second, also while the run pauses or waits.

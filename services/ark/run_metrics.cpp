@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
+#include "idl/recording.pb.h"
 
 namespace kilotwin::ark {
 
@@ -66,6 +67,8 @@ void RunMetrics::on_metrics(const WireMetrics& metrics) {
                               metrics.robot_received._buffer[i], metrics.robot_collided._buffer[i],
                               metrics.robot_backed_off._buffer[i]});
   }
+  if (const auto& octets = metrics.observations; octets._length != 0)
+    observations_.emplace_back(reinterpret_cast<const char*>(octets._buffer), octets._length);  // NOLINT
   if (metrics.hash_parts._length != 0) {
     parts_.emplace_back(Tick{metrics.first_tick},
                         std::vector<std::uint64_t>(metrics.hash_parts._buffer,
@@ -73,12 +76,19 @@ void RunMetrics::on_metrics(const WireMetrics& metrics) {
   }
 }
 
-void RunMetrics::advance(const std::function<void(Tick, std::uint64_t)>& each) {
+void RunMetrics::advance(RunObserver& observer, const std::function<void(Tick, std::uint64_t)>& each) {
   std::vector<std::pair<Tick, std::vector<std::uint64_t>>> parts;
+  std::vector<std::string> observations;
   {
     const std::lock_guard lock(mutex_);
     if (!malformed_.empty()) throw RunError(malformed_);
     parts.swap(parts_);
+    observations.swap(observations_);
+  }
+  for (const std::string& octets : observations) {
+    proto::Observations observed;
+    if (!observed.ParseFromString(octets)) throw RunError("a metrics sample holds observations that cannot be read");
+    observer.observed(observed);
   }
   for (const auto& [tick, values] : parts) KILOTWIN_DEMAND(hashes_.add(tick, values));
   while (hashes_.advance()) each(hashes_.tick(), hashes_.chain());

@@ -18,8 +18,9 @@ class RunMetrics {
   /// `chain`: H(first - 1).
   RunMetrics(const RunPlan& plan, const dds::Participant& participant, Tick first, std::uint64_t chain);
 
-  /// Calls back with every H that has become known. Throws RunError where a metrics sample came that cannot be ours.
-  void advance(const std::function<void(Tick, std::uint64_t chain)>& each);
+  /// Hands what federates observed to the observer, then every H that has become known to `each`. Throws RunError where a metrics
+  /// sample came that cannot be ours.
+  void advance(RunObserver& observer, const std::function<void(Tick, std::uint64_t chain)>& each);
   /// The last tick whose H is known, and that H.
   [[nodiscard]] Tick hash_tick() const { return hashes_.tick(); }
   [[nodiscard]] std::uint64_t chain() const { return hashes_.chain(); }
@@ -49,6 +50,7 @@ class RunMetrics {
   std::mutex mutex_;  // guards what follows
   std::vector<Account> accounts_;
   std::vector<std::pair<Tick, std::vector<std::uint64_t>>> parts_;  // not yet in hashes_
+  std::vector<std::string> observations_;                           // not yet handed on
   std::string malformed_;                                           // the first malformed sample
   dds::Reader<WireMetrics> reader_;
 };

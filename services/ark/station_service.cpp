@@ -12,7 +12,9 @@
 #include "core/federation/frame_io.hpp"
 #include "core/federation/pace.hpp"
 #include "core/federation/snapshots.hpp"
+#include "core/observations/events.hpp"
 #include "core/os/interrupt.hpp"
+#include "idl/recording.pb.h"
 #include "services/ark/external_input.hpp"
 #include "services/ark/run_metrics.hpp"
 #include "services/ark/station_engine.hpp"
@@ -64,6 +66,11 @@ class StationFederate : public Federate {
     }
     engine_.emit(overhead_.frame);
     overhead_.write();
+    if (records_packets_) {
+      proto::Observations observed;
+      note_packets(overhead_.frame, observed);
+      if (observed.event_size() > 0) observer_.observed(observed);
+    }
     if (!overhead_.frame.packets.empty() && station_packets_.readers() > 0) publish_packets(now);
   }
 
@@ -113,7 +120,7 @@ class StationFederate : public Federate {
   /// Takes in what federates have counted, and writes checkpoint parts whose state hash has become known.
   void settle() {
     write_checkpoint();
-    metrics_.advance([this](Tick tick, std::uint64_t chain) {
+    metrics_.advance(observer_, [this](Tick tick, std::uint64_t chain) {
       observer_.hash(tick, chain);
       write_checkpoint();
     });
@@ -255,6 +262,7 @@ class StationFederate : public Federate {
   dds::Writer<PublicRobotState> robots_;
   dds::Writer<PublicStationPacket> station_packets_;
   std::uint64_t packets_published_ = 0;
+  const bool records_packets_ = RecordedEvents(session_.plan()).station;
   Clock::time_point next_robots_{};
   SwarmStream swarm_stream_;
   Pace pace_{session_.plan()};

@@ -6,9 +6,12 @@
 
 #include "core/base/say.hpp"
 #include "core/federation/frame_io.hpp"
+#include "core/federation/observed.hpp"
 #include "core/logs/robot_logs.hpp"
+#include "idl/recording.pb.h"
 #include "services/behaviours/eeprom_files.hpp"
 #include "services/behaviours/engine.hpp"
+#include "services/behaviours/host_observer.hpp"
 #include "services/behaviours/running_note.hpp"
 #include "services/behaviours/watchdog.hpp"
 
@@ -36,15 +39,17 @@ class BehavioursFederate : public Federate {
     swarm_.emplace(plan.robots(), plan.movables(), plan.memory.size());
   }
 
-  void publish(Tick) override {
+  void publish(Tick now) override {
     engine_.emit(actuation_.frame);
     actuation_.write();
+    observer_.at(now, observed_);
   }
 
   void step(Tick from) override {
     if (swarm_) swarm_->gather(from, bodies_->at(from));
     engine_.step(from, *radio_.at(from)[0], swarm_ ? &*swarm_ : nullptr,
                  {tracking_ ? tracking_->at(from)[0] : nullptr, session_.schedule().memberships()});
+    observer_.stepped(from, observed_);
     for (const auto& printed : engine_.printed()) logs_.write(from, printed.robot, printed.text);
     for (; printed_failures_ < engine_.failures().size(); ++printed_failures_) {
       const auto& failure = engine_.failures()[printed_failures_];
@@ -69,6 +74,7 @@ class BehavioursFederate : public Federate {
 
   void count(WireMetrics& metrics, bool last) override {
     metrics.robots_failed = engine_.robots_failed();
+    lend_observations(observed_, octets_, metrics);
     if (last) write_eeproms(engine_, session_.plan().share(host_), context_.run_directory);
   }
 
@@ -87,6 +93,9 @@ class BehavioursFederate : public Federate {
       printed_failures_;  // a resumed engine starts with the failures of its checkpoint, printed by the earlier run
   RobotLogs logs_;
   std::size_t printed_warnings_ = 0;
+  HostObserver observer_{session_.plan(), host_, engine_};
+  proto::Observations observed_;  // since the last metrics sample
+  std::string octets_;            // of the last metrics sample
 };
 
 }  // namespace

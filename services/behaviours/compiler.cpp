@@ -56,7 +56,7 @@ Compiler find_compiler(const fs::path& wanted) {
 /// zero-initialised locals, one CPU type.
 Arguments code_flags(const Compiler& compiler) {
   Arguments flags{
-      "-O2", "-g1", "-w", "-fdiagnostics-color=never", "-nostdinc", "-DF_CPU=8000000", "-funsigned-char",
+      "-O2", "-g", "-w", "-fdiagnostics-color=never", "-nostdinc", "-DF_CPU=8000000", "-funsigned-char",
       "-fpack-struct", "-fshort-enums", "-fcommon", "-march=x86-64", "-fPIC", "-fvisibility=hidden",
       "-ffp-contract=off", "-fno-math-errno", "-fno-strict-aliasing", "-fwrapv", "-fno-delete-null-pointer-checks",
       "-fcf-protection=none", "-fno-stack-protector", "-fstack-clash-protection", "-fno-asynchronous-unwind-tables",

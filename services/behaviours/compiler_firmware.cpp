@@ -18,6 +18,7 @@ std::vector<std::string> common_arguments(const fs::path& gcc, const fs::path& r
   return {gcc.string(),
           "-mmcu=atmega328p",
           "-Os",
+          "-g",
           "-std=gnu11",
           "-DF_CPU=8000000",
           "-funsigned-char",
@@ -64,6 +65,13 @@ CompiledProgram compile_firmware(const std::vector<fs::path>& sources, const Com
   const fs::path whole = fs::path(unfinished) / "program.elf";
   std::vector<std::string> arguments = common_arguments(gcc, runtime);
   for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
+  // Equal sources in different folders give equal octets.
+  if (const fs::path here = fs::current_path(error); !error)
+    arguments.push_back("-fdebug-prefix-map=" + here.string() + "=.");
+  for (const fs::path& source : sources) {
+    if (source.has_parent_path()) arguments.push_back("-fdebug-prefix-map=" + source.parent_path().string() + "=.");
+  }
+  arguments.push_back("-fdebug-prefix-map=" + runtime.string() + "=/kilotwin");
   for (const fs::path& source : sources) arguments.push_back(source.string());
   arguments.insert(arguments.end(), {(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(),
                                      "-lm", "-o", whole.string()});

@@ -485,6 +485,24 @@ void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::
   tx_period_[i] = tx_period;
 }
 
+bool BehavioursEngine::read(std::uint32_t robot, std::uint64_t offset, std::span<std::uint8_t> to) const {
+  const std::uint32_t i = robot - share_.first;
+  if (presence_[i] != Presence::kNew && presence_[i] != Presence::kAlive) return false;
+  const Program& program = programs_->program(plan_.program_of(robot));
+  // A robot that has not run yet has the variables of its program's start.
+  const std::span<const std::uint8_t> data = presence_[i] == Presence::kNew
+                                                 ? std::span(program.slot(robot % kSlots).initial_data())
+                                                 : memory_[i].data();
+  const std::uint64_t first = program.file.data.first;
+  if (offset < first || offset - first > data.size() || to.size() > data.size() - (offset - first)) return false;
+  std::memcpy(to.data(), data.data() + (offset - first), to.size());
+  return true;
+}
+
+std::uint64_t BehavioursEngine::offset_of(std::uint32_t robot, std::uint64_t pointer) const {
+  return pointer - programs_->program(plan_.program_of(robot)).slot(robot % kSlots).image_address();
+}
+
 void BehavioursEngine::emit(ActuationFrame& frame) const {
   frame.tick = now_;
   frame.first_robot = share_.first;

@@ -104,6 +104,12 @@ class BehavioursEngine {
     return calibrated_[i] != 0 ? nullptr : eeprom_[i].get();
   }
 
+  /// Copies octets of a robot's variables, for the recording. `offset`: as in ElfFile. Returns false where the robot runs no
+  /// program here, has failed, or has no variables there.
+  [[nodiscard]] bool read(std::uint32_t robot, std::uint64_t offset, std::span<std::uint8_t> to) const;
+  /// The offset to which a pointer in a robot's memory points.
+  [[nodiscard]] std::uint64_t offset_of(std::uint32_t robot, std::uint64_t pointer) const;
+
   /// Octets that the memories of all robots occupy.
   [[nodiscard]] std::uint64_t memory_octets() const;
 

@@ -54,6 +54,10 @@ class FirmwareRobots {
   virtual void begin_tick(const SwarmView&) = 0;
   virtual void end_tick() = 0;
   [[nodiscard]] virtual Outputs outputs(std::uint32_t i) const = 0;
+  /// Copies octets of robot i's RAM, which begins at address 0x100. Returns false where it has none there.
+  [[nodiscard]] virtual bool read(std::uint32_t i, std::uint16_t address, std::span<std::uint8_t> to) const {
+    return static_cast<void>(i), static_cast<void>(address), static_cast<void>(to), false;
+  }
   /// Digest of the robot's state, for the state hash.
   [[nodiscard]] virtual std::uint64_t word(std::uint32_t i) const = 0;
   [[nodiscard]] virtual std::string save(std::uint32_t i) const = 0;

@@ -78,6 +78,7 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
 
 void RadioEngine::step(Tick from, const Inputs& inputs) {
   KILOTWIN_DEMAND(from == tick_);
+  logged_.clear();
   if (divided_) take_ghosts(inputs.ghosts);
   forget(begin_of(from));
   read_poses(inputs.swarm);
@@ -91,7 +92,16 @@ void RadioEngine::step(Tick from, const Inputs& inputs) {
     contend(from, inputs.swarm);
     arrive(from);
   }
+  measure_logged(inputs.swarm);
   ++tick_;
+}
+
+void RadioEngine::measure_logged(const SwarmView& swarm) {
+  for (MessageEvent& event : logged_) {
+    const double dx = swarm.x_mm[event.sender] - swarm.x_mm[event.receiver];
+    const double dy = swarm.y_mm[event.sender] - swarm.y_mm[event.receiver];
+    event.distance_mm = static_cast<float>(__builtin_sqrt(dx * dx + dy * dy));
+  }
 }
 
 void RadioEngine::read_poses(const SwarmView& swarm) {
@@ -341,6 +351,7 @@ void RadioEngine::finish(std::uint32_t index, Cycles end) {
   if (owns(robot)) {
     ++counters_.sent;
     ++radio_counts_[robot].sent;
+    log_sent(robot, end);
     if (counts_pairs_) pairs_.add(robot, robot);
   }
   if (firmware_ && firmware_->has(robot)) return;
@@ -420,6 +431,7 @@ void RadioEngine::receive(const Transmission& packet, std::uint32_t receiver, bo
   } else {
     ++counters_.received;
     ++radio_counts_[receiver].received;
+    log_received(receiver, packet.sender, packet.end);
     if (firmware)
       firmware_->note_reception(receiver, packet.message);
     else

@@ -54,6 +54,14 @@ class RadioState;
 
 namespace kilotwin::comm {
 
+/// A message for the recording.
+struct MessageEvent {
+  Cycles time = 0;  ///< the packet's end
+  std::uint32_t sender = 0;
+  std::uint32_t receiver = 0;  ///< the sender itself: it has sent the whole packet
+  float distance_mm = 0;       ///< from sender to receiver
+};
+
 class RadioEngine {
  public:
   /// Inputs of a step from tick k; all are of tick k.
@@ -96,6 +104,13 @@ class RadioEngine {
   [[nodiscard]] const std::vector<RadioCount>& radio_counts() const { return radio_counts_; }
   /// Sorted by receiver, then sender; receiver == sender: its own successes. Empty unless recording.messages is set.
   [[nodiscard]] std::vector<PairCount> pair_counts() const { return pairs_.all(); }
+
+  /// From now on messages sent, or received, are logged for the recording.
+  void log_messages(bool sent, bool received) { logs_sent_ = sent, logs_received_ = received; }
+  /// Those of the last step, in the order in which the engine came to know of them.
+  [[nodiscard]] const std::vector<MessageEvent>& logged_messages() const { return logged_; }
+  /// Null where there are no firmware robots.
+  [[nodiscard]] const FirmwareRobots* firmware() const { return firmware_robots_.get(); }
 
   void save(proto::RadioState&) const;
   /// Restores the state saved at `tick`. Throws RunError if it does not fit the plan.
@@ -155,6 +170,13 @@ class RadioEngine {
   void receive_by_strength(const Transmission&, bool jammed, Tick now);
   template <class Readings>
   void receive(const Transmission&, std::uint32_t receiver, bool is_lost, Tick now, Readings readings);
+  void log_sent(std::uint32_t sender, Cycles time) {
+    if (logs_sent_) logged_.push_back({time, sender, sender, 0});
+  }
+  void log_received(std::uint32_t receiver, std::uint32_t sender, Cycles time) {
+    if (logs_received_) logged_.push_back({time, sender, receiver, 0});
+  }
+  void measure_logged(const SwarmView&);
   [[nodiscard]] bool fades(std::uint32_t receiver, Tick now, std::uint32_t draw) const;
 
   const Region region_;
@@ -192,6 +214,10 @@ class RadioEngine {
 
   const std::unique_ptr<FirmwareRobots> firmware_robots_;
   std::optional<FirmwareAir> firmware_;  ///< if the plan has firmware robots
+
+  // For the recording alone.
+  bool logs_sent_ = false, logs_received_ = false;
+  std::vector<MessageEvent> logged_;
 
   // Within a step.
   std::size_t next_copy_ = 0;      ///< index of the overhead packet whose start pulse is next

@@ -1,7 +1,9 @@
 #include "services/comm/radio_service.hpp"
 
 #include "core/federation/frame_io.hpp"
+#include "core/federation/observed.hpp"
 #include "services/comm/radio_engine.hpp"
+#include "services/comm/radio_observer.hpp"
 
 namespace kilotwin::comm {
 namespace {
@@ -21,7 +23,8 @@ class CommFederate : public Federate {
     }
   }
 
-  void publish(Tick) override {
+  void publish(Tick now) override {
+    observer_.at(now, observed_);
     for (std::uint32_t host = 0; host < radio_out_.size(); ++host) {
       engine_.emit(HostId{host}, radio_out_[host]->frame);
       radio_out_[host]->write();
@@ -32,6 +35,7 @@ class CommFederate : public Federate {
     swarm_.gather(from, bodies_.at(from));
     swarm_.gather(actuation_.at(from));
     engine_.step(from, {swarm_, *overhead_.at(from)[0]});
+    observer_.stepped(from, observed_);
   }
 
   [[nodiscard]] std::uint64_t hash_part() const override { return engine_.hash_part(); }
@@ -48,6 +52,7 @@ class CommFederate : public Federate {
     metrics.sent = counters.sent;
     metrics.received = counters.received;
     metrics.collided = counters.collided;
+    lend_observations(observed_, octets_, metrics);
     if (!last) return;
     for (const PairCount& pair : engine_.pair_counts()) {
       receiver_.push_back(pair.receiver);
@@ -84,7 +89,10 @@ class CommFederate : public Federate {
   Input<OverheadFrame> overhead_;
   SwarmView swarm_;
   std::vector<std::unique_ptr<Output<RadioFrame>>> radio_out_;
-  // Columns that the last metrics sample points to.
+  RadioObserver observer_{session_.plan(), engine_};
+  proto::Observations observed_;  // since the last metrics sample
+  // What the last metrics sample points to.
+  std::string octets_;
   std::vector<std::uint32_t> receiver_, sender_, count_;
   std::vector<std::uint32_t> attempted_, robot_sent_, received_, collided_, backed_off_;
 };

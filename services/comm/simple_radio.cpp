@@ -51,6 +51,7 @@ void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
   if (owns(sender)) {
     ++counters_.sent;
     ++radio_counts_[sender].sent;
+    log_sent(sender, begin_of(now));
     if (counts_pairs_) pairs_.add(sender, sender);
   }
   receptions_.begin_message(message_[sender]);
@@ -74,6 +75,7 @@ void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
     } else {
       ++counters_.received;
       ++radio_counts_[receiver].received;
+      log_received(receiver, sender, begin_of(now));
       receptions_.add(receiver, ranging_.gains(__builtin_sqrt(square_mm2)));
       if (counts_pairs_) pairs_.add(receiver, sender);
     }

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 
 #include "clients/recorder/reader.hpp"
 #include "core/federation/topics.hpp"
@@ -104,6 +105,34 @@ TEST_F(Control, PausesStepsContinuesAndStops) {
                            scratch_, "resumed");
   EXPECT_EQ(resumed.state_hash, summary.state_hash);
   EXPECT_EQ(resumed.resumed_from_tick, at + 6);
+}
+
+TEST_F(Control, TheCommandSteersARun) {
+  start();
+  const std::string domain = std::to_string(domain_);
+  const auto control = [&](Words words) {
+    words.insert(words.begin(), "control");
+    words.insert(words.end(), {"--domain", domain, "--json"});
+    Outcome outcome = kilotwin(words, scratch_);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  const auto paused = control({"pause"});
+  EXPECT_EQ(paused.at("phase"), "paused");
+  const auto stepped = control({"step", "7"});
+  EXPECT_EQ(stepped.at("tick").get<int>(), paused.at("tick").get<int>() + 7);
+  EXPECT_EQ(stepped.at("phase"), "paused");
+  control({"checkpoint"});
+  EXPECT_EQ(control({"continue"}).at("phase"), "running");
+  EXPECT_EQ(control({"status"}).at("robots"), 20);
+  EXPECT_EQ(control({"stop"}).at("phase"), "ended");
+  const Outcome outcome = process_->wait(30);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("kilotwin control status --domain " + domain), std::string::npos) << outcome.err;
+  const Outcome none = kilotwin({"control", "pause", "--domain", domain, "--patience", "0.3"}, scratch_);
+  EXPECT_EQ(none.status, 1);
+  EXPECT_NE(none.err.find("no run on domain " + domain), std::string::npos) << none.err;
+  EXPECT_EQ(kilotwin({"control", "step", "--domain", domain}, scratch_).status, 2);
 }
 
 TEST_F(Control, ExternalOverheadPacketsAreStampedRecordedAndReplayed) {

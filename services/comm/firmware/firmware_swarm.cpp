@@ -200,6 +200,14 @@ comm::FirmwareRobots::Outputs FirmwareSwarm::outputs(std::uint32_t i) const {
   return out;
 }
 
+bool FirmwareSwarm::read(std::uint32_t i, std::uint16_t address, std::span<std::uint8_t> to) const {
+  constexpr std::size_t kRam = 0x100, kRamEnd = 0x900;
+  if (i >= robots_.size() || robots_[i].flat || address < kRam || address + to.size() > kRamEnd) return false;
+  for (std::size_t k = 0; k < to.size(); ++k)
+    to[k] = robots_[i].mcu->memory(static_cast<std::uint16_t>(address + k));
+  return true;
+}
+
 std::uint64_t FirmwareSwarm::word(std::uint32_t i) const {
   const Mcu& mcu = *robots_[i].mcu;
   const std::uint64_t word = hash_mix(mcu.now(), mcu.program_counter());

@@ -37,6 +37,7 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
   void begin_tick(const SwarmView&) override;
   void end_tick() override;
   [[nodiscard]] Outputs outputs(std::uint32_t i) const override;
+  [[nodiscard]] bool read(std::uint32_t i, std::uint16_t address, std::span<std::uint8_t> to) const override;
   [[nodiscard]] std::uint64_t word(std::uint32_t i) const override;
   [[nodiscard]] std::string save(std::uint32_t i) const override;
   void load(std::uint32_t i, const std::string& octets) override;

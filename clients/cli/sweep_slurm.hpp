@@ -1,0 +1,20 @@
+/// A sweep as one array job of Slurm.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "clients/cli/sweep_runs.hpp"
+
+namespace kilotwin::cli {
+
+/// Writes DIR/commands, a line per run, and DIR/array.sbatch, submits it, waits for its end, and calls `ended` for each run. A run whose
+/// element did not come to its end counts as failed. `options`: for sbatch. Returns false if this process is interrupted; the job is
+/// cancelled then. Throws RunError where there is no Slurm, or it refuses the job.
+[[nodiscard]] bool run_on_slurm(std::vector<SweepRun>& runs, const std::filesystem::path& directory,
+                                const std::vector<std::string>& options,
+                                const std::function<void(const SweepRun&)>& ended);
+
+}  // namespace kilotwin::cli

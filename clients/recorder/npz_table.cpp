@@ -1,0 +1,233 @@
+// The archive is a ZIP file without compression (APPNOTE 6.3), with its 64-bit records throughout, so that no array is too long.
+// Arrays are NPY 1.0 files: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
+#include "clients/recorder/npz_table.hpp"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "core/base/error.hpp"
+#include "core/os/files.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+constexpr std::uint32_t kLocal = 0x04034b50, kCentral = 0x02014b50, kEnd = 0x06054b50, kEnd64 = 0x06064b50,
+                        kLocator64 = 0x07064b50;
+constexpr std::uint16_t kVersion64 = 45;        // ZIP64
+constexpr std::uint16_t kDate1980 = 1 << 5 | 1;  // equal tables give equal files
+constexpr std::uint32_t kIn64 = 0xffffffffu;     // the number is in the 64-bit record
+constexpr std::size_t kMostComment = 0xffff;
+constexpr std::int64_t kMissingText = -1;
+/// A missing whole number. No recorded value is that small but by intent.
+constexpr std::int64_t kMissingInteger = std::numeric_limits<std::int64_t>::min();
+
+/// Little-endian numbers, one after the other.
+class Octets {
+ public:
+  template <class Number> Octets& operator<<(Number value) {
+    for (std::size_t i = 0; i < sizeof value; ++i)
+      text_ += static_cast<char>(static_cast<std::uint64_t>(value) >> 8 * i & 0xff);
+    return *this;
+  }
+  Octets& operator<<(const std::string& text) {
+    text_ += text;
+    return *this;
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+struct Member {
+  std::string name;
+  std::uint64_t offset = 0, size = 0;
+  std::uint32_t crc = 0;
+};
+
+std::string local_header(const Member& member) {
+  Octets octets;
+  octets << kLocal << kVersion64 << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0} << kDate1980 << member.crc
+         << kIn64 << kIn64 << static_cast<std::uint16_t>(member.name.size()) << std::uint16_t{20} << member.name
+         << std::uint16_t{1} << std::uint16_t{16} << member.size << member.size;
+  return octets.text();
+}
+
+std::string directory(const std::vector<Member>& members, std::uint64_t offset, const std::string& comment) {
+  Octets octets;
+  for (const Member& member : members) {
+    octets << kCentral << kVersion64 << kVersion64 << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0}
+           << kDate1980 << member.crc << kIn64 << kIn64 << static_cast<std::uint16_t>(member.name.size())
+           << std::uint16_t{28} << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0} << std::uint32_t{0} << kIn64
+           << member.name << std::uint16_t{1} << std::uint16_t{24} << member.size << member.size << member.offset;
+  }
+  const std::uint64_t size = octets.text().size(), count = members.size();
+  octets << kEnd64 << std::uint64_t{44} << kVersion64 << kVersion64 << std::uint32_t{0} << std::uint32_t{0} << count
+         << count << size << offset;
+  octets << kLocator64 << std::uint32_t{0} << offset + size << std::uint32_t{1};
+  octets << kEnd << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0xffff} << std::uint16_t{0xffff} << kIn64
+         << kIn64 << static_cast<std::uint16_t>(comment.size()) << comment;
+  return octets.text();
+}
+
+std::string array_header(const std::string& type, std::uint64_t rows) {
+  constexpr std::size_t kAlignment = 64, kPrefix = 10;
+  std::string text = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({},), }}", type, rows);
+  text.append(kAlignment - (kPrefix + text.size() + 1) % kAlignment, ' ');
+  text += '\n';
+  Octets octets;
+  octets << std::string("\x93NUMPY\x01") + '\0' << static_cast<std::uint16_t>(text.size()) << text;
+  return octets.text();
+}
+
+/// UTF-8 as code points; a malformed octet becomes U+FFFD.
+std::u32string code_points(std::string_view text) {
+  std::u32string points;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto octet = static_cast<unsigned char>(text[i]);
+    const std::size_t length = octet < 0x80 ? 1 : octet >> 5 == 6 ? 2 : octet >> 4 == 14 ? 3 : octet >> 3 == 30 ? 4 : 0;
+    char32_t point = length == 1 ? octet : octet & (0x7fu >> length);
+    bool right = length > 0 && i + length <= text.size();
+    for (std::size_t k = 1; right && k < length; ++k) {
+      const auto next = static_cast<unsigned char>(text[i + k]);
+      right = next >> 6 == 2;
+      point = point << 6 | (next & 0x3fu);
+    }
+    points += right ? point : U'\uFFFD';
+    i += right ? length : 1;
+  }
+  return points;
+}
+
+}  // namespace
+
+NpzTable::NpzTable(std::filesystem::path file, std::vector<Column> columns, const TableMetadata& metadata)
+    : Table(columns.size()),
+      file_(std::move(file)),
+      described_(std::move(columns)),
+      comment_(table_json(described_, metadata).substr(0, kMostComment)) {
+  output_.reset(std::fopen(file_.c_str(), "wb"));
+  if (!output_) fail();
+  for (std::size_t i = 0; i < columns_; ++i) {
+    Spill& spill = spills_.emplace_back();
+    spill.cells.reset(std::tmpfile());
+    if (!spill.cells) throw RunError(fmt::format("a temporary file cannot be made: {}", os::system_reason()));
+  }
+}
+
+void NpzTable::fail() const {
+  throw RunError(fmt::format("{}: cannot be written: {}", file_.string(), os::system_reason()));
+}
+
+void NpzTable::put(std::uint64_t bits) {
+  if (std::fwrite(&bits, sizeof bits, 1, spills_[cell_++].cells.get()) != 1)
+    throw RunError(fmt::format("a temporary file cannot be written: {}", os::system_reason()));
+}
+
+void NpzTable::integer(std::int64_t value) { put(std::bit_cast<std::uint64_t>(value)); }
+
+void NpzTable::number(double value) { put(std::bit_cast<std::uint64_t>(value)); }
+
+void NpzTable::text(std::string_view value) {
+  Spill& spill = spills_[cell_];
+  auto found = spill.texts.find(value);
+  if (found == spill.texts.end()) {
+    found = spill.texts.emplace(value, static_cast<std::int64_t>(spill.by_number.size())).first;
+    spill.by_number.emplace_back(value);
+    spill.longest = std::max(spill.longest, code_points(value).size());
+  }
+  integer(found->second);
+}
+
+void NpzTable::missing() {
+  spills_[cell_].any_missing = true;
+  switch (described_[cell_].type) {
+    case CellType::kInteger: return integer(kMissingInteger);
+    case CellType::kText: return integer(kMissingText);
+    default: return number(std::numeric_limits<double>::quiet_NaN());
+  }
+}
+
+void NpzTable::end_row() {
+  KILOTWIN_DEMAND(cell_ == columns_);
+  cell_ = 0;
+  ++rows_;
+}
+
+void NpzTable::append(const void* octets, std::size_t size) {
+  if (std::fwrite(octets, 1, size, output_.get()) != size) fail();
+  written_ += size;
+  crc_ = static_cast<std::uint32_t>(::crc32_z(crc_, static_cast<const Bytef*>(octets), size));
+}
+
+/// The cells of a column after its array's header.
+void NpzTable::copy(Spill& spill, const Column& column) {
+  const bool is_text = column.type == CellType::kText;
+  const bool as_double = column.type == CellType::kInteger && spill.any_missing;
+  const std::string type = is_text ? fmt::format("<U{}", spill.longest)
+                           : column.type == CellType::kInteger && !as_double ? "<i8"
+                                                                             : "<f8";
+  const std::string header = array_header(type, rows_);
+  append(header.data(), header.size());
+  std::vector<std::u32string> texts;
+  for (const std::string& text : spill.by_number) {
+    texts.push_back(code_points(text));
+    texts.back().resize(spill.longest, U'\0');
+  }
+  const std::u32string none(spill.longest, U'\0');
+  std::rewind(spill.cells.get());
+  constexpr std::size_t kBlock = 8192;
+  std::vector<std::uint64_t> block(kBlock);
+  for (std::uint64_t left = rows_; left > 0;) {
+    const std::size_t count = std::fread(block.data(), 8, static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlock)),
+                                         spill.cells.get());
+    if (count == 0) throw RunError(fmt::format("a temporary file cannot be read: {}", os::system_reason()));
+    left -= count;
+    for (std::size_t i = 0; i < count && (is_text || as_double); ++i) {
+      const auto value = std::bit_cast<std::int64_t>(block[i]);
+      if (is_text) {
+        const std::u32string& text = value == kMissingText ? none : texts[static_cast<std::size_t>(value)];
+        append(text.data(), text.size() * sizeof(char32_t));
+      } else {
+        block[i] = std::bit_cast<std::uint64_t>(value == kMissingInteger ? std::numeric_limits<double>::quiet_NaN()
+                                                                         : static_cast<double>(value));
+      }
+    }
+    if (!is_text) append(block.data(), count * 8);
+  }
+}
+
+void NpzTable::close() {
+  std::vector<Member> members;
+  for (std::size_t i = 0; i < columns_; ++i) {
+    Member& member = members.emplace_back();
+    member.name = described_[i].name + ".npy";
+    member.offset = written_;
+    const std::string placeholder = local_header(member);
+    append(placeholder.data(), placeholder.size());
+    const std::uint64_t begin = written_;
+    crc_ = 0;
+    copy(spills_[i], described_[i]);
+    spills_[i].cells.reset();
+    member.size = written_ - begin;
+    member.crc = crc_;
+    // The checksum is known now.
+    const std::string header = local_header(member);
+    if (::fseeko(output_.get(), static_cast<off_t>(member.offset), SEEK_SET) != 0 ||
+        std::fwrite(header.data(), 1, header.size(), output_.get()) != header.size() ||
+        ::fseeko(output_.get(), 0, SEEK_END) != 0)
+      fail();
+  }
+  const std::string end = directory(members, written_, comment_);
+  append(end.data(), end.size());
+  if (std::fclose(output_.release()) != 0) fail();
+}
+
+}  // namespace kilotwin::recorder

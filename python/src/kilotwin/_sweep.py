@@ -1,0 +1,77 @@
+"""Many runs."""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Mapping
+
+from kilotwin._program import call, common_words, text_of
+from kilotwin._run import Run
+
+if TYPE_CHECKING:
+    import pandas
+
+
+class Sweep:
+    """The results of a sweep."""
+
+    def __init__(self, directory: str | os.PathLike[str]) -> None:
+        #: The sweep's directory.
+        self.directory = Path(directory)
+
+    def runs(self) -> list[Run]:
+        """The runs that came to their end, by point and seed."""
+        with open(self.directory / "runs.csv", newline="") as file:
+            return [Run(row["directory"]) for row in csv.DictReader(file) if row["well"] == "1"]
+
+    def table(self, name: str = "runs") -> pandas.DataFrame:
+        """`runs`: a row per run, failed ones included; `sweep`: a row per point, means and standard errors (_se) at the end;
+        `curves`: the same over time. Needs pandas."""
+        import pandas as pd
+
+        return pd.read_csv(self.directory / f"{name}.csv")
+
+
+def sweep(
+    experiment: str | os.PathLike[str],
+    *,
+    out: str | os.PathLike[str],
+    seeds: str | None = None,
+    set: Mapping[str, Any] | None = None,
+    latin: int | None = None,
+    jobs: int | None = None,
+    robots: int | None = None,
+    behaviour: str | os.PathLike[str] | None = None,
+    duration_s: float | None = None,
+    model: str | os.PathLike[str] | None = None,
+    define: Mapping[str, Any] | None = None,
+    resume: bool = False,
+    force: bool = False,
+) -> Sweep:
+    """Runs an experiment over seeds and values, on all cores.
+
+    seeds: "1..20". set: per field a list of values, or a text such as "10..200:10" or "log:0.01..10:7". latin: so many points of a
+    Latin hypercube over the ranges in place of all combinations. resume: goes on with the sweep in `out`. Runs that fail are
+    listed in the table; the others are there. Raises KilotwinError for wrong input, or if no run came to its end.
+    """
+    words = ["sweep", os.fspath(experiment)]
+    if seeds is not None:
+        words += ["--seeds", seeds]
+    for field, values in (set or {}).items():
+        text = values if isinstance(values, str) else ",".join(text_of(value) for value in values)
+        words += ["--set", f"{field}={text}"]
+    for option, value in [("--latin", latin), ("--jobs", jobs)]:
+        if value is not None:
+            words += [option, str(value)]
+    words += common_words(
+        robots=robots, behaviour=behaviour, duration_s=duration_s, model=model, define=define, out=None if resume else out, force=force
+    )
+    if resume:
+        words += ["--resume", os.fspath(out)]
+    call(words, accepted=(0, 1))
+    done = Sweep(out)
+    if not (done.directory / "runs.csv").exists():
+        call(words)
+    return done

@@ -1,0 +1,120 @@
+// Tables in their formats; NumPy and pandas read what was written, where they are installed.
+#include "clients/recorder/table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "core/base/error.hpp"
+#include "core/os/files.hpp"
+#include "core/os/process.hpp"
+
+namespace kilotwin::recorder {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TableTest : public testing::Test {
+ protected:
+  TableTest() {
+    std::string name = (fs::temp_directory_path() / "kilotwin-table-XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+  }
+  ~TableTest() override { fs::remove_all(folder_); }
+
+  fs::path write(const std::string& name) {
+    const fs::path file = folder_ / name;
+    const auto table = open_table(file,
+                                  {{"time_s", "s", CellType::kTime},
+                                   {"robot", "", CellType::kInteger},
+                                   {"hops", "", CellType::kInteger},
+                                   {"x_mm", "mm", CellType::kNumber, 4},
+                                   {"state", "", CellType::kText}},
+                                  {{"seed", "7"}, {"version", "1, \"two\""}});
+    const TickLength length{262144};
+    for (int i = 0; i < 3; ++i) {
+      table->time(Tick{i}, length);
+      table->integer(i);
+      if (i == 1)
+        table->missing();
+      else
+        table->integer(10 * i);
+      if (i == 2)
+        table->missing();
+      else
+        table->number(-1.25 * i);
+      table->text(i == 0 ? "running" : i == 1 ? "a \"b\", Käfer 🐞" : "");
+      table->end_row();
+    }
+    table->close();
+    EXPECT_EQ(table->rows(), 3u);
+    return file;
+  }
+
+  /// Runs Python; skips the test where it or a module is missing.
+  void python(const std::string& modules, const std::string& text) {
+    // Debian's NumPy is for Debian's Python, which need not be the first on the PATH.
+    const fs::path python3 = fs::exists("/usr/bin/python3") ? "/usr/bin/python3" : os::find_executable("python3");
+    if (python3.empty() || !os::run_process({python3, "-c", "import " + modules}).end.well())
+      GTEST_SKIP() << "python3 with " << modules << " is not installed";
+    const os::ProcessResult result = os::run_process({python3, "-c", text, folder_});
+    EXPECT_TRUE(result.end.well()) << result.errors;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(TableTest, CsvIsAsBefore) {
+  EXPECT_EQ(os::read_file(write("t.csv")),
+            "time_s,robot,hops,x_mm,state\n0,0,0,0.0000,running\n0.032768,1,,-1.2500,\"a \"\"b\"\", Käfer 🐞\"\n"
+            "0.065536,2,20,,\n");
+  EXPECT_NE(os::read_file(folder_ / "t.csv.json").find("\"unit\": \"mm\""), std::string::npos);
+}
+
+TEST_F(TableTest, EqualTablesGiveEqualFiles) {
+  const std::string first = os::read_file(write("a.npz"));
+  EXPECT_EQ(first, os::read_file(write("b.npz")));
+}
+
+TEST_F(TableTest, OtherEndingsAreRefused) {
+  EXPECT_THROW(static_cast<void>(open_table(folder_ / "t.xls", {{"a", ""}}, {})), UserError);
+  EXPECT_THROW(static_cast<void>(open_table(folder_ / "none/t.npz", {{"a", ""}}, {})), RunError);
+}
+
+TEST_F(TableTest, NumPyReadsTheArchive) {
+  write("t.npz");
+  python("numpy", R"(
+import json, sys, zipfile, numpy as np
+name = sys.argv[1] + "/t.npz"
+assert zipfile.ZipFile(name).testzip() is None
+t = np.load(name)
+assert t.files == ["time_s", "robot", "hops", "x_mm", "state"], t.files
+assert t["robot"].dtype == np.int64 and list(t["robot"]) == [0, 1, 2]
+assert t["hops"].dtype == np.float64 and t["hops"][0] == 0 and np.isnan(t["hops"][1]) and t["hops"][2] == 20
+assert t["time_s"][2] == 0.065536
+assert t["x_mm"][1] == -1.25 and np.isnan(t["x_mm"][2])
+assert list(t["state"]) == ["running", 'a "b", K\u00e4fer \U0001F41E', ""], t["state"]
+about = json.loads(zipfile.ZipFile(name).comment)
+assert about["seed"] == "7" and about["version"] == '1, "two"' and about["columns"][3]["unit"] == "mm"
+)");
+}
+
+TEST_F(TableTest, PandasReadsBothFormatsWithoutOptions) {
+  write("t.npz");
+  write("t.csv.gz");
+  python("numpy, pandas", R"(
+import sys, numpy as np, pandas as pd
+a = pd.DataFrame(dict(np.load(sys.argv[1] + "/t.npz")))
+b = pd.read_csv(sys.argv[1] + "/t.csv.gz")
+assert list(a.columns) == list(b.columns)
+for column in ["time_s", "robot", "hops", "x_mm"]:
+    assert a[column].dtype == b[column].dtype, column
+    assert np.allclose(a[column], b[column], equal_nan=True), column
+assert list(a["state"]) == list(b["state"].fillna(""))
+)");
+}
+
+}  // namespace
+}  // namespace kilotwin::recorder
