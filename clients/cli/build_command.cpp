@@ -20,7 +20,7 @@ struct BuildArguments {
   std::vector<fs::path> sources;
   fs::path out;
   std::vector<std::string> define;
-  bool avr = false, boot_loader = false;
+  bool avr = false, boot_loader = false, wide_int = false;
 };
 
 void write_program(const fs::path& compiled, const fs::path& out) {
@@ -42,10 +42,26 @@ int build_for_robot(const BuildArguments& arguments, const behaviours::CompileOp
   return kDone;
 }
 
-int build(const BuildArguments& arguments) {
+/// `--define A=1 B=2`: words of the form NAME=VALUE after a --define are macros too, unless there is such a file.
+BuildArguments with_defines(BuildArguments arguments) {
+  if (arguments.define.empty()) return arguments;
+  const auto is_macro = [](const fs::path& source) {
+    std::error_code error;
+    return source.string().find('=') != std::string::npos && !fs::exists(source, error);
+  };
+  for (const fs::path& source : arguments.sources) {
+    if (is_macro(source)) arguments.define.push_back(source.string());
+  }
+  std::erase_if(arguments.sources, is_macro);
+  return arguments;
+}
+
+int build(const BuildArguments& given) {
+  const BuildArguments arguments = with_defines(given);
   behaviours::CompileOptions options;
   options.defines = arguments.define;
   options.boot_loader = arguments.boot_loader;
+  options.wide_int = arguments.wide_int;
   const fs::path object =
       arguments.out.empty() ? fs::path(arguments.sources.front().stem().string() + ".so") : arguments.out;
   if (behaviours::is_station_plugin(arguments.sources)) {
@@ -57,7 +73,7 @@ int build(const BuildArguments& arguments) {
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
   for (const std::string& note : compiled.notes) say("note: " + note);
   if (arguments.sources.front().extension() != ".so") {
-    for (const std::string& warning : behaviours::robot_warnings(arguments.sources, options)) say(warning);
+    for (const std::string& warning : behaviours::program_warnings(arguments.sources, compiled.sha256, options)) say(warning);
   }
   write_program(compiled.file, object);
   return kDone;
@@ -78,6 +94,8 @@ Command add_build(CLI::App& program) {
       "--avr", arguments->avr,
       "compile for the ATmega328P and print flash and RAM; with -o, also link firmware (.elf) with a kilolib "
       "that runs on the robot");
+  app.add_flag("--wide-int", arguments->wide_int,
+               "for simulation: int has 32 bits, as on this machine; else it has 16, as on the robot");
   app.add_flag("--boot-loader", arguments->boot_loader,
                "with --avr and -o: put a boot loader at 0x7000, which takes programs from an overhead controller");
   return {&app, [arguments] { return build(*arguments); }};

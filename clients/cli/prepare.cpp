@@ -27,6 +27,7 @@
 #include "core/plan/from_manifest.hpp"
 #include "core/plan/plan.hpp"
 #include "services/behaviours/compiler.hpp"
+#include "services/behaviours/robot_warnings.hpp"
 #include "services/behaviours/sha256.hpp"
 #include "services/comm/firmware/flash_image.hpp"
 
@@ -68,6 +69,19 @@ behaviours::CompiledProgram checked_firmware(const fs::path& file) {
   return {file, behaviours::sha256_hex(*octets), {}};
 }
 
+/// Shows a program's warnings, the first of them if there are many.
+void show_warnings(const std::vector<fs::path>& sources, const std::string& sha256,
+                   const behaviours::CompileOptions& options) {
+  constexpr std::size_t kMost = 10;
+  if (sources.front().extension() == ".so") return;
+  const std::vector<std::string> warnings = behaviours::program_warnings(sources, sha256, options);
+  for (std::size_t n = 0; n < std::min(warnings.size(), kMost); ++n) say(warnings[n]);
+  if (warnings.size() > kMost) {
+    say(fmt::format("{}: {} more warnings; `kilotwin build` shows all", sources.front().string(),
+                    warnings.size() - kMost));
+  }
+}
+
 /// Compiles each distinct program once and records each group's program. Returns the compiled files, in the manifest's order.
 std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunArguments& arguments,
                                      proto::Manifest& manifest, Notes notes) {
@@ -87,12 +101,17 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
     behaviours::CompileOptions options;
     options.defines = arguments.define;
     options.boot_loader = true;
+    options.wide_int = group.wide_int();
     const behaviours::CompiledProgram compiled = is_linked     ? checked_firmware(sources.front())
                                                  : group.avr() ? behaviours::compile_firmware(sources, options)
                                                                : behaviours::compile(sources, options);
     if (notes == Notes::kPrinted) {
       for (const std::string& note : compiled.notes) say("note: " + note);
     }
+    const bool is_new = std::none_of(
+        manifest.program().begin(), manifest.program().end(),
+        [&](const proto::Program& program) { return program.sha256() == compiled.sha256; });
+    if (notes == Notes::kPrinted && is_new && !is_firmware) show_warnings(sources, compiled.sha256, options);
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;
     if (index == manifest.program_size()) {

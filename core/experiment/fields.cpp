@@ -227,6 +227,7 @@ constexpr FieldRule kRules[] = {
     {"LightImage.picture_s", 0, kLongest_s, "s", Lower::kExcluded},
     {"LightSensor.radius_mm", 0, kRobotRadius_mm, "mm"},
     {"LightSensor.angle_deg", -360, 360, "degrees"},
+    {"LightSensor.tilt_deg", 0, 90, "degrees"},
     {"LightSensor.height_mm", 0, 100, "mm"},
     {"LightSensor.body_height_mm", 0, 100, "mm"},
     {"LightSensor.gain_sd", 0, 1, ""},

@@ -120,6 +120,7 @@ WireActuationFrame to_wire(const WireHeader& header, const ActuationFrame& frame
   wire.tx_period = borrow<UShorts>(frame.tx_period);
   wire.offer_robot = borrow<ULongs>(frame.offer_robot);
   wire.offer_message = borrow<Octets>(frame.offer_message);
+  wire.offer_crc_error = borrow<UShorts>(frame.offer_crc_error);
   wire.spin_up = borrow<Octets>(frame.spin_up);
   return wire;
 }
@@ -130,10 +131,12 @@ bool from_wire(const WireActuationFrame& wire, ActuationFrame& frame) {
   const bool whole = copy(wire.motor_left, frame.motor_left) && copy(wire.motor_right, frame.motor_right) &&
                      copy(wire.led, frame.led) && copy(wire.life_cycle, frame.life_cycle) &&
                      copy(wire.tx_period, frame.tx_period) && copy(wire.offer_robot, frame.offer_robot) &&
-                     copy(wire.offer_message, frame.offer_message) && copy(wire.spin_up, frame.spin_up);
+                     copy(wire.offer_message, frame.offer_message) &&
+                     copy(wire.offer_crc_error, frame.offer_crc_error) && copy(wire.spin_up, frame.spin_up);
   const std::size_t n = frame.motor_left.size();
   return whole && frame.motor_right.size() == n && frame.led.size() == n && frame.life_cycle.size() == n &&
          frame.tx_period.size() == n && frame.offer_message.size() == frame.offer_robot.size() &&
+         (frame.offer_crc_error.empty() || frame.offer_crc_error.size() == frame.offer_robot.size()) &&
          frame.spin_up.size() == n;
 }
 
@@ -148,6 +151,7 @@ WireRadioFrame to_wire(const WireHeader& header, const RadioFrame& frame) {
   wire.reception_high_gain = borrow<Shorts>(frame.reception_high_gain);
   wire.reception_low_gain = borrow<Shorts>(frame.reception_low_gain);
   wire.messages = borrow<Octets>(frame.messages);
+  wire.message_crc_error = borrow<UShorts>(frame.message_crc_error);
   wire.firmware_robot = borrow<ULongs>(frame.firmware_robot);
   wire.firmware_motor_left = borrow<Octets>(frame.firmware_motor_left);
   wire.firmware_motor_right = borrow<Octets>(frame.firmware_motor_right);
@@ -166,6 +170,7 @@ bool from_wire(const WireRadioFrame& wire, RadioFrame& frame) {
       copy(wire.reception_robot, frame.reception_robot) && copy(wire.reception_message, frame.reception_message) &&
       copy(wire.reception_high_gain, frame.reception_high_gain) &&
       copy(wire.reception_low_gain, frame.reception_low_gain) && copy(wire.messages, frame.messages) &&
+      copy(wire.message_crc_error, frame.message_crc_error) &&
       copy(wire.firmware_robot, frame.firmware_robot) &&
       copy(wire.firmware_motor_left, frame.firmware_motor_left) &&
       copy(wire.firmware_motor_right, frame.firmware_motor_right) &&
@@ -176,7 +181,8 @@ bool from_wire(const WireRadioFrame& wire, RadioFrame& frame) {
          frame.reception_low_gain.size() == n && frame.firmware_motor_left.size() == f &&
          frame.firmware_motor_right.size() == f && frame.firmware_led.size() == f &&
          frame.firmware_spin_up.size() == f && frame.firmware_life_cycle.size() == f &&
-         frame.firmware_fault.size() == f;
+         frame.firmware_fault.size() == f &&
+         (frame.message_crc_error.empty() || frame.message_crc_error.size() == frame.messages.size());
 }
 
 WireOverheadFrame to_wire(const WireHeader& header, const OverheadFrame& frame) {

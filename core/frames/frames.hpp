@@ -84,6 +84,7 @@ struct ActuationFrame {
   std::vector<std::uint16_t> tx_period;               ///< kilo_tx_period, counts of 128 us
   std::vector<std::uint32_t> offer_robot;             ///< ascending
   std::vector<IrMessage> offer_message;
+  std::vector<std::uint16_t> offer_crc_error;  ///< per offer: its CRC XOR the right one; empty: all CRCs are right
   std::vector<std::uint8_t> spin_up;  ///< per robot, 1: both motors were kicked before they got the duties above
 };
 
@@ -98,6 +99,7 @@ struct RadioFrame {
   std::vector<std::uint32_t> reception_message;  ///< index into messages
   std::vector<std::int16_t> reception_high_gain, reception_low_gain;
   std::vector<IrMessage> messages;
+  std::vector<std::uint16_t> message_crc_error;  ///< per message, as offer_crc_error
   // Robots that run firmware: what their processors show at the end of the tick, which their host passes on.
   std::vector<std::uint32_t> firmware_robot;  ///< ascending
   std::vector<std::uint8_t> firmware_motor_left, firmware_motor_right, firmware_spin_up, firmware_led,

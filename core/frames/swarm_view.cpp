@@ -63,6 +63,7 @@ void SwarmView::gather(Tick of, std::span<const BodyFrame* const> frames) {
 void SwarmView::gather(std::span<const ActuationFrame* const> frames) {
   offer_robot.clear();
   offer_message.clear();
+  offer_crc_error.clear();
   for (const ActuationFrame* frame : frames) {
     const auto put = [first = frame->first_robot](const auto& from, auto& to) {
       std::copy(from.begin(), from.end(), to.begin() + first);
@@ -75,6 +76,8 @@ void SwarmView::gather(std::span<const ActuationFrame* const> frames) {
     put(frame->tx_period, tx_period);
     offer_robot.insert(offer_robot.end(), frame->offer_robot.begin(), frame->offer_robot.end());
     offer_message.insert(offer_message.end(), frame->offer_message.begin(), frame->offer_message.end());
+    offer_crc_error.insert(offer_crc_error.end(), frame->offer_crc_error.begin(), frame->offer_crc_error.end());
+    offer_crc_error.resize(offer_message.size(), 0);
   }
 }
 

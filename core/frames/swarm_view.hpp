@@ -34,6 +34,7 @@ class SwarmView {
   std::vector<std::uint16_t> tx_period;                                 ///< per robot, as in ActuationFrame
   std::vector<std::uint32_t> offer_robot;                               ///< as in ActuationFrame, host by host
   std::vector<IrMessage> offer_message;
+  std::vector<std::uint16_t> offer_crc_error;  ///< as in ActuationFrame; of all offers
 
  private:
   std::size_t memory_size_;

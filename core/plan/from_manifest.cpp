@@ -260,6 +260,7 @@ LightSensorSettings sensor_of(const proto::LightSensor& sensor) {
   out.height_mm = sensor.height_mm();
   out.body_height_mm = sensor.body_height_mm();
   out.cosine = sensor.cosine();
+  out.tilt_deg = sensor.tilt_deg();
   out.gain_sd = sensor.gain_sd();
   out.offset_sd = sensor.offset_sd();
   out.noise_floor = sensor.noise_floor();

@@ -46,7 +46,7 @@ struct LightImageSettings {
 };
 
 struct LightSensorSettings {
-  double radius_mm = 0, angle_deg = 0, height_mm = 0, body_height_mm = 0;
+  double radius_mm = 0, angle_deg = 0, height_mm = 0, tilt_deg = 0, body_height_mm = 0;
   bool cosine = false;
   double gain_sd = 0, offset_sd = 0;
   double noise_floor = 0, noise_relative = 0;

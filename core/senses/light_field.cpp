@@ -19,6 +19,9 @@ LightField::LightField(const RunPlan& plan, Share share)
   kt_sincos(sensor.angle_deg * (kPi / 180), &s, &c);
   anchor_x_mm_ = sensor.radius_mm * c;
   anchor_y_mm_ = sensor.radius_mm * s;
+  double outward = 0, upward = 0;
+  kt_sincos(sensor.tilt_deg * (kPi / 180), &outward, &upward);
+  axis_ = {outward * c, outward * s, upward};
 
   const Random random(plan.seed());
   for (std::uint32_t i = 0; i < share.size(); ++i) {
@@ -49,11 +52,13 @@ void LightField::at(const SwarmView& swarm) {
   for (LightImage& image : images_) image.at(time_s);
 }
 
-double LightField::light(double x_mm, double y_mm, double z_mm, std::uint32_t self) const {
+double LightField::light(double x_mm, double y_mm, double z_mm, std::uint32_t self,
+                         const Direction& axis) const {
+  const Direction* const facing = light_.sensor.cosine ? &axis : nullptr;
   double sum = light_.ambient;
   for (const Lamp& lamp : lamps_) {
     if (shadows_ && shadows_->hides(lamp, x_mm, y_mm, z_mm, self)) continue;
-    sum += reading_of(lamp, x_mm, y_mm, z_mm, light_.sensor.cosine);
+    sum += reading_of(lamp, x_mm, y_mm, z_mm, facing);
   }
   for (const LightImage& image : images_) sum += image.reading(x_mm, y_mm);
   return sum;
@@ -64,7 +69,8 @@ double LightField::reading(std::uint32_t id) const {
   kt_sincos(swarm_->heading_rad[id], &s, &c);
   const double x_mm = swarm_->x_mm[id] + c * anchor_x_mm_ - s * anchor_y_mm_;
   const double y_mm = swarm_->y_mm[id] + s * anchor_x_mm_ + c * anchor_y_mm_;
-  return gain_[id - share_.first] * light(x_mm, y_mm, anchor_z_mm_, id) + offset_[id - share_.first];
+  const Direction axis{c * axis_.x - s * axis_.y, s * axis_.x + c * axis_.y, axis_.z};
+  return gain_[id - share_.first] * light(x_mm, y_mm, anchor_z_mm_, id, axis) + offset_[id - share_.first];
 }
 
 double LightField::sd(double reading) const {

@@ -27,14 +27,16 @@ class LightField {
   /// Standard deviation of one reading with this mean, counts.
   [[nodiscard]] double sd(double reading) const;
 
-  /// The light at a point, in counts of a nominal sensor. Robot `self` casts no shadow on it.
-  [[nodiscard]] double light(double x_mm, double y_mm, double z_mm, std::uint32_t self) const;
+  /// The light at a point, in counts of a nominal sensor that looks along `axis`. Robot `self` casts no shadow on it.
+  [[nodiscard]] double light(double x_mm, double y_mm, double z_mm, std::uint32_t self,
+                             const Direction& axis = {}) const;
 
  private:
   const RunPlan& plan_;
   const LightSettings& light_;
   const Share share_;
   double anchor_x_mm_ = 0, anchor_y_mm_ = 0, anchor_z_mm_;  ///< the sensor's position in the robot's frame
+  Direction axis_;                                          ///< the sensor's axis in the robot's frame
   std::vector<double> gain_, offset_;                       ///< per robot of the share
   const SwarmView* swarm_ = nullptr;
   std::vector<LightImage> images_;

@@ -16,16 +16,23 @@ struct Lamp {
 /// The source at `time_s`: its position on its way-points or circle, and whether it is switched on.
 [[nodiscard]] Lamp lamp_at(const LightSourceSettings&, double time_s);
 
+/// A unit vector.
+struct Direction {
+  double x = 0, y = 0, z = 1;
+};
+
 /// Reading of a nominal sensor at (x, y, z), counts, not limited to the converter's range. It falls with the square of the
-/// distance. With `cosine` it also falls with the cosine of the angle from the vertical, as on a flat sensor that looks up.
-[[nodiscard]] inline double reading_of(const Lamp& lamp, double x_mm, double y_mm, double z_mm, bool cosine) {
+/// distance. With an axis it also falls with the cosine of the angle between axis and lamp, as on a flat sensor (Lambert), and is
+/// 0 beyond 90 degrees; null: light counts alike from all sides.
+[[nodiscard]] inline double reading_of(const Lamp& lamp, double x_mm, double y_mm, double z_mm, const Direction* axis) {
   const double dx = lamp.x_mm - x_mm, dy = lamp.y_mm - y_mm, dz = lamp.z_mm - z_mm;
   // Avoids a division by 0. Within 1 mm every lamp saturates the sensor.
   double square = dx * dx + dy * dy + dz * dz;
   if (square < 1) square = 1;
   const double reading = lamp.intensity * 1e6 / square;
-  if (!cosine) return reading;
-  return dz > 0 ? reading * dz / __builtin_sqrt(square) : 0;
+  if (axis == nullptr) return reading;
+  const double along = dx * axis->x + dy * axis->y + dz * axis->z;
+  return along > 0 ? reading * along / __builtin_sqrt(square) : 0;
 }
 
 }  // namespace kilotwin::senses

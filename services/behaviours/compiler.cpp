@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <system_error>
 
 #include "core/base/error.hpp"
@@ -17,6 +18,7 @@
 #include "services/behaviours/elf_file.hpp"
 #include "services/behaviours/loop_barriers.hpp"
 #include "services/behaviours/program_text.hpp"
+#include "services/behaviours/robot_int.hpp"
 #include "services/behaviours/sha256.hpp"
 
 namespace kilotwin::behaviours {
@@ -152,7 +154,7 @@ std::string build(Arguments arguments, const fs::path& kept, const std::vector<f
   const Temporary result(kept);
   append(arguments, {"-o", result.path()});
   const os::ProcessResult process = run_compiler(arguments);
-  if (!process.end.well()) throw UserError(first_error(process.errors, sources));
+  if (!process.end.well()) throw UserError(all_errors(process.errors, sources));
   std::string octets = os::read_file(result.path());
   os::write_file(kept, octets);
   return octets;
@@ -168,26 +170,33 @@ std::optional<std::string> assembly_of(Arguments arguments, const fs::path& plac
   return os::read_if_there(result.path());
 }
 
+bool needs_code_on_stack(const std::string& assembly) {
+  return assembly.find(".note.GNU-stack,\"x\"") != std::string::npos;
+}
+
 /// Refuses trampolines: gcc calls a nested function through code on the stack if its address is taken and it uses variables of the
 /// enclosing function. The AVR cannot execute its RAM, and here stacks are not executable.
 void refuse_code_on_stack(const std::string& assembly, Arguments compile, const std::vector<fs::path>& sources,
                           const fs::path& place) {
-  if (assembly.find(".note.GNU-stack,\"x\"") == std::string::npos) return;
+  if (!needs_code_on_stack(assembly)) return;
   std::erase(compile, "-w");
   append(compile, {"-Wtrampolines", "-Werror=trampolines"});
   std::string errors;
   (void)assembly_of(compile, place, errors);
-  const std::string error = first_error(errors, sources);
+  const std::string error = all_errors(errors, sources);
   throw UserError(
       error.substr(0, error.find(" [-W")) +
       "; a robot cannot run code on its stack: let the nested function use no variable of the one around it, or "
       "call it there by its name alone");
 }
 
+/// Thrown if a program does not compile with the robot's int. It may compile without.
+struct NeedsWideInt {};
+
 /// Compiles one source to assembly with cycle counters and loop barriers. The barriers change the text that is compiled, so error
 /// messages come from a compilation of the unchanged source.
 std::string counted_assembly(const Arguments& compiler, const fs::path& source, const std::string& preprocessed,
-                             const std::vector<fs::path>& sources, const fs::path& place) {
+                             const std::vector<fs::path>& sources, const fs::path& place, bool robot_int) {
   const Temporary marked(place);
   os::write_file(marked.path(), with_loop_barriers(preprocessed));
   std::string errors;
@@ -200,12 +209,15 @@ std::string counted_assembly(const Arguments& compiler, const fs::path& source, 
   }
   append(arguments, {"-x", is_cpp(source) ? "c++-cpp-output" : "cpp-output", marked.path()});
   auto assembly = assembly_of(arguments, place, errors);
+  if (!assembly && robot_int) throw NeedsWideInt{};
   if (!assembly) {
     arguments = compiler;
     arguments.push_back(source.string());
     assembly = assembly_of(arguments, place, errors);
   }
-  if (!assembly) throw UserError(first_error(errors, sources));
+  if (!assembly) throw UserError(all_errors(errors, sources));
+  // The error is to name the columns of the source, which the robot's int shifts.
+  if (robot_int && needs_code_on_stack(*assembly)) throw NeedsWideInt{};
   refuse_code_on_stack(*assembly, arguments, sources, place);
   return with_cycle_counters(*assembly);
 }
@@ -230,7 +242,7 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& includes, con
     arguments.push_back((runtime / name).string());
     std::string errors;
     const auto assembly = assembly_of(arguments, kept, errors);
-    if (!assembly) throw UserError(first_error(errors, {runtime / name}));
+    if (!assembly) throw UserError(all_errors(errors, {runtime / name}));
     parts.push_back(std::make_unique<Temporary>(kept));
     const bool is_firmware = name == std::string_view("kilolib.c") || name == std::string_view("machine.c");
     const auto counted = is_firmware ? Counted::kTestsOnly : Counted::kAll;
@@ -239,18 +251,6 @@ fs::path runtime_object(const Compiler& compiler, const Arguments& includes, con
   }
   (void)build(link, kept, {runtime / "kilolib.c"});
   return kept;
-}
-
-/// Functions and variables that a linker reports as undefined.
-std::set<std::string> undefined_names(const std::string& errors) {
-  constexpr std::string_view kMark = "undefined reference to `";
-  std::set<std::string> names;
-  for (std::size_t at = errors.find(kMark); at != std::string::npos; at = errors.find(kMark, at + 1)) {
-    const std::size_t first = at + kMark.size();
-    names.insert(errors.substr(first, errors.find_first_of("'(", first) - first));
-  }
-  names.erase("main");
-  return names;
 }
 
 /// The linker's messages about a program with undefined functions or variables.
@@ -277,7 +277,7 @@ std::string linked(const Arguments& first, const Arguments& rest, const fs::path
     const os::ProcessResult process = run_compiler(arguments);
     if (!process.end.well()) {
       if (!undefined_names(process.errors).empty()) throw Incomplete{process.errors};
-      throw UserError(first_error(process.errors, sources));
+      throw UserError(all_errors(process.errors, sources));
     }
     std::string octets = os::read_file(result.path());
     const std::uint64_t unused = ElfFile::parse(octets, place.string()).unused_octets() / kAlignment * kAlignment;
@@ -291,8 +291,10 @@ struct Toolchain {
   Compiler compiler;
   fs::path cache, runtime;
   Arguments code, includes, defines;
+  bool robot_int = true;  ///< C programs get an int of 16 bits
 
-  /// Compiles and links, or returns the cached result. Throws Incomplete if functions are missing, UserError for other errors.
+  /// Compiles and links, or returns the cached result. Throws Incomplete if functions are missing, NeedsWideInt if robot_int
+  /// does not suit the program, UserError for other errors.
   [[nodiscard]] CompiledProgram make(const ProgramText& text, const Arguments& dialect) const;
 
   /// The preprocessed text of one source, or "" on failure.
@@ -304,6 +306,7 @@ struct Toolchain {
     Arguments result = language_flags(as_cpp || is_cpp(file));
     for (const Arguments& part : {code, dialect, defines, place_flags(text.sources), includes})
       append(result, part);
+    if (robot_int) result.emplace_back("-DKILOTWIN_ROBOT_INT");
     return result;
   }
 };
@@ -325,6 +328,8 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
   const std::string runtime_content = content;
   for (const std::string& flag : defines) content += flag + '\n';
   for (const std::string& flag : dialect) content += flag + '\n';
+  content += robot_int ? "int 16\n" : "int 32\n";
+  const std::string program_content = content;
   std::vector<fs::path> files = text.files;
   std::vector<std::string> texts;
   bool for_kilombo = std::find(dialect.begin(), dialect.end(), "-DSIMULATOR") != dialect.end();
@@ -334,9 +339,14 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
     append(preprocess, flags_for(text, file, dialect));
     preprocess.push_back(file.string());
     os::ProcessResult process = run_compiler(preprocess);
-    if (!process.end.well()) throw UserError(first_error(process.errors, text.sources));
+    if (!process.end.well()) throw UserError(all_errors(process.errors, text.sources));
     content += sha256_hex(process.output);
     for_kilombo = for_kilombo || process.output.find("UserdataSize") != std::string::npos;
+    if (robot_int) {
+      const bool as_cpp = std::find(dialect.begin(), dialect.end(), "c++") != dialect.end() || is_cpp(file);
+      if (as_cpp || !allows_robot_int(process.output)) throw NeedsWideInt{};
+      process.output = with_robot_int(process.output);
+    }
     texts.push_back(std::move(process.output));
     if (i + 1 == text.files.size() && for_kilombo) files.push_back(runtime / "simulator.c");
   }
@@ -358,8 +368,17 @@ CompiledProgram Toolchain::make(const ProgramText& text, const Arguments& dialec
     Arguments compile{compiler.path};
     append(compile, flags_for(text, files[i], dialect));
     parts.push_back(std::make_unique<Temporary>(kept));
-    const std::string assembly = counted_assembly(compile, files[i], texts[i], text.sources, kept);
-    os::write_file(parts.back()->path(), assembly);
+    // Each file is compiled once: its counted assembly is kept by the content of everything that goes into it.
+    const fs::path assembly =
+        cache / "assembly" / (sha256_hex(program_content + (is_cpp(files[i]) ? "c++\n" : "c\n") + texts[i]) + ".s");
+    auto counted = os::read_if_there(assembly);
+    if (!counted) {
+      counted = counted_assembly(compile, files[i], texts[i], text.sources, kept, robot_int);
+      std::error_code error;
+      fs::create_directories(assembly.parent_path(), error);
+      os::write_file(assembly, *counted);
+    }
+    os::write_file(parts.back()->path(), *counted);
     link.push_back(parts.back()->path());
   }
   append(link, {"-x", "none", "-lgcc", "-Wl,-T," + (runtime / "constructors.ld").string()});
@@ -375,26 +394,77 @@ bool mentions(const std::vector<fs::path>& sources, std::string_view word) {
   return false;
 }
 
-/// Makes the program, and adds missing sources until it links or no further source is found.
+/// The sources that an earlier search added to these, one path per line, in the cache.
+fs::path search_result(const Toolchain& toolchain, const std::vector<fs::path>& sources) {
+  std::string key;
+  for (const fs::path& source : sources) {
+    std::error_code error;
+    key += fs::absolute(source, error).lexically_normal().string() + '\n';
+  }
+  for (const std::string& flag : toolchain.defines) key += flag + '\n';
+  return toolchain.cache / "searches" / sha256_hex(key);
+}
+
+/// Makes the program, and adds missing sources until it links or no further source is found. Begins with those that it found
+/// the last time.
 CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sources, const Arguments& dialect) {
   std::vector<std::string> notes;
+  const fs::path search = search_result(toolchain, sources);
+  const std::size_t given = sources.size();
+  const auto add = [&](const fs::path& source) {
+    notes.push_back(source.string() + ": compiled too; it has what the program lacks");
+    sources.push_back(source);
+  };
+  std::istringstream found(os::read_if_there(search).value_or(""));
+  for (std::string line; std::getline(found, line);) {
+    std::error_code error;
+    if (fs::is_regular_file(line, error)) add(fs::relative(line));
+  }
+  bool searched = false;
   for (;;) {
     const ProgramText text = program_text(sources, toolchain.cache);
     try {
       CompiledProgram program = toolchain.make(text, dialect);
+      if (searched) {
+        std::string all;
+        for (std::size_t n = given; n < sources.size(); ++n) all += fs::absolute(sources[n]).string() + '\n';
+        std::error_code error;
+        fs::create_directories(search.parent_path(), error);
+        os::write_file(search, all);
+      }
       notes.insert(notes.begin(), text.notes.begin(), text.notes.end());
       program.notes = std::move(notes);
       return program;
+    } catch (const UserError& error) {
+      if (!searched && sources.size() > given) {  // what was found then no longer fits
+        sources.resize(given);
+        notes.clear();
+        searched = true;
+        continue;
+      }
+      std::string all = error.what();
+      for (const std::string& note : text.notes) all += "\nnote: " + note;
+      throw UserError(all);
     } catch (const Incomplete& incomplete) {
+      searched = true;
       auto preprocessed = [&](const fs::path& source) { return toolchain.preprocessed(source, dialect); };
       const std::vector<fs::path> more = sources_with(undefined_names(incomplete.errors), text, preprocessed);
-      if (more.empty()) throw UserError(first_error(incomplete.errors, text.sources));
-      for (const fs::path& source : more) {
-        notes.push_back(source.string() + ": compiled too; it has what the program lacks");
-        sources.push_back(source);
-      }
+      if (more.empty()) throw UserError(all_errors(incomplete.errors, text.sources));
+      for (const fs::path& source : more) add(source);
     }
   }
+}
+
+/// complete(), with the robot's int if the program allows it.
+CompiledProgram complete_with_int(Toolchain toolchain, const std::vector<fs::path>& sources, const Arguments& dialect) {
+  try {
+    return complete(toolchain, sources, dialect);
+  } catch (const NeedsWideInt&) {
+    toolchain.robot_int = false;
+  }
+  CompiledProgram program = complete(toolchain, sources, dialect);
+  if (!is_cpp(sources.front())) program.notes.push_back(sources.front().string() + ": its int has 32 bits here, 16 on the robot");
+  return program;
 }
 
 /// Compiler options under which a program may compile that is invalid without them, and the note for the user.
@@ -448,12 +518,13 @@ CompiledProgram compile(const std::vector<fs::path>& sources, const CompileOptio
   toolchain.runtime = unpacked_runtime(toolchain.cache);
   toolchain.includes = include_flags(toolchain.compiler, toolchain.runtime);
   toolchain.code = code_flags(toolchain.compiler);
+  toolchain.robot_int = !options.wide_int;
   try {
-    return complete(toolchain, sources, {});
+    return complete_with_int(toolchain, sources, {});
   } catch (const UserError& error) {
     for (const Dialect& dialect : dialects_for(error.what(), sources, toolchain.runtime)) {
       try {
-        CompiledProgram program = complete(toolchain, sources, dialect.flags);
+        CompiledProgram program = complete_with_int(toolchain, sources, dialect.flags);
         program.notes.push_back(sources.front().string() + ": " + dialect.note);
         return program;
       } catch (const UserError&) {

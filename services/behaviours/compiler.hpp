@@ -12,6 +12,7 @@ struct CompileOptions {
   std::vector<std::string> defines;       ///< macros, NAME or NAME=VALUE
   std::filesystem::path compiler;         ///< empty: the first of cc, gcc, clang on the PATH
   std::filesystem::path cache_directory;  ///< empty: os::cache_directory()
+  bool wide_int = false;     ///< programs for the simulation keep the host's int of 32 bits; else it has 16, as on the robot
   bool boot_loader = false;  ///< firmware gets this project's boot loader at 0x7000, as a robot has one
 };
 
@@ -24,7 +25,7 @@ struct CompiledProgram {
 /// Compiles C and C++ sources, together with the embedded runtime, into one shared object with fixed compiler flags. Ignores
 /// copies of kilolib beside the sources, and searches the neighbourhood for missing sources (program_text.hpp). The cache key is
 /// the content of all inputs; equal inputs give equal octets. A single .so is checked and returned unchanged.
-/// Throws UserError "FILE:LINE:COLUMN: error: ..." with the first error and the number of further errors. If the machine has no
+/// Throws UserError with the errors, one per line: "FILE:LINE:COLUMN: error: ...". If the machine has no
 /// compiler, the error names the package to install.
 [[nodiscard]] CompiledProgram compile(const std::vector<std::filesystem::path>& sources,
                                       const CompileOptions& options = {});

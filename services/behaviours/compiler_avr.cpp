@@ -73,14 +73,14 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
     for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
     arguments.insert(arguments.end(), {"-c", source.string(), "-o", object});
     const os::ProcessResult result = run_compiler(arguments);
-    if (!result.end.well()) throw UserError(first_error(result.errors, text.sources));
+    if (!result.end.well()) throw UserError(all_errors(result.errors, text.sources));
     link.push_back(object);
   }
   // A relocatable link of all objects with the C library. References to kilolib stay undefined.
   const std::string whole = (folder.path() / "program.o").string();
   link.insert(link.end(), {"-Wl,--start-group", "-lm", "-lc", "-lgcc", "-Wl,--end-group", "-o", whole});
   const os::ProcessResult linked = run_compiler(link);
-  if (!linked.end.well()) throw UserError(first_error(linked.errors, sources));
+  if (!linked.end.well()) throw UserError(all_errors(linked.errors, sources));
   return parsed_size(run_compiler({size, whole}).output);
 }
 

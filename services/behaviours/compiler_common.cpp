@@ -174,17 +174,16 @@ os::ProcessResult run_compiler(const std::vector<std::string>& arguments) {
   return result;
 }
 
-std::string first_error(const std::string& output, const std::vector<fs::path>& sources) {
+std::string all_errors(const std::string& output, const std::vector<fs::path>& sources) {
   std::vector<std::string> lines;
   std::istringstream stream(output);
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  std::string first;
-  std::size_t count = 0;
+  std::vector<std::string> found;
   auto look_for = [&](auto parse) {
-    if (count > 0) return;
+    if (!found.empty()) return;
     for (const std::string& line : lines) {
-      const std::optional<std::string> found = parse(line);
-      if (found && count++ == 0) first = *found;
+      const std::optional<std::string> error = parse(line);
+      if (error && std::find(found.begin(), found.end(), *error) == found.end()) found.push_back(*error);
     }
   };
   look_for(compiler_error);
@@ -192,9 +191,23 @@ std::string first_error(const std::string& output, const std::vector<fs::path>& 
   look_for([&](const std::string& line) { return missing_main(line, sources.front()); });
   look_for([&](const std::string& line) { return linker_error(line, sources); });
   look_for([&](const std::string& line) { return placeless_error(line, sources.front()); });
-  if (count == 0) return sources.front().string() + ":1:1: error: the compiler failed";
-  if (count > 1) first += " (" + std::to_string(count - 1) + (count == 2 ? " more error)" : " more errors)");
-  return first;
+  if (found.empty()) return sources.front().string() + ":1:1: error: the compiler failed";
+  constexpr std::size_t kMost = 20;
+  std::string all = found[0];
+  for (std::size_t n = 1; n < std::min(found.size(), kMost); ++n) all += '\n' + found[n];
+  if (found.size() > kMost) all += "\n(" + std::to_string(found.size() - kMost) + " more errors)";
+  return all;
+}
+
+std::set<std::string> undefined_names(const std::string& errors) {
+  constexpr std::string_view kMark = "undefined reference to `";
+  std::set<std::string> names;
+  for (std::size_t at = errors.find(kMark); at != std::string::npos; at = errors.find(kMark, at + 1)) {
+    const std::size_t first = at + kMark.size();
+    names.insert(errors.substr(first, errors.find_first_of("'(", first) - first));
+  }
+  names.erase("main");
+  return names;
 }
 
 }  // namespace kilotwin::behaviours

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,11 @@ void check_sources(const std::vector<std::filesystem::path>& sources);
 /// or a program that it started, lack of memory, a full disk, an internal compiler error.
 [[nodiscard]] os::ProcessResult run_compiler(const std::vector<std::string>& arguments);
 
-/// The first error in a compiler's or linker's output as one line, "FILE:LINE:COLUMN: error: ... (N more errors)". FILE is a
-/// source, spelled as in `sources`, or a header.
-[[nodiscard]] std::string first_error(const std::string& output, const std::vector<std::filesystem::path>& sources);
+/// The errors in a compiler's or linker's output, one per line: "FILE:LINE:COLUMN: error: ...", at most 20. FILE is a source,
+/// spelled as in `sources`, or a header.
+[[nodiscard]] std::string all_errors(const std::string& output, const std::vector<std::filesystem::path>& sources);
+
+/// Functions and variables but main() that a linker reports as undefined.
+[[nodiscard]] std::set<std::string> undefined_names(const std::string& errors);
 
 }  // namespace kilotwin::behaviours

@@ -7,6 +7,7 @@
 #include "core/os/process.hpp"
 #include "services/behaviours/compiler.hpp"
 #include "services/behaviours/compiler_common.hpp"
+#include "services/behaviours/program_text.hpp"
 #include "services/behaviours/sha256.hpp"
 
 namespace kilotwin::behaviours {
@@ -44,55 +45,101 @@ fs::path compile_boot_loader(const fs::path& gcc, const fs::path& runtime, const
   const os::ProcessResult compiled = run_compiler(arguments);
   if (!compiled.end.well())
     throw RunError("the boot loader does not compile: " +
-                   first_error(compiled.errors, {runtime / "avr/boot_loader.c"}));
+                   all_errors(compiled.errors, {runtime / "avr/boot_loader.c"}));
   const os::ProcessResult copied = run_compiler(
       {(gcc.parent_path() / "avr-objcopy").string(), "-O", "binary", linked.string(), octets.string()});
   if (!copied.end.well()) throw RunError("avr-objcopy: " + copied.errors);
   return octets;
 }
 
+/// A folder in the cache for the files of one link, removed by the destructor.
+class Workplace {
+ public:
+  explicit Workplace(const fs::path& cache) {
+    std::error_code error;
+    fs::create_directories(cache / "firmware", error);
+    std::string made = (cache / "firmware" / "linking-XXXXXX").string();
+    if (mkdtemp(made.data()) == nullptr) throw RunError(made + ": cannot be made; is the disk full?");
+    path_ = made;
+  }
+  Workplace(const Workplace&) = delete;
+  Workplace& operator=(const Workplace&) = delete;
+  ~Workplace() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// The arguments that link kilolib, and the boot loader if asked, into the program.
+std::vector<std::string> link_arguments(const fs::path& gcc, const fs::path& runtime, const fs::path& folder,
+                                        bool boot_loader) {
+  std::vector<std::string> arguments{(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(),
+                                     "-lm"};
+  if (!boot_loader) return arguments;
+  const fs::path loader = compile_boot_loader(gcc, runtime, folder);
+  arguments.insert(arguments.end(),
+                   {"-Wl,--section-start=.boot_loader=0x7000", "-Wl,-u,kilo_boot_loader",
+                    "-DBOOT_LOADER=\"" + loader.string() + "\"", (runtime / "avr/boot_section.S").string()});
+  return arguments;
+}
+
 }  // namespace
 
-CompiledProgram compile_firmware(const std::vector<fs::path>& sources, const CompileOptions& options) {
+CompiledProgram compile_firmware(const std::vector<fs::path>& given, const CompileOptions& options) {
+  check_sources(given);
   const fs::path gcc = os::find_executable("avr-gcc");
   if (gcc.empty()) throw UserError("no avr-gcc on this machine; apt-get install gcc-avr avr-libc binutils-avr");
   const fs::path cache = os::cache_directory(options.cache_directory), runtime = unpacked_runtime(cache);
-  std::error_code error;
-  fs::create_directories(cache / "firmware", error);
-  std::string unfinished = (cache / "firmware" / "linking-XXXXXX").string();
-  if (mkdtemp(unfinished.data()) == nullptr) throw RunError(unfinished + ": cannot be made; is the disk full?");
-
-  const fs::path whole = fs::path(unfinished) / "program.elf";
-  std::vector<std::string> arguments = common_arguments(gcc, runtime);
-  for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
+  const Workplace folder(cache);
+  const fs::path whole = folder.path() / "program.elf";
+  std::vector<std::string> common = common_arguments(gcc, runtime);
+  for (const std::string& flag : define_flags(options.defines)) common.push_back(flag);
   // Equal sources in different folders give equal octets.
+  std::error_code error;
   if (const fs::path here = fs::current_path(error); !error)
-    arguments.push_back("-fdebug-prefix-map=" + here.string() + "=.");
-  for (const fs::path& source : sources) {
-    if (source.has_parent_path()) arguments.push_back("-fdebug-prefix-map=" + source.parent_path().string() + "=.");
+    common.push_back("-fdebug-prefix-map=" + here.string() + "=.");
+  for (const fs::path& source : given) {
+    if (source.has_parent_path()) common.push_back("-fdebug-prefix-map=" + source.parent_path().string() + "=.");
   }
-  arguments.push_back("-fdebug-prefix-map=" + runtime.string() + "=/kilotwin");
-  for (const fs::path& source : sources) arguments.push_back(source.string());
-  arguments.insert(arguments.end(), {(runtime / "avr/kilolib.c").string(), (runtime / "avr/infrared.S").string(),
-                                     "-lm", "-o", whole.string()});
-  if (options.boot_loader) {
-    const fs::path loader = compile_boot_loader(gcc, runtime, unfinished);
-    arguments.insert(arguments.end(),
-                     {"-Wl,--section-start=.boot_loader=0x7000", "-Wl,-u,kilo_boot_loader",
-                      "-DBOOT_LOADER=\"" + loader.string() + "\"", (runtime / "avr/boot_section.S").string()});
+  common.push_back("-fdebug-prefix-map=" + runtime.string() + "=/kilotwin");
+  const std::vector<std::string> rest = link_arguments(gcc, runtime, folder.path(), options.boot_loader);
+  const auto preprocessed = [&](const fs::path& source) {
+    std::vector<std::string> arguments = common;
+    arguments.insert(arguments.end(), {"-E", "-P", program_text({source}, cache).files[0].string()});
+    const os::ProcessResult result = run_compiler(arguments);
+    return result.end.well() ? result.output : "";
+  };
+  std::vector<fs::path> sources = given;
+  std::vector<std::string> notes;
+  for (;;) {
+    const ProgramText text = program_text(sources, cache);
+    std::vector<std::string> arguments = common;
+    for (const fs::path& file : text.files) arguments.push_back(file.string());
+    arguments.insert(arguments.end(), rest.begin(), rest.end());
+    arguments.insert(arguments.end(), {"-o", whole.string()});
+    const os::ProcessResult result = run_compiler(arguments);
+    if (options.boot_loader && result.errors.find("overlaps") != std::string::npos) {
+      throw UserError(given.front().string() +
+                      ": the program reaches into the boot loader's section of the flash; it has room for 28 KiB");
+    }
+    if (const auto octets = os::read_if_there(whole); result.end.well() && octets) {
+      const std::string sha256 = sha256_hex(*octets);
+      const fs::path file = cache / "firmware" / (sha256 + ".elf");
+      os::write_file(file, *octets);
+      notes.insert(notes.begin(), text.notes.begin(), text.notes.end());
+      return {file, sha256, notes};
+    }
+    const std::vector<fs::path> more = sources_with(undefined_names(result.errors), text, preprocessed);
+    if (more.empty()) throw UserError(all_errors(result.errors, text.sources));
+    for (const fs::path& source : more) {
+      notes.push_back(source.string() + ": compiled too; it has what the program lacks");
+      sources.push_back(source);
+    }
   }
-  const os::ProcessResult result = run_compiler(arguments);
-  const auto octets = os::read_if_there(whole);
-  fs::remove_all(unfinished, error);
-  if (options.boot_loader && result.errors.find("overlaps") != std::string::npos) {
-    throw UserError(sources.front().string() +
-                    ": the program reaches into the boot loader's section of the flash; it has room for 28 KiB");
-  }
-  if (!result.end.well() || !octets) throw UserError(first_error(result.errors, sources));
-  const std::string sha256 = sha256_hex(*octets);
-  const fs::path file = cache / "firmware" / (sha256 + ".elf");
-  os::write_file(file, *octets);
-  return {file, sha256, {}};
 }
 
 }  // namespace kilotwin::behaviours

@@ -83,7 +83,7 @@ struct Toolchain {
     std::error_code error;
     if (!result.end.well()) {
       fs::remove(name, error);
-      throw UserError(first_error(result.errors, sources));
+      throw UserError(all_errors(result.errors, sources));
     }
     fs::permissions(name, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec |
                               fs::perms::others_read | fs::perms::others_exec);
@@ -139,7 +139,7 @@ CompiledProgram compile_station_plugin(const std::vector<fs::path>& sources, con
     append(preprocess, arguments);
     append(preprocess, {"-E", "-P", source.string()});
     const os::ProcessResult result = run_compiler(preprocess);
-    if (!result.end.well()) throw UserError(first_error(result.errors, sources));
+    if (!result.end.well()) throw UserError(all_errors(result.errors, sources));
     text.append(result.output).append(1, '\0');
   }
   const fs::path kept = toolchain.kept(text, arguments, ".so");

@@ -19,6 +19,10 @@ constexpr std::int64_t kPatienceCycles = 8'000'000;
 /// Prefetch distance: a robot's memory is prefetched while the robot this many places before it runs.
 constexpr std::size_t kAhead = 2;
 
+/// Per program: number of probes of loop(), and ticks between two of them.
+constexpr std::uint32_t kProbes = 8;
+constexpr std::int64_t kProbePeriod = 37;
+
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
 
 }  // namespace
@@ -48,11 +52,13 @@ BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared
       message_(share_.size()),
       is_due_(share_.size()),
       due_(share_.size()),
+      crc_error_(share_.size()),
       requested_(share_.size()),
       sent_(share_.size()),
       first_reception_(share_.size() + 1),
       wait_period_(share_.size()),
-      divided_(programs_->size()) {
+      probes_(programs_->size()),
+      warned_(programs_->size()) {
   KILOTWIN_DEMAND(programs_->size() == static_cast<std::uint32_t>(plan.programs().size()));
   for (const RobotEeprom& brought : plan.eeproms()) {
     if (!share_.contains(brought.robot)) continue;
@@ -95,11 +101,13 @@ void BehavioursEngine::gather(const RadioFrame& radio) {
   for (const std::uint32_t robot : radio.sent) sent_[own(robot)] = 1;
 
   messages_.resize(radio.messages.size());
+  wrong_crc_ = !radio.message_crc_error.empty();
   for (std::size_t m = 0; m < radio.messages.size(); ++m) {
     const IrMessage& message = radio.messages[m];
     std::copy_n(message.begin(), 9, messages_[m].data);
     messages_[m].type = message[9];
-    messages_[m].crc = kilotwin_message_crc(message.data());
+    const std::uint16_t error = wrong_crc_ ? radio.message_crc_error[m] : std::uint16_t{0};
+    messages_[m].crc = kilotwin_message_crc(message.data()) ^ error;
   }
   receptions_.resize(radio.reception_robot.size());
   std::uint32_t next = 0;
@@ -200,6 +208,7 @@ void BehavioursEngine::say_what_was_heard() {
     tx_period_[i] = 0;
     if (is_due_[i] == 0 || requested_[i] == 0 || holds_[i] != 0) continue;
     message_[i] = due_[i];
+    crc_error_[i] = 0;
     is_due_[i] = 0;
     holds_[i] = offers_[i] = 1;
   }
@@ -227,6 +236,7 @@ void BehavioursEngine::say_by_rule(std::uint32_t i, const Pose& p_WR) {
   tx_period_[i] = rule->tx_period;
   if (requested_[i] == 0 || holds_[i] != 0) return;
   message_[i] = rule->message;
+  crc_error_[i] = 0;
   if (rule->id_octet) message_[i][*rule->id_octet] = static_cast<std::uint8_t>(robot & 255);
   holds_[i] = offers_[i] = 1;
 }
@@ -306,6 +316,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   set_surroundings(i, slot, static_cast<std::uint32_t>(receptions.size()));
   std::int32_t interrupted_cycles = 0;
   if (eventful) {
+    slot.exchange()->wrong_crc = wrong_crc_ ? 1 : 0;
     const Fault* const fault = executor.interrupt(receptions, sent, interrupted_cycles);
     if (fault != nullptr) return fail_robot(i, *fault, program, slot);
     if (executor.robot().reset != 0) {
@@ -333,16 +344,70 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
     if (message != nullptr) {
       std::copy_n(message->data, 9, message_[i].begin());
       message_[i][9] = message->type;
+      crc_error_[i] = message->crc ^ kilotwin_message_crc(message_[i].data());
+      if (crc_error_[i] != 0) note_wrong_crc(i, message->crc);
       holds_[i] = offers_[i] = 1;
     }
   }
   keep_eeprom(i, slot);
   note_outputs(i, robot, executor.tx_period());
+  if (slot.exchange()->overflows != 0) note_overflows(i, *slot.exchange(), program, slot);
+  if (slot.exchange()->ended != 0) {
+    slot.exchange()->ended = 0;
+    if (is_first(i, Warning::kEnded))
+      warnings_.push_back({share_.first + i, "its main() has ended, so it does nothing more; main() ends with kilo_start(setup, loop)"});
+  }
   if (thread.divided != 0) note_division(i, thread.divided, program, slot);
   robot.spin_up = 0;
   if (!slot.clear_before_data()) return fail_robot(i, Fault{Fault::kBeforeVariables, 0, 0}, program, slot);
   if (!memory.copy_out(slot, executor.data_octets(), thread))
-    fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
+    return fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
+  const LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
+  if (probe.done < kProbes && from.count() >= probe.next) probe_loop(i, program, slot, executor);
+}
+
+/// Calls loop() once more in this tick, in the slot, and discards the result. On a robot loop() runs as often as it can. If
+/// further calls change the program's variables or outputs although nothing has happened, their number matters.
+void BehavioursEngine::probe_loop(std::uint32_t i, const Program& program, const Slot& slot, const Executor& executor) {
+  LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
+  const KtRobot before = executor.robot();
+  const bool rests = before.loop_rate == KT_LOOP_PER_TICK && before.debt_cycles == 0 && wait_period_[i] == 0 &&
+                     before.state == static_cast<std::uint8_t>(LifeCycle::kRunning);
+  if (!rests) return;
+  probe.next = now_.count() + kProbePeriod;
+  ++probe.done;
+  KtSurroundings& around = *slot.surroundings();
+  if (around.eeprom != nullptr) {  // the call may write to it
+    std::copy_n(around.eeprom, sizeof around.eeprom_copy, around.eeprom_copy);
+    around.eeprom = nullptr;
+    around.eeprom_filled = 1;
+  }
+  around.receiving_cycles = 0;
+  const std::uint32_t printed = slot.exchange()->log_length;
+  const auto budget = static_cast<std::int32_t>(plan_.tick_length.cycles());
+  const Executor::Main main = executor.run_main(budget, 0);
+  slot.exchange()->log_length = printed;
+  slot.exchange()->overflows = slot.exchange()->ended = 0;
+  const KtRobot& after = executor.robot();
+  if (main.fault != nullptr || main.preempted || after.waits != before.waits + 1) return;
+  const auto saved = memory_[i].data();
+  const std::size_t hardware = program.file.table.robot - program.file.data.first;
+  const std::uint8_t* const now = slot.data();
+  const bool same = std::equal(saved.begin(), saved.begin() + static_cast<std::ptrdiff_t>(hardware), now) &&
+                    std::equal(saved.begin() + static_cast<std::ptrdiff_t>(hardware + sizeof(KtRobot)), saved.end(),
+                               now + hardware + sizeof(KtRobot)) &&
+                    after.duty_left == before.duty_left && after.duty_right == before.duty_right &&
+                    after.led == before.led;
+  if (same) return;
+  ++probe.changed;
+  probe.cycles += std::max(budget - main.left, 1);
+  if (probe.done < kProbes || probe.changed < kProbes * 3 / 4) return;
+  char text[224];
+  std::snprintf(text, sizeof text,
+                "each call of its loop() changes its state, and a robot calls it about %lld times per tick, here once; "
+                "let it act by kilo_ticks, or set loop_rate: AS_ON_ROBOT",
+                static_cast<long long>(std::max<std::int64_t>(1, std::int64_t{budget} * probe.changed / probe.cycles)));
+  warnings_.push_back({share_.first + i, text});
 }
 
 /// Runs the main program for the rest of the tick.
@@ -456,11 +521,40 @@ void BehavioursEngine::fail_robot(std::uint32_t i, std::string text) {
   memory_[i].release();
 }
 
+/// Whether robot i is the first of its program with such a warning.
+bool BehavioursEngine::is_first(std::uint32_t i, Warning warning) {
+  std::uint8_t& warned = warned_[plan_.program_of(share_.first + i)];
+  const auto bit = static_cast<std::uint8_t>(warning);
+  const bool first = (warned & bit) == 0;
+  warned |= bit;
+  return first;
+}
+
+void BehavioursEngine::note_overflows(std::uint32_t i, KtExchange& told, const Program& program, const Slot& slot) {
+  // The robot may have overwritten the exchange, so limit its number.
+  const std::uint32_t count = std::min<std::uint32_t>(told.overflows, KT_MOST_OVERFLOWS);
+  told.overflows = 0;
+  for (std::uint32_t n = 0; n < count; ++n) {
+    const std::uint64_t code = told.overflow[n];
+    if (!overflown_.emplace(plan_.program_of(share_.first + i), code - slot.image_address()).second) continue;
+    std::string text = describe_overflow(code, program, slot);
+    if (overflows_.insert(text).second) warnings_.push_back({share_.first + i, std::move(text)});
+  }
+}
+
+void BehavioursEngine::note_wrong_crc(std::uint32_t i, std::uint16_t crc) {
+  if (!is_first(i, Warning::kWrongCrc)) return;
+  char text[192];
+  std::snprintf(text, sizeof text,
+                "its message has the CRC 0x%04x instead of 0x%04x, so receivers drop it, as on the robot; after each "
+                "change of a message set its crc to message_crc(&message)",
+                crc, crc ^ crc_error_[i]);
+  warnings_.push_back({share_.first + i, text});
+}
+
 void BehavioursEngine::note_division(std::uint32_t i, std::uint64_t code, const Program& program,
                                      const Slot& slot) {
-  const std::uint32_t index = plan_.program_of(share_.first + i);
-  if (divided_[index] != 0) return;
-  divided_[index] = 1;
+  if (!is_first(i, Warning::kDivision)) return;
   warnings_.push_back({share_.first + i, describe_division(code, program, slot)});
 }
 
@@ -514,11 +608,16 @@ void BehavioursEngine::emit(ActuationFrame& frame) const {
   frame.tx_period = tx_period_;
   frame.offer_robot.clear();
   frame.offer_message.clear();
+  frame.offer_crc_error.clear();
+  std::uint16_t any_error = 0;
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
     if (offers_[i] == 0) continue;
     frame.offer_robot.push_back(share_.first + i);
     frame.offer_message.push_back(message_[i]);
+    frame.offer_crc_error.push_back(crc_error_[i]);
+    any_error |= crc_error_[i];
   }
+  if (any_error == 0) frame.offer_crc_error.clear();
 }
 
 std::uint64_t BehavioursEngine::hash_part() const {

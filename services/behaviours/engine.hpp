@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -84,7 +85,8 @@ class BehavioursEngine {
   /// Text that robots printed in the last step, in the order in which they ran. Not part of the state.
   [[nodiscard]] const std::vector<Printed>& printed() const { return printed_; }
 
-  /// Divisions by zero in robots' programs, which go on running: the first one of each program, in order of time.
+  /// Divisions by zero, messages with a wrong CRC, ends of main() and a loop() whose number of calls matters, the first of each kind of each program; overflows of an int, the first of
+  /// each line. In order of time. The programs go on running.
   [[nodiscard]] const std::vector<Failure>& warnings() const { return warnings_; }
 
   /// The robot whose code is running. Any thread or process may read it while the engine steps.
@@ -114,6 +116,7 @@ class BehavioursEngine {
   [[nodiscard]] std::uint64_t memory_octets() const;
 
  private:
+  enum class Warning : std::uint8_t { kDivision = 1, kWrongCrc = 2, kEnded = 4 };
   enum class Presence : std::uint8_t { kNone, kNew, kAlive, kFailed, kFirmware };
 
   void gather(const RadioFrame& radio);
@@ -128,6 +131,10 @@ class BehavioursEngine {
   void calibrate_ranging(const RadioParameters&);
   void keep_eeprom(std::uint32_t i, const Slot&);
   const Fault* run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles);
+  [[nodiscard]] bool is_first(std::uint32_t i, Warning);
+  void probe_loop(std::uint32_t i, const Program&, const Slot&, const Executor&);
+  void note_overflows(std::uint32_t i, KtExchange&, const Program&, const Slot&);
+  void note_wrong_crc(std::uint32_t i, std::uint16_t crc);
   void note_division(std::uint32_t i, std::uint64_t code, const Program&, const Slot&);
   void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);
   void fail_robot(std::uint32_t i, const Fault&, const Program&, const Slot&);
@@ -165,6 +172,7 @@ class BehavioursEngine {
   std::vector<std::uint8_t> holds_;   ///< 1: the robot holds a message that is not sent yet
   std::vector<std::uint8_t> offers_;  ///< 1: the robot offers a further message in this tick
   std::vector<IrMessage> message_;    ///< the offered message; valid if offers_
+  std::vector<std::uint16_t> crc_error_;  ///< of the offered message: its CRC XOR the right one
   // Of tracked robots that say what listeners heard of them.
   std::vector<std::uint8_t> is_due_;  ///< 1: a message that was heard waits to be offered
   std::vector<IrMessage> due_;        ///< that message; valid if is_due_
@@ -178,10 +186,19 @@ class BehavioursEngine {
   std::vector<std::uint32_t> first_reception_;  ///< per robot, plus one: index into receptions_
   std::vector<KtReception> receptions_;         ///< ordered by robot, then by time of arrival
   std::vector<KtMessage> messages_;             ///< of receptions_, with checksums
+  bool wrong_crc_ = false;                      ///< one of messages_ has a wrong checksum
 
   // No result depends on these.
   std::vector<std::int32_t> wait_period_;  ///< per robot: Executor::Main::wait_period of the last tick
-  std::vector<std::uint8_t> divided_;      ///< per program: 1 if a division by zero was reported
+  std::set<std::string> overflows_;        ///< lines of which was said that an int overflows
+  std::set<std::pair<std::uint32_t, std::uint64_t>> overflown_;  ///< their programs and places in the code
+  struct LoopProbe {
+    std::int64_t next = 0;  ///< tick of the next probe
+    std::uint32_t done = 0, changed = 0;
+    std::int64_t cycles = 0;  ///< of the calls that changed something
+  };
+  std::vector<LoopProbe> probes_;          ///< per program: whether a further call of loop() in a tick changes its state
+  std::vector<std::uint8_t> warned_;       ///< per program: Warning bits of what was reported
 
   Running own_running_;
   Running* running_ = &own_running_;

@@ -33,7 +33,9 @@ enum Field : std::size_t {
   kSeenLed,
   kIsDue,
   kDue,
-  kFields = kDue + 10
+  kCrcErrorLow = kDue + 10,
+  kCrcErrorHigh,
+  kFields
 };
 
 }  // namespace
@@ -57,6 +59,8 @@ void BehavioursEngine::save(proto::BehavioursState& state) const {
     fields[kSeenLed] = seen_led_[i];
     fields[kIsDue] = is_due_[i];
     std::copy(due_[i].begin(), due_[i].end(), fields.begin() + kDue);
+    fields[kCrcErrorLow] = static_cast<std::uint8_t>(crc_error_[i] & 0xff);
+    fields[kCrcErrorHigh] = static_cast<std::uint8_t>(crc_error_[i] >> 8);
     fields[kHolds] = holds_[i];
     fields[kOffers] = offers_[i];
     std::copy(message_[i].begin(), message_[i].end(), fields.begin() + kMessage);
@@ -121,6 +125,7 @@ void BehavioursEngine::load(Tick tick, std::span<const proto::BehavioursState* c
     holds_[i] = fields[kHolds];
     offers_[i] = fields[kOffers];
     std::copy_n(fields.begin() + kMessage, 10, message_[i].begin());
+    crc_error_[i] = static_cast<std::uint16_t>(fields[kCrcErrorLow] | fields[kCrcErrorHigh] << 8);
   }
 }
 

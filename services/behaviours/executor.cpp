@@ -211,6 +211,11 @@ std::string describe(const Fault& fault, const Program& program, const Slot& slo
   return text + place(fault.code, program, slot);
 }
 
+std::string describe_overflow(std::uint64_t code, const Program& program, const Slot& slot) {
+  return "an int overflows" + place(code - 1, program, slot) +
+         ": it has 16 bits, -32768 to 32767, and wraps as on the robot; use int32_t";
+}
+
 std::string describe_division(std::uint64_t code, const Program& program, const Slot& slot) {
   return "division by zero" + place(code, program, slot) +
          "; the quotient is all ones (of a negative number 1), the remainder the dividend, as on the robot";

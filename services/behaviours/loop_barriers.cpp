@@ -1,70 +1,13 @@
 #include "services/behaviours/loop_barriers.hpp"
 
-#include <cctype>
 #include <cstdint>
 #include <set>
 #include <vector>
 
+#include "services/behaviours/c_tokens.hpp"
+
 namespace kilotwin::behaviours {
 namespace {
-
-struct Token {
-  std::string_view text;
-  std::size_t at = 0;  ///< offset in the text
-};
-
-bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '$'; }
-
-/// Offset after the quoted literal that begins at `at`.
-std::size_t end_of_literal(std::string_view text, std::size_t at) {
-  const char quote = text[at++];
-  while (at < text.size() && text[at] != quote && text[at] != '\n') at += text[at] == '\\' ? 2u : 1u;
-  return at < text.size() ? at + 1 : text.size();
-}
-
-/// Splits the text into words, literals and single characters. Skips white space and lines that begin with '#'.
-std::vector<Token> tokens_of(std::string_view text) {
-  std::vector<Token> tokens;
-  bool line_begins = true;
-  for (std::size_t at = 0; at < text.size();) {
-    const char c = text[at];
-    std::size_t end = at + 1;
-    if (c == '\n') {
-      line_begins = true;
-      at = end;
-      continue;
-    }
-    if (std::isspace(static_cast<unsigned char>(c)) != 0) {
-      at = end;
-      continue;
-    }
-    if (c == '#' && line_begins) {
-      while (end < text.size() && text[end] != '\n') ++end;
-      at = end;
-      continue;
-    }
-    line_begins = false;
-    if (is_word(c)) {
-      while (end < text.size() && is_word(text[end])) ++end;
-    } else if (c == '"' || c == '\'') {
-      end = end_of_literal(text, at);
-    }
-    tokens.push_back({text.substr(at, end - at), at});
-    at = end;
-  }
-  return tokens;
-}
-
-/// Index of the bracket that closes the one at `open`, or the number of tokens if there is none.
-std::size_t closing(const std::vector<Token>& tokens, std::size_t open) {
-  int depth = 0;
-  for (std::size_t i = open; i < tokens.size(); ++i) {
-    const char c = tokens[i].text[0];
-    if (c == '(' || c == '[' || c == '{') ++depth;
-    if ((c == ')' || c == ']' || c == '}') && --depth == 0) return i;
-  }
-  return tokens.size();
-}
 
 constexpr std::string_view kBarrier = "({__asm__ volatile(\"\":::\"memory\");}),";
 

@@ -160,13 +160,26 @@ std::vector<fs::path> folders_around(const fs::path& file) {
   return result;
 }
 
-/// Finds a header that a makefile's -I would find, or nothing.
-std::optional<fs::path> header_around(const fs::path& includer, const std::string& name) {
+struct FoundHeader {
+  fs::path path;
+  std::vector<fs::path> others;  ///< of the same name, in the same folder or below it
+};
+
+/// Finds a header that a makefile's -I would find, or nothing. Of several the nearest: the one with the shortest path from the
+/// file that includes it.
+std::optional<FoundHeader> header_around(const fs::path& includer, const std::string& name) {
+  const fs::path from = normal(includer).parent_path();
+  const auto steps = [&](const fs::path& to) {
+    const fs::path way = to.lexically_relative(from);
+    return std::distance(way.begin(), way.end());
+  };
   for (const fs::path& folder : folders_around(includer)) {
-    for (const fs::path& candidate : files_below(folder)) {
-      const std::string path = candidate.string();
-      if (path.ends_with("/" + name)) return candidate;
-    }
+    std::vector<fs::path> candidates = files_below(folder);
+    std::erase_if(candidates, [&](const fs::path& file) { return !file.string().ends_with("/" + name); });
+    if (candidates.empty()) continue;
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [&](const fs::path& a, const fs::path& b) { return steps(a) < steps(b); });
+    return FoundHeader{candidates.front(), {candidates.begin() + 1, candidates.end()}};
   }
   return std::nullopt;
 }
@@ -246,12 +259,14 @@ class Preparation {
       return normal(copy) == target ? "" : '"' + copy.string() + '"';
     }
     if (is_runtime_header(include.name)) return "";
-    const std::optional<fs::path> found = header_around(file, named.lexically_normal().string());
+    const std::optional<FoundHeader> found = header_around(file, named.lexically_normal().string());
     if (!found) return "";
-    note(found->string() + ": found for #include " +
-         (include.quoted ? '"' + include.name + '"' : '<' + include.name + '>'));
-    result_.included.insert(*found);
-    return '"' + fs::absolute(prepared(*found)).string() + '"';
+    std::string text = found->path.string() + ": found for #include " +
+                       (include.quoted ? '"' + include.name + '"' : '<' + include.name + '>');
+    if (!found->others.empty()) text += "; the nearest of " + std::to_string(found->others.size() + 1) + ", another is " + found->others.front().string();
+    note(text);
+    result_.included.insert(found->path);
+    return '"' + fs::absolute(prepared(found->path)).string() + '"';
   }
 
   /// Whether a header is found by the compiler's search path: in the runtime or among the compiler's own.

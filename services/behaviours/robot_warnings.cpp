@@ -26,6 +26,10 @@ using Arguments = std::vector<std::string>;
 const Arguments kQuestions{"-Wformat",      "-Wconversion", "-Wno-sign-conversion",
                            "-Wtype-limits", "-Woverflow",   "-fdiagnostics-color=never"};
 
+/// The compiler's own warnings that runs show. The others are about taste.
+const Arguments kUsual{"-Wall", "-Wno-unused", "-Wno-main", "-Wno-comment", "-Wno-unknown-pragmas", "-Wno-format",
+                       "-fdiagnostics-color=never"};
+
 struct Diagnostic {
   std::string file, line, column, text, option;
 };
@@ -83,6 +87,14 @@ Value of_type(const std::string& type) {
   if (has("char") || has("int8") || has("bool")) return {1, without_sign ? 255.0 : 128.0, false, ""};
   if (has("int") || has("short")) return {2, without_sign ? 65535.0 : 32768.0, false, ""};
   return {};
+}
+
+/// To check a source's syntax with the headers that programs are compiled with.
+void append_host_headers(Arguments& arguments, const std::string& host, const fs::path& runtime) {
+  std::string own = run_compiler({host, "-print-file-name=include"}).output;
+  while (!own.empty() && own.back() == '\n') own.pop_back();
+  arguments.insert(arguments.end(), {"-fsyntax-only", "-nostdinc", "-isystem", (runtime / "libc").string(), "-isystem", own,
+                                     "-include", (runtime / "machine.h").string()});
 }
 
 std::optional<double> literal(const std::string& text) {
@@ -178,13 +190,10 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
     shared.insert(shared.end(), {"-isystem", (runtime / "kilolib").string()});
     Arguments on_robot{
         avr, "-mmcu=atmega328p", "-S", "-O0", "-o", "/dev/null", "-fdump-tree-gimple-lineno=" + dump.string()};
-    Arguments on_host{host, "-fsyntax-only", "-nostdinc"};
+    Arguments on_host{host};
     on_robot.insert(on_robot.end(), shared.begin(), shared.end());
     on_host.insert(on_host.end(), shared.begin(), shared.end());
-    std::string own = run_compiler({host, "-print-file-name=include"}).output;
-    while (!own.empty() && own.back() == '\n') own.pop_back();
-    on_host.insert(on_host.end(), {"-isystem", (runtime / "libc").string(), "-isystem", own, "-include",
-                                   (runtime / "machine.h").string()});
+    append_host_headers(on_host, host, runtime);
     on_robot.push_back(text.files[i].string());
     on_host.push_back(text.files[i].string());
     const os::ProcessResult robot = run_compiler(on_robot);
@@ -219,6 +228,54 @@ std::vector<std::string> robot_warnings(const std::vector<fs::path>& sources, co
     return std::make_pair(line_of(a), a) < std::make_pair(line_of(b), b);
   });
   result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
+}
+
+namespace {
+
+/// The compiler's own warnings, "FILE:LINE:COLUMN: warning: ... [-W...]".
+std::vector<std::string> usual_warnings(const std::vector<fs::path>& sources, const CompileOptions& options) {
+  const std::string host = os::find_executable("gcc").string();
+  if (host.empty()) return {};
+  const fs::path cache = os::cache_directory(options.cache_directory), runtime = unpacked_runtime(cache);
+  const ProgramText text = program_text(sources, cache);
+  std::vector<std::string> result;
+  for (const fs::path& file : text.files) {
+    if (is_cpp(file)) continue;
+    Arguments arguments{host, "-std=gnu11", "-funsigned-char", "-fshort-enums", "-DF_CPU=8000000"};
+    for (const std::string& flag : define_flags(options.defines)) arguments.push_back(flag);
+    arguments.insert(arguments.end(), kUsual.begin(), kUsual.end());
+    arguments.insert(arguments.end(), {"-isystem", (runtime / "kilolib").string()});
+    append_host_headers(arguments, host, runtime);
+    arguments.push_back(file.string());
+    for (const Diagnostic& found : diagnostics(run_compiler(arguments).errors)) {
+      result.push_back(found.file + ':' + found.line + ':' + found.column + ": warning: " + readable(found.text) + " [" +
+                       found.option + ']');
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> program_warnings(const std::vector<fs::path>& sources, const std::string& sha256,
+                                          const CompileOptions& options) {
+  const fs::path cache = os::cache_directory(options.cache_directory);
+  const bool for_robot = !os::find_executable("avr-gcc").empty();
+  const fs::path kept = cache / "warnings" / (sha256 + (for_robot ? "-robot" : "-host"));
+  std::vector<std::string> result;
+  if (const auto known = os::read_if_there(kept)) {
+    std::istringstream lines(*known);
+    for (std::string line; std::getline(lines, line);) result.push_back(line);
+    return result;
+  }
+  result = usual_warnings(sources, options);
+  for (std::string& warning : robot_warnings(sources, options)) result.push_back(std::move(warning));
+  std::string text;
+  for (const std::string& warning : result) text += warning + '\n';
+  std::error_code error;
+  fs::create_directories(kept.parent_path(), error);
+  os::write_file(kept, text);
   return result;
 }
 

@@ -119,7 +119,7 @@ void FirmwareAir::collect_packets(Cycles from, Cycles until, const Channel& chan
     if (x.aborted)
       bits.set(0);
     else
-      bits = packet_bits(x.message);
+      bits = packet_bits(x.message, static_cast<std::uint16_t>(message_crc(x.message) ^ x.crc_error));
     packets_.push_back({x.start, x.sender, !x.aborted && x.start + kListening > from, bits});
   }
   for (const OverheadController::Copy& copy : overhead.copies()) {

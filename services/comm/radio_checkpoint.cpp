@@ -1,4 +1,6 @@
 // Saves and restores the radio engine.
+#include <utility>
+
 #include "core/base/error.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/comm/message_octets.hpp"
@@ -25,7 +27,10 @@ void RadioEngine::save(proto::RadioState& part) const {
     part.add_next_interrupt(timers_.time_word(i));
     part.add_timer_counts(timers_.count_word(i));
     part.add_tx_period(tx_period_[i]);
-    if (is(i, kHolding)) append(*part.mutable_held_messages(), message_[i]);
+    if (is(i, kHolding)) {
+      append(*part.mutable_held_messages(), message_[i]);
+      part.add_held_crc_error(crc_error_[i]);
+    }
     part.add_robot_attempted(radio_counts_[i].attempted);
     part.add_robot_sent(radio_counts_[i].sent);
     part.add_robot_received(radio_counts_[i].received);
@@ -40,6 +45,7 @@ void RadioEngine::save(proto::RadioState& part) const {
     part.mutable_transmission_flags()->push_back(
         static_cast<char>((x.aborted ? kAborted : 0) | (x.orphaned ? kOrphaned : 0) | (x.over ? kOver : 0)));
     append(*part.mutable_transmission_messages(), x.message);
+    part.add_transmission_crc_error(x.crc_error);
   }
   part.mutable_next_send()->Add(next_send_.begin(), next_send_.end());
   overhead_.save(*part.mutable_overhead());
@@ -79,10 +85,14 @@ void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> part
     tx_period_[i] = static_cast<std::uint16_t>(part.tx_period(n));
     radio_counts_[i] = {part.robot_attempted(n), part.robot_sent(n), part.robot_received(n), part.robot_collided(n),
                         part.robot_backed_off(n)};
-    if (is(i, kHolding)) message_[i] = message_at(part.held_messages(), held++);
+    if (!is(i, kHolding)) continue;
+    require(std::cmp_less(held, part.held_crc_error_size()));
+    crc_error_[i] = static_cast<std::uint16_t>(part.held_crc_error(static_cast<int>(held)));
+    message_[i] = message_at(part.held_messages(), held++);
   }
   const int transmissions = part.transmission_start_size();
   require(part.transmission_end_size() == transmissions && part.transmission_sender_size() == transmissions &&
+          part.transmission_crc_error_size() == transmissions &&
           part.transmission_flags().size() == size_of(transmissions));
   channel_.all().clear();
   for (int n = 0; n < transmissions; ++n) {
@@ -90,7 +100,8 @@ void RadioEngine::load(Tick tick, std::span<const proto::RadioState* const> part
     const char flags = part.transmission_flags()[size_of(n)];
     channel_.all().push_back({part.transmission_start(n), part.transmission_end(n), part.transmission_sender(n),
                               (flags & kAborted) != 0, (flags & kOrphaned) != 0,
-                              message_at(part.transmission_messages(), size_of(n)), (flags & kOver) != 0});
+                              message_at(part.transmission_messages(), size_of(n)), (flags & kOver) != 0,
+                              static_cast<std::uint16_t>(part.transmission_crc_error(n))});
   }
   overhead_.load(part.overhead());
   if (firmware_) firmware_->load(part);
@@ -115,6 +126,7 @@ void ReceptionLog::save(proto::RadioState& part) const {
     part.add_reception_low_gain(reception.gains.low);
   }
   for (const IrMessage& message : messages_) append(*part.mutable_received_messages(), message);
+  part.mutable_received_crc_error()->Add(crc_error_.begin(), crc_error_.end());
 }
 
 void ReceptionLog::load(const proto::RadioState& part) {
@@ -123,7 +135,11 @@ void ReceptionLog::load(const proto::RadioState& part) {
   require(part.reception_message_size() == receptions && part.reception_high_gain_size() == receptions &&
           part.reception_low_gain_size() == receptions);
   const std::size_t messages = part.received_messages().size() / IrMessage{}.size();
-  for (std::size_t n = 0; n < messages; ++n) messages_.push_back(message_at(part.received_messages(), n));
+  require(size_of(part.received_crc_error_size()) == messages);
+  for (std::size_t n = 0; n < messages; ++n) {
+    messages_.push_back(message_at(part.received_messages(), n));
+    crc_error_.push_back(static_cast<std::uint16_t>(part.received_crc_error(static_cast<int>(n))));
+  }
   for (int n = 0; n < receptions; ++n) {
     require(part.reception_robot(n) + 1 < first_.size() && part.reception_message(n) < messages);
     arrived_.push_back({part.reception_robot(n),

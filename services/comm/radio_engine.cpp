@@ -40,6 +40,7 @@ RadioEngine::RadioEngine(const RunPlan& plan, std::unique_ptr<FirmwareRobots> fi
       state_(plan.robots(), 0),
       tx_period_(plan.robots(), 0),
       message_(plan.robots()),
+      crc_error_(plan.robots(), 0),
       next_send_(simple_ ? plan.robots() : 0, 0),
       links_(plan),
       neighbourhood_(links_.reach_mm(), links_.span_mm(), plan.robots()),
@@ -138,6 +139,7 @@ void RadioEngine::take_offers(const SwarmView& swarm) {
     if (!is(robot, kRunning) || is(robot, kHolding)) continue;
     state_[robot] |= kHolding;
     message_[robot] = swarm.offer_message[n];
+    crc_error_[robot] = swarm.offer_crc_error[n];
   }
 }
 
@@ -277,7 +279,7 @@ void RadioEngine::attempt(std::uint32_t robot, Tick now) {
   }
   state_[robot] |= kSending;
   abort_interrupted(robot, t, now);
-  channel_.add({t, t + kPacket, robot, false, false, message_[robot]});
+  channel_.add({t, t + kPacket, robot, false, false, message_[robot], false, crc_error_[robot]});
 }
 
 /// A start pulse of `robot`: senders in their leading octet that detect it give up.
@@ -369,7 +371,7 @@ void RadioEngine::receive_packet(const Transmission& packet, Tick now) {
     jammed = jammed || copy.overlaps(packet.start, packet.end);
   }
   channel_.find_rivals(packet.sender, packet.start, packet.end, rivals_);
-  receptions_.begin_message(packet.message);
+  receptions_.begin_message(packet.message, packet.crc_error);
   if (table_.used())
     receive_by_strength(packet, jammed, now);
   else
@@ -428,6 +430,8 @@ void RadioEngine::receive(const Transmission& packet, std::uint32_t receiver, bo
   } else if (firmware ? firmware_->fades(receiver, packet.sender, packet.start)
                       : fades(receiver, now, packet.sender)) {
     ++counters_.faded;
+  } else if (packet.crc_error != 0) {
+    if (!firmware) receptions_.add(receiver, readings());
   } else {
     ++counters_.received;
     ++radio_counts_[receiver].received;
@@ -492,6 +496,7 @@ void RadioEngine::emit(HostId host, RadioFrame& frame) const {
   frame.reception_high_gain.clear();
   frame.reception_low_gain.clear();
   frame.messages.clear();
+  frame.message_crc_error.clear();
   receptions_.emit(share, frame);
   emit_firmware(share, frame);
 }
@@ -531,7 +536,8 @@ std::uint64_t RadioEngine::hash_part() const {
   }
   for (const Transmission& x : channel_.all()) {
     if (!owns(x.sender)) continue;
-    const auto [first, second] = words(x.message);
+    auto [first, second] = words(x.message);
+    second |= std::uint64_t{x.crc_error} << 48;
     sum += entity_hash(HashDomain::kRadio, x.sender,
                        {static_cast<std::uint64_t>(x.start), static_cast<std::uint64_t>(x.end), first, second});
   }

@@ -73,7 +73,8 @@ class RadioEngine {
   };
 
   /// Messages of robots since the start. attempted = sent + aborted + packets on the air. Every packet sent counts once per
-  /// robot that could receive it: as received, collided or faded. Packets of the overhead controller do not count.
+  /// robot that could receive it: as received, collided or faded. Robots drop packets with a wrong CRC, which count as sent
+  /// alone. Packets of the overhead controller do not count.
   struct Counters {
     std::uint64_t attempted = 0;  ///< start pulses
     std::uint64_t sent = 0;       ///< whole packets
@@ -200,6 +201,7 @@ class RadioEngine {
       known_;                             ///< per robot of a divided channel; known: owned, or a ghost
   std::vector<std::uint16_t> tx_period_;  ///< per robot
   std::vector<IrMessage> message_;        ///< per robot: content of its slot
+  std::vector<std::uint16_t> crc_error_;  ///< per robot: of the message, as Transmission::crc_error
   std::vector<Cycles> next_send_;         ///< per robot, model SIMPLE: earliest time of its next message
   LinkBudget links_;
   Neighbourhood neighbourhood_;

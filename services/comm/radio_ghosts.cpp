@@ -29,6 +29,7 @@ void RadioEngine::emit_ghosts(const Region& to, RadioGhosts& ghosts) const {
     ghosts.state.push_back(state_[i]);
     ghosts.tx_period.push_back(tx_period_[i]);
     ghosts.message.push_back(message_[i]);
+    ghosts.crc_error.push_back(crc_error_[i]);
     ghosts.next_send.push_back(simple_ ? next_send_[i] : 0);
   }
   for (const Transmission& x : channel_.all()) {
@@ -52,6 +53,7 @@ void RadioEngine::take_ghosts(std::span<const RadioGhosts* const> frames) {
       state_[i] = frame->state[n];
       tx_period_[i] = frame->tx_period[n];
       message_[i] = frame->message[n];
+      crc_error_[i] = frame->crc_error[n];
       if (simple_) next_send_[i] = frame->next_send[n];
     }
     transmissions.insert(transmissions.end(), frame->transmissions.begin(), frame->transmissions.end());

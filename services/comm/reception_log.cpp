@@ -8,6 +8,7 @@ namespace kilotwin::comm {
 
 void ReceptionLog::clear() {
   messages_.clear();
+  crc_error_.clear();
   arrived_.clear();
 }
 
@@ -34,12 +35,17 @@ void ReceptionLog::emit(Share share, RadioFrame& frame) const {
     if (number == kUnnumbered) {
       number = static_cast<std::uint32_t>(frame.messages.size());
       frame.messages.push_back(messages_[reception.message]);
+      if (const std::uint16_t error = crc_error_[reception.message]; error != 0) {
+        frame.message_crc_error.resize(number, 0);
+        frame.message_crc_error.push_back(error);
+      }
     }
     frame.reception_robot.push_back(reception.robot);
     frame.reception_message.push_back(number);
     frame.reception_high_gain.push_back(reception.gains.high);
     frame.reception_low_gain.push_back(reception.gains.low);
   }
+  if (!frame.message_crc_error.empty()) frame.message_crc_error.resize(frame.messages.size(), 0);
 }
 
 }  // namespace kilotwin::comm

@@ -20,7 +20,11 @@ class ReceptionLog {
 
   void clear();
   /// Registers a message; the following add() calls refer to it. Messages come in order of arrival.
-  void begin_message(const IrMessage& message) { messages_.push_back(message); }
+  /// `crc_error`: as in ActuationFrame.
+  void begin_message(const IrMessage& message, std::uint16_t crc_error = 0) {
+    messages_.push_back(message);
+    crc_error_.push_back(crc_error);
+  }
   void add(std::uint32_t robot, Gains gains) {
     arrived_.push_back({robot, static_cast<std::uint32_t>(messages_.size() - 1), gains});
   }
@@ -42,6 +46,7 @@ class ReceptionLog {
     Gains gains;
   };
   std::vector<IrMessage> messages_;
+  std::vector<std::uint16_t> crc_error_;  ///< per message
   std::vector<Reception> arrived_;    ///< in order of arrival
   std::vector<Reception> sorted_;     ///< by robot
   std::vector<std::uint32_t> first_;  ///< per robot: index of its first reception in sorted_; then the total

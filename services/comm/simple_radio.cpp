@@ -54,7 +54,7 @@ void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
     log_sent(sender, begin_of(now));
     if (counts_pairs_) pairs_.add(sender, sender);
   }
-  receptions_.begin_message(message_[sender]);
+  receptions_.begin_message(message_[sender], crc_error_[sender]);
   neighbourhood_.visit(sender, [&](std::uint32_t receiver, double square_mm2) {
     if (!is(receiver, kReceptive) || !owns(receiver)) return;
     const auto happens = [&](double probability, std::uint32_t draw) {
@@ -72,6 +72,8 @@ void RadioEngine::receive_simply(std::uint32_t sender, Tick now) {
       ++radio_counts_[receiver].collided;
     } else if (happens(model.drop_probability, first_draw) || happens(loss_, first_draw + 1)) {
       ++counters_.faded;
+    } else if (crc_error_[sender] != 0) {
+      receptions_.add(receiver, ranging_.gains(__builtin_sqrt(square_mm2)));
     } else {
       ++counters_.received;
       ++radio_counts_[receiver].received;

@@ -3,6 +3,9 @@
 #include <png.h>
 
 #include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
 
 #include "tests/system/program.hpp"
 
@@ -115,6 +118,37 @@ TEST_F(Senses, RefuseFilesThatCannotBeRead) {
   refused({"robots.eeprom=nowhere"}, "nowhere");
   write(scratch.path() / "eeproms/3.eeprom", "short");
   refused({"seed=4"}, "has 5 octets");
+}
+
+/// Number of robots whose centre came within `radius_mm` of the origin.
+std::size_t arrived(const std::string& trajectories, double radius_mm) {
+  std::istringstream lines(trajectories);
+  std::set<std::string> robots;
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line)) {
+    std::istringstream cells(line);
+    std::string time, robot, x, y;
+    std::getline(cells, time, ','), std::getline(cells, robot, ',');
+    std::getline(cells, x, ','), std::getline(cells, y, ',');
+    if (std::hypot(std::stod(x), std::stod(y)) < radius_mm) robots.insert(robot);
+  }
+  return robots.size();
+}
+
+/// Two ways to seek a lamp, with fixed thresholds and with the robot's own.
+TEST(Phototaxis, BringsEighteenOfTwentyRobotsToALamp) {
+  const Scratch scratch;
+  for (const char* const behaviour : {"behaviours/move_to_light.c", "behaviours/phototaxis.c"}) {
+    static_cast<void>(run({source("experiments/move_to_light.txtpb"), "--mode", "local", "--set",
+                           std::string("robots.behaviour=") + source(behaviour)},
+                          scratch, "run"));
+    const Outcome exported = kilotwin({"export", scratch / "run", "--trajectories", "-", "--every", "2"}, scratch);
+    ASSERT_EQ(exported.status, 0) << exported.err;
+    EXPECT_GE(arrived(exported.out, 150), 18u) << behaviour;
+    EXPECT_LE(arrived(exported.out.substr(0, exported.out.find("\n2.")), 150), 2u) << "at the start";
+    std::filesystem::remove_all(scratch / "run");
+  }
 }
 
 }  // namespace

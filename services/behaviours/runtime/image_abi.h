@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 5u
+#define KT_IMAGE_VERSION 6u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -70,8 +70,11 @@ struct KtRobot {
   uint8_t trigger_lost; /* get_voltage() was called since the last message */
   uint8_t looped;       /* host: the tick ended in a loop that reads no memory that an interrupt may change */
   uint32_t heap_octets; /* largest extent of the heap so far */
-  uint32_t unused;
+  uint16_t blocked_at;  /* low bits of kilo_ticks when the program last kept interrupts off for long */
+  uint16_t blocked;     /* for how long: units of KT_BLOCKED_UNIT cycles */
 };
+
+#define KT_BLOCKED_UNIT 256u
 
 /* The running callback. */
 #define KT_IN_TX_SUCCESS 1u
@@ -96,9 +99,14 @@ struct KtReception {
 
 /* Events of a robot in a tick and its answers. Part of the slot, not of a robot's memory. */
 #define KT_MOST_RECEPTIONS 192u
+#define KT_MOST_OVERFLOWS 4u
 struct KtExchange {
+  uint64_t overflow[KT_MOST_OVERFLOWS]; /* addresses after which an int overflowed */
+  uint32_t overflows;                   /* number of these; the host empties the list */
+  uint32_t ended;                       /* 1: main() has returned; the host sets it to 0 */
   uint32_t receptions; /* if there are more than KT_MOST_RECEPTIONS, the host delivers them in several calls */
   uint32_t sent;       /* 1: the robot's own message has been sent */
+  uint32_t wrong_crc;  /* 1: a message of this tick has a wrong CRC */
   struct KtMessage message;
   struct KtReception reception[KT_MOST_RECEPTIONS];
   uint32_t log_length; /* octets printed since the host last emptied the log */

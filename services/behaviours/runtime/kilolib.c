@@ -21,6 +21,7 @@ enum {
   BUSY_CYCLES = 20,
   RAND_HARD_CYCLES = 8 * 2 * 2 * READING_CYCLES
 };
+enum { PACKET_CYCLES = 13 * 10 * 269 };
 enum { HIGHEST_READING = 1023 };
 
 uint64_t kt_enter(void);
@@ -90,6 +91,15 @@ static void set_cycles_left(int32_t left) {
   __asm__ volatile("movl %0, %%gs:%c1" : : "r"(left), "i"(KT_THREAD_BUDGET) : "memory");
 }
 
+/* Notes that interrupts are off for this long, in which every message is lost: hears(). */
+static void block(uint64_t cycles) {
+  enum { MOST = 65535 };
+  if (robot.blocked_at != (uint16_t)kilo_ticks) robot.blocked = 0;
+  robot.blocked_at = (uint16_t)kilo_ticks;
+  const uint64_t sum = robot.blocked + (cycles + KT_BLOCKED_UNIT - 1) / KT_BLOCKED_UNIT;
+  robot.blocked = (uint16_t)(sum < MOST ? sum : MOST);
+}
+
 /* Lets the main program wait for `cycles`. With KT_LOOP_PER_TICK it waits for whole ticks; remainders add up. A callback cannot
  * wait, so the main program waits for it. With KT_LOOP_AS_ON_ROBOT the cycles reduce the tick's budget, as code does. */
 static void spend(uint64_t cycles) {
@@ -104,7 +114,10 @@ static void spend(uint64_t cycles) {
     return;
   }
   robot.debt_cycles += cycles;
-  if (robot.in_interrupt) return;
+  if (robot.in_interrupt) {
+    block(cycles);
+    return;
+  }
   while (robot.debt_cycles >= robot.tick_cycles) {
     robot.debt_cycles -= robot.tick_cycles;
     wait_for_tick();
@@ -228,6 +241,7 @@ int16_t get_voltage(void) {
 /* The firmware takes each bit from a pair of voltage readings whose lowest bits differ, which is a fair bit if readings are
  * independent. Without noise the readings never differ, and all bits are equal. */
 uint8_t rand_hard(void) {
+  block(RAND_HARD_CYCLES);
   spend(RAND_HARD_CYCLES);
   robot.trigger_lost = 0;
   if (!(kt_surroundings->voltage_sd > 0)) return convert(kt_surroundings->voltage, 0) & 1 ? 255 : 0;
@@ -278,6 +292,11 @@ uint8_t estimate_distance(const distance_measurement_t* distance) {
   if (high >= LOW_ONLY_FROM) return (uint8_t)(KILOTWIN_IR_CONTACT_MM + by_low);
   const int blend = by_high * (LOW_ONLY_FROM - high) + by_low * (high - BOTH_FROM);
   return (uint8_t)(KILOTWIN_IR_CONTACT_MM + blend / (LOW_ONLY_FROM - BOTH_FROM));
+}
+
+void kilotwin_overflow(void) {
+  struct KtExchange* told = kt_exchange;
+  if (told->overflows < KT_MOST_OVERFLOWS) told->overflow[told->overflows++] = (uint64_t)__builtin_return_address(0);
 }
 
 /* The state machine. */
@@ -394,6 +413,7 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
 /* The end of main(). On a robot avr-libc then loops for ever with interrupts disabled. */
 _Noreturn void kilotwin_end(void) {
   robot.deaf = 1;
+  kt_exchange->ended = 1;
   for (;;) park();
 }
 
@@ -506,6 +526,20 @@ static void boot_loader(uint8_t type) {
   if (type < BOOT || type > BOOTPGM_SIZE) robot.reset = 1;
 }
 
+/* Whether a message of this tick is heard, at a random time in it. One that overlaps a time with interrupts off is lost: its
+ * bits are taken late. The overhead controller repeats its commands until one is heard. */
+static uint8_t hears(uint8_t type) {
+  if (robot.blocked == 0 || type >= BOOT) return 1;
+  const uint64_t since = (uint16_t)((uint16_t)kilo_ticks - robot.blocked_at);
+  const uint64_t blocked = (uint64_t)robot.blocked * KT_BLOCKED_UNIT, passed = since * robot.tick_cycles;
+  if (passed >= blocked + robot.tick_cycles) {
+    robot.blocked = 0;
+    return 1;
+  }
+  const uint64_t left = since <= 1 ? blocked : blocked + robot.tick_cycles - passed;
+  return (noise() >> 11) % robot.tick_cycles >= left + PACKET_CYCLES;
+}
+
 /* Messages after a RESET in the same tick are lost, because the robot is starting. */
 static uint64_t interrupts(void) {
   const struct KtExchange* events = kt_exchange;
@@ -519,6 +553,8 @@ static uint64_t interrupts(void) {
     rx_dist.high_gain = robot.trigger_lost ? robot.adc : reception->high_gain;
     robot.trigger_lost = 0;
     robot.heard = 1;
+    if (!hears(rx_msg.type)) continue;
+    if (events->wrong_crc && rx_msg.crc != message_crc(&rx_msg)) continue;
     if (robot.bootloader)
       boot_loader(rx_msg.type);
     else if (rx_msg.type < BOOT)

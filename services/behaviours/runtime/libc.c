@@ -271,11 +271,11 @@ long random_r(unsigned long* state) {
   return (long)(*state = (unsigned long)x);
 }
 
-/* Insertion sort: stable, small, and fast enough for a robot's few elements. */
+/* Insertion sort: stable, small, and fast enough for a robot's few elements. Comparators return the robot's int, 16 bits. */
 void qsort(void* base, size_t count, size_t size, int (*compare)(const void*, const void*)) {
   unsigned char* first = base;
   for (size_t i = 1; i < count; ++i) {
-    for (unsigned char* at = first + i * size; at > first && compare(at - size, at) > 0; at -= size) {
+    for (unsigned char* at = first + i * size; at > first && (int16_t)compare(at - size, at) > 0; at -= size) {
       for (size_t k = 0; k < size; ++k) {
         const unsigned char swapped = at[k];
         at[k] = at[k - size];
@@ -290,7 +290,7 @@ void* bsearch(const void* key, const void* base, size_t count, size_t size,
   const unsigned char* first = base;
   while (count > 0) {
     const unsigned char* middle = first + count / 2 * size;
-    const int order = compare(key, middle);
+    const int order = (int16_t)compare(key, middle);
     if (order == 0) return (void*)middle;
     if (order > 0) {
       first = middle + size;

@@ -16,6 +16,8 @@ extern "C" {
 #endif
 void kilotwin_sleep(void);
 void kilotwin_spend(unsigned long long cycles);
+/* Called where a value does not fit into the 16 bits of the robot's int: robot_int.hpp. */
+void kilotwin_overflow(void);
 #ifdef __cplusplus
 }
 #endif

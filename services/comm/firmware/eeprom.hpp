@@ -10,14 +10,14 @@
 
 namespace kilotwin::firmware {
 
-/// The content that a calibrated robot has: core/base/eeprom_layout.h. kilo_uid is the robot's id.
-[[nodiscard]] inline std::array<std::uint8_t, kEepromOctets> make_eeprom(std::uint32_t robot,
+/// The content that a calibrated robot has: core/base/eeprom_layout.h.
+[[nodiscard]] inline std::array<std::uint8_t, kEepromOctets> make_eeprom(std::uint16_t uid,
                                                                          const Calibration& calibration,
                                                                          const RangingTable& ranging) {
   static_assert(kEepromOctets == KILOTWIN_EEPROM_OCTETS);
   std::array<std::uint8_t, kEepromOctets> octets{};
   kilotwin_fill_eeprom(octets.data(),
-                       {static_cast<std::uint16_t>(robot), calibration.turn_left, calibration.turn_right,
+                       {uid, calibration.turn_left, calibration.turn_right,
                         calibration.straight_left, calibration.straight_right});
   kilotwin_fill_ranging(octets.data(), ranging.high.data(), ranging.low.data());
   return octets;

@@ -1,5 +1,6 @@
 #include "services/comm/firmware/firmware_swarm.hpp"
 
+#include <algorithm>
 #include <map>
 
 #include "core/base/error.hpp"
@@ -46,8 +47,12 @@ FirmwareSwarm::FirmwareSwarm(const RunPlan& plan, const fs::path& run_directory,
     Robot& robot = robots_.emplace_back();
     robot.period = timers.period(id);
     robot.switched_on = timers.next(id) - robot.period;
-    robot.mcu = std::make_unique<Mcu>(images.at(program),
-                                      make_eeprom(id, parameters.calibration(id), radios.table(id)), random, id);
+    std::array<std::uint8_t, kEepromOctets> eeprom =
+        make_eeprom(plan.uid_of(id), parameters.calibration(id), radios.table(id));
+    const auto brought = std::find_if(plan.eeproms().begin(), plan.eeproms().end(),
+                                      [id](const RobotEeprom& stated) { return stated.robot == id; });
+    if (brought != plan.eeproms().end()) std::copy_n(brought->content.begin(), eeprom.size(), eeprom.begin());
+    robot.mcu = std::make_unique<Mcu>(images.at(program), eeprom, random, id);
   }
   // Up to tick 0, before which nobody sends.
   std::vector<std::vector<comm::Cycles>> flashes(robots_.size());

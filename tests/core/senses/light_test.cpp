@@ -53,7 +53,8 @@ TEST(Light, FallsWithTheSquareOfTheDistance) {
   std::vector<ScenePose> poses;
   for (int i = 0; i < 20; ++i) poses.push_back({100.0 * i + 50, -30.0 * i, 0.3 * i});
   const auto got = readings(
-      "source { x_mm: 10 y_mm: -20 height_mm: 250 intensity: 123 } ambient: 7 sensor { radius_mm: 0 gain_sd: 0 }",
+      "source { x_mm: 10 y_mm: -20 height_mm: 250 intensity: 123 } ambient: 7 sensor { radius_mm: 0 gain_sd: 0 "
+      "cosine: false }",
       poses);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double dx = poses[i].x_mm - 10, dy = poses[i].y_mm + 20, dz = 250 - 30;
@@ -63,18 +64,36 @@ TEST(Light, FallsWithTheSquareOfTheDistance) {
 
 TEST(Light, ReadsItsIntensityAtOneMetre) {
   EXPECT_NEAR(
-      readings("source { height_mm: 30 intensity: 88 } sensor { radius_mm: 0 gain_sd: 0 }", {{1000, 0, 0}})[0], 88,
+      readings("source { height_mm: 30 intensity: 88 } sensor { radius_mm: 0 gain_sd: 0 angle_deg: 180 tilt_deg: 90 }",
+               {{1000, 0, 0}})[0],
+      88,
       1e-9);
 }
 
 TEST(Light, FallsWithTheCosineIfTheSensorLooksUp) {
-  const char* const source = "source { height_mm: 330 intensity: 50 } sensor { radius_mm: 0 gain_sd: 0 cosine: ";
+  const char* const source =
+      "source { height_mm: 330 intensity: 50 } sensor { radius_mm: 0 gain_sd: 0 tilt_deg: 0 cosine: ";
   const double plain = readings(std::string(source) + "false }", {{400, 0, 0}})[0];
   const double cosine = readings(std::string(source) + "true }", {{400, 0, 0}})[0];
   EXPECT_NEAR(cosine / plain, 300.0 / 500, 1e-12);
-  EXPECT_EQ(readings("source { height_mm: 20 } sensor { radius_mm: 0 gain_sd: 0 cosine: true }", {{400, 0, 0}})[0],
-            0)
+  EXPECT_EQ(readings("source { height_mm: 20 } sensor { radius_mm: 0 gain_sd: 0 tilt_deg: 0 }", {{400, 0, 0}})[0], 0)
       << "from below";
+}
+
+/// Lambert's law on a sensor tilted by t, lamp at elevation e: cos t sin e + sin t cos e cos a, with a the lamp's bearing from
+/// the side to which the sensor looks. With t = e = 45 degrees that is (1 + cos a) / 2.
+TEST(Light, FollowsASineAsTheRobotTurns) {
+  const std::string lamp = "source { x_mm: 300 height_mm: 330 intensity: 100 } sensor { radius_mm: 0 gain_sd: 0 ";
+  for (int degrees = -180; degrees < 180; degrees += 15) {
+    const double heading = degrees * kPi / 180, from_axis = heading + 100 * kPi / 180;
+    const double whole = 100e6 / (300.0 * 300 + 300.0 * 300);
+    EXPECT_NEAR(readings(lamp + "}", {{0, 0, heading}})[0], whole * (1 + std::cos(from_axis)) / 2, 1e-9);
+    const double low = std::cos(kPi / 6) * std::sqrt(0.5) + 0.5 * std::sqrt(0.5) * std::cos(from_axis);
+    EXPECT_NEAR(readings(lamp + "tilt_deg: 30 }", {{0, 0, heading}})[0], whole * low, 1e-9);
+    EXPECT_NEAR(readings(lamp + "tilt_deg: 90 angle_deg: 0 }", {{0, 0, heading}})[0],
+                whole * std::max(0.0, std::sqrt(0.5) * std::cos(heading)), 1e-9)
+        << "dark behind";
+  }
 }
 
 TEST(Light, IsMeasuredAtTheSensorOnTheRim) {
@@ -83,7 +102,7 @@ TEST(Light, IsMeasuredAtTheSensorOnTheRim) {
     const double heading = degrees * kPi / 180, angle = heading + 100 * kPi / 180;
     const double x = 60 + 14.5 * std::cos(angle), y = -40 + 14.5 * std::sin(angle);
     const double expected = 100e6 / (x * x + y * y + 170.0 * 170.0);
-    EXPECT_NEAR(readings(std::string("source { height_mm: 200 } ") + kQuiet, {{60, -40, heading}})[0], expected,
+    EXPECT_NEAR(readings("source { height_mm: 200 } sensor { gain_sd: 0 cosine: false }", {{60, -40, heading}})[0], expected,
                 1e-9 * expected);
   }
 }

@@ -75,6 +75,7 @@ RadioFrame Air::frame(Tick tick, const Share& share) const {
     frame.reception_high_gain.push_back(reception.high_gain);
     frame.reception_low_gain.push_back(reception.low_gain);
     frame.messages.push_back(reception.message);
+    frame.message_crc_error.push_back(reception.crc_error);
   }
   return frame;
 }
@@ -148,6 +149,8 @@ ActuationFrame Swarm::frame() const {
     append(all.spin_up, part.spin_up);
     append(all.offer_robot, part.offer_robot);
     append(all.offer_message, part.offer_message);
+    append(all.offer_crc_error, part.offer_crc_error);
+    all.offer_crc_error.resize(all.offer_message.size(), 0);
   }
   return all;
 }

@@ -44,6 +44,7 @@ struct Air {
     std::uint32_t robot;
     IrMessage message;
     std::int16_t high_gain = 400, low_gain = 300;
+    std::uint16_t crc_error = 0;
   };
   std::vector<Reception> receptions;  ///< ordered by robot
   std::vector<std::uint32_t> ask, sent;

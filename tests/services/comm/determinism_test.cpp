@@ -34,7 +34,10 @@ RadioFrame merged(const std::vector<RadioFrame>& frames) {
     append(all.reception_high_gain, frame.reception_high_gain);
     append(all.reception_low_gain, frame.reception_low_gain);
     // One message per reception, so that the numbering of messages does not matter.
-    for (const std::uint32_t index : frame.reception_message) all.messages.push_back(frame.messages.at(index));
+    for (const std::uint32_t index : frame.reception_message) {
+      all.messages.push_back(frame.messages.at(index));
+      all.message_crc_error.push_back(frame.message_crc_error.empty() ? 0 : frame.message_crc_error.at(index));
+    }
   }
   return all;
 }
@@ -48,6 +51,7 @@ void expect_equal(const RadioFrame& a, const RadioFrame& b) {
   ASSERT_EQ(a.reception_high_gain, b.reception_high_gain);
   ASSERT_EQ(a.reception_low_gain, b.reception_low_gain);
   ASSERT_EQ(a.messages, b.messages);
+  ASSERT_EQ(a.message_crc_error, b.message_crc_error);
 }
 
 constexpr std::uint32_t kRobots = 150;
@@ -128,6 +132,9 @@ TEST(Determinism, LoadedEngineContinuesLikeTheSavedOne) {
   for (const char* cycles : {"262144", "32768", "100003", "1048576"}) {
     const RunPlan plan = crowd_plan("tick_cycles: " + std::string(cycles) + " radio { range_mm: 120 loss: 0.05 } ");
     Swarm swarm(plan);
+    swarm.hosts.crc_error = [](std::uint32_t robot, Tick tick) {
+      return static_cast<std::uint16_t>((robot + tick.count()) % 5 == 0 ? robot : 0);
+    };
     auto loaded = std::make_unique<RadioEngine>(plan);
     bool following = false;
     std::mt19937_64 random(5);

@@ -57,6 +57,10 @@ class FakeHosts {
     return IrMessage{static_cast<std::uint8_t>(robot), static_cast<std::uint8_t>(robot >> 8),
                      static_cast<std::uint8_t>(t), static_cast<std::uint8_t>(t >> 8)};
   };
+  /// Its CRC XOR the right one.
+  std::function<std::uint16_t(std::uint32_t robot, Tick)> crc_error = [](std::uint32_t, Tick) {
+    return std::uint16_t{0};
+  };
   std::vector<ScenePose> poses;
   OverheadFrame overhead;
 
@@ -83,6 +87,7 @@ class FakeHosts {
     frame.tick = from + 1;
     frame.offer_robot.clear();
     frame.offer_message.clear();
+    frame.offer_crc_error.clear();
     for (const std::uint32_t robot : radio.sent) slot_[robot] = 0;
     for (std::uint32_t i = share.first; i < share.last; ++i) {
       frame.life_cycle[i - share.first] = life_cycle[i];
@@ -94,6 +99,7 @@ class FakeHosts {
       slot_[robot] = 1;
       frame.offer_robot.push_back(robot);
       frame.offer_message.push_back(message(robot, from));
+      frame.offer_crc_error.push_back(crc_error(robot, from));
     }
   }
 

@@ -62,6 +62,27 @@ TEST(Reception, DeliversMessagesAndCountsPairs) {
   EXPECT_EQ(table[2] + table[11] + table[14], swarm.radio.counters().sent);
 }
 
+/// A packet with a wrong CRC takes its time on the air like any other, and reaches the receivers' hosts with its error.
+TEST(Reception, PacketsWithAWrongCrcCountAsSentAlone) {
+  for (const char* const model : {"radio { range_mm: 100 }", "radio { range_mm: 100 model: SIMPLE }"}) {
+    const RunPlan plan = make_plan(model, {{0, 0, 0}, {50, 0, 0}});
+    Swarm swarm(plan);
+    swarm.hosts.crc_error = [](std::uint32_t robot, Tick) { return static_cast<std::uint16_t>(robot * 0x8001); };
+    std::uint32_t heard[2] = {};
+    run(swarm, 640, [&](const RadioFrame& frame, std::size_t n) {
+      ++heard[frame.reception_robot[n]];
+      const std::uint32_t m = frame.reception_message[n];
+      const std::uint16_t error = frame.message_crc_error.empty() ? 0 : frame.message_crc_error.at(m);
+      EXPECT_EQ(error, frame.reception_robot[n] == 0 ? 0x8001 : 0);
+    });
+    EXPECT_GT(heard[0], 30u) << model;
+    EXPECT_GT(heard[1], 30u) << model;
+    EXPECT_EQ(swarm.radio.radio_counts()[0].received, 0u) << model;
+    EXPECT_EQ(swarm.radio.radio_counts()[1].received, heard[1]) << model;
+    EXPECT_EQ(swarm.radio.counters().received, heard[1]) << model;
+  }
+}
+
 /// A - B - C; A and C are out of each other's range. Their first attempts fall into the same kilo_tick with independent uniform
 /// phases. They overlap with probability 2 q - q^2, with q = air time / period. 3000 rows of three robots; a true generator
 /// exceeds the bound of 4.5 standard deviations once in 150000 seeds.

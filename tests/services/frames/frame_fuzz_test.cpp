@@ -34,7 +34,7 @@ template <class Visit> void each_field(BodyFrame& f, Visit visit) {
 template <class Visit> void each_field(ActuationFrame& f, Visit visit) {
   visit(f.motor_left), visit(f.motor_right), visit(f.led), visit(f.life_cycle), visit(f.tx_period),
       visit(f.offer_robot);
-  visit(f.offer_message), visit(f.spin_up);
+  visit(f.offer_message), visit(f.offer_crc_error), visit(f.spin_up);
 }
 
 template <class Visit> void each_field(TrackingFrame& f, Visit visit) {

@@ -74,47 +74,57 @@ static volatile uint8_t motion, motion_done;
 
 /* The ADC. While no program takes a reading, edges of the comparator start conversions of the high-gain amplifier. */
 
-static void listen_to(uint8_t channel) { ADMUX = _BV(REFS0) | channel; }
-
-static void wait_for_edges(void) {
-  listen_to(0);
-  ADCSRB = _BV(ADTS0);
+static void listen_to(uint8_t channel) {
+  ADMUX = _BV(REFS0) | channel;
   ADCSRA = _BV(ADEN) | _BV(ADATE) | _BV(ADPS1) | _BV(ADPS0);
 }
+
+/* Clocks of the ADC: 1 MHz, and the 62.5 kHz that the temperature sensor needs. */
+enum { AT_1_MHZ = _BV(ADPS1) | _BV(ADPS0), AT_62_KHZ = _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0) };
 
 static uint16_t conversion(void) {
   while (ADCSRA & _BV(ADSC)) {}
   return ADC;
 }
 
-static int16_t reading(uint8_t multiplexer) {
+static uint16_t converted(uint8_t multiplexer, uint8_t clock) {
+  ADMUX = multiplexer;
+  ADCSRA = _BV(ADEN) | _BV(ADSC) | clock;
+  return conversion();
+}
+
+/* `listens`: edges of the comparator start conversions again afterwards. */
+static int16_t reading(uint8_t multiplexer, uint8_t clock, uint8_t listens) {
   if (rx_busy) return -1;
   const uint8_t flags = SREG;
   cli();
-  ADMUX = multiplexer;
-  ADCSRA = _BV(ADEN) | _BV(ADSC) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);
-  const int16_t value = (int16_t)conversion();
-  wait_for_edges();
+  const int16_t value = (int16_t)converted(multiplexer, clock);
+  if (listens) listen_to(0);
   SREG = flags;
   return value;
 }
 
-int16_t get_ambientlight(void) { return reading(_BV(REFS0) | 7); }
-int16_t get_voltage(void) { return reading(_BV(REFS0) | 6); }
-int16_t get_temperature(void) { return reading(_BV(REFS1) | _BV(REFS0) | 8); }
+int16_t get_ambientlight(void) { return reading(_BV(REFS0) | 7, AT_1_MHZ, 1); }
+int16_t get_temperature(void) { return reading(_BV(REFS1) | _BV(REFS0) | 8, AT_62_KHZ, 1); }
 
-/* Each bit is the first of two readings' lowest bits that differ, which noise makes a fair coin. At most 64 tries per bit. */
+/* As on robots with the original library, the next message's high-gain strength is this voltage. */
+int16_t get_voltage(void) { return reading(_BV(REFS0) | 6, AT_1_MHZ, 0); }
+
+/* Each bit is the first of two readings' lowest bits that differ, which noise makes a fair coin. After 128 tries the bit is that
+ * of the last reading. A message that arrives meanwhile may lose its strength, or be lost. */
 uint8_t rand_hard(void) {
   uint8_t value = 0;
   for (uint8_t bit = 0; bit < 8; ++bit) {
-    for (uint8_t tries = 0; tries < 64; ++tries) {
-      int16_t first, second;
-      while ((first = get_voltage()) < 0) {}
-      while ((second = get_voltage()) < 0) {}
-      if (((first ^ second) & 1) == 0) continue;
-      value |= (uint8_t)((first & 1) << bit);
-      break;
-    }
+    uint8_t first, second, tries = 0;
+    do {
+      const uint8_t flags = SREG;
+      cli();
+      first = (uint8_t)converted(_BV(REFS0) | 6, AT_1_MHZ) & 1;
+      second = (uint8_t)converted(_BV(REFS0) | 6, AT_1_MHZ) & 1;
+      listen_to(0);
+      SREG = flags;
+    } while (first == second && ++tries < 128);
+    value |= (uint8_t)(first << bit);
   }
   return value;
 }
@@ -433,8 +443,8 @@ void kilo_init(void) {
   set_motors(0, 0);
 
   DIDR1 = _BV(AIN1D) | _BV(AIN0D);
+  ADCSRB = _BV(ADTS0);
   stop_receiving();
-  wait_for_edges();
   ACSR = _BV(ACI);
   ACSR = _BV(ACIE) | _BV(ACIS1) | _BV(ACIS0);
   sei();

@@ -18,7 +18,7 @@ constexpr Calibration kDuties{60, 61, 70, 71};
 const RangingTable kNominal{KILOTWIN_IR_HIGH, KILOTWIN_IR_LOW};
 
 Mcu make(const FlashImage& image, std::uint32_t robot = 5) {
-  return Mcu(image, make_eeprom(robot, kDuties, kNominal), Random(1), robot);
+  return Mcu(image, make_eeprom(static_cast<std::uint16_t>(robot), kDuties, kNominal), Random(1), robot);
 }
 
 /// The light pulses of a message that starts at a cycle.

@@ -63,6 +63,32 @@ TEST_F(FirmwareRun, SendsAndReceivesWhenANativeRobotDoes) {
   EXPECT_EQ(native.totals.received, firmware.totals.received);
 }
 
+TEST_F(FirmwareRun, NobodyHearsAWrongCrc) {
+  std::string wrong = kTalker;
+  const std::string right = "message_crc(&hello)";
+  wrong.replace(wrong.find(right), right.size(), right + " + 1");
+  const std::string talker = program("talker.c", wrong);
+  for (const char* const kind : {"", "avr: true"}) {
+    const Timeline timeline = run(pair_of(talker, kind));
+    EXPECT_EQ(timeline.totals.received, 0u) << kind;
+    for (std::size_t robot = 0; robot < 2; ++robot) {
+      EXPECT_GT(timeline.motors[robot].back().value >> 8, 60u) << kind << " sent";
+      EXPECT_EQ(timeline.motors[robot].back().value & 0xff, 0u) << kind << " heard";
+    }
+  }
+  const Timeline mixed =
+      run("duration_s: 10 radio { range_mm: 300 }\n"
+          "robots { count: 1 " +
+          talker +
+          " }\n"
+          "robots { count: 1 avr: true " +
+          talker + " layout { x_mm: 60 } }\n");
+  for (std::size_t robot = 0; robot < 2; ++robot) {
+    EXPECT_GT(mixed.motors[robot].back().value >> 8, 12u) << "sent";
+    EXPECT_EQ(mixed.motors[robot].back().value & 0xff, 0u) << "heard";
+  }
+}
+
 TEST_F(FirmwareRun, MovesWhenANativeRobotDoes) {
   const std::string walk = "behaviour: \"" KILOTWIN_SOURCE_DIR "/behaviours/walk.c\" ";
   const Timeline native = run(pair_of(walk, "")), firmware = run(pair_of(walk, "avr: true"));
@@ -178,6 +204,53 @@ TEST_F(FirmwareRun, ExchangesMessagesWithNativeRobots) {
     EXPECT_GT(timeline.motors[robot].back().value & 0xff, 12u) << "messages heard";
     EXPECT_GT(timeline.motors[robot].back().value >> 8, 12u) << "messages sent";
   }
+}
+
+TEST_F(FirmwareRun, HasItsUidAndEeprom) {
+  const std::string shows = program(
+      "shows.c", "#include <avr/eeprom.h>\n" + whole_program("static void setup(void) { set_motors(kilo_uid & 255, "
+                                                               "eeprom_read_byte((uint8_t*)300)); }\n"
+                                                               "static void loop(void) {}\n"));
+  fs::create_directories(folder_ / "eeproms");
+  std::string eeprom(1024, '\xff');
+  eeprom[0xb0] = 77, eeprom[0xb1] = 0, eeprom[300] = 33;
+  std::ofstream(folder_ / "eeproms/1.eeprom") << eeprom;
+  for (const char* const kind : {"", "avr: true "}) {
+    const Timeline timeline = run("duration_s: 2 robots { count: 2 first_uid: 42 " + shows + kind + "eeprom: \"" +
+                                  (folder_ / "eeproms").string() + "\" layout { grid {} } }\n");
+    ASSERT_FALSE(timeline.motors[0].empty() || timeline.motors[1].empty()) << kind;
+    EXPECT_EQ(timeline.motors[0].back().value >> 8, 42u) << kind;
+    EXPECT_EQ(timeline.motors[1].back().value, 77u << 8 | 33) << kind;
+  }
+}
+
+TEST_F(FirmwareRun, FindsCompanionFilesAsNativeRobotsDo) {
+  std::ofstream(folder_ / "light.c") << "#include <kilolib.h>\nvoid shine(void) { set_color(RGB(0, 3, 0)); }\n";
+  const std::string lamp =
+      program("lamp.c", whole_program("void shine(void);\nstatic void setup(void) { shine(); }\nstatic void loop(void) {}\n"));
+  for (const char* const kind : {"", "avr: true "})
+    EXPECT_EQ(run("duration_s: 1 robots { count: 1 " + lamp + kind + "}\n").led[0].back().value, 12u) << kind;
+}
+
+/// rand_hard() keeps interrupts off, so it loses messages; about as many on the robot's processor as natively.
+TEST_F(FirmwareRun, RandHardLosesMessagesAsANativeRobotDoes) {
+  const std::string talker = program("talker.c", kTalker);
+  const std::string rolls = program(
+      "rolls.c", whole_program("static uint8_t heard;\n"
+                               "static void receive(message_t* m, distance_measurement_t* d) { ++heard; }\n"
+                               "static void setup(void) {}\n"
+                               "static void loop(void) { for (uint8_t i = 0; i < 10; ++i) rand_hard(); set_motors(0, heard); delay(10); }\n",
+                               "kilo_message_rx = receive;"));
+  const auto heard = [&](const std::string& kind) {
+    const Timeline timeline =
+        run("duration_s: 100 seed: 5 radio { range_mm: 300 }\n"
+            "robots { count: 1 " + talker + " }\n"
+            "robots { count: 1 loop_rate: AS_ON_ROBOT " + rolls + kind + " layout { x_mm: 60 } }\n");
+    return static_cast<double>(timeline.motors[1].back().value & 0xff);
+  };
+  const double native = heard(""), firmware = heard("avr: true ");
+  EXPECT_LT(native, 150) << "of 190";
+  EXPECT_NEAR(native, firmware, 40);
 }
 
 }  // namespace

@@ -1,0 +1,18 @@
+/// Gives programs the int of the robot: 16 bits. Values that are stored in an int wrap as on the robot, and the line is told.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace kilotwin::behaviours {
+
+/// Replaces `int` by `short` in preprocessed C, except in headers of the runtime and of the compiler, and in types with long,
+/// short, char or unsigned. Sums, differences and products are still computed with 32 bits. Where one is stored in an int, by =,
+/// +=, -=, *=, ++ or --, or as initial value, the text gets a test that calls kilotwin_overflow() if 16 bits do not hold it.
+/// Lines keep their numbers. Text that the parser does not understand stays without tests.
+[[nodiscard]] std::string with_robot_int(std::string_view preprocessed);
+
+/// Whether a program can get it: it hands no addresses of int to the C library.
+[[nodiscard]] bool allows_robot_int(std::string_view preprocessed);
+
+}  // namespace kilotwin::behaviours
