@@ -73,7 +73,8 @@ int build(const BuildArguments& given) {
   const behaviours::CompiledProgram compiled = behaviours::compile(arguments.sources, options);
   for (const std::string& note : compiled.notes) say("note: " + note);
   if (arguments.sources.front().extension() != ".so") {
-    for (const std::string& warning : behaviours::program_warnings(arguments.sources, compiled.sha256, options)) say(warning);
+    for (const std::string& warning : behaviours::program_warnings(arguments.sources, compiled.sha256, options))
+      say(warning);
   }
   write_program(compiled.file, object);
   return kDone;

@@ -108,9 +108,9 @@ std::vector<fs::path> build_programs(const LoadedExperiment& loaded, const RunAr
     if (notes == Notes::kPrinted) {
       for (const std::string& note : compiled.notes) say("note: " + note);
     }
-    const bool is_new = std::none_of(
-        manifest.program().begin(), manifest.program().end(),
-        [&](const proto::Program& program) { return program.sha256() == compiled.sha256; });
+    const bool is_new =
+        std::none_of(manifest.program().begin(), manifest.program().end(),
+                     [&](const proto::Program& program) { return program.sha256() == compiled.sha256; });
     if (notes == Notes::kPrinted && is_new && !is_firmware) show_warnings(sources, compiled.sha256, options);
     int index = 0;
     while (index < manifest.program_size() && manifest.program(index).sha256() != compiled.sha256) ++index;

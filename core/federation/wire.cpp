@@ -170,8 +170,7 @@ bool from_wire(const WireRadioFrame& wire, RadioFrame& frame) {
       copy(wire.reception_robot, frame.reception_robot) && copy(wire.reception_message, frame.reception_message) &&
       copy(wire.reception_high_gain, frame.reception_high_gain) &&
       copy(wire.reception_low_gain, frame.reception_low_gain) && copy(wire.messages, frame.messages) &&
-      copy(wire.message_crc_error, frame.message_crc_error) &&
-      copy(wire.firmware_robot, frame.firmware_robot) &&
+      copy(wire.message_crc_error, frame.message_crc_error) && copy(wire.firmware_robot, frame.firmware_robot) &&
       copy(wire.firmware_motor_left, frame.firmware_motor_left) &&
       copy(wire.firmware_motor_right, frame.firmware_motor_right) &&
       copy(wire.firmware_spin_up, frame.firmware_spin_up) && copy(wire.firmware_led, frame.firmware_led) &&

@@ -52,8 +52,7 @@ void LightField::at(const SwarmView& swarm) {
   for (LightImage& image : images_) image.at(time_s);
 }
 
-double LightField::light(double x_mm, double y_mm, double z_mm, std::uint32_t self,
-                         const Direction& axis) const {
+double LightField::light(double x_mm, double y_mm, double z_mm, std::uint32_t self, const Direction& axis) const {
   const Direction* const facing = light_.sensor.cosine ? &axis : nullptr;
   double sum = light_.ambient;
   for (const Lamp& lamp : lamps_) {

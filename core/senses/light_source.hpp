@@ -24,7 +24,8 @@ struct Direction {
 /// Reading of a nominal sensor at (x, y, z), counts, not limited to the converter's range. It falls with the square of the
 /// distance. With an axis it also falls with the cosine of the angle between axis and lamp, as on a flat sensor (Lambert), and is
 /// 0 beyond 90 degrees; null: light counts alike from all sides.
-[[nodiscard]] inline double reading_of(const Lamp& lamp, double x_mm, double y_mm, double z_mm, const Direction* axis) {
+[[nodiscard]] inline double reading_of(const Lamp& lamp, double x_mm, double y_mm, double z_mm,
+                                       const Direction* axis) {
   const double dx = lamp.x_mm - x_mm, dy = lamp.y_mm - y_mm, dz = lamp.z_mm - z_mm;
   // Avoids a division by 0. Within 1 mm every lamp saturates the sensor.
   double square = dx * dx + dy * dy + dz * dz;

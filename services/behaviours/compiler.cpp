@@ -456,14 +456,16 @@ CompiledProgram complete(const Toolchain& toolchain, std::vector<fs::path> sourc
 }
 
 /// complete(), with the robot's int if the program allows it.
-CompiledProgram complete_with_int(Toolchain toolchain, const std::vector<fs::path>& sources, const Arguments& dialect) {
+CompiledProgram complete_with_int(Toolchain toolchain, const std::vector<fs::path>& sources,
+                                  const Arguments& dialect) {
   try {
     return complete(toolchain, sources, dialect);
   } catch (const NeedsWideInt&) {
     toolchain.robot_int = false;
   }
   CompiledProgram program = complete(toolchain, sources, dialect);
-  if (!is_cpp(sources.front())) program.notes.push_back(sources.front().string() + ": its int has 32 bits here, 16 on the robot");
+  if (!is_cpp(sources.front()))
+    program.notes.push_back(sources.front().string() + ": its int has 32 bits here, 16 on the robot");
   return program;
 }
 

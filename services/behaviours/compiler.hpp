@@ -12,7 +12,8 @@ struct CompileOptions {
   std::vector<std::string> defines;       ///< macros, NAME or NAME=VALUE
   std::filesystem::path compiler;         ///< empty: the first of cc, gcc, clang on the PATH
   std::filesystem::path cache_directory;  ///< empty: os::cache_directory()
-  bool wide_int = false;     ///< programs for the simulation keep the host's int of 32 bits; else it has 16, as on the robot
+  bool wide_int =
+      false;  ///< programs for the simulation keep the host's int of 32 bits; else it has 16, as on the robot
   bool boot_loader = false;  ///< firmware gets this project's boot loader at 0x7000, as a robot has one
 };
 

@@ -355,7 +355,9 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   if (slot.exchange()->ended != 0) {
     slot.exchange()->ended = 0;
     if (is_first(i, Warning::kEnded))
-      warnings_.push_back({share_.first + i, "its main() has ended, so it does nothing more; main() ends with kilo_start(setup, loop)"});
+      warnings_.push_back(
+          {share_.first + i,
+           "its main() has ended, so it does nothing more; main() ends with kilo_start(setup, loop)"});
   }
   if (thread.divided != 0) note_division(i, thread.divided, program, slot);
   robot.spin_up = 0;
@@ -368,7 +370,8 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
 
 /// Calls loop() once more in this tick, in the slot, and discards the result. On a robot loop() runs as often as it can. If
 /// further calls change the program's variables or outputs although nothing has happened, their number matters.
-void BehavioursEngine::probe_loop(std::uint32_t i, const Program& program, const Slot& slot, const Executor& executor) {
+void BehavioursEngine::probe_loop(std::uint32_t i, const Program& program, const Slot& slot,
+                                  const Executor& executor) {
   LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
   const KtRobot before = executor.robot();
   const bool rests = before.loop_rate == KT_LOOP_PER_TICK && before.debt_cycles == 0 && wait_period_[i] == 0 &&
@@ -403,10 +406,11 @@ void BehavioursEngine::probe_loop(std::uint32_t i, const Program& program, const
   probe.cycles += std::max(budget - main.left, 1);
   if (probe.done < kProbes || probe.changed < kProbes * 3 / 4) return;
   char text[224];
-  std::snprintf(text, sizeof text,
-                "each call of its loop() changes its state, and a robot calls it about %lld times per tick, here once; "
-                "let it act by kilo_ticks, or set loop_rate: AS_ON_ROBOT",
-                static_cast<long long>(std::max<std::int64_t>(1, std::int64_t{budget} * probe.changed / probe.cycles)));
+  std::snprintf(
+      text, sizeof text,
+      "each call of its loop() changes its state, and a robot calls it about %lld times per tick, here once; "
+      "let it act by kilo_ticks, or set loop_rate: AS_ON_ROBOT",
+      static_cast<long long>(std::max<std::int64_t>(1, std::int64_t{budget} * probe.changed / probe.cycles)));
   warnings_.push_back({share_.first + i, text});
 }
 
@@ -545,10 +549,11 @@ void BehavioursEngine::note_overflows(std::uint32_t i, KtExchange& told, const P
 void BehavioursEngine::note_wrong_crc(std::uint32_t i, std::uint16_t crc) {
   if (!is_first(i, Warning::kWrongCrc)) return;
   char text[192];
-  std::snprintf(text, sizeof text,
-                "its message has the CRC 0x%04x instead of 0x%04x, so receivers drop it, as on the robot; after each "
-                "change of a message set its crc to message_crc(&message)",
-                crc, crc ^ crc_error_[i]);
+  std::snprintf(
+      text, sizeof text,
+      "its message has the CRC 0x%04x instead of 0x%04x, so receivers drop it, as on the robot; after each "
+      "change of a message set its crc to message_crc(&message)",
+      crc, crc ^ crc_error_[i]);
   warnings_.push_back({share_.first + i, text});
 }
 

@@ -169,9 +169,9 @@ class BehavioursEngine {
   std::vector<std::uint8_t> absent_;    ///< 1: a tracked robot that is not there
   std::vector<std::uint8_t> seen_led_;  ///< of tracked robots, or kUnknownLed
   std::vector<std::uint16_t> tx_period_;
-  std::vector<std::uint8_t> holds_;   ///< 1: the robot holds a message that is not sent yet
-  std::vector<std::uint8_t> offers_;  ///< 1: the robot offers a further message in this tick
-  std::vector<IrMessage> message_;    ///< the offered message; valid if offers_
+  std::vector<std::uint8_t> holds_;       ///< 1: the robot holds a message that is not sent yet
+  std::vector<std::uint8_t> offers_;      ///< 1: the robot offers a further message in this tick
+  std::vector<IrMessage> message_;        ///< the offered message; valid if offers_
   std::vector<std::uint16_t> crc_error_;  ///< of the offered message: its CRC XOR the right one
   // Of tracked robots that say what listeners heard of them.
   std::vector<std::uint8_t> is_due_;  ///< 1: a message that was heard waits to be offered
@@ -197,8 +197,8 @@ class BehavioursEngine {
     std::uint32_t done = 0, changed = 0;
     std::int64_t cycles = 0;  ///< of the calls that changed something
   };
-  std::vector<LoopProbe> probes_;          ///< per program: whether a further call of loop() in a tick changes its state
-  std::vector<std::uint8_t> warned_;       ///< per program: Warning bits of what was reported
+  std::vector<LoopProbe> probes_;     ///< per program: whether a further call of loop() in a tick changes its state
+  std::vector<std::uint8_t> warned_;  ///< per program: Warning bits of what was reported
 
   Running own_running_;
   Running* running_ = &own_running_;

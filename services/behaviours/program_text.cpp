@@ -263,7 +263,9 @@ class Preparation {
     if (!found) return "";
     std::string text = found->path.string() + ": found for #include " +
                        (include.quoted ? '"' + include.name + '"' : '<' + include.name + '>');
-    if (!found->others.empty()) text += "; the nearest of " + std::to_string(found->others.size() + 1) + ", another is " + found->others.front().string();
+    if (!found->others.empty())
+      text += "; the nearest of " + std::to_string(found->others.size() + 1) + ", another is " +
+              found->others.front().string();
     note(text);
     result_.included.insert(found->path);
     return '"' + fs::absolute(prepared(found->path)).string() + '"';

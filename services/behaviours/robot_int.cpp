@@ -20,9 +20,9 @@ bool is_identifier(std::string_view word) { return is_word(word[0]) && (word[0] 
 /// Words of which declarations are made, besides names.
 bool is_specifier(std::string_view word) {
   static constexpr std::array<std::string_view, 21> kWords{
-      "int",      "signed",   "unsigned",     "short",  "long",     "char",         "double",
-      "float",    "const",    "volatile",     "static", "extern",   "register",     "inline",
-      "typedef",  "auto",     "__volatile__", "_Bool",  "_Complex", "__extension__", "__inline__"};
+      "int",     "signed", "unsigned",     "short",  "long",     "char",          "double",
+      "float",   "const",  "volatile",     "static", "extern",   "register",      "inline",
+      "typedef", "auto",   "__volatile__", "_Bool",  "_Complex", "__extension__", "__inline__"};
   return is_one_of(word, kWords);
 }
 
@@ -134,8 +134,9 @@ class Narrower {
       change(first, i, op, i + 2, end_of_value(i + 2), 2);
     } else if ((op == '+' || op == '-') && is_joined(i) && tokens_[i + 1].text[0] == op) {
       step(i, op);
-    } else if (op == '=' && !is(i + 1, "=") && (i == 0 || !is_joined(i - 1) || is_word(tokens_[i - 1].text[0]) ||
-                                                  is(i - 1, "]") || is(i - 1, ")"))) {
+    } else if (op == '=' && !is(i + 1, "=") &&
+               (i == 0 || !is_joined(i - 1) || is_word(tokens_[i - 1].text[0]) || is(i - 1, "]") ||
+                is(i - 1, ")"))) {
       const std::size_t first = place_before(i), end = end_of_value(i + 1);
       if (first == kNowhere || !computes(i + 1, end)) return;
       test_value(i + 1, end, "_Generic((" + text_of(first, i) + "),short:1,default:0)");
@@ -290,7 +291,8 @@ std::string with_robot_int(std::string_view preprocessed) { return Narrower(prep
 
 bool allows_robot_int(std::string_view preprocessed) {
   // The prototypes are in headers of the runtime, so calls are what follows another line marker.
-  static constexpr std::array<std::string_view, 6> kTakers{"frexp", "frexpf", "scanf", "sscanf", "fscanf", "remquo"};
+  static constexpr std::array<std::string_view, 6> kTakers{"frexp",  "frexpf", "scanf",
+                                                           "sscanf", "fscanf", "remquo"};
   const auto parts = system_parts(preprocessed);
   for (const Token& token : tokens_of(preprocessed)) {
     if (is_one_of(token.text, kTakers) && !std::prev(parts.upper_bound(token.at))->second) return false;

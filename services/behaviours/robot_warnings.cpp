@@ -27,7 +27,12 @@ const Arguments kQuestions{"-Wformat",      "-Wconversion", "-Wno-sign-conversio
                            "-Wtype-limits", "-Woverflow",   "-fdiagnostics-color=never"};
 
 /// The compiler's own warnings that runs show. The others are about taste.
-const Arguments kUsual{"-Wall", "-Wno-unused", "-Wno-main", "-Wno-comment", "-Wno-unknown-pragmas", "-Wno-format",
+const Arguments kUsual{"-Wall",
+                       "-Wno-unused",
+                       "-Wno-main",
+                       "-Wno-comment",
+                       "-Wno-unknown-pragmas",
+                       "-Wno-format",
                        "-fdiagnostics-color=never"};
 
 struct Diagnostic {
@@ -93,8 +98,8 @@ Value of_type(const std::string& type) {
 void append_host_headers(Arguments& arguments, const std::string& host, const fs::path& runtime) {
   std::string own = run_compiler({host, "-print-file-name=include"}).output;
   while (!own.empty() && own.back() == '\n') own.pop_back();
-  arguments.insert(arguments.end(), {"-fsyntax-only", "-nostdinc", "-isystem", (runtime / "libc").string(), "-isystem", own,
-                                     "-include", (runtime / "machine.h").string()});
+  arguments.insert(arguments.end(), {"-fsyntax-only", "-nostdinc", "-isystem", (runtime / "libc").string(),
+                                     "-isystem", own, "-include", (runtime / "machine.h").string()});
 }
 
 std::optional<double> literal(const std::string& text) {
@@ -249,8 +254,8 @@ std::vector<std::string> usual_warnings(const std::vector<fs::path>& sources, co
     append_host_headers(arguments, host, runtime);
     arguments.push_back(file.string());
     for (const Diagnostic& found : diagnostics(run_compiler(arguments).errors)) {
-      result.push_back(found.file + ':' + found.line + ':' + found.column + ": warning: " + readable(found.text) + " [" +
-                       found.option + ']');
+      result.push_back(found.file + ':' + found.line + ':' + found.column + ": warning: " + readable(found.text) +
+                       " [" + found.option + ']');
     }
   }
   return result;

@@ -41,7 +41,7 @@ struct Transmission {
   bool aborted = false;   ///< given up in its leading octet
   bool orphaned = false;  ///< its sender has left RUNNING; its end is not reported to the host
   IrMessage message{};
-  bool over = false;  ///< sent by a firmware robot, and ended; `aborted` and `message` are final
+  bool over = false;            ///< sent by a firmware robot, and ended; `aborted` and `message` are final
   std::uint16_t crc_error = 0;  ///< its CRC XOR the right one; receivers drop it unless 0
 
   [[nodiscard]] bool overlaps(Cycles from, Cycles until) const { return start < until && from < end; }

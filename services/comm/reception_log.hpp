@@ -47,9 +47,9 @@ class ReceptionLog {
   };
   std::vector<IrMessage> messages_;
   std::vector<std::uint16_t> crc_error_;  ///< per message
-  std::vector<Reception> arrived_;    ///< in order of arrival
-  std::vector<Reception> sorted_;     ///< by robot
-  std::vector<std::uint32_t> first_;  ///< per robot: index of its first reception in sorted_; then the total
+  std::vector<Reception> arrived_;        ///< in order of arrival
+  std::vector<Reception> sorted_;         ///< by robot
+  std::vector<std::uint32_t> first_;      ///< per robot: index of its first reception in sorted_; then the total
   mutable std::vector<std::uint32_t> number_;  ///< scratch of emit(): index of each message in the frame
 };
 

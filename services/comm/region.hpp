@@ -39,7 +39,7 @@ struct RadioGhosts {
   std::vector<std::uint16_t> tx_period;
   std::vector<IrMessage> message;
   std::vector<std::uint16_t> crc_error;  ///< of the message
-  std::vector<Cycles> next_send;  ///< model SIMPLE only
+  std::vector<Cycles> next_send;         ///< model SIMPLE only
   std::vector<Transmission> transmissions;
 
   void clear() { *this = {}; }

@@ -296,7 +296,8 @@ uint8_t estimate_distance(const distance_measurement_t* distance) {
 
 void kilotwin_overflow(void) {
   struct KtExchange* told = kt_exchange;
-  if (told->overflows < KT_MOST_OVERFLOWS) told->overflow[told->overflows++] = (uint64_t)__builtin_return_address(0);
+  if (told->overflows < KT_MOST_OVERFLOWS)
+    told->overflow[told->overflows++] = (uint64_t)__builtin_return_address(0);
 }
 
 /* The state machine. */

@@ -16,9 +16,8 @@ namespace kilotwin::firmware {
                                                                          const RangingTable& ranging) {
   static_assert(kEepromOctets == KILOTWIN_EEPROM_OCTETS);
   std::array<std::uint8_t, kEepromOctets> octets{};
-  kilotwin_fill_eeprom(octets.data(),
-                       {uid, calibration.turn_left, calibration.turn_right,
-                        calibration.straight_left, calibration.straight_right});
+  kilotwin_fill_eeprom(octets.data(), {uid, calibration.turn_left, calibration.turn_right,
+                                       calibration.straight_left, calibration.straight_right});
   kilotwin_fill_ranging(octets.data(), ranging.high.data(), ranging.low.data());
   return octets;
 }

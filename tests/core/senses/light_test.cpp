@@ -64,10 +64,10 @@ TEST(Light, FallsWithTheSquareOfTheDistance) {
 
 TEST(Light, ReadsItsIntensityAtOneMetre) {
   EXPECT_NEAR(
-      readings("source { height_mm: 30 intensity: 88 } sensor { radius_mm: 0 gain_sd: 0 angle_deg: 180 tilt_deg: 90 }",
-               {{1000, 0, 0}})[0],
-      88,
-      1e-9);
+      readings(
+          "source { height_mm: 30 intensity: 88 } sensor { radius_mm: 0 gain_sd: 0 angle_deg: 180 tilt_deg: 90 }",
+          {{1000, 0, 0}})[0],
+      88, 1e-9);
 }
 
 TEST(Light, FallsWithTheCosineIfTheSensorLooksUp) {
@@ -76,7 +76,8 @@ TEST(Light, FallsWithTheCosineIfTheSensorLooksUp) {
   const double plain = readings(std::string(source) + "false }", {{400, 0, 0}})[0];
   const double cosine = readings(std::string(source) + "true }", {{400, 0, 0}})[0];
   EXPECT_NEAR(cosine / plain, 300.0 / 500, 1e-12);
-  EXPECT_EQ(readings("source { height_mm: 20 } sensor { radius_mm: 0 gain_sd: 0 tilt_deg: 0 }", {{400, 0, 0}})[0], 0)
+  EXPECT_EQ(readings("source { height_mm: 20 } sensor { radius_mm: 0 gain_sd: 0 tilt_deg: 0 }", {{400, 0, 0}})[0],
+            0)
       << "from below";
 }
 
@@ -102,8 +103,8 @@ TEST(Light, IsMeasuredAtTheSensorOnTheRim) {
     const double heading = degrees * kPi / 180, angle = heading + 100 * kPi / 180;
     const double x = 60 + 14.5 * std::cos(angle), y = -40 + 14.5 * std::sin(angle);
     const double expected = 100e6 / (x * x + y * y + 170.0 * 170.0);
-    EXPECT_NEAR(readings("source { height_mm: 200 } sensor { gain_sd: 0 cosine: false }", {{60, -40, heading}})[0], expected,
-                1e-9 * expected);
+    EXPECT_NEAR(readings("source { height_mm: 200 } sensor { gain_sd: 0 cosine: false }", {{60, -40, heading}})[0],
+                expected, 1e-9 * expected);
   }
 }
 

@@ -57,9 +57,8 @@ TEST(Compiler, ErrorsNameTheUsersLine) {
   EXPECT_TRUE(error_of({no_main}).starts_with(no_main + ":1:1: error: there is no main()")) << error_of({no_main});
   const std::string several =
       folder.write("f.c", "#include <kilolib.h>\nint main(void) {\n  one = 1;\n  two = 2;\n  three();\n}\n");
-  EXPECT_EQ(error_of({several}),
-            several + ":3:3: error: 'one' undeclared (first use in this function)\n" + several +
-                ":4:3: error: 'two' undeclared (first use in this function)");
+  EXPECT_EQ(error_of({several}), several + ":3:3: error: 'one' undeclared (first use in this function)\n" +
+                                     several + ":4:3: error: 'two' undeclared (first use in this function)");
   const std::string twice = folder.write("g.c", "int main(void) { return 0; }\n");
   EXPECT_EQ(error_of({twice, link}).find('\n'), std::string::npos) << error_of({twice, link});
   const std::string avr = folder.write("e.c", "#include <kilolib.h>\nint main(void) { return oops; }\n");

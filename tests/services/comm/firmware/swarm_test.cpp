@@ -209,8 +209,8 @@ TEST_F(FirmwareRun, ExchangesMessagesWithNativeRobots) {
 TEST_F(FirmwareRun, HasItsUidAndEeprom) {
   const std::string shows = program(
       "shows.c", "#include <avr/eeprom.h>\n" + whole_program("static void setup(void) { set_motors(kilo_uid & 255, "
-                                                               "eeprom_read_byte((uint8_t*)300)); }\n"
-                                                               "static void loop(void) {}\n"));
+                                                             "eeprom_read_byte((uint8_t*)300)); }\n"
+                                                             "static void loop(void) {}\n"));
   fs::create_directories(folder_ / "eeproms");
   std::string eeprom(1024, '\xff');
   eeprom[0xb0] = 77, eeprom[0xb1] = 0, eeprom[300] = 33;
@@ -226,8 +226,9 @@ TEST_F(FirmwareRun, HasItsUidAndEeprom) {
 
 TEST_F(FirmwareRun, FindsCompanionFilesAsNativeRobotsDo) {
   std::ofstream(folder_ / "light.c") << "#include <kilolib.h>\nvoid shine(void) { set_color(RGB(0, 3, 0)); }\n";
-  const std::string lamp =
-      program("lamp.c", whole_program("void shine(void);\nstatic void setup(void) { shine(); }\nstatic void loop(void) {}\n"));
+  const std::string lamp = program(
+      "lamp.c",
+      whole_program("void shine(void);\nstatic void setup(void) { shine(); }\nstatic void loop(void) {}\n"));
   for (const char* const kind : {"", "avr: true "})
     EXPECT_EQ(run("duration_s: 1 robots { count: 1 " + lamp + kind + "}\n").led[0].back().value, 12u) << kind;
 }
@@ -235,17 +236,21 @@ TEST_F(FirmwareRun, FindsCompanionFilesAsNativeRobotsDo) {
 /// rand_hard() keeps interrupts off, so it loses messages; about as many on the robot's processor as natively.
 TEST_F(FirmwareRun, RandHardLosesMessagesAsANativeRobotDoes) {
   const std::string talker = program("talker.c", kTalker);
-  const std::string rolls = program(
-      "rolls.c", whole_program("static uint8_t heard;\n"
-                               "static void receive(message_t* m, distance_measurement_t* d) { ++heard; }\n"
-                               "static void setup(void) {}\n"
-                               "static void loop(void) { for (uint8_t i = 0; i < 10; ++i) rand_hard(); set_motors(0, heard); delay(10); }\n",
-                               "kilo_message_rx = receive;"));
+  const std::string rolls =
+      program("rolls.c", whole_program("static uint8_t heard;\n"
+                                       "static void receive(message_t* m, distance_measurement_t* d) { ++heard; }\n"
+                                       "static void setup(void) {}\n"
+                                       "static void loop(void) { for (uint8_t i = 0; i < 10; ++i) rand_hard(); "
+                                       "set_motors(0, heard); delay(10); }\n",
+                                       "kilo_message_rx = receive;"));
   const auto heard = [&](const std::string& kind) {
     const Timeline timeline =
         run("duration_s: 100 seed: 5 radio { range_mm: 300 }\n"
-            "robots { count: 1 " + talker + " }\n"
-            "robots { count: 1 loop_rate: AS_ON_ROBOT " + rolls + kind + " layout { x_mm: 60 } }\n");
+            "robots { count: 1 " +
+            talker +
+            " }\n"
+            "robots { count: 1 loop_rate: AS_ON_ROBOT " +
+            rolls + kind + " layout { x_mm: 60 } }\n");
     return static_cast<double>(timeline.motors[1].back().value & 0xff);
   };
   const double native = heard(""), firmware = heard("avr: true ");
