@@ -105,7 +105,7 @@ TEST_F(Observations, RecordingChangesNoResult) {
 TEST_F(Observations, VariablesHaveTheirValues) {
   run_observed("run");
   const Table table = table_of(exported("run", "--variables"));
-  ASSERT_EQ(table.size(), 9u * 10) << "0, 0.5 ... 4.5 s; the run ends at tick 153, before 5.01 s";
+  ASSERT_EQ(table.size(), 9u * 11) << "0, 0.5 ... 5 s, which is tick 153, the last one";
   for (const auto& row : table) {
     const int robot = std::stoi(row.at("robot")), tick = static_cast<int>(std::stod(row.at("time_s")) / 0.032768 + 0.5);
     // A robot starts its program in its first tick, and loops once in each one after.
@@ -153,7 +153,7 @@ TEST_F(Observations, AFederatedRunRecordsTheSame) {
 
 TEST_F(Observations, AResumedRunRecordsTheRest) {
   run_observed("whole", {"--mode", "local", "--checkpoint-every", "2"});
-  run_observed("rest", {"--mode", "local", "--resume", scratch_ / "whole/checkpoints"});
+  run_observed("rest", {"--mode", "local", "--resume", scratch_ / "whole"});
   const Table whole = table_of(exported("whole", "--variables")), rest = table_of(exported("rest", "--variables"));
   ASSERT_FALSE(rest.empty());
   ASSERT_LT(rest.size(), whole.size());
@@ -220,7 +220,7 @@ TEST_F(Observations, FailuresSayWhoWhenAndWhere) {
 
 TEST_F(Observations, MistakesAreNamedWithTheirPlace) {
   const std::pair<const char*, const char*> cases[] = {
-      {"recording { variable { name: \"beat\" } }", "there are beats, scores"},
+      {"recording { variable { name: \"beat\" } }", "there are beats, note, scores"},
       {"recording { variable { name: \"beats[\" } }", "expected an index"},
       {"recording { variable { name: \"beats\" every_s: 0.001 } }", "shorter than a tick"},
       {"recording { variable { } }", "without a name"},
