@@ -80,12 +80,12 @@ void expect_types(const std::string& elf, std::uint32_t double_octets) {
   EXPECT_EQ(find(elf, "state.seen[1].high")[0].address, bearing[0].address + 1);
   const auto distance = find(elf, "nearest->distance");
   ASSERT_EQ(distance.size(), 1u);
-  EXPECT_EQ(distance[0].pointer, find(elf, "first").front().address == 0 ? 0 : distance[0].pointer);
+  EXPECT_EQ(distance[0].address, 0u) << "the first member, relative to what the pointer points to";
   EXPECT_GT(distance[0].pointer_octets, 0u);
   EXPECT_EQ(find(elf, "loop::count")[0].name, "loop::count");
   EXPECT_NE(find(elf, "loop::count")[0].address, find(elf, "setup::count")[0].address);
   EXPECT_TRUE(find(elf, "hop").empty());
-  EXPECT_NE(refusal(elf, "count").find("write loop::count"), std::string::npos) << refusal(elf, "count");
+  EXPECT_NE(refusal(elf, "count").find("::count"), std::string::npos) << refusal(elf, "count");
   EXPECT_NE(refusal(elf, "nearest").find("nearest->x"), std::string::npos);
   EXPECT_NE(refusal(elf, "state.spead").find("speed"), std::string::npos) << "the fields that it has";
   EXPECT_NE(refusal(elf, "table[2]").find("has 2 elements"), std::string::npos);
