@@ -1,366 +1,251 @@
 #include "clients/identify/identify.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
+#include "clients/identify/document.hpp"
+#include "clients/identify/findings.hpp"
 #include "clients/identify/fit/fitter.hpp"
-#include "clients/identify/fit/residuals.hpp"
-#include "clients/identify/model/effect_records.hpp"
-#include "clients/identify/model/effect_text.hpp"
 #include "clients/identify/model/model_file.hpp"
-#include "clients/identify/predict/forecast.hpp"
-#include "clients/identify/predict/held_out_gain.hpp"
-#include "clients/identify/predict/prediction_errors.hpp"
+#include "clients/identify/predict/final_check.hpp"
 #include "clients/identify/replay/simulation_check.hpp"
-#include "clients/identify/search/search.hpp"
+#include "clients/identify/unexplained/prediction_windows.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::identify {
 namespace {
 
-using nlohmann::json;
+/// Joint Monte Carlo rollouts of the predictions that are reported.
+constexpr std::uint32_t kRollouts = 64;
 
-/// Root mean square error, with its 95 % interval if known.
-json summary_of(const PredictionErrors& errors, const std::optional<ErrorBounds>& bounds,
-                Interval ErrorBounds::*which) {
-  json out = {{"rmse_mm", errors.rmse_mm()}, {"rows", errors.rows}};
-  if (bounds) {
-    out["rmse_low_mm"] = ((*bounds).*which).low_mm;
-    out["rmse_high_mm"] = ((*bounds).*which).high_mm;
-  }
-  return out;
+FitState without_term(const Fitter& fitter, const FitState& fit, std::size_t t) {
+  FitState less = fit;
+  less.model.terms.erase(less.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+  fitter.fit(less, 1);
+  return less;
 }
 
-/// Reduction of the error.
-json improvement_of(const PredictionErrors& before, const PredictionErrors& after,
-                    const std::optional<ErrorBounds>& bounds) {
-  json out = {{"less_by_mm", before.rmse_mm() - after.rmse_mm()}};
-  if (bounds) {
-    out["low_mm"] = bounds->less_by.low_mm;
-    out["high_mm"] = bounds->less_by.high_mm;
-    out["bounds_how"] =
-        fmt::format("95 %, by a bootstrap over {}{}", bounds->runs > 1 ? "robots and runs" : "robots",
-                    bounds->runs > 1 ? fmt::format(", {} robots and {} runs", bounds->robots, bounds->runs)
-                                     : fmt::format(": {} robots in one run", bounds->robots));
-  }
-  return out;
+void take_out(Search& found, std::size_t t, FitState without) {
+  found.fit = std::move(without);
+  found.reasons.erase(found.reasons.begin() + static_cast<std::ptrdiff_t>(t));
 }
 
-/// An experiment that separates two effects: it varies the covariate of one and holds that of the other.
-std::string experiment_for(const std::vector<std::string>& found, const std::vector<std::string>& instead) {
-  const auto only_one = [&](const char* word) {
-    return (std::find(found.begin(), found.end(), word) != found.end()) !=
-           (std::find(instead.begin(), instead.end(), word) != instead.end());
+/// Removes terms that do not reduce the error of the training data at the prediction horizon. A small p one step ahead
+/// does not suffice.
+void keep_predictive_terms(const Fitter& fitter, const MeasuredSet& train, const ForecastTimes& times,
+                           Search& found) {
+  const auto error_mm = [&](const FitState& state) {
+    return errors_of(train, forecast(state.model, state.tracks, times, false, fitter.threads())).rmse_mm();
   };
-  if (only_one("motor_time"))
-    return "let some robots rest for the first half of a run: motor-on time and run time then differ";
-  if (only_one("time_since_command")) return "command motions of very different durations in random order";
-  if (only_one("measurement"))
-    return "rotate or shift the camera between two runs: effects of the camera move with it";
-  if (only_one("robot")) return "exchange the start positions of fast and slow robots between runs";
-  if (only_one("neighbours")) return "repeat a run with each robot alone";
-  if (only_one("position"))
-    return "start the same robots from other positions, and rotate the placement by 90 degrees";
-  if (only_one("world_frame") || only_one("heading"))
-    return "repeat the commands with all robots rotated by 90 degrees";
-  if (only_one("time")) return "start the same commands later after power-on";
-  if (only_one("history") || only_one("command"))
-    return "command left and right turns in random order before straight segments of equal length";
-  return "repeat the runs with more robots, or for longer";
+  if (found.fit.model.terms.empty()) return;
+  double with_mm = error_mm(found.fit);
+  for (std::size_t t = found.fit.model.terms.size(); t-- > 0;) {
+    FitState without = without_term(fitter, found.fit, t);
+    const double without_mm = error_mm(without);
+    // Measurement effects rarely change predicted positions, so they need not reduce the error. They must not
+    // raise it.
+    const bool on_measurement = is_measured(found.fit.model.terms[t].blocks.front().target);
+    if (without_mm > with_mm * (on_measurement ? 0.9995 : 1.0005)) continue;
+    take_out(found, t, std::move(without));
+    with_mm = without_mm;
+  }
 }
 
-/// Evaluation of the model without one term, refitted, on held-out data.
-struct Without {
-  double rmse_mm;
-  HeldOutGain gain;  ///< of the model with the term over the one without
-};
-
-/// One entry per effect. Terms of one name share an entry, with the largest loss among them.
-json effects_of(const Search& found, const std::vector<Without>& without, double before_mm, double after_mm) {
-  json effects = json::array();
-  for (std::size_t t = 0; t < found.model.terms.size(); ++t) {
-    const Term& term = found.model.terms[t];
-    const Reason& reason = found.reasons[t];
-    const auto known =
-        std::find_if(effects.begin(), effects.end(), [&](const json& e) { return e["name"] == term.name; });
-    if (known != effects.end()) {
-      (*known)["rmse_without_mm"] = std::max((*known)["rmse_without_mm"].get<double>(), without[t].rmse_mm);
-      if (json& evidence = (*known)["evidence"]; without[t].gain.nat > evidence["held_out_gain"].get<double>()) {
-        evidence["held_out_gain"] = without[t].gain.nat;
-        evidence["held_out_gain_se"] = without[t].gain.nat_se;
-      }
-      continue;
-    }
-    const double gap = before_mm * before_mm - after_mm * after_mm;
-    const double share = gap > 0 ? (without[t].rmse_mm * without[t].rmse_mm - after_mm * after_mm) / gap : 0;
-    const std::vector<proto::Effect> written = effects_of_term(term);
-    json records = json::array();
-    for (const proto::Effect& effect : written) records.push_back(effect.ShortDebugString());
-    const std::string size = size_in_words(written);
-    effects.push_back(
-        {{"name", term.name},
-         {"covariates", reason.covariates},
-         {"acts_on", reason.acts_on},
-         {"evidence",
-          {{"log10_p", reason.finding.log10_p},
-           {"threshold_log10_p", reason.threshold_log10_p},
-           {"p_family",
-            std::min(1.0, ScoreTest::kFamilyAlarm *
-                              std::pow(10.0, std::max(-300.0, reason.finding.log10_p - reason.threshold_log10_p)))},
-           {"log_likelihood_gain", reason.finding.evidence},
-           {"held_out_gain", without[t].gain.nat},
-           {"held_out_gain_se", without[t].gain.nat_se},
-           {"degrees", reason.finding.degrees}}},
-         {"parameters", {{"form", form_of(term)}, {"columns", term.coefficients.size()}, {"records", records}}},
-         {"rmse_without_mm", without[t].rmse_mm},
-         {"share_removed", std::clamp(share, 0.0, 1.0)},
-         {"in_words", fmt::format("{} depends on {}{}{}", reason.acts_on, fmt::join(reason.covariates, ", "),
-                                  size.empty() ? "" : ": ", size)}});
-  }
-  std::stable_sort(effects.begin(), effects.end(), [](const json& a, const json& b) {
-    return a["evidence"]["log_likelihood_gain"].get<double>() > b["evidence"]["log_likelihood_gain"].get<double>();
-  });
-  return effects;
+/// The models on the way of the search with fewer terms than its result, and the result.
+std::vector<Stage> path_to(const Search& found) {
+  std::vector<Stage> path;
+  const std::size_t terms = found.fit.model.terms.size();
+  std::copy_if(found.path.begin(), found.path.end(), std::back_inserter(path),
+               [&](const Stage& stage) { return stage.fit.model.terms.size() < terms; });
+  if (terms == 0) return {found.path.front()};
+  path.push_back({found.fit, found.reasons});
+  return path;
 }
 
-json describe_set(const MeasuredSet& train, const MeasuredSet* test, bool held_out) {
-  double duration_s = 0;
-  std::vector<double> steps;
-  for (const Run& run : train.runs) {
-    for (const Track& track : run.tracks) {
-      if (!track.samples.empty()) duration_s = std::max(duration_s, track.samples.back().time_s);
-      for (std::size_t i = 1; i < track.samples.size(); i += 10)
-        steps.push_back(track.samples[i].time_s - track.samples[i - 1].time_s);
+std::vector<std::string> effects_of(const MotionModel& model) {
+  std::vector<std::string> names;
+  for (const Term& term : model.terms)
+    if (std::find(names.begin(), names.end(), term.name) == names.end()) names.push_back(term.name);
+  return names;
+}
+
+bool holds(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// Everything about dropped effects leaves the findings, except that they were dropped.
+void note_dropped(Findings& f, const std::vector<Stage>& path) {
+  const std::vector<std::string> kept = effects_of(f.found.fit.model);
+  const Stage& last = path.back();
+  for (std::size_t t = 0; t < last.fit.model.terms.size(); ++t) {
+    const std::string& name = last.fit.model.terms[t].name;
+    if (holds(kept, name) || holds(f.check.dropped, name)) continue;
+    f.check.dropped.push_back(name);
+    const Reason& reason = last.reasons[t];
+    f.found.rejected.insert(f.found.rejected.begin(),
+                            {name, reason.covariates, reason.acts_on, reason.finding.log10_p,
+                             reason.threshold_log10_p, "held-out data are predicted no better with it"});
+  }
+  std::erase_if(f.found.steps, [&](const Step& step) { return !holds(kept, step.added); });
+  std::erase_if(f.found.ambiguous, [&](const Ambiguity& a) { return !holds(kept, a.found); });
+}
+
+/// The last check: goes back along the path of the search until held-out data are not predicted worse.
+void check_on_held_out(Findings& f, const Evaluation& evaluation, const ForecastTimes& times,
+                       const ForecastTimes& reported, const std::vector<Stage>& path) {
+  std::vector<PredictionErrors> errors;
+  for (const Stage& stage : path) {
+    errors.push_back(evaluation.judge(stage.fit, times).errors);
+    f.check.path.push_back({effects_of(stage.fit.model), errors.back().rmse_mm()});
+  }
+  for (std::size_t k = last_not_worse(evaluation.set(), errors);;) {
+    f.check.kept = k;
+    f.found.fit = path[k].fit;
+    f.found.reasons = path[k].reasons;
+    f.after = k == 0 ? f.before : evaluation.judge(f.found.fit, reported);
+    // The reported predictions have rollouts.
+    if (k == 0 || last_not_worse(evaluation.set(), {f.before.errors, f.after.errors}) == 1) return;
+    errors.resize(k);
+    k = last_not_worse(evaluation.set(), errors);
+  }
+}
+
+/// Evaluates each term on held-out data. A term that lowers their likelihood and does not lower their prediction error is
+/// removed.
+void check_terms(Findings& f, const Fitter& fitter, const Evaluation& evaluation, const ForecastTimes& times,
+                 const ForecastTimes& reported) {
+  constexpr double kSame = 1e-3;
+  for (bool changed = true; changed;) {
+    changed = false;
+    f.terms.clear();
+    if (f.found.fit.model.terms.empty()) return;
+    const double with_mm = evaluation.judge(f.found.fit, times).errors.rmse_mm();
+    for (std::size_t t = 0; t < f.found.fit.model.terms.size(); ++t) {
+      FitState less = without_term(fitter, f.found.fit, t);
+      const double without_mm = evaluation.judge(less, times).errors.rmse_mm();
+      const HeldOutGain gain =
+          held_out_gain(f.found.fit.model, less.model, f.after.tracks, evaluation.marked_only(), fitter.threads());
+      f.terms.push_back({std::move(less), without_mm, gain});
+    }
+    for (std::size_t t = f.terms.size(); t-- > 0 && !changed;) {
+      if (f.terms[t].gain.nat >= 0 || f.terms[t].rmse_without_mm > with_mm * (1 + kSame)) continue;
+      take_out(f.found, t, f.terms[t].without);
+      f.after = evaluation.judge(f.found.fit, reported);
+      changed = true;
     }
   }
-  std::sort(steps.begin(), steps.end());
-  return {{"runs", train.runs.size()},
-          {"robots", train.robots().size()},
-          {"tracks", train.tracks()},
-          {"samples", train.samples()},
-          {"test_samples", test != nullptr ? test->samples() : 0},
-          {"has_headings", train.has_headings},
-          {"has_commands", train.has_commands},
-          {"duration_s", duration_s},
-          {"sample_s", steps.empty() ? 0 : steps[steps.size() / 2]},
-          {"held_out", held_out}};
+}
+
+/// Windows of the tracks of the fit.
+std::vector<Window> fitted_windows(const FitState& fit, const std::vector<Forecast>& forecasts, double horizon_s) {
+  std::vector<Forecast> of_fit;
+  for (const Forecast& f : forecasts)
+    if (!fit.tracks.set().runs[f.run].tracks[f.place].held_out) of_fit.push_back(f);
+  return windows_of(fit.tracks, of_fit, horizon_s);
+}
+
+/// Errors, their intervals and floors, and what remains unexplained.
+void assess(Findings& f, const MeasuredSet& train, const MeasuredSet* test, const Evaluation& evaluation,
+            const ForecastTimes& times, std::uint32_t threads) {
+  const std::vector<Forecast> fitted = forecast(f.found.fit.model, f.found.fit.tracks, times, false, threads);
+  f.bounds = bounds_of(evaluation.set(), f.before.errors, f.after.errors);
+  f.expected_mm = (gives_errors(f.held_out) ? f.after.errors : errors_of(train, fitted)).expected_mm();
+  std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>> all{{&train, &fitted}};
+  if (test != nullptr) all.emplace_back(test, &f.after.forecasts);
+  f.replicates = replicates_of(all, times.horizon_s);
+  f.unexplained = find_unexplained(
+      gives_errors(f.held_out) ? evaluation.set() : train, fitted_windows(f.found.fit, fitted, times.horizon_s),
+      windows_of(f.after.tracks, f.after.forecasts, times.horizon_s), f.after.errors, f.bounds, f.replicates);
+}
+
+/// Errors over the horizon; empty if nothing is held out.
+nlohmann::json horizon_curve(const Findings& f, const Evaluation& evaluation, std::uint32_t threads) {
+  nlohmann::json curve;
+  if (!gives_errors(f.held_out)) return curve;
+  for (const double ahead_s : {1.0, 2.0, 5.0, 10.0, 15.0, 20.0}) {
+    const ForecastTimes at{20, 10, ahead_s};
+    const auto errors = [&](const MotionModel& model, const PreparedSet& tracks) {
+      return errors_of(evaluation.set(), forecast(model, tracks, at, evaluation.marked_only(), threads));
+    };
+    const PredictionErrors was = errors(f.base.model, f.before.tracks),
+                           is = errors(f.found.fit.model, f.after.tracks);
+    curve["at_s"].push_back(ahead_s);
+    curve["before_mm"].push_back(was.rmse_mm());
+    curve["after_mm"].push_back(is.rmse_mm());
+    curve["floor_mm"].push_back(is.expected_mm());
+  }
+  return curve;
+}
+
+std::vector<Prediction> predictions_of(const Findings& f, const MeasuredSet& judged) {
+  std::vector<Prediction> out;
+  for (std::size_t i = 0; i < f.before.forecasts.size(); ++i) {
+    const Forecast &b = f.before.forecasts[i], &a = f.after.forecasts[i];
+    KILOTWIN_DEMAND(b.run == a.run && b.place == a.place && b.time_s == a.time_s);
+    const Run& run = judged.runs[b.run];
+    out.push_back({run.name, run.tracks[b.place].robot, b.time_s, b.x_mm, b.y_mm, a.x_mm, a.y_mm});
+  }
+  return out;
 }
 
 }  // namespace
-
-void hold_out_part(MeasuredSet& set) {
-  if (set.runs.size() >= 3) {
-    const std::size_t keep = set.runs.size() - std::max<std::size_t>(1, set.runs.size() / 4);
-    for (std::size_t r = keep; r < set.runs.size(); ++r)
-      for (Track& track : set.runs[r].tracks) track.held_out = true;
-    return;
-  }
-  const std::vector<std::uint32_t> robots = set.robots();
-  for (Run& run : set.runs) {
-    for (Track& track : run.tracks) {
-      const auto place = std::lower_bound(robots.begin(), robots.end(), track.robot) - robots.begin();
-      track.held_out = robots.size() >= 4 ? place % 4 == 3 : set.runs.size() == 2 && &run == &set.runs.back();
-    }
-  }
-}
 
 Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Options& options) {
   const auto say_progress = [&](double part, const std::string& what) {
     if (options.progress) options.progress(part, what);
   };
   const auto started = std::chrono::steady_clock::now();
-  PreparedSet prepared(train);
-  if (prepared.units().empty())
+  FitState base(train);
+  if (base.tracks.units().empty())
     throw UserError("no track of the training runs has two samples; give longer tracks");
-  std::optional<PreparedSet> other;
-  if (test != nullptr) other.emplace(*test, static_cast<std::uint32_t>(train.runs.size()));
-  PreparedSet& judged = other ? *other : prepared;
-  const bool held_out_only = !other && std::any_of(train.runs.begin(), train.runs.end(), [](const Run& run) {
-    return std::any_of(run.tracks.begin(), run.tracks.end(), [](const Track& t) { return t.held_out; });
-  });
+  const Evaluation evaluation(train, test, options.threads);
+  const ForecastTimes times{10, 5, options.horizon_s};
+  ForecastTimes reported = times;
+  reported.rollouts = kRollouts;
 
   say_progress(0.02, "base model");
-  Fitter fitter(prepared, options.threads);
-  MotionModel before;
-  fitter.fit_base(before);
-  if (other) other->find_centres(before, options.threads);
-
-  Search found;
-  found.model = before;
+  const Fitter fitter(train, options.threads);
+  fitter.fit_base(base);
+  Search found{base, {}, {{base, {}}}, {}, {}, {}};
   if (options.find_effects) {
-    found = search(fitter, before,
-                   [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); });
+    found =
+        search(fitter, base, [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); });
   }
-  const ForecastTimes forecast_times{10, 5, options.horizon_s};
-  // A term stays only if it reduces the error at the prediction horizon. A small p one step ahead does not
-  // suffice.
-  const auto fitted_mm = [&](const MotionModel& model) {
-    return errors_of(train, forecast(model, prepared, forecast_times, false, options.threads)).rmse_mm();
-  };
-  if (!found.model.terms.empty()) {
-    say_progress(0.86, "evaluating each effect");
-    double with_mm = fitted_mm(found.model);
-    for (std::size_t t = found.model.terms.size(); t-- > 0;) {
-      MotionModel without = found.model;
-      without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(t));
-      fitter.fit(without, 1);
-      const double without_mm = fitted_mm(without);
-      // Measurement effects rarely change predicted positions, so they need not reduce the error. They must not
-      // raise it.
-      const bool on_measurement = is_measured(found.model.terms[t].blocks.front().target);
-      if (without_mm > with_mm * (on_measurement ? 0.9995 : 1.0005)) continue;
-      found.model = without;
-      found.reasons.erase(found.reasons.begin() + static_cast<std::ptrdiff_t>(t));
-      with_mm = without_mm;
-    }
-  }
-  const MotionModel& after = found.model;
-  if (other) other->find_centres(after, options.threads);
-  json document;
+  say_progress(0.85, "evaluating each effect");
+  keep_predictive_terms(fitter, train, times, found);
+  const std::vector<Stage> path = path_to(found);
 
-  say_progress(0.9, "predictions");
-  ForecastTimes final = forecast_times;
-  final.rollouts = 64;
-  const std::vector<Forecast> forecast_before = forecast(before, judged, final, held_out_only, options.threads);
-  const std::vector<Forecast> forecast_after = forecast(after, judged, final, held_out_only, options.threads);
+  say_progress(0.88, "predictions");
+  const Judged before = evaluation.judge(base, reported);
+  Findings f{base, std::move(found), evaluation.held_out(), before, before, {}, 0, {}, {}, {}, {}};
+  if (gives_errors(f.held_out) && before.errors.rows == 0) f.held_out = HeldOut::kNoTime;
+  if (!gives_errors(f.held_out)) {
+    f.after = evaluation.judge(f.found.fit, reported);
+  } else {
+    check_on_held_out(f, evaluation, times, reported, path);
+    check_terms(f, fitter, evaluation, times, reported);
+    note_dropped(f, path);
+  }
+  say_progress(0.91, "what is left unexplained");
+  assess(f, train, test, evaluation, times, options.threads);
 
   Identified out;
-  for (std::size_t i = 0; i < forecast_before.size(); ++i) {
-    const Forecast &b = forecast_before[i], &a = forecast_after[i];
-    KILOTWIN_DEMAND(b.run == a.run && b.place == a.place && b.time_s == a.time_s);
-    const Run& run = judged.set().runs[b.run];
-    out.predictions.push_back({run.name, run.tracks[b.place].robot, b.time_s, b.x_mm, b.y_mm, a.x_mm, a.y_mm});
-  }
-  const PredictionErrors errors_before = errors_of(judged.set(), forecast_before),
-                         errors_after = errors_of(judged.set(), forecast_after);
-  const std::optional<ErrorBounds> bounds = bounds_of(judged.set(), errors_before, errors_after);
-  json& contract = document["contract"];
-  contract["before"] = summary_of(errors_before, bounds, &ErrorBounds::before);
-  contract["after"] = summary_of(errors_after, bounds, &ErrorBounds::after);
-  contract["improvement"] = improvement_of(errors_before, errors_after, bounds);
-  contract["noise_floor_mm"] = errors_after.expected_mm();
-  contract["noise_floor_how"] =
-      "the error that the model with effects predicts for itself: filter uncertainty at the start, process noise "
-      "over the "
-      "horizon and tracker noise, all estimated from one-step innovations";
-  {
-    const std::vector<Forecast> fitted = forecast(after, prepared, forecast_times, false, options.threads);
-    std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>> all{{&train, &fitted}};
-    if (other) all.emplace_back(test, &forecast_after);
-    if (const std::optional<Replicates> again = replicates_of(all, options.horizon_s)) {
-      contract["replicates"] = {{"floor_mm", again->floor_mm},
-                                {"repeatable_mm", again->repeatable_mm},
-                                {"groups", again->groups},
-                                {"windows", again->windows}};
-    }
-  }
-  contract["horizon_s"] = options.horizon_s;
-  std::vector<Without> without;
-  for (std::size_t t = 0; t < after.terms.size(); ++t) {
-    MotionModel less = after;
-    less.terms.erase(less.terms.begin() + static_cast<std::ptrdiff_t>(t));
-    fitter.fit(less, 1);
-    without.push_back(
-        {errors_of(judged.set(), forecast(less, judged, forecast_times, held_out_only, options.threads)).rmse_mm(),
-         held_out_gain(after, less, judged, held_out_only, options.threads)});
-  }
-  contract["effects"] = effects_of(found, without, errors_before.rmse_mm(), errors_after.rmse_mm());
-  document["effect_curves"] = document["effect_maps"] = json::array();
-  for (const Term& term : after.terms) {
-    const std::vector<proto::Effect> written = effects_of_term(term);
-    for (json& curve : curves_of(term.name, written)) document["effect_curves"].push_back(std::move(curve));
-    for (json& map : maps_of(term.name, written)) document["effect_maps"].push_back(std::move(map));
-  }
-  contract["rejected"] = json::array();
-  for (const Rejected& r : found.rejected) {
-    contract["rejected"].push_back({{"name", r.name},
-                                    {"covariates", r.covariates},
-                                    {"acts_on", r.acts_on},
-                                    {"log10_p", r.log10_p},
-                                    {"threshold_log10_p", r.threshold_log10_p}});
-  }
-  contract["ambiguous"] = json::array();
-  for (const Ambiguity& a : found.ambiguous) {
-    contract["ambiguous"].push_back({{"found", a.found},
-                                     {"instead", a.instead},
-                                     {"experiment", experiment_for(a.found_covariates, a.covariates)},
-                                     {"log_likelihood_difference", a.evidence_difference}});
-  }
-  contract["base"] = {
-      {"straight_speed_mm_s", after.base.straight_mm_s}, {"turn_speed_mm_s", after.base.turn_mm_s},
-      {"wheel_base_mm", after.base.wheel_base_mm},       {"tracked_point_ahead_mm", after.base.ahead_mm},
-      {"tracked_point_left_mm", after.base.left_mm},     {"disc_centre_ahead_mm", after.base.centre_mm},
-      {"bias_mean_mm_s", after.base.bias_mean_mm_s},     {"bias_sd_mm_s", after.base.bias_sd_mm_s}};
-  contract["noise"] = {{"factor_variance_s", after.noise.factor_s},
-                       {"wheel_sd_mm", std::sqrt(after.noise.wheel_mm2_s)},
-                       {"heading_sd_rad", std::sqrt(after.noise.heading_rad2_s)},
-                       {"drift_sd_mm", std::sqrt(after.noise.drift_mm2_s)},
-                       {"tracker_position_sd_mm", std::sqrt(after.noise.position_mm2)},
-                       {"tracker_heading_sd_rad", std::sqrt(after.noise.heading_rad2)},
-                       {"at_walls_sd_mm", std::sqrt(after.noise.wall_mm2_s)},
-                       {"at_walls_sd_rad", std::sqrt(after.noise.wall_rad2_s)},
-                       {"at_robots_sd_mm", std::sqrt(after.noise.contact_mm2_s)},
-                       {"at_robots_sd_rad", std::sqrt(after.noise.contact_rad2_s)}};
-  // Lines that disc centres do not cross. A side without an entry has no wall.
-  contract["walls"] = json::object();
-  for (const auto& [side, at_mm] :
-       {std::pair{"x_low_mm", after.walls.x_low_mm}, std::pair{"x_high_mm", after.walls.x_high_mm},
-        std::pair{"y_low_mm", after.walls.y_low_mm}, std::pair{"y_high_mm", after.walls.y_high_mm}}) {
-    if (std::isfinite(at_mm)) contract["walls"][side] = at_mm;
-  }
-  document["set"] = describe_set(train, test, held_out_only);
-  document["steps"] = json::array();
-  for (const Step& step : found.steps)
-    document["steps"].push_back({{"added", step.added}, {"held_out_gain", step.held_out}});
-  document["robots"] = json::array();
-  std::map<std::uint32_t, std::array<double, 3>> by_robot;
-  for (const auto* errors : {&errors_before, &errors_after}) {
-    for (const auto& [track, part] : errors->by_track) {
-      auto& sums = by_robot[judged.set().runs[track.first].tracks[track.second].robot];
-      sums[errors == &errors_before ? 0 : 1] += part.sum_mm2;
-      if (errors == &errors_before) sums[2] += static_cast<double>(part.rows);
-    }
-  }
-  for (const auto& [robot, bias] : after.robots) {
-    json entry = {{"robot", robot},
-                  {"bias_left_mm_s", bias.mean_mm_s[0]},
-                  {"bias_right_mm_s", bias.mean_mm_s[1]},
-                  {"sd_left_mm_s", std::sqrt(bias.covariance(0, 0))},
-                  {"sd_right_mm_s", std::sqrt(bias.covariance(1, 1))}};
-    if (const auto sums = by_robot.find(robot); sums != by_robot.end() && sums->second[2] > 0) {
-      entry["before_mm"] = std::sqrt(sums->second[0] / sums->second[2]);
-      entry["after_mm"] = std::sqrt(sums->second[1] / sums->second[2]);
-    }
-    document["robots"].push_back(entry);
-  }
-  say_progress(0.92, "errors over the horizon");
-  json& curve = document["horizon"];
-  for (const double ahead_s : {1.0, 2.0, 5.0, 10.0, 15.0, 20.0}) {
-    const ForecastTimes at{20, 10, ahead_s};
-    const PredictionErrors was =
-        errors_of(judged.set(), forecast(before, judged, at, held_out_only, options.threads));
-    const PredictionErrors is =
-        errors_of(judged.set(), forecast(after, judged, at, held_out_only, options.threads));
-    curve["at_s"].push_back(ahead_s);
-    curve["before_mm"].push_back(was.rmse_mm());
-    curve["after_mm"].push_back(is.rmse_mm());
-    curve["floor_mm"].push_back(is.expected_mm());
-  }
-  const std::vector<Disturbance> left_before = disturbances_of(before, prepared, options.threads),
-                                 left_after = disturbances_of(after, prepared, options.threads);
-  document["covariate_plots"] = covariate_plots(left_before, left_after);
-  document["maps"] = maps(left_before, left_after);
-  out.model = proto_of(after);
+  out.predictions = predictions_of(f, evaluation.set());
+  out.document = document_of(f, train, test, options.horizon_s, options.threads);
+  say_progress(0.93, "errors over the horizon");
+  out.document["horizon"] = horizon_curve(f, evaluation, options.threads);
   say_progress(0.95, "simulation check");
-  const proto::Model written_before = proto_of(before);
-  const json simulated = simulation_check({before, written_before}, {after, out.model}, other ? *other : prepared,
-                                          held_out_only, options.threads);
-  for (const auto& [part, content] : simulated.items()) (part == "simulated" ? contract : document)[part] = content;
-  document["seconds"]["all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-  out.document = std::move(document);
+  out.model = proto_of(f.found.fit.model);
+  const proto::Model written_before = proto_of(f.base.model);
+  const nlohmann::json simulated = simulation_check({f.base.model, written_before}, {f.found.fit.model, out.model},
+                                                    f.after.tracks, evaluation.marked_only(), options.threads);
+  for (const auto& [part, content] : simulated.items())
+    (part == "simulated" ? out.document["contract"] : out.document)[part] = content;
+  out.document["seconds"]["all"] =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   say_progress(1, "done");
   return out;
 }

@@ -4,13 +4,20 @@
 /// The document contains everything that the report shows. Its keys (lengths mm, times s, angles rad; lists may be
 /// empty):
 ///   contract      result.json: before, after {rmse_mm, rmse_low_mm, rmse_high_mm, rows}, improvement {less_by_mm,
-///                 low_mm, high_mm, bounds_how}, noise_floor_mm, noise_floor_how, replicates {floor_mm, repeatable_mm,
-///                 groups, windows}, horizon_s, effects, base, noise, walls, rejected, ambiguous, faults, simulated
-///                 (replay/simulation_check.hpp)
+///                 low_mm, high_mm, bounds_how}, held_out {kind, in_words}, noise_floor_mm, noise_floor_how, replicates
+///                 {floor_mm, repeatable_mm, groups, windows}, horizon_s, effects, base, noise, walls, rejected,
+///                 ambiguous, faults, simulated (replay/simulation_check.hpp). All errors are of held-out data; if
+///                 nothing is held out they are null
+///     next        the most useful thing to do next, as one sentence
+///     check       {path [{effects [..], rmse_mm}], kept, dropped [..]}: the last check (predict/final_check.hpp)
+///     unexplained {large, systematic_mm, share, expected_mm, repetitions_mm, learner {error_mm, error_left_mm,
+///                 less_by_low_mm, less_by_high_mm, cross_validated}, patterns [{covariates [..], units [..], components
+///                 [..], share, at [..], and_at [..], first_mm [and_at][at], second_mm}], in_words}: what the model
+///                 leaves unexplained (unexplained/unexplained.hpp)
 ///     effects     [{name, covariates [..], acts_on, evidence {log10_p, threshold_log10_p, p_family, log_likelihood_gain,
 ///                 held_out_gain, held_out_gain_se, degrees}, parameters {form, ...}, rmse_without_mm, share_removed,
 ///                 in_words}], strongest first
-///     rejected    [{name, covariates, acts_on, log10_p, threshold_log10_p}]: most significant hypotheses not accepted
+///     rejected    [{name, covariates, acts_on, log10_p, threshold_log10_p, why}]: most significant hypotheses not accepted
 ///     ambiguous   [{found, instead, log_likelihood_difference, experiment}]: effects not identifiable separately
 ///     faults      [{kind, run, robot, from_s, to_s, in_words}]: faults of the data, excluded from the fit
 ///   set           {train, test, runs, robots, tracks, samples, has_headings, has_commands, duration_s, sample_s, held_out}
@@ -59,8 +66,5 @@ struct Identified {
 
 /// Fits the tracks of `train` that are not held out. Predicts `test`; null: the held-out tracks of `train`.
 [[nodiscard]] Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Options&);
-
-/// Holds out about a quarter: the last runs if there are three or more, else some robots, else the last run.
-void hold_out_part(MeasuredSet&);
 
 }  // namespace kilotwin::identify

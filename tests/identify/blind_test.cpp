@@ -17,11 +17,9 @@ identify::MotionModel fitted(const truth::Scene& scene, std::uint64_t seed) {
   truth::write_data(scene, truth::play(scene, seed).train, folder);
   const identify::MeasuredSet set = identify::load_measured_set(folder);
   std::filesystem::remove_all(folder);
-  identify::PreparedSet prepared(set);
-  const identify::Fitter fitter(prepared, 2);
-  identify::MotionModel model;
-  fitter.fit_base(model);
-  return model;
+  identify::FitState state(set);
+  identify::Fitter(set, 2).fit_base(state);
+  return state.model;
 }
 
 void expect_room_of(const truth::Scene& scene, const identify::Walls& walls, double within_mm) {

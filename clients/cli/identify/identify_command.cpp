@@ -15,6 +15,7 @@
 #include "clients/identify/data/plausibility.hpp"
 #include "clients/identify/identify.hpp"
 #include "clients/identify/model/model_file.hpp"
+#include "clients/identify/predict/evaluation.hpp"
 #include "clients/identify/report/prediction_residuals.hpp"
 #include "clients/identify/report/report.hpp"
 #include "core/base/error.hpp"
@@ -89,23 +90,48 @@ class Unfinished {
   bool kept_ = false;
 };
 
+/// Whether something large is left unexplained. Results of other kinds of data do not say.
+bool is_unexplained(const nlohmann::json& result) {
+  const auto left = result.find("unexplained");
+  return left != result.end() && left->at("large").get<bool>();
+}
+
+void print_errors(const nlohmann::json& result, double horizon_s) {
+  const auto error = [&](const char* when) -> const nlohmann::json& { return result.at(when).at("rmse_mm"); };
+  if (error("before").is_null()) {
+    fmt::print("{}\n", result.at("held_out").at("in_words").get<std::string>());
+  } else {
+    fmt::print(
+        "prediction error, horizon {:g} s: {:.2f} mm with the base model, {:.2f} mm with effects; noise floor "
+        "{:.2f} mm\n",
+        horizon_s, error("before").get<double>(), error("after").get<double>(),
+        result.at("noise_floor_mm").get<double>());
+  }
+  // Results of other kinds of data have neither.
+  if (const auto check = result.find("check"); check != result.end()) {
+    for (const auto& name : check->at("dropped"))
+      fmt::print("{}: not written, because held-out data are predicted no better with it\n",
+                 name.get<std::string>());
+  }
+  if (is_unexplained(result))
+    fmt::print("unexplained: {}\n", result.at("unexplained").at("in_words").get<std::string>());
+}
+
 void print_results(const IdentifyArguments& arguments, const identify::Identified& found,
                    const std::vector<identify::DataFault>& faults) {
   const auto& result = found.document.at("contract");
   if (found.document.contains("summary")) {
     for (const auto& line : found.document.at("summary")) fmt::print("{}\n", line.get<std::string>());
   } else {
-    const auto number = [&](const char* when) { return result.at(when).at("rmse_mm").get<double>(); };
-    fmt::print(
-        "prediction error, horizon {:g} s: {:.2f} mm with the base model, {:.2f} mm with effects; noise floor "
-        "{:.2f} "
-        "mm\n",
-        arguments.horizon_s, number("before"), number("after"), result.at("noise_floor_mm").get<double>());
+    print_errors(result, arguments.horizon_s);
   }
   for (const identify::DataFault& fault : faults) fmt::print("{}: {}\n", name_of(fault.kind), fault.in_words());
   for (const auto& effect : result.at("effects"))
     fmt::print("{}: {}\n", effect.at("name").get<std::string>(), effect.at("in_words").get<std::string>());
-  if (result.at("effects").empty()) fmt::print("no significant effect: the base model explains these data\n");
+  if (result.at("effects").empty() && !is_unexplained(result))
+    fmt::print("no significant effect: the base model explains these data\n");
+  if (const auto next = result.find("next"); next != result.end())
+    fmt::print("next: {}\n", next->get<std::string>());
 }
 
 int identify_data(const IdentifyArguments& arguments) {

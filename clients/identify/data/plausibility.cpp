@@ -23,6 +23,9 @@ constexpr double kSmallestRoom_mm = 15;
 // Kilobots drive at 10 mm/s. Bounds of a plausible median speed.
 constexpr double kFastestMedian_mm_s = 150, kSlowestMedian_mm_s = 0.1;
 constexpr double kLook_s = 5;
+// A run in which robots were seen for less than this share of its time, and that is longer than this, robots times
+// seconds, holds several recordings. Its neighbours on a raster of time would not fit into memory.
+constexpr double kLeastSeen = 0.05, kMuchTime_s = 2e5;
 
 std::string of(const Run& run, const Track& track) {
   return fmt::format("run {}, robot {}", run.name, track.robot);
@@ -50,6 +53,25 @@ void demand_seconds(const MeasuredSet& set, const std::string& from) {
         "{}: the sampling interval is {:g} s; give time_s in seconds (not milliseconds or frames), about one "
         "sample per second",
         from, step));
+}
+
+void demand_one_recording_per_run(const MeasuredSet& set, const std::string& from) {
+  for (const Run& run : set.runs) {
+    double first_s = 1e300, last_s = -1e300, seen_s = 0;
+    for (const Track& track : run.tracks) {
+      for (std::size_t i = 0; i < track.samples.size(); ++i) {
+        first_s = std::min(first_s, track.samples[i].time_s);
+        last_s = std::max(last_s, track.samples[i].time_s);
+        if (i > 0) seen_s += std::min(track.samples[i].time_s - track.samples[i - 1].time_s, kSlowestSampling_s);
+      }
+    }
+    const double time_s = (last_s - first_s) * static_cast<double>(run.tracks.size());
+    if (time_s > kMuchTime_s && seen_s < kLeastSeen * time_s)
+      throw UserError(fmt::format(
+          "{}: run {}: robots were seen for {:.2g} % of its {:g} s; give each recording a run of its own, with "
+          "time_s from its start",
+          from, run.name, 100 * seen_s / time_s, last_s - first_s));
+  }
 }
 
 void demand_millimetres(const MeasuredSet& set, const std::string& from) {
@@ -139,6 +161,7 @@ void demand_motion(const MeasuredSet& set, const std::string& from) {
 
 void demand_plausible(const MeasuredSet& set, const std::string& from) {
   demand_seconds(set, from);
+  demand_one_recording_per_run(set, from);
   demand_millimetres(set, from);
   demand_radians(set, from);
   demand_motion(set, from);

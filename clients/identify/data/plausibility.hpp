@@ -9,7 +9,7 @@
 namespace kilotwin::identify {
 
 /// Throws UserError, with the remedy, if
-///   - times are not seconds since the start of the run (an epoch, milliseconds, frames);
+///   - times are not seconds since the start of the run (an epoch, milliseconds, frames), or a run is many recordings;
 ///   - positions are not mm (metres, pixels), or headings not radians;
 ///   - no robot is commanded to move while it is tracked, or no commanded robot moves.
 /// `from` is the directory, for the message.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "clients/identify/fit/fitter.hpp"
 #include "clients/identify/model/camera_scale.hpp"
@@ -24,65 +25,68 @@ bool acts_on_speed(const Block& block) {
 
 }  // namespace
 
-MotionModel Fitter::with_uncertain_walls(MotionModel model) const {
+void Fitter::set_uncertain_walls(MotionModel& model) {
   model.contact_range_mm = std::max(model.contact_range_mm, kUncertainContact_mm);
   model.contacts = true;
   model.walls_uncertain = true;
-  return model;
 }
 
-bool Fitter::contacts_contradict_geometry(const MotionModel& model) const {
+bool Fitter::contacts_contradict_geometry(const FitState& state) const {
   // Larger wheel and heading noise in contact indicates contacts. This compares it with the noise of free robots.
-  MotionModel trial = with_uncertain_walls(model);
+  FitState trial = state;
+  set_uncertain_walls(trial.model);
   const double with_noise = log_likelihood(trial);
   fit_noise(trial);
   std::size_t samples = 0;
-  for (const TrackView& view : set_.views()) samples += view.track->held_out ? 0 : view.track->samples.size();
+  for (const TrackView& view : state.tracks.views())
+    samples += view.track->held_out ? 0 : view.track->samples.size();
   constexpr double kSure = 30, kEach = 0.002;
   return log_likelihood(trial) > with_noise + kSure + kEach * static_cast<double>(samples);
 }
 
-void Fitter::fit_camera_distortion(MotionModel& model) const {
+void Fitter::fit_camera_distortion(FitState& state) const {
+  MotionModel& model = state.model;
   const MotionModel before = model;
-  model = with_uncertain_walls(model);
+  set_uncertain_walls(model);
   model.walls = {};
   constexpr int kPasses = 3;
   for (int pass = 0; pass < kPasses; ++pass) {
-    fit_noise(model);
-    step(model);
+    fit_noise(state);
+    step(state);
   }
   model.walls = carried(before.walls, before, model);
-  resolve_walls(model);
+  resolve_walls(state);
 }
 
-void Fitter::resolve_walls(MotionModel& model) const {
-  MotionModel trial = model;
-  trial.walls_uncertain = false;
-  trial.contact_range_mm = contact_range_of(trial.base, set_.set().has_headings);
-  set_.find_centres(trial, threads_);
-  trial.contacts = set_.encounters().overlap_density() < Encounters::kNoCollisions;
+void Fitter::resolve_walls(FitState& state) const {
+  FitState trial = state;
+  trial.model.walls_uncertain = false;
+  trial.model.contact_range_mm = contact_range_of(trial.model.base, headings_);
+  trial.tracks.find_centres(trial.model, threads_);
+  trial.model.contacts = trial.tracks.encounters().overlap_density() < Encounters::kNoCollisions;
   update_walls(trial);
-  if (!set_.set().has_headings) fit_walls(trial);
+  if (!headings_) fit_walls(trial);
   fit_noise(trial);
-  if (log_likelihood_of_all(trial) > log_likelihood_of_all(model)) model = trial;
+  if (log_likelihood_of_all(trial) > log_likelihood_of_all(state)) state = std::move(trial);
 }
 
-bool Fitter::correct_camera_scale(MotionModel& model) const {
+bool Fitter::correct_camera_scale(FitState& state) {
   constexpr double kNear = 0.15, kSame = 0.001;
-  const std::vector<RobotPair> pairs = set_.pairs();
+  const std::vector<RobotPair> pairs = state.tracks.pairs();
   const std::optional<ContactDistance> apart = contact_distance(pairs);
-  scale_constraint_.reset();
+  state.scale.reset();
   if (!apart || std::abs(apart->mm / kDiscDiameter_mm - 1) > kNear) return false;
   const double factor = kDiscDiameter_mm / apart->mm;
-  if (!rescale(model, factor)) return false;
+  if (!rescale(state.model, factor)) return false;
   std::vector<RobotPair> met;
   for (RobotPair pair : pairs)
     if (std::abs(pair.distance_mm - apart->mm) < 2) met.push_back(pair);
-  scale_constraint_ = std::make_shared<const ScaleConstraint>(model, met, apart->sd_mm / kDiscDiameter_mm);
+  state.scale = std::make_shared<const ScaleConstraint>(state.model, met, apart->sd_mm / kDiscDiameter_mm);
   return std::abs(factor - 1) > kSame;
 }
 
-void Fitter::choose_camera_scale(MotionModel& model) const {
+void Fitter::choose_camera_scale(FitState& state) const {
+  MotionModel& model = state.model;
   // Prior: the speeds and the wheel base of the ARGoS paper, independent normal. The exponent is quadratic in the
   // factor.
   const BaseParameters defaults;
@@ -103,9 +107,9 @@ void Fitter::choose_camera_scale(MotionModel& model) const {
   }
   if (by_seed <= 0) return;
   double log_factor = precision * std::log(by_seed / precision);
-  if (scale_constraint_) {
-    const double sure = 1 / (scale_constraint_->relative_sd() * scale_constraint_->relative_sd());
-    log_factor += sure * std::log(scale_constraint_->factor(model));
+  if (state.scale) {
+    const double sure = 1 / (state.scale->relative_sd() * state.scale->relative_sd());
+    log_factor += sure * std::log(state.scale->factor(model));
     precision += sure;
   }
   rescale(model, std::exp(log_factor / precision));

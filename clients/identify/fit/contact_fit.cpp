@@ -48,15 +48,17 @@ double contact_range_of(const BaseParameters& base, bool headings) {
   return kContactRange_mm + (headings ? 0 : kMostly * std::abs(base.centre_mm - base.ahead_mm));
 }
 
-void Fitter::update_walls(MotionModel& model) const {
-  if (!set_.set().has_headings) return;
+void Fitter::update_walls(FitState& state) const {
+  if (!headings_) return;
+  MotionModel& model = state.model;
   const Walls known = model.walls;
-  model.walls = detected_walls(set_, model);
+  model.walls = detected_walls(state.tracks, model);
   for (double Walls::*const side : {&Walls::x_low_mm, &Walls::x_high_mm, &Walls::y_low_mm, &Walls::y_high_mm})
     if (std::isinf(model.walls.*side)) model.walls.*side = known.*side;
 }
 
-void Fitter::fit_walls(MotionModel& model) const {
+void Fitter::fit_walls(FitState& state) const {
+  MotionModel& model = state.model;
   // Largest distance between the tracked point and the disc centre.
   const double reach = std::abs(model.base.centre_mm - model.base.ahead_mm);
   // The tracked point with the camera distortion removed.
@@ -78,9 +80,9 @@ void Fitter::fit_walls(MotionModel& model) const {
       Side{&Walls::y_high_mm, &Sample::y_mm, 1}, Side{&Walls::y_low_mm, &Sample::y_mm, -1}};
   for (const Side& side : sides) {
     // With headings, detected_walls() has found most walls already.
-    if (set_.set().has_headings && std::isfinite(model.walls.*side.wall)) continue;
+    if (headings_ && std::isfinite(model.walls.*side.wall)) continue;
     std::vector<double> places;
-    for (const TrackView& view : set_.views())
+    for (const TrackView& view : state.tracks.views())
       for (const Sample& s : view.track->samples) places.push_back(side.sign * place_of(view, s).*side.along);
     if (places.size() < 100) return;
     const std::size_t rank = places.size() - 1 - std::max<std::size_t>(3, places.size() / 2000);
@@ -89,7 +91,7 @@ void Fitter::fit_walls(MotionModel& model) const {
     // Tracks that came near the side, at most kMost.
     constexpr std::size_t kMost = 16;
     std::vector<const TrackView*> near;
-    for (const TrackView& view : set_.views()) {
+    for (const TrackView& view : state.tracks.views()) {
       if (view.track->held_out || near.size() == kMost) continue;
       const auto there = std::count_if(
           view.track->samples.begin(), view.track->samples.end(),
@@ -117,8 +119,9 @@ void Fitter::fit_walls(MotionModel& model) const {
   }
 }
 
-void Fitter::fit_contact_noise(MotionModel& model) const {
-  const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+void Fitter::fit_contact_noise(FitState& state) const {
+  MotionModel& model = state.model;
+  const std::vector<const TrackView*> tracks = state.tracks.some_tracks(kEnoughSamples);
   double best = log_likelihood_with_contacts(model, tracks);
   const auto climb = [&](double Noise::*part) {
     const double start = model.noise.*part;
@@ -168,71 +171,70 @@ double Fitter::persistent_push_mm2_s(const MotionModel& model, const std::vector
   return count < kFew ? 0 : std::min(sum_mm2 / time_s, kMost_mm2_s);
 }
 
-void Fitter::fit_disc_centre(MotionModel& model) const {
-  const bool headings = set_.set().has_headings;
-  const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
+void Fitter::fit_disc_centre(FitState& state) const {
   struct Candidate {
-    MotionModel model;
+    FitState state;
     double log_likelihood = 0;
     Encounters encounters;
   };
   std::vector<Candidate> candidates;
   const auto add = [&](double centre_mm) {
-    Candidate& c = candidates.emplace_back(Candidate{model, 0, {}});
-    c.model.base.centre_mm = centre_mm;
-    c.model.contact_range_mm = contact_range_of(c.model.base, headings);
-    set_.find_centres(c.model, threads_);
-    if (headings) {
-      c.model.walls = detected_walls(set_, c.model);
+    Candidate& c = candidates.emplace_back(Candidate{state, 0, {}});
+    MotionModel& model = c.state.model;
+    model.base.centre_mm = centre_mm;
+    model.contact_range_mm = contact_range_of(model.base, headings_);
+    c.state.tracks.find_centres(model, threads_);
+    if (headings_) {
+      model.walls = detected_walls(c.state.tracks, model);
     } else {
-      fit_walls(c.model);
+      fit_walls(c.state);
       // A candidate with more contacts needs contact noise of its own for a fair comparison.
-      fit_contact_noise(c.model);
+      fit_contact_noise(c.state);
     }
-    c.log_likelihood = log_likelihood_with_contacts(c.model, tracks);
-    c.encounters = set_.encounters();
+    c.log_likelihood = log_likelihood_with_contacts(model, c.state.tracks.some_tracks(kEnoughSamples));
+    c.encounters = c.state.tracks.encounters();
   };
   add(kAxleOffset_mm);
   // Alternative: the tracked point is the disc centre.
   constexpr double kApart_mm = 3;
-  if (std::abs(model.base.ahead_mm - kAxleOffset_mm) > kApart_mm) add(model.base.ahead_mm);
+  const double ahead_mm = state.model.base.ahead_mm;
+  if (std::abs(ahead_mm - kAxleOffset_mm) > kApart_mm) add(ahead_mm);
   const Candidate* best = &candidates.front();
   for (const Candidate& c : candidates) {
     // Walls are stronger evidence than encounters. Without walls the likelihood is no evidence, because it only
     // depends on which samples count as contacts.
     constexpr double kSure = 50;
-    const bool walls = c.model.walls.any() || best->model.walls.any();
+    const bool walls = c.state.model.walls.any() || best->state.model.walls.any();
     const double better = walls ? c.log_likelihood - best->log_likelihood : 0;
     if (better > kSure ||
         (better > -kSure && c.encounters.overlap_density() < 0.5 * best->encounters.overlap_density()))
       best = &c;
   }
-  model = best->model;
-  model.contacts = best->encounters.overlap_density() < Encounters::kNoCollisions;
-  if (best != &candidates.back()) set_.find_centres(model, threads_);
+  state = best->state;
+  state.model.contacts = best->encounters.overlap_density() < Encounters::kNoCollisions;
 }
 
-void Fitter::fit_contacts(MotionModel& model) const {
-  if (model.walls_uncertain) resolve_walls(model);
+void Fitter::fit_contacts(FitState& state) const {
+  MotionModel& model = state.model;
+  if (model.walls_uncertain) resolve_walls(state);
   // Large contact noise would hide wrong positions of the walls.
   const Noise anew;
   for (double Noise::*const part :
        {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
     model.noise.*part = anew.*part;
-  const bool headings = set_.set().has_headings;
   // A missing effect may have looked like a displaced disc centre.
-  if (!headings) fit_disc_centre(model);
-  for (int round = 0; round < (headings ? 1 : 2); ++round) {
-    if (headings || round > 0) {
-      fit_walls(model);
-      set_.find_centres(model, threads_);
+  if (!headings_) fit_disc_centre(state);
+  for (int round = 0; round < (headings_ ? 1 : 2); ++round) {
+    if (headings_ || round > 0) {
+      fit_walls(state);
+      state.tracks.find_centres(model, threads_);
     }
-    if (model.measures() && correct_camera_scale(model)) set_.find_centres(model, threads_);
+    if (model.measures() && correct_camera_scale(state)) state.tracks.find_centres(model, threads_);
     // Camera distortion shows false encounters and hides true ones.
     if (model.measures() && !model.walls_uncertain)
-      model.contacts = set_.encounters().overlap_density() < Encounters::kNoCollisions;
-    fit_contact_noise(model);
-    fit(model, 1);
+      model.contacts = state.tracks.encounters().overlap_density() < Encounters::kNoCollisions;
+    fit_contact_noise(state);
+    fit(state, 1);
   }
 }
 

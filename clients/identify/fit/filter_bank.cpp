@@ -26,10 +26,10 @@ void FilterBank::take(const Sample& sample) {
   const double from_s = last_s(), weight = total_of(hypotheses_);
   double lost = 0;
   for (Hypothesis& h : hypotheses_) {
-    sub_steps(view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
+    sub_steps(*view_.clock, from_s, sample.time_s, [&](double t, double length, const CommandState& commands) {
       h.filter.step(t, length, commands, view_.neighbours->view(view_.place, std::min(t, from_s)));
     });
-    const Innovation innovation = h.filter.update(sample, view_.clock.at(sample.time_s - 1e-9));
+    const Innovation innovation = h.filter.update(sample, view_.clock->at(sample.time_s - 1e-9));
     h.log_weight += innovation.log_likelihood;
     if (!innovation.lost || innovation.size != 2) continue;
     h.log_weight -= 20;

@@ -29,22 +29,22 @@ template <class Each> void sub_steps(const CommandClock& clock, double from_s, d
   }
 }
 
-/// A track with what the filter needs.
+/// A track with what the filter needs. What it points to belongs to the PreparedSet, and is constant.
 struct TrackView {
   const Track* track = nullptr;
   std::uint32_t run = 0;     ///< index in the set
   std::uint32_t number = 0;  ///< run number in effects
   std::size_t place = 0;     ///< index of the track in its run
   const RunNeighbours* neighbours = nullptr;
-  CommandClock clock;
-  double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample
-  std::vector<bool> at_boundary = {};  ///< whether each sample is at the boundary of visited places
+  const CommandClock* clock = nullptr;
+  const std::vector<bool>* at_boundary = nullptr;  ///< whether each sample is at the boundary of visited places
+  double start_heading_rad = 0, start_heading_sd_rad = 0;  ///< at the first sample, as last estimated
 
   /// The part of a situation that does not depend on the pose.
   [[nodiscard]] Situation at(double time_s) const {
     Situation s;
     s.time_s = time_s;
-    s.commands = clock.at(time_s);
+    s.commands = clock->at(time_s);
     s.robot = track->robot;
     s.run = number;
     return s;
@@ -59,11 +59,11 @@ void run_filter(TrackFilter& filter, const TrackView& view, std::size_t samples,
   filter.start(all.front(), {}, view.start_heading_rad, view.start_heading_sd_rad);
   visitor.start(filter);
   for (std::size_t i = 1; i < std::min(samples, all.size()); ++i) {
-    filter.at_boundary(view.at_boundary[i - 1] || view.at_boundary[i]);
-    sub_steps(view.clock, all[i - 1].time_s, all[i].time_s, [&](double t, double h, const CommandState& commands) {
+    filter.at_boundary((*view.at_boundary)[i - 1] || (*view.at_boundary)[i]);
+    sub_steps(*view.clock, all[i - 1].time_s, all[i].time_s, [&](double t, double h, const CommandState& commands) {
       visitor.step(filter.step(t, h, commands, view.neighbours->view(view.place, t + h / 2)));
     });
-    visitor.update(filter.update(all[i], view.clock.at(all[i].time_s - 1e-9)), all[i]);
+    visitor.update(filter.update(all[i], view.clock->at(all[i].time_s - 1e-9)), all[i]);
   }
 }
 

@@ -12,80 +12,65 @@ std::vector<Block> blocks_of(const MotionModel& model) {
   return blocks;
 }
 
-std::vector<const TrackView*> Fitter::some_tracks(std::size_t samples) const {
-  std::vector<const TrackView*> chosen, all;
-  for (const TrackView& view : set_.views())
-    if (!view.track->held_out) all.push_back(&view);
-  std::size_t sum = 0;
-  for (std::size_t i = 0; i < all.size() && sum < samples; ++i) {
-    chosen.push_back(all[(i * 7919) % all.size()]);
-    sum += chosen.back()->track->samples.size();
-  }
-  std::sort(chosen.begin(), chosen.end());
-  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
-  return chosen;
+void Fitter::fit_noise(FitState& state) const {
+  state.model.noise = most_likely_noise(state.model, state.tracks.some_tracks(kEnoughSamples), headings_, threads_);
 }
 
-void Fitter::fit_noise(MotionModel& model) const {
-  model.noise = most_likely_noise(model, some_tracks(kEnoughSamples), set_.set().has_headings, threads_);
-}
-
-void Fitter::fit_base(MotionModel& model) const {
-  const bool headings = set_.set().has_headings;
-  if (headings) {
-    set_.find_headings(model, threads_);
+void Fitter::fit_base(FitState& state) const {
+  if (headings_) {
+    state.tracks.find_headings(state.model, threads_);
   } else {
     // In a small arena, a wrong tracked point and wrong walls can stabilise each other. The fit starts from both
     // likely tracked points and keeps the one with the higher likelihood.
-    const std::vector<const TrackView*> tracks = some_tracks(kEnoughSamples);
-    const MotionModel given = model;
+    const FitState given = state;
     double best = -1e300;
-    for (const double ahead_mm : {0.0, given.base.ahead_mm}) {
-      MotionModel start = given;
-      start.base.ahead_mm = ahead_mm;
-      start.contact_range_mm = contact_range_of(start.base, headings);
-      set_.find_headings(start, threads_);
+    for (const double ahead_mm : {0.0, given.model.base.ahead_mm}) {
+      FitState start = given;
+      start.model.base.ahead_mm = ahead_mm;
+      start.model.contact_range_mm = contact_range_of(start.model.base, headings_);
+      start.tracks.find_headings(start.model, threads_);
       fit_walls(start);
-      const double value = log_likelihood_with_contacts(start, tracks);
+      const double value = log_likelihood_with_contacts(start.model, start.tracks.some_tracks(kEnoughSamples));
       if (value <= best) continue;
       best = value;
-      model = start;
+      state = start;
     }
-    set_.find_headings(model, threads_);
+    // The walls changed the model since the headings were estimated.
+    state.tracks.find_headings(state.model, threads_);
     // Contacts that are not recognised would look like wheel noise.
-    fit_contact_noise(model);
+    fit_contact_noise(state);
   }
-  fit(model, 3);
-  fit_disc_centre(model);
+  fit(state, 3);
+  fit_disc_centre(state);
   // Without headings, walls, disc centres and contact noise depend on each other: alternate.
   constexpr int kMostRounds = 4;
   constexpr double kSettled = 20;
   double likelihood = -1e300;
-  for (int round = 0; round < (headings ? 1 : kMostRounds); ++round) {
-    if (headings || round > 0) fit_walls(model);
-    if (round > 0) set_.find_centres(model, threads_);
-    fit_contact_noise(model);
-    fit(model, 2);
-    const double found = log_likelihood(model);
+  for (int round = 0; round < (headings_ ? 1 : kMostRounds); ++round) {
+    if (headings_ || round > 0) fit_walls(state);
+    if (round > 0) state.tracks.find_centres(state.model, threads_);
+    fit_contact_noise(state);
+    fit(state, 2);
+    const double found = log_likelihood(state);
     if (found < likelihood + kSettled) break;
     likelihood = found;
   }
-  if (contacts_contradict_geometry(model)) {
-    model = with_uncertain_walls(model);
-    fit(model, 2);
+  if (contacts_contradict_geometry(state)) {
+    set_uncertain_walls(state.model);
+    fit(state, 2);
   }
 }
 
-void Fitter::fit(MotionModel& model, int passes) const {
+void Fitter::fit(FitState& state, int passes) const {
   // A new camera map changes the positions of walls and of encounters.
-  const bool new_camera_map = !model.terms.empty() && is_camera_map(model.terms.back());
-  if (passes > 1 && new_camera_map) fit_camera_distortion(model);
+  const bool new_camera_map = !state.model.terms.empty() && is_camera_map(state.model.terms.back());
+  if (passes > 1 && new_camera_map) fit_camera_distortion(state);
   for (int pass = 0; pass < passes; ++pass) {
-    set_.find_headings(model, threads_);
-    update_walls(model);
+    state.tracks.find_headings(state.model, threads_);
+    update_walls(state);
     // New terms explain part of the former noise once they have their amplitude.
-    if (pass != 0 || passes == 1) fit_noise(model);
-    step(model);
+    if (pass != 0 || passes == 1) fit_noise(state);
+    step(state);
   }
 }
 

@@ -18,9 +18,10 @@ struct Equations {
   Eigen::VectorXd prior_precision;  ///< prior precisions of the terms' coefficients
 };
 
-Equations equations_of(const Fitter& fitter, const MotionModel& model) {
+Equations equations_of(const Fitter& fitter, const FitState& state) {
+  const MotionModel& model = state.model;
   Equations e;
-  e.units = linearise(model, fitter.set().units(), blocks_of(model), {100, fitter.threads()});
+  e.units = linearise(model, state.tracks.units(), blocks_of(model), {100, fitter.threads()});
   const Eigen::Index n = e.units.front().information.rows();
   e.information = Eigen::MatrixXd::Zero(n, n);
   e.score = e.prior_precision = Eigen::VectorXd::Zero(n);
@@ -104,18 +105,19 @@ void Fitter::apply(MotionModel& model, const std::vector<Unit>& units, const Eig
   model.base.bias_sd_mm_s = std::sqrt(std::max(variance, 0.01));
 }
 
-double Fitter::log_posterior(const MotionModel& model) const {
-  double value = log_likelihood(model);
-  for (const Term& term : model.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
+double Fitter::log_posterior(const FitState& state) const {
+  double value = log_likelihood(state);
+  for (const Term& term : state.model.terms) value -= 0.5 * term.precision.dot(term.coefficients.cwiseAbs2());
   return value;
 }
 
-void Fitter::step(MotionModel& model) const {
-  const Equations e = equations_of(*this, model);
+void Fitter::step(FitState& state) const {
+  const Equations e = equations_of(*this, state);
   // Damps a step that lowers the posterior: first the directions with little information, then the whole step.
+  MotionModel& model = state.model;
   const MotionModel start = model;
   const bool camera_fitted = start.measures() && start.walls.any();
-  const double before = log_posterior(start);
+  const double before = log_posterior(state);
   struct Trial {
     double firmness, length;
   };
@@ -127,11 +129,11 @@ void Fitter::step(MotionModel& model) const {
     model = start;
     apply(model, e.units, trial.length * held.ldlt().solve(e.score));
     if (camera_fitted) model.walls = carried(start.walls, start, model);
-    better = log_posterior(model) > before - 2;
+    better = log_posterior(state) > before - 2;
     if (better) break;
   }
   if (!better) model = start;
-  if (model.measures()) choose_camera_scale(model);
+  if (model.measures()) choose_camera_scale(state);
 }
 
 }  // namespace kilotwin::identify

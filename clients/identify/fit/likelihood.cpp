@@ -27,24 +27,26 @@ double Fitter::log_likelihood_with_contacts(const MotionModel& model,
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
-double Fitter::log_likelihood(const MotionModel& model) const {
-  const std::vector<TrackView>& views = set_.views();
+double Fitter::log_likelihood(const FitState& state) const {
+  const std::vector<TrackView>& views = state.tracks.views();
   std::vector<double> sums(views.size());
   os::in_parallel(views.size(), threads_, [&](std::size_t i) {
     if (views[i].track->held_out) return;
-    sums[i] = likelihood_of(model, views[i]).sum;
+    sums[i] = likelihood_of(state.model, views[i]).sum;
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
-double Fitter::log_likelihood_of_all(const MotionModel& model) const {
-  return log_likelihood_with_contacts(model, some_tracks(std::numeric_limits<std::size_t>::max()));
+double Fitter::log_likelihood_of_all(const FitState& state) const {
+  return log_likelihood_with_contacts(state.model,
+                                      state.tracks.some_tracks(std::numeric_limits<std::size_t>::max()));
 }
 
-double Fitter::log_evidence(const MotionModel& model) const {
-  double value = log_likelihood(model);
+double Fitter::log_evidence(const FitState& state) const {
+  const MotionModel& model = state.model;
+  double value = log_likelihood(state);
   if (model.terms.empty()) return value;
-  const std::vector<Unit> units = linearise(model, set_.units(), blocks_of(model), {100, threads_});
+  const std::vector<Unit> units = linearise(model, state.tracks.units(), blocks_of(model), {100, threads_});
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(units[0].information.rows(), units[0].information.cols());
   for (const Unit& unit : units) information += unit.information;
   Eigen::VectorXd unused = Eigen::VectorXd::Zero(information.rows());

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <utility>
 
 #include "clients/identify/fit/filter_bank.hpp"
 #include "clients/identify/fit/likelihood.hpp"
@@ -15,20 +15,38 @@ namespace kilotwin::identify {
 
 PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
     : set_(&set), first_number_(first_number) {
+  auto clocks = std::make_shared<std::vector<CommandClock>>();
   for (std::size_t r = 0; r < set.runs.size(); ++r) {
-    neighbours_.push_back(std::make_unique<RunNeighbours>(set.runs[r]));
-    neighbours_.back()->update_traffic(set.runs[r], MotionModel{}.cells);
+    auto neighbours = std::make_shared<RunNeighbours>(set.runs[r]);
+    neighbours->update_traffic(set.runs[r], MotionModel{}.cells);
     for (std::size_t t = 0; t < set.runs[r].tracks.size(); ++t) {
       const Track& track = set.runs[r].tracks[t];
       if (track.samples.size() < 2) continue;
       const auto place = static_cast<std::uint32_t>(r);
-      views_.push_back({&track, place, first_number + place, t, neighbours_.back().get(), CommandClock(track)});
+      views_.push_back({&track, place, first_number + place, t, neighbours.get()});
+      clocks->emplace_back(track);
     }
+    neighbours_.push_back(std::move(neighbours));
   }
   constexpr double kMargin_mm = 12;
   const VisitedBoundary boundary(set, kMargin_mm);
+  auto at_boundary = std::make_shared<std::vector<std::vector<bool>>>();
+  for (const TrackView& view : views_) {
+    std::vector<bool>& near = at_boundary->emplace_back();
+    for (const Sample& s : view.track->samples) near.push_back(boundary.is_near(s.x_mm, s.y_mm));
+  }
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    views_[v].clock = &(*clocks)[v];
+    views_[v].at_boundary = &(*at_boundary)[v];
+  }
+  clocks_ = std::move(clocks);
+  at_boundary_ = std::move(at_boundary);
+}
+
+void PreparedSet::set_neighbours(std::size_t run, RunNeighbours neighbours) {
+  neighbours_[run] = std::make_shared<const RunNeighbours>(std::move(neighbours));
   for (TrackView& view : views_)
-    for (const Sample& s : view.track->samples) view.at_boundary.push_back(boundary.is_near(s.x_mm, s.y_mm));
+    if (view.run == run) view.neighbours = neighbours_[run].get();
 }
 
 std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
@@ -44,13 +62,26 @@ std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
   return units;
 }
 
+std::vector<const TrackView*> PreparedSet::some_tracks(std::size_t samples) const {
+  std::vector<const TrackView*> chosen, all;
+  for (const TrackView& view : views_)
+    if (!view.track->held_out) all.push_back(&view);
+  std::size_t sum = 0;
+  for (std::size_t i = 0; i < all.size() && sum < samples; ++i) {
+    chosen.push_back(all[(i * 7919) % all.size()]);
+    sum += chosen.back()->track->samples.size();
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
 void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) {
   std::vector<Centres> centres(views_.size());
   os::in_parallel(views_.size(), threads, [&](std::size_t v) { centres[v] = centres_of(model, views_[v]); });
-  centres_.clear();
   for (std::size_t r = 0; r < neighbours_.size(); ++r) {
     // A track too short for the filter uses its measured positions.
-    std::vector<Centres>& of_run = centres_.emplace_back();
+    std::vector<Centres> of_run;
     for (const Track& track : set_->runs[r].tracks) {
       Centres& own = of_run.emplace_back();
       for (const Sample& s : track.samples) {
@@ -60,30 +91,18 @@ void PreparedSet::find_centres(const MotionModel& model, std::uint32_t threads) 
     }
     for (std::size_t v = 0; v < views_.size(); ++v)
       if (views_[v].run == r) of_run[views_[v].place] = std::move(centres[v]);
-    *neighbours_[r] = RunNeighbours(set_->runs[r], &of_run);
-    neighbours_[r]->update_traffic(set_->runs[r], model.cells);
+    RunNeighbours neighbours(set_->runs[r], &of_run);
+    neighbours.update_traffic(set_->runs[r], model.cells);
+    set_neighbours(r, std::move(neighbours));
   }
-}
-
-PreparedSet::TrackEstimates PreparedSet::estimates() const {
-  TrackEstimates found{centres_, {}};
-  for (const TrackView& view : views_)
-    found.starts_rad.emplace_back(view.start_heading_rad, view.start_heading_sd_rad);
-  return found;
-}
-
-void PreparedSet::restore(const TrackEstimates& found, const MotionModel& model) {
-  centres_ = found.centres;
-  for (std::size_t r = 0; r < neighbours_.size(); ++r) {
-    *neighbours_[r] = centres_.empty() ? RunNeighbours(set_->runs[r]) : RunNeighbours(set_->runs[r], &centres_[r]);
-    neighbours_[r]->update_traffic(set_->runs[r], model.cells);
-  }
-  for (std::size_t v = 0; v < views_.size(); ++v)
-    std::tie(views_[v].start_heading_rad, views_[v].start_heading_sd_rad) = found.starts_rad[v];
 }
 
 void PreparedSet::update_traffic(const MotionModel& model) {
-  for (std::size_t r = 0; r < neighbours_.size(); ++r) neighbours_[r]->update_traffic(set_->runs[r], model.cells);
+  for (std::size_t r = 0; r < neighbours_.size(); ++r) {
+    RunNeighbours neighbours = *neighbours_[r];
+    neighbours.update_traffic(set_->runs[r], model.cells);
+    set_neighbours(r, std::move(neighbours));
+  }
 }
 
 Encounters PreparedSet::encounters() const {

@@ -28,41 +28,42 @@ struct Encounters {
   }
 };
 
-/// The tracks of a set, ready for the filter.
+/// The tracks of a set, ready for the filter, and what a fit estimates of them: initial headings, disc centres, and
+/// what neighbours see of them. One value: a copy shares what is constant, and a change of the copy leaves the original
+/// as it is.
 class PreparedSet {
  public:
-  /// Runs get the numbers `first_number`, ... Run numbers of two sets must not overlap.
+  /// Runs get the numbers `first_number`, ... Run numbers of two sets must not overlap. The set must outlive all copies.
   explicit PreparedSet(const MeasuredSet&, std::uint32_t first_number = 0);
 
   [[nodiscard]] const MeasuredSet& set() const { return *set_; }
-  [[nodiscard]] std::vector<TrackView>& views() { return views_; }
   [[nodiscard]] const std::vector<TrackView>& views() const { return views_; }
   [[nodiscard]] const RunNeighbours& neighbours(std::size_t run) const { return *neighbours_[run]; }
   /// The tracks of the fit, grouped into units: by robot, or one per track if there are fewer than six robots.
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
-  /// Recomputes the disc centres, and with them the neighbour views.
-  void find_centres(const MotionModel&, std::uint32_t threads);
-  /// Estimates that belong to the tracks: disc centres and initial headings.
-  struct TrackEstimates {
-    std::vector<std::vector<Centres>> centres;          ///< by run; empty: measured positions
-    std::vector<std::pair<double, double>> starts_rad;  ///< by view: heading and its standard deviation
-  };
-  [[nodiscard]] TrackEstimates estimates() const;
-  /// Restores these estimates. Traffic grids are recomputed with the model's cells.
-  void restore(const TrackEstimates&, const MotionModel&);
-  /// Recomputes the traffic grids with the model's cells.
-  void update_traffic(const MotionModel&);
+  /// Tracks of the fit, spread over the set, up to this number of samples.
+  [[nodiscard]] std::vector<const TrackView*> some_tracks(std::size_t samples) const;
   [[nodiscard]] Encounters encounters() const;
   /// Robots that came near each other, by disc centres.
   [[nodiscard]] std::vector<RobotPair> pairs() const;
+
+  /// Estimates the disc centres, and with them what neighbours see.
+  void find_centres(const MotionModel&, std::uint32_t threads);
   /// Estimates the initial heading of each track: the measured one, or the most likely of many hypotheses.
   void find_headings(const MotionModel&, std::uint32_t threads);
+  /// Computes the traffic grids with the model's cells.
+  void update_traffic(const MotionModel&);
 
  private:
+  void set_neighbours(std::size_t run, RunNeighbours);
+
   const MeasuredSet* set_;
   std::uint32_t first_number_;
-  std::vector<std::unique_ptr<RunNeighbours>> neighbours_;
-  std::vector<std::vector<Centres>> centres_;  ///< by run, as last estimated; empty: measured positions
+  /// By view; constant.
+  std::shared_ptr<const std::vector<CommandClock>> clocks_;
+  std::shared_ptr<const std::vector<std::vector<bool>>> at_boundary_;
+  /// By run; what they point to is constant.
+  std::vector<std::shared_ptr<const RunNeighbours>> neighbours_;
   std::vector<TrackView> views_;
 };
 

@@ -58,7 +58,10 @@ template <class Of> std::pair<double, double> range_of(const std::vector<Disturb
 
 }  // namespace
 
-std::vector<Disturbance> disturbances_of(const MotionModel& model, const PreparedSet& set, std::uint32_t threads) {
+std::vector<Disturbance> disturbances_of(const FitState& state, std::uint32_t threads) {
+  const MotionModel& model = state.model;
+  PreparedSet set = state.tracks;
+  set.find_headings(model, threads);
   std::vector<std::vector<Disturbance>> parts(set.views().size());
   os::in_parallel(parts.size(), threads, [&](std::size_t v) {
     const TrackView& view = set.views()[v];

@@ -15,9 +15,8 @@ struct Disturbance {
   std::uint32_t track;
 };
 
-/// Of all tracks, for driven robots without contacts.
-[[nodiscard]] std::vector<Disturbance> disturbances_of(const MotionModel&, const PreparedSet&,
-                                                       std::uint32_t threads);
+/// Of all tracks, for driven robots without contacts. The model estimates the initial headings itself.
+[[nodiscard]] std::vector<Disturbance> disturbances_of(const FitState&, std::uint32_t threads);
 
 /// covariate_plots of the result document (identify.hpp).
 [[nodiscard]] nlohmann::json covariate_plots(const std::vector<Disturbance>& before,

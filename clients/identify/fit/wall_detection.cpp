@@ -58,7 +58,7 @@ Walls detected_walls(const PreparedSet& set, const MotionModel& model) {
   for (std::size_t v = 0; v < set.views().size(); ++v) {
     const TrackView& view = set.views()[v];
     for (const Sample& s : view.track->samples) {
-      if (view.clock.at(s.time_s).command != Motion::kStraight) continue;
+      if (view.clock->at(s.time_s).command != Motion::kStraight) continue;
       if (measures) {
         const Eigen::Vector3d pose = model.pose_of(s, view.at(s.time_s));
         const double centre = std::isnan(s.heading_rad) ? model.base.ahead_mm : model.base.centre_mm;

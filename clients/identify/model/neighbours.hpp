@@ -51,8 +51,8 @@ class RunNeighbours {
   std::size_t instants_ = 0;
   std::vector<NeighbourView> views_;  ///< [track][instant]
   std::vector<Spot> spots_;           ///< [track][instant]
-  /// Neighbours of all views. On the heap, so that views stay valid when the run moves.
-  std::unique_ptr<std::vector<OtherRobot>> others_ = std::make_unique<std::vector<OtherRobot>>();
+  /// Neighbours of all views. On the heap and shared, so that views stay valid in a copy.
+  std::shared_ptr<std::vector<OtherRobot>> others_ = std::make_shared<std::vector<OtherRobot>>();
   NeighbourView nobody_;
 };
 

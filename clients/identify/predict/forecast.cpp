@@ -114,7 +114,7 @@ class JointForecast {
       out.expected_error_mm = std::sqrt(robot.moments->square_mm2 + 2 * model_.noise.position_mm2);
       return true;
     }
-    const CommandState commands = robot.view->clock.at(now_s_ - 1e-9);
+    const CommandState commands = robot.view->clock->at(now_s_ - 1e-9);
     double x = 0, y = 0, square = 0, spread = 0;
     for (std::size_t i = 0; i < robot.filters.size(); ++i) {
       const Eigen::Vector3d seen = robot.filters[i].expected(now_s_, commands);
@@ -161,7 +161,7 @@ class JointForecast {
       grids_.see(x_[r], y_[r], robots_[r].near);
     }
     for (std::size_t r = 0; grids_.any() && r < robots_.size(); ++r)
-      if (!std::isnan(x_[r]) && robots_[r].view->clock.at(now_s_).driven()) grids_.add(x_[r], y_[r], for_s);
+      if (!std::isnan(x_[r]) && robots_[r].view->clock->at(now_s_).driven()) grids_.add(x_[r], y_[r], for_s);
   }
   void locate() {
     x_.assign(robots_.size(), std::nan(""));
@@ -178,7 +178,7 @@ class JointForecast {
   void advance(double to_s) {
     for (Robot& robot : robots_) {
       for (TrackFilter& filter : robot.filters)
-        sub_steps(robot.view->clock, robot.now_s, to_s, [&](double t, double h, const CommandState& commands) {
+        sub_steps(*robot.view->clock, robot.now_s, to_s, [&](double t, double h, const CommandState& commands) {
           filter.step_mean(t, h, commands, robot.near);
         });
       if (!robot.filters.empty()) robot.now_s = std::max(robot.now_s, to_s);
@@ -231,7 +231,7 @@ class TrafficRecord {
       const auto [near, place] = of(banks[f]);
       RunNeighbours::Spot last = near->spot(place, next_[f] - 1);
       for (std::size_t i = next_[f]; i < near->instants() && near->time_s(i) < now_s - 1e-6; ++i) {
-        last.driven = banks[f].view().clock.at(near->time_s(i) + 1e-9).driven();
+        last.driven = banks[f].view().clock->at(near->time_s(i) + 1e-9).driven();
         add(last, now);
       }
     }
@@ -310,6 +310,7 @@ struct RunForecast {
       const TrackView& view = banks[i].view();
       Forecast p{view.run, static_cast<std::uint32_t>(view.place), time_s, 0, 0, 0};
       if (!joint.expected(i, p)) p.x_mm = std::nan("");
+      if (banks[i].started()) set_start(banks[i], p);
       out.push_back(p);
     }
     return out;
@@ -319,6 +320,17 @@ struct RunForecast {
   const bool neighbours;
   std::vector<FilterBank> banks;
   TrafficRecord traffic;
+
+ private:
+  /// The most likely hypothesis at the start of the horizon.
+  static void set_start(const FilterBank& bank, Forecast& to) {
+    const auto best = std::max_element(bank.hypotheses().begin(), bank.hypotheses().end(),
+                                       [](const auto& a, const auto& b) { return a.log_weight < b.log_weight; });
+    const Belief& belief = best->filter.belief();
+    to.from_x_mm = belief.centre_x_mm();
+    to.from_y_mm = belief.centre_y_mm();
+    to.from_heading_rad = belief.mean[2];
+  }
 };
 
 }  // namespace

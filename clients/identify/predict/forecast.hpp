@@ -13,6 +13,8 @@ struct Forecast {
   double time_s;
   double x_mm, y_mm;
   double expected_error_mm;  ///< root mean square distance to the measurement that the filter itself expects
+  /// Disc centre and heading at the start of the horizon, as estimated by the filter.
+  double from_x_mm = 0, from_y_mm = 0, from_heading_rad = 0;
 };
 
 struct ForecastTimes {

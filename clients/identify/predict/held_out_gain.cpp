@@ -11,7 +11,7 @@ namespace kilotwin::identify {
 namespace {
 
 /// One per view of the set.
-std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet& set, std::uint32_t threads) {
+std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet set, std::uint32_t threads) {
   set.find_headings(model, threads);
   std::vector<double> sums(set.views().size());
   os::in_parallel(sums.size(), threads, [&](std::size_t v) {
@@ -27,8 +27,8 @@ std::vector<double> log_likelihoods(const MotionModel& model, PreparedSet& set, 
 
 }  // namespace
 
-HeldOutGain held_out_gain(const MotionModel& with, const MotionModel& without, PreparedSet& set, bool held_out_only,
-                          std::uint32_t threads) {
+HeldOutGain held_out_gain(const MotionModel& with, const MotionModel& without, const PreparedSet& set,
+                          bool held_out_only, std::uint32_t threads) {
   const std::vector<double> less = log_likelihoods(without, set, threads),
                             more = log_likelihoods(with, set, threads);
   std::map<std::uint32_t, double> by_robot;

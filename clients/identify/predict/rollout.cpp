@@ -83,12 +83,12 @@ std::vector<RolloutMoments> rollouts(const MotionModel& model, const std::vector
         grids.see(x[r], y[r], nears[r]);
       }
       for (std::size_t r = 0; grids.any() && r < robots.size(); ++r)
-        if (robots[r].view->clock.at(now_s).driven()) grids.add(x[r], y[r], next_s - now_s);
+        if (robots[r].view->clock->at(now_s).driven()) grids.add(x[r], y[r], next_s - now_s);
       for (std::uint32_t r = 0; r < robots.size(); ++r) {
         const NeighbourView& near = nears[r];
         const double start_s = step == 1 ? robots[r].now_s : now_s;
         Belief& belief = filters[r].belief();
-        sub_steps(robots[r].view->clock, start_s, next_s,
+        sub_steps(*robots[r].view->clock, start_s, next_s,
                   [&](double t, double h, const CommandState& commands) { filters[r].step(t, h, commands, near); });
         const Eigen::LDLT<Eigen::Matrix3d> root(belief.covariance.topLeftCorner<3, 3>());
         const Eigen::Vector3d scaled =
@@ -116,7 +116,7 @@ std::vector<RolloutMoments> rollouts(const MotionModel& model, const std::vector
       now_s = next_s;
     }
     for (std::size_t r = 0; r < robots.size(); ++r) {
-      const Eigen::Vector3d seen = filters[r].expected(to_s, robots[r].view->clock.at(to_s - 1e-9));
+      const Eigen::Vector3d seen = filters[r].expected(to_s, robots[r].view->clock->at(to_s - 1e-9));
       out[r].x_mm += seen[0];
       out[r].y_mm += seen[1];
       out[r].square_mm2 += seen.head<2>().squaredNorm();

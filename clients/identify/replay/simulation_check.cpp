@@ -142,7 +142,7 @@ std::string words_of(const json& statistics, bool decidable, const char* unit) {
 
 }  // namespace
 
-json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet& set, bool held_out_only,
+json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set, bool held_out_only,
                       std::uint32_t threads) {
   set.find_headings(full.fitted, threads);
   const std::size_t runs = set.set().runs.size();

@@ -21,7 +21,7 @@ struct WrittenModel {
 ///                  base_distance, base_p}], agrees, in_words}; `agrees` is null with too few robots
 ///   distributions, msd, speed_over_time   plot data (identify.hpp)
 /// Empty if the runs are too long to simulate or yield no statistic.
-[[nodiscard]] nlohmann::json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet& set,
+[[nodiscard]] nlohmann::json simulation_check(const WrittenModel& base, const WrittenModel& full, PreparedSet set,
                                               bool held_out_only, std::uint32_t threads);
 
 }  // namespace kilotwin::identify

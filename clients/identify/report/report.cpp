@@ -12,6 +12,7 @@
 #include "clients/identify/report/report_simulated.hpp"
 #include "clients/identify/report/report_summary.hpp"
 #include "clients/identify/report/report_text.hpp"
+#include "clients/identify/report/report_unexplained.hpp"
 #include "clients/report/html.hpp"
 #include "core/os/files.hpp"
 
@@ -81,6 +82,8 @@ std::string better_lead(const json& contract) {
   std::string out;
   if (const std::string how = text(part(contract, "improvement"), "bounds_how"); !how.empty())
     out += "Intervals: " + escaped(how) + ". ";
+  if (const std::string which = text(part(contract, "held_out"), "in_words"); !which.empty())
+    out += escaped(which) + " ";
   if (const std::string how = text(contract, "noise_floor_how"); !how.empty())
     out += "Noise floor: " + escaped(how) + ".";
   const json& again = part(contract, "replicates");
@@ -143,6 +146,9 @@ std::string report_html(const json& document) {
   if (!better.empty()) better = "<div class=\"grid\">" + better + "</div>\n";
   if (many) better += robots;
   page += section("better", "Improvement", better_lead(contract), better);
+  page +=
+      section("unexplained", "What is left unexplained", escaped(text(part(contract, "unexplained"), "in_words")),
+              unexplained_body(part(contract, "unexplained"), figures));
   page += given_tables(part(document, "tables"));
   page += section("faults", "Faults of the data",
                   "Excluded before the fit. These are faults of the measurement, not properties of the robots.",

@@ -138,6 +138,8 @@ std::string words_of(const std::string& name) {
                                                             {"residual_x", "residual along x"},
                                                             {"residual_y", "residual along y"},
                                                             {"driven_time", "driven time"},
+                                                            {"straight", "share of straight driving"},
+                                                            {"turning", "share of left minus right turns"},
                                                             {"radius", "distance from the centre"},
                                                             {"forward", "forward speed"},
                                                             {"sideways", "sideways slip"},
@@ -253,6 +255,41 @@ PlotNumber plot_map(Gnuplot& plots, const json& map, const char* when, const std
       gnuplot_text(title.empty() ? when : title), -most, most, gnuplot_text(text(map, "unit")));
   commands +=
       fmt::format("plot $d using 1:2:({}):({}):3 with boxxyerror fs solid 1 noborder fc palette", half_x, half_y);
+  return plots.add(kMap_px, kMapHigh_px, commands);
+}
+
+PlotNumber plot_table(Gnuplot& plots, const json& table, const std::string& title) {
+  const std::vector<double> at = numbers(table, "at"), and_at = numbers(table, "and_at");
+  std::vector<std::vector<double>> columns(3);
+  double most = 0;
+  for (std::size_t row = 0; row < and_at.size() && row < table["value"].size(); ++row) {
+    const std::vector<double> values = numbers(json{{"row", table["value"][row]}}, "row");
+    for (std::size_t col = 0; col < std::min(at.size(), values.size()); ++col) {
+      if (!std::isfinite(values[col])) continue;
+      columns[0].push_back(static_cast<double>(col));
+      columns[1].push_back(static_cast<double>(row));
+      columns[2].push_back(values[col]);
+      most = std::max(most, std::abs(values[col]));
+    }
+  }
+  if (at.size() < 2 || and_at.size() < 2 || !(most > 0)) return std::nullopt;
+  const auto tics = [](const char* which, const std::vector<double>& values) {
+    std::string out = fmt::format("set {}tics (", which);
+    const std::size_t every = 1 + values.size() / 6;
+    for (std::size_t i = 0; i < values.size(); i += every)
+      out += fmt::format("{}'{:.3g}' {}", i > 0 ? ", " : "", values[i], i);
+    return out + ")\n";
+  };
+  std::string commands = block("d", columns) + tics("x", at) + tics("y", and_at);
+  for (const auto& [which, index] : {std::pair{"x", 0U}, {"y", 1U}})
+    commands +=
+        axis(which, table["covariates"][index].get<std::string>(), table["units"][index].get<std::string>());
+  commands += fmt::format(
+      "unset grid\nunset key\nset title {}\nset xrange [-0.5:{}]\nset yrange [-0.5:{}]\nset cbrange [{}:{}]\nset "
+      "palette defined (-1 '#2563a8', 0 '#f6f4ef', 1 '#d95f0e')\nset cblabel {} offset -0.5,0\n",
+      gnuplot_text(title), static_cast<double>(at.size()) - 0.5, static_cast<double>(and_at.size()) - 0.5, -most,
+      most, gnuplot_text(text(table, "unit")));
+  commands += "plot $d using 1:2:(0.505):(0.505):3 with boxxyerror fs solid 1 noborder fc palette";
   return plots.add(kMap_px, kMapHigh_px, commands);
 }
 

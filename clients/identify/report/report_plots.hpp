@@ -32,6 +32,10 @@ PlotNumber plot_steps(Gnuplot&, const nlohmann::json& steps, double floor_mm);
 /// The error of each robot before and after.
 PlotNumber plot_robots(Gnuplot&, const nlohmann::json& robots);
 
+/// Values over two covariates (at, and_at, covariates, units, value [and_at][at], unit) in colours. Cells are equally
+/// wide, whatever their bins.
+PlotNumber plot_table(Gnuplot&, const nlohmann::json& table, const std::string& title);
+
 /// Readable name of a covariate, target or unit.
 [[nodiscard]] std::string words_of(const std::string& name);
 

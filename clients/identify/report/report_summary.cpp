@@ -20,6 +20,17 @@ std::optional<double> share_explained(const Errors& e) {
   return std::clamp((*e.before * *e.before - *e.after * *e.after) / could, 0.0, 1.0);
 }
 
+/// Nothing is held out: the effects without an error.
+std::string verdict_without_errors(const json& contract) {
+  const std::string why = text(part(contract, "held_out"), "in_words");
+  const json& effects = part(contract, "effects");
+  const std::size_t count = effects.is_array() ? effects.size() : 0;
+  const std::string found = count == 0   ? "No tested effect is significant."
+                            : count == 1 ? "One effect is significant in the data of the fit."
+                                         : fmt::format("{} effects are significant in the data of the fit.", count);
+  return fmt::format("{} <b>{}</b>", found, escaped(why.empty() ? "The prediction error is unknown." : why));
+}
+
 }  // namespace
 
 Errors errors_of(const json& contract) {
@@ -39,7 +50,10 @@ std::string headline(const json& contract) {
     if (std::find(phrases.begin(), phrases.end(), phrase) == phrases.end()) phrases.push_back(phrase);
   }
   const char* const kSeen = "<em>the measurement</em> has effects of its own";
-  if (phrases.empty() && !tracker) return "The base model explains these data";
+  if (phrases.empty() && !tracker)
+    return part(part(contract, "unexplained"), "large") == json(true)
+               ? "No tested effect explains how these data deviate from the base model"
+               : "The base model explains these data";
   if (phrases.empty()) return fmt::format("The base model explains the motion, but {}", kSeen);
   std::string because = phrases[0];
   if (phrases.size() == 2) because += " and " + phrases[1];
@@ -51,6 +65,7 @@ std::string headline(const json& contract) {
 std::string verdict(const json& contract) {
   const Errors e = errors_of(contract);
   const std::string ahead = fmt::format("{:g}", number(contract, "horizon_s").value_or(10));
+  if (!e.before) return verdict_without_errors(contract);
   std::string out = fmt::format(
       "On held-out data, with a horizon of {} s, the base model has a prediction error of <b>{} mm</b> (root mean "
       "square)",
@@ -68,6 +83,13 @@ std::string verdict(const json& contract) {
       out += fmt::format(" The reduction is {} to {} mm (95 %).", figure(number(less, "low_mm")),
                          figure(number(less, "high_mm")));
   }
+  if (const json& dropped = part(part(contract, "check"), "dropped"); dropped.is_array() && !dropped.empty())
+    out += fmt::format(" {} not written: held-out data are predicted no better with {}.",
+                       dropped.size() == 1 ? "One effect was" : fmt::format("{} effects were", dropped.size()),
+                       dropped.size() == 1 ? "it" : "them");
+  if (part(part(contract, "unexplained"), "large") == json(true))
+    out += fmt::format(" <a href=\"#unexplained\"><b>{} mm</b> of it are systematic and unexplained</a>.",
+                       figure(number(part(contract, "unexplained"), "systematic_mm")));
   if (e.floor && e.after && *e.after <= *e.floor) {
     out += fmt::format(" That is at the noise floor of these robots and this tracker (about <b>{} mm</b>).",
                        figure(e.floor));
@@ -97,6 +119,7 @@ std::string verdict(const json& contract) {
                        faults.size() == 1 ? "a fault" : fmt::format("{} faults", faults.size()),
                        faults.size() == 1 ? "was" : "were");
   }
+  if (const std::string next = text(contract, "next"); !next.empty()) out += " <b>Next:</b> " + escaped(next);
   return out;
 }
 

@@ -1,6 +1,7 @@
 #include "clients/identify/search/amplitudes.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "clients/identify/search/shape_refinement.hpp"
 #include "clients/identify/search/target_extension.hpp"
@@ -77,8 +78,9 @@ void keep_target(Term& term, Target target) {
 class CurveTimesAmplitudes {
  public:
   /// Replaces the term `source`, which has the curve, and the last term, which has the amplitudes.
-  CurveTimesAmplitudes(const Fitter& fitter, MotionModel& model, std::size_t source)
-      : fitter_(fitter), model_(model), found_(model.terms.back()) {
+  CurveTimesAmplitudes(const Fitter& fitter, FitState& state, std::size_t source)
+      : fitter_(fitter), state_(state), found_(state.model.terms.back()) {
+    MotionModel& model = state.model;
     const Basis& basis = found_.blocks.front().basis;
     open_ = basis.factors[0].known.empty() ? 0 : 1;
     // The curve enters with amplitude 1. Amplitude columns that were pruned are 0.
@@ -97,15 +99,16 @@ class CurveTimesAmplitudes {
   }
 
   void fit() {
-    fitter_.fit(model_, 2);
-    likelihood_ = fitter_.log_likelihood(model_);
+    const MotionModel& model = state_.model;
+    fitter_.fit(state_, 2);
+    likelihood_ = fitter_.log_likelihood(state_);
     in_turns();
-    refine_curves(fitter_, model_, model_.terms.size() - 1);
-    likelihood_ = fitter_.log_likelihood(model_);
+    refine_curves(fitter_, state_, model.terms.size() - 1);
+    likelihood_ = fitter_.log_likelihood(state_);
     // The curve may have received a constant part, which the amplitudes lacked.
     in_turns();
     in_turn(true);
-    about_the_mean(model_.terms.back());
+    about_the_mean(state_.model.terms.back());
   }
   [[nodiscard]] double log_likelihood() const { return likelihood_; }
 
@@ -121,7 +124,8 @@ class CurveTimesAmplitudes {
   /// Updates the amplitudes with the curve fixed, then the rest with the amplitudes fixed. Returns whether the
   /// likelihood rose.
   bool in_turn(bool with_smoothness) {
-    const MotionModel before = model_;
+    const FitState before = state_;
+    MotionModel& model = state_.model;
     const Factor known = amplitudes_;
     Term changes = found_;
     changes.blocks.resize(1);
@@ -129,20 +133,20 @@ class CurveTimesAmplitudes {
     const auto n = static_cast<Eigen::Index>(basis.size());
     changes.coefficients = Eigen::VectorXd::Zero(n);
     changes.precision = found_.precision.head(n).eval();
-    basis.factors[1 - open_] = known_curve(model_.terms.back(), 1);
-    model_.terms.push_back(std::move(changes));
-    fitter_.fit(model_, 1);
-    add(model_.terms.back().coefficients);
-    model_.terms.pop_back();
-    for (Block& block : model_.terms.back().blocks) block.basis.factors.front() = amplitudes_;
+    basis.factors[1 - open_] = known_curve(model.terms.back(), 1);
+    model.terms.push_back(std::move(changes));
+    fitter_.fit(state_, 1);
+    add(model.terms.back().coefficients);
+    model.terms.pop_back();
+    for (Block& block : model.terms.back().blocks) block.basis.factors.front() = amplitudes_;
     if (with_smoothness) {
-      refit(fitter_, model_, model_.terms.size() - 1);
+      refit(fitter_, state_, model.terms.size() - 1);
     } else {
-      fitter_.fit(model_, 1);
+      fitter_.fit(state_, 1);
     }
-    const double now = fitter_.log_likelihood(model_), gained = now - likelihood_;
+    const double now = fitter_.log_likelihood(state_), gained = now - likelihood_;
     if (gained < 0) {
-      model_ = before;
+      state_ = before;
       amplitudes_ = known;
     } else {
       likelihood_ = now;
@@ -151,7 +155,7 @@ class CurveTimesAmplitudes {
   }
 
   const Fitter& fitter_;
-  MotionModel& model_;
+  FitState& state_;
   Term found_;
   std::size_t open_ = 0;  ///< index of the factor in the found term that is not the curve
   Factor amplitudes_;
@@ -160,21 +164,16 @@ class CurveTimesAmplitudes {
 
 }  // namespace
 
-std::optional<std::size_t> merge_amplitudes(const Fitter& fitter, MotionModel& model) {
-  const std::optional<std::size_t> source = source_of(model, model.terms.back());
+std::optional<std::size_t> merge_amplitudes(const Fitter& fitter, FitState& state) {
+  const std::optional<std::size_t> source = source_of(state.model, state.model.terms.back());
   if (!source) return std::nullopt;
-  const MotionModel was = model;
-  const PreparedSet::TrackEstimates tracks = fitter.set().estimates();
-  const double likelihood = fitter.log_likelihood(was);
-  CurveTimesAmplitudes one(fitter, model, *source);
+  FitState trial = state;
+  CurveTimesAmplitudes one(fitter, trial, *source);
   one.fit();
-  if (one.log_likelihood() > likelihood - kLikelihoodSlack) {
-    extend_targets(fitter, model, model.terms.size() - 1);
-    return source;
-  }
-  model = was;
-  fitter.set().restore(tracks, model);
-  return std::nullopt;
+  if (one.log_likelihood() <= fitter.log_likelihood(state) - kLikelihoodSlack) return std::nullopt;
+  extend_targets(fitter, trial, trial.model.terms.size() - 1);
+  state = std::move(trial);
+  return source;
 }
 
 bool multiplies_known_curve(const Term& term) {

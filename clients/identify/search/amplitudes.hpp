@@ -12,7 +12,7 @@ namespace kilotwin::identify {
 /// term, the last, unless the likelihood falls. Alternates two fits until they converge: the curve with the
 /// amplitudes fixed, then the amplitudes with the curve fixed. Returns the former index of the other term, or
 /// nothing, with the model unchanged.
-[[nodiscard]] std::optional<std::size_t> merge_amplitudes(const Fitter&, MotionModel&);
+[[nodiscard]] std::optional<std::size_t> merge_amplitudes(const Fitter&, FitState&);
 
 /// Whether a term multiplies a curve that another term has fitted.
 [[nodiscard]] bool multiplies_known_curve(const Term&);

@@ -84,9 +84,10 @@ struct Recorder {
   }
 };
 
-std::vector<TrackInnovations> innovations_of(const Fitter& fitter, const MotionModel& model) {
+std::vector<TrackInnovations> innovations_of(const Fitter& fitter, const FitState& state) {
+  const MotionModel& model = state.model;
   std::vector<const TrackView*> views;
-  for (const TrackView& view : fitter.set().views())
+  for (const TrackView& view : state.tracks.views())
     if (!view.track->held_out) views.push_back(&view);
   std::vector<TrackInnovations> all(views.size());
   os::in_parallel(views.size(), fitter.threads(), [&](std::size_t i) {
@@ -242,9 +243,9 @@ double middle_of(const Scan& scan, const Candidate& found, double step_s) {
 
 }  // namespace
 
-std::optional<CalibrationShift> find_calibration_shift(const Fitter& fitter, const MotionModel& model,
+std::optional<CalibrationShift> find_calibration_shift(const Fitter& fitter, const FitState& state,
                                                        double least_gain) {
-  const std::vector<TrackInnovations> all = innovations_of(fitter, model);
+  const std::vector<TrackInnovations> all = innovations_of(fitter, state);
   std::vector<std::uint32_t> runs;
   std::vector<double> steps;
   double from_s = 1e300, to_s = -1e300;
@@ -360,15 +361,16 @@ Term term_of(const std::vector<CalibrationShift>& shifts, const std::array<bool,
 
 }  // namespace
 
-std::vector<CalibrationShift> add_calibration_shifts(const Fitter& fitter, MotionModel& model, double least_gain) {
+std::vector<CalibrationShift> add_calibration_shifts(const Fitter& fitter, FitState& state, double least_gain) {
+  MotionModel& model = state.model;
   const std::size_t place = model.terms.size();
   std::vector<CalibrationShift> shifts;
   for (bool fitted = false; static_cast<int>(shifts.size()) < kMostShifts;) {
-    const std::optional<CalibrationShift> found = find_calibration_shift(fitter, model, least_gain);
+    const std::optional<CalibrationShift> found = find_calibration_shift(fitter, state, least_gain);
     if (!found) {
       // Noise that was fitted without shifts is too large and may hide smaller ones.
       if (shifts.empty() || fitted) break;
-      fitter.fit(model, 2);
+      fitter.fit(state, 2);
       fitted = true;
       continue;
     }

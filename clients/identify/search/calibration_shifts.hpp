@@ -24,13 +24,13 @@ struct CalibrationShift {
 
 /// The most significant calibration shift in the tracks of the fit, with at least this gain. Nothing if none is
 /// significant: false alarms occur in far fewer than one of a thousand sets.
-[[nodiscard]] std::optional<CalibrationShift> find_calibration_shift(const Fitter&, const MotionModel&,
+[[nodiscard]] std::optional<CalibrationShift> find_calibration_shift(const Fitter&, const FitState&,
                                                                      double least_gain = 0);
 
 /// Adds all calibration shifts to the model as one term of steps, and fits it. Pushes of driven robots are left to
 /// other hypotheses, and so are displacements that last several frames. Returns the shifts. If there are none, the
 /// model is unchanged.
-std::vector<CalibrationShift> add_calibration_shifts(const Fitter&, MotionModel&, double least_gain = 0);
+std::vector<CalibrationShift> add_calibration_shifts(const Fitter&, FitState&, double least_gain = 0);
 
 inline constexpr const char* kCalibrationShiftsName = "camera-shifts";
 

@@ -128,10 +128,11 @@ struct Steps {
 };
 
 /// Selects the steps on a raster whose gain exceeds their price.
-void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t place,
-                  const std::vector<double>& points, Steps& steps) {
+void choose_steps(const Fitter& fitter, const FitState& state, std::size_t place, const std::vector<double>& points,
+                  Steps& steps) {
+  const MotionModel& model = state.model;
   const Term& term = model.terms[place];
-  const LocalQuadratic l = local_quadratic(fitter, model, steps.beside ? model.terms.size() : place,
+  const LocalQuadratic l = local_quadratic(fitter, state, steps.beside ? model.terms.size() : place,
                                            stepping(steps.kinds, points), steps.beside);
   double had = 0;
   Eigen::VectorXd score = l.score;
@@ -158,15 +159,17 @@ void choose_steps(const Fitter& fitter, const MotionModel& model, std::size_t pl
 }
 
 /// Complexity of a curve: half the log determinant of its posterior precision relative to the prior.
-double bends(const Fitter& fitter, const MotionModel& model, std::size_t place) {
-  const LocalQuadratic l = local_quadratic(fitter, model, place, {});
+double bends(const Fitter& fitter, const FitState& state, std::size_t place) {
+  const MotionModel& model = state.model;
+  const LocalQuadratic l = local_quadratic(fitter, state, place, {});
   const ReducedColumns now = reduced_columns(l, l.score_without(model.terms[place].coefficients), l.term_columns());
   const Eigen::VectorXd sd = model.terms[place].precision.cwiseInverse().cwiseSqrt();
   return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
 }
 
 /// Adds the steps to the model and refines their times on finer rasters. False if their order changes.
-bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, const Steps& steps, double apart_s) {
+bool put_steps(const Fitter& fitter, FitState& state, std::size_t place, const Steps& steps, double apart_s) {
+  MotionModel& model = state.model;
   constexpr int kSide = 6, kRaster = 2 * kSide + 1;
   const std::size_t home = place;
   std::vector<double> at = steps.at_s;
@@ -180,7 +183,7 @@ bool put_steps(const Fitter& fitter, MotionModel& model, std::size_t place, cons
     for (const double t : at)
       for (int i = -kSide; i <= kSide; ++i) raster.push_back(t + i * fine_s);
     if (raster.size() > kMostColumns) return false;
-    const LocalQuadratic l = local_quadratic(fitter, model, place, stepping(steps.kinds, raster));
+    const LocalQuadratic l = local_quadratic(fitter, state, place, stepping(steps.kinds, raster));
     const Eigen::VectorXd score = l.score_without(model.terms[place].coefficients);
     const ReducedColumns data = reduced_columns(l, score, l.added_columns());
     StepChoice choice(data, raster.size(), steps.kinds.size());
@@ -231,7 +234,8 @@ bool goes_on(const Axis& axis) {
 
 }  // namespace
 
-std::string find_change_points(const Fitter& fitter, MotionModel& model, std::size_t place) {
+std::string find_change_points(const Fitter& fitter, FitState& state, std::size_t place) {
+  const MotionModel& model = state.model;
   const std::string name = model.terms[place].name;
   double duration_s = 0;
   std::vector<Block> kinds;
@@ -261,31 +265,31 @@ std::string find_change_points(const Fitter& fitter, MotionModel& model, std::si
   const bool by_the_clock = basis.factors.front().axis.of == Covariate::kTime;
   if (by_the_clock && (in_world || in_image)) forms.push_back({in_world ? picture : walls, false, {}, 0});
   // On the raster the gain is approximate. The decision follows after the refinement.
-  MotionModel best = model;
+  FitState best = state;
   double best_gain = 0;
   for (std::size_t f = 0; f < forms.size(); ++f) {
     Steps& form = forms[f];
     constexpr double kBetter = 2;
     const bool other = f == 2;
-    choose_steps(fitter, model, place, points, form);
+    choose_steps(fitter, state, place, points, form);
     if (form.at_s.empty() || (form.gain < kBetter && !other)) continue;
-    MotionModel trial = model;
+    FitState trial = state;
     if (!put_steps(fitter, trial, place, form, apart_s)) continue;
-    if (other) trial.terms[place].name = in_world ? "camera-by-time" : "drift-by-time";
+    if (other) trial.model.terms[place].name = in_world ? "camera-by-time" : "drift-by-time";
     fitter.fit(trial, 2);
     if (form.beside) refit(fitter, trial, place);
     // Price of a step: the choice of its time, and its size. Price of a curve: its complexity.
     const double price = std::log(static_cast<double>(points.size())) + 3 * static_cast<double>(form.kinds.size());
-    const double curve = form.beside ? 0 : bends(fitter, model, place);
-    const double gain = fitter.log_likelihood(trial) - fitter.log_likelihood(model) + curve -
+    const double curve = form.beside ? 0 : bends(fitter, state, place);
+    const double gain = fitter.log_likelihood(trial) - fitter.log_likelihood(state) + curve -
                         price * static_cast<double>(form.at_s.size());
     // Without clear evidence the target stays.
     constexpr double kSurelyOther = 3;
     if (gain <= best_gain + (other ? kSurelyOther : 0)) continue;
     best_gain = gain;
-    best = trial;
+    best = std::move(trial);
   }
-  model = best;
+  state = std::move(best);
   return model.terms[place].name;
 }
 

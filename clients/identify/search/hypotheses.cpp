@@ -19,7 +19,7 @@ Extent extent_of(const PreparedSet& set) {
     }
     if (std::find(e.runs.begin(), e.runs.end(), view.number) == e.runs.end()) e.runs.push_back(view.number);
     const double end_s = samples.back().time_s;
-    const CommandState last = view.clock.at(end_s);
+    const CommandState last = view.clock->at(end_s);
     e.duration_s = std::max(e.duration_s, end_s);
     e.motor_s = std::max({e.motor_s, last.motor_s[0], last.motor_s[1]});
     e.driven_s = std::max(e.driven_s, last.driven_s);
@@ -30,7 +30,7 @@ Extent extent_of(const PreparedSet& set) {
     note(last);
     for (const CommandChange& change : view.track->commands) {
       // At the end of the previous command.
-      note(view.clock.at(std::nextafter(change.time_s, -1.0)));
+      note(view.clock->at(std::nextafter(change.time_s, -1.0)));
       e.has_stop = e.has_stop || (change.motion == Motion::kStop && change.time_s > 0);
       e.has_straight = e.has_straight || change.motion == Motion::kStraight;
       e.has_turns = e.has_turns || change.motion == Motion::kLeft || change.motion == Motion::kRight;

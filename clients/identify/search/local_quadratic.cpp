@@ -6,13 +6,14 @@
 
 namespace kilotwin::identify {
 
-LocalQuadratic local_quadratic(const Fitter& fitter, const MotionModel& model, std::size_t term,
+LocalQuadratic local_quadratic(const Fitter& fitter, const FitState& state, std::size_t term,
                                const std::vector<Block>& more, bool beside) {
+  const MotionModel& model = state.model;
   std::vector<Block> blocks = blocks_of(model);
   blocks.insert(blocks.end(), more.begin(), more.end());
   LocalQuadratic out;
   out.units =
-      linearise(model, fitter.set().units(), blocks, {100, fitter.threads(), beside ? -1 : static_cast<int>(term)});
+      linearise(model, state.tracks.units(), blocks, {100, fitter.threads(), beside ? -1 : static_cast<int>(term)});
   const Eigen::Index all = out.units.front().information.rows();
   out.information = Eigen::MatrixXd::Zero(all, all);
   out.score = Eigen::VectorXd::Zero(all);

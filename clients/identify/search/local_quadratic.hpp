@@ -26,7 +26,7 @@ struct LocalQuadratic {
 };
 
 /// `beside`: the blocks are added to the term instead of replacing it.
-[[nodiscard]] LocalQuadratic local_quadratic(const Fitter&, const MotionModel&, std::size_t term,
+[[nodiscard]] LocalQuadratic local_quadratic(const Fitter&, const FitState&, std::size_t term,
                                              const std::vector<Block>& more, bool beside = false);
 
 /// Information and score of some columns after the elimination of the nuisance columns (Schur complement).

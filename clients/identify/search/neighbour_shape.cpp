@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
@@ -265,23 +266,23 @@ class Choice {
 
 }  // namespace
 
-bool refine_neighbour_shape(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  const std::vector<Block>& had = model.terms[place].blocks;
+bool refine_neighbour_shape(const Fitter& fitter, FitState& state, std::size_t place) {
+  const std::vector<Block>& had = state.model.terms[place].blocks;
   if (had.empty() || !std::all_of(had.begin(), had.end(), is_of_neighbours)) return false;
   const bool pushes = had.front().target == Target::kTurn || had.front().target == Target::kSideways;
   std::vector<Form> forms =
-      pushes ? forms_of_push(fitter.set(), had.front().target == Target::kTurn, had.front().during)
-             : forms_of_speed(fitter.set(), had.front().during);
-  double likelihood = fitter.log_likelihood(model);
+      pushes ? forms_of_push(state.tracks, had.front().target == Target::kTurn, had.front().during)
+             : forms_of_speed(state.tracks, had.front().during);
+  double likelihood = fitter.log_likelihood(state);
   // Replaces the term by some of the forms if the gain exceeds `least_gain`.
   const auto try_forms = [&](const std::vector<Form>& of, std::size_t most, double least_gain) {
     // Robots that stay apart have no neighbours within any radius, and refined radii may lie beyond the listed ones.
     if (of.empty()) return std::vector<Form>{};
     std::vector<Block> all;
     for (const Form& form : of) all.insert(all.end(), form.begin(), form.end());
-    MotionModel trial = model;
+    FitState trial = state;
     const LocalQuadratic l = local_quadratic(fitter, trial, place, all);
-    const Eigen::VectorXd at_zero = l.score_without(trial.terms[place].coefficients);
+    const Eigen::VectorXd at_zero = l.score_without(trial.model.terms[place].coefficients);
     const ReducedColumns data = reduced_columns(l, at_zero, l.added_columns());
     const Chosen chosen = Choice(data, of).choose(most);
     std::vector<Form> found;
@@ -293,20 +294,20 @@ bool refine_neighbour_shape(const Fitter& fitter, MotionModel& model, std::size_
     if (found.empty()) return found;
     std::vector<Eigen::Index> columns;
     for (const Eigen::Index c : chosen.columns) columns.push_back(l.own + c);
-    replace_blocks(trial, place, l, blocks, at_zero, columns, chosen.sd);
+    replace_blocks(trial.model, place, l, blocks, at_zero, columns, chosen.sd);
     fitter.fit(trial, 1);
     refit(fitter, trial, place);
     const double reached = fitter.log_likelihood(trial);
     if (reached < likelihood + least_gain) return std::vector<Form>{};
-    model = trial;
+    state = std::move(trial);
     likelihood = reached;
     return found;
   };
   const std::vector<Form> first = try_forms(forms, kFirstForms, 0);
   if (first.empty()) return false;
   // Noise and disc centres change with the first choice.
-  fitter.fit_contacts(model);
-  likelihood = fitter.log_likelihood(model);
+  fitter.fit_contacts(state);
+  likelihood = fitter.log_likelihood(state);
   const std::vector<Form> finer = try_forms(with_radii_about(first), kFirstForms, kLeastEvidence);
   forms.insert(forms.end(), finer.begin(), finer.end());
   try_forms(forms, kMostForms, kLeastEvidence);

@@ -8,6 +8,6 @@ namespace kilotwin::identify {
 /// Replaces a term over neighbours by the combination of forms with the highest evidence: tables of the number
 /// within a radius, sums with weights that fall with the distance, curves of the distance of the nearest. Returns
 /// false, without a change, for other terms.
-bool refine_neighbour_shape(const Fitter&, MotionModel&, std::size_t term);
+bool refine_neighbour_shape(const Fitter&, FitState&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -39,73 +39,81 @@ constexpr std::size_t kEnoughSamples = 130000;
 
 class Loop {
  public:
-  Loop(const Fitter& fitter, const MotionModel& base,
-       const std::function<void(double, const std::string&)>& progress)
-      : fitter_(fitter), progress_(progress), extent_(extent_of(fitter.set())) {
-    out_.model = base;
+  Loop(const Fitter& fitter, const FitState& base, const std::function<void(double, const std::string&)>& progress)
+      : fitter_(fitter), progress_(progress), extent_(extent_of(base.tracks)), out_{base, {}, {{base, {}}},
+                                                                                    {},   {}, {}} {
     base_likelihood_ = fitter.log_likelihood_of_all(base);
-    units_ = fitter.set().units();
-    std::size_t samples = 0;
-    for (const auto& unit : units_)
-      for (const TrackView* view : unit) samples += view->track->samples.size();
-    // A large set: uses every n-th robot.
-    const std::size_t every = samples / kEnoughSamples + 1;
-    if (every > 1) {
-      std::vector<std::vector<const TrackView*>> part;
-      for (std::size_t u = 0; u < units_.size(); u += every) part.push_back(units_[u]);
-      if (part.size() >= 6) units_ = std::move(part);
-    }
   }
 
   Search run() {
     for (int round = 0; round < kMostRounds; ++round) {
       round_ = round;
       say("testing hypotheses");
-      if (accept_calibration_shifts()) continue;
+      if (accept_calibration_shifts()) {
+        note_stage();
+        continue;
+      }
       score_dictionary();
       const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round));
       note_rejected(outcome);
       const Finding* const best = best_of(outcome, kRemnant * explained());
       if (best != nullptr) {
-        const SavedState before = save();
-        const double likelihood = fitter_.log_likelihood_of_all(out_.model);
+        const Search before = out_;
+        const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
         note_ambiguous(*best, outcome);
-        if (replaced_by_alternative(hypothesis(*best).name)) continue;
+        if (replaced_by_alternative(hypothesis(*best).name)) {
+          note_stage();
+          continue;
+        }
         note_alternatives(*best, outcome);
         add(*best, outcome.threshold_log10_p);
         // The likelihood must rise by a part of the predicted gain.
-        if (fitter_.log_likelihood_of_all(out_.model) < likelihood + 3) {
-          restore(before);
+        if (fitter_.log_likelihood_of_all(out_.fit) < likelihood + 3) {
+          out_ = before;
           failed_.insert(hypothesis(*best).name);
         } else {
           say("backward elimination");
           eliminate_earlier();
-          fitter_.fit_contacts(out_.model);
+          fitter_.fit_contacts(out_.fit);
           try_camera_motion();
+          note_stage();
         }
         continue;
       }
       say("testing alternatives");
       if (!eliminate()) break;
+      note_stage();
     }
     say("simplifying shapes");
-    for (std::size_t t = 0; t < out_.model.terms.size(); ++t) simplify(fitter_, out_.model, t);
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) simplify(fitter_, out_.fit, t);
     return std::move(out_);
   }
 
  private:
+  void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
   void say(const char* doing) const {
     std::string text = doing;
-    for (const Term& term : out_.model.terms)
-      text += (&term == &out_.model.terms.front() ? "; accepted: " : ", ") + term.name;
+    for (const Term& term : out_.fit.model.terms)
+      text += (&term == &out_.fit.model.terms.front() ? "; accepted: " : ", ") + term.name;
     progress_(0.9 * round_ / kMostRounds, text);
   }
+  /// The tracks of the test. A large set: every n-th unit.
+  [[nodiscard]] std::vector<std::vector<const TrackView*>> tested_units() const {
+    std::vector<std::vector<const TrackView*>> units = out_.fit.tracks.units();
+    std::size_t samples = 0;
+    for (const auto& unit : units)
+      for (const TrackView* view : unit) samples += view->track->samples.size();
+    const std::size_t every = samples / kEnoughSamples + 1;
+    std::vector<std::vector<const TrackView*>> part;
+    for (std::size_t u = 0; u < units.size(); u += every) part.push_back(units[u]);
+    return part.size() >= 6 ? part : units;
+  }
   void score_dictionary() {
-    dictionary_ = dictionary_of(extent_, out_.model.terms);
-    std::vector<Block> blocks = blocks_of(out_.model);
+    dictionary_ = dictionary_of(extent_, out_.fit.model.terms);
+    std::vector<Block> blocks = blocks_of(out_.fit.model);
     blocks.insert(blocks.end(), dictionary_.blocks.begin(), dictionary_.blocks.end());
-    const std::vector<Unit> units = linearise(out_.model, units_, blocks, {100, fitter_.threads()});
-    score_test_.emplace(fitter_, out_.model, units, dictionary_);
+    const std::vector<Unit> units = linearise(out_.fit.model, tested_units(), blocks, {100, fitter_.threads()});
+    score_test_.emplace(fitter_, out_.fit.model, units, dictionary_);
   }
   const Finding* best_of(const ScoreTest::Outcome& outcome, double least_evidence) const {
     const Finding* best = nullptr;
@@ -145,18 +153,17 @@ class Loop {
   const Hypothesis& hypothesis(const Finding& f) const { return dictionary_.hypotheses[f.hypothesis]; }
 
   /// Gain in log likelihood of all accepted effects.
-  [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.model) - base_likelihood_; }
+  [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.fit) - base_likelihood_; }
 
   /// Adds calibration shifts of the camera. Returns whether there were any.
   bool accept_calibration_shifts() {
     // A smooth curve of a drift with sudden ends leaves residuals that look like shifts.
-    if (std::any_of(out_.model.terms.begin(), out_.model.terms.end(),
+    if (std::any_of(out_.fit.model.terms.begin(), out_.fit.model.terms.end(),
                     [](const Term& term) { return term.name == "drift-by-time"; }))
       return false;
-    const std::vector<CalibrationShift> shifts =
-        add_calibration_shifts(fitter_, out_.model, kRemnant * explained());
+    const std::vector<CalibrationShift> shifts = add_calibration_shifts(fitter_, out_.fit, kRemnant * explained());
     if (shifts.empty()) return false;
-    fitter_.fit_contacts(out_.model);
+    fitter_.fit_contacts(out_.fit);
     Finding finding;
     bool pushed = true;
     for (const CalibrationShift& shift : shifts) {
@@ -179,8 +186,8 @@ class Loop {
     Term term = dictionary_.term_of(h, found.relative_scale);
     const Reason reason{h.covariates, h.acts_on, found, threshold};
     // A further term of an accepted effect may belong to a richer shape of it.
-    for (std::size_t t = 0; t < out_.model.terms.size(); ++t) {
-      if (out_.model.terms[t].name != h.name) continue;
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
+      if (out_.fit.model.terms[t].name != h.name) continue;
       if (recovered_by_refinement(t, found.evidence)) {
         out_.steps.push_back({h.name, found.held_out});
         return;
@@ -188,37 +195,37 @@ class Loop {
       const Finding instead = score_test_->evidence_of(h, static_cast<int>(t));
       const Finding own = score_test_->evidence_of_term(static_cast<int>(t));
       if (instead.evidence < own.evidence + found.evidence - 2) continue;
-      out_.model.terms[t] = dictionary_.term_of(h, instead.relative_scale);
+      out_.fit.model.terms[t] = dictionary_.term_of(h, instead.relative_scale);
       out_.reasons[t].finding = instead;
       out_.reasons[t].finding.log10_p = std::min(reason.finding.log10_p, out_.reasons[t].finding.log10_p);
-      fitter_.fit(out_.model, 2);
+      fitter_.fit(out_.fit, 2);
       refine_shape(t);
       out_.steps.push_back({h.name, found.held_out});
       return;
     }
-    out_.model.terms.push_back(std::move(term));
+    out_.fit.model.terms.push_back(std::move(term));
     out_.reasons.push_back(reason);
     say("fitting");
-    fitter_.fit(out_.model, 2);
+    fitter_.fit(out_.fit, 2);
     out_.steps.push_back({h.name, found.held_out});
-    if (!merged()) refine_shape(out_.model.terms.size() - 1);
+    if (!merged()) refine_shape(out_.fit.model.terms.size() - 1);
   }
 
   /// Refines the shape of a term. Returns whether that recovers most of the expected gain of a further term.
   bool recovered_by_refinement(std::size_t place, double expected_gain) {
     constexpr double kMost = 0.5;
-    const SavedState before = save();
-    const double likelihood = fitter_.log_likelihood(out_.model);
+    const Search before = out_;
+    const double likelihood = fitter_.log_likelihood(out_.fit);
     say("fitting");
     refine_shape(place);
-    if (fitter_.log_likelihood(out_.model) > likelihood + kMost * expected_gain) return true;
-    restore(before);
+    if (fitter_.log_likelihood(out_.fit) > likelihood + kMost * expected_gain) return true;
+    out_ = before;
     return false;
   }
 
   /// Whether the last term, amplitudes of an accepted curve, was merged with it.
   bool merged() {
-    const std::optional<std::size_t> curve = merge_amplitudes(fitter_, out_.model);
+    const std::optional<std::size_t> curve = merge_amplitudes(fitter_, out_.fit);
     if (!curve) return false;
     out_.reasons.back().finding.evidence += out_.reasons[*curve].finding.evidence;
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(*curve));
@@ -227,9 +234,10 @@ class Loop {
 
   /// Refines the shape of a term.
   void refine_shape(std::size_t place) {
-    if (!refine_neighbour_shape(fitter_, out_.model, place) && !refine_traffic_shape(fitter_, out_.model, place))
-      refine_curves(fitter_, out_.model, place);
-    const std::string before = out_.model.terms[place].name, name = find_change_points(fitter_, out_.model, place);
+    if (!refine_neighbour_shape(fitter_, out_.fit, place) && !refine_traffic_shape(fitter_, out_.fit, place))
+      refine_curves(fitter_, out_.fit, place);
+    const std::string before = out_.fit.model.terms[place].name,
+                      name = find_change_points(fitter_, out_.fit, place);
     if (name != before) {
       for (const Hypothesis& h : dictionary_.hypotheses) {
         if (h.name != name) continue;
@@ -237,17 +245,17 @@ class Loop {
         out_.reasons[place].acts_on = h.acts_on;
       }
     }
-    fit_total_variation_map(fitter_, out_.model, place);
-    extend_targets(fitter_, out_.model, place);
+    fit_total_variation_map(fitter_, out_.fit, place);
+    extend_targets(fitter_, out_.fit, place);
   }
   /// Tests camera motion against a drift of the robots. Robots at rest and walls separate the two.
   void try_camera_motion() {
-    const auto drift = std::find_if(out_.model.terms.begin(), out_.model.terms.end(),
+    const auto drift = std::find_if(out_.fit.model.terms.begin(), out_.fit.model.terms.end(),
                                     [](const Term& term) { return term.name == "drift-by-time"; });
-    if (drift == out_.model.terms.end() || failed_.contains(kCameraForDrift)) return;
+    if (drift == out_.fit.model.terms.end() || failed_.contains(kCameraForDrift)) return;
     // Once only: otherwise the search could alternate between both.
     failed_.insert(kCameraForDrift);
-    const auto place = static_cast<std::size_t>(drift - out_.model.terms.begin());
+    const auto place = static_cast<std::size_t>(drift - out_.fit.model.terms.begin());
     const bool at_rest = std::any_of(drift->blocks.begin(), drift->blocks.end(),
                                      [](const Block& block) { return (block.during & ~kDriven) != 0; });
     score_dictionary();
@@ -271,14 +279,14 @@ class Loop {
   /// continue.
   bool eliminate() {
     if (eliminations_++ >= 3) return false;
-    for (int t = 0; t < static_cast<int>(out_.model.terms.size()); ++t) {
+    for (int t = 0; t < static_cast<int>(out_.fit.model.terms.size()); ++t) {
       const auto place = static_cast<std::size_t>(t);
       const Finding own = score_test_->evidence_of_term(t);
       if (own.held_out < 2 && removed(place, false)) return true;
       const Hypothesis* best = nullptr;
       Finding best_finding;
       for (const Hypothesis& h : dictionary_.hypotheses) {
-        if (h.log_choices > kManyChoices && h.name != out_.model.terms[place].name) continue;
+        if (h.log_choices > kManyChoices && h.name != out_.fit.model.terms[place].name) continue;
         // Amplitudes of this term's curve are no alternative: they contain the curve.
         if (multiplies_known_curve(dictionary_.term_of(h, 1))) continue;
         const Finding other = score_test_->evidence_of(h, t);
@@ -287,9 +295,9 @@ class Loop {
           best_finding = other;
         }
       }
-      if (best == nullptr || best->name == out_.model.terms[place].name ||
+      if (best == nullptr || best->name == out_.fit.model.terms[place].name ||
           best_finding.evidence <= own.evidence + std::max(kClose, kRemnant * own.evidence) ||
-          failed_.contains(best->name + " for " + out_.model.terms[place].name))
+          failed_.contains(best->name + " for " + out_.fit.model.terms[place].name))
         continue;
       if (exchanged_for(place, *best, best_finding)) return true;
     }
@@ -298,41 +306,31 @@ class Loop {
   /// Exchanges a term for another hypothesis. The quadratic approximation may overestimate its evidence: restores
   /// the state if the likelihood falls.
   bool exchanged_for(std::size_t place, const Hypothesis& other, Finding finding) {
-    const SavedState before = save();
+    const Search before = out_;
     // Contacts show whether the robots move or the camera does.
-    const auto acts_on_camera = [&] { return is_measured(out_.model.terms[place].blocks.front().target); };
+    const auto acts_on_camera = [&] { return is_measured(out_.fit.model.terms[place].blocks.front().target); };
     const bool was_on_camera = acts_on_camera();
     // With the disc centres of the state before.
-    const double likelihood = fitter_.log_likelihood(out_.model),
-                 likelihood_of_all = fitter_.log_likelihood_of_all(out_.model);
+    const double likelihood = fitter_.log_likelihood(out_.fit),
+                 likelihood_of_all = fitter_.log_likelihood_of_all(out_.fit);
     finding.log10_p = out_.reasons[place].finding.log10_p;
-    out_.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
+    out_.fit.model.terms[place] = dictionary_.term_of(other, finding.relative_scale);
     out_.reasons[place] = {other.covariates, other.acts_on, finding, out_.reasons[place].threshold_log10_p};
-    fitter_.fit(out_.model, 2);
+    fitter_.fit(out_.fit, 2);
     if (was_on_camera != acts_on_camera()) {
       refine_shape(place);
-      fitter_.fit_contacts(out_.model);
-      if (fitter_.log_likelihood_of_all(out_.model) > likelihood_of_all - kAsGood) return true;
+      fitter_.fit_contacts(out_.fit);
+      if (fitter_.log_likelihood_of_all(out_.fit) > likelihood_of_all - kAsGood) return true;
     } else {
       // Shape refinement can recover a part of the difference only.
-      if (fitter_.log_likelihood(out_.model) > likelihood - kMostByShape) {
+      if (fitter_.log_likelihood(out_.fit) > likelihood - kMostByShape) {
         refine_shape(place);
-        if (fitter_.log_likelihood(out_.model) > likelihood - kAsGood) return true;
+        if (fitter_.log_likelihood(out_.fit) > likelihood - kAsGood) return true;
       }
     }
-    restore(before);
-    failed_.insert(other.name + " for " + out_.model.terms[place].name);
+    out_ = before;
+    failed_.insert(other.name + " for " + out_.fit.model.terms[place].name);
     return false;
-  }
-  /// State of the search, with the estimates that belong to the tracks.
-  struct SavedState {
-    Search found;
-    PreparedSet::TrackEstimates tracks;
-  };
-  [[nodiscard]] SavedState save() const { return {out_, fitter_.set().estimates()}; }
-  void restore(const SavedState& saved) {
-    out_ = saved.found;
-    fitter_.set().restore(saved.tracks, out_.model);
   }
   /// Whether a term is the constant part of another one.
   static bool is_constant_of(const Term& term, const Term& other) {
@@ -346,24 +344,24 @@ class Loop {
   /// A new effect may explain what earlier terms were accepted for, unless it has far less evidence. Tries to
   /// remove each earlier term, with the shape of the new one refined.
   void eliminate_earlier() {
-    if (multiplies_known_curve(out_.model.terms.back())) return;
+    if (multiplies_known_curve(out_.fit.model.terms.back())) return;
     constexpr double kFarLess = 0.1;
-    for (std::size_t t = out_.model.terms.size() - 1; t-- > 0;) {
-      const Term &earlier = out_.model.terms[t], &last = out_.model.terms.back();
+    for (std::size_t t = out_.fit.model.terms.size() - 1; t-- > 0;) {
+      const Term &earlier = out_.fit.model.terms[t], &last = out_.fit.model.terms.back();
       const bool far_less = out_.reasons.back().finding.evidence < kFarLess * out_.reasons[t].finding.evidence;
       if ((!far_less || is_constant_of(earlier, last)) && earlier.name != last.name) removed(t, true);
     }
   }
   /// Removes a term unless the evidence falls.
   bool removed(std::size_t t, bool shape_last) {
-    const SavedState before = save();
-    const double evidence = fitter_.log_evidence(out_.model);
-    out_.model.terms.erase(out_.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    const Search before = out_;
+    const double evidence = fitter_.log_evidence(out_.fit);
+    out_.fit.model.terms.erase(out_.fit.model.terms.begin() + static_cast<std::ptrdiff_t>(t));
     out_.reasons.erase(out_.reasons.begin() + static_cast<std::ptrdiff_t>(t));
-    fitter_.fit(out_.model, shape_last ? 2 : 1);
-    if (shape_last) refine_shape(out_.model.terms.size() - 1);
-    if (fitter_.log_evidence(out_.model) > evidence - kClose) return true;
-    restore(before);
+    fitter_.fit(out_.fit, shape_last ? 2 : 1);
+    if (shape_last) refine_shape(out_.fit.model.terms.size() - 1);
+    if (fitter_.log_evidence(out_.fit) > evidence - kClose) return true;
+    out_ = before;
     return false;
   }
   void note_rejected(const ScoreTest::Outcome& outcome) {
@@ -377,7 +375,7 @@ class Loop {
       if (std::any_of(out_.rejected.begin(), out_.rejected.end(),
                       [&](const Rejected& r) { return r.name == h.name; }))
         continue;
-      out_.rejected.push_back({h.name, h.covariates, h.acts_on, f->log10_p, outcome.threshold_log10_p});
+      out_.rejected.push_back({h.name, h.covariates, h.acts_on, f->log10_p, outcome.threshold_log10_p, {}});
       if (out_.rejected.size() == 12) break;
     }
   }
@@ -386,28 +384,28 @@ class Loop {
   bool replaced_by_alternative(const std::string& name) {
     const auto c = alternatives_.by_name.find(name);
     if (c == alternatives_.by_name.end() ||
-        out_.model.terms.size() != alternatives_.before.found.model.terms.size() + 1 ||
-        out_.model.terms.back().name != alternatives_.chosen)
+        out_.fit.model.terms.size() != alternatives_.before->fit.model.terms.size() + 1 ||
+        out_.fit.model.terms.back().name != alternatives_.chosen)
       return false;
     const auto [term, reason] = c->second;
     alternatives_.by_name.erase(c);
-    const SavedState now = save();
-    const double evidence = fitter_.log_evidence(now.found.model);
-    restore(alternatives_.before);
-    out_.model.terms.push_back(term);
+    const Search now = out_;
+    const double evidence = fitter_.log_evidence(now.fit);
+    out_ = *alternatives_.before;
+    out_.fit.model.terms.push_back(term);
     out_.reasons.push_back(reason);
     say("fitting");
-    fitter_.fit(out_.model, 2);
-    refine_shape(out_.model.terms.size() - 1);
-    fitter_.fit_contacts(out_.model);
+    fitter_.fit(out_.fit, 2);
+    refine_shape(out_.fit.model.terms.size() - 1);
+    fitter_.fit_contacts(out_.fit);
     out_.steps.push_back({term.name, reason.finding.held_out});
-    if (fitter_.log_evidence(out_.model) > evidence) return true;
-    restore(now);
+    if (fitter_.log_evidence(out_.fit) > evidence) return true;
+    out_ = now;
     return false;
   }
   void note_alternatives(const Finding& best, const ScoreTest::Outcome& outcome) {
     const std::string& chosen = hypothesis(best).name;
-    alternatives_ = {save(), chosen, {}};
+    alternatives_ = {out_, chosen, {}};
     std::map<std::string, double> most;
     for (const Finding& f : outcome.findings) {
       const Hypothesis& h = hypothesis(f);
@@ -435,13 +433,12 @@ class Loop {
   const std::function<void(double, const std::string&)>& progress_;
   const Extent extent_;
   Dictionary dictionary_;  ///< hypotheses in addition to the model
-  std::vector<std::vector<const TrackView*>> units_;
   std::optional<ScoreTest> score_test_;
   Search out_;
   double base_likelihood_ = 0;
   /// Alternatives to the effect that was accepted last.
   struct Alternatives {
-    SavedState before;
+    std::optional<Search> before;  ///< nothing before the first round
     std::string chosen;
     std::map<std::string, std::pair<Term, Reason>> by_name;  ///< by name
   };
@@ -452,7 +449,7 @@ class Loop {
 
 }  // namespace
 
-Search search(const Fitter& fitter, const MotionModel& base,
+Search search(const Fitter& fitter, const FitState& base,
               const std::function<void(double, const std::string&)>& progress) {
   return Loop(fitter, base, progress).run();
 }

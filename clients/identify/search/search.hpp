@@ -30,6 +30,7 @@ struct Rejected {
   std::vector<std::string> covariates;
   std::string acts_on;
   double log10_p = 0, threshold_log10_p = 0;
+  std::string why = {};  ///< empty: not significant
 };
 
 struct Step {
@@ -37,16 +38,24 @@ struct Step {
   double held_out = 0;
 };
 
-struct Search {
-  MotionModel model;
+/// A model on the way of a search.
+struct Stage {
+  FitState fit;
   std::vector<Reason> reasons;  ///< one per term of the model
+};
+
+/// The state of a search, as one value.
+struct Search {
+  FitState fit;
+  std::vector<Reason> reasons;  ///< one per term of the model
+  std::vector<Stage> path;      ///< the base model, then the model after each accepted change
   std::vector<Ambiguity> ambiguous;
   std::vector<Rejected> rejected;  ///< the most significant hypotheses that are not in the model
   std::vector<Step> steps;
 };
 
 /// Starts from a fitted base model. `progress` gets 0..1 and the present step.
-[[nodiscard]] Search search(const Fitter&, const MotionModel& base,
+[[nodiscard]] Search search(const Fitter&, const FitState& base,
                             const std::function<void(double, const std::string&)>& progress);
 
 }  // namespace kilotwin::identify

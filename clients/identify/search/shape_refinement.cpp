@@ -345,14 +345,15 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
 namespace {
 
 /// Uses the `rich` blocks in place of the term's, or the term's own if there are none.
-void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, const std::vector<Block>& rich) {
+void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, const std::vector<Block>& rich) {
+  MotionModel& model = state.model;
   const std::vector<ColumnGroup> groups = groups_of(rich.empty() ? model.terms[place].blocks : rich);
   std::vector<Smoothness> smoothness;
   Eigen::VectorXd sd;
   double likelihood = -1e300;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const bool anew = pass == 0 && !rich.empty();
-    const LocalQuadratic l = local_quadratic(fitter, model, place, anew ? rich : std::vector<Block>{});
+    const LocalQuadratic l = local_quadratic(fitter, state, place, anew ? rich : std::vector<Block>{});
     Term& term = model.terms[place];
     const Eigen::VectorXd at_zero = l.score_without(term.coefficients);
     const std::vector<Eigen::Index> columns = anew ? l.added_columns() : l.term_columns();
@@ -365,8 +366,8 @@ void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, c
     } else {
       term.precision = held.array().square().inverse();
     }
-    fitter.fit(model, 1);
-    const double now = fitter.log_likelihood(model);
+    fitter.fit(state, 1);
+    const double now = fitter.log_likelihood(state);
     const bool last = pass + 1 == kMostPasses || now < likelihood + kSettled;
     likelihood = now;
     if (!last) continue;
@@ -377,10 +378,10 @@ void fit_smoothly(const Fitter& fitter, MotionModel& model, std::size_t place, c
 
 }  // namespace
 
-void refine_curves(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  fit_smoothly(fitter, model, place, richer(model.terms[place]));
+void refine_curves(const Fitter& fitter, FitState& state, std::size_t place) {
+  fit_smoothly(fitter, state, place, richer(state.model.terms[place]));
 }
 
-void refit(const Fitter& fitter, MotionModel& model, std::size_t place) { fit_smoothly(fitter, model, place, {}); }
+void refit(const Fitter& fitter, FitState& state, std::size_t place) { fit_smoothly(fitter, state, place, {}); }
 
 }  // namespace kilotwin::identify

@@ -30,8 +30,8 @@ double choose_smoothness(const Eigen::MatrixXd& information, const Eigen::Vector
                          Eigen::VectorXd& sd);
 
 /// Replaces the term's bases by rich ones and refits the model until it converges.
-void refine_curves(const Fitter&, MotionModel&, std::size_t term);
+void refine_curves(const Fitter&, FitState&, std::size_t term);
 /// Refits the term with its present bases.
-void refit(const Fitter&, MotionModel&, std::size_t term);
+void refit(const Fitter&, FitState&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
@@ -114,10 +115,10 @@ std::vector<Block> blocks_of(std::vector<SimpleForm>& forms, const Term& term) {
 }
 
 /// Replaces the term by the best form if its evidence suffices, or in any case. Returns false if it does not.
-bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::vector<SimpleForm>& forms,
+bool put_best(const Fitter& fitter, FitState& state, std::size_t place, std::vector<SimpleForm>& forms,
               bool in_any_case) {
-  const Term& term = model.terms[place];
-  const LocalQuadratic l = local_quadratic(fitter, model, place, blocks_of(forms, term));
+  const Term& term = state.model.terms[place];
+  const LocalQuadratic l = local_quadratic(fitter, state, place, blocks_of(forms, term));
   const Eigen::VectorXd score = l.score_without(term.coefficients);
   const ReducedColumns now = reduced_columns(l, score, l.term_columns());
   const double had = log_evidence(now.information, now.score, term.precision.cwiseInverse().cwiseSqrt());
@@ -128,27 +129,27 @@ bool put_best(const Fitter& fitter, MotionModel& model, std::size_t place, std::
   for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
   std::vector<Block> blocks;
   for (const Block& block : term.blocks) blocks.push_back({block.target, best.form->basis, block.during});
-  replace_blocks(model, place, l, blocks, score, columns, best.sd);
+  replace_blocks(state.model, place, l, blocks, score, columns, best.sd);
   return true;
 }
 
 /// Complexity of a term: half the log determinant of its posterior precision relative to the prior.
-double cost_of(const Fitter& fitter, const MotionModel& model, std::size_t place) {
-  const LocalQuadratic l = local_quadratic(fitter, model, place, {});
+double cost_of(const Fitter& fitter, const FitState& state, std::size_t place) {
+  const LocalQuadratic l = local_quadratic(fitter, state, place, {});
   const ReducedColumns now = reduced_columns(l, l.score, l.term_columns());
-  const Eigen::VectorXd sd = model.terms[place].precision.cwiseInverse().cwiseSqrt();
+  const Eigen::VectorXd sd = state.model.terms[place].precision.cwiseInverse().cwiseSqrt();
   return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
 }
 
 }  // namespace
 
-bool simplify(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  const Factor* const curve = curve_of(model.terms[place]);
-  if (curve == nullptr || model.terms[place].coefficients.size() < 2) return false;
-  std::vector<SimpleForm> forms = forms_of(*curve, model.terms[place].blocks.front().target);
-  MotionModel simple = model;
+bool simplify(const Fitter& fitter, FitState& state, std::size_t place) {
+  const Factor* const curve = curve_of(state.model.terms[place]);
+  if (curve == nullptr || state.model.terms[place].coefficients.size() < 2) return false;
+  std::vector<SimpleForm> forms = forms_of(*curve, state.model.terms[place].blocks.front().target);
+  FitState simple = state;
   if (!put_best(fitter, simple, place, forms, false)) return false;
-  const std::vector<Factor>& factors = simple.terms[place].blocks.front().basis.factors;
+  const std::vector<Factor>& factors = simple.model.terms[place].blocks.front().basis.factors;
   if (!factors.empty() &&
       (factors.front().shape == Shape::kExponential || factors.front().shape == Shape::kAtLeast)) {
     // A finer raster around the optimum.
@@ -163,9 +164,9 @@ bool simplify(const Fitter& fitter, MotionModel& model, std::size_t place) {
     put_best(fitter, simple, place, finer, true);
   }
   fitter.fit(simple, 2);
-  const double lost = fitter.log_likelihood(model) - fitter.log_likelihood(simple);
-  if (lost > cost_of(fitter, model, place) - cost_of(fitter, simple, place) + kMostEvidenceLost) return false;
-  model = simple;
+  const double lost = fitter.log_likelihood(state) - fitter.log_likelihood(simple);
+  if (lost > cost_of(fitter, state, place) - cost_of(fitter, simple, place) + kMostEvidenceLost) return false;
+  state = std::move(simple);
   return true;
 }
 

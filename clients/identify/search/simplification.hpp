@@ -7,6 +7,6 @@
 namespace kilotwin::identify {
 
 /// Returns whether a simpler form replaced the term's curves.
-bool simplify(const Fitter&, MotionModel&, std::size_t term);
+bool simplify(const Fitter&, FitState&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
@@ -101,13 +102,13 @@ std::vector<Extension> extensions_of(const Term& term, bool headings) {
 
 }  // namespace
 
-void extend_targets(const Fitter& fitter, MotionModel& model, std::size_t place) {
+void extend_targets(const Fitter& fitter, FitState& state, std::size_t place) {
   for (int extended = 0; extended < kMostExtensions; ++extended) {
-    const std::vector<Extension> all = extensions_of(model.terms[place], fitter.set().set().has_headings);
+    const std::vector<Extension> all = extensions_of(state.model.terms[place], state.tracks.set().has_headings);
     if (all.empty()) return;
     std::vector<Block> blocks;
     for (const Extension& w : all) blocks.insert(blocks.end(), w.blocks.begin(), w.blocks.end());
-    const LocalQuadratic l = local_quadratic(fitter, model, model.terms.size(), blocks, true);
+    const LocalQuadratic l = local_quadratic(fitter, state, state.model.terms.size(), blocks, true);
     double best = kLeastGain;
     const Extension* chosen = nullptr;
     Eigen::VectorXd chosen_sd;
@@ -132,19 +133,17 @@ void extend_targets(const Fitter& fitter, MotionModel& model, std::size_t place)
       chosen_sd = sd.cwiseMax(1e-6 * std::max(sd.maxCoeff(), 1e-6));
     }
     if (chosen == nullptr) return;
-    const MotionModel was = model;
-    const double likelihood = fitter.log_likelihood(model);
-    Term& term = model.terms[place];
+    FitState trial = state;
+    Term& term = trial.model.terms[place];
     term.blocks.insert(term.blocks.end(), chosen->blocks.begin(), chosen->blocks.end());
     const Eigen::Index had = term.coefficients.size();
     term.coefficients.conservativeResize(had + chosen->size());
     term.coefficients.tail(chosen->size()).setZero();
     term.precision.conservativeResize(had + chosen->size());
     term.precision.tail(chosen->size()) = chosen_sd.array().square().inverse();
-    fitter.fit(model, 2);
-    if (fitter.log_likelihood(model) > likelihood + kLeastGain) continue;
-    model = was;
-    return;
+    fitter.fit(trial, 2);
+    if (fitter.log_likelihood(trial) <= fitter.log_likelihood(state) + kLeastGain) return;
+    state = std::move(trial);
   }
 }
 

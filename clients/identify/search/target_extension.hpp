@@ -7,6 +7,6 @@ namespace kilotwin::identify {
 
 /// Lets a term also act on related targets (one wheel, turn rate, slip, robots at rest, measured heading), as long
 /// as the evidence rises.
-void extend_targets(const Fitter&, MotionModel&, std::size_t term);
+void extend_targets(const Fitter&, FitState&, std::size_t term);
 
 }  // namespace kilotwin::identify

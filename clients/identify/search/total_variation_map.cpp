@@ -92,9 +92,10 @@ class FineSums {
   bool in_contact_ = false;
 };
 
-std::vector<NormalEquations> sums_of(const Fitter& fitter, const MotionModel& model, const Block& map,
+std::vector<NormalEquations> sums_of(const Fitter& fitter, const FitState& state, const Block& map,
                                      const NodeGrid& grid) {
-  const auto units = fitter.set().units();
+  const MotionModel& model = state.model;
+  const auto units = state.tracks.units();
   std::vector<NormalEquations> folds(std::min(kFolds, units.size()), NormalEquations(grid));
   os::in_parallel(folds.size(), fitter.threads(), [&](std::size_t f) {
     FineSums sums(model, map, folds[f]);
@@ -274,25 +275,26 @@ void halve(Fitted& map) {
 
 }  // namespace
 
-void fit_total_variation_map(const Fitter& fitter, MotionModel& model, std::size_t place) {
-  const std::vector<Block>& had = model.terms[place].blocks;
+void fit_total_variation_map(const Fitter& fitter, FitState& state, std::size_t place) {
+  const std::vector<Block>& had = state.model.terms[place].blocks;
   if (std::none_of(had.begin(), had.end(), is_map_of_speed)) return;
   Fitted map;
-  map.grid = grid_of(fitter.set());
+  map.grid = grid_of(state.tracks);
   if (map.grid.columns < 8 || map.grid.rows < 8) return;
-  map.f = sampled(model.terms[place], map.grid);
-  MotionModel trial = model;
-  trial.terms[place] = with_map(model.terms[place], map.grid, map.f);
-  double likelihood = fitter.log_likelihood(model);
+  map.f = sampled(state.model.terms[place], map.grid);
+  FitState trial = state;
+  trial.model.terms[place] = with_map(state.model.terms[place], map.grid, map.f);
+  double likelihood = fitter.log_likelihood(state);
   constexpr int kPasses = 3;
   constexpr int kMostNodes = 190;
   for (int pass = 0; pass < kPasses; ++pass) {
     const bool finer = pass == 2 && std::max(map.grid.columns, map.grid.rows) * 2 - 1 < kMostNodes;
     if (finer) {
       halve(map);
-      trial.terms[place].blocks.front() = block_of(map.grid, map.f);
+      trial.model.terms[place].blocks.front() = block_of(map.grid, map.f);
     }
-    const std::vector<NormalEquations> folds = sums_of(fitter, trial, trial.terms[place].blocks.front(), map.grid);
+    const std::vector<NormalEquations> folds =
+        sums_of(fitter, trial, trial.model.terms[place].blocks.front(), map.grid);
     if (folds.size() < 2) return;
     NormalEquations all(map.grid);
     for (const NormalEquations& fold : folds) all.add(fold, 1);
@@ -312,17 +314,17 @@ void fit_total_variation_map(const Fitter& fitter, MotionModel& model, std::size
       if (pass == 0 && gain < kLeastMapEvidence) return;
     }
     map.f = solve(all, map.f, map.by, {6, 30});
-    MotionModel next = trial;
-    next.terms[place].blocks.front() = block_of(map.grid, map.f);
+    FitState next = trial;
+    next.model.terms[place].blocks.front() = block_of(map.grid, map.f);
     fitter.fit(next, 1);
-    map.f *= next.terms[place].coefficients[0];
-    next.terms[place].blocks.front() = block_of(map.grid, map.f);
-    next.terms[place].coefficients[0] = 1;
+    map.f *= next.model.terms[place].coefficients[0];
+    next.model.terms[place].blocks.front() = block_of(map.grid, map.f);
+    next.model.terms[place].coefficients[0] = 1;
     const double found = fitter.log_likelihood(next);
     if (found < likelihood + kLeastMapEvidence) break;
     likelihood = found;
     trial = next;
-    model = trial;
+    state = trial;
   }
 }
 

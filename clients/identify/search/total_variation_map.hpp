@@ -7,6 +7,6 @@ namespace kilotwin::identify {
 
 /// Replaces a term's smooth map of the speed over the floor by values on a fine grid with a total variation prior
 /// (Rudin, Osher, Fatemi 1992), which preserves edges. Only if the cross-validated likelihood over robots rises.
-void fit_total_variation_map(const Fitter&, MotionModel&, std::size_t term);
+void fit_total_variation_map(const Fitter&, FitState&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -65,8 +65,9 @@ struct Visit {
 using Instant = std::vector<Visit>;
 
 /// [run][instant]. Long sets: the beginning of every run.
-std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const MotionModel& model, std::uint8_t during) {
-  const PreparedSet& set = fitter.set();
+std::vector<std::vector<Instant>> visits_of(const Fitter& fitter, const FitState& state, std::uint8_t during) {
+  const MotionModel& model = state.model;
+  const PreparedSet& set = state.tracks;
   const std::vector<TrackView>& views = set.views();
   std::vector<std::vector<Residual>> residuals(views.size());
   os::in_parallel(views.size(), fitter.threads(), [&](std::size_t v) {
@@ -197,9 +198,8 @@ RatedCells climbed(const std::vector<std::vector<Instant>>& runs, RatedCells bes
 
 }  // namespace
 
-GridCells fit_grid_cells(const Fitter& fitter, const MotionModel& model, const GridCells& from,
-                         std::uint8_t during) {
-  const std::vector<std::vector<Instant>> runs = visits_of(fitter, model, during);
+GridCells fit_grid_cells(const Fitter& fitter, const FitState& state, const GridCells& from, std::uint8_t during) {
+  const std::vector<std::vector<Instant>> runs = visits_of(fitter, state, during);
   std::vector<float> away;
   for (const auto& run : runs)
     for (const Instant& instant : run)

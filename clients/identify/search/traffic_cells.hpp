@@ -7,7 +7,6 @@ namespace kilotwin::identify {
 
 /// The grid whose driven time per cell explains most of the speed residuals, by a local search from `from`. The
 /// model must not use traffic itself. Uses robots under the commands `during`.
-[[nodiscard]] GridCells fit_grid_cells(const Fitter&, const MotionModel&, const GridCells& from,
-                                       std::uint8_t during);
+[[nodiscard]] GridCells fit_grid_cells(const Fitter&, const FitState&, const GridCells& from, std::uint8_t during);
 
 }  // namespace kilotwin::identify

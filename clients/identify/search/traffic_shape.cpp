@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "clients/identify/search/local_quadratic.hpp"
 #include "clients/identify/search/shape_refinement.hpp"
@@ -90,7 +91,8 @@ Block of_form(const Block& like, Shape shape, std::uint8_t cells, std::vector<do
 
 }  // namespace
 
-bool refine_traffic_shape(const Fitter& fitter, MotionModel& model, std::size_t place) {
+bool refine_traffic_shape(const Fitter& fitter, FitState& state, std::size_t place) {
+  MotionModel& model = state.model;
   const Term& term = model.terms[place];
   if (term.blocks.size() != 1 || term.blocks.front().basis.factors.size() != 1 ||
       !term.blocks.front().basis.looks_at(Covariate::kTraffic))
@@ -110,16 +112,16 @@ bool refine_traffic_shape(const Fitter& fitter, MotionModel& model, std::size_t 
   // The right cells improve positions and noise.
   constexpr int kRounds = 2;
   for (int round = 0; round < kRounds; ++round) {
-    MotionModel without = model;
-    without.terms[place].coefficients.setZero();
+    FitState without = state;
+    without.model.terms[place].coefficients.setZero();
     const GridCells cells = fit_grid_cells(fitter, without, model.cells[kOwn], like.during);
-    MotionModel next = model;
-    next.cells[kTried] = cells;
-    fitter.set().update_traffic(next);
+    FitState next = state;
+    next.model.cells[kTried] = cells;
+    next.tracks.update_traffic(next.model);
     const Block smooth = of_form(like, Shape::kExponential, kTried, scales),
                 stepping = of_form(like, Shape::kAtLeast, kTried, steps);
     const LocalQuadratic l = local_quadratic(fitter, next, place, {smooth, stepping});
-    const Eigen::VectorXd at_zero = l.score_without(next.terms[place].coefficients);
+    const Eigen::VectorXd at_zero = l.score_without(next.model.terms[place].coefficients);
     const ReducedColumns data = reduced_columns(l, at_zero, l.added_columns());
     const auto n = static_cast<Eigen::Index>(scales.size());
     Form best;
@@ -131,14 +133,14 @@ bool refine_traffic_shape(const Fitter& fitter, MotionModel& model, std::size_t 
     if (other.evidence > best.evidence) best = std::move(other);
     for (Block& block : best.blocks) block.basis.factors.front().axis.radius = kOwn;
     for (Eigen::Index& c : best.columns) c += l.own;
-    replace_blocks(next, place, l, best.blocks, at_zero, best.columns, best.sd);
-    next.cells[kOwn] = cells;
-    next.cells[kTried] = model.cells[kTried];
-    model = next;
-    fitter.set().update_traffic(model);
-    fitter.fit(model, 1);
+    replace_blocks(next.model, place, l, best.blocks, at_zero, best.columns, best.sd);
+    next.model.cells[kOwn] = cells;
+    next.model.cells[kTried] = model.cells[kTried];
+    next.tracks.update_traffic(next.model);
+    state = std::move(next);
+    fitter.fit(state, 1);
   }
-  refit(fitter, model, place);
+  refit(fitter, state, place);
   return true;
 }
 

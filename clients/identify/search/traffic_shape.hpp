@@ -6,6 +6,6 @@
 namespace kilotwin::identify {
 
 /// Maximises the evidence over cell size and curve. Returns false, without a change, for other terms.
-bool refine_traffic_shape(const Fitter&, MotionModel&, std::size_t term);
+bool refine_traffic_shape(const Fitter&, FitState&, std::size_t term);
 
 }  // namespace kilotwin::identify

@@ -82,12 +82,11 @@ struct Found {
   std::vector<CalibrationShift> shifts;
 };
 Found found_in(const MeasuredSet& set) {
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  Found found;
-  fitter.fit_base(found.model);
-  found.shifts = add_calibration_shifts(fitter, found.model);
-  return found;
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  fitter.fit_base(state);
+  std::vector<CalibrationShift> shifts = add_calibration_shifts(fitter, state);
+  return {state.model, std::move(shifts)};
 }
 
 TEST(CalibrationShifts, NoneWithAFixedCamera) {

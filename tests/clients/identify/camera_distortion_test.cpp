@@ -83,29 +83,29 @@ Term camera_map() {
 
 TEST(CameraDistortion, WallsAreCertainWithoutDistortion) {
   const MeasuredSet set = behind_walls(0);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit_base(state);
   EXPECT_FALSE(model.walls_uncertain);
   EXPECT_NEAR(model.walls.x_high_mm, kWide_mm, 3);
   EXPECT_NEAR(model.walls.y_low_mm, -kHigh_mm, 3);
   // After a forced doubt the walls are accepted again.
   model.walls_uncertain = true;
-  fitter.fit_contacts(model);
+  fitter.fit_contacts(state);
   EXPECT_FALSE(model.walls_uncertain);
   EXPECT_NEAR(model.walls.x_high_mm, kWide_mm, 3);
 }
 
 TEST(CameraDistortion, WallsAreUncertainUntilAMapRemovesTheDistortion) {
   const MeasuredSet set = behind_walls(kBarrel);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit_base(state);
   ASSERT_TRUE(model.walls_uncertain);
   model.terms.push_back(camera_map());
-  fitter.fit(model, 2);
+  fitter.fit(state, 2);
   EXPECT_FALSE(model.walls_uncertain);
   // Walls in the world. The scale follows from the priors of the speeds only.
   EXPECT_NEAR((model.walls.x_high_mm - model.walls.x_low_mm) / (model.walls.y_high_mm - model.walls.y_low_mm),

@@ -43,9 +43,9 @@ MeasuredSet held_fast(bool headings) {
 /// Fitted gain near other robots; elsewhere the gain is 1.
 double gain_beside_others(bool headings) {
   const MeasuredSet set = held_fast(headings);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
   Factor near;
   near.shape = Factor::Shape::kTaper;
   near.axis = {Covariate::kNearest, 3};
@@ -54,7 +54,7 @@ double gain_beside_others(bool headings) {
                          {{Target::kGain, Basis{{near}}, kDriven}},
                          Eigen::VectorXd::Zero(1),
                          Eigen::VectorXd::Constant(1, 1)});
-  fitter.fit(model, 4);
+  fitter.fit(state, 4);
   Situation s;
   s.commands.command = Motion::kLeft;
   s.near.nearest_mm = 33.5;
@@ -69,16 +69,15 @@ TEST(Contacts, TheFullLikelihoodIncludesContacts) {
   // Without headings, contacts yield no information, and here all robots are in contact. Large contact noise must
   // explain that driven robots do not move.
   MeasuredSet set = held_fast(false);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel much, little;
-  little.noise.contact_mm2_s = much.noise.contact_mm2_s / 100;
+  const Fitter fitter(set, 2);
+  FitState much(set), little(set);
+  little.model.noise.contact_mm2_s = much.model.noise.contact_mm2_s / 100;
   EXPECT_EQ(fitter.log_likelihood(much), 0);
   EXPECT_EQ(fitter.log_likelihood(little), 0);
   EXPECT_GT(fitter.log_likelihood_of_all(much), fitter.log_likelihood_of_all(little) + 100);
   // Without contacts both likelihoods are equal.
-  MotionModel none = much;
-  none.contacts = false;
+  FitState none = much;
+  none.model.contacts = false;
   EXPECT_NEAR(fitter.log_likelihood_of_all(none), fitter.log_likelihood(none), 1e-6);
   EXPECT_NE(fitter.log_likelihood(none), 0);
   // Held-out tracks enter neither.
@@ -109,10 +108,11 @@ TEST(Contacts, RolloutsConvergeInTheStep) {
   MotionModel model;
   model.noise = {1e-12, 1e-12, 1e-12, 1e-12, 1e-8, 1e-10};
   const RobotBias none{Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+  const std::vector<CommandClock> clocks(run.tracks.begin(), run.tracks.end());
   std::vector<TrackView> views;
   std::vector<TrackFilter> filters;
   for (const Track& track : run.tracks) {
-    views.push_back({&track, 0, 0, track.robot, nullptr, CommandClock(track)});
+    views.push_back({&track, 0, 0, track.robot, nullptr, &clocks[track.robot]});
     filters.emplace_back(model, none, track.robot, 0);
     filters.back().start(track.samples.front(), {}, 0, 1e-6);
   }
@@ -133,26 +133,30 @@ TEST(Contacts, PushApartReportsOverlaps) {
   EXPECT_FALSE(push_apart(x, y));
 }
 
-TEST(Contacts, TrackEstimatesAreRestored) {
+TEST(FitState, ATrialOnACopyLeavesNoTrace) {
   const MeasuredSet set = held_fast(false);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  prepared.find_centres(model, 2);
-  prepared.find_headings(model, 2);
-  const double likelihood = fitter.log_likelihood_of_all(model);
-  const PreparedSet::TrackEstimates found = prepared.estimates();
-  // Another camera scale changes disc centres and initial headings.
-  MotionModel larger = model;
-  larger.terms.push_back({"camera",
-                          {{Target::kMeasuredScale, {}}},
-                          Eigen::VectorXd::Constant(1, 0.3),
-                          Eigen::VectorXd::Constant(1, 1)});
-  prepared.find_centres(larger, 2);
-  prepared.find_headings(larger, 2);
-  EXPECT_GT(std::abs(fitter.log_likelihood_of_all(model) - likelihood), 1);
-  prepared.restore(found, model);
-  EXPECT_EQ(fitter.log_likelihood_of_all(model), likelihood);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  state.tracks.find_centres(state.model, 2);
+  state.tracks.find_headings(state.model, 2);
+  const double likelihood = fitter.log_likelihood_of_all(state);
+  // Another camera scale changes disc centres and initial headings; other cells change the traffic.
+  FitState trial = state;
+  trial.model.terms.push_back({"camera",
+                               {{Target::kMeasuredScale, {}}},
+                               Eigen::VectorXd::Constant(1, 0.3),
+                               Eigen::VectorXd::Constant(1, 1)});
+  trial.model.cells[0].side_mm = 20;
+  trial.tracks.update_traffic(trial.model);
+  trial.tracks.find_centres(trial.model, 2);
+  fitter.fit(trial, 1);
+  EXPECT_EQ(fitter.log_likelihood_of_all(state), likelihood);
+  // What the trial estimated of the tracks counts.
+  trial.model = state.model;
+  EXPECT_GT(std::abs(fitter.log_likelihood_of_all(trial) - likelihood), 1);
+  // Going back is assignment.
+  trial = state;
+  EXPECT_EQ(fitter.log_likelihood_of_all(trial), likelihood);
 }
 
 }  // namespace

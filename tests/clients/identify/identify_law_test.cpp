@@ -104,10 +104,10 @@ TEST(Identify, CommandsCountTheMotorsTheyRun) {
 TEST(Identify, ParametersAreRecovered) {
   const World world;
   const MeasuredSet set = played(world, 7, 10, 2, 120);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit(model, 4);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit(state, 4);
   EXPECT_NEAR(std::sqrt(model.noise.position_mm2), world.tracker_mm, 0.05);
   EXPECT_NEAR(std::sqrt(model.noise.heading_rad2), world.tracker_rad, 0.003);
   // Fitted biases absorb a part: 0.87 of the truth over eight seeds, standard deviation 0.09.

@@ -103,11 +103,11 @@ Term unfitted(Factor factor) {
 }
 
 /// The fitted model without effects and without contacts.
-MotionModel fitted(const Fitter& fitter) {
-  MotionModel model;
-  model.contacts = false;
-  fitter.fit(model, 2);
-  return model;
+FitState fitted(const Fitter& fitter, const MeasuredSet& set) {
+  FitState state(set);
+  state.model.contacts = false;
+  fitter.fit(state, 2);
+  return state;
 }
 
 double gain_of(const MotionModel& model, const Situation& s) { return model.rates(s, {0, 0}).left_gain; }
@@ -136,14 +136,14 @@ TEST(Place, AnEdgeOfTheFloorStaysSharp) {
   const auto side = [](double x, double y) { return x + 0.5 * y - 15; };
   const MeasuredSet set =
       played([&](const Around& a) { return side(a.x_mm[a.robot], a.y_mm[a.robot]) > 0 ? 0.5 : 1.0; }, 5, 12, 300);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model = fitted(fitter);
+  const Fitter fitter(set, 2);
+  FitState state = fitted(fitter, set);
+  MotionModel& model = state.model;
   model.terms.push_back(unfitted(map_of_the_floor(5)));
-  fitter.fit(model, 2);
-  const double smooth = fitter.log_likelihood(model);
-  fit_total_variation_map(fitter, model, 0);
-  EXPECT_GT(fitter.log_likelihood(model), smooth + 50);
+  fitter.fit(state, 2);
+  const double smooth = fitter.log_likelihood(state);
+  fit_total_variation_map(fitter, state, 0);
+  EXPECT_GT(fitter.log_likelihood(state), smooth + 50);
   // At 25 mm from the edge the map has its plateau values on both sides.
   const double along = std::hypot(1, 0.5);
   for (const double y : {-60.0, 0.0, 60.0}) {
@@ -156,12 +156,12 @@ TEST(Place, AnEdgeOfTheFloorStaysSharp) {
 
 TEST(Place, ASmoothMapStaysSmooth) {
   const MeasuredSet set = played([](const Around& a) { return 1 + 0.001 * a.x_mm[a.robot]; }, 6, 12, 150);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model = fitted(fitter);
+  const Fitter fitter(set, 2);
+  FitState state = fitted(fitter, set);
+  MotionModel& model = state.model;
   model.terms.push_back(unfitted(map_of_the_floor(3)));
-  fitter.fit(model, 2);
-  fit_total_variation_map(fitter, model, 0);
+  fitter.fit(state, 2);
+  fit_total_variation_map(fitter, state, 0);
   EXPECT_EQ(model.terms[0].blocks.front().basis.factors.front().shape, Shape::kCosines2);
 }
 
@@ -174,17 +174,17 @@ TEST(Place, TheNeighbourhoodRadiusIsRecovered) {
         return 1 - 0.2 * std::min(count, 2);
       },
       7, 12, 200);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model = fitted(fitter);
+  const Fitter fitter(set, 2);
+  FitState state = fitted(fitter, set);
+  MotionModel& model = state.model;
   Factor density;
   density.shape = Shape::kCosines;
   density.axis = {Covariate::kDensity, 6};
   density.high = 4;
   density.count = 3;
   model.terms.push_back(unfitted(density));
-  fitter.fit(model, 2);
-  ASSERT_TRUE(refine_neighbour_shape(fitter, model, 0));
+  fitter.fit(state, 2);
+  ASSERT_TRUE(refine_neighbour_shape(fitter, state, 0));
   const auto gain = [&](std::initializer_list<double> x_mm) {
     std::vector<double> x{0}, y(x_mm.size() + 1, 0);
     x.insert(x.end(), x_mm);
@@ -207,17 +207,17 @@ TEST(Place, TheDirectionOfNeighboursIsRecovered) {
         return 1 / (1 + 0.7 * sum_of_others(a, 110, [](double, double cosine) { return std::max(0.0, cosine); }));
       },
       11, 12, 160);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model = fitted(fitter);
+  const Fitter fitter(set, 2);
+  FitState state = fitted(fitter, set);
+  MotionModel& model = state.model;
   Factor near;
   near.shape = Shape::kTaper;
   near.axis = {Covariate::kNearest, 6};
   near.high = 100;
   near.count = 3;
   model.terms.push_back(unfitted(near));
-  fitter.fit(model, 2);
-  ASSERT_TRUE(refine_neighbour_shape(fitter, model, 0));
+  fitter.fit(state, 2);
+  ASSERT_TRUE(refine_neighbour_shape(fitter, state, 0));
   std::vector<OtherRobot> list;
   const auto gain = [&](std::initializer_list<double> x_mm, double heading_rad) {
     std::vector<double> x{0}, y(x_mm.size() + 1, 0);
@@ -257,24 +257,24 @@ TEST(Place, TrafficCountsPerCell) {
 double off(double a_mm, double b_mm, double side_mm) { return std::abs(std::remainder(a_mm - b_mm, side_mm)); }
 
 /// A fitted model with a traffic effect in the grid of that index.
-MotionModel remembering(const Fitter& fitter, std::uint8_t cells) {
-  MotionModel model = fitted(fitter);
+FitState remembering(const Fitter& fitter, const MeasuredSet& set, std::uint8_t cells) {
+  FitState state = fitted(fitter, set);
   Factor trodden;
   trodden.shape = Shape::kExponential;
   trodden.axis = {Covariate::kTraffic, cells};
   trodden.points = {2, 8, 32};
-  model.terms.push_back(unfitted(trodden));
-  fitter.fit(model, 2);
-  return model;
+  state.model.terms.push_back(unfitted(trodden));
+  fitter.fit(state, 2);
+  return state;
 }
 
 TEST(Place, TrafficCellsAreRecovered) {
   const MeasuredSet set =
       played([](const Around& a) { return 1 - 0.5 * a.traffic_s / (a.traffic_s + 4); }, 8, 12, 150);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model = remembering(fitter, 2);
-  ASSERT_TRUE(refine_traffic_shape(fitter, model, 0));
+  const Fitter fitter(set, 2);
+  FitState state = remembering(fitter, set, 2);
+  const MotionModel& model = state.model;
+  ASSERT_TRUE(refine_traffic_shape(fitter, state, 0));
   const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
   const GridCells& cells = model.cells[axis.radius];
   EXPECT_NEAR(cells.side_mm, kCells.side_mm, 0.7);
@@ -298,10 +298,10 @@ TEST(Place, TrafficCellsAreRecovered) {
 TEST(Place, AStepInTrafficIsRecovered) {
   const GridCells small{24, 7, -9};
   const MeasuredSet set = played([](const Around& a) { return a.traffic_s > 2 ? 0.7 : 1.0; }, 9, 12, 200, small);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model = remembering(fitter, 0);
-  ASSERT_TRUE(refine_traffic_shape(fitter, model, 0));
+  const Fitter fitter(set, 2);
+  FitState state = remembering(fitter, set, 0);
+  const MotionModel& model = state.model;
+  ASSERT_TRUE(refine_traffic_shape(fitter, state, 0));
   const Axis axis = model.terms[0].blocks.front().basis.factors.front().axis;
   const GridCells& cells = model.cells[axis.radius];
   EXPECT_NEAR(cells.side_mm, small.side_mm, 0.3);

@@ -63,6 +63,11 @@ TEST(Plausible, WrongUnitsAreReported) {
   says([](Sample& s) { s.x_mm = 300 * std::round(s.x_mm / 300), s.y_mm = 0; }, "commanded robots drive");
 }
 
+TEST(Plausible, RecordingsInOneRunAreReported) {
+  const std::string text = complaint([](Sample& s) { s.time_s += s.x_mm > 800 ? 3e5 : 0; });
+  EXPECT_NE(text.find("give each recording a run of its own"), std::string::npos) << text;
+}
+
 TEST(Plausible, CommandsWithoutRobotsAreReported) {
   MeasuredSet set = good();
   for (Track& track : set.runs[0].tracks) track.commands = {{-1e300, Motion::kStop}};

@@ -125,18 +125,18 @@ TEST(ShapeRefinement, ASharpShapeIsRecovered) {
   TargetGroup acting;
   acting.gain = [](double s) { return s < 0.8 ? 0.4 : std::min(1.0, 0.4 + 0.5 * (s - 0.8)); };
   const MeasuredSet set = played(acting, 5, 8, 120);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
-  const double before = fitter.log_likelihood(model);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit_base(state);
+  const double before = fitter.log_likelihood(state);
   model.terms.push_back(
       unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
-  fitter.fit(model, 2);
-  const double coarse = fitter.log_likelihood(model);
-  refine_curves(fitter, model, 0);
+  fitter.fit(state, 2);
+  const double coarse = fitter.log_likelihood(state);
+  refine_curves(fitter, state, 0);
   EXPECT_GT(coarse, before + 100);
-  EXPECT_GT(fitter.log_likelihood(model), coarse + 100);
+  EXPECT_GT(fitter.log_likelihood(state), coarse + 100);
   // Identifiable relative to later times.
   const auto gain_at = [&](double since_s) {
     Situation s;
@@ -151,15 +151,15 @@ TEST(ShapeRefinement, ASharpShapeIsRecovered) {
 /// Speed by the time since the command, fitted as a free curve, then simplified.
 MotionModel simplified(const TargetGroup& acting, std::uint64_t seed, bool& simpler) {
   const MeasuredSet set = played(acting, seed, 6, 100);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit_base(state);
   model.terms.push_back(
       unfitted("start", {{Target::kGain, Basis{{cosines(Covariate::kSinceCommand, 10, 3, 1)}}, kDriven}}));
-  fitter.fit(model, 2);
-  refine_curves(fitter, model, 0);
-  simpler = simplify(fitter, model, 0);
+  fitter.fit(state, 2);
+  refine_curves(fitter, state, 0);
+  simpler = simplify(fitter, state, 0);
   return model;
 }
 
@@ -198,24 +198,24 @@ TEST(Simplification, ACurveWithoutSimpleFormStays) {
 }
 
 /// A smooth curve over 80 s, fitted and refined.
-void add_drift_by_time(const Fitter& fitter, MotionModel& model) {
+void add_drift_by_time(const Fitter& fitter, FitState& state) {
   const Basis basis{{cosines(Covariate::kTime, 80, 8, 0)}};
-  model.terms.push_back(
+  state.model.terms.push_back(
       unfitted("drift-by-time", {{Target::kWorldX, basis, kDriven}, {Target::kWorldY, basis, kDriven}}));
-  fitter.fit(model, 2);
-  refine_curves(fitter, model, 0);
+  fitter.fit(state, 2);
+  refine_curves(fitter, state, 0);
 }
 
 TEST(ChangePoints, TheTimeOfAPulseIsRecovered) {
   TargetGroup acting;
   acting.drift_x_mm_s = [](double t) { return t >= 40.2 && t < 41 ? 15.0 : 0.0; };
   const MeasuredSet set = played(acting, 6, 8, 80);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
-  add_drift_by_time(fitter, model);
-  EXPECT_EQ(find_change_points(fitter, model, 0), "drift-by-time");
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit_base(state);
+  add_drift_by_time(fitter, state);
+  EXPECT_EQ(find_change_points(fitter, state, 0), "drift-by-time");
   const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
   ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
   ASSERT_EQ(steps.points.size(), 2u);
@@ -227,31 +227,30 @@ TEST(ChangePoints, TheTimeOfAPulseIsRecovered) {
 }
 
 /// A curve over the motor-on time, fitted and refined.
-void add_speed_by_motor_time(const Fitter& fitter, MotionModel& model, double longest_s) {
+void add_speed_by_motor_time(const Fitter& fitter, FitState& state, double longest_s) {
   const Basis basis{{cosines(Covariate::kMotorTime, longest_s, 8, 0)}};
-  model.terms.push_back(unfitted("speed-by-motor-time", {{Target::kGain, basis, kDriven}}));
-  fitter.fit(model, 2);
-  refine_curves(fitter, model, 0);
+  state.model.terms.push_back(unfitted("speed-by-motor-time", {{Target::kGain, basis, kDriven}}));
+  fitter.fit(state, 2);
+  refine_curves(fitter, state, 0);
 }
 
 /// An accepted effect of motor-on time before its refinement.
 struct FoundInUse {
   FoundInUse(const TargetGroup& acting, std::uint64_t seed) : set(played(acting, seed, 8, 80)) {
-    fitter.fit_base(model);
-    add_speed_by_motor_time(fitter, model, 75);
+    fitter.fit_base(state);
+    add_speed_by_motor_time(fitter, state, 75);
   }
   MeasuredSet set;
-  PreparedSet prepared{set};
-  Fitter fitter{prepared, 2};
-  MotionModel model;
+  Fitter fitter{set, 2};
+  FitState state{set};
 };
 
 TEST(ChangePoints, ASuddenChangeInMotorTimeIsAStep) {
   TargetGroup acting;
   acting.left = acting.right = [](double used_s) { return used_s < 35 ? 1.0 : 0.7; };
   FoundInUse found(acting, 9);
-  EXPECT_EQ(find_change_points(found.fitter, found.model, 0), "speed-by-motor-time");
-  const auto& blocks = found.model.terms[0].blocks;
+  EXPECT_EQ(find_change_points(found.fitter, found.state, 0), "speed-by-motor-time");
+  const auto& blocks = found.state.model.terms[0].blocks;
   const Factor& steps = blocks.back().basis.factors[0];
   ASSERT_EQ(steps.shape, Factor::Shape::kAtLeast);
   EXPECT_EQ(steps.axis.of, Covariate::kMotorTime);
@@ -264,12 +263,12 @@ TEST(TargetExtension, AnEffectOfLeftWheelsIsNoBias) {
   TargetGroup acting;
   acting.left = [](double used_s) { return 1 - 0.4 * (1 - std::exp(-used_s / 20)); };
   FoundInUse found(acting, 10);
-  extend_targets(found.fitter, found.model, 0);
+  extend_targets(found.fitter, found.state, 0);
   Situation at;
   at.commands.command = Motion::kStraight;
   const auto ratio = [&](double used_s) {
     at.commands.motor_s = {used_s, used_s};
-    const Rates rates = found.model.rates(at, Eigen::Vector2d::Zero());
+    const Rates rates = found.state.model.rates(at, Eigen::Vector2d::Zero());
     return rates.left_gain / rates.right_gain;
   };
   for (const double used_s : {5.0, 20.0, 50.0}) EXPECT_NEAR(ratio(used_s), acting.left(used_s), 0.05) << used_s;
@@ -282,12 +281,12 @@ TEST(ChangePoints, ACameraShiftIsNoDrift) {
   for (Track& track : set.runs[0].tracks)
     for (Sample& s : track.samples)
       if (s.time_s >= 33.3 && s.time_s < 55.3) s.x_mm += 6;
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 2);
-  MotionModel model;
-  fitter.fit_base(model);
-  add_drift_by_time(fitter, model);
-  EXPECT_EQ(find_change_points(fitter, model, 0), "camera-by-time");
+  const Fitter fitter(set, 2);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit_base(state);
+  add_drift_by_time(fitter, state);
+  EXPECT_EQ(find_change_points(fitter, state, 0), "camera-by-time");
   EXPECT_EQ(model.terms[0].blocks[0].target, Target::kMeasuredX);
   const Factor& steps = model.terms[0].blocks[0].basis.factors[0];
   double shift_mm = 0;
@@ -299,16 +298,16 @@ TEST(ChangePoints, ACameraShiftIsNoDrift) {
 TEST(NeighbourShape, RobotsThatStayApartOfferNoForm) {
   // Robots 3 m apart are no neighbours at any radius.
   const MeasuredSet set = played(TargetGroup{}, 11, 4, 40);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 1);
-  MotionModel model;
-  fitter.fit_base(model);
+  const Fitter fitter(set, 1);
+  FitState state(set);
+  MotionModel& model = state.model;
+  fitter.fit_base(state);
   Factor nearest;
   nearest.shape = Factor::Shape::kTaper;
   nearest.axis = {Covariate::kNearest, 3};
   nearest.high = kNeighbourRadii_mm[3];
   model.terms.push_back(unfitted("turn-by-neighbours", {{Target::kTurn, Basis{{nearest}}, kDriven}}));
-  EXPECT_FALSE(refine_neighbour_shape(fitter, model, 0));
+  EXPECT_FALSE(refine_neighbour_shape(fitter, state, 0));
   EXPECT_EQ(model.terms.size(), 1U);
 }
 
@@ -320,15 +319,15 @@ TEST(Amplitudes, OfOneCurveDifferBetweenRobots) {
   acting.own_gain = [&](std::uint32_t robot, double t) { return 1 + (robot % 2 == 0 ? tired(t) : 0); };
   const std::uint32_t robots = 8;
   const MeasuredSet set = played(acting, 31, robots, duration_s);
-  PreparedSet prepared(set);
-  const Fitter fitter(prepared, 1);
-  MotionModel model;
+  const Fitter fitter(set, 1);
+  FitState state(set);
+  MotionModel& model = state.model;
   model.contacts = false;
   const Basis curve{{cosines(Covariate::kTime, duration_s, 4, 0)}};
   model.terms.push_back(unfitted("speed-by-time", {{Target::kGain, curve}}));
-  fitter.fit(model, 2);
+  fitter.fit(state, 2);
   // A single term has no amplitudes.
-  EXPECT_EQ(merge_amplitudes(fitter, model), std::nullopt);
+  EXPECT_EQ(merge_amplitudes(fitter, state), std::nullopt);
   ASSERT_EQ(model.terms.size(), 1U);
   Factor known = curve.factors.front();
   known.known.assign(model.terms[0].coefficients.begin(), model.terms[0].coefficients.end());
@@ -339,12 +338,12 @@ TEST(Amplitudes, OfOneCurveDifferBetweenRobots) {
   Term amplitudes = unfitted("speed-by-robot-and-time", {{Target::kGain, Basis{{each, known}}}});
   amplitudes.precision.setConstant(1);
   model.terms.push_back(amplitudes);
-  fitter.fit(model, 2);
-  const double as_two = fitter.log_likelihood(model);
-  EXPECT_EQ(merge_amplitudes(fitter, model), 0U);
+  fitter.fit(state, 2);
+  const double as_two = fitter.log_likelihood(state);
+  EXPECT_EQ(merge_amplitudes(fitter, state), 0U);
   ASSERT_EQ(model.terms.size(), 1U);
   EXPECT_EQ(model.terms[0].name, "speed-by-robot-and-time");
-  EXPECT_GT(fitter.log_likelihood(model), as_two - 10);
+  EXPECT_GT(fitter.log_likelihood(state), as_two - 10);
   const Block& block = model.terms[0].blocks.front();
   const Factor& shown = block.basis.factors.front();
   ASSERT_EQ(shown.known.size(), robots);

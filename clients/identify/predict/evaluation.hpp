@@ -1,0 +1,57 @@
+/// Evaluation of models on tracks that took no part in their fit.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/identify/predict/forecast.hpp"
+#include "clients/identify/predict/prediction_errors.hpp"
+
+namespace kilotwin::identify {
+
+/// What took no part in the fit. kNoTime: something did, but was not measured at any predicted time.
+enum class HeldOut : std::uint8_t { kTestSet, kRuns, kRobots, kNothing, kNoTime };
+/// Whether held-out data give an error.
+[[nodiscard]] constexpr bool gives_errors(HeldOut h) { return h != HeldOut::kNothing && h != HeldOut::kNoTime; }
+/// "test set", "runs", "robots", "nothing", "no predicted time".
+[[nodiscard]] const char* name_of(HeldOut);
+/// One or two sentences: what the errors refer to or, if nothing is held out, which further data would give them.
+[[nodiscard]] std::string in_words(HeldOut);
+
+/// Holds out about a quarter: the last runs if there are three or more, else some robots, else the last run. One run of
+/// up to three robots is fitted whole.
+void hold_out_part(MeasuredSet&);
+
+/// The held-out tracks as one model sees them, and its forecasts of them.
+struct Judged {
+  PreparedSet tracks;
+  std::vector<Forecast> forecasts;  ///< empty if nothing is held out
+  PredictionErrors errors;
+};
+
+class Evaluation {
+ public:
+  /// `test`: null if a part of `train` is held out, or nothing. Both must outlive the evaluation.
+  Evaluation(const MeasuredSet& train, const MeasuredSet* test, std::uint32_t threads);
+
+  [[nodiscard]] HeldOut held_out() const { return held_out_; }
+  /// The set with the held-out tracks.
+  [[nodiscard]] const MeasuredSet& set() const { return test_ != nullptr ? *test_ : train_; }
+  /// Whether only tracks with the mark `held_out` of the set count.
+  [[nodiscard]] bool marked_only() const { return held_out_ == HeldOut::kRuns || held_out_ == HeldOut::kRobots; }
+  /// The tracks of the set as this model sees them: disc centres and initial headings are its own.
+  [[nodiscard]] PreparedSet tracks_of(const FitState&) const;
+  /// Forecasts of the held-out tracks.
+  [[nodiscard]] Judged judge(const FitState&, const ForecastTimes&) const;
+
+ private:
+  const MeasuredSet& train_;
+  const MeasuredSet* test_;
+  std::optional<PreparedSet> test_tracks_;  ///< as measured
+  std::uint32_t threads_;
+  HeldOut held_out_;
+};
+
+}  // namespace kilotwin::identify

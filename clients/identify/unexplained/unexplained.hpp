@@ -1,0 +1,47 @@
+/// What a model leaves unexplained: its error on held-out data, compared with
+///   - what the model expects of itself (forecast.hpp);
+///   - what differs between repetitions of the same commands (prediction_errors.hpp);
+///   - what a flexible learner over all covariates together predicts (random_forest.hpp).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/identify/predict/prediction_errors.hpp"
+#include "clients/identify/unexplained/error_patterns.hpp"
+
+namespace kilotwin::identify {
+
+/// The learner: trained on windows of the fit, judged on held-out windows. Without those it is cross-validated by track.
+struct LearnerCheck {
+  double error_mm = 0;        ///< of the model, on the same windows
+  double error_left_mm = 0;   ///< after the learner's prediction is subtracted
+  Interval less_by_mm{0, 0};  ///< 95 % interval of the difference
+  bool cross_validated = false;
+  /// Root mean square of what the learner predicts; 0 if that is within chance.
+  [[nodiscard]] double predicted_mm() const;
+};
+
+struct Unexplained {
+  double error_mm = 0;                   ///< of the model on held-out data; 0: nothing is held out
+  double expected_mm = 0;                ///< by the model itself
+  std::optional<double> repetitions_mm;  ///< differs between repetitions
+  std::optional<LearnerCheck> learner;   ///< nothing: too few windows
+  /// The largest systematic part by these comparisons, beyond their uncertainty; 0: none.
+  double systematic_mm = 0;
+  double share = 0;               ///< of the mean square error
+  std::vector<Pattern> patterns;  ///< what it looks like; empty if nothing large is left
+  std::string in_words;
+
+  [[nodiscard]] bool large() const { return systematic_mm > 0; }
+};
+
+/// `known` and `held_out`: windows of the fit and of held-out data (may be empty); `errors` and `bounds`: of the model on
+/// held-out data. `set`: that `held_out` refers to, or `known` if nothing is held out.
+[[nodiscard]] Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& known,
+                                           const std::vector<Window>& held_out, const PredictionErrors& errors,
+                                           const std::optional<ErrorBounds>& bounds,
+                                           const std::optional<Replicates>& replicates);
+
+}  // namespace kilotwin::identify

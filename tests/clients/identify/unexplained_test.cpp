@@ -1,0 +1,139 @@
+// What is left unexplained is found, measured and shown; nothing is found in noise.
+#include "clients/identify/unexplained/unexplained.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+namespace kilotwin::identify {
+namespace {
+
+constexpr std::uint32_t kWandering = 12;
+
+struct Sets {
+  MeasuredSet set;
+  std::vector<Window> known, held_out;
+};
+
+/// Windows of robots that wander; errors along x by `effect` of the window, with noise.
+Sets windows_with(const std::function<double(const Window&)>& effect, double noise_mm, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  std::normal_distribution<double> normal(0, noise_mm);
+  Sets sets;
+  for (std::uint32_t run = 0; run < 4; ++run) {
+    sets.set.runs.push_back({std::to_string(run), {}});
+    for (std::uint32_t robot = 0; robot < kWandering; ++robot) {
+      sets.set.runs.back().tracks.push_back({robot, {}, {}, false});
+      for (int k = 0; k < 30; ++k) {
+        Window w;
+        w.run = run;
+        w.place = robot;
+        const auto put = [&](Feature f, double value) { w.at[static_cast<std::size_t>(f)] = value; };
+        put(Feature::kTime, 5.0 * k);
+        put(Feature::kDrivenTime, 4.0 * k);
+        put(Feature::kX, uniform(-400, 400));
+        put(Feature::kY, uniform(-400, 400));
+        put(Feature::kHeading, uniform(-M_PI, M_PI));
+        put(Feature::kCommand, std::floor(uniform(0, 4)));
+        put(Feature::kStraight, uniform(0, 1));
+        put(Feature::kTurning, uniform(-1, 1));
+        put(Feature::kSinceCommand, uniform(0, 10));
+        put(Feature::kNearest, uniform(40, 200));
+        put(Feature::kBearing, uniform(-M_PI, M_PI));
+        put(Feature::kRobot, robot);
+        w.in_world_mm = {effect(w) + normal(random), normal(random)};
+        const double c = std::cos(w[Feature::kHeading]), s = std::sin(w[Feature::kHeading]);
+        w.in_body_mm = {c * w.in_world_mm[0] + s * w.in_world_mm[1], c * w.in_world_mm[1] - s * w.in_world_mm[0]};
+        (run < 2 ? sets.known : sets.held_out).push_back(w);
+      }
+    }
+  }
+  return sets;
+}
+
+PredictionErrors errors_by_track(const std::vector<Window>& windows, double expected_mm) {
+  PredictionErrors errors;
+  for (const Window& w : windows) {
+    PredictionErrors::Part& part = errors.by_track[{w.run, w.place}];
+    part.sum_mm2 += w.in_world_mm.squaredNorm();
+    ++part.rows;
+    errors.sum_mm2 += w.in_world_mm.squaredNorm();
+    errors.expected_mm2 += expected_mm * expected_mm;
+    ++errors.rows;
+  }
+  return errors;
+}
+
+Unexplained unexplained_in(const Sets& sets, double expected_mm, const std::optional<Replicates>& replicates = {}) {
+  const PredictionErrors errors = errors_by_track(sets.held_out, expected_mm);
+  return find_unexplained(sets.set, sets.known, sets.held_out, errors, bounds_of(sets.set, errors, errors),
+                          replicates);
+}
+
+TEST(Unexplained, NothingIsFoundInNoise) {
+  const double noise_mm = 3, expected_mm = noise_mm * std::sqrt(2.0);
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const Unexplained u =
+        unexplained_in(windows_with([](const Window&) { return 0.0; }, noise_mm, seed), expected_mm);
+    EXPECT_FALSE(u.large()) << seed << ": " << u.in_words;
+    EXPECT_TRUE(u.patterns.empty());
+  }
+}
+
+TEST(Unexplained, AWaveThatTravelsOverTheFloorIsFoundAndShown) {
+  // Of place and time together; of neither alone.
+  const auto wave = [](const Window& w) { return 5 * std::sin((w[Feature::kX] - 8 * w[Feature::kTime]) / 150); };
+  const Unexplained u = unexplained_in(windows_with(wave, 2, 3), 2 * std::sqrt(2.0));
+  ASSERT_TRUE(u.large()) << u.in_words;
+  // The root mean square of the wave is 3.5 mm.
+  EXPECT_GT(u.systematic_mm, 2);
+  EXPECT_LT(u.systematic_mm, 4);
+  ASSERT_FALSE(u.patterns.empty()) << u.in_words;
+  const std::vector<Feature>& over = u.patterns.front().over;
+  ASSERT_EQ(over.size(), 2U);
+  EXPECT_TRUE(over[0] == Feature::kTime || over[0] == Feature::kDrivenTime) << name_of(over[0]);
+  EXPECT_EQ(over[1], Feature::kX) << name_of(over[1]);
+  EXPECT_FALSE(u.patterns.front().in_body);
+}
+
+TEST(Unexplained, ALearnerFindsWhatTheModelDoesNotExpectToKnow) {
+  // The model expects large errors of itself, so its expectation shows nothing.
+  const auto by_place = [](const Window& w) { return w[Feature::kX] > 0 && w[Feature::kY] > 0 ? 8.0 : 0.0; };
+  const Unexplained u = unexplained_in(windows_with(by_place, 2, 6), 20);
+  ASSERT_TRUE(u.large()) << u.in_words;
+  ASSERT_TRUE(u.learner);
+  EXPECT_GT(u.learner->predicted_mm(), 2.5);  // of 4 mm
+  EXPECT_NE(u.in_words.find("random forest"), std::string::npos) << u.in_words;
+}
+
+TEST(Unexplained, OfSomeRobotsIsShownByRobot) {
+  // The bootstrap draws robots: one of twelve could be chance, four of twelve are not.
+  const auto lame = [](const Window& w) { return std::fmod(w[Feature::kRobot], 3) == 2 ? 12.0 : 0.0; };
+  const Unexplained u = unexplained_in(windows_with(lame, 2, 4), 2 * std::sqrt(2.0));
+  ASSERT_TRUE(u.large());
+  ASSERT_FALSE(u.patterns.empty());
+  EXPECT_EQ(u.patterns.front().over, std::vector<Feature>{Feature::kRobot});
+  EXPECT_NEAR(u.patterns.front().first_mm(0, 5), 12, 1);
+  EXPECT_NEAR(u.patterns.front().first_mm(0, 4), 0, 1);
+  EXPECT_NE(u.in_words.find("robot"), std::string::npos) << u.in_words;
+}
+
+TEST(Unexplained, AnErrorBeyondTheExpectationIsSaidEvenWithoutAPattern) {
+  const Sets sets = windows_with([](const Window&) { return 0.0; }, 3, 5);
+  const Unexplained u = unexplained_in(sets, 1.0);
+  EXPECT_TRUE(u.large());
+  EXPECT_NEAR(u.systematic_mm, std::sqrt(2 * 9 - 1), 0.5);
+  EXPECT_NE(u.in_words.find("the model itself expects"), std::string::npos) << u.in_words;
+  // Repetitions show the same.
+  const Unexplained by_repetitions = unexplained_in(sets, 10, Replicates{1.5, 4, 50, 200});
+  EXPECT_TRUE(by_repetitions.large());
+  EXPECT_NE(by_repetitions.in_words.find("repetitions"), std::string::npos) << by_repetitions.in_words;
+}
+
+}  // namespace
+}  // namespace kilotwin::identify
