@@ -52,12 +52,12 @@ std::string in_json(const Status& status) {
 }
 
 std::string in_words(const Status& status) {
-  std::string text = fmt::format("{} is {} at tick {} of {}, {:.3f} s simulated, {:.1f} s of wall time\n", status.name,
-                                 name_of(status.phase), status.tick, status.last_tick, status.simulated_s,
-                                 status.wall_s);
+  std::string text =
+      fmt::format("{} is {} at tick {} of {}, {:.3f} s simulated, {:.1f} s of wall time\n", status.name,
+                  name_of(status.phase), status.tick, status.last_tick, status.simulated_s, status.wall_s);
   text += fmt::format("robots    {}{}\nmessages  {} sent, {} received\n", status.robots,
-                      status.robots_failed == 0 ? "" : fmt::format(", {} failed", status.robots_failed), status.sent,
-                      status.received);
+                      status.robots_failed == 0 ? "" : fmt::format(", {} failed", status.robots_failed),
+                      status.sent, status.received);
   if (status.note[0] != '\0') text += fmt::format("note      {}\n", status.note);
   return text;
 }
@@ -79,7 +79,8 @@ Status carry_out(RunControl& control, const ControlArguments& arguments, const S
   }
   if (arguments.command == "continue") {
     ask(kilotwin_open_CONTINUE_RUN);
-    return control.await([](const Status& now) { return now.phase == kilotwin_open_RUNNING; }, "continue", patience);
+    return control.await([](const Status& now) { return now.phase == kilotwin_open_RUNNING; }, "continue",
+                         patience);
   }
   if (arguments.command == "step") {
     ask(kilotwin_open_STEP_RUN);

@@ -37,7 +37,8 @@ recorder::TableMetadata metadata_of(const recorder::RunDirectory& directory) {
   about.emplace_back("seed", std::to_string(reader.header().seed()));
   about.emplace_back("run", fmt::format("{:016x}", reader.header().run()));
   if (std::filesystem::exists(directory.summary())) {
-    about.emplace_back("state_hash", fmt::format("{:016x}", recorder::read_summary(directory.summary()).state_hash));
+    about.emplace_back("state_hash",
+                       fmt::format("{:016x}", recorder::read_summary(directory.summary()).state_hash));
   }
   if (const auto origin = recorder::read_provenance(directory.provenance())) {
     about.emplace_back("version", origin->version);
@@ -49,14 +50,16 @@ recorder::TableMetadata metadata_of(const recorder::RunDirectory& directory) {
 
 int export_run(const ExportArguments& arguments) {
   const std::vector<const std::filesystem::path*> tables{
-      &arguments.trajectories, &arguments.bodies, &arguments.messages, &arguments.radio,       &arguments.cells,
-      &arguments.variables,    &arguments.events, &arguments.commands, &arguments.observables, &arguments.environment,
-      &arguments.mcap};
-  const bool rows_wanted = std::any_of(tables.begin(), tables.end(), [](const auto* table) { return !table->empty(); });
+      &arguments.trajectories, &arguments.bodies,      &arguments.messages, &arguments.radio,
+      &arguments.cells,        &arguments.variables,   &arguments.events,   &arguments.commands,
+      &arguments.observables,  &arguments.environment, &arguments.mcap};
+  const bool rows_wanted =
+      std::any_of(tables.begin(), tables.end(), [](const auto* table) { return !table->empty(); });
   if (!rows_wanted && arguments.model.empty()) {
     throw UserError(
         "export: nothing to export; give --trajectories FILE, --variables FILE, --events FILE, --commands FILE, "
-        "--observables FILE, --environment FILE, --bodies FILE, --messages FILE, --radio FILE, --cells FILE, --mcap FILE, "
+        "--observables FILE, --environment FILE, --bodies FILE, --messages FILE, --radio FILE, --cells FILE, "
+        "--mcap FILE, "
         "--model FILE or several; a table ends in .csv, .csv.gz or .npz");
   }
   if (!arguments.model.empty()) {
@@ -89,10 +92,12 @@ int export_run(const ExportArguments& arguments) {
   });
   each(arguments.messages,
        [&](Reader& reader, const auto& file) { return recorder::export_messages(reader, file, about); });
-  each(arguments.radio, [&](Reader& reader, const auto& file) { return recorder::export_radio(reader, file, about); });
+  each(arguments.radio,
+       [&](Reader& reader, const auto& file) { return recorder::export_radio(reader, file, about); });
   each(arguments.variables,
        [&](Reader& reader, const auto& file) { return recorder::export_variables(reader, file, about); });
-  each(arguments.events, [&](Reader& reader, const auto& file) { return recorder::export_events(reader, file, about); });
+  each(arguments.events,
+       [&](Reader& reader, const auto& file) { return recorder::export_events(reader, file, about); });
   each(arguments.commands,
        [&](Reader& reader, const auto& file) { return recorder::export_commands(reader, file, about); });
   each(arguments.observables,
@@ -103,9 +108,7 @@ int export_run(const ExportArguments& arguments) {
   each(arguments.cells, [&](Reader& reader, const auto& file) { return kilogrid::export_cells(reader, file); });
   each(
       arguments.mcap,
-      [&](Reader& reader, const auto& file) {
-        return mcap::export_mcap(reader, file, arguments.every_s);
-      },
+      [&](Reader& reader, const auto& file) { return mcap::export_mcap(reader, file, arguments.every_s); },
       "states");
   // A damaged recording is exported up to the damage.
   return damaged ? kFailed : kDone;
@@ -116,7 +119,8 @@ int export_run(const ExportArguments& arguments) {
 Command add_export(CLI::App& program) {
   const auto arguments = std::make_shared<ExportArguments>();
   CLI::App& app = *program.add_subcommand(
-      "export", "write tables from a recorded run: FILE.csv, FILE.csv.gz, FILE.npz for NumPy, or - for standard output");
+      "export",
+      "write tables from a recorded run: FILE.csv, FILE.csv.gz, FILE.npz for NumPy, or - for standard output");
   app.add_option("RUN", arguments->run, "run directory or recording")->required()->type_name("");
   app.add_option("--trajectories", arguments->trajectories, fmt::format("columns {}", recorder::kTrajectoryColumns))
       ->type_name("FILE");

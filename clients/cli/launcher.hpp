@@ -15,7 +15,7 @@ struct LaunchOptions {
   double start_monotonic_s = 0;  ///< start time of the command, steady clock, s
   double give_up_after_s = 0;    ///< longest wait of services for each other without progress; 0: no limit
   bool show_progress = true;
-  bool realtime = false;  ///< services take precedence over other programs of the machine
+  bool realtime = false;             ///< services take precedence over other programs of the machine
   std::vector<std::string> monitor;  ///< options of the residual monitor, for the station; empty: none
 };
 

@@ -93,8 +93,9 @@ void add_recorded_variables(const LoadedExperiment& loaded, const std::vector<st
     if (!any) {
       const std::string names = names_in_words(elves);
       throw loaded.locations.error(
-          place, fmt::format("no program has a global or static variable \"{}\"; {}", wanted.name(),
-                             names.empty() ? "firmware needs an .elf file with debug information" : "there are " + names));
+          place,
+          fmt::format("no program has a global or static variable \"{}\"; {}", wanted.name(),
+                      names.empty() ? "firmware needs an .elf file with debug information" : "there are " + names));
     }
     if (static_cast<std::size_t>(manifest.variable_size()) > behaviours::kMostScalars)
       throw loaded.locations.error(place, fmt::format("the variables have more than {} values; name parts of them",
@@ -114,17 +115,18 @@ void check_observables(const LoadedExperiment& loaded, const proto::Manifest& ma
       throw loaded.locations.error(place, fmt::format("there are {} observables; it takes at most {}",
                                                       loaded.experiment.observable_size(), kMostObservables));
     const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
-    if (name.empty() || name.size() > 60 || !letter(name[0]) ||
-        !std::all_of(name.begin(), name.end(), [&](char c) { return letter(c) || c == '_' || (c >= '0' && c <= '9'); }))
-      throw loaded.locations.error(place, fmt::format("\"{}\" is no name of an observable; it takes a letter, then letters, "
-                                                      "digits and _, at most 60",
-                                                      name));
+    if (name.empty() || name.size() > 60 || !letter(name[0]) || !std::all_of(name.begin(), name.end(), [&](char c) {
+          return letter(c) || c == '_' || (c >= '0' && c <= '9');
+        }))
+      throw loaded.locations.error(
+          place, fmt::format("\"{}\" is no name of an observable; it takes a letter, then letters, "
+                             "digits and _, at most 60",
+                             name));
     if (!names.insert(name).second || recorder::kind_of_name(name, variables) != recorder::NameKind::kUnknown)
       throw loaded.locations.error(place + ".name", fmt::format("the name {} is taken; give another one", name));
     try {
-      static_cast<void>(recorder::Expression::parse(observable.value(), [&](const std::string& used) {
-        return recorder::kind_of_name(used, variables);
-      }));
+      static_cast<void>(recorder::Expression::parse(
+          observable.value(), [&](const std::string& used) { return recorder::kind_of_name(used, variables); }));
     } catch (const UserError& error) {
       throw loaded.locations.error(observable.has_value() ? place + ".value" : place, error.what());
     }

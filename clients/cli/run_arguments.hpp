@@ -39,8 +39,8 @@ struct RunArguments {
   double give_up_after_s = 0;  ///< longest wait of services for each other without progress; 0: no limit
   MonitorOptions monitor;
   Output output;
-  bool strict = false; ///< end with status 1 where a program has failed
-  bool quiet = false;  ///< print neither progress nor summary
+  bool strict = false;  ///< end with status 1 where a program has failed
+  bool quiet = false;   ///< print neither progress nor summary
 };
 
 /// Adds the argument EXPERIMENT and the options that replace parts of the experiment, for `run`, `check` and `sweep`.

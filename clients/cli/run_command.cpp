@@ -181,8 +181,8 @@ int run(const RunOptions& arguments, double started_s) {
       return *status;
   } else {
     const int status = launch(plan, prepared.directory,
-                              {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet, arguments.realtime,
-                               monitor_words(arguments.monitor)});
+                              {claim->domain(), started_s, arguments.give_up_after_s, !arguments.quiet,
+                               arguments.realtime, monitor_words(arguments.monitor)});
     if (status != 0) return status;
   }
   if (!arguments.quiet || arguments.strict) {
@@ -191,9 +191,10 @@ int run(const RunOptions& arguments, double started_s) {
                                              recorder::RunDirectory::default_path(summary.name, summary.seed));
     if (!arguments.quiet) fmt::print("{}", recorder::summary_text(summary, place));
     if (arguments.strict && summary.robots_failed > 0) {
-      throw RunError(fmt::format("{} of {} robots failed, and --strict was given; \"failures\" of {} says who, when and "
-                                 "where",
-                                 summary.robots_failed, summary.robots, prepared.directory.summary().string()));
+      throw RunError(
+          fmt::format("{} of {} robots failed, and --strict was given; \"failures\" of {} says who, when and "
+                      "where",
+                      summary.robots_failed, summary.robots, prepared.directory.summary().string()));
     }
   }
   if (page) view_until_interrupted(*page);

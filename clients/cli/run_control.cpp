@@ -78,7 +78,8 @@ void RunControl::send(kilotwin_open_RunCommand command, std::uint32_t steps, Sec
   const auto until = Clock::now() + patience;
   while (control_.readers() == 0) {
     if (Clock::now() > until || interrupted() != 0)
-      throw RunError(fmt::format("the run on domain {} takes no commands; its station has not been found", domain_));
+      throw RunError(
+          fmt::format("the run on domain {} takes no commands; its station has not been found", domain_));
     std::this_thread::sleep_for(kPoll);
   }
   PublicRunControl sample{};

@@ -201,7 +201,8 @@ recorder::Summary RunRecorder::finish(const RunTotals& totals, double start_s) {
   summary.messages = {totals.attempted, totals.sent, totals.received, totals.collided};
   for (const RadioCount& radio : totals.radios) summary.per_robot.add(radio);
   summary.robots_failed = totals.robots_failed;
-  std::stable_sort(failures_.begin(), failures_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+  std::stable_sort(failures_.begin(), failures_.end(),
+                   [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
   summary.failures = std::move(failures_);
   summary.station = totals.station;
   summary.recoveries = static_cast<std::uint32_t>(plan_.program_failures().size());

@@ -158,7 +158,8 @@ class Results {
     report_.add_failed(run.point, run.seed, run.directory, why);
     if (++failed_ > kMostComplaints) return;
     const SweepPoint& point = sweep_.points[run.point];
-    say(fmt::format("kilotwin: {} with seed {} failed: {}", point.empty() ? sweep_.name : label(point), run.seed, why));
+    say(fmt::format("kilotwin: {} with seed {} failed: {}", point.empty() ? sweep_.name : label(point), run.seed,
+                    why));
   }
 
   const Sweep& sweep_;
@@ -171,8 +172,8 @@ void print_results(const SweepArguments& arguments, const Sweep& sweep, const Sw
   std::string plots = (directory / "sweep.svg").string();
   if (report.has_response()) plots += " and " + (directory / "response.svg").string();
   fmt::print("{}runs    {}\ntable   {}\ncurves  {}\nplot    {}\nreport  {}\nresults {}\n", report.table(),
-             (directory / "runs.csv").string(), (directory / "sweep.csv").string(), (directory / "curves.csv").string(),
-             plots, (directory / "report.html").string(),
+             (directory / "runs.csv").string(), (directory / "sweep.csv").string(),
+             (directory / "curves.csv").string(), plots, (directory / "report.html").string(),
              arguments.resume.empty() ? place_in_words(directory, arguments.run.output, sweep.fallback)
                                       : directory.string());
 }
@@ -203,7 +204,8 @@ int sweep(const SweepArguments& arguments) {
       waiting.push_back(run);
   }
   if (!arguments.resume.empty())
-    say(fmt::format("kilotwin: {} of {} runs were done before", sweep.runs.size() - waiting.size(), sweep.runs.size()));
+    say(fmt::format("kilotwin: {} of {} runs were done before", sweep.runs.size() - waiting.size(),
+                    sweep.runs.size()));
   for (const SweepRun& run : waiting) remove_unfinished(run);
   catch_interrupts();
   const auto ended = [&](const SweepRun& run) { results.take(run); };
@@ -212,9 +214,10 @@ int sweep(const SweepArguments& arguments) {
   results.say_how_many_failed();
   const SweepReport& report = results.report();
   if (!all) {
-    say(fmt::format("kilotwin: interrupted; {} of {} runs were done; the same command with --resume {} in place of --out "
-                    "does the others",
-                    report.runs(), sweep.runs.size(), sweep.directory.string()));
+    say(fmt::format(
+        "kilotwin: interrupted; {} of {} runs were done; the same command with --resume {} in place of --out "
+        "does the others",
+        report.runs(), sweep.runs.size(), sweep.directory.string()));
   }
   if (report.runs() == 0) return kFailed;
   report.write(sweep.directory, recorder::provenance_of_this_process());
@@ -239,8 +242,9 @@ Command add_sweep(CLI::App& program) {
                  "polarisation or pushed (default: pushed where there are movable bodies, else msd)")
       ->type_name("OBSERVABLE");
   app.add_option("--jobs", arguments->jobs, "runs at a time (default: one per core)")->type_name("N");
-  app.add_option("--latin", arguments->latin,
-                 "in place of all combinations, so many points that cover the ranges of --set evenly: a Latin hypercube")
+  app.add_option(
+         "--latin", arguments->latin,
+         "in place of all combinations, so many points that cover the ranges of --set evenly: a Latin hypercube")
       ->check(CLI::Range(std::size_t{1}, kMostSweepRuns).description(""))
       ->type_name("N");
   app.add_option("--latin-seed", arguments->latin_seed, "seed of the points of --latin")
@@ -249,8 +253,8 @@ Command add_sweep(CLI::App& program) {
   app.add_option("--resume", arguments->resume,
                  "go on with the sweep in this directory: runs that are done stay; --seeds may be more")
       ->type_name("DIR");
-  CLI::Option* const slurm = app.add_flag(
-      "--slurm", arguments->slurm, "run as one array job of Slurm, wait for it, and merge its results");
+  CLI::Option* const slurm = app.add_flag("--slurm", arguments->slurm,
+                                          "run as one array job of Slurm, wait for it, and merge its results");
   app.add_option("--slurm-option", arguments->slurm_options, "an option for sbatch, such as --time=1:00:00")
       ->needs(slurm)
       ->allow_extra_args(false)

@@ -127,7 +127,8 @@ std::pair<std::string, std::vector<std::string>> parse_set(const std::string& se
 double uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
 /// `count` values, one from each cell of equal width, in random order.
-std::vector<std::string> stratified(const std::vector<std::string>& parts, std::size_t count, std::mt19937_64& random) {
+std::vector<std::string> stratified(const std::vector<std::string>& parts, std::size_t count,
+                                    std::mt19937_64& random) {
   const auto range = parts.size() == 1 ? parse_real_range(parts[0]) : std::nullopt;
   std::vector<std::string> values;
   for (std::size_t cell = 0; cell < count; ++cell) {

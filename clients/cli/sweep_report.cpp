@@ -104,8 +104,15 @@ void SweepReport::add(std::size_t point, std::uint64_t seed, const std::filesyst
   const std::size_t states = curves.time_s.size();
   if (states > at.time_s.size()) at.time_s = curves.time_s;
   if (states > at.over_time.size()) at.over_time.resize(states, Samples(observables()));
-  Run& entry = all_runs_.emplace_back(Run{point, seed, run.string(), {}, {}, summary.messages.sent,
-                                          summary.messages.received, summary.messages.collided, summary.state_hash,
+  Run& entry = all_runs_.emplace_back(Run{point,
+                                          seed,
+                                          run.string(),
+                                          {},
+                                          {},
+                                          summary.messages.sent,
+                                          summary.messages.received,
+                                          summary.messages.collided,
+                                          summary.state_hash,
                                           summary.robots_failed});
   for (std::size_t o = 0; o < observables(); ++o) {
     const std::vector<double>& values =
@@ -243,10 +250,11 @@ std::string SweepReport::page(const recorder::Provenance& provenance) const {
   Data facts{Data::type::list};
   std::string words;
   for (const std::string& word : provenance.command_line) words += (words.empty() ? "" : " ") + word;
-  for (const auto& [fact, value] : {std::pair<const char*, std::string>{"command line", words},
-                                    {"version", provenance.build},
-                                    {"machine", fmt::format("{}, {} cores", provenance.host, provenance.cores)},
-                                    {"tables", "runs.csv (a row per run), sweep.csv (at the end), curves.csv (over time)"}}) {
+  for (const auto& [fact, value] :
+       {std::pair<const char*, std::string>{"command line", words},
+        {"version", provenance.build},
+        {"machine", fmt::format("{}, {} cores", provenance.host, provenance.cores)},
+        {"tables", "runs.csv (a row per run), sweep.csv (at the end), curves.csv (over time)"}}) {
     facts << object({{"fact", fact}, {"value", value}});
   }
   Data page = object({{"name", name_}, {"date", provenance.date}, {"runs", runs_text()}, {"table", table.text()}});
@@ -273,7 +281,8 @@ void SweepReport::write(const std::filesystem::path& directory, const recorder::
 
 std::string SweepReport::table_csv() const {
   std::string csv = csv_header("point,runs") +
-                    ",sent,sent_se,received,received_se,collided,collided_se,robots_failed,realtime_factor" + fields_header() + "\n";
+                    ",sent,sent_se,received,received_se,collided,collided_se,robots_failed,realtime_factor" +
+                    fields_header() + "\n";
   const Samples none(observables());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Observed& at = observed_[i];
@@ -292,9 +301,8 @@ std::string SweepReport::runs_csv() const {
   csv += ",sent,received,collided,robots_failed,state_hash,failure\n";
   std::vector<const Run*> sorted;
   for (const Run& run : all_runs_) sorted.push_back(&run);
-  std::sort(sorted.begin(), sorted.end(), [](const Run* a, const Run* b) {
-    return std::pair(a->point, a->seed) < std::pair(b->point, b->seed);
-  });
+  std::sort(sorted.begin(), sorted.end(),
+            [](const Run* a, const Run* b) { return std::pair(a->point, a->seed) < std::pair(b->point, b->seed); });
   for (const Run* run : sorted) {
     const bool well = run->failure.empty();
     csv += fmt::format("{},{},{},{}{}", csv_cell(run->directory), run->point, run->seed, well ? 1 : 0,

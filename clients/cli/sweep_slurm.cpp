@@ -27,7 +27,8 @@ constexpr auto kPoll = std::chrono::seconds(1);
 fs::path required_tool(const char* name) {
   const fs::path tool = os::find_executable(name);
   if (tool.empty())
-    throw RunError(fmt::format("--slurm: no {} on this machine; submit from a node of the cluster that has it", name));
+    throw RunError(
+        fmt::format("--slurm: no {} on this machine; submit from a node of the cluster that has it", name));
   return tool;
 }
 
@@ -84,7 +85,8 @@ bool in_queue(const fs::path& squeue, const std::string& job) {
 bool run_on_slurm(std::vector<SweepRun>& runs, const fs::path& directory, const std::vector<std::string>& options,
                   const std::function<void(const SweepRun&)>& ended) {
   if (runs.empty()) return true;
-  const fs::path sbatch = required_tool("sbatch"), squeue = required_tool("squeue"), scancel = required_tool("scancel");
+  const fs::path sbatch = required_tool("sbatch"), squeue = required_tool("squeue"),
+                 scancel = required_tool("scancel");
   const std::size_t runs_each = (runs.size() + kMostElements - 1) / kMostElements;
   const std::size_t elements = (runs.size() + runs_each - 1) / runs_each;
   os::write_file(directory / "commands", commands_of(runs));

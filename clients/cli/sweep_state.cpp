@@ -30,9 +30,10 @@ void check_plan(const fs::path& directory, const std::string& plan) {
   if (!text)
     throw UserError(fmt::format("--resume: {} holds no sweep; give the directory of one", directory.string()));
   if (*text != plan) {
-    throw UserError(fmt::format("--resume: {} is a sweep of another experiment, other values or other options; its "
-                                "sweep.json says which; only --seeds, --jobs and --plot may differ",
-                                directory.string()));
+    throw UserError(
+        fmt::format("--resume: {} is a sweep of another experiment, other values or other options; its "
+                    "sweep.json says which; only --seeds, --jobs and --plot may differ",
+                    directory.string()));
   }
 }
 

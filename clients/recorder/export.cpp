@@ -110,7 +110,8 @@ std::vector<std::uint32_t> groups_of(const proto::RecordingHeader& header) {
   std::vector<std::uint32_t> groups;
   for (int group = 0; group < header.group_robots_size(); ++group) {
     const std::size_t room = header.robots() - std::min<std::size_t>(groups.size(), header.robots());
-    groups.insert(groups.end(), std::min<std::size_t>(room, header.group_robots(group)), static_cast<std::uint32_t>(group));
+    groups.insert(groups.end(), std::min<std::size_t>(room, header.group_robots(group)),
+                  static_cast<std::uint32_t>(group));
   }
   groups.resize(header.robots(), 0);
   return groups;
@@ -143,8 +144,8 @@ std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& file
   if (recording.header().movable_size() == 0) {
     throw UserError(fmt::format("{}: no movable bodies; the experiment names none", recording.path().string()));
   }
-  return export_states(recording, file, every_s, {kTime, {"body", "", CellType::kInteger}, kX, kY, kHeading}, metadata,
-                       [&](Table& table, const proto::StateRecord& state, Tick tick) {
+  return export_states(recording, file, every_s, {kTime, {"body", "", CellType::kInteger}, kX, kY, kHeading},
+                       metadata, [&](Table& table, const proto::StateRecord& state, Tick tick) {
                          append_body_rows(table, state, tick, recording.tick_length());
                        });
 }
@@ -206,8 +207,8 @@ std::uint64_t export_radio(Reader& recording, const std::filesystem::path& file,
   const auto table = open_table(file, std::move(columns), metadata);
   for (int i = 0; i < radio.attempted_size(); ++i) {
     table->integer(i);
-    for (const std::uint32_t count : {radio.attempted(i), radio.sent(i), radio.received(i), radio.collided(i),
-                                      radio.backed_off(i)})
+    for (const std::uint32_t count :
+         {radio.attempted(i), radio.sent(i), radio.received(i), radio.collided(i), radio.backed_off(i)})
       table->integer(count);
     table->end_row();
   }

@@ -39,12 +39,12 @@ std::uint64_t export_bodies(Reader& recording, const std::filesystem::path& file
 /// the number of messages that it sent successfully. Returns the number of rows. Throws UserError if no messages were
 /// recorded.
 std::uint64_t export_messages(Reader& recording, const std::filesystem::path& file,
-                            const TableMetadata& metadata = {});
+                              const TableMetadata& metadata = {});
 
 /// Columns robot,attempted,sent,received,collided,backed_off: counts of each robot's radio. Returns the number of rows. Throws
 /// UserError if the run did not reach its end.
 std::uint64_t export_radio(Reader& recording, const std::filesystem::path& file,
-                            const TableMetadata& metadata = {});
+                           const TableMetadata& metadata = {});
 
 /// Columns time_s,robot,group and one per recorded variable, under its name: one row per robot and tick at which it has a value of any
 /// of them, sorted by time and then by robot. Throws UserError if the run recorded no variables.
@@ -53,11 +53,13 @@ std::uint64_t export_variables(Reader& recording, const std::filesystem::path& f
 
 /// Columns time_s,event,robot,group,led_r,led_g,led_b,motor_left,motor_right,state,sender,distance_mm,text: one row per event, by
 /// ascending time. Cells that say nothing about the event are empty. Times of messages are exact to the cycle, others to the tick.
-std::uint64_t export_events(Reader& recording, const std::filesystem::path& file, const TableMetadata& metadata = {});
+std::uint64_t export_events(Reader& recording, const std::filesystem::path& file,
+                            const TableMetadata& metadata = {});
 
 /// Columns run,robot,time_s,motion, as `kilotwin identify` reads commands: every change of a robot's motion, exact to the tick. Throws
 /// UserError if the run did not record the event MOTION.
-std::uint64_t export_commands(Reader& recording, const std::filesystem::path& file, const TableMetadata& metadata = {});
+std::uint64_t export_commands(Reader& recording, const std::filesystem::path& file,
+                              const TableMetadata& metadata = {});
 
 /// Columns time_s, one per observable of the experiment, and those of observables.hpp: one row per recorded state.
 std::uint64_t export_observables(Reader& recording, const std::filesystem::path& file,

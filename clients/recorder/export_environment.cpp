@@ -60,12 +60,18 @@ std::uint64_t export_environment(const std::filesystem::path& run_directory, con
     for (const std::string_view row : split(logs[i], '\n')) most = std::max(most, split(row, '\t').size());
   }
   if (!any)
-    throw UserError(fmt::format("{}: no logs of environments; the experiment's station has none", run_directory.string()));
-  std::vector<Column> columns{
-      {"environment", "", CellType::kInteger}, {"name", "", CellType::kText},   {"time_s", "s", CellType::kNumber},
-      {"robot", "", CellType::kNumber},        {"colour", "", CellType::kText}, {"x", "", CellType::kNumber},
-      {"y", "", CellType::kNumber},            {"orientation_deg", "deg", CellType::kNumber}};
-  for (std::size_t i = kFixed; i < most; ++i) columns.push_back({fmt::format("value_{}", i - kFixed + 1), "", CellType::kText});
+    throw UserError(
+        fmt::format("{}: no logs of environments; the experiment's station has none", run_directory.string()));
+  std::vector<Column> columns{{"environment", "", CellType::kInteger},
+                              {"name", "", CellType::kText},
+                              {"time_s", "s", CellType::kNumber},
+                              {"robot", "", CellType::kNumber},
+                              {"colour", "", CellType::kText},
+                              {"x", "", CellType::kNumber},
+                              {"y", "", CellType::kNumber},
+                              {"orientation_deg", "deg", CellType::kNumber}};
+  for (std::size_t i = kFixed; i < most; ++i)
+    columns.push_back({fmt::format("value_{}", i - kFixed + 1), "", CellType::kText});
   const auto table = open_table(file, std::move(columns), metadata);
   for (std::size_t environment = 0; environment < logs.size(); ++environment) {
     const std::string name = name_of(header.environment(static_cast<int>(environment)));

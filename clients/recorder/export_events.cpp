@@ -107,8 +107,9 @@ std::uint64_t export_events(Reader& recording, const std::filesystem::path& file
 std::uint64_t export_commands(Reader& recording, const std::filesystem::path& file, const TableMetadata& metadata) {
   const auto& kinds = recording.header().event();
   if (std::find(kinds.begin(), kinds.end(), proto::MOTION) == kinds.end()) {
-    throw UserError(fmt::format("{}: no changes of motion; run again with recording {{ event: MOTION }} in the experiment",
-                                recording.path().string()));
+    throw UserError(
+        fmt::format("{}: no changes of motion; run again with recording {{ event: MOTION }} in the experiment",
+                    recording.path().string()));
   }
   const auto table = open_table(file,
                                 {{"run", "", CellType::kText},

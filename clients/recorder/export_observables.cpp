@@ -6,7 +6,8 @@
 
 namespace kilotwin::recorder {
 
-std::uint64_t export_observables(Reader& recording, const std::filesystem::path& file, const TableMetadata& metadata) {
+std::uint64_t export_observables(Reader& recording, const std::filesystem::path& file,
+                                 const TableMetadata& metadata) {
   const ObservableCurves curves = observe(recording);
   std::vector<Column> columns{{"time_s", "s", CellType::kNumber}};
   std::vector<const std::vector<double>*> values;
@@ -16,7 +17,8 @@ std::uint64_t export_observables(Reader& recording, const std::filesystem::path&
   }
   for (std::size_t o = 0; o < kObservables.size(); ++o) {
     const ObservableInfo& info = kObservables[o];
-    columns.push_back({fmt::format("{}{}", info.name, info.column_suffix), std::string(info.unit), CellType::kNumber});
+    columns.push_back(
+        {fmt::format("{}{}", info.name, info.column_suffix), std::string(info.unit), CellType::kNumber});
     values.push_back(&curves.value[o]);
   }
   const auto table = open_table(file, std::move(columns), metadata);

@@ -13,7 +13,8 @@ namespace {
 /// Where each robot's value stands in the records of a tick.
 class Cells {
  public:
-  Cells(std::size_t variables, std::size_t robots) : robots_(robots), at_(variables * robots, kNone), has_(robots, 0) {}
+  Cells(std::size_t variables, std::size_t robots)
+      : robots_(robots), at_(variables * robots, kNone), has_(robots, 0) {}
 
   void take(const std::vector<proto::VariableRecord>& records) {
     for (std::size_t r = 0; r < records.size(); ++r) {
@@ -49,12 +50,14 @@ class Cells {
 
 }  // namespace
 
-std::uint64_t export_variables(Reader& recording, const std::filesystem::path& file, const TableMetadata& metadata) {
+std::uint64_t export_variables(Reader& recording, const std::filesystem::path& file,
+                               const TableMetadata& metadata) {
   const proto::RecordingHeader& header = recording.header();
   if (header.variable_size() == 0) {
-    throw UserError(fmt::format("{}: no variables; run again with recording {{ variable {{ name: \"NAME\" }} }} in the "
-                                "experiment",
-                                recording.path().string()));
+    throw UserError(
+        fmt::format("{}: no variables; run again with recording {{ variable {{ name: \"NAME\" }} }} in the "
+                    "experiment",
+                    recording.path().string()));
   }
   std::vector<Column> columns{
       {"time_s", "s", CellType::kTime}, {"robot", "", CellType::kInteger}, {"group", "", CellType::kInteger}};

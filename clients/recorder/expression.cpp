@@ -19,10 +19,36 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kDeepest = 60;
 
 enum class Operation : std::uint8_t {
-  kNumber, kName,
-  kNegate, kNot, kSqrt, kAbs, kSin, kCos,
-  kAdd, kSubtract, kMultiply, kDivide, kPower, kEqual, kUnequal, kLess, kLessEqual, kGreater, kGreaterEqual, kAnd, kOr,
-  kMean, kSum, kMin, kMax, kSd, kMedian, kShare, kCount, kQuantile
+  kNumber,
+  kName,
+  kNegate,
+  kNot,
+  kSqrt,
+  kAbs,
+  kSin,
+  kCos,
+  kAdd,
+  kSubtract,
+  kMultiply,
+  kDivide,
+  kPower,
+  kEqual,
+  kUnequal,
+  kLess,
+  kLessEqual,
+  kGreater,
+  kGreaterEqual,
+  kAnd,
+  kOr,
+  kMean,
+  kSum,
+  kMin,
+  kMax,
+  kSd,
+  kMedian,
+  kShare,
+  kCount,
+  kQuantile
 };
 
 struct Function {
@@ -95,7 +121,8 @@ class Parser {
     skip_blanks();
     if (!text_.substr(at_).starts_with(token)) return false;
     const std::size_t end = at_ + token.size();
-    if (begins_name(token[0]) && end < text_.size() && (begins_name(text_[end]) || is_digit(text_[end]))) return false;
+    if (begins_name(token[0]) && end < text_.size() && (begins_name(text_[end]) || is_digit(text_[end])))
+      return false;
     at_ = end;
     return true;
   }
@@ -248,9 +275,10 @@ class Parser {
     const NameKind kind = kind_of_(name);
     if (kind == NameKind::kUnknown) {
       at_ = begin;
-      refuse(fmt::format("there is no \"{}\"; names are x_mm, y_mm, heading_rad, displacement_mm, led, state, group, failed, "
-                         "robot, time_s, colours, life cycles, and the variables that the run records",
-                         name));
+      refuse(fmt::format(
+          "there is no \"{}\"; names are x_mm, y_mm, heading_rad, displacement_mm, led, state, group, failed, "
+          "robot, time_s, colours, life cycles, and the variables that the run records",
+          name));
     }
     if (std::find(names_.begin(), names_.end(), name) == names_.end()) names_.push_back(name);
     auto made = std::make_unique<Node>();
@@ -339,7 +367,8 @@ double mean_of(const Values& values) {
 double reduce(Operation operation, Values& values, double q) {
   if (operation == Operation::kCount)
     return static_cast<double>(std::count_if(values.begin(), values.end(), [](double v) { return v != 0; }));
-  if (operation == Operation::kSum) return values.empty() ? 0 : mean_of(values) * static_cast<double>(values.size());
+  if (operation == Operation::kSum)
+    return values.empty() ? 0 : mean_of(values) * static_cast<double>(values.size());
   if (values.empty()) return kNone;
   switch (operation) {
     case Operation::kMean: return mean_of(values);

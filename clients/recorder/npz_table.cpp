@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint32_t kLocal = 0x04034b50, kCentral = 0x02014b50, kEnd = 0x06054b50, kEnd64 = 0x06064b50,
                         kLocator64 = 0x07064b50;
-constexpr std::uint16_t kVersion64 = 45;        // ZIP64
+constexpr std::uint16_t kVersion64 = 45;         // ZIP64
 constexpr std::uint16_t kDate1980 = 1 << 5 | 1;  // equal tables give equal files
 constexpr std::uint32_t kIn64 = 0xffffffffu;     // the number is in the 64-bit record
 constexpr std::size_t kMostComment = 0xffff;
@@ -54,9 +54,9 @@ struct Member {
 
 std::string local_header(const Member& member) {
   Octets octets;
-  octets << kLocal << kVersion64 << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0} << kDate1980 << member.crc
-         << kIn64 << kIn64 << static_cast<std::uint16_t>(member.name.size()) << std::uint16_t{20} << member.name
-         << std::uint16_t{1} << std::uint16_t{16} << member.size << member.size;
+  octets << kLocal << kVersion64 << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0} << kDate1980
+         << member.crc << kIn64 << kIn64 << static_cast<std::uint16_t>(member.name.size()) << std::uint16_t{20}
+         << member.name << std::uint16_t{1} << std::uint16_t{16} << member.size << member.size;
   return octets.text();
 }
 
@@ -65,8 +65,9 @@ std::string directory(const std::vector<Member>& members, std::uint64_t offset, 
   for (const Member& member : members) {
     octets << kCentral << kVersion64 << kVersion64 << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0}
            << kDate1980 << member.crc << kIn64 << kIn64 << static_cast<std::uint16_t>(member.name.size())
-           << std::uint16_t{28} << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0} << std::uint32_t{0} << kIn64
-           << member.name << std::uint16_t{1} << std::uint16_t{24} << member.size << member.size << member.offset;
+           << std::uint16_t{28} << std::uint16_t{0} << std::uint16_t{0} << std::uint16_t{0} << std::uint32_t{0}
+           << kIn64 << member.name << std::uint16_t{1} << std::uint16_t{24} << member.size << member.size
+           << member.offset;
   }
   const std::uint64_t size = octets.text().size(), count = members.size();
   octets << kEnd64 << std::uint64_t{44} << kVersion64 << kVersion64 << std::uint32_t{0} << std::uint32_t{0} << count
@@ -92,7 +93,11 @@ std::u32string code_points(std::string_view text) {
   std::u32string points;
   for (std::size_t i = 0; i < text.size();) {
     const auto octet = static_cast<unsigned char>(text[i]);
-    const std::size_t length = octet < 0x80 ? 1 : octet >> 5 == 6 ? 2 : octet >> 4 == 14 ? 3 : octet >> 3 == 30 ? 4 : 0;
+    const std::size_t length = octet < 0x80       ? 1
+                               : octet >> 5 == 6  ? 2
+                               : octet >> 4 == 14 ? 3
+                               : octet >> 3 == 30 ? 4
+                                                  : 0;
     char32_t point = length == 1 ? octet : octet & (0x7fu >> length);
     bool right = length > 0 && i + length <= text.size();
     for (std::size_t k = 1; right && k < length; ++k) {
@@ -171,7 +176,7 @@ void NpzTable::append(const void* octets, std::size_t size) {
 void NpzTable::copy(Spill& spill, const Column& column) {
   const bool is_text = column.type == CellType::kText;
   const bool as_double = column.type == CellType::kInteger && spill.any_missing;
-  const std::string type = is_text ? fmt::format("<U{}", spill.longest)
+  const std::string type = is_text                                           ? fmt::format("<U{}", spill.longest)
                            : column.type == CellType::kInteger && !as_double ? "<i8"
                                                                              : "<f8";
   const std::string header = array_header(type, rows_);
@@ -186,8 +191,8 @@ void NpzTable::copy(Spill& spill, const Column& column) {
   constexpr std::size_t kBlock = 8192;
   std::vector<std::uint64_t> block(kBlock);
   for (std::uint64_t left = rows_; left > 0;) {
-    const std::size_t count = std::fread(block.data(), 8, static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlock)),
-                                         spill.cells.get());
+    const std::size_t count = std::fread(
+        block.data(), 8, static_cast<std::size_t>(std::min<std::uint64_t>(left, kBlock)), spill.cells.get());
     if (count == 0) throw RunError(fmt::format("a temporary file cannot be read: {}", os::system_reason()));
     left -= count;
     for (std::size_t i = 0; i < count && (is_text || as_double); ++i) {

@@ -236,7 +236,8 @@ const char* Reader::defect_of_sample(const proto::TrackerRecord& sample) const {
 
 const char* Reader::defect_of_variable(const proto::VariableRecord& variable) const {
   if (!valid_tick(variable.tick())) return "a variable at a tick out of range";
-  if (variable.variable() >= static_cast<std::uint32_t>(header_.variable_size())) return "a variable without a name";
+  if (variable.variable() >= static_cast<std::uint32_t>(header_.variable_size()))
+    return "a variable without a name";
   const bool integer = header_.variable(static_cast<int>(variable.variable())).integer();
   const int values = integer ? variable.integer_size() : variable.number_size();
   if (values != variable.robot_size() || variable.integer_size() + variable.number_size() != values)

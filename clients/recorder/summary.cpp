@@ -106,8 +106,7 @@ namespace {
 Json failures_json(const std::vector<Summary::Failure>& failures) {
   Json json = Json::array();
   for (std::size_t i = 0; i < std::min(failures.size(), Summary::kMostFailures); ++i) {
-    json.push_back(
-        Json{{"robot", failures[i].robot}, {"time_s", failures[i].time_s}, {"what", failures[i].text}});
+    json.push_back(Json{{"robot", failures[i].robot}, {"time_s", failures[i].time_s}, {"what", failures[i].text}});
   }
   return json;
 }

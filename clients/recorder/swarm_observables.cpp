@@ -15,14 +15,14 @@ namespace kilotwin::recorder {
 namespace {
 
 /// A colour is which channels are lit: red | green << 1 | blue << 2.
-constexpr std::array<std::string_view, 8> kColours{"off", "red", "green", "yellow", "blue", "magenta", "cyan", "white"};
-constexpr std::array<LifeCycle, 10> kLifeCycles{LifeCycle::kSleeping, LifeCycle::kIdle,   LifeCycle::kBattery,
-                                                LifeCycle::kSetup,    LifeCycle::kRunning, LifeCycle::kCharging,
-                                                LifeCycle::kMoving,   LifeCycle::kAbsent,  LifeCycle::kFlat,
-                                                LifeCycle::kFailed};
-constexpr std::array<std::string_view, 12> kPerRobot{"x_mm",  "y_mm",  "heading_rad", "displacement_mm",
-                                                     "led",   "led_r", "led_g",       "led_b",
-                                                     "state", "failed", "group",      "robot"};
+constexpr std::array<std::string_view, 8> kColours{"off",  "red",     "green", "yellow",
+                                                   "blue", "magenta", "cyan",  "white"};
+constexpr std::array<LifeCycle, 10> kLifeCycles{
+    LifeCycle::kSleeping, LifeCycle::kIdle,   LifeCycle::kBattery, LifeCycle::kSetup, LifeCycle::kRunning,
+    LifeCycle::kCharging, LifeCycle::kMoving, LifeCycle::kAbsent,  LifeCycle::kFlat,  LifeCycle::kFailed};
+constexpr std::array<std::string_view, 12> kPerRobot{"x_mm",  "y_mm",   "heading_rad", "displacement_mm",
+                                                     "led",   "led_r",  "led_g",       "led_b",
+                                                     "state", "failed", "group",       "robot"};
 
 double colour_of(std::uint8_t led) {
   return ((led & 3) != 0 ? 1 : 0) | ((led >> 2 & 3) != 0 ? 2 : 0) | ((led >> 4 & 3) != 0 ? 4 : 0);
@@ -40,8 +40,8 @@ double constant_of(const std::string& name) {
 }
 
 const ObservableInfo* built_in(const std::string& name) {
-  const auto* const found =
-      std::find_if(kObservables.begin(), kObservables.end(), [&](const ObservableInfo& o) { return o.name == name; });
+  const auto* const found = std::find_if(kObservables.begin(), kObservables.end(),
+                                         [&](const ObservableInfo& o) { return o.name == name; });
   return found == kObservables.end() ? nullptr : found;
 }
 
@@ -110,8 +110,7 @@ void SwarmObservables::fill(double time_s, const proto::StateRecord& state, cons
   each("robot", [&](int i) { return i; });
   each("time_s", [&](int) { return time_s; });
   for (std::size_t o = 0; o < kObservables.size(); ++o) {
-    if (!curves.value[o].empty())
-      each(kObservables[o].name.data(), [&](int) { return curves.value[o].back(); });
+    if (!curves.value[o].empty()) each(kObservables[o].name.data(), [&](int) { return curves.value[o].back(); });
   }
 }
 
@@ -122,7 +121,9 @@ std::vector<double> SwarmObservables::values(double time_s, const proto::StateRe
     start_y_mm_.assign(state.y_mm().begin(), state.y_mm().end());
   }
   fill(time_s, state, curves);
-  const NamedValues named = [this](const std::string& name) -> const std::vector<double>& { return columns_.at(name); };
+  const NamedValues named = [this](const std::string& name) -> const std::vector<double>& {
+    return columns_.at(name);
+  };
   std::vector<double> values;
   for (const Expression& expression : expressions_)
     values.push_back(expression.value(static_cast<std::size_t>(state.x_mm_size()), named));

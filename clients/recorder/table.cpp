@@ -16,8 +16,9 @@ std::unique_ptr<Table> open_table(const std::filesystem::path& file, std::vector
   if (ending == ".npz") return std::make_unique<NpzTable>(file, std::move(columns), metadata);
   for (const char* other : {".arrow", ".feather", ".h5", ".hdf5", ".mcap", ".npy", ".parquet", ".xls", ".xlsx"}) {
     if (ending != other) continue;
-    throw UserError(fmt::format("{}: tables are not written as {}; give .csv, .csv.gz or .npz, or - for standard output",
-                                file.string(), other));
+    throw UserError(
+        fmt::format("{}: tables are not written as {}; give .csv, .csv.gz or .npz, or - for standard output",
+                    file.string(), other));
   }
   return std::make_unique<CsvTable>(file, std::move(columns), metadata);
 }

@@ -70,7 +70,8 @@ void note_failure(Tick tick, std::uint32_t robot, const std::string& text, proto
 void ChangeObserver::observe(const SwarmView& swarm, proto::Observations& to) {
   const std::size_t robots = swarm.robots();
   if (recorded_.led) {
-    note_changes(swarm.tick, proto::LED, robots, [&](std::size_t i) { return std::uint32_t{swarm.led[i]}; }, led_, to);
+    note_changes(
+        swarm.tick, proto::LED, robots, [&](std::size_t i) { return std::uint32_t{swarm.led[i]}; }, led_, to);
   }
   if (recorded_.motion) {
     note_changes(

@@ -39,18 +39,14 @@ VariableSampler::VariableSampler(const RunPlan& plan, Share share, bool firmware
   const proto::Manifest& manifest = plan.manifest();
   for (int v = 0; v < manifest.variable_size(); ++v) {
     const proto::ProgramVariable& from = manifest.variable(v);
-    Variable variable{static_cast<std::uint32_t>(v),
-                      from.integer(),
-                      RecordingSchedule(plan.tick_length, from.every_s()),
-                      {},
-                      {}};
+    Variable variable{
+        static_cast<std::uint32_t>(v), from.integer(), RecordingSchedule(plan.tick_length, from.every_s()), {}, {}};
     for (const proto::VariablePlace& place : from.place()) variable.places.push_back(place_of(place));
     for (std::uint32_t robot = share.first; robot < share.last; ++robot) {
       const std::uint32_t program = plan.program_of(robot);
       if (program == kNoProgram || plan.firmware(robot) != firmware) continue;
       for (int p = 0; p < from.place_size(); ++p) {
-        if (from.place(p).program() == program)
-          variable.readings.push_back({robot, static_cast<std::uint32_t>(p)});
+        if (from.place(p).program() == program) variable.readings.push_back({robot, static_cast<std::uint32_t>(p)});
       }
     }
     if (!variable.readings.empty()) variables_.push_back(std::move(variable));

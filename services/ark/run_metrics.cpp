@@ -87,7 +87,8 @@ void RunMetrics::advance(RunObserver& observer, const std::function<void(Tick, s
   }
   for (const std::string& octets : observations) {
     proto::Observations observed;
-    if (!observed.ParseFromString(octets)) throw RunError("a metrics sample holds observations that cannot be read");
+    if (!observed.ParseFromString(octets))
+      throw RunError("a metrics sample holds observations that cannot be read");
     observer.observed(observed);
   }
   for (const auto& [tick, values] : parts) KILOTWIN_DEMAND(hashes_.add(tick, values));

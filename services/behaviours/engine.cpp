@@ -589,9 +589,8 @@ bool BehavioursEngine::read(std::uint32_t robot, std::uint64_t offset, std::span
   if (presence_[i] != Presence::kNew && presence_[i] != Presence::kAlive) return false;
   const Program& program = programs_->program(plan_.program_of(robot));
   // A robot that has not run yet has the variables of its program's start.
-  const std::span<const std::uint8_t> data = presence_[i] == Presence::kNew
-                                                 ? std::span(program.slot(robot % kSlots).initial_data())
-                                                 : memory_[i].data();
+  const std::span<const std::uint8_t> data =
+      presence_[i] == Presence::kNew ? std::span(program.slot(robot % kSlots).initial_data()) : memory_[i].data();
   const std::uint64_t first = program.file.data.first;
   if (offset < first || offset - first > data.size() || to.size() > data.size() - (offset - first)) return false;
   std::memcpy(to.data(), data.data() + (offset - first), to.size());

@@ -60,7 +60,8 @@ std::optional<std::uint64_t> number_of(Dwarf_Die& die, unsigned attribute) {
 std::optional<Dwarf_Die> type_of(Dwarf_Die& die) {
   Dwarf_Attribute attribute;
   Dwarf_Die type, peeled;
-  if (dwarf_attr_integrate(&die, DW_AT_type, &attribute) == nullptr || dwarf_formref_die(&attribute, &type) == nullptr)
+  if (dwarf_attr_integrate(&die, DW_AT_type, &attribute) == nullptr ||
+      dwarf_formref_die(&attribute, &type) == nullptr)
     return std::nullopt;
   if (dwarf_peel_type(&type, &peeled) != 0) return std::nullopt;
   return peeled;
@@ -283,17 +284,17 @@ class Resolver {
     const std::uint64_t encoding = tag == DW_TAG_base_type ? number_of(type, DW_AT_encoding).value_or(0) : 0;
     ScalarVariable scalar = at_;
     const bool is_float = encoding == DW_ATE_float;
-    scalar.kind = is_float ? ScalarVariable::Kind::kFloat
-                  : encoding == DW_ATE_signed || encoding == DW_ATE_signed_char
-                      ? ScalarVariable::Kind::kSigned
-                      : ScalarVariable::Kind::kUnsigned;
+    scalar.kind = is_float                                                      ? ScalarVariable::Kind::kFloat
+                  : encoding == DW_ATE_signed || encoding == DW_ATE_signed_char ? ScalarVariable::Kind::kSigned
+                                                                                : ScalarVariable::Kind::kUnsigned;
     const std::uint64_t octets =
         scalar.bits == 0 ? size_of(type) : (scalar.bit_offset + std::uint64_t{scalar.bits} + 7) / 8;
     const bool known = tag == DW_TAG_enumeration_type || (encoding != 0 && encoding != DW_ATE_complex_float);
     if (!known || octets == 0 || octets > 8 || (is_float && octets != 4 && octets != 8))
       refuse("is of a type that cannot be recorded");
     scalar.octets = static_cast<std::uint32_t>(octets);
-    if (scalars_.size() == kMostScalars) refuse(fmt::format("has more than {} values; name some of them", kMostScalars));
+    if (scalars_.size() == kMostScalars)
+      refuse(fmt::format("has more than {} values; name some of them", kMostScalars));
     scalars_.push_back(std::move(scalar));
   }
 
@@ -305,7 +306,8 @@ class Resolver {
 /// Those that count: of the program before the runtime's, outside functions before those within.
 std::vector<Found> preferred(std::vector<Found> all) {
   const auto keep = [&](auto condition) {
-    if (std::any_of(all.begin(), all.end(), condition)) std::erase_if(all, [&](const Found& f) { return !condition(f); });
+    if (std::any_of(all.begin(), all.end(), condition))
+      std::erase_if(all, [&](const Found& f) { return !condition(f); });
   };
   keep([](const Found& f) { return !f.is_runtime; });
   keep([](const Found& f) { return f.address.has_value(); });
@@ -334,15 +336,16 @@ std::vector<ScalarVariable> find_variable(const std::string& elf, const Variable
   if (found.empty()) return {};
   if (!found.front().address) {
     throw UserError(fmt::format(
-        "the compiler keeps {} nowhere, because nothing reads it; declare it volatile, or use its value", path.name));
+        "the compiler keeps {} nowhere, because nothing reads it; declare it volatile, or use its value",
+        path.name));
   }
   for (const Found& other : found) {
     if (other.address == found.front().address) continue;
-    throw UserError(
-        other.function.empty()
-            ? fmt::format("two files have a static variable {}; give one another name", path.name)
-            : fmt::format("the functions {} and {} have a static variable {}; write {}::{}", found.front().function,
-                          other.function, path.name, other.function, path.name));
+    throw UserError(other.function.empty()
+                        ? fmt::format("two files have a static variable {}; give one another name", path.name)
+                        : fmt::format("the functions {} and {} have a static variable {}; write {}::{}",
+                                      found.front().function, other.function, path.name, other.function,
+                                      path.name));
   }
   const auto type = type_of(found.front().die);
   if (!type) throw UserError(path.name + " has no type in the debug information");

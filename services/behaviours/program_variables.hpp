@@ -13,9 +13,9 @@ namespace kilotwin::behaviours {
 /// Where a value lies in the program's memory.
 struct ScalarVariable {
   enum class Kind : std::uint8_t { kSigned, kUnsigned, kFloat };
-  std::string name;           ///< with fields and indices: "table[3].x"
-  std::uint64_t address = 0;  ///< with a pointer: relative to what it points to
-  std::uint64_t pointer = 0;  ///< address of the pointer
+  std::string name;                              ///< with fields and indices: "table[3].x"
+  std::uint64_t address = 0;                     ///< with a pointer: relative to what it points to
+  std::uint64_t pointer = 0;                     ///< address of the pointer
   std::uint32_t octets = 0, pointer_octets = 0;  ///< pointer_octets: 0 without a pointer
   std::uint32_t bit_offset = 0, bits = 0;        ///< of a bit field; bits: 0 where it is none
   Kind kind = Kind::kSigned;

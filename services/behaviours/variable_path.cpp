@@ -61,9 +61,10 @@ class Parser {
   }
 
   [[noreturn]] void refuse(std::string_view what) const {
-    throw UserError(fmt::format("\"{}\", character {}: {}; write a variable as hops, state.mode, table[3], mydata->x "
-                                "or loop::count",
-                                text_, text_.size() - rest_.size() + 1, what));
+    throw UserError(
+        fmt::format("\"{}\", character {}: {}; write a variable as hops, state.mode, table[3], mydata->x "
+                    "or loop::count",
+                    text_, text_.size() - rest_.size() + 1, what));
   }
 
   const std::string_view text_;

@@ -36,7 +36,8 @@ RadioObserver::RadioObserver(const RunPlan& plan, RadioEngine& engine)
 }
 
 void RadioObserver::at(Tick now, proto::Observations& to) const {
-  if (sampler_.any() && engine_.firmware() != nullptr) sampler_.sample(now, FirmwareMemory(*engine_.firmware()), to);
+  if (sampler_.any() && engine_.firmware() != nullptr)
+    sampler_.sample(now, FirmwareMemory(*engine_.firmware()), to);
 }
 
 void RadioObserver::stepped(Tick from, proto::Observations& to) const {

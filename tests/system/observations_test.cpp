@@ -48,7 +48,8 @@ recording {
   variable { name: "state" every_s: 1 }
   event: LED event: MOTION event: STATE event: SENT event: RECEIVED
 }
-observable { name: "red" value: "share(led == red)" }
+observable { name: "red" value: "share(led == red)"
+}
 observable { name: "score" value: "mean(scores[2])" }
 observable { name: "late" value: "quantile(beats, 0.5, robot > 3)" }
 )";
@@ -107,7 +108,8 @@ TEST_F(Observations, VariablesHaveTheirValues) {
   const Table table = table_of(exported("run", "--variables"));
   ASSERT_EQ(table.size(), 9u * 11) << "0, 0.5 ... 5 s, which is tick 153, the last one";
   for (const auto& row : table) {
-    const int robot = std::stoi(row.at("robot")), tick = static_cast<int>(std::stod(row.at("time_s")) / 0.032768 + 0.5);
+    const int robot = std::stoi(row.at("robot")),
+              tick = static_cast<int>(std::stod(row.at("time_s")) / 0.032768 + 0.5);
     // A robot starts its program in its first tick, and loops once in each one after.
     EXPECT_NEAR(std::stoi(row.at("beats")), std::max(0, tick), 2) << tick;
     if (row.at("scores[0]").empty() || tick == 0) continue;
@@ -165,9 +167,10 @@ TEST_F(Observations, ObservablesAreInSummarySweepAndTable) {
   ASSERT_EQ(summary.observables.size(), 3u);
   EXPECT_EQ(summary.observables[1].first, "score");
   EXPECT_EQ(summary.observables[1].second, 4 * 10 - 3) << "mean of uid 0..8";
-  const Outcome sweep = kilotwin({"sweep", scratch_ / "observed.txtpb", "--seeds", "1..3", "--set",
-                                  "robots.layout.grid.pitch_mm=50..60:5", "--plot", "score", "--out", scratch_ / "sweep"},
-                                 scratch_);
+  const Outcome sweep =
+      kilotwin({"sweep", scratch_ / "observed.txtpb", "--seeds", "1..3", "--set",
+                "robots.layout.grid.pitch_mm=50..60:5", "--plot", "score", "--out", scratch_ / "sweep"},
+               scratch_);
   ASSERT_EQ(sweep.status, 0) << sweep.err;
   const Table runs = table_of(read(scratch_.path() / "sweep/runs.csv"));
   ASSERT_EQ(runs.size(), 9u);
@@ -204,8 +207,8 @@ TEST_F(Observations, AnInterruptedSweepGoesOn) {
 
 TEST_F(Observations, FailuresSayWhoWhenAndWhere) {
   for (const char* mode : {"local", "federated"}) {
-    const Outcome outcome = kilotwin({"run", scratch_ / "plain.txtpb", "--mode", mode, "--define", "FAULT", "--strict",
-                                      "--quiet", "--out", scratch_ / mode},
+    const Outcome outcome = kilotwin({"run", scratch_ / "plain.txtpb", "--mode", mode, "--define", "FAULT",
+                                      "--strict", "--quiet", "--out", scratch_ / mode},
                                      scratch_);
     EXPECT_EQ(outcome.status, 1) << outcome.err;
     EXPECT_NE(outcome.err.find("1 of 9 robots failed"), std::string::npos) << outcome.err;
@@ -239,8 +242,9 @@ TEST_F(Observations, MistakesAreNamedWithTheirPlace) {
 
 TEST_F(Observations, FirmwareRobotsHaveVariablesToo) {
   write(scratch_.path() / "avr.txtpb",
-        std::string(kExperiment) + "robots { count: 2 avr: true behaviour: \"observed.c\" first_uid: 20 layout { x_mm: 200 "
-                                   "y_mm: 200 grid { pitch_mm: 50 } } }" +
+        std::string(kExperiment) +
+            "robots { count: 2 avr: true behaviour: \"observed.c\" first_uid: 20 layout { x_mm: 200 "
+            "y_mm: 200 grid { pitch_mm: 50 } } }" +
             kRecording);
   run({scratch_ / "avr.txtpb", "--mode", "local"}, scratch_, "avr");
   int seen = 0;

@@ -29,7 +29,8 @@ TEST(SweepPoints, RangesHaveStepsListsAndLogarithms) {
   EXPECT_EQ(values("log:0.01..10:4"), (Texts{"0.01", "0.1", "1", "10"}));
   EXPECT_EQ(values("7,1..2,0.5,true"), (Texts{"7", "1", "2", "0.5", "true"}));
   EXPECT_EQ(values("\"a..b\""), (Texts{"\"a..b\""})) << "text is text";
-  for (const char* wrong : {"0.1..1", "0..1:0", "0..1:-1", "log:1..10", "log:1..10:1", "log:1..10:2.5", "0..1e9:0.001"})
+  for (const char* wrong :
+       {"0.1..1", "0..1:0", "0..1:-1", "log:1..10", "log:1..10:1", "log:1..10:2.5", "0..1e9:0.001"})
     EXPECT_THROW(static_cast<void>(values(wrong)), UserError) << wrong;
 }
 
@@ -66,8 +67,7 @@ TEST(SweepPoints, AnyTextIsReadOrRefused) {
     for (const bool latin : {false, true}) {
       try {
         read += !(latin ? latin_points({text}, 3, 1) : sweep_points({text})).empty();
-      } catch (const UserError&) {
-      }
+      } catch (const UserError&) {}
     }
   }
   EXPECT_GT(read, 1000);

@@ -25,13 +25,14 @@ class Swarm {
   [[nodiscard]] Expression parse(const std::string& text) const {
     return Expression::parse(text, [this](const std::string& name) {
       const auto found = columns.find(name);
-      return found == columns.end()           ? NameKind::kUnknown
+      return found == columns.end()      ? NameKind::kUnknown
              : found->second.size() == 1 ? NameKind::kSingle
                                          : NameKind::kPerRobot;
     });
   }
   [[nodiscard]] double operator()(const std::string& text) const {
-    return parse(text).value(5, [this](const std::string& name) -> const std::vector<double>& { return columns.at(name); });
+    return parse(text).value(
+        5, [this](const std::string& name) -> const std::vector<double>& { return columns.at(name); });
   }
 };
 
@@ -132,9 +133,10 @@ TEST(Expression, RandomExpressionsHaveTheirValue) {
 
 TEST(Expression, AnyTextIsReadOrRefused) {
   const Swarm swarm;
-  const std::vector<std::string> tokens{"mean", "(", ")", "hops", ",", "group", "==", "1", ".5", "share", "-", "^", "and",
-                                        "not", "quantile", "x_mm", "time_s", " ", "/", "0", "table[1].x", "[", "or", "\xff",
-                                        "1e999", "<", "red", "sqrt", "1e", "->", "::"};
+  const std::vector<std::string> tokens{"mean",   "(",     ")",   "hops", ",",          "group", "==",       "1",
+                                        ".5",     "share", "-",   "^",    "and",        "not",   "quantile", "x_mm",
+                                        "time_s", " ",     "/",   "0",    "table[1].x", "[",     "or",       "\xff",
+                                        "1e999",  "<",     "red", "sqrt", "1e",         "->",    "::"};
   std::mt19937_64 random(5);
   int read = 0;
   for (int i = 0; i < 50'000; ++i) {
@@ -143,8 +145,7 @@ TEST(Expression, AnyTextIsReadOrRefused) {
     try {
       static_cast<void>(swarm(text));
       ++read;
-    } catch (const UserError&) {
-    }
+    } catch (const UserError&) {}
   }
   EXPECT_GT(read, 300) << "the grammar is reached";
 }

@@ -99,16 +99,19 @@ TEST(ProgramVariables, NamesAreThoseOfTheProgramItself) {
   const auto names = variable_names(native());
   EXPECT_NE(std::find(names.begin(), names.end(), "hops"), names.end());
   EXPECT_NE(std::find(names.begin(), names.end(), "loop::count"), names.end());
-  EXPECT_EQ(std::find(names.begin(), names.end(), "kilo_ticks"), names.end()) << "that of the runtime is not listed";
+  EXPECT_EQ(std::find(names.begin(), names.end(), "kilo_ticks"), names.end())
+      << "that of the runtime is not listed";
   EXPECT_EQ(find(native(), "kilo_ticks").size(), 1u) << "but can be recorded";
 }
 
 TEST(ProgramVariables, WhatTheCompilerDropsIsSaid) {
   const Folder folder;
-  const auto file = compile({folder.write("program.c", program("static int unread; void loop() { ++unread; }"))}, cached()).file;
+  const auto file =
+      compile({folder.write("program.c", program("static int unread; void loop() { ++unread; }"))}, cached()).file;
   const std::string elf = os::read_file(file);
   const std::string why = refusal(elf, "unread");
-  EXPECT_TRUE(why.find("volatile") != std::string::npos || (why == "none" && find(elf, "unread").size() == 1)) << why;
+  EXPECT_TRUE(why.find("volatile") != std::string::npos || (why == "none" && find(elf, "unread").size() == 1))
+      << why;
 }
 
 /// Damaged files give an error or a result, and no crash.
@@ -118,9 +121,11 @@ TEST(ProgramVariables, DamagedFilesAreSurvived) {
   for (int i = 0; i < 300; ++i) {
     std::string damaged = whole;
     const std::size_t from = random() % damaged.size();
-    for (std::size_t k = 0; k < 64 && from + k < damaged.size(); ++k) damaged[from + k] = static_cast<char>(random());
+    for (std::size_t k = 0; k < 64 && from + k < damaged.size(); ++k)
+      damaged[from + k] = static_cast<char>(random());
     if (i % 7 == 0) damaged.resize(random() % damaged.size());
-    for (const char* path : {"state", "table[1][2]", "nearest->distance", "loop::count"}) static_cast<void>(refusal(damaged, path));
+    for (const char* path : {"state", "table[1][2]", "nearest->distance", "loop::count"})
+      static_cast<void>(refusal(damaged, path));
     static_cast<void>(variable_names(damaged));
   }
 }
@@ -132,7 +137,8 @@ TEST(VariablePath, ReadsWhatItWrites) {
   ASSERT_EQ(path.steps.size(), 2u);
   EXPECT_EQ(path.steps[0].index, 3u);
   EXPECT_EQ(path.steps[1].field, "x");
-  for (const char* wrong : {"", "3x", "a.", "a[", "a[]", "a[x]", "a[1", "a->", "a::", "a b", "a[99999999999999999999]"})
+  for (const char* wrong :
+       {"", "3x", "a.", "a[", "a[]", "a[x]", "a[1", "a->", "a::", "a b", "a[99999999999999999999]"})
     EXPECT_THROW(static_cast<void>(VariablePath::parse(wrong)), UserError) << wrong;
 }
 
@@ -146,8 +152,7 @@ TEST(VariablePath, AnyTextIsReadOrRefused) {
     try {
       static_cast<void>(VariablePath::parse(text));
       ++read;
-    } catch (const UserError&) {
-    }
+    } catch (const UserError&) {}
   }
   EXPECT_GT(read, 100);
 }
