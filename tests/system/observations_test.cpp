@@ -40,7 +40,7 @@ arena { width_mm: 600 height_mm: 600 }
 robots { count: 9 behaviour: "observed.c" layout { grid { pitch_mm: 50 } } }
 )";
 
-constexpr const char* kRecording = R"(
+constexpr const char* kRecording = R"text(
 recording {
   every_s: 1
   variable { name: "beats" every_s: 0.5 }
@@ -48,21 +48,20 @@ recording {
   variable { name: "state" every_s: 1 }
   event: LED event: MOTION event: STATE event: SENT event: RECEIVED
 }
-observable { name: "red" value: "share(led == red)"
-}
+observable { name: "red" value: "share(led == red)" }
 observable { name: "score" value: "mean(scores[2])" }
 observable { name: "late" value: "quantile(beats, 0.5, robot > 3)" }
-)";
+)text";
 
 using Table = std::vector<std::map<std::string, std::string>>;
 
 Table table_of(const std::string& csv) {
   std::istringstream in(csv);
   const auto cells = [](const std::string& line) {
-    std::vector<std::string> cells;
+    std::vector<std::string> row;
     std::istringstream parts(line);
-    for (std::string cell; std::getline(parts, cell, ',');) cells.push_back(cell);
-    return cells;
+    for (std::string cell; std::getline(parts, cell, ',');) row.push_back(cell);
+    return row;
   };
   std::string line;
   std::getline(in, line);
@@ -129,7 +128,9 @@ TEST_F(Observations, EventsAgreeWithCountsAndLayout) {
     ++count[row.at("event")];
     EXPECT_GE(std::stod(row.at("time_s")), last);
     last = std::stod(row.at("time_s"));
-    if (row.at("event") == "received") EXPECT_GT(std::stod(row.at("distance_mm")), 30);
+    if (row.at("event") == "received") {
+      EXPECT_GT(std::stod(row.at("distance_mm")), 30);
+    }
   }
   EXPECT_EQ(count["sent"], summary.messages.sent);
   EXPECT_EQ(count["received"], summary.messages.received);
