@@ -75,14 +75,14 @@ try {
     if (channel.topic === "/robots") {
       const time = tickOf(number) * TICK_S;
       assert.equal(message.logTime, BigInt(Math.round(time * 1e9)));
-      assert.equal(value.data.length, ROBOTS * value.pointStride);
+      assert.equal(value.data.length, ROBOTS * value.point_stride);
       const at = new DataView(value.data.buffer, value.data.byteOffset, value.data.byteLength);
       for (let i = 0; i < ROBOTS; ++i) {
         const place = circling(i, time);
-        assert.ok(Math.abs(at.getFloat32(i * value.pointStride, true) - place.x) < 1e-6);
-        assert.ok(Math.abs(at.getFloat32(i * value.pointStride + 4, true) - place.y) < 1e-6);
+        assert.ok(Math.abs(at.getFloat32(i * value.point_stride, true) - place.x) < 1e-6);
+        assert.ok(Math.abs(at.getFloat32(i * value.point_stride + 4, true) - place.y) < 1e-6);
         const led = (i + Math.floor(number / 8)) % 64;
-        if (led !== 0) assert.equal(at.getUint8(i * value.pointStride + 12), 85 * (led & 3));
+        if (led !== 0) assert.equal(at.getUint8(i * value.point_stride + 12), 85 * (led & 3));
       }
       ++number;
     } else if (channel.topic === "/poses") {
@@ -96,7 +96,7 @@ try {
       assert.deepEqual(value.entities.map((entity) => entity.id), ["arena", "obstacles"]);
       assert.deepEqual(value.entities[0].lines[0].points.map((point) => point.x), [-1, 1, 1, -1]);
     } else if (channel.topic === "/counters") {
-      assert.equal(value.robotsRunning, ROBOTS);
+      assert.equal(value.robots_running, ROBOTS);
     }
   }
   assert.deepEqual(counts, { "/scene": 1, "/robots": STATES, "/poses": STATES, "/counters": STATES, "/log": 1 });
