@@ -202,7 +202,8 @@ TEST_F(Endings, AKilledServiceIsReportedInOneLine) {
     EXPECT_TRUE(process.says("killed", 3)) << "reported within 3 s";
     const Outcome outcome = process.wait(20);
     EXPECT_EQ(outcome.status, 1);
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 2)
+        << "the domain, then the end: " << outcome.err;
     EXPECT_NE(outcome.err.find(victim == "comm" ? "radio" : victim), std::string::npos) << outcome.err;
     EXPECT_NE(outcome.err.find("killed"), std::string::npos) << outcome.err;
     expect_nothing_left();

@@ -29,7 +29,7 @@ TEST(Printing, IsTheSameInOneProcessAndInMany) {
   write(
       scratch.path() / "talk.c",
       "#define DEBUG\n#include <kilolib.h>\n#include <debug.h>\n"
-      "static message_t m; static message_t* tx(void) { return &m; }\n"
+      "static message_t m; static message_t* tx(void) { m.crc = message_crc(&m); return &m; }\n"
       "static void rx(message_t* r, distance_measurement_t* d) { printf(\"heard %u\\n\", estimate_distance(d)); }\n"
       "static void setup(void) { printf(\"robot %u\\n\", kilo_uid); }\n"
       "static void loop(void) { if (kilo_ticks % 30 == 0) fprintf(stderr, \"at %lu\\n\", (unsigned "

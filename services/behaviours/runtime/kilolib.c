@@ -115,7 +115,8 @@ static void spend(uint64_t cycles) {
   }
   robot.debt_cycles += cycles;
   if (robot.in_interrupt) {
-    block(cycles);
+    /* A reading is over before the next message can have begun: only longer waits lose messages. */
+    if (cycles >= PACKET_CYCLES / 4) block(cycles);
     return;
   }
   while (robot.debt_cycles >= robot.tick_cycles) {

@@ -44,9 +44,10 @@ std::vector<std::int32_t> values(Swarm& swarm) {
 
 TEST(RobotSenses, ReadTheLightWhereTheRobotIs) {
   // Robots stand 40 mm apart along x, looking along it: a lamp high above the third.
-  Swarm swarm({reporting("static void loop(void) { value = get_ambientlight(); }")}, 6, 2,
-              "light { ambient: 100 source { x_mm: 80 height_mm: 130 intensity: 5 } sensor { gain_sd: 0 "
-              "noise_floor: 0 noise_relative: 0 } }");
+  Swarm swarm(
+      {reporting("static void loop(void) { value = get_ambientlight(); }")}, 6, 2,
+      "light { ambient: 100 source { x_mm: 80 height_mm: 130 intensity: 5 } sensor { cosine: false gain_sd: 0 "
+      "noise_floor: 0 noise_relative: 0 } }");
   swarm.start();
   const auto read = values(swarm);
   for (int i = 0; i < 6; ++i) {
@@ -68,7 +69,7 @@ TEST(RobotSenses, ReadingsAreNormalWithTheStatedSpreadAndEndAt1023) {
       << "variance, rounding included";
   EXPECT_NEAR(reported % 1000 - 500, 0, 4 * 100 * 20 / std::sqrt(20000.0)) << "mean, hundredths";
   Swarm bright({reporting("static void loop(void) { value = get_ambientlight(); }")}, 1, 1,
-               "light { source { height_mm: 31 } }");
+               "light { source { height_mm: 31 } sensor { cosine: false } }");
   bright.start();
   EXPECT_EQ(values(bright)[0], 1023);
 }
