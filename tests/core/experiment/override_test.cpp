@@ -53,7 +53,7 @@ TEST_F(Override, MistakesNameTheArgumentAndTheChoices) {
        "motion, "
        "robot_model, physics, radio, station, recording, deployment, movable, obstacle, light, battery, "
        "temperature, "
-       "effect, field, run_number, door, tracker, tracking, observable, observable"},
+       "effect, field, run_number, door, tracker, tracking, observable"},
       {"seed", "--set seed: there is no value; write FIELD=VALUE, for instance arena.width_mm=1000"},
       {"seed=x", "--set seed=x: seed cannot be x; it takes a whole number"},
       {"seed=", "--set seed=: seed cannot be empty; it takes a whole number"},
