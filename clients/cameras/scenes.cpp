@@ -1,12 +1,5 @@
 #include "clients/cameras/scenes.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-
-#include "core/base/error.hpp"
-
 namespace kilotwin::cameras {
 
 Scene scene_of(const observe::SwarmAt& now, const observe::SwarmAt* earlier) {
@@ -31,51 +24,26 @@ Scene scene_of(const observe::SwarmAt& now, const observe::SwarmAt* earlier) {
   return scene;
 }
 
-RecordedScenes::RecordedScenes(const std::filesystem::path& recording) : reader_(recording) {
-  const proto::StateRecord* const first = reader_.next_state();
-  if (first == nullptr) throw UserError(fmt::format("{}: holds no state; record one first", recording.string()));
-  before_ = after_ = *first;
-  first_s_ = seconds_of(before_);
-}
-
-double RecordedScenes::seconds_of(const proto::StateRecord& state) const {
-  return reader_.tick_length().seconds_at(Tick{state.tick()});
-}
-
 std::optional<Scene> RecordedScenes::at(double time_s) {
-  // A frame at the very time of a state must find it, though both times were rounded.
-  constexpr double kSlack_s = 1e-9;
-  while (seconds_of(after_) + kSlack_s < time_s) {
-    const proto::StateRecord* const next = reader_.next_state();
-    if (next == nullptr) return std::nullopt;
-    before_ = std::move(after_);
-    after_ = *next;
-  }
-  const double passed_s = seconds_of(after_) - seconds_of(before_);
-  const double share = passed_s > 0 ? std::clamp((time_s - seconds_of(before_)) / passed_s, 0.0, 1.0) : 0;
-  const proto::StateRecord& of_led = share < 1 ? before_ : after_;
+  const std::optional<recorder::Snapshot> now = states_.at(time_s);
+  if (!now) return std::nullopt;
+  const recorder::Snapshot &before = states_.before(), &after = states_.after();
+  const double passed_s = after.time_s - before.time_s;
   Scene scene;
-  for (int robot = 0; robot < before_.x_mm_size(); ++robot) {
-    const double dx_mm = after_.x_mm(robot) - before_.x_mm(robot), dy_mm = after_.y_mm(robot) - before_.y_mm(robot);
-    const double turn_rad = wrapped(after_.heading_rad(robot) - before_.heading_rad(robot));
+  for (std::size_t robot = 0; robot < now->x_mm.size(); ++robot) {
     RobotView view;
     view.robot = static_cast<std::uint32_t>(robot);
-    view.pose = {before_.x_mm(robot) + share * dx_mm, before_.y_mm(robot) + share * dy_mm,
-                 wrapped(before_.heading_rad(robot) + share * turn_rad)};
-    view.led = static_cast<std::uint8_t>(of_led.led()[static_cast<std::size_t>(robot)]);
+    view.pose = {now->x_mm[robot], now->y_mm[robot], now->heading_rad[robot]};
+    view.led = now->led[robot];
     if (passed_s > 0) {
-      view.vx_mm_s = dx_mm / passed_s;
-      view.vy_mm_s = dy_mm / passed_s;
-      view.turn_rad_s = turn_rad / passed_s;
+      view.vx_mm_s = (after.x_mm[robot] - before.x_mm[robot]) / passed_s;
+      view.vy_mm_s = (after.y_mm[robot] - before.y_mm[robot]) / passed_s;
+      view.turn_rad_s = wrapped(after.heading_rad[robot] - before.heading_rad[robot]) / passed_s;
     }
     scene.robots.push_back(view);
   }
-  for (int body = 0; body < before_.movable_x_mm_size(); ++body) {
-    const double turn_rad = wrapped(after_.movable_heading_rad(body) - before_.movable_heading_rad(body));
-    scene.movables.push_back({std::lerp(before_.movable_x_mm(body), after_.movable_x_mm(body), share),
-                              std::lerp(before_.movable_y_mm(body), after_.movable_y_mm(body), share),
-                              before_.movable_heading_rad(body) + share * turn_rad});
-  }
+  for (std::size_t body = 0; body < now->movable_x_mm.size(); ++body)
+    scene.movables.push_back({now->movable_x_mm[body], now->movable_y_mm[body], now->movable_heading_rad[body]});
   return scene;
 }
 

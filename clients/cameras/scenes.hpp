@@ -6,32 +6,27 @@
 
 #include "clients/cameras/renderer.hpp"
 #include "clients/observe/observer.hpp"
-#include "clients/recorder/reader.hpp"
+#include "clients/recorder/timed_states.hpp"
 
 namespace kilotwin::cameras {
 
 /// The scene of a live run. `earlier`, if given, is the state before: motion is taken from the difference.
 [[nodiscard]] Scene scene_of(const observe::SwarmAt& now, const observe::SwarmAt* earlier);
 
-/// The recorded states of a run, in order of time. Between two states poses are interpolated along a straight line, headings along the
-/// shorter way; an LED keeps its colour until the next state.
+/// The recorded states of a run, in order of time; between two states as recorder::TimedStates interpolates.
 class RecordedScenes {
  public:
   /// Throws UserError where the recording has no state.
-  explicit RecordedScenes(const std::filesystem::path& recording);
+  explicit RecordedScenes(const std::filesystem::path& recording) : states_(recording) {}
 
-  [[nodiscard]] double first_s() const { return first_s_; }
+  [[nodiscard]] double first_s() const { return states_.first_s(); }
   /// The scene at a time, which must not be less than that of the call before; nothing after the last state.
   [[nodiscard]] std::optional<Scene> at(double time_s);
   /// The tick of the last recorded state at or before that time.
-  [[nodiscard]] std::int64_t tick() const { return before_.tick(); }
+  [[nodiscard]] std::int64_t tick() const { return states_.tick(); }
 
  private:
-  [[nodiscard]] double seconds_of(const proto::StateRecord& state) const;
-
-  recorder::Reader reader_;
-  proto::StateRecord before_, after_;
-  double first_s_ = 0;
+  recorder::TimedStates states_;
 };
 
 }  // namespace kilotwin::cameras

@@ -27,6 +27,7 @@ struct Command {
 [[nodiscard]] Command add_identify(CLI::App& program);
 [[nodiscard]] Command add_cameras(CLI::App& program);
 [[nodiscard]] Command add_track(CLI::App& program);
+[[nodiscard]] Command add_movie(CLI::App& program);
 [[nodiscard]] Command add_service(CLI::App& program, double started_s);
 [[nodiscard]] Command add_ros2(CLI::App& program);
 [[nodiscard]] Command add_play(CLI::App& program);
@@ -34,6 +35,7 @@ struct Command {
 [[nodiscard]] Command add_control(CLI::App& program);
 [[nodiscard]] Command add_config(CLI::App& program);
 [[nodiscard]] Command add_ohc(CLI::App& program);
+[[nodiscard]] Command add_debug(CLI::App& program);
 [[nodiscard]] Command add_doctor(CLI::App& program);
 
 }  // namespace kilotwin::cli

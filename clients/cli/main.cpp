@@ -28,7 +28,9 @@ int main(int argc, char** argv) {
                                add_ohc(program),
                                add_cameras(program),
                                add_track(program),
+                               add_movie(program),
                                add_view(program),
+                               add_debug(program),
                                add_doctor(program),
                                add_control(program)};
                      });

@@ -45,5 +45,7 @@ struct RunArguments {
 
 /// Adds the argument EXPERIMENT and the options that replace parts of the experiment, for `run`, `check` and `sweep`.
 void add_experiment_options(CLI::App& app, RunArguments& arguments);
+/// Adds --seed and --set, for `run` and `debug`.
+void add_change_options(CLI::App& app, RunArguments& arguments);
 
 }  // namespace kilotwin::cli

@@ -2,24 +2,20 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <csignal>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <thread>
 
 #include "clients/cli/commands.hpp"
 #include "clients/cli/launcher.hpp"
+#include "clients/cli/local_worker.hpp"
 #include "clients/cli/other_program.hpp"
 #include "clients/cli/prepare.hpp"
-#include "clients/cli/progress.hpp"
 #include "clients/cli/recovery.hpp"
 #include "clients/cli/run_arguments.hpp"
-#include "clients/cli/run_recorder.hpp"
 #include "clients/cli/shell_words.hpp"
 #include "clients/cli/worker.hpp"
-#include "clients/local/local_run.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/dds/dds.hpp"
@@ -50,33 +46,6 @@ std::string prepared_text(const RunPlan& plan, const recorder::RunDirectory& dir
   for (const std::string& word : monitor_words(monitor)) text += " " + shell_word(word);
   text += "\n";
   return text;
-}
-
-void run_in_this_process(const RunPlan& plan, const recorder::RunDirectory& directory, std::uint32_t threads,
-                         bool quiet, double started_s) {
-  local::LocalOptions options;
-  options.threads = threads;
-  options.run_directory = directory.path();
-  Beginning beginning = beginning_of(plan, directory);
-  options.resumed = std::move(beginning.resumed);
-  options.inputs = std::move(beginning.inputs);
-  options.tracker_samples = [stamped = std::move(beginning.tracker_samples),
-                             next = std::size_t{0}](Tick tick) mutable {
-    std::vector<TrackerSample> samples;
-    for (; next < stamped.size() && stamped[next].first <= tick; ++next) samples.push_back(stamped[next].second);
-    return samples;
-  };
-  const auto programs = behaviours::ProgramSet::load(plan, directory.path());
-  ProgressBar progress(plan, !quiet);
-  RunRecorder run_recorder(plan, directory, options.resumed, [&](const RunProgress& now) { progress.show(now); });
-  const RunTotals totals = local::run(plan, programs, options, run_recorder);
-  progress.clear();
-  const double first_tick_s =
-      std::chrono::duration<double>(run_recorder.first_tick_at().time_since_epoch()).count();
-  run_recorder.finish(totals, first_tick_s - started_s);
-  if (!totals.failure.empty()) {
-    throw RunError(fmt::format("{}; what was recorded so far is in {}", totals.failure, directory.path().string()));
-  }
 }
 
 /// Returns in two processes: nothing in the worker, which has done the run; the exit status in the process that waited for it.
@@ -201,19 +170,6 @@ int run(const RunOptions& arguments, double started_s) {
   return kDone;
 }
 
-/// Checks a seed: decimal, leading zeros allowed. Refuses a number beyond 64 bits, because truncation would make another seed of it.
-std::string decimal_seed(std::string& text) {
-  std::uint64_t seed = 0;
-  const char* const last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, seed);
-  if (error != std::errc() || end != last) {
-    return fmt::format("\"{}\" is no seed; give a whole number, 0..{}", text,
-                       std::numeric_limits<std::uint64_t>::max());
-  }
-  text = std::to_string(seed);
-  return {};
-}
-
 }  // namespace
 
 Command add_run(CLI::App& program, double started_s) {
@@ -232,13 +188,7 @@ Command add_run(CLI::App& program, double started_s) {
       ->check(CLI::Range(1, 256).description(""))
       ->capture_default_str()
       ->type_name("N");
-  app.add_option("--seed", arguments->seed, "seed of all random numbers")
-      ->transform(CLI::Validator(decimal_seed, ""))
-      ->type_name("N");
-  app.add_option("--set", arguments->set,
-                 "sets a field of the experiment, for example robots[0].layout.grid.pitch_mm=33")
-      ->allow_extra_args(false)
-      ->type_name("FIELD=VALUE");
+  add_change_options(app, *arguments);
   app.add_option("--pace", arguments->pace, "max, or simulated time over wall time: 1 is real time")
       ->capture_default_str()
       ->type_name("FACTOR");

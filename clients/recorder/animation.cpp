@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/recorder/discs.hpp"
 #include "clients/recorder/ground.hpp"
 #include "clients/recorder/svg.hpp"
 #include "clients/recorder/view.hpp"
@@ -16,7 +17,7 @@ namespace kilotwin::recorder {
 namespace {
 
 constexpr double kMargin_px = 28, kTitle_px = 56, kFoot_px = 64, kWidth_px = 720, kMostHeight_px = 640;
-constexpr std::string_view kFailedRim = "#d0021b", kMarker = "#2563a8";
+constexpr std::string_view kMarker = "#2563a8";
 
 /// Pauses and continues by click and space bar; starts paused where the system asks for reduced motion.
 constexpr std::string_view kScript = R"(<script>

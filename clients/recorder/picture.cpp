@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "clients/recorder/discs.hpp"
 #include "clients/recorder/ground.hpp"
 #include "clients/recorder/svg.hpp"
 #include "clients/recorder/view.hpp"
@@ -20,38 +21,10 @@ namespace {
 
 constexpr double kMargin_px = 28, kGap_px = 26, kTitle_px = 56, kPanelTitle_px = 26, kPanelFoot_px = 48;
 
-constexpr std::string_view kFailedRim = "#d0021b", kStartDot = "#b4bcc6";
+constexpr std::string_view kStartDot = "#b4bcc6";
 /// Colours of paths and ends by the robot's x at the start, from left to right.
 constexpr std::array<std::string_view, 6> kByStart = {"#2b4c9b", "#2387b5", "#2aa58a",
                                                       "#d9a21b", "#e0702a", "#b8336a"};
-
-/// Robots as discs in their LED's colour with a tick towards the heading; failed robots have a red rim. A disc is a line of
-/// length 0 with round caps, as thick as the disc: ten bytes.
-std::string draw_discs(const Snapshot& at, const View& view) {
-  std::map<std::uint8_t, std::string> by_led;
-  std::string rims, failed_rims, ticks;
-  const double disc = disc_units(view), rim = std::clamp(disc * 0.09, 1.5, 18.0), tick = disc * 0.5;
-  for (std::size_t i = 0; i < at.x_mm.size(); ++i) {
-    const long x = view.x(at.x_mm[i]), y = view.y(at.y_mm[i]);
-    put(failed(at, i) ? failed_rims : rims, "M{} {}h1", x, y);
-    put(by_led[at.led[i] & 63], "M{} {}h1", x, y);
-    put(ticks, "M{} {}l{} {}", x, y, std::lround(tick * std::cos(at.heading_rad[i])),
-        -std::lround(tick * std::sin(at.heading_rad[i])));
-  }
-  std::string out = "<g fill=\"none\" stroke-linecap=\"round\">\n";
-  put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", svg::kInk, disc, rims);
-  if (!failed_rims.empty()) {
-    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", kFailedRim,
-        disc + std::max(disc * 0.25, 26.0), failed_rims);
-  }
-  for (const auto& [led, discs] : by_led) {
-    put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" d=\"{}\"/>\n", svg::led_colour(led),
-        std::max(disc - 2 * rim, disc * 0.5), discs);
-  }
-  put(out, "<path stroke=\"{}\" stroke-width=\"{:.1f}\" stroke-linecap=\"butt\" d=\"{}\"/>\n</g>\n", svg::kInk,
-      std::clamp(disc * 0.1, 1.5, 24.0), ticks);
-  return out;
-}
 
 /// Paths of all robots. Colours follow x at the start, which makes mixing visible.
 std::string draw_paths(const Paths& paths, const View& view, const Box& start) {

@@ -118,7 +118,7 @@ Process::Process(const Command& command) : own_group_(command.own_group) {
     // Both descriptors are duplicated first, because output may be 2 and errors may be 1.
     const int errors = command.errors == STDOUT_FILENO && command.output != Command::kInherit ? dup(STDOUT_FILENO)
                                                                                               : command.errors;
-    connect(Command::kDiscard, STDIN_FILENO);
+    connect(command.input, STDIN_FILENO);
     connect(command.output, STDOUT_FILENO);
     connect(errors, STDERR_FILENO);
     execve(program.c_str(), arguments.data(), environment);

@@ -32,8 +32,8 @@ struct Command {
 
   std::vector<std::string> arguments;  ///< argv; arguments[0] is also the program's path unless `program` is given
   std::filesystem::path program;       ///< empty: arguments[0]
-  int output = kInherit,
-      errors = kInherit;  ///< descriptors for its standard output and error; its standard input is empty
+  int input = kDiscard;                ///< descriptor of its standard input; kDiscard: empty
+  int output = kInherit, errors = kInherit;  ///< descriptors for its standard output and error
   Environment environment = Environment::kInherit;
   /// Starts a process group. The terminal's Ctrl-C does not reach the group, and signal() reaches its descendants too.
   bool own_group = false;

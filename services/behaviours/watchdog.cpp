@@ -4,8 +4,12 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "core/base/say.hpp"
+#include "core/os/files.hpp"
 #include "core/os/interrupt.hpp"
 
 namespace kilotwin::behaviours {
@@ -15,6 +19,14 @@ constexpr auto kPeriod = std::chrono::milliseconds(1000);
 /// Periods after which a call is reported, and after which the process is aborted. The cycle counters return control within
 /// milliseconds, unless a program leaves the counted code, e.g. by a jump into the middle of an instruction.
 constexpr int kReportAfter = 2, kAbortAfter = 30;
+
+/// Whether a debugger holds this process: then a program that does not return may just have been stopped.
+bool traced() {
+  const std::optional<std::string> status = os::read_if_there("/proc/self/status");
+  constexpr std::string_view kTracer = "TracerPid:\t";
+  const std::size_t at = status ? status->find(kTracer) : std::string::npos;
+  return at != std::string::npos && status->substr(at + kTracer.size(), 2) != "0\n";
+}
 
 }  // namespace
 
@@ -46,6 +58,7 @@ void Watchdog::watch() {
       auto& [before, periods] = watched[i];
       periods = robot != BehavioursEngine::kNobody && entry == before ? periods + 1 : 0;
       before = entry;
+      if (periods >= kReportAfter && traced()) periods = 0;
       if (periods < kReportAfter) continue;
       if (periods == kReportAfter) say(fmt::format("the program of robot {} has not returned for over 1 s", robot));
       if (interrupted() != 0) {

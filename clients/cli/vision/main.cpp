@@ -1,5 +1,5 @@
-// The program `kilotwin-vision`, which `kilotwin cameras` and `kilotwin track` start. It is a program of its own so that the
-// simulator builds and runs without OpenCV.
+// The program `kilotwin-vision`, which `kilotwin cameras`, `kilotwin track` and `kilotwin movie` start. It is a program of its
+// own so that the simulator builds and runs without OpenCV and librsvg.
 
 #include <CLI/CLI.hpp>
 
@@ -9,6 +9,6 @@ int main(int argc, char** argv) {
   using namespace kilotwin::cli;
   return run_program(argc, argv, "Pictures of arenas: drawn and tracked. Start: kilotwin track SOURCE --out F.csv",
                      [](CLI::App& program) -> std::vector<Command> {
-                       return {add_cameras(program), add_track(program)};
+                       return {add_cameras(program), add_track(program), add_movie(program)};
                      });
 }
