@@ -16,6 +16,7 @@
 #include "clients/cli/run_arguments.hpp"
 #include "clients/cli/shell_words.hpp"
 #include "clients/cli/worker.hpp"
+#include "clients/recorder/summary.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/dds/dds.hpp"
