@@ -27,8 +27,10 @@ int become(const std::string& name, const std::string& command, const std::vecto
 }  // namespace
 
 std::filesystem::path program_beside(const std::string& name) {
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  const std::filesystem::path here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  const std::filesystem::path program = here / name, installed = here.parent_path() / "libexec/kilotwin" / name;
   if (std::filesystem::exists(program)) return program;
+  if (std::filesystem::exists(installed)) return installed;
   throw RunError(
       fmt::format("{} is not there; scripts/demo builds the simulator alone. Build the rest: scripts/setup && "
                   "cmake --preset release && cmake --build --preset release",

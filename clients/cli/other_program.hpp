@@ -8,7 +8,7 @@
 
 namespace kilotwin::cli {
 
-/// A program in the folder of this one. Throws RunError where it is not there.
+/// A program in the folder of this one, or installed in ../libexec/kilotwin. Throws RunError where it is not there.
 [[nodiscard]] std::filesystem::path program_beside(const std::string& name);
 
 /// Adds a command that starts `program` (from the folder of this one) with the same arguments, --help included. The work throws

@@ -52,7 +52,8 @@ PageFiles::PageFiles(const fs::path& directory) {
 
 PageFiles PageFiles::of_this_program() {
   const fs::path beside = fs::read_symlink("/proc/self/exe").parent_path();
-  for (const fs::path& directory : {beside / "page", beside.parent_path() / "share/kilotwin/page"}) {
+  for (const fs::path& directory : {beside / "page", beside.parent_path() / "share/kilotwin/page",
+                                    beside.parent_path().parent_path() / "share/kilotwin/page"}) {
     if (fs::exists(directory / "index.html")) return PageFiles(directory);
   }
   PageFiles page;

@@ -14,8 +14,8 @@ struct PageFile {
 
 class PageFiles {
  public:
-  /// The page beside the running program: in a build directory `page/`, installed `../share/kilotwin/page/`. Where it was not
-  /// built, one that says how to build it.
+  /// The page beside the running program: in a build directory `page/`, installed `share/kilotwin/page/` beside bin or libexec.
+  /// Where it was not built, one that says how to build it.
   [[nodiscard]] static PageFiles of_this_program();
   /// All files in a directory. Throws UserError where it has no index.html.
   explicit PageFiles(const std::filesystem::path& directory);
