@@ -24,6 +24,7 @@ struct Command {
 [[nodiscard]] Command add_sweep(CLI::App& program);
 [[nodiscard]] Command add_export(CLI::App& program);
 [[nodiscard]] Command add_replay(CLI::App& program);
+[[nodiscard]] Command add_import(CLI::App& program);
 [[nodiscard]] Command add_identify(CLI::App& program);
 [[nodiscard]] Command add_cameras(CLI::App& program);
 [[nodiscard]] Command add_track(CLI::App& program);

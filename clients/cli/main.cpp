@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
                                add_movie(program),
                                add_view(program),
                                add_debug(program),
+                               add_import(program),
                                add_doctor(program),
                                add_control(program)};
                      });

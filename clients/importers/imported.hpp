@@ -1,0 +1,35 @@
+/// Experiments of other simulators, as experiments of Kilotwin.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "idl/experiment.pb.h"
+
+namespace kilotwin::importers {
+
+/// A table of initial poses that the experiment names.
+struct PosesFile {
+  std::string name;  ///< beside the experiment file
+  std::string text;  ///< CSV: x_mm,y_mm,heading_deg
+};
+
+struct Imported {
+  proto::Experiment experiment;
+  std::vector<PosesFile> poses;
+  /// What was not taken over as it is, with its line: "12: <floor>: ...". In the order of the file.
+  std::vector<std::string> notes;
+};
+
+/// An .argos file of ARGoS' Kilobot plugin. `name`: the file, for errors. Throws UserError with the line of a syntax error, or if
+/// there is no robot.
+[[nodiscard]] Imported from_argos(std::string_view text, const std::string& name);
+
+/// Parameters of Kilombo, a JSON object. `name` as above. Throws UserError.
+[[nodiscard]] Imported from_kilombo(std::string_view text, const std::string& name);
+
+/// The experiment file: the notes as comments, then the fields.
+[[nodiscard]] std::string experiment_text(const Imported& imported, const std::string& source);
+
+}  // namespace kilotwin::importers

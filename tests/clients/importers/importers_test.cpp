@@ -1,0 +1,176 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "clients/importers/imported.hpp"
+#include "core/base/error.hpp"
+
+namespace kilotwin::importers {
+namespace {
+
+constexpr const char* kGather = R"(<argos-configuration>
+  <framework><system threads="4"/><experiment length="60" ticks_per_second="31" random_seed="7"/></framework>
+  <controllers>
+    <kilobot_controller id="walker" library="l">
+      <actuators>
+        <differential_steering implementation="default" bias_avg="0.000015" bias_stddev="0.00186"/>
+        <kilobot_communication implementation="default"/>
+      </actuators>
+      <sensors><kilobot_communication implementation="default" medium="ir" noise_std_dev="5"/></sensors>
+      <params behavior="build/behaviors/disperse"/>
+    </kilobot_controller>
+  </controllers>
+  <arena size="1.2,1.2,1" center="0,0,0.5">
+    <box id="north" size="1,0.01,0.1" movable="false"><body position="0,0.505,0" orientation="0,0,0"/></box>
+    <box id="south" size="1,0.01,0.1" movable="false"><body position="0,-0.505,0" orientation="0,0,0"/></box>
+    <box id="east" size="0.01,1,0.1" movable="false"><body position="0.505,0,0" orientation="0,0,0"/></box>
+    <box id="west" size="0.01,1,0.1" movable="false"><body position="-0.505,0,0" orientation="0,0,0"/></box>
+    <box id="load" size="0.1,0.1,0.03" movable="true" mass="0.018"><body position="0.3,0,0" orientation="90,0,0"/></box>
+    <cylinder id="post" radius="0.04" height="0.05" movable="false"><body position="-0.3,0.1,0"/></cylinder>
+    <light id="lamp" position="0,0,1" intensity="1"/>
+    <distribute>
+      <position method="uniform" min="-0.2,-0.1,0" max="0.2,0.3,0"/>
+      <orientation method="uniform" min="0,0,0" max="360,0,0"/>
+      <entity quantity="20"><kilobot id="kb" communication_range="0.1"><controller config="walker"/></kilobot></entity>
+    </distribute>
+    <kilobot id="kb_20" communication_range="0.1"><body position="-0.4,0.4,0" orientation="90,0,0"/><controller config="walker"/></kilobot>
+    <kilobot id="kb_21" colour="red"><body position="0.4,-0.4,0" orientation="0,0,0"/><controller config="walker"/></kilobot>
+  </arena>
+  <physics_engines><dynamics2d id="plane"/></physics_engines>
+  <media><kilobot_communication id="ir" message_drop_prob="0.25"/></media>
+  <warp factor="9"/>
+</argos-configuration>
+)";
+
+bool notes(const Imported& imported, const std::string& words) {
+  return std::any_of(imported.notes.begin(), imported.notes.end(),
+                     [&](const std::string& note) { return note.find(words) != std::string::npos; });
+}
+
+TEST(ArgosImport, TakesOverWhatHasACounterpart) {
+  const Imported imported = from_argos(kGather, "gather.argos");
+  const proto::Experiment& e = imported.experiment;
+  EXPECT_EQ(e.duration_s(), 60);
+  EXPECT_EQ(e.seed(), 7u);
+  // The space within the four walls, which are no obstacles.
+  EXPECT_NEAR(e.arena().width_mm(), 1000, 1e-6);
+  EXPECT_NEAR(e.arena().height_mm(), 1000, 1e-6);
+  ASSERT_EQ(e.obstacle_size(), 1);
+  EXPECT_DOUBLE_EQ(e.obstacle(0).cylinder().radius_mm(), 40);
+  EXPECT_DOUBLE_EQ(e.obstacle(0).x_mm(), -300);
+  ASSERT_EQ(e.movable_size(), 1);
+  EXPECT_DOUBLE_EQ(e.movable(0).mass_g(), 18);
+  EXPECT_DOUBLE_EQ(e.movable(0).heading_deg(), 90);
+  EXPECT_NEAR(e.motion().bias_mean_mm_s(), 0.015, 1e-9);
+  EXPECT_NEAR(e.motion().bias_sd_mm_s(), 1.86, 1e-9);
+  EXPECT_NEAR(e.radio().propagation().reading_sd_db(), 5 * 0.139, 1e-9);
+  EXPECT_DOUBLE_EQ(e.radio().range_mm(), 100);
+  EXPECT_DOUBLE_EQ(e.radio().loss(), 0.25);
+  EXPECT_DOUBLE_EQ(e.light().source(0).intensity(), std::round(1024 * std::exp(-2.0)));
+}
+
+TEST(ArgosImport, PlacesRobotsByTheirDiscs) {
+  const Imported imported = from_argos(kGather, "gather.argos");
+  ASSERT_EQ(imported.experiment.robots_size(), 2);
+  const proto::RobotGroup &drawn = imported.experiment.robots(0), &stated = imported.experiment.robots(1);
+  EXPECT_EQ(drawn.count(), 20u);
+  EXPECT_EQ(drawn.behaviour(0), "disperse.c");
+  EXPECT_DOUBLE_EQ(drawn.layout().random().width_mm(), 400);
+  EXPECT_NEAR(drawn.layout().y_mm(), 100, 1e-9);
+  EXPECT_EQ(stated.first_uid(), 20u);
+  ASSERT_EQ(imported.poses.size(), 1u);
+  EXPECT_EQ(stated.layout().poses().csv(), imported.poses[0].name);
+  // The disc's centre is 9.2 mm ahead of the point between the rear legs.
+  EXPECT_EQ(imported.poses[0].text, "x_mm,y_mm,heading_deg\n-400.000,409.200,90\n409.200,-400.000,0\n");
+}
+
+TEST(ArgosImport, SaysWhatWasNotTakenOverWithItsLine) {
+  const Imported imported = from_argos(kGather, "gather.argos");
+  EXPECT_TRUE(notes(imported, "2: <system>: threads=\"4\": give --threads"));
+  EXPECT_TRUE(notes(imported, "27: <kilobot>: colour=\"red\" has no counterpart"));
+  EXPECT_TRUE(notes(imported, "31: <warp>: has no counterpart"));
+  EXPECT_TRUE(notes(imported, "10: <params>: names a compiled program"));
+  EXPECT_FALSE(notes(imported, "library"));
+  const std::string text = experiment_text(imported, "gather.argos");
+  EXPECT_EQ(text.rfind("# Made of gather.argos by kilotwin import.\n", 0), 0u);
+  EXPECT_NE(text.find("#   31: <warp>"), std::string::npos);
+}
+
+std::string error_of(const std::string& text) {
+  try {
+    (void)from_argos(text, "f.argos");
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(ArgosImport, NamesThePlaceOfAnError) {
+  EXPECT_EQ(error_of("<argos-configuration>\n<framework>\n</argos-configuration>").rfind("f.argos:3: is no XML", 0),
+            0u)
+      << error_of("<argos-configuration>\n<framework>\n</argos-configuration>");
+  EXPECT_EQ(error_of("<html/>"), "f.argos: begins with <html>; an .argos file begins with <argos-configuration>");
+  EXPECT_EQ(error_of("<argos-configuration/>"), "f.argos: holds no <kilobot>");
+  EXPECT_EQ(error_of("<argos-configuration>\n<arena size=\"2,x,1\"/></argos-configuration>"),
+            "f.argos:2: <arena size=\"2,x,1\">: expected three numbers, as in \"1,2,0\"");
+  EXPECT_EQ(error_of("<argos-configuration><arena>\n<kilobot><controller "
+                     "config=\"c\"/></kilobot></arena></argos-configuration>"),
+            "f.argos:2: <controller config=\"c\">: is defined nowhere");
+}
+
+TEST(ArgosImport, SurvivesAnyChangeOfItsFile) {
+  const std::string good = kGather;
+  std::uint64_t state = 1;
+  const auto draw = [&state](std::size_t below) {
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return static_cast<std::size_t>((state >> 33) % below);
+  };
+  int refused = 0;
+  for (int k = 0; k < 3000; ++k) {
+    std::string text = good;
+    for (std::size_t changes = 1 + draw(4); changes > 0; --changes) {
+      const std::size_t at = draw(text.size());
+      if (draw(3) == 0)
+        text.erase(at, draw(40));
+      else
+        text[at] = "<>\"=/,.-9e x\0"[draw(13)];
+    }
+    try {
+      (void)from_argos(text, "f.argos");
+    } catch (const UserError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 1000);
+  EXPECT_LT(refused, 3000);
+}
+
+TEST(KilomboImport, TakesOverItsParameters) {
+  const Imported imported = from_kilombo(
+      R"({"botName": "orbit", "nBots": 30, "formation": "pile", "simulationTime": 60, "commsRadius": 70, "randSeed": 3,
+          "msgSuccessRate": 0.8, "speed": 7, "turnRate": 13, "timeStep": 0.04, "mySwitch": 1, "GUI": 0, "histLength": 5})",
+      "p.json");
+  const proto::Experiment& e = imported.experiment;
+  EXPECT_EQ(e.name(), "orbit");
+  EXPECT_EQ(e.seed(), 3u);
+  EXPECT_EQ(e.duration_s(), 60);
+  EXPECT_EQ(e.robots(0).count(), 30u);
+  EXPECT_EQ(e.robots(0).behaviour(0), "orbit.c");
+  EXPECT_EQ(e.radio().range_mm(), 70);
+  EXPECT_NEAR(e.radio().loss(), 0.2, 1e-12);
+  EXPECT_EQ(e.motion().straight_speed_mm_s(), 7);
+  EXPECT_NEAR(e.motion().turn_speed_mm_s(), 13 * 3.14159265 / 180 * 25, 1e-6);
+  EXPECT_TRUE(notes(imported, "mySwitch: is a parameter of the program"));
+  EXPECT_TRUE(notes(imported, "timeStep: a tick is 32.768 ms"));
+  EXPECT_FALSE(notes(imported, "histLength"));
+  EXPECT_THROW((void)from_kilombo("{\"nBots\": \"x\"}", "p.json"), UserError);
+  EXPECT_THROW((void)from_kilombo("[1]", "p.json"), UserError);
+  EXPECT_THROW((void)from_kilombo("{", "p.json"), UserError);
+  EXPECT_THROW((void)from_kilombo("{\"nBots\": 0}", "p.json"), UserError);
+}
+
+}  // namespace
+}  // namespace kilotwin::importers
