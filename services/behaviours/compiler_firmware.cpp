@@ -19,7 +19,7 @@ std::vector<std::string> common_arguments(const fs::path& gcc, const fs::path& r
   return {gcc.string(),
           "-mmcu=atmega328p",
           "-Os",
-          "-g",
+          "-gdwarf-4",  // by default this compiler writes stabs, which libdw does not read
           "-std=gnu11",
           "-DF_CPU=8000000",
           "-funsigned-char",

@@ -255,9 +255,7 @@ TEST_F(Observations, FirmwareRobotsHaveVariablesToo) {
     EXPECT_GT(std::stoi(row.at("beats")), 0);
     ++seen;
   }
-  if (seen == 0)
-    GTEST_SKIP()
-        << "known defect: avr-gcc's output has no debug information of the program, so no variables are found";
+  EXPECT_GT(seen, 0);
 }
 
 }  // namespace

@@ -94,12 +94,7 @@ void expect_types(const std::string& elf, std::uint32_t double_octets) {
 }
 
 TEST(ProgramVariables, NativeProgramsHaveTheirTypes) { expect_types(native(), 8); }
-TEST(ProgramVariables, FirmwareHasItsTypes) {
-  if (find(firmware(), "hops").empty())
-    GTEST_SKIP()
-        << "known defect: avr-gcc's output has no debug information of the program, so no variables are found";
-  expect_types(firmware(), 4);
-}
+TEST(ProgramVariables, FirmwareHasItsTypes) { expect_types(firmware(), 4); }
 
 TEST(ProgramVariables, NamesAreThoseOfTheProgramItself) {
   const auto names = variable_names(native());
