@@ -56,11 +56,9 @@ Runs::~Runs() {
   fs::remove_all(scratch_, ignored);
 }
 
-bool Runs::run(const std::vector<std::string>& words, const fs::path& log) {
-  std::vector<std::string> all{kilotwin_};
-  all.insert(all.end(), words.begin(), words.end());
+bool run_quietly(std::vector<std::string> words, const fs::path& log) {
   std::vector<char*> argv;
-  for (std::string& word : all) argv.push_back(word.data());
+  for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   const pid_t process = fork();
   if (process == 0) {
@@ -71,6 +69,12 @@ bool Runs::run(const std::vector<std::string>& words, const fs::path& log) {
   }
   int status = 0;
   return process >= 0 && waitpid(process, &status, 0) == process && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+bool Runs::run(const std::vector<std::string>& words, const fs::path& log) {
+  std::vector<std::string> all{kilotwin_};
+  all.insert(all.end(), words.begin(), words.end());
+  return run_quietly(std::move(all), log);
 }
 
 bool Runs::accepts(const std::string& experiment, const std::vector<std::string>& words) {

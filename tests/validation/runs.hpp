@@ -26,6 +26,9 @@ struct Recorded {
   [[nodiscard]] std::size_t state_at(double time_s) const;
 };
 
+/// Runs a program to its end; its words go to `log`. Returns whether its status was 0.
+bool run_quietly(std::vector<std::string> words, const std::filesystem::path& log);
+
 class Runs {
  public:
   /// `kilotwin`: the program. Everything goes into a scratch directory that is removed with the object.
@@ -42,7 +45,6 @@ class Runs {
   [[nodiscard]] const std::filesystem::path& scratch() const { return scratch_; }
 
  private:
-  /// Runs the program to its end; its words go to `log`. Returns whether its status was 0.
   bool run(const std::vector<std::string>& words, const std::filesystem::path& log);
 
   std::string kilotwin_;
