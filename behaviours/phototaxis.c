@@ -5,8 +5,8 @@
 #include <kilolib.h>
 
 #define SAMPLES 8
-#define SMOOTHING 8  /* loops over which readings are averaged */
-#define FADE 512     /* loops in which the remembered readings approach each other to a third */
+#define SMOOTHING 8  /* ticks over which readings are averaged */
+#define FADE 512     /* ticks in which the remembered readings approach each other to a third */
 #define CONTRAST 8   /* with less than 1/8 of the light as contrast, the robot turns on */
 #define HYSTERESIS 8 /* share of the contrast by which the light must pass the mean */
 
@@ -49,6 +49,9 @@ static void setup(void) {
 }
 
 static void loop(void) {
+  static uint32_t tick;
+  if (kilo_ticks == tick) return;
+  tick = kilo_ticks;
   const uint16_t now = light();
   if (now > smooth)
     smooth += (now - smooth) / SMOOTHING;

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 struct Case {
   const char* name;
   std::string source;  ///< a file, or a text with setup, loop and declarations
-  bool as_on_robot = false;
+  bool once_per_tick = false;
 };
 
 std::string with_main(const std::string& text) {
@@ -68,7 +68,7 @@ void measure(const Case& one, std::uint32_t robots, int rounds, const fs::path& 
   manifest.add_group_program(0);
   proto::RobotGroup& group = *manifest.mutable_experiment()->add_robots();
   group.set_count(robots);
-  if (one.as_on_robot) group.set_loop_rate(proto::RobotGroup::AS_ON_ROBOT);
+  if (one.once_per_tick) group.set_loop_rate(proto::RobotGroup::ONCE_PER_TICK);
   proto::Program& program = *manifest.add_program();
   program.set_path(source.filename());
   program.set_sha256(compiled.sha256);
@@ -106,7 +106,7 @@ int main(int count, char** words) {
   if (mkdtemp(folder.data()) == nullptr) return 1;
   const std::string own = std::string(KILOTWIN_BEHAVIOURS) + "/disperse.c";
   for (const Case& one :
-       {Case{"disperse, returns from loop()", own}, Case{"disperse, loop() as on the robot", own, true},
+       {Case{"disperse", own}, Case{"disperse, loop() once per tick", own, true},
         Case{"empty loop()", "static void loop(void) {}"},
         Case{"blocked in delay()", "static void loop(void) { delay(60000); }"},
         Case{"while (!received);", "static void loop(void) { while (!received); }"},

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/spin_up.hpp"
 #include "core/plan/effect_settings.hpp"
 #include "core/plan/plan.hpp"
 
@@ -12,7 +13,7 @@ namespace kilotwin {
 /// Motor duties of a robot in a tick. The left motor drives the right-hand wheel.
 struct Duties {
   std::uint8_t left = 0, right = 0;
-  std::uint8_t spin_up = 0;  ///< 1: both motors start with full duty
+  std::uint8_t spin_up = 0;  ///< how long both motors have full duty before: core/base/spin_up.hpp
 
   [[nodiscard]] bool any() const { return (left | right | spin_up) != 0; }
 };
@@ -23,12 +24,16 @@ class MotorRule {
   explicit MotorRule(const RunPlan&);
 
   [[nodiscard]] Duties acting(std::uint8_t left, std::uint8_t right, std::uint8_t spin_up) const {
+    if (spin_up == kFullDuty) return {255, 255, 0};
     return {left > dead_band_duty_ ? left : std::uint8_t{0}, right > dead_band_duty_ ? right : std::uint8_t{0},
             kick_part_ > 0 ? spin_up : std::uint8_t{0}};
   }
   [[nodiscard]] std::uint8_t dead_band_duty() const { return dead_band_duty_; }
-  /// Fraction of a tick for which a kick lasts.
-  [[nodiscard]] double kick_part() const { return kick_part_; }
+  /// Fraction of a tick at full duty, of a robot with this Duties::spin_up.
+  [[nodiscard]] double kick_part(std::uint8_t spin_up) const {
+    const double part = kick_part_ * (spin_up / static_cast<double>(kOneSpinUp));
+    return part < 1 ? part : 1;
+  }
 
  private:
   std::uint8_t dead_band_duty_;

@@ -85,7 +85,7 @@ struct ActuationFrame {
   std::vector<std::uint32_t> offer_robot;             ///< ascending
   std::vector<IrMessage> offer_message;
   std::vector<std::uint16_t> offer_crc_error;  ///< per offer: its CRC XOR the right one; empty: all CRCs are right
-  std::vector<std::uint8_t> spin_up;  ///< per robot, 1: both motors were kicked before they got the duties above
+  std::vector<std::uint8_t> spin_up;  ///< per robot, full duty of both motors in the tick: core/base/spin_up.hpp
 };
 
 /// What the radio tells one host.

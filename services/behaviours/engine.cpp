@@ -5,6 +5,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/message_crc.h"
+#include "core/base/spin_up.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/plan/tracking_settings.hpp"
 
@@ -23,9 +24,20 @@ constexpr std::size_t kAhead = 2;
 constexpr std::uint32_t kProbes = 8;
 constexpr std::int64_t kProbePeriod = 37;
 
+/// A program whose loop() settles in none of that many calls of a tick is slow to simulate.
+constexpr std::int64_t kManyCalls = 64;
+
 constexpr std::uint16_t kInitialTxPeriod = 3906;  // kilolib: half a second in counts of 128 us
 
 }  // namespace
+
+/// One robot's program in one tick.
+struct BehavioursEngine::Span {
+  const Program& program;
+  const Slot& slot;
+  bool eventful;      ///< callbacks have run in this tick
+  bool kept = false;  ///< memory_ holds what the slot holds, besides KtRobot
+};
 
 BehavioursEngine::BehavioursEngine(const RunPlan& plan, HostId host, std::shared_ptr<ProgramSet> programs)
     : plan_(plan),
@@ -327,9 +339,10 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
       interrupted_cycles = 0;
     }
   }
+  Span span{program, slot, eventful};
   if (executor.robot().parked == 0) {
     if (sent) interrupted_cycles += static_cast<std::int32_t>(kPacketCycles);
-    const Fault* const fault = run_main(i, executor, interrupted_cycles);
+    const Fault* const fault = run_main(i, executor, interrupted_cycles, span);
     if (fault != nullptr) return fail_robot(i, *fault, program, slot);
   }
   // Read single fields. A copy of the whole struct would stall: store forwarding fails for parts that the robot has just written.
@@ -338,6 +351,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   if (requested_[i] != 0 && holds_[i] == 0 && robot.state == static_cast<std::uint8_t>(LifeCycle::kRunning)) {
     const KtMessage* message = nullptr;
     std::int32_t cycles = 0;
+    span.kept = false;
     const Fault* const fault = executor.transmit(message, cycles);
     if (fault != nullptr) return fail_robot(i, *fault, program, slot);
     if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) robot.debt_cycles += static_cast<std::uint64_t>(cycles);
@@ -360,9 +374,10 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
            "its main() has ended, so it does nothing more; main() ends with kilo_start(setup, loop)"});
   }
   if (thread.divided != 0) note_division(i, thread.divided, program, slot);
-  robot.spin_up = 0;
   if (!slot.clear_before_data()) return fail_robot(i, Fault{Fault::kBeforeVariables, 0, 0}, program, slot);
-  if (!memory.copy_out(slot, executor.data_octets(), thread))
+  if (span.kept)
+    memory.set(program, program.file.table.robot, robot);
+  else if (!memory.copy_out(slot, executor.data_octets(), thread))
     return fail_robot(i, Fault{Fault::kStackLost, 0, 0}, program, slot);
   const LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
   if (probe.done < kProbes && from.count() >= probe.next) probe_loop(i, program, slot, executor);
@@ -414,9 +429,67 @@ void BehavioursEngine::probe_loop(std::uint32_t i, const Program& program, const
   warnings_.push_back({share_.first + i, text});
 }
 
+/// Calls loop() as often as `cycles` allow. Calls that change nothing are skipped: if a call, or a number of calls, leaves the state
+/// as it was, then so do all further ones until something happens to the robot.
+Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& executor, std::int32_t cycles,
+                                           Span& span) {
+  RobotMemory& memory = memory_[i];
+  RobotThread& thread = executor.thread();
+  KtRobot& robot = executor.robot();
+  const KtExchange& exchange = *span.slot.exchange();
+  // What memory holds must be the state before the first call.
+  if (span.eventful)
+    static_cast<void>(memory.copy_out(span.slot, executor.data_octets(), thread));
+  else
+    memory.set(span.program, span.program.file.table.ticks, executor.ticks());
+  std::uint32_t calls = 1;
+  std::int64_t all_calls = 0;
+  for (;;) {
+    robot.calls = calls;
+    robot.spent = robot.returned = 0;
+    const std::uint32_t printed = exchange.log_length;
+    Executor::Main main = executor.run_main(cycles, wait_period_[i]);
+    if (main.fault != nullptr || robot.returned == 0) {
+      if (all_calls >= kManyCalls && robot.spent == 0) note_calls(i, all_calls);
+      return main;
+    }
+    const std::int32_t used = cycles - main.left;
+    all_calls += calls;
+    cycles = main.left;
+    if (robot.spent == 0 && exchange.log_length == printed &&
+        memory.equals(span.program, span.slot, executor.data_octets(), thread)) {
+      span.kept = true;
+      if (calls == 1 || used <= 0 || cycles <= 0) return main;
+      // A period of several calls: only its rest at the end of the tick is still to be executed.
+      cycles %= used;
+      if (cycles == 0) return main;
+      span.kept = false;
+      calls = 0;
+      continue;
+    }
+    if (cycles <= 0) return main;
+    static_cast<void>(memory.copy_out(span.slot, executor.data_octets(), thread));
+    if (calls != 0 && calls < 1u << 20) calls *= 2;
+  }
+}
+
+/// Notes that in this tick loop() was called so often, and that the last call changed something.
+void BehavioursEngine::note_calls(std::uint32_t i, std::int64_t calls) {
+  LoopProbe& probe = probes_[plan_.program_of(share_.first + i)];
+  if (probe.done >= kProbes || now_.count() < probe.next) return;
+  probe.next = now_.count() + kProbePeriod;
+  if (++probe.done < kProbes) return;
+  char text[208];
+  std::snprintf(text, sizeof text,
+                "each call of its loop() changes its state, so each is simulated, more than %lld per tick; this "
+                "takes time. If only kilo_ticks matters to it, loop_rate: ONCE_PER_TICK is faster",
+                static_cast<long long>(calls));
+  warnings_.push_back({share_.first + i, text});
+}
+
 /// Runs the main program for the rest of the tick.
-const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executor,
-                                        std::int32_t interrupted_cycles) {
+const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executor, std::int32_t interrupted_cycles,
+                                        Span& span) {
   KtRobot& robot = executor.robot();
   const auto tick_cycles = static_cast<std::int32_t>(plan_.tick_length.cycles());
   std::int64_t cycles = tick_cycles;
@@ -427,9 +500,15 @@ const Fault* BehavioursEngine::run_main(std::uint32_t i, const Executor& executo
     const std::uint64_t paid = std::min<std::uint64_t>(owed, static_cast<std::uint64_t>(tick_cycles));
     robot.debt_cycles = owed - paid;
     cycles -= static_cast<std::int64_t>(paid);
-    if (cycles <= 0) return nullptr;
+    if (cycles <= 0) {
+      if (span.eventful) return nullptr;
+      memory_[i].set(span.program, span.program.file.table.ticks, executor.ticks());
+      span.kept = true;
+      return nullptr;
+    }
   }
-  Executor::Main main = executor.run_main(static_cast<std::int32_t>(cycles), wait_period_[i]);
+  const Executor::Main main = as_on_robot ? run_loops(i, executor, static_cast<std::int32_t>(cycles), span)
+                                          : executor.run_main(static_cast<std::int32_t>(cycles), wait_period_[i]);
   wait_period_[i] = main.wait_period;
   if (main.fault != nullptr) return main.fault;
   if (as_on_robot && main.left < 0) robot.debt_cycles += static_cast<std::uint64_t>(-main.left);
@@ -573,10 +652,35 @@ void BehavioursEngine::take_log(std::uint32_t i, const Slot& slot) {
   exchange.log_length = exchange.log_lost = 0;
 }
 
-void BehavioursEngine::note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period) {
-  motor_left_[i] = robot.motors_on != 0 ? robot.duty_left : std::uint8_t{0};
-  motor_right_[i] = robot.motors_on != 0 ? robot.duty_right : std::uint8_t{0};
-  spin_up_[i] = robot.motors_on != 0 ? robot.spin_up : std::uint8_t{0};
+/// Duties at the end of the tick, and how long both were full in it. A spin-up that goes on shows the duties before it.
+void BehavioursEngine::note_motors(std::uint32_t i, KtRobot& robot) {
+  const std::int64_t tick_cycles = plan_.tick_length.cycles();
+  std::uint8_t left = robot.duty_left, right = robot.duty_right;
+  std::int64_t full_cycles = robot.full_cycles;
+  if (robot.full != 0) {
+    const std::int64_t since = std::max<std::int64_t>(tick_cycles - robot.full_from, 0);
+    if (left == 255 && right == 255) {
+      full_cycles += since;
+      if (full_cycles < tick_cycles) {
+        left = robot.before_left;
+        right = robot.before_right;
+      } else {
+        full_cycles = 0;
+      }
+    } else {  // the program has ended it by a register
+      full_cycles += std::min(since, kSpinUpCycles);
+      robot.full = 0;
+    }
+  }
+  robot.full_from = robot.full_cycles = 0;
+  const bool on = robot.motors_on != 0;
+  motor_left_[i] = on ? left : std::uint8_t{0};
+  motor_right_[i] = on ? right : std::uint8_t{0};
+  spin_up_[i] = on && full_cycles > 0 ? spin_up_of(full_cycles, tick_cycles) : std::uint8_t{0};
+}
+
+void BehavioursEngine::note_outputs(std::uint32_t i, KtRobot& robot, std::uint16_t tx_period) {
+  note_motors(i, robot);
   led_[i] = robot.led & 63;
   // A sleeping robot that has woken up to listen is idle for the radio.
   const bool listens = robot.state == static_cast<std::uint8_t>(LifeCycle::kSleeping) && robot.deaf == 0;
@@ -624,6 +728,16 @@ void BehavioursEngine::emit(ActuationFrame& frame) const {
   if (any_error == 0) frame.offer_crc_error.clear();
 }
 
+namespace {
+
+/// For the hash: 0, 1 for one whole spin-up, else the value from bit 2 on.
+std::uint64_t spin_up_word(std::uint8_t spin_up) {
+  if (spin_up == 0 || spin_up == kOneSpinUp) return spin_up != 0 ? 1 : 0;
+  return std::uint64_t{spin_up} << 2;
+}
+
+}  // namespace
+
 std::uint64_t BehavioursEngine::hash_part() const {
   std::uint64_t sum = 0;
   for (std::uint32_t i = 0; i < share_.size(); ++i) {
@@ -633,7 +747,7 @@ std::uint64_t BehavioursEngine::hash_part() const {
     const std::uint64_t outputs = motor_left_[i] | std::uint64_t{motor_right_[i]} << 8 |
                                   std::uint64_t{led_[i]} << 16 | std::uint64_t{life_cycle_[i]} << 24 |
                                   std::uint64_t{tx_period_[i]} << 32 | std::uint64_t{holds_[i]} << 48 |
-                                  std::uint64_t{spin_up_[i]} << 49 | std::uint64_t{is_due_[i]} << 50;
+                                  spin_up_word(spin_up_[i]) << 49 | std::uint64_t{is_due_[i]} << 50;
     if (senses_.has_batteries()) {
       const auto charge = static_cast<std::uint64_t>(senses_.charge(i));
       sum += entity_hash(HashDomain::kProgram, share_.first + i, {outputs, charge});

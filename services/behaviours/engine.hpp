@@ -130,7 +130,9 @@ class BehavioursEngine {
   void set_surroundings(std::uint32_t i, const Slot&, std::uint32_t receptions);
   void calibrate_ranging(const RadioParameters&);
   void keep_eeprom(std::uint32_t i, const Slot&);
-  const Fault* run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles);
+  struct Span;
+  const Fault* run_main(std::uint32_t i, const Executor&, std::int32_t interrupted_cycles, Span&);
+  Executor::Main run_loops(std::uint32_t i, const Executor&, std::int32_t cycles, Span&);
   [[nodiscard]] bool is_first(std::uint32_t i, Warning);
   void probe_loop(std::uint32_t i, const Program&, const Slot&, const Executor&);
   void note_overflows(std::uint32_t i, KtExchange&, const Program&, const Slot&);
@@ -141,7 +143,9 @@ class BehavioursEngine {
   void fail_robot(std::uint32_t i, std::string text);
   void fail_known_culprits(Tick from);
   void take_log(std::uint32_t i, const Slot&);
-  void note_outputs(std::uint32_t i, const KtRobot& robot, std::uint16_t tx_period);
+  void note_outputs(std::uint32_t i, KtRobot& robot, std::uint16_t tx_period);
+  void note_motors(std::uint32_t i, KtRobot& robot);
+  void note_calls(std::uint32_t i, std::int64_t calls);
 
   const RunPlan& plan_;
   const HostId host_;

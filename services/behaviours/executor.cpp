@@ -58,6 +58,25 @@ void RobotMemory::restore(const Program& program, const Slot& slot, std::span<co
   std::memcpy(octets_.get() + data_octets_, stack.data(), stack.size());
 }
 
+bool RobotMemory::equals(const Program& program, const Slot& slot, std::uint32_t data_octets,
+                         const RobotThread& thread) const {
+  if (data_octets != data_octets_ || slot.stack_top() - thread.robot_stack != stack_octets_) return false;
+  const std::uint8_t* const now = slot.data();
+  const std::uint8_t* const then = octets_.get();
+  const auto same = [&](std::size_t first, std::size_t last) {
+    return std::memcmp(now + first, then + first, last - first) == 0;
+  };
+  const std::size_t robot = program.file.table.robot - program.file.data.first;
+  // Of the hardware: generator and outputs, but neither clocks nor counters.
+  return same(robot, robot + offsetof(KtRobot, debt_cycles)) &&
+         same(robot + offsetof(KtRobot, loop_rate), robot + offsetof(KtRobot, waits)) &&
+         same(robot + offsetof(KtRobot, full), robot + offsetof(KtRobot, looped)) &&
+         same(robot + offsetof(KtRobot, heap_octets), robot + offsetof(KtRobot, full_from)) && same(0, robot) &&
+         same(robot + sizeof(KtRobot), data_octets) &&
+         std::memcmp(reinterpret_cast<const std::uint8_t*>(thread.robot_stack), then + data_octets_,  // NOLINT
+                     stack_octets_) == 0;
+}
+
 namespace {
 
 /// Limit of a callback: one second of the robot's time. On a robot a longer callback would block all messages, the clock and the

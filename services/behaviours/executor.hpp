@@ -58,6 +58,10 @@ class RobotMemory {
     return true;
   }
 
+  /// Whether the robot in the slot has this memory, besides its clocks and what the host counts.
+  [[nodiscard]] bool equals(const Program& program, const Slot& slot, std::uint32_t data_octets,
+                            const RobotThread& thread) const;
+
   [[nodiscard]] std::span<std::uint8_t> data() { return {octets_.get(), data_octets_}; }
   [[nodiscard]] std::span<const std::uint8_t> data() const { return {octets_.get(), data_octets_}; }
   [[nodiscard]] std::span<const std::uint8_t> stack() const {
@@ -114,6 +118,11 @@ class Executor {
     std::memcpy(&value, ticks_, sizeof value);
     value += ticks;
     std::memcpy(ticks_, &value, sizeof value);
+  }
+  [[nodiscard]] std::uint32_t ticks() const {
+    std::uint32_t value = 0;
+    std::memcpy(&value, ticks_, sizeof value);
+    return value;
   }
   [[nodiscard]] std::uint16_t tx_period() const {
     std::uint16_t value = 0;

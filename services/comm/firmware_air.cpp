@@ -246,7 +246,7 @@ std::uint64_t FirmwareAir::hash() const {
     const FirmwareRobots::Outputs& out = outputs_[i];
     const std::uint64_t shown = std::uint64_t{out.motor_left} | std::uint64_t{out.motor_right} << 8 |
                                 std::uint64_t{out.led} << 16 | std::uint64_t{out.fault} << 24 |
-                                std::uint64_t{out.spun_up} << 40 |
+                                std::uint64_t{out.spin_up} << 40 |
                                 std::uint64_t{static_cast<std::uint8_t>(life_cycle_[i])} << 32;
     sum += entity_hash(HashDomain::kRadio, robots_.ids()[i], {robots_.word(i), shown});
   }

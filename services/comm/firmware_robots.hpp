@@ -23,13 +23,12 @@ struct Pulse {
 
 class FirmwareRobots {
  public:
-  /// A run samples the motors' kick after every kSpan cycles from its start.
+  /// The radio advances robots in spans of this length.
   static constexpr Cycles kSpan = 2048;
 
   struct Outputs {
     std::uint8_t motor_left = 0, motor_right = 0, led = 0;  ///< as in ActuationFrame
-    /// Both motors were kicked. Full duty for less than a tick does not show in the mean duty.
-    bool spun_up = false;
+    std::uint8_t spin_up = 0;    ///< how long both motors had full duty in the tick: core/base/spin_up.hpp
     bool listening = true;       ///< neither halted nor asleep with its clocks off
     bool flat = false;           ///< off because its battery is empty
     std::uint8_t fault = 0;      ///< firmware::Halt of a robot that has faulted, else 0

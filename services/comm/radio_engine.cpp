@@ -517,7 +517,7 @@ void RadioEngine::emit_firmware(Share share, RadioFrame& frame) const {
     frame.firmware_robot.push_back(ids[i]);
     frame.firmware_motor_left.push_back(out.motor_left);
     frame.firmware_motor_right.push_back(out.motor_right);
-    frame.firmware_spin_up.push_back(out.spun_up ? 1 : 0);
+    frame.firmware_spin_up.push_back(out.spin_up);
     frame.firmware_led.push_back(out.led);
     frame.firmware_life_cycle.push_back(static_cast<std::uint8_t>(firmware_->life_cycle(i)));
     frame.firmware_fault.push_back(std::uint32_t{out.fault} << 24 | out.fault_at);

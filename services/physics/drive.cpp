@@ -169,7 +169,7 @@ void DriveModel::make_curves(const MotionSettings& motion, const RobotParameters
 DriveModel::Speeds DriveModel::speeds_with_kick(std::uint32_t robot, Duties duties) const {
   const Curves& curves = curves_of_[robot];
   const WheelBias& bias = bias_[robot];
-  const double kick = motors_.kick_part(), after = (duties.left | duties.right) != 0 ? 1 - kick : 0;
+  const double kick = motors_.kick_part(duties.spin_up), after = (duties.left | duties.right) != 0 ? 1 - kick : 0;
   const Speeds full = nominal(curves, 255, 255), set = nominal(curves, duties.left, duties.right);
   return {kick * (full.left_mm_s + bias.left_mm_s) + after * (set.left_mm_s + bias.left_mm_s),
           kick * (full.right_mm_s + bias.right_mm_s) + after * (set.right_mm_s + bias.right_mm_s)};

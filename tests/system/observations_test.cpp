@@ -37,7 +37,7 @@ constexpr const char* kExperiment = R"(
 name: "observed"
 duration_s: 5
 arena { width_mm: 600 height_mm: 600 }
-robots { count: 9 behaviour: "observed.c" layout { grid { pitch_mm: 50 } } }
+robots { count: 9 behaviour: "observed.c" loop_rate: ONCE_PER_TICK layout { grid { pitch_mm: 50 } } }
 )";
 
 constexpr const char* kRecording = R"text(

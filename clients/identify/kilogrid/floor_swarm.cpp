@@ -123,7 +123,7 @@ FloorRun simulate(const FloorScene& scene, const Floor& floor, const proto::Mode
         if (reading_mm < radio.wall_range_mm) programs[robot].hear_wall(kilo_ticks, kStrongest - reading_mm);
       }
       const Motion next = programs[robot].loop(kilo_ticks);
-      actuation.spin_up[robot] = next != motion[robot] ? 1 : 0;
+      actuation.spin_up[robot] = next != motion[robot] ? kOneSpinUp : std::uint8_t{0};
       motion[robot] = next;
       actuation.motor_left[robot] = next == Motion::kStraight || next == Motion::kLeft ? kDuty : 0;
       actuation.motor_right[robot] = next == Motion::kStraight || next == Motion::kRight ? kDuty : 0;

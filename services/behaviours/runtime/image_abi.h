@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 6u
+#define KT_IMAGE_VERSION 7u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -62,7 +62,7 @@ struct KtRobot {
   uint8_t motion; /* the motion that the last calibration message commanded */
   uint8_t motion_done;
   uint64_t waits;         /* number of times that the program has waited for a tick */
-  uint8_t spin_up;        /* spinup_motors() was called; the host reads and clears it once per tick */
+  uint8_t full;           /* both motors have full duty since full_from */
   uint8_t straight_left;  /* host */
   uint8_t straight_right; /* host */
   uint8_t heard;          /* a message arrived while a sleeping robot listened */
@@ -72,6 +72,14 @@ struct KtRobot {
   uint32_t heap_octets; /* largest extent of the heap so far */
   uint16_t blocked_at;  /* low bits of kilo_ticks when the program last kept interrupts off for long */
   uint16_t blocked;     /* for how long: units of KT_BLOCKED_UNIT cycles */
+  /* Time at full duty of both motors. The host takes and resets it at the end of each tick. */
+  uint32_t full_from;   /* cycle of the tick */
+  uint32_t full_cycles; /* in this tick, before full_from */
+  uint8_t before_left;  /* duties before full_from */
+  uint8_t before_right;
+  uint8_t spent;    /* host: 0; 1: the program has spent time in a delay or in a call */
+  uint8_t returned; /* host: 0; 1: loop() has returned as often as the host wants to know */
+  uint32_t calls;   /* host: after this many further calls of loop() the host looks at the state */
 };
 
 #define KT_BLOCKED_UNIT 256u
@@ -156,7 +164,7 @@ struct KtImage {
 #else
 #define KT_ASSERT _Static_assert
 #endif
-KT_ASSERT(sizeof(struct KtRobot) == 64, "no padding");
+KT_ASSERT(sizeof(struct KtRobot) == 80, "no padding");
 KT_ASSERT(sizeof(struct KtMessage) == 12, "no padding");
 KT_ASSERT(sizeof(struct KtReception) == 16, "no padding");
 KT_ASSERT(sizeof(struct KtThread) == 48 && __builtin_offsetof(struct KtThread, budget) == KT_THREAD_BUDGET &&

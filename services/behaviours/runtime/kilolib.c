@@ -63,14 +63,18 @@ uint16_t tx_clock, tx_increment = 255;
 
 /* Waits for the next tick. It jumps and does not call; see switch.c. */
 #define IN_LINE static inline __attribute__((always_inline))
-IN_LINE void wait_for_tick(void) {
-  ++robot.waits;
+IN_LINE void return_to_host(void) {
   __asm__ volatile("lea 1f(%%rip), %%rax\n\tpush %%rax\n\tjmp kt_wait\n1:"
                    :
                    :
                    : "rax", "rcx", "rdx", "rsi", "rdi", "r8", "r9", "r10", "r11", "xmm0", "xmm1", "xmm2", "xmm3",
                      "xmm4", "xmm5", "xmm6", "xmm7", "xmm8", "xmm9", "xmm10", "xmm11", "xmm12", "xmm13", "xmm14",
                      "xmm15", "memory", "cc");
+}
+
+IN_LINE void wait_for_tick(void) {
+  ++robot.waits;
+  return_to_host();
 }
 
 enum { MOST_AT_ONCE = 1 << 30 };
@@ -103,6 +107,7 @@ static void block(uint64_t cycles) {
 /* Lets the main program wait for `cycles`. With KT_LOOP_PER_TICK it waits for whole ticks; remainders add up. A callback cannot
  * wait, so the main program waits for it. With KT_LOOP_AS_ON_ROBOT the cycles reduce the tick's budget, as code does. */
 static void spend(uint64_t cycles) {
+  if (cycles != 0) robot.spent = 1;
   if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT && !robot.in_interrupt) {
     while (cycles > 0) {
       const int32_t part = cycles < MOST_AT_ONCE ? (int32_t)cycles : MOST_AT_ONCE;
@@ -145,18 +150,38 @@ void _delay_us(double us) { _delay_ms(us / 1000); }
 
 /* Motors, light, sensors. */
 
+/* Cycles since the beginning of the tick. Callbacks run at its beginning. */
+static uint32_t cycle_of_tick(void) {
+  if (robot.loop_rate == KT_LOOP_PER_TICK) return (uint32_t)robot.debt_cycles;
+  if (robot.in_interrupt) return 0;
+  const int32_t now = (int32_t)robot.tick_cycles - cycles_left() - cycles_held();
+  return now > 0 ? (uint32_t)now : 0;
+}
+
+enum { FULL_DUTY = 255 };
+
 void set_motors(uint8_t left, uint8_t right) {
+  const uint8_t full = left == FULL_DUTY && right == FULL_DUTY;
+  if (full != robot.full) {
+    const uint32_t now = cycle_of_tick();
+    if (full) {
+      robot.full_from = now;
+      robot.before_left = robot.duty_left;
+      robot.before_right = robot.duty_right;
+    } else if (now > robot.full_from) {
+      robot.full_cycles += now - robot.full_from;
+    }
+    robot.full = full;
+  }
   robot.duty_left = left;
   robot.duty_right = right;
 }
 
 volatile uint8_t* kilotwin_motor_duty(uint8_t right) { return right ? &robot.duty_right : &robot.duty_left; }
 
-/* The physics engine simulates the spin-up: 15 ms at full duty within the tick for which the next duties hold. */
 void spinup_motors(void) {
+  set_motors(FULL_DUTY, FULL_DUTY);
   delay(15);
-  set_motors(255, 255);
-  robot.spin_up = 1;
 }
 
 void set_color(uint8_t color) { robot.led = color & 63; }
@@ -397,10 +422,18 @@ void kilo_start(void (*setup)(void), void (*loop)(void)) {
         robot.state = RUNNING;
         /* fall through */
       case RUNNING: {
+        if (robot.loop_rate == KT_LOOP_AS_ON_ROBOT) {
+          loop();
+          if (--robot.calls == 0) {
+            robot.returned = 1;
+            return_to_host();
+          }
+          break;
+        }
         /* Once per tick. If loop() itself waited, it is called again in the tick in which its wait ended. */
         const uint64_t waits = robot.waits;
         loop();
-        if (robot.loop_rate == KT_LOOP_PER_TICK && waits == robot.waits) rest_of_tick();
+        if (waits == robot.waits) rest_of_tick();
         break;
       }
       case MOVING:

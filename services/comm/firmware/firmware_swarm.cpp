@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/base/error.hpp"
+#include "core/base/spin_up.hpp"
 #include "core/base/state_hash.hpp"
 #include "core/os/files.hpp"
 #include "core/os/worker_pool.hpp"
@@ -101,7 +102,6 @@ void FirmwareSwarm::run_robot(Robot& robot, comm::Cycles until, const std::vecto
   robot.light.clear();
   for (const comm::Pulse& pulse : light)
     robot.light.push_back({own(robot, pulse.time), pulse.gains.high, pulse.gains.low});
-  robot.fulls.clear();
   flashes.clear();
   auto next = robot.light.cbegin();
   std::size_t pulse = 0;
@@ -113,8 +113,6 @@ void FirmwareSwarm::run_robot(Robot& robot, comm::Cycles until, const std::vecto
     // An instruction may end a little later than the span.
     for (std::size_t n = flashes.size(); n < mcu.flashes().size(); ++n)
       flashes.push_back(std::min(nominal(robot, mcu.flashes()[n]), end - 1));
-    const firmware::Outputs out = mcu.outputs();
-    robot.fulls.push_back(out.motor_left == 255 && out.motor_right == 255 ? 1 : 0);
     begin = end;
     if (begin >= until) break;
   }
@@ -125,12 +123,6 @@ void FirmwareSwarm::commit() {
   for (std::uint32_t i = 0; i < robots_.size(); ++i) {
     Robot& robot = robots_[i];
     robot.has_run = false;
-    for (const std::uint8_t full : robot.fulls) {
-      robot.full = full != 0;
-      robot.full_throughout = robot.full_throughout && robot.full;
-      robot.kicked = robot.kicked || robot.full;
-    }
-    robot.fulls.clear();
     write_log(i);
   }
   begin_ = until_;
@@ -141,8 +133,6 @@ void FirmwareSwarm::begin_tick(const SwarmView& swarm) {
   senses_.at(swarm);
   for (std::uint32_t i = 0; i < robots_.size(); ++i) {
     Robot& robot = robots_[i];
-    robot.full_throughout = robot.full;
-    robot.kicked = robot.kick_goes_on;
     robot.has_sent = false;
     robot.mcu->set_readings(senses_.readings(ids_[i]));
   }
@@ -150,12 +140,11 @@ void FirmwareSwarm::begin_tick(const SwarmView& swarm) {
 
 void FirmwareSwarm::end_tick() {
   for (Robot& robot : robots_) {
-    robot.kick_goes_on = robot.full && !robot.full_throughout;
-    robot.spun_up = robot.kicked && !robot.kick_goes_on && !robot.full_throughout;
-    if (robot.kick_goes_on) continue;
-    const firmware::Outputs out = robot.mcu->outputs();
-    robot.shown_left = out.motor_left;
-    robot.shown_right = out.motor_right;
+    const Mcu::MotorUse use = robot.mcu->take_motors();
+    robot.shown_left = use.left;
+    robot.shown_right = use.right;
+    const auto full_cycles = static_cast<std::int64_t>(use.full_cycles);
+    robot.spin_up = full_cycles > 0 ? spin_up_of(full_cycles, cycles_per_tick_) : std::uint8_t{0};
   }
   if (!senses_.has_batteries()) return;
   for (std::uint32_t i = 0; i < robots_.size(); ++i) use_battery(i);
@@ -176,8 +165,7 @@ void FirmwareSwarm::use_battery(std::uint32_t i) {
   if (!senses_.is_flat(id)) return;
   robot.mcu->power_off();
   robot.flat = true;
-  robot.full = robot.kick_goes_on = robot.spun_up = false;
-  robot.shown_left = robot.shown_right = 0;
+  robot.shown_left = robot.shown_right = robot.spin_up = 0;
 }
 
 /// What a robot has printed since the last commit.
@@ -195,7 +183,7 @@ comm::FirmwareRobots::Outputs FirmwareSwarm::outputs(std::uint32_t i) const {
   out.motor_left = robots_[i].shown_left;
   out.motor_right = robots_[i].shown_right;
   out.led = shown.led;
-  out.spun_up = robots_[i].spun_up;
+  out.spin_up = robots_[i].spin_up;
   out.listening = mcu.listening();
   out.flat = robots_[i].flat;
   if (mcu.halt() == Halt::kIllegalInstruction || mcu.halt() == Halt::kBadAddress) {
@@ -223,10 +211,8 @@ std::string FirmwareSwarm::save(std::uint32_t i) const {
   // Who goes on from this checkpoint finds what was printed before it.
   if (logs_) logs_->flush();
   const Robot& robot = robots_[i];
-  const int flags =
-      (robot.full ? 1 : 0) | (robot.kick_goes_on ? 2 : 0) | (robot.spun_up ? 4 : 0) | (robot.flat ? 8 : 0);
-  std::string board{static_cast<char>(flags), static_cast<char>(robot.shown_left),
-                    static_cast<char>(robot.shown_right)};
+  std::string board{robot.flat ? '\1' : '\0', static_cast<char>(robot.shown_left),
+                    static_cast<char>(robot.shown_right), static_cast<char>(robot.spin_up)};
   std::int64_t battery[2] = {0, 0};
   if (senses_.has_batteries()) battery[0] = senses_.charge(ids_[i]), battery[1] = senses_.drain(ids_[i]);
   for (const std::int64_t value : battery) {
@@ -236,19 +222,17 @@ std::string FirmwareSwarm::save(std::uint32_t i) const {
 }
 
 void FirmwareSwarm::load(std::uint32_t i, const std::string& octets) {
-  constexpr std::size_t kBoard = 3 + 2 * sizeof(std::int64_t);
+  constexpr std::size_t kBoard = 4 + 2 * sizeof(std::int64_t);
   if (octets.size() < kBoard)
     throw RunError("a firmware robot is missing in the checkpoint; resume from another one");
   Robot& robot = robots_[i];
-  robot.full = (octets[0] & 1) != 0;
-  robot.kick_goes_on = (octets[0] & 2) != 0;
-  robot.spun_up = (octets[0] & 4) != 0;
+  robot.flat = octets[0] != 0;
   robot.shown_left = static_cast<std::uint8_t>(octets[1]);
   robot.shown_right = static_cast<std::uint8_t>(octets[2]);
-  robot.flat = (octets[0] & 8) != 0;
+  robot.spin_up = static_cast<std::uint8_t>(octets[3]);
   std::uint64_t battery[2] = {0, 0};
-  for (std::size_t n = 3; n < kBoard; ++n)
-    battery[(n - 3) / 8] |= std::uint64_t{static_cast<std::uint8_t>(octets[n])} << (n - 3) % 8 * 8;
+  for (std::size_t n = 4; n < kBoard; ++n)
+    battery[(n - 4) / 8] |= std::uint64_t{static_cast<std::uint8_t>(octets[n])} << (n - 4) % 8 * 8;
   if (senses_.has_batteries())
     senses_.restore(ids_[i], static_cast<std::int64_t>(battery[0]), static_cast<std::int64_t>(battery[1]));
   robot.mcu->load(octets.substr(kBoard));

@@ -51,15 +51,11 @@ class FirmwareSwarm final : public comm::FirmwareRobots {
     comm::Cycles switched_on;  ///< at most 0
     comm::Cycles period;       ///< nominal cycles in which its own clock counts 2^18 cycles
     bool has_run = false;      ///< since the last commit
-    // Whether both motors have full duty: now; during the whole tick; at some time in it, or in a spin-up that goes on.
-    bool full = false, full_throughout = false, kicked = false;
-    bool kick_goes_on = false;  ///< at the end of the last tick
     std::uint8_t shown_left = 0, shown_right = 0;
-    bool spun_up = false;
-    bool has_sent = false;  ///< in this tick
+    std::uint8_t spin_up = 0;  ///< core/base/spin_up.hpp
+    bool has_sent = false;     ///< in this tick
     bool flat = false;
     std::vector<Light> light;
-    std::vector<std::uint8_t> fulls;  ///< of this run: full duty at the end of each span
   };
 
   [[nodiscard]] OwnCycles own(const Robot&, comm::Cycles) const;

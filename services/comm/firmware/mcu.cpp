@@ -88,7 +88,7 @@ struct LogHook {
 };
 
 Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>& eeprom, const Random& random,
-         std::uint32_t robot)
+         std::uint32_t robot, Core core)
     : random_(random), robot_(robot), program_(image.flash) {
   static std::once_flag once;
   std::call_once(once, [] { avr_global_logger_set(LogHook::log); });
@@ -107,6 +107,7 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
     std::copy(program_.begin(), program_.end(), avr_->flash + at);
   std::fill_n(avr_->flash + kProgramSpace, 4, std::uint8_t{0xff});
   avr_->flashend = avr_->codeend = kProgramSpace - 1;
+  if (core == Core::kFast) core_ = std::make_unique<FastCore>(avr_->flash);
   auto* const data = static_cast<std::uint8_t*>(std::calloc(kDataSpace, 1));
   std::copy_n(avr_->data, avr_->ramend + 1u, data);
   std::free(avr_->data);
@@ -142,6 +143,8 @@ Mcu::Mcu(const FlashImage& image, const std::array<std::uint8_t, kEepromOctets>&
   std::uint32_t flags = 0;  // neither printed by libsimavr nor slowed down while polled
   avr_ioctl(avr_, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
   avr_irq_register_notify(avr_io_getirq(avr_, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_serial, this);
+  for (const Register one : {kDdrB, kDdrD, kTccr2a, kOcr2a, kOcr2b})
+    avr_irq_register_notify(avr_iomem_getirq(avr_, one, nullptr, AVR_IOMEM_IRQ_ALL), on_motor, this);
   after_reset();
 
   for (int i = 0; i < avr_->irq_pool.count; ++i) {
@@ -253,8 +256,14 @@ void Mcu::run_burst(OwnCycles budget) {
   const avr_cycle_timer_slot_t* const next = avr_->cycle_timers.timer;
   avr_cycle_count_t cycles = budget;
   if (next != nullptr) cycles = next->when > avr_->cycle ? std::min(cycles, next->when - avr_->cycle) : 1;
+  avr_flashaddr_t at = avr_->pc;
+  if (core_ && avr_->interrupt_state == 0) {
+    const std::uint64_t passed = core_->run(*avr_, cycles);
+    cycles = passed < cycles ? 1 : 0;  // then one instruction of libsimavr
+    at = avr_->pc;
+  }
   avr_->run_cycle_count = cycles;
-  const avr_flashaddr_t at = avr_run_one(avr_);
+  if (cycles > 0) at = avr_run_one(avr_);
   if (avr_->state == cpu_Crashed) {
     if (state_.halt == Halt::kNone) {  // it ran out of the flash
       state_.halt = Halt::kBadAddress;
@@ -347,6 +356,7 @@ std::span<const std::uint8_t, kFlashOctets> Mcu::flash() const {
 void Mcu::put_page(std::uint32_t address, const std::uint8_t* octets) {
   for (std::uint32_t at = address; at < kProgramSpace; at += kFlashOctets)
     std::memmove(avr_->flash + at, octets, kPageOctets);
+  if (core_) core_->forget(address, kPageOctets);
 }
 
 void Mcu::keep_page(std::uint32_t address) {
@@ -379,6 +389,51 @@ int Mcu::on_flash(avr_io_t* module, std::uint32_t request, void* parameter) {
       },
       module);
   return result;
+}
+
+/// A register that drives the motors has been written.
+void Mcu::on_motor(avr_irq_t*, std::uint32_t, void* mcu) { static_cast<Mcu*>(mcu)->note_motors(); }
+
+void Mcu::note_motors() {
+  constexpr OwnCycles kBothWritten = 64;
+  const Outputs out = outputs();
+  State& s = state_;
+  if (out.motor_left == s.left && out.motor_right == s.right) return;
+  const OwnCycles at = now();
+  if (at - s.changed_at > kBothWritten) {
+    s.steady_left = s.left;
+    s.steady_right = s.right;
+  }
+  s.changed_at = at;
+  s.left = out.motor_left;
+  s.right = out.motor_right;
+  const bool full = s.left == 255 && s.right == 255;
+  if (full && s.full_since == kNever) {
+    s.full_since = at;
+    s.before_left = s.steady_left;
+    s.before_right = s.steady_right;
+  } else if (!full && s.full_since != kNever) {
+    s.full_cycles += at - std::max(s.full_since, s.motors_from);
+    s.full_since = kNever;
+  }
+}
+
+Mcu::MotorUse Mcu::take_motors() {
+  note_motors();
+  State& s = state_;
+  MotorUse use{s.full_cycles, s.left, s.right};
+  if (s.full_since != kNever) {
+    use.full_cycles += now() - std::max(s.full_since, s.motors_from);
+    if (s.full_since > s.motors_from) {
+      use.left = s.before_left;
+      use.right = s.before_right;
+    } else {
+      use.full_cycles = 0;
+    }
+  }
+  s.full_cycles = 0;
+  s.motors_from = now();
+  return use;
 }
 
 void Mcu::on_led(avr_irq_t* pin, std::uint32_t value, void* mcu) {

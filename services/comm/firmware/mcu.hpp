@@ -19,6 +19,7 @@
 
 #include "core/random/random.hpp"
 #include "core/senses/robot_senses.hpp"
+#include "services/comm/firmware/fast_core.hpp"
 #include "services/comm/firmware/flash_image.hpp"
 
 struct avr_t;
@@ -51,8 +52,11 @@ enum class Halt : std::uint8_t {
 
 class Mcu {
  public:
+  /// What executes instructions: libsimavr alone, or FastCore those that it knows. The results are equal.
+  enum class Core : std::uint8_t { kFast, kLibsimavr };
   /// A robot that is switched on at cycle 0. The random stream of `robot` gives the noise of its converter.
-  Mcu(const FlashImage&, const std::array<std::uint8_t, kEepromOctets>& eeprom, const Random&, std::uint32_t robot);
+  Mcu(const FlashImage&, const std::array<std::uint8_t, kEepromOctets>& eeprom, const Random&, std::uint32_t robot,
+      Core = Core::kFast);
   ~Mcu();
   Mcu(const Mcu&) = delete;
   Mcu& operator=(const Mcu&) = delete;
@@ -73,6 +77,13 @@ class Mcu {
   [[nodiscard]] std::string& printed() { return printed_; }
 
   [[nodiscard]] Outputs outputs() const;
+  /// The motors since the last call, and the duties to show: where full duty of both motors goes on and is younger than the last
+  /// call, those before it.
+  struct MotorUse {
+    OwnCycles full_cycles = 0;  ///< for how long both motors had full duty
+    std::uint8_t left = 0, right = 0;
+  };
+  [[nodiscard]] MotorUse take_motors();
   [[nodiscard]] Halt halt() const { return state_.halt; }
   /// Whether it can receive: it is neither halted nor asleep with its clocks off.
   [[nodiscard]] bool listening() const;
@@ -103,6 +114,10 @@ class Mcu {
     std::uint32_t conversions = 0;  ///< number of conversions, each with its own noise
     std::uint32_t fault_at = 0;
     Halt halt = Halt::kNone;
+    // Motors. Full duty of both counts from full_since on; `steady` are the duties that held before a change for longer than it
+    // takes to write both.
+    OwnCycles motors_from = 0, full_since = kNever, full_cycles = 0, changed_at = 0;
+    std::uint8_t left = 0, right = 0, steady_left = 0, steady_right = 0, before_left = 0, before_right = 0;
   };
   /// A range of memory that changes while the processor runs.
   struct Range {
@@ -129,6 +144,8 @@ class Mcu {
   void start_conversion();
   [[nodiscard]] std::vector<Range> ranges() const;
 
+  void note_motors();
+  static void on_motor(avr_irq_t*, std::uint32_t value, void* mcu);
   static void on_led(avr_irq_t*, std::uint32_t value, void* mcu);
   static void on_conversion(avr_irq_t*, std::uint32_t, void* mcu);
   static void on_serial(avr_irq_t*, std::uint32_t octet, void* mcu);
@@ -137,6 +154,7 @@ class Mcu {
   friend struct LogHook;
 
   avr_t* avr_;
+  std::unique_ptr<FastCore> core_;  ///< null: libsimavr executes everything
   const Random random_;
   const std::uint32_t robot_;
   senses::Readings readings_;

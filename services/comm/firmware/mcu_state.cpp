@@ -131,6 +131,11 @@ std::string Mcu::save() const {
   append(octets, state_.conversions);
   append(octets, state_.fault_at);
   append(octets, state_.halt);
+  for (const OwnCycles cycles : {state_.motors_from, state_.full_since, state_.full_cycles, state_.changed_at})
+    append(octets, cycles);
+  for (const std::uint8_t duty : {state_.left, state_.right, state_.steady_left, state_.steady_right,
+                                  state_.before_left, state_.before_right})
+    append(octets, duty);
 
   const std::uint64_t block = address_of(avr_), block_end = block + malloc_usable_size(avr_);
   const std::uint64_t code = address_of(&__executable_start), code_end = address_of(&__etext);
@@ -187,6 +192,11 @@ void Mcu::load(const std::string& octets) {
   state_.conversions = reader.next<std::uint32_t>();
   state_.fault_at = reader.next<std::uint32_t>();
   state_.halt = reader.next<Halt>();
+  for (OwnCycles* cycles : {&state_.motors_from, &state_.full_since, &state_.full_cycles, &state_.changed_at})
+    *cycles = reader.next<OwnCycles>();
+  for (std::uint8_t* duty : {&state_.left, &state_.right, &state_.steady_left, &state_.steady_right,
+                             &state_.before_left, &state_.before_right})
+    *duty = reader.next<std::uint8_t>();
 
   const auto changed = reader.next<std::uint32_t>();
   std::size_t range = 0;

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstring>
 
+#include "core/base/spin_up.hpp"
 #include "core/math/elementary.h"
+#include "idl/manifest.pb.h"
 #include "tests/services/behaviours/swarm.hpp"
 
 namespace kilotwin::behaviours::test {
@@ -49,25 +51,51 @@ TEST(Kilolib, ChecksumsAreThoseOfTheFirmware) {
   EXPECT_EQ(r[8], 5);
 }
 
-TEST(Kilolib, SpinUpIsReportedOnceWithTheNextDuties) {
-  // A spin-up takes 15 ms of the program's time, so about two fit into a tick.
-  Swarm swarm(
-      {program("static void loop(void) { spinup_motors(); set_motors(70, (uint8_t)(kilo_ticks & 1)); }\n"),
-       program("static void loop(void) { if (kilo_ticks == 20) spinup_motors(); else set_motors(1, 2); }\n")},
-      1);
+/// Steps as on the robot; the sum of the times at full duty, in spin-ups, and the last duty of the left motor.
+std::pair<double, int> full_duty(const std::string& loop, int ticks) {
+  Swarm swarm({program(loop)}, 1, 1, "", [](proto::Manifest& manifest) {
+    manifest.mutable_experiment()->mutable_robots(0)->clear_loop_rate();
+  });
   swarm.start();
-  int kicks = 0, others = 0;
-  for (int k = 0; k < 100; ++k) {
+  double sum = 0;
+  for (int k = 0; k < ticks; ++k) {
     swarm.step();
     const ActuationFrame frame = swarm.frame();
-    kicks += frame.spin_up[0];
-    others += frame.spin_up[1];
-    // The duty is not 255 for a whole tick unless the program sets it.
-    EXPECT_EQ(frame.motor_left[0], 70);
-    EXPECT_EQ(frame.motor_left[1] == 255, frame.spin_up[1] == 1);
+    const bool throughout = frame.spin_up[0] == kFullDuty || frame.motor_left[0] == 255;
+    sum += throughout ? 262144.0 / 120000 : frame.spin_up[0] / 100.0;
   }
-  EXPECT_GE(kicks, 65);  // it waits a tick for every 32.768 ms that kicks take
-  EXPECT_EQ(others, 1);
+  return {sum, swarm.frame().motor_left[0]};
+}
+
+TEST(Kilolib, TimeAtFullDutyIsCountedToTheCycle) {
+  constexpr double kWhole = 262144.0 / 120000;  // spin-ups in a tick
+  const auto [always, shown] = full_duty("static void loop(void) { spinup_motors(); set_motors(70, 0); }\n", 100);
+  EXPECT_NEAR(always, 100 * kWhole, 0.02 * 100) << "one after the other";
+  EXPECT_EQ(shown, 70);
+  const auto [often, steps] =
+      full_duty("static void loop(void) { spinup_motors(); set_motors(70, 70); delay(45); }\n", 610);
+  EXPECT_NEAR(often, 610 * 32.768 / 60, 2) << "15 of 60 ms, across the ends of ticks";
+  EXPECT_EQ(steps, 70);
+  const auto [by_hand, after] = full_duty(
+      "static void loop(void) { set_motors(255, 255); delay(15); set_motors(70, 70); delay(45); }\n", 610);
+  EXPECT_NEAR(by_hand, often, 2);
+  EXPECT_EQ(after, 70);
+  const auto [once, later] =
+      full_duty("static void loop(void) { if (kilo_ticks == 20) spinup_motors(); set_motors(1, 2); }\n", 100);
+  EXPECT_GE(once, 1);
+  EXPECT_LE(once, 1 + kWhole) << "as often as fits into that tick";
+  EXPECT_EQ(later, 1);
+}
+
+TEST(Kilolib, ASpinUpThatGoesOnShowsTheDutiesBeforeIt) {
+  Swarm swarm({program("static void loop(void) { set_motors(70, 0); delay(25); spinup_motors(); set_motors(0, 70); "
+                       "delay(10000); }\n")},
+              1);
+  swarm.start();
+  swarm.steps(4);
+  const ActuationFrame frame = swarm.frame();
+  EXPECT_EQ(frame.motor_right[0], 70);
+  EXPECT_EQ(frame.motor_left[0], 0);
 }
 
 TEST(Kilolib, ReceivedMessagesCarryTheirChecksum) {

@@ -96,7 +96,9 @@ Swarm::Swarm(const std::vector<std::string>& texts, std::uint32_t robots, std::u
     proto::Program& entry = *manifest.add_program();
     entry.set_path(source.filename());
     entry.set_sha256(compiled.sha256);
-    manifest.mutable_experiment()->add_robots()->set_count(robots);
+    proto::RobotGroup& group = *manifest.mutable_experiment()->add_robots();
+    group.set_count(robots);
+    group.set_loop_rate(proto::RobotGroup::ONCE_PER_TICK);  // tests count calls of loop(); `edit` may change it
     manifest.add_group_program(static_cast<std::uint32_t>(p));
     for (std::uint32_t i = 0; i < robots; ++i) {
       manifest.add_x_mm(40.0 * i);

@@ -31,7 +31,7 @@ class Swarm {
     right_[robot] = right;
   }
   /// The next step begins with a kick of both motors.
-  void kick(std::uint32_t robot) { spin_up_[robot] = 1; }
+  void kick(std::uint32_t robot) { spin_up_[robot] = kOneSpinUp; }
   void set_all_motors(std::uint8_t left, std::uint8_t right) {
     for (std::uint32_t r = 0; r < plan_.robots(); ++r) set_motors(r, left, right);
   }

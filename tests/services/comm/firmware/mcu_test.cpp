@@ -65,6 +65,58 @@ TEST(Mcu, RunsOnCommandAndDrivesMotorsAndLed) {
   EXPECT_EQ(mcu.outputs().motor_left, 0) << "paused";
 }
 
+/// All that a robot shows and holds is the same at any time, whatever executes its instructions.
+TEST(Mcu, TheFastCoreGivesWhatLibsimavrGives) {
+  const FlashImage programs[] = {
+      talker(),
+      firmware("#define DEBUG\n#include <debug.h>\n" +
+               whole_program(
+                   "static uint16_t n; static void setup(void) { debug_init(); rand_seed(rand_hard()); }\n"
+                   "static void loop(void) { set_motors(rand_soft(), get_ambientlight() >> 2); set_color(n++);\n"
+                   "  printf(\"%u \", n); delay(n % 50); if (n % 7 == 0) spinup_motors(); }")),
+      firmware(whole_program(
+          "static volatile float sum; static int32_t table[20];\n"
+          "static void receive(message_t* m, distance_measurement_t* d) { delay(3); sum += m->data[0] / 3.0f; }\n"
+          "static void setup(void) {}\n"
+          "static void loop(void) { for (uint8_t i = 1; i < 20; ++i) table[i] = table[i - 1] * 7 / (i + 1) - "
+          "kilo_ticks;\n"
+          "  sum = sum * 0.5f + table[19]; set_motors(table[7], sum); }",
+          "kilo_message_rx = receive;"))};
+  senses::Readings readings{};
+  readings.light = 300;
+  readings.light_sd = 4;
+  readings.voltage = 700;
+  readings.voltage_sd = 3;
+  for (const FlashImage& program : programs) {
+    const auto eeprom = make_eeprom(5, kDuties, kNominal);
+    Mcu fast(program, eeprom, Random(1), 5), slow(program, eeprom, Random(1), 5, Mcu::Core::kLibsimavr);
+    fast.set_readings(readings);
+    slow.set_readings(readings);
+    std::mt19937 random(8);
+    for (int span = 0; span < 4000; ++span) {
+      std::vector<Light> pulses;
+      if (span == 20) pulses = light(kRun, fast.now() + 500);
+      if (span > 100 && span % 40 == 0)
+        pulses = light(0, fast.now() + random() % 2000, 600, 400, static_cast<std::uint8_t>(span));
+      const OwnCycles until = fast.now() + (pulses.empty() ? 1 + random() % 2048 : 60'000);
+      fast.run(until, pulses);
+      slow.run(until, pulses);
+      ASSERT_EQ(fast.now(), slow.now()) << span;
+      ASSERT_EQ(fast.program_counter(), slow.program_counter()) << span;
+      const Outputs a = fast.outputs(), b = slow.outputs();
+      ASSERT_TRUE(a.motor_left == b.motor_left && a.motor_right == b.motor_right && a.led == b.led) << span;
+      for (int address = 0; address < 0x900; ++address)
+        ASSERT_EQ(fast.memory(static_cast<std::uint16_t>(address)),
+                  slow.memory(static_cast<std::uint16_t>(address)))
+            << span << " at " << address;
+    }
+    EXPECT_EQ(fast.flashes(), slow.flashes());
+    EXPECT_EQ(fast.printed(), slow.printed());
+    EXPECT_EQ(fast.eeprom(), slow.eeprom());
+    EXPECT_NE(fast.outputs().motor_left + fast.outputs().motor_right, 0) << "it runs";
+  }
+}
+
 TEST(Mcu, SendsWholePacketsEverySixteenTicks) {
   Mcu mcu = make(talker());
   mcu.run(kSecond / 2, {});

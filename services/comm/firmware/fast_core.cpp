@@ -1,0 +1,589 @@
+#include "services/comm/firmware/fast_core.hpp"
+
+#include <simavr/sim_avr.h>
+
+#include <algorithm>
+
+namespace kilotwin::firmware {
+namespace {
+
+/// Kinds of operations. `Z`: Y and Z with a displacement. A kind names the instruction of the AVR instruction set manual.
+enum Kind : std::uint8_t {
+  kUnknown,
+  kLibsimavrs,
+  kNop,
+  kMovw,
+  kMul,
+  kMuls,
+  kCpc,
+  kSbc,
+  kAdd,
+  kCpse,
+  kCp,
+  kSub,
+  kAdc,
+  kAnd,
+  kEor,
+  kOr,
+  kMov,
+  kCpi,
+  kSbci,
+  kSubi,
+  kOri,
+  kAndi,
+  kLdd,
+  kStd,
+  kLdIncrement,
+  kLdDecrement,
+  kStIncrement,
+  kStDecrement,
+  kLds,
+  kSts,
+  kPush,
+  kPop,
+  kCom,
+  kNeg,
+  kSwap,
+  kInc,
+  kAsr,
+  kLsr,
+  kRor,
+  kDec,
+  kJmp,
+  kCall,
+  kRjmp,
+  kRcall,
+  kRet,
+  kIjmp,
+  kIcall,
+  kAdiw,
+  kSbiw,
+  kLdi,
+  kBrbs,
+  kBrbc,
+  kSbrc,
+  kSbrs,
+  kBst,
+  kBld,
+  kSetFlag,
+  kClearFlag,
+  kLpm,
+  kLpmIncrement,
+  kReadRegister,
+  kWriteDirections,
+  kReadFlags,
+  kDelayBySbiw
+};
+
+/// DDRB, DDRC and DDRD; the PORT register follows each.
+constexpr std::uint32_t kDdrB = 0x24, kDdrC = 0x27, kDdrD = 0x2a;
+constexpr std::uint32_t kX = 26, kY = 28, kZ = 30, kSpl = 0x5d, kSph = 0x5e, kSreg = 0x5f;
+constexpr std::uint32_t kRam = 0x100, kRamEnd = 0x8ff;
+
+bool is_long(std::uint32_t opcode) {
+  return (opcode & 0xfc0f) == 0x9000 || (opcode & 0xfe0c) == 0x940c;  // LDS and STS; JMP and CALL
+}
+
+}  // namespace
+
+FastCore::FastCore(const std::uint8_t* flash)
+    : flash_(flash), operations_(std::make_unique<std::array<Operation, kFlashOctets / 2>>()) {}
+
+void FastCore::forget(std::uint32_t address, std::uint32_t octets) {
+  // An instruction before the page may reach into it, and one that skips looks at the next.
+  const std::uint32_t first = address / 2 < 4 ? 0 : address / 2 - 4;
+  const std::uint32_t last = std::min<std::uint32_t>((address + octets) / 2, kFlashOctets / 2);
+  for (std::uint32_t i = first; i < last; ++i) (*operations_)[i] = Operation();
+}
+
+FastCore::Operation FastCore::decode(std::uint32_t pc) const {
+  const std::uint32_t o = word(pc), next = pc + 2;
+  const auto d5 = static_cast<std::uint8_t>(o >> 4 & 31), r5 = static_cast<std::uint8_t>((o >> 5 & 16) | (o & 15));
+  const auto d4 = static_cast<std::uint8_t>(16 + (o >> 4 & 15));
+  const std::uint32_t k8 = (o >> 4 & 0xf0) | (o & 15);
+  const Operation other{kLibsimavrs, 0, 0, 1, 0};
+  const auto registers = [&](Kind kind) { return Operation{kind, d5, r5, 1, 0}; };
+  const auto constant = [&](Kind kind) { return Operation{kind, d4, 0, 1, k8}; };
+  // Towards an address beyond the flash libsimavr goes.
+  const auto jump = [&](Kind kind, std::int32_t words, std::uint8_t flag) {
+    const std::int64_t to = std::int64_t{next} + 2 * words;
+    if (to < 0 || to >= std::int64_t{kFlashOctets}) return other;
+    return Operation{kind, flag, 0, 1, static_cast<std::uint32_t>(to)};
+  };
+  const auto skip = [&](Kind kind, std::uint8_t d, std::uint8_t r) {
+    if (next + 4 >= kFlashOctets) return other;
+    return Operation{kind, d, r, static_cast<std::uint8_t>(is_long(word(next)) ? 2 : 1), 0};
+  };
+  switch (o >> 12) {
+    case 0x0:
+      if (o == 0) return {kNop, 0, 0, 1, 0};
+      if ((o & 0xff00) == 0x0100)
+        return {kMovw, static_cast<std::uint8_t>((o >> 4 & 15) * 2), static_cast<std::uint8_t>((o & 15) * 2), 1, 0};
+      if ((o & 0xff00) == 0x0200) return {kMuls, d4, static_cast<std::uint8_t>(16 + (o & 15)), 1, 0};
+      switch (o >> 10) {
+        case 1: return registers(kCpc);
+        case 2: return registers(kSbc);
+        case 3: return registers(kAdd);
+        default: return other;
+      }
+    case 0x1:
+      switch (o >> 10 & 3) {
+        case 0: return skip(kCpse, d5, r5);
+        case 1: return registers(kCp);
+        case 2: return registers(kSub);
+        default: return registers(kAdc);
+      }
+    case 0x2:
+      switch (o >> 10 & 3) {
+        case 0: return registers(kAnd);
+        case 1: return registers(kEor);
+        case 2: return registers(kOr);
+        default: return registers(kMov);
+      }
+    case 0x3: return constant(kCpi);
+    case 0x4: return constant(kSbci);
+    case 0x5: return constant(kSubi);
+    case 0x6: return constant(kOri);
+    case 0x7: return constant(kAndi);
+    case 0x8:
+    case 0xa: {
+      const std::uint32_t q = (o >> 8 & 0x20) | (o >> 7 & 0x18) | (o & 7);
+      const auto base = static_cast<std::uint8_t>((o & 8) != 0 ? kY : kZ);
+      return {(o & 0x0200) != 0 ? kStd : kLdd, d5, base, 1, q};
+    }
+    case 0x9: break;
+    case 0xb: {
+      const std::uint32_t address = (o >> 5 & 0x30) + (o & 15) + 32;
+      const bool directions = address == kDdrB || address == kDdrC || address == kDdrD;
+      if ((o & 0x0800) != 0) return directions ? Operation{kWriteDirections, d5, 0, 1, address} : other;
+      if (directions || address == kSpl || address == kSph) return {kReadRegister, d5, 0, 1, address};
+      return address == kSreg ? Operation{kReadFlags, d5, 0, 1, 0} : other;
+    }
+    case 0xc:
+    case 0xd: {
+      const auto words = static_cast<std::int32_t>((o & 0xfff) ^ 0x800) - 0x800;
+      return jump((o & 0x1000) != 0 ? kRcall : kRjmp, words, 0);
+    }
+    case 0xe: return constant(kLdi);
+    default: {
+      const auto flag = static_cast<std::uint8_t>(o & 7);
+      if ((o & 0x0800) == 0) {
+        const auto words = static_cast<std::int32_t>((o >> 3 & 0x7f) ^ 0x40) - 0x40;
+        return jump((o & 0x0400) != 0 ? kBrbc : kBrbs, words, flag);
+      }
+      if ((o & 8) != 0) return other;
+      switch (o >> 9 & 3) {
+        case 0: return {kBld, d5, flag, 1, 0};
+        case 1: return {kBst, d5, flag, 1, 0};
+        case 2: return skip(kSbrc, d5, flag);
+        default: return skip(kSbrs, d5, flag);
+      }
+    }
+  }
+  if ((o & 0x0c00) == 0x0c00) return {kMul, d5, r5, 1, 0};
+  if ((o & 0x0e00) == 0x0600) {
+    const auto pair = static_cast<std::uint8_t>(24 + (o >> 3 & 6));
+    const std::uint32_t k = (o >> 2 & 0x30) | (o & 15);
+    if ((o & 0x0100) == 0) return {kAdiw, pair, 0, 1, k};
+    // A delay: SBIW by 1, and BRNE back to it.
+    const bool loops = k == 1 && next + 2 < kFlashOctets && word(next) == 0xf7f1;
+    return {loops ? kDelayBySbiw : kSbiw, pair, 0, 1, k};
+  }
+  if ((o & 0x0800) != 0) return other;
+  const auto address = [&] { return next + 2 < kFlashOctets ? word(next) : 0; };
+  const auto in_ram = [](std::uint32_t a) { return a >= kRam && a <= kRamEnd; };
+  if ((o & 0x0e00) == 0x0000) {
+    switch (o & 15) {
+      case 0x0: return in_ram(address()) ? Operation{kLds, d5, 0, 2, address()} : other;
+      case 0x1: return {kLdIncrement, d5, kZ, 1, 0};
+      case 0x2: return {kLdDecrement, d5, kZ, 1, 0};
+      case 0x4: return {kLpm, d5, 0, 1, 0};
+      case 0x5: return {kLpmIncrement, d5, 0, 1, 0};
+      case 0x9: return {kLdIncrement, d5, kY, 1, 0};
+      case 0xa: return {kLdDecrement, d5, kY, 1, 0};
+      case 0xc: return {kLdd, d5, kX, 1, 0};
+      case 0xd: return {kLdIncrement, d5, kX, 1, 0};
+      case 0xe: return {kLdDecrement, d5, kX, 1, 0};
+      case 0xf: return {kPop, d5, 0, 1, 0};
+      default: return other;
+    }
+  }
+  if ((o & 0x0e00) == 0x0200) {
+    switch (o & 15) {
+      case 0x0: return in_ram(address()) ? Operation{kSts, d5, 0, 2, address()} : other;
+      case 0x1: return {kStIncrement, d5, kZ, 1, 0};
+      case 0x2: return {kStDecrement, d5, kZ, 1, 0};
+      case 0x9: return {kStIncrement, d5, kY, 1, 0};
+      case 0xa: return {kStDecrement, d5, kY, 1, 0};
+      case 0xc: return {kStd, d5, kX, 1, 0};
+      case 0xd: return {kStIncrement, d5, kX, 1, 0};
+      case 0xe: return {kStDecrement, d5, kX, 1, 0};
+      case 0xf: return {kPush, d5, 0, 1, 0};
+      default: return other;
+    }
+  }
+  switch (o & 15) {
+    case 0x0: return {kCom, d5, 0, 1, 0};
+    case 0x1: return {kNeg, d5, 0, 1, 0};
+    case 0x2: return {kSwap, d5, 0, 1, 0};
+    case 0x3: return {kInc, d5, 0, 1, 0};
+    case 0x5: return {kAsr, d5, 0, 1, 0};
+    case 0x6: return {kLsr, d5, 0, 1, 0};
+    case 0x7: return {kRor, d5, 0, 1, 0};
+    case 0xa: return {kDec, d5, 0, 1, 0};
+    default: break;
+  }
+  if ((o & 0xfe0c) == 0x940c) {
+    const std::uint32_t to = address() * 2;
+    if ((o & 0x01f1) != 0 || to >= kFlashOctets) return other;
+    return {(o & 2) != 0 ? kCall : kJmp, 0, 0, 2, to};
+  }
+  if ((o & 0xff0f) == 0x9408) {
+    const auto flag = static_cast<std::uint8_t>(o >> 4 & 7);
+    if (flag == S_I) return other;
+    return {(o & 0x80) != 0 ? kClearFlag : kSetFlag, flag, 0, 1, 0};
+  }
+  switch (o) {
+    case 0x9409: return {kIjmp, 0, 0, 1, 0};
+    case 0x9508: return {kRet, 0, 0, 1, 0};
+    case 0x9509: return {kIcall, 0, 0, 1, 0};
+    case 0x95c8: return {kLpm, 0, 0, 1, 0};
+    default: return other;
+  }
+}
+
+std::uint64_t FastCore::run(avr_t& avr, std::uint64_t cycles) {
+  std::uint8_t* const data = avr.data;
+  std::uint8_t* const flag = avr.sreg;
+  Operation* const operations = operations_->data();
+  std::uint32_t pc = avr.pc;
+  std::uint64_t passed = 0;
+  const auto is_ram = [](std::uint32_t address) { return address >= kRam && address <= kRamEnd; };
+  const auto pair = [data](std::uint32_t i) { return data[i] | std::uint32_t{data[i + 1]} << 8; };
+  const auto set_pair = [data](std::uint32_t i, std::uint32_t value) {
+    data[i] = static_cast<std::uint8_t>(value);
+    data[i + 1] = static_cast<std::uint8_t>(value >> 8);
+  };
+  // Flags after an operation with this result.
+  const auto set_ns = [flag](std::uint32_t result) {
+    flag[S_N] = static_cast<std::uint8_t>(result >> 7 & 1);
+    flag[S_S] = flag[S_N] ^ flag[S_V];
+  };
+  const auto set_zns = [flag, set_ns](std::uint32_t result) {
+    flag[S_Z] = (result & 0xff) == 0 ? 1 : 0;
+    set_ns(result);
+  };
+  const auto add = [flag, set_zns](std::uint32_t a, std::uint32_t b, std::uint32_t carry) {
+    const std::uint32_t sum = a + b + carry;
+    const std::uint32_t carries = (a & b) | (~sum & (a | b));
+    flag[S_H] = static_cast<std::uint8_t>(carries >> 3 & 1);
+    flag[S_C] = static_cast<std::uint8_t>(carries >> 7 & 1);
+    flag[S_V] = static_cast<std::uint8_t>(((a & b & ~sum) | (~a & ~b & sum)) >> 7 & 1);
+    set_zns(sum);
+    return static_cast<std::uint8_t>(sum);
+  };
+  const auto subtract = [flag, set_ns](std::uint32_t a, std::uint32_t b, std::uint32_t carry, bool keeps_zero) {
+    const std::uint32_t difference = a - b - carry;
+    const std::uint32_t borrows = (~a & b) | (difference & (~a | b));
+    flag[S_H] = static_cast<std::uint8_t>(borrows >> 3 & 1);
+    flag[S_C] = static_cast<std::uint8_t>(borrows >> 7 & 1);
+    flag[S_V] = static_cast<std::uint8_t>(((a & ~b & ~difference) | (~a & b & difference)) >> 7 & 1);
+    const bool zero = (difference & 0xff) == 0;
+    flag[S_Z] = keeps_zero ? static_cast<std::uint8_t>(flag[S_Z] & (zero ? 1 : 0)) : zero ? 1 : 0;
+    set_ns(difference);
+    return static_cast<std::uint8_t>(difference);
+  };
+  const auto logic = [flag, set_zns](std::uint32_t result) {
+    flag[S_V] = 0;
+    set_zns(result);
+    return static_cast<std::uint8_t>(result);
+  };
+  const auto shifted = [flag](std::uint32_t before, std::uint32_t after) {
+    flag[S_Z] = after == 0 ? 1 : 0;
+    flag[S_C] = static_cast<std::uint8_t>(before & 1);
+    flag[S_N] = static_cast<std::uint8_t>(after >> 7 & 1);
+    flag[S_V] = flag[S_N] ^ flag[S_C];
+    flag[S_S] = flag[S_N] ^ flag[S_V];
+    return static_cast<std::uint8_t>(after);
+  };
+  const auto subtract_word = [flag](std::uint32_t a, std::uint32_t result) {
+    flag[S_V] = static_cast<std::uint8_t>((a & ~result) >> 15 & 1);
+    flag[S_C] = static_cast<std::uint8_t>((result & ~a) >> 15 & 1);
+    flag[S_Z] = (result & 0xffff) == 0 ? 1 : 0;
+    flag[S_N] = static_cast<std::uint8_t>(result >> 15 & 1);
+    flag[S_S] = flag[S_N] ^ flag[S_V];
+  };
+
+  while (passed < cycles && pc < kFlashOctets) {
+    Operation& o = operations[pc / 2];
+    if (o.kind == kUnknown) o = decode(pc);
+    std::uint32_t next = pc + 2;
+    std::uint32_t took = 1;
+    switch (o.kind) {
+      case kNop: break;
+      case kMovw:
+        data[o.d] = data[o.r];
+        data[o.d + 1] = data[o.r + 1];
+        break;
+      case kMul: {
+        const std::uint32_t product = std::uint32_t{data[o.d]} * data[o.r];
+        set_pair(0, product);
+        flag[S_Z] = product == 0 ? 1 : 0;
+        flag[S_C] = static_cast<std::uint8_t>(product >> 15 & 1);
+        took = 2;
+        break;
+      }
+      case kMuls: {
+        const auto product = static_cast<std::uint32_t>(std::int32_t{static_cast<std::int8_t>(data[o.d])} *
+                                                        static_cast<std::int8_t>(data[o.r]));
+        set_pair(0, product);
+        flag[S_Z] = (product & 0xffff) == 0 ? 1 : 0;
+        flag[S_C] = static_cast<std::uint8_t>(product >> 15 & 1);
+        took = 2;
+        break;
+      }
+      case kCpc: subtract(data[o.d], data[o.r], flag[S_C], true); break;
+      case kSbc: data[o.d] = subtract(data[o.d], data[o.r], flag[S_C], true); break;
+      case kAdd: data[o.d] = add(data[o.d], data[o.r], 0); break;
+      case kAdc: data[o.d] = add(data[o.d], data[o.r], flag[S_C]); break;
+      case kCp: subtract(data[o.d], data[o.r], 0, false); break;
+      case kSub: data[o.d] = subtract(data[o.d], data[o.r], 0, false); break;
+      case kAnd: data[o.d] = logic(data[o.d] & data[o.r]); break;
+      case kEor: data[o.d] = logic(data[o.d] ^ data[o.r]); break;
+      case kOr: data[o.d] = logic(data[o.d] | data[o.r]); break;
+      case kMov: data[o.d] = data[o.r]; break;
+      case kCpi: subtract(data[o.d], o.k, 0, false); break;
+      case kSbci: data[o.d] = subtract(data[o.d], o.k, flag[S_C], true); break;
+      case kSubi: data[o.d] = subtract(data[o.d], o.k, 0, false); break;
+      case kOri: data[o.d] = logic(data[o.d] | o.k); break;
+      case kAndi: data[o.d] = logic(data[o.d] & o.k); break;
+      case kLdi: data[o.d] = static_cast<std::uint8_t>(o.k); break;
+      case kCpse:
+      case kSbrc:
+      case kSbrs: {
+        const bool bit = (data[o.d] >> (o.r & 7) & 1) != 0;
+        const bool skips = o.kind == kCpse ? data[o.d] == data[o.r] : bit == (o.kind == kSbrs);
+        if (skips) next += 2u * o.words, took += o.words;
+        break;
+      }
+      case kLdd: {
+        const std::uint32_t address = pair(o.r) + o.k;
+        if (!is_ram(address)) goto libsimavrs;
+        data[o.d] = data[address];
+        took = 2;
+        break;
+      }
+      case kStd: {
+        const std::uint32_t address = pair(o.r) + o.k;
+        if (!is_ram(address)) goto libsimavrs;
+        data[address] = data[o.d];
+        took = 2;
+        break;
+      }
+      case kLdIncrement: {
+        const std::uint32_t address = pair(o.r);
+        if (!is_ram(address) || (o.d & ~1u) == o.r) goto libsimavrs;
+        data[o.d] = data[address];
+        set_pair(o.r, address + 1);
+        took = 2;
+        break;
+      }
+      case kLdDecrement: {
+        const std::uint32_t address = pair(o.r) - 1;
+        if (!is_ram(address) || (o.d & ~1u) == o.r) goto libsimavrs;
+        data[o.d] = data[address];
+        set_pair(o.r, address);
+        took = 2;
+        break;
+      }
+      case kStIncrement: {
+        const std::uint32_t address = pair(o.r);
+        if (!is_ram(address) || (o.d & ~1u) == o.r) goto libsimavrs;
+        data[address] = data[o.d];
+        set_pair(o.r, address + 1);
+        took = 2;
+        break;
+      }
+      case kStDecrement: {
+        const std::uint32_t address = pair(o.r) - 1;
+        if (!is_ram(address) || (o.d & ~1u) == o.r) goto libsimavrs;
+        data[address] = data[o.d];
+        set_pair(o.r, address);
+        took = 2;
+        break;
+      }
+      case kLds:
+        data[o.d] = data[o.k];
+        next += 2;
+        took = 2;
+        break;
+      case kSts:
+        data[o.k] = data[o.d];
+        next += 2;
+        took = 2;
+        break;
+      case kPush: {
+        const std::uint32_t top = pair(kSpl);
+        if (!is_ram(top)) goto libsimavrs;
+        data[top] = data[o.d];
+        set_pair(kSpl, top - 1);
+        took = 2;
+        break;
+      }
+      case kPop: {
+        const std::uint32_t top = pair(kSpl) + 1;
+        if (!is_ram(top)) goto libsimavrs;
+        data[o.d] = data[top];
+        set_pair(kSpl, top);
+        took = 2;
+        break;
+      }
+      case kCom:
+        data[o.d] = logic(0xffu - data[o.d]);
+        flag[S_C] = 1;
+        break;
+      case kNeg: {
+        const std::uint32_t before = data[o.d], result = (0u - before) & 0xff;
+        data[o.d] = static_cast<std::uint8_t>(result);
+        flag[S_H] = static_cast<std::uint8_t>((result | before) >> 3 & 1);
+        flag[S_V] = result == 0x80 ? 1 : 0;
+        flag[S_C] = result != 0 ? 1 : 0;
+        set_zns(result);
+        break;
+      }
+      case kSwap: data[o.d] = static_cast<std::uint8_t>(data[o.d] >> 4 | data[o.d] << 4); break;
+      case kInc: {
+        const auto result = static_cast<std::uint8_t>(data[o.d] + 1);
+        data[o.d] = result;
+        flag[S_V] = result == 0x80 ? 1 : 0;
+        set_zns(result);
+        break;
+      }
+      case kDec: {
+        const auto result = static_cast<std::uint8_t>(data[o.d] - 1);
+        data[o.d] = result;
+        flag[S_V] = result == 0x7f ? 1 : 0;
+        set_zns(result);
+        break;
+      }
+      case kAsr: data[o.d] = shifted(data[o.d], data[o.d] >> 1 | (data[o.d] & 0x80u)); break;
+      case kLsr: data[o.d] = shifted(data[o.d], data[o.d] >> 1); break;
+      case kRor: data[o.d] = shifted(data[o.d], data[o.d] >> 1 | (flag[S_C] != 0 ? 0x80u : 0)); break;
+      case kJmp:
+        next = o.k;
+        took = 3;
+        break;
+      case kRjmp:
+        next = o.k;
+        took = 2;
+        break;
+      case kIjmp:
+        next = pair(kZ) * 2;
+        if (next >= kFlashOctets) goto libsimavrs;
+        took = 2;
+        break;
+      case kCall:
+      case kRcall:
+      case kIcall: {
+        const std::uint32_t top = pair(kSpl), back = (pc + 2u * o.words) / 2;
+        const std::uint32_t to = o.kind == kIcall ? pair(kZ) * 2 : o.k;
+        if (!is_ram(top) || !is_ram(top - 1) || to >= kFlashOctets) goto libsimavrs;
+        data[top] = static_cast<std::uint8_t>(back);
+        data[top - 1] = static_cast<std::uint8_t>(back >> 8);
+        set_pair(kSpl, top - 2);
+        next = to;
+        took = o.kind == kCall ? 4 : 3;
+        break;
+      }
+      case kRet: {
+        const std::uint32_t top = pair(kSpl);
+        if (!is_ram(top + 1) || !is_ram(top + 2)) goto libsimavrs;
+        const std::uint32_t to = (std::uint32_t{data[top + 1]} << 8 | data[top + 2]) * 2;
+        if (to >= kFlashOctets) goto libsimavrs;
+        set_pair(kSpl, top + 2);
+        next = to;
+        took = 4;
+        break;
+      }
+      case kAdiw: {
+        const std::uint32_t before = pair(o.d), result = (before + o.k) & 0xffff;
+        set_pair(o.d, result);
+        flag[S_V] = static_cast<std::uint8_t>((~before & result) >> 15 & 1);
+        flag[S_C] = static_cast<std::uint8_t>((~result & before) >> 15 & 1);
+        flag[S_Z] = result == 0 ? 1 : 0;
+        flag[S_N] = static_cast<std::uint8_t>(result >> 15 & 1);
+        flag[S_S] = flag[S_N] ^ flag[S_V];
+        took = 2;
+        break;
+      }
+      case kDelayBySbiw: {
+        // All rounds but the last take four cycles and lead back here. The loop below executes what does not fit.
+        const std::uint32_t before = pair(o.d), rounds = before == 0 ? 0xffffu : before - 1;
+        const auto skipped = static_cast<std::uint32_t>(std::min<std::uint64_t>(rounds, (cycles - passed) / 4));
+        if (skipped > 0) {
+          const std::uint32_t after = (before - skipped) & 0xffff;
+          set_pair(o.d, after);
+          subtract_word((after + 1) & 0xffff, after);
+          passed += 4ull * skipped;
+          continue;
+        }
+        [[fallthrough]];
+      }
+      case kSbiw: {
+        const std::uint32_t before = pair(o.d), result = (before - o.k) & 0xffff;
+        set_pair(o.d, result);
+        subtract_word(before, result);
+        took = 2;
+        break;
+      }
+      case kBrbs:
+        if (flag[o.d] != 0) next = o.k, took = 2;
+        break;
+      case kBrbc:
+        if (flag[o.d] == 0) next = o.k, took = 2;
+        break;
+      case kBst: flag[S_T] = static_cast<std::uint8_t>(data[o.d] >> o.r & 1); break;
+      case kBld:
+        data[o.d] = static_cast<std::uint8_t>((data[o.d] & ~(1u << o.r)) | std::uint32_t{flag[S_T]} << o.r);
+        break;
+      case kSetFlag: flag[o.d] = 1; break;
+      case kClearFlag: flag[o.d] = 0; break;
+      case kLpm: {
+        const std::uint32_t address = pair(kZ);
+        if (address >= kFlashOctets) goto libsimavrs;
+        data[o.d] = avr.flash[address];
+        took = 3;
+        break;
+      }
+      case kLpmIncrement: {
+        const std::uint32_t address = pair(kZ);
+        if ((o.d & ~1u) == kZ || address >= kFlashOctets) goto libsimavrs;
+        data[o.d] = avr.flash[address];
+        set_pair(kZ, address + 1);
+        took = 3;
+        break;
+      }
+      case kReadRegister: data[o.d] = data[o.k]; break;
+      case kWriteDirections:
+        // A program that sets its LED in each loop() writes what is there. Without pull-ups this has no effect.
+        if (data[o.d] != data[o.k] || (data[o.k + 1] & ~data[o.k]) != 0) goto libsimavrs;
+        break;
+      case kReadFlags: {
+        std::uint8_t flags = 0;
+        for (int i = 0; i < 8; ++i) flags = static_cast<std::uint8_t>(flags | flag[i] << i);
+        data[kSreg] = flags;
+        data[o.d] = flags;
+        break;
+      }
+      default: goto libsimavrs;
+    }
+    pc = next;
+    passed += took;
+  }
+libsimavrs:
+  avr.pc = pc;
+  avr.cycle += passed;
+  return passed;
+}
+
+}  // namespace kilotwin::firmware

@@ -1,0 +1,107 @@
+// loop() as often as on the robot: calls that change nothing are skipped, all others are not.
+#include <gtest/gtest.h>
+
+#include "idl/manifest.pb.h"
+#include "tests/services/behaviours/swarm.hpp"
+
+namespace kilotwin::behaviours::test {
+namespace {
+
+/// A swarm of one robot with the default loop_rate.
+struct Robot : Swarm {
+  explicit Robot(const std::string& body)
+      : Swarm({program(body)}, 1, 1, "", [](proto::Manifest& manifest) {
+          manifest.mutable_experiment()->mutable_robots(0)->clear_loop_rate();
+        }) {
+    start();
+  }
+};
+
+TEST(LoopRate, ACountThatSettlesTakesOneTick) {
+  Robot robot(
+      "static uint8_t count, rounds; static uint32_t since;\n"
+      "static void setup(void) { since = kilo_ticks; }\n"
+      "static void loop(void) { if (kilo_ticks - since < 10) return; if (++count < 50) return;\n"
+      "  count = 0; since = kilo_ticks; set_motors(++rounds, 0); }\n");
+  const int before = robot.frame().motor_left[0];
+  robot.steps(100);
+  EXPECT_EQ(robot.frame().motor_left[0] - before, 10);
+}
+
+TEST(LoopRate, CallsThatChangeSomethingAreAllExecuted) {
+  // A call takes some tens of cycles of the 262144 of a tick.
+  Robot robot(
+      "static uint32_t n; static message_t m;\n"
+      "static message_t* tx(void) { memcpy(m.data, &n, 4); return &m; }\n"
+      "static void loop(void) { ++n; }\n");
+  robot.steps(20);
+  Air air;
+  air.ask = {0};
+  robot.step(air);
+  const IrMessage sent = robot.frame().offer_message.at(0);
+  const int calls = sent[0] | sent[1] << 8 | sent[2] << 16;
+  EXPECT_GT(calls, 20 * 2000);
+  EXPECT_LT(calls, 22 * 40000);
+}
+
+TEST(LoopRate, MessagesAreSeenOnceEach) {
+  Robot robot(
+      "static volatile uint8_t is_new; static uint8_t n;\n"
+      "static void rx(message_t* m, distance_measurement_t* d) { is_new = 1; }\n"
+      "static void loop(void) { if (!is_new) return; is_new = 0; set_motors(++n, 0); }\n");
+  for (int k = 1; k <= 100; ++k) {
+    Air air;
+    if (k % 3 == 0) air.receptions = {{0, message(0)}};
+    robot.step(air);
+    EXPECT_EQ(robot.frame().motor_left[0], k / 3);
+  }
+}
+
+TEST(LoopRate, TheClockIsSeenInItsTick) {
+  Robot robot("static void loop(void) { set_motors(kilo_ticks & 255, kilo_ticks / 7 & 255); }\n");
+  const int first = robot.frame().motor_left[0];
+  for (int k = 1; k <= 100; ++k) {
+    robot.step();
+    EXPECT_EQ(robot.frame().motor_left[0], (first + k) & 255);
+  }
+}
+
+TEST(LoopRate, DelaysKeepTheirTime) {
+  // Two states that are equal before and after each call: their delays must not be skipped.
+  Robot robot("static void loop(void) { set_color(1); delay(500); set_color(0); delay(500); }\n");
+  int changes = 0;
+  std::uint8_t last = robot.led(0);
+  constexpr int kTicks = 3052;  // 100 s
+  for (int k = 0; k < kTicks; ++k) {
+    robot.step();
+    changes += robot.led(0) != last ? 1 : 0;
+    last = robot.led(0);
+  }
+  EXPECT_NEAR(changes, 200, 2);
+}
+
+TEST(LoopRate, PeriodsOfSeveralCallsAreCutShort) {
+  // Three colours in turn, then again from the first: the state repeats after three calls.
+  Robot robot(
+      "static uint8_t i; static void loop(void) { i = (i + 1) % 3; set_color(i + 1); set_motors(7, 8); }\n");
+  for (int k = 0; k < 50; ++k) {
+    robot.step();
+    EXPECT_GE(robot.led(0), 1);
+    EXPECT_LE(robot.led(0), 3);
+    EXPECT_EQ(robot.frame().motor_right[0], 8);
+  }
+}
+
+TEST(LoopRate, PrintedTextIsNotSkipped) {
+  Robot robot(
+      "#define DEBUG\n#include \"debug.h\"\n"
+      "static void loop(void) { printf(\"x\"); delay(1); }\n");
+  robot.step();
+  EXPECT_GT(robot.hosts[0]->printed().size(), 0u);
+  std::size_t octets = 0;
+  for (const auto& printed : robot.hosts[0]->printed()) octets += printed.text.size();
+  EXPECT_GE(octets, 20u);
+}
+
+}  // namespace
+}  // namespace kilotwin::behaviours::test
