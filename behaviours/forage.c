@@ -6,7 +6,9 @@
  *   type 14      it changes its goal: data 0 to the home (it now carries food), 1 to the food (it has put its food down)
  *   type 15      there is no food left
  * Inside its goal it stops and asks for the change by its blue LED. Without a bearing it walks at random.
- * LED: red while it carries food, green on its way to the food, blue while it asks, off when there is none left. */
+ * LED: red while it carries food, green on its way to the food, blue while it asks, off when there is none left.
+ * Broadcast 120 is the station's identification, as in housekeeping.c: the robot stops, and shows blue for its own number, red for
+ * others; 0xFFFF ends it. */
 #include <kilolib.h>
 #include <stdlib.h>
 
@@ -15,13 +17,16 @@
 #define STRAIGHT_TICKS 320
 #define MOST_TURN_TICKS 160
 #define SWAP_LOCK_TICKS 100
+#define IDENTIFY 120
+#define NOBODY 0xffff
+#define IDENTIFICATION_TICKS 320 /* without a further question it is over */
 
 enum motion { STOP, STRAIGHT, LEFT, RIGHT };
 enum { INSIDE = 0, SWAP = 14, NO_FOOD = 15 };
 
 static uint8_t carries, asks, has_ended, has_bearing, ever_swapped;
-static uint16_t bearing_deg;
-static uint32_t bearing_at, swapped_at, leg_ends_at;
+static uint16_t bearing_deg, asked_number = NOBODY;
+static uint32_t bearing_at, swapped_at, leg_ends_at, asked_at;
 static enum motion motion = STOP;
 
 static void move(enum motion next) {
@@ -59,6 +64,10 @@ static void sense(uint8_t type, uint16_t data) {
 
 static void receive(message_t* message, distance_measurement_t* strength) {
   (void)strength;
+  if (message->type == IDENTIFY) {
+    asked_number = (uint16_t)message->data[0] << 8 | message->data[1];
+    asked_at = kilo_ticks;
+  }
   if (message->type != 0) return;
   for (uint8_t i = 0; i < 9; i += 3) {
     const uint8_t* slot = message->data + i;
@@ -81,7 +90,10 @@ static void walk_at_random(void) {
 static void setup(void) { srand(rand_hard() << 8 | rand_hard()); }
 
 static void loop(void) {
-  if (has_ended && !carries) {
+  if (asked_number != NOBODY && kilo_ticks - asked_at < IDENTIFICATION_TICKS) {
+    set_color(asked_number == kilo_uid ? RGB(0, 0, 3) : RGB(3, 0, 0));
+    move(STOP);
+  } else if (has_ended && !carries) {
     set_color(0);
     move(STOP);
   } else if (asks) {

@@ -1,17 +1,14 @@
 #include "clients/cameras/mjpeg_server.hpp"
 
 #include <fmt/format.h>
-#include <libwebsockets.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <mutex>
 #include <string_view>
-#include <thread>
-#include <vector>
 
-#include "core/base/error.hpp"
+#include "clients/http/loopback_server.hpp"
 
 namespace kilotwin::cameras {
 namespace {
@@ -42,35 +39,9 @@ struct Client {
 
 class MjpegServer::Service {
  public:
-  explicit Service(std::uint16_t port) {
-    lws_set_log_level(0, nullptr);
-    static const std::array<lws_protocols, 2> protocols{
-        {{"http", &Service::on_event, sizeof(Client), 0, 0, nullptr, 0}, {nullptr, nullptr, 0, 0, 0, nullptr, 0}}};
-    lws_context_creation_info info{};
-    info.port = port;
-    info.iface = "127.0.0.1";
-    info.protocols = protocols.data();
-    info.user = this;
-    info.gid = -1;
-    info.uid = -1;
-    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
-    context_ = lws_create_context(&info);
-    lws_vhost* const host = context_ == nullptr ? nullptr : lws_create_vhost(context_, &info);
-    if (host == nullptr) {
-      if (context_ != nullptr) lws_context_destroy(context_);
-      throw UserError(fmt::format("--mjpeg: port {} of 127.0.0.1 cannot be served; choose one that is free", port));
-    }
-    port_ = static_cast<std::uint16_t>(lws_get_vhost_listen_port(host));
-    thread_ = std::thread([this] {
-      while (!ends_ && lws_service(context_, 0) >= 0) {}
-    });
-  }
-  ~Service() {
-    ends_ = true;
-    lws_cancel_service(context_);
-    thread_.join();
-    lws_context_destroy(context_);
-  }
+  explicit Service(std::uint16_t port)
+      : server_(port, wanted(this),
+                fmt::format("--mjpeg: port {} of 127.0.0.1 cannot be served; choose one that is free", port)) {}
   Service(const Service&) = delete;
 
   void post(const std::string& jpeg, const FrameStamp& stamp) {
@@ -85,13 +56,21 @@ class MjpegServer::Service {
       posted->number = newest_ ? newest_->number + 1 : 1;
       newest_ = std::move(posted);
     }
-    lws_cancel_service(context_);
+    server_.wake();
   }
 
-  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] std::uint16_t port() const { return server_.port(); }
   [[nodiscard]] std::uint32_t clients() const { return streams_; }
 
  private:
+  static lws_context_creation_info wanted(Service* user) {
+    static const std::array<lws_protocols, 2> protocols{
+        {{"http", &Service::on_event, sizeof(Client), 0, 0, nullptr, 0}, {nullptr, nullptr, 0, 0, 0, nullptr, 0}}};
+    lws_context_creation_info info{};
+    info.protocols = protocols.data();
+    info.user = user;
+    return info;
+  }
   static int on_event(lws* connection, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
     auto* const service = static_cast<Service*>(lws_context_user(lws_get_context(connection)));
     auto* const client = static_cast<Client*>(user);
@@ -99,7 +78,7 @@ class MjpegServer::Service {
       case LWS_CALLBACK_HTTP: return service->begin(connection, *client, {static_cast<char*>(in), length});
       case LWS_CALLBACK_HTTP_WRITEABLE: return service->go_on(connection, *client);
       case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
-        lws_callback_on_writable_all_protocol(service->context_, lws_get_protocol(connection));
+        lws_callback_on_writable_all_protocol(lws_get_context(connection), lws_get_protocol(connection));
         return 0;
       case LWS_CALLBACK_CLOSED_HTTP:
         if (client != nullptr) service->end(*client);
@@ -188,12 +167,8 @@ class MjpegServer::Service {
     return 0;
   }
 
-  /// The library wants room in front of what it writes.
   [[nodiscard]] bool write(lws* connection, std::string_view text, bool last) {
-    buffer_.resize(LWS_PRE + text.size());
-    std::copy(text.begin(), text.end(), buffer_.begin() + LWS_PRE);
-    return lws_write(connection, buffer_.data() + LWS_PRE, text.size(),
-                     last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) >= static_cast<int>(text.size());
+    return server_.write(connection, text, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP);
   }
 
   void end(Client& client) {
@@ -203,14 +178,10 @@ class MjpegServer::Service {
     client.sending = nullptr;
   }
 
-  lws_context* context_ = nullptr;
-  std::uint16_t port_ = 0;
-  std::atomic<bool> ends_{false};
   std::atomic<std::uint32_t> streams_{0};
   std::mutex mutex_;
-  PostedPicture newest_;               // guarded by mutex_
-  std::vector<unsigned char> buffer_;  // of the service's thread
-  std::thread thread_;
+  PostedPicture newest_;  // guarded by mutex_
+  http::LoopbackServer server_;
 };
 
 MjpegServer::MjpegServer(std::uint16_t port) : service_(std::make_unique<Service>(port)) {}

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <thread>
 #include <utility>
@@ -81,11 +80,6 @@ cv::Rect placed(const ArkCalibration& calibration, std::size_t camera) {
     throw UserError(fmt::format("K and R of camera {} do not put its picture onto the panorama", camera));
   const int x = static_cast<int>(left), y = static_cast<int>(top);
   return {x, y, static_cast<int>(right) - x + 1, static_cast<int>(bottom) - y + 1};
-}
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
 }
 
 /// The number and the camera of a name frame_%05d_%d.jpg.
@@ -304,9 +298,12 @@ std::optional<CapturedFrame> ArkDirectory::next(const std::atomic<bool>& stop) {
   while (const std::optional<int> number = next_number(stop)) {
     last_ = *number;
     std::array<cv::Mat, kArkCameras> pictures;
+    std::optional<cameras::FrameStamp> stamp;
     bool all = true;
     for (std::size_t camera = 0; camera < kArkCameras; ++camera) {
-      pictures.at(camera) = cv::imread(file(*number, camera).string(), cv::IMREAD_COLOR);
+      StampedPicture read = read_stamped(file(*number, camera));
+      pictures.at(camera) = read.picture;
+      stamp = read.stamp;
       if (!pictures.at(camera).empty()) continue;
       // A directory that grows may replace its oldest files.
       all = false;
@@ -316,11 +313,7 @@ std::optional<CapturedFrame> ArkDirectory::next(const std::atomic<bool>& stop) {
     }
     if (!all) continue;
     CapturedFrame frame{mosaic_.join(pictures), frames_, static_cast<double>(frames_) / options_.rate_hz, 0};
-    if (options_.watch) {
-      frame.capture_ns = now_ns();
-      if (frames_ == 0) start_ns_ = frame.capture_ns;
-      frame.time_s = 1e-9 * static_cast<double>(frame.capture_ns - start_ns_);
-    }
+    if (options_.watch) clock_.time(frame, stamp);
     ++frames_;
     return frame;
   }

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/track/capture_clock.hpp"
 #include "clients/track/floor_map.hpp"
 #include "clients/track/source.hpp"
 
@@ -90,7 +91,7 @@ class ArkDirectory : public Source {
   std::vector<int> numbers_;  ///< of the frames; a directory that grows has none
   int last_ = -1;
   std::uint64_t frames_ = 0;
-  std::int64_t start_ns_ = 0;
+  CaptureClock clock_;
 };
 
 }  // namespace kilotwin::track

@@ -17,6 +17,8 @@ constexpr double kMargin = 9;
 constexpr int kConfirm = 3, kGiveUp = 3;
 /// Share of the radius by which a fitted centre may be off for reasons that its deviation does not know.
 constexpr double kShift = 0.07;
+/// A robot that may be held with this probability does not show how robots carry their LED.
+constexpr double kMostHeld = 0.1;
 /// No robot is faster.
 constexpr double kTopSpeed_mm_s = 35;
 
@@ -54,7 +56,8 @@ void Follower::take(Track& track, std::size_t index, const Sighting& sighting) {
   std::optional<double> by_led;
   double by_led_sd = 0;
   if (sighting.led_bearing_rad) {
-    if (const std::optional<double> heading = track.path.heading_rad())
+    const bool held = track.heading_filter.modes()[HeadingFilter::kHeld] > kMostHeld;
+    if (const std::optional<double> heading = track.path.heading_rad(); heading && !held)
       led_bearing_.add(*sighting.led_bearing_rad, *heading);
     if (const std::optional<LedMount> mount = led_bearing_.mount()) {
       by_led = wrapped(*sighting.led_bearing_rad - mount->from_heading_rad);

@@ -14,18 +14,21 @@ constexpr double kAhead_mm = 9.2;
 
 /// What a mode begins with. Speeds: docs/explanation/motion.md; the spread is that of uncalibrated robots.
 struct Mode {
-  double speed_mm_s, turn_rad_s, speed_sd, turn_sd;
+  double speed_mm_s, turn_rad_s, speed_sd, turn_sd;  ///< of held: velocity, and its standard deviations in mm/s
 };
-constexpr std::array<Mode, 4> kModesOfMotion{{
+constexpr std::array<Mode, HeadingFilter::kModes> kModesOfMotion{{
     {0, 0, 0.05, 0.002},
     {10, 0, 2.5, 0.12},
     {10, 0.8, 2.5, 0.15},
     {10, -0.8, 2.5, 0.15},
+    {0, 0, 6, 6},
 }};
-/// Rate at which a robot changes its mode, 1/s.
-constexpr double kSwitching_1_s = 0.5;
+/// Rate at which a robot changes its mode, 1/s, and the share of these changes by which something begins to hold it.
+constexpr double kSwitching_1_s = 0.5, kHeldShare = 0.02;
+/// Densities of the noise of a robot that is held: heading rad^2/s, velocity (mm/s)^2/s. It may turn unseen.
+constexpr double kHeldHeadingNoise = 0.05, kHeldVelocityNoise = 100;
 /// Densities of the noise while a mode lasts, per second: position mm^2, heading rad^2, speed (mm/s)^2, turn rate (rad/s)^2.
-constexpr double kPositionNoise = 0.02, kHeadingNoise = 4e-4, kSpeedNoise = 0.3, kTurnNoise = 1e-3;
+constexpr double kPositionNoise = 0.06, kHeadingNoise = 4e-4, kSpeedNoise = 0.3, kTurnNoise = 1e-3;
 /// A robot that moved by this much moves: mm, and in standard deviations.
 constexpr double kMoved_mm = 1.5, kMovedDeviations = 6;
 /// While its heading is not known, the origin follows drift with this time constant, s.
@@ -53,24 +56,30 @@ void HeadingFilter::start(double time_s, double x_mm, double y_mm, double sd_mm,
     const Mode& mode = kModesOfMotion[i];
     const double offset = mode.speed_mm_s > 0 ? std::atan2(kAhead_mm * mode.turn_rad_s, mode.speed_mm_s) : 0;
     const double heading = bearing_rad ? *bearing_rad : wrapped(direction - offset);
-    const double heading_sd = bearing_rad ? bearing_sd_rad : (i == 0 ? 0.7 : 0.35);
+    const double heading_sd = bearing_rad ? bearing_sd_rad : (i == 0 ? 0.7 : i == kHeld ? 1.0 : 0.35);
     hypotheses_[i].state << x_mm, y_mm, heading, mode.speed_mm_s, mode.turn_rad_s;
     hypotheses_[i].covariance = Matrix::Zero();
     hypotheses_[i].covariance.diagonal() << sd_mm * sd_mm, sd_mm * sd_mm, heading_sd * heading_sd,
         mode.speed_sd * mode.speed_sd, mode.turn_sd * mode.turn_sd;
   }
-  weights_ = moves ? std::array<double, 4>{0.01, 0.53, 0.23, 0.23} : std::array<double, 4>{0.7, 0.1, 0.1, 0.1};
+  weights_ = moves ? std::array<double, kModes>{0.01, 0.51, 0.23, 0.23, 0.02}
+                   : std::array<double, kModes>{0.7, 0.1, 0.1, 0.09, 0.01};
 }
 
 void HeadingFilter::mix(double dt_s) {
   const double leaves = 1 - std::exp(-kSwitching_1_s * dt_s);
+  const auto share_of = [leaves](std::size_t from, std::size_t to) {
+    if (from == to) return 1 - leaves;
+    if (from == kHeld) return leaves / (kModes - 1);
+    return to == kHeld ? kHeldShare * leaves : (1 - kHeldShare) * leaves / (kModes - 2);
+  };
   std::array<Hypothesis, kModes> mixed;
-  std::array<double, 4> weights{};
+  std::array<double, kModes> weights{};
   for (std::size_t to = 0; to < kModes; ++to) {
     const Mode& mode = kModesOfMotion[to];
     std::array<double, kModes> shares{};
     for (std::size_t from = 0; from < kModes; ++from)
-      shares[from] = (from == to ? 1 - leaves : leaves / (kModes - 1)) * weights_[from];
+      shares[from] = share_of(from, to) * weights_[from];
     for (const double share : shares) weights[to] += share;
     std::array<Hypothesis, kModes> entering = hypotheses_;
     for (std::size_t from = 0; from < kModes; ++from) {
@@ -103,9 +112,25 @@ void HeadingFilter::mix(double dt_s) {
   weights_ = weights;
 }
 
+void HeadingFilter::predict_held(Hypothesis& h, double dt_s) {
+  h.state.head<2>() += dt_s * h.state.tail<2>();
+  Matrix step = Matrix::Identity();
+  step(0, 3) = step(1, 4) = dt_s;
+  h.covariance = step * h.covariance * step.transpose();
+  h.covariance(0, 0) += kPositionNoise * dt_s;
+  h.covariance(1, 1) += kPositionNoise * dt_s;
+  h.covariance(2, 2) += kHeldHeadingNoise * dt_s;
+  h.covariance(3, 3) += kHeldVelocityNoise * dt_s;
+  h.covariance(4, 4) += kHeldVelocityNoise * dt_s;
+}
+
 void HeadingFilter::predict(double dt_s) {
   for (std::size_t i = 0; i < kModes; ++i) {
     Hypothesis& h = hypotheses_[i];
+    if (i == kHeld) {
+      predict_held(h, dt_s);
+      continue;
+    }
     const double v = h.state(3), w = h.state(4);
     const double middle = h.state(2) + 0.5 * w * dt_s;
     const double c = std::cos(middle), s = std::sin(middle);
@@ -134,7 +159,7 @@ void HeadingFilter::predict(double dt_s) {
 }
 
 void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
-  std::array<double, 4> likelihoods{};
+  std::array<double, kModes> likelihoods{};
   for (std::size_t i = 0; i < kModes; ++i) {
     Hypothesis& h = hypotheses_[i];
     Eigen::Matrix2d total = h.covariance.topLeftCorner<2, 2>();
@@ -148,13 +173,13 @@ void HeadingFilter::measure(double x_mm, double y_mm, double sd_mm) {
     h.covariance = 0.5 * (h.covariance + h.covariance.transpose()).eval();
     likelihoods[i] = -0.5 * innovation.dot(inverse * innovation) - 0.5 * std::log(total.determinant());
     // Robots do not drive backwards: a negative speed is the wrong heading.
-    if (i != 0 && h.state(3) < 0) likelihoods[i] -= 0.5 * h.state(3) * h.state(3);
+    if (i != 0 && i != kHeld && h.state(3) < 0) likelihoods[i] -= 0.5 * h.state(3) * h.state(3);
   }
   weigh(likelihoods);
 }
 
 void HeadingFilter::measure_bearing(double bearing_rad, double sd_rad) {
-  std::array<double, 4> likelihoods{};
+  std::array<double, kModes> likelihoods{};
   for (std::size_t i = 0; i < kModes; ++i) {
     Hypothesis& h = hypotheses_[i];
     const double innovation = wrapped(bearing_rad - h.state(2));
@@ -170,7 +195,7 @@ void HeadingFilter::measure_bearing(double bearing_rad, double sd_rad) {
   weigh(likelihoods);
 }
 
-void HeadingFilter::weigh(const std::array<double, 4>& log_likelihoods) {
+void HeadingFilter::weigh(const std::array<double, kModes>& log_likelihoods) {
   const double most = *std::max_element(log_likelihoods.begin(), log_likelihoods.end());
   double sum = 0;
   for (std::size_t i = 0; i < kModes; ++i) {

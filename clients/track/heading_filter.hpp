@@ -4,7 +4,9 @@
 /// moves sideways too: its direction of motion is some 36 degrees off the heading. Per mode (stop, straight, left, right) an
 /// extended Kalman filter holds (x, y, heading, speed, turn rate) with
 ///   x' = v cos h - a w sin h,  y' = v sin h + a w cos h,  h' = w.
-/// The modes differ in what v and w are at their beginning, and exchange weight as in Blom and Bar-Shalom (1988).
+/// A robot that a wall or another robot holds slides: its path then tells nothing of its heading. A fifth mode, held, has
+/// (x, y, heading, x', y') instead, with a heading that wanders.
+/// The modes differ in what their speeds are at their beginning, and exchange weight as in Blom and Bar-Shalom (1988).
 /// docs/explanation/camera-tracker.md has the equations.
 #pragma once
 
@@ -27,15 +29,16 @@ class HeadingFilter {
               std::optional<double> bearing_rad = std::nullopt, double bearing_sd_rad = 0);
   /// Nothing until the robot has moved, or its heading was measured.
   [[nodiscard]] std::optional<Heading> heading() const;
-  /// Probabilities of stop, straight, left, right; nothing before heading().
-  [[nodiscard]] const std::array<double, 4>& modes() const { return weights_; }
+  /// Stop, straight, left, right, held.
+  static constexpr std::size_t kModes = 5, kHeld = 4;
+  /// Probabilities of the modes; nothing before heading().
+  [[nodiscard]] const std::array<double, kModes>& modes() const { return weights_; }
 
  private:
-  static constexpr int kModes = 4;
   using Vector = Eigen::Matrix<double, 5, 1>;
   using Matrix = Eigen::Matrix<double, 5, 5>;
   struct Hypothesis {
-    Vector state = Vector::Zero();  ///< x, y, heading, speed, turn rate
+    Vector state = Vector::Zero();  ///< x, y, heading, speed, turn rate; of held: x, y, heading, velocity
     Matrix covariance = Matrix::Zero();
   };
 
@@ -43,14 +46,15 @@ class HeadingFilter {
              double bearing_sd_rad);
   void mix(double dt_s);
   void predict(double dt_s);
+  static void predict_held(Hypothesis& h, double dt_s);
   void measure(double x_mm, double y_mm, double sd_mm);
   void measure_bearing(double bearing_rad, double sd_rad);
-  void weigh(const std::array<double, 4>& log_likelihoods);
+  void weigh(const std::array<double, kModes>& log_likelihoods);
 
   bool started_ = false;
   double time_s_ = 0;
   std::array<Hypothesis, kModes> hypotheses_;
-  std::array<double, 4> weights_{};
+  std::array<double, kModes> weights_{};
   /// Where the robot was while its heading is not known.
   std::optional<std::array<double, 3>> origin_;  ///< time_s, x_mm, y_mm
 };

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/pose.hpp"
+
 namespace kilotwin::track {
 namespace {
 
-constexpr long kEnough = 60;           ///< readings
-constexpr double kAgreement = 0.94;    ///< mean resultant length: a circular standard deviation of 20 degrees
+constexpr double kEnough = 60;         ///< readings
+constexpr std::size_t kWindow = 6;     ///< bins, 60 degrees, around the mode
+constexpr double kAgreement = 0.6;     ///< share of the readings in the window
 constexpr double kLeastSd_rad = 0.05;  ///< of one reading: robots are not built alike
 /// Old readings lose weight beyond this count: a camera may be turned.
 constexpr double kMostWeight = 20000;
@@ -18,23 +21,36 @@ constexpr double kDriven_mm = 10;     ///< in the whole time
 }  // namespace
 
 void LedBearing::add(double bearing_rad, double heading_rad) {
-  if (static_cast<double>(count_) >= kMostWeight) {
-    cos_ /= 2;
-    sin_ /= 2;
-    count_ /= 2;
+  double total = 0;
+  for (const Bin& bin : bins_) total += bin.count;
+  if (total >= kMostWeight) {
+    for (Bin& bin : bins_) bin = {bin.count / 2, bin.cos / 2, bin.sin / 2};
   }
-  cos_ += std::cos(bearing_rad - heading_rad);
-  sin_ += std::sin(bearing_rad - heading_rad);
-  ++count_;
+  const double off = wrapped(bearing_rad - heading_rad);
+  const auto index = static_cast<std::size_t>((off + kPi) / (2 * kPi) * kBins);
+  Bin& bin = bins_.at(std::min(index, kBins - 1));
+  bin.count += 1;
+  bin.cos += std::cos(off);
+  bin.sin += std::sin(off);
 }
 
 std::optional<LedMount> LedBearing::mount() const {
-  if (count_ < kEnough) return std::nullopt;
-  const double agreement = std::hypot(cos_, sin_) / static_cast<double>(count_);
-  if (agreement < kAgreement) return std::nullopt;
+  double total = 0;
+  Bin best;
+  for (std::size_t first = 0; first < kBins; ++first) {
+    total += bins_.at(first).count;
+    Bin window;
+    for (std::size_t i = 0; i < kWindow; ++i) {
+      const Bin& bin = bins_.at((first + i) % kBins);
+      window = {window.count + bin.count, window.cos + bin.cos, window.sin + bin.sin};
+    }
+    if (window.count > best.count) best = window;
+  }
+  if (total < kEnough || best.count < kAgreement * total) return std::nullopt;
+  const double agreement = std::hypot(best.cos, best.sin) / best.count;
   // Circular standard deviation.
   const double sd = std::sqrt(-2 * std::log(std::min(agreement, 1 - 1e-9)));
-  return LedMount{std::atan2(sin_, cos_), std::max(kLeastSd_rad, sd)};
+  return LedMount{std::atan2(best.sin, best.cos), std::max(kLeastSd_rad, sd)};
 }
 
 void StraightPath::add(double time_s, double x_mm, double y_mm) {

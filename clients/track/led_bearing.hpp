@@ -1,9 +1,12 @@
 /// The direction in which robots carry their LED, learned from robots that drive straight.
 ///
 /// The LED lies off the disc's centre, in the same direction from the heading on all robots of one kind. Once this direction is
-/// known, a lit LED gives the heading at once, at rest too.
+/// known, a lit LED gives the heading at once, at rest too. The direction is the mode of the readings: robots that slide along a wall
+/// seem to drive straight, and give readings of any direction.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 namespace kilotwin::track {
@@ -21,8 +24,11 @@ class LedBearing {
   [[nodiscard]] std::optional<LedMount> mount() const;
 
  private:
-  double cos_ = 0, sin_ = 0;
-  long count_ = 0;
+  static constexpr std::size_t kBins = 36;
+  struct Bin {
+    double count = 0, cos = 0, sin = 0;
+  };
+  std::array<Bin, kBins> bins_;
 };
 
 /// The heading of a robot whose path over the last two seconds is straight; fed with each measured centre.

@@ -9,41 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "clients/cameras/picture_file.hpp"
+#include "clients/track/capture_clock.hpp"
 #include "core/base/error.hpp"
-#include "core/os/files.hpp"
 
 namespace kilotwin::track {
 namespace fs = std::filesystem;
 namespace {
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
-/// On the steady clock: the capture time that the picture's stamp tells, if that was just now; else the present.
-std::int64_t capture_of(const std::optional<cameras::FrameStamp>& stamp) {
-  constexpr std::int64_t kOldest_ns = 2'000'000'000;
-  if (!stamp) return now_ns();
-  const std::int64_t utc_ns =
-      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-          .count();
-  const std::int64_t age_ns = utc_ns - stamp->capture_ns;
-  return age_ns >= 0 && age_ns <= kOldest_ns ? now_ns() - age_ns : now_ns();
-}
-
-/// A live picture from a file; an empty one where it cannot be decoded.
-CapturedFrame live_picture(const fs::path& file) {
-  CapturedFrame frame;
-  const std::optional<std::string> content = os::read_if_there(file);
-  if (!content || content->empty()) return frame;
-  frame.capture_ns = capture_of(cameras::stamp_of(*content));
-  // OpenCV takes the octets as they are; it does not write them.
-  const cv::Mat octets(1, static_cast<int>(content->size()), CV_8UC1, const_cast<char*>(content->data()));
-  frame.picture = cv::imdecode(octets, cv::IMREAD_COLOR);
-  return frame;
-}
 
 bool is_picture(const fs::path& file) {
   std::string extension = file.extension().string();
@@ -85,11 +56,10 @@ class GrowingDirectory : public Source {
       while (!waiting_.empty()) {
         const fs::path file = waiting_.front();
         waiting_.pop_front();
-        CapturedFrame frame = live_picture(file);
-        if (frame.picture.empty()) continue;
-        frame.number = number_++;
-        if (frame.number == 0) start_ns_ = frame.capture_ns;
-        frame.time_s = 1e-9 * static_cast<double>(frame.capture_ns - start_ns_);
+        const auto [picture, stamp] = read_stamped(file);
+        if (picture.empty()) continue;
+        CapturedFrame frame{picture, number_++, 0, 0};
+        clock_.time(frame, stamp);
         return frame;
       }
       constexpr std::chrono::milliseconds kPause{4};
@@ -118,7 +88,7 @@ class GrowingDirectory : public Source {
   std::string suffix_, last_;
   std::deque<fs::path> waiting_;
   std::uint64_t number_ = 0;
-  std::int64_t start_ns_ = 0;
+  CaptureClock clock_;
 };
 
 /// One file that is replaced by each new picture.
@@ -128,12 +98,11 @@ class RewrittenPicture : public Source {
   std::optional<CapturedFrame> next(const std::atomic<bool>& stop) override {
     while (!stop) {
       if (is_new()) {
-        CapturedFrame frame = live_picture(file_);
-        if (!frame.picture.empty() && frame.capture_ns > last_ns_) {
-          frame.number = number_++;
-          if (frame.number == 0) start_ns_ = frame.capture_ns;
-          last_ns_ = frame.capture_ns;
-          frame.time_s = 1e-9 * static_cast<double>(frame.capture_ns - start_ns_);
+        const auto [picture, stamp] = read_stamped(file_);
+        if (!picture.empty() && (!stamp || !last_stamp_ns_ || stamp->capture_ns > *last_stamp_ns_)) {
+          CapturedFrame frame{picture, number_++, 0, 0};
+          clock_.time(frame, stamp);
+          if (stamp) last_stamp_ns_ = stamp->capture_ns;
           return frame;
         }
       }
@@ -154,7 +123,8 @@ class RewrittenPicture : public Source {
   fs::path file_;
   fs::file_time_type written_{};
   std::uint64_t number_ = 0;
-  std::int64_t start_ns_ = 0, last_ns_ = 0;
+  CaptureClock clock_;
+  std::optional<std::int64_t> last_stamp_ns_;
 };
 
 class Video : public Source {
@@ -165,11 +135,8 @@ class Video : public Source {
   }
   std::optional<CapturedFrame> next(const std::atomic<bool>&) override {
     if (!capture_.grab()) return std::nullopt;
-    CapturedFrame frame{cv::Mat(), number_, static_cast<double>(number_) / rate_hz_, live_ ? now_ns() : 0};
-    if (live_) {
-      if (number_ == 0) start_ns_ = frame.capture_ns;
-      frame.time_s = 1e-9 * static_cast<double>(frame.capture_ns - start_ns_);
-    }
+    CapturedFrame frame{cv::Mat(), number_, static_cast<double>(number_) / rate_hz_, 0};
+    if (live_) clock_.time(frame, std::nullopt);
     if (!capture_.retrieve(frame.picture) || frame.picture.empty()) return std::nullopt;
     ++number_;
     return frame;
@@ -181,7 +148,7 @@ class Video : public Source {
   bool live_;
   double rate_hz_;
   std::uint64_t number_ = 0;
-  std::int64_t start_ns_ = 0;
+  CaptureClock clock_;
 };
 
 std::unique_ptr<Source> open_directory(const fs::path& place, const SourceOptions& options) {

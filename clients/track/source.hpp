@@ -19,7 +19,7 @@ namespace kilotwin::track {
 struct CapturedFrame {
   cv::Mat picture;
   std::uint64_t number = 0;     ///< counts the source's frames from 0, dropped ones included
-  double time_s = 0;            ///< since the first frame
+  double time_s = 0;            ///< since the first frame; of what the picture shows: capture_clock.hpp
   std::int64_t capture_ns = 0;  ///< steady clock, when the frame arrived from a live source; 0 for files
 };
 

@@ -1,7 +1,6 @@
 #include "clients/view/gateway.hpp"
 
 #include <fmt/format.h>
-#include <libwebsockets.h>
 #include <sys/random.h>
 
 #include <algorithm>
@@ -12,9 +11,8 @@
 #include <mutex>
 #include <optional>
 #include <string_view>
-#include <thread>
-#include <vector>
 
+#include "clients/http/loopback_server.hpp"
 #include "clients/view/run_text.hpp"
 #include "core/base/error.hpp"
 
@@ -119,43 +117,12 @@ bool equal_tokens(std::string_view a, std::string_view b) {
 class Gateway::Service {
  public:
   Service(std::uint16_t port, std::string token, PageFiles page)
-      : token_(std::move(token)), page_(std::move(page)) {
-    lws_set_log_level(0, nullptr);
-    static const std::array<lws_protocols, 3> protocols{
-        {{"http", &Service::on_http, sizeof(Download), 0, 0, nullptr, 0},
-         {kSubprotocol, &Service::on_socket, sizeof(Session), kLongestRequest_bytes, 0, nullptr, 0},
-         {nullptr, nullptr, 0, 0, 0, nullptr, 0}}};
-    static const lws_retry_bo_t patience{nullptr, 0, 0, kPingAfter_s, kHangUpAfter_s, 0};
-    lws_context_creation_info info{};
-    info.port = port;
-    info.iface = "127.0.0.1";
-    info.protocols = protocols.data();
-    info.user = this;
-    info.gid = -1;
-    info.uid = -1;
-    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_DISABLE_IPV6;
-    info.timeout_secs = kHeaderTimeout_s;
-    info.max_http_header_pool = kMostHeaders;
-    info.fd_limit_per_thread = kMostConnections;
-    info.retry_and_idle_policy = &patience;
-    context_ = lws_create_context(&info);
-    lws_vhost* const host = context_ == nullptr ? nullptr : lws_create_vhost(context_, &info);
-    if (host == nullptr) {
-      if (context_ != nullptr) lws_context_destroy(context_);
-      throw UserError(fmt::format(
-          "--port {}: cannot be served on 127.0.0.1; choose a port that is free, or leave the option out", port));
-    }
-    port_ = static_cast<std::uint16_t>(lws_get_vhost_listen_port(host));
-    thread_ = std::thread([this] {
-      while (!ends_ && lws_service(context_, 0) >= 0) {}
-    });
-  }
-  ~Service() {
-    ends_ = true;
-    lws_cancel_service(context_);
-    thread_.join();
-    lws_context_destroy(context_);
-  }
+      : token_(std::move(token)),
+        page_(std::move(page)),
+        server_(port, wanted(this),
+                fmt::format(
+                    "--port {}: cannot be served on 127.0.0.1; choose a port that is free, or leave the option out",
+                    port)) {}
   Service(const Service&) = delete;
 
   void show(Answers& answers, std::string run_text) {
@@ -166,23 +133,38 @@ class Gateway::Service {
       status_.message.reset();
       frame_.message.reset();
     }
-    lws_cancel_service(context_);
+    server_.wake();
   }
   void post(Newest Service::*which, std::string message) {
     {
       const std::lock_guard lock(mutex_);
       (this->*which).set(std::move(message));
     }
-    lws_cancel_service(context_);
+    server_.wake();
   }
 
-  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] std::uint16_t port() const { return server_.port(); }
   [[nodiscard]] const std::string& token() const { return token_; }
   [[nodiscard]] Traffic traffic() const { return {viewers_, frames_, bytes_, refused_}; }
 
   Newest run_, status_, frame_;  // guarded by mutex_
 
  private:
+  static lws_context_creation_info wanted(Service* user) {
+    static const std::array<lws_protocols, 3> protocols{
+        {{"http", &Service::on_http, sizeof(Download), 0, 0, nullptr, 0},
+         {kSubprotocol, &Service::on_socket, sizeof(Session), kLongestRequest_bytes, 0, nullptr, 0},
+         {nullptr, nullptr, 0, 0, 0, nullptr, 0}}};
+    static const lws_retry_bo_t patience{nullptr, 0, 0, kPingAfter_s, kHangUpAfter_s, 0};
+    lws_context_creation_info info{};
+    info.protocols = protocols.data();
+    info.user = user;
+    info.timeout_secs = kHeaderTimeout_s;
+    info.max_http_header_pool = kMostHeaders;
+    info.fd_limit_per_thread = kMostConnections;
+    info.retry_and_idle_policy = &patience;
+    return info;
+  }
   static Service& of(lws* connection) {
     return *static_cast<Service*>(lws_context_user(lws_get_context(connection)));
   }
@@ -237,7 +219,7 @@ class Gateway::Service {
     const std::string& content = download.file->content;
     const std::size_t count = std::min(kChunk_bytes, content.size() - download.sent);
     const bool last = download.sent + count == content.size();
-    if (!write(connection, std::string_view(content).substr(download.sent, count),
+    if (!server_.write(connection, std::string_view(content).substr(download.sent, count),
                last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP))
       return -1;
     download.sent += count;
@@ -268,7 +250,7 @@ class Gateway::Service {
         return service.receive(connection, *session->viewer, {static_cast<char*>(in), length});
       case LWS_CALLBACK_SERVER_WRITEABLE: return service.send_next(connection, *session->viewer);
       case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
-        lws_callback_on_writable_all_protocol(service.context_, lws_get_protocol(connection));
+        lws_callback_on_writable_all_protocol(lws_get_context(connection), lws_get_protocol(connection));
         return 0;
       case LWS_CALLBACK_CLOSED:
         if (session != nullptr && session->viewer != nullptr) {
@@ -324,7 +306,7 @@ class Gateway::Service {
   int send_next(lws* connection, Viewer& viewer) {
     const auto [message, binary] = next_message(viewer);
     if (!message) return 0;
-    if (!write(connection, *message, binary ? LWS_WRITE_BINARY : LWS_WRITE_TEXT)) return -1;
+    if (!server_.write(connection, *message, binary ? LWS_WRITE_BINARY : LWS_WRITE_TEXT)) return -1;
     bytes_ += message->size();
     if (binary) ++frames_;
     lws_callback_on_writable(connection);
@@ -396,25 +378,14 @@ class Gateway::Service {
     return {std::make_shared<const std::string>(std::move(frame)), true};
   }
 
-  /// The library wants room in front of what it writes. It keeps what the socket does not take at once.
-  [[nodiscard]] bool write(lws* connection, std::string_view text, lws_write_protocol protocol) {
-    buffer_.resize(LWS_PRE + text.size());
-    std::copy(text.begin(), text.end(), buffer_.begin() + LWS_PRE);
-    return lws_write(connection, buffer_.data() + LWS_PRE, text.size(), protocol) >= static_cast<int>(text.size());
-  }
-
   const std::string token_;
   const PageFiles page_;
-  lws_context* context_ = nullptr;
-  std::uint16_t port_ = 0;
-  std::atomic<bool> ends_{false};
   std::atomic<std::uint32_t> viewers_{0};
   std::atomic<std::uint64_t> frames_{0}, bytes_{0}, refused_{0};
   mutable std::mutex mutex_;
   std::mutex answering_;               // held during calls of answers_
-  Answers* answers_ = nullptr;         // guarded by answering_
-  std::vector<unsigned char> buffer_;  // of the service's thread
-  std::thread thread_;
+  Answers* answers_ = nullptr;  // guarded by answering_
+  http::LoopbackServer server_;
 };
 
 Gateway::Gateway(std::uint16_t port, std::string token, PageFiles page)

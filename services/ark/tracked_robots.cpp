@@ -27,7 +27,8 @@ std::span<const TrackerSample> TrackedRobots::samples_of(Tick now, std::int64_t 
       samples_.push_back(std::move(stamped_.front().second));
   } else {
     for (TrackerInput::Stamped& stamped : arrived) {
-      underway_.push_back({now + 1, stamped.arrival, taken});
+      // What came before the run began to count waited for the run, not for its tick.
+      if (counts_) underway_.push_back({now + 1, stamped.arrival, taken});
       samples_.push_back(std::move(stamped.sample));
     }
     heard_ += heard.size();
@@ -37,6 +38,7 @@ std::span<const TrackerSample> TrackedRobots::samples_of(Tick now, std::int64_t 
       sample.heard = std::move(heard);
     }
   }
+  counts_ = true;
   for (const TrackerSample& sample : samples_) observer.tracker_sample(now, sample);
   return samples_;
 }

@@ -43,6 +43,7 @@ class TrackedRobots {
   std::vector<std::uint8_t>
       announced_;  ///< per robot: 1 + Membership that is announced and has not taken effect; 0: none
   std::deque<Underway> underway_;
+  bool counts_ = false;                    ///< latencies: from the second tick on
   LatencyHistogram effect_, wait_, step_;  ///< arrival to effect, and its parts: to the publication, and from there
   std::uint64_t joined_ = 0, left_ = 0, lost_ = 0, heard_ = 0;
 };

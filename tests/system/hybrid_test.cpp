@@ -15,6 +15,7 @@
 #include <set>
 #include <thread>
 
+#include "clients/doors/tracked_frame.hpp"
 #include "clients/recorder/reader.hpp"
 #include "core/federation/topics.hpp"
 #include "tests/system/program.hpp"
@@ -33,9 +34,9 @@ constexpr double kFrames_per_s = 30, kClockAhead_s = 37, kDrift = 50e-6, kExposu
 class SyntheticTracker {
  public:
   SyntheticTracker(const dds::Participant& participant, std::string source, double radius_mm)
-      : writer_(participant, topics::tracker_frames()), source_(std::move(source)), radius_mm_(radius_mm) {}
+      : writer_(participant, std::move(source)), radius_mm_(radius_mm) {}
   ~SyntheticTracker() { stop(); }
-  [[nodiscard]] bool is_heard() { return writer_.readers() > 0; }
+  [[nodiscard]] bool is_heard() const { return writer_.readers() > 0; }
   void start() {
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
@@ -65,49 +66,25 @@ class SyntheticTracker {
   void write(std::uint64_t frame, double sent_s, std::mt19937_64& random) {
     std::normal_distribution<double> noise(0, 0.3);
     const double capture_s = sent_s - kExposureToSent_s;
-    std::vector<std::uint32_t> robot;
-    std::vector<std::uint8_t> state, led;
-    std::vector<double> x, y, heading;
-    std::vector<float> xx, xy, heading_variance;
+    const auto reading_ns = [](double t_s) { return std::llround((kClockAhead_s + (1 + kDrift) * t_s) * 1e9); };
+    doors::TrackedFrame sample{frame, reading_ns(capture_s), reading_ns(sent_s), false, {}};
     for (std::uint32_t n = 0; n < 3; ++n) {
       if ((n == 2 && capture_s < 2) || (n == 1 && capture_s > 4)) continue;
       const double angle = 0.1 * capture_s + 2.1 * n;
-      robot.push_back(kFirst + n);
-      state.push_back(0);
-      x.push_back(radius_mm_ * std::cos(angle) + noise(random));
-      y.push_back(radius_mm_ * std::sin(angle) + noise(random));
-      heading.push_back(std::remainder(angle + 1.5708, 6.283185307));
-      xx.push_back(0.09f);
-      xy.push_back(0);
-      heading_variance.push_back(0.01f);
-      led.push_back(static_cast<std::uint8_t>(n + 1));
+      doors::TrackedRobot& robot = sample.robots.emplace_back();
+      robot.robot = kFirst + n;
+      robot.x_mm = radius_mm_ * std::cos(angle) + noise(random);
+      robot.y_mm = radius_mm_ * std::sin(angle) + noise(random);
+      robot.heading_rad = std::remainder(angle + 1.5708, 6.283185307);
+      robot.xx_mm2 = robot.yy_mm2 = 0.09f;
+      robot.heading_variance_rad2 = 0.01f;
+      robot.led = static_cast<std::uint8_t>(n + 1);
     }
-    const auto reading_ns = [](double t_s) { return std::llround((kClockAhead_s + (1 + kDrift) * t_s) * 1e9); };
-    PublicTrackerFrame sample{};
-    source_.copy(sample.source, sizeof sample.source - 1);
-    sample.frame = frame;
-    sample.capture_ns = reading_ns(capture_s);
-    sample.sent_ns = reading_ns(sent_s);
-    const auto lend = [](auto& sequence, auto& values) {
-      sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
-      sequence._buffer = values.data();
-    };
-    lend(sample.robot, robot);
-    lend(sample.state, state);
-    lend(sample.x_mm, x);
-    lend(sample.y_mm, y);
-    lend(sample.heading_rad, heading);
-    lend(sample.xx_mm2, xx);
-    lend(sample.xy_mm2, xy);
-    lend(sample.yy_mm2, xx);
-    lend(sample.heading_variance_rad2, heading_variance);
-    lend(sample.led, led);
     writer_.write(sample);
     ++written_;
   }
 
-  dds::Writer<PublicTrackerFrame> writer_;
-  std::string source_;
+  doors::FrameWriter writer_;
   double radius_mm_;
   std::atomic<std::uint64_t> written_{0};
   std::jthread thread_;

@@ -13,6 +13,7 @@
 #include <random>
 #include <thread>
 
+#include "clients/doors/tracked_frame.hpp"
 #include "core/csv/csv_reader.hpp"
 #include "core/federation/topics.hpp"
 #include "tests/system/program.hpp"
@@ -72,7 +73,7 @@ class Player {
   Player(const dds::Participant& participant, std::vector<std::vector<Pose>> frames, Shift knock)
       : frames_(std::move(frames)),
         knock_(knock),
-        writer_(participant, topics::tracker_frames()),
+        writer_(participant, "other arena"),
         status_(participant, topics::run_status(), [this](const PublicRunStatus& sample, dds::SampleState state) {
           if (state.valid && sample.phase == kilotwin_open_RUNNING) hear(sample.wall_s);
         }) {
@@ -113,43 +114,26 @@ class Player {
     std::normal_distribution<double> noise(0, 1);
     constexpr double kPosition_mm = 0.4, kHeading_rad = 0.03;
     const double time_s = static_cast<double>(frame) / kFrames_per_s;
-    std::vector<std::uint32_t> robot;
-    std::vector<double> x, y, heading;
+    const std::int64_t capture_ns = std::chrono::nanoseconds(capture).count();
+    doors::TrackedFrame sample{frame + 1, capture_ns, capture_ns, false, {}};
     for (std::uint32_t n = 0; n < kRobots; ++n) {
       const Pose& pose = frames_[frame][n];
       const bool shifted = time_s >= knock_.from_s;
-      robot.push_back(n);
-      x.push_back(pose.x_mm + (shifted ? knock_.x_mm : 0) + kPosition_mm * noise(random_));
-      y.push_back(pose.y_mm + (shifted ? knock_.y_mm : 0) + kPosition_mm * noise(random_));
-      heading.push_back(std::remainder(pose.heading_rad + kHeading_rad * noise(random_), 6.283185307179586));
+      doors::TrackedRobot& robot = sample.robots.emplace_back();
+      robot.robot = n;
+      robot.x_mm = pose.x_mm + (shifted ? knock_.x_mm : 0) + kPosition_mm * noise(random_);
+      robot.y_mm = pose.y_mm + (shifted ? knock_.y_mm : 0) + kPosition_mm * noise(random_);
+      robot.heading_rad = std::remainder(pose.heading_rad + kHeading_rad * noise(random_), 6.283185307179586);
+      robot.xx_mm2 = robot.yy_mm2 = static_cast<float>(kPosition_mm * kPosition_mm);
+      robot.heading_variance_rad2 = static_cast<float>(kHeading_rad * kHeading_rad);
+      robot.led = 0;
     }
-    std::vector<std::uint8_t> state(kRobots, 0), led(kRobots, 0);
-    std::vector<float> variance(kRobots, static_cast<float>(kPosition_mm * kPosition_mm)), none(kRobots, 0),
-        heading_variance(kRobots, static_cast<float>(kHeading_rad * kHeading_rad));
-    PublicTrackerFrame sample{};
-    std::string("other arena").copy(sample.source, sizeof sample.source - 1);
-    sample.frame = frame + 1;
-    sample.capture_ns = sample.sent_ns = std::chrono::nanoseconds(capture).count();
-    const auto lend = [](auto& sequence, auto& values) {
-      sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
-      sequence._buffer = values.data();
-    };
-    lend(sample.robot, robot);
-    lend(sample.state, state);
-    lend(sample.x_mm, x);
-    lend(sample.y_mm, y);
-    lend(sample.heading_rad, heading);
-    lend(sample.xx_mm2, variance);
-    lend(sample.xy_mm2, none);
-    lend(sample.yy_mm2, variance);
-    lend(sample.heading_variance_rad2, heading_variance);
-    lend(sample.led, led);
     writer_.write(sample);
   }
 
   std::vector<std::vector<Pose>> frames_;
   const Shift knock_;
-  dds::Writer<PublicTrackerFrame> writer_;
+  doors::FrameWriter writer_;
   std::mt19937_64 random_{3};
   std::mutex mutex_;
   std::condition_variable_any wake_;

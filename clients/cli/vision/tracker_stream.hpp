@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "clients/doors/tracked_frame.hpp"
 #include "clients/track/tracker.hpp"
 #include "core/dds/dds.hpp"
-#include "core/federation/topics.hpp"
 
 namespace kilotwin::cli {
 
@@ -24,10 +24,9 @@ class TrackerStream {
   [[nodiscard]] const dds::Participant& participant() const { return participant_; }
 
  private:
-  std::string source_;
   SampleIds ids_;
   dds::Participant participant_;
-  dds::Writer<PublicTrackerFrame> writer_;
+  doors::FrameWriter writer_;
 };
 
 }  // namespace kilotwin::cli

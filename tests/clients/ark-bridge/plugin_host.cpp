@@ -179,23 +179,26 @@ int main(int argc, char** argv) {
   if (experiment->serviceInterval != 20) fail("the service interval is not that of the experiment file");
   std::printf("createExpt: loaded, service interval %d ms\n", experiment->serviceInterval);
   const std::unique_ptr<QWidget> gui(experiment->createGUI());
+  const auto* const label = qobject_cast<QLabel*>(gui.get());
+  if (label == nullptr) fail("the panel is no QLabel");
 
   Station station(experiment.get());
   station.start();
   int status = 0;
   bool ended = false;
+  // The panel tells the present state: after the end of the run it no longer says that it joined.
+  QString joined;
   for (int round = 0; round < 2 * kRounds && !ended; ++round) {
     app.processEvents();
+    if (label->text().contains("joined a run")) joined = label->text();
     std::this_thread::sleep_for(kPause);
     ended = waitpid(run, &status, WNOHANG) == run;
   }
   station.stop();
   if (!ended || status != 0) fail("the run did not see what it should");
   check_orders(station);
-  const auto* const label = qobject_cast<QLabel*>(gui.get());
-  if (label == nullptr || !label->text().contains("joined a run"))
-    fail("the panel does not say that it joined a run");
-  std::printf("panel: %s\n", qPrintable(label->text()));
+  if (joined.isEmpty()) fail("the panel did not say that it joined a run; it says: " + label->text());
+  std::printf("panel: %s\n", qPrintable(joined));
   return 0;
 }
 

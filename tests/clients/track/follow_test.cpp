@@ -116,6 +116,14 @@ TEST(LedDirection, IsLearnedFromStraightPaths) {
   }
   ASSERT_TRUE(bearing.mount());
   EXPECT_NEAR(bearing.mount()->from_heading_rad, -0.83, 0.03);
+  // Robots that slide along walls give readings of other directions.
+  LedBearing among_slides;
+  for (int i = 0; i < 500; ++i) {
+    const double heading = any(random);
+    among_slides.add(heading - 0.83 + (i % 4 == 0 ? 1.2 : noise(random)), heading);
+  }
+  ASSERT_TRUE(among_slides.mount());
+  EXPECT_NEAR(among_slides.mount()->from_heading_rad, -0.83, 0.03);
   // Readings that do not agree teach nothing.
   LedBearing loose;
   for (int i = 0; i < 500; ++i) loose.add(any(random), any(random));

@@ -1,6 +1,7 @@
 // The heading filter against robots that drive by the exact kinematics, with the biases of the ARGoS paper.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -63,12 +64,23 @@ TEST(Headings, ALedReadingGivesItAtRest) {
 
 struct Condition {
   double sd_mm, step_s;
+  double half_mm = 1e9;  ///< half the side of the arena: its walls hold discs, and do not turn them
+  bool led = false;      ///< the LED gives the heading, too
 };
+
+/// The wall pushes the robot back. True where it did.
+bool held(Robot& robot, double half_mm) {
+  const double x = robot.centre_x(), y = robot.centre_y();
+  const double dx = std::clamp(x, -half_mm, half_mm) - x, dy = std::clamp(y, -half_mm, half_mm) - y;
+  robot.x_mm += dx;
+  robot.y_mm += dy;
+  return dx != 0 || dy != 0;
+}
 
 class HeadingOf : public testing::TestWithParam<Condition> {};
 
 TEST_P(HeadingOf, IsWithinFiveDegreesAfterStraightMotionAndTenOverall) {
-  const auto [sd_mm, step_s] = GetParam();
+  const auto [sd_mm, step_s, half_mm, led] = GetParam();
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal(0, 1);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -81,7 +93,7 @@ TEST_P(HeadingOf, IsWithinFiveDegreesAfterStraightMotionAndTenOverall) {
     robot.heading_rad = 2 * std::numbers::pi * uniform(random);
     HeadingFilter filter;
     int mode = 1;
-    double until_s = 0, since_s = 0;
+    double until_s = 0, since_s = 0, held_s = -10;
     for (double t = 0; t < 40; t += step_s) {
       if (t >= until_s) {
         since_s = t;
@@ -91,14 +103,20 @@ TEST_P(HeadingOf, IsWithinFiveDegreesAfterStraightMotionAndTenOverall) {
       const double left = mode == 0 ? 0 : (mode == 1 ? 10 : mode == 2 ? 0 : 20) + bias_left;
       const double right = mode == 0 ? 0 : (mode == 1 ? 10 : mode == 2 ? 20 : 0) + bias_right;
       robot.drive(left, right, step_s);
-      filter.update(t, robot.centre_x() + sd_mm * normal(random), robot.centre_y() + sd_mm * normal(random), sd_mm);
+      if (held(robot, half_mm)) held_s = t;
+      const double x = robot.centre_x() + sd_mm * normal(random), y = robot.centre_y() + sd_mm * normal(random);
+      constexpr double kLed_rad = 0.1;
+      if (led)
+        filter.update(t, x, y, sd_mm, wrapped(robot.heading_rad + kLed_rad * normal(random)), 2 * kLed_rad);
+      else
+        filter.update(t, x, y, sd_mm);
       const std::optional<Heading> heading = filter.heading();
       if (!heading) continue;
       const double error = wrapped(heading->heading_rad - robot.heading_rad);
       all += error * error;
       normalised += error * error / heading->variance_rad2;
       ++count;
-      if (mode != 1 || t - since_s < 2) continue;
+      if (mode != 1 || t - since_s < 2 || t - held_s < 2) continue;
       straight += error * error;
       ++straight_count;
     }
@@ -117,7 +135,41 @@ TEST_P(HeadingOf, IsWithinFiveDegreesAfterStraightMotionAndTenOverall) {
 
 INSTANTIATE_TEST_SUITE_P(Conditions, HeadingOf,
                          testing::Values(Condition{0.1, 1 / 30.0}, Condition{0.3, 1 / 30.0}, Condition{0.3, 0.1},
-                                         Condition{0.6, 1 / 30.0}));
+                                         Condition{0.6, 1 / 30.0}, Condition{0.1, 1 / 30.0, 150, true},
+                                         Condition{0.3, 1 / 30.0, 150, true}));
+
+TEST(Headings, OfARobotThatAWallHoldsAreUncertain) {
+  // It drives at 45 degrees against a wall and slides along it: the path is straight, and is not its heading.
+  Robot robot;
+  robot.heading_rad = kPi / 4;
+  robot.y_mm = -60;
+  HeadingFilter filter;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0, 0.1);
+  constexpr double kStep_s = 1.0 / 30;
+  double t = 0, slides_since_s = 1e9, worst = 0;
+  for (; t < 25; t += kStep_s) {
+    robot.drive(10, 10, kStep_s);
+    const double beyond_mm = robot.centre_y();
+    if (beyond_mm > 0) {
+      robot.y_mm -= beyond_mm;
+      slides_since_s = std::min(slides_since_s, t);
+    }
+    filter.update(t, robot.centre_x() + noise(random), robot.centre_y() + noise(random), 0.1);
+    if (t < slides_since_s + 1) continue;
+    const double error = wrapped(filter.heading()->heading_rad - robot.heading_rad);
+    worst = std::max(worst, error * error / filter.heading()->variance_rad2);
+  }
+  EXPECT_LT(slides_since_s, 15);
+  EXPECT_LT(worst, 9) << "errors within three standard deviations";
+  // It turns away, and is known again.
+  for (const double end_s = t + 6; t < end_s; t += kStep_s) {
+    const bool turns = t < end_s - 4;
+    robot.drive(turns ? 20 : 10, turns ? 0 : 10, kStep_s);
+    filter.update(t, robot.centre_x() + noise(random), robot.centre_y() + noise(random), 0.1);
+  }
+  EXPECT_NEAR(wrapped(filter.heading()->heading_rad - robot.heading_rad), 0, 0.09);
+}
 
 }  // namespace
 }  // namespace kilotwin::track

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/recorder/reader.hpp"
-#include "core/dds/dds.hpp"
+#include "tests/system/ceiling.hpp"
 #include "tests/system/program.hpp"
 
 namespace kilotwin::test {
@@ -21,9 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kRobots = 8;
-constexpr int kWidth_px = 640, kHeight_px = 480;
-constexpr double kArenaWidth_mm = 600, kArenaHeight_mm = 400, kMargin_mm = 40;
-constexpr double kPx_per_mm = kWidth_px / (kArenaWidth_mm + 2 * kMargin_mm);
+const Ceiling kCeiling{600, 400};
 
 std::string world() {
   return fmt::format(R"(
@@ -34,7 +32,7 @@ arena {{ width_mm: {} height_mm: {} }}
 robots {{ count: {} behaviour: "{}" layout {{ random {{}} }} }}
 recording {{ every_s: 0.5 }}
 )",
-                     kArenaWidth_mm, kArenaHeight_mm, kRobots, source("behaviours/housekeeping.c"));
+                     kCeiling.width_mm, kCeiling.height_mm, kRobots, source("behaviours/housekeeping.c"));
 }
 
 std::string tracked() {
@@ -48,24 +46,7 @@ robots {{ count: {} body: TRACKED layout {{ grid {{ pitch_mm: 45 }} }} }}
 station {{ environment {{ plugin {{ built_in: "identify" parameter {{ name: "wait_s" value: "3" }} }} }} }}
 recording {{ every_s: 0.5 }}
 )",
-                     kArenaWidth_mm, kArenaHeight_mm, kRobots);
-}
-
-/// Where the arena's corners appear in the picture.
-std::string calibration() {
-  std::string text = "%YAML:1.0\n---\n";
-  for (int corner = 0; corner < 4; ++corner) {
-    const double x = (corner % 2 == 0 ? -0.5 : 0.5) * kArenaWidth_mm * kPx_per_mm + 0.5 * (kWidth_px - 1);
-    const double y = (corner / 2 == 0 ? -0.5 : 0.5) * kArenaHeight_mm * kPx_per_mm + 0.5 * (kHeight_px - 1);
-    text += fmt::format("corner{}: [ {:.6f}, {:.6f} ]\n", corner + 1, x, y);
-  }
-  return text;
-}
-
-/// Two domains that were free; the runs claim them.
-std::pair<std::string, std::string> two_domains() {
-  const dds::DomainClaim one = dds::DomainClaim::any(), other = dds::DomainClaim::any();
-  return {std::to_string(one.domain()), std::to_string(other.domain())};
+                     kCeiling.width_mm, kCeiling.height_mm, kRobots);
 }
 
 int free_port() {
@@ -92,13 +73,13 @@ TEST(TrackerLive, RobotsOfAnotherWorldGetTheirNumbersByTheStationsIdentification
   const auto [here, there] = two_domains();
   write(scratch / "world.txtpb", world());
   write(scratch / "tracked.txtpb", tracked());
-  write(scratch / "ceiling.yaml", calibration());
+  write(scratch / "ceiling.yaml", kCeiling.calibration());
 
   Process virtual_controller({program(), "ohc", "--pty", scratch / "port", "--domain", there}, scratch.path());
   ASSERT_TRUE(eventually([&] { return fs::is_symlink(scratch / "port"); }));
   const std::string port = std::to_string(free_port());
   Process cameras({KILOTWIN_VISION, "cameras", "--domain", there, "--mjpeg", port, "--size",
-                   fmt::format("{}x{}", kWidth_px, kHeight_px), "--fps", "10", "--noise", "3"},
+                   kCeiling.size(), "--fps", "10", "--noise", "3"},
                   scratch.path());
   ASSERT_TRUE(cameras.says("camera.mjpg", 60));
   Process world_run({program(), "run", scratch / "world.txtpb", "--pace", "1", "--quiet", "--domain", there,
@@ -106,7 +87,7 @@ TEST(TrackerLive, RobotsOfAnotherWorldGetTheirNumbersByTheStationsIdentification
                     scratch.path());
   ASSERT_TRUE(virtual_controller.says("run world", 60));
   Process tracker({KILOTWIN_VISION, "track", "http://127.0.0.1:" + port + "/camera.mjpg", "--calibration",
-                   scratch / "ceiling.yaml", "--arena", fmt::format("{}x{}", kArenaWidth_mm, kArenaHeight_mm),
+                   scratch / "ceiling.yaml", "--arena", kCeiling.arena(),
                    "--domain", here, "--name", "ceiling", "--identify", "--out", scratch / "robots.csv"},
                   scratch.path());
   ASSERT_TRUE(tracker.says(" 8 robots", 90));

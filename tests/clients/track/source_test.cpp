@@ -10,6 +10,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "clients/track/capture_clock.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::track {
@@ -85,6 +86,32 @@ TEST_F(Sources, AGrowingDirectoryIsFollowedAndDropsAreCounted) {
   EXPECT_EQ(taken + frames.dropped(), 1U + kMore);
   frames.stop();
   EXPECT_FALSE(frames.next());
+}
+
+/// Speeds follow from the simulated time that pictures of `kilotwin cameras` tell, whatever the pace of the run.
+TEST(CaptureClocks, FollowTheTimeOfWhatPicturesShow) {
+  CaptureClock clock;
+  const auto time_of = [&](const std::optional<cameras::FrameStamp>& stamp) {
+    CapturedFrame frame;
+    clock.time(frame, stamp);
+    return frame.time_s;
+  };
+  cameras::FrameStamp stamp;
+  stamp.run = 7;
+  stamp.simulated_s = 100;
+  EXPECT_EQ(time_of(stamp), 0);
+  stamp.simulated_s = 102.5;
+  EXPECT_EQ(time_of(stamp), 2.5);
+  EXPECT_EQ(time_of(stamp), 2.5) << "the run stands still";
+  // Another run, and pictures without a stamp: time goes on as it came.
+  stamp.run = 8;
+  stamp.simulated_s = 1;
+  const double later_s = time_of(stamp);
+  EXPECT_GE(later_s, 2.5);
+  EXPECT_LT(later_s, 60);
+  stamp.simulated_s = 2;
+  EXPECT_DOUBLE_EQ(time_of(stamp), later_s + 1);
+  EXPECT_GE(time_of(std::nullopt), later_s + 1);
 }
 
 TEST_F(Sources, FilesAreNotDropped) {

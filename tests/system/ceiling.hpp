@@ -1,0 +1,24 @@
+/// A camera under the ceiling of one experiment, which plays the real world of another: what both sides have to know.
+#pragma once
+
+#include <string>
+#include <utility>
+
+namespace kilotwin::test {
+
+/// A camera of `kilotwin cameras` that sees the whole rectangular arena.
+struct Ceiling {
+  double width_mm, height_mm;  ///< of the arena
+  int width_px = 640, height_px = 480;
+
+  /// For `cameras --size` and `track --arena`.
+  [[nodiscard]] std::string size() const;
+  [[nodiscard]] std::string arena() const;
+  /// For `track --calibration`: where the arena's corners appear in the picture.
+  [[nodiscard]] std::string calibration() const;
+};
+
+/// Two domains that were free; the runs claim them.
+[[nodiscard]] std::pair<std::string, std::string> two_domains();
+
+}  // namespace kilotwin::test
