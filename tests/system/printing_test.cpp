@@ -37,7 +37,8 @@ TEST(Printing, IsTheSameInOneProcessAndInMany) {
       "int main(void) { kilo_init(); debug_init(); kilo_message_tx = tx; kilo_message_rx = rx; kilo_start(setup, "
       "loop); return 0; }\n");
   write(scratch.path() / "talk.txtpb",
-        "duration_s: 4 robots { count: 9 behaviour: \"talk.c\" loop_rate: ONCE_PER_TICK layout { grid { pitch_mm: 50 } } }\n"
+        "duration_s: 4 robots { count: 9 behaviour: \"talk.c\" loop_rate: ONCE_PER_TICK layout { grid { pitch_mm: "
+        "50 } } }\n"
         "robots { count: 1 behaviour: \"talk.c\" avr: true layout { x_mm: 150 } }\n");
   const Words words{scratch / "talk.txtpb"};
   const auto with = [&](const Words& more, const std::string& name) {

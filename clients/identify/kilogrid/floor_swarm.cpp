@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/pose.hpp"
+#include "core/base/spin_up.hpp"
 #include "core/math/elementary.h"
 #include "idl/manifest.pb.h"
 #include "services/physics/engine.hpp"

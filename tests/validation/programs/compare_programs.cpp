@@ -129,16 +129,17 @@ int compare_all(const Arguments& arguments) {
       fmt::format("{} of {} programs that run both ways agree; {} do not run\n", agree, ran, rows.size() - ran);
   fmt::print("\n{}", end);
   if (!arguments.results.empty()) {
-    std::ofstream(arguments.results) << fmt::format(
-                                            "\n{} robots, {} s, seeds 1 to {}, the default `loop_rate`, no noise of "
-                                            "motion. *Event for event*: every change of\n"
-                                            "motors and LED comes within one tick, and the counts of messages are "
-                                            "equal. *Alike*: means over robots and\n"
-                                            "seeds of path, distance, LED and messages differ by less than 10 %, "
-                                            "or by less than two standard errors.\n\n",
-                                            settings.robots, settings.duration_s, settings.seeds)
-                                     << table << "\n"
-                                     << end;
+    std::ofstream(arguments.results)
+        << fmt::format(
+               "\n{} robots, {} s, seeds 1 to {}, the default `loop_rate`, no noise of "
+               "motion. *Event for event*: every change of\n"
+               "motors and LED comes within one tick, and the counts of messages are "
+               "equal. *Alike*: means over robots and\n"
+               "seeds of path, distance, LED and messages differ by less than 10 %, "
+               "or by less than two standard errors.\n\n",
+               settings.robots, settings.duration_s, settings.seeds)
+        << table << "\n"
+        << end;
   }
   return agree == ran ? 0 : 1;
 }

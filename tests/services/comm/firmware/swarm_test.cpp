@@ -99,8 +99,9 @@ TEST_F(FirmwareRun, MovesWhenANativeRobotDoes) {
   const std::string include = "#include <kilolib.h>\n";
   ASSERT_NE(text.find(include), std::string::npos);
   text.replace(text.find(include), include.size(),
-               include + "#include <avr/interrupt.h>\n"
-                         "static uint32_t now(void) { cli(); const uint32_t t = kilo_ticks; sei(); return t; }\n");
+               include +
+                   "#include <avr/interrupt.h>\n"
+                   "static uint32_t now(void) { cli(); const uint32_t t = kilo_ticks; sei(); return t; }\n");
   const std::string walk = program("walk.c", text);
   const Timeline native = run(pair_of(walk, "")), firmware = run(pair_of(walk, "avr: true"));
   const std::int64_t end = native.totals.last.count();
@@ -117,7 +118,8 @@ TEST_F(FirmwareRun, DiffersFirstWhereTheClockCarriesOver) {
   const std::string walk = "behaviour: \"" KILOTWIN_SOURCE_DIR "/behaviours/walk.c\" ";
   int early = 0;
   for (const char* const seed : {"seed=1", "seed=2", "seed=3", "seed=4", "seed=5"}) {
-    const Timeline native = run(pair_of(walk, ""), 1, {seed}), firmware = run(pair_of(walk, "avr: true"), 1, {seed});
+    const Timeline native = run(pair_of(walk, ""), 1, {seed}),
+                   firmware = run(pair_of(walk, "avr: true"), 1, {seed});
     for (std::size_t robot = 0; robot < 2; ++robot) {
       const auto &a = native.led[robot], &b = firmware.led[robot];
       std::size_t n = 0;
