@@ -24,11 +24,14 @@ constexpr std::array<Mode, HeadingFilter::kModes> kModesOfMotion{{
     {0, 0, 6, 6},
 }};
 /// Rate at which a robot changes its mode, 1/s, and the share of these changes by which something begins to hold it.
-constexpr double kSwitching_1_s = 0.5, kHeldShare = 0.02;
+constexpr double kSwitching_1_s = 0.5, kHeldShare = 0.05;
+/// The rate at which a robot that is held comes free, of kSwitching_1_s.
+constexpr double kHeldLasts = 0.5;
 /// Densities of the noise of a robot that is held: heading rad^2/s, velocity (mm/s)^2/s. It may turn unseen.
-constexpr double kHeldHeadingNoise = 0.05, kHeldVelocityNoise = 100;
-/// Densities of the noise while a mode lasts, per second: position mm^2, heading rad^2, speed (mm/s)^2, turn rate (rad/s)^2.
-constexpr double kPositionNoise = 0.06, kHeadingNoise = 4e-4, kSpeedNoise = 0.3, kTurnNoise = 1e-3;
+constexpr double kHeldHeadingNoise = 0.05, kHeldVelocityNoise = 5;
+/// Densities of the noise while a mode lasts, per second: of the axle along its heading mm^2, heading rad^2, position otherwise mm^2,
+/// speed (mm/s)^2, turn rate (rad/s)^2. The first two are those of wheels that let the heading wander by 1.4 degrees in a second.
+constexpr double kAlongNoise = 0.1, kHeadingNoise = 6e-4, kOtherNoise = 0.01, kSpeedNoise = 0.3, kTurnNoise = 1e-3;
 /// A robot that moved by this much moves: mm, and in standard deviations.
 constexpr double kMoved_mm = 1.5, kMovedDeviations = 6;
 /// While its heading is not known, the origin follows drift with this time constant, s.
@@ -69,8 +72,8 @@ void HeadingFilter::start(double time_s, double x_mm, double y_mm, double sd_mm,
 void HeadingFilter::mix(double dt_s) {
   const double leaves = 1 - std::exp(-kSwitching_1_s * dt_s);
   const auto share_of = [leaves](std::size_t from, std::size_t to) {
+    if (from == kHeld) return from == to ? 1 - kHeldLasts * leaves : kHeldLasts * leaves / (kModes - 1);
     if (from == to) return 1 - leaves;
-    if (from == kHeld) return leaves / (kModes - 1);
     return to == kHeld ? kHeldShare * leaves : (1 - kHeldShare) * leaves / (kModes - 2);
   };
   std::array<Hypothesis, kModes> mixed;
@@ -78,8 +81,7 @@ void HeadingFilter::mix(double dt_s) {
   for (std::size_t to = 0; to < kModes; ++to) {
     const Mode& mode = kModesOfMotion[to];
     std::array<double, kModes> shares{};
-    for (std::size_t from = 0; from < kModes; ++from)
-      shares[from] = share_of(from, to) * weights_[from];
+    for (std::size_t from = 0; from < kModes; ++from) shares[from] = share_of(from, to) * weights_[from];
     for (const double share : shares) weights[to] += share;
     std::array<Hypothesis, kModes> entering = hypotheses_;
     for (std::size_t from = 0; from < kModes; ++from) {
@@ -117,8 +119,8 @@ void HeadingFilter::predict_held(Hypothesis& h, double dt_s) {
   Matrix step = Matrix::Identity();
   step(0, 3) = step(1, 4) = dt_s;
   h.covariance = step * h.covariance * step.transpose();
-  h.covariance(0, 0) += kPositionNoise * dt_s;
-  h.covariance(1, 1) += kPositionNoise * dt_s;
+  h.covariance(0, 0) += kAlongNoise * dt_s;
+  h.covariance(1, 1) += kAlongNoise * dt_s;
   h.covariance(2, 2) += kHeldHeadingNoise * dt_s;
   h.covariance(3, 3) += kHeldVelocityNoise * dt_s;
   h.covariance(4, 4) += kHeldVelocityNoise * dt_s;
@@ -148,8 +150,16 @@ void HeadingFilter::predict(double dt_s) {
     jacobian(2, 4) = dt_s;
     h.covariance = jacobian * h.covariance * jacobian.transpose();
     const bool moves = i != 0;
-    h.covariance(0, 0) += (moves ? kPositionNoise : 1e-4) * dt_s;
-    h.covariance(1, 1) += (moves ? kPositionNoise : 1e-4) * dt_s;
+    h.covariance(0, 0) += kOtherNoise * dt_s;
+    h.covariance(1, 1) += kOtherNoise * dt_s;
+    if (moves) {
+      // Wheels fluctuate: the axle moves on and turns, and never sideways. The centre of the disc is ahead of it.
+      const Eigen::Vector2d along(c, s), ahead = kAhead_mm * Eigen::Vector2d(-s, c);
+      h.covariance.topLeftCorner<2, 2>() +=
+          dt_s * (kAlongNoise * along * along.transpose() + kHeadingNoise * ahead * ahead.transpose());
+      h.covariance.block<2, 1>(0, 2) += dt_s * kHeadingNoise * ahead;
+      h.covariance.block<1, 2>(2, 0) += dt_s * kHeadingNoise * ahead.transpose();
+    }
     h.covariance(2, 2) += (moves ? kHeadingNoise : 1e-6) * dt_s;
     if (moves) {
       h.covariance(3, 3) += kSpeedNoise * dt_s;

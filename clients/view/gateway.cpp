@@ -220,7 +220,7 @@ class Gateway::Service {
     const std::size_t count = std::min(kChunk_bytes, content.size() - download.sent);
     const bool last = download.sent + count == content.size();
     if (!server_.write(connection, std::string_view(content).substr(download.sent, count),
-               last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP))
+                       last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP))
       return -1;
     download.sent += count;
     if (!last) {
@@ -383,7 +383,7 @@ class Gateway::Service {
   std::atomic<std::uint32_t> viewers_{0};
   std::atomic<std::uint64_t> frames_{0}, bytes_{0}, refused_{0};
   mutable std::mutex mutex_;
-  std::mutex answering_;               // held during calls of answers_
+  std::mutex answering_;        // held during calls of answers_
   Answers* answers_ = nullptr;  // guarded by answering_
   http::LoopbackServer server_;
 };

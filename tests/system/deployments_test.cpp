@@ -168,7 +168,9 @@ struct Comparison {
 };
 
 /// The hue, as the tracker's classes: which channels are lit.
-int channels(std::uint8_t led) { return ((led & 3) != 0) | ((led >> 2 & 3) != 0) << 1 | ((led >> 4 & 3) != 0) << 2; }
+int channels(std::uint8_t led) {
+  return ((led & 3) != 0) | ((led >> 2 & 3) != 0) << 1 | ((led >> 4 & 3) != 0) << 2;
+}
 
 /// Robot `first + i` of the deployment against the world's robot `whose[i]`.
 Comparison compare(const World& world, const std::vector<Moment>& seen, std::size_t first,
@@ -222,8 +224,8 @@ class Deployments : public testing::Test {
   }
   std::unique_ptr<Process> start_run(const std::string& file, const std::string& domain, const std::string& out,
                                      const Words& more = {}) {
-    Words words{"run", scratch_ / file, "--pace", fmt::format("{}", kPace), "--quiet", "--domain", domain, "--out",
-                scratch_ / out};
+    Words words{"run",  scratch_ / file, "--pace",      fmt::format("{}", kPace), "--quiet", "--domain",
+                domain, "--out",         scratch_ / out};
     words.insert(words.end(), more.begin(), more.end());
     return start(program(), words);
   }
@@ -234,26 +236,37 @@ class Deployments : public testing::Test {
                                    "--blur", "0.7", "--uneven-light", "0.2"});
   }
   std::unique_ptr<Process> start_tracker(const Words& more = {}) {
-    Words words{"track",   scratch_ / "ceiling.jpg", "--watch",  "--calibration", scratch_ / "ceiling.yaml",
-                "--arena", kCeiling.arena(),         "--domain", here_,           "--name",
-                "ceiling", "--out",                  scratch_ / "robots.csv"};
+    Words words{"track",
+                scratch_ / "ceiling.jpg",
+                "--watch",
+                "--calibration",
+                scratch_ / "ceiling.yaml",
+                "--arena",
+                kCeiling.arena(),
+                "--domain",
+                here_,
+                "--name",
+                "ceiling",
+                "--out",
+                scratch_ / "robots.csv"};
     words.insert(words.end(), more.begin(), more.end());
     return start(KILOTWIN_VISION, words);
   }
   void expect_as_asked(const Comparison& result) {
     std::string of_robots;
     for (const Errors& errors : result.heading_of_deg) of_robots += fmt::format(" {:.1f}", errors.rms());
-    std::printf("%s", fmt::format("[ measured ] position {:.2f} mm, heading {:.1f} deg after 2 s of straight motion ({} "
-                                  "values), {:.1f} deg overall (robots:{}), LED {:.2f} % (just after changes too: "
-                                  "{:.2f} %), {} values, absent in {}\n",
-                                  result.position_mm.rms(), result.straight_deg.rms(), result.straight_deg.count,
-                                  result.heading_deg.rms(), of_robots,
-                                  100.0 * static_cast<double>(result.steady_right) /
-                                      static_cast<double>(std::max(1L, result.steady_leds)),
-                                  100.0 * static_cast<double>(result.led_right) /
-                                      static_cast<double>(std::max(1L, result.leds)),
-                                  result.position_mm.count, result.absent)
-                          .c_str());
+    std::printf(
+        "%s",
+        fmt::format("[ measured ] position {:.2f} mm, heading {:.1f} deg after 2 s of straight motion ({} "
+                    "values), {:.1f} deg overall (robots:{}), LED {:.2f} % (just after changes too: "
+                    "{:.2f} %), {} values, absent in {}\n",
+                    result.position_mm.rms(), result.straight_deg.rms(), result.straight_deg.count,
+                    result.heading_deg.rms(), of_robots,
+                    100.0 * static_cast<double>(result.steady_right) /
+                        static_cast<double>(std::max(1L, result.steady_leds)),
+                    100.0 * static_cast<double>(result.led_right) / static_cast<double>(std::max(1L, result.leds)),
+                    result.position_mm.count, result.absent)
+            .c_str());
     EXPECT_GT(result.position_mm.count, 1000);
     EXPECT_GT(result.straight_deg.count, 200);
     EXPECT_LT(result.absent, result.position_mm.count / 100);
@@ -274,17 +287,19 @@ class Deployments : public testing::Test {
 };
 
 TEST_F(Deployments, CTheSimulatedStationDrivesRobotsThatACameraSees) {
-  const std::string robots = fmt::format("robots {{ count: {} behaviour: \"{}\" layout {{ grid {{ pitch_mm: 90 }} }} }}\n",
-                                         kRobots, source("behaviours/forage.c"));
+  const std::string robots =
+      fmt::format("robots {{ count: {} behaviour: \"{}\" layout {{ grid {{ pitch_mm: 90 }} }} }}\n", kRobots,
+                  source("behaviours/forage.c"));
   write(scratch_ / "world.txtpb", "name: \"world\" duration_s: 900 seed: 5\n" + arena() + robots);
   // The experiment of deployment a; options alone make it deployment c.
-  write(scratch_ / "foraging.txtpb",
-        "name: \"foraging\" duration_s: 900\n" + arena() + robots +
-            "station {\n"
-            "  environment { plugin { built_in: \"identify\" parameter { name: \"wait_s\" value: \"2\" } } }\n"
-            "  environment { foraging { home_x_mm: 200 home_y_mm: 0 home_radius_mm: 90 food_x_mm: -200 food_y_mm: 0 "
-            "food_radius_mm: 90 } }\n"
-            "}\n");
+  write(
+      scratch_ / "foraging.txtpb",
+      "name: \"foraging\" duration_s: 900\n" + arena() + robots +
+          "station {\n"
+          "  environment { plugin { built_in: \"identify\" parameter { name: \"wait_s\" value: \"2\" } } }\n"
+          "  environment { foraging { home_x_mm: 200 home_y_mm: 0 home_radius_mm: 90 food_x_mm: -200 food_y_mm: 0 "
+          "food_radius_mm: 90 } }\n"
+          "}\n");
   const auto virtual_controller = start(program(), {"ohc", "--pty", scratch_ / "port", "--domain", there_});
   ASSERT_TRUE(eventually([&] { return fs::is_symlink(scratch_ / "port"); }));
   const auto camera = start_camera();
@@ -295,9 +310,9 @@ TEST_F(Deployments, CTheSimulatedStationDrivesRobotsThatACameraSees) {
   const auto tracker = start_tracker({"--identify"});
   const auto controller = start(program(), {"ohc", "--serial", scratch_ / "port", "--domain", here_});
   ASSERT_TRUE(controller->says("waiting for a run", 30));
-  const auto run = start_run("foraging.txtpb", here_, "run",
-                             {"--set", "robots.body=TRACKED", "--set", "robots.says.shadow=true", "--set",
-                              "tracking.start=WHEN_SEEN"});
+  const auto run = start_run(
+      "foraging.txtpb", here_, "run",
+      {"--set", "robots.body=TRACKED", "--set", "robots.says.shadow=true", "--set", "tracking.start=WHEN_SEEN"});
   ASSERT_TRUE(tracker->says(fmt::format("identification: {0} of {0} robots have their numbers", kRobots), 120));
   const double from_s = of_run.time_s() + 3;
   constexpr double kLasts_s = 45;
@@ -338,9 +353,10 @@ int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
 TEST_F(Deployments, DSimulatedRobotsMoveAmongThoseThatACameraSees) {
   write(scratch_ / "wander.c", kWander);
   write(scratch_ / "world.txtpb",
-        fmt::format("name: \"world\" duration_s: 900 seed: 3\n{}robots {{ count: {} behaviour: \"wander.c\" layout {{ "
-                    "grid {{ pitch_mm: 110 }} }} }}\n",
-                    arena(), kRobots));
+        fmt::format(
+            "name: \"world\" duration_s: 900 seed: 3\n{}robots {{ count: {} behaviour: \"wander.c\" layout {{ "
+            "grid {{ pitch_mm: 110 }} }} }}\n",
+            arena(), kRobots));
   constexpr std::size_t kSimulated = 6;
   write(scratch_ / "hybrid.txtpb",
         fmt::format("name: \"hybrid\" duration_s: 900\n{}tracker {{ source: \"ceiling\" first_robot: {} }}\n"

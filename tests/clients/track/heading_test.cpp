@@ -139,9 +139,9 @@ INSTANTIATE_TEST_SUITE_P(Conditions, HeadingOf,
                                          Condition{0.3, 1 / 30.0, 150, true}));
 
 TEST(Headings, OfARobotThatAWallHoldsAreUncertain) {
-  // It drives at 45 degrees against a wall and slides along it: the path is straight, and is not its heading.
+  // It drives at 60 degrees against a wall and slides along it: the path is straight, and is not its heading.
   Robot robot;
-  robot.heading_rad = kPi / 4;
+  robot.heading_rad = kPi / 3;
   robot.y_mm = -60;
   HeadingFilter filter;
   std::mt19937_64 random(5);

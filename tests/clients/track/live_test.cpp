@@ -78,8 +78,8 @@ TEST(TrackerLive, RobotsOfAnotherWorldGetTheirNumbersByTheStationsIdentification
   Process virtual_controller({program(), "ohc", "--pty", scratch / "port", "--domain", there}, scratch.path());
   ASSERT_TRUE(eventually([&] { return fs::is_symlink(scratch / "port"); }));
   const std::string port = std::to_string(free_port());
-  Process cameras({KILOTWIN_VISION, "cameras", "--domain", there, "--mjpeg", port, "--size",
-                   kCeiling.size(), "--fps", "10", "--noise", "3"},
+  Process cameras({KILOTWIN_VISION, "cameras", "--domain", there, "--mjpeg", port, "--size", kCeiling.size(),
+                   "--fps", "10", "--noise", "3"},
                   scratch.path());
   ASSERT_TRUE(cameras.says("camera.mjpg", 60));
   Process world_run({program(), "run", scratch / "world.txtpb", "--pace", "1", "--quiet", "--domain", there,
@@ -87,8 +87,8 @@ TEST(TrackerLive, RobotsOfAnotherWorldGetTheirNumbersByTheStationsIdentification
                     scratch.path());
   ASSERT_TRUE(virtual_controller.says("run world", 60));
   Process tracker({KILOTWIN_VISION, "track", "http://127.0.0.1:" + port + "/camera.mjpg", "--calibration",
-                   scratch / "ceiling.yaml", "--arena", kCeiling.arena(),
-                   "--domain", here, "--name", "ceiling", "--identify", "--out", scratch / "robots.csv"},
+                   scratch / "ceiling.yaml", "--arena", kCeiling.arena(), "--domain", here, "--name", "ceiling",
+                   "--identify", "--out", scratch / "robots.csv"},
                   scratch.path());
   ASSERT_TRUE(tracker.says(" 8 robots", 90));
   Process controller({program(), "ohc", "--serial", scratch / "port", "--domain", here}, scratch.path());
