@@ -22,6 +22,7 @@ struct Command {
 [[nodiscard]] Command add_check(CLI::App& program);
 [[nodiscard]] Command add_build(CLI::App& program);
 [[nodiscard]] Command add_sweep(CLI::App& program);
+[[nodiscard]] Command add_tune(CLI::App& program);
 [[nodiscard]] Command add_export(CLI::App& program);
 [[nodiscard]] Command add_replay(CLI::App& program);
 [[nodiscard]] Command add_import(CLI::App& program);

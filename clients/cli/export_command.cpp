@@ -60,7 +60,7 @@ int export_run(const ExportArguments& arguments) {
         "export: nothing to export; give --trajectories FILE, --variables FILE, --events FILE, --commands FILE, "
         "--observables FILE, --environment FILE, --bodies FILE, --messages FILE, --radio FILE, --cells FILE, "
         "--mcap FILE, "
-        "--model FILE or several; a table ends in .csv, .csv.gz or .npz");
+        "--model FILE or several; a table ends in .csv, .csv.gz, .npz or .arrow");
   }
   if (!arguments.model.empty()) {
     const auto run = recorder::RunDirectory::open(arguments.run, recorder::RunDirectory::Needs::kManifest);
@@ -118,9 +118,9 @@ int export_run(const ExportArguments& arguments) {
 
 Command add_export(CLI::App& program) {
   const auto arguments = std::make_shared<ExportArguments>();
-  CLI::App& app = *program.add_subcommand(
-      "export",
-      "write tables from a recorded run: FILE.csv, FILE.csv.gz, FILE.npz for NumPy, or - for standard output");
+  CLI::App& app = *program.add_subcommand("export",
+                                          "write tables from a recorded run: FILE.csv, FILE.csv.gz, FILE.npz for "
+                                          "NumPy, FILE.arrow, or - for standard output");
   app.add_option("RUN", arguments->run, "run directory or recording")->required()->type_name("");
   app.add_option("--trajectories", arguments->trajectories, fmt::format("columns {}", recorder::kTrajectoryColumns))
       ->type_name("FILE");

@@ -21,12 +21,15 @@ struct ImportArguments {
 
 int import_file(const ImportArguments& arguments) {
   const std::string ending = arguments.file.extension().string();
-  if (ending != ".argos" && ending != ".xml" && ending != ".json")
-    throw UserError(fmt::format("{}: is of no known kind; give an .argos file, or a .json file of Kilombo",
-                                arguments.file.string()));
+  const bool yaml = ending == ".yaml" || ending == ".yml";
+  if (ending != ".argos" && ending != ".xml" && ending != ".json" && !yaml)
+    throw UserError(fmt::format(
+        "{}: is of no known kind; give an .argos file, a .json file of Kilombo or a .yaml file of pogosim",
+        arguments.file.string()));
   const std::string text = os::read_file(arguments.file), name = arguments.file.string();
-  importers::Imported imported =
-      ending == ".json" ? importers::from_kilombo(text, name) : importers::from_argos(text, name);
+  importers::Imported imported = ending == ".json" ? importers::from_kilombo(text, name)
+                                 : yaml            ? importers::from_pogosim(text, name)
+                                                   : importers::from_argos(text, name);
   if (!arguments.behaviour.empty()) {
     for (proto::RobotGroup& group : *imported.experiment.mutable_robots())
       group.set_behaviour(0, arguments.behaviour.string());
@@ -55,9 +58,9 @@ int import_file(const ImportArguments& arguments) {
 
 Command add_import(CLI::App& program) {
   const auto arguments = std::make_shared<ImportArguments>();
-  CLI::App& app =
-      *program.add_subcommand("import", "make an experiment file of an .argos file, or of Kilombo's JSON");
-  app.add_option("FILE", arguments->file, "an .argos file, or a .json file of Kilombo")
+  CLI::App& app = *program.add_subcommand(
+      "import", "make an experiment file of an .argos file, of Kilombo's JSON, or of pogosim's YAML");
+  app.add_option("FILE", arguments->file, "an .argos file, a .json file of Kilombo, or a .yaml file of pogosim")
       ->required()
       ->check(CLI::ExistingFile.description(""));
   app.add_option("-o,--out", arguments->out, "the experiment file (default: FILE's name with .txtpb, here)")

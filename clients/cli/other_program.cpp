@@ -37,6 +37,16 @@ std::filesystem::path program_beside(const std::string& name) {
                   program.string()));
 }
 
+std::filesystem::path main_program() {
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe"), here = self.parent_path();
+  const std::filesystem::path beside = here / "kilotwin",
+                              installed = here.parent_path().parent_path() / "bin/kilotwin";
+  if (!self.filename().string().starts_with("kilotwin-")) return "/proc/self/exe";
+  if (std::filesystem::exists(beside) && !std::filesystem::is_directory(beside)) return beside;
+  if (std::filesystem::exists(installed)) return installed;
+  throw RunError(fmt::format("the program kilotwin is neither {} nor {}", beside.string(), installed.string()));
+}
+
 Command add_other_program(CLI::App& app, const std::string& command, const std::string& description,
                           const std::string& program) {
   CLI::App& parser = *app.add_subcommand(command, description);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "clients/cli/commands.hpp"
+#include "clients/cli/observable_choice.hpp"
 #include "clients/cli/prepare.hpp"
 #include "clients/cli/run_arguments.hpp"
 #include "clients/cli/sweep_points.hpp"
@@ -43,45 +44,9 @@ struct SweepArguments {
 /// Failed runs that are reported one by one; the others are counted.
 constexpr std::size_t kMostComplaints = 5;
 
-std::optional<recorder::Observable> built_in(const std::string& name) {
-  for (std::size_t o = 0; o < recorder::kObservables.size(); ++o) {
-    if (recorder::kObservables[o].name == name) return static_cast<recorder::Observable>(o);
-  }
-  return std::nullopt;
-}
-
-/// Throws UserError where `plot` names no observable.
-void check_plot(const std::string& plot, const proto::Experiment& experiment) {
-  if (plot.empty() || built_in(plot)) return;
-  std::string names;
-  for (const recorder::ObservableInfo& info : recorder::kObservables)
-    names += (names.empty() ? "" : ", ") + std::string(info.name);
-  for (const proto::Observable& own : experiment.observable()) {
-    if (own.name() == plot) return;
-    names += ", " + own.name();
-  }
-  throw UserError(fmt::format("--plot: no observable \"{}\"; there are {}", plot, names));
-}
-
 std::vector<std::string> words_of(const SweepArguments& arguments, const SweepPoint& point, const SweepRun& run) {
-  std::vector<std::string> words{"kilotwin",
-                                 "run",
-                                 arguments.run.experiment.string(),
-                                 "--mode",
-                                 "local",
-                                 "--quiet",
-                                 "--out",
-                                 run.directory.string()};
-  if (!arguments.seeds.empty()) words.insert(words.end(), {"--seed", std::to_string(run.seed)});
-  for (const std::string& set : point) words.insert(words.end(), {"--set", set});
-  for (const std::string& define : arguments.run.define) words.insert(words.end(), {"--define", define});
-  if (arguments.run.duration_s)
-    words.insert(words.end(), {"--duration", fmt::format("{}", *arguments.run.duration_s)});
-  if (arguments.run.robots) words.insert(words.end(), {"--robots", std::to_string(*arguments.run.robots)});
-  if (!arguments.run.behaviour.empty())
-    words.insert(words.end(), {"--behaviour", arguments.run.behaviour.string()});
-  if (!arguments.run.model.empty()) words.insert(words.end(), {"--model", arguments.run.model.string()});
-  return words;
+  return run_words(arguments.run, point, arguments.seeds.empty() ? std::nullopt : std::optional(run.seed),
+                   run.directory);
 }
 
 /// What a sweep consists of.
@@ -105,11 +70,11 @@ Sweep checked(const SweepArguments& arguments) {
     const LoadedExperiment loaded = load_with_overrides(one);
     static_cast<void>(resolve(loaded, one, Notes::kSilent));
     sweep.name = loaded.experiment.name();
-    check_plot(arguments.plot, loaded.experiment);
+    if (!arguments.plot.empty()) check_observable("--plot", arguments.plot, loaded.experiment);
     if (loaded.experiment.movable_size() > 0) sweep.plotted = recorder::Observable::kPushed;
     sweep.own_seeds.push_back(loaded.experiment.seed());
   }
-  if (const auto wanted = built_in(arguments.plot)) sweep.plotted = *wanted;
+  if (const auto wanted = built_in_observable(arguments.plot)) sweep.plotted = *wanted;
   return sweep;
 }
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "clients/cli/other_program.hpp"
 #include "clients/cli/progress.hpp"
 #include "core/base/error.hpp"
 #include "core/os/children.hpp"
@@ -22,6 +23,7 @@ constexpr auto kGrace = std::chrono::milliseconds(3000);
 /// Starts run `index`. Returns false if the system currently has no room for another process.
 bool start(os::Children& children, const SweepRun& run, std::size_t index) {
   os::ChildOptions options;
+  options.program = main_program();
   options.log = run.directory.string() + ".log";
   options.output_to_log = true;
   options.tag = index;
@@ -44,10 +46,24 @@ std::string progress_text(std::size_t done, std::size_t runs, Clock::time_point 
 
 }  // namespace
 
-bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time,
-             const std::function<void(const SweepRun&)>& ended) {
+std::vector<std::string> run_words(const RunArguments& arguments, const SweepPoint& point,
+                                   std::optional<std::uint64_t> seed, const std::filesystem::path& directory) {
+  std::vector<std::string> words{
+      "kilotwin", "run", arguments.experiment.string(), "--mode", "local", "--quiet", "--out", directory.string()};
+  if (seed) words.insert(words.end(), {"--seed", std::to_string(*seed)});
+  for (const std::string& set : point) words.insert(words.end(), {"--set", set});
+  for (const std::string& define : arguments.define) words.insert(words.end(), {"--define", define});
+  if (arguments.duration_s) words.insert(words.end(), {"--duration", fmt::format("{}", *arguments.duration_s)});
+  if (arguments.robots) words.insert(words.end(), {"--robots", std::to_string(*arguments.robots)});
+  if (!arguments.behaviour.empty()) words.insert(words.end(), {"--behaviour", arguments.behaviour.string()});
+  if (!arguments.model.empty()) words.insert(words.end(), {"--model", arguments.model.string()});
+  return words;
+}
+
+bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time, const std::function<void(const SweepRun&)>& ended,
+             bool shown) {
   os::Children children;
-  Progress progress(true);
+  Progress progress(shown);
   const auto begun = Clock::now();
   std::size_t next = 0, done = 0;
   for (;;) {

@@ -5,8 +5,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "clients/cli/run_arguments.hpp"
+#include "clients/cli/sweep_points.hpp"
 
 namespace kilotwin::cli {
 
@@ -19,9 +23,14 @@ struct SweepRun {
   std::string last_line;            ///< last line of its log: the error if it failed
 };
 
+/// The command line of a local run of an experiment with overrides. `seed`: none for that of the experiment.
+[[nodiscard]] std::vector<std::string> run_words(const RunArguments& arguments, const SweepPoint& point,
+                                                 std::optional<std::uint64_t> seed,
+                                                 const std::filesystem::path& directory);
+
 /// Executes all runs, at most `at_a_time` at once, and calls `ended` after each. If this process is interrupted, it ends the active
-/// runs and returns false. Shows progress on stderr.
+/// runs and returns false. `shown`: progress on stderr.
 [[nodiscard]] bool run_all(std::vector<SweepRun>& runs, std::size_t at_a_time,
-                           const std::function<void(const SweepRun&)>& ended);
+                           const std::function<void(const SweepRun&)>& ended, bool shown = true);
 
 }  // namespace kilotwin::cli

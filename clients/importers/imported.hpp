@@ -29,6 +29,9 @@ struct Imported {
 /// Parameters of Kilombo, a JSON object. `name` as above. Throws UserError.
 [[nodiscard]] Imported from_kilombo(std::string_view text, const std::string& name);
 
+/// A configuration of pogosim, in YAML. `name` as above. Throws UserError with the line, or if no object is a pogobot.
+[[nodiscard]] Imported from_pogosim(std::string_view text, const std::string& name);
+
 /// The experiment file: the notes as comments, then the fields.
 [[nodiscard]] std::string experiment_text(const Imported& imported, const std::string& source);
 

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <limits>
 
+#include "clients/recorder/utf8.hpp"
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 
@@ -86,29 +87,6 @@ std::string array_header(const std::string& type, std::uint64_t rows) {
   Octets octets;
   octets << std::string("\x93NUMPY\x01") + '\0' << static_cast<std::uint16_t>(text.size()) << text;
   return octets.text();
-}
-
-/// UTF-8 as code points; a malformed octet becomes U+FFFD.
-std::u32string code_points(std::string_view text) {
-  std::u32string points;
-  for (std::size_t i = 0; i < text.size();) {
-    const auto octet = static_cast<unsigned char>(text[i]);
-    const std::size_t length = octet < 0x80       ? 1
-                               : octet >> 5 == 6  ? 2
-                               : octet >> 4 == 14 ? 3
-                               : octet >> 3 == 30 ? 4
-                                                  : 0;
-    char32_t point = length == 1 ? octet : octet & (0x7fu >> length);
-    bool right = length > 0 && i + length <= text.size();
-    for (std::size_t k = 1; right && k < length; ++k) {
-      const auto next = static_cast<unsigned char>(text[i + k]);
-      right = next >> 6 == 2;
-      point = point << 6 | (next & 0x3fu);
-    }
-    points += right ? point : U'\uFFFD';
-    i += right ? length : 1;
-  }
-  return points;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "clients/recorder/arrow_table.hpp"
 #include "clients/recorder/csv_table.hpp"
 #include "clients/recorder/npz_table.hpp"
 #include "core/base/error.hpp"
@@ -14,11 +15,13 @@ std::unique_ptr<Table> open_table(const std::filesystem::path& file, std::vector
                                   const TableMetadata& metadata) {
   const std::string ending = file.extension().string();
   if (ending == ".npz") return std::make_unique<NpzTable>(file, std::move(columns), metadata);
-  for (const char* other : {".arrow", ".feather", ".h5", ".hdf5", ".mcap", ".npy", ".parquet", ".xls", ".xlsx"}) {
+  if (ending == ".arrow" || ending == ".feather")
+    return std::make_unique<ArrowTable>(file, std::move(columns), metadata);
+  for (const char* other : {".h5", ".hdf5", ".mcap", ".npy", ".parquet", ".xls", ".xlsx"}) {
     if (ending != other) continue;
-    throw UserError(
-        fmt::format("{}: tables are not written as {}; give .csv, .csv.gz or .npz, or - for standard output",
-                    file.string(), other));
+    throw UserError(fmt::format(
+        "{}: tables are not written as {}; give .csv, .csv.gz, .npz or .arrow, or - for standard output",
+        file.string(), other));
   }
   return std::make_unique<CsvTable>(file, std::move(columns), metadata);
 }

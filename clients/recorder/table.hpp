@@ -1,4 +1,5 @@
-/// Table: rows of typed columns, written to CSV (.csv, .csv.gz, - for standard output) or NumPy (.npz).
+/// Table: rows of typed columns, written to CSV (.csv, .csv.gz, - for standard output), NumPy (.npz) or Arrow (.arrow,
+/// .feather).
 ///
 /// A row is written cell by cell, in the order of the columns:
 ///
@@ -20,10 +21,10 @@
 namespace kilotwin::recorder {
 
 enum class CellType : std::uint8_t {
-  kInteger,  ///< int64 in NumPy; float64 where a cell is missing
-  kNumber,   ///< float64; a missing cell is NaN
+  kInteger,  ///< int64; in NumPy float64 where a cell is missing
+  kNumber,   ///< float64; a missing cell is NaN in NumPy
   kTime,     ///< float64, s; in CSV all digits of the tick's time
-  kText      ///< Unicode strings; a missing cell is empty
+  kText      ///< Unicode strings; a missing cell is empty in NumPy
 };
 
 struct Column {
@@ -33,7 +34,8 @@ struct Column {
   int decimals = -1;  ///< in CSV, with kNumber; -1: the shortest text that gives the same number
 };
 
-/// What is written beside the rows: name and value. In .npz as JSON in the archive's comment, beside a CSV file as FILE.json.
+/// What is written beside the rows: name and value. In .npz as JSON in the archive's comment, in .arrow in
+/// the schema's metadata, beside a CSV file as FILE.json.
 using TableMetadata = std::vector<std::pair<std::string, std::string>>;
 
 class Table {

@@ -121,8 +121,8 @@ TEST(ArgosImport, NamesThePlaceOfAnError) {
             "f.argos:2: <controller config=\"c\">: is defined nowhere");
 }
 
-TEST(ArgosImport, SurvivesAnyChangeOfItsFile) {
-  const std::string good = kGather;
+/// How many of 3000 files with random changes are refused.
+int refused_of_3000(const std::string& good, Imported (*import)(std::string_view, const std::string&)) {
   std::uint64_t state = 1;
   const auto draw = [&state](std::size_t below) {
     state = state * 6364136223846793005u + 1442695040888963407u;
@@ -139,11 +139,16 @@ TEST(ArgosImport, SurvivesAnyChangeOfItsFile) {
         text[at] = "<>\"=/,.-9e x\0"[draw(13)];
     }
     try {
-      (void)from_argos(text, "f.argos");
+      (void)import(text, "f");
     } catch (const UserError&) {
       ++refused;
     }
   }
+  return refused;
+}
+
+TEST(ArgosImport, SurvivesAnyChangeOfItsFile) {
+  const int refused = refused_of_3000(kGather, from_argos);
   EXPECT_GT(refused, 1000);
   EXPECT_LT(refused, 3000);
 }
@@ -170,6 +175,92 @@ TEST(KilomboImport, TakesOverItsParameters) {
   EXPECT_THROW((void)from_kilombo("[1]", "p.json"), UserError);
   EXPECT_THROW((void)from_kilombo("{", "p.json"), UserError);
   EXPECT_THROW((void)from_kilombo("{\"nBots\": 0}", "p.json"), UserError);
+}
+
+constexpr const char* kPogosim = R"(---
+boundary_condition: periodic
+arena_file: arenas/disk.csv
+arena_surface: 1.0e6
+save_data_period: 2.0
+seed: 5
+simulation_time: 300.0
+time_step: 0.01
+initial_formation: aligned_chessboard
+chessboard_distance_between_neighbors: 60
+objects:
+    sun:
+        type: static_light
+        geometry: global
+        value: 3276
+    lamp: { type: static_light, geometry: disk, x: 564.2, y: 664.2, radius: 100, value: 10000 }
+    boxes: { type: passive_object, geometry: rectangle, nb: 2, body_width: 70, body_height: 50 }
+    walls: { type: pogowall, geometry: arena }
+    robots:
+        type: pogobot
+        nb:
+            batch_options: [10, 20, 30]
+        radius: 26.5
+        communication_radius: 80.0
+        msg_success_rate: { type: static, rate: 0.9 }
+        max_linear_speed: 9.0
+        body_restitution: 0.5
+        wings: 2
+parameters:
+    run_duration_min: 1000
+)";
+
+TEST(PogosimImport, TakesOverWhatHasACounterpart) {
+  const Imported imported = from_pogosim(kPogosim, "c.yaml");
+  const proto::Experiment& e = imported.experiment;
+  EXPECT_EQ(e.duration_s(), 300);
+  EXPECT_EQ(e.seed(), 5u);
+  EXPECT_EQ(e.recording().every_s(), 2);
+  EXPECT_NEAR(e.arena().circle().radius_mm(), std::sqrt(1e6 / 3.14159265358979), 0.05);
+  ASSERT_EQ(e.robots_size(), 1);
+  EXPECT_EQ(e.robots(0).count(), 10u);
+  EXPECT_EQ(e.robots(0).layout().grid().pitch_mm(), 60);
+  EXPECT_EQ(e.robots(0).layout().grid().heading_deg(), 90);
+  EXPECT_EQ(e.radio().range_mm(), 96.5);
+  EXPECT_NEAR(e.radio().loss(), 0.1, 1e-9);
+  EXPECT_EQ(e.motion().straight_speed_mm_s(), 9);
+  EXPECT_NEAR(e.light().ambient(), 1023 * 3276 / 32767.0, 0.1);
+  ASSERT_EQ(e.light().source_size(), 1);
+  EXPECT_NEAR(e.light().source(0).x_mm(), 0, 0.1);
+  EXPECT_NEAR(e.light().source(0).y_mm(), 100, 0.1);
+  ASSERT_EQ(e.movable_size(), 2);
+  EXPECT_EQ(e.movable(0).box().length_mm(), 50);
+  EXPECT_GT(e.movable(1).x_mm() - e.movable(0).x_mm(), 70);
+}
+
+TEST(PogosimImport, SaysWhatWasNotTakenOverWithItsLine) {
+  const Imported imported = from_pogosim(kPogosim, "c.yaml");
+  for (const char* note :
+       {"2: boundary_condition: periodic", "8: time_step: a tick is", "18: walls: pogowall has no counterpart",
+        "nb: is a batch over 10,20,30", "radius: 26.5 mm; Kilobots have 16.5 mm", "body_restitution: collisions",
+        "28: wings: has no counterpart", "30: run_duration_min: is a parameter of the program"})
+    EXPECT_TRUE(notes(imported, note)) << note << "\n" << experiment_text(imported, "c.yaml");
+}
+
+TEST(PogosimImport, NamesThePlaceOfAnError) {
+  const auto error = [](const std::string& text) -> std::string {
+    try {
+      (void)from_pogosim(text, "c.yaml");
+    } catch (const UserError& e) {
+      return e.what();
+    }
+    return {};
+  };
+  EXPECT_EQ(error("a: 1").rfind("c.yaml: has no \"objects:\"", 0), 0u) << error("a: 1");
+  EXPECT_EQ(error("objects:\n  r: { nb: x }"), "c.yaml:2: nb: expected a number");
+  EXPECT_EQ(error("objects: {}"), "c.yaml: no object is a pogobot");
+  EXPECT_EQ(error("objects: {\n  r: [").rfind("c.yaml:", 0), 0u);
+  EXPECT_EQ(error("objects: { r: { nb: 0 } }").rfind("c.yaml: r: nb: expected 1 to", 0), 0u);
+}
+
+TEST(PogosimImport, SurvivesAnyChangeOfItsFile) {
+  const int refused = refused_of_3000(kPogosim, from_pogosim);
+  EXPECT_GT(refused, 300);
+  EXPECT_LT(refused, 3000);
 }
 
 }  // namespace

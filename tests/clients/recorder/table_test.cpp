@@ -74,8 +74,10 @@ TEST_F(TableTest, CsvIsAsBefore) {
 }
 
 TEST_F(TableTest, EqualTablesGiveEqualFiles) {
-  const std::string first = os::read_file(write("a.npz"));
-  EXPECT_EQ(first, os::read_file(write("b.npz")));
+  for (const std::string ending : {".npz", ".arrow"}) {
+    const std::string first = os::read_file(write("a" + ending));
+    EXPECT_EQ(first, os::read_file(write("b" + ending)));
+  }
 }
 
 TEST_F(TableTest, OtherEndingsAreRefused) {
@@ -99,6 +101,30 @@ assert list(t["state"]) == ["running", 'a "b", K\u00e4fer \U0001F41E', ""], t["s
 about = json.loads(zipfile.ZipFile(name).comment)
 assert about["seed"] == "7" and about["version"] == '1, "two"' and about["columns"][3]["unit"] == "mm"
 )");
+}
+
+TEST_F(TableTest, ArrowsOwnReaderReadsTheFile) {
+  write("t.arrow");
+  const auto table =
+      open_table(folder_ / "long.feather", {{"n", "", CellType::kInteger}, {"word", "", CellType::kText}}, {});
+  for (int i = 0; i < 150'000; ++i) {
+    if (i % 7 == 0)
+      table->missing();
+    else
+      table->integer(-i);
+    if (i % 11 == 0)
+      table->missing();
+    else
+      table->text(std::to_string(i) + "\xff");  // no UTF-8
+    table->end_row();
+  }
+  table->close();
+  const fs::path node = os::find_executable("node");
+  if (node.empty()) GTEST_SKIP() << "node is not installed";
+  const os::ProcessResult result = os::run_process(
+      {node, KILOTWIN_SOURCES "/tests/clients/recorder/arrow_test.mjs", folder_, KILOTWIN_SOURCES "/build/npm"});
+  if (result.end.code == 77) GTEST_SKIP() << "build/npm has no apache-arrow; scripts/setup installs it";
+  EXPECT_TRUE(result.end.well()) << result.errors;
 }
 
 TEST_F(TableTest, PandasReadsBothFormatsWithoutOptions) {

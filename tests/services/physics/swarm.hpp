@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/spin_up.hpp"
 #include "idl/checkpoint.pb.h"
 #include "services/physics/engine.hpp"
 #include "tests/support/scenes.hpp"

@@ -1,0 +1,110 @@
+// `kilotwin tune`: what is known to be best is found, and what it leaves says so.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "tests/system/program.hpp"
+
+namespace kilotwin::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+nlohmann::json tuned(const Words& more, const Scratch& scratch, const std::string& experiment,
+                     const std::string& budget = "76") {
+  Words words{"tune", experiment, "--quiet", "--seeds", "2", "--budget", budget, "--out", scratch / "tune"};
+  words.insert(words.end(), more.begin(), more.end());
+  const Outcome outcome = kilotwin(words, scratch);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_FALSE(fs::exists(scratch / "tune/runs"));
+  return nlohmann::json::parse(read(scratch / "tune/tune.json"));
+}
+
+TEST(TuneCommand, FindsTheGridThatSpreadsARobotSwarmMost) {
+  Scratch scratch;
+  const auto json = tuned({"--duration", "1", "--robots", "9", "--vary", "robots.layout.grid.pitch_mm=40.0..120.0",
+                           "--maximise", "spread"},
+                          scratch, source("experiments/disperse.txtpb"));
+  EXPECT_GT(json.at("best").at("robots.layout.grid.pitch_mm"), 110);
+  EXPECT_GT(json.at("gain").at("mean"), 0);
+  EXPECT_EQ(json.at("gain").at("runs"), 8);
+  // The words of the result repeat it.
+  Words words = json.at("run");
+  words.erase(words.begin());
+  const auto out = std::find(words.begin(), words.end(), "--out");
+  *(out + 1) = scratch / "again";
+  EXPECT_EQ(kilotwin(words, scratch).status, 0);
+  // A header, and as many points as the budget allows: less than a generation of 5 points is left of it.
+  const std::string points = read(scratch / "tune/points.csv");
+  EXPECT_TRUE(points.starts_with("generation,robots.layout.grid.pitch_mm,spread,spread_se,failed\n")) << points;
+  EXPECT_GE(std::count(points.begin(), points.end(), '\n'), 1 + 10);
+  EXPECT_NE(read(scratch / "tune/report.html").find("robots.layout.grid.pitch_mm"), std::string::npos);
+}
+
+TEST(TuneCommand, VariesConstantsOfPrograms) {
+  Scratch scratch;
+  write(scratch / "walk.c", R"(#include "kilolib.h"
+void setup(void) {}
+void loop(void) {
+  if (kilo_ticks < WALK_TICKS) set_motors(kilo_straight_left, kilo_straight_right);
+  else set_motors(0, 0);
+}
+int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
+)");
+  write(scratch / "walk.txtpb",
+        "name: \"walk\" duration_s: 3 arena { width_mm: 1000 height_mm: 1000 }\n"
+        "robots { count: 4 behaviour: \"walk.c\" layout { grid { pitch_mm: 150 } } }\n");
+  const auto json =
+      tuned({"--define", "WALK_TICKS=0", "--vary-define", "WALK_TICKS=1..90", "--maximise", "displacement"},
+            scratch, scratch / "walk.txtpb");
+  EXPECT_GT(json.at("best").at("WALK_TICKS"), 75);
+}
+
+TEST(TuneCommand, TheWorstOfSeveralModelsDecides) {
+  // A slow and a fast model. The worst is the slow one's displacement, and the mean lies halfway between both.
+  Scratch scratch;
+  write(scratch / "slow.txtpb", "motion { straight_speed_mm_s: 1 bias_sd_mm_s: 0 }\n");
+  write(scratch / "fast.txtpb", "motion { straight_speed_mm_s: 20 bias_sd_mm_s: 0 }\n");
+  const auto value = [&](bool worst) {
+    Words more{"--duration",
+               "3",
+               "--robots",
+               "9",
+               "--vary",
+               "robots.layout.grid.pitch_mm=60..61",
+               "--maximise",
+               "displacement",
+               "--models",
+               scratch / "slow.txtpb",
+               scratch / "fast.txtpb"};
+    if (worst) more.push_back("--worst");
+    if (fs::exists(scratch / "tune")) fs::remove_all(scratch / "tune");
+    return tuned(more, scratch, source("experiments/disperse.txtpb"), "152").at("value").at("mean").get<double>();
+  };
+  const double of_mean = value(false), of_worst = value(true);
+  EXPECT_LT(of_worst, 0.5 * of_mean);
+}
+
+TEST(TuneCommand, ErrorsSayWhatIsWrong) {
+  Scratch scratch;
+  const std::string experiment = source("experiments/disperse.txtpb");
+  const auto error = [&](const Words& words) {
+    Words all{"tune", experiment, "--out", scratch / "tune"};
+    all.insert(all.end(), words.begin(), words.end());
+    const Outcome outcome = kilotwin(all, scratch);
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_FALSE(fs::exists(scratch / "tune"));
+    return outcome.err;
+  };
+  EXPECT_NE(error({"--maximise", "spread"}).find("--vary"), std::string::npos);
+  EXPECT_NE(error({"--vary", "robots.count=1..9"}).find("--maximise"), std::string::npos);
+  EXPECT_NE(error({"--vary", "robots.count=1..9", "--maximise", "beauty"}).find("no observable \"beauty\""),
+            std::string::npos);
+  EXPECT_NE(error({"--vary", "robots.colour=1..9", "--maximise", "spread"}).find("colour"), std::string::npos);
+  EXPECT_NE(error({"--vary", "robots.count=1..9", "--maximise", "spread", "--budget", "10"}).find("at least 104"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace kilotwin::test
