@@ -94,10 +94,12 @@ function(kilotwin_program name)
 endfunction()
 
 # kilotwin_test(NAME SOURCES a_test.cpp ... DEPENDS target ... [TIMEOUT s] [LABELS label ...]): one GoogleTest program, each
-# case of which is a ctest. Labels: fast (the default; all together take about 20 s), dds (federates over Cyclone DDS), system
-# (the program as users run it), slow (statistics, fuzzing, identification).
+# case of which is a ctest. Labels: fast (the default), dds (federates over Cyclone DDS), system (the program as users run it), slow
+# (statistics, fuzzing, identification). A fast program is one more ctest as a whole, with the label whole: a process per case
+# would take most of the time. The test preset "fast" runs these, all others leave them out. SLOW_CASES names cases of a fast program
+# that are slow, as patterns of --gtest_filter.
 function(kilotwin_test name)
-  cmake_parse_arguments(arg "UNITE" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "UNITE" "TIMEOUT" "SOURCES;DEPENDS;LABELS;SLOW_CASES" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -111,5 +113,15 @@ function(kilotwin_test name)
   if(arg_UNITE)
     kilotwin_unite(${name})
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+  list(JOIN arg_SLOW_CASES ":" slow)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "-${slow}"
+    PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+  if(slow)
+    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "${slow}" TEST_LIST ${name}_SLOW_TESTS
+      PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS slow)
+  endif()
+  if(arg_LABELS STREQUAL fast)
+    add_test(NAME ${name} COMMAND ${name} --gtest_brief=1 "--gtest_filter=-${slow}")
+    set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "inner;whole")
+  endif()
 endfunction()
