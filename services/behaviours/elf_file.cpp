@@ -292,7 +292,8 @@ std::string ElfFile::function_at(std::uint64_t offset) const {
                                 [](std::uint64_t value, const Function& f) { return value < f.offset; });
   while (after != functions.begin()) {
     --after;
-    if (offset - after->offset < after->size) return after->name;
+    // The compiler calls parts and copies of a function f f.cold, f.constprop.0 and so on.
+    if (offset - after->offset < after->size) return after->name.substr(0, after->name.find('.'));
     if (offset - after->offset > kMostOctets) break;
   }
   return "";

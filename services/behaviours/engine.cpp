@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/message_crc.h"
@@ -366,6 +367,7 @@ void BehavioursEngine::run_robot(Tick from, std::uint32_t i, std::uint8_t kilo_t
   keep_eeprom(i, slot);
   note_outputs(i, robot, executor.tx_period());
   if (slot.exchange()->overflows != 0) note_overflows(i, *slot.exchange(), program, slot);
+  if (slot.exchange()->heap_full != 0) note_full_heap(i, *slot.exchange(), program, slot);
   if (slot.exchange()->ended != 0) {
     slot.exchange()->ended = 0;
     if (is_first(i, Warning::kEnded))
@@ -582,6 +584,7 @@ void BehavioursEngine::reset_robot(Tick tick, std::uint32_t i, const Program& pr
 
 void BehavioursEngine::fail_robot(std::uint32_t i, const Fault& fault, const Program& program, const Slot& slot) {
   static_cast<void>(slot.clear_before_data());  // for the next robot in the slot
+  if (slot.exchange()->heap_full != 0) note_full_heap(i, *slot.exchange(), program, slot);
   fail_robot(i, describe(fault, program, slot));
 }
 
@@ -623,6 +626,12 @@ void BehavioursEngine::note_overflows(std::uint32_t i, KtExchange& told, const P
     std::string text = describe_overflow(code, program, slot);
     if (overflows_.insert(text).second) warnings_.push_back({share_.first + i, std::move(text)});
   }
+}
+
+void BehavioursEngine::note_full_heap(std::uint32_t i, KtExchange& told, const Program& program, const Slot& slot) {
+  const std::uint64_t code = std::exchange(told.heap_full, 0);
+  if (is_first(i, Warning::kHeapFull))
+    warnings_.push_back({share_.first + i, describe_full_heap(code, program, slot)});
 }
 
 void BehavioursEngine::note_wrong_crc(std::uint32_t i, std::uint16_t crc) {

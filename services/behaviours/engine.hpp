@@ -116,7 +116,7 @@ class BehavioursEngine {
   [[nodiscard]] std::uint64_t memory_octets() const;
 
  private:
-  enum class Warning : std::uint8_t { kDivision = 1, kWrongCrc = 2, kEnded = 4 };
+  enum class Warning : std::uint8_t { kDivision = 1, kWrongCrc = 2, kEnded = 4, kHeapFull = 8 };
   enum class Presence : std::uint8_t { kNone, kNew, kAlive, kFailed, kFirmware };
 
   void gather(const RadioFrame& radio);
@@ -136,6 +136,7 @@ class BehavioursEngine {
   [[nodiscard]] bool is_first(std::uint32_t i, Warning);
   void probe_loop(std::uint32_t i, const Program&, const Slot&, const Executor&);
   void note_overflows(std::uint32_t i, KtExchange&, const Program&, const Slot&);
+  void note_full_heap(std::uint32_t i, KtExchange& told, const Program& program, const Slot& slot);
   void note_wrong_crc(std::uint32_t i, std::uint16_t crc);
   void note_division(std::uint32_t i, std::uint64_t code, const Program&, const Slot&);
   void reset_robot(Tick tick, std::uint32_t i, const Program&, const Slot&);

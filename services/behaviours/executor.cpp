@@ -4,6 +4,7 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 #include <vector>
 
 #include "core/base/error.hpp"
@@ -201,6 +202,46 @@ const Fault* Executor::transmit(const KtMessage*& message, std::int32_t& cycles)
   return fault;
 }
 
+namespace {
+
+/// The word on a stack of the slot at this address; nothing where there is no such stack.
+std::optional<std::uint64_t> word_on_stack(std::uint64_t address, const Slot& slot) {
+  for (const std::uint64_t top : {slot.stack_top(), slot.interrupt_stack_top()}) {
+    if (address % 8 != 0 || address < top - kStackOctets || address > top - 8) continue;
+    return *reinterpret_cast<const std::uint64_t*>(address);  // NOLINT
+  }
+  return std::nullopt;
+}
+
+bool is_code(std::uint64_t address, const Program& program, const Slot& slot) {
+  return !program.file.function_at(address - slot.image_address()).empty();
+}
+
+/// What is known of a jump out of the program; empty: the fault is none.
+std::string describe_jump(const Fault& fault, const Program& program, const Slot& slot) {
+  char address[32];
+  constexpr std::uint8_t kReturn = 0xc3;
+  const char* const overwritten =
+      "its return address is overwritten; it writes past the end of an array of its own";
+  if (is_code(fault.code, program, slot)) {
+    // An address of more than 47 bits faults at the instruction itself.
+    const std::uint8_t instruction = *reinterpret_cast<const std::uint8_t*>(fault.code);  // NOLINT
+    if (fault.address != 0 || instruction != kReturn) return "";
+    const auto target = word_on_stack(fault.stack, slot);
+    if (!target || *target >> 47 == 0) return "";
+    return program.file.function_at(fault.code - slot.image_address()) + "() returns to nowhere: " + overwritten;
+  }
+  if (fault.address != fault.code) return "";
+  std::snprintf(address, sizeof address, "0x%llx", static_cast<unsigned long long>(fault.address));
+  if (word_on_stack(fault.stack - 8, slot) == fault.code)
+    return std::string("a function returns to address ") + address + ": " + overwritten;
+  const auto caller = word_on_stack(fault.stack, slot);
+  if (!caller || !is_code(*caller - 1, program, slot)) return "";
+  return std::string("call of a function at address ") + address + place(*caller - 1, program, slot);
+}
+
+}  // namespace
+
 std::string describe(const Fault& fault, const Program& program, const Slot& slot) {
   std::string text;
   char address[32];
@@ -217,9 +258,18 @@ std::string describe(const Fault& fault, const Program& program, const Slot& slo
       break;
     case SIGSYS: text = "system call " + std::to_string(fault.address) + ", which a robot does not have"; break;
     case SIGTRAP: text = "breakpoint instruction"; break;
-    case SIGILL: text = "illegal instruction (abort, or what the compiler knew to be undefined)"; break;
+    case SIGILL:
+      if (program.file.function_at(fault.code - slot.image_address()) == "abort") {
+        const auto caller = word_on_stack(fault.stack, slot);
+        if (caller && is_code(*caller - 1, program, slot))
+          return "abort(), or a failed assertion," + place(*caller - 1, program, slot);
+      }
+      text = "illegal instruction (abort, or what the compiler knew to be undefined)";
+      break;
     case SIGSEGV:
     case SIGBUS:
+      text = describe_jump(fault, program, slot);
+      if (!text.empty()) return text;
       text = fault.address < stack_bottom && fault.address >= stack_bottom - 4 * kPage ? "stack overflow, address "
                                                                                        : "access to address ";
       text += address;
@@ -233,6 +283,11 @@ std::string describe(const Fault& fault, const Program& program, const Slot& slo
 std::string describe_overflow(std::uint64_t code, const Program& program, const Slot& slot) {
   return "an int overflows" + place(code - 1, program, slot) +
          ": it has 16 bits, -32768 to 32767, and wraps as on the robot; use int32_t";
+}
+
+std::string describe_full_heap(std::uint64_t code, const Program& program, const Slot& slot) {
+  return "the heap is full: there is no room for what is asked for" + place(code - 1, program, slot) +
+         "; it has 64 KiB here, and a robot has 2 KiB of RAM in all";
 }
 
 std::string describe_division(std::uint64_t code, const Program& program, const Slot& slot) {

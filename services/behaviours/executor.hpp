@@ -212,6 +212,8 @@ class Executor {
 [[nodiscard]] std::string describe(const Fault&, const Program&, const Slot&);
 /// One line about an int that does not hold a value; `code`: the address after the call that told it.
 [[nodiscard]] std::string describe_overflow(std::uint64_t code, const Program&, const Slot&);
+/// One line about a request of memory that the heap cannot fulfil; `code`: the address after the call that made it.
+[[nodiscard]] std::string describe_full_heap(std::uint64_t code, const Program&, const Slot&);
 /// One line about a division by zero at address `code`.
 [[nodiscard]] std::string describe_division(std::uint64_t code, const Program&, const Slot&);
 

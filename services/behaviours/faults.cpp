@@ -53,6 +53,7 @@ void handle(int signal, siginfo_t* info, void* context) {
   // For SIGSYS and SIGTRAP the saved address is that of the next instruction.
   if (signal == SIGSYS) thread.fault = {signal, static_cast<std::uint32_t>(info->si_syscall), code - 1};
   if (signal == SIGTRAP) thread.fault = {signal, 0, code - 1};
+  thread.fault.stack = static_cast<std::uint64_t>(registers[REG_RSP]);
   // Restore the processor state of the host: no single-stepping, ascending string operations, no alignment checks, rounding to
   // nearest, floating-point exceptions masked.
   constexpr greg_t kTrapFlag = 0x100, kDirectionFlag = 0x400, kAlignmentCheck = 0x40000;

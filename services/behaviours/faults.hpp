@@ -22,6 +22,7 @@ struct Fault {
   int signal = kNone;
   std::uint64_t address = 0;  ///< the inaccessible address; for SIGSYS the number of the system call
   std::uint64_t code = 0;     ///< address of the faulting instruction
+  std::uint64_t stack = 0;    ///< stack pointer at that instruction; 0: unknown
 };
 
 /// Data that a thread shares with the robot's code that it runs. %gs points to it.

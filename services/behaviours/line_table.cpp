@@ -3,6 +3,7 @@
 #include <elfutils/libdw.h>
 
 #include <memory>
+#include <utility>
 
 namespace kilotwin::behaviours {
 namespace {
@@ -25,6 +26,13 @@ std::optional<LineTables::Place> find_row(Dwarf_Lines* lines, std::size_t count,
   return std::nullopt;
 }
 
+/// Whether the table has rows of functions that the linker has removed. It leaves them at address 0, so they may cover the
+/// addresses of other functions.
+bool has_removed_functions(Dwarf_Lines* lines, std::size_t count) {
+  Dwarf_Addr first = 0;
+  return count > 0 && dwarf_lineaddr(dwarf_onesrcline(lines, 0), &first) == 0 && first == 0;
+}
+
 }  // namespace
 
 std::optional<LineTables::Place> LineTables::find(std::uint64_t offset) const {
@@ -39,10 +47,14 @@ std::optional<LineTables::Place> LineTables::find(std::uint64_t offset) const {
   Dwarf_CU* unit = nullptr;
   Dwarf_Lines* lines = nullptr;
   std::size_t count = 0;
+  std::optional<Place> doubtful;
   for (; dwarf_next_lines(dwarf.get(), at, &next, &unit, nullptr, nullptr, &lines, &count) == 0; at = next) {
-    if (auto found = find_row(lines, count, offset)) return found;
+    auto found = find_row(lines, count, offset);
+    if (!found) continue;
+    if (!has_removed_functions(lines, count)) return found;
+    if (!doubtful) doubtful = std::move(found);
   }
-  return std::nullopt;
+  return doubtful;
 }
 
 }  // namespace kilotwin::behaviours

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define KT_IMAGE_MAGIC 0x6e6977746f6c696bu /* "kilotwin" */
-#define KT_IMAGE_VERSION 7u
+#define KT_IMAGE_VERSION 8u
 /* Size of the buffer for text that a robot prints in one tick. A serial line of 38400 baud sends 126 octets per tick. */
 #define KT_LOG_OCTETS 3584
 /* Section of the heap. It is the last of a robot's memory, so that only its used part need be saved. */
@@ -120,6 +120,8 @@ struct KtExchange {
   uint32_t log_length; /* octets printed since the host last emptied the log */
   uint32_t log_lost;   /* octets beyond KT_LOG_OCTETS, which are dropped */
   char log[KT_LOG_OCTETS];
+  uint64_t
+      heap_full; /* address after the call that asked the heap for more than it has; 0: none. The host sets it to 0 */
 };
 
 /* Sensors and EEPROM of the robot that runs, written by the host. Part of the slot, not of a robot's memory. Readings are

@@ -132,6 +132,7 @@ static void spend(uint64_t cycles) {
 
 /* For malloc(). */
 uint32_t* kt_heap_octets(void) { return &robot.heap_octets; }
+void kt_heap_full(const void* caller) { kt_exchange->heap_full = (uint64_t)caller; }
 
 /* For delays in the rest of the runtime. */
 void kilotwin_spend(unsigned long long cycles) { spend(cycles); }

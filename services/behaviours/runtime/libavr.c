@@ -61,11 +61,13 @@ enum { HEAP_OCTETS = 65536, HEADER = sizeof(size_t), ALIGNMENT = 8 };
 __attribute__((section(".bss" KT_HEAP_SECTION))) static uint64_t heap[HEAP_OCTETS / sizeof(uint64_t)];
 
 uint32_t* kt_heap_octets(void);
+void kt_heap_full(const void* caller);
 
 static size_t* header(size_t at) { return (size_t*)((uint8_t*)heap + at); }
 
-void* malloc(size_t wanted) {
-  if (wanted > HEAP_OCTETS) return NULL;
+/* `caller`: an address of the program, for the message about a full heap. */
+static void* allocate(size_t wanted, const void* caller) {
+  if (wanted > HEAP_OCTETS) return kt_heap_full(caller), NULL;
   const size_t needed = (wanted + HEADER + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
   const size_t end = *kt_heap_octets();
   size_t at = 0, room = 0;
@@ -79,7 +81,7 @@ void* malloc(size_t wanted) {
   }
   if (at >= end) room = 0;
   if (room < needed) {
-    if (at > HEAP_OCTETS - needed) return NULL;
+    if (needed > HEAP_OCTETS || at > HEAP_OCTETS - needed) return kt_heap_full(caller), NULL;
     memset((uint8_t*)heap + at + room, 0, needed - room);
     *kt_heap_octets() = (uint32_t)(at + needed);
     room = needed;
@@ -89,21 +91,25 @@ void* malloc(size_t wanted) {
   return header(at) + 1;
 }
 
+void* malloc(size_t wanted) { return allocate(wanted, __builtin_return_address(0)); }
+
 void free(void* block) {
   if (block != NULL) ((size_t*)block)[-1] &= ~(size_t)1;
 }
 
 void* calloc(size_t count, size_t size) {
-  if (size != 0 && count > HEAP_OCTETS / size) return NULL;
-  void* block = malloc(count * size);
+  const void* caller = __builtin_return_address(0);
+  if (size != 0 && count > HEAP_OCTETS / size) return kt_heap_full(caller), NULL;
+  void* block = allocate(count * size, caller);
   return block == NULL ? NULL : memset(block, 0, count * size);
 }
 
 void* realloc(void* block, size_t wanted) {
-  if (block == NULL) return malloc(wanted);
+  const void* caller = __builtin_return_address(0);
+  if (block == NULL) return allocate(wanted, caller);
   const size_t size = (((size_t*)block)[-1] & ~(size_t)1) - HEADER;
   if (wanted <= size) return block;
-  void* larger = malloc(wanted);
+  void* larger = allocate(wanted, caller);
   if (larger == NULL) return NULL;
   memcpy(larger, block, size);
   free(block);

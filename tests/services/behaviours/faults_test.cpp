@@ -31,7 +31,9 @@ TEST(Faults, NullWrite) {
   one_fails("volatile int* p = (int*)(uintptr_t)(n - n); *p = 1;", "access to address 0x0 in loop()");
 }
 
-TEST(Faults, WildJump) { one_fails("((void (*)(void))(uintptr_t)(n + 16))();", "access to address 0x1"); }
+TEST(Faults, WildJump) {
+  one_fails("((void (*)(void))(uintptr_t)(n + 16))();", "call of a function at address 0x1");
+}
 
 TEST(Faults, WriteToCode) { one_fails("*(volatile uint8_t*)&loop = 0;", "access to address 0x"); }
 
@@ -130,7 +132,46 @@ TEST(Faults, BeforeTheVariables) {
             "extern uint8_t kilotwin_variables[] __attribute__((visibility(\"hidden\")));");
 }
 
-TEST(Faults, FailedAssertion) { one_fails("assert(n == 200);", "illegal instruction", "#include <assert.h>"); }
+TEST(Faults, FailedAssertion) {
+  one_fails("assert(n == 200);", "abort(), or a failed assertion, in loop() at program0.c:4",
+            "#include <assert.h>");
+}
+
+TEST(Faults, AbortNamesItsCaller) {
+  one_fails("give_up(n);", "abort(), or a failed assertion, in give_up() at program0.c:1",
+            "static void __attribute__((noinline)) give_up(int n) { if (n != 200) abort(); }");
+}
+
+TEST(Faults, OverwrittenReturnAddress) {
+  const std::string fill =
+      "static void __attribute__((noinline)) fill(uint8_t* a, int n, uint8_t with) { for (int i = 0; i < n; ++i) "
+      "((volatile uint8_t*)a)[i] = with; }\n"
+      "static void __attribute__((noinline)) careless(int n, uint8_t with) { uint8_t a[8]; fill(a, n, with); }";
+  // An address that no processor has, and one that it has but the program has not.
+  one_fails("careless(64, 0xaa);", "careless() returns to nowhere: its return address is overwritten", fill);
+  one_fails("careless(64, 0);", "a function returns to address 0x0: its return address is overwritten", fill);
+}
+
+TEST(Faults, AFullHeapIsReportedOnceWithItsPlace) {
+  Swarm swarm({program("static void* volatile last;\n"
+                       "static void loop(void) { last = malloc(1000); }")},
+              3);
+  swarm.start();
+  swarm.steps(200);
+  std::vector<std::string> told;
+  for (const auto& warning : swarm.hosts[0]->warnings()) told.push_back(warning.text);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_NE(told[0].find("the heap is full"), std::string::npos) << told[0];
+  EXPECT_NE(told[0].find("in loop() at program0.c:"), std::string::npos) << told[0];
+  EXPECT_EQ(swarm.hosts[0]->robots_failed(), 0u);
+}
+
+TEST(Faults, ARequestOfTheWholeHeapIsRefused) {
+  Swarm swarm({program("static void loop(void) { set_color(malloc(65536) == 0 ? 3 : 1); }")}, 1);
+  swarm.start();
+  swarm.steps(2);
+  EXPECT_EQ(swarm.led(0), 3);
+}
 
 TEST(Faults, InACallback) {
   Swarm swarm({program("static void rx(message_t* m, distance_measurement_t* d) { *(volatile char*)8 = 1; }")}, 4);
