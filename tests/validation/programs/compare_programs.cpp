@@ -32,8 +32,12 @@ struct Arguments {
 
 struct Row {
   std::string name, verdict, detail, changes, note;
+  int seeds = 0;
   bool ran = false, agrees = false;
 };
+
+/// Seeds of a program that does not agree with one: four robots do not show how a random program is distributed.
+constexpr int kMoreSeeds = 6;
 
 /// Files that hold a main(), in the order of their names.
 std::vector<fs::path> programs_in(const fs::path& folder) {
@@ -71,7 +75,7 @@ std::vector<fs::path> chosen(const Arguments& arguments) {
   return all;
 }
 
-Row row_of(const PairSettings& settings, const fs::path& program, const fs::path& root) {
+Row row_of(PairSettings settings, const fs::path& program, const fs::path& root) {
   Row row;
   row.name = program.lexically_relative(root).string();
   const Outcome native = run_program(settings, program, false);
@@ -83,8 +87,13 @@ Row row_of(const PairSettings& settings, const fs::path& program, const fs::path
     row.note = outcome->refusal;
     return row;
   }
+  Comparison result = compare(native, firmware);
+  if (!result.agrees && !result.event_exact && settings.seeds < settings.more_seeds) {
+    settings.seeds = settings.more_seeds;
+    return row_of(settings, program, root);
+  }
   row.ran = true;
-  const Comparison result = compare(native, firmware);
+  row.seeds = settings.seeds;
   row.agrees = result.agrees || result.event_exact;
   row.changes = fmt::format("{} of {}, {}", result.same_changes, result.native_changes, result.firmware_changes);
   row.verdict = result.event_exact ? "event for event" : result.agrees ? "alike" : "DIFFERS";
@@ -99,7 +108,8 @@ int compare_all(const Arguments& arguments) {
   PairSettings settings;
   settings.kilotwin = KILOTWIN_PROGRAM;
   settings.scratch = scratch;
-  if (arguments.quick) settings.seeds = 1, settings.duration_s = 8;
+  settings.more_seeds = kMoreSeeds;
+  if (arguments.quick) settings.duration_s = 8;
   const std::vector<fs::path> programs = chosen(arguments);
   const fs::path root = arguments.folder.empty() ? fs::path(KILOTWIN_SOURCES) : fs::path(arguments.folder);
   std::vector<Row> rows(programs.size());
@@ -111,35 +121,37 @@ int compare_all(const Arguments& arguments) {
     rows[i] = row_of(own, programs[i], root);
     fs::remove_all(own.scratch);
     const std::lock_guard lock(printing);
-    fmt::print("{:<46} {:<20} {:<20} {}\n", rows[i].name, rows[i].verdict, rows[i].changes,
+    fmt::print("{:<46} {:<20} {:>2} {:<20} {}\n", rows[i].name, rows[i].verdict, rows[i].seeds, rows[i].changes,
                rows[i].agrees ? rows[i].detail : rows[i].detail + "  " + rows[i].note);
     std::fflush(stdout);
   });
   fs::remove_all(scratch);
   std::size_t ran = 0, agree = 0;
   std::string table =
-      "| program | verdict | changes alike, of native, of firmware | largest difference: native, firmware |\n"
-      "|---|---|---|---|\n";
+      "| program | verdict | seeds | changes alike, of native, of firmware | largest difference: native, firmware "
+      "|\n"
+      "|---|---|---|---|---|\n";
   for (const Row& row : rows) {
     ran += row.ran ? 1 : 0;
     agree += row.agrees ? 1 : 0;
-    table += fmt::format("| `{}` | {} | {} | {} |\n", row.name, row.verdict, row.changes, row.detail);
+    table +=
+        fmt::format("| `{}` | {} | {} | {} | {} |\n", row.name, row.verdict, row.seeds, row.changes, row.detail);
   }
   const std::string end =
       fmt::format("{} of {} programs that run both ways agree; {} do not run\n", agree, ran, rows.size() - ran);
   fmt::print("\n{}", end);
   if (!arguments.results.empty()) {
-    std::ofstream(arguments.results)
-        << fmt::format(
-               "\n{} robots, {} s, seeds 1 to {}, the default `loop_rate`, no noise of "
-               "motion. *Event for event*: every change of\n"
-               "motors and LED comes within one tick, and the counts of messages are "
-               "equal. *Alike*: means over robots and\n"
-               "seeds of path, distance, LED and messages differ by less than 10 %, "
-               "or by less than two standard errors.\n\n",
-               settings.robots, settings.duration_s, settings.seeds)
-        << table << "\n"
-        << end;
+    std::ofstream(arguments.results) << fmt::format(
+                                            "\n{} robots, {} s, seed 1, the default `loop_rate`, no noise of "
+                                            "motion. A program that does not agree "
+                                            "runs with seeds 1 to {}.\n *Event for event*: every change of\n"
+                                            "motors and LED comes within one tick, and the counts of messages are "
+                                            "equal. *Alike*: means over robots and\n"
+                                            "seeds of path, distance, LED and messages differ by less than 10 %, "
+                                            "or by less than two standard errors.\n\n",
+                                            settings.robots, settings.duration_s, settings.more_seeds)
+                                     << table << "\n"
+                                     << end;
   }
   return agree == ran ? 0 : 1;
 }

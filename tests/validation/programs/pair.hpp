@@ -31,7 +31,7 @@ struct Outcome {
 struct PairSettings {
   std::string kilotwin;           ///< the program
   std::filesystem::path scratch;  ///< directory for experiments and runs
-  int seeds = 1, robots = 4;
+  int seeds = 1, more_seeds = 1, robots = 4;
   double duration_s = 12;
 };
 

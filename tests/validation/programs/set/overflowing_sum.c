@@ -1,9 +1,12 @@
-/* Adds 300 readings of light in an int of 16 bits, which overflows where it is bright. LED: red below 0, else green. */
+/* Adds 300 readings of light in an int of 16 bits, which overflows where it is bright. LED: red below 0, else green. The sum is
+ * volatile: a compiler may assume that an int does not overflow, and avr-gcc would drop the comparison with 0. */
 #include <kilolib.h>
 
 static void setup(void) {}
 static void loop(void) {
-  int sum = 0, count = 0;
+  static volatile int sum;
+  int count = 0;
+  sum = 0;
   while (count < 300) {
     int reading = get_ambientlight();
     if (reading < 0) continue;
