@@ -3,10 +3,12 @@
 //   NAME      only programs whose file name contains it
 //   --folder  the programs of a directory and its subdirectories, in place of the repository's
 //   --quick   8 s, of the set that was written for this comparison
+// Ends with status 1 where a program differs that is not known to.
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstring>
 #include <fstream>
@@ -33,11 +35,19 @@ struct Arguments {
 struct Row {
   std::string name, verdict, detail, changes, note;
   int seeds = 0;
-  bool ran = false, agrees = false;
+  bool ran = false, agrees = false, known = false;
 };
 
 /// Seeds of a program that does not agree with one: four robots do not show how a random program is distributed.
 constexpr int kMoreSeeds = 6;
+
+/// Programs of the repository that are known to differ: docs/explanation/validation.md says why.
+constexpr std::array kKnown{"counts_loops.c", "overflowing_sum.c", "waits_in_callback.c", "crc_forgotten.c",
+                            "disperse.c"};
+
+bool is_known(const fs::path& program) {
+  return std::find(kKnown.begin(), kKnown.end(), program.filename().string()) != kKnown.end();
+}
 
 /// Files that hold a main(), in the order of their names.
 std::vector<fs::path> programs_in(const fs::path& folder) {
@@ -95,8 +105,12 @@ Row row_of(PairSettings settings, const fs::path& program, const fs::path& root)
   row.ran = true;
   row.seeds = settings.seeds;
   row.agrees = result.agrees || result.event_exact;
+  row.known = !row.agrees && is_known(program);
   row.changes = fmt::format("{} of {}, {}", result.same_changes, result.native_changes, result.firmware_changes);
-  row.verdict = result.event_exact ? "event for event" : result.agrees ? "alike" : "DIFFERS";
+  row.verdict = result.event_exact ? "event for event"
+                : result.agrees    ? "alike"
+                : row.known        ? "differs, known"
+                                   : "DIFFERS";
   if (!result.event_exact && result.part > 0)
     row.detail = fmt::format("{}: {:.4g}, {:.4g}", result.measure, result.native, result.firmware);
   return row;
@@ -126,7 +140,7 @@ int compare_all(const Arguments& arguments) {
     std::fflush(stdout);
   });
   fs::remove_all(scratch);
-  std::size_t ran = 0, agree = 0;
+  std::size_t ran = 0, agree = 0, known = 0;
   std::string table =
       "| program | verdict | seeds | changes alike, of native, of firmware | largest difference: native, firmware "
       "|\n"
@@ -134,6 +148,7 @@ int compare_all(const Arguments& arguments) {
   for (const Row& row : rows) {
     ran += row.ran ? 1 : 0;
     agree += row.agrees ? 1 : 0;
+    known += row.known ? 1 : 0;
     table +=
         fmt::format("| `{}` | {} | {} | {} | {} |\n", row.name, row.verdict, row.seeds, row.changes, row.detail);
   }
@@ -144,7 +159,7 @@ int compare_all(const Arguments& arguments) {
     std::ofstream(arguments.results) << fmt::format(
                                             "\n{} robots, {} s, seed 1, the default `loop_rate`, no noise of "
                                             "motion. A program that does not agree "
-                                            "runs with seeds 1 to {}.\n *Event for event*: every change of\n"
+                                            "runs with seeds 1 to {}. *Event for event*: every change of\n"
                                             "motors and LED comes within one tick, and the counts of messages are "
                                             "equal. *Alike*: means over robots and\n"
                                             "seeds of path, distance, LED and messages differ by less than 10 %, "
@@ -153,7 +168,7 @@ int compare_all(const Arguments& arguments) {
                                      << table << "\n"
                                      << end;
   }
-  return agree == ran ? 0 : 1;
+  return agree + known == ran ? 0 : 1;
 }
 
 int usage() {
