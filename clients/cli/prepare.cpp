@@ -267,7 +267,12 @@ LoadedExperiment load_with_overrides(const RunArguments& arguments) {
   if (!arguments.model.empty()) apply_model(loaded, arguments.model);
   for (const std::string& assignment : arguments.set) apply_override(loaded, assignment);
   if (arguments.robots) set_robots(loaded, *arguments.robots);
-  if (!arguments.behaviour.empty()) set_behaviour(loaded, arguments.behaviour);
+  if (!arguments.behaviour.empty()) {
+    if (!std::filesystem::exists(arguments.behaviour))
+      throw UserError(fmt::format("--behaviour {}: there is no such file; a relative path begins where you are",
+                                  arguments.behaviour.string()));
+    set_behaviour(loaded, arguments.behaviour);
+  }
   if (arguments.seed) apply_override(loaded, fmt::format("seed={}", *arguments.seed), "--seed");
   if (arguments.duration_s)
     apply_override(loaded, fmt::format("duration_s={}", *arguments.duration_s), "--duration");

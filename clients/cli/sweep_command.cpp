@@ -132,15 +132,19 @@ class Results {
   std::size_t failed_ = 0;
 };
 
-void print_results(const SweepArguments& arguments, const Sweep& sweep, const SweepReport& report) {
+void print_results(const SweepArguments& arguments, const Sweep& sweep, const SweepReport& report, bool plotted) {
   const fs::path& directory = sweep.directory;
   std::string plots = (directory / "sweep.svg").string();
   if (report.has_response()) plots += " and " + (directory / "response.svg").string();
-  fmt::print("{}runs    {}\ntable   {}\ncurves  {}\nplot    {}\nreport  {}\nresults {}\n", report.table(),
-             (directory / "runs.csv").string(), (directory / "sweep.csv").string(),
-             (directory / "curves.csv").string(), plots, (directory / "report.html").string(),
-             arguments.resume.empty() ? place_in_words(directory, arguments.run.output, sweep.fallback)
-                                      : directory.string());
+  fmt::print("{}runs    {}\ntable   {}\ncurves  {}\n", report.table(), (directory / "runs.csv").string(),
+             (directory / "sweep.csv").string(), (directory / "curves.csv").string());
+  if (plotted)
+    fmt::print("plot    {}\nreport  {}\n", plots, (directory / "report.html").string());
+  else
+    fmt::print("plot    none: gnuplot is not installed; scripts/setup installs it\n");
+  fmt::print("results {}\n", arguments.resume.empty()
+                                 ? place_in_words(directory, arguments.run.output, sweep.fallback)
+                                 : directory.string());
 }
 
 int sweep(const SweepArguments& arguments) {
@@ -185,8 +189,8 @@ int sweep(const SweepArguments& arguments) {
         report.runs(), sweep.runs.size(), sweep.directory.string()));
   }
   if (report.runs() == 0) return kFailed;
-  report.write(sweep.directory, recorder::provenance_of_this_process());
-  print_results(arguments, sweep, report);
+  const bool plotted = report.write(sweep.directory, recorder::provenance_of_this_process());
+  print_results(arguments, sweep, report, plotted);
   return results.failed() == 0 && all ? kDone : kFailed;
 }
 

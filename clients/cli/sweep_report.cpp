@@ -264,7 +264,7 @@ std::string SweepReport::page(const recorder::Provenance& provenance) const {
   return html::page("Kilotwin: sweep of " + name_, html::rendered(html::templates::kSweep, page));
 }
 
-void SweepReport::write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const {
+bool SweepReport::write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const {
   const auto table = [&](const char* name, const std::string& csv) {
     const std::size_t header = csv.find('\n');
     CsvWriter writer(directory / name, csv.substr(0, header));
@@ -274,9 +274,11 @@ void SweepReport::write(const std::filesystem::path& directory, const recorder::
   table("runs.csv", runs_csv());
   table("sweep.csv", table_csv());
   table("curves.csv", curves_csv());
+  if (!Gnuplot::installed()) return false;
   write_plot(curves(), directory / "sweep.svg");
   if (has_response()) write_plot(response(), directory / "response.svg");
   os::write_file(directory / "report.html", page(provenance));
+  return true;
 }
 
 std::string SweepReport::table_csv() const {

@@ -32,9 +32,9 @@ class SweepReport {
   [[nodiscard]] std::string table() const;
   /// A page with the table, the plots and the provenance.
   [[nodiscard]] std::string page(const recorder::Provenance& provenance) const;
-  /// Writes runs.csv, sweep.csv, curves.csv, sweep.svg, response.svg if has_response(), and report.html. Throws RunError; the tables are
-  /// written first.
-  void write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const;
+  /// Writes runs.csv, sweep.csv and curves.csv. With gnuplot also sweep.svg, response.svg if has_response(), and report.html. Returns
+  /// whether gnuplot is there. Throws RunError; the tables are written first.
+  [[nodiscard]] bool write(const std::filesystem::path& directory, const recorder::Provenance& provenance) const;
   /// One row per point: every observable at the end of the runs and the summaries' counts, each with mean and standard error.
   [[nodiscard]] std::string table_csv() const;
   /// One row per run: its directory, the swept fields, seed, whether it is well, every observable at its end, counts, state hash.

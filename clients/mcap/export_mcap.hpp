@@ -1,9 +1,4 @@
-/// A recording as an MCAP file that Foxglove, Lichtblick and Rerun open. Topics, all with time stamps of simulated time:
-///   /scene      foxglove.SceneUpdate: walls, obstacles, movable bodies
-///   /robots     foxglove.PointCloud: all robots, in the colours of their LEDs
-///   /poses      foxglove.PosesInFrame: all robots, with headings
-///   /counters   kilotwin.mcap.SwarmCounters: numbers for plots
-///   /log        foxglove.Log: inputs of the run, and its end
+/// A recording as an MCAP file that Foxglove, Lichtblick and Rerun open, with the topics of clients/foxglove/topics.hpp.
 #pragma once
 
 #include <cstdint>

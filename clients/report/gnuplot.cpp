@@ -93,6 +93,8 @@ std::vector<Gnuplot::Drawn> Gnuplot::draw() const {
   return drawn;
 }
 
+bool Gnuplot::installed() { return !os::find_executable("gnuplot").empty(); }
+
 std::string gnuplot_text(std::string_view text) {
   // Within single quotes only the quote itself needs escaping for gnuplot. Enhanced text has markup of its own.
   std::string out = "'";

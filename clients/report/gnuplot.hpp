@@ -10,6 +10,8 @@ namespace kilotwin {
 /// Plots that one gnuplot process draws.
 class Gnuplot {
  public:
+  /// Whether plots can be drawn on this machine.
+  [[nodiscard]] static bool installed();
   /// Adds a plot of width x height px and returns its number. `commands` contain the data as data blocks.
   std::size_t add(int width_px, int height_px, std::string commands);
   struct Drawn {

@@ -27,6 +27,9 @@ constexpr std::array<Mode, HeadingFilter::kModes> kModesOfMotion{{
 constexpr double kSwitching_1_s = 0.5, kHeldShare = 0.05;
 /// The rate at which a robot that is held comes free, of kSwitching_1_s.
 constexpr double kHeldLasts = 0.5;
+/// So long after the start nothing holds the robot: a heading that is wrong at the start would never be corrected, because a robot
+/// that is held may move in any direction.
+constexpr double kKnownAfter_s = 5;
 /// Densities of the noise of a robot that is held: heading rad^2/s, velocity (mm/s)^2/s. It may turn unseen.
 constexpr double kHeldHeadingNoise = 0.05, kHeldVelocityNoise = 5;
 /// Densities of the noise while a mode lasts, per second: of the axle along its heading mm^2, heading rad^2, position otherwise mm^2,
@@ -53,7 +56,7 @@ void HeadingFilter::start(double time_s, double x_mm, double y_mm, double sd_mm,
     return;
   }
   started_ = true;
-  time_s_ = time_s;
+  started_s_ = time_s_ = time_s;
   const double direction = std::atan2(dy, dx);
   for (std::size_t i = 0; i < kModes; ++i) {
     const Mode& mode = kModesOfMotion[i];
@@ -65,16 +68,17 @@ void HeadingFilter::start(double time_s, double x_mm, double y_mm, double sd_mm,
     hypotheses_[i].covariance.diagonal() << sd_mm * sd_mm, sd_mm * sd_mm, heading_sd * heading_sd,
         mode.speed_sd * mode.speed_sd, mode.turn_sd * mode.turn_sd;
   }
-  weights_ = moves ? std::array<double, kModes>{0.01, 0.51, 0.23, 0.23, 0.02}
-                   : std::array<double, kModes>{0.7, 0.1, 0.1, 0.09, 0.01};
+  weights_ = moves ? std::array<double, kModes>{0.01, 0.53, 0.23, 0.23, 1e-4}
+                   : std::array<double, kModes>{0.7, 0.1, 0.1, 0.1, 1e-4};
 }
 
 void HeadingFilter::mix(double dt_s) {
   const double leaves = 1 - std::exp(-kSwitching_1_s * dt_s);
-  const auto share_of = [leaves](std::size_t from, std::size_t to) {
+  const double held = time_s_ - started_s_ < kKnownAfter_s ? kLeastWeight : kHeldShare;
+  const auto share_of = [leaves, held](std::size_t from, std::size_t to) {
     if (from == kHeld) return from == to ? 1 - kHeldLasts * leaves : kHeldLasts * leaves / (kModes - 1);
     if (from == to) return 1 - leaves;
-    return to == kHeld ? kHeldShare * leaves : (1 - kHeldShare) * leaves / (kModes - 2);
+    return to == kHeld ? held * leaves : (1 - held) * leaves / (kModes - 2);
   };
   std::array<Hypothesis, kModes> mixed;
   std::array<double, kModes> weights{};

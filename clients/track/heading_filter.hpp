@@ -52,7 +52,7 @@ class HeadingFilter {
   void weigh(const std::array<double, kModes>& log_likelihoods);
 
   bool started_ = false;
-  double time_s_ = 0;
+  double started_s_ = 0, time_s_ = 0;
   std::array<Hypothesis, kModes> hypotheses_;
   std::array<double, kModes> weights_{};
   /// Where the robot was while its heading is not known.

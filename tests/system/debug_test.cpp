@@ -15,7 +15,7 @@ static uint16_t beats;
 void setup(void) { for (int i = 0; i < 3; ++i) squares[i] = kilo_uid * kilo_uid + i; }
 void loop(void) {
   ++beats;
-  if (beats == 30 && kilo_uid == 12) *(volatile int*)8 = 1;
+  if (kilo_ticks == 60 && kilo_uid == 12) *(volatile int*)8 = 1;
 }
 int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
 )";
@@ -60,9 +60,9 @@ TEST(Debug, StopsAtALine) {
 TEST(Debug, StopsWhereARobotFails) {
   const Scratch scratch;
   const Outcome outcome = debugged(scratch, {"--robot", "2", "--at", "0.5", "--command", "delete", "--command",
-                                             "continue", "--command", "print beats"});
+                                             "continue", "--command", "print kilo_ticks"});
   EXPECT_NE(outcome.out.find("SIGSEGV"), std::string::npos) << outcome.out << outcome.err;
-  EXPECT_NE(outcome.out.find("= 30\n"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("= 60\n"), std::string::npos) << outcome.out;
 }
 
 TEST(Debug, SaysWhichRobotsThereAre) {

@@ -9,6 +9,7 @@
 #include "clients/report/html.hpp"
 #include "clients/report/plot.hpp"
 #include "clients/report/templates.hpp"
+#include "core/base/say.hpp"
 #include "core/csv/csv_writer.hpp"
 #include "core/os/files.hpp"
 
@@ -174,6 +175,10 @@ void write_tune_report(const TuneResult& r, const std::filesystem::path& directo
                        const recorder::Provenance& provenance) {
   write_points(r, directory / "points.csv");
   os::write_file(directory / "tune.json", json_text(r));
+  if (!Gnuplot::installed()) {
+    say("kilotwin: no plot and no report.html: gnuplot is not installed; scripts/setup installs it");
+    return;
+  }
   write_plot(search_plot(r), directory / "search.svg");
   os::write_file(directory / "report.html",
                  html::page("Kilotwin: " + r.name + " tuned",

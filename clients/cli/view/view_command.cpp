@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 
+#include "clients/foxglove/server/live_topics.hpp"
 #include "clients/view/live_run.hpp"
 #include "clients/view/recorded_run.hpp"
 #include "core/base/error.hpp"
@@ -24,7 +25,8 @@ struct ViewArguments {
   std::filesystem::path run;
   std::optional<std::uint32_t> domain;
   dds::Transport transport;
-  std::uint16_t port = 0;
+  std::optional<std::uint16_t> port;
+  bool foxglove = false;
 };
 
 /// How often a recording is looked at for new states.
@@ -44,7 +46,7 @@ class Viewing {
     view::PageFiles page = view::PageFiles::of_this_program();
     if (!page.built())
       warn("kilotwin: the page was not built, its address says how; building it needs scripts/setup");
-    gateway_ = std::make_unique<view::Gateway>(arguments.port, view::random_token(), std::move(page));
+    gateway_ = std::make_unique<view::Gateway>(arguments.port.value_or(0), view::random_token(), std::move(page));
     say("kilotwin: open " + gateway_->address());
     if (recorded_) show_recording();
   }
@@ -81,11 +83,26 @@ class Viewing {
   std::unique_ptr<view::Gateway> gateway_;  // ends before what answers for it
 };
 
+int serve_foxglove(const ViewArguments& arguments) {
+  if (!arguments.domain)
+    throw UserError(
+        "view: --foxglove shows live runs; give --domain N. For a recorded one: kilotwin export RUN --mcap FILE");
+  dds::Transport transport = arguments.transport;
+  transport.domain = *arguments.domain;
+  foxglove::Server server(arguments.port.value_or(foxglove::kUsualPort));
+  say(fmt::format(
+      "kilotwin: open ws://127.0.0.1:{} in Foxglove or Lichtblick, as a Foxglove WebSocket; Ctrl-C ends",
+      server.port()));
+  foxglove::LiveTopics live(transport, server);
+  while (interrupted() == 0) live.serve();
+  return kDone;
+}
+
 int show(const ViewArguments& arguments) {
   if (arguments.run.empty() && !arguments.domain)
     throw UserError("view: give RUN, the directory of a run, or --domain N, the domain of a live one");
   catch_interrupts();
-  return Viewing(arguments).work();
+  return arguments.foxglove ? serve_foxglove(arguments) : Viewing(arguments).work();
 }
 
 }  // namespace
@@ -104,9 +121,12 @@ Command add_view(CLI::App& program) {
          "address of a machine of the run; give each of them, this machine too (default: all on this machine)")
       ->allow_extra_args(false)
       ->type_name("ADDRESS");
-  app.add_option("--port", arguments->port, "port of 127.0.0.1 for the page; 0: one that is free")
-      ->capture_default_str()
+  app.add_option(
+         "--port", arguments->port,
+         "port of 127.0.0.1 for the page (default: one that is free; with --foxglove 8765); 0: one that is free")
       ->type_name("P");
+  app.add_flag("--foxglove", arguments->foxglove,
+               "serve live runs by the Foxglove WebSocket protocol in place of the page");
   app.footer(
       "Example: kilotwin view runs/disperse-1. Open the address that it prints. The token in it allows to steer a "
       "live run.");
