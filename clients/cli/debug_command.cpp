@@ -43,9 +43,12 @@ std::string gdb_script(const DebugArguments& arguments, const RunPlan& plan,
   const auto address = program.slot(arguments.robot % behaviours::kSlots).image_address();
   // Robots of a program share its memory in turn, so that a place in the program is passed by several.
   std::string condition = fmt::format("kilo_uid == {}", plan.uid_of(arguments.robot));
+  std::string wait;
   if (arguments.at_s > 0) {
-    const double ticks = arguments.at_s / plan.tick_length.seconds_at(Tick{1});
-    condition += fmt::format(" && kilo_ticks >= {:.0f}", std::floor(ticks));
+    const double ticks = std::floor(arguments.at_s / plan.tick_length.seconds_at(Tick{1}));
+    condition += fmt::format(" && kilo_ticks >= {:.0f}", ticks);
+    // A program may pass the place thousands of times per tick, and gdb looks at each. The processor itself watches the clock.
+    wait = fmt::format("watch -l kilo_ticks if kilo_ticks >= {:.0f}\ncontinue\ndelete\n", ticks);
   }
   std::string script =
       "set confirm off\n"
@@ -59,7 +62,7 @@ std::string gdb_script(const DebugArguments& arguments, const RunPlan& plan,
     const std::filesystem::path file = std::filesystem::absolute(base / program.name).lexically_normal();
     if (std::filesystem::exists(file)) script += fmt::format("directory {}\n", file.parent_path().string());
   }
-  script += fmt::format("break {} if {}\n", arguments.place, condition);
+  script += wait + fmt::format("break {} if {}\n", arguments.place, condition);
   script += fmt::format(
       "echo \\n\\\nRobot {0}, kilo_uid {1}: stops in {2}. Its variables by print NAME; next, step, continue, bt, "
       "quit.\\n\\n\n",
