@@ -1,7 +1,8 @@
 // Evaluates `kilotwin identify` on the scenes of tests/identify/truth. Prints prediction errors before and after
 // beside those of an oracle, correctly named effects, and false findings. Exit status 1 if a criterion fails.
 // Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S]
-//              [--nothing N] [--jobs N] [SCENE|nothing:SEED]...
+//              [--nothing N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...
+// --rivals: other methods on the same scenes, beside it.
 // --robots, --runs and --seconds override a scene's number of robots, number of training runs and their duration.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "core/os/worker_pool.hpp"
+#include "tests/identify/comparison.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/oracle.hpp"
 #include "tests/identify/truth/play.hpp"
@@ -36,6 +38,7 @@ struct Arguments {
   std::uint64_t seed = 1;
   fs::path keep;
   bool small = false;
+  bool rivals = false;
   int robots = 0;      ///< 0: the scene's
   int runs = 0;        ///< training runs; 0: the scene's
   double seconds = 0;  ///< of training runs; 0: the scene's
@@ -48,7 +51,7 @@ int usage() {
   fmt::print(
       stderr,
       "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S] "
-      "[--nothing N] [--jobs N] [SCENE|nothing:SEED]...\n"
+      "[--nothing N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...\n"
       "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
       fmt::join(scenario_names(), " "));
   return 2;
@@ -105,16 +108,20 @@ Scene scene_of(const std::string& name) {
 
 std::string in_quotes(const fs::path& path) { return "'" + path.string() + "'"; }
 
-Verdict try_scene(const Arguments& arguments, const Scene& scene, std::uint64_t seed, int samples,
-                  const fs::path& folder) {
-  const Play played = play(scene, seed);
-  write_data(scene, played.train, folder / "train");
-  write_data(scene, played.test, folder / "test");
+std::vector<Prediction> oracle_of(const Scene& scene, const Play& played, int samples) {
   std::vector<Prediction> oracle;
   for (const auto& run : played.test) {
-    const std::vector<Prediction> of_run = predict(scene, played.individuals, run, kHorizon_s, samples, seed + 1);
+    const std::vector<Prediction> of_run =
+        predict(scene, played.individuals, run, kHorizon_s, samples, played.seed + 1);
     oracle.insert(oracle.end(), of_run.begin(), of_run.end());
   }
+  return oracle;
+}
+
+Verdict try_set(const Arguments& arguments, const Scene& scene, const Play& played,
+                const std::vector<Prediction>& oracle, const fs::path& folder) {
+  write_data(scene, played.train, folder / "train");
+  write_data(scene, played.test, folder / "test");
   if (!arguments.keep.empty()) write_predictions(oracle, folder / "oracle.csv");
   const fs::path out = folder / "out";
   fs::remove_all(out);
@@ -136,6 +143,19 @@ Verdict try_scene(const Arguments& arguments, const Scene& scene, std::uint64_t 
   }
   verdict.seconds = seconds;
   return verdict;
+}
+
+Verdict try_scene(const Arguments& arguments, const Scene& scene, std::uint64_t seed, int samples,
+                  const fs::path& folder) {
+  const Play played = play(scene, seed);
+  return try_set(arguments, scene, played, oracle_of(scene, played, samples), folder);
+}
+
+/// A scene by name, with the size that the arguments give it.
+Scene scene_of(const Arguments& arguments, const std::string& name) {
+  Scene scene = scene_of(name);
+  if (arguments.small) scene = smaller(std::move(scene));
+  return resized(std::move(scene), arguments.robots, arguments.runs, arguments.seconds);
 }
 
 void print_header() {
@@ -165,9 +185,7 @@ int judge_scenes(const Arguments& arguments, const fs::path& folder) {
   print_header();
   kilotwin::os::in_parallel(
       arguments.scenes.size(), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
-        Scene scene = scene_of(arguments.scenes[i]);
-        if (arguments.small) scene = smaller(std::move(scene));
-        scene = resized(std::move(scene), arguments.robots, arguments.runs, arguments.seconds);
+        const Scene scene = scene_of(arguments, arguments.scenes[i]);
         const Verdict verdict =
             try_scene(arguments, scene, arguments.seed, arguments.small ? 30 : 100, folder / scene.name);
         const std::lock_guard lock(printing);
@@ -204,6 +222,23 @@ int judge_nothing(const Arguments& arguments, const fs::path& folder) {
   return alarms;
 }
 
+/// Identify beside its rivals. Returns the number of scenes in which identify failed.
+int judge_rivals(const Arguments& arguments, const fs::path& folder) {
+  int failed = 0;
+  Comparison comparison;
+  comparison.print_header();
+  for (const std::string& name : arguments.scenes) {
+    const Scene scene = scene_of(arguments, name);
+    const Play played = play(scene, arguments.seed);
+    const std::vector<Prediction> oracle = oracle_of(scene, played, arguments.small ? 30 : 100);
+    const Verdict verdict = try_set(arguments, scene, played, oracle, folder / scene.name);
+    if (!verdict.failure.empty()) ++failed;
+    comparison.add(scene, played, oracle, verdict);
+  }
+  comparison.print_summary();
+  return failed;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -213,6 +248,8 @@ int main(int argc, char** argv) {
       const std::string word = argv[i];
       if (word == "--small") {
         arguments.small = true;
+      } else if (word == "--rivals") {
+        arguments.rivals = true;
       } else if (word.rfind("--", 0) != 0) {
         scene_of(word);
         arguments.scenes.push_back(word);
@@ -240,11 +277,12 @@ int main(int argc, char** argv) {
     }
     if (arguments.scenes.empty() && arguments.nothing == 0) {
       arguments.scenes = scenario_names();
-      arguments.nothing = 300;
+      arguments.nothing = arguments.rivals ? 0 : 300;
     }
     const Folder folder(arguments.keep);
     bool good = true;
-    if (!arguments.scenes.empty()) good = judge_scenes(arguments, folder.path()) == 0;
+    if (!arguments.scenes.empty())
+      good = (arguments.rivals ? judge_rivals : judge_scenes)(arguments, folder.path()) == 0;
     // With few sets the bound is below one: then no finding is allowed.
     if (arguments.nothing > 0)
       good = judge_nothing(arguments, folder.path()) <= kFalseAlarms * arguments.nothing && good;

@@ -24,6 +24,14 @@ template <class Look> void for_others(const Situation& at, const Look& look) {
   }
 }
 
+/// A point of the picture of a camera with a fisheye lens.
+Vec through_fisheye(Vec point, double strength) {
+  constexpr double kFocal_mm = 600;
+  const double x = point.x - 30, y = point.y + 20, q = std::hypot(x, y) / kFocal_mm;
+  const double scale = q > 1e-9 ? 1 + strength * (std::atan(q) / q - 1) : 1;
+  return {30 + x * scale, -20 + y * scale};
+}
+
 }  // namespace
 
 Effect battery_by_the_clock(double strength) {
@@ -332,6 +340,78 @@ Effect wait_behind(double strength) {
           {}};
 }
 
+Effect build_up(double strength) {
+  return {"build-up",
+          "speed is 0.1 + 0.9 s^2 / (s^2 + (2.8 s)^2), s = time since the command",
+          {{"time_since_command"}},
+          {"time", "position"},
+          [=](const Situation& at, Push& push) {
+            const double s2 = square(at.since_change_s);
+            slow_both(push, 1 - 0.9 * strength * square(2.8) / (s2 + square(2.8)));
+          },
+          {}};
+}
+
+Effect inertia(double strength) {
+  return {"inertia",
+          "wheels change from the speed of the command before to that of the present one as exp(-s / 1.4 s), also "
+          "at rest",
+          {{"time_since_command"}, {"history"}},
+          {"time", "position"},
+          [=](const Situation& at, Push& push) {
+            constexpr double kWheelBase_mm = 25;
+            const auto speeds = [](Motion motion) -> Wheels<double> {
+              switch (motion) {
+                case Motion::kStraight: return {10, 10};
+                case Motion::kLeft: return {0, 20};
+                case Motion::kRight: return {20, 0};
+                case Motion::kStop: break;
+              }
+              return {0, 0};
+            };
+            const Wheels<double> was = speeds(at.before), is = speeds(at.motion);
+            const double left = strength * (was.left - is.left) * std::exp(-at.since_change_s / 1.4),
+                         right = strength * (was.right - is.right) * std::exp(-at.since_change_s / 1.4);
+            push.slip_mm_s.x += (left + right) / 2;
+            push.turn_rad_s += (right - left) / kWheelBase_mm;
+          },
+          {}};
+}
+
+Effect fresh_trails(double strength) {
+  return {"fresh-trails",
+          "speed is 1 - 0.55 exp(-s / 12 s), s = time since another driven robot was on that spot of 37 mm",
+          {{"history"}, {"neighbours"}},
+          {"robot", "time"},
+          [=](const Situation& at, Push& push) {
+            slow_both(push, 1 - 0.55 * strength * std::exp(-at.since_other_s / 12));
+          },
+          {}};
+}
+
+Effect robots_that_fail(double strength) {
+  return {"robots-that-fail",
+          "robots 1, 4, 7... run at 0.6 of their speed from 83.7 s on",
+          {{"robot", "time"}},
+          {"position", "measurement"},
+          [=](const Situation& at, Push& push) {
+            if (at.robot % 3 == 1 && at.time_s >= 83.7 - 1e-9) slow_both(push, 1 - 0.4 * strength);
+          },
+          {}};
+}
+
+Effect travelling_waves(double strength) {
+  return {"travelling-waves",
+          "speed is 1 - 0.5 max(0, sin(2 pi (0.8 x + 0.6 y) / 420 mm - 2 pi t / 70 s))",
+          {{"position", "time"}},
+          {"robot", "measurement"},
+          [=](const Situation& at, Push& push) {
+            const double phase = 2 * kPi * ((0.8 * at.disc.x + 0.6 * at.disc.y) / 420 - at.time_s / 70);
+            slow_both(push, 1 - 0.5 * strength * std::max(0.0, std::sin(phase)));
+          },
+          {}};
+}
+
 Effect weak_right(double strength) {
   return {"weak-right",
           "turning right, the left wheel runs at 0.72 of its speed and the robot slips back at 1.2 mm/s",
@@ -438,6 +518,46 @@ Effect pincushion(double strength) {
             const double x = view.point.x + 35, y = view.point.y - 25, q = std::min(std::hypot(x, y) / 900, 1.4);
             const double scale = q > 1e-9 ? 1 + strength * (std::tan(q) / q - 1) : 1;
             view.point = {-35 + x * scale, 25 + y * scale};
+          }};
+}
+
+Effect fisheye(double strength) {
+  return {"fisheye",
+          "a point at r from (30, -20) mm is seen at f atan(r / f), f = 600 mm",
+          {{"measurement"}},
+          {},
+          {},
+          [=](const Situation&, View& view) { view.point = through_fisheye(view.point, strength); }};
+}
+
+Effect fisheye_with_headings(double strength) {
+  return {"fisheye-with-headings",
+          "a point at r from (30, -20) mm is seen at f atan(r / f), f = 600 mm; directions are bent alike",
+          {{"measurement"}},
+          {},
+          {},
+          [=](const Situation&, View& view) {
+            constexpr double kAhead_mm = 0.1;
+            const Vec ahead{view.point.x + kAhead_mm * std::cos(view.heading_rad),
+                            view.point.y + kAhead_mm * std::sin(view.heading_rad)};
+            view.point = through_fisheye(view.point, strength);
+            const Vec seen = through_fisheye(ahead, strength);
+            view.heading_rad = std::atan2(seen.y - view.point.y, seen.x - view.point.x);
+          }};
+}
+
+Effect camera_knock(double strength) {
+  return {"camera-knock",
+          "from 88.4 s on all is seen 26 mm to the right, 17 mm down and turned by 0.06 rad about the middle",
+          {{"measurement", "time"}},
+          {"robot", "position", "world_frame"},
+          {},
+          [=](const Situation& at, View& view) {
+            if (at.time_s < 88.4 - 1e-9) return;
+            const double a = 0.06 * strength, c = std::cos(a), s = std::sin(a);
+            view.point = {c * view.point.x - s * view.point.y + 26 * strength,
+                          s * view.point.x + c * view.point.y - 17 * strength};
+            view.heading_rad += a;
           }};
 }
 

@@ -149,6 +149,33 @@ const Entry kEntries[] = {
        s.spot_corner = {7, -6};
        return s;
      }},
+    {"build-up", "time_since_command: speed builds up over seconds after each command",
+     [] { return with(tidy_lab(), Effects{build_up()}); }},
+    {"inertia", "history and time_since_command: wheels follow their commands with a lag",
+     [] { return with(tidy_lab(), Effects{inertia()}); }},
+    {"trails", "history: robots are slow where another one has just been",
+     [] {
+       Scene s = with(crowded_lab(), Effects{fresh_trails()});
+       s.width_mm = s.height_mm = 640;
+       return s;
+     }},
+    {"failing", "robot and time: some robots are slow from some time on",
+     [] { return with(tidy_lab(), Effects{robots_that_fail()}); }},
+    {"waves", "position and time: stripes of slow floor travel",
+     [] { return with(tidy_lab(), Effects{travelling_waves()}); }},
+    {"fisheye", "measurement: a strong barrel distortion, straight headings",
+     [] { return with(tidy_lab(), Effects{fisheye()}); }},
+    {"fisheye-headings", "measurement: a strong barrel distortion, headings bent with it",
+     [] { return with(tidy_lab(), Effects{fisheye_with_headings()}); }},
+    {"knocked", "measurement and time: the camera is knocked in the middle of each run",
+     [] {
+       Scene s = with(tidy_lab(), Effects{camera_knock()});
+       s.disc_ahead_mm = 0;
+       s.tracked_ahead_mm = 0;
+       return s;
+     }},
+    {"knocked-ahead", "the same with discs 9.2 mm ahead of the drive",
+     [] { return with(tidy_lab(), Effects{camera_knock()}); }},
     // Two effects at once.
     {"fatigue-lens", "motor_time and measurement",
      [] {

@@ -40,6 +40,7 @@ struct Situation {
   double since_rest_s = 0;                  // time since the last rest of both motors
   double trodden_s = 0;                     // driven time of all robots on this spot of the floor in this run
   const std::vector<Vec>* discs = nullptr;  // of all robots, this one included
+  double since_other_s = 1e9;               // since another driven robot was on this spot of the floor in this run
   bool driven() const { return motion != Motion::kStop; }
 };
 

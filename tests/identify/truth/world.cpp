@@ -126,7 +126,8 @@ Memory::Memory(const Scene& scene, int run, const std::vector<std::vector<Order>
       spot_mm_(scene.spot_mm),
       spot_corner_(scene.spot_corner),
       spots_(2 * static_cast<int>(kFloor_mm / 2 / scene.spot_mm) + 1),
-      trodden_s_(static_cast<std::size_t>(spots_ * spots_), 0) {
+      trodden_s_(static_cast<std::size_t>(spots_ * spots_), 0),
+      passages_(trodden_s_.size()) {
   take_orders();
 }
 
@@ -160,7 +161,15 @@ void Memory::go_to(double time_s, const std::vector<Vec>& discs) {
     if (nominal.left > 0) robot.driven_s.left += dt;
     if (nominal.right > 0) robot.driven_s.right += dt;
     robot.since_rest_s = robot.motion == Motion::kStop ? 0 : robot.since_rest_s + dt;
-    if (robot.motion != Motion::kStop) trodden_s_[spot(discs[i])] += static_cast<float>(dt);
+    if (robot.motion == Motion::kStop) continue;
+    const std::size_t at = spot(discs[i]);
+    trodden_s_[at] += static_cast<float>(dt);
+    Passages& passages = passages_[at];
+    if (passages.last != static_cast<int>(i)) {
+      passages.other_s = passages.last_s;
+      passages.last = static_cast<int>(i);
+    }
+    passages.last_s = static_cast<float>(time_s);
   }
   time_s_ = time_s;
   take_orders();
@@ -177,6 +186,7 @@ double Memory::next_change_s() const {
 
 Situation Memory::situation(int robot, Vec disc, double heading_rad, const std::vector<Vec>& discs) const {
   const Robot& r = robots_[static_cast<std::size_t>(robot)];
+  const Passages& passages = passages_[spot(disc)];
   return {time_s_,
           run_,
           robot,
@@ -188,7 +198,8 @@ Situation Memory::situation(int robot, Vec disc, double heading_rad, const std::
           r.driven_s,
           r.since_rest_s,
           trodden_s_[spot(disc)],
-          &discs};
+          &discs,
+          time_s_ - static_cast<double>(passages.last == robot ? passages.other_s : passages.last_s)};
 }
 
 World::World(const Scene& scene, const std::vector<Individual>& individuals, Memory memory,

@@ -52,6 +52,11 @@ class Memory {
     Wheels<double> driven_s;
     double since_rest_s = 0;
   };
+  /// The robots that drove over a spot last.
+  struct Passages {
+    int last = -1;                          // robot; -1: none
+    float last_s = -1e9F, other_s = -1e9F;  // times of its passage, and of the latest one of another robot
+  };
   std::size_t spot(Vec place) const;
   void take_orders();
 
@@ -63,6 +68,7 @@ class Memory {
   Vec spot_corner_;
   int spots_;                     // along a side of the floor
   std::vector<float> trodden_s_;  // by spot
+  std::vector<Passages> passages_;
 };
 
 /// All robots of a run.

@@ -1,0 +1,36 @@
+/// `kilotwin identify` beside its rivals on the same sets.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/identify/truth/oracle.hpp"
+#include "tests/identify/truth/scene.hpp"
+#include "tests/identify/verdict.hpp"
+
+namespace kilotwin::truth {
+
+/// Errors of several methods on the sets of scenes, and which causes they name.
+class Comparison {
+ public:
+  Comparison();
+  /// Fits the rivals to a set and adds a row. `identified`: the verdict on identify's own result. Scenes without headings
+  /// give no rates, so rivals cannot fit them.
+  void add(const Scene&, const Play&, const std::vector<Prediction>& oracle, const Verdict& identified);
+  void print_header() const;
+  /// Over all rows: error over the oracle's and reduction of the base model's error (geometric means), precision, recall
+  /// and F1 of the causes, mean seconds.
+  void print_summary() const;
+
+ private:
+  struct Total {
+    std::string method;
+    double log_ratio = 0, log_improvement = 0, seconds = 0;
+    int sets = 0, causes = 0, named = 0, wrong = 0;
+    bool names = false;
+  };
+  void count(Total&, const Verdict&);
+  std::vector<Total> totals_;
+};
+
+}  // namespace kilotwin::truth
