@@ -69,12 +69,13 @@ std::optional<Pose> between(const std::vector<Sample>& track, double time_s) {
               a.heading_rad + w * std::remainder(b.heading_rad - a.heading_rad, 2 * M_PI)};
 }
 
-int near_to(const std::map<int, std::vector<Sample>>& tracks, int robot, double time_s, Vec at) {
+int near_to(const std::map<int, std::vector<Sample>>& tracks, int robot, double time_s, Vec at,
+            double within_mm = kNear_mm) {
   int count = 0;
   for (const auto& [other, track] : tracks) {
     if (other == robot) continue;
     if (const auto pose = between(track, time_s))
-      count += std::hypot(pose->point.x - at.x, pose->point.y - at.y) < kNear_mm ? 1 : 0;
+      count += std::hypot(pose->point.x - at.x, pose->point.y - at.y) < within_mm ? 1 : 0;
   }
   return count;
 }
@@ -155,6 +156,12 @@ std::optional<Pose> start_pose(const Rival& rival, const Run& run, const std::ve
 }  // namespace
 
 std::vector<RateRow> rate_rows(const std::vector<Run>& runs) {
+  constexpr double kAtWall_mm = 6, kTouching_mm = 40;
+  const Area area = walls_of(runs);
+  const auto at_wall = [&](Vec p) {
+    return p.x < area.low.x + kAtWall_mm || p.x > area.high.x - kAtWall_mm || p.y < area.low.y + kAtWall_mm ||
+           p.y > area.high.y - kAtWall_mm;
+  };
   std::vector<RateRow> rows;
   int number = 0;
   for (const Run& run : runs) {
@@ -163,7 +170,9 @@ std::vector<RateRow> rate_rows(const std::vector<Run>& runs) {
       for (std::size_t i = 1; i < track.size(); ++i) {
         const Sample &a = track[i - 1], &b = track[i];
         const double dt = b.time_s - a.time_s;
-        if (dt <= 0 || dt > kLongest_s) continue;
+        if (dt <= 0 || dt > kLongest_s || at_wall(a.point) || at_wall(b.point) ||
+            near_to(tracks, robot, a.time_s, a.point, kTouching_mm) > 0)
+          continue;
         RateRow row{number, {}, rates_between(a, b)};
         const int near = near_to(tracks, robot, a.time_s, a.point);
         for (double t = a.time_s; t < b.time_s - 1e-9;) {

@@ -31,7 +31,7 @@ struct RateRow {
   Eigen::Vector3d rates;
 };
 
-/// All pairs of samples that are less than 1.5 s apart, of all tracks of some runs.
+/// All pairs of samples that are less than 1.5 s apart, of all tracks of some runs, except at walls and at other robots.
 [[nodiscard]] std::vector<RateRow> rate_rows(const std::vector<Run>& runs);
 
 /// A fitted rival.
