@@ -210,7 +210,7 @@ void FirmwareAir::decode_flashes(Cycles from, Cycles until) {
           case PulseDecoder::Event::kAborted: ends = decoder.state().start + kStartPulse; break;
           case PulseDecoder::Event::kGarbled: break;
         }
-        events_.push_back({kind, robots_.ids()[i], time, ends, decoder.message()});
+        events_.push_back({kind, robots_.ids()[i], time, ends, decoder.packet()});
       };
       for (std::size_t& n = decoded_[i]; n < flashes_[i].size() && flashes_[i][n] < end; ++n) {
         note(decoder.pass(flashes_[i][n], true), flashes_[i][n]);

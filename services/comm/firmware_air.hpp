@@ -41,8 +41,8 @@ class FirmwareAir {
     PulseDecoder::Event kind;
     std::uint32_t robot;  ///< id
     Cycles time;
-    Cycles end;         ///< end of the transmission; kStarted: an upper bound of it
-    IrMessage message;  ///< kReceived
+    Cycles end;     ///< end of the transmission; kStarted: an upper bound of it
+    Packet packet;  ///< kReceived
   };
 
   FirmwareAir(const RunPlan&, FirmwareRobots&, const TickTimers&, const Neighbourhood&, LinkBudget&, const Ranging&,

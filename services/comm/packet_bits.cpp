@@ -30,17 +30,18 @@ PacketBits packet_bits(const IrMessage& message, std::uint16_t crc) {
   return bits;
 }
 
-std::optional<IrMessage> message_of(const PacketBits& bits) {
+std::optional<Packet> packet_of(const PacketBits& bits) {
   std::array<std::uint8_t, 13> octets{};
   for (std::size_t i = 0; i < octets.size(); ++i) {
     if (!bits[i * kBitsPerOctet] || !bits[i * kBitsPerOctet + kStopBit]) return std::nullopt;
     for (std::size_t b = 0; b < 8; ++b)
       octets[i] = static_cast<std::uint8_t>(octets[i] | int{bits[i * kBitsPerOctet + 1 + b]} << b);
   }
-  IrMessage message;
-  std::copy(octets.begin() + 1, octets.begin() + 11, message.begin());
-  if (octets[0] != 0 || message_crc(message) != (octets[11] | octets[12] << 8)) return std::nullopt;
-  return message;
+  if (octets[0] != 0) return std::nullopt;
+  Packet packet;
+  std::copy(octets.begin() + 1, octets.begin() + 11, packet.message.begin());
+  packet.crc_error = static_cast<std::uint16_t>(message_crc(packet.message) ^ (octets[11] | octets[12] << 8));
+  return packet;
 }
 
 PulseDecoder::Event PulseDecoder::pass(Cycles now, bool flash) {
@@ -73,9 +74,9 @@ PulseDecoder::Event PulseDecoder::feed(Cycles now) {
   state_.bits.set(state_.octet * kBitsPerOctet + bit);
   if (bit != kStopBit || (state_.octet + 1) * kBitsPerOctet < kPacketBits) return Event::kNone;
   state_.busy = false;
-  const std::optional<IrMessage> message = message_of(state_.bits);
-  if (!message) return Event::kGarbled;
-  message_ = *message;
+  const std::optional<Packet> packet = packet_of(state_.bits);
+  if (!packet) return Event::kGarbled;
+  packet_ = *packet;
   return Event::kReceived;
 }
 

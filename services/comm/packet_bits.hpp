@@ -19,8 +19,13 @@ using PacketBits = std::bitset<kPacketBits>;
 [[nodiscard]] PacketBits packet_bits(const IrMessage&);
 /// With a CRC that may be wrong.
 [[nodiscard]] PacketBits packet_bits(const IrMessage&, std::uint16_t crc);
-/// The message; nullopt if a robot would drop the packet.
-[[nodiscard]] std::optional<IrMessage> message_of(const PacketBits&);
+/// A packet with all its start and stop bits and a leading octet of zeros.
+struct Packet {
+  IrMessage message{};
+  std::uint16_t crc_error = 0;  ///< its CRC XOR the right one; a robot drops it unless 0
+};
+/// The packet of these bits; nullopt if they are none.
+[[nodiscard]] std::optional<Packet> packet_of(const PacketBits&);
 
 /// Decodes the pulses of one sender as a receiver does: it synchronises to the start bit of each octet.
 class PulseDecoder {
@@ -29,7 +34,7 @@ class PulseDecoder {
     kNone,
     kStarted,   ///< this pulse starts a packet
     kAborted,   ///< the sender gave up in the leading octet
-    kReceived,  ///< message() is complete
+    kReceived,  ///< packet() is complete
     kGarbled    ///< the pulses are no valid packet
   };
   struct State {
@@ -50,7 +55,7 @@ class PulseDecoder {
 
   [[nodiscard]] const State& state() const { return state_; }
   void restore(const State& state) { state_ = state; }
-  [[nodiscard]] const IrMessage& message() const { return message_; }
+  [[nodiscard]] const Packet& packet() const { return packet_; }
   /// Duration of `count` bits of this sender, nominal cycles.
   [[nodiscard]] Cycles bits(Cycles count) const { return count * kBit * period_ / kRegularPeriod; }
 
@@ -66,7 +71,7 @@ class PulseDecoder {
 
   Cycles period_;
   State state_;
-  IrMessage message_{};
+  Packet packet_;
 };
 
 }  // namespace kilotwin::comm

@@ -249,7 +249,8 @@ void RadioEngine::run_firmware(Cycles from, Cycles until, Tick now) {
       if (x.sender != event.robot || x.over) continue;
       x.over = true;
       x.end = event.end;
-      x.message = event.message;
+      x.message = event.packet.message;
+      x.crc_error = event.packet.crc_error;
       if (event.kind == Kind::kReceived) continue;
       ++counters_.aborted;
       ++radio_counts_[event.robot].backed_off;

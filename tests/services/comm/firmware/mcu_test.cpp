@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <random>
 
 #include "core/base/error.hpp"
@@ -117,6 +118,26 @@ TEST(Mcu, TheFastCoreGivesWhatLibsimavrGives) {
   }
 }
 
+TEST(PulseDecoder, APacketWithAWrongCrcIsWholeAndSaysSo) {
+  IrMessage message{};
+  message[3] = 0xa5;
+  for (const std::uint16_t error : std::array<std::uint16_t, 3>{0, 1, 0x8001}) {
+    const comm::PacketBits bits =
+        comm::packet_bits(message, static_cast<std::uint16_t>(comm::message_crc(message) ^ error));
+    comm::PulseDecoder decoder(comm::kTimerCounts * comm::kTimerCount);
+    auto last = comm::PulseDecoder::Event::kNone;
+    for (std::size_t bit = 0; bit < comm::kPacketBits; ++bit) {
+      if (!bits[bit]) continue;
+      const auto time = static_cast<comm::Cycles>(bit) * comm::kBit;
+      EXPECT_EQ(decoder.pass(time, true), comm::PulseDecoder::Event::kNone);
+      last = decoder.feed(time);
+    }
+    ASSERT_EQ(last, comm::PulseDecoder::Event::kReceived) << error;
+    EXPECT_EQ(decoder.packet().message, message);
+    EXPECT_EQ(decoder.packet().crc_error, error);
+  }
+}
+
 TEST(Mcu, SendsWholePacketsEverySixteenTicks) {
   Mcu mcu = make(talker());
   mcu.run(kSecond / 2, {});
@@ -132,7 +153,8 @@ TEST(Mcu, SendsWholePacketsEverySixteenTicks) {
     if (event == comm::PulseDecoder::Event::kStarted) starts.push_back(time);
     if (event != comm::PulseDecoder::Event::kReceived) continue;
     ends.push_back(time);
-    EXPECT_EQ(decoder.message()[3], 0xa5);
+    EXPECT_EQ(decoder.packet().message[3], 0xa5);
+    EXPECT_EQ(decoder.packet().crc_error, 0);
   }
   ASSERT_EQ(starts.size(), 38u);
   ASSERT_EQ(ends.size(), 38u);
