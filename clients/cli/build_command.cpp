@@ -42,22 +42,7 @@ int build_for_robot(const BuildArguments& arguments, const behaviours::CompileOp
   return kDone;
 }
 
-/// `--define A=1 B=2`: words of the form NAME=VALUE after a --define are macros too, unless there is such a file.
-BuildArguments with_defines(BuildArguments arguments) {
-  if (arguments.define.empty()) return arguments;
-  const auto is_macro = [](const fs::path& source) {
-    std::error_code error;
-    return source.string().find('=') != std::string::npos && !fs::exists(source, error);
-  };
-  for (const fs::path& source : arguments.sources) {
-    if (is_macro(source)) arguments.define.push_back(source.string());
-  }
-  std::erase_if(arguments.sources, is_macro);
-  return arguments;
-}
-
-int build(const BuildArguments& given) {
-  const BuildArguments arguments = with_defines(given);
+int build(const BuildArguments& arguments) {
   behaviours::CompileOptions options;
   options.defines = arguments.define;
   options.boot_loader = arguments.boot_loader;

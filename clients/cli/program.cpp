@@ -5,6 +5,9 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <string_view>
 
 #include "core/base/build_identity.hpp"
 #include "core/base/error.hpp"
@@ -25,6 +28,32 @@ std::string complaint(const CLI::App& program, const CLI::ParseError& error, int
   return fmt::format("kilotwin: \"{}\" is no command; there are {}; see kilotwin --help", argv[1], known);
 }
 
+/// `--define A=1 B=2`: each word of the form NAME=VALUE that follows a macro is a macro too, unless there is such a file. The
+/// words in reverse order, as CLI11 takes them.
+std::vector<std::string> words_of(int argc, char** argv) {
+  const auto is_macro = [](std::string_view word) {
+    const std::string_view name = word.substr(0, word.find('='));
+    std::error_code ignored;
+    return name.size() < word.size() && !name.empty() &&
+           name.find_first_not_of(
+               "abcdefghijklmnopqrstuvwxyz"
+               "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+               "0123456789_") == name.npos &&
+           !std::filesystem::exists(word, ignored);
+  };
+  std::vector<std::string> words;
+  bool after_macro = false;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    const bool follows_option = i > 1 && std::string_view(argv[i - 1]) == "--define";
+    if (after_macro && !follows_option && is_macro(word)) words.emplace_back("--define");
+    after_macro = follows_option || word.starts_with("--define=") || (after_macro && is_macro(word));
+    words.emplace_back(word);
+  }
+  std::reverse(words.begin(), words.end());
+  return words;
+}
+
 int parse_and_run(int argc, char** argv, const std::string& description,
                   const std::function<std::vector<Command>(CLI::App&)>& add_commands) {
   CLI::App program{description};
@@ -37,7 +66,7 @@ int parse_and_run(int argc, char** argv, const std::string& description,
       "kilotwin COMMAND --help lists the options of a command. Exit status: 0 done, 1 the run or the check "
       "failed, 2 bad input or arguments.");
   try {
-    program.parse(argc, argv);
+    program.parse(words_of(argc, argv));
   } catch (const CLI::Success& success) {
     return program.exit(success);
   } catch (const CLI::ParseError& error) {

@@ -174,6 +174,29 @@ os::ProcessResult run_compiler(const std::vector<std::string>& arguments) {
   return result;
 }
 
+namespace {
+
+/// A note about names in capitals that the program lacks, which a makefile may define; empty: none.
+std::string note_of_macros(const std::vector<std::string>& errors) {
+  constexpr std::string_view kMark = "' undeclared";
+  constexpr std::string_view kCapitals = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
+  std::set<std::string> names;
+  for (const std::string& error : errors) {
+    const std::size_t end = error.find(kMark);
+    if (end == std::string::npos || end == 0) continue;
+    const std::size_t quote = error.rfind('\'', end - 1);
+    if (quote == std::string::npos) continue;
+    const std::string name = error.substr(quote + 1, end - quote - 1);
+    if (name.size() > 1 && name.find_first_not_of(kCapitals) == std::string::npos) names.insert(name);
+  }
+  if (names.empty()) return "";
+  std::string note = "\nnote: if a makefile defines what is undeclared, add --define";
+  for (const std::string& name : names) note += ' ' + name + "=VALUE";
+  return note;
+}
+
+}  // namespace
+
 std::string all_errors(const std::string& output, const std::vector<fs::path>& sources) {
   std::vector<std::string> lines;
   std::istringstream stream(output);
@@ -196,7 +219,7 @@ std::string all_errors(const std::string& output, const std::vector<fs::path>& s
   std::string all = found[0];
   for (std::size_t n = 1; n < std::min(found.size(), kMost); ++n) all += '\n' + found[n];
   if (found.size() > kMost) all += "\n(" + std::to_string(found.size() - kMost) + " more errors)";
-  return all;
+  return all + note_of_macros(found);
 }
 
 std::set<std::string> undefined_names(const std::string& errors) {

@@ -45,6 +45,19 @@ TEST_F(Commands, RunWritesTheFilesOfTheContract) {
     EXPECT_TRUE(fs::exists(scratch.path() / "run" / file)) << file;
 }
 
+TEST_F(Commands, MacrosMayFollowOneDefine) {
+  write(scratch / "p.c",
+        "#include <kilolib.h>\nstatic void setup(void) {}\nstatic void loop(void) { set_color(RGB(RED, GREEN, 0)); "
+        "}\n"
+        "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  run(small({"--behaviour", scratch / "p.c", "--define", "RED=3", "GREEN=1"}), scratch, "run");
+  Words words = small({"--behaviour", scratch / "p.c", "--define", "RED=3"});
+  words.insert(words.begin(), "run");
+  const Outcome outcome = kilotwin(words, scratch);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("--define GREEN=VALUE"), std::string::npos) << outcome.err;
+}
+
 TEST_F(Commands, ExportWritesTrajectoriesAndMessages) {
   run(small({"--set", "recording.messages=true"}), scratch, "run");
   const Outcome outcome = kilotwin(

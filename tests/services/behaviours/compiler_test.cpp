@@ -70,6 +70,15 @@ TEST(Compiler, ErrorsNameTheUsersLine) {
   }
 }
 
+TEST(Compiler, MacrosThatAMakefileMayDefineAreNamed) {
+  const Folder folder;
+  const std::string source = folder.write("p.c",
+                                          "#include <kilolib.h>\nstatic void setup(void) {}\n"
+                                          "static void loop(void) { set_motors(SPEED, WIDTH); missing = 1; }\n"
+                                          "int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }\n");
+  EXPECT_TRUE(error_of({source}).ends_with("add --define SPEED=VALUE WIDTH=VALUE")) << error_of({source});
+}
+
 TEST(Compiler, CodeOnTheStackIsRefusedAsForTheRobot) {
   const Folder folder;
   const auto nested = [&](const std::string& captured) {
