@@ -445,6 +445,9 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
   else
     memory.set(span.program, span.program.file.table.ticks, executor.ticks());
   std::uint32_t calls = 1;
+  // After the first change one call is tried again: most programs act once and settle. A tick that ended within loop() settles so
+  // too, at a return of loop(), from which the next tick goes on at little cost.
+  bool tried_again = false;
   std::int64_t all_calls = 0;
   for (;;) {
     robot.calls = calls;
@@ -471,7 +474,8 @@ Executor::Main BehavioursEngine::run_loops(std::uint32_t i, const Executor& exec
     }
     if (cycles <= 0) return main;
     static_cast<void>(memory.copy_out(span.slot, executor.data_octets(), thread));
-    if (calls != 0 && calls < 1u << 20) calls *= 2;
+    if (calls != 0 && calls < 1u << 20 && tried_again) calls *= 2;
+    tried_again = true;
   }
 }
 
