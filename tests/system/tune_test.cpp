@@ -62,7 +62,8 @@ int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
 }
 
 TEST(TuneCommand, TheWorstOfSeveralModelsDecides) {
-  // A slow and a fast model. The worst is the slow one's displacement, and the mean lies halfway between both.
+  // Robots drive straight on for 3 s: at 1 mm/s by one model, at 20 mm/s by the other. The worst is the slow one's displacement, and
+  // the mean lies halfway between both.
   Scratch scratch;
   write(scratch / "slow.txtpb", "motion { straight_speed_mm_s: 1 bias_sd_mm_s: 0 }\n");
   write(scratch / "fast.txtpb", "motion { straight_speed_mm_s: 20 bias_sd_mm_s: 0 }\n");
@@ -70,9 +71,11 @@ TEST(TuneCommand, TheWorstOfSeveralModelsDecides) {
     Words more{"--duration",
                "3",
                "--robots",
-               "9",
+               "4",
+               "--behaviour",
+               source("behaviours/straight.c"),
                "--vary",
-               "robots.layout.grid.pitch_mm=60..61",
+               "robots.layout.grid.pitch_mm=200..210",
                "--maximise",
                "displacement",
                "--models",
