@@ -1,10 +1,33 @@
 #include "clients/http/loopback_server.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "core/base/error.hpp"
 
 namespace kilotwin::http {
+
+std::string header_of(lws* connection, lws_token_indexes token) {
+  std::array<char, 256> text{};
+  const int length = lws_hdr_copy(connection, text.data(), static_cast<int>(text.size()), token);
+  return length > 0 ? std::string(text.data(), static_cast<std::size_t>(length)) : std::string();
+}
+
+bool names_this_machine(lws* connection) {
+  const std::string host = header_of(connection, WSI_TOKEN_HOST);
+  const std::string name = host.substr(0, host.rfind(':'));
+  return name == "127.0.0.1" || name == "localhost";
+}
+
+int closed(lws* connection, lws_close_status status, std::string reason) {
+  lws_close_reason(connection, status, reinterpret_cast<unsigned char*>(reason.data()), reason.size());
+  return -1;
+}
+
+bool is_whole(lws* connection, std::string& message, std::string_view part) {
+  message += part;
+  return lws_is_final_fragment(connection) != 0 && lws_remaining_packet_payload(connection) == 0;
+}
 
 LoopbackServer::LoopbackServer(std::uint16_t port, lws_context_creation_info wanted, const std::string& refusal) {
   lws_set_log_level(0, nullptr);

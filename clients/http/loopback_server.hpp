@@ -15,6 +15,15 @@
 
 namespace kilotwin::http {
 
+/// Whether the request's `Host` is this machine: a page of another origin could reach the port under a name of its own.
+[[nodiscard]] bool names_this_machine(lws* connection);
+/// A header of the request, at most 255 octets; empty where it is absent or longer.
+[[nodiscard]] std::string header_of(lws* connection, lws_token_indexes token);
+/// What a callback returns to close a WebSocket with a reason.
+[[nodiscard]] int closed(lws* connection, lws_close_status status, std::string reason);
+/// Adds a part of a WebSocket message to `message`. Returns whether the message is whole.
+[[nodiscard]] bool is_whole(lws* connection, std::string& message, std::string_view part);
+
 class LoopbackServer {
  public:
   /// `wanted`: protocols, user, and bounds other than the library's; address and identity are set here. Port 0: one that is free.

@@ -3,7 +3,6 @@
 #include "clients/recorder/arrow_table.hpp"
 
 #include <flatbuffers/flatbuffers.h>
-#include <fmt/format.h>
 
 #include <bit>
 #include <cstring>
@@ -11,7 +10,6 @@
 
 #include "clients/recorder/utf8.hpp"
 #include "core/base/error.hpp"
-#include "core/os/files.hpp"
 
 namespace kilotwin::recorder {
 namespace {
@@ -128,9 +126,10 @@ std::string message(Builder& builder, Header kind, Offset header, std::size_t bo
 }  // namespace
 
 ArrowTable::ArrowTable(std::filesystem::path file, std::vector<Column> columns, const TableMetadata& metadata)
-    : Table(columns.size()), file_(std::move(file)), described_(std::move(columns)), metadata_(metadata) {
-  output_.reset(std::fopen(file_.c_str(), "wb"));
-  if (!output_) throw RunError(fmt::format("{}: cannot be written: {}", file_.string(), os::system_reason()));
+    : Table(columns.size()),
+      described_(std::move(columns)),
+      metadata_(metadata),
+      output_(std::move(file), os::OutputFile::Existing::kReplace) {
   cells_.resize(columns_);
   std::string begin(kMagic);
   begin.resize(padded(begin.size()));
@@ -141,8 +140,9 @@ ArrowTable::ArrowTable(std::filesystem::path file, std::vector<Column> columns, 
 }
 
 void ArrowTable::write(const void* octets, std::size_t size) {
-  if (std::fwrite(octets, 1, size, output_.get()) != size)
-    throw RunError(fmt::format("{}: cannot be written: {}", file_.string(), os::system_reason()));
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  output_.buffer().append(static_cast<const char*>(octets), size);
+  output_.flush_if_above(kBlock);
   written_ += static_cast<std::int64_t>(size);
 }
 
@@ -264,8 +264,7 @@ void ArrowTable::close() {
   const auto size = static_cast<std::int32_t>(footer.size());
   write(&size, sizeof size);
   write(kMagic.data(), kMagic.size());
-  if (std::fclose(output_.release()) != 0)
-    throw RunError(fmt::format("{}: cannot be written: {}", file_.string(), os::system_reason()));
+  output_.close();
 }
 
 }  // namespace kilotwin::recorder

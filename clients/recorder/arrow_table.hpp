@@ -2,10 +2,10 @@
 /// cells are nulls.
 #pragma once
 
-#include <cstdio>
 #include <string>
 
 #include "clients/recorder/table.hpp"
+#include "core/os/files.hpp"
 
 namespace kilotwin::recorder {
 
@@ -25,9 +25,6 @@ class ArrowTable final : public Table {
   void close() override;
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   /// Cells of one column in the batch at hand, as Arrow lays them out.
   struct Cells {
     std::string values;                ///< 8 octets per number; texts one after the other
@@ -48,10 +45,9 @@ class ArrowTable final : public Table {
   Place write_message(const std::string& header, const std::string& body);
   void write(const void* octets, std::size_t size);
 
-  const std::filesystem::path file_;
   const std::vector<Column> described_;
   const TableMetadata metadata_;
-  std::unique_ptr<std::FILE, Close> output_;
+  os::OutputFile output_;
   std::int64_t written_ = 0;
   std::vector<Cells> cells_;
   std::size_t cell_ = 0, rows_of_batch_ = 0;

@@ -8,26 +8,10 @@
 
 #include "clients/recorder/svg.hpp"
 #include "clients/report/templates.hpp"
+#include "core/base/base64.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::html {
-namespace {
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t k = 0; k < bytes.size(); k += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t i = 0; i < 3; ++i)
-      three = three << 8 | (k + i < bytes.size() ? static_cast<std::uint8_t>(bytes[k + i]) : 0U);
-    for (std::size_t i = 0; i < 4; ++i) out += k + i <= bytes.size() ? kDigits[three >> (18 - 6 * i) & 63] : '=';
-  }
-  return out;
-}
-
-}  // namespace
-
 std::string escaped(std::string_view text) { return recorder::svg::escaped(text); }
 
 std::string with_unit(std::string_view name) {

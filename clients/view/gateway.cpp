@@ -84,24 +84,12 @@ struct Session {
   Viewer* viewer;
 };
 
-std::string header_of(lws* connection, lws_token_indexes token) {
-  std::array<char, 256> text{};
-  const int length = lws_hdr_copy(connection, text.data(), static_cast<int>(text.size()), token);
-  return length > 0 ? std::string(text.data(), static_cast<std::size_t>(length)) : std::string();
-}
-
-/// Whether a `Host` names this machine: a page of another origin could reach the port under a name of its own.
-bool is_this_machine(const std::string& host) {
-  const std::string name = host.substr(0, host.rfind(':'));
-  return name == "127.0.0.1" || name == "localhost";
-}
-
 bool is_allowed(lws* connection) {
-  const std::string host = header_of(connection, WSI_TOKEN_HOST);
-  if (!is_this_machine(host)) return false;
+  if (!http::names_this_machine(connection)) return false;
   // Browsers always state the origin of a page that opens a WebSocket; other programs have none.
-  const std::string origin = header_of(connection, WSI_TOKEN_ORIGIN);
-  return lws_hdr_total_length(connection, WSI_TOKEN_ORIGIN) == 0 || origin == "http://" + host;
+  const std::string origin = http::header_of(connection, WSI_TOKEN_ORIGIN);
+  return lws_hdr_total_length(connection, WSI_TOKEN_ORIGIN) == 0 ||
+         origin == "http://" + http::header_of(connection, WSI_TOKEN_HOST);
 }
 
 /// Takes the same time for every wrong token.
@@ -190,7 +178,7 @@ class Gateway::Service {
   }
 
   int begin_file(lws* connection, Download& download, const std::string& path) {
-    if (!is_this_machine(header_of(connection, WSI_TOKEN_HOST)))
+    if (!http::names_this_machine(connection))
       return refuse(connection, HTTP_STATUS_FORBIDDEN, "open the page as http://127.0.0.1");
     if (lws_hdr_total_length(connection, WSI_TOKEN_GET_URI) == 0)
       return refuse(connection, HTTP_STATUS_METHOD_NOT_ALLOWED, "only GET");
@@ -262,18 +250,15 @@ class Gateway::Service {
     }
   }
 
-  int disconnect(lws* connection, lws_close_status status, std::string_view why) {
+  int disconnect(lws* connection, lws_close_status status, std::string why) {
     ++refused_;
-    std::string reason(why);
-    lws_close_reason(connection, status, reinterpret_cast<unsigned char*>(reason.data()), reason.size());
-    return -1;
+    return http::closed(connection, status, std::move(why));
   }
 
   int receive(lws* connection, Viewer& viewer, std::string_view part) {
     if (viewer.incoming.size() + part.size() > kLongestRequest_bytes)
       return disconnect(connection, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the request is too long");
-    viewer.incoming += part;
-    if (lws_is_final_fragment(connection) == 0 || lws_remaining_packet_payload(connection) > 0) return 0;
+    if (!http::is_whole(connection, viewer.incoming, part)) return 0;
     if (!viewer.allowed()) return disconnect(connection, LWS_CLOSE_STATUS_POLICY_VIOLATION, "too many requests");
     const std::optional<Request> request = parse_request(viewer.incoming);
     viewer.incoming.clear();

@@ -38,8 +38,6 @@ class Measurement {
   /// --set of the parameters that are fields, --define of those that are macros.
   [[nodiscard]] RunArguments arguments_at(const tune::Point& point) const;
 
-  /// The value as the observable has it: with its sign back where the smallest is best.
-  [[nodiscard]] double in_units(double value) const { return goal_.largest ? value : -value; }
   /// Why the last run that failed did so; empty if none failed.
   [[nodiscard]] const std::string& last_failure() const { return last_failure_; }
   [[nodiscard]] bool interrupted() const { return interrupted_; }

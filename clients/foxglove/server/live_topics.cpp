@@ -31,6 +31,7 @@ void LiveTopics::begin() {
     World world(*facts.experiment);
     server_.begin(fmt::format("{:016x}", facts.run));
     topics_.emplace(server_, std::move(world));
+    time_ = 0;
     say(fmt::format("kilotwin: sees run {}, {} robots", one_line(facts.name, 128), facts.robots));
   } catch (const std::invalid_argument& error) {
     warn(fmt::format("kilotwin: run {} cannot be shown: {}", one_line(facts.name, 128), one_line(error.what())));

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "clients/http/loopback_server.hpp"
+#include "core/base/base64.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::foxglove {
@@ -26,18 +27,6 @@ constexpr char kMessageData = 1, kTime = 2;
 constexpr std::uint16_t kPingAfter_s = 20, kHangUpAfter_s = 40;
 constexpr unsigned kHeaderTimeout_s = 5;
 constexpr int kMostConnections = 200;
-
-std::string base64(std::string_view octets) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < octets.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      bits = bits << 8 | (i + k < octets.size() ? static_cast<unsigned char>(octets[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) text += i + k <= octets.size() ? kDigits[bits >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
 
 template <class Number> void put(std::string& to, Number value) {
   for (std::size_t i = 0; i < sizeof value; ++i) to += static_cast<char>(value >> 8 * i & 0xff);
@@ -72,14 +61,6 @@ struct Viewer {
 struct Session {
   Viewer* viewer;
 };
-
-bool is_this_machine(lws* connection) {
-  std::array<char, 256> text{};
-  const int length = lws_hdr_copy(connection, text.data(), static_cast<int>(text.size()), WSI_TOKEN_HOST);
-  const std::string host(text.data(), static_cast<std::size_t>(std::max(length, 0)));
-  const std::string name = host.substr(0, host.rfind(':'));
-  return name == "127.0.0.1" || name == "localhost";
-}
 
 }  // namespace
 
@@ -149,7 +130,7 @@ class Server::Service {
     auto* const session = static_cast<Session*>(user);
     switch (reason) {
       case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
-        return is_this_machine(connection) && service.viewers_ < kMostViewers ? 0 : -1;
+        return http::names_this_machine(connection) && service.viewers_ < kMostViewers ? 0 : -1;
       case LWS_CALLBACK_ESTABLISHED:
         session->viewer = new Viewer;
         ++service.viewers_;
@@ -171,23 +152,18 @@ class Server::Service {
     }
   }
 
-  static int disconnect(lws* connection, lws_close_status status, std::string reason) {
-    lws_close_reason(connection, status, reinterpret_cast<unsigned char*>(reason.data()), reason.size());
-    return -1;
-  }
-
   int receive(lws* connection, Viewer& viewer, std::string_view part) {
     if (viewer.incoming.size() + part.size() > kLongestRequest_bytes)
-      return disconnect(connection, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the request is too long");
-    viewer.incoming += part;
-    if (lws_is_final_fragment(connection) == 0 || lws_remaining_packet_payload(connection) > 0) return 0;
+      return http::closed(connection, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "the request is too long");
+    if (!http::is_whole(connection, viewer.incoming, part)) return 0;
     const std::string text = std::exchange(viewer.incoming, {});
     if (lws_frame_is_binary(connection) != 0) return 0;  // what viewers publish is of no interest
     const json request = json::parse(text, nullptr, false);
     if (!request.is_object())
-      return disconnect(connection, LWS_CLOSE_STATUS_INVALID_PAYLOAD, "that is no JSON object");
+      return http::closed(connection, LWS_CLOSE_STATUS_INVALID_PAYLOAD, "that is no JSON object");
     if (!take(viewer, request))
-      return disconnect(connection, LWS_CLOSE_STATUS_POLICY_VIOLATION, "that is no subscription, or one too many");
+      return http::closed(connection, LWS_CLOSE_STATUS_POLICY_VIOLATION,
+                          "that is no subscription, or one too many");
     lws_callback_on_writable(connection);
     return 0;
   }

@@ -2,6 +2,7 @@
 // comes late, one that breaks the rules, and another run. Status 77: the npm packages are not there.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
+import dgram from "node:dgram";
 import fs from "node:fs";
 import { createRequire } from "node:module";
 import os from "node:os";
@@ -22,7 +23,19 @@ try {
 
 const scratch = fs.mkdtempSync(path.join(os.tmpdir(), "kilotwin-foxglove-"));
 const started = [];
-const domain = String(60 + (process.pid % 50));
+/** A DDS domain whose first port nobody has; `kilotwin run` refuses one that another run has claimed. */
+async function freeDomain() {
+  for (let domain = 60 + (process.pid % 50); ; domain = 1 + (domain % 110)) {
+    const socket = dgram.createSocket("udp4");
+    const free = await new Promise((done) => {
+      socket.once("error", () => done(false));
+      socket.bind({ port: 7410 + 250 * domain, exclusive: true }, () => done(true));
+    });
+    await new Promise((done) => (free ? socket.close(done) : done()));
+    if (free) return String(domain);
+  }
+}
+const domain = await freeDomain();
 const failed = setTimeout(() => {
   console.error("nothing happened for 100 s");
   end(1);
