@@ -22,7 +22,7 @@ constexpr double kLeastError_px = 0.016;
 /// Rays per independent one, times the radius. Measured: docs/results/camera-tracker.md, "Stated uncertainty".
 constexpr double kTogether_px = 52;
 /// Centres of two robots are two radii apart. The seen radius is a bit smaller or larger than the body's.
-constexpr double kLeastDistance = 1.55;
+constexpr double kLeastDistance = 1.8;
 
 double distance(const Point& a, const Point& b) { return std::hypot(a.x_px - b.x_px, a.y_px - b.y_px); }
 

@@ -3,7 +3,12 @@
 
 #include <cmath>
 #include <set>
+#include <tuple>
 
+#include "clients/cameras/renderer.hpp"
+#include "clients/track/brightness.hpp"
+#include "core/plan/world.hpp"
+#include "idl/experiment.pb.h"
 #include "tests/clients/track/film.hpp"
 
 namespace kilotwin::track {
@@ -77,6 +82,36 @@ TEST_P(Rendered, PosesAndColoursAreRight) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Films, Rendered, testing::Values(Film{12, 0.6, 3, 0.2, 0.7}, Film{20, 1, 4, 0.25, 0.8}));
+
+/// Four by three robots that stand still, seen by a tracker that knows nothing of the scale.
+class TightGrid : public testing::TestWithParam<std::tuple<double, double>> {};
+
+TEST_P(TightGrid, HasNoRobotsInItsGaps) {
+  const auto [pitch_mm, px_per_mm] = GetParam();
+  constexpr double kWidth_mm = 700, kHeight_mm = 500;
+  constexpr std::uint32_t kRobots = 12, kColumns = 4;
+  proto::Experiment experiment;
+  experiment.mutable_arena()->set_width_mm(kWidth_mm);
+  experiment.mutable_arena()->set_height_mm(kHeight_mm);
+  cameras::CameraModel camera =
+      cameras::CameraModel::overhead(cvRound(kWidth_mm * px_per_mm), cvRound(kHeight_mm * px_per_mm), px_per_mm);
+  camera.read_noise = 3;
+  camera.uneven_light = 0.2;
+  camera.blur_px = 0.7;
+  cameras::Renderer renderer(World(experiment), camera);
+  cameras::Scene scene;
+  for (std::uint32_t i = 0; i < kRobots; ++i) {
+    cameras::RobotView& view = scene.robots.emplace_back();
+    view.robot = i;
+    view.pose = {pitch_mm * (i % kColumns), pitch_mm * (i / kColumns), 2.0 * i};
+  }
+  Detector detector;
+  EXPECT_EQ(detector.find(grey_of(renderer.render(scene))).size(), kRobots);
+}
+
+INSTANTIATE_TEST_SUITE_P(Pitches, TightGrid,
+                         testing::Combine(testing::Values(34, 36, 38, 40, 42, 44, 47),
+                                          testing::Values(0.85, 1.3, 2.4)));
 
 }  // namespace
 }  // namespace kilotwin::track
