@@ -20,16 +20,18 @@ namespace {
 
 using google::protobuf::internal::WireFormatLite;
 
-/// What is read of a record: its frame's prefix, its kind and length, and its first field, the tick.
-constexpr std::size_t kRead_bytes = kFramePrefix_bytes + 32;
+/// What is read of a record: its frame's prefix, its kind and length, and its first two fields.
+constexpr std::size_t kRead_bytes = kFramePrefix_bytes + 36;
+/// Indices of variables and kinds of events beyond this are damage.
+constexpr std::size_t kMostLists = 4096;
 
 std::uint32_t get_u32(const std::uint8_t* from) {
   return from[0] | std::uint32_t{from[1]} << 8 | std::uint32_t{from[2]} << 16 | std::uint32_t{from[3]} << 24;
 }
 
 struct Beginning {
-  int kind = 0;                      ///< field number in Record
-  std::optional<std::int64_t> tick;  ///< if that is the record's first field
+  int kind = 0;                               ///< field number in Record
+  std::optional<std::int64_t> first, second;  ///< fields 1 and 2, where they are whole numbers
 };
 
 Beginning beginning_of(const std::uint8_t* from, std::size_t size) {
@@ -37,11 +39,35 @@ Beginning beginning_of(const std::uint8_t* from, std::size_t size) {
   Beginning beginning;
   beginning.kind = WireFormatLite::GetTagFieldNumber(in.ReadTag());
   std::uint32_t length = 0;
-  std::uint64_t tick = 0;
-  if (in.ReadVarint32(&length) && in.ReadTag() == WireFormatLite::MakeTag(1, WireFormatLite::WIRETYPE_VARINT) &&
-      in.ReadVarint64(&tick))
-    beginning.tick = static_cast<std::int64_t>(tick);
+  if (!in.ReadVarint32(&length)) return beginning;
+  const auto take = [&in](int field) -> std::optional<std::int64_t> {
+    std::uint64_t value = 0;
+    if (in.ReadTag() != WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_VARINT) || !in.ReadVarint64(&value))
+      return std::nullopt;
+    return static_cast<std::int64_t>(value);
+  };
+  beginning.first = take(1);
+  if (beginning.first) beginning.second = take(2);
   return beginning;
+}
+
+/// Keeps ticks in ascending order. Records of several hosts are in order but for the last few.
+void insert(std::vector<StateIndex::Entry>& entries, StateIndex::Entry entry) {
+  auto at = entries.end();
+  while (at != entries.begin() && std::prev(at)->tick > entry.tick) --at;
+  entries.insert(at, entry);
+}
+
+void insert(std::vector<std::vector<StateIndex::Entry>>& lists, std::int64_t list, StateIndex::Entry entry) {
+  if (list < 0 || static_cast<std::size_t>(list) >= kMostLists) return;
+  if (lists.size() <= static_cast<std::size_t>(list)) lists.resize(static_cast<std::size_t>(list) + 1);
+  insert(lists[static_cast<std::size_t>(list)], entry);
+}
+
+const std::vector<StateIndex::Entry>& list_of(const std::vector<std::vector<StateIndex::Entry>>& lists,
+                                              std::size_t list) {
+  static const std::vector<StateIndex::Entry> none;
+  return list < lists.size() ? lists[list] : none;
 }
 
 }  // namespace
@@ -72,11 +98,23 @@ bool StateIndex::take_record(std::uint64_t size) {
                    std::min<std::size_t>(length, static_cast<std::size_t>(got) - kFramePrefix_bytes));
   switch (record.kind) {
     case proto::Record::kStateFieldNumber:
-      if (record.tick && (states_.empty() || *record.tick > states_.back().tick))
-        states_.push_back({*record.tick, offset_});
+      if (record.first && (states_.empty() || *record.first > states_.back().tick))
+        states_.push_back({*record.first, offset_});
       break;
     case proto::Record::kFloorFieldNumber:
-      if (record.tick) floors_.push_back({*record.tick, offset_});
+      if (record.first) floors_.push_back({*record.first, offset_});
+      break;
+    case proto::Record::kVariableFieldNumber:
+      if (record.second) insert(variables_, *record.second, {*record.first, offset_});
+      break;
+    case proto::Record::kEventFieldNumber:
+      if (record.second) insert(events_, *record.second, {*record.first, offset_});
+      break;
+    case proto::Record::kTrackerFieldNumber:
+      if (record.first) insert(trackers_, {*record.first, offset_});
+      break;
+    case proto::Record::kInputFieldNumber:  // its second field is the tick
+      if (record.second) inputs_.push_back({*record.second, offset_});
       break;
     case proto::Record::kRadioFieldNumber: radio_ = offset_; break;
     case proto::Record::kMessagesFieldNumber: messages_ = offset_; break;
@@ -86,6 +124,12 @@ bool StateIndex::take_record(std::uint64_t size) {
   offset_ += kFramePrefix_bytes + length;
   return true;
 }
+
+const std::vector<StateIndex::Entry>& StateIndex::variable(std::size_t index) const {
+  return list_of(variables_, index);
+}
+
+const std::vector<StateIndex::Entry>& StateIndex::events(std::size_t kind) const { return list_of(events_, kind); }
 
 std::size_t StateIndex::at_or_before(std::int64_t tick) const {
   const auto after = std::upper_bound(states_.begin(), states_.end(), tick,

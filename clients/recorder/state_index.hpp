@@ -1,5 +1,6 @@
-/// StateIndex: where the states and floors of a recording lie in its file. It reads the first octets of each record and
-/// checks the checksum of its length; Reader checks the record itself. A recording may grow meanwhile: update() continues.
+/// StateIndex: where the states, floors, variables and inputs of a recording lie in its file. It reads the first octets of each
+/// record and checks the checksum of its length; Reader checks the record itself. A recording may grow meanwhile: update()
+/// continues.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +29,14 @@ class StateIndex {
   [[nodiscard]] const std::vector<Entry>& states() const { return states_; }
   /// In the order of the file.
   [[nodiscard]] const std::vector<Entry>& floors() const { return floors_; }
+  /// Values of one variable, by its index in the header. Ticks ascend; several hosts may have one record each per tick.
+  [[nodiscard]] const std::vector<Entry>& variable(std::size_t index) const;
+  /// Events of one kind, a number of proto::RecordedEvent. Ticks ascend.
+  [[nodiscard]] const std::vector<Entry>& events(std::size_t kind) const;
+  /// Samples of trackers. Ticks ascend.
+  [[nodiscard]] const std::vector<Entry>& trackers() const { return trackers_; }
+  /// Inputs, in the order of the file.
+  [[nodiscard]] const std::vector<Entry>& inputs() const { return inputs_; }
   /// The counts of all radios, and of messages per pair; near the end of the file.
   [[nodiscard]] std::optional<std::uint64_t> radio() const { return radio_; }
   [[nodiscard]] std::optional<std::uint64_t> messages() const { return messages_; }
@@ -42,7 +51,8 @@ class StateIndex {
 
   os::Descriptor file_;
   std::uint64_t offset_ = 0;  // of the next frame
-  std::vector<Entry> states_, floors_;
+  std::vector<Entry> states_, floors_, trackers_, inputs_;
+  std::vector<std::vector<Entry>> variables_, events_;
   std::optional<std::uint64_t> radio_, messages_;
   bool ended_ = false;
 };

@@ -23,8 +23,8 @@ using Clock = std::chrono::steady_clock;
 
 /// Bytes of a file that are handed to the library at once.
 constexpr std::size_t kChunk_bytes = 65536;
-/// Lines that wait for one viewer; further ones are dropped.
-constexpr std::size_t kMostWaitingLines = 8;
+/// Lines that wait for one viewer, and its questions; further lines are dropped, and older questions.
+constexpr std::size_t kMostWaitingLines = 8, kMostQuestions = 16;
 /// A viewer that answers no ping for so long is disconnected.
 constexpr std::uint16_t kPingAfter_s = 20, kHangUpAfter_s = 40;
 /// Bounds of clients that open connections and say nothing.
@@ -56,7 +56,8 @@ struct Newest {
 struct Viewer {
   bool may_steer = false, wants_frame = false;
   std::uint64_t run_seen = 0, status_seen = 0, frame_seen = 0, floors_seen = 0;
-  std::optional<Request> at, trail, robot;
+  std::optional<Request> at;
+  std::deque<Request> questions;  // at most kMostQuestions
   std::deque<std::string> lines;
   std::string incoming;
   double allowance = kMostRequestsPerSecond;  // requests that it may send now
@@ -69,6 +70,19 @@ struct Viewer {
     allowance = std::min(allowance, kMostRequestsPerSecond) - 1;
     counted = now;
     return allowance >= 0;
+  }
+  /// A question replaces an earlier one of its kind; curves wait beside each other.
+  void ask(const Request& request) {
+    if (request.kind != Request::Kind::kPlot)
+      std::erase_if(questions, [&request](const Request& other) { return other.kind == request.kind; });
+    if (questions.size() == kMostQuestions) questions.pop_front();
+    questions.push_back(request);
+  }
+  std::optional<Request> next_question() {
+    if (questions.empty()) return std::nullopt;
+    const Request question = questions.front();
+    questions.pop_front();
+    return question;
   }
   void tell(std::string line) {
     if (lines.size() < kMostWaitingLines) lines.push_back(std::move(line));
@@ -276,8 +290,11 @@ class Gateway::Service {
         return;
       case Request::Kind::kNext: viewer.wants_frame = true; return;
       case Request::Kind::kAt: viewer.at = request; return;
-      case Request::Kind::kTrail: viewer.trail = request; return;
-      case Request::Kind::kRobot: viewer.robot = request; return;
+      case Request::Kind::kTrail:
+      case Request::Kind::kRobot:
+      case Request::Kind::kPlots:
+      case Request::Kind::kPlot:
+      case Request::Kind::kProgram: return viewer.ask(request);
       default: break;
     }
     if (!viewer.may_steer)
@@ -331,7 +348,7 @@ class Gateway::Service {
     return answered_frame(viewer);
   }
 
-  /// Turns one request into a line.
+  /// Turns requests into lines, until one has an answer.
   void answer(Viewer& viewer) {
     const std::lock_guard lock(answering_);
     if (answers_ == nullptr) return;
@@ -342,15 +359,23 @@ class Gateway::Service {
       }
       return;  // the frame comes first
     }
-    std::string line;
-    if (viewer.trail) {
-      line = answers_->trail(viewer.trail->robot, viewer.trail->tick);
-      viewer.trail.reset();
-    } else if (viewer.robot) {
-      line = answers_->robot(viewer.robot->robot);
-      viewer.robot.reset();
+    while (const std::optional<Request> request = viewer.next_question()) {
+      std::string line = answer_to(*request);
+      if (!line.empty()) return viewer.tell(std::move(line));
     }
-    if (!line.empty()) viewer.tell(std::move(line));
+  }
+
+  /// With answering_ held.
+  [[nodiscard]] std::string answer_to(const Request& request) {
+    switch (request.kind) {
+      case Request::Kind::kTrail: return answers_->trail(request.robot, request.tick);
+      case Request::Kind::kRobot: return answers_->robot(request.robot);
+      case Request::Kind::kProgram: return answers_->program(request.robot, request.tick);
+      case Request::Kind::kPlots: return answers_->plots();
+      case Request::Kind::kPlot:
+        return answers_->plot(request.number, request.of_robot ? std::optional(request.robot) : std::nullopt);
+      default: return {};
+    }
   }
 
   [[nodiscard]] Outgoing answered_frame(Viewer& viewer) {

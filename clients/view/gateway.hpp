@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "clients/view/page_files.hpp"
@@ -34,6 +35,10 @@ class Answers {
   /// A text message, or empty: there is none.
   [[nodiscard]] virtual std::string trail(std::uint32_t robot, std::int64_t tick) = 0;
   [[nodiscard]] virtual std::string robot(std::uint32_t robot) = 0;
+  [[nodiscard]] virtual std::string plots() = 0;
+  /// Of a robot, or of the swarm.
+  [[nodiscard]] virtual std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) = 0;
+  [[nodiscard]] virtual std::string program(std::uint32_t robot, std::int64_t tick) = 0;
   /// Steers the run. Returns empty, or why it cannot.
   [[nodiscard]] virtual std::string steer(const Request& request) = 0;
 };

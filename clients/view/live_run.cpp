@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/view/run_text.hpp"
+#include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "idl/experiment.pb.h"
 
@@ -15,6 +16,8 @@ namespace kilotwin::view {
 namespace {
 
 using namespace std::chrono_literals;
+
+constexpr auto kLookAtRecording = 250ms;
 
 /// Unique among processes that steer a run.
 std::string client_name() { return fmt::format("kilotwin view {} {}", getpid(), random_token().substr(0, 8)); }
@@ -45,8 +48,9 @@ std::string status_text(const PublicRunStatus& status, bool ended) {
 
 }  // namespace
 
-LiveRun::LiveRun(const dds::Transport& transport, bool tells)
-    : tells_(tells),
+LiveRun::LiveRun(const dds::Transport& transport, std::filesystem::path directory, bool tells)
+    : directory_(std::move(directory)),
+      tells_(tells),
       observer_(transport),
       participant_(transport),
       control_(participant_, topics::run_control()),
@@ -72,7 +76,32 @@ void LiveRun::serve(Gateway& gateway) {
       return;
     case observe::News::kNothing: break;
   }
-  if (observer_.run() != nullptr) post_status(gateway, false);
+  if (observer_.run() == nullptr) return;
+  post_status(gateway, false);
+  follow_recording();
+}
+
+std::shared_ptr<RecordedRun> LiveRun::recording() {
+  const std::lock_guard lock(mutex_);
+  return recording_;
+}
+
+/// Opens the recording as soon as it is there, and looks for new records from time to time.
+void LiveRun::follow_recording() {
+  if (directory_.empty() || run_ == 0 || Clock::now() < look_) return;
+  look_ = Clock::now() + kLookAtRecording;
+  if (const std::shared_ptr<RecordedRun> known = recording()) {
+    static_cast<void>(known->grown());
+    return;
+  }
+  try {
+    auto found = std::make_shared<RecordedRun>(directory_);
+    if (found->run() != run_) return;
+    const std::lock_guard lock(mutex_);
+    recording_ = std::move(found);
+  } catch (const UserError&) {
+    // Its first state is not written yet.
+  }
 }
 
 void LiveRun::begin(Gateway& gateway) {
@@ -93,6 +122,10 @@ void LiveRun::begin(Gateway& gateway) {
     const std::string text = run_text(outline, *facts.experiment);
     grid_ = grid_of(*facts.experiment);
     run_ = facts.run;
+    {
+      const std::lock_guard lock(mutex_);
+      recording_.reset();
+    }
     gateway.show(*this, text);
     if (tells_) say(fmt::format("kilotwin: sees run {}, {} robots", one_line(facts.name, 128), facts.robots));
   } catch (const std::invalid_argument& error) {
@@ -126,6 +159,21 @@ void LiveRun::post_status(Gateway& gateway, bool ended) {
     status = status_;
   }
   gateway.post_status(status_text(status, ended));
+}
+
+std::string LiveRun::plots() {
+  const std::shared_ptr<RecordedRun> recorded = recording();
+  return recorded ? recorded->plots() : R"({"type":"plots","plots":[]})";
+}
+
+std::string LiveRun::plot(std::uint32_t number, std::optional<std::uint32_t> robot) {
+  const std::shared_ptr<RecordedRun> recorded = recording();
+  return recorded ? recorded->plot(number, robot) : std::string();
+}
+
+std::string LiveRun::program(std::uint32_t robot, std::int64_t tick) {
+  const std::shared_ptr<RecordedRun> recorded = recording();
+  return recorded ? recorded->program(robot, tick) : program_text({robot, tick, /*known=*/false, {}, {}});
 }
 
 std::string LiveRun::steer(const Request& request) {

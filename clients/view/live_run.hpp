@@ -1,24 +1,30 @@
 /// LiveRun: runs on a domain as they happen. States come from an observer, which can never slow a run; requests go out as
-/// RunControl, as any other program's would.
+/// RunControl, as any other program's would. Curves, variables and logs come from the run's recording while it grows, where
+/// its directory is given.
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "clients/observe/observer.hpp"
 #include "clients/view/frame_code.hpp"
 #include "clients/view/gateway.hpp"
+#include "clients/view/recorded_run.hpp"
 #include "core/federation/topics.hpp"
 
 namespace kilotwin::view {
 
 class LiveRun : public Answers {
  public:
-  /// `tells`: lines about the beginning and the end of runs, on stderr.
-  LiveRun(const dds::Transport& transport, bool tells);
+  /// `directory`: of the run that is expected; empty: not known. `tells`: lines about the beginning and the end of runs, on
+  /// stderr.
+  LiveRun(const dds::Transport& transport, std::filesystem::path directory, bool tells);
   ~LiveRun() override;
 
   /// Looks at the domain for up to 50 ms and passes on what is new. Call it again and again.
@@ -32,13 +38,20 @@ class LiveRun : public Answers {
   [[nodiscard]] std::string floors_at(std::int64_t) override { return {}; }
   [[nodiscard]] std::string trail(std::uint32_t, std::int64_t) override { return {}; }
   [[nodiscard]] std::string robot(std::uint32_t) override { return {}; }
+  [[nodiscard]] std::string plots() override;
+  [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
+  [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string steer(const Request& request) override;
 
  private:
   void begin(Gateway& gateway);
   void post_state(Gateway& gateway);
+  void follow_recording();
+  [[nodiscard]] std::shared_ptr<RecordedRun> recording();
   void post_status(Gateway& gateway, bool ended);
 
+  using Clock = std::chrono::steady_clock;
+  const std::filesystem::path directory_;
   const bool tells_;
   observe::Observer observer_;
   dds::Participant participant_;
@@ -46,6 +59,8 @@ class LiveRun : public Answers {
   std::mutex mutex_;
   PublicRunStatus status_{};  // the newest, of any run; guarded by mutex_
   std::uint64_t status_number_ = 0;
+  std::shared_ptr<RecordedRun> recording_;  // of the run at hand; guarded by mutex_
+  Clock::time_point look_{};                // when to look for new records
   dds::Reader<PublicRunStatus> statuses_;
 
   std::uint64_t posted_status_ = 0, ended_run_ = 0;

@@ -6,7 +6,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "clients/view/robot_log.hpp"
 #include "core/base/error.hpp"
+#include "core/logs/robot_logs.hpp"
 #include "idl/manifest.pb.h"
 
 namespace kilotwin::view {
@@ -79,6 +81,7 @@ RecordedRun::RecordedRun(const fs::path& run) : reader_(recording_of(run)), inde
     if (resolved.run() == reader_.header().run()) {
       *experiment = resolved.experiment();
       firmware_ = firmware_of(resolved);
+      logs_of_ = directory.path();
     }
   }
   grid_ = grid_of(*experiment);
@@ -221,6 +224,34 @@ std::string RecordedRun::robot(std::uint32_t robot) {
     }
   }
   return text.dump();
+}
+
+std::string RecordedRun::plots() {
+  const std::lock_guard lock(mutex_);
+  return curves_.list();
+}
+
+std::string RecordedRun::plot(std::uint32_t number, std::optional<std::uint32_t> robot) {
+  const std::lock_guard lock(mutex_);
+  return curves_.plot(number, robot);
+}
+
+std::string RecordedRun::program(std::uint32_t robot, std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  const proto::RecordingHeader& header = reader_.header();
+  if (robot >= header.robots()) return notice_text(fmt::format("There is no robot {}.", robot));
+  ProgramText text;
+  text.robot = robot;
+  text.tick = tick;
+  for (int v = 0; v < header.variable_size(); ++v)
+    text.variables.emplace_back(header.variable(v).name(),
+                                curves_.value(static_cast<std::uint32_t>(v), robot, tick));
+  if (!logs_of_.empty()) {
+    // A tick's lines are stamped with its time, to the millisecond.
+    text.log =
+        log_until(RobotLogs::file_in(logs_of_, robot), reader_.tick_length().seconds_at(Tick{tick}) + 0.0005);
+  }
+  return program_text(text);
 }
 
 std::string RecordedRun::steer(const Request&) { return "A recorded run cannot be steered."; }

@@ -10,6 +10,7 @@
 #include "clients/recorder/state_index.hpp"
 #include "clients/view/frame_code.hpp"
 #include "clients/view/gateway.hpp"
+#include "clients/view/recorded_curves.hpp"
 #include "clients/view/run_text.hpp"
 
 namespace kilotwin::view {
@@ -25,6 +26,7 @@ class RecordedRun : public Answers {
   /// Looks for new states. Returns a message of type "extent" where there are some, else empty.
   [[nodiscard]] std::string grown();
   [[nodiscard]] std::size_t states() const;
+  [[nodiscard]] std::uint64_t run() const { return reader_.header().run(); }
   [[nodiscard]] const std::string& name() const { return reader_.header().name(); }
   [[nodiscard]] std::uint32_t robots() const { return reader_.header().robots(); }
 
@@ -34,6 +36,9 @@ class RecordedRun : public Answers {
   [[nodiscard]] std::string floors_at(std::int64_t tick) override;
   [[nodiscard]] std::string trail(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string robot(std::uint32_t robot) override;
+  [[nodiscard]] std::string plots() override;
+  [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
+  [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
   [[nodiscard]] std::string steer(const Request&) override;
 
  private:
@@ -43,6 +48,8 @@ class RecordedRun : public Answers {
   mutable std::mutex mutex_;  // the gateway's thread answers, another one looks whether the recording grows
   recorder::Reader reader_;
   recorder::StateIndex index_;
+  RecordedCurves curves_{reader_, index_};
+  std::filesystem::path logs_of_;  // the run directory; empty: the recording stands alone
   std::unique_ptr<const proto::Experiment> experiment_;
   std::vector<bool> firmware_;
   PositionGrid grid_;

@@ -11,15 +11,18 @@ namespace {
 using nlohmann::json;
 using Kind = Request::Kind;
 
-constexpr std::array<std::pair<std::string_view, Kind>, 9> kKinds{{{"hello", Kind::kHello},
-                                                                   {"next", Kind::kNext},
-                                                                   {"at", Kind::kAt},
-                                                                   {"trail", Kind::kTrail},
-                                                                   {"robot", Kind::kRobot},
-                                                                   {"pause", Kind::kPause},
-                                                                   {"continue", Kind::kContinue},
-                                                                   {"step", Kind::kStep},
-                                                                   {"stop", Kind::kStop}}};
+constexpr std::array<std::pair<std::string_view, Kind>, 12> kKinds{{{"hello", Kind::kHello},
+                                                                    {"next", Kind::kNext},
+                                                                    {"at", Kind::kAt},
+                                                                    {"trail", Kind::kTrail},
+                                                                    {"robot", Kind::kRobot},
+                                                                    {"plots", Kind::kPlots},
+                                                                    {"plot", Kind::kPlot},
+                                                                    {"program", Kind::kProgram},
+                                                                    {"pause", Kind::kPause},
+                                                                    {"continue", Kind::kContinue},
+                                                                    {"step", Kind::kStep},
+                                                                    {"stop", Kind::kStop}}};
 
 /// A whole number of the object, at least `lowest`; nothing where it is absent or another value.
 template <class Whole> std::optional<Whole> whole(const json& object, const char* key, std::int64_t lowest) {
@@ -50,6 +53,11 @@ bool take_fields(const json& object, Request& request) {
     }
     case Kind::kAt: return take(object, "tick", 0, request.tick) && take(object, "request", 1, request.number);
     case Kind::kTrail: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
+    case Kind::kProgram: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
+    case Kind::kPlot:
+      request.of_robot = object.contains("robot");
+      return take(object, "plot", 0, request.number) &&
+             (!request.of_robot || take(object, "robot", 0, request.robot));
     case Kind::kRobot: return take(object, "robot", 0, request.robot);
     case Kind::kStep: return take(object, "steps", 1, request.steps) && request.steps <= kMostSteps;
     default: return true;

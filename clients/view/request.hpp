@@ -5,6 +5,9 @@
 ///   {"do": "at", "tick": T, "request": N}    the recorded state at or before tick T
 ///   {"do": "trail", "robot": R, "tick": T}   the recorded path of a robot up to tick T
 ///   {"do": "robot", "robot": R}          counters of a robot
+///   {"do": "plots"}                      what can be plotted
+///   {"do": "plot", "plot": P, "robot": R}    a curve over time, of a robot, or without R of the swarm
+///   {"do": "program", "robot": R, "tick": T} variables and log of a robot's program up to tick T
 ///   {"do": "pause"} {"do": "continue"} {"do": "step", "steps": N} {"do": "stop"}
 #pragma once
 
@@ -20,12 +23,26 @@ inline constexpr std::size_t kLongestRequest_bytes = 512;
 inline constexpr std::uint32_t kMostSteps = 1'000'000;
 
 struct Request {
-  enum class Kind : std::uint8_t { kHello, kNext, kAt, kTrail, kRobot, kPause, kContinue, kStep, kStop };
+  enum class Kind : std::uint8_t {
+    kHello,
+    kNext,
+    kAt,
+    kTrail,
+    kRobot,
+    kPlots,
+    kPlot,
+    kProgram,
+    kPause,
+    kContinue,
+    kStep,
+    kStop
+  };
   Kind kind = Kind::kNext;
   std::string token;         ///< with kHello
-  std::int64_t tick = 0;     ///< with kAt and kTrail
-  std::uint32_t number = 0;  ///< with kAt
-  std::uint32_t robot = 0;   ///< with kTrail and kRobot
+  std::int64_t tick = 0;     ///< with kAt, kTrail and kProgram
+  std::uint32_t number = 0;  ///< with kAt and kPlot
+  std::uint32_t robot = 0;   ///< with kTrail, kRobot, kProgram, and kPlot if `of_robot`
+  bool of_robot = false;     ///< with kPlot
   std::uint32_t steps = 1;   ///< with kStep
 
   [[nodiscard]] bool steers() const { return kind >= Kind::kPause; }

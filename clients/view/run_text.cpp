@@ -160,6 +160,18 @@ std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm) {
   return text_of({{"type", "trail"}, {"robot", robot}, {"xy", xy_mm}});
 }
 
+std::string program_text(const ProgramText& program) {
+  json variables = json::array();
+  for (const auto& [name, value] : program.variables)
+    variables.push_back({{"name", name}, {"value", value ? json(*value) : json(nullptr)}});
+  return text_of({{"type", "program"},
+                  {"robot", program.robot},
+                  {"tick", program.tick},
+                  {"known", program.known},
+                  {"variables", variables},
+                  {"log", program.log}});
+}
+
 std::string notice_text(const std::string& line) { return text_of({{"type", "notice"}, {"text", line}}); }
 
 }  // namespace kilotwin::view

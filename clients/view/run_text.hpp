@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/view/frame_code.hpp"
@@ -35,6 +37,16 @@ struct RunOutline {
 [[nodiscard]] std::string floors_text(const std::vector<proto::FloorRecord>&);
 /// A message of type "trail": where a robot was, oldest first, x and y in turn.
 [[nodiscard]] std::string trail_text(std::uint32_t robot, const std::vector<double>& xy_mm);
+/// What a robot's program knows and has printed up to a tick.
+struct ProgramText {
+  std::uint32_t robot = 0;
+  std::int64_t tick = 0;
+  bool known = true;  ///< false: the run's recording is not at hand
+  std::vector<std::pair<std::string, std::optional<double>>> variables;  ///< recorded ones; nothing: no value yet
+  std::string log;
+};
+/// A message of type "program".
+[[nodiscard]] std::string program_text(const ProgramText&);
 /// A message of type "notice": one line for whoever looks.
 [[nodiscard]] std::string notice_text(const std::string& line);
 

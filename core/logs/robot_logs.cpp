@@ -45,7 +45,11 @@ RobotLogs::~RobotLogs() {
   }
 }
 
-fs::path RobotLogs::file_of(std::uint32_t robot) const { return folder_ / fmt::format("robot-{:05}.txt", robot); }
+fs::path RobotLogs::file_in(const fs::path& run_directory, std::uint32_t robot) {
+  return run_directory / "logs" / fmt::format("robot-{:05}.txt", robot);
+}
+
+fs::path RobotLogs::file_of(std::uint32_t robot) const { return file_in(folder_.parent_path(), robot); }
 
 void RobotLogs::cut(Tick first, const std::function<bool(std::uint32_t)>& own) {
   std::error_code none;

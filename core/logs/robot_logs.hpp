@@ -33,6 +33,10 @@ class RobotLogs {
   void write(Tick from, std::uint32_t robot, std::string_view text);
   void flush();
 
+  /// A robot's file in a run directory.
+  [[nodiscard]] static std::filesystem::path file_in(const std::filesystem::path& run_directory,
+                                                     std::uint32_t robot);
+
  private:
   struct Log {
     std::string text;  ///< not yet in the file

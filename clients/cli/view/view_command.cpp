@@ -39,7 +39,7 @@ class Viewing {
       dds::Transport transport = arguments.transport;
       transport.domain = *arguments.domain;
       // Where `kilotwin run` started this process, lines about its own run would disturb its progress.
-      live_ = std::make_unique<view::LiveRun>(transport, /*tells=*/arguments.run.empty());
+      live_ = std::make_unique<view::LiveRun>(transport, arguments.run, /*tells=*/arguments.run.empty());
     } else {
       recorded_ = std::make_unique<view::RecordedRun>(arguments.run);
     }
@@ -113,7 +113,9 @@ Command add_view(CLI::App& program) {
   app.add_option("RUN", arguments->run, "directory of a run, which may still be going on, or its recording")
       ->type_name("");
   app.add_option("--domain", arguments->domain,
-                 "DDS domain of live runs; with RUN, the run's recording is shown once it has ended")
+                 "DDS domain of live runs; with RUN, its recording adds curves, variables and logs, and is shown "
+                 "once the run "
+                 "has ended")
       ->check(CLI::Range(0u, dds::kLastDomain).description(""))
       ->type_name("N");
   app.add_option(

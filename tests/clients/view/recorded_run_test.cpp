@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "clients/recorder/observables.hpp"
+#include "clients/view/robot_log.hpp"
 #include "core/base/error.hpp"
 #include "tests/clients/view/recordings.hpp"
 #include "tests/system/program.hpp"
@@ -143,6 +146,139 @@ TEST(RecordedRun, TellsOfRobotsAndTheirTrails) {
   EXPECT_NEAR(trail["xy"][trail["xy"].size() - 2].get<double>(), end.x_mm, 1);
   EXPECT_EQ(json::parse(run.trail(20, 0))["type"], "notice");
   EXPECT_NE(run.steer({}), "");
+}
+
+/// The number of a plot in the list.
+std::uint32_t number_of(RecordedRun& run, const std::string& name) {
+  const json list = json::parse(run.plots())["plots"];
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (list[i]["name"] == name) return static_cast<std::uint32_t>(i);
+  ADD_FAILURE() << name;
+  return 0;
+}
+
+TEST(RecordedCurves, AreTheObservablesOfTheStates) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 50});
+  recorder::Reader reader(scratch / "r.ktrec");
+  const recorder::ObservableCurves expected = recorder::observe(reader);
+  RecordedRun run(scratch / "r.ktrec");
+  for (const auto& info : {recorder::Observable::kMsd, recorder::Observable::kNearest}) {
+    const std::string name(recorder::kObservables[static_cast<std::size_t>(info)].name);
+    const json plot = json::parse(run.plot(number_of(run, name), std::nullopt));
+    ASSERT_EQ(plot["time"].size(), expected.time_s.size());
+    for (std::size_t i = 0; i < expected.time_s.size(); ++i) {
+      EXPECT_NEAR(plot["time"][i].get<double>(), expected.time_s[i], 1e-3);
+      const double value = expected.of(info)[i];
+      EXPECT_NEAR(plot["values"][0][i].get<double>(), value, 1e-5 * std::abs(value)) << name;
+    }
+  }
+  const json lit = json::parse(run.plot(number_of(run, "lit"), std::nullopt));
+  EXPECT_EQ(lit["values"][0][0], 19) << "the LED of robot 0 is off at first";
+  const json robot = json::parse(run.plot(number_of(run, "displacement"), 7));
+  const Pose first = test::circling_pose(7, 20, 0), last = test::circling_pose(7, 20, robot["time"].back());
+  EXPECT_NEAR(robot["values"][0].back().get<double>(), std::hypot(last.x_mm - first.x_mm, last.y_mm - first.y_mm),
+              0.01);
+  EXPECT_EQ(run.plot(number_of(run, "msd"), 7), "") << "of the swarm alone";
+  EXPECT_EQ(run.plot(number_of(run, "displacement"), 20), "") << "no such robot";
+  EXPECT_EQ(run.plot(1000, std::nullopt), "");
+}
+
+TEST(RecordedCurves, ShowVariablesAndCountEvents) {
+  Scratch scratch;
+  constexpr std::uint32_t kRobots = 6;
+  constexpr int kStates = 30;
+  test::write_circling(scratch / "r.ktrec", {.robots = kRobots, .states = kStates, .inside = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const json swarm = json::parse(run.plot(number_of(run, "count"), std::nullopt));
+  ASSERT_EQ(swarm["time"].size(), std::size_t{kStates});
+  EXPECT_EQ(swarm["names"], (json{"mean", "min", "max"}));
+  const json of_robot = json::parse(run.plot(number_of(run, "count"), 4));
+  const json part = json::parse(run.plot(number_of(run, "part"), 4)),
+             none = json::parse(run.plot(number_of(run, "part"), 3));
+  for (int i = 0; i < kStates; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    EXPECT_EQ(swarm["values"][0][at], 3 * i - 5) << "the mean of -2 r over 6 robots is -5";
+    EXPECT_EQ(swarm["values"][1][at], 3 * i - 10);
+    EXPECT_EQ(swarm["values"][2][at], 3 * i);
+    EXPECT_EQ(of_robot["values"][0][at], test::circling_count(4, i));
+    EXPECT_EQ(part["values"][0][at], 0.5 * static_cast<double>(test::circling_count(4, i)));
+    EXPECT_TRUE(none["values"][0][at].is_null());
+  }
+  // Robots 1, 3 and 5 have sent once per state.
+  EXPECT_EQ(json::parse(run.plot(number_of(run, "sent"), std::nullopt))["values"][0].back(), 3 * kStates);
+  EXPECT_EQ(json::parse(run.plot(number_of(run, "sent"), 3))["values"][0].back(), kStates);
+  EXPECT_EQ(json::parse(run.plot(number_of(run, "sent"), 2))["values"][0].back(), 0);
+
+  // The value at a time is the last one up to it.
+  const json text = json::parse(run.text());
+  const auto last = text["lastTick"].get<std::int64_t>();
+  for (std::int64_t tick = 0; tick <= last; tick += 5) {
+    const json program = json::parse(run.program(4, tick));
+    EXPECT_EQ(program["variables"][0]["name"], "count");
+    const auto number = static_cast<int>(std::floor(static_cast<double>(tick) / (0.5 / 0.032768)));
+    EXPECT_LE(std::abs(program["variables"][0]["value"].get<std::int64_t>() - test::circling_count(4, number)), 3)
+        << tick;
+  }
+  EXPECT_TRUE(json::parse(run.program(3, last))["variables"][1]["value"].is_null());
+  EXPECT_EQ(json::parse(run.program(kRobots, 0))["type"], "notice");
+}
+
+TEST(RecordedCurves, OfLongRunsHaveABoundedNumberOfPoints) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 4, .states = 5000, .every_s = 0.1, .inside = true});
+  RecordedRun run(scratch / "r.ktrec");
+  for (const char* name : {"msd", "count"}) {
+    const json plot = json::parse(run.plot(number_of(run, name), std::nullopt));
+    EXPECT_LE(plot["time"].size(), kMostPoints + 1) << name;
+    EXPECT_GT(plot["time"].size(), kMostPoints / 2) << name;
+  }
+  // Events are counted over several answers; what has come so far stays.
+  json sent;
+  int answers = 0;
+  do {
+    sent = json::parse(run.plot(number_of(run, "sent"), std::nullopt));
+    ++answers;
+  } while (!sent["whole"].get<bool>() && answers < 100);
+  EXPECT_GT(answers, 1);
+  EXPECT_EQ(sent["values"][0].back(), 2 * 5000);
+  EXPECT_LE(sent["time"].size(), kMostPoints + 2);
+}
+
+TEST(RecordedCurves, GrowWithTheRecording) {
+  Scratch scratch;
+  test::write_circling(scratch / "whole.ktrec", {.robots = 5, .states = 40, .inside = true});
+  const std::string whole = test::read(scratch / "whole.ktrec");
+  test::write(scratch / "r.ktrec", whole.substr(0, whole.size() / 2));
+  RecordedRun run(scratch / "r.ktrec");
+  const std::uint32_t count = number_of(run, "count"), sent = number_of(run, "sent");
+  const json before = json::parse(run.plot(count, std::nullopt));
+  static_cast<void>(run.plot(sent, std::nullopt));
+  test::write(scratch / "r.ktrec", whole);
+  ASSERT_NE(run.grown(), "");
+  RecordedRun fresh(scratch / "r.ktrec");
+  EXPECT_LT(before["time"].size(), 40u);
+  // An answer holds for a second, so another robot is asked for.
+  EXPECT_EQ(run.plot(count, 2), fresh.plot(count, 2));
+  EXPECT_EQ(run.plot(sent, 1), fresh.plot(sent, 1));
+}
+
+TEST(RobotLog, EndsAtTheTimeWithWholeLines) {
+  Scratch scratch;
+  std::string text;
+  for (int i = 0; i < 2000; ++i)
+    text += std::to_string(i / 10) + "." + std::to_string(i % 10) + "00 line " + std::to_string(i) + "\n";
+  test::write(scratch / "log.txt", text);
+  EXPECT_EQ(log_until(scratch / "log.txt", -1), "");
+  EXPECT_EQ(log_until(scratch / "log.txt", 0.1), "0.000 line 0\n0.100 line 1\n");
+  const std::string end = log_until(scratch / "log.txt", 1e9);
+  EXPECT_LE(end.size(), kMostLog_bytes);
+  EXPECT_GT(end.size(), kMostLog_bytes / 2);
+  EXPECT_TRUE(text.ends_with(end));
+  EXPECT_EQ(text[text.size() - end.size() - 1], '\n') << "a whole line comes first";
+  test::write(scratch / "log.txt", "0.5 no end");
+  EXPECT_EQ(log_until(scratch / "log.txt", 1), "0.5 no end");
+  EXPECT_EQ(log_until(scratch / "none.txt", 1), "");
 }
 
 TEST(RecordedRun, ChangesTheFloorWithTime) {

@@ -17,7 +17,38 @@ struct Circling {
   int states = 50;
   double every_s = 0.5;
   bool floors = false;  ///< the first at the start, another in the middle
+  bool inside = false;  ///< variables "count", of two hosts, and "part" of every second robot; events SENT
 };
+
+/// The value of "count" of a robot in state `number`; "part" is half of it.
+inline std::int64_t circling_count(std::uint32_t robot, int number) { return 3 * number - 2 * std::int64_t{robot}; }
+
+/// Both variables and one SENT event per robot with an odd number, as two hosts report them, the second host first.
+inline void write_inside(recorder::Writer& writer, std::int64_t tick, std::uint32_t robots, int number) {
+  for (const std::uint32_t first : {robots / 2, 0u}) {
+    proto::VariableRecord count, part;
+    proto::EventRecord sent;
+    count.set_variable(0);
+    part.set_variable(1);
+    sent.set_kind(proto::SENT);
+    for (auto* record : {&count, &part}) record->set_tick(tick);
+    sent.set_tick(tick);
+    for (std::uint32_t i = first; i < (first == 0 ? robots / 2 : robots); ++i) {
+      count.add_robot(i);
+      count.add_integer(circling_count(i, number));
+      if (i % 2 == 0) {
+        part.add_robot(i);
+        part.add_number(0.5 * static_cast<double>(circling_count(i, number)));
+      } else {
+        sent.add_robot(i);
+        sent.add_offset_cycles(0);
+      }
+    }
+    writer.variable(count);
+    writer.variable(part);
+    writer.event(sent);
+  }
+}
 
 /// Half the width and height of the arena: room for all of them.
 inline double circling_half_mm(std::uint32_t robots) { return std::max(1000.0, 28 * std::sqrt(robots)); }
@@ -51,6 +82,15 @@ inline void write_circling(const std::filesystem::path& file, const Circling& pl
   header.set_arena_width_mm(2 * circling_half_mm(plan.robots));
   header.set_arena_height_mm(2 * circling_half_mm(plan.robots));
   header.add_group_robots(plan.robots);
+  if (plan.inside) {
+    for (const bool integer : {true, false}) {
+      proto::VariableColumn& column = *header.add_variable();
+      column.set_name(integer ? "count" : "part");
+      column.set_every_s(plan.every_s);
+      column.set_integer(integer);
+    }
+    header.add_event(proto::SENT);
+  }
   recorder::Writer writer(file, header);
   const TickLength length{header.tick_cycles()};
   const recorder::RecordingSchedule schedule(length, plan.every_s);
@@ -68,9 +108,12 @@ inline void write_circling(const std::filesystem::path& file, const Circling& pl
     if (plan.floors && number == 0) writer.floor(plain_floor(tick.count(), 10));
     if (plan.floors && number == plan.states / 2) writer.floor(plain_floor(tick.count(), 20));
     writer.state({tick, x, y, heading, led, life});
+    // A federated run reports late.
+    if (plan.inside && number > 0) write_inside(writer, schedule.tick(number - 1).count(), plan.robots, number - 1);
     for (std::int64_t k = 0; k < 16; ++k)
       writer.hash(Tick{tick.count() + k}, static_cast<std::uint64_t>(tick.count()));
   }
+  if (plan.inside) write_inside(writer, schedule.tick(plan.states - 1).count(), plan.robots, plan.states - 1);
   proto::RadioRecord radio;
   for (std::uint32_t i = 0; i < plan.robots; ++i) {
     radio.add_attempted(i + 5);

@@ -1,0 +1,305 @@
+#include "clients/view/recorded_curves.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "core/base/ids.hpp"
+
+namespace kilotwin::view {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+/// What one curve may read of the file, and the octets per robot of a state and of the value of a variable.
+constexpr std::size_t kCurveBytes = 48'000'000, kStateBytesPerRobot = 26, kValueBytesPerRobot = 6;
+/// Of a recording that grows, an answer is given again for so long.
+constexpr auto kAnswerHolds = 1s;
+constexpr std::size_t kMostAnswers = 64;
+/// Records of events that one answer reads at most.
+constexpr std::size_t kMostRecordsPerAnswer = 4000, kMostEventCounts = 8;
+/// Variables and events reach the recording at most so many ticks after the newest one, and some more.
+constexpr std::int64_t kSettled_ticks = 128;
+constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+
+struct EventPlot {
+  proto::RecordedEvent kind;
+  const char* name;
+  const char* title;
+};
+constexpr std::array<EventPlot, 3> kEventPlots{{{proto::SENT, "sent", "messages sent, recorded"},
+                                                {proto::RECEIVED, "received", "messages received, recorded"},
+                                                {proto::FAILURE, "failures", "failures of programs"}}};
+
+/// Numbers in JSON, six digits each; null where there is none.
+std::string numbers(const std::vector<double>& values) {
+  std::string text = "[";
+  for (const double value : values) {
+    if (text.size() > 1) text += ',';
+    text += std::isfinite(value) ? fmt::format("{:.6g}", value) : "null";
+  }
+  return text + ']';
+}
+
+double number_in(const proto::VariableRecord& record, int i) {
+  if (i < record.integer_size()) return static_cast<double>(record.integer(i));
+  return i < record.number_size() ? record.number(i) : kNothing;
+}
+
+/// Where a robot stands in a record, whose robots ascend; -1: nowhere.
+int place_of(const proto::VariableRecord& record, std::uint32_t robot) {
+  const auto found = std::lower_bound(record.robot().begin(), record.robot().end(), robot);
+  if (found == record.robot().end() || *found != robot) return -1;
+  return static_cast<int>(found - record.robot().begin());
+}
+
+}  // namespace
+
+RecordedCurves::RecordedCurves(recorder::Reader& reader, const recorder::StateIndex& index)
+    : reader_(reader), index_(index) {
+  const proto::RecordingHeader& header = reader_.header();
+  for (std::size_t i = 0; i < recorder::kObservables.size(); ++i) {
+    const recorder::ObservableInfo& info = recorder::kObservables[i];
+    if (static_cast<recorder::Observable>(i) == recorder::Observable::kPushed && header.movable_size() == 0)
+      continue;
+    const bool of_robot = static_cast<recorder::Observable>(i) == recorder::Observable::kDisplacement;
+    plots_.push_back(
+        {std::string(info.name), std::string(info.title), std::string(info.unit), true, of_robot, {}, {}, i});
+  }
+  constexpr std::array<std::array<const char*, 2>, kCounts> kCountNames{
+      {{"running", "robots whose program runs"}, {"failed", "failed robots"}, {"lit", "robots with their LED on"}}};
+  for (std::size_t i = 0; i < kCounts; ++i)
+    plots_.push_back(
+        {kCountNames[i][0], kCountNames[i][1], "", true, false, {}, {}, recorder::kObservables.size() + i});
+  for (const EventPlot& event : kEventPlots) {
+    const bool recorded =
+        std::find(header.event().begin(), header.event().end(), event.kind) != header.event().end();
+    if (recorded || event.kind == proto::FAILURE)
+      plots_.push_back({event.name, event.title, "", true, true, {}, static_cast<std::uint32_t>(event.kind), 0});
+  }
+  for (int v = 0; v < header.variable_size(); ++v) {
+    const std::string& name = header.variable(v).name();
+    plots_.push_back({name, name, "", true, true, static_cast<std::uint32_t>(v), {}, 0});
+  }
+}
+
+std::string RecordedCurves::list() const {
+  json plots = json::array();
+  for (const Plot& plot : plots_) {
+    plots.push_back({{"name", plot.name},
+                     {"title", plot.title},
+                     {"unit", plot.unit},
+                     {"swarm", plot.of_swarm},
+                     {"robot", plot.of_robot},
+                     {"variable", plot.variable.has_value()}});
+  }
+  return json{{"type", "plots"}, {"plots", plots}}.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string RecordedCurves::plot(std::uint32_t number, std::optional<std::uint32_t> robot) {
+  if (number >= plots_.size()) return {};
+  const Plot& plot = plots_[number];
+  if (robot && (*robot >= reader_.header().robots() || !plot.of_robot)) return {};
+  const std::pair key(number, robot ? std::int64_t{*robot} : -1);
+  const auto known = answers_.find(key);
+  const auto now = Clock::now();
+  if (known != answers_.end() &&
+      (known->second.states == index_.states().size() || now - known->second.made < kAnswerHolds))
+    return known->second.text;
+  const Curves curves = plot.variable ? of_variable(*plot.variable, robot)
+                        : plot.event  ? of_events(*plot.event, robot)
+                        : robot       ? of_displacement(*robot)
+                                      : of_states(plot);
+  std::string text = fmt::format(
+      "{{\"type\":\"plot\",\"plot\":{},\"robot\":{},\"whole\":{},\"names\":{},\"time\":{},\"values\":[", number,
+      robot ? std::to_string(*robot) : "null", curves.whole, json(curves.names).dump(), numbers(curves.time_s));
+  for (std::size_t i = 0; i < curves.values.size(); ++i) text += (i > 0 ? "," : "") + numbers(curves.values[i]);
+  text += "]}";
+  if (answers_.size() >= kMostAnswers) answers_.clear();
+  if (curves.whole) answers_[key] = {text, index_.states().size(), now};
+  return text;
+}
+
+const proto::Record* RecordedCurves::record_at(std::uint64_t offset) {
+  reader_.go_to(offset);
+  return reader_.next();
+}
+
+double RecordedCurves::seconds(std::int64_t tick) const { return reader_.tick_length().seconds_at(Tick{tick}); }
+
+/// A power of two, so that a curve that has become longer keeps every second point.
+std::size_t RecordedCurves::stride(std::size_t entries, std::size_t entry_bytes) const {
+  const std::size_t affordable =
+      std::clamp<std::size_t>(kCurveBytes / std::max<std::size_t>(1, entry_bytes), 2, kMostPoints);
+  std::size_t stride = 1;
+  while (entries / stride > affordable) stride *= 2;
+  return stride;
+}
+
+/// Reads the states that a curve needs and that were not read yet.
+void RecordedCurves::take_states() {
+  const std::vector<recorder::StateIndex::Entry>& all = index_.states();
+  const std::size_t step = stride(all.size(), kStateBytesPerRobot * reader_.header().robots());
+  std::erase_if(states_, [step](const auto& state) { return state.first % step != 0; });
+  for (std::size_t i = 0; i < all.size(); i += step) {
+    if (states_.contains(i)) continue;
+    const proto::Record* const record = record_at(all[i].offset);
+    if (record == nullptr || !record->has_state()) continue;
+    const proto::StateRecord& state = record->state();
+    observer_.add(seconds(state.tick()), recorder::values(state.x_mm()), recorder::values(state.y_mm()),
+                  recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
+                  recorder::values(state.movable_y_mm()));
+    std::array<double, kNumbers>& numbers = states_[i];
+    for (std::size_t o = 0; o < recorder::kObservables.size(); ++o) numbers[o] = observer_.curves().value[o].back();
+    const auto count = [&numbers](std::size_t place, const std::string& octets, auto holds) {
+      numbers[recorder::kObservables.size() + place] = static_cast<double>(std::count_if(
+          octets.begin(), octets.end(), [&](char octet) { return holds(static_cast<std::uint8_t>(octet)); }));
+    };
+    count(0, state.life_cycle(),
+          [](std::uint8_t life) { return life == static_cast<std::uint8_t>(LifeCycle::kRunning); });
+    count(1, state.life_cycle(),
+          [](std::uint8_t life) { return life == static_cast<std::uint8_t>(LifeCycle::kFailed); });
+    count(2, state.led(), [](std::uint8_t led) { return led != 0; });
+  }
+}
+
+RecordedCurves::Curves RecordedCurves::of_states(const Plot& plot) {
+  take_states();
+  Curves curves;
+  curves.names = {"value"};
+  curves.values.resize(1);
+  for (const auto& [number, numbers] : states_) {
+    curves.time_s.push_back(seconds(index_.states()[number].tick));
+    curves.values[0].push_back(numbers[plot.number]);
+  }
+  return curves;
+}
+
+RecordedCurves::Curves RecordedCurves::of_displacement(std::uint32_t robot) {
+  const std::vector<recorder::StateIndex::Entry>& all = index_.states();
+  const std::size_t step = stride(all.size(), kStateBytesPerRobot * reader_.header().robots());
+  Curves curves{{}, {"value"}, {{}}};
+  double from_x = 0, from_y = 0;
+  for (std::size_t i = 0; i < all.size(); i += step) {
+    const proto::Record* const record = record_at(all[i].offset);
+    if (record == nullptr || !record->has_state()) continue;
+    const double x = record->state().x_mm(static_cast<int>(robot)),
+                 y = record->state().y_mm(static_cast<int>(robot));
+    if (curves.time_s.empty()) {
+      from_x = x;
+      from_y = y;
+    }
+    curves.time_s.push_back(seconds(record->state().tick()));
+    curves.values[0].push_back(std::hypot(x - from_x, y - from_y));
+  }
+  return curves;
+}
+
+RecordedCurves::Curves RecordedCurves::of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot) {
+  const std::vector<recorder::StateIndex::Entry>& all = index_.variable(variable);
+  Curves curves;
+  curves.names = robot ? std::vector<std::string>{"value"} : std::vector<std::string>{"mean", "min", "max"};
+  curves.values.resize(curves.names.size());
+  // Records of one tick belong together.
+  std::vector<std::size_t> firsts;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (i == 0 || all[i].tick != all[i - 1].tick) firsts.push_back(i);
+  const std::size_t step = stride(firsts.size(), kValueBytesPerRobot * reader_.header().robots());
+  for (std::size_t number = 0; number < firsts.size(); number += step) {
+    const std::int64_t tick = all[firsts[number]].tick;
+    double sum = 0, least = kNothing, largest = kNothing, value = kNothing;
+    std::size_t count = 0;
+    for (std::size_t i = firsts[number]; i < all.size() && all[i].tick == tick; ++i) {
+      const proto::Record* const record = record_at(all[i].offset);
+      if (record == nullptr || !record->has_variable()) continue;
+      if (robot) {
+        if (const int place = place_of(record->variable(), *robot); place >= 0)
+          value = number_in(record->variable(), place);
+        continue;
+      }
+      for (int k = 0; k < record->variable().robot_size(); ++k) {
+        const double one = number_in(record->variable(), k);
+        if (!std::isfinite(one)) continue;
+        sum += one;
+        least = std::fmin(least, one);
+        largest = std::fmax(largest, one);
+        ++count;
+      }
+    }
+    curves.time_s.push_back(seconds(tick));
+    if (robot) {
+      curves.values[0].push_back(value);
+    } else {
+      curves.values[0].push_back(count > 0 ? sum / static_cast<double>(count) : kNothing);
+      curves.values[1].push_back(least);
+      curves.values[2].push_back(largest);
+    }
+  }
+  return curves;
+}
+
+RecordedCurves::EventCounts& RecordedCurves::counts_of(std::uint32_t kind, std::optional<std::uint32_t> robot) {
+  for (EventCounts& counts : event_counts_)
+    if (counts.kind == kind && counts.robot == robot) return counts;
+  if (event_counts_.size() >= kMostEventCounts) event_counts_.pop_front();
+  return event_counts_.emplace_back(EventCounts{kind, robot, {}});
+}
+
+/// The number of events so far. Every event counts, also where the curve has fewer points.
+RecordedCurves::Curves RecordedCurves::of_events(std::uint32_t kind, std::optional<std::uint32_t> robot) {
+  const std::vector<recorder::StateIndex::Entry>& all = index_.events(kind);
+  EventCounts& counts = counts_of(kind, robot);
+  std::vector<std::uint64_t>& up_to = counts.up_to;
+  Curves curves{{seconds(index_.states().front().tick)}, {"value"}, {{0}}};
+  // Of a recording that grows, a host's records may still come between the last ones.
+  const std::int64_t settled =
+      index_.ended() || all.empty() ? std::numeric_limits<std::int64_t>::max() : all.back().tick - kSettled_ticks;
+  for (std::size_t read = 0; up_to.size() < all.size() && all[up_to.size()].tick <= settled; ++read) {
+    if (read == kMostRecordsPerAnswer) {
+      curves.whole = false;
+      break;
+    }
+    const proto::Record* const record = record_at(all[up_to.size()].offset);
+    std::uint64_t count = up_to.empty() ? 0 : up_to.back();
+    if (record != nullptr && record->has_event()) {
+      const auto& robots = record->event().robot();
+      count += static_cast<std::uint64_t>(robot ? std::count(robots.begin(), robots.end(), *robot) : robots.size());
+    }
+    up_to.push_back(count);
+  }
+  const std::size_t step = up_to.size() / kMostPoints + 1;
+  const auto add = [&curves](double time_s, std::uint64_t count) {
+    curves.time_s.push_back(time_s);
+    curves.values[0].push_back(static_cast<double>(count));
+  };
+  for (std::size_t i = step - 1; i < up_to.size(); i += step) add(seconds(all[i].tick), up_to[i]);
+  if (!curves.whole || up_to.empty()) return curves;
+  const double end = seconds(std::max(index_.states().back().tick, all[up_to.size() - 1].tick));
+  if (curves.time_s.back() < end)
+    add(end, up_to.back());
+  else
+    curves.values[0].back() = static_cast<double>(up_to.back());
+  return curves;
+}
+
+std::optional<double> RecordedCurves::value(std::uint32_t variable, std::uint32_t robot, std::int64_t tick) {
+  // As many records as hosts may have one tick; a robot that is absent has no value.
+  constexpr int kMostRecords = 64;
+  const std::vector<recorder::StateIndex::Entry>& all = index_.variable(variable);
+  auto at = std::upper_bound(all.begin(), all.end(), tick,
+                             [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
+  for (int tries = 0; at != all.begin() && tries < kMostRecords; ++tries) {
+    --at;
+    const proto::Record* const record = record_at(at->offset);
+    if (record == nullptr || !record->has_variable()) continue;
+    if (const int place = place_of(record->variable(), robot); place >= 0)
+      return number_in(record->variable(), place);
+  }
+  return std::nullopt;
+}
+
+}  // namespace kilotwin::view

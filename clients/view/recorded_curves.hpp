@@ -1,0 +1,85 @@
+/// RecordedCurves: what the page can plot of a recording, as curves over time. A recording may still grow.
+///
+/// A curve has kMostPoints points at most, and reads so much of the file at most that a viewer never waits for long. Where there
+/// are more states, it takes every second, fourth, eighth... of them.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/recorder/observables.hpp"
+#include "clients/recorder/reader.hpp"
+#include "clients/recorder/state_index.hpp"
+
+namespace kilotwin::view {
+
+inline constexpr std::size_t kMostPoints = 1000;
+
+class RecordedCurves {
+ public:
+  /// Both must outlive this object, and the caller calls it from one thread at a time.
+  RecordedCurves(recorder::Reader& reader, const recorder::StateIndex& index);
+
+  /// A message of type "plots": what can be plotted, of the swarm and of single robots. Plots have numbers from 0.
+  [[nodiscard]] std::string list() const;
+  /// A message of type "plot". Of the swarm, variables have their mean, least and largest value. Where `whole` is false in it, it
+  /// took too long to read all; another call continues. Empty: there is no such plot.
+  [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot);
+  /// The last recorded value of a variable of a robot up to a tick; nothing where there is none.
+  [[nodiscard]] std::optional<double> value(std::uint32_t variable, std::uint32_t robot, std::int64_t tick);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// Numbers of the swarm per state: the observables of observables.hpp, and counts of robots.
+  static constexpr std::size_t kCounts = 3, kNumbers = recorder::kObservables.size() + kCounts;
+
+  struct Plot {
+    std::string name, title, unit;
+    bool of_swarm = true, of_robot = false;
+    std::optional<std::uint32_t> variable, event;  ///< else a number of the swarm per state
+    std::size_t number = 0;                        ///< index of it
+  };
+  struct Curves {
+    std::vector<double> time_s;
+    std::vector<std::string> names;
+    std::vector<std::vector<double>> values;  ///< per name
+    bool whole = true;                        ///< false: the next answer has more
+  };
+  struct Answer {
+    std::string text;
+    std::size_t states = 0;  ///< that the recording had
+    Clock::time_point made;
+  };
+  /// Of one kind, of the swarm or of a robot: the number of events up to each record that was read.
+  struct EventCounts {
+    std::uint32_t kind = 0;
+    std::optional<std::uint32_t> robot;
+    std::vector<std::uint64_t> up_to;
+  };
+
+  void take_states();
+  [[nodiscard]] Curves of_states(const Plot& plot);
+  [[nodiscard]] Curves of_displacement(std::uint32_t robot);
+  [[nodiscard]] Curves of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot);
+  [[nodiscard]] Curves of_events(std::uint32_t kind, std::optional<std::uint32_t> robot);
+  [[nodiscard]] EventCounts& counts_of(std::uint32_t kind, std::optional<std::uint32_t> robot);
+  [[nodiscard]] const proto::Record* record_at(std::uint64_t offset);
+  [[nodiscard]] double seconds(std::int64_t tick) const;
+  [[nodiscard]] std::size_t stride(std::size_t entries, std::size_t entry_bytes) const;
+
+  recorder::Reader& reader_;
+  const recorder::StateIndex& index_;
+  std::vector<Plot> plots_;
+  recorder::ObservableObserver observer_;                       // knows the first state
+  std::map<std::size_t, std::array<double, kNumbers>> states_;  // by number of the state
+  std::map<std::pair<std::uint32_t, std::int64_t>, Answer> answers_;
+  std::deque<EventCounts> event_counts_;
+};
+
+}  // namespace kilotwin::view
