@@ -1,7 +1,7 @@
 # cmake -DNPM= -DPAGE= -DWORK= -DOUT= -DSTAMP= -P build.cmake: builds the page in PAGE to OUT, and writes STAMP.
 find_program(node node)
 set(vite ${NPM}/node_modules/vite/bin/vite.js)
-if(NOT node OR NOT EXISTS ${vite})
+if(NOT node OR NOT EXISTS ${vite} OR NOT EXISTS ${NPM}/node_modules/uplot)
   message(NOTICE "the page of kilotwin view is not built: it needs Node.js and the npm packages that scripts/setup installs")
   return()
 endif()

@@ -2,14 +2,17 @@
 import { Camera } from "./camera.ts";
 import { Connection } from "./connection.ts";
 import { Labels } from "./labels.ts";
-import { element, notice, setText, showConnection, showFrame, showRobot, showRun, showScale } from "./panels.ts";
+import { element, notice, setText, showConnection, showFrame, showProgram, showRobot, showRun, showScale } from "./panels.ts";
 import { Playback } from "./playback.ts";
+import { Plots } from "./plots.ts";
 import { listenToPointer } from "./pointer.ts";
 import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type Message, type RobotCounts, type Run, type Status } from "./protocol.ts";
 import { Renderer } from "./renderer.ts";
 import { Theme } from "./theme.ts";
 
 const PANEL_EVERY_MS = 200;
+/** How often the selected robot's variables and log are asked for while time passes. */
+const PROGRAM_EVERY_MS = 400;
 const TRAIL_EVERY_S = 1;
 const TRAIL_SEGMENTS = 30;
 /** Swarms larger than this begin without trails. */
@@ -25,7 +28,11 @@ class Page {
   readonly #camera = new Camera();
   readonly #renderer = new Renderer(this.#picture);
   readonly #labels = new Labels(element<HTMLCanvasElement>("labels"));
-  readonly #theme = new Theme(() => (this.#stale = true));
+  readonly #plots: Plots = new Plots({
+    send: (request) => this.#connection.send(request),
+    seek: (time) => this.#run && this.#seek(time / this.#run.tickSeconds),
+  });
+  readonly #theme = new Theme(() => this.#recolour());
   readonly #playback = new Playback((request) => this.#connection.send(request));
   readonly #connection: Connection;
 
@@ -34,6 +41,7 @@ class Page {
   #counts: RobotCounts | undefined;
   #selected: number | undefined;
   #trail: [number, number][] = [];
+  #program: { tick: number; askedAt: number } | undefined; // what was asked for last
   #mayTrail = 0; // when the trail of the selected robot may be asked for again
   #trails = true;
   #trailFrom: Frame | undefined;
@@ -58,6 +66,11 @@ class Page {
     requestAnimationFrame((now) => this.#tick(now));
   }
 
+  #recolour(): void {
+    this.#stale = true;
+    this.#plots.recolour();
+  }
+
   // The connection.
 
   #connected(): void {
@@ -71,6 +84,8 @@ class Page {
   #lost(): void {
     showConnection("lost");
     this.#playback.lost();
+    this.#plots.lost();
+    this.#program = undefined;
   }
 
   #message(message: Message): void {
@@ -79,8 +94,15 @@ class Page {
       case "run": return this.#begin(message);
       case "status":
         this.#status = message;
+        this.#plots.status(message);
         return this.#buttons();
+      case "plots": return this.#plots.list(message.plots);
+      case "plot": return this.#plots.take(message);
+      case "program":
+        if (message.robot === this.#selected) showProgram(message);
+        return;
       case "extent":
+        this.#plots.grown();
         if (this.#run) {
           this.#run.lastTick = message.lastTick;
           this.#run.states = message.states;
@@ -118,6 +140,8 @@ class Page {
     this.#line.min = String(run.firstTick);
     this.#line.max = String(run.lastTick);
     this.#playback.begin(run);
+    this.#plots.begin(run);
+    this.#program = undefined;
     this.#line.disabled = this.#playback.live;
     element("speed").parentElement!.hidden = this.#playback.live;
     element("back").hidden = this.#playback.live;
@@ -132,6 +156,7 @@ class Page {
     this.counters.bytes += frame.bytes;
     this.#bytes.push({ at: performance.now(), bytes: frame.bytes });
     this.#playback.take(frame);
+    this.#plots.frame(frame, performance.now());
     this.#stale = true;
   }
 
@@ -216,6 +241,13 @@ class Page {
     this.#connection.send({ do: "trail", robot: this.#selected, tick: Math.floor(this.#playback.time) });
   }
 
+  #askProgram(robot: number, tick: number, now: number): void {
+    const last = this.#program;
+    if (last && (last.tick === tick || now - last.askedAt < PROGRAM_EVERY_MS)) return;
+    this.#program = { tick, askedAt: now };
+    this.#connection.send({ do: "program", robot, tick });
+  }
+
   #panels(now: number): void {
     const run = this.#run;
     const frame = this.#playback.current;
@@ -233,7 +265,11 @@ class Page {
     setText("clock", `${(time * run.tickSeconds).toFixed(2)} / ${(run.lastTick * run.tickSeconds).toFixed(1)} s`);
     if (document.activeElement !== this.#line || this.#playback.playing || this.#playback.live) this.#line.value = String(time);
     this.#line.setAttribute("aria-valuetext", `${(time * run.tickSeconds).toFixed(1)} seconds`);
-    if (this.#selected !== undefined) showRobot(run, frame, this.#selected, this.#counts);
+    if (this.#selected !== undefined) {
+      showRobot(run, frame, this.#selected, this.#counts);
+      this.#askProgram(this.#selected, Math.floor(time), now);
+    }
+    this.#plots.update(now, time * run.tickSeconds);
     this.#buttons();
   }
 
@@ -285,7 +321,10 @@ class Page {
     this.#selected = robot;
     this.#trail = [];
     this.#mayTrail = 0;
+    this.#program = undefined;
     this.#stale = true;
+    this.#plots.select(robot);
+    showProgram(undefined);
     if (robot === undefined) {
       element("robot").hidden = true;
       return;
@@ -375,6 +414,7 @@ class Page {
     on("zoom-out", () => this.#zoom(1 / 1.4));
     on("fit", () => this.#fit());
     on("trails", () => this.#showTrails(!this.#trails));
+    on("plots-button", () => this.#plots.toggle());
     on("save", () => this.#save());
     on("theme", () => this.#theme.toggle());
     on("help", () => this.#toggleHelp());
@@ -413,6 +453,7 @@ class Page {
       "=": () => this.#zoom(1.4),
       "-": () => this.#zoom(1 / 1.4),
       "0": () => this.#fit(),
+      p: () => this.#plots.toggle(),
       t: () => this.#showTrails(!this.#trails),
       d: () => this.#theme.toggle(),
       s: () => this.#save(),

@@ -2,7 +2,7 @@
 import { GRID_PX, roundStep } from "./geometry.ts";
 import {
   groupOf, headingOf, ledOf, leftMotorOn, lifeName, lifeOf, rightMotorOn, LIFE_FAILED,
-  type Frame, type RobotCounts, type Run, type Status,
+  type Frame, type ProgramText, type RobotCounts, type Run, type Status,
 } from "./protocol.ts";
 
 export function element<Kind extends HTMLElement>(id: string): Kind {
@@ -83,8 +83,7 @@ export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCo
   const state = frame.state[robot]!;
   const group = groupOf(run, robot);
   const facts: Fact[] = [
-    ["x", `${(run.gridLowest + run.gridStep * frame.x[robot]!).toFixed(1)} mm`],
-    ["y", `${(run.gridLowest + run.gridStep * frame.y[robot]!).toFixed(1)} mm`],
+    ["x, y", `${(run.gridLowest + run.gridStep * frame.x[robot]!).toFixed(1)}, ${(run.gridLowest + run.gridStep * frame.y[robot]!).toFixed(1)} mm`],
     ["heading", `${((headingOf(value) * 180) / Math.PI).toFixed(0)}°`],
     ["LED (r g b)", ledOf(value).join(" ")],
     ["state", lifeName(lifeOf(state))],
@@ -104,6 +103,29 @@ export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCo
     if (counts.heardBy) facts.push(["heard by", list(counts.heardBy)]);
   }
   setFacts(element("robot-facts"), facts);
+}
+
+const valueText = (value: number | null): string =>
+  value === null ? "–" : Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(6)));
+
+/** Variables and log of the selected robot's program. Their text comes from programs. */
+export function showProgram(program: ProgramText | undefined): void {
+  element("robot-program").hidden = !program;
+  if (!program) return;
+  setFacts(element("robot-variables"), program.variables.map(({ name, value }): Fact => [name, valueText(value)]));
+  const unknown = "The recording is not known here: kilotwin view RUN --domain N.";
+  const hint = (id: string, absent: boolean, text: string): void => {
+    element(id).hidden = !absent;
+    setText(id, program.known ? text : unknown);
+  };
+  hint("no-variables", program.variables.length === 0, "None is recorded; recording { variable { name: \"NAME\" } } in the experiment records one.");
+  const log = element("robot-log");
+  const atEnd = log.scrollTop + log.clientHeight >= log.scrollHeight - 4;
+  const changed = log.textContent !== program.log;
+  if (changed) log.textContent = program.log;
+  log.hidden = program.log === "";
+  hint("no-log", program.log === "", "Nothing so far.");
+  if (changed && atEnd) log.scrollTop = log.scrollHeight;
 }
 
 /** A bar of a round length, as far apart as the lines of the grid. */

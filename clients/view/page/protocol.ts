@@ -74,7 +74,43 @@ export interface RobotCounts {
   heardBy?: { robot: number; count: number }[];
 }
 
+/** What can be plotted over time, of the swarm and of single robots. */
+export interface PlotInfo {
+  name: string;
+  title: string;
+  unit: string;
+  swarm: boolean;
+  robot: boolean;
+  variable: boolean;
+}
+
+/** One plot of the list: columns of `values` have an entry per entry of `time`, s. */
+export interface PlotData {
+  type: "plot";
+  plot: number;
+  robot: number | null;
+  /** false: there is more, if it is asked for again. */
+  whole: boolean;
+  names: string[];
+  time: number[];
+  values: (number | null)[][];
+}
+
+/** What a robot's program knows and has printed up to a tick. */
+export interface ProgramText {
+  type: "program";
+  robot: number;
+  tick: number;
+  /** false: the run's directory is not known. */
+  known: boolean;
+  variables: { name: string; value: number | null }[];
+  log: string;
+}
+
 export type Message =
+  | PlotData
+  | ProgramText
+  | { type: "plots"; plots: PlotInfo[] }
   | Run
   | Status
   | RobotCounts
@@ -135,6 +171,7 @@ export const ledOf = (headingLed: number): [number, number, number] => [
   (headingLed >> 4) & 3,
 ];
 
+export const LIFE_RUNNING = 4;
 export const LIFE_ABSENT = 13;
 export const LIFE_FLAT = 14;
 export const LIFE_FAILED = 15;

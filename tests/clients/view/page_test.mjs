@@ -144,8 +144,78 @@ async function recordedRun() {
   assert.equal(await served.stop(), 0);
 }
 
+/** An experiment whose program prints and has variables; what it prints would be harmful as HTML. */
+function talkingExperiment() {
+  fs.writeFileSync(path.join(scratch, "talk.c"), `
+    #include <kilolib.h>
+    #include <stdio.h>
+    volatile uint32_t rounds;
+    static void loop(void) {
+      if (kilo_ticks / 32 != rounds) {
+        rounds = kilo_ticks / 32;
+        printf("round %lu <img src=x onerror=alert(1)>\\n", (unsigned long)rounds);
+      }
+      set_motors(kilo_straight_left, kilo_straight_right);
+    }
+    static void setup(void) {}
+    int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }`);
+  const experiment = path.join(scratch, "talk.txtpb");
+  fs.writeFileSync(experiment, `duration_s: 600 seed: 5 arena { width_mm: 2000 height_mm: 2000 }
+    robots { count: 100 behaviour: "talk.c" layout { grid { pitch_mm: 60 } } }
+    recording { every_s: 0.5 variable { name: "rounds" every_s: 0.5 } }`);
+  return experiment;
+}
+
+/** What the legend of a plot says, and the value of one of its lines; undefined where there is none. */
+const legend = async (page, plot) => (await page.locator(`#plots .plot:nth-child(${plot}) .u-legend`).allTextContents())[0] ?? "";
+async function line(page, plot, name) {
+  const found = new RegExp(`${name}:? ?([-0-9.e]+)`).exec(await legend(page, plot));
+  return found ? Number(found[1]) : undefined;
+}
+
+async function plotsAndPrograms() {
+  const run = path.join(scratch, "talked");
+  execFileSync(kilotwin, ["run", talkingExperiment(), "--duration", "30", "--mode", "local", "--quiet", "--out", run]);
+  const served = await serve([viewProgram, "view", run]);
+  const page = await open(served.address);
+  await eventually("a picture", async () => (await drawn(page)) > 1);
+  await press(page, "Pause");
+  await page.locator("#line").fill("610"); // 20.0 s
+  await eventually("sought", async () => Math.abs((await clock(page)) - 610 * 0.032768) < 0.6);
+
+  // The selected robot's variables and log, up to this time.
+  await page.locator("#find-id").fill("42");
+  await press(page, "Select");
+  const rounds = async () => Number(/rounds(\d+)/.exec(await text(page, "robot-variables"))?.[1]);
+  await eventually("its variable", async () => Math.abs((await rounds()) - (await clock(page)) * 31.25 / 32) < 2);
+  const log = await text(page, "robot-log");
+  assert.match(log, new RegExp(`round ${await rounds()} <img src=x onerror=alert\\(1\\)>\n$`));
+  assert.equal(await page.locator("#robot-log img").count(), 0);
+
+  // Plots: of the swarm, then of the robot; a click goes to its time.
+  await press(page, "Plots");
+  await eventually("the mean square displacement", async () => (await line(page, 1, "value")) > 0);
+  assert.equal(await page.locator("#plots select").nth(1).inputValue(), await page.evaluate(() => [...document.querySelectorAll("#plots select")[1].options].find((option) => option.text === "rounds").value));
+  await eventually("the variable's mean", async () => (await line(page, 2, "mean")) === (await rounds()));
+  await page.locator("#plots select").nth(2).selectOption({ label: "rounds of robot 42" });
+  await eventually("the robot's variable", async () => (await line(page, 3, "value")) === (await rounds()));
+  await picture(page, "plots");
+  const plot = await page.locator("#plots .plot:nth-child(3) .u-over").boundingBox();
+  await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
+  await eventually("half of the time", async () => Math.abs((await clock(page)) - 15) < 1);
+  await page.mouse.move(5, 5);
+  await eventually("its value then", async () => Math.abs((await line(page, 3, "value")) - 15 * 31.25 / 32) < 2);
+  await page.keyboard.press("d");
+  await picture(page, "plots-dark");
+  await page.keyboard.press("p");
+  assert.ok(await page.locator("#plots").isHidden());
+  assert.deepEqual(page.faults, []);
+  await page.close();
+  assert.equal(await served.stop(), 0);
+}
+
 async function liveRun() {
-  const served = await serve([kilotwin, "run", path.join(sources, "experiments/disperse.txtpb"), "--duration", "600", "--pace", "1",
+  const served = await serve([kilotwin, "run", talkingExperiment(), "--pace", "1",
     "--partitions", "1x1", "--out", path.join(scratch, "run"), "--view"]);
   const page = await open(served.address);
   const phase = (wanted) => eventually(`phase ${wanted}`, async () => (await text(page, "phase")) === wanted);
@@ -177,7 +247,21 @@ async function liveRun() {
   await page.locator("#find-id").fill("7");
   await press(page, "Select");
   await eventually("the robot", async () => (await text(page, "robot-facts")).includes("motors on"));
+  // Variables, log and curves come from the recording while it grows.
+  await eventually("its variable", async () => (await text(page, "robot-variables")).includes("rounds"));
+  await press(page, "Plots");
+  await press(page, "Continue");
+  await eventually("its log", async () => (await text(page, "robot-log")).includes("round 1 <img"));
+  await eventually("a curve", async () => (await line(page, 1, "value")) > 0);
+  await page.locator("#plots select").nth(2).selectOption({ label: "rounds of robot 7" });
+  await eventually("its curve", async () => (await line(page, 3, "value")) >= 1);
+  await page.locator("#plots select").nth(1).selectOption({ label: "simulated over real time" });
+  await eventually("the speed", async () => (await line(page, 2, "value")) > 0);
+  await press(page, "Pause");
+  await phase("live: paused");
+  tick = await tickOf();
   await picture(page, "live");
+  await page.keyboard.press("p");
   await page.keyboard.press("Escape");
   await press(page, "Continue");
   await phase("live: running");
@@ -188,6 +272,7 @@ async function liveRun() {
   await press(page, "Stop the run for good");
   await phase("recorded");
   await eventually("its recording", async () => (await text(page, "run-facts")).includes("states"));
+  await eventually("the launcher's end", () => served.text.includes("the page now shows the recording"));
   assert.deepEqual(page.faults, []);
   await page.close();
   assert.equal(await served.stop(), 0);
@@ -195,6 +280,7 @@ async function liveRun() {
 
 try {
   await recordedRun();
+  await plotsAndPrograms();
   await liveRun();
   console.log("the page does what it should");
 } finally {
