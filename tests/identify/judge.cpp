@@ -1,7 +1,8 @@
 // Evaluates `kilotwin identify` on the scenes of tests/identify/truth. Prints prediction errors before and after
 // beside those of an oracle, correctly named effects, and false findings. Exit status 1 if a criterion fails.
 // Usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S]
-//              [--nothing N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...
+//              [--nothing N] [--coverage N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...
+// --coverage N: how often the 95 % intervals of N sets hold the true values.
 // --rivals: other methods on the same scenes, beside it.
 // --robots, --runs and --seconds override a scene's number of robots, number of training runs and their duration.
 #include <fmt/format.h>
@@ -12,12 +13,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "core/os/worker_pool.hpp"
 #include "tests/identify/comparison.hpp"
+#include "tests/identify/truth/dice.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/oracle.hpp"
 #include "tests/identify/truth/play.hpp"
@@ -43,6 +47,7 @@ struct Arguments {
   int runs = 0;        ///< training runs; 0: the scene's
   double seconds = 0;  ///< of training runs; 0: the scene's
   int nothing = 0;
+  int coverage = 0;  ///< sets
   int jobs = 1;
   std::vector<std::string> scenes;
 };
@@ -51,7 +56,7 @@ int usage() {
   fmt::print(
       stderr,
       "usage: judge [--program KILOTWIN] [--seed N] [--keep DIR] [--small] [--robots N] [--runs N] [--seconds S] "
-      "[--nothing N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...\n"
+      "[--nothing N] [--coverage N] [--rivals] [--jobs N] [SCENE|nothing:SEED]...\n"
       "Without scenes and --nothing: all scenes, and 300 small sets without an effect. Scenes: {}\n",
       fmt::join(scenario_names(), " "));
   return 2;
@@ -239,6 +244,67 @@ int judge_rivals(const Arguments& arguments, const fs::path& folder) {
   return failed;
 }
 
+/// Counts how many 95 % intervals hold the true value, by parameter.
+class Coverage {
+ public:
+  void add(const std::string& parameter, double truth, double value, double sd) {
+    constexpr double kNormal95 = 1.96;
+    auto& [held, all] = counts_[parameter];
+    held += std::abs(value - truth) <= kNormal95 * sd ? 1 : 0;
+    ++all;
+  }
+  void print() const {
+    for (const auto& [parameter, count] : counts_) {
+      const auto [held, all] = count;
+      const double share = static_cast<double>(held) / all;
+      fmt::print("{:24} {:5} of {:5} intervals hold the truth: {:.1f} % +- {:.1f}\n", parameter, held, all,
+                 100 * share, 100 * std::sqrt(0.95 * 0.05 / all));
+    }
+  }
+
+ private:
+  std::map<std::string, std::pair<int, int>> counts_;
+};
+
+/// Sets whose true parameters are drawn: do the intervals hold them? Returns the number of sets that failed.
+int judge_coverage(const Arguments& arguments, const fs::path& folder) {
+  int failed = 0;
+  std::mutex mutex;
+  Coverage coverage;
+  kilotwin::os::in_parallel(
+      static_cast<std::size_t>(arguments.coverage), static_cast<std::uint32_t>(arguments.jobs), [&](std::size_t i) {
+        const std::uint64_t seed = arguments.seed * 1000 + i;
+        Scene scene = nothing_to_find(seed);
+        Dice dice(seed ^ 0x636f766572);
+        constexpr double kWheelBase_mm = 25, kWheelBaseSd_mm = 2;
+        scene.wheel_base_mm = kWheelBase_mm + kWheelBaseSd_mm * dice.normal();
+        const Verdict verdict = try_scene(arguments, scene, seed, 1, folder / scene.name);
+        const std::lock_guard lock(mutex);
+        if (!verdict.failure.empty()) {
+          print_row(verdict);
+          ++failed;
+          return;
+        }
+        const Play played = play(scene, seed);
+        std::ifstream in(folder / scene.name / "out" / "result.json");
+        const nlohmann::json result = nlohmann::json::parse(in);
+        const auto base = [&](const char* parameter, double truth) {
+          coverage.add(parameter, truth, result.at("base").at(parameter).get<double>(),
+                       result.at("base_sd").at(parameter).get<double>());
+        };
+        base("wheel_base_mm", scene.wheel_base_mm);
+        base("tracked_point_ahead_mm", scene.tracked_ahead_mm);
+        base("tracked_point_left_mm", 0);
+        for (const nlohmann::json& robot : result.at("robots")) {
+          const Wheels<double>& bias = played.individuals.at(robot.at("robot").get<std::size_t>()).bias_mm_s;
+          coverage.add("bias_left_mm_s", bias.left, robot.at("bias_left_mm_s"), robot.at("sd_left_mm_s"));
+          coverage.add("bias_right_mm_s", bias.right, robot.at("bias_right_mm_s"), robot.at("sd_right_mm_s"));
+        }
+      });
+  coverage.print();
+  return failed;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -269,13 +335,15 @@ int main(int argc, char** argv) {
         arguments.seconds = std::stod(argv[++i]);
       } else if (word == "--nothing") {
         arguments.nothing = std::stoi(argv[++i]);
+      } else if (word == "--coverage") {
+        arguments.coverage = std::stoi(argv[++i]);
       } else if (word == "--jobs") {
         arguments.jobs = std::stoi(argv[++i]);
       } else {
         return usage();
       }
     }
-    if (arguments.scenes.empty() && arguments.nothing == 0) {
+    if (arguments.scenes.empty() && arguments.nothing == 0 && arguments.coverage == 0) {
       arguments.scenes = scenario_names();
       arguments.nothing = arguments.rivals ? 0 : 300;
     }
@@ -283,6 +351,7 @@ int main(int argc, char** argv) {
     bool good = true;
     if (!arguments.scenes.empty())
       good = (arguments.rivals ? judge_rivals : judge_scenes)(arguments, folder.path()) == 0;
+    if (arguments.coverage > 0) good = judge_coverage(arguments, folder.path()) == 0 && good;
     // With few sets the bound is below one: then no finding is allowed.
     if (arguments.nothing > 0)
       good = judge_nothing(arguments, folder.path()) <= kFalseAlarms * arguments.nothing && good;
