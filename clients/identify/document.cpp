@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "clients/identify/bands.hpp"
 #include "clients/identify/fit/residuals.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/model/effect_text.hpp"
@@ -71,6 +72,8 @@ std::string next_step(const Findings& f) {
   if (f.held_out == HeldOut::kNothing)
     return "Measure a second run, or at least four robots, so that held-out data can confirm the effects.";
   if (f.held_out == HeldOut::kNoTime) return "Measure longer runs, so that predictions can be compared with them.";
+  if (f.numbering.anew())
+    return "Give each robot the same number in all runs, or other numbers in each run, and identify again.";
   if (!f.check.dropped.empty())
     return "Find out what differed between the data of the fit and the held-out data: an effect held in the former "
            "only.";
@@ -83,7 +86,7 @@ std::string next_step(const Findings& f) {
     return fmt::format("To tell {} from {}: {}.", a.found, a.instead,
                        experiment_for(a.found_covariates, a.covariates));
   }
-  return "Use the model: kilotwin run EXPERIMENT --model model.txtpb.";
+  return fmt::format("Use the model: kilotwin run EXPERIMENT --model {}", f.model_file);
 }
 
 /// A covariate of result.json, as words.
@@ -130,7 +133,11 @@ json effect_of(const Findings& f, std::size_t t) {
         {"held_out_gain", if_judged(gain.nat)},
         {"held_out_gain_se", if_judged(gain.nat_se)},
         {"degrees", reason.finding.degrees}}},
-      {"parameters", {{"form", form_of(term)}, {"columns", term.coefficients.size()}, {"records", records}}},
+      {"parameters",
+       {{"form", form_of(term)},
+        {"columns", term.coefficients.size()},
+        {"records", records},
+        {"bands_95", bands_of(f.found.fit.model, t, f.uncertainty)}}},
       {"rmse_without_mm", judged ? json(f.terms[t].rmse_without_mm) : json()},
       {"share_removed", judged ? json(share_removed(f, f.terms[t])) : json()},
       {"in_words", fmt::format("{} depends on {}{}{}", reason.acts_on, fmt::join(covariates, ", "),
@@ -224,7 +231,44 @@ json base_of(const BaseParameters& base) {
   return {{"straight_speed_mm_s", base.straight_mm_s}, {"turn_speed_mm_s", base.turn_mm_s},
           {"wheel_base_mm", base.wheel_base_mm},       {"tracked_point_ahead_mm", base.ahead_mm},
           {"tracked_point_left_mm", base.left_mm},     {"disc_centre_ahead_mm", base.centre_mm},
-          {"bias_mean_mm_s", base.bias_mean_mm_s},     {"bias_sd_mm_s", base.bias_sd_mm_s}};
+          {"bias_mean_mm_s", base.bias_mean_mm_s},     {"bias_sd_mm_s", base.bias_sd_mm_s},
+          {"command_lag_s", base.command_lag_s}};
+}
+
+json numbering_of(const Numbering& numbering) {
+  json out = {{"anew_in_each_run", numbering.anew()}, {"spread", numbering.spread}, {"chance", numbering.chance}};
+  if (numbering.anew())
+    out["in_words"] =
+        "Robots seem to be numbered anew in each run: they differ in speed, but a number does not have the same "
+        "speed in all runs.";
+  return out;
+}
+
+/// Standard deviations of the base parameters.
+json base_sd_of(const Uncertainty& u) {
+  return {{"straight_speed_mm_s", u.sd(kStraightSpeed)},
+          {"turn_speed_mm_s", u.sd(kTurnSpeed)},
+          {"wheel_base_mm", u.sd(kWheelBase)},
+          {"tracked_point_ahead_mm", u.sd(kAheadPoint)},
+          {"tracked_point_left_mm", u.sd(kLeftPoint)}};
+}
+
+/// Where contacts and walls act, and what the data say about it.
+json disc_centre_of(const MotionModel& model) {
+  constexpr double kSame_mm = 3, kTold = 3;
+  const bool tracked = std::abs(model.base.centre_mm - model.base.ahead_mm) < kSame_mm;
+  const std::string where =
+      tracked ? "at the tracked point"
+              : fmt::format("{:.1f} mm ahead of the drive's reference point", model.base.centre_mm);
+  const double evidence = model.centre_evidence;
+  const std::string why = evidence == 0 ? "assumed: these data do not tell it"
+                          : evidence > kTold
+                              ? fmt::format("told by contacts, by {:.0f} nat of log likelihood", evidence)
+                              : std::string("told by how near robots come to each other");
+  return {{"ahead_mm", model.base.centre_mm},
+          {"at_tracked_point", tracked},
+          {"log_likelihood_over_alternative", evidence},
+          {"in_words", fmt::format("Contacts and walls act {} ({}).", where, why)}};
 }
 
 json noise_of(const Noise& noise) {
@@ -323,6 +367,10 @@ json robots_of(const Findings& f, const MeasuredSet& judged) {
                   {"bias_right_mm_s", bias.mean_mm_s[1]},
                   {"sd_left_mm_s", std::sqrt(bias.covariance(0, 0))},
                   {"sd_right_mm_s", std::sqrt(bias.covariance(1, 1))}};
+    if (const auto known = f.uncertainty.biases.find(robot); known != f.uncertainty.biases.end()) {
+      entry["sd_left_mm_s"] = std::sqrt(known->second(0, 0));
+      entry["sd_right_mm_s"] = std::sqrt(known->second(1, 1));
+    }
     if (const auto sums = by_robot.find(robot); sums != by_robot.end() && sums->second[2] > 0) {
       entry["before_mm"] = std::sqrt(sums->second[0] / sums->second[2]);
       entry["after_mm"] = std::sqrt(sums->second[1] / sums->second[2]);
@@ -332,11 +380,17 @@ json robots_of(const Findings& f, const MeasuredSet& judged) {
   return robots;
 }
 
-json contract_of(const Findings& f, double horizon_s) {
+json contract_of(const Findings& f, const MeasuredSet& judged, double horizon_s) {
   const MotionModel& after = f.found.fit.model;
   json contract;
   contract["before"] = summary_of(f.before.errors, f.bounds, &ErrorBounds::before);
   contract["after"] = summary_of(f.after.errors, f.bounds, &ErrorBounds::after);
+  if (f.before.errors.rows > 0)
+    contract["free"] = {
+        {"before_mm", f.free_before.rows > 0 ? json(f.free_before.rmse_mm()) : json()},
+        {"after_mm", f.free_after.rows > 0 ? json(f.free_after.rmse_mm()) : json()},
+        {"rows", f.free_after.rows},
+        {"share_of_rows", static_cast<double>(f.free_after.rows) / static_cast<double>(f.before.errors.rows)}};
   contract["improvement"] = improvement_of(f.before.errors, f.after.errors, f.bounds);
   contract["held_out"] = {{"kind", name_of(f.held_out)}, {"in_words", identify::in_words(f.held_out)}};
   contract["noise_floor_mm"] = f.expected_mm;
@@ -351,12 +405,23 @@ json contract_of(const Findings& f, double horizon_s) {
   }
   contract["horizon_s"] = horizon_s;
   contract["effects"] = effects_of(f);
+  if (const double lag_s = after.base.command_lag_s; lag_s != 0)
+    contract["command_lag"] = {
+        {"lag_s", lag_s},
+        {"in_words",
+         fmt::format("The tracks follow the commands {:.3f} s {} than stamped. The fit allows for it; check the "
+                     "clocks of tracker and commands.",
+                     std::abs(lag_s), lag_s > 0 ? "later" : "earlier")}};
+  contract["numbering"] = numbering_of(f.numbering);
   contract["check"] = check_of(f.check);
   contract["unexplained"] = unexplained_of(f.unexplained);
   contract["next"] = next_step(f);
   contract["rejected"] = rejected_of(f.found);
   contract["ambiguous"] = ambiguous_of(f.found);
   contract["base"] = base_of(after.base);
+  contract["base_sd"] = base_sd_of(f.uncertainty);
+  contract["disc_centre"] = disc_centre_of(after);
+  contract["robots"] = robots_of(f, judged);
   contract["noise"] = noise_of(after.noise);
   contract["walls"] = walls_of(after.walls);
   return contract;
@@ -368,7 +433,8 @@ json document_of(const Findings& f, const MeasuredSet& train, const MeasuredSet*
                  std::uint32_t threads) {
   const MeasuredSet& judged = test != nullptr ? *test : train;
   json document;
-  document["contract"] = contract_of(f, horizon_s);
+  document["contract"] = contract_of(f, judged, horizon_s);
+  document["robots"] = document["contract"]["robots"];
   document["effect_curves"] = document["effect_maps"] = json::array();
   for (const Term& term : f.found.fit.model.terms) {
     const std::vector<proto::Effect> written = effects_of_term(term);
@@ -379,7 +445,6 @@ json document_of(const Findings& f, const MeasuredSet& train, const MeasuredSet*
   document["steps"] = json::array();
   for (const Step& step : f.found.steps)
     document["steps"].push_back({{"added", step.added}, {"held_out_gain", step.held_out}});
-  document["robots"] = robots_of(f, judged);
   const std::vector<Disturbance> left_before = disturbances_of(f.base, threads),
                                  left_after = disturbances_of(f.found.fit, threads);
   document["covariate_plots"] = covariate_plots(left_before, left_after);

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/identify/fit/numbering.hpp"
+#include "clients/identify/fit/uncertainty.hpp"
 #include "clients/identify/predict/evaluation.hpp"
 #include "clients/identify/predict/held_out_gain.hpp"
 #include "clients/identify/search/search.hpp"
@@ -38,11 +40,16 @@ struct Findings {
   HeldOut held_out;
   Judged before, after;               ///< the base model and the written one, on held-out data
   std::optional<ErrorBounds> bounds;  ///< of their errors
-  double expected_mm = 0;             ///< error that the written model expects of itself
+  /// The same errors of robots that stayed away from walls and from each other over the horizon.
+  PredictionErrors free_before, free_after;
+  double expected_mm = 0;  ///< error that the written model expects of itself
   std::optional<Replicates> replicates;
   std::vector<TermCheck> terms;  ///< by term; empty if nothing is held out
   FinalCheck check;
   Unexplained unexplained;
+  Numbering numbering;      ///< of the robots, by the base model
+  Uncertainty uncertainty;  ///< of the written model
+  std::string model_file;   ///< where the model will stand
 };
 
 }  // namespace kilotwin::identify

@@ -60,7 +60,8 @@ std::vector<Stage> path_to(const Search& found) {
   const std::size_t terms = found.fit.model.terms.size();
   std::copy_if(found.path.begin(), found.path.end(), std::back_inserter(path),
                [&](const Stage& stage) { return stage.fit.model.terms.size() < terms; });
-  if (terms == 0) return {found.path.front()};
+  if (terms == 0) path.push_back(found.path.front());
+  if (terms == 0 && found.fit.model.base.command_lag_s == path.front().fit.model.base.command_lag_s) return path;
   path.push_back({found.fit, found.reasons});
   return path;
 }
@@ -147,10 +148,24 @@ std::vector<Window> fitted_windows(const FitState& fit, const std::vector<Foreca
   return windows_of(fit.tracks, of_fit, horizon_s);
 }
 
+/// Errors on the tracks of the fit.
+PredictionErrors fitted_errors(const MeasuredSet& train, const std::vector<Forecast>& forecasts) {
+  std::vector<Forecast> of_fit;
+  for (const Forecast& f : forecasts)
+    if (!train.runs[f.run].tracks[f.place].held_out) of_fit.push_back(f);
+  return errors_of(train, of_fit);
+}
+
 /// Errors, their intervals and floors, and what remains unexplained.
 void assess(Findings& f, const MeasuredSet& train, const MeasuredSet* test, const Evaluation& evaluation,
             const ForecastTimes& times, std::uint32_t threads) {
   const std::vector<Forecast> fitted = forecast(f.found.fit.model, f.found.fit.tracks, times, false, threads);
+  const auto errors_of_free = [&](const Judged& judged) {
+    return errors_of(evaluation.set(),
+                     free_ones(f.found.fit.model, f.after.tracks, judged.forecasts, times.horizon_s));
+  };
+  f.free_before = errors_of_free(f.before);
+  f.free_after = errors_of_free(f.after);
   f.bounds = bounds_of(evaluation.set(), f.before.errors, f.after.errors);
   f.expected_mm = (gives_errors(f.held_out) ? f.after.errors : errors_of(train, fitted)).expected_mm();
   std::vector<std::pair<const MeasuredSet*, const std::vector<Forecast>*>> all{{&train, &fitted}};
@@ -211,8 +226,16 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   fitter.fit_base(base);
   Search found{base, {}, {{base, {}}}, {}, {}, {}};
   if (options.find_effects) {
-    found =
-        search(fitter, base, [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); });
+    const auto leaves_much = [&](const FitState& fit) {
+      // What robots do in contact is uncertain, and no effect.
+      const std::vector<Forecast> forecasts = free_ones(
+          fit.model, fit.tracks, forecast(fit.model, fit.tracks, times, false, options.threads), options.horizon_s);
+      return leaves_systematic_error(train, fitted_windows(fit, forecasts, options.horizon_s),
+                                     fitted_errors(train, forecasts));
+    };
+    found = search(
+        fitter, base, [&](double part, const std::string& what) { say_progress(0.1 + 0.75 * part, what); },
+        leaves_much);
   }
   say_progress(0.85, "evaluating each effect");
   keep_predictive_terms(fitter, train, times, found);
@@ -220,7 +243,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
 
   say_progress(0.88, "predictions");
   const Judged before = evaluation.judge(base, reported);
-  Findings f{base, std::move(found), evaluation.held_out(), before, before, {}, 0, {}, {}, {}, {}};
+  Findings f{base, std::move(found),  evaluation.held_out(), before, before, {}, {}, {}, 0, {}, {}, {}, {}, {},
+             {},   options.model_file};
   if (gives_errors(f.held_out) && before.errors.rows == 0) f.held_out = HeldOut::kNoTime;
   if (!gives_errors(f.held_out)) {
     f.after = evaluation.judge(f.found.fit, reported);
@@ -231,6 +255,8 @@ Identified identify(const MeasuredSet& train, const MeasuredSet* test, const Opt
   }
   say_progress(0.91, "what is left unexplained");
   assess(f, train, test, evaluation, times, options.threads);
+  f.numbering = numbering_of(fitter, f.base);
+  f.uncertainty = uncertainty_of(fitter, f.found.fit);
 
   Identified out;
   out.predictions = predictions_of(f, evaluation.set());

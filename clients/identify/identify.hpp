@@ -54,6 +54,8 @@ struct Options {
   double horizon_s = 10;
   std::uint32_t threads = 2;
   bool find_effects = true;  ///< false: the base model only
+  /// Where the caller will write the model: for the text of the result.
+  std::string model_file = "model.txtpb";
   /// Progress, 0..1, and the present step.
   std::function<void(double, const std::string&)> progress;
 };

@@ -107,6 +107,17 @@ void print_errors(const nlohmann::json& result, double horizon_s) {
         horizon_s, error("before").get<double>(), error("after").get<double>(),
         result.at("noise_floor_mm").get<double>());
   }
+  if (const auto free = result.find("free");
+      free != result.end() && !free->at("after_mm").is_null() && free->at("share_of_rows").get<double>() < 0.98)
+    fmt::print(
+        "away from walls and other robots ({:.0f} % of the predictions): {:.2f} mm, {:.2f} mm with effects\n",
+        100 * free->at("share_of_rows").get<double>(), free->at("before_mm").get<double>(),
+        free->at("after_mm").get<double>());
+  for (const char* of : {"command_lag", "numbering"}) {
+    const auto found = result.find(of);
+    if (found != result.end() && found->contains("in_words"))
+      fmt::print("{}\n", found->at("in_words").get<std::string>());
+  }
   // Results of other kinds of data have neither.
   if (const auto check = result.find("check"); check != result.end()) {
     for (const auto& name : check->at("dropped"))
@@ -145,6 +156,7 @@ int identify_data(const IdentifyArguments& arguments) {
   identify::Options options;
   options.horizon_s = arguments.horizon_s;
   options.threads = arguments.threads;
+  options.model_file = (out / "model.txtpb").string();
   std::optional<Progress> progress(std::in_place, !arguments.quiet);
   // Reading takes the first 2 %, drawing the last 3 %.
   options.progress = [&](double share, const std::string& what) {
@@ -161,7 +173,7 @@ int identify_data(const IdentifyArguments& arguments) {
   }
 
   progress->show(0.97, "drawing the report", "drawing");
-  os::write_file(out / "model.txtpb",
+  os::write_file(options.model_file,
                  identify::text_of(found.model, fmt::format("Identified from {}.", arguments.train.string())));
   os::write_file(out / "result.json", found.document.at("contract").dump(2) + "\n");
   os::write_file(out / "predictions.csv", csv_of(found.predictions));

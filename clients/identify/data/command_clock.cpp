@@ -20,12 +20,13 @@ double CommandState::discounted_s(std::size_t decay_index, std::size_t motor) co
   return initial_discounted_s[decay_index][motor] * kept + (on ? span_s * (1 - kept) : 0);
 }
 
-CommandClock::CommandClock(const Track& track) {
+CommandClock::CommandClock(const Track& track, double lag_s) {
   CommandState state;
   auto left = state.initial_discounted_s;
   double now_s = 0;
   for (const CommandChange& change : track.commands) {
-    const double at_s = std::max(change.time_s, 0.0);
+    const double at_s =
+        starts_s_.empty() ? std::max(change.time_s, 0.0) : std::max({change.time_s + lag_s, starts_s_.back(), 0.0});
     if (!starts_s_.empty()) state.advance(at_s - now_s);
     now_s = at_s;
     for (std::size_t f = 0; f < kDecayTimes_s.size(); ++f)

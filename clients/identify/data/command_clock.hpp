@@ -37,7 +37,8 @@ struct CommandState {
 /// The commands of a track as a piecewise constant function of time.
 class CommandClock {
  public:
-  explicit CommandClock(const Track&);
+  /// `lag_s`: the robot follows each command but its first this much later than stamped.
+  explicit CommandClock(const Track&, double lag_s = 0);
   /// The state at a time. At a change: under the new command.
   [[nodiscard]] CommandState at(double time_s) const;
   /// Time of the first change after `after_s`; infinite if there is none.

@@ -210,7 +210,13 @@ void Fitter::fit_disc_centre(FitState& state) const {
         (better > -kSure && c.encounters.overlap_density() < 0.5 * best->encounters.overlap_density()))
       best = &c;
   }
+  const Candidate* other = candidates.size() < 2    ? nullptr
+                           : best == &candidates[0] ? &candidates[1]
+                                                    : &candidates[0];
+  const bool told = other != nullptr && (best->state.model.walls.any() || other->state.model.walls.any());
+  const double evidence = told ? best->log_likelihood - other->log_likelihood : 0;
   state = best->state;
+  state.model.centre_evidence = evidence;
   state.model.contacts = best->encounters.overlap_density() < Encounters::kNoCollisions;
 }
 
@@ -222,8 +228,8 @@ void Fitter::fit_contacts(FitState& state) const {
   for (double Noise::*const part :
        {&Noise::wall_mm2_s, &Noise::wall_rad2_s, &Noise::contact_mm2_s, &Noise::contact_rad2_s})
     model.noise.*part = anew.*part;
-  // A missing effect may have looked like a displaced disc centre.
-  if (!headings_) fit_disc_centre(state);
+  // A missing effect may have looked like a displaced disc centre. With headings, effects of the camera alone do.
+  if (!headings_ || model.measures()) fit_disc_centre(state);
   for (int round = 0; round < (headings_ ? 1 : 2); ++round) {
     if (headings_ || round > 0) {
       fit_walls(state);

@@ -17,8 +17,11 @@ template <class Each> void sub_steps(const CommandClock& clock, double from_s, d
     const double end = std::min(to_s, clock.next_change_s(t));
     const double length = end - t;
     CommandState state = clock.at(t);
-    // A robot at rest needs few sub-steps.
-    const double longest = state.driven() ? kSubStep_s : 2.0;
+    // A robot at rest needs few sub-steps, once it has come to rest.
+    constexpr double kComesToRest_s = 6, kAtRest_s = 2;
+    const double longest = state.driven()                   ? kSubStep_s
+                           : state.since_s < kComesToRest_s ? 2 * kSubStep_s
+                                                            : kAtRest_s;
     const int count = std::max(1, static_cast<int>(std::ceil(length / longest - 1e-9)));
     const double h = length / count;
     for (int i = 0; i < count; ++i) {

@@ -43,6 +43,15 @@ PreparedSet::PreparedSet(const MeasuredSet& set, std::uint32_t first_number)
   at_boundary_ = std::move(at_boundary);
 }
 
+void PreparedSet::set_command_lag(double lag_s) {
+  if (lag_s == command_lag_s_) return;
+  command_lag_s_ = lag_s;
+  auto clocks = std::make_shared<std::vector<CommandClock>>();
+  for (const TrackView& view : views_) clocks->emplace_back(*view.track, lag_s);
+  for (std::size_t v = 0; v < views_.size(); ++v) views_[v].clock = &(*clocks)[v];
+  clocks_ = std::move(clocks);
+}
+
 void PreparedSet::set_neighbours(std::size_t run, RunNeighbours neighbours) {
   neighbours_[run] = std::make_shared<const RunNeighbours>(std::move(neighbours));
   for (TrackView& view : views_)
@@ -63,13 +72,19 @@ std::vector<std::vector<const TrackView*>> PreparedSet::units() const {
 }
 
 std::vector<const TrackView*> PreparedSet::some_tracks(std::size_t samples) const {
-  std::vector<const TrackView*> chosen, all;
-  for (const TrackView& view : views_)
-    if (!view.track->held_out) all.push_back(&view);
+  std::vector<const TrackView*> chosen;
+  for (const std::size_t v : some_views(samples)) chosen.push_back(&views_[v]);
+  return chosen;
+}
+
+std::vector<std::size_t> PreparedSet::some_views(std::size_t samples) const {
+  std::vector<std::size_t> chosen, all;
+  for (std::size_t v = 0; v < views_.size(); ++v)
+    if (!views_[v].track->held_out) all.push_back(v);
   std::size_t sum = 0;
   for (std::size_t i = 0; i < all.size() && sum < samples; ++i) {
     chosen.push_back(all[(i * 7919) % all.size()]);
-    sum += chosen.back()->track->samples.size();
+    sum += views_[chosen.back()].track->samples.size();
   }
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());

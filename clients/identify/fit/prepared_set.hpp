@@ -43,10 +43,14 @@ class PreparedSet {
   [[nodiscard]] std::vector<std::vector<const TrackView*>> units() const;
   /// Tracks of the fit, spread over the set, up to this number of samples.
   [[nodiscard]] std::vector<const TrackView*> some_tracks(std::size_t samples) const;
+  /// Their indices in views().
+  [[nodiscard]] std::vector<std::size_t> some_views(std::size_t samples) const;
   [[nodiscard]] Encounters encounters() const;
   /// Robots that came near each other, by disc centres.
   [[nodiscard]] std::vector<RobotPair> pairs() const;
 
+  /// Lets robots follow their commands this much later than stamped, s.
+  void set_command_lag(double lag_s);
   /// Estimates the disc centres, and with them what neighbours see.
   void find_centres(const MotionModel&, std::uint32_t threads);
   /// Estimates the initial heading of each track: the measured one, or the most likely of many hypotheses.
@@ -59,6 +63,7 @@ class PreparedSet {
 
   const MeasuredSet* set_;
   std::uint32_t first_number_;
+  double command_lag_s_ = 0;
   /// By view; constant.
   std::shared_ptr<const std::vector<CommandClock>> clocks_;
   std::shared_ptr<const std::vector<std::vector<bool>>> at_boundary_;

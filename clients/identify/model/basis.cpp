@@ -39,9 +39,10 @@ std::size_t Factor::columns() const {
     case Shape::kGrid: return 1;
     case Shape::kCosines:
     case Shape::kTaper: return count;
-    case Shape::kCosines2:
+    case Shape::kCosines2: return (count + 1) * (count + 2) / 2 - first;
     case Shape::kPolynomials2: return (count + 1) * (count + 2) / 2 - 1;
-    case Shape::kHarmonics: return 2 * std::size_t{count};
+    case Shape::kHarmonics:
+    case Shape::kTravelling: return 2 * std::size_t{count};
     case Shape::kTable:
     case Shape::kAtLeast:
     case Shape::kExponential:
@@ -72,7 +73,7 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
     case Shape::kCosines2:
       cosines(M_PI * unit_of(c, low, high, warp), count, a.data());
       cosines(M_PI * unit_of(value_of(and_axis, s, wheel), and_low, and_high, 0), count, b.data());
-      for (std::uint32_t sum = 1; sum <= count; ++sum)
+      for (std::uint32_t sum = first; sum <= count; ++sum)
         for (std::uint32_t k = 0; k <= sum; ++k) *to++ = a[sum - k] * b[k];
       return;
     case Shape::kPolynomials2:
@@ -87,6 +88,14 @@ void Factor::evaluate_columns(const Situation& s, std::size_t wheel, double* to)
         to[2 * k + 1] = std::sin((first + k) * c);
       }
       return;
+    case Shape::kTravelling: {
+      const double phase = points[0] * s.x_mm + points[1] * s.y_mm - points[2] * s.time_s;
+      for (std::uint32_t k = 0; k < count; ++k) {
+        to[2 * k] = std::cos((first + k) * phase);
+        to[2 * k + 1] = std::sin((first + k) * phase);
+      }
+      return;
+    }
     case Shape::kTable:
       for (std::size_t i = 0; i < points.size(); ++i) to[i] = c == points[i] ? 1 : 0;
       return;
@@ -135,7 +144,7 @@ std::vector<double> Factor::roughness() const {
   if (!known.empty()) return rough;
   if (shape == Shape::kCosines) {
     for (std::uint32_t k = 0; k < count; ++k) rough[k] = std::max(first + k, 1u);
-  } else if (shape == Shape::kHarmonics) {
+  } else if (shape == Shape::kHarmonics || shape == Shape::kTravelling) {
     for (std::uint32_t k = 0; k < count; ++k) rough[2 * k] = rough[2 * k + 1] = first + k;
   } else if (shape == Shape::kPolynomials2) {
     std::size_t i = 0;
@@ -143,8 +152,9 @@ std::vector<double> Factor::roughness() const {
       for (std::uint32_t k = 0; k <= sum; ++k) rough[i++] = sum;
   } else if (shape == Shape::kCosines2) {
     std::size_t i = 0;
-    for (std::uint32_t sum = 1; sum <= count; ++sum)
-      for (std::uint32_t k = 0; k <= sum; ++k) rough[i++] = std::sqrt((sum - k) * (sum - k) + k * k + 0.0);
+    for (std::uint32_t sum = first; sum <= count; ++sum)
+      for (std::uint32_t k = 0; k <= sum; ++k)
+        rough[i++] = std::max(1.0, std::sqrt((sum - k) * (sum - k) + k * k + 0.0));
   }
   return rough;
 }
@@ -205,7 +215,9 @@ Factor* Basis::only_open() { return const_cast<Factor*>(std::as_const(*this).onl
 
 bool Basis::looks_at(Covariate covariate) const {
   return std::any_of(factors.begin(), factors.end(), [&](const Factor& f) {
-    return f.axis.of == covariate || (f.of_two() && f.and_axis.of == covariate);
+    const bool travels = f.shape == Factor::Shape::kTravelling;
+    return f.axis.of == covariate || ((f.of_two() || travels) && f.and_axis.of == covariate) ||
+           (travels && covariate == Covariate::kTime);
   });
 }
 

@@ -12,7 +12,7 @@ struct Factor {
   enum class Shape : std::uint8_t {
     kLinear,        ///< (c - low) / (high - low)
     kCosines,       ///< cos(k pi u), k = first..; u = (c - low) / (high - low)
-    kCosines2,      ///< cos(j pi u) cos(k pi v), 0 < j + k <= order, over two covariates
+    kCosines2,      ///< cos(j pi u) cos(k pi v), first <= j + k <= order, over two covariates; first: 0 or 1
     kPolynomials2,  ///< P_j(2u - 1) P_k(2v - 1), 0 < j + k <= order, Legendre polynomials, over two covariates
     kHarmonics,     ///< cos(k a), sin(k a), k = first..; a: an angle
     kTable,         ///< indicator of a key, one column per point
@@ -22,11 +22,13 @@ struct Factor {
     kTaper,         ///< (1 - c / high)^k, k = 1..; 0 from `high` on
     kGrid,          ///< one column: bilinear interpolation of `points` on a grid, over two covariates
     kWave,          ///< cos and sin of 2 pi c / point, two columns per point
+    /// cos(k p), sin(k p), k = first.., with the phase p = points[0] x + points[1] y - points[2] t, in rad, mm and s
+    kTravelling,
   };
   Shape shape = Shape::kLinear;
   Axis axis, and_axis;
   double low = 0, high = 1, and_low = 0, and_high = 1;
-  /// kCosines, kHarmonics, kTaper: the first k and the number of columns. kCosines2, kPolynomials2: count is the
+  /// kCosines, kHarmonics, kTravelling, kTaper: the first k and the number of columns. kCosines2, kPolynomials2: count is the
   /// order. kGrid: count is the number of nodes along the first axis.
   std::uint32_t first = 1, count = 1;
   /// Above 0: logarithmic scale u = log(1 + (c - low) / warp), normalised. It resolves values near `low` finely.

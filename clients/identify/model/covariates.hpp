@@ -15,7 +15,7 @@ inline constexpr std::array<double, 14> kNeighbourRadii_mm = {40,  50,  60,  70,
                                                               110, 120, 130, 140, 150, 175, 200};
 
 /// Number of grids of driven time per floor cell, each with its own cell size (MotionModel::cells).
-inline constexpr std::size_t kTrafficGrids = 6;
+inline constexpr std::size_t kTrafficGrids = 10;
 
 /// One neighbour, relative to a robot.
 struct OtherRobot {

@@ -190,6 +190,7 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
       function.mutable_harmonic()->set_period(factor.points[0]);
       break;
     }
+    case Shape::kTravelling: break;  // a sum of products
     case Shape::kGrid: {
       function.set_and_of(covariate_of(factor.and_axis.of));
       proto::Spline2d& grid = *function.mutable_spline_2d();
@@ -225,6 +226,58 @@ Function function_of(const Factor& factor, const Eigen::VectorXd& coefficients) 
   return function;
 }
 
+/// The weighted columns of a travelling wave, as products of harmonics of x, y and t.
+std::vector<std::vector<Function>> products_of_wave(const Factor& factor, const Eigen::VectorXd& coefficients) {
+  const auto harmonic = [](Function::Covariate of, double number, bool sine) {
+    Function f;
+    f.set_of(of);
+    if (number == 0) {
+      f.clear_of();
+      f.set_constant(sine ? 0 : 1);
+    } else {
+      if (sine)
+        f.mutable_harmonic()->set_sine(number < 0 ? -1 : 1);
+      else
+        f.mutable_harmonic()->set_cosine(1);
+      f.mutable_harmonic()->set_period(2 * M_PI / std::abs(number));
+    }
+    return f;
+  };
+  std::vector<std::vector<Function>> all;
+  const auto add = [&](double weight, double k, bool x, bool y, bool t) {
+    Function size;
+    size.set_constant(rounded(weight));
+    const std::vector<Function> product{size, harmonic(Function::X, k * factor.points[0], x),
+                                        harmonic(Function::Y, k * factor.points[1], y),
+                                        harmonic(Function::TIME, k * factor.points[2], t)};
+    const bool none = std::any_of(product.begin(), product.end(),
+                                  [](const Function& f) { return f.has_constant() && f.constant() == 0; });
+    if (!none) all.push_back(product);
+  };
+  for (std::uint32_t i = 0; i < factor.count; ++i) {
+    const double k = factor.first + i, c = coefficients[2 * i], s = coefficients[2 * i + 1];
+    // cos(a + b - t) and sin(a + b - t).
+    add(c, k, false, false, false);
+    add(-c, k, true, true, false);
+    add(c, k, true, false, true);
+    add(c, k, false, true, true);
+    add(s, k, true, false, false);
+    add(s, k, false, true, false);
+    add(-s, k, false, false, true);
+    add(s, k, true, true, true);
+  }
+  return all;
+}
+
+/// The weighted columns of a factor as a sum of products.
+std::vector<std::vector<Function>> products_of_columns(const Factor& factor, const Eigen::VectorXd& coefficients) {
+  if (factor.shape != Shape::kTravelling) return {{function_of(factor, coefficients)}};
+  if (factor.known.empty()) return products_of_wave(factor, coefficients);
+  const Eigen::Map<const Eigen::VectorXd> known(factor.known.data(),
+                                                static_cast<Eigen::Index>(factor.known.size()));
+  return products_of_wave(factor, coefficients[0] * known);
+}
+
 /// Lists of functions. The sum over lists of the product of each list equals the basis' weighted sum of columns.
 std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factors, std::size_t from,
                                                const Eigen::VectorXd& coefficients) {
@@ -236,17 +289,18 @@ std::vector<std::vector<Function>> products_of(const std::vector<Factor>& factor
   const Factor& factor = factors[from];
   // Amplitudes of a constant stay a product, like those of the curve beside it.
   const bool of_a_constant = factors.size() == 1 && !factor.known.empty();
-  if (from + 1 == factors.size() && !of_a_constant) return {{function_of(factor, coefficients)}};
+  if (from + 1 == factors.size() && !of_a_constant) return products_of_columns(factor, coefficients);
   std::vector<std::vector<Function>> all;
   const auto n = static_cast<Eigen::Index>(factor.size());
   const Eigen::Index rest = coefficients.size() / n;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::VectorXd part = coefficients.segment(i * rest, rest);
     if (part.isZero(0)) continue;
-    const Function own = function_of(factor, Eigen::VectorXd::Unit(n, i));
-    for (std::vector<Function>& product : products_of(factors, from + 1, part)) {
-      product.insert(product.begin(), own);
-      all.push_back(std::move(product));
+    for (const std::vector<Function>& own : products_of_columns(factor, Eigen::VectorXd::Unit(n, i))) {
+      for (std::vector<Function>& product : products_of(factors, from + 1, part)) {
+        product.insert(product.begin(), own.begin(), own.end());
+        all.push_back(std::move(product));
+      }
     }
   }
   return all;
@@ -314,6 +368,7 @@ double rounded(double value) {
 }
 
 const char* form_of(const Term& term) {
+  if (term.general) return "table";
   if (term.blocks.empty() || term.blocks.front().basis.factors.empty()) return "constant";
   if (term.blocks.front().basis.factors.size() > 1) return "product";
   switch (term.blocks.front().basis.factors.front().shape) {
@@ -325,6 +380,7 @@ const char* form_of(const Term& term) {
     case Shape::kGrid: return "map";
     case Shape::kHarmonics:
     case Shape::kWave: return "harmonic";
+    case Shape::kTravelling: return "wave";
     case Shape::kTable: return "table";
     case Shape::kAtLeast: return "steps";
     case Shape::kExponential:

@@ -63,6 +63,7 @@ proto::Model proto_of(const MotionModel& fitted) {
     field.set_name(field_name(c));
     field.set_counts(proto::ArenaField::DRIVEN_TIME);
     field.set_cell_mm(rounded(fitted.cells[c].side_mm));
+    if (fitted.cells[c].forget_s > 0) field.set_forget_s(rounded(fitted.cells[c].forget_s));
   }
   std::set<std::string> names;
   for (const Term& term : fitted.terms) {

@@ -25,6 +25,8 @@ struct BaseParameters {
   /// The disc centre, ahead of the reference point. Contacts and covariates refer to it.
   double centre_mm = kAxleOffset_mm;
   double bias_mean_mm_s = 0.015, bias_sd_mm_s = 1.86;
+  /// Robots follow commands this much later than their stamps: a property of the clocks of the data. s
+  double command_lag_s = 0;
 };
 
 /// Noise variances. Those "per second" grow with time.
@@ -81,6 +83,8 @@ struct Term {
   Eigen::VectorXd coefficients;  ///< of all blocks, in order
   /// Prior precisions of the coefficients. The prior mean is 0.
   Eigen::VectorXd precision;
+  /// A nonparametric term of several covariates: it keeps its bases, and is written as a table.
+  bool general = false;
 };
 
 /// The curve of the first block with its present coefficients, as a factor with known coefficients. `factor`:
@@ -104,12 +108,15 @@ struct MotionModel {
   Noise noise;
   Walls walls;
   bool contacts = true;  ///< whether robots collide with each other
+  /// Log likelihood of the disc centre over that of its alternative; 0: the data do not tell them apart.
+  double centre_evidence = 0;
   /// Whether walls may be anywhere along the boundary of visited places. `walls` is then not used for contacts.
   bool walls_uncertain = false;
   /// Robots with estimated centres this close may be in contact, mm.
   double contact_range_mm = kContactRange_mm;
-  /// Grids of driven time per floor cell.
-  std::array<GridCells, kTrafficGrids> cells = {GridCells{20}, {28}, {39}, {55}, {78}, {110}};
+  /// Grids of driven time per floor cell. Those of the second row forget: fresh trails.
+  std::array<GridCells, kTrafficGrids> cells = {
+      GridCells{20}, {28}, {39}, {55}, {78}, {110}, {30, 0, 0, 10}, {50, 0, 0, 10}, {30, 0, 0, 40}, {50, 0, 0, 40}};
   std::vector<Term> terms;
   std::map<std::uint32_t, RobotBias> robots;
 

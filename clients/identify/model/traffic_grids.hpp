@@ -16,12 +16,12 @@ class TrafficGrids {
   }
   [[nodiscard]] bool any() const { return !grids_.empty(); }
   /// Adds the time of a driven robot at a place, s.
-  void add(double x_mm, double y_mm, double seconds) {
-    for (Grid& grid : grids_) grid.traffic.add(x_mm, y_mm, seconds);
+  void add(double x_mm, double y_mm, double seconds, double now_s) {
+    for (Grid& grid : grids_) grid.traffic.add(x_mm, y_mm, seconds, now_s);
   }
   /// Sets the driven time of the cells at a place.
-  void see(double x_mm, double y_mm, NeighbourView& view) const {
-    for (const Grid& grid : grids_) view.traffic_s[grid.cells] = grid.traffic.value_s(x_mm, y_mm);
+  void see(double x_mm, double y_mm, double now_s, NeighbourView& view) const {
+    for (const Grid& grid : grids_) view.traffic_s[grid.cells] = grid.traffic.value_s(x_mm, y_mm, now_s);
   }
 
  private:

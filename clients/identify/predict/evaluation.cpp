@@ -72,6 +72,7 @@ Evaluation::Evaluation(const MeasuredSet& train, const MeasuredSet* test, std::u
 
 PreparedSet Evaluation::tracks_of(const FitState& state) const {
   PreparedSet tracks = test_tracks_ ? *test_tracks_ : state.tracks;
+  tracks.set_command_lag(state.model.base.command_lag_s);
   if (test_tracks_) tracks.find_centres(state.model, threads_);
   tracks.find_headings(state.model, threads_);
   return tracks;

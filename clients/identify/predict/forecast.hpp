@@ -29,6 +29,10 @@ struct ForecastTimes {
 [[nodiscard]] std::vector<Forecast> forecast(const MotionModel&, const PreparedSet&, const ForecastTimes&,
                                              bool held_out_only, std::uint32_t threads);
 
+/// The forecasts of robots that stayed away from walls and from other robots over the whole horizon, by measured places.
+[[nodiscard]] std::vector<Forecast> free_ones(const MotionModel&, const PreparedSet&, const std::vector<Forecast>&,
+                                              double horizon_s);
+
 /// The sample within 0.01 s of a time; false if there is none.
 [[nodiscard]] bool measured_at(const Track&, double time_s, Sample&);
 

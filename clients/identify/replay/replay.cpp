@@ -122,7 +122,10 @@ class Motors {
     const double middle_s = time_s + kTick_s / 2;
     for (std::size_t r = 0; r < next_.size(); ++r) {
       const Track& track = *scene_.robots[r].track;
-      while (next_[r] < track.commands.size() && track.commands[next_[r]].time_s < middle_s) ++next_[r];
+      const auto begins_s = [&](std::size_t i) {
+        return track.commands[i].time_s + (i > 0 ? scene_.command_lag_s : 0);
+      };
+      while (next_[r] < track.commands.size() && begins_s(next_[r]) < middle_s) ++next_[r];
       const bool seen = track.samples.front().time_s < middle_s;
       const Motion motion = seen && next_[r] > 0 ? track.commands[next_[r] - 1].motion : Motion::kStop;
       // The left motor drives the right-hand wheel.
@@ -228,6 +231,7 @@ Scene scene_of(const MotionModel& model, const PreparedSet& set, std::size_t run
     const Eigen::Vector3d pose = model.pose_of(seen, view.at(first.time_s));
     const double x_mm = pose[0], y_mm = pose[1], heading_rad = pose[2];
     scene.run = view.number;
+    scene.command_lag_s = model.base.command_lag_s;
     scene.robots.push_back({view.track, x_mm + model.base.centre_mm * std::cos(heading_rad),
                             y_mm + model.base.centre_mm * std::sin(heading_rad), wrapped_angle(heading_rad)});
   }

@@ -17,8 +17,9 @@ struct Scene {
     double x_mm = 0, y_mm = 0, heading_rad = 0;  ///< disc centre at the first sample
   };
   Walls walls;
-  bool contacts = true;   ///< true: the planar engine, robots collide; false: the kinematic engine
-  std::uint32_t run = 0;  ///< value of the covariate RUN
+  bool contacts = true;      ///< true: the planar engine, robots collide; false: the kinematic engine
+  std::uint32_t run = 0;     ///< value of the covariate RUN
+  double command_lag_s = 0;  ///< as in BaseParameters
   std::vector<Robot> robots;
 
   /// Time of the last sample, s.

@@ -62,8 +62,8 @@ std::string fault_list(const json& contract) {
   return out.empty() ? "" : "<ul class=\"faults\">" + out + "</ul>\n";
 }
 
-/// The numbers of an object as a table of two columns.
-std::string figures_of(const json& object) {
+/// The numbers of an object as a table of two columns. `sd`: standard deviations by the same keys, shown as 95 % intervals.
+std::string figures_of(const json& object, const json& sd = {}) {
   if (!object.is_object() || object.empty()) return "";
   html::Table table({"", ""});
   for (const auto& [key, value] : object.items()) {
@@ -72,6 +72,8 @@ std::string figures_of(const json& object) {
                                                   : "";
     if (value.is_string()) shown = escaped(value.get<std::string>());
     if (value.is_boolean()) shown = value.get<bool>() ? "yes" : "no";
+    constexpr double kNormal95 = 1.96;
+    if (const auto spread = number(sd, key.c_str())) shown += " ± " + figure(kNormal95 * *spread);
     if (!shown.empty()) table.row({escaped(html::with_unit(key)), shown});
   }
   return table.text("facts");
@@ -170,13 +172,13 @@ std::string report_html(const json& document) {
               rejected_table(contract));
   std::string model;
   for (const auto& [key, title] : {std::pair{"base", "Drive"}, {"noise", "Noise"}}) {
-    const std::string table = figures_of(part(contract, key));
+    const std::string table = figures_of(part(contract, key), part(contract, (std::string(key) + "_sd").c_str()));
     if (!table.empty()) model += fmt::format("<div><h3>{}</h3>{}</div>\n", title, table);
   }
   if (const std::string table = figures_of(part(document, "set")); !table.empty())
     model += "<div><h3>Data</h3>" + table + "</div>\n";
-  page +=
-      section("model", "Base model and data", "", model.empty() ? "" : "<div class=\"thirds\">" + model + "</div>");
+  page += section("model", "Base model and data", escaped(text(part(contract, "disc_centre"), "in_words")),
+                  model.empty() ? "" : "<div class=\"thirds\">" + model + "</div>");
   return html::page("Kilotwin: identification report", figures.filled(std::move(page)));
 }
 

@@ -43,13 +43,27 @@ std::pair<double, double> pattern_of(const json& plot, const char* when) {
   return {sum, bins};
 }
 
-/// The plot that shows an effect best: over its covariate, with the fitted curve, with the largest mean relative
-/// to its standard error.
+/// Whether a plot shows the residuals of what an effect acts on. An effect on something that has no plot matches none;
+/// results that do not say what effects act on match all.
+bool shows_target(const json& effect, const json& plot) {
+  const std::string acts_on = acts_on_of(effect), target = text(plot, "target");
+  static const std::map<std::string, std::vector<std::string>> kOf = {{"forward", {"speed"}},
+                                                                      {"turn", {"turn rate", "measured heading"}},
+                                                                      {"world_x", {"drift", "measured position"}},
+                                                                      {"world_y", {"drift", "measured position"}}};
+  const auto of = kOf.find(target);
+  return acts_on.empty() || of == kOf.end() ||
+         std::any_of(of->second.begin(), of->second.end(),
+                     [&](const std::string& word) { return acts_on.find(word) != std::string::npos; });
+}
+
+/// The plot that shows an effect best: over its covariate, of what it acts on, with the fitted curve, with the largest mean
+/// relative to its standard error.
 const json* plot_for(const json& effect, const json& plots) {
   const json* best = nullptr;
   double best_strength = 0;
   for (const json& plot : plots) {
-    if (!shares_covariate(effect, text(plot, "covariate"))) continue;
+    if (!shares_covariate(effect, text(plot, "covariate")) || !shows_target(effect, plot)) continue;
     const bool fitted = part(plot, "fitted").is_array();
     const double strength = (fitted ? 1e6 : 1e-6) + pattern_of(plot, "before").first;
     if (strength <= best_strength) continue;

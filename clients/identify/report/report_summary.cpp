@@ -83,6 +83,15 @@ std::string verdict(const json& contract) {
       out += fmt::format(" The reduction is {} to {} mm (95 %).", figure(number(less, "low_mm")),
                          figure(number(less, "high_mm")));
   }
+  const json& free = part(contract, "free");
+  if (const auto share = number(free, "share_of_rows"); share && number(free, "after_mm") && *share < 0.98)
+    out += fmt::format(
+        " For robots that stay away from walls and from each other ({} of the predictions) it is <b>{} mm</b> "
+        "before and "
+        "<b>{} mm</b> after.",
+        percent(share), figure(number(free, "before_mm")), figure(number(free, "after_mm")));
+  for (const char* of : {"command_lag", "numbering"})
+    if (const std::string words = text(part(contract, of), "in_words"); !words.empty()) out += " " + escaped(words);
   if (const json& dropped = part(part(contract, "check"), "dropped"); dropped.is_array() && !dropped.empty())
     out += fmt::format(" {} not written: held-out data are predicted no better with {}.",
                        dropped.size() == 1 ? "One effect was" : fmt::format("{} effects were", dropped.size()),

@@ -124,6 +124,26 @@ void add_history_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   }
 }
 
+void add_inertia_hypotheses(DictionaryBuilder& make, const Extent& extent) {
+  std::vector<double> moving;
+  if (extent.has_straight) moving.push_back(1);
+  if (extent.has_turns) moving.insert(moving.end(), {2, 3});
+  if (moving.size() + (extent.has_stop ? 1 : 0) < 2) return;
+  // What is left of the motion under the previous command, and what lacks of that under the present one.
+  const Factor since = keyed(Shape::kExponential, Covariate::kSinceCommand, {0.4, 1.2, 3.6});
+  std::vector<Eigen::Index> columns;
+  for (const Target target : {Target::kAhead, Target::kTurn}) {
+    for (const Covariate which : {Covariate::kPreviousCommand, Covariate::kCommand}) {
+      const Basis basis{{keyed(Shape::kTable, which, moving), since}};
+      const std::uint8_t during = which == Covariate::kCommand ? kDriven : kAlways;
+      for (const Eigen::Index c :
+           some({make.put(target, basis, during)}, 0, static_cast<Eigen::Index>(basis.size())))
+        columns.push_back(c);
+    }
+  }
+  make.add("inertia-by-command", {"history", "time_since_command"}, "speed and turn rate", columns);
+}
+
 void add_discounted_motor_time_hypotheses(DictionaryBuilder& make, const Extent& extent) {
   const auto lately = [&](Shape shape, Covariate of, std::size_t decay_index, std::uint32_t count) {
     Factor f = over(shape, of, 0, std::min(kDecayTimes_s[decay_index], extent.driven_s), count);

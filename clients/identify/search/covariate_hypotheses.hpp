@@ -26,6 +26,9 @@ void add_motor_time_hypotheses(DictionaryBuilder&, const Extent&);
 void add_command_hypotheses(DictionaryBuilder&, const Extent&);
 /// The previous command: constants, or curves of the time since the change, under any command and under straight.
 void add_history_hypotheses(DictionaryBuilder&, const Extent&);
+/// Wheels that change from the speed under the previous command to that under the present one within seconds, also when
+/// robots stop.
+void add_inertia_hypotheses(DictionaryBuilder&, const Extent&);
 /// Discounted motor-on time: motors warm up and cool down, batteries recover, turns accumulate to one side.
 void add_discounted_motor_time_hypotheses(DictionaryBuilder&, const Extent&);
 

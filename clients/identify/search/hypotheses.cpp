@@ -64,6 +64,7 @@ Dictionary dictionary_of(const Extent& extent, const std::vector<Term>& found) {
   add_command_hypotheses(make, extent);
   add_neighbour_hypotheses(make, extent);
   add_history_hypotheses(make, extent);
+  add_inertia_hypotheses(make, extent);
   add_traffic_hypotheses(make);
   add_discounted_motor_time_hypotheses(make, extent);
   add_robot_hypotheses(make, extent);

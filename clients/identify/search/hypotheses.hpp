@@ -49,4 +49,8 @@ struct Extent {
 /// For terms already found, the dictionary also has hypotheses about their amplitudes.
 [[nodiscard]] Dictionary dictionary_of(const Extent&, const std::vector<Term>& found = {});
 
+/// Hypotheses without a named form: products of bases over any two covariates, and maps that change with time. One
+/// dictionary per family of covariates, since the cost rises with the square of the columns.
+[[nodiscard]] std::vector<Dictionary> general_dictionaries_of(const Extent&);
+
 }  // namespace kilotwin::identify

@@ -15,6 +15,7 @@
 #include "clients/identify/search/target_extension.hpp"
 #include "clients/identify/search/total_variation_map.hpp"
 #include "clients/identify/search/traffic_shape.hpp"
+#include "clients/identify/search/travelling_waves.hpp"
 
 namespace kilotwin::identify {
 namespace {
@@ -36,19 +37,28 @@ constexpr const char* kCameraForDrift = "camera-by-time for drift-by-time";
 constexpr double kRemnant = 0.003;
 /// Largest number of samples in the test. More add cost and no power that is needed.
 constexpr std::size_t kEnoughSamples = 130000;
+/// The same for general terms, which have more columns.
+constexpr std::size_t kEnoughForGeneral = 70000;
+constexpr int kMostGeneral = 3;
+/// Key of a general term among the failed hypotheses.
+constexpr const char* kGeneral = "general ";
 
 class Loop {
  public:
-  Loop(const Fitter& fitter, const FitState& base, const std::function<void(double, const std::string&)>& progress)
-      : fitter_(fitter), progress_(progress), extent_(extent_of(base.tracks)), out_{base, {}, {{base, {}}},
-                                                                                    {},   {}, {}} {
+  Loop(const Fitter& fitter, const FitState& base, const std::function<void(double, const std::string&)>& progress,
+       const std::function<bool(const FitState&)>& leaves_much)
+      : fitter_(fitter),
+        progress_(progress),
+        leaves_much_(leaves_much),
+        extent_(extent_of(base.tracks)),
+        out_{base, {}, {{base, {}}}, {}, {}, {}} {
     base_likelihood_ = fitter.log_likelihood_of_all(base);
   }
 
   Search run() {
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMostRounds + 2 * general_terms_; ++round) {
       round_ = round;
-      say("testing hypotheses");
+      say("testing hypotheses", 0);
       if (accept_calibration_shifts()) {
         note_stage();
         continue;
@@ -57,6 +67,10 @@ class Loop {
       const ScoreTest::Outcome outcome = score_test_->test(kSeed + static_cast<std::uint64_t>(round));
       note_rejected(outcome);
       const Finding* const best = best_of(outcome, kRemnant * explained());
+      if (best != nullptr && lag_explains(*best)) {
+        note_stage();
+        continue;
+      }
       if (best != nullptr) {
         const Search before = out_;
         const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
@@ -72,7 +86,7 @@ class Loop {
           out_ = before;
           failed_.insert(hypothesis(*best).name);
         } else {
-          say("backward elimination");
+          say("backward elimination", 0.6);
           eliminate_earlier();
           fitter_.fit_contacts(out_.fit);
           try_camera_motion();
@@ -80,30 +94,34 @@ class Loop {
         }
         continue;
       }
-      say("testing alternatives");
-      if (!eliminate()) break;
+      say("testing alternatives", 0.5);
+      if (!eliminate() && !accept_general()) break;
       note_stage();
     }
-    say("simplifying shapes");
-    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) simplify(fitter_, out_.fit, t);
+    for (std::size_t t = 0; t < out_.fit.model.terms.size(); ++t) {
+      say("simplifying shapes", static_cast<double>(t) / static_cast<double>(out_.fit.model.terms.size()));
+      simplify(fitter_, out_.fit, t);
+    }
     return std::move(out_);
   }
 
  private:
   void note_stage() { out_.path.push_back({out_.fit, out_.reasons}); }
-  void say(const char* doing) const {
+  /// `part`: the share of the present round that is done.
+  void say(const char* doing, double part) const {
     std::string text = doing;
     for (const Term& term : out_.fit.model.terms)
       text += (&term == &out_.fit.model.terms.front() ? "; accepted: " : ", ") + term.name;
-    progress_(0.9 * round_ / kMostRounds, text);
+    progress_(std::min(0.95, 0.9 * (round_ + part) / kMostRounds), text);
   }
   /// The tracks of the test. A large set: every n-th unit.
-  [[nodiscard]] std::vector<std::vector<const TrackView*>> tested_units() const {
+  [[nodiscard]] std::vector<std::vector<const TrackView*>> tested_units(
+      std::size_t most_samples = kEnoughSamples) const {
     std::vector<std::vector<const TrackView*>> units = out_.fit.tracks.units();
     std::size_t samples = 0;
     for (const auto& unit : units)
       for (const TrackView* view : unit) samples += view->track->samples.size();
-    const std::size_t every = samples / kEnoughSamples + 1;
+    const std::size_t every = samples / most_samples + 1;
     std::vector<std::vector<const TrackView*>> part;
     for (std::size_t u = 0; u < units.size(); u += every) part.push_back(units[u]);
     return part.size() >= 6 ? part : units;
@@ -155,6 +173,71 @@ class Loop {
   /// Gain in log likelihood of all accepted effects.
   [[nodiscard]] double explained() const { return fitter_.log_likelihood_of_all(out_.fit) - base_likelihood_; }
 
+  /// Adds the general term with the most evidence if much is left unexplained. Returns whether there is one.
+  bool accept_general() {
+    if (general_terms_ == kMostGeneral || !leaves_much_ || !leaves_much_(out_.fit)) return false;
+    say("testing general terms", 0.7);
+    if (general_.empty()) general_ = general_dictionaries_of(extent_);
+    std::vector<Dictionary> families = general_;
+    if (Dictionary waves = wave_dictionary_of(fitter_, out_.fit, extent_); !waves.hypotheses.empty())
+      families.push_back(std::move(waves));
+    struct Best {
+      Term term;
+      Reason reason;
+    };
+    std::optional<Best> best;
+    bool is_wave = false;  // a form of its own, with a name
+    for (const Dictionary& family : families) {
+      std::vector<Block> blocks = blocks_of(out_.fit.model);
+      blocks.insert(blocks.end(), family.blocks.begin(), family.blocks.end());
+      const std::vector<Unit> units =
+          linearise(out_.fit.model, tested_units(kEnoughForGeneral), blocks, {100, fitter_.threads()});
+      const ScoreTest test(fitter_, out_.fit.model, units, family);
+      const ScoreTest::Outcome outcome = test.test(kSeed + 100 + static_cast<std::uint64_t>(round_));
+      for (const Finding& f : outcome.findings) {
+        const Hypothesis& h = family.hypotheses[f.hypothesis];
+        if (!good(f, outcome.threshold_log10_p) || f.evidence < kRemnant * explained() ||
+            failed_.contains(kGeneral + h.name) || (best && f.evidence <= best->reason.finding.evidence))
+          continue;
+        is_wave = &family == &families.back() && families.size() > general_.size();
+        best = Best{family.term_of(h, f.relative_scale), {h.covariates, h.acts_on, f, outcome.threshold_log10_p}};
+      }
+    }
+    if (!best) return false;
+    const Search before = out_;
+    const double likelihood = fitter_.log_likelihood_of_all(out_.fit);
+    const std::string name = best->term.name;
+    best->term.general = !is_wave;
+    out_.fit.model.terms.push_back(std::move(best->term));
+    out_.reasons.push_back(std::move(best->reason));
+    say("fitting", 0.3);
+    fitter_.fit(out_.fit, 2);
+    refine_shape(out_.fit.model.terms.size() - 1);
+    fitter_.fit_contacts(out_.fit);
+    out_.steps.push_back({name, out_.reasons.back().finding.held_out});
+    if (fitter_.log_likelihood_of_all(out_.fit) < likelihood + 3) {
+      out_ = before;
+      failed_.insert(kGeneral + name);
+      return accept_general();
+    }
+    ++general_terms_;
+    --eliminations_;
+    return true;
+  }
+  /// Whether a lag between commands and motion, one number, explains most of what the best hypothesis explains. Then
+  /// the model gets the lag.
+  bool lag_explains(const Finding& best) {
+    constexpr double kMost = 0.8;
+    if (fitter_.fit_command_lag(out_.fit, kMost * best.evidence) == 0) return false;
+    if (out_.reasons.empty() || starts_anew_) return true;
+    // Effects that were found beside a wrong clock may be its artefacts: the search starts anew.
+    FitState anew = out_.path.front().fit;
+    if (fitter_.fit_command_lag(anew) == 0) return true;
+    starts_anew_ = true;
+    out_ = {std::move(anew), {}, {out_.path.front()}, {}, {}, {}};
+    failed_.clear();
+    return true;
+  }
   /// Adds calibration shifts of the camera. Returns whether there were any.
   bool accept_calibration_shifts() {
     // A smooth curve of a drift with sudden ends leaves residuals that look like shifts.
@@ -205,7 +288,7 @@ class Loop {
     }
     out_.fit.model.terms.push_back(std::move(term));
     out_.reasons.push_back(reason);
-    say("fitting");
+    say("fitting", 0.3);
     fitter_.fit(out_.fit, 2);
     out_.steps.push_back({h.name, found.held_out});
     if (!merged()) refine_shape(out_.fit.model.terms.size() - 1);
@@ -216,7 +299,7 @@ class Loop {
     constexpr double kMost = 0.5;
     const Search before = out_;
     const double likelihood = fitter_.log_likelihood(out_.fit);
-    say("fitting");
+    say("fitting", 0.3);
     refine_shape(place);
     if (fitter_.log_likelihood(out_.fit) > likelihood + kMost * expected_gain) return true;
     out_ = before;
@@ -234,6 +317,7 @@ class Loop {
 
   /// Refines the shape of a term.
   void refine_shape(std::size_t place) {
+    if (out_.fit.model.terms[place].general) return refit(fitter_, out_.fit, place);
     if (!refine_neighbour_shape(fitter_, out_.fit, place) && !refine_traffic_shape(fitter_, out_.fit, place))
       refine_curves(fitter_, out_.fit, place);
     const std::string before = out_.fit.model.terms[place].name,
@@ -394,7 +478,7 @@ class Loop {
     out_ = *alternatives_.before;
     out_.fit.model.terms.push_back(term);
     out_.reasons.push_back(reason);
-    say("fitting");
+    say("fitting", 0.3);
     fitter_.fit(out_.fit, 2);
     refine_shape(out_.fit.model.terms.size() - 1);
     fitter_.fit_contacts(out_.fit);
@@ -431,6 +515,9 @@ class Loop {
 
   const Fitter& fitter_;
   const std::function<void(double, const std::string&)>& progress_;
+  const std::function<bool(const FitState&)>& leaves_much_;
+  std::vector<Dictionary> general_;  ///< empty: not needed yet
+  int general_terms_ = 0;
   const Extent extent_;
   Dictionary dictionary_;  ///< hypotheses in addition to the model
   std::optional<ScoreTest> score_test_;
@@ -445,13 +532,15 @@ class Loop {
   Alternatives alternatives_;
   std::set<std::string> failed_;  ///< hypotheses that failed after the refit
   int eliminations_ = 0, round_ = 0;
+  bool starts_anew_ = false;  ///< with a lag
 };
 
 }  // namespace
 
 Search search(const Fitter& fitter, const FitState& base,
-              const std::function<void(double, const std::string&)>& progress) {
-  return Loop(fitter, base, progress).run();
+              const std::function<void(double, const std::string&)>& progress,
+              const std::function<bool(const FitState&)>& leaves_much) {
+  return Loop(fitter, base, progress, leaves_much).run();
 }
 
 }  // namespace kilotwin::identify

@@ -54,8 +54,10 @@ struct Search {
   std::vector<Step> steps;
 };
 
-/// Starts from a fitted base model. `progress` gets 0..1 and the present step.
+/// Starts from a fitted base model. `progress` gets 0..1 and the present step. `leaves_much`: whether a model leaves a
+/// large systematic error of the data of the fit; only then general terms are tested, those without a named form.
 [[nodiscard]] Search search(const Fitter&, const FitState& base,
-                            const std::function<void(double, const std::string&)>& progress);
+                            const std::function<void(double, const std::string&)>& progress,
+                            const std::function<bool(const FitState&)>& leaves_much = {});
 
 }  // namespace kilotwin::identify

@@ -42,7 +42,8 @@ Factor richer(Factor f) {
     case Shape::kCosines2: f.count = 11; break;
     case Shape::kPolynomials2: f.count = 7; break;
     case Shape::kHarmonics: f.count = f.axis.of == Covariate::kBearing ? 3 : 10; break;
-    case Shape::kTaper: f.count = 6; break;
+    case Shape::kTaper:
+    case Shape::kTravelling: f.count = 6; break;
     case Shape::kExponential: f.points = {0.25, 0.5, 1, 2, 4, 8}; break;
     case Shape::kAtLeast:
       if (f.axis.of != Covariate::kTime) break;
@@ -379,6 +380,7 @@ void fit_smoothly(const Fitter& fitter, FitState& state, std::size_t place, cons
 }  // namespace
 
 void refine_curves(const Fitter& fitter, FitState& state, std::size_t place) {
+  if (state.model.terms[place].general) return refit(fitter, state, place);
   fit_smoothly(fitter, state, place, richer(state.model.terms[place]));
 }
 

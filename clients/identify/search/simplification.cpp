@@ -141,9 +141,72 @@ double cost_of(const Fitter& fitter, const FitState& state, std::size_t place) {
   return -log_evidence(now.information, Eigen::VectorXd::Zero(sd.size()), sd);
 }
 
+/// A table times a curve over time, both open; null: another term.
+const Factor* amplitudes_over_time(const Term& term) {
+  if (term.blocks.size() != 1 || is_measured(term.blocks.front().target)) return nullptr;
+  const std::vector<Factor>& factors = term.blocks.front().basis.factors;
+  if (factors.size() != 2 || !factors[0].known.empty() || !factors[1].known.empty()) return nullptr;
+  const bool over_time = factors[1].shape == Shape::kCosines &&
+                         (factors[1].axis.of == Covariate::kTime || factors[1].axis.of == Covariate::kDrivenTime);
+  return factors[0].shape == Shape::kTable && over_time ? factors.data() : nullptr;
+}
+
+/// Replaces curves of robots or commands over time by amplitudes that begin at one instant, if those do as well.
+bool simplify_to_switch(const Fitter& fitter, FitState& state, std::size_t place) {
+  const Factor* const factors = amplitudes_over_time(state.model.terms[place]);
+  if (factors == nullptr || factors[0].points.empty() || factors[0].points.size() > kMostColumns / 2) return false;
+  const Factor table = factors[0], curve = factors[1];
+  const Block like = state.model.terms[place].blocks.front();
+  const auto keys = static_cast<Eigen::Index>(table.points.size());
+  const auto each = std::max<std::size_t>(1, kMostColumns / table.points.size());
+  constexpr std::size_t kFirst = 12, kNext = 6;
+  FitState simple = state;
+  double low_s = curve.low, high_s = curve.high;
+  for (std::size_t points = kFirst; high_s - low_s > 1; points = kNext) {
+    const double apart_s = (high_s - low_s) / static_cast<double>(points + 1);
+    std::vector<double> at;
+    for (std::size_t i = 1; i <= points; ++i) at.push_back(low_s + static_cast<double>(i) * apart_s);
+    std::vector<Block> blocks;
+    for (std::size_t first = 0; first < points; first += each) {
+      Block block = like;
+      const auto end = at.begin() + static_cast<std::ptrdiff_t>(std::min(points, first + each));
+      Factor begins =
+          form(curve, Shape::kAtLeast, 1, {at.begin() + static_cast<std::ptrdiff_t>(first), end}).basis.factors[0];
+      block.basis = Basis{{begins, table}};
+      blocks.push_back(std::move(block));
+    }
+    const LocalQuadratic l = local_quadratic(fitter, simple, place, blocks);
+    const Eigen::VectorXd score = l.score_without(simple.model.terms[place].coefficients);
+    const ReducedColumns data = reduced_columns(l, score, l.added_columns());
+    std::vector<SimpleForm> instants;
+    for (std::size_t i = 0; i < points; ++i) {
+      SimpleForm one = form(curve, Shape::kAtLeast, 1, {at[i]});
+      one.basis.factors.push_back(table);
+      one.first = static_cast<Eigen::Index>(i) * keys;
+      instants.push_back(std::move(one));
+    }
+    const BestForm best = best_of(instants, data, 1);
+    if (best.form == nullptr) return false;
+    std::vector<Eigen::Index> columns;
+    for (const Eigen::Index c : best.columns) columns.push_back(l.own + c);
+    replace_blocks(simple.model, place, l, {{like.target, best.form->basis, like.during}}, score, columns, best.sd);
+    const double found_s = best.form->basis.factors.front().points.front();
+    low_s = found_s - apart_s;
+    high_s = found_s + apart_s;
+  }
+  simple.model.terms[place].general = false;
+  fitter.fit(simple, 2);
+  constexpr double kChoice = 5;  // log of the number of instants
+  const double lost = fitter.log_likelihood(state) - fitter.log_likelihood(simple);
+  if (lost > cost_of(fitter, state, place) - cost_of(fitter, simple, place) - kChoice) return false;
+  state = std::move(simple);
+  return true;
+}
+
 }  // namespace
 
 bool simplify(const Fitter& fitter, FitState& state, std::size_t place) {
+  if (simplify_to_switch(fitter, state, place)) return true;
   const Factor* const curve = curve_of(state.model.terms[place]);
   if (curve == nullptr || state.model.terms[place].coefficients.size() < 2) return false;
   std::vector<SimpleForm> forms = forms_of(*curve, state.model.terms[place].blocks.front().target);

@@ -69,13 +69,32 @@ void with_constant(Basis& basis) {
     basis.factors.front().first = 0;
 }
 
+/// Headings that are measured in a bent picture: to first order each is off by a(x, y) + b(x, y) cos 2h + c(x, y) sin 2h,
+/// with the heading h and maps that follow from the derivatives of the distortion.
+Extension bent_directions(const Factor& map) {
+  Factor place = map;
+  place.known.clear();
+  place.count = std::min<std::uint32_t>(place.count, 4);
+  Factor twice;
+  twice.shape = Shape::kHarmonics;
+  twice.axis.of = Covariate::kHeading;
+  twice.first = 2;
+  twice.count = 1;
+  return {{{Target::kMeasuredHeading, Basis{{place}}, kAlways},
+           {Target::kMeasuredHeading, Basis{{twice}}, kAlways},
+           {Target::kMeasuredHeading, Basis{{place, twice}}, kAlways}}};
+}
+
 std::vector<Extension> extensions_of(const Term& term, bool headings) {
   const Block& first = term.blocks.front();
   const Basis basis = modest(first.basis);
   std::vector<Extension> all;
   if (is_measured(first.target)) {
-    if (headings && !acts(term, Target::kMeasuredHeading, kAlways))
+    if (headings && !acts(term, Target::kMeasuredHeading, kAlways)) {
       all.push_back({{{Target::kMeasuredHeading, basis, kAlways}}});
+      if (const Factor* const map = basis.only_open(); map != nullptr && basis.factors.size() == 1 && map->of_two())
+        all.push_back(bent_directions(*map));
+    }
     if (basis.looks_at(Covariate::kX) || first.target != Target::kMeasuredX) return all;
     // A camera that shifts may also rotate and change its scale.
     for (const Target target : {Target::kMeasuredTurn, Target::kMeasuredScale})
@@ -103,6 +122,7 @@ std::vector<Extension> extensions_of(const Term& term, bool headings) {
 }  // namespace
 
 void extend_targets(const Fitter& fitter, FitState& state, std::size_t place) {
+  if (state.model.terms[place].general) return;
   for (int extended = 0; extended < kMostExtensions; ++extended) {
     const std::vector<Extension> all = extensions_of(state.model.terms[place], state.tracks.set().has_headings);
     if (all.empty()) return;

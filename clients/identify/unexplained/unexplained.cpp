@@ -162,6 +162,14 @@ double LearnerCheck::predicted_mm() const {
   return less_by_mm.low_mm > 0 && square > kLarge * error_mm * error_mm ? std::sqrt(square) : 0;
 }
 
+bool leaves_systematic_error(const MeasuredSet& set, const std::vector<Window>& known,
+                             const PredictionErrors& errors) {
+  if (errors.rows == 0) return false;
+  if (errors.rmse_mm() > kBeyond * errors.expected_mm()) return true;
+  const std::optional<LearnerCheck> learner = check_of(set, known, {});
+  return learner && learner->predicted_mm() > 0;
+}
+
 Unexplained find_unexplained(const MeasuredSet& set, const std::vector<Window>& known,
                              const std::vector<Window>& held_out, const PredictionErrors& errors,
                              const std::optional<ErrorBounds>& bounds,

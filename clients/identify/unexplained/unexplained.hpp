@@ -44,4 +44,8 @@ struct Unexplained {
                                            const std::optional<ErrorBounds>& bounds,
                                            const std::optional<Replicates>& replicates);
 
+/// Whether a model leaves a systematic error of the data of its own fit: `known` are its windows, `errors` its errors there.
+[[nodiscard]] bool leaves_systematic_error(const MeasuredSet&, const std::vector<Window>& known,
+                                           const PredictionErrors& errors);
+
 }  // namespace kilotwin::identify

@@ -75,6 +75,14 @@ std::vector<Form> forms() {
   Factor amplitudes = over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5});
   amplitudes.known = {0.6, -0.9};
   amplitudes.plus = 1;
+  Factor travelling = over(Shape::kTravelling, Covariate::kX, 0, 1, 2, {0.012, -0.007, 0.3});
+  travelling.and_axis.of = Covariate::kY;
+  Factor whole_map = map;
+  whole_map.first = 0;
+  Factor of_time = over(Shape::kCosines, Covariate::kTime, 0, 18, 3);
+  of_time.first = 0;
+  Factor twice = over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 1);
+  twice.first = 2;
   Factor growing = known;
   growing.plus = 0.5;
   return {
@@ -122,6 +130,12 @@ std::vector<Form> forms() {
       {"robots' known amounts of a curve", {{amplitudes, over(Shape::kCosines, Covariate::kTime, 0, 18, 4)}}},
       {"robots' known amounts of a constant", {{amplitudes}}},
       {"a known curve times harmonics", {{growing, over(Shape::kHarmonics, Covariate::kHeading, 0, 1, 3)}}},
+      {"travelling wave", {{travelling}}},
+      {"robots' own travelling waves", {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}), travelling}}},
+      {"map over time", {{of_time, whole_map}}},
+      {"map of bent headings", {{lens, twice}}},
+      {"commands and what is left of the one before",
+       {{previous, over(Shape::kExponential, Covariate::kSinceCommand, 0, 1, 1, {0.4, 1.2, 3.6})}}},
       {"robots in time",
        {{over(Shape::kTable, Covariate::kRobot, 0, 1, 1, {3, 5}),
          over(Shape::kLinear, Covariate::kTime, 0, 15, 1)}}}};

@@ -1,0 +1,96 @@
+#include "clients/identify/fit/numbering.hpp"
+
+#include <Eigen/LU>
+#include <map>
+#include <random>
+#include <utility>
+#include <vector>
+
+namespace kilotwin::identify {
+namespace {
+
+/// Least number of tracks of a run.
+constexpr std::size_t kFewestTracks = 5;
+
+/// The biases of one track by its own measurements.
+struct TrackBias {
+  std::uint32_t robot, run;
+  Eigen::Vector2d mean_mm_s;
+  Eigen::Matrix2d precision;
+};
+
+/// Precision-weighted means and the sum of squares about them.
+struct Pool {
+  Eigen::Matrix2d precision = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
+  double square = 0;
+  int count = 0;
+  void add(const TrackBias& t) {
+    precision += t.precision;
+    weighted += t.precision * t.mean_mm_s;
+    square += t.mean_mm_s.dot(t.precision * t.mean_mm_s);
+    ++count;
+  }
+  [[nodiscard]] Eigen::Vector2d mean() const { return precision.inverse() * weighted; }
+  [[nodiscard]] double spread() const { return square - weighted.dot(mean()); }
+};
+
+std::vector<TrackBias> track_biases(const Fitter& fitter, const FitState& base) {
+  const MotionModel& model = base.model;
+  std::vector<std::vector<const TrackView*>> tracks;
+  for (const TrackView& view : base.tracks.views())
+    if (!view.track->held_out && view.track->samples.size() > 1) tracks.push_back({&view});
+  const std::vector<Unit> units = linearise(model, tracks, blocks_of(model), {100, fitter.threads()});
+  const double prior = 1 / (model.base.bias_sd_mm_s * model.base.bias_sd_mm_s);
+  std::vector<TrackBias> out;
+  for (std::size_t u = 0; u < units.size(); ++u) {
+    const Eigen::Matrix2d all = units[u].bias_covariance.inverse(), own = all - prior * Eigen::Matrix2d::Identity();
+    if (own.determinant() < prior * prior) continue;  // a track that tells next to nothing
+    const std::uint32_t robot = tracks[u].front()->track->robot;
+    const Eigen::Vector2d weighted = all * (model.bias_of(robot).mean_mm_s + units[u].bias_step) -
+                                     prior * Eigen::Vector2d::Constant(model.base.bias_mean_mm_s);
+    out.push_back({robot, tracks[u].front()->run, own.inverse() * weighted, own});
+  }
+  std::map<std::uint32_t, Pool> runs;
+  for (const TrackBias& t : out) runs[t.run].add(t);
+  for (TrackBias& t : out) t.mean_mm_s -= runs[t.run].mean();
+  return out;
+}
+
+/// Sum of squares of the biases about the means of their robots' numbers.
+double within(const std::vector<TrackBias>& tracks) {
+  std::map<std::uint32_t, Pool> robots;
+  for (const TrackBias& t : tracks) robots[t.robot].add(t);
+  double sum = 0;
+  for (const auto& [robot, pool] : robots) sum += pool.spread();
+  return sum;
+}
+
+}  // namespace
+
+Numbering numbering_of(const Fitter& fitter, const FitState& base) {
+  constexpr int kTrials = 400;
+  std::vector<TrackBias> tracks = track_biases(fitter, base);
+  std::map<std::uint32_t, std::vector<std::size_t>> runs;
+  for (std::size_t t = 0; t < tracks.size(); ++t) runs[tracks[t].run].push_back(t);
+  std::erase_if(runs, [](const auto& run) { return run.second.size() < kFewestTracks; });
+  if (runs.size() < 2) return {};
+  Pool all;
+  for (const TrackBias& t : tracks) all.add(t);
+  Numbering out;
+  out.spread = all.spread() / (2.0 * (all.count - 1));
+  const double own = within(tracks);
+  std::mt19937_64 engine(20191);
+  int as_good = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<TrackBias> drawn = tracks;
+    for (const auto& [run, members] : runs)
+      for (std::size_t i = members.size(); i > 1; --i)
+        std::swap(drawn[members[i - 1]].robot, drawn[members[engine() % i]].robot);
+    as_good += within(drawn) <= own ? 1 : 0;
+  }
+  out.chance = static_cast<double>(as_good) / kTrials;
+  return out;
+}
+
+}  // namespace kilotwin::identify

@@ -1,0 +1,154 @@
+#include "clients/identify/search/travelling_waves.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+
+#include "clients/identify/search/dictionary_builder.hpp"
+#include "clients/identify/search/visits.hpp"
+#include "core/os/worker_pool.hpp"
+
+namespace kilotwin::identify {
+namespace {
+
+/// Shortest wavelength and period, and the spacing of the raster as a share of the resolution of the data.
+constexpr double kShortest_mm = 120, kShortest_s = 12, kSpacing = 0.5;
+/// Peaks that become hypotheses.
+constexpr std::size_t kPeaks = 4;
+/// Visits that the periodogram uses.
+constexpr std::size_t kMostVisits = 25000;
+
+struct Point {
+  double x_mm, y_mm, time_s, score, information;
+};
+
+/// Wave numbers, rad/mm, and angular frequency, rad/s.
+using Wave = std::array<double, 3>;
+
+std::vector<Point> points_of(const Fitter& fitter, const FitState& state) {
+  const std::vector<std::vector<Instant>> runs = visits_of(fitter, state, kDriven);
+  std::vector<Point> all;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const double start_s = state.tracks.neighbours(r).instants() > 0 ? state.tracks.neighbours(r).time_s(0) : 0;
+    for (std::size_t i = 0; i < runs[r].size(); ++i)
+      for (const Visit& v : runs[r][i])
+        if (v.information > 0)
+          all.push_back({v.x_mm, v.y_mm, start_s + static_cast<double>(i) * RunNeighbours::kRaster_s, v.score,
+                         v.information});
+  }
+  const std::size_t every = all.size() / kMostVisits + 1;
+  std::vector<Point> some;
+  for (std::size_t i = 0; i < all.size(); i += every) some.push_back(all[i]);
+  return some;
+}
+
+/// Half the sum of squares that a wave of this phase explains.
+double power_of(const std::vector<Point>& points, const Wave& k) {
+  double cosine = 0, sine = 0, cc = 0, ss = 0;
+  for (const Point& p : points) {
+    const double phase = k[0] * p.x_mm + k[1] * p.y_mm - k[2] * p.time_s;
+    const double c = std::cos(phase), s = std::sin(phase);
+    cosine += p.score * c;
+    sine += p.score * s;
+    cc += p.information * c * c;
+    ss += p.information * s * s;
+  }
+  return 0.5 * (cosine * cosine / std::max(cc, 1e-9) + sine * sine / std::max(ss, 1e-9));
+}
+
+struct Peak {
+  Wave wave;
+  double power;
+};
+
+/// The periodogram along the frequencies of one pair of wave numbers, by recurrence.
+Peak best_frequency(const std::vector<Point>& points, double kx, double ky, double step_w, int steps) {
+  using Complex = std::complex<double>;
+  std::vector<Complex> at(points.size()), by(points.size());
+  double information = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point& p = points[i];
+    at[i] = std::polar(p.score, kx * p.x_mm + ky * p.y_mm + steps * step_w * p.time_s);
+    by[i] = std::polar(1.0, -step_w * p.time_s);
+    information += p.information / 2;
+  }
+  Peak best{{kx, ky, 0}, 0};
+  for (int j = -steps; j <= steps; ++j) {
+    Complex sum = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      sum += at[i];
+      at[i] *= by[i];
+    }
+    // A wave that stands still is a map; robots and biases absorb what is constant.
+    if (j == 0) continue;
+    const double power = 0.5 * std::norm(sum) / std::max(information, 1e-9);
+    if (power > best.power) best = {{kx, ky, j * step_w}, power};
+  }
+  return best;
+}
+
+Peak climbed(const std::vector<Point>& points, Peak peak, const Wave& step) {
+  peak.power = power_of(points, peak.wave);
+  for (double part = 0.5; part > 0.02; part /= 2) {
+    for (bool better = true; better;) {
+      better = false;
+      for (std::size_t d = 0; d < 3; ++d) {
+        for (const double sign : {1.0, -1.0}) {
+          Wave trial = peak.wave;
+          trial[d] += sign * part * step[d];
+          const double power = power_of(points, trial);
+          if (power <= peak.power) continue;
+          peak = {trial, power};
+          better = true;
+        }
+      }
+    }
+  }
+  return peak;
+}
+
+}  // namespace
+
+Dictionary wave_dictionary_of(const Fitter& fitter, const FitState& state, const Extent& extent) {
+  Dictionary dictionary;
+  DictionaryBuilder make(dictionary);
+  const std::vector<Point> points = points_of(fitter, state);
+  const double width_mm = extent.x_high_mm - extent.x_low_mm, height_mm = extent.y_high_mm - extent.y_low_mm;
+  constexpr std::size_t kFewest = 500;
+  if (points.size() >= kFewest && extent.duration_s > 2 * kShortest_s) {
+    const Wave step{kSpacing * 2 * M_PI / width_mm, kSpacing * 2 * M_PI / height_mm,
+                    kSpacing * 2 * M_PI / extent.duration_s};
+    const double most = 2 * M_PI / kShortest_mm;
+    const int across = static_cast<int>(most / step[0]), up = static_cast<int>(most / step[1]);
+    const int steps = static_cast<int>(2 * M_PI / kShortest_s / step[2]);
+    // Opposite wave numbers with the opposite frequency are the same wave.
+    std::vector<std::pair<double, double>> numbers;
+    for (int j = 0; j <= up; ++j)
+      for (int i = j == 0 ? 1 : -across; i <= across; ++i) numbers.emplace_back(i * step[0], j * step[1]);
+    std::vector<Peak> peaks(numbers.size());
+    os::in_parallel(numbers.size(), fitter.threads(), [&](std::size_t i) {
+      peaks[i] = best_frequency(points, numbers[i].first, numbers[i].second, step[2], steps);
+    });
+    std::stable_sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.power > b.power; });
+    peaks.resize(std::min(peaks.size(), kPeaks));
+    os::in_parallel(peaks.size(), fitter.threads(),
+                    [&](std::size_t i) { peaks[i] = climbed(points, peaks[i], step); });
+    const double choices = static_cast<double>(numbers.size()) * 2 * steps;
+    for (const Peak& peak : peaks) {
+      Factor wave;
+      wave.shape = Factor::Shape::kTravelling;
+      wave.axis.of = Covariate::kX;
+      wave.and_axis.of = Covariate::kY;
+      wave.count = 2;
+      wave.points.assign(peak.wave.begin(), peak.wave.end());
+      const auto bases = make.put(kSpeed, Basis{{wave}});
+      for (const Eigen::Index size : {2, 4})
+        make.add(kSpeed, "position-and-time", {"position", "time"}, some(bases, 0, size), choices);
+    }
+  }
+  make.finish();
+  return dictionary;
+}
+
+}  // namespace kilotwin::identify

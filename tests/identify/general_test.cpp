@@ -1,0 +1,112 @@
+// Parts of the search on small scenes: lag of the commands, general terms and their simpler forms, bent headings, the disc
+// centre behind a knocked camera, uncertainty.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "clients/identify/fit/uncertainty.hpp"
+#include "clients/identify/model/effect_records.hpp"
+#include "clients/identify/search/search.hpp"
+#include "tests/identify/truth/effects.hpp"
+#include "tests/identify/truth/files.hpp"
+#include "tests/identify/truth/play.hpp"
+#include "tests/identify/truth/scenarios.hpp"
+
+namespace kilotwin {
+namespace {
+
+using identify::FitState;
+using identify::Fitter;
+using identify::MeasuredSet;
+
+/// Ten robots, two runs of 120 s, in an arena of 700 mm.
+truth::Scene small(std::vector<truth::Effect> effects) {
+  truth::Scene scene = truth::scenario("nothing-tidy");
+  scene.robots = 10;
+  scene.train_runs = 2;
+  scene.train_s = 120;
+  scene.test_runs = 0;
+  scene.width_mm = scene.height_mm = 700;
+  scene.effects = std::move(effects);
+  return scene;
+}
+
+truth::Play played(const truth::Scene& scene, std::uint64_t seed = 5) { return truth::play(scene, seed); }
+
+MeasuredSet set_of(const truth::Scene& scene, const truth::Play& play) {
+  const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+  const auto folder = std::filesystem::path(testing::TempDir()) / (std::string("general-") + test->name());
+  truth::write_data(scene, play.train, folder);
+  MeasuredSet set = identify::load_measured_set(folder);
+  std::filesystem::remove_all(folder);
+  return set;
+}
+
+bool finds(const identify::Search& found, const std::vector<std::string>& covariates) {
+  return std::any_of(found.reasons.begin(), found.reasons.end(), [&](const identify::Reason& reason) {
+    return std::all_of(covariates.begin(), covariates.end(), [&](const std::string& c) {
+      return std::find(reason.covariates.begin(), reason.covariates.end(), c) != reason.covariates.end();
+    });
+  });
+}
+
+TEST(CommandLag, IsFittedInPlaceOfEffects) {
+  const truth::Scene scene = small({});
+  for (const double lag_s : {0.1, -0.15}) {
+    MeasuredSet set = set_of(scene, played(scene));
+    for (identify::Run& run : set.runs)
+      for (identify::Track& track : run.tracks)
+        for (identify::CommandChange& change : track.commands)
+          if (change.time_s > 0) change.time_s = std::max(change.time_s - lag_s, 1e-3);
+    FitState base(set);
+    const Fitter fitter(set, 2);
+    fitter.fit_base(base);
+    const identify::Search found = identify::search(fitter, base, [](double, const std::string&) {});
+    EXPECT_FALSE(finds(found, {"time_since_command"})) << lag_s << " s";
+    EXPECT_LE(found.reasons.size(), 1U) << lag_s << " s";
+    EXPECT_NEAR(found.fit.model.base.command_lag_s, lag_s, 0.02);
+  }
+}
+
+TEST(CommandLag, IsNotUsedWithoutOne) {
+  const truth::Scene scene = small({});
+  const MeasuredSet set = set_of(scene, played(scene));
+  FitState base(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(base);
+  EXPECT_EQ(fitter.fit_command_lag(base), 0);
+  EXPECT_EQ(base.model.base.command_lag_s, 0);
+}
+
+TEST(Uncertainty, HoldsTheTrueBiases) {
+  // 40 biases, 2 of them outside on average; more than 8 in one of 2000 sets.
+  truth::Scene scene = small({});
+  scene.robots = 20;
+  const truth::Play play = played(scene);
+  const MeasuredSet set = set_of(scene, play);
+  FitState state(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(state);
+  const identify::Uncertainty u = identify::uncertainty_of(fitter, state);
+  int outside = 0;
+  for (const auto& [robot, covariance] : u.biases) {
+    const truth::Wheels<double>& truth = play.individuals.at(robot).bias_mm_s;
+    const Eigen::Vector2d off = state.model.bias_of(robot).mean_mm_s - Eigen::Vector2d(truth.left, truth.right);
+    for (int w = 0; w < 2; ++w) outside += std::abs(off[w]) > 1.96 * std::sqrt(covariance(w, w)) ? 1 : 0;
+  }
+  EXPECT_LE(outside, 8);
+  for (int c = 0; c < identify::kBaseColumns; ++c) EXPECT_GT(u.sd(c), 0);
+}
+
+TEST(TrafficGrid, Forgets) {
+  identify::TrafficGrid grid({30, 0, 0, 10});
+  grid.add(5, 5, 2, 0);
+  EXPECT_NEAR(grid.value_s(5, 5, 10), 2 * std::exp(-1), 1e-5);
+  grid.add(5, 5, 1, 10);
+  EXPECT_NEAR(grid.value_s(5, 5, 20), (2 * std::exp(-1) + 1) * std::exp(-1), 1e-5);
+}
+
+}  // namespace
+}  // namespace kilotwin
