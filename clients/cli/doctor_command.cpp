@@ -18,6 +18,7 @@
 #include "core/base/error.hpp"
 #include "core/dds/dds.hpp"
 #include "core/federation/topics.hpp"
+#include "core/os/temporary_folder.hpp"
 #include "services/behaviours/compiler.hpp"
 
 namespace kilotwin::cli {
@@ -32,30 +33,9 @@ struct Finding {
   bool fatal = false;
 };
 
-/// A temporary directory.
-class Scratch {
- public:
-  Scratch() {
-    std::error_code error;
-    std::string pattern = (fs::temp_directory_path(error) / "kilotwin-doctor-XXXXXX").string();
-    if (error || mkdtemp(pattern.data()) == nullptr)
-      throw UserError("no directory for temporary files can be written; set TMPDIR to one");
-    path_ = pattern;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 Finding check_compiler() {
   try {
-    const Scratch scratch;
+    const os::TemporaryFolder scratch("kilotwin-doctor");
     const fs::path source = scratch.path() / "probe.c";
     std::ofstream(source) << "#include <kilolib.h>\nvoid setup(void){}\nvoid loop(void){}\n"
                              "int main(void){kilo_init();kilo_start(setup,loop);return 0;}\n";

@@ -1,36 +1,17 @@
 #include "clients/report/gnuplot.hpp"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <filesystem>
 
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "core/os/temporary_folder.hpp"
 
 namespace kilotwin {
 namespace fs = std::filesystem;
 namespace {
-
-class Scratch {
- public:
-  Scratch() {
-    std::string pattern = (fs::temp_directory_path() / "kilotwin-report-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw RunError("no scratch directory can be made for plots");
-    path_ = pattern;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 // Style of all plots: thin frame, print-safe ink, line types with colours that colour-blind readers can
 // distinguish.
@@ -69,7 +50,7 @@ std::vector<Gnuplot::Drawn> Gnuplot::draw() const {
   const fs::path program = os::find_executable("gnuplot");
   if (program.empty())
     throw RunError("the report's plots need gnuplot, which is not on the PATH; install gnuplot-nox");
-  const Scratch scratch;
+  const os::TemporaryFolder scratch("kilotwin-report");
   const auto file = [&](std::size_t k) { return (scratch.path() / fmt::format("{}.svg", k)).string(); };
   const auto run = [&](const std::string& commands) {
     os::write_file(scratch.path() / "plots", commands);

@@ -1,10 +1,9 @@
-#include <cstdlib>
 #include <sstream>
-#include <system_error>
 
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "core/os/temporary_folder.hpp"
 #include "services/behaviours/compiler.hpp"
 #include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/program_text.hpp"
@@ -12,23 +11,6 @@
 namespace kilotwin::behaviours {
 namespace fs = std::filesystem;
 namespace {
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() : path_((fs::temp_directory_path() / "kilotwin-avr-XXXXXX").string()) {
-    if (mkdtemp(path_.data()) == nullptr) throw RunError(path_ + ": cannot be made; is the disk full?");
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  [[nodiscard]] fs::path path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 std::string required_tool(const char* name, const char* package) {
   const fs::path path = os::find_executable(name);
@@ -53,7 +35,7 @@ AvrSize compile_for_avr(const std::vector<fs::path>& sources, const CompileOptio
   const std::string gcc = required_tool("avr-gcc", "gcc-avr avr-libc");
   const std::string size = required_tool("avr-size", "binutils-avr");
   const fs::path runtime = unpacked_runtime(os::cache_directory(options.cache_directory));
-  const TemporaryFolder folder;
+  const os::TemporaryFolder folder("kilotwin-avr");
   std::vector<std::string> link{gcc, "-mmcu=atmega328p", "-r", "-nostartfiles", "-Wl,-d"};
   const ProgramText text = program_text(sources, os::cache_directory(options.cache_directory));
   for (const fs::path& source : text.files) {

@@ -5,6 +5,7 @@
 #include "core/base/error.hpp"
 #include "core/os/files.hpp"
 #include "core/os/process.hpp"
+#include "core/os/temporary_folder.hpp"
 #include "services/behaviours/compiler.hpp"
 #include "services/behaviours/compiler_common.hpp"
 #include "services/behaviours/program_text.hpp"
@@ -52,28 +53,6 @@ fs::path compile_boot_loader(const fs::path& gcc, const fs::path& runtime, const
   return octets;
 }
 
-/// A folder in the cache for the files of one link, removed by the destructor.
-class Workplace {
- public:
-  explicit Workplace(const fs::path& cache) {
-    std::error_code error;
-    fs::create_directories(cache / "firmware", error);
-    std::string made = (cache / "firmware" / "linking-XXXXXX").string();
-    if (mkdtemp(made.data()) == nullptr) throw RunError(made + ": cannot be made; is the disk full?");
-    path_ = made;
-  }
-  Workplace(const Workplace&) = delete;
-  Workplace& operator=(const Workplace&) = delete;
-  ~Workplace() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 /// The arguments that link kilolib, and the boot loader if asked, into the program.
 std::vector<std::string> link_arguments(const fs::path& gcc, const fs::path& runtime, const fs::path& folder,
                                         bool boot_loader) {
@@ -94,7 +73,7 @@ CompiledProgram compile_firmware(const std::vector<fs::path>& given, const Compi
   const fs::path gcc = os::find_executable("avr-gcc");
   if (gcc.empty()) throw UserError("no avr-gcc on this machine; apt-get install gcc-avr avr-libc binutils-avr");
   const fs::path cache = os::cache_directory(options.cache_directory), runtime = unpacked_runtime(cache);
-  const Workplace folder(cache);
+  const os::TemporaryFolder folder("linking", cache / "firmware");
   const fs::path whole = folder.path() / "program.elf";
   std::vector<std::string> common = common_arguments(gcc, runtime);
   for (const std::string& flag : define_flags(options.defines)) common.push_back(flag);
