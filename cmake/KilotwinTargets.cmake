@@ -97,9 +97,9 @@ endfunction()
 # case of which is a ctest. Labels: fast (the default), dds (federates over Cyclone DDS), system (the program as users run it), slow
 # (statistics, fuzzing, identification). A fast program is one more ctest as a whole, with the label whole: a process per case
 # would take most of the time. The test preset "fast" runs these, all others leave them out. SLOW_CASES names cases of a fast program
-# that are slow, as patterns of --gtest_filter.
+# that are slow, as patterns of --gtest_filter. ALONE: no other test runs beside it.
 function(kilotwin_test name)
-  cmake_parse_arguments(arg "UNITE" "TIMEOUT" "SOURCES;DEPENDS;LABELS;SLOW_CASES" ${ARGN})
+  cmake_parse_arguments(arg "UNITE;ALONE" "TIMEOUT" "SOURCES;DEPENDS;LABELS;SLOW_CASES" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -115,7 +115,7 @@ function(kilotwin_test name)
   endif()
   list(JOIN arg_SLOW_CASES ":" slow)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "-${slow}"
-    PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+    PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" RUN_SERIAL "${arg_ALONE}")
   if(slow)
     gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "${slow}" TEST_LIST ${name}_SLOW_TESTS
       PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS slow)

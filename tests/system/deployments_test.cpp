@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -91,6 +90,7 @@ struct Truth {
   bool straight = false;  ///< it has driven straight for 2 s
   bool steady = false;    ///< its LED has not changed for as long as the tracker looks at colours
   bool has_driven = false;
+  bool is_free = false;  ///< it has touched neither a wall nor another robot for 2 s
 };
 
 /// The real world over time, robot by robot.
@@ -122,9 +122,8 @@ class World {
 
  private:
   void tell(std::size_t robot) {
-    constexpr double kStraight_s = 2, kLeast_mm = 8, kLooks_s = 0.5, kDriven_mm = 15;
-    double straight_since = 1e9, led_since = 0, driven_mm = 0;
-    std::size_t before = 0;  // the moment 2 s earlier
+    constexpr double kStraight_s = 2, kFree_s = 2, kLooks_s = 0.5, kDriven_mm = 15;
+    double straight_since = 1e9, led_since = 0, driven_mm = 0, touched = -1e9;
     for (std::size_t n = 0; n < moments_.size(); ++n) {
       const Moment& now = moments_[n];
       const double t = now.time_s;
@@ -132,15 +131,24 @@ class World {
       if (now.drives_straight[robot] && straight_since > t) straight_since = t;
       if (n > 0 && now.leds[robot] != moments_[n - 1].leds[robot]) led_since = t;
       if (n > 0) driven_mm += distance_mm(now.poses[robot], moments_[n - 1].poses[robot]);
-      while (moments_[before].time_s < t - kStraight_s) ++before;
-      // A robot that a wall holds is commanded to drive, and does not.
-      const bool moves = distance_mm(now.poses[robot], moments_[before].poses[robot]) > kLeast_mm;
+      if (touches(now, robot)) touched = t;
       Truth& truth = facts_[n].emplace_back();
       truth.led = now.leds[robot];
-      truth.straight = t - straight_since >= kStraight_s && moves;
+      truth.straight = t - straight_since >= kStraight_s;
+      truth.is_free = t - touched >= kFree_s;
       truth.steady = t - led_since >= kLooks_s;
       truth.has_driven = driven_mm > kDriven_mm;
     }
+  }
+  /// Whether something may hold the robot: its motors then turn it unseen, or push it to a side.
+  static bool touches(const Moment& moment, std::size_t robot) {
+    constexpr double kRadius_mm = 16.5, kNear_mm = 1;
+    const Pose& pose = moment.poses[robot];
+    if (kCeiling.width_mm / 2 - std::abs(pose.x_mm) < kRadius_mm + kNear_mm) return true;
+    if (kCeiling.height_mm / 2 - std::abs(pose.y_mm) < kRadius_mm + kNear_mm) return true;
+    for (std::size_t other = 0; other < moment.poses.size(); ++other)
+      if (other != robot && distance_mm(pose, moment.poses[other]) < 2 * kRadius_mm + kNear_mm) return true;
+    return false;
   }
   static double distance_mm(const Pose& a, const Pose& b) { return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm); }
 
@@ -163,8 +171,9 @@ struct Errors {
 };
 
 struct Comparison {
-  Errors position_mm, heading_deg, straight_deg;
-  std::vector<Errors> heading_of_deg;
+  Errors position_mm;
+  // Headings: of free robots after straight motion, of all free ones, of others.
+  Errors straight_deg, free_deg, touching_deg;
   long led_right = 0, leds = 0, steady_right = 0, steady_leds = 0, absent = 0;
 };
 
@@ -177,7 +186,6 @@ int channels(std::uint8_t led) {
 Comparison compare(const World& world, const std::vector<Moment>& seen, std::size_t first,
                    const std::vector<std::size_t>& whose, double from_s) {
   Comparison result;
-  result.heading_of_deg.resize(kRobots);
   for (const Moment& moment : seen) {
     if (moment.time_s < from_s) continue;
     for (std::size_t i = 0; i < kRobots; ++i) {
@@ -200,12 +208,30 @@ Comparison compare(const World& world, const std::vector<Moment>& seen, std::siz
       // Nobody can know the heading of a robot that has not moved.
       if (!truth->has_driven) continue;
       const double error_deg = wrapped(pose.heading_rad - truth->pose.heading_rad) / kDegree;
-      result.heading_deg.add(error_deg);
-      result.heading_of_deg[i].add(error_deg);
-      if (truth->straight) result.straight_deg.add(error_deg);
+      (truth->is_free ? result.free_deg : result.touching_deg).add(error_deg);
+      if (truth->is_free && truth->straight) result.straight_deg.add(error_deg);
     }
   }
   return result;
+}
+
+/// For each robot of the deployment, from `first` on, the robot of the world at its place.
+std::vector<std::size_t> nearest(const World& world, const Moment& moment, std::size_t first) {
+  std::vector<std::size_t> whose(kRobots);
+  for (std::size_t i = 0; i < kRobots; ++i) {
+    const Pose& pose = moment.poses[first + i];
+    double least_mm = 1e9;
+    for (std::size_t robot = 0; robot < kRobots; ++robot) {
+      const std::optional<Truth> truth = world.at(moment.wall_s, robot);
+      if (!truth) continue;
+      const double off_mm = std::hypot(pose.x_mm - truth->pose.x_mm, pose.y_mm - truth->pose.y_mm);
+      if (off_mm >= least_mm) continue;
+      least_mm = off_mm;
+      whose[i] = robot;
+    }
+    EXPECT_LT(least_mm, 5);
+  }
+  return whose;
 }
 
 class Deployments : public testing::Test {
@@ -253,29 +279,28 @@ class Deployments : public testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     return start(KILOTWIN_VISION, words);
   }
-  /// `straight_deg`: bound of headings after 2 s of straight motion. 5 is the goal.
-  void expect_as_asked(const Comparison& result, double straight_deg = 5) {
-    std::string of_robots;
-    for (const Errors& errors : result.heading_of_deg) of_robots += fmt::format(" {:.1f}", errors.rms());
-    std::printf(
-        "%s",
-        fmt::format("[ measured ] position {:.2f} mm, heading {:.1f} deg after 2 s of straight motion ({} "
-                    "values), {:.1f} deg overall (robots:{}), LED {:.2f} % (just after changes too: "
-                    "{:.2f} %), {} values, absent in {}\n",
-                    result.position_mm.rms(), result.straight_deg.rms(), result.straight_deg.count,
-                    result.heading_deg.rms(), of_robots,
-                    100.0 * static_cast<double>(result.steady_right) /
-                        static_cast<double>(std::max(1L, result.steady_leds)),
-                    100.0 * static_cast<double>(result.led_right) / static_cast<double>(std::max(1L, result.leds)),
-                    result.position_mm.count, result.absent)
-            .c_str());
+  static void expect_as_asked(const Comparison& result) {
+    const auto percent = [](long right, long of) {
+      return 100 * static_cast<double>(right) / static_cast<double>(std::max(1L, of));
+    };
+    Errors overall = result.free_deg;
+    overall.add(result.touching_deg);
+    fmt::print(
+        "[ measured ] position {:.2f} mm; heading of free robots {:.1f} deg after 2 s of straight motion ({} "
+        "values), "
+        "{:.1f} deg whatever they did ({}); of robots that touch others or walls {:.1f} deg ({}); overall {:.1f} "
+        "deg; LED "
+        "{:.2f} % (just after changes too: {:.2f} %); absent in {} of {}\n",
+        result.position_mm.rms(), result.straight_deg.rms(), result.straight_deg.count, result.free_deg.rms(),
+        result.free_deg.count, result.touching_deg.rms(), result.touching_deg.count, overall.rms(),
+        percent(result.steady_right, result.steady_leds), percent(result.led_right, result.leds), result.absent,
+        result.position_mm.count);
     EXPECT_GT(result.position_mm.count, 1000);
     EXPECT_GT(result.straight_deg.count, 200);
     EXPECT_LT(result.absent, result.position_mm.count / 100);
     EXPECT_LT(result.position_mm.rms(), 1);
-    EXPECT_LT(result.straight_deg.rms(), straight_deg);
-    // The goal is 10. Three trials of deployment c gave 5.5 to 9.7, so the bound has room for others.
-    EXPECT_LT(result.heading_deg.rms(), 20);
+    EXPECT_LT(result.straight_deg.rms(), 5);
+    EXPECT_LT(result.free_deg.rms(), 10);
     EXPECT_GT(static_cast<double>(result.steady_right), 0.99 * static_cast<double>(result.steady_leds));
   }
   void end(Process& run, const std::string& out) {
@@ -318,7 +343,7 @@ TEST_F(Deployments, CTheSimulatedStationDrivesRobotsThatACameraSees) {
       {"--set", "robots.body=TRACKED", "--set", "robots.says.shadow=true", "--set", "tracking.start=WHEN_SEEN"});
   ASSERT_TRUE(tracker->says(fmt::format("identification: {0} of {0} robots have their numbers", kRobots), 120));
   const double from_s = of_run.time_s() + 3;
-  constexpr double kLasts_s = 45;
+  constexpr double kLasts_s = 30;
   ASSERT_TRUE(eventually([&] { return of_run.time_s() > from_s + kLasts_s; }, 200));
   end(*run, "run");
   world_run->signal(SIGINT);
@@ -354,9 +379,6 @@ int main(void) { kilo_init(); kilo_start(setup, loop); return 0; }
 )";
 
 TEST_F(Deployments, DSimulatedRobotsMoveAmongThoseThatACameraSees) {
-  // Known defect, cause not found: in one of five trials each tracked robot had the place of another one.
-  if (std::getenv("KILOTWIN_KNOWN_DEFECTS") == nullptr)
-    GTEST_SKIP() << "fails at times; KILOTWIN_KNOWN_DEFECTS=1 runs it";
   write(scratch_ / "wander.c", kWander);
   write(scratch_ / "world.txtpb",
         fmt::format(
@@ -376,33 +398,21 @@ TEST_F(Deployments, DSimulatedRobotsMoveAmongThoseThatACameraSees) {
   ASSERT_TRUE(eventually([&] { return fs::exists(scratch_ / "ceiling.jpg"); }, 60));
   const auto tracker = start_tracker();
   const auto run = start_run("hybrid.txtpb", here_, "run");
-  constexpr double kFrom_s = 5, kLasts_s = 45;
+  constexpr double kFrom_s = 5, kLasts_s = 30;
   ASSERT_TRUE(eventually([&] { return of_run.time_s() > kFrom_s + kLasts_s; }, 200));
   end(*run, "run");
   world_run->signal(SIGINT);
   world_run->wait(60);
   const World world(of_world.moments());
   const std::vector<Moment> seen = of_run.moments();
-  // Who is who is found once, by place.
-  std::vector<std::size_t> whose(kRobots);
+  // Who is who is found once, by place, and stays so.
   const auto begin = std::find_if(seen.begin(), seen.end(), [](const Moment& m) { return m.time_s >= kFrom_s; });
   ASSERT_NE(begin, seen.end());
-  for (std::size_t i = 0; i < kRobots; ++i) {
-    double least_mm = 1e9;
-    for (std::size_t robot = 0; robot < kRobots; ++robot) {
-      const std::optional<Truth> truth = world.at(begin->wall_s, robot);
-      ASSERT_TRUE(truth);
-      const Pose& pose = begin->poses[kSimulated + i];
-      const double off_mm = std::hypot(pose.x_mm - truth->pose.x_mm, pose.y_mm - truth->pose.y_mm);
-      if (off_mm >= least_mm) continue;
-      least_mm = off_mm;
-      whose[i] = robot;
-    }
-    EXPECT_LT(least_mm, 5);
-  }
-  // The goal of 5 degrees is missed: 6.0 to 6.3 were measured, because of one robot, whose heading is off by 9 degrees overall.
-  constexpr double kStraight_deg = 8;
-  expect_as_asked(compare(world, seen, kSimulated, whose, kFrom_s), kStraight_deg);
+  const std::vector<std::size_t> whose = nearest(world, *begin, kSimulated);
+  const auto end = std::find_if(seen.rbegin(), seen.rend(), [&](const Moment& m) { return world.at(m.wall_s, 0); });
+  ASSERT_NE(end, seen.rend());
+  EXPECT_EQ(nearest(world, *end, kSimulated), whose) << "tracked robots have exchanged their numbers";
+  expect_as_asked(compare(world, seen, kSimulated, whose, kFrom_s));
 }
 
 }  // namespace
