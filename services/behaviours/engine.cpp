@@ -714,6 +714,20 @@ bool BehavioursEngine::read(std::uint32_t robot, std::uint64_t offset, std::span
   return true;
 }
 
+bool BehavioursEngine::write(std::uint32_t robot, std::uint64_t offset, std::span<const std::uint8_t> octets) {
+  const std::uint32_t i = robot - share_.first;
+  if (presence_[i] != Presence::kNew && presence_[i] != Presence::kAlive) return false;
+  const Program& program = programs_->program(plan_.program_of(robot));
+  // As the next step would.
+  if (presence_[i] == Presence::kNew) reset_robot(now_, i, program, program.slot(robot % kSlots));
+  const std::span<std::uint8_t> data = memory_[i].data();
+  const std::uint64_t first = program.file.data.first;
+  if (offset < first || offset - first > data.size() || octets.size() > data.size() - (offset - first))
+    return false;
+  std::memcpy(data.data() + (offset - first), octets.data(), octets.size());
+  return true;
+}
+
 std::uint64_t BehavioursEngine::offset_of(std::uint32_t robot, std::uint64_t pointer) const {
   return pointer - programs_->program(plan_.program_of(robot)).slot(robot % kSlots).image_address();
 }

@@ -27,14 +27,14 @@ class BehavioursState;
 
 namespace kilotwin::behaviours {
 
-/// A step does for each robot, in this order:
-///   1. advance the robot's clock;
 /// What the station and the schedule say of tracked robots; needed where RunPlan::any_tracked().
 struct TrackedInputs {
   const TrackingFrame* frame = nullptr;
   std::span<const MembershipChange> memberships{};  ///< that take effect in the step, in order
 };
 
+/// A step does for each robot, in this order:
+///   1. advance the robot's clock;
 ///   2. call kilo_message_tx_success if its message has been sent;
 ///   3. call kilo_message_rx for each reception, in order of arrival;
 ///   4. run the main program until it has used up the tick;
@@ -43,8 +43,8 @@ struct TrackedInputs {
 ///
 /// The radio runs the processors of firmware robots; this engine copies their motors and LEDs from the radio's frame.
 /// Robots of tracked groups show the LED that a tracker saw. Without a program they are IDLE, or RUNNING while a rule says
-/// something for them, or if they say what listeners hear of them. With one, their shadow, they have its life cycle; its motors are shown and move nothing. A robot that
-/// is absent runs no program and is ABSENT. A sleeping robot wakes every 8 s to listen and meanwhile has
+/// something for them, or if they say what listeners hear of them. With one, their shadow, they have its life cycle; its motors
+/// are shown and move nothing. A robot that is absent runs no program and is ABSENT. A sleeping robot wakes every 8 s to listen and meanwhile has
 /// the life cycle IDLE. A robot with a flat battery has the life cycle FLAT and restarts once it is charged.
 ///
 /// The engine is a pure function of its inputs. A fault in a robot's code stops that robot and adds a Failure. Engines of one
@@ -85,8 +85,8 @@ class BehavioursEngine {
   /// Text that robots printed in the last step, in the order in which they ran. Not part of the state.
   [[nodiscard]] const std::vector<Printed>& printed() const { return printed_; }
 
-  /// Divisions by zero, messages with a wrong CRC, ends of main() and a loop() whose number of calls matters, the first of each kind of each program; overflows of an int, the first of
-  /// each line. In order of time. The programs go on running.
+  /// Divisions by zero, messages with a wrong CRC, ends of main() and a loop() whose number of calls matters, the first of each
+  /// kind of each program; overflows of an int, the first of each line. In order of time. The programs go on running.
   [[nodiscard]] const std::vector<Failure>& warnings() const { return warnings_; }
 
   /// The robot whose code is running. Any thread or process may read it while the engine steps.
@@ -109,6 +109,9 @@ class BehavioursEngine {
   /// Copies octets of a robot's variables, for the recording. `offset`: as in ElfFile. Returns false where the robot runs no
   /// program here, has failed, or has no variables there.
   [[nodiscard]] bool read(std::uint32_t robot, std::uint64_t offset, std::span<std::uint8_t> to) const;
+  /// Changes a robot's variables between two steps, as a debugger would: no program and no message does so. Returns false where
+  /// read() does.
+  [[nodiscard]] bool write(std::uint32_t robot, std::uint64_t offset, std::span<const std::uint8_t> octets);
   /// The offset to which a pointer in a robot's memory points.
   [[nodiscard]] std::uint64_t offset_of(std::uint32_t robot, std::uint64_t pointer) const;
 

@@ -2,26 +2,9 @@
 
 #include "core/observations/events.hpp"
 #include "idl/recording.pb.h"
+#include "services/behaviours/host_memory.hpp"
 
 namespace kilotwin::behaviours {
-namespace {
-
-class HostMemory final : public ProgramMemory {
- public:
-  explicit HostMemory(const BehavioursEngine& engine) : engine_(engine) {}
-  [[nodiscard]] bool read(std::uint32_t robot, std::uint64_t address, std::span<std::uint8_t> to) const override {
-    return engine_.read(robot, address, to);
-  }
-  [[nodiscard]] std::uint64_t address_of(std::uint32_t robot, std::uint64_t pointer) const override {
-    return engine_.offset_of(robot, pointer);
-  }
-
- private:
-  const BehavioursEngine& engine_;
-};
-
-}  // namespace
-
 HostObserver::HostObserver(const RunPlan& plan, HostId host, const BehavioursEngine& engine)
     : engine_(engine), sampler_(plan, plan.share(host), false), failures_(engine.failures().size()) {}
 

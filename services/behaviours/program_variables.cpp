@@ -86,6 +86,8 @@ std::optional<std::uint64_t> address_of(Dwarf_Die& variable) {
   if (dwarf_attr(&variable, DW_AT_location, &attribute) == nullptr ||
       dwarf_getlocation(&attribute, &operations, &count) != 0 || count != 1 || operations[0].atom != DW_OP_addr)
     return std::nullopt;
+  // The linker has left the variable out, because nothing refers to it.
+  if (operations[0].number == 0) return std::nullopt;
   return operations[0].number;
 }
 
@@ -335,9 +337,10 @@ std::vector<ScalarVariable> find_variable(const std::string& elf, const Variable
   std::vector<Found> found = preferred(std::move(all));
   if (found.empty()) return {};
   if (!found.front().address) {
-    throw UserError(fmt::format(
-        "the compiler keeps {} nowhere, because nothing reads it; declare it volatile, or use its value",
-        path.name));
+    throw UserError(
+        fmt::format("the program keeps {} nowhere, because nothing reads it; use its value, and declare it "
+                    "volatile if that does not help",
+                    path.name));
   }
   for (const Found& other : found) {
     if (other.address == found.front().address) continue;

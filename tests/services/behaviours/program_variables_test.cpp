@@ -115,6 +115,17 @@ TEST(ProgramVariables, WhatTheCompilerDropsIsSaid) {
       << why;
 }
 
+TEST(ProgramVariables, WhatTheLinkerLeavesOutIsSaid) {
+  const Folder folder;
+  const auto source = folder.write("program.c", program("volatile uint8_t unused = 3; void loop() {}"));
+  for (const auto& file : {compile({source}, cached()).file, compile_firmware({source}, cached()).file}) {
+    const std::string elf = os::read_file(file);
+    EXPECT_NE(refusal(elf, "unused").find("keeps unused nowhere"), std::string::npos) << refusal(elf, "unused");
+    const auto names = variable_names(elf);
+    EXPECT_EQ(std::find(names.begin(), names.end(), "unused"), names.end());
+  }
+}
+
 /// Damaged files give an error or a result, and no crash.
 TEST(ProgramVariables, DamagedFilesAreSurvived) {
   std::mt19937_64 random(22);
