@@ -20,6 +20,7 @@ struct Command {
 /// `started_s`: start time of the program, steady clock, s.
 [[nodiscard]] Command add_run(CLI::App& program, double started_s);
 [[nodiscard]] Command add_check(CLI::App& program);
+[[nodiscard]] Command add_arenas(CLI::App& program);
 [[nodiscard]] Command add_build(CLI::App& program);
 [[nodiscard]] Command add_sweep(CLI::App& program);
 [[nodiscard]] Command add_tune(CLI::App& program);

@@ -20,6 +20,6 @@ int main(int argc, char** argv) {
                                add_config(program),         add_ohc(program),      add_cameras(program),
                                add_track(program),          add_movie(program),    add_view(program),
                                add_debug(program),          add_import(program),   add_doctor(program),
-                               add_control(program)};
+                               add_control(program),        add_arenas(program)};
                      });
 }

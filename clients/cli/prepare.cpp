@@ -317,10 +317,22 @@ Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, 
   return resolved;
 }
 
+void write_programs(const LoadedExperiment& loaded, const Resolved& resolved,
+                    const recorder::RunDirectory& directory) {
+  for (int i = 0; i < resolved.manifest.program_size(); ++i) {
+    fs::copy_file(resolved.objects[static_cast<std::size_t>(i)],
+                  directory.program(settings_of(resolved.manifest.program(i))),
+                  fs::copy_options::overwrite_existing);
+  }
+  copy_sources(loaded, directory.programs());
+  copy_plugins(loaded, resolved.manifest, resolved.plugins, directory.path() / "plugins");
+}
+
 Prepared prepare(const RunArguments& arguments) {
   const LoadedExperiment loaded = load_with_overrides(arguments);
   if (arguments.mode == "federated" && !arguments.prepare) check_processes(loaded.experiment.deployment());
-  auto [manifest, objects, plugins] = resolve(loaded, arguments, Notes::kPrinted);
+  Resolved resolved = resolve(loaded, arguments, Notes::kPrinted);
+  proto::Manifest& manifest = resolved.manifest;
   fs::path checkpoint;
   if (manifest.resumed()) {
     checkpoint = checkpoint_directory(arguments.resume);
@@ -343,12 +355,7 @@ Prepared prepare(const RunArguments& arguments) {
   auto directory = make_output(arguments.output,
                                recorder::RunDirectory::default_path(experiment.name(), experiment.seed()), inputs);
   try {
-    for (int i = 0; i < manifest.program_size(); ++i) {
-      fs::copy_file(objects[static_cast<std::size_t>(i)], directory.program(settings_of(manifest.program(i))),
-                    fs::copy_options::overwrite_existing);
-    }
-    copy_sources(loaded, directory.programs());
-    copy_plugins(loaded, manifest, plugins, directory.path() / "plugins");
+    write_programs(loaded, resolved, directory);
     if (manifest.resumed()) fs::copy(checkpoint, directory.path() / "resumed");
     os::write_file(directory.experiment(), experiment_as_run(loaded, manifest, directory));
     recorder::write_provenance(recorder::provenance_of_this_process(), directory.provenance());

@@ -23,6 +23,10 @@ struct Resolved {
 /// cache. Writes nothing else. Throws UserError with the place of the first error.
 [[nodiscard]] Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, Notes notes);
 
+/// Writes the resolved programs and plugins into the run directory, and their sources for readers. Throws filesystem_error.
+void write_programs(const LoadedExperiment& loaded, const Resolved& resolved,
+                    const recorder::RunDirectory& directory);
+
 struct Prepared {
   recorder::RunDirectory directory;
   proto::Manifest manifest;

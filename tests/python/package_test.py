@@ -28,6 +28,24 @@ recording { variable { name: "has_wave" every_s: 1 } event: LED event: MOTION }
 observable { name: "reached" value: "share(has_wave == 1)" }
 """ % (SOURCES / "behaviours/hop_count.c")
 
+# It blinks as the station says, and shows how the variables of the caller arrive.
+OBEYS = """
+#include <kilolib.h>
+volatile uint8_t gain = 7;
+volatile int8_t table[2] = {1, -2};
+volatile float weight = 0.5f;
+volatile uint8_t seen_at_setup, heard, mixed;
+static void rx(message_t* m, distance_measurement_t* d) { (void)d; heard = m->type; set_color(m->data[0]); }
+static void setup(void) { seen_at_setup = gain; }
+static void loop(void) { mixed = table[0] + table[1] + (uint8_t)weight + gain; }
+int main(void) { kilo_init(); kilo_message_rx = rx; kilo_start(setup, loop); return 0; }
+"""
+OBEYING = """
+duration_s: 6 seed: 4
+arena { width_mm: 500 height_mm: 500 }
+robots { count: 5 behaviour: "obeys.c" layout { grid { pitch_mm: 60 } } }
+"""
+
 
 class Package(unittest.TestCase):
     def setUp(self):
@@ -83,6 +101,94 @@ class Package(unittest.TestCase):
             kilotwin.load(self.out)
         with self.assertRaisesRegex(KeyError, "no column"):
             kilotwin.run(EXPERIMENT, robots=4, duration_s=1, out=self.out / "r").trajectories()["z_mm"]
+
+    def test_an_arena_has_the_results_of_a_run(self):
+        options = {"robots": 16, "duration_s": 3}
+        runs = [kilotwin.run(EXPERIMENT, seed=seed, out=self.out / f"run{seed}", **options) for seed in (5, 6, 7)]
+        hashes = [int(run.summary["state_hash"], 16) for run in runs]
+        with kilotwin.Arenas(EXPERIMENT, 3, seed=5, threads=2, **options) as arenas:
+            self.assertEqual(arenas.x_mm.shape, (3, 16))
+            begun = arenas.observe()
+            while not arenas.ended.all():
+                arenas.step(7)
+            self.assertEqual(list(arenas.state_hash), hashes)
+            self.assertEqual(list(arenas.tick), [arenas.last_tick] * 3)
+            poses = runs[1].trajectories()
+            last = poses["time_s"] == poses["time_s"].max()
+            np.testing.assert_allclose(arenas.x_mm[1], poses["x_mm"][last], atol=1e-3)
+            self.assertEqual(arenas.sent[2], runs[2].summary["messages"]["sent"])
+            # Beyond the end nothing happens; what was observed stays as it was.
+            arenas.step(seconds=2)
+            self.assertEqual(list(arenas.state_hash), hashes)
+            self.assertFalse(np.array_equal(begun["x_mm"], arenas.x_mm))
+            arenas.reset()
+            for name, array in begun.items():
+                np.testing.assert_array_equal(array, arenas.observe()[name], name)
+            # An arena of another seed is the other arena.
+            arenas.reset(seeds=[6], arenas=[0])
+            self.assertEqual(arenas.seeds, (6, 6, 7))
+            arenas.step(10**6)
+            self.assertEqual(list(arenas.state_hash), [hashes[1], hashes[1], hashes[2]])
+        with self.assertRaisesRegex(kilotwin.KilotwinError, "closed"):
+            arenas.step()
+
+    def test_a_caller_sends_messages_and_sets_variables(self):
+        (self.out / "obeys.c").write_text(OBEYS)
+        (self.out / "e.txtpb").write_text(OBEYING)
+        names = ["gain", "table", "weight", "seen_at_setup", "heard"]
+        with kilotwin.Arena(self.out / "e.txtpb", variables=names) as arena:
+            self.assertEqual(arena.variables, ("gain", "table[0]", "table[1]", "weight", "seen_at_setup", "heard"))
+            self.assertEqual(arena.x_mm.shape, (5,))
+            np.testing.assert_array_equal(arena.variable("gain"), 7)
+            np.testing.assert_array_equal(arena.variable("table[1]"), -2)
+            # Before the first step: what the program begins with.
+            arena.set_variable("gain", [10, 11, 12, np.nan, 255])
+            arena.step(seconds=4)
+            np.testing.assert_array_equal(arena.variable("seen_at_setup"), [10, 11, 12, 7, 255])
+            arena.set_variable("table[1]", -128)
+            arena.set_variable("weight", np.linspace(0, 1, 5))
+            np.testing.assert_array_equal(arena.variable("table[1]"), -128)
+            np.testing.assert_allclose(arena.variable("weight"), np.linspace(0, 1, 5), rtol=1e-7)
+            np.testing.assert_array_equal(arena.variable("table[0]"), 1)
+            for name, value in [("gain", 256), ("gain", -1), ("gain", 0.5), ("table[0]", 128), ("gain", np.inf)]:
+                with self.assertRaisesRegex(kilotwin.KilotwinError, "cannot hold"):
+                    arena.set_variable(name, value)
+            with self.assertRaisesRegex(KeyError, "there are: gain"):
+                arena.variable("gains")
+            # Whoever hears the station shows it, from the next ticks on.
+            arena.send(9, [0b11])
+            arena.step(seconds=0.2)
+            np.testing.assert_array_equal(arena.variable("heard"), 9)
+            np.testing.assert_array_equal(arena.led, [[3, 0, 0]] * 5)
+            self.assertEqual(arena.robots_failed, 0)
+            self.assertEqual(arena.failures(), [])
+            with self.assertRaisesRegex(kilotwin.KilotwinError, "no octet"):
+                arena.send(256)
+
+    def test_a_robot_that_crashes_costs_the_robot(self):
+        (self.out / "obeys.c").write_text(OBEYS.replace("seen_at_setup = gain", "if (kilo_uid == 2) *(volatile int*)8 = 1"))
+        (self.out / "e.txtpb").write_text(OBEYING)
+        with kilotwin.Arena(self.out / "e.txtpb", variables=["gain"]) as arena:
+            arena.step(10**6)
+            self.assertEqual(arena.robots_failed, 1)
+            self.assertEqual([failure["robot"] for failure in arena.failures()], [2])
+            self.assertTrue(np.isnan(arena.variable("gain")[2]))
+            with self.assertRaisesRegex(kilotwin.KilotwinError, "robot 2 has no variable"):
+                arena.set_variable("gain", 1)
+
+    def test_errors_of_arenas_are_exceptions(self):
+        with self.assertRaisesRegex(kilotwin.KilotwinError, "none.txtpb") as raised:
+            kilotwin.Arena(self.out / "none.txtpb")
+        self.assertEqual(raised.exception.status, 2)
+        with self.assertRaisesRegex(kilotwin.KilotwinError, "no program has a global or static variable"):
+            kilotwin.Arena(EXPERIMENT, variables=["nothing"])
+        with kilotwin.Arenas(EXPERIMENT, 2, robots=4) as arenas:
+            with self.assertRaises(ValueError):
+                arenas.reset(seeds=[1, 2, 3])
+            with self.assertRaisesRegex(kilotwin.KilotwinError, "no arena 2"):
+                arenas.reset(seeds=[1], arenas=[2])
+            with self.assertRaises(ValueError):
+                arenas.x_mm[0, 0] = 1
 
 
 if __name__ == "__main__":

@@ -12,9 +12,10 @@ The package starts the program `kilotwin`, which must be on the PATH, or named b
 names of columns: _s seconds, _mm millimetres, _rad radians.
 """
 
+from kilotwin._arenas import Arena, Arenas
 from kilotwin._program import KilotwinError, program
 from kilotwin._run import Run, load, replay, run
 from kilotwin._sweep import Sweep, sweep
 from kilotwin._table import Table
 
-__all__ = ["KilotwinError", "Run", "Sweep", "Table", "load", "program", "replay", "run", "sweep"]
+__all__ = ["Arena", "Arenas", "KilotwinError", "Run", "Sweep", "Table", "load", "program", "replay", "run", "sweep"]

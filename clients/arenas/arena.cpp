@@ -1,0 +1,108 @@
+#include "clients/arenas/arena.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <limits>
+#include <optional>
+
+#include "core/base/error.hpp"
+#include "core/base/state_hash.hpp"
+#include "core/federation/hash_sums.hpp"
+#include "idl/manifest.pb.h"
+#include "services/behaviours/host_memory.hpp"
+
+namespace kilotwin::arenas {
+namespace {
+
+/// Nobody records an arena.
+class Nobody final : public RunObserver {
+  void state(Tick, const SwarmView&, bool) override {}
+  void hash(Tick, std::uint64_t) override {}
+  void input(const Directive&) override {}
+};
+
+constexpr Tick kFirst{0};
+
+}  // namespace
+
+Arena::Arena(std::shared_ptr<const RunPlan> plan, const std::shared_ptr<behaviours::ProgramSet>& programs,
+             const std::filesystem::path& run_directory)
+    : plan_(std::move(plan)),
+      engines_(*plan_, programs, {run_directory, kFirst, 1, false}),
+      schedule_(kFirst, plan_->last_tick, 0),
+      station_outputs_(*plan_, {}, kFirst) {
+  const proto::Manifest& manifest = plan_->manifest();
+  for (const proto::ProgramVariable& variable : manifest.variable()) {
+    auto& places = places_.emplace_back(static_cast<std::size_t>(manifest.program_size()));
+    for (const proto::VariablePlace& place : variable.place())
+      places.at(place.program()) = std::make_unique<const VariablePlace>(place);
+  }
+  engines_.begin();
+  if (first_hashed(kFirst) == kFirst) chain_ = hash_chain(chain_, engines_.hash_sum());
+}
+
+void Arena::step(std::int64_t ticks) {
+  Nobody nobody;
+  for (std::int64_t i = 0; i < ticks; ++i) {
+    const Tick from = now();
+    if (schedule_.verdict(from) != RunSchedule::Verdict::kStep) return;
+    engines_.step(alone_, from, schedule_);
+    chain_ = hash_chain(chain_, engines_.hash_sum());
+    station_outputs_.take(from, engines_.station(), nobody);
+  }
+}
+
+std::vector<behaviours::BehavioursEngine::Failure> Arena::failures() const {
+  std::vector<behaviours::BehavioursEngine::Failure> failures;
+  for (const auto& host : engines_.hosts())
+    failures.insert(failures.end(), host->failures().begin(), host->failures().end());
+  return failures;
+}
+
+void Arena::send(const OverheadPacket& packet) {
+  Directive directive;
+  directive.sequence_number = directives_++;
+  directive.tick = now();
+  directive.kind = DirectiveKind::kOverheadInput;
+  directive.packet = packet;
+  schedule_.add(directive);
+}
+
+const VariablePlace* Arena::place_of(std::size_t index, std::uint32_t robot) const {
+  const std::uint32_t program = plan_->program_of(robot);
+  if (program == kNoProgram || plan_->firmware(robot)) return nullptr;
+  return places_.at(index).at(program).get();
+}
+
+behaviours::BehavioursEngine& Arena::host_of(std::uint32_t robot) const {
+  return *engines_.hosts()[plan_->host_of(robot).value()];
+}
+
+std::string Arena::name_of(std::size_t index) const {
+  return plan_->manifest().variable(static_cast<int>(index)).name();
+}
+
+double Arena::variable(std::size_t index, std::uint32_t robot) const {
+  const VariablePlace* const place = place_of(index, robot);
+  if (place == nullptr) return std::numeric_limits<double>::quiet_NaN();
+  const std::optional<std::uint64_t> raw = place->fetch(robot, behaviours::HostMemory(host_of(robot)));
+  return raw ? place->number(*raw) : std::numeric_limits<double>::quiet_NaN();
+}
+
+void Arena::set_variable(std::size_t index, std::uint32_t robot, double value) {
+  const VariablePlace* const place = place_of(index, robot);
+  behaviours::BehavioursEngine& host = host_of(robot);
+  const behaviours::HostMemory memory(host);
+  const auto address = place == nullptr ? std::nullopt : place->address(robot, memory);
+  const auto before = place == nullptr ? std::nullopt : place->fetch(robot, memory);
+  if (!address || !before)
+    throw UserError(fmt::format("robot {} has no variable {} that can be set", robot, name_of(index)));
+  const std::optional<std::uint64_t> after = place->with(value, *before);
+  if (!after) throw UserError(fmt::format("robot {}: {} cannot hold {:g}", robot, name_of(index), value));
+  std::array<std::uint8_t, 8> octets{};
+  for (std::size_t i = 0; i < place->octets(); ++i) octets.at(i) = static_cast<std::uint8_t>(*after >> 8 * i);
+  KILOTWIN_DEMAND(host.write(robot, *address, std::span(octets).first(place->octets())));
+}
+
+}  // namespace kilotwin::arenas
