@@ -294,7 +294,8 @@ class Gateway::Service {
       case Request::Kind::kRobot:
       case Request::Kind::kPlots:
       case Request::Kind::kPlot:
-      case Request::Kind::kProgram: return viewer.ask(request);
+      case Request::Kind::kProgram:
+      case Request::Kind::kOutside: return viewer.ask(request);
       default: break;
     }
     if (!viewer.may_steer)
@@ -371,6 +372,7 @@ class Gateway::Service {
       case Request::Kind::kTrail: return answers_->trail(request.robot, request.tick);
       case Request::Kind::kRobot: return answers_->robot(request.robot);
       case Request::Kind::kProgram: return answers_->program(request.robot, request.tick);
+      case Request::Kind::kOutside: return answers_->outside(request.tick);
       case Request::Kind::kPlots: return answers_->plots();
       case Request::Kind::kPlot:
         return answers_->plot(request.number, request.of_robot ? std::optional(request.robot) : std::nullopt);

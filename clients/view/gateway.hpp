@@ -39,6 +39,7 @@ class Answers {
   /// Of a robot, or of the swarm.
   [[nodiscard]] virtual std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) = 0;
   [[nodiscard]] virtual std::string program(std::uint32_t robot, std::int64_t tick) = 0;
+  [[nodiscard]] virtual std::string outside(std::int64_t tick) = 0;
   /// Steers the run. Returns empty, or why it cannot.
   [[nodiscard]] virtual std::string steer(const Request& request) = 0;
 };

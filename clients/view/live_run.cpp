@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,9 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kLookAtRecording = 250ms;
+/// A place that a tracker stated is shown for so long.
+constexpr auto kPlaceHolds = 1s;
+constexpr std::size_t kMostTrackers = 16;
 
 /// Unique among processes that steer a run.
 std::string client_name() { return fmt::format("kilotwin view {} {}", getpid(), random_token().substr(0, 8)); }
@@ -30,6 +34,28 @@ const char* phase_name(kilotwin_open_RunPhase phase) {
     case kilotwin_open_ENDED: return "ended";
     default: return "broken";
   }
+}
+
+template <class Column, class Values> void take(const Column& column, Values& values) {
+  if (column._length > 0) values.assign(column._buffer, column._buffer + column._length);
+}
+
+/// Nothing where the columns differ in length.
+std::optional<TrackerSample> tracker_sample(const PublicTrackerFrame& frame, std::uint32_t first_robot) {
+  TrackerSample sample;
+  take(frame.robot, sample.robot);
+  take(frame.state, sample.state);
+  take(frame.x_mm, sample.x);
+  take(frame.y_mm, sample.y);
+  take(frame.heading_rad, sample.heading_rad);
+  take(frame.xx_mm2, sample.xx);
+  take(frame.xy_mm2, sample.xy);
+  take(frame.yy_mm2, sample.yy);
+  take(frame.heading_variance_rad2, sample.heading_variance_rad2);
+  take(frame.led, sample.led);
+  for (std::uint32_t& robot : sample.robot) robot += first_robot;
+  if (!has_equal_columns(sample)) return std::nullopt;
+  return sample;
 }
 
 std::string status_text(const PublicRunStatus& status, bool ended) {
@@ -54,6 +80,7 @@ LiveRun::LiveRun(const dds::Transport& transport, std::filesystem::path director
       observer_(transport),
       participant_(transport),
       control_(participant_, topics::run_control()),
+      overhead_(participant_, topics::overhead_packets()),
       statuses_(participant_, topics::run_status(),
                 [this](const PublicRunStatus& sample, dds::SampleState state) {
                   if (!state.valid) return;
@@ -61,6 +88,14 @@ LiveRun::LiveRun(const dds::Transport& transport, std::filesystem::path director
                   status_ = sample;
                   ++status_number_;
                 }),
+      tracker_frames_(participant_, topics::tracker_frames(),
+                      [this](const PublicTrackerFrame& sample, dds::SampleState state) {
+                        if (state.valid) on_tracker_frame(sample);
+                      }),
+      station_packets_(participant_, topics::station_packets(),
+                       [this](const PublicStationPacket& sample, dds::SampleState state) {
+                         if (state.valid) on_packet(sample);
+                       }),
       client_(client_name()) {}
 
 LiveRun::~LiveRun() = default;
@@ -125,6 +160,9 @@ void LiveRun::begin(Gateway& gateway) {
     {
       const std::lock_guard lock(mutex_);
       recording_.reset();
+      trackers_ = trackers_of(*facts.experiment);
+      frames_.clear();
+      packets_.clear();
     }
     gateway.show(*this, text);
     if (tells_) say(fmt::format("kilotwin: sees run {}, {} robots", one_line(facts.name, 128), facts.robots));
@@ -176,8 +214,56 @@ std::string LiveRun::program(std::uint32_t robot, std::int64_t tick) {
   return recorded ? recorded->program(robot, tick) : program_text({robot, tick, /*known=*/false, {}, {}});
 }
 
+void LiveRun::on_tracker_frame(const PublicTrackerFrame& frame) {
+  const std::lock_guard lock(mutex_);
+  if (run_ == 0 || (frame.run != 0 && frame.run != run_)) return;
+  // Sources that the experiment does not name have no place in the arena, unless it names none.
+  const auto named = std::find_if(trackers_.begin(), trackers_.end(), [&frame](const TrackerSettings& tracker) {
+    return tracker.source == frame.source;
+  });
+  if (named == trackers_.end() && !trackers_.empty()) return;
+  if (!frames_.contains(frame.source) && frames_.size() >= kMostTrackers) return;
+  std::optional<TrackerSample> sample = tracker_sample(frame, named == trackers_.end() ? 0 : named->first_robot);
+  if (!sample) return;
+  sample->source = static_cast<std::uint32_t>(named - trackers_.begin());
+  frames_[frame.source] = {std::move(*sample), Clock::now()};
+}
+
+void LiveRun::on_packet(const PublicStationPacket& packet) {
+  const std::lock_guard lock(mutex_);
+  if (packet.run != run_) return;
+  if (packets_.size() == kMostPackets) packets_.pop_front();
+  ShownPacket& shown = packets_.emplace_back();
+  shown.time_s = packet.time_s;
+  shown.command = packet.command;
+  std::copy_n(packet.message, shown.message.size(), shown.message.begin());
+}
+
+std::string LiveRun::outside(std::int64_t tick) {
+  std::map<std::uint32_t, TrackedPlace> places;
+  Outside outside;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [source, frame] : frames_)
+      if (Clock::now() - frame.seen < kPlaceHolds) add_places(trackers_, frame.sample, places);
+    outside.packets.assign(packets_.begin(), packets_.end());
+  }
+  for (const auto& [robot, place] : places) outside.robots.push_back(place);
+  return outside_text(tick, outside);
+}
+
 std::string LiveRun::steer(const Request& request) {
   if (run_ == 0) return "The run has ended.";
+  if (request.kind == Request::Kind::kOverhead) {
+    PublicOverheadPacket packet{};
+    client_.copy(packet.client, sizeof packet.client - 1);
+    packet.run = run_;
+    packet.request = ++request_;
+    packet.command = static_cast<std::uint8_t>(request.packet.command);
+    std::copy(request.packet.message.begin(), request.packet.message.end(), packet.message);
+    overhead_.write(packet);
+    return {};
+  }
   PublicRunControl sample{};
   client_.copy(sample.client, sizeof sample.client - 1);
   sample.run = run_;

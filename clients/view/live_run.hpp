@@ -6,7 +6,9 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -41,12 +43,19 @@ class LiveRun : public Answers {
   [[nodiscard]] std::string plots() override;
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
   [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
+  [[nodiscard]] std::string outside(std::int64_t tick) override;
   [[nodiscard]] std::string steer(const Request& request) override;
 
  private:
+  struct SeenFrame {
+    TrackerSample sample;
+    std::chrono::steady_clock::time_point seen;
+  };
   void begin(Gateway& gateway);
   void post_state(Gateway& gateway);
   void follow_recording();
+  void on_tracker_frame(const PublicTrackerFrame& frame);
+  void on_packet(const PublicStationPacket& packet);
   [[nodiscard]] std::shared_ptr<RecordedRun> recording();
   void post_status(Gateway& gateway, bool ended);
 
@@ -56,15 +65,21 @@ class LiveRun : public Answers {
   observe::Observer observer_;
   dds::Participant participant_;
   dds::Writer<PublicRunControl> control_;
+  dds::Writer<PublicOverheadPacket> overhead_;
+  std::atomic<std::uint64_t> run_{0};  // at hand; 0: none
   std::mutex mutex_;
   PublicRunStatus status_{};  // the newest, of any run; guarded by mutex_
   std::uint64_t status_number_ = 0;
-  std::shared_ptr<RecordedRun> recording_;  // of the run at hand; guarded by mutex_
-  Clock::time_point look_{};                // when to look for new records
+  std::shared_ptr<RecordedRun> recording_;   // of the run at hand; guarded by mutex_
+  Clock::time_point look_{};                 // when to look for new records
+  std::vector<TrackerSettings> trackers_;    // of the run at hand; guarded by mutex_, like the next two
+  std::map<std::string, SeenFrame> frames_;  // the newest of each tracker
+  std::deque<ShownPacket> packets_;          // the newest
   dds::Reader<PublicRunStatus> statuses_;
+  dds::Reader<PublicTrackerFrame> tracker_frames_;
+  dds::Reader<PublicStationPacket> station_packets_;
 
   std::uint64_t posted_status_ = 0, ended_run_ = 0;
-  std::atomic<std::uint64_t> run_{0};  // at hand; 0: none
   PositionGrid grid_;
   const std::string client_;   // how requests are signed
   std::uint32_t request_ = 0;  // of the gateway's thread

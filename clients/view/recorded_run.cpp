@@ -19,6 +19,9 @@ using recorder::StateIndex;
 
 /// A trail has so many points at most, and reads so many bytes of states at most.
 constexpr std::size_t kTrailPoints = 400, kTrailBytes = 48'000'000, kStateBytesPerRobot = 26;
+/// A place that a tracker stated is shown for so long. Records that one answer reads at most.
+constexpr double kPlaceHolds_s = 1;
+constexpr std::size_t kMostSamples = 128;
 /// Pairs of robots that are listed for one robot.
 constexpr std::size_t kMostPartners = 8;
 
@@ -252,6 +255,63 @@ std::string RecordedRun::program(std::uint32_t robot, std::int64_t tick) {
         log_until(RobotLogs::file_in(logs_of_, robot), reader_.tick_length().seconds_at(Tick{tick}) + 0.0005);
   }
   return program_text(text);
+}
+
+std::string RecordedRun::outside(std::int64_t tick) {
+  const std::lock_guard lock(mutex_);
+  return outside_text(tick, {places_at(tick), packets_until(tick)});
+}
+
+/// Of each tracked robot, the last place that a tracker stated shortly before.
+std::vector<TrackedPlace> RecordedRun::places_at(std::int64_t tick) {
+  const std::vector<StateIndex::Entry>& all = index_.trackers();
+  const auto shortly = static_cast<std::int64_t>(kPlaceHolds_s / reader_.tick_length().seconds());
+  const std::vector<TrackerSettings> trackers = trackers_of(*experiment_);
+  std::map<std::uint32_t, TrackedPlace> places;
+  auto at = std::upper_bound(all.begin(), all.end(), tick,
+                             [](std::int64_t wanted, const auto& entry) { return wanted < entry.tick; });
+  for (std::size_t read = 0; at != all.begin() && read < kMostSamples; ++read) {
+    if ((--at)->tick < tick - shortly) break;
+    const proto::Record* const record = record_at(at->offset);
+    if (record == nullptr || !record->has_tracker()) continue;
+    if (const auto sample = sample_of(record->tracker())) add_places(trackers, *sample, places);
+  }
+  std::vector<TrackedPlace> list;
+  for (const auto& [robot, place] : places) list.push_back(place);
+  return list;
+}
+
+/// All packets of the station where they are recorded, else those of outsiders.
+std::vector<ShownPacket> RecordedRun::packets_until(std::int64_t tick) {
+  const auto seconds = [this](std::int64_t at, std::uint32_t offset_cycles) {
+    return reader_.tick_length().seconds_at(Tick{at}) + offset_cycles / kNominalClockHz;
+  };
+  std::vector<ShownPacket> newest_first;
+  const auto& kinds = reader_.header().event();
+  const bool all_packets = std::find(kinds.begin(), kinds.end(), proto::STATION) != kinds.end();
+  const std::vector<StateIndex::Entry>& entries = all_packets ? index_.events(proto::STATION) : index_.inputs();
+  std::size_t read = 0;
+  for (auto at = entries.rbegin(); at != entries.rend() && newest_first.size() < kMostPackets; ++at) {
+    if (at->tick > tick) continue;
+    if (++read > kMostSamples) break;
+    const proto::Record* const record = record_at(at->offset);
+    if (record == nullptr) continue;
+    if (record->has_event()) {
+      const proto::EventRecord& event = record->event();
+      for (int i = std::min({event.value_size(), event.text_size(), event.offset_cycles_size()}); i-- > 0;) {
+        if (const auto message = message_of(event.text(i)))
+          newest_first.push_back(
+              {seconds(event.tick(), event.offset_cycles(i)), static_cast<std::uint8_t>(event.value(i)), *message});
+      }
+    } else if (record->has_input() && record->input().kind() == proto::InputRecord::OVERHEAD_INPUT) {
+      const proto::InputRecord& input = record->input();
+      if (const auto packet = packet_of(input.packet()))
+        newest_first.push_back({seconds(input.tick(), input.packet_offset_cycles()),
+                                static_cast<std::uint8_t>(packet->command), packet->message});
+    }
+  }
+  if (newest_first.size() > kMostPackets) newest_first.resize(kMostPackets);
+  return {newest_first.rbegin(), newest_first.rend()};
 }
 
 std::string RecordedRun::steer(const Request&) { return "A recorded run cannot be steered."; }

@@ -10,6 +10,7 @@
 #include "clients/recorder/state_index.hpp"
 #include "clients/view/frame_code.hpp"
 #include "clients/view/gateway.hpp"
+#include "clients/view/outside.hpp"
 #include "clients/view/recorded_curves.hpp"
 #include "clients/view/run_text.hpp"
 
@@ -39,11 +40,14 @@ class RecordedRun : public Answers {
   [[nodiscard]] std::string plots() override;
   [[nodiscard]] std::string plot(std::uint32_t number, std::optional<std::uint32_t> robot) override;
   [[nodiscard]] std::string program(std::uint32_t robot, std::int64_t tick) override;
+  [[nodiscard]] std::string outside(std::int64_t tick) override;
   [[nodiscard]] std::string steer(const Request&) override;
 
  private:
   [[nodiscard]] const proto::StateRecord* state(std::size_t number);
   [[nodiscard]] const proto::Record* record_at(std::uint64_t offset);
+  [[nodiscard]] std::vector<TrackedPlace> places_at(std::int64_t tick);
+  [[nodiscard]] std::vector<ShownPacket> packets_until(std::int64_t tick);
 
   mutable std::mutex mutex_;  // the gateway's thread answers, another one looks whether the recording grows
   recorder::Reader reader_;

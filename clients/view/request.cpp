@@ -5,13 +5,15 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "clients/view/outside.hpp"
+
 namespace kilotwin::view {
 namespace {
 
 using nlohmann::json;
 using Kind = Request::Kind;
 
-constexpr std::array<std::pair<std::string_view, Kind>, 12> kKinds{{{"hello", Kind::kHello},
+constexpr std::array<std::pair<std::string_view, Kind>, 14> kKinds{{{"hello", Kind::kHello},
                                                                     {"next", Kind::kNext},
                                                                     {"at", Kind::kAt},
                                                                     {"trail", Kind::kTrail},
@@ -19,6 +21,8 @@ constexpr std::array<std::pair<std::string_view, Kind>, 12> kKinds{{{"hello", Ki
                                                                     {"plots", Kind::kPlots},
                                                                     {"plot", Kind::kPlot},
                                                                     {"program", Kind::kProgram},
+                                                                    {"outside", Kind::kOutside},
+                                                                    {"overhead", Kind::kOverhead},
                                                                     {"pause", Kind::kPause},
                                                                     {"continue", Kind::kContinue},
                                                                     {"step", Kind::kStep},
@@ -43,6 +47,19 @@ template <class Whole> bool take(const json& object, const char* key, std::int64
   return value.has_value();
 }
 
+/// Packets whose payload is one message, and those that end it.
+bool take_packet(const json& object, OverheadPacket& packet) {
+  std::uint32_t command = 0;
+  const auto message = object.find("message");
+  if (!take(object, "command", 0, command) || message == object.end() || !message->is_string()) return false;
+  const std::optional<IrMessage> octets = message_of(message->get_ref<const std::string&>());
+  if (!octets || command > static_cast<std::uint32_t>(OverheadCommand::kOnce)) return false;
+  packet.command = static_cast<OverheadCommand>(command);
+  packet.message = *octets;
+  return packet.command == OverheadCommand::kStop || packet.command == OverheadCommand::kRepeat ||
+         packet.command == OverheadCommand::kOnce;
+}
+
 bool take_fields(const json& object, Request& request) {
   switch (request.kind) {
     case Kind::kHello: {
@@ -53,6 +70,8 @@ bool take_fields(const json& object, Request& request) {
     }
     case Kind::kAt: return take(object, "tick", 0, request.tick) && take(object, "request", 1, request.number);
     case Kind::kTrail: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
+    case Kind::kOutside: return take(object, "tick", 0, request.tick);
+    case Kind::kOverhead: return take_packet(object, request.packet);
     case Kind::kProgram: return take(object, "tick", 0, request.tick) && take(object, "robot", 0, request.robot);
     case Kind::kPlot:
       request.of_robot = object.contains("robot");

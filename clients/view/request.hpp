@@ -8,7 +8,9 @@
 ///   {"do": "plots"}                      what can be plotted
 ///   {"do": "plot", "plot": P, "robot": R}    a curve over time, of a robot, or without R of the swarm
 ///   {"do": "program", "robot": R, "tick": T} variables and log of a robot's program up to tick T
+///   {"do": "outside", "tick": T}         what trackers saw, and packets for the overhead controller, up to tick T
 ///   {"do": "pause"} {"do": "continue"} {"do": "step", "steps": N} {"do": "stop"}
+///   {"do": "overhead", "command": C, "message": "20 hexadecimal digits"}    a packet for the overhead controller
 #pragma once
 
 #include <cstddef>
@@ -16,6 +18,8 @@
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "core/frames/overhead_packet.hpp"
 
 namespace kilotwin::view {
 
@@ -32,18 +36,21 @@ struct Request {
     kPlots,
     kPlot,
     kProgram,
+    kOutside,
     kPause,
     kContinue,
     kStep,
-    kStop
+    kStop,
+    kOverhead
   };
   Kind kind = Kind::kNext;
   std::string token;         ///< with kHello
-  std::int64_t tick = 0;     ///< with kAt, kTrail and kProgram
+  std::int64_t tick = 0;     ///< with kAt, kTrail, kProgram and kOutside
   std::uint32_t number = 0;  ///< with kAt and kPlot
   std::uint32_t robot = 0;   ///< with kTrail, kRobot, kProgram, and kPlot if `of_robot`
   bool of_robot = false;     ///< with kPlot
   std::uint32_t steps = 1;   ///< with kStep
+  OverheadPacket packet;     ///< with kOverhead
 
   [[nodiscard]] bool steers() const { return kind >= Kind::kPause; }
 };

@@ -4,15 +4,18 @@ import { Connection } from "./connection.ts";
 import { Labels } from "./labels.ts";
 import { element, notice, setText, showConnection, showFrame, showProgram, showRobot, showRun, showScale } from "./panels.ts";
 import { Playback } from "./playback.ts";
+import { ellipsesOf, messageOf, showPackets } from "./outside.ts";
 import { Plots } from "./plots.ts";
 import { listenToPointer } from "./pointer.ts";
-import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type Message, type RobotCounts, type Run, type Status } from "./protocol.ts";
-import { Renderer } from "./renderer.ts";
+import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type Message, type OutsideText, type RobotCounts, type Run, type Status } from "./protocol.ts";
+import { Renderer, type Marks } from "./renderer.ts";
+import { svgOf } from "./svg.ts";
 import { Theme } from "./theme.ts";
 
 const PANEL_EVERY_MS = 200;
 /** How often the selected robot's variables and log are asked for while time passes. */
 const PROGRAM_EVERY_MS = 400;
+const OUTSIDE_EVERY_MS = 250;
 const TRAIL_EVERY_S = 1;
 const TRAIL_SEGMENTS = 30;
 /** Swarms larger than this begin without trails. */
@@ -20,6 +23,8 @@ const MOST_TRAILS = 5000;
 /** Robots further than this from a click are not selected. */
 const CLICK_REACH_PX = 14;
 const SEEK_S = 5;
+/** The overhead controller's command to send a message once. */
+const ONCE = 6;
 
 class Page {
   #stale = true;
@@ -42,6 +47,9 @@ class Page {
   #selected: number | undefined;
   #trail: [number, number][] = [];
   #program: { tick: number; askedAt: number } | undefined; // what was asked for last
+  #outside: OutsideText | undefined;
+  #ellipses: [number, number][][] = [];
+  #outsideAsked: { tick: number; at: number } | undefined;
   #mayTrail = 0; // when the trail of the selected robot may be asked for again
   #trails = true;
   #trailFrom: Frame | undefined;
@@ -85,7 +93,7 @@ class Page {
     showConnection("lost");
     this.#playback.lost();
     this.#plots.lost();
-    this.#program = undefined;
+    this.#program = this.#outsideAsked = undefined;
   }
 
   #message(message: Message): void {
@@ -96,6 +104,10 @@ class Page {
         this.#status = message;
         this.#plots.status(message);
         return this.#buttons();
+      case "outside":
+        this.#outside = message;
+        this.#ellipses = ellipsesOf(message);
+        return showPackets(message, this.#maySend);
       case "plots": return this.#plots.list(message.plots);
       case "plot": return this.#plots.take(message);
       case "program":
@@ -141,7 +153,8 @@ class Page {
     this.#line.max = String(run.lastTick);
     this.#playback.begin(run);
     this.#plots.begin(run);
-    this.#program = undefined;
+    this.#program = this.#outsideAsked = this.#outside = undefined;
+    this.#ellipses = [];
     this.#line.disabled = this.#playback.live;
     element("speed").parentElement!.hidden = this.#playback.live;
     element("back").hidden = this.#playback.live;
@@ -195,13 +208,17 @@ class Page {
       this.#fitted = false;
       [this.#camera.x, this.#camera.y] = selected;
     }
-    const trail = selected && this.#trail.length > 0 ? [...this.#trail, selected] : [];
-    const range = element<HTMLInputElement>("range").checked ? (run?.radioRange ?? 0) : 0;
-    this.#renderer.draw(this.#camera, this.#theme.palette, frame, frame?.movables ?? new Float32Array(), { selected, trail, range });
+    this.#renderer.draw(this.#camera, this.#theme.palette, frame, frame?.movables ?? new Float32Array(), this.#marks(selected));
     showScale(this.#camera.pxPerMm);
     if (run && frame) this.#labels.draw(run, frame, this.#camera, this.#selected, (robot) => this.#placeOf(robot));
     this.counters.drawn += 1;
     this.counters.drawMs += performance.now() - began;
+  }
+
+  #marks(selected: [number, number] | undefined): Marks {
+    const trail = selected && this.#trail.length > 0 ? [...this.#trail, selected] : [];
+    const range = element<HTMLInputElement>("range").checked ? (this.#run?.radioRange ?? 0) : 0;
+    return { selected, trail, range, ellipses: this.#ellipses };
   }
 
   /** Where a robot is drawn, mm. */
@@ -248,6 +265,13 @@ class Page {
     this.#connection.send({ do: "program", robot, tick });
   }
 
+  #askOutside(tick: number, now: number): void {
+    const last = this.#outsideAsked;
+    if (last && (last.tick === tick || now - last.at < OUTSIDE_EVERY_MS)) return;
+    this.#outsideAsked = { tick, at: now };
+    this.#connection.send({ do: "outside", tick });
+  }
+
   #panels(now: number): void {
     const run = this.#run;
     const frame = this.#playback.current;
@@ -269,6 +293,7 @@ class Page {
       showRobot(run, frame, this.#selected, this.#counts);
       this.#askProgram(this.#selected, Math.floor(time), now);
     }
+    this.#askOutside(Math.floor(time), now);
     this.#plots.update(now, time * run.tickSeconds);
     this.#buttons();
   }
@@ -277,6 +302,18 @@ class Page {
 
   get #paused(): boolean {
     return this.#playback.live ? this.#status?.phase === "paused" : !this.#playback.playing;
+  }
+
+  get #maySend(): boolean {
+    const phase = this.#status?.phase;
+    return this.#playback.live && this.#maySteer && (phase === "running" || phase === "paused");
+  }
+
+  #sendOverhead(): void {
+    const data = element<HTMLInputElement>("overhead-data").value;
+    const message = messageOf(element<HTMLInputElement>("overhead-type").valueAsNumber, data);
+    if (message === undefined) notice("A message has a type from 0 to 255 and up to 9 octets of data, two hexadecimal digits each.");
+    else this.#connection.send({ do: "overhead", command: ONCE, message });
   }
 
   #buttons(): void {
@@ -292,6 +329,7 @@ class Page {
     play.disabled = !steers;
     element<HTMLButtonElement>("forward").disabled = !steers || (live && phase !== "paused");
     element("stop").hidden = !live || !steers;
+    if (element("overhead-form").hidden === this.#maySend) showPackets(this.#outside, this.#maySend);
     const badge = element("phase");
     badge.hidden = !this.#run;
     setText("phase", live ? `live: ${phase ?? "waiting"}` : "recorded");
@@ -392,14 +430,29 @@ class Page {
     context.drawImage(this.#picture, 0, 0);
     const labels = element<HTMLCanvasElement>("labels");
     if (labels.width > 0 && labels.height > 0) context.drawImage(labels, 0, 0, copy.width, copy.height);
-    copy.toBlob((blob) => {
-      if (!blob) return;
-      const link = document.createElement("a");
-      link.href = URL.createObjectURL(blob);
-      link.download = `${this.#run?.name ?? "kilotwin"}-${Math.floor(this.#playback.time)}.png`;
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-    });
+    copy.toBlob((blob) => blob && this.#download(blob, "png"));
+  }
+
+  /** Saves the same section as lines and areas, without the trails of all robots. */
+  #saveSvg(): void {
+    const run = this.#run;
+    const frame = this.#playback.current;
+    if (!run || !frame) return;
+    const selected = this.#selected === undefined ? undefined : this.#placeOf(this.#selected);
+    const svg = svgOf(
+      { run, frame, kinds: kindsOf(run), floors: this.#renderer.floors, movables: frame.movables, marks: this.#marks(selected),
+        selected: this.#selected, placeOf: (robot) => this.#placeOf(robot) },
+      this.#camera, this.#theme.palette,
+    );
+    this.#download(new Blob([svg], { type: "image/svg+xml" }), "svg");
+  }
+
+  #download(blob: Blob, ending: string): void {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = `${this.#run?.name ?? "kilotwin"}-${Math.floor(this.#playback.time)}.${ending}`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   }
 
   #listen(): void {
@@ -416,12 +469,17 @@ class Page {
     on("trails", () => this.#showTrails(!this.#trails));
     on("plots-button", () => this.#plots.toggle());
     on("save", () => this.#save());
+    on("save-svg", () => this.#saveSvg());
     on("theme", () => this.#theme.toggle());
     on("help", () => this.#toggleHelp());
     for (const id of ["follow", "range"]) element(id).addEventListener("change", () => (this.#stale = true));
     element("find").addEventListener("submit", (event) => {
       event.preventDefault();
       this.#find();
+    });
+    element("overhead-form").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#sendOverhead();
     });
     element<HTMLSelectElement>("speed").addEventListener("change", (event) => {
       this.#playback.speed = Number((event.target as HTMLSelectElement).value);
@@ -441,7 +499,7 @@ class Page {
   }
 
   #key(event: KeyboardEvent): void {
-    const typing = event.target instanceof HTMLInputElement && event.target.type === "number";
+    const typing = event.target instanceof HTMLInputElement && ["number", "text"].includes(event.target.type);
     const onControl = event.target instanceof HTMLButtonElement || event.target instanceof HTMLSelectElement || event.target === this.#line;
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
     const run = this.#run;
@@ -457,6 +515,7 @@ class Page {
       t: () => this.#showTrails(!this.#trails),
       d: () => this.#theme.toggle(),
       s: () => this.#save(),
+      v: () => this.#saveSvg(),
       f: () => element("follow").click(),
       "?": () => this.#toggleHelp(),
       Escape: () => {

@@ -107,7 +107,19 @@ export interface ProgramText {
   log: string;
 }
 
+/** What trackers saw up to a tick, and the newest packets for the overhead controller, oldest first. */
+export interface OutsideText {
+  type: "outside";
+  tick: number;
+  robots: number[];
+  /** Per robot x, y in mm and the covariance xx, xy, yy in mm². */
+  places: number[];
+  /** `message`: ten octets as hexadecimal digits, data and type. */
+  packets: { time: number; command: number; message: string }[];
+}
+
 export type Message =
+  | OutsideText
   | PlotData
   | ProgramText
   | { type: "plots"; plots: PlotInfo[] }

@@ -29,6 +29,8 @@ export interface Marks {
   selected: Point | undefined;
   trail: Point[];
   range: number;
+  /** Where tracked robots are with a probability of 95 %: rims. */
+  ellipses: Point[][];
 }
 
 class Program {
@@ -127,6 +129,10 @@ export class Renderer {
       for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
       return texture;
     });
+  }
+
+  get floors(): Floor[] {
+    return this.#floors;
   }
 
   /** Takes a state. Between two states, `part` of the way from `frame` to `next`. */
@@ -275,6 +281,7 @@ export class Renderer {
 
   #marks(camera: Camera, palette: Palette, marks: Marks, radius: number): void {
     const px = 1 / camera.pxPerMm;
+    for (const rim of marks.ellipses) this.#above.path(rim, 1.5 * px, palette.tracked, true);
     this.#above.path(marks.trail, 2 * px, palette.accent);
     if (!marks.selected) return;
     this.#above.path(circle(...marks.selected, radius + 4 * px, 48), 2.5 * px, palette.accent, true);

@@ -29,9 +29,11 @@ class NotedRun : public RecordedRun {
  public:
   using RecordedRun::RecordedRun;
   [[nodiscard]] std::string steer(const Request& request) override {
+    if (request.kind == Request::Kind::kOverhead) packets.push_back(request.packet);
     steered.push_back(request.kind);
     return request.kind == Request::Kind::kStop ? "not now" : "";
   }
+  std::vector<OverheadPacket> packets;
   std::vector<Request::Kind> steered;  // of the gateway's thread; read it after an answer
 };
 
@@ -142,11 +144,13 @@ TEST_F(GatewayTest, OnlyTheTokenAllowsToSteer) {
   viewer.send_text(std::string(R"({"do":"hello","token":")") + kToken + "\"}");
   EXPECT_NE(viewer.await("grant")->payload.find("true"), std::string::npos);
   viewer.send_text(R"({"do":"pause"})");
+  viewer.send_text(R"({"do":"overhead","command":6,"message":"0a0000000000000000ff"})");
   viewer.send_text(R"({"do":"stop"})");
   const auto refusal = viewer.await("notice");
   ASSERT_TRUE(refusal);
   EXPECT_NE(refusal->payload.find("not now"), std::string::npos);
-  EXPECT_EQ(run_->steered, (std::vector{Request::Kind::kPause, Request::Kind::kStop}));
+  EXPECT_EQ(run_->steered, (std::vector{Request::Kind::kPause, Request::Kind::kOverhead, Request::Kind::kStop}));
+  EXPECT_EQ(run_->packets.at(0).message[9], 255);
   EXPECT_NE(gateway_->address().find(kToken), std::string::npos);
 }
 
@@ -158,6 +162,11 @@ TEST_F(GatewayTest, DisconnectsWhoBreaksTheRules) {
     return viewer.closed();
   };
   EXPECT_EQ(closing([](WebSocketClient& v) { v.send_text("hello?"); }), 1007);
+  for (const char* wrong : {R"({"do":"overhead","command":6,"message":"0a"})",
+                            R"({"do":"overhead","command":4,"message":"0a0000000000000000ff"})",
+                            R"({"do":"overhead","command":6,"message":"zz0000000000000000ff"})", R"({"do":"plot"})",
+                            R"({"do":"plot","plot":1,"robot":-1})", R"({"do":"program","robot":1})"})
+    EXPECT_EQ(closing([wrong](WebSocketClient& v) { v.send_text(wrong); }), 1007) << wrong;
   EXPECT_EQ(closing([](WebSocketClient& v) { v.send_frame(2, std::string(40, '\0')); }), 1007);
   EXPECT_EQ(closing([](WebSocketClient& v) { v.send_text(std::string(100000, ' ')); }), 1009);
   EXPECT_EQ(closing([](WebSocketClient& v) {

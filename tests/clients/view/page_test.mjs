@@ -124,10 +124,29 @@ async function recordedRun() {
   await page.locator("#find-id").fill("5000");
   await press(page, "Select");
   await eventually("no such robot", async () => (await text(page, "notice")).includes("0 to 999"));
-  const download = page.waitForEvent("download");
-  await press(page, "Save the picture as PNG");
-  const file = await (await download).path();
-  assert.equal(fs.readFileSync(file).subarray(1, 4).toString(), "PNG");
+  const saved = async (name) => {
+    const download = page.waitForEvent("download");
+    await press(page, name);
+    return fs.readFileSync(await (await download).path());
+  };
+  assert.equal((await saved("Save the picture as PNG")).subarray(1, 4).toString(), "PNG");
+
+  // The SVG has the same robots at the same places: a disc per robot, the ellipses of 9 tracked ones, some dozen elements.
+  const svg = (await saved("Save the picture as SVG")).toString();
+  const elements = await page.evaluate((source) => {
+    const parsed = new DOMParser().parseFromString(source, "image/svg+xml");
+    return parsed.querySelector("parsererror") ? undefined : [...parsed.querySelectorAll("path")].map((one) => one.outerHTML);
+  }, svg);
+  assert.ok(elements && elements.length < 200);
+  const [sx, sy] = await onScreen(page, ...circling(3, await clock(page)));
+  const view = await page.locator("#picture").boundingBox();
+  const discs = elements.filter((one) => one.includes('fill="rgb')).flatMap((one) => [...one.matchAll(/M(-?[\d.]+) (-?[\d.]+)a([\d.]+)/g)]);
+  assert.equal(discs.length, 1000);
+  assert.ok(discs.some(([, x, y, r]) => Math.hypot(Number(x) + Number(r) - (sx - view.x), Number(y) - (sy - view.y)) < 1));
+  const outlines = elements.filter((one) => /stroke-width="1.5"/.test(one)).join("");
+  assert.equal(outlines.split("Z").length - 1, 9);
+  await eventually("packets", async () => (await text(page, "packets")).includes("once  type 7"));
+  if (pictures) fs.writeFileSync(path.join(pictures, "picture.svg"), svg);
 
   // The gateway ends and comes back: the page goes on where it was, without a reload.
   const sought = await clock(page);
@@ -229,6 +248,7 @@ async function liveRun() {
   await eventually("the stranger watches", async () => (await received(stranger)) > 1);
   assert.ok(await stranger.locator("#play").isDisabled());
   assert.ok(await stranger.locator("#stop").isHidden());
+  assert.ok(await stranger.locator("#overhead-form").isHidden());
   await stranger.context().close();
 
   await press(page, "Pause");
@@ -257,6 +277,14 @@ async function liveRun() {
   await eventually("its curve", async () => (await line(page, 3, "value")) >= 1);
   await page.locator("#plots select").nth(1).selectOption({ label: "simulated over real time" });
   await eventually("the speed", async () => (await line(page, 2, "value")) > 0);
+  // A message for the overhead controller; what is no message is not sent.
+  await page.locator("#overhead-type").fill("3");
+  await page.locator("#overhead-data").fill("0a1");
+  await press(page, "Send");
+  await eventually("the reason", async () => (await text(page, "notice")).includes("two hexadecimal digits"));
+  await page.locator("#overhead-data").fill("0a 1b");
+  await press(page, "Send");
+  await eventually("the packet", async () => (await text(page, "packets")).includes("once  type 3  0a1b"));
   await press(page, "Pause");
   await phase("live: paused");
   tick = await tickOf();
@@ -272,6 +300,7 @@ async function liveRun() {
   await press(page, "Stop the run for good");
   await phase("recorded");
   await eventually("its recording", async () => (await text(page, "run-facts")).includes("states"));
+  await eventually("the packet in the recording", async () => (await text(page, "packets")).includes("once  type 3  0a1b"));
   await eventually("the launcher's end", () => served.text.includes("the page now shows the recording"));
   assert.deepEqual(page.faults, []);
   await page.close();

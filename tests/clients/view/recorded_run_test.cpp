@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "clients/recorder/observables.hpp"
 #include "clients/view/robot_log.hpp"
 #include "core/base/error.hpp"
+#include "idl/experiment.pb.h"
 #include "tests/clients/view/recordings.hpp"
 #include "tests/system/program.hpp"
 
@@ -261,6 +263,58 @@ TEST(RecordedCurves, GrowWithTheRecording) {
   // An answer holds for a second, so another robot is asked for.
   EXPECT_EQ(run.plot(count, 2), fresh.plot(count, 2));
   EXPECT_EQ(run.plot(sent, 1), fresh.plot(sent, 1));
+}
+
+TEST(RecordedRun, TellsWhatTrackersSawAndWhichPacketsCame) {
+  Scratch scratch;
+  test::write_circling(scratch / "r.ktrec", {.robots = 20, .states = 200, .outside = true});
+  RecordedRun run(scratch / "r.ktrec");
+  const auto last = json::parse(run.text())["lastTick"].get<std::int64_t>();
+  for (const std::int64_t tick : {std::int64_t{0}, last / 2, last}) {
+    const json outside = json::parse(run.outside(tick));
+    ASSERT_EQ(outside["robots"], (json{0, 1, 2, 3, 4, 5, 6, 7, 8})) << "the tracker has lost robot 9";
+    const Pose pose = test::circling_pose(8, 20, static_cast<double>(tick) * 0.032768);
+    EXPECT_NEAR(outside["places"][40].get<double>(), pose.x_mm, 12) << "of at most half a second before";
+    EXPECT_EQ(outside["places"][42], 850);
+    EXPECT_EQ(outside["places"][43], 750);
+    const auto packets = outside["packets"];
+    const int sent = static_cast<int>(static_cast<double>(tick) * 0.032768 / 5 + 1e-6) + 1;
+    EXPECT_EQ(packets.size(), static_cast<std::size_t>(std::min<int>(sent, kMostPackets)));
+    EXPECT_EQ(packets.back()["command"], 6);
+    char octets[24];
+    std::snprintf(octets, sizeof octets, "%02x%016d07", sent - 1, 0);
+    EXPECT_EQ(packets.back()["message"], octets);
+  }
+}
+
+TEST(TrackedPlaces, TurnWithTheirTracker) {
+  proto::Experiment experiment;
+  proto::Tracker& tracker = *experiment.add_tracker();
+  tracker.set_source("ceiling");
+  tracker.set_x_mm(100);
+  tracker.set_heading_deg(90);
+  tracker.set_scale(2);
+  TrackerSample sample;
+  sample.robot = {3};
+  sample.state = {0};
+  sample.x = {10};
+  sample.y = {0};
+  sample.heading_rad = {0};
+  sample.xx = {25};
+  sample.xy = {0};
+  sample.yy = {1};
+  sample.heading_variance_rad2 = {1};
+  sample.led = {0};
+  std::map<std::uint32_t, TrackedPlace> places;
+  add_places(trackers_of(experiment), sample, places);
+  ASSERT_EQ(places.size(), 1u);
+  EXPECT_NEAR(places[3].x_mm, 100, 1e-9);
+  EXPECT_NEAR(places[3].y_mm, 20, 1e-9);
+  EXPECT_NEAR(places[3].xx_mm2, 4, 1e-9);
+  EXPECT_NEAR(places[3].yy_mm2, 100, 1e-9);
+  EXPECT_FALSE(message_of("00"));
+  EXPECT_FALSE(message_of("zz000000000000000000"));
+  EXPECT_EQ((*message_of("0a0000000000000000ff"))[9], 255);
 }
 
 TEST(RobotLog, EndsAtTheTimeWithWholeLines) {

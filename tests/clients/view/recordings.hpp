@@ -9,6 +9,7 @@
 
 #include "clients/recorder/writer.hpp"
 #include "core/base/pose.hpp"
+#include "core/frames/overhead_packet.hpp"
 
 namespace kilotwin::test {
 
@@ -16,8 +17,9 @@ struct Circling {
   std::uint32_t robots = 20;
   int states = 50;
   double every_s = 0.5;
-  bool floors = false;  ///< the first at the start, another in the middle
-  bool inside = false;  ///< variables "count", of two hosts, and "part" of every second robot; events SENT
+  bool floors = false;   ///< the first at the start, another in the middle
+  bool outside = false;  ///< a tracker sees robots 0 to 9, and every tenth state a packet comes from outside
+  bool inside = false;   ///< variables "count", of two hosts, and "part" of every second robot; events SENT
 };
 
 /// The value of "count" of a robot in state `number`; "part" is half of it.
@@ -70,6 +72,41 @@ inline proto::FloorRecord plain_floor(std::int64_t tick, char shade) {
   return floor;
 }
 
+/// What a tracker states of robots 0 to 9: standard deviations of 40 mm and 10 mm, the longer one along the diagonal.
+inline proto::TrackerRecord circling_sample(std::int64_t tick, std::uint32_t robots, double time_s) {
+  proto::TrackerRecord sample;
+  sample.set_tick(tick);
+  sample.set_source(0);
+  for (std::uint32_t i = 0; i < 10; ++i) {
+    const Pose pose = circling_pose(i, robots, time_s);
+    sample.add_robot(i);
+    sample.add_x(static_cast<float>(pose.x_mm));
+    sample.add_y(static_cast<float>(pose.y_mm));
+    sample.add_heading_rad(static_cast<float>(pose.heading_rad));
+    sample.add_xx(850);
+    sample.add_xy(750);
+    sample.add_yy(850);
+    sample.add_heading_variance_rad2(1);
+    sample.mutable_state()->push_back(i == 9 ? 2 : 0);  // the tracker has lost robot 9
+    sample.mutable_led()->push_back(0);
+  }
+  return sample;
+}
+
+inline proto::InputRecord circling_packet(std::int64_t tick, int number) {
+  proto::InputRecord input;
+  input.set_sequence_number(static_cast<std::uint64_t>(number));
+  input.set_tick(tick);
+  input.set_kind(proto::InputRecord::OVERHEAD_INPUT);
+  OverheadPacket packet;
+  packet.command = OverheadCommand::kOnce;
+  packet.message[0] = static_cast<std::uint8_t>(number);
+  packet.message[9] = 7;
+  input.set_packet(octets_of(packet));
+  input.set_packet_offset_cycles(0);
+  return input;
+}
+
 inline void write_circling(const std::filesystem::path& file, const Circling& plan) {
   proto::RecordingHeader header;
   header.set_format(recorder::kRecordingFormat);
@@ -108,6 +145,8 @@ inline void write_circling(const std::filesystem::path& file, const Circling& pl
     if (plan.floors && number == 0) writer.floor(plain_floor(tick.count(), 10));
     if (plan.floors && number == plan.states / 2) writer.floor(plain_floor(tick.count(), 20));
     writer.state({tick, x, y, heading, led, life});
+    if (plan.outside) writer.tracker(circling_sample(tick.count(), plan.robots, length.seconds_at(tick)));
+    if (plan.outside && number % 10 == 0) writer.input(circling_packet(tick.count(), number / 10));
     // A federated run reports late.
     if (plan.inside && number > 0) write_inside(writer, schedule.tick(number - 1).count(), plan.robots, number - 1);
     for (std::int64_t k = 0; k < 16; ++k)

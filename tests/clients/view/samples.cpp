@@ -61,7 +61,8 @@ int main(int argc, char** argv) {
     test::write_circling(argv[2], {.robots = static_cast<std::uint32_t>(std::atoi(argv[3])),
                                    .states = std::atoi(argv[4]),
                                    .every_s = std::atof(argv[5]),
-                                   .floors = true});
+                                   .floors = true,
+                                   .outside = true});
     return 0;
   }
   fmt::print(stderr, "view_samples: expected recording FILE ROBOTS STATES EVERY_S, or frame FRAME EXPECTED\n");

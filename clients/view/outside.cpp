@@ -1,0 +1,102 @@
+#include "clients/view/outside.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/base/pose.hpp"
+#include "idl/experiment.pb.h"
+#include "idl/recording.pb.h"
+#include "services/ark/tracking/measured_pose.hpp"
+
+namespace kilotwin::view {
+namespace {
+
+using nlohmann::json;
+
+/// TrackerFrame.state of idl/public.idl: the tracker has lost the robot.
+constexpr std::uint8_t kLost = 2;
+
+/// A tenth of a millimetre is enough for a picture.
+double rounded(double value) { return std::round(10 * value) / 10; }
+
+}  // namespace
+
+std::vector<TrackerSettings> trackers_of(const proto::Experiment& experiment) {
+  std::vector<TrackerSettings> trackers;
+  for (const proto::Tracker& tracker : experiment.tracker()) {
+    trackers.push_back({tracker.source(), tracker.x_mm(), tracker.y_mm(), tracker.heading_deg() * kPi / 180,
+                        tracker.scale(), tracker.mirrored(), tracker.first_robot(), tracker.position_sd_mm(),
+                        tracker.heading_sd_deg() * kPi / 180});
+  }
+  return trackers;
+}
+
+std::optional<TrackerSample> sample_of(const proto::TrackerRecord& record) {
+  TrackerSample sample;
+  sample.source = record.source();
+  sample.robot.assign(record.robot().begin(), record.robot().end());
+  sample.state.assign(record.state().begin(), record.state().end());
+  sample.x.assign(record.x().begin(), record.x().end());
+  sample.y.assign(record.y().begin(), record.y().end());
+  sample.heading_rad.assign(record.heading_rad().begin(), record.heading_rad().end());
+  sample.xx.assign(record.xx().begin(), record.xx().end());
+  sample.xy.assign(record.xy().begin(), record.xy().end());
+  sample.yy.assign(record.yy().begin(), record.yy().end());
+  sample.heading_variance_rad2.assign(record.heading_variance_rad2().begin(), record.heading_variance_rad2().end());
+  sample.led.assign(record.led().begin(), record.led().end());
+  if (!has_equal_columns(sample)) return std::nullopt;
+  return sample;
+}
+
+bool has_equal_columns(const TrackerSample& sample) {
+  for (const std::size_t size :
+       {sample.state.size(), sample.x.size(), sample.y.size(), sample.heading_rad.size(), sample.xx.size(),
+        sample.xy.size(), sample.yy.size(), sample.heading_variance_rad2.size(), sample.led.size()}) {
+    if (size != sample.robot.size()) return false;
+  }
+  return true;
+}
+
+void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSample& sample,
+                std::map<std::uint32_t, TrackedPlace>& to) {
+  const TrackerSettings tracker = sample.source < trackers.size() ? trackers[sample.source] : TrackerSettings{};
+  for (std::size_t n = 0; n < sample.robot.size(); ++n) {
+    if (sample.state[n] == kLost) continue;
+    const ark::MeasuredPose pose = ark::measured_pose(tracker, sample, n);
+    if (pose.is_near())
+      to.try_emplace(sample.robot[n],
+                     TrackedPlace{sample.robot[n], pose.x_mm, pose.y_mm, pose.xx, pose.xy, pose.yy});
+  }
+}
+
+std::optional<IrMessage> message_of(std::string_view hexadecimal) {
+  IrMessage message{};
+  if (hexadecimal.size() != 2 * message.size()) return std::nullopt;
+  for (std::size_t i = 0; i < message.size(); ++i) {
+    const char* const from = hexadecimal.data() + 2 * i;
+    const auto [end, error] = std::from_chars(from, from + 2, message[i], 16);
+    if (error != std::errc() || end != from + 2) return std::nullopt;
+  }
+  return message;
+}
+
+std::string outside_text(std::int64_t tick, const Outside& outside) {
+  json robots = json::array(), places = json::array(), packets = json::array();
+  for (const TrackedPlace& place : outside.robots) {
+    robots.push_back(place.robot);
+    for (const double value : {place.x_mm, place.y_mm}) places.push_back(rounded(value));
+    for (const double value : {place.xx_mm2, place.xy_mm2, place.yy_mm2}) places.push_back(value);
+  }
+  for (const ShownPacket& packet : outside.packets) {
+    std::string octets;
+    for (const std::uint8_t octet : packet.message) octets += fmt::format("{:02x}", octet);
+    packets.push_back({{"time", packet.time_s}, {"command", packet.command}, {"message", octets}});
+  }
+  return json{{"type", "outside"}, {"tick", tick}, {"robots", robots}, {"places", places}, {"packets", packets}}
+      .dump();
+}
+
+}  // namespace kilotwin::view

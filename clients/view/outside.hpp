@@ -1,0 +1,60 @@
+/// What enters a run from outside, for viewers: where trackers saw robots and how sure they are, and packets for the overhead
+/// controller.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/frames/overhead_packet.hpp"
+#include "core/frames/tracker_sample.hpp"
+#include "core/plan/tracking_settings.hpp"
+
+namespace kilotwin {
+namespace proto {
+class Experiment;
+class TrackerRecord;
+}  // namespace proto
+
+namespace view {
+
+inline constexpr std::size_t kMostPackets = 8;  ///< that a viewer is told of
+
+/// A tracked robot in the arena's frame, with the covariance of its position.
+struct TrackedPlace {
+  std::uint32_t robot = 0;
+  double x_mm = 0, y_mm = 0, xx_mm2 = 0, xy_mm2 = 0, yy_mm2 = 0;
+};
+
+/// A packet that the station sends or was sent.
+struct ShownPacket {
+  double time_s = 0;  ///< simulated
+  std::uint8_t command = 0;
+  IrMessage message{};
+};
+
+struct Outside {
+  std::vector<TrackedPlace> robots;
+  std::vector<ShownPacket> packets;  ///< oldest first
+};
+
+/// The experiment's trackers, with the places of their origins.
+[[nodiscard]] std::vector<TrackerSettings> trackers_of(const proto::Experiment&);
+/// The columns of a record that say where robots are. Nothing where their lengths differ.
+[[nodiscard]] std::optional<TrackerSample> sample_of(const proto::TrackerRecord&);
+/// Whether there is one entry per robot in each column.
+[[nodiscard]] bool has_equal_columns(const TrackerSample& sample);
+/// The robots that a sample holds and that the tracker has not lost. Robots that are listed already stay as they are.
+void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSample& sample,
+                std::map<std::uint32_t, TrackedPlace>& to);
+/// The octets of a message from 20 hexadecimal digits; nothing where they are none.
+[[nodiscard]] std::optional<IrMessage> message_of(std::string_view hexadecimal);
+/// A message of type "outside".
+[[nodiscard]] std::string outside_text(std::int64_t tick, const Outside&);
+
+}  // namespace view
+}  // namespace kilotwin
