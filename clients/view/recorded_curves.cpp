@@ -17,6 +17,8 @@ using nlohmann::json;
 
 /// What one curve may read of the file, and the octets per robot of a state and of the value of a variable.
 constexpr std::size_t kCurveBytes = 48'000'000, kStateBytesPerRobot = 26, kValueBytesPerRobot = 6;
+/// One answer reads states for so long at most, because all viewers wait for it.
+constexpr auto kReadFor = 40ms;
 /// Of a recording that grows, an answer is given again for so long.
 constexpr auto kAnswerHolds = 1s;
 constexpr std::size_t kMostAnswers = 64;
@@ -140,36 +142,43 @@ std::size_t RecordedCurves::stride(std::size_t entries, std::size_t entry_bytes)
   return stride;
 }
 
-/// Reads the states that a curve needs and that were not read yet.
-void RecordedCurves::take_states() {
+template <class Known, class Take> bool RecordedCurves::each_new_state(Known& known, const Take& take) {
   const std::vector<recorder::StateIndex::Entry>& all = index_.states();
   const std::size_t step = stride(all.size(), kStateBytesPerRobot * reader_.header().robots());
-  std::erase_if(states_, [step](const auto& state) { return state.first % step != 0; });
+  std::erase_if(known, [step](const auto& state) { return state.first % step != 0; });
+  const auto until = Clock::now() + kReadFor;
   for (std::size_t i = 0; i < all.size(); i += step) {
-    if (states_.contains(i)) continue;
+    if (known.contains(i)) continue;
     const proto::Record* const record = record_at(all[i].offset);
-    if (record == nullptr || !record->has_state()) continue;
-    const proto::StateRecord& state = record->state();
+    if (record != nullptr && record->has_state()) take(i, record->state());
+    if (Clock::now() > until && i + step < all.size()) return false;
+  }
+  return true;
+}
+
+bool RecordedCurves::take_states() {
+  return each_new_state(states_, [this](std::size_t number, const proto::StateRecord& state) {
     observer_.add(seconds(state.tick()), recorder::values(state.x_mm()), recorder::values(state.y_mm()),
                   recorder::values(state.heading_rad()), recorder::values(state.movable_x_mm()),
                   recorder::values(state.movable_y_mm()));
-    std::array<double, kNumbers>& numbers = states_[i];
+    std::array<double, kNumbers>& numbers = states_[number];
     for (std::size_t o = 0; o < recorder::kObservables.size(); ++o) numbers[o] = observer_.curves().value[o].back();
     const auto count = [&numbers](std::size_t place, const std::string& octets, auto holds) {
       numbers[recorder::kObservables.size() + place] = static_cast<double>(std::count_if(
           octets.begin(), octets.end(), [&](char octet) { return holds(static_cast<std::uint8_t>(octet)); }));
     };
-    count(0, state.life_cycle(),
-          [](std::uint8_t life) { return life == static_cast<std::uint8_t>(LifeCycle::kRunning); });
-    count(1, state.life_cycle(),
-          [](std::uint8_t life) { return life == static_cast<std::uint8_t>(LifeCycle::kFailed); });
+    const auto is = [](LifeCycle wanted) {
+      return [wanted](std::uint8_t life) { return life == static_cast<std::uint8_t>(wanted); };
+    };
+    count(0, state.life_cycle(), is(LifeCycle::kRunning));
+    count(1, state.life_cycle(), is(LifeCycle::kFailed));
     count(2, state.led(), [](std::uint8_t led) { return led != 0; });
-  }
+  });
 }
 
 RecordedCurves::Curves RecordedCurves::of_states(const Plot& plot) {
-  take_states();
   Curves curves;
+  curves.whole = take_states();
   curves.names = {"value"};
   curves.values.resize(1);
   for (const auto& [number, numbers] : states_) {
@@ -180,21 +189,16 @@ RecordedCurves::Curves RecordedCurves::of_states(const Plot& plot) {
 }
 
 RecordedCurves::Curves RecordedCurves::of_displacement(std::uint32_t robot) {
-  const std::vector<recorder::StateIndex::Entry>& all = index_.states();
-  const std::size_t step = stride(all.size(), kStateBytesPerRobot * reader_.header().robots());
+  if (places_.robot != robot) places_ = {robot, {}};
   Curves curves{{}, {"value"}, {{}}};
-  double from_x = 0, from_y = 0;
-  for (std::size_t i = 0; i < all.size(); i += step) {
-    const proto::Record* const record = record_at(all[i].offset);
-    if (record == nullptr || !record->has_state()) continue;
-    const double x = record->state().x_mm(static_cast<int>(robot)),
-                 y = record->state().y_mm(static_cast<int>(robot));
-    if (curves.time_s.empty()) {
-      from_x = x;
-      from_y = y;
-    }
-    curves.time_s.push_back(seconds(record->state().tick()));
-    curves.values[0].push_back(std::hypot(x - from_x, y - from_y));
+  curves.whole = each_new_state(places_.at, [this, robot](std::size_t number, const proto::StateRecord& state) {
+    const auto i = static_cast<int>(robot);
+    places_.at[number] = {state.x_mm(i), state.y_mm(i)};
+  });
+  for (const auto& [number, place] : places_.at) {
+    const std::array<double, 2>& first = places_.at.begin()->second;
+    curves.time_s.push_back(seconds(index_.states()[number].tick));
+    curves.values[0].push_back(std::hypot(place[0] - first[0], place[1] - first[1]));
   }
   return curves;
 }

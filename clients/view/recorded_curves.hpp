@@ -63,7 +63,16 @@ class RecordedCurves {
     std::vector<std::uint64_t> up_to;
   };
 
-  void take_states();
+  /// Numbers of a robot per state: its place, mm.
+  struct RobotPlaces {
+    std::optional<std::uint32_t> robot;
+    std::map<std::size_t, std::array<double, 2>> at;  ///< by number of the state
+  };
+
+  /// Calls take(number, state) for each state that a curve needs and that `known` does not hold; forgets the others that it holds.
+  /// False: it took too long, and another call continues.
+  template <class Known, class Take> [[nodiscard]] bool each_new_state(Known& known, const Take& take);
+  [[nodiscard]] bool take_states();
   [[nodiscard]] Curves of_states(const Plot& plot);
   [[nodiscard]] Curves of_displacement(std::uint32_t robot);
   [[nodiscard]] Curves of_variable(std::uint32_t variable, std::optional<std::uint32_t> robot);
@@ -78,6 +87,7 @@ class RecordedCurves {
   std::vector<Plot> plots_;
   recorder::ObservableObserver observer_;                       // knows the first state
   std::map<std::size_t, std::array<double, kNumbers>> states_;  // by number of the state
+  RobotPlaces places_;                                          // of the robot that was asked for last
   std::map<std::pair<std::uint32_t, std::int64_t>, Answer> answers_;
   std::deque<EventCounts> event_counts_;
 };
