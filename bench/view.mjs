@@ -37,6 +37,22 @@ const say = (line = "") => {
   console.log(line);
 };
 
+/** CPU time of all processes of Chromium that this program has started, s. */
+function browserCpu() {
+  const processes = new Map();
+  for (const pid of fs.readdirSync("/proc").filter((name) => /^\d+$/.test(name))) {
+    try {
+      const [, name, rest] = /^\d+ \((.*)\) (.*)$/s.exec(fs.readFileSync(`/proc/${pid}/stat`, "utf8"));
+      const fields = rest.split(" ");
+      processes.set(Number(pid), { name, parent: Number(fields[1]), cpu: (Number(fields[11]) + Number(fields[12])) / 100 });
+    } catch {
+      // It has ended meanwhile.
+    }
+  }
+  const isOurs = (pid) => pid === process.pid || (processes.has(pid) && isOurs(processes.get(pid).parent));
+  return [...processes].reduce((sum, [pid, one]) => sum + (one.name.startsWith("chrom") && isOurs(pid) ? one.cpu : 0), 0);
+}
+
 function recordingOf(robots, states, every) {
   const file = path.join(scratch, `${robots}-${states}.ktrec`);
   execFileSync(samples, ["recording", file, String(robots), String(states), String(every)]);
@@ -92,24 +108,29 @@ class Viewer {
 async function drawing() {
   say("\n## Frames per second of drawing\n");
   say("A recording with a state every 0.1 s plays at real time. Chromium without a window draws 1280 x 720 by software (SwiftShader).");
-  say("The browser asks for at most 60 frames per second.\n");
-  say("| robots | frames drawn per second | bytes of a frame | bytes per second to the viewer | load during it |\n|---|---|---|---|---|");
+  say("The browser asks for at most 60 frames per second. The CPU time is that of all its processes; it tells how many frames a machine");
+  say("draws that does nothing else.\n");
+  say("| robots | trails | frames drawn per second | CPU time of a frame | bytes of a frame | bytes per second to the viewer | load |\n|---|---|---|---|---|---|---|");
   const { browser, reason } = await launchBrowser(npm);
   if (reason) throw new Error(reason);
   try {
-    for (const [robots, states] of [[1000, 200], [10000, 120], [100000, 40]]) {
+    for (const [robots, states, trails] of [[1000, 200, true], [1000, 200, false], [10000, 120, false], [100000, 60, false]]) {
       const served = await Served.start([view, "view", recordingOf(robots, states, 0.1)], scratch);
       const page = await browser.newPage({ viewport: { width: 1280, height: 720 } });
       await page.goto(served.address);
       await eventually("a picture", () => page.evaluate(() => window.kilotwin.drawn > 3));
+      if (!trails && robots <= 5000) await page.keyboard.press("t"); // larger swarms begin without
+      await pause(2);
       const counters = () => page.evaluate(() => ({ ...window.kilotwin, now: performance.now() }));
       const before = await counters();
-      await pause(states / 10 > 6 ? 5 : 2.5);
+      const cpu = browserCpu();
+      await pause(states / 10 > 6 ? 5 : 3);
       const after = await counters();
+      const cpuOfFrame = (browserCpu() - cpu) / Math.max(1, after.drawn - before.drawn);
       const passed = (after.now - before.now) / 1000;
       const frames = after.received - before.received;
       const perSecond = (name) => (after[name] - before[name]) / passed;
-      say(`| ${robots} | ${perSecond("drawn").toFixed(1)} | ${Math.round((after.bytes - before.bytes) / Math.max(1, frames))} | ${(perSecond("bytes") / 1000).toFixed(0)} kB/s | ${load()} |`);
+      say(`| ${robots} | ${trails ? "yes" : "no"} | ${perSecond("drawn").toFixed(1)} | ${(1000 * cpuOfFrame).toFixed(0)} ms | ${Math.round((after.bytes - before.bytes) / Math.max(1, frames))} | ${(perSecond("bytes") / 1000).toFixed(0)} kB/s | ${load()} |`);
       await page.close();
       await served.stop();
     }
