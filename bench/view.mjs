@@ -54,8 +54,8 @@ function browserCpu() {
 }
 
 function recordingOf(robots, states, every) {
-  const file = path.join(scratch, `${robots}-${states}.ktrec`);
-  execFileSync(samples, ["recording", file, String(robots), String(states), String(every)]);
+  const file = path.join(scratch, `${robots}-${states}-${every}.ktrec`);
+  if (!fs.existsSync(file)) execFileSync(samples, ["recording", file, String(robots), String(states), String(every)]);
   return file;
 }
 
