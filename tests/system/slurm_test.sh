@@ -1,0 +1,115 @@
+#!/usr/bin/env bash
+# usage: slurm_test.sh KILOTWIN SOURCES
+# A sweep on a real Slurm of one node, whose daemons are this script's own. The node fails while elements of the array run. The sweep
+# must end with the rows of the same sweep without Slurm. Status 77: there is no Slurm, or this is not root, which slurmd needs.
+set -euo pipefail
+program=$1 sources=$2
+
+for tool in slurmctld slurmd sbatch munged python3; do
+  command -v "$tool" > /dev/null || { echo "no $tool here: apt-get install slurmctld slurmd slurm-client munge"; exit 77; }
+done
+[ "$(id -u)" = 0 ] || { echo "slurmd needs root"; exit 77; }
+
+scratch=$(mktemp -d "${TMPDIR:-/tmp}/kilotwin-slurm-XXXXXX")
+stop() { # SIGNAL: of the daemons
+  local file
+  for file in "$scratch"/*.pid; do
+    if [ -e "$file" ]; then kill "-$1" "$(cat "$file")" 2> /dev/null || true; fi
+  done
+}
+finish() {
+  stop TERM
+  sleep 1
+  stop KILL
+  rm -rf "$scratch"
+}
+trap finish EXIT
+
+port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
+chmod 755 "$scratch"
+mkdir -m 700 "$scratch/munge"
+mkdir "$scratch/state" "$scratch/spool"
+head -c 1024 /dev/urandom > "$scratch/munge/key"
+chmod 600 "$scratch/munge/key"
+munged --key-file="$scratch/munge/key" --socket="$scratch/munge/socket" --pid-file="$scratch/munged.pid" \
+  --log-file="$scratch/munge/log" --seed-file="$scratch/munge/seed" --num-threads=2 --force
+node=$(hostname -s)
+export SLURM_CONF="$scratch/slurm.conf"
+cat > "$SLURM_CONF" << END
+ClusterName=one
+SlurmctldHost=$node(127.0.0.1)
+SlurmctldPort=$(port)
+SlurmdPort=$(port)
+SlurmUser=root
+AuthInfo=socket=$scratch/munge/socket
+StateSaveLocation=$scratch/state
+SlurmdSpoolDir=$scratch/spool
+SlurmctldPidFile=$scratch/slurmctld.pid
+SlurmdPidFile=$scratch/slurmd.pid
+SlurmctldLogFile=$scratch/slurmctld.log
+SlurmdLogFile=$scratch/slurmd.log
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+MpiDefault=none
+ReturnToService=2
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SlurmdTimeout=10
+SchedulerParameters=sched_interval=1,batch_sched_delay=1
+NodeName=$node NodeAddr=127.0.0.1 CPUs=$(nproc)
+PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+END
+slurmctld
+slurmd
+waits=0
+until sinfo -h -o %T 2> /dev/null | grep -q idle; do
+  waits=$((waits + 1))
+  [ "$waits" -lt 150 ] || { cat "$scratch"/*.log; echo "FAILED: the node does not come up"; exit 1; }
+  sleep 0.2
+done
+
+cd "$sources"
+sweep=("$program" sweep experiments/disperse.txtpb --robots 20 --duration 20 --seeds 1..24)
+"${sweep[@]}" --slurm --out "$scratch/sweep" > "$scratch/sweep.log" 2>&1 &
+of_sweep=$!
+done_runs() { find "$scratch/sweep" -name summary.json 2> /dev/null | wc -l; }
+until [ "$(done_runs)" -ge 5 ] || ! kill -0 "$of_sweep" 2> /dev/null; do sleep 0.1; done
+before=$(done_runs)
+# The node's power fails: its daemon ends, and all that it had started.
+kill -KILL "$(cat "$scratch/slurmd.pid")"
+for process in $(pgrep -f "$scratch/sweep/" || true) $(pgrep -f "slurmstepd.*" || true); do
+  if [ "$process" != "$of_sweep" ] && grep -qz "SLURM_CONF=$SLURM_CONF" "/proc/$process/environ" 2> /dev/null; then
+    kill -KILL "$process" 2> /dev/null || true
+  fi
+done
+sleep 1
+slurmd
+echo "the node failed after $before of 24 runs"
+
+status=0
+wait "$of_sweep" || status=$?
+if [ "$status" = 1 ]; then
+  echo "lost elements are submitted again"
+  "$program" sweep --resume "$scratch/sweep" --slurm > "$scratch/resumed.log" 2>&1 || { cat "$scratch/resumed.log"; exit 1; }
+elif [ "$status" != 0 ]; then
+  cat "$scratch/sweep.log"
+  exit 1
+fi
+"${sweep[@]}" --out "$scratch/plain" > /dev/null 2>&1
+python3 - "$scratch/sweep/runs.csv" "$scratch/plain/runs.csv" << 'END'
+import csv
+import sys
+
+# What depends on the machine, or on where the results lie, may differ.
+DIFFERS = {"directory", "wall_s", "start_s", "cpu_s", "peak_memory_mib", "run", "speed"}
+tables = [[{k: v for k, v in row.items() if k not in DIFFERS} for row in csv.DictReader(open(name))] for name in sys.argv[1:]]
+if len(tables[0]) != 24 or tables[0] != tables[1]:
+    print(f"FAILED: {len(tables[0])} rows by Slurm, {len(tables[1])} without")
+    for one, other in zip(*tables):
+        if one != other:
+            print({k: (one[k], other[k]) for k in one if one[k] != other[k]})
+            break
+    sys.exit(1)
+print("24 rows, as without Slurm")
+END
