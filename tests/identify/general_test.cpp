@@ -9,6 +9,7 @@
 #include "clients/identify/fit/uncertainty.hpp"
 #include "clients/identify/model/effect_records.hpp"
 #include "clients/identify/search/search.hpp"
+#include "clients/identify/search/travelling_waves.hpp"
 #include "tests/identify/truth/effects.hpp"
 #include "tests/identify/truth/files.hpp"
 #include "tests/identify/truth/play.hpp"
@@ -78,6 +79,21 @@ TEST(CommandLag, IsNotUsedWithoutOne) {
   fitter.fit_base(base);
   EXPECT_EQ(fitter.fit_command_lag(base), 0);
   EXPECT_EQ(base.model.base.command_lag_s, 0);
+}
+
+TEST(TravellingWaves, AreFoundByTheirPeriodogram) {
+  const truth::Scene scene = small({truth::travelling_waves()});
+  const MeasuredSet set = set_of(scene, played(scene));
+  FitState base(set);
+  const Fitter fitter(set, 2);
+  fitter.fit_base(base);
+  const identify::Dictionary waves = identify::wave_dictionary_of(fitter, base, identify::extent_of(base.tracks));
+  ASSERT_FALSE(waves.blocks.empty());
+  const std::vector<double>& numbers = waves.blocks.front().basis.factors.front().points;
+  // The truth: a wavelength of 420 mm, a period of 70 s, direction (0.8, 0.6).
+  EXPECT_NEAR(numbers[0], 2 * M_PI * 0.8 / 420, 0.0015);
+  EXPECT_NEAR(numbers[1], 2 * M_PI * 0.6 / 420, 0.0015);
+  EXPECT_NEAR(numbers[2], 2 * M_PI / 70, 0.01);
 }
 
 TEST(Uncertainty, HoldsTheTrueBiases) {
