@@ -142,7 +142,7 @@ void LiveRun::follow_recording() {
 void LiveRun::begin(Gateway& gateway) {
   const observe::RunFacts& facts = *observer_.run();
   RunOutline outline;
-  outline.live = true;
+  outline.live = outline.federated = true;
   outline.name = facts.name;
   outline.run = facts.run;
   outline.seed = facts.seed;
@@ -249,6 +249,7 @@ std::string LiveRun::outside(std::int64_t tick) {
     outside.packets.assign(packets_.begin(), packets_.end());
   }
   for (const auto& [robot, place] : places) outside.robots.push_back(place);
+  if (const std::shared_ptr<RecordedRun> recorded = recording()) outside.alarms = recorded->alarms_until(tick);
   return outside_text(tick, outside);
 }
 

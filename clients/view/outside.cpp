@@ -4,6 +4,8 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/base/pose.hpp"
@@ -83,6 +85,18 @@ std::optional<IrMessage> message_of(std::string_view hexadecimal) {
   return message;
 }
 
+std::vector<std::string> alarms_until(const std::filesystem::path& file, double until_s) {
+  constexpr std::string_view kBefore = "monitor: ";  // the time, s
+  std::vector<std::string> alarms;
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line);) {
+    if (!line.starts_with(kBefore) || std::strtod(line.c_str() + kBefore.size(), nullptr) > until_s) continue;
+    if (alarms.size() == kMostAlarms) alarms.erase(alarms.begin());
+    alarms.push_back(line.substr(kBefore.size()));
+  }
+  return alarms;
+}
+
 std::string outside_text(std::int64_t tick, const Outside& outside) {
   json robots = json::array(), places = json::array(), packets = json::array();
   for (const TrackedPlace& place : outside.robots) {
@@ -95,8 +109,9 @@ std::string outside_text(std::int64_t tick, const Outside& outside) {
     for (const std::uint8_t octet : packet.message) octets += fmt::format("{:02x}", octet);
     packets.push_back({{"time", packet.time_s}, {"command", packet.command}, {"message", octets}});
   }
-  return json{{"type", "outside"}, {"tick", tick}, {"robots", robots}, {"places", places}, {"packets", packets}}
-      .dump();
+  return json{{"type", "outside"}, {"tick", tick},       {"robots", robots},
+              {"places", places},  {"packets", packets}, {"alarms", outside.alarms}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 }  // namespace kilotwin::view

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -22,7 +22,7 @@ class TrackerRecord;
 
 namespace view {
 
-inline constexpr std::size_t kMostPackets = 8;  ///< that a viewer is told of
+inline constexpr std::size_t kMostPackets = 8, kMostAlarms = 20;  ///< that a viewer is told of
 
 /// A tracked robot in the arena's frame, with the covariance of its position.
 struct TrackedPlace {
@@ -40,6 +40,7 @@ struct ShownPacket {
 struct Outside {
   std::vector<TrackedPlace> robots;
   std::vector<ShownPacket> packets;  ///< oldest first
+  std::vector<std::string> alarms;   ///< lines of the residual monitor, oldest first
 };
 
 /// The experiment's trackers, with the places of their origins.
@@ -53,6 +54,9 @@ void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSampl
                 std::map<std::uint32_t, TrackedPlace>& to);
 /// The octets of a message from 20 hexadecimal digits; nothing where they are none.
 [[nodiscard]] std::optional<IrMessage> message_of(std::string_view hexadecimal);
+/// The last alarms of the residual monitor up to a time, kMostAlarms at most, from the run's alarms.txt. Empty where there is no
+/// such file.
+[[nodiscard]] std::vector<std::string> alarms_until(const std::filesystem::path& file, double until_s);
 /// A message of type "outside".
 [[nodiscard]] std::string outside_text(std::int64_t tick, const Outside&);
 

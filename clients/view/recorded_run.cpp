@@ -84,6 +84,7 @@ RecordedRun::RecordedRun(const fs::path& run) : reader_(recording_of(run)), inde
     if (resolved.run() == reader_.header().run()) {
       *experiment = resolved.experiment();
       firmware_ = firmware_of(resolved);
+      federated_ = resolved.mode() == "federated";
       logs_of_ = directory.path();
     }
   }
@@ -106,6 +107,7 @@ std::string RecordedRun::text() const {
   outline.robots = header.robots();
   outline.states = index_.states().size();
   outline.firmware = firmware_;
+  outline.federated = federated_;
   return run_text(outline, *experiment_);
 }
 
@@ -259,7 +261,12 @@ std::string RecordedRun::program(std::uint32_t robot, std::int64_t tick) {
 
 std::string RecordedRun::outside(std::int64_t tick) {
   const std::lock_guard lock(mutex_);
-  return outside_text(tick, {places_at(tick), packets_until(tick)});
+  return outside_text(tick, {places_at(tick), packets_until(tick), alarms_until(tick)});
+}
+
+std::vector<std::string> RecordedRun::alarms_until(std::int64_t tick) const {
+  if (logs_of_.empty()) return {};
+  return view::alarms_until(logs_of_ / "alarms.txt", reader_.tick_length().seconds_at(Tick{tick}));
 }
 
 /// Of each tracked robot, the last place that a tracker stated shortly before.

@@ -27,6 +27,8 @@ class RecordedRun : public Answers {
   /// Looks for new states. Returns a message of type "extent" where there are some, else empty.
   [[nodiscard]] std::string grown();
   [[nodiscard]] std::size_t states() const;
+  /// Lines of the residual monitor up to a tick.
+  [[nodiscard]] std::vector<std::string> alarms_until(std::int64_t tick) const;
   [[nodiscard]] std::uint64_t run() const { return reader_.header().run(); }
   [[nodiscard]] const std::string& name() const { return reader_.header().name(); }
   [[nodiscard]] std::uint32_t robots() const { return reader_.header().robots(); }
@@ -56,6 +58,7 @@ class RecordedRun : public Answers {
   std::filesystem::path logs_of_;  // the run directory; empty: the recording stands alone
   std::unique_ptr<const proto::Experiment> experiment_;
   std::vector<bool> firmware_;
+  bool federated_ = false;
   PositionGrid grid_;
 };
 

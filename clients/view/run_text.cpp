@@ -75,6 +75,12 @@ json groups_of(const RunOutline& outline, const proto::Experiment& experiment) {
   return list;
 }
 
+/// Columns and rows of equal size over the rectangle around the arena, as PartitionGrid divides it.
+json partitions_of(const RunOutline& outline, const proto::Experiment& experiment) {
+  if (!outline.federated) return {1, 1};
+  return {experiment.deployment().partition_columns(), experiment.deployment().partition_rows()};
+}
+
 /// Lamps that stand still.
 json lamps_of(const proto::Experiment& experiment) {
   json list = json::array();
@@ -142,6 +148,7 @@ std::string run_text(const RunOutline& outline, const proto::Experiment& experim
                   {"movables", movables_of(world)},
                   {"lamps", lamps_of(experiment)},
                   {"circles", circles_of(experiment)},
+                  {"partitions", partitions_of(outline, experiment)},
                   {"groups", groups_of(outline, experiment)}});
 }
 

@@ -26,6 +26,7 @@ struct RunOutline {
   std::int64_t first_tick = 0, last_tick = 0;
   std::uint32_t robots = 0;
   std::size_t states = 0;      ///< of a recording
+  bool federated = false;      ///< the arena is divided into the partitions of the experiment
   std::vector<bool> firmware;  ///< per group: runs on the simulated processor; may be shorter
 };
 

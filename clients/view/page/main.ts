@@ -4,7 +4,7 @@ import { Connection } from "./connection.ts";
 import { Labels } from "./labels.ts";
 import { element, notice, setText, showConnection, showFrame, showProgram, showRobot, showRun, showScale } from "./panels.ts";
 import { Playback } from "./playback.ts";
-import { ellipsesOf, messageOf, showPackets } from "./outside.ts";
+import { ellipsesOf, messageOf, showAlarms, showPackets } from "./outside.ts";
 import { Plots } from "./plots.ts";
 import { listenToPointer } from "./pointer.ts";
 import { kindsOf, lifeOf, LIFE_ABSENT, type Frame, type Message, type OutsideText, type RobotCounts, type Run, type Status } from "./protocol.ts";
@@ -107,6 +107,7 @@ class Page {
       case "outside":
         this.#outside = message;
         this.#ellipses = ellipsesOf(message);
+        showAlarms(message.alarms);
         return showPackets(message, this.#maySend);
       case "plots": return this.#plots.list(message.plots);
       case "plot": return this.#plots.take(message);
@@ -155,6 +156,7 @@ class Page {
     this.#plots.begin(run);
     this.#program = this.#outsideAsked = this.#outside = undefined;
     this.#ellipses = [];
+    showAlarms([]);
     this.#line.disabled = this.#playback.live;
     element("speed").parentElement!.hidden = this.#playback.live;
     element("back").hidden = this.#playback.live;

@@ -38,6 +38,12 @@ export function showPackets(outside: OutsideText | undefined, maySend: boolean):
   setText("packets", lines.reverse().join("\n"));
 }
 
+/** The alarms of the residual monitor, newest first. */
+export function showAlarms(alarms: string[]): void {
+  element("alarms").hidden = alarms.length === 0;
+  setText("alarm-lines", [...alarms].reverse().join("\n"));
+}
+
 /** The ten octets of a message, data first, as hexadecimal digits; undefined where the text is none. */
 export function messageOf(type: number, data: string): string | undefined {
   const digits = data.replace(/\s+/g, "");

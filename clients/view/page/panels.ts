@@ -51,6 +51,7 @@ export function showRun(run: Run, status: Status | undefined, bytesPerSecond: nu
     ["tick", `${(1000 * run.tickSeconds).toFixed(3)} ms`],
     ["radio range", `${run.radioRange.toFixed(0)} mm`],
   ];
+  if (run.partitions[0] * run.partitions[1] > 1) facts.push(["partitions", run.partitions.join(" × ")]);
   if (run.source === "recorded") facts.push(["states", String(run.states)]);
   if (status) {
     facts.push(["messages sent", String(status.sent)], ["received", String(status.received)]);
@@ -75,6 +76,16 @@ export function showFrame(run: Run, frame: Frame, tick: number, speed: number | 
   element("faults-figure").hidden = failed === 0;
 }
 
+/** Column and row of the partition in which a robot stands; undefined where there is one partition. */
+function partitionOf(run: Run, frame: Frame, robot: number): string | undefined {
+  const [columns, rows] = run.partitions;
+  if (columns * rows <= 1) return undefined;
+  const { halfWidth, halfHeight } = run.arena;
+  const cell = (value: number, half: number, count: number): number =>
+    Math.min(count - 1, Math.max(0, Math.floor(((run.gridLowest + run.gridStep * value + half) / (2 * half)) * count)));
+  return `${cell(frame.x[robot]!, halfWidth, columns)}, ${cell(frame.y[robot]!, halfHeight, rows)}`;
+}
+
 export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCounts | undefined): void {
   const section = element("robot");
   section.hidden = false;
@@ -92,6 +103,8 @@ export function showRobot(run: Run, frame: Frame, robot: number, counts: RobotCo
     const motors = [leftMotorOn(state) ? "left" : "", rightMotorOn(state) ? "right" : ""].filter(Boolean).join(" and ");
     facts.push(["motors on", motors || "none"]);
   }
+  const partition = partitionOf(run, frame, robot);
+  if (partition) facts.push(["partition", partition]);
   if (group) facts.push(["kind", group.kind], ["program", fileName(group.program) || "none"]);
   if (counts?.robot === robot) {
     const radio = counts.radio;

@@ -42,6 +42,8 @@ export interface Run {
   movables: Shape[];
   lamps: { x: number; y: number }[];
   circles: Circle[];
+  /** Columns and rows of the partitions over the rectangle around the arena. */
+  partitions: [number, number];
   groups: Group[];
 }
 
@@ -116,6 +118,8 @@ export interface OutsideText {
   places: number[];
   /** `message`: ten octets as hexadecimal digits, data and type. */
   packets: { time: number; command: number; message: string }[];
+  /** Lines of the residual monitor, oldest first. */
+  alarms: string[];
 }
 
 export type Message =

@@ -247,7 +247,23 @@ export class Renderer {
       for (let x = Math.ceil(low / step) * step; x <= high; x += step) this.#below.line([x, under], [x, over], px, palette.grid);
       for (let y = Math.ceil(under / step) * step; y <= over; y += step) this.#below.line([low, y], [high, y], px, palette.grid);
     }
+    this.#partitions(run, px, palette);
     this.#below.path(this.#edge(run), 3 * px, palette.wall, true);
+  }
+
+  /** Borders of partitions, dashed. */
+  #partitions(run: Run, px: number, palette: Palette): void {
+    const { halfWidth: w, halfHeight: h } = run.arena;
+    const dash = 7 * px;
+    const dashed = (from: Point, to: Point): void => {
+      const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+      const dashes = Math.min(400, Math.ceil(length / (2 * dash)));
+      const at = (part: number): Point => [from[0] + (to[0] - from[0]) * part, from[1] + (to[1] - from[1]) * part];
+      for (let i = 0; i < dashes; ++i) this.#below.line(at(i / dashes), at((i + 0.5) / dashes), 1.5 * px, palette.obstacle);
+    };
+    const [columns, rows] = run.partitions;
+    for (let c = 1; c < columns; ++c) dashed([-w + (2 * w * c) / columns, -h], [-w + (2 * w * c) / columns, h]);
+    for (let r = 1; r < rows; ++r) dashed([-w, -h + (2 * h * r) / rows], [w, -h + (2 * h * r) / rows]);
   }
 
   #edge(run: Run): Point[] {

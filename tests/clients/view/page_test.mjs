@@ -195,6 +195,7 @@ async function line(page, plot, name) {
 async function plotsAndPrograms() {
   const run = path.join(scratch, "talked");
   execFileSync(kilotwin, ["run", talkingExperiment(), "--duration", "30", "--mode", "local", "--quiet", "--out", run]);
+  fs.writeFileSync(path.join(run, "alarms.txt"), "monitor: 12.0 s: robot 2 <b>leaves</b> the model\nmonitor: 25.0 s: robot 4 leaves the model\n");
   const served = await serve([viewProgram, "view", run]);
   const page = await open(served.address);
   await eventually("a picture", async () => (await drawn(page)) > 1);
@@ -210,6 +211,9 @@ async function plotsAndPrograms() {
   const log = await text(page, "robot-log");
   assert.match(log, new RegExp(`round ${await rounds()} <img src=x onerror=alert\\(1\\)>\n$`));
   assert.equal(await page.locator("#robot-log img").count(), 0);
+
+  // Alarms of the residual monitor, up to this time.
+  assert.equal(await text(page, "alarm-lines"), "12.0 s: robot 2 <b>leaves</b> the model");
 
   // Plots: of the swarm, then of the robot; a click goes to its time.
   await press(page, "Plots");
@@ -235,7 +239,7 @@ async function plotsAndPrograms() {
 
 async function liveRun() {
   const served = await serve([kilotwin, "run", talkingExperiment(), "--pace", "1",
-    "--partitions", "1x1", "--out", path.join(scratch, "run"), "--view"]);
+    "--partitions", "2x1", "--out", path.join(scratch, "run"), "--view"]);
   const page = await open(served.address);
   const phase = (wanted) => eventually(`phase ${wanted}`, async () => (await text(page, "phase")) === wanted);
   await phase("live: running");
@@ -267,6 +271,8 @@ async function liveRun() {
   await page.locator("#find-id").fill("7");
   await press(page, "Select");
   await eventually("the robot", async () => (await text(page, "robot-facts")).includes("motors on"));
+  const left = async () => Number.parseFloat(/x, y(-?[\d.]+)/.exec(await text(page, "robot-facts"))[1]) < 0;
+  assert.ok((await text(page, "robot-facts")).includes(`partition${(await left()) ? 0 : 1}, 0`));
   // Variables, log and curves come from the recording while it grows.
   await eventually("its variable", async () => (await text(page, "robot-variables")).includes("rounds"));
   await press(page, "Plots");

@@ -297,6 +297,17 @@ TEST(RecordedRun, TellsWhatTrackersSawAndWhichPacketsCame) {
   }
 }
 
+TEST(Alarms, AreThoseUpToTheTime) {
+  Scratch scratch;
+  test::write(scratch / "alarms.txt",
+              "monitor: 71.4 s: robot 2 leaves the model\nmonitor: 75.2 s: tracker \"a\"\nsomething else\n");
+  EXPECT_TRUE(alarms_until(scratch / "alarms.txt", 71).empty());
+  EXPECT_EQ(alarms_until(scratch / "alarms.txt", 72),
+            (std::vector<std::string>{"71.4 s: robot 2 leaves the model"}));
+  EXPECT_EQ(alarms_until(scratch / "alarms.txt", 100).size(), 2u);
+  EXPECT_TRUE(alarms_until(scratch / "none.txt", 100).empty());
+}
+
 TEST(TrackedPlaces, TurnWithTheirTracker) {
   proto::Experiment experiment;
   proto::Tracker& tracker = *experiment.add_tracker();
