@@ -20,6 +20,7 @@
 #include "core/experiment/field_checks.hpp"
 #include "core/experiment/layout.hpp"
 #include "core/experiment/limits.hpp"
+#include "core/experiment/radio_population.hpp"
 #include "core/experiment/surroundings.hpp"
 #include "core/federation/checkpoint.hpp"
 #include "core/os/files.hpp"
@@ -297,6 +298,7 @@ Resolved resolve(const LoadedExperiment& loaded, const RunArguments& arguments, 
   manifest.set_run(new_run_id());
   manifest.set_build(std::string(build_identity()));
   *manifest.mutable_experiment() = with_counts(loaded, placed);
+  use_measured_radio(*manifest.mutable_experiment());
   manifest.mutable_x_mm()->Add(placed.x_mm.begin(), placed.x_mm.end());
   manifest.mutable_y_mm()->Add(placed.y_mm.begin(), placed.y_mm.end());
   manifest.mutable_heading_rad()->Add(placed.heading_rad.begin(), placed.heading_rad.end());

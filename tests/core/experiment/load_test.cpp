@@ -1,5 +1,6 @@
 #include <google/protobuf/text_format.h>
 
+#include "core/experiment/radio_population.hpp"
 #include "scratch.hpp"
 
 namespace kilotwin::test {
@@ -116,6 +117,43 @@ TEST_F(Load, ModelReplacesTheFieldsThatItStates) {
   EXPECT_EQ(loaded.experiment.DebugString(), expected.DebugString());
   EXPECT_EQ(error_of([&] { validate(loaded); }),
             "m.txtpb:4:3: bias_left_mm_s is -500; it takes a number, -100..100 mm/s");
+}
+
+TEST_F(Load, PropagationWithoutABlockIsThatOfTheMeasuredRobots) {
+  proto::Experiment stated = load("radio { model: PROPAGATION }").experiment;
+  use_measured_radio(stated);
+  LoadedExperiment fitted = load("radio { model: PROPAGATION }");
+  apply_model(fitted, std::filesystem::path(KILOTWIN_SOURCE_DIR) / "experiments/models/radio-25-robots.txtpb");
+  const proto::Radio &radio = stated.radio(), &expected = fitted.experiment.radio();
+  const auto same = [](double a, double b) { EXPECT_NEAR(a, b, 1e-3 * std::abs(b)); };
+  same(radio.range_mm(), expected.range_mm());
+  same(radio.oscillator_sd(), expected.oscillator_sd());
+  const google::protobuf::Reflection& fields = *radio.propagation().GetReflection();
+  std::vector<const google::protobuf::FieldDescriptor*> given;
+  fields.ListFields(expected.propagation(), &given);
+  EXPECT_GT(given.size(), 10U);
+  for (const auto* field : given) {
+    if (!field->is_repeated()) {
+      same(fields.GetDouble(radio.propagation(), field), fields.GetDouble(expected.propagation(), field));
+      continue;
+    }
+    const int entries = fields.FieldSize(expected.propagation(), field);
+    ASSERT_EQ(fields.FieldSize(radio.propagation(), field), entries);
+    for (int i = 0; i < entries; ++i)
+      same(fields.GetRepeatedDouble(radio.propagation(), field, i),
+           fields.GetRepeatedDouble(expected.propagation(), field, i));
+  }
+  // What an experiment states remains.
+  for (const char* text :
+       {"radio { model: PROPAGATION propagation { power_sd_db: 2 } }", "radio { model: DISC }"}) {
+    proto::Experiment own = load(text).experiment;
+    const std::string before = own.DebugString();
+    use_measured_radio(own);
+    EXPECT_EQ(own.DebugString(), before);
+  }
+  proto::Experiment ranged = load("radio { model: PROPAGATION range_mm: 90 }").experiment;
+  use_measured_radio(ranged);
+  EXPECT_EQ(ranged.radio().range_mm(), 90);
 }
 
 TEST_F(Load, ModelErrorsNameTheModelFile) {
