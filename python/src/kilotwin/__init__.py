@@ -13,9 +13,27 @@ names of columns: _s seconds, _mm millimetres, _rad radians.
 """
 
 from kilotwin._arenas import Arena, Arenas
+from kilotwin._identify import Identification, identify
 from kilotwin._program import KilotwinError, program
 from kilotwin._run import Run, load, replay, run
 from kilotwin._sweep import Sweep, sweep
 from kilotwin._table import Table
+from kilotwin._tune import Tuned, tune
 
-__all__ = ["Arena", "Arenas", "KilotwinError", "Run", "Sweep", "Table", "load", "program", "replay", "run", "sweep"]
+__all__ = [
+    "Arena",
+    "Arenas",
+    "Identification",
+    "KilotwinError",
+    "Run",
+    "Sweep",
+    "Table",
+    "Tuned",
+    "identify",
+    "load",
+    "program",
+    "replay",
+    "run",
+    "sweep",
+    "tune",
+]

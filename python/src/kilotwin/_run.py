@@ -76,6 +76,11 @@ class Run:
         """robot, attempted, sent, received, collided, backed_off."""
         return self._table("--radio")
 
+    def export_model(self, file: str | os.PathLike[str]) -> Path:
+        """Writes the model as it ran, with each robot's own parameters; others take it as `model=`. Replaces the file."""
+        call(["export", str(self.directory), "--model", os.fspath(file)])
+        return Path(file)
+
     def __repr__(self) -> str:
         return f"kilotwin.Run({str(self.directory)!r})"
 
