@@ -23,7 +23,13 @@ struct BuildArguments {
   bool avr = false, boot_loader = false, wide_int = false;
 };
 
-void write_program(const fs::path& compiled, const fs::path& out) {
+/// Without `out` nothing is written where the user stands: it was a test.
+void write_program(const fs::path& compiled, const BuildArguments& arguments) {
+  const fs::path& out = arguments.out;
+  if (out.empty()) {
+    fmt::print("{} builds; -o FILE keeps what was built\n", arguments.sources.front().string());
+    return;
+  }
   std::error_code error;
   fs::copy_file(compiled, out, fs::copy_options::overwrite_existing, error);
   if (error) throw UserError(fmt::format("{}: cannot be written: {}", out.string(), error.message()));
@@ -32,7 +38,7 @@ void write_program(const fs::path& compiled, const fs::path& out) {
 
 int build_for_robot(const BuildArguments& arguments, const behaviours::CompileOptions& options) {
   if (!arguments.out.empty())
-    write_program(behaviours::compile_firmware(arguments.sources, options).file, arguments.out);
+    write_program(behaviours::compile_firmware(arguments.sources, options).file, arguments);
   constexpr double kFlash = 32768, kRam = 2048;
   const behaviours::AvrSize size = behaviours::compile_for_avr(arguments.sources, options);
   fmt::print(
@@ -47,11 +53,9 @@ int build(const BuildArguments& arguments) {
   options.defines = arguments.define;
   options.boot_loader = arguments.boot_loader;
   options.wide_int = arguments.wide_int;
-  const fs::path object =
-      arguments.out.empty() ? fs::path(arguments.sources.front().stem().string() + ".so") : arguments.out;
   if (behaviours::is_station_plugin(arguments.sources)) {
     if (arguments.avr) throw UserError("--avr: a plugin of the station runs on no robot; leave --avr out");
-    write_program(behaviours::compile_station_plugin(arguments.sources, options).file, object);
+    write_program(behaviours::compile_station_plugin(arguments.sources, options).file, arguments);
     return kDone;
   }
   if (arguments.avr) return build_for_robot(arguments, options);
@@ -61,7 +65,7 @@ int build(const BuildArguments& arguments) {
     for (const std::string& warning : behaviours::program_warnings(arguments.sources, compiled.sha256, options))
       say(warning);
   }
-  write_program(compiled.file, object);
+  write_program(compiled.file, arguments);
   return kDone;
 }
 
@@ -74,7 +78,8 @@ Command add_build(CLI::App& program) {
   app.add_option("PROGRAM", arguments->sources, "C or C++ sources of one program, or of one plugin of the station")
       ->required()
       ->type_name("");
-  app.add_option("-o", arguments->out, "file to write (default: PROGRAM.so in this directory)")->type_name("FILE");
+  app.add_option("-o", arguments->out, "file to write (default: none; the program is only tested)")
+      ->type_name("FILE");
   app.add_option("--define", arguments->define, "a macro")->allow_extra_args(false)->type_name("NAME=VALUE");
   app.add_flag(
       "--avr", arguments->avr,

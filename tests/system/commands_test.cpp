@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "clients/recorder/reader.hpp"
@@ -142,6 +143,15 @@ TEST_F(Commands, BuildMakesAProgramThatRuns) {
   ASSERT_EQ(kilotwin({"build", source("behaviours/disperse.c"), "-o", scratch / "d.so"}, scratch).status, 0);
   const auto built = run(small({"--behaviour", scratch / "d.so"}), scratch, "built");
   EXPECT_EQ(built.state_hash, run(small(), scratch, "compiled").state_hash);
+}
+
+TEST_F(Commands, BuildWithoutAFileLeavesNothingWhereOneStands) {
+  const Scratch here;
+  const Outcome outcome = kilotwin({"build", source("behaviours/disperse.c")}, here);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("-o FILE"), std::string::npos) << outcome.out;
+  for (const fs::directory_entry& entry : fs::directory_iterator(here.path()))
+    EXPECT_NE(entry.path().extension(), ".so") << entry.path();
 }
 
 TEST_F(Commands, BuildForTheRealRobotPrintsSizes) {

