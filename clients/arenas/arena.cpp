@@ -8,7 +8,6 @@
 
 #include "core/base/error.hpp"
 #include "core/base/state_hash.hpp"
-#include "core/federation/hash_sums.hpp"
 #include "idl/manifest.pb.h"
 #include "services/behaviours/host_memory.hpp"
 
@@ -39,7 +38,7 @@ Arena::Arena(std::shared_ptr<const RunPlan> plan, const std::shared_ptr<behaviou
       places.at(place.program()) = std::make_unique<const VariablePlace>(place);
   }
   engines_.begin();
-  if (first_hashed(kFirst) == kFirst) chain_ = hash_chain(chain_, engines_.hash_sum());
+  chain_ = hash_chain(chain_, engines_.hash_sum());
 }
 
 void Arena::step(std::int64_t ticks) {

@@ -1,5 +1,4 @@
-// Parts of the search on small scenes: lag of the commands, general terms and their simpler forms, bent headings, the disc
-// centre behind a knocked camera, uncertainty.
+// Parts of the search on small scenes: lag of the commands, travelling waves, uncertainty, traffic that fades.
 #include <gtest/gtest.h>
 
 #include <algorithm>
