@@ -6,6 +6,7 @@
 
 #include "clients/cli/run_recorder.hpp"
 #include "clients/recorder/reader.hpp"
+#include "clients/recorder/tracker_records.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
 #include "core/federation/frame_check.hpp"
@@ -118,7 +119,8 @@ Beginning beginning_of(const RunPlan& plan, const recorder::RunDirectory& direct
   recorder::Reader reader(recording);
   while (const proto::Record* record = reader.next()) {
     if (record->has_tracker() && Tick{record->tracker().tick()} >= first)
-      beginning.tracker_samples.emplace_back(Tick{record->tracker().tick()}, from_record(record->tracker()));
+      beginning.tracker_samples.emplace_back(Tick{record->tracker().tick()},
+                                             recorder::from_record(record->tracker()));
     if (!record->has_input()) continue;
     Directive input = from_record(record->input());
     if (!changes_results(input) || input.tick < first || defect(input, plan) != nullptr) continue;

@@ -13,6 +13,7 @@
 #include "clients/cli/run_recorder.hpp"
 #include "clients/local/local_run.hpp"
 #include "clients/recorder/reader.hpp"
+#include "clients/recorder/tracker_records.hpp"
 #include "core/base/error.hpp"
 #include "core/federation/frame_check.hpp"
 #include "core/os/interrupt.hpp"
@@ -155,7 +156,8 @@ class RecordedSamples {
 
   std::vector<TrackerSample> of(Tick tick) {
     std::vector<TrackerSample> samples;
-    for (; next_ != nullptr && Tick{next_->tick()} <= tick; advance()) samples.push_back(from_record(*next_));
+    for (; next_ != nullptr && Tick{next_->tick()} <= tick; advance())
+      samples.push_back(recorder::from_record(*next_));
     return samples;
   }
 

@@ -71,8 +71,5 @@ class RunRecorder : public RunObserver {
   return directive.kind == DirectiveKind::kOverheadInput || directive.kind == DirectiveKind::kMembership;
 }
 [[nodiscard]] Directive from_record(const proto::InputRecord& record);
-[[nodiscard]] proto::TrackerRecord to_record(Tick tick, const TrackerSample& sample);
-/// Throws UserError where its columns differ in length.
-[[nodiscard]] TrackerSample from_record(const proto::TrackerRecord& record);
 
 }  // namespace kilotwin::cli

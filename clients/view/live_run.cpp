@@ -8,6 +8,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "clients/recorder/tracker_records.hpp"
 #include "clients/view/run_text.hpp"
 #include "core/base/error.hpp"
 #include "core/base/say.hpp"
@@ -54,7 +55,7 @@ std::optional<TrackerSample> tracker_sample(const PublicTrackerFrame& frame, std
   take(frame.heading_variance_rad2, sample.heading_variance_rad2);
   take(frame.led, sample.led);
   for (std::uint32_t& robot : sample.robot) robot += first_robot;
-  if (!has_equal_columns(sample)) return std::nullopt;
+  if (!recorder::has_equal_columns(sample)) return std::nullopt;
   return sample;
 }
 

@@ -36,32 +36,6 @@ std::vector<TrackerSettings> trackers_of(const proto::Experiment& experiment) {
   return trackers;
 }
 
-std::optional<TrackerSample> sample_of(const proto::TrackerRecord& record) {
-  TrackerSample sample;
-  sample.source = record.source();
-  sample.robot.assign(record.robot().begin(), record.robot().end());
-  sample.state.assign(record.state().begin(), record.state().end());
-  sample.x.assign(record.x().begin(), record.x().end());
-  sample.y.assign(record.y().begin(), record.y().end());
-  sample.heading_rad.assign(record.heading_rad().begin(), record.heading_rad().end());
-  sample.xx.assign(record.xx().begin(), record.xx().end());
-  sample.xy.assign(record.xy().begin(), record.xy().end());
-  sample.yy.assign(record.yy().begin(), record.yy().end());
-  sample.heading_variance_rad2.assign(record.heading_variance_rad2().begin(), record.heading_variance_rad2().end());
-  sample.led.assign(record.led().begin(), record.led().end());
-  if (!has_equal_columns(sample)) return std::nullopt;
-  return sample;
-}
-
-bool has_equal_columns(const TrackerSample& sample) {
-  for (const std::size_t size :
-       {sample.state.size(), sample.x.size(), sample.y.size(), sample.heading_rad.size(), sample.xx.size(),
-        sample.xy.size(), sample.yy.size(), sample.heading_variance_rad2.size(), sample.led.size()}) {
-    if (size != sample.robot.size()) return false;
-  }
-  return true;
-}
-
 void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSample& sample,
                 std::map<std::uint32_t, TrackedPlace>& to) {
   const TrackerSettings tracker = sample.source < trackers.size() ? trackers[sample.source] : TrackerSettings{};

@@ -17,8 +17,7 @@
 namespace kilotwin {
 namespace proto {
 class Experiment;
-class TrackerRecord;
-}  // namespace proto
+}
 
 namespace view {
 
@@ -45,10 +44,6 @@ struct Outside {
 
 /// The experiment's trackers, with the places of their origins.
 [[nodiscard]] std::vector<TrackerSettings> trackers_of(const proto::Experiment&);
-/// The columns of a record that say where robots are. Nothing where their lengths differ.
-[[nodiscard]] std::optional<TrackerSample> sample_of(const proto::TrackerRecord&);
-/// Whether there is one entry per robot in each column.
-[[nodiscard]] bool has_equal_columns(const TrackerSample& sample);
 /// The robots that a sample holds and that the tracker has not lost. Robots that are listed already stay as they are.
 void add_places(const std::vector<TrackerSettings>& trackers, const TrackerSample& sample,
                 std::map<std::uint32_t, TrackedPlace>& to);

@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "clients/recorder/tracker_records.hpp"
 #include "clients/view/robot_log.hpp"
 #include "core/base/error.hpp"
 #include "core/logs/robot_logs.hpp"
@@ -281,7 +282,11 @@ std::vector<TrackedPlace> RecordedRun::places_at(std::int64_t tick) {
     if ((--at)->tick < tick - shortly) break;
     const proto::Record* const record = record_at(at->offset);
     if (record == nullptr || !record->has_tracker()) continue;
-    if (const auto sample = sample_of(record->tracker())) add_places(trackers, *sample, places);
+    try {
+      add_places(trackers, recorder::from_record(record->tracker()), places);
+    } catch (const UserError&) {
+      // A damaged sample shows no robots.
+    }
   }
   std::vector<TrackedPlace> list;
   for (const auto& [robot, place] : places) list.push_back(place);
