@@ -39,7 +39,13 @@ class MotionEffects {
                 const ArenaFields* fields, MotionChanges&);
 
  private:
+  /// Sums of gains per robot, of the left wheel and of the right one.
+  struct GainSum {
+    std::vector<double> left, right;
+  };
+
   TermList terms_;
+  std::vector<GainSum> sums_;  ///< within evaluate()
   double half_base_mm_, limit_mm_s_;
   bool act_at_rest_ = false, drift_ = false;
 };

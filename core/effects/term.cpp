@@ -1,5 +1,7 @@
 #include "core/effects/term.hpp"
 
+#include <algorithm>
+
 #include "core/math/elementary.h"
 
 namespace kilotwin {
@@ -52,6 +54,11 @@ void TermList::add(const EffectSettings& effect, std::uint32_t number, bool left
     for (const std::uint32_t robot : effect.robots) {
       if (robot < plan_.robots()) term.applies[robot] = 1;
     }
+  }
+  if (!effect.sum.empty()) {
+    const auto known = std::find(sum_names_.begin(), sum_names_.end(), effect.sum);
+    term.sum = static_cast<std::uint32_t>(known - sum_names_.begin());
+    if (known == sum_names_.end()) sum_names_.push_back(effect.sum);
   }
   for (std::uint32_t f = 0; f < effect.functions.size(); ++f) {
     const FunctionSettings& given = effect.functions[f];

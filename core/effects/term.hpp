@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/effects/covariates.hpp"
@@ -28,6 +29,7 @@ struct Term {
   double along = 1, across = 0;       ///< cosine and sine of the direction
   std::uint8_t commands = 0;          ///< bits of the MotionCommands during which the term acts
   std::vector<std::uint8_t> applies;  ///< per robot; empty: to all
+  std::optional<std::uint32_t> sum;   ///< for gains that are added before they act: index of their sum, from 0
   std::vector<Factor> factors;
 };
 
@@ -39,6 +41,8 @@ class TermList {
   [[nodiscard]] bool empty() const { return terms_.empty(); }
   [[nodiscard]] const std::vector<Term>& terms() const { return terms_; }
   [[nodiscard]] const Covariates& covariates() const { return covariates_; }
+  /// Number of sums of gains.
+  [[nodiscard]] std::size_t sums() const { return sum_names_.size(); }
   /// Approximate maximum of a term's magnitude.
   [[nodiscard]] double largest(const Term&) const;
 
@@ -65,6 +69,7 @@ class TermList {
       noise_per_tick_;  ///< independent noise: standard deviation in a tick over that of the mean over one second
   Covariates covariates_;
   std::vector<Term> terms_;
+  std::vector<std::string> sum_names_;
   std::vector<double> values_;
 };
 

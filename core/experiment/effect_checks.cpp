@@ -99,6 +99,8 @@ class EffectCheck {
     const bool on_wheels = target == Effect::WHEEL_GAIN || target == Effect::WHEEL_OFFSET;
     demand(on_wheels || !effect.has_wheel(), path + ".wheel",
            "wheel has no effect here; it goes with acts_on: WHEEL_GAIN or WHEEL_OFFSET");
+    demand(target == Effect::WHEEL_GAIN || effect.sum().empty(), path + ".sum",
+           "sum has no effect here; it goes with acts_on: WHEEL_GAIN, since all others are added in any case");
     const bool directed = target == Effect::BODY_DRIFT || target == Effect::WORLD_DRIFT ||
                           target == Effect::MEASURED_OFFSET || target == Effect::MEASURED_BODY_OFFSET;
     demand(directed || !effect.has_direction_deg(), path + ".direction_deg",

@@ -114,6 +114,8 @@ struct EffectSettings {
   std::vector<FunctionSettings> functions;
   std::vector<MotionCommand> during;
   std::vector<std::uint32_t> robots;
+  std::string
+      sum;  ///< with kWheelGain: gains of one name are added before they act; empty: the gain acts by itself
 
   /// Whether the effect belongs to the measurement model, not to the motion model.
   [[nodiscard]] bool is_measured() const { return target >= Target::kMeasuredOffset; }

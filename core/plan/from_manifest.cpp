@@ -365,6 +365,7 @@ EffectSettings settings_of(const proto::Effect& effect) {
   out.functions = each<FunctionSettings>(effect.function(), settings_of);
   for (const int command : effect.during()) out.during.push_back(static_cast<MotionCommand>(command));
   out.robots = list(effect.robot());
+  out.sum = effect.sum();
   return out;
 }
 

@@ -404,9 +404,13 @@ std::vector<Effect> effects_of_term(const Term& term) {
       coefficients[at] = term.coefficients[first + i];
     }
     first += own;
-    for (const std::vector<Function>& product : products_of(block.basis.factors, 0, coefficients)) {
+    const std::vector<std::vector<Function>> products = products_of(block.basis.factors, 0, coefficients);
+    for (const std::vector<Function>& product : products) {
       Effect effect;
       set_target(effect, block.target);
+      // The columns of a block add up; gains of different blocks multiply.
+      if (products.size() > 1 && effect.acts_on() == Effect::WHEEL_GAIN)
+        effect.set_sum(fmt::format("{}-{}", term.name, &block - term.blocks.data() + 1));
       if (!is_measured(block.target) && block.during != kDriven) {
         for (int command = 0; command < 4; ++command)
           if ((block.during >> command & 1) != 0) effect.add_during(static_cast<proto::Command>(command));

@@ -294,12 +294,8 @@ TEST_F(WrittenModel, PredictsLikeTheFittedModel) {
           most_rad = std::max(most_rad, std::abs(wrapped_angle(seen[r][i].heading_rad - should[r][i].heading_rad)));
         }
       }
-      // Gains of several effects multiply, and columns of a term add up: a gain that needs several effects is written to the
-      // first order. Amplitudes are of some 10 %, so the second order is of some 1 %.
-      const bool is_gain = target == Target::kGain || target == Target::kGainLeft || target == Target::kGainRight;
-      const bool to_first_order = is_gain && effects_of_term(term).size() > 1;
-      EXPECT_LT(most_mm, to_first_order ? 3 : 0.15) << name_of(target) << " by " << form.name;
-      EXPECT_LT(most_rad, to_first_order ? 0.05 : 0.005) << name_of(target) << " by " << form.name;
+      EXPECT_LT(most_mm, 0.15) << name_of(target) << " by " << form.name;
+      EXPECT_LT(most_rad, 0.005) << name_of(target) << " by " << form.name;
     }
   }
 }

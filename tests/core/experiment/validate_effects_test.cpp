@@ -62,6 +62,9 @@ TEST_F(ValidateEffects, ErrorsNameTheirPlace) {
        "e.txtpb:2:39: wheel has no effect here; it goes with acts_on: WHEEL_GAIN or WHEEL_OFFSET"},
       {"effect { name: 'a' acts_on: TURN_RATE direction_deg: 3 function { constant: 1 } }",
        "e.txtpb:2:39: direction_deg has no effect here; it goes with drifts and measured offsets"},
+      {"effect { name: 'a' acts_on: TURN_RATE sum: 's' function { constant: 1 } }",
+       "e.txtpb:2:39: sum has no effect here; it goes with acts_on: WHEEL_GAIN, since all others are added in any "
+       "case"},
       {"effect { name: 'a' acts_on: TURN_RATE function { } }",
        "e.txtpb:2:39: function has no shape; it takes constant, linear, exponential, harmonic, spline, spline_2d, "
        "steps, table, noise or episodes"},

@@ -57,6 +57,23 @@ TEST(Effects, GainsMultiplyAndOffsetsAdd) {
   EXPECT_NEAR(swarm.poses()[0].x_mm, (12 * 1.5 * 0.5 - 1.5) * 10 * kTick_s, 1e-11);
 }
 
+TEST(Effects, GainsOfASumAddUpBeforeTheyMultiply) {
+  const auto gain = [](const char* name, const char* more, double value) {
+    return "effect { name: '" + std::string(name) + "' acts_on: WHEEL_GAIN " + more +
+           " function { constant: " + std::to_string(value) + " } } ";
+  };
+  // (1 + 0.5 - 0.25) (1 + 0.2 + 0.2) (1 - 0.5). Members of a sum need not follow each other.
+  const std::string text = kQuiet + gain("a", "sum: 's'", 0.5) + gain("b", "sum: 't'", 0.2) + gain("c", "", -0.5) +
+                           gain("d", "sum: 's'", -0.25) + gain("e", "wheel: LEFT_WHEEL sum: 't'", 0.2) +
+                           gain("f", "wheel: RIGHT_WHEEL sum: 't'", 0.2);
+  const RunPlan plan = make_plan(text, {{0, 0, 0}});
+  Swarm swarm(plan);
+  swarm.set_all_motors(70, 70);
+  swarm.run(10);
+  EXPECT_NEAR(swarm.poses()[0].x_mm, 10 * 1.25 * 1.4 * 0.5 * 10 * kTick_s, 1e-11);
+  EXPECT_EQ(swarm.poses()[0].heading_rad, 0);
+}
+
 TEST(Effects, ATurnRateMovesTheReferencePointOnACircle) {
   const RunPlan plan = make_plan(kQuiet + effect("acts_on: TURN_RATE", "constant: 0.1"), {{0, 0, 0}});
   Swarm swarm(plan);
