@@ -155,7 +155,7 @@ void Monitor::process_samples(const SwarmView& swarm) {
 }
 
 void Monitor::process(const TrackerSample& sample, const SwarmView& swarm) {
-  const TrackerSettings tracker = ark::tracker_of(plan_.tracking_settings(), sample.source);
+  const TrackerSettings tracker = tracker_of(plan_.tracking_settings(), sample.source);
   for (std::size_t n = 0; n < sample.robot.size(); ++n) {
     if (sample.robot[n] >= entry_of_.size() || entry_of_[sample.robot[n]] < 0) continue;
     const auto state = TrackedState{sample.state[n]};
@@ -164,7 +164,7 @@ void Monitor::process(const TrackerSample& sample, const SwarmView& swarm) {
     const auto i = static_cast<std::size_t>(entry_of_[sample.robot[n]]);
     WatchedRobot& robot = robots_[i];
     const auto innovation =
-        robot.measure(ark::measured_pose(tracker, sample, n), std::min(sample.source, trackers_ - 1), dispersion_);
+        robot.measure(measured_pose(tracker, sample, n), std::min(sample.source, trackers_ - 1), dispersion_);
     if (!innovation) continue;
     ++totals_.samples;
     totals_.outliers += innovation->is_outlier ? 1u : 0u;

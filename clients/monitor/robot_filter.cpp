@@ -34,7 +34,7 @@ void RobotFilter::forget_biases() {
   covariance_(3, 3) = covariance_(4, 4) = prior_.sd_mm_s * prior_.sd_mm_s;
 }
 
-void RobotFilter::start(const ark::MeasuredPose& at, double heading_rad, double heading_variance) {
+void RobotFilter::start(const MeasuredPose& at, double heading_rad, double heading_variance) {
   state_[0] = at.x_mm;
   state_[1] = at.y_mm;
   state_[2] = wrapped(heading_rad);
@@ -128,7 +128,7 @@ Transition RobotFilter::predict(const WheelMotion& motion, double time_s, double
   return step;
 }
 
-Innovation RobotFilter::correct(const ark::MeasuredPose& measured, double back_s) {
+Innovation RobotFilter::correct(const MeasuredPose& measured, double back_s) {
   Innovation innovation;
   const bool with_heading = measured.has_heading();
   innovation.dimensions = with_heading ? 3 : 2;

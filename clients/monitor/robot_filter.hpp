@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "clients/monitor/wheel_motion.hpp"
-#include "services/ark/tracking/measured_pose.hpp"
+#include "core/trackers/measured_pose.hpp"
 
 namespace kilotwin::monitor {
 
@@ -52,7 +52,7 @@ class RobotFilter {
   RobotFilter(Geometry geometry, BiasPrior prior);
 
   /// Starts at a pose with a heading of the given variance, and biases as before.
-  void start(const ark::MeasuredPose& at, double heading_rad, double heading_variance);
+  void start(const MeasuredPose& at, double heading_rad, double heading_variance);
   void forget_biases();
   /// The pose becomes unknown within some 100 mm and 1 rad; the biases stay.
   void loosen();
@@ -60,7 +60,7 @@ class RobotFilter {
   /// `touching`: contacts disturb the robot, so the biases learn nothing.
   Transition predict(const WheelMotion& motion, double time_s, double jitter_s, bool touching);
   /// `back_s`: how much older than the state the measurement is, >= 0.
-  Innovation correct(const ark::MeasuredPose& measured, double back_s);
+  Innovation correct(const MeasuredPose& measured, double back_s);
 
   [[nodiscard]] double x_mm() const { return state_[0]; }
   [[nodiscard]] double y_mm() const { return state_[1]; }

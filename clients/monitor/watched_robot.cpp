@@ -128,7 +128,7 @@ void WatchedRobot::advance_to(std::int64_t cycle) {
   if (cycle > at_) step_to(cycle);
 }
 
-void WatchedRobot::begin(const ark::MeasuredPose& measured) {
+void WatchedRobot::begin(const MeasuredPose& measured) {
   counts_ = false;
   outliers_ = 0;
   at_ = measured.cycle;
@@ -144,9 +144,9 @@ void WatchedRobot::begin(const ark::MeasuredPose& measured) {
   phase_ = Phase::kSeeksHeading;
 }
 
-void WatchedRobot::seek_heading(const ark::MeasuredPose& measured) {
+void WatchedRobot::seek_heading(const MeasuredPose& measured) {
   // Dead reckoning from heading 0; the direction of the measured motion then shows the heading.
-  ark::MeasuredPose origin = sought_from_;
+  MeasuredPose origin = sought_from_;
   origin.x_mm = sought_x_mm_;
   origin.y_mm = sought_y_mm_;
   RobotFilter reckoning(setting_.geometry, setting_.prior);
@@ -167,7 +167,7 @@ void WatchedRobot::seek_heading(const ark::MeasuredPose& measured) {
   phase_ = Phase::kFollowed;
 }
 
-std::optional<Innovation> WatchedRobot::measure(const ark::MeasuredPose& measured, std::uint32_t tracker,
+std::optional<Innovation> WatchedRobot::measure(const MeasuredPose& measured, std::uint32_t tracker,
                                                 Dispersion& dispersion) {
   if (measured.in_doubt || !measured.is_near() || measured.cycle < known_from_) return std::nullopt;
   if (phase_ != Phase::kUnknown && at_ < known_from_) lose();  // a gap longer than the memory

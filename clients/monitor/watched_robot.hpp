@@ -34,8 +34,7 @@ class WatchedRobot {
 
   /// Takes a measurement up to which the motion is known. Returns its innovation; none where the estimate begins with it, or it is
   /// too old.
-  std::optional<Innovation> measure(const ark::MeasuredPose& measured, std::uint32_t tracker,
-                                    Dispersion& dispersion);
+  std::optional<Innovation> measure(const MeasuredPose& measured, std::uint32_t tracker, Dispersion& dispersion);
 
   /// After an alarm: for a minute nothing is tested or learned. Then tests begin anew, on probation at first.
   void hold();
@@ -70,8 +69,8 @@ class WatchedRobot {
     return history_[static_cast<std::size_t>(tick % kHistory)];
   }
   [[nodiscard]] WheelMotion mean_motion(std::int64_t from_cycle, std::int64_t to_cycle) const;
-  void begin(const ark::MeasuredPose& measured);
-  void seek_heading(const ark::MeasuredPose& measured);
+  void begin(const MeasuredPose& measured);
+  void seek_heading(const MeasuredPose& measured);
   void advance_to(std::int64_t cycle);
   void step_to(std::int64_t cycle);
   void warm_up(double time_s, Dispersion& dispersion);
@@ -96,7 +95,7 @@ class WatchedRobot {
   std::uint32_t outliers_ = 0;  ///< in a row
   std::uint64_t restarts_ = 0;
   double tested_s_ = 0;
-  ark::MeasuredPose sought_from_;                                   ///< begin of the stretch that shows the heading
+  MeasuredPose sought_from_;                                        ///< begin of the stretch that shows the heading
   double sought_x_mm_ = 0, sought_y_mm_ = 0, sought_turn_rad_ = 0;  ///< motion since, as if the heading had been 0
 };
 

@@ -73,7 +73,7 @@ std::optional<std::uint32_t> TrackedSwarm::sender_of(const HeardMessage& heard) 
   if (listener >= next_.size() || !next_[listener].known) return std::nullopt;
   const auto& at = next_[listener].v;
   std::optional<std::uint32_t> best;
-  double least_mm = kFarthest_mm;
+  double least_mm = kFarthestSample_mm;
   for (std::size_t i = 0; i < next_.size(); ++i) {
     if (i == listener || !next_[i].known || !settings_.says_heard(robots_[i])) continue;
     const double dx_mm = next_[i].v[kX] - at[kX], dy_mm = next_[i].v[kY] - at[kY];
@@ -243,7 +243,7 @@ void TrackedSwarm::emit(Tick now, TrackingFrame& frame) const {
     const TrackedState state = track.in_doubt                ? TrackedState::kInDoubt
                                : cycle - track.seen > kFresh ? TrackedState::kPredicted
                                                              : TrackedState::kSeen;
-    const auto within = [](double value) { return std::clamp(value, -kFarthest_mm, kFarthest_mm); };
+    const auto within = [](double value) { return std::clamp(value, -kFarthestSample_mm, kFarthestSample_mm); };
     frame.robot.push_back(robots_[i]);
     frame.state.push_back(static_cast<std::uint8_t>(state));
     frame.x_mm.push_back(within(track.v[kX]));

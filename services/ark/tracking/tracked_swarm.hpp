@@ -21,7 +21,7 @@
 #include "core/frames/tracker_sample.hpp"
 #include "core/plan/plan.hpp"
 #include "core/plan/tracking_settings.hpp"
-#include "services/ark/tracking/measured_pose.hpp"
+#include "core/trackers/measured_pose.hpp"
 
 namespace kilotwin::proto {
 class StationState;

@@ -1,4 +1,4 @@
-#include "services/ark/tracking/measured_pose.hpp"
+#include "core/trackers/measured_pose.hpp"
 
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 #include "core/frames/frames.hpp"
 #include "core/math/elementary.h"
 
-namespace kilotwin::ark {
+namespace kilotwin {
 namespace {
 
 /// Bounds of what a tracker may state as variances.
@@ -15,7 +15,8 @@ constexpr double kLeastVariance_mm2 = 1e-4, kMostVariance_mm2 = 1e6, kLeastVaria
 }  // namespace
 
 bool MeasuredPose::is_near() const {
-  return x_mm > -kFarthest_mm && x_mm < kFarthest_mm && y_mm > -kFarthest_mm && y_mm < kFarthest_mm;
+  return x_mm > -kFarthestSample_mm && x_mm < kFarthestSample_mm && y_mm > -kFarthestSample_mm &&
+         y_mm < kFarthestSample_mm;
 }
 
 TrackerSettings tracker_of(const TrackingSettings& settings, std::uint32_t source) {
@@ -49,4 +50,4 @@ MeasuredPose measured_pose(const TrackerSettings& tracker, const TrackerSample& 
   return measured;
 }
 
-}  // namespace kilotwin::ark
+}  // namespace kilotwin

@@ -6,7 +6,7 @@
 #include "core/frames/tracker_sample.hpp"
 #include "core/plan/tracking_settings.hpp"
 
-namespace kilotwin::ark {
+namespace kilotwin {
 
 /// A heading with a larger variance is none, rad^2.
 inline constexpr double kNoHeading_rad2 = 10;
@@ -26,7 +26,7 @@ struct MeasuredPose {
 };
 
 /// Samples farther from the centre are no robots': arenas are at most 1e6 mm wide.
-inline constexpr double kFarthest_mm = 1e7;
+inline constexpr double kFarthestSample_mm = 1e7;
 
 /// The settings of a source; those of a tracker without a block where the experiment has none for it.
 [[nodiscard]] TrackerSettings tracker_of(const TrackingSettings&, std::uint32_t source);
@@ -34,4 +34,4 @@ inline constexpr double kFarthest_mm = 1e7;
 /// Entry `n` of the sample. A stated covariance counts within sane bounds, else that of the settings.
 [[nodiscard]] MeasuredPose measured_pose(const TrackerSettings&, const TrackerSample&, std::size_t n);
 
-}  // namespace kilotwin::ark
+}  // namespace kilotwin
