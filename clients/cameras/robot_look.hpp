@@ -47,7 +47,7 @@ struct Look {
   /// Share of white in the middle of a lit LED, which is how an overexposed LED looks, 0..1.
   double led_white = 0.4;
   /// Share of the LED's light that falls beside it, as glow, 0..1.
-  double led_glow = 0.25;
+  double led_glow = 0.45;
 };
 
 }  // namespace kilotwin::cameras

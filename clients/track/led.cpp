@@ -21,6 +21,9 @@ constexpr double kLeastLight = 0.10;
 constexpr double kMixed = 0.5;
 /// Where even the weakest one has this share, the light is white.
 constexpr double kGrey = 0.7;
+/// Light that rises across the border to another robot, to more than this multiple, is the other's. So many windows are looked at.
+constexpr double kSpill = 1.5;
+constexpr int kClimb = 8, kTries = 3;
 constexpr double kClipped = 246;  ///< grey level above which a pixel counts as saturated
 
 using Colour = std::array<double, 3>;  // red, green, blue
@@ -73,9 +76,14 @@ Colour floor_around(const cv::Mat& picture, const Circle& disc, const std::vecto
 /// The light of one robot's surroundings, relative to the floor: a grid of some 20 x 20 pixels.
 struct Light {
   int left, top, stride, columns, rows;
-  std::vector<Colour> relative;  ///< pixel / floor, 0 where another robot is nearer
-  std::vector<double> weight;    ///< how much of the pixel is light of an LED
+  std::vector<Colour> relative;  ///< pixel / floor
+  std::vector<double> weight;    ///< how much of the pixel is light of an LED; 0 where another robot is nearer
+  std::vector<double> anyones;   ///< the same whoever is nearer
   std::vector<bool> clipped;     ///< the camera is saturated: there is no colour
+
+  [[nodiscard]] std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column);
+  }
 };
 
 Light light_around(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& others) {
@@ -86,11 +94,13 @@ Light light_around(const cv::Mat& picture, const Circle& disc, const std::vector
   const int right = std::min(picture.cols - 1, cvCeil(disc.centre.x_px + reach));
   const int bottom = std::min(picture.rows - 1, cvCeil(disc.centre.y_px + reach));
   const int stride = std::max(1, cvRound(disc.radius_px / kGridRadius));
-  Light light{left, top, stride, std::max(0, (right - left) / stride + 1), std::max(0, (bottom - top) / stride + 1),
-              {},   {},  {}};
+  Light light{
+      left, top, stride, std::max(0, (right - left) / stride + 1), std::max(0, (bottom - top) / stride + 1), {},
+      {},   {},  {}};
   const auto count = static_cast<std::size_t>(light.columns) * static_cast<std::size_t>(light.rows);
   light.relative.assign(count, Colour{});
   light.weight.assign(count, 0);
+  light.anyones.assign(count, 0);
   light.clipped.assign(count, false);
   std::size_t i = 0;
   for (int y = 0; y < light.rows; ++y) {
@@ -98,9 +108,9 @@ Light light_around(const cv::Mat& picture, const Circle& disc, const std::vector
       const int row = top + y * stride, column = left + x * stride;
       const double own = distance(column, row, disc) / disc.radius_px;
       if (own > kOuter) continue;
-      if (std::any_of(others.begin(), others.end(),
-                      [&](const Circle& o) { return distance(column, row, o) / o.radius_px < own; }))
-        continue;
+      double nearest = own;  // distance from the middle of the robot that is nearest, radii
+      for (const Circle& other : others)
+        nearest = std::min(nearest, distance(column, row, other) / other.radius_px);
       Colour& c = light.relative[i];
       c = pixel(picture, row, column);
       light.clipped[i] = std::min({c[0], c[1], c[2]}) >= kClipped;
@@ -109,17 +119,18 @@ Light light_around(const cv::Mat& picture, const Circle& disc, const std::vector
       // A body reflects less than the floor: its tint counts little. In its middle, a dome may mirror a lamp.
       const double tint =
           light.clipped[i] ? 0 : std::max(0.0, (most - least) - kLeastChroma) * std::min(1.0, most / 0.5);
-      double excess = own > 0.45 ? std::max(0.0, most - 1 - kLeastExcess) : 0;
+      double excess = nearest > 0.45 ? std::max(0.0, most - 1 - kLeastExcess) : 0;
       // The rim is dark: what is as bright as the floor there is light.
-      if (own > kRimFrom && own < kRimTo) excess = std::max(excess, 2 * (most - kBrightRim));
-      light.weight[i] = std::max(tint, excess);
+      if (nearest > kRimFrom && nearest < kRimTo) excess = std::max(excess, 2 * (most - kBrightRim));
+      light.anyones[i] = std::max(tint, excess);
+      light.weight[i] = nearest < own ? 0 : light.anyones[i];
     }
   }
   return light;
 }
 
 struct Spot {
-  double x = 0, y = 0;  ///< px of the picture
+  double x = 0, y = 0;  ///< columns and rows of the grid
   double strength = 0;  ///< mean weight within the window
 };
 
@@ -138,12 +149,12 @@ std::vector<double> summed(const Light& light) {
 }
 
 /// The middle of the light within a window around a point of the grid.
-Spot middle_of(const Light& light, double x, double y, double window) {
+Spot middle_of(const Light& light, const std::vector<double>& weight, double x, double y, double window) {
   double total = 0, sum_x = 0, sum_y = 0;
   for (int row = std::max(0, cvFloor(y - window)); row <= std::min(light.rows - 1, cvCeil(y + window)); ++row) {
     for (int column = std::max(0, cvFloor(x - window)); column <= std::min(light.columns - 1, cvCeil(x + window));
          ++column) {
-      const double w = light.weight[static_cast<std::size_t>(row * light.columns + column)];
+      const double w = weight[light.index(column, row)];
       if (w <= 0 || (column - x) * (column - x) + (row - y) * (row - y) > window * window) continue;
       total += w;
       sum_x += w * column;
@@ -154,9 +165,14 @@ Spot middle_of(const Light& light, double x, double y, double window) {
   return {sum_x / total, sum_y / total, total / (CV_PI * window * window)};
 }
 
+/// Radius of the window that a spot fills, in columns of the grid.
+double window_of(const Light& light, const Circle& disc) {
+  return std::max(1.2, kSpot * disc.radius_px / light.stride);
+}
+
 /// The window with the most light, and the middle of the light in it.
 Spot brightest(const Light& light, const Circle& disc) {
-  const double window = std::max(1.2, kSpot * disc.radius_px / light.stride);
+  const double window = window_of(light, disc);
   const int half = std::max(1, cvRound(0.85 * window));
   const std::vector<double> sums = summed(light);
   const auto at = [&](int x, int y) { return sums[static_cast<std::size_t>(y * (light.columns + 1) + x)]; };
@@ -175,12 +191,31 @@ Spot brightest(const Light& light, const Circle& disc) {
     }
   }
   if (best_x < 0) return {};
-  Spot spot = middle_of(light, best_x, best_y, window);
+  Spot spot = middle_of(light, light.weight, best_x, best_y, window);
   // The window moves to the middle of the light.
-  for (int i = 0; i < 3 && spot.strength > 0; ++i) spot = middle_of(light, spot.x, spot.y, window);
-  spot.x = light.left + spot.x * light.stride;
-  spot.y = light.top + spot.y * light.stride;
+  for (int i = 0; i < 3 && spot.strength > 0; ++i) spot = middle_of(light, light.weight, spot.x, spot.y, window);
   return spot;
+}
+
+/// Whether a spot is the rim of a neighbour's light: from it the light rises to much more, on the neighbour's side.
+bool is_spilled(const Light& light, const Circle& disc, const Spot& spot) {
+  const double window = window_of(light, disc);
+  Spot top = spot;
+  for (int i = 0; i < kClimb; ++i) top = middle_of(light, light.anyones, top.x, top.y, window);
+  const int column = std::clamp(cvRound(top.x), 0, light.columns - 1),
+            row = std::clamp(cvRound(top.y), 0, light.rows - 1);
+  const std::size_t i = light.index(column, row);
+  return light.weight[i] < light.anyones[i] && top.strength > kSpill * spot.strength;
+}
+
+/// Takes a spot out of the light, so that the next one is found.
+void remove(Light& light, const Circle& disc, const Spot& spot) {
+  const double reach = 2 * window_of(light, disc);
+  for (int row = 0; row < light.rows; ++row) {
+    for (int column = 0; column < light.columns; ++column) {
+      if (std::hypot(column - spot.x, row - spot.y) <= reach) light.weight[light.index(column, row)] = 0;
+    }
+  }
 }
 
 Led classify(const Light& light, const Circle& disc, const Spot& spot) {
@@ -190,10 +225,9 @@ Led classify(const Light& light, const Circle& disc, const Spot& spot) {
   double white = 0;
   for (int row = 0; row < light.rows; ++row) {
     for (int column = 0; column < light.columns; ++column) {
-      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns) +
-                            static_cast<std::size_t>(column);
+      const std::size_t i = light.index(column, row);
       if (light.weight[i] <= 0 || light.clipped[i]) continue;
-      const double x = light.left + column * light.stride - spot.x, y = light.top + row * light.stride - spot.y;
+      const double x = (column - spot.x) * light.stride, y = (row - spot.y) * light.stride;
       if (x * x + y * y > reach * reach) continue;
       const Colour& c = light.relative[i];
       const auto [least, most] = std::minmax({c[0], c[1], c[2]});
@@ -240,14 +274,19 @@ std::uint8_t bits_of(Led led) {
 }
 
 LedReading read_led(const cv::Mat& picture, const Circle& disc, const std::vector<Circle>& others) {
-  const Light light = light_around(picture, disc, others);
+  Light light = light_around(picture, disc, others);
   if (light.weight.empty()) return {};
-  const Spot spot = brightest(light, disc);
+  Spot spot = brightest(light, disc);
+  for (int tries = 0; tries < kTries && spot.strength >= kLeastLight && is_spilled(light, disc, spot); ++tries) {
+    remove(light, disc, spot);
+    spot = brightest(light, disc);
+  }
   LedReading reading;
   reading.strength = spot.strength;
   if (spot.strength < kLeastLight) return reading;
   reading.led = classify(light, disc, spot);
-  const double dx = spot.x - disc.centre.x_px, dy = spot.y - disc.centre.y_px;
+  const double dx = light.left + spot.x * light.stride - disc.centre.x_px,
+               dy = light.top + spot.y * light.stride - disc.centre.y_px;
   if (std::hypot(dx, dy) > 0.4 * disc.radius_px) reading.bearing_rad = std::atan2(-dy, dx);
   return reading;
 }

@@ -1,7 +1,10 @@
 // The whole tracker on rendered pictures of robots that drive: positions, headings and colours against the truth.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <random>
 #include <set>
 #include <tuple>
 
@@ -82,6 +85,46 @@ TEST_P(Rendered, PosesAndColoursAreRight) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Films, Rendered, testing::Values(Film{12, 0.6, 3, 0.2, 0.7}, Film{20, 1, 4, 0.25, 0.8}));
+
+// A third of the LEDs are dark beside lit ones of neighbours that they touch: the neighbours' glow is not theirs.
+TEST(Crowd, RobotsThatTouchKeepTheirColours) {
+  constexpr double kPitch_mm = 33.3, kSide_mm = 400;
+  constexpr std::uint32_t kRobots = 64, kColumns = 8;
+  proto::Experiment experiment;
+  experiment.mutable_arena()->set_width_mm(kSide_mm);
+  experiment.mutable_arena()->set_height_mm(kSide_mm);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> heading(-kPi, kPi);
+  constexpr std::array<std::uint8_t, 5> kColours{0, 3, 3 << 2, 3 << 4, 0};
+  for (const double px_per_mm : {0.85, 1.3, 2.0}) {
+    const int side_px = cvRound(kSide_mm * px_per_mm);
+    cameras::CameraModel camera = cameras::CameraModel::overhead(side_px, side_px, px_per_mm);
+    camera.read_noise = 3;
+    camera.uneven_light = 0.2;
+    camera.blur_px = 0.7;
+    cameras::Renderer renderer(World(experiment), camera);
+    int all = 0, right = 0;
+    for (std::uint64_t frame = 0; frame < 6; ++frame) {
+      cameras::Scene scene;
+      std::vector<Circle> discs;
+      for (std::uint32_t i = 0; i < kRobots; ++i) {
+        const Pose pose{kPitch_mm * (i % kColumns - 3.5), kPitch_mm * (i / kColumns - 3.5), heading(random)};
+        scene.robots.push_back({i, pose, kColours[random() % kColours.size()], 0, 0, 0});
+        const cv::Point2d centre = renderer.centre_px(pose);
+        discs.push_back({{centre.x, centre.y}, 16.5 * px_per_mm});
+      }
+      const cv::Mat picture = renderer.render(scene, frame);
+      for (std::size_t i = 0; i < discs.size(); ++i) {
+        std::vector<Circle> others = discs;
+        others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+        ++all;
+        right += bits_of(read_led(picture, discs[i], others).led) == scene.robots[i].led ? 1 : 0;
+      }
+    }
+    std::printf("64 robots that touch, %.2f px/mm: LED %.2f %%\n", px_per_mm, 100.0 * right / all);
+    EXPECT_GT(right, 0.99 * all) << px_per_mm;
+  }
+}
 
 /// Four by three robots that stand still, seen by a tracker that knows nothing of the scale.
 class TightGrid : public testing::TestWithParam<std::tuple<double, double>> {};
