@@ -1,11 +1,16 @@
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "clients/importers/imported.hpp"
+#include "clients/importers/tracker_log.hpp"
 #include "core/base/error.hpp"
 
 namespace kilotwin::importers {
@@ -261,6 +266,54 @@ TEST(PogosimImport, SurvivesAnyChangeOfItsFile) {
   const int refused = refused_of_3000(kPogosim, from_pogosim);
   EXPECT_GT(refused, 300);
   EXPECT_LT(refused, 3000);
+}
+
+/// A file with a log, which goes with it.
+class LogFile {
+ public:
+  explicit LogFile(const std::string& text)
+      : path_(std::filesystem::temp_directory_path() / ("import-" + std::to_string(getpid()) + ".log")) {
+    std::ofstream(path_, std::ios::binary) << text;
+  }
+  ~LogFile() { std::filesystem::remove(path_); }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  const std::filesystem::path path_;
+};
+
+TEST(LogImport, AnArkLogBecomesTracksAndTrackedRobots) {
+  const LogFile log(
+      "10\t4\t1\t1000\t900\t90\t1\t9\t0\t1500\t1000\t-90\t0\n10.5\t4\t0\t1010\t900\t0\t1\t9\t0\tnan\t2000\t0\t2\n");
+  const ImportedLog log_of = from_tracker_log(log.path(), {});
+  const std::string run = log.path().stem().string();
+  // y up, from the centre of 2000 by 2000 pixels, times from 0; the lost position is left out.
+  EXPECT_EQ(log_of.tracks,
+            "run,robot,time_s,x_mm,y_mm\n" + run + ",4,0,0,100\n" + run + ",9,0,500,0\n" + run + ",4,0.5,10,100\n");
+  const proto::Experiment& e = log_of.imported.experiment;
+  ASSERT_EQ(e.robots_size(), 1);
+  EXPECT_EQ(e.robots(0).count(), 2u);
+  EXPECT_EQ(e.robots(0).body(), proto::RobotGroup::TRACKED);
+  EXPECT_EQ(e.arena().width_mm(), 2000);
+  ASSERT_EQ(log_of.imported.poses.size(), 1u);
+  EXPECT_EQ(log_of.imported.poses[0].text, "x_mm,y_mm,heading_deg\n0,100,90\n500,0,-90\n");
+  ASSERT_EQ(e.door_size(), 1);
+  EXPECT_EQ(e.door(0).log().format(), proto::LogDoor::ARK);
+  ASSERT_EQ(e.door(0).robots().robot_size(), 2);
+  EXPECT_EQ(e.door(0).robots().robot(1).name(), "9");
+  EXPECT_EQ(e.door(0).robots().robot(1).robot(), 1u);
+  for (const char* words : {"orientation", "colour", "state", "commands", "4 to 9", "1 positions are no numbers"})
+    EXPECT_TRUE(notes(log_of.imported, words)) << words;
+}
+
+TEST(LogImport, ALineThatIsNoneIsNamed) {
+  const LogFile log("10\t4\t1\t1000\t900\t90\n11\t4\t1\there\t900\t90\n");
+  try {
+    static_cast<void>(from_tracker_log(log.path(), {}));
+    FAIL();
+  } catch (const UserError& error) {
+    EXPECT_NE(std::string(error.what()).find(":2:8: x is \"here\""), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace
